@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace stageid {
+
+/// Names and units of one group of channels.
+struct ChannelList {
+  std::vector<std::string> names;
+  std::vector<std::string> units;  ///< as many as names
+  std::size_t size() const noexcept { return names.size(); }
+  friend bool operator==(const ChannelList&, const ChannelList&) = default;
+};
+
+/// What holds for a whole log.
+struct LogInfo {
+  double sample_rate_hz = 0.0;
+  int period_samples = 0;
+  int transient_periods = 0;
+  ChannelList excitation;
+  ChannelList actuators;
+  ChannelList sensors;
+  std::string metadata_json = "{}";  ///< configuration text, version, seeds, start time: for people
+                                     ///< and provenance; native logs only
+};
+
+/// Counts of everything in a run that was not perfect.
+struct RunHealth {
+  std::uint64_t cycles = 0;
+  std::uint64_t late = 0;
+  std::uint64_t missing = 0;  ///< incomplete, stale, corrupt or link trouble
+  std::uint64_t marked = 0;
+  std::int64_t largest_lateness_ns = 0;
+  double seconds = 0.0;       ///< wall time of the run
+};
+
+/// What holds for one run.
+struct LogRun {
+  std::string name;          ///< "0000", for messages
+  int realization = 0;       ///< 0-based
+  int experiment = 0;        ///< 0-based
+  std::uint64_t samples = 0; ///< recorded rows
+  bool complete = true;
+  std::string started_utc;   ///< ISO 8601, may be empty
+  RunHealth health;
+};
+
+}  // namespace stageid

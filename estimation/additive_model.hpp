@@ -1,0 +1,78 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "acquisition/log_info.hpp"
+
+namespace stageid {
+
+/// How a continuous-time model meets sampled data, see method.md section 4.
+enum class HoldModel : std::uint8_t {
+  none,   ///< P(j omega) e^{-j omega delay}
+  phase,  ///< and the hold's delay T/2
+  sinc,   ///< and its magnitude sinc(omega T / 2)
+  exact   ///< every basis function through hold, delay and sampler: aliasing included
+};
+
+/// P_i(s) = (B_0 + B_1 s + ...) / (s^integrators (1 + a_1 s + ...)), s in rad/s.
+struct Submodel {
+  int integrators = 0;
+  std::vector<double> denominator = {1.0};  ///< [1, a_1, ..., a_n]
+  std::vector<Eigen::MatrixXd> numerator;   ///< B_0, B_1, ...: n_y x n_u each
+
+  // Filled by a fit, where they apply.
+  std::optional<double> natural_frequency_std_hz;
+  std::optional<double> damping_ratio_std;
+
+  /// n = 2 with complex poles: 1/(2 pi sqrt(a_2)) and a_1/(2 sqrt(a_2)).
+  bool is_mode() const noexcept { return integrators == 0 && denominator.size() == 3; }
+  double natural_frequency_hz() const;  ///< @pre is_mode()
+  double damping_ratio() const;         ///< @pre is_mode()
+};
+
+/// How a fit ended, as the model file tells it.
+struct FitRecord {
+  double cost = 0.0;  ///< 1/(2N) sum vec(E)^H W vec(E)
+  std::string weighting;
+  int iterations = 0;
+  std::string status;
+  double relative_rms_error = 0.0;  ///< sqrt(mean |E|^2/|G|^2) over lines and channels
+  double band_hz[2] = {0.0, 0.0};
+  double seconds = 0.0;
+};
+
+/// P(s) = sum of submodels, with delays per channel: what model.json holds.
+struct AdditiveModel {
+  ChannelList inputs;
+  ChannelList outputs;
+  double sample_rate_hz = 0.0;  ///< 0: unknown
+  HoldModel hold = HoldModel::none;
+  Eigen::VectorXd input_delay_s;   ///< n_u
+  Eigen::VectorXd output_delay_s;  ///< n_y
+  std::vector<Submodel> submodels;
+  FitRecord fit;
+  std::vector<double> cost_history;
+  std::string provenance_json = "{}";
+
+  Eigen::Index n_outputs() const noexcept { return static_cast<Eigen::Index>(outputs.size()); }
+  Eigen::Index n_inputs() const noexcept { return static_cast<Eigen::Index>(inputs.size()); }
+};
+
+/// The model's response on a list of frequencies, (n_y n_u) x N, column k = vec(P(j omega_k)), through
+/// the given hold model and the model's own delays.
+/// @throws std::invalid_argument if `hold` needs a sample rate and there is none, or f is not below Nyquist.
+Eigen::MatrixXcd response(const AdditiveModel& model, const Eigen::Ref<const Eigen::VectorXd>& frequency_hz,
+                          HoldModel hold);
+
+/// model.json as in docs/formats.md; whole or not at all.
+/// @throws FileError, FormatError
+void write_model(const std::filesystem::path& file, const AdditiveModel& model);
+AdditiveModel read_model(const std::filesystem::path& file);
+
+const char* to_string(HoldModel hold) noexcept;
+
+}  // namespace stageid

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "excitation/frequency_grid.hpp"
+#include "excitation/multisine.hpp"
+
+namespace stageid {
+
+/// How the axes share the experiments of one realization.
+enum class ExcitationScheme : std::uint8_t {
+  single_axis,         ///< experiment e excites axis e alone
+  orthogonal_dft,      ///< all axes at once, axis p in experiment e times exp(2 pi j p e / n); any n
+  orthogonal_hadamard  ///< the same with a Hadamard matrix: n = 1, 2, 4, 8, 12, 16, 20 ...
+};
+
+/// One excited channel of the stage.
+struct ExcitationAxis {
+  std::string channel;            ///< actuator name
+  double level = 1.0;             ///< rms or peak, unit of the channel
+  Eigen::VectorXd shape;          ///< relative amplitude a line; empty: flat
+};
+
+struct ExperimentSpec {
+  ExcitationScheme scheme = ExcitationScheme::single_axis;
+  AmplitudeScaling scaling = AmplitudeScaling::rms;
+  std::vector<ExcitationAxis> axes;  ///< one experiment per axis and realization
+  int realizations = 2;
+  int periods = 2;            ///< measured periods of every run
+  int transient_periods = 1;  ///< periods before them that are recorded and not used
+  int crest_iterations = 0;
+  std::uint64_t seed = 0;
+};
+
+/// Which realization and experiment one run belongs to (both 0-based).
+struct RunId {
+  int realization = 0;
+  int experiment = 0;
+  friend auto operator<=>(const RunId&, const RunId&) = default;
+};
+
+/// The whole experiment: every run's multisines follow from it, on every machine the same.
+class ExperimentPlan {
+ public:
+  /// @throws std::invalid_argument naming the wrong field.
+  ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec);
+
+  const FrequencyGrid& grid() const noexcept { return grid_; }
+  const ExperimentSpec& spec() const noexcept { return spec_; }
+  int experiments() const noexcept { return static_cast<int>(spec_.axes.size()); }
+  std::vector<RunId> runs() const;  ///< in the order of measuring: realization by realization
+  long long samples_per_run() const noexcept;
+  double duration_s() const noexcept;
+
+  /// One period of the excitation of a run, samples_per_period x axes.
+  Eigen::MatrixXd excitation(RunId run) const;
+
+  /// Its spectrum R(l_k), axes x lines: coefficient of exp(j 2 pi l n / N), i.e. DFT / N.
+  Eigen::MatrixXcd spectrum(RunId run) const;
+
+ private:
+  FrequencyGrid grid_;
+  ExperimentSpec spec_;
+};
+
+/// Writes / reads excitation.h5 (docs/formats.md).
+/// @throws FileError, FormatError
+void write_experiment_plan(const std::filesystem::path& file, const ExperimentPlan& plan);
+ExperimentPlan read_experiment_plan(const std::filesystem::path& file);
+
+}  // namespace stageid

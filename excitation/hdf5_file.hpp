@@ -1,0 +1,97 @@
+#pragma once
+
+#include <hdf5.h>
+
+#include <Eigen/Core>
+#include <complex>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace stageid {
+
+/// One HDF5 handle and what closes it.
+class Hdf5Handle {
+ public:
+  using Close = herr_t (*)(hid_t);
+  Hdf5Handle() = default;
+  Hdf5Handle(hid_t id, Close close) noexcept : id_(id), close_(close) {}
+  ~Hdf5Handle() { reset(); }
+  Hdf5Handle(Hdf5Handle&& other) noexcept { swap(other); }
+  Hdf5Handle& operator=(Hdf5Handle&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  hid_t get() const noexcept { return id_; }
+  explicit operator bool() const noexcept { return id_ >= 0; }
+  void reset() noexcept {
+    if (id_ >= 0) close_(id_);
+    id_ = -1;
+  }
+
+ private:
+  void swap(Hdf5Handle& other) noexcept {
+    std::swap(id_, other.id_);
+    std::swap(close_, other.close_);
+  }
+  hid_t id_ = -1;
+  Close close_ = nullptr;
+};
+
+/// A thin layer over the HDF5 C library: names the file and dataset in every error, checks shapes,
+/// and knows the few types that stageid's files hold. Paths are absolute ("/runs/0000/sensors").
+///
+/// Reading: a missing object or a wrong type or shape is a FormatError, an unreadable file a
+/// FileError (not there) or FormatError (not HDF5, cut short).
+/// Concurrent use: Debian's HDF5 is not thread-safe; one thread at a time in the whole program.
+class Hdf5File {
+ public:
+  static Hdf5File open(const std::filesystem::path& file);    ///< read-only
+  static Hdf5File create(const std::filesystem::path& file);  ///< truncates; no track times: same content, same bytes
+
+  const std::filesystem::path& path() const noexcept { return path_; }
+  bool exists(const std::string& object) const;
+  bool has_attribute(const std::string& object, const std::string& name) const;
+  std::vector<std::string> children(const std::string& group) const;  ///< by name; names only
+  std::vector<hsize_t> shape(const std::string& dataset) const;
+  hid_t id() const noexcept { return file_.get(); }
+
+  // Attributes: object "/" is the root. An integer may be stored as a float and the reverse.
+  double read_real_attribute(const std::string& object, const std::string& name) const;
+  long long read_integer_attribute(const std::string& object, const std::string& name) const;
+  std::string read_text_attribute(const std::string& object, const std::string& name) const;
+  /// A string attribute of one or more strings, fixed or variable length.
+  std::vector<std::string> read_texts_attribute(const std::string& object, const std::string& name) const;
+  void write_attribute(const std::string& object, const std::string& name, double value);
+  void write_attribute(const std::string& object, const std::string& name, long long value);
+  void write_attribute(const std::string& object, const std::string& name, const std::string& value);
+  void write_attribute(const std::string& object, const std::string& name, const std::vector<std::string>& values);
+
+  // Datasets. Numeric data come row-major (C order), as HDF5 stores them. NaN is not checked here.
+  std::vector<double> read_reals(const std::string& dataset) const;                      ///< any shape
+  std::vector<std::complex<double>> read_complex(const std::string& dataset) const;      ///< compound r, i
+  std::vector<std::string> read_texts(const std::string& dataset) const;                 ///< 1-D
+  /// Rows [first, first + count) of a 1-D or 2-D dataset as float64, row-major, into `out`.
+  void read_rows(const std::string& dataset, hsize_t first, hsize_t count, double* out) const;
+
+  void create_group(const std::string& group);
+  void write_reals(const std::string& dataset, const std::vector<hsize_t>& shape, const double* data);
+  void write_complex(const std::string& dataset, const std::vector<hsize_t>& shape, const std::complex<double>* data);
+  void write_integers(const std::string& dataset, const std::vector<hsize_t>& shape, const long long* data);
+  void write_texts(const std::string& dataset, const std::vector<std::string>& values);
+  /// An empty chunked dataset of `columns` columns (0: 1-D) that append_rows() extends.
+  void create_growing(const std::string& dataset, hsize_t columns, hid_t file_type, hsize_t chunk_rows);
+  void append_rows(const std::string& dataset, hsize_t count, const double* data);
+  void append_rows(const std::string& dataset, hsize_t count, const unsigned char* data);
+
+  /// Flushes and closes; @throws FileError if the disk is full.
+  void close();
+
+ private:
+  Hdf5File(std::filesystem::path path, Hdf5Handle file);
+  std::filesystem::path path_;
+  Hdf5Handle file_;
+};
+
+}  // namespace stageid

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace stageid {
+
+/// An output that exists whole or not at all: write to path(), then commit() renames it onto the
+/// target (after fsync). Destroyed without commit(), it removes the temporary file.
+class OutputFile {
+ public:
+  /// @throws FileError if the directory does not exist or cannot be written.
+  explicit OutputFile(std::filesystem::path target);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  const std::filesystem::path& path() const noexcept { return temporary_; }
+
+  /// @throws FileError if the file cannot be synchronized or renamed.
+  void commit();
+
+ private:
+  std::filesystem::path target_;
+  std::filesystem::path temporary_;
+  bool committed_ = false;
+};
+
+/// Writes `text` to `target`, whole or not at all. @throws FileError
+void write_text_file(const std::filesystem::path& target, std::string_view text);
+
+}  // namespace stageid

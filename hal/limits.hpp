@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <string>
+
+namespace stageid {
+
+/// Limits that are enforced behind every back end. Vectors: one entry a channel; an empty vector
+/// means no limit of that kind.
+struct StageLimits {
+  Eigen::VectorXd actuator_n;            ///< |u|
+  Eigen::VectorXd slew_n_s;              ///< |u[n] - u[n-1]| fs
+  Eigen::VectorXd thermal_rms_n;         ///< rms of u over an exponential window
+  double thermal_time_constant_s = 10.;  ///< of that window
+  Eigen::VectorXd position_window_m;     ///< |y|
+};
+
+enum class LimitKind : std::uint8_t { none, actuator, slew, thermal_rms, position, not_finite };
+const char* to_string(LimitKind kind) noexcept;
+
+/// The first limit that was hit in a run.
+struct LimitViolation {
+  LimitKind kind = LimitKind::none;
+  int channel = -1;  ///< index of the actuator or sensor
+  double value = 0.0;
+  double limit = 0.0;
+  std::uint64_t cycle = 0;
+};
+
+}  // namespace stageid

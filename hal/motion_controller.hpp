@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace stageid {
+
+/// Linear controller of one logical axis: integrator + lead + low pass (+ notches), in continuous
+/// time; discretized by Tustin with prewarping at the crossover.
+///   C(s) = gain_n_per_m (1 + w_i/s) (s/w_1 + 1)/(s/w_2 + 1) / (s^2/w_lp^2 + 2 d s/w_lp + 1) prod notch
+struct AxisController {
+  double crossover_hz = 0.0;  ///< 0: the axis is open
+  double gain = 0.0;          ///< N/m or Nm/rad
+  double integrator_hz = 0.0;
+  double lead_zero_hz = 0.0;
+  double lead_pole_hz = 0.0;
+  double lowpass_hz = 0.0;
+  double lowpass_damping = 0.7;
+  struct Notch {
+    double frequency_hz = 0.0;
+    double zero_damping = 0.0;
+    double pole_damping = 0.0;
+  };
+  std::vector<Notch> notches;
+};
+
+struct MotionControllerSpec {
+  double sample_rate_hz = 0.0;
+  Eigen::MatrixXd sensor_decoupling;    ///< axes x sensors
+  Eigen::MatrixXd actuator_decoupling;  ///< actuators x axes
+  std::vector<AxisController> axes;
+};
+
+/// u = -T_u C(z) T_y y. Sizes fixed at construction; update() does not allocate.
+class MotionController {
+ public:
+  /// @throws std::invalid_argument on sizes or frequencies that make no sense.
+  explicit MotionController(const MotionControllerSpec& spec);
+
+  void reset() noexcept;
+  /// Adds nothing: writes the control part of u (size actuators) computed from y (size sensors).
+  void update(const double* y, double* u) noexcept;
+
+  Eigen::Index sensors() const noexcept { return sensor_decoupling_.cols(); }
+  Eigen::Index actuators() const noexcept { return actuator_decoupling_.rows(); }
+
+  /// Frequency response -C(e^{j omega T}) from y to u, actuators x sensors.
+  Eigen::MatrixXcd response(double frequency_hz) const;
+
+ private:
+  struct Section {  // direct form II transposed
+    double b0, b1, b2, a1, a2;
+  };
+  double sample_rate_hz_;
+  Eigen::MatrixXd sensor_decoupling_;
+  Eigen::MatrixXd actuator_decoupling_;
+  std::vector<std::vector<Section>> sections_;  // one list an axis
+  std::vector<double> state_;                   // two a section
+  Eigen::VectorXd axis_;
+};
+
+}  // namespace stageid

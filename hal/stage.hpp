@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace stageid {
+
+/// The machine or its link failed. Exit code 1.
+class StageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// One actuator or sensor, SI units.
+struct Channel {
+  std::string name;
+  std::string unit;                     ///< "N", "m"
+  double position_m[3] = {0., 0., 0.};  ///< on the stage, centre of mass = origin
+  double direction[3] = {0., 0., 1.};   ///< unit vector
+};
+
+enum class Clock : std::uint8_t { virtual_time, wall };
+
+/// What a back end is and can do; an experiment that does not fit is refused before it starts.
+struct StageInfo {
+  std::string name;
+  std::string backend;  ///< "sim", "can", "modbus", "replay"
+  double sample_rate_hz = 0.0;
+  double maximum_rate_hz = 0.0;
+  double transport_delay_s = 0.0;  ///< declared, from command computed to hold output changed
+  Clock clock = Clock::virtual_time;
+  std::vector<Channel> actuators;
+  std::vector<Channel> sensors;
+};
+
+/// How one exchange ended. `ok` and `late` carry valid measurements.
+enum class Outcome : std::uint8_t {
+  ok,
+  late,         ///< the deadline passed; measurement valid, marked
+  incomplete,   ///< some sensors missing: see Inputs::valid
+  stale,        ///< nothing new: the last measurement is held
+  corrupt,      ///< a frame or reply failed its check
+  bus_passive,
+  bus_off,
+  link_down,
+  fault,        ///< the stage reports a fault (interlock, amplifier, non-finite sensor)
+  limit         ///< a limit would have been or was exceeded: see LimitedStage::violation()
+};
+const char* to_string(Outcome outcome) noexcept;
+
+/// CiA 402-like states.
+enum class NodeState : std::uint8_t {
+  not_ready, switch_on_disabled, ready, switched_on, operation_enabled, measuring, quick_stop, fault_reaction, fault
+};
+const char* to_string(NodeState state) noexcept;
+
+/// What the stage measured. `y` is filled in place (size sensors, SI); `valid` bit i = sensor i.
+struct Inputs {
+  std::uint64_t cycle = 0;
+  std::int64_t t_sample_ns = 0;
+  std::int64_t t_rx_ns = 0;
+  std::span<double> y;
+  std::uint64_t valid = 0;
+  NodeState node_state = NodeState::not_ready;
+};
+
+/// What the stage shall do. `u`: size actuators, SI.
+struct Outputs {
+  std::uint64_t cycle = 0;
+  std::int64_t t_apply_ns = 0;
+  std::span<const double> u;
+};
+
+/// Absolute time (of the stage's clock) by which an exchange must have ended; 0: none.
+struct Deadline {
+  std::int64_t t_ns = 0;
+};
+
+/// The door for one exchange a sample: simulator, replay, CAN FD streaming, Modbus.
+///
+/// The constructors, prepare() and start() may allocate, block and throw. Between start() and stop()
+/// only exchange() is called, from one thread; it does not allocate, lock, log or throw.
+///
+/// Order: start() leaves the stage in closed-loop-ready standstill and gives the first measurement
+/// y[0]; exchange() with u[n], computed from y[n], waits for the next sample instant and gives y[n+1].
+class CyclicStage {
+ public:
+  virtual ~CyclicStage() = default;
+  virtual const StageInfo& info() const noexcept = 0;
+
+  /// Brings the stage to operation_enabled and reads y[0] into `first.y`. `run_seed` makes the run
+  /// repeatable on back ends that draw random numbers (the simulator: same seed, same run, whatever
+  /// was run before); others ignore it.
+  /// @throws StageError if the machine does not answer or refuses.
+  virtual void start(std::uint64_t run_seed, Inputs& first) = 0;
+
+  [[nodiscard]] virtual Outcome exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept = 0;
+
+  /// Brings the outputs to a safe state (zero force, disabled). Idempotent.
+  virtual void stop() noexcept = 0;
+};
+
+}  // namespace stageid
