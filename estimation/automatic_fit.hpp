@@ -1,0 +1,31 @@
+#pragma once
+
+#include <vector>
+
+#include "estimation/cmif.hpp"
+#include "estimation/fit_additive_model.hpp"
+
+namespace stageid {
+
+/// Which submodels beside the modes.
+struct ModelStructure {
+  bool rigid_body = true;            ///< B_0 / s^2
+  bool direct_term = false;          ///< a constant matrix: compliance of modes above the band
+  bool general_damping = false;      ///< modes with B_0 + B_1 s (general viscous) instead of B_0
+};
+
+/// What decides the number of modes.
+struct ModeSelection {
+  std::vector<ModeCandidate> modes;  ///< start here; empty: from the CMIF
+  int exactly = 0;                   ///< > 0: so many modes; 0: by statistics (BIC)
+  bool keep_modes = false;           ///< fit `modes` as they are: none added, none removed
+  int most = 60;
+};
+
+/// A fit that completes its own start: peaks of the CMIF, then modes at the peaks of the weighted
+/// residual's CMIF while they are worth their parameters, duplicates merged, worthless ones dropped.
+/// Every decision is in FitResult::decisions.
+FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure, const ModeSelection& selection,
+                        const FitOptions& options);
+
+}  // namespace stageid

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "estimation/additive_model.hpp"
+
+namespace stageid {
+
+/// Diagonal weights W of the cost 1/(2N) sum vec(E)^H W vec(E).
+enum class Weighting : std::uint8_t {
+  unit,
+  inverse_magnitude,  ///< 1/|G|: the paper's
+  relative,           ///< 1/|G|^2
+  noise_variance,     ///< 1/noise_variance: maximum likelihood for a linear plant
+  total_variance,     ///< 1/total_variance
+  user                ///< FitOptions::user_weights
+};
+const char* to_string(Weighting weighting) noexcept;
+
+enum class FitMethod : std::uint8_t {
+  riv,  ///< the paper's refined instrumental variables
+  gn,   ///< Gauss-Newton
+  sk    ///< Sanathanan-Koerner: biased fixed point, for comparison
+};
+const char* to_string(FitMethod method) noexcept;
+
+enum class DelayModel : std::uint8_t { fixed, estimate, per_channel };
+
+/// What to fit and how. Checked once by fit_additive_model().
+struct FitOptions {
+  Weighting weighting = Weighting::relative;
+  Eigen::MatrixXd user_weights;  ///< (n_y n_u) x N
+  HoldModel hold = HoldModel::none;
+  DelayModel delay = DelayModel::fixed;
+  double delay_s = 0.0;          ///< fixed: the delay; else the start (0 for estimate: searched)
+  FitMethod method = FitMethod::riv;
+  int max_iterations = 100;
+  double gradient_tolerance = 1e-9;  ///< scaled: max_i |e_i| / sqrt(M_ii 2N cost)
+  double step_tolerance = 1e-10;     ///< largest relative change of a pole, and of the cost
+  int threads = 0;                   ///< 0: all cores; the result does not depend on it
+  std::function<void(int iteration, double cost)> progress;
+};
+
+enum class FitStatus : std::uint8_t { gradient_small, step_small, cost_stalled, iteration_limit, singular };
+const char* to_string(FitStatus status) noexcept;
+
+/// A fit that did not converge is a result, not an error: look at `status`.
+struct FitResult {
+  AdditiveModel model;  ///< the iterate of least cost, with standard deviations where variances are known
+  FitStatus status = FitStatus::iteration_limit;
+  std::string message = "fit_additive_model was not called";
+  std::vector<double> cost;            ///< one entry an iterate, the start first
+  std::vector<std::string> decisions;  ///< what an automatic fit chose, and why, in order
+  Eigen::MatrixXd response_variance;   ///< (n_y n_u) x N of P from the parameter covariance; may be empty
+  bool trustworthy() const noexcept {
+    return status == FitStatus::gradient_small || status == FitStatus::step_small;
+  }
+};
+
+}  // namespace stageid
