@@ -62,11 +62,12 @@ struct AdditiveModel {
   Eigen::Index n_inputs() const noexcept { return static_cast<Eigen::Index>(inputs.size()); }
 };
 
-/// The model's response on a list of frequencies, (n_y n_u) x N, column k = vec(P(j omega_k)), through
-/// the given hold model and the model's own delays.
-/// @throws std::invalid_argument if `hold` needs a sample rate and there is none, or f is not below Nyquist.
-Eigen::MatrixXcd response(const AdditiveModel& model, const Eigen::Ref<const Eigen::VectorXd>& frequency_hz,
-                          HoldModel hold);
+/// The model's response on a list of frequencies, (n_y n_u) x N, column k = vec(P(j omega_k)),
+/// through the given hold model and the model's own delays.
+/// @throws std::invalid_argument if `hold` needs a sample rate and there is none, or f is not below
+/// Nyquist.
+Eigen::MatrixXcd response(const AdditiveModel& model,
+                          const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold);
 
 /// model.json as in docs/formats.md; whole or not at all.
 /// @throws FileError, FormatError

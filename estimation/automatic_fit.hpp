@@ -9,9 +9,9 @@ namespace stageid {
 
 /// Which submodels beside the modes.
 struct ModelStructure {
-  bool rigid_body = true;            ///< B_0 / s^2
-  bool direct_term = false;          ///< a constant matrix: compliance of modes above the band
-  bool general_damping = false;      ///< modes with B_0 + B_1 s (general viscous) instead of B_0
+  bool rigid_body = true;        ///< B_0 / s^2
+  bool direct_term = false;      ///< a constant matrix: compliance of modes above the band
+  bool general_damping = false;  ///< modes with B_0 + B_1 s (general viscous) instead of B_0
 };
 
 /// What decides the number of modes.
@@ -23,9 +23,9 @@ struct ModeSelection {
 };
 
 /// A fit that completes its own start: peaks of the CMIF, then modes at the peaks of the weighted
-/// residual's CMIF while they are worth their parameters, duplicates merged, worthless ones dropped.
-/// Every decision is in FitResult::decisions.
-FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure, const ModeSelection& selection,
-                        const FitOptions& options);
+/// residual's CMIF while they are worth their parameters, duplicates merged, worthless ones
+/// dropped. Every decision is in FitResult::decisions.
+FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
+                        const ModeSelection& selection, const FitOptions& options);
 
 }  // namespace stageid

@@ -1,0 +1,153 @@
+#include "estimation/cmif.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+/// G(j omega_k) with what `kind` multiplies it by.
+Eigen::MatrixXcd weighted_response(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
+  Eigen::MatrixXcd G = frf.at(k);
+  if (kind == CmifKind::accelerance) {
+    const double omega = 2.0 * std::numbers::pi * frf.frequency_hz[k];
+    G *= omega * omega;
+  } else if (kind == CmifKind::whitened) {
+    const Eigen::MatrixXd& variance =
+        frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
+    if (variance.size() == 0)
+      throw std::invalid_argument(
+          "CMIF: whitening needs variances, and the FRF has none; use accelerance");
+    G.reshaped() =
+        G.reshaped().cwiseQuotient(variance.col(k).cwiseSqrt().cast<std::complex<double>>());
+  }
+  return G;
+}
+
+struct Decomposition {
+  Eigen::MatrixXd curves;                 ///< squared singular values, curves x N
+  std::vector<Eigen::MatrixXcd> vectors;  ///< left singular vectors a line
+};
+
+Decomposition decompose(const FrfEstimate& frf, CmifKind kind, bool with_vectors) {
+  Decomposition out;
+  const Eigen::Index curves = std::min(frf.n_outputs(), frf.n_inputs());
+  out.curves.resize(curves, frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    Eigen::MatrixXcd G = weighted_response(frf, kind, k);
+    if (G.rows() > G.cols()) G.transposeInPlace();
+    const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(G, with_vectors ? Eigen::ComputeThinU : 0);
+    out.curves.col(k) = svd.singularValues().head(curves).cwiseAbs2();
+    if (with_vectors) out.vectors.push_back(svd.matrixU());
+  }
+  return out;
+}
+
+/// How far a peak stands above the higher of the two valleys around it, in dB of power.
+double prominence_db(const Eigen::Ref<const Eigen::RowVectorXd>& curve, Eigen::Index peak) {
+  const double height = curve[peak];
+  double left = height;
+  for (Eigen::Index k = peak - 1; k >= 0 && curve[k] <= height; --k)
+    left = std::min(left, curve[k]);
+  double right = height;
+  for (Eigen::Index k = peak + 1; k < curve.size() && curve[k] <= height; ++k)
+    right = std::min(right, curve[k]);
+  return 10.0 * std::log10(height / std::max({left, right, 1e-300}));
+}
+
+/// Half-power width by linear interpolation; the narrower side counts twice if the other is not
+/// clean.
+double half_power_damping(const Eigen::VectorXd& f,
+                          const Eigen::Ref<const Eigen::RowVectorXd>& curve, Eigen::Index peak) {
+  const double half = 0.5 * curve[peak];
+  const auto side = [&](Eigen::Index direction) {
+    Eigen::Index k = peak;
+    while (k + direction >= 0 && k + direction < curve.size() && curve[k + direction] < curve[k]) {
+      const Eigen::Index next = k + direction;
+      if (curve[next] <= half) {
+        const double share = (curve[k] - half) / (curve[k] - curve[next]);
+        return std::abs(f[k] + share * (f[next] - f[k]) - f[peak]);
+      }
+      k = next;
+    }
+    return 0.0;
+  };
+  const double below = side(-1);
+  const double above = side(+1);
+  const double width = below > 0.0 && above > 0.0 ? below + above : 2.0 * std::max(below, above);
+  if (!(width > 0.0)) return 0.01;
+  return std::clamp(width / (2.0 * f[peak]), 5e-4, 0.1);
+}
+
+/// A peak of a lower curve that only mirrors a crossing: the curve above dips there and the shapes
+/// swap.
+bool is_crossing(const Decomposition& d, Eigen::Index curve, Eigen::Index k) {
+  if (curve == 0 || k == 0 || k + 1 >= d.curves.cols()) return false;
+  const double gap_db =
+      10.0 * std::log10(d.curves(curve - 1, k) / std::max(d.curves(curve, k), 1e-300));
+  if (gap_db > 3.0) return false;
+  const auto mac = [&](Eigen::Index i, Eigen::Index j) {
+    return std::norm(d.vectors[static_cast<std::size_t>(k - 1)].col(i).dot(
+        d.vectors[static_cast<std::size_t>(k + 1)].col(j)));
+  };
+  return mac(curve, curve - 1) > 0.5 && mac(curve - 1, curve) > 0.5;
+}
+
+/// Height of a local maximum above the mean of its neighbours a few lines away, against the scatter
+/// there: below this a peak is noise.
+bool above_scatter(const Eigen::Ref<const Eigen::RowVectorXd>& curve, Eigen::Index k) {
+  const Eigen::Index reach = 12;
+  const Eigen::Index first = std::max<Eigen::Index>(0, k - reach);
+  const Eigen::Index last = std::min<Eigen::Index>(curve.size() - 1, k + reach);
+  if (last - first < reach) return true;
+  std::vector<double> steps;
+  for (Eigen::Index i = first; i < last; ++i)
+    steps.push_back(
+        std::abs(10.0 * std::log10(std::max(curve[i + 1], 1e-300) / std::max(curve[i], 1e-300))));
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
+                   steps.end());
+  return prominence_db(curve, k) > 6.0 * steps[steps.size() / 2] || prominence_db(curve, k) > 20.0;
+}
+
+}  // namespace
+
+Eigen::MatrixXd cmif(const FrfEstimate& frf, CmifKind kind) {
+  return decompose(frf, kind, false).curves;
+}
+
+std::vector<ModeCandidate> pick_modes(const FrfEstimate& frf, const PeakOptions& options) {
+  const Decomposition d = decompose(frf, options.kind, true);
+  struct Peak {
+    ModeCandidate mode;
+    double prominence;
+  };
+  std::vector<Peak> peaks;
+  for (Eigen::Index c = 0; c < d.curves.rows(); ++c) {
+    const Eigen::RowVectorXd curve = d.curves.row(c);
+    for (Eigen::Index k = 1; k + 1 < curve.size(); ++k) {
+      if (!(curve[k] > curve[k - 1] && curve[k] >= curve[k + 1])) continue;
+      const double prominence = prominence_db(curve, k);
+      if (prominence < options.minimum_prominence_db || !above_scatter(curve, k) ||
+          is_crossing(d, c, k))
+        continue;
+      peaks.push_back({{frf.frequency_hz[k], half_power_damping(frf.frequency_hz, curve, k),
+                        static_cast<int>(c) + 1},
+                       prominence});
+    }
+  }
+  std::stable_sort(peaks.begin(), peaks.end(),
+                   [](const Peak& a, const Peak& b) { return a.prominence > b.prominence; });
+  if (peaks.size() > static_cast<std::size_t>(options.most_peaks))
+    peaks.resize(static_cast<std::size_t>(options.most_peaks));
+  std::vector<ModeCandidate> modes;
+  for (const Peak& peak : peaks) modes.push_back(peak.mode);
+  std::stable_sort(modes.begin(), modes.end(), [](const ModeCandidate& a, const ModeCandidate& b) {
+    return a.frequency_hz < b.frequency_hz;
+  });
+  return modes;
+}
+
+}  // namespace stageid

@@ -1,0 +1,212 @@
+#include "estimation/fit_additive_model.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <thread>
+
+#include "estimation/fit_iteration.hpp"
+#include "estimation/parameter_covariance.hpp"
+
+namespace stageid {
+namespace {
+
+void require(bool condition, const std::string& message) {
+  if (!condition) throw std::invalid_argument(message);
+}
+
+void check_start(const FrfEstimate& frf, const AdditiveModel& start, const FitOptions& options) {
+  check(frf);
+  require(!start.submodels.empty(),
+          "fit: the start has no submodel; give at least one mode or the rigid body");
+  require(options.max_iterations >= 0, "fit: max_iterations must not be negative");
+  require(std::isfinite(options.delay_s), "fit: the delay must be finite");
+  if (options.hold != HoldModel::none)
+    require(frf.sample_rate_hz > 0.0,
+            fmt::format("fit: hold {} needs the sample rate, and the FRF has none; use hold none",
+                        to_string(options.hold)));
+  if (options.hold == HoldModel::exact)
+    require(frf.frequency_hz.maxCoeff() < 0.5 * frf.sample_rate_hz,
+            "fit: a line lies at or above half the sample rate; choose a smaller band");
+  int biproper = 0;
+  int integrating = 0;
+  for (const Submodel& s : start.submodels) {
+    const auto n = static_cast<int>(s.denominator.size()) - 1;
+    const auto m = static_cast<int>(s.numerator.size()) - 1;
+    require(n >= 0 && s.denominator[0] == 1.0, "fit: a denominator must start with 1");
+    require(s.integrators >= 0 && s.integrators <= 2,
+            "fit: a submodel may have 0, 1 or 2 integrators");
+    require(m >= 0 && m <= n + s.integrators,
+            "fit: a submodel must be proper and have a numerator");
+    biproper += m == n + s.integrators ? 1 : 0;
+    integrating += s.integrators > 0 ? 1 : 0;
+    for (const Eigen::MatrixXd& B : s.numerator)
+      require(B.rows() == frf.n_outputs() && B.cols() == frf.n_inputs(),
+              "fit: a numerator's shape is not outputs x inputs");
+  }
+  require(biproper <= 1, "fit: at most one submodel may be biproper, or the model is not unique");
+  require(integrating <= 1,
+          "fit: at most one submodel may have integrators, or the model is not unique");
+}
+
+FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
+                        const FitOptions& options) {
+  FitProblem problem;
+  problem.lines = {frf.omega_rad_s(), frf.sample_rate_hz > 0.0 ? 1.0 / frf.sample_rate_hz : 0.0,
+                   options.hold};
+  problem.n_outputs = frf.n_outputs();
+  problem.n_inputs = frf.n_inputs();
+  problem.G_re = frf.response.real();
+  problem.G_im = frf.response.imag();
+  problem.W = make_weights(frf, options);
+  for (const Submodel& s : start.submodels)
+    problem.shapes.push_back({s.integrators, static_cast<int>(s.denominator.size()) - 1,
+                              static_cast<int>(s.numerator.size()) - 1});
+  problem.delay = options.delay;
+  const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  problem.threads = options.threads > 0 ? options.threads : cores;
+  const Eigen::Index per_channel = problem.functions();
+  require(
+      2 * problem.size() >= per_channel && 2 * problem.size() * problem.channels() >=
+                                               problem.globals() + per_channel * problem.channels(),
+      fmt::format("fit: {} lines of {} channels cannot carry {} parameters; choose fewer modes or "
+                  "a wider band",
+                  problem.size(), problem.channels(),
+                  problem.globals() + per_channel * problem.channels()));
+  return problem;
+}
+
+FitParameters make_parameters(const FitProblem& problem, const AdditiveModel& start,
+                              const FitOptions& options) {
+  FitParameters beta;
+  for (const Submodel& s : start.submodels)
+    beta.a.push_back(Eigen::Map<const Eigen::VectorXd>(
+        s.denominator.data() + 1, static_cast<Eigen::Index>(s.denominator.size()) - 1));
+  const bool from_start = options.delay != DelayModel::fixed &&
+                          start.input_delay_s.size() == problem.n_inputs &&
+                          start.output_delay_s.size() == problem.n_outputs;
+  beta.input_delay_s = from_start ? start.input_delay_s
+                                  : Eigen::VectorXd::Constant(problem.n_inputs, options.delay_s);
+  beta.output_delay_s =
+      from_start ? start.output_delay_s : Eigen::VectorXd::Zero(problem.n_outputs);
+  beta.B.setZero(problem.channels(), problem.functions());
+  Eigen::Index f = 0;
+  for (const Submodel& s : start.submodels)
+    for (const Eigen::MatrixXd& B : s.numerator) beta.B.col(f++) = B.reshaped();
+  return beta;
+}
+
+void fill_submodels(const FitProblem& problem, const FitParameters& beta, AdditiveModel& model) {
+  Eigen::Index f = 0;
+  for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
+    Submodel& s = model.submodels[i];
+    s.denominator.assign(1, 1.0);
+    s.denominator.insert(s.denominator.end(), beta.a[i].begin(), beta.a[i].end());
+    for (Eigen::MatrixXd& B : s.numerator)
+      B = beta.B.col(f++).reshaped(problem.n_outputs, problem.n_inputs);
+  }
+  model.input_delay_s = beta.input_delay_s;
+  model.output_delay_s = beta.output_delay_s;
+}
+
+/// Delta method, facts.md section 10:  df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
+void fill_deviations(const Eigen::MatrixXd& covariance, AdditiveModel& model) {
+  Eigen::Index first = 0;
+  for (Submodel& s : model.submodels) {
+    const auto order = static_cast<Eigen::Index>(s.denominator.size()) - 1;
+    if (s.is_mode()) {
+      const Eigen::Matrix2d C = covariance.block<2, 2>(first, first);
+      const double a1 = s.denominator[1];
+      const double a2 = s.denominator[2];
+      const Eigen::Vector2d df(0.0, -0.5 * s.natural_frequency_hz() / a2);
+      const Eigen::Vector2d dz = s.damping_ratio() * Eigen::Vector2d(1.0 / a1, -0.5 / a2);
+      s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
+      s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
+    }
+    first += order;
+  }
+}
+
+void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
+                      const FitParameters& beta, FitResult& result) {
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
+  const Residual E = residual(problem, groups, beta.B);
+  const ArrowSystem gn(problem, beta, groups, E, FitMethod::gn);
+  const bool likelihood = options.weighting == Weighting::noise_variance ||
+                          options.weighting == Weighting::total_variance;
+  const Eigen::MatrixXd& known =
+      frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
+  const double dof = frf.noise_variance.size() > 0 ? frf.noise_dof : frf.total_dof;
+  VarianceKnowledge knowledge = VarianceKnowledge::none;
+  if (likelihood)
+    knowledge = VarianceKnowledge::weights;
+  else if (known.size() > 0 && known.minCoeff() > 0.0)
+    knowledge = VarianceKnowledge::given;
+  const Eigen::MatrixXd variance =
+      knowledge == VarianceKnowledge::given ? smoothed_variance(known, dof) : Eigen::MatrixXd();
+  const ParameterCovariance covariance =
+      parameter_covariance(problem, beta, groups, E, gn, knowledge, variance);
+  if (covariance.globals.size() == 0 && problem.globals() > 0) return;
+  fill_deviations(covariance.globals, result.model);
+  result.response_variance = covariance.response_variance;
+  if (knowledge == VarianceKnowledge::weights && covariance.residual_scale > 1.0)
+    result.decisions.push_back(
+        fmt::format("the residual is {:.3g} times what the variances predict: the model does not "
+                    "explain the data; "
+                    "standard deviations are raised by {:.3g}",
+                    covariance.residual_scale, std::sqrt(covariance.residual_scale)));
+}
+
+double relative_rms_error(const FrfEstimate& frf, const Residual& E) {
+  double sum = 0.0;
+  Eigen::Index count = 0;
+  for (Eigen::Index k = 0; k < E.re.cols(); ++k)
+    for (Eigen::Index c = 0; c < E.re.rows(); ++c) {
+      const double power = std::norm(frf.response(c, k));
+      if (!(power > 0.0)) continue;
+      sum += (E.re(c, k) * E.re(c, k) + E.im(c, k) * E.im(c, k)) / power;
+      ++count;
+    }
+  return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
+}
+
+}  // namespace
+
+FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
+                             const FitOptions& options) {
+  check_start(frf, start, options);
+  const FitProblem problem = make_problem(frf, start, options);
+  FitParameters beta = make_parameters(problem, start, options);
+  if (options.delay != DelayModel::fixed && options.delay_s == 0.0 &&
+      start.input_delay_s.size() == 0)
+    search_delay(problem, beta);
+
+  FitResult result;
+  const IterationResult iteration = iterate(problem, beta, options);
+  result.status = iteration.status;
+  result.message = iteration.message;
+  result.cost = iteration.cost;
+  result.model = start;
+  result.model.inputs = frf.inputs;
+  result.model.outputs = frf.outputs;
+  result.model.sample_rate_hz = frf.sample_rate_hz;
+  result.model.hold = options.hold;
+  fill_submodels(problem, beta, result.model);
+  if (options.uncertainty && result.status != FitStatus::singular)
+    fill_uncertainty(frf, options, problem, beta, result);
+
+  FitRecord& record = result.model.fit;
+  record.cost = iteration.E.cost;
+  record.weighting = to_string(options.weighting);
+  record.iterations = iteration.iterations;
+  record.status = to_string(result.status);
+  record.relative_rms_error = relative_rms_error(frf, iteration.E);
+  record.band_hz[0] = frf.frequency_hz[0];
+  record.band_hz[1] = frf.frequency_hz[frf.lines() - 1];
+  result.model.cost_history = result.cost;
+  return result;
+}
+
+}  // namespace stageid

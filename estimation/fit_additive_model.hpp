@@ -7,12 +7,13 @@ namespace stageid {
 
 /// Minimizes J(beta) = 1/(2N) sum_k vec(E_k)^H W_k vec(E_k), E = G - P, from `start`.
 ///
-/// Only the denominators (and delays) of `start` matter when its numerators are zero: they are then the
-/// solution of the convex problem (paper, eq. "convex problem"). Every iteration is damped so that the
-/// cost never rises, poles stay stable, and the numerators are re-solved after every denominator step.
-/// Source: paper, section 3; method.md section 6.
+/// Only the denominators (and delays) of `start` matter when its numerators are zero: they are then
+/// the solution of the convex problem (paper, eq. "convex problem"). Every iteration is damped so
+/// that the cost never rises, poles stay stable, and the numerators are re-solved after every
+/// denominator step. Source: paper, section 3; method.md section 6.
 /// @throws std::invalid_argument: shapes, weights (variances missing, zero, not finite), more
 ///         parameters than data, hold without sample rate.
-FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start, const FitOptions& options = {});
+FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
+                             const FitOptions& options = {});
 
 }  // namespace stageid

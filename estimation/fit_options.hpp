@@ -36,26 +36,35 @@ struct FitOptions {
   Eigen::MatrixXd user_weights;  ///< (n_y n_u) x N
   HoldModel hold = HoldModel::none;
   DelayModel delay = DelayModel::fixed;
-  double delay_s = 0.0;          ///< fixed: the delay; else the start (0 for estimate: searched)
+  double delay_s = 0.0;  ///< fixed: the delay; else the start (0 for estimate: searched)
   FitMethod method = FitMethod::riv;
   int max_iterations = 100;
   double gradient_tolerance = 1e-9;  ///< scaled: max_i |e_i| / sqrt(M_ii 2N cost)
   double step_tolerance = 1e-10;     ///< largest relative change of a pole, and of the cost
+  bool uncertainty = true;           ///< also standard deviations and the variance of the response
   int threads = 0;                   ///< 0: all cores; the result does not depend on it
   std::function<void(int iteration, double cost)> progress;
 };
 
-enum class FitStatus : std::uint8_t { gradient_small, step_small, cost_stalled, iteration_limit, singular };
+enum class FitStatus : std::uint8_t {
+  gradient_small,
+  step_small,
+  cost_stalled,
+  iteration_limit,
+  singular
+};
 const char* to_string(FitStatus status) noexcept;
 
 /// A fit that did not converge is a result, not an error: look at `status`.
 struct FitResult {
-  AdditiveModel model;  ///< the iterate of least cost, with standard deviations where variances are known
+  AdditiveModel
+      model;  ///< the iterate of least cost, with standard deviations where variances are known
   FitStatus status = FitStatus::iteration_limit;
   std::string message = "fit_additive_model was not called";
   std::vector<double> cost;            ///< one entry an iterate, the start first
   std::vector<std::string> decisions;  ///< what an automatic fit chose, and why, in order
-  Eigen::MatrixXd response_variance;   ///< (n_y n_u) x N of P from the parameter covariance; may be empty
+  Eigen::MatrixXd
+      response_variance;  ///< (n_y n_u) x N of P from the parameter covariance; may be empty
   bool trustworthy() const noexcept {
     return status == FitStatus::gradient_small || status == FitStatus::step_small;
   }

@@ -1,0 +1,172 @@
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+
+#include "estimation/additive_model.hpp"
+#include "estimation/json_file.hpp"
+#include "excitation/output_file.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json matrix_to_json(const Eigen::MatrixXd& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index y = 0; y < matrix.rows(); ++y) {
+    Json row = Json::array();
+    for (Eigen::Index u = 0; u < matrix.cols(); ++u) row.push_back(matrix(y, u));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Json submodel_to_json(const Submodel& s) {
+  Json out;
+  out["integrators"] = s.integrators;
+  out["denominator"] = s.denominator;
+  out["numerator"] = Json::array();
+  for (const Eigen::MatrixXd& B : s.numerator) out["numerator"].push_back(matrix_to_json(B));
+  if (s.is_mode()) {
+    out["natural_frequency_hz"] = s.natural_frequency_hz();
+    out["damping_ratio"] = s.damping_ratio();
+    if (s.natural_frequency_std_hz) out["natural_frequency_std_hz"] = *s.natural_frequency_std_hz;
+    if (s.damping_ratio_std) out["damping_ratio_std"] = *s.damping_ratio_std;
+  }
+  return out;
+}
+
+std::vector<double> to_list(const Eigen::VectorXd& values, Eigen::Index size) {
+  if (values.size() == 0) return std::vector<double>(static_cast<std::size_t>(size), 0.0);
+  return {values.begin(), values.end()};
+}
+
+Eigen::MatrixXd matrix_from_json(const JsonNode& node, std::size_t rows, std::size_t columns) {
+  Eigen::MatrixXd out(rows, columns);
+  const std::vector<JsonNode> lines = node.elements();
+  if (lines.size() != rows) node.fail("must have " + std::to_string(rows) + " rows, one an output");
+  for (std::size_t y = 0; y < rows; ++y) {
+    const std::vector<double> values = lines[y].numbers();
+    if (values.size() != columns)
+      lines[y].fail("must have " + std::to_string(columns) + " numbers, one an input");
+    for (std::size_t u = 0; u < columns; ++u)
+      out(static_cast<Eigen::Index>(y), static_cast<Eigen::Index>(u)) = values[u];
+  }
+  return out;
+}
+
+Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::size_t n_inputs) {
+  Submodel s;
+  s.integrators = static_cast<int>(node.member("integrators").integer(0, 2));
+  s.denominator = node.member("denominator").numbers();
+  if (s.denominator.empty() || s.denominator[0] != 1.0)
+    node.member("denominator").fail("must start with 1");
+  if (s.denominator.size() > 1 && s.denominator.back() == 0.0)
+    node.member("denominator").fail("must not end with 0");
+  for (const JsonNode& matrix : node.member("numerator").elements())
+    s.numerator.push_back(matrix_from_json(matrix, n_outputs, n_inputs));
+  if (s.numerator.empty()) node.member("numerator").fail("must hold at least one matrix");
+  if (s.numerator.size() > s.denominator.size() + static_cast<std::size_t>(s.integrators))
+    node.member("numerator")
+        .fail("has a higher degree than the denominator: the submodel is improper");
+  if (node.has("natural_frequency_std_hz"))
+    s.natural_frequency_std_hz = node.member("natural_frequency_std_hz").number();
+  if (node.has("damping_ratio_std"))
+    s.damping_ratio_std = node.member("damping_ratio_std").number();
+  return s;
+}
+
+HoldModel hold_from_text(const JsonNode& node) {
+  const std::string text = node.text();
+  for (const HoldModel hold :
+       {HoldModel::none, HoldModel::phase, HoldModel::sinc, HoldModel::exact})
+    if (text == to_string(hold)) return hold;
+  node.fail("must be none, phase, sinc or exact");
+}
+
+Eigen::VectorXd delays_from_json(const JsonNode& root, const std::string& key, std::size_t size) {
+  if (!root.has(key)) return Eigen::VectorXd::Zero(static_cast<Eigen::Index>(size));
+  const std::vector<double> values = root.member(key).numbers();
+  if (values.size() != size)
+    root.member(key).fail("must have " + std::to_string(size) + " numbers, one a channel");
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(size));
+}
+
+FitRecord fit_from_json(const JsonNode& node) {
+  FitRecord fit;
+  fit.cost = node.number_or("cost", 0.0);
+  if (node.has("weighting")) fit.weighting = node.member("weighting").text();
+  if (node.has("iterations"))
+    fit.iterations = static_cast<int>(node.member("iterations").integer(0, 1'000'000'000));
+  if (node.has("status")) fit.status = node.member("status").text();
+  fit.relative_rms_error = node.number_or("relative_rms_error", 0.0);
+  if (node.has("band_hz")) {
+    const std::vector<double> band = node.member("band_hz").numbers();
+    if (band.size() != 2) node.member("band_hz").fail("must be two frequencies");
+    fit.band_hz[0] = band[0];
+    fit.band_hz[1] = band[1];
+  }
+  fit.seconds = node.number_or("seconds", 0.0);
+  return fit;
+}
+
+ChannelList channels_from_json(const JsonNode& root, const std::string& key) {
+  ChannelList out;
+  out.names = root.member(key).texts();
+  if (out.names.empty()) root.member(key).fail("must name at least one channel");
+  const std::string units = key.substr(0, key.size() - 1) + "_units";
+  if (root.has(units)) out.units = root.member(units).texts();
+  out.units.resize(out.names.size());
+  return out;
+}
+
+}  // namespace
+
+void write_model(const std::filesystem::path& file, const AdditiveModel& model) {
+  Json root;
+  root["format"] = "stageid-model";
+  root["format_version"] = 1;
+  root["inputs"] = model.inputs.names;
+  root["outputs"] = model.outputs.names;
+  root["input_units"] = model.inputs.units;
+  root["output_units"] = model.outputs.units;
+  root["sample_rate_hz"] = model.sample_rate_hz;
+  root["hold"] = to_string(model.hold);
+  root["input_delay_s"] = to_list(model.input_delay_s, model.n_inputs());
+  root["output_delay_s"] = to_list(model.output_delay_s, model.n_outputs());
+  root["submodels"] = Json::array();
+  for (const Submodel& s : model.submodels) root["submodels"].push_back(submodel_to_json(s));
+  root["fit"] = {{"cost", model.fit.cost},
+                 {"weighting", model.fit.weighting},
+                 {"iterations", model.fit.iterations},
+                 {"status", model.fit.status},
+                 {"relative_rms_error", model.fit.relative_rms_error},
+                 {"band_hz", {model.fit.band_hz[0], model.fit.band_hz[1]}},
+                 {"seconds", model.fit.seconds}};
+  root["cost_history"] = model.cost_history;
+  root["provenance"] = Json::parse(model.provenance_json);
+  write_text_file(file, root.dump(1) + "\n");
+}
+
+AdditiveModel read_model(const std::filesystem::path& file) {
+  const JsonFile json(file, "stageid-model");
+  const JsonNode root = json.root();
+  if (root.has("format_version")) root.member("format_version").integer(1, 1);
+  AdditiveModel model;
+  model.inputs = channels_from_json(root, "inputs");
+  model.outputs = channels_from_json(root, "outputs");
+  model.sample_rate_hz = root.number_or("sample_rate_hz", 0.0);
+  if (model.sample_rate_hz < 0.0)
+    root.member("sample_rate_hz").fail("must not be negative (0: unknown)");
+  model.hold = root.has("hold") ? hold_from_text(root.member("hold")) : HoldModel::none;
+  model.input_delay_s = delays_from_json(root, "input_delay_s", model.inputs.size());
+  model.output_delay_s = delays_from_json(root, "output_delay_s", model.outputs.size());
+  for (const JsonNode& node : root.member("submodels").elements())
+    model.submodels.push_back(submodel_from_json(node, model.outputs.size(), model.inputs.size()));
+  if (root.has("fit")) model.fit = fit_from_json(root.member("fit"));
+  if (root.has("cost_history")) model.cost_history = root.member("cost_history").numbers();
+  if (root.has("provenance")) model.provenance_json = root.member("provenance").raw().dump();
+  return model;
+}
+
+}  // namespace stageid

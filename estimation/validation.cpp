@@ -1,0 +1,78 @@
+#include "estimation/validation.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace stageid {
+
+Eigen::MatrixXcd response_like(const AdditiveModel& model, const FrfEstimate& frf) {
+  if (frf.hold == Hold::none) {
+    // Continuous data: neither hold nor delay, unless the model was fitted to data like these.
+    AdditiveModel bare = model;
+    if (model.hold != HoldModel::none) {
+      bare.input_delay_s.setZero(model.n_inputs());
+      bare.output_delay_s.setZero(model.n_outputs());
+    }
+    return response(bare, frf.frequency_hz, HoldModel::none);
+  }
+  const HoldModel sampled = model.hold == HoldModel::none ? HoldModel::exact : model.hold;
+  if (frf.compensated == Compensation::none) return response(model, frf.frequency_hz, sampled);
+  if (model.hold == HoldModel::none) return response(model, frf.frequency_hz, HoldModel::none);
+  // A model that contains the delay, data that have lost it: lose the same.
+  Eigen::MatrixXcd P = response(model, frf.frequency_hz, sampled);
+  const double period = 1.0 / frf.sample_rate_hz;
+  const Eigen::VectorXd omega = frf.omega_rad_s();
+  for (Eigen::Index k = 0; k < P.cols(); ++k) {
+    const double x = 0.5 * omega[k] * period;
+    const double magnitude = frf.compensated == Compensation::hold ? x / std::sin(x) : 1.0;
+    P.col(k) *= std::polar(magnitude, omega[k] * (frf.delay_s + 0.5 * period));
+  }
+  return P;
+}
+
+namespace {
+
+/// Largest |autocorrelation| of whitened residuals over lines, all channels together, lags 1 to 10.
+void fill_whiteness(const Eigen::MatrixXcd& white, Validation& out) {
+  const double power = white.cwiseAbs2().sum();
+  if (!(power > 0.0) || white.cols() < 20) return;
+  for (Eigen::Index lag = 1; lag <= 10; ++lag) {
+    const Eigen::Index n = white.cols() - lag;
+    const std::complex<double> sum =
+        white.leftCols(n).conjugate().cwiseProduct(white.rightCols(n)).sum();
+    out.whiteness = std::max(out.whiteness, std::abs(sum) / power);
+  }
+  // |r|^2 of circular white noise is exponential with mean 1/count; ten lags share 1 %.
+  const double count = static_cast<double>(white.size());
+  out.whiteness_limit = std::sqrt(-std::log(1.0 - std::pow(0.99, 0.1)) / count);
+}
+
+}  // namespace
+
+Validation validate(const AdditiveModel& model, const FrfEstimate& frf) {
+  if (model.inputs.names != frf.inputs.names || model.outputs.names != frf.outputs.names)
+    throw std::invalid_argument(
+        "validate: the model and the FRF have different channels; select the same inputs and "
+        "outputs in the same order");
+  const Eigen::MatrixXcd E = frf.response - response_like(model, frf);
+  Validation out;
+  const Eigen::ArrayXXd squared = E.cwiseAbs2().array();
+  const Eigen::ArrayXXd power = frf.response.cwiseAbs2().array();
+  const Eigen::ArrayXXd relative = (power > 0.0).select(squared / power.max(1e-300), 0.0);
+  const double used = static_cast<double>((power > 0.0).count());
+  out.relative_rms_error = used > 0.0 ? std::sqrt(relative.sum() / used) : 0.0;
+  out.normalized_error = power.sum() > 0.0 ? std::sqrt(squared.sum() / power.sum()) : 0.0;
+  out.channel_error = relative.rowwise().mean().sqrt();
+  const Eigen::MatrixXd& variance =
+      frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
+  if (variance.size() > 0 && variance.minCoeff() > 0.0) {
+    const Eigen::ArrayXXd ratio = squared / variance.array();
+    out.chi_square_per_dof = ratio.mean();
+    out.whitened_above_95 =
+        static_cast<double>((ratio > -std::log(0.05)).count()) / static_cast<double>(ratio.size());
+    fill_whiteness(E.cwiseQuotient(variance.cwiseSqrt().cast<std::complex<double>>()), out);
+  }
+  return out;
+}
+
+}  // namespace stageid

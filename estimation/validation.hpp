@@ -7,20 +7,24 @@ namespace stageid {
 
 /// How a model does on a response that it was not fitted to.
 struct Validation {
-  double relative_rms_error = 0.0;   ///< sqrt(mean |E|^2/|G|^2)
-  double normalized_error = 0.0;     ///< sum |E|^2 over sum |G|^2, square root
-  double chi_square_per_dof = 0.0;   ///< mean |E|^2/variance, 1 if the model is within the noise; 0 unknown
-  double whitened_above_95 = 0.0;    ///< share of |e|^2 above the 95 % point of Exp(1); 0.05 is right
-  double whiteness = 0.0;            ///< largest |autocorrelation| of the whitened residual over lines, lags 1..10,
-  double whiteness_limit = 0.0;      ///<   and its 99 % limit
-  Eigen::VectorXd channel_error;     ///< relative rms a channel, n_y n_u
+  double relative_rms_error = 0.0;  ///< sqrt(mean |E|^2/|G|^2)
+  double normalized_error = 0.0;    ///< sum |E|^2 over sum |G|^2, square root
+  double chi_square_per_dof =
+      0.0;  ///< mean |E|^2/variance, 1 if the model is within the noise; 0 unknown
+  double whitened_above_95 = 0.0;  ///< share of |e|^2 above the 95 % point of Exp(1); 0.05 is right
+  double whiteness =
+      0.0;  ///< largest |autocorrelation| of the whitened residual over lines, lags 1..10,
+  double whiteness_limit = 0.0;   ///<   and its 99 % limit
+  Eigen::VectorXd channel_error;  ///< relative rms a channel, n_y n_u
 };
 
-/// Compares a model with measured data on their lines, through the hold and delay that the data still hold.
+/// Compares a model with measured data on their lines, through the hold and delay that the data
+/// still hold.
 /// @throws std::invalid_argument if channels do not match by name.
 Validation validate(const AdditiveModel& model, const FrfEstimate& frf);
 
-/// The model's response as it would have been measured: through hold and delay unless the data are compensated.
+/// The model's response as it would have been measured: through hold and delay unless the data are
+/// compensated.
 Eigen::MatrixXcd response_like(const AdditiveModel& model, const FrfEstimate& frf);
 
 }  // namespace stageid

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimation/fit_problem.hpp"
+
+namespace stageid {
+
+/// The equations of one step, M d_beta = e, in the order beta = (globals, numerators of channel 1,
+/// 2, ...) where globals are the denominator coefficients of all submodels and then the delays.
+///
+/// With J the Jacobian dP/dbeta (the instrument Phih of the paper) and Phi the regressor,
+///   riv: M = sum Re{J^H W Phi},  e = sum Re{J^H W vec E}   (identity of method.md section 6)
+///   gn:  M = sum Re{J^H W J},    e the same
+///   sk:  M = sum Re{Phi^H W Phi}, e = sum Re{Phi^H W vec E}
+/// Phi differs from J only in the denominator columns: those of J minus (j omega)^q E / A_i.
+///
+/// Numerators of different channels never meet in M (diagonal W), so it is an arrow: channels are
+/// eliminated one by one and the Schur complement on the globals is solved.
+class ArrowSystem {
+ public:
+  /// @pre `groups` were evaluated with derivatives at `beta`, `E` is their residual.
+  ArrowSystem(const FitProblem& problem, const FitParameters& beta,
+              const std::vector<BasisGroup>& groups, const Residual& E, FitMethod method);
+
+  struct Step {
+    Eigen::VectorXd globals;
+    Eigen::MatrixXd B;  ///< n_c x n_f
+    bool ok = false;    ///< false: the equations are singular
+  };
+  /// Solves with `damping` times the diagonal of the Schur complement added to it.
+  Step solve(double damping) const;
+  /// The globals only: enough where numerators are re-solved afterwards.
+  Eigen::VectorXd solve_globals(double damping) const;
+
+  /// One channel's part of M: border and numerator block.
+  struct Channel {
+    Eigen::MatrixXd ab;  ///< globals x n_f
+    Eigen::MatrixXd ba;  ///< n_f x globals
+    Eigen::MatrixXd bb;  ///< n_f x n_f
+    Eigen::VectorXd e;   ///< n_f
+    Eigen::MatrixXd Z;   ///< bb^-1 ba, n_f x globals
+    Eigen::VectorXd x;   ///< bb^-1 e
+  };
+  const std::vector<Channel>& channels() const noexcept { return channels_; }
+  const Eigen::MatrixXd& M_globals() const noexcept { return M_; }
+  const Eigen::VectorXd& e_globals() const noexcept { return e_; }
+  const Eigen::MatrixXd& schur() const noexcept { return schur_; }
+  const Eigen::VectorXd& schur_gradient() const noexcept { return schur_e_; }
+  bool regular() const noexcept { return regular_; }
+
+ private:
+  void add_group(const BasisGroup& group);
+  void add_denominator_block(const BasisGroup& group, const Eigen::MatrixXd& B,
+                             const Eigen::MatrixXd& W, const Eigen::MatrixXd& WE_re,
+                             const Eigen::MatrixXd& WE_im);
+  void add_delay_columns(const BasisGroup& group, const Eigen::MatrixXd& B,
+                         const Eigen::MatrixXd& W, const Eigen::MatrixXd& WE_re,
+                         const Eigen::MatrixXd& WE_im);
+  std::vector<Eigen::Index> delay_parameters(Eigen::Index channel) const;
+  void eliminate();
+
+  const FitProblem& problem_;
+  const FitParameters& beta_;
+  const Residual& E_;
+  FitMethod method_;
+  std::vector<DerivativeColumn> columns_;
+  Eigen::MatrixXd Y_re_;  // N x denominators: (j omega)^q / A_i
+  Eigen::MatrixXd Y_im_;
+  Eigen::MatrixXd M_;
+  Eigen::VectorXd e_;
+  std::vector<Channel> channels_;
+  Eigen::MatrixXd schur_;
+  Eigen::VectorXd schur_e_;
+  bool regular_ = true;
+};
+
+/// x solving M x = b for symmetric positive M, scaled to unit diagonal; matrix of right-hand sides.
+/// @returns false if M is singular to rounding.
+bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x);
+
+}  // namespace stageid

@@ -1,0 +1,295 @@
+#include "estimation/fit_iteration.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+
+#include "estimation/arrow_system.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kSmallestDamping = 1e-5;
+constexpr double kLargestDamping = 0.9;
+constexpr double kLargestMove = 4.0 / 3.0;  // of a natural frequency in one iteration
+constexpr double kLargestLevenberg = 1e8;
+// Of the cost: what is gained below this is rounding.
+constexpr double kRoundingGain = 1e-13;
+
+/// A candidate with its numerators solved.
+struct Trial {
+  FitParameters beta;
+  Residual E;
+};
+
+FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
+                      const Eigen::VectorXd& step) {
+  FitParameters out = beta;
+  Eigen::Index p = 0;
+  for (Eigen::VectorXd& a : out.a) {
+    a += step.segment(p, a.size());
+    p += a.size();
+  }
+  if (problem.delay == DelayModel::estimate) {
+    out.input_delay_s.array() += step[p];
+  } else if (problem.delay == DelayModel::per_channel) {
+    out.input_delay_s += step.segment(p, problem.n_inputs);
+    out.output_delay_s.head(problem.n_outputs - 1) += step.tail(problem.n_outputs - 1);
+  }
+  return out;
+}
+
+std::optional<Trial> try_step(const FitProblem& problem, const FitParameters& beta,
+                              const Eigen::VectorXd& step) {
+  if (!step.allFinite()) return std::nullopt;
+  Trial trial{stepped(problem, beta, step), {}};
+  if (!stabilize(problem, beta, trial.beta)) return std::nullopt;
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, trial.beta, false);
+  if (!solve_numerators(problem, groups, trial.beta.B, trial.E)) return std::nullopt;
+  return trial;
+}
+
+/// Largest change of a denominator coefficient or delay, relative to its own size.
+double relative_step(const FitProblem& problem, const FitParameters& beta,
+                     const Eigen::VectorXd& step) {
+  double largest = 0.0;
+  Eigen::Index p = 0;
+  for (const Eigen::VectorXd& a : beta.a)
+    for (Eigen::Index q = 0; q < a.size(); ++q)
+      largest = std::max(largest, std::abs(step[p++]) / std::max(std::abs(a[q]), 1e-300));
+  const double time = 1.0 / problem.lines.omega_rad_s.maxCoeff();
+  for (; p < step.size(); ++p) largest = std::max(largest, std::abs(step[p]) / time);
+  return largest;
+}
+
+/// max_i |e_i| / sqrt(M_ii 2 N cost): 0 to 1, the cosine between the residual and a parameter's
+/// effect.
+double scaled_gradient(const FitProblem& problem, const ArrowSystem& system, double cost) {
+  const double total = 2.0 * static_cast<double>(problem.size()) * cost;
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < system.schur_gradient().size(); ++i)
+    largest =
+        std::max(largest, std::abs(system.schur_gradient()[i]) /
+                              std::sqrt(std::max(std::abs(system.schur()(i, i)) * total, 1e-300)));
+  return largest;
+}
+
+class Iteration {
+ public:
+  Iteration(const FitProblem& problem, FitParameters& beta, const FitOptions& options)
+      : problem_(problem), beta_(beta), options_(options) {
+    signal_cost_ =
+        (problem.W.array() * (problem.G_re.array().square() + problem.G_im.array().square()))
+            .sum() /
+        (2.0 * static_cast<double>(problem.size()));
+  }
+
+  IterationResult run() {
+    if (!begin())
+      return finish(FitStatus::singular,
+                    "the start's numerators are not determined: two modes coincide or the data do "
+                    "not excite them");
+    while (result_.iterations < options_.max_iterations) {
+      const bool go_on = options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
+      if (!go_on) return std::move(result_);
+    }
+    return finish(problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
+                  fmt::format("stopped after {} iterations, scaled gradient {:.2g}",
+                              result_.iterations, gradient_));
+  }
+
+ private:
+  bool begin() {
+    stabilize(problem_, beta_, beta_);
+    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, false);
+    if (!solve_numerators(problem_, groups, beta_.B, result_.E)) return false;
+    result_.cost.push_back(result_.E.cost);
+    return true;
+  }
+
+  IterationResult finish(FitStatus status, std::string message) {
+    end(status, std::move(message));
+    return std::move(result_);
+  }
+  bool end(FitStatus status, std::string message) {
+    result_.status = status;
+    result_.message = std::move(message);
+    return false;
+  }
+
+  void accept(Trial&& trial) {
+    beta_ = std::move(trial.beta);
+    result_.E = std::move(trial.E);
+    result_.cost.push_back(result_.E.cost);
+    ++result_.iterations;
+    if (options_.progress) options_.progress(result_.iterations, result_.E.cost);
+  }
+
+  /// True if the system says that the end is reached; `result_` is then complete.
+  bool at_optimum(const ArrowSystem& system) {
+    gradient_ = scaled_gradient(problem_, system, result_.E.cost);
+    if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance) {
+      end(FitStatus::gradient_small,
+          fmt::format("the first-order condition holds: scaled gradient {:.2g}", gradient_));
+      return true;
+    }
+    if (result_.E.cost < 1e-28 * signal_cost_) {
+      end(FitStatus::gradient_small, "the residual has reached rounding");
+      return true;
+    }
+    return false;
+  }
+
+  bool descent_step() {
+    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
+    const ArrowSystem system(problem_, beta_, groups, result_.E, options_.method);
+    if (!system.regular())
+      return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+    if (at_optimum(system)) return false;
+    if (attempt(system, options_.method == FitMethod::riv ? 3 : 40)) return still_moving();
+    if (options_.method == FitMethod::riv && !ended_) {
+      const ArrowSystem gauss_newton(problem_, beta_, groups, result_.E, FitMethod::gn);
+      if (attempt(gauss_newton, 40)) return still_moving();
+    }
+    if (!ended_)
+      end(FitStatus::cost_stalled,
+          fmt::format("no step lowers the cost; scaled gradient {:.2g}", gradient_));
+    return false;
+  }
+
+  /// Tries steps of growing damping; accepts the first that lowers the cost.
+  bool attempt(const ArrowSystem& system, int tries) {
+    const double cost = result_.E.cost;
+    for (int i = 0; i < tries && levenberg_ <= kLargestLevenberg; ++i) {
+      const Eigen::VectorXd step = system.solve_globals(levenberg_);
+      const double gain =
+          step.dot(system.schur_gradient()) / (2.0 * static_cast<double>(problem_.size()) * cost);
+      step_size_ = relative_step(problem_, beta_, step);
+      std::optional<Trial> trial = try_step(problem_, beta_, step);
+      if (trial && trial->E.cost < cost) {
+        gain_ = (cost - trial->E.cost) / cost;
+        accept(std::move(*trial));
+        levenberg_ = i == 0 ? (levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0) : levenberg_;
+        return true;
+      }
+      if (std::abs(gain) < kRoundingGain || step_size_ < options_.step_tolerance) {
+        ended_ = true;
+        end(FitStatus::step_small, fmt::format("the step is {:.1e} of the parameters and changes "
+                                               "the cost by rounding only; scaled gradient {:.2g}",
+                                               step_size_, gradient_));
+        return false;
+      }
+      levenberg_ = std::max(10.0 * levenberg_, 1e-4);
+    }
+    if (levenberg_ > kLargestLevenberg) levenberg_ = 1e-4;
+    return false;
+  }
+
+  bool still_moving() {
+    if (step_size_ < options_.step_tolerance)
+      return end(FitStatus::step_small,
+                 fmt::format("the last step was {:.1e} of the parameters", step_size_));
+    return true;
+  }
+
+  bool fixed_point_step() {
+    if (result_.iterations == 0) best_ = Trial{beta_, result_.E};
+    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
+    const ArrowSystem system(problem_, beta_, groups, result_.E, FitMethod::sk);
+    if (!system.regular())
+      return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+    gradient_ = scaled_gradient(problem_, system, result_.E.cost);
+    Eigen::VectorXd step = system.solve_globals(0.0);
+    std::optional<Trial> trial;
+    for (int halvings = 0; halvings < 12 && !trial; ++halvings, step *= 0.5) {
+      step_size_ = relative_step(problem_, beta_, step);
+      trial = try_step(problem_, beta_, step);
+    }
+    if (!trial) return end_at_best(FitStatus::cost_stalled, "no acceptable step");
+    accept(std::move(*trial));
+    if (result_.E.cost < best_.E.cost) best_ = Trial{beta_, result_.E};
+    if (step_size_ < std::max(options_.step_tolerance, 1e-9))
+      return end_at_best(FitStatus::step_small,
+                         "the fixed point of Sanathanan and Koerner is reached; it is not the "
+                         "minimum of the cost");
+    if (result_.iterations >= options_.max_iterations)
+      return end_at_best(FitStatus::iteration_limit,
+                         fmt::format("stopped after {} iterations", result_.iterations));
+    return true;
+  }
+
+  bool end_at_best(FitStatus status, std::string message) {
+    beta_ = best_.beta;
+    result_.E = best_.E;
+    return end(status, std::move(message));
+  }
+
+  const FitProblem& problem_;
+  FitParameters& beta_;
+  const FitOptions& options_;
+  IterationResult result_;
+  double signal_cost_ = 0.0;
+  double levenberg_ = 0.0;
+  double gradient_ = 1.0;
+  double step_size_ = 0.0;
+  double gain_ = 1.0;
+  bool ended_ = false;
+  Trial best_;
+};
+
+bool stabilize_mode(double before_a2, double largest_omega, Eigen::VectorXd& a) {
+  if (!(a[1] > 0.0)) return false;
+  a[0] = std::abs(a[0]);
+  const double root = std::sqrt(a[1]);
+  const double zeta = std::clamp(a[0] / (2.0 * root), kSmallestDamping, kLargestDamping);
+  a[0] = 2.0 * zeta * root;
+  const double move = std::sqrt(before_a2) / root;
+  return move < kLargestMove && move > 1.0 / kLargestMove && 1.0 / root < largest_omega;
+}
+
+}  // namespace
+
+bool stabilize(const FitProblem& problem, const FitParameters& before, FitParameters& beta) {
+  const double highest = problem.lines.omega_rad_s.maxCoeff();
+  const double nyquist =
+      problem.lines.sample_period_s > 0.0 ? 3.1 / problem.lines.sample_period_s : 1e300;
+  const double largest =
+      problem.lines.hold == HoldModel::exact ? std::max(nyquist, highest) : 10.0 * highest;
+  for (std::size_t i = 0; i < beta.a.size(); ++i) {
+    Eigen::VectorXd& a = beta.a[i];
+    if (a.size() == 1) {
+      if (!(a[0] > 0.0)) return false;
+    } else if (a.size() == 2) {
+      if (!stabilize_mode(before.a[i][1], largest, a)) return false;
+    } else {
+      for (const std::complex<double> pole : roots(a))
+        if (!(pole.real() < 0.0)) return false;
+    }
+  }
+  return true;
+}
+
+IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options) {
+  return Iteration(problem, beta, options).run();
+}
+
+void search_delay(const FitProblem& problem, FitParameters& beta) {
+  const double highest = problem.lines.omega_rad_s.maxCoeff();
+  const double step =
+      0.5 / highest;  // rad at the highest line: well inside the basin of the best delay
+  double best_cost = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd best = beta.input_delay_s;
+  FitParameters trial = beta;
+  for (int i = 0; i <= 24; ++i) {
+    trial.input_delay_s.setConstant(step * i);
+    const std::vector<BasisGroup> groups = evaluate_groups(problem, trial, false);
+    Residual E;
+    if (!solve_numerators(problem, groups, trial.B, E) || !(E.cost < best_cost)) continue;
+    best_cost = E.cost;
+    best = trial.input_delay_s;
+  }
+  beta.input_delay_s = best;
+}
+
+}  // namespace stageid

@@ -1,0 +1,195 @@
+#include "estimation/fit_problem.hpp"
+
+#include <Eigen/Cholesky>
+#include <atomic>
+#include <map>
+#include <thread>
+
+#include "estimation/weighted_products.hpp"
+
+namespace stageid {
+
+Eigen::Index FitProblem::functions() const noexcept {
+  Eigen::Index n = 0;
+  for (const SubmodelShape& shape : shapes) n += shape.functions();
+  return n;
+}
+
+Eigen::Index FitProblem::denominators() const noexcept {
+  Eigen::Index n = 0;
+  for (const SubmodelShape& shape : shapes) n += shape.order;
+  return n;
+}
+
+Eigen::Index FitProblem::delays() const noexcept {
+  switch (delay) {
+    case DelayModel::fixed:
+      return 0;
+    case DelayModel::estimate:
+      return 1;
+    case DelayModel::per_channel:
+      return n_outputs + n_inputs - 1;
+  }
+  return 0;
+}
+
+std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem) {
+  std::vector<DerivativeColumn> columns;
+  Eigen::Index function = 0;
+  Eigen::Index parameter = 0;
+  for (const SubmodelShape& shape : problem.shapes) {
+    for (int m = 0; m < shape.functions(); ++m)
+      for (int q = 0; q < shape.order; ++q) columns.push_back({function + m, parameter + q});
+    function += shape.functions();
+    parameter += shape.order;
+  }
+  return columns;
+}
+
+std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
+                                        bool with_derivatives) {
+  std::map<double, std::vector<Eigen::Index>> members;
+  for (Eigen::Index c = 0; c < problem.channels(); ++c) {
+    const double delay =
+        beta.input_delay_s[c / problem.n_outputs] + beta.output_delay_s[c % problem.n_outputs];
+    members[delay].push_back(c);
+  }
+  std::vector<BasisGroup> groups;
+  for (auto& [delay, channels] : members) {
+    BasisGroup group;
+    group.delay_s = delay;
+    group.channels = std::move(channels);
+    groups.push_back(std::move(group));
+  }
+
+  const Eigen::Index N = problem.size();
+  const auto n_d = static_cast<Eigen::Index>(derivative_columns(problem).size());
+  parallel_tasks(static_cast<int>(groups.size()), problem.threads, [&](int g) {
+    BasisGroup& group = groups[static_cast<std::size_t>(g)];
+    group.F_re.resize(N, problem.functions());
+    group.F_im.resize(N, problem.functions());
+    if (with_derivatives) {
+      group.D_re.resize(N, n_d);
+      group.D_im.resize(N, n_d);
+      group.T_re.resize(N, problem.functions());
+      group.T_im.resize(N, problem.functions());
+    }
+    SubmodelBasis basis;
+    Eigen::Index f = 0;
+    Eigen::Index d = 0;
+    for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
+      const SubmodelShape& shape = problem.shapes[i];
+      evaluate_basis(problem.lines, shape, beta.a[i], group.delay_s, with_derivatives, basis);
+      const Eigen::Index functions = shape.functions();
+      const Eigen::Index gradients = functions * shape.order;
+      group.F_re.middleCols(f, functions) = basis.value.real();
+      group.F_im.middleCols(f, functions) = basis.value.imag();
+      if (with_derivatives) {
+        group.D_re.middleCols(d, gradients) = basis.gradient.real();
+        group.D_im.middleCols(d, gradients) = basis.gradient.imag();
+        group.T_re.middleCols(f, functions) = basis.delay.real();
+        group.T_im.middleCols(f, functions) = basis.delay.imag();
+      }
+      f += functions;
+      d += gradients;
+    }
+  });
+  return groups;
+}
+
+Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                  const Eigen::MatrixXd& B) {
+  Residual E{problem.G_re, problem.G_im, 0.0};
+  for (const BasisGroup& group : groups) {
+    const bool all = group.channels.size() == static_cast<std::size_t>(problem.channels());
+    if (all) {
+      E.re.noalias() -= B * group.F_re.transpose();
+      E.im.noalias() -= B * group.F_im.transpose();
+    } else {
+      for (const Eigen::Index c : group.channels) {
+        E.re.row(c) -= (group.F_re * B.row(c).transpose()).transpose();
+        E.im.row(c) -= (group.F_im * B.row(c).transpose()).transpose();
+      }
+    }
+  }
+  const double sum = (problem.W.array() * (E.re.array().square() + E.im.array().square())).sum();
+  E.cost = sum / (2.0 * static_cast<double>(problem.size()));
+  return E;
+}
+
+namespace {
+
+/// Solves the scaled normal equations of one channel for one right-hand side.
+class ScaledNormalEquations {
+ public:
+  explicit ScaledNormalEquations(const Eigen::MatrixXd& M) {
+    scale_ = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    Eigen::MatrixXd scaled = scale_.asDiagonal() * M * scale_.asDiagonal();
+    // Far below the rounding of the sums: only keeps the factorization of coinciding poles alive.
+    scaled.diagonal().array() += 1e-14;
+    factor_.compute(scaled);
+  }
+  bool ok() const { return factor_.info() == Eigen::Success; }
+  Eigen::VectorXd solve(const Eigen::VectorXd& b) const {
+    return scale_.cwiseProduct(factor_.solve(scale_.cwiseProduct(b)));
+  }
+
+ private:
+  Eigen::VectorXd scale_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+};
+
+}  // namespace
+
+bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                      Eigen::MatrixXd& B, Residual& E) {
+  const Eigen::Index n_f = problem.functions();
+  const auto pairs = triangular_pairs(n_f);
+  B.setZero(problem.channels(), n_f);
+  bool regular = true;
+  std::vector<std::vector<ScaledNormalEquations>> factors(groups.size());
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const BasisGroup& group = groups[g];
+    const Eigen::MatrixXd W = rows_of(problem.W, group.channels);
+    const Eigen::MatrixXd gram = weighted_pair_sums(
+        W, {group.F_re, group.F_im}, {group.F_re, group.F_im}, pairs, problem.threads);
+    factors[g].reserve(group.channels.size());
+    Eigen::MatrixXd M(n_f, n_f);
+    for (std::size_t c = 0; c < group.channels.size(); ++c) {
+      for (std::size_t p = 0; p < pairs.size(); ++p)
+        M(pairs[p].left, pairs[p].right) = M(pairs[p].right, pairs[p].left) =
+            gram(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(p));
+      factors[g].emplace_back(M);
+      regular = regular && factors[g].back().ok();
+    }
+  }
+  if (!regular) return false;
+  // The first pass solves, the second refines with the residual itself.
+  E = residual(problem, groups, B);
+  for (int pass = 0; pass < 2; ++pass) {
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const Eigen::MatrixXd e = numerator_gradient(problem, groups[g], E);
+      for (std::size_t c = 0; c < groups[g].channels.size(); ++c)
+        B.row(groups[g].channels[c]) +=
+            factors[g][c].solve(e.row(static_cast<Eigen::Index>(c)).transpose()).transpose();
+    }
+    E = residual(problem, groups, B);
+  }
+  return std::isfinite(E.cost);
+}
+
+void parallel_tasks(int count, int threads, const std::function<void(int)>& task) {
+  if (threads <= 1 || count <= 1) {
+    for (int i = 0; i < count; ++i) task(i);
+    return;
+  }
+  std::atomic<int> next{0};
+  const auto work = [&] {
+    for (int i = next++; i < count; i = next++) task(i);
+  };
+  std::vector<std::jthread> helpers;
+  for (int t = 1; t < std::min(threads, count); ++t) helpers.emplace_back(work);
+  work();
+}
+
+}  // namespace stageid

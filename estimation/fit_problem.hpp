@@ -1,0 +1,96 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimation/basis.hpp"
+#include "estimation/fit_options.hpp"
+#include "frf/frf_estimate.hpp"
+
+namespace stageid {
+
+// Symbols (paper, section 2 and 3; method.md section 6):
+//   N lines, n_c = n_y n_u channels (column-stacked), G data, W diagonal weights, E = G - P
+//   F(k, j)   the numerator functions of all submodels, j = 1 .. n_f
+//   B(c, j)   the numerator coefficients of channel c
+//   D(k, .)   derivatives of F to the denominator coefficients
+
+/// Data of a fit, channels as rows: real arithmetic throughout, since parameters are real.
+struct FitProblem {
+  ModelLines lines;
+  Eigen::Index n_outputs = 0;
+  Eigen::Index n_inputs = 0;
+  Eigen::MatrixXd G_re;  ///< n_c x N
+  Eigen::MatrixXd G_im;
+  Eigen::MatrixXd W;  ///< n_c x N
+  std::vector<SubmodelShape> shapes;
+  DelayModel delay = DelayModel::fixed;
+  int threads = 1;
+
+  Eigen::Index channels() const noexcept { return G_re.rows(); }
+  Eigen::Index size() const noexcept { return G_re.cols(); }
+  Eigen::Index functions() const noexcept;     ///< n_f
+  Eigen::Index denominators() const noexcept;  ///< number of denominator coefficients
+  Eigen::Index delays() const noexcept;        ///< number of free delays: 0, 1 or n_y + n_u - 1
+  Eigen::Index globals() const noexcept { return denominators() + delays(); }
+};
+
+/// beta: everything that is estimated.
+struct FitParameters {
+  std::vector<Eigen::VectorXd> a;  ///< one a submodel, size its order
+  Eigen::VectorXd input_delay_s;   ///< n_u
+  Eigen::VectorXd output_delay_s;  ///< n_y; the last is the gauge and stays
+  Eigen::MatrixXd B;               ///< n_c x n_f
+};
+
+/// Channels that share one delay, and the functions that they see.
+struct BasisGroup {
+  double delay_s = 0.0;
+  std::vector<Eigen::Index> channels;
+  Eigen::MatrixXd F_re;  ///< N x n_f
+  Eigen::MatrixXd F_im;
+  Eigen::MatrixXd D_re;  ///< N x n_d, see DerivativeColumn; empty unless asked for
+  Eigen::MatrixXd D_im;
+  Eigen::MatrixXd T_re;  ///< N x n_f: derivative to the delay; empty unless asked for
+  Eigen::MatrixXd T_im;
+};
+
+/// What column of D belongs to what: dF_function / da_parameter.
+struct DerivativeColumn {
+  Eigen::Index function;
+  Eigen::Index parameter;
+};
+std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem);
+
+/// Evaluates the functions of every group of channels at the parameters.
+std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
+                                        bool with_derivatives);
+
+/// E = G - P and what follows from it.
+struct Residual {
+  Eigen::MatrixXd re;  ///< n_c x N
+  Eigen::MatrixXd im;
+  double cost = 0.0;  ///< 1/(2N) sum vec(E)^H W vec(E)
+};
+Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                  const Eigen::MatrixXd& B);
+
+/// The convex problem: numerators for fixed denominators, by channel, from normal equations scaled
+/// to unit diagonal with one step of refinement. Also returns the residual. `B` is overwritten.
+/// @returns false if a channel's equations are singular to rounding.
+bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                      Eigen::MatrixXd& B, Residual& E);
+
+/// The weights of a fit. Variances from few degrees of freedom are smoothed over neighbouring
+/// lines, so that a weight does not depend on the very noise that it weighs (facts.md section 8).
+/// @throws std::invalid_argument if what the weighting needs is missing, zero or not finite.
+Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options);
+
+/// `variance` averaged over as many neighbouring lines as give about 100 degrees of freedom.
+Eigen::MatrixXd smoothed_variance(const Eigen::MatrixXd& variance, double dof);
+
+/// Runs task(0) .. task(count - 1) on up to `threads` threads. Which thread runs a task does not
+/// matter to the result.
+void parallel_tasks(int count, int threads, const std::function<void(int)>& task);
+
+}  // namespace stageid

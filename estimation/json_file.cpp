@@ -1,0 +1,92 @@
+#include "estimation/json_file.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+namespace stageid {
+
+JsonNode JsonNode::member(const std::string& key) const {
+  if (!value_.is_object()) fail("must be an object with \"" + key + "\"");
+  const auto found = value_.find(key);
+  if (found == value_.end()) fail("\"" + key + "\" is missing");
+  return {file_, (place_ == "/" ? "" : place_) + "/" + key, *found};
+}
+
+std::vector<JsonNode> JsonNode::elements() const {
+  if (!value_.is_array()) fail("must be a list");
+  std::vector<JsonNode> out;
+  std::size_t i = 0;
+  for (const nlohmann::json& element : value_)
+    out.emplace_back(file_, place_ + "/" + std::to_string(i++), element);
+  return out;
+}
+
+double JsonNode::number() const {
+  if (!value_.is_number()) fail("must be a number");
+  const auto number = value_.get<double>();
+  if (!std::isfinite(number)) fail("must be a finite number");
+  return number;
+}
+
+double JsonNode::positive() const {
+  const double value = number();
+  if (!(value > 0.0)) fail("must be above zero");
+  return value;
+}
+
+double JsonNode::number_or(const std::string& key, double fallback) const {
+  return has(key) ? member(key).number() : fallback;
+}
+
+long long JsonNode::integer(long long lowest, long long highest) const {
+  if (!value_.is_number_integer()) fail("must be a whole number");
+  const auto number = value_.get<long long>();
+  if (number < lowest || number > highest)
+    fail("must be a whole number from " + std::to_string(lowest) + " to " +
+         std::to_string(highest));
+  return number;
+}
+
+std::string JsonNode::text() const {
+  if (!value_.is_string()) fail("must be text in quotes");
+  return value_.get<std::string>();
+}
+
+std::vector<double> JsonNode::numbers() const {
+  std::vector<double> out;
+  for (const JsonNode& node : elements()) out.push_back(node.number());
+  return out;
+}
+
+std::vector<std::string> JsonNode::texts() const {
+  std::vector<std::string> out;
+  for (const JsonNode& node : elements()) out.push_back(node.text());
+  return out;
+}
+
+JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file_(std::move(file)) {
+  std::ifstream stream(file_, std::ios::binary);
+  if (!stream) throw FileError(file_.string() + ": cannot be read: " + std::strerror(errno));
+  std::stringstream text;
+  text << stream.rdbuf();
+  if (text.str().empty())
+    throw FormatError(file_, "", "is empty; a JSON file of format " + format + " is wanted");
+  try {
+    value_ = nlohmann::json::parse(text.str());
+  } catch (const nlohmann::json::parse_error& error) {
+    // The library's own text names line and column behind its error number.
+    const std::string what = error.what();
+    const std::size_t start = what.find("at line");
+    throw FormatError(file_, "",
+                      "is not JSON: " + (start == std::string::npos ? what : what.substr(start)));
+  }
+  const JsonNode node = root();
+  if (!value_.is_object() || !node.has("format") || !value_["format"].is_string() ||
+      value_["format"] != format)
+    throw FormatError(file_, "",
+                      "is not a " + format + " file; its \"format\" must be \"" + format + "\"");
+}
+
+}  // namespace stageid

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "excitation/file_error.hpp"
+
+namespace stageid {
+
+/// A place in a JSON file from outside: every access checks, every failure names file and place.
+class JsonNode {
+ public:
+  JsonNode(const std::filesystem::path& file, std::string place, const nlohmann::json& value)
+      : file_(file), place_(std::move(place)), value_(value) {}
+
+  bool has(const std::string& key) const { return value_.is_object() && value_.contains(key); }
+  JsonNode member(const std::string& key) const;
+  std::vector<JsonNode> elements() const;
+  double number() const;    ///< finite
+  double positive() const;  ///< > 0
+  double number_or(const std::string& key,
+                   double fallback) const;  ///< a member that may be missing
+  long long integer(long long lowest, long long highest) const;
+  std::string text() const;
+  std::vector<double> numbers() const;
+  std::vector<std::string> texts() const;
+  const nlohmann::json& raw() const noexcept { return value_; }
+  [[noreturn]] void fail(const std::string& what) const { throw FormatError(file_, place_, what); }
+
+ private:
+  const std::filesystem::path& file_;
+  std::string place_;
+  const nlohmann::json& value_;
+};
+
+/// A JSON file with its "format" checked.
+class JsonFile {
+ public:
+  /// @throws FileError, FormatError
+  JsonFile(std::filesystem::path file, const std::string& format);
+  JsonFile(const JsonFile&) = delete;
+  JsonFile& operator=(const JsonFile&) = delete;
+  JsonNode root() const { return {file_, "/", value_}; }
+
+ private:
+  std::filesystem::path file_;
+  nlohmann::json value_;
+};
+
+}  // namespace stageid

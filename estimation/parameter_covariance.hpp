@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "estimation/arrow_system.hpp"
+
+namespace stageid {
+
+struct ParameterCovariance {
+  Eigen::MatrixXd globals;            ///< of denominator coefficients and delays
+  Eigen::MatrixXd response_variance;  ///< E|dP|^2, n_c x N
+  double residual_scale = 1.0;  ///< what variances were multiplied with (unknown or too small)
+};
+
+/// What is known about the data's variance.
+enum class VarianceKnowledge : std::uint8_t {
+  weights,  ///< W is its inverse: maximum likelihood
+  given,    ///< another variance than the weights': sandwich form
+  none      ///< proportional to 1/W, scaled by the residual
+};
+
+/// First-order covariance of the estimate. With M = sum Re{J^H W J} and K = sum Re{J^H W C W J},
+///   Cov(beta) = 1/2 M^-1 K M^-1,   which is [2 sum Re{J^H C^-1 J}]^-1 for W = C^-1
+/// (facts.md section 10), restricted to what is wanted by the arrow structure.
+/// Where W is the inverse variance but the residual is clearly larger than it predicts, the
+/// covariance is raised by that ratio (`residual_scale`).
+/// @param gn the Gauss-Newton system at the estimate
+ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
+                                         const std::vector<BasisGroup>& groups, const Residual& E,
+                                         const ArrowSystem& gn, VarianceKnowledge knowledge,
+                                         const Eigen::MatrixXd& variance);
+
+}  // namespace stageid

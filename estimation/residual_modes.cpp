@@ -1,0 +1,151 @@
+#include "estimation/residual_modes.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "estimation/basis.hpp"
+#include "estimation/fit_problem.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kDampings[] = {0.002, 0.006, 0.02, 0.06};
+constexpr double kBelowBand = 0.5;  // candidates reach beyond the band's ends by these factors
+constexpr double kAboveBand = 1.8;
+constexpr double kLeastOwnShare = 0.02;
+constexpr Eigen::Index kBlock = 64;
+
+/// Frequencies a fraction of the half-power width apart, not finer than the lines.
+std::vector<ModeCandidate> candidate_grid(const FrfEstimate& frf, const AdditiveModel& model) {
+  const double low = kBelowBand * frf.frequency_hz[0];
+  double high = kAboveBand * frf.frequency_hz[frf.lines() - 1];
+  if (model.hold == HoldModel::exact) high = std::min(high, 0.48 * frf.sample_rate_hz);
+  const double spacing = frf.lines() > 1
+                             ? (frf.frequency_hz[frf.lines() - 1] - frf.frequency_hz[0]) /
+                                   static_cast<double>(frf.lines() - 1)
+                             : low;
+  std::vector<ModeCandidate> grid;
+  for (const double zeta : kDampings)
+    for (double f = low; f <= high; f += std::max(0.7 * zeta * f, 0.5 * spacing)) {
+      const bool outside = f < frf.frequency_hz[0] || f > frf.frequency_hz[frf.lines() - 1];
+      if (outside && zeta < 0.02) continue;  // its width cannot be seen from inside
+      grid.push_back({f, zeta, 1});
+    }
+  return grid;
+}
+
+/// The candidate on the lines, hold and mean delay as factors: good enough to score.
+Eigen::VectorXcd candidate_function(const Eigen::VectorXd& f, const Eigen::VectorXcd& factor,
+                                    const ModeCandidate& mode) {
+  Eigen::VectorXcd out(f.size());
+  for (Eigen::Index k = 0; k < f.size(); ++k) {
+    const double x = f[k] / mode.frequency_hz;
+    out[k] = factor[k] / std::complex<double>(1.0 - x * x, 2.0 * mode.damping_ratio * x);
+  }
+  return out;
+}
+
+Eigen::VectorXcd delay_factor(const FrfEstimate& frf, const AdditiveModel& model) {
+  double delay = model.input_delay_s.size() > 0
+                     ? model.input_delay_s.mean() + model.output_delay_s.mean()
+                     : 0.0;
+  if (model.hold != HoldModel::none) delay += 0.5 / frf.sample_rate_hz;
+  const Eigen::VectorXd omega = frf.omega_rad_s();
+  Eigen::VectorXcd out(omega.size());
+  for (Eigen::Index k = 0; k < out.size(); ++k) out[k] = std::polar(1.0, -omega[k] * delay);
+  return out;
+}
+
+/// Orthonormal columns spanning the model's own functions under the mean weights; real and
+/// imaginary parts stacked, 2N x n.
+Eigen::MatrixXd own_functions(const FrfEstimate& frf, const AdditiveModel& model,
+                              const Eigen::VectorXcd& factor, const Eigen::VectorXd& root_weight) {
+  std::vector<Eigen::VectorXcd> functions;
+  for (const Submodel& s : model.submodels) {
+    if (s.is_mode()) {
+      functions.push_back(candidate_function(frf.frequency_hz, factor,
+                                             {s.natural_frequency_hz(), s.damping_ratio(), 1}));
+    } else if (s.integrators == 2) {
+      functions.push_back(
+          factor.cwiseQuotient(frf.frequency_hz.cwiseAbs2().cast<std::complex<double>>()));
+    } else if (s.denominator.size() == 1) {
+      functions.push_back(factor);
+    }
+  }
+  const Eigen::Index N = frf.lines();
+  Eigen::MatrixXd columns(2 * N, static_cast<Eigen::Index>(functions.size()));
+  for (std::size_t i = 0; i < functions.size(); ++i) {
+    const auto c = static_cast<Eigen::Index>(i);
+    columns.col(c).head(N) = functions[i].real().cwiseProduct(root_weight);
+    columns.col(c).tail(N) = functions[i].imag().cwiseProduct(root_weight);
+    columns.col(c).normalize();
+  }
+  if (columns.cols() == 0) return columns;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(columns);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(2 * N, columns.cols());
+}
+
+}  // namespace
+
+std::vector<ResidualMode> residual_modes(const FrfEstimate& frf, const AdditiveModel& model,
+                                         const Eigen::MatrixXd& weights, std::size_t most,
+                                         int threads) {
+  const Eigen::MatrixXcd E = frf.response - response(model, frf.frequency_hz, model.hold);
+  const Eigen::Index N = frf.lines();
+  Eigen::MatrixXd WE(weights.rows(), 2 * N);
+  WE << weights.cwiseProduct(E.real()), weights.cwiseProduct(E.imag());
+  // Channels of very different size count alike in the mean.
+  const Eigen::VectorXd channel_scale = weights.rowwise().mean().cwiseInverse();
+  const Eigen::VectorXd root_weight =
+      (channel_scale.asDiagonal() * weights).colwise().mean().cwiseSqrt().transpose();
+  const Eigen::VectorXcd factor = delay_factor(frf, model);
+  const Eigen::MatrixXd own = own_functions(frf, model, factor, root_weight);
+
+  const std::vector<ModeCandidate> grid = candidate_grid(frf, model);
+  std::vector<ResidualMode> scored(grid.size());
+  const auto blocks = static_cast<int>((grid.size() + kBlock - 1) / kBlock);
+  parallel_tasks(blocks, threads, [&](int block) {
+    const auto first = static_cast<Eigen::Index>(block) * kBlock;
+    const Eigen::Index count =
+        std::min<Eigen::Index>(kBlock, static_cast<Eigen::Index>(grid.size()) - first);
+    Eigen::MatrixXd phi(2 * N, count);
+    Eigen::MatrixXd power(N, count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Eigen::VectorXcd x =
+          candidate_function(frf.frequency_hz, factor, grid[static_cast<std::size_t>(first + i)]);
+      phi.col(i) << x.real(), x.imag();
+      power.col(i) = x.cwiseAbs2();
+    }
+    const Eigen::MatrixXd correlation = WE * phi;
+    const Eigen::MatrixXd norm = weights * power;
+    phi.topRows(N).array().colwise() *= root_weight.array();
+    phi.bottomRows(N).array().colwise() *= root_weight.array();
+    const Eigen::VectorXd total = phi.colwise().squaredNorm().transpose();
+    const Eigen::VectorXd imitated = (own.transpose() * phi).colwise().squaredNorm().transpose();
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const double raw =
+          (correlation.col(i).array().square() / norm.col(i).array().max(1e-300)).sum();
+      const double share =
+          own.cols() > 0 ? std::max(1.0 - imitated[i] / total[i], kLeastOwnShare) : 1.0;
+      scored[static_cast<std::size_t>(first + i)] = {grid[static_cast<std::size_t>(first + i)],
+                                                     raw / share};
+    }
+  });
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const ResidualMode& a, const ResidualMode& b) { return a.gain > b.gain; });
+  std::vector<ResidualMode> best;
+  for (const ResidualMode& candidate : scored) {
+    if (best.size() == most) break;
+    const bool taken = std::any_of(best.begin(), best.end(), [&](const ResidualMode& other) {
+      const double width = 2.0 * std::max(candidate.mode.damping_ratio, other.mode.damping_ratio) *
+                           other.mode.frequency_hz;
+      return std::abs(candidate.mode.frequency_hz - other.mode.frequency_hz) < width;
+    });
+    if (!taken) best.push_back(candidate);
+  }
+  return best;
+}
+
+}  // namespace stageid
