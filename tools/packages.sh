@@ -1,0 +1,46 @@
+# The Debian packages that the scripts need, and how they are installed: the only list there is.
+# Sourced by tools/quickstart and tools/test.
+
+# To build and run the program.
+build_packages="g++ cmake ninja-build pkg-config
+  libeigen3-dev libfftw3-dev libhdf5-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev
+  libfmt-dev libxxhash-dev libjs-dygraphs"
+
+# What the tests need beside that: the references in Python, the report in a browser, the format.
+test_packages="libgtest-dev libgmock-dev libbenchmark-dev
+  python3 python3-numpy python3-scipy python3-h5py chromium clang-format git"
+
+# Only for tools/test --tidy.
+tidy_packages="clang-tidy"
+
+# install_packages NAME...: installs what is missing; calls apt-get only if something is.
+install_packages() {
+  local missing="" package
+  command -v dpkg-query > /dev/null ||
+    fail "this script installs Debian packages; on another system install the likes of: $*"
+  for package in "$@"; do
+    [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2> /dev/null)" = installed ] ||
+      missing="$missing $package"
+  done
+  [ -n "$missing" ] || return 0
+
+  local as_root=""
+  if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo > /dev/null ||
+      fail "packages are missing and there is no sudo; as root: apt-get install --no-install-recommends$missing"
+    as_root="sudo"
+  fi
+  say "Installing:$missing"
+  # $missing and $as_root are word lists on purpose.
+  # shellcheck disable=SC2086
+  $as_root apt-get -q update &&
+    $as_root env DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends $missing ||
+    fail "apt-get could not install:$missing"
+}
+
+say() { printf '\n== %s\n' "$*" >&2; }
+
+fail() {
+  printf '%s: %s\n' "${0##*/}" "$*" >&2
+  exit 1
+}
