@@ -9,7 +9,8 @@
 
 namespace stageid {
 
-/// Whether the response still contains a zero-order hold (and sampler), as measured by a digital loop.
+/// Whether the response still contains a zero-order hold (and sampler), as measured by a digital
+/// loop.
 enum class Hold : std::uint8_t { none, zoh };
 
 /// What was divided out of the response: nothing; e^{-j omega delay_s}; or the delay and the hold's
@@ -28,7 +29,8 @@ struct FrfEstimate {
 
   /// E|dG|^2 of the response given (the mean), same shape; empty (0 x 0) if unknown.
   Eigen::MatrixXd noise_variance;  ///< from periods: what repeating the same phases would give
-  Eigen::MatrixXd total_variance;  ///< from realizations: noise and stochastic nonlinear contributions
+  Eigen::MatrixXd
+      total_variance;  ///< from realizations: noise and stochastic nonlinear contributions
 
   double sample_rate_hz = 0.0;  ///< 0: unknown
   Hold hold = Hold::none;
@@ -36,14 +38,14 @@ struct FrfEstimate {
   double delay_s = 0.0;  ///< what `compensated` took out (without the hold's own T/2)
 
   int realizations = 0;
-  int periods = 0;            ///< used, of each run
+  int periods = 0;  ///< used, of each run
   int experiments = 0;
-  double noise_dof = 0.0;     ///< degrees of freedom of noise_variance: M E (P-1), see plant_frf.hpp
-  double total_dof = 0.0;     ///< M - 1
+  double noise_dof = 0.0;  ///< degrees of freedom of noise_variance: M E (P-1), see plant_frf.hpp
+  double total_dof = 0.0;  ///< M - 1
   Eigen::VectorXd input_condition;         ///< N: cond(U(k)), 1 is perfect; empty if unknown
   Eigen::MatrixXd residual_covariance_re;  ///< (n_y n_y) x N: C_E, Hermitian, per experiment and
   Eigen::MatrixXd residual_covariance_im;  ///<   the mean of periods; empty if unknown
-  Eigen::MatrixXcd covariance;             ///< (n_c n_c) x N on request, n_c = n_y n_u: Cov(vec G); else empty
+  Eigen::MatrixXcd covariance;  ///< (n_c n_c) x N on request, n_c = n_y n_u: Cov(vec G); else empty
   std::vector<std::string> excluded_channels;  ///< actuators outside the sub-plant
   Eigen::VectorXd excluded_power;              ///< their excited-line power over that of the inputs
   std::string provenance_json = "{}";          ///< inputs (hash), configuration, version, seeds

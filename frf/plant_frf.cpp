@@ -1,0 +1,277 @@
+#include "frf/plant_frf.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <utility>
+
+#include "excitation/frequency_grid.hpp"
+#include "frf/channel_choice.hpp"
+#include "frf/excitation_spectrum.hpp"
+#include "frf/frf_provenance.hpp"
+#include "frf/plant_average.hpp"
+#include "frf/realization_spectra.hpp"
+#include "frf/run_spectra.hpp"
+#include "frf/run_table.hpp"
+#include "frf/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+/// One run's excitation: the period as recorded and its spectrum.
+struct RunExcitation {
+  Eigen::MatrixXd period;
+  ExcitationSpectrum spectrum;
+};
+
+/// What the first realization fixes for all: lines and axes.
+struct ExcitedPart {
+  std::vector<int> lines;
+  std::vector<Eigen::Index> axes;
+};
+
+/// Tells FrfOptions::progress how many bytes are done, from one thread at a time.
+class ByteCounter {
+ public:
+  ByteCounter(const FrfOptions& options, const std::vector<RealizationRuns>& realizations)
+      : tell_(options.progress) {
+    for (const RealizationRuns& realization : realizations) {
+      for (const UsedRun& used : realization.runs) {
+        const LogInfo& info = used.log->info();
+        total_ += static_cast<double>(used.periods) * info.period_samples *
+                  static_cast<double>(info.actuators.size() + info.sensors.size()) * sizeof(double);
+      }
+    }
+  }
+  void add(double bytes) {
+    if (!tell_) return;
+    const std::lock_guard lock(mutex_);
+    done_ += bytes;
+    tell_(done_, total_);
+  }
+
+ private:
+  const std::function<void(double, double)>& tell_;
+  std::mutex mutex_;
+  double done_ = 0.0;
+  double total_ = 0.0;
+};
+
+/// The estimate in the making: reads realization by realization, threads over the runs of one.
+class PlantEstimation {
+ public:
+  PlantEstimation(std::vector<RealizationRuns> realizations, const FrfOptions& options)
+      : realizations_(std::move(realizations)),
+        options_(options),
+        info_(realizations_.front().runs.front().log->info()),
+        workers_(worker_count(options.threads)),
+        bytes_(options_, realizations_) {
+    const std::size_t most =
+        std::max_element(realizations_.begin(), realizations_.end(),
+                         [](const auto& a, const auto& b) { return a.runs.size() < b.runs.size(); })
+            ->runs.size();
+    // No more workspaces than there is work for: each holds a period of samples.
+    run_workers_ = static_cast<int>(std::min(static_cast<std::size_t>(workers_), most));
+    for (int w = 0; w < run_workers_; ++w) {
+      workspaces_.push_back(std::make_unique<RunWorkspace>(info_.period_samples));
+    }
+  }
+
+  FrfEstimate estimate();
+
+ private:
+  std::vector<RunExcitation> read_excitation(const RealizationRuns& realization);
+  ExcitedPart excited_part(const RealizationRuns& realization,
+                           const std::vector<RunExcitation>& excitation) const;
+  void check_excitation(const RealizationRuns& realization,
+                        const std::vector<RunExcitation>& excitation) const;
+  RealizationSpectra measure(const RealizationRuns& realization,
+                             const std::vector<RunExcitation>& excitation);
+  void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra,
+                    FrfProvenance& provenance);
+  FrfEstimate describe() const;
+
+  std::vector<RealizationRuns> realizations_;
+  const FrfOptions& options_;
+  const LogInfo& info_;
+  int workers_;
+  int run_workers_ = 1;
+  ByteCounter bytes_;
+  std::vector<std::unique_ptr<RunWorkspace>> workspaces_;
+  ExcitedPart excited_;
+  ChannelChoice channels_;
+  int fewest_periods_ = std::numeric_limits<int>::max();
+  double input_power_ = 0.0;
+  Eigen::VectorXd excluded_power_;
+};
+
+std::vector<RunExcitation> PlantEstimation::read_excitation(const RealizationRuns& realization) {
+  std::vector<RunExcitation> excitation(realization.runs.size());
+  for_each_task(run_workers_, realization.runs.size(), [&](int worker, std::size_t e) {
+    const UsedRun& used = realization.runs[e];
+    excitation[e].period = used.log->excitation(used.index);
+    if (excitation[e].period.rows() != info_.period_samples) {
+      throw std::invalid_argument(
+          fmt::format("{}/excitation: {} samples; one period of {} belongs there", used.place(),
+                      excitation[e].period.rows(), info_.period_samples));
+    }
+    excitation[e].spectrum = excitation_spectrum(
+        excitation[e].period, workspaces_[static_cast<std::size_t>(worker)]->dft);
+  });
+  return excitation;
+}
+
+ExcitedPart PlantEstimation::excited_part(const RealizationRuns& realization,
+                                          const std::vector<RunExcitation>& excitation) const {
+  ExcitedPart part{excitation.front().spectrum.lines, {}};
+  if (part.lines.empty()) {
+    throw std::invalid_argument(
+        fmt::format("{}/excitation: nothing is excited; the indirect method needs "
+                    "the signal that was added in the loop",
+                    realization.runs.front().place()));
+  }
+  for (const RunExcitation& run : excitation) {
+    part.axes.insert(part.axes.end(), run.spectrum.channels.begin(), run.spectrum.channels.end());
+  }
+  std::sort(part.axes.begin(), part.axes.end());
+  part.axes.erase(std::unique(part.axes.begin(), part.axes.end()), part.axes.end());
+  return part;
+}
+
+void PlantEstimation::check_excitation(const RealizationRuns& realization,
+                                       const std::vector<RunExcitation>& excitation) const {
+  for (std::size_t e = 0; e < excitation.size(); ++e) {
+    const ExcitationSpectrum& spectrum = excitation[e].spectrum;
+    const std::string place = realization.runs[e].place() + "/excitation";
+    if (spectrum.lines != excited_.lines) {
+      std::vector<int> differing;
+      std::set_symmetric_difference(spectrum.lines.begin(), spectrum.lines.end(),
+                                    excited_.lines.begin(), excited_.lines.end(),
+                                    std::back_inserter(differing));
+      const double resolution_hz = info_.sample_rate_hz / info_.period_samples;
+      throw std::invalid_argument(fmt::format(
+          "{}: {} lines are excited here and {} in {}, line {} ({} Hz) in one only; all runs must "
+          "excite the same lines",
+          place, spectrum.lines.size(), excited_.lines.size(),
+          realizations_.front().runs.front().place(), differing.front(),
+          differing.front() * resolution_hz));
+    }
+    for (const Eigen::Index axis : spectrum.channels) {
+      if (std::binary_search(excited_.axes.begin(), excited_.axes.end(), axis)) continue;
+      throw std::invalid_argument(fmt::format(
+          "{}: channel {} is excited here and never in realization {}; all realizations must "
+          "excite the same axes",
+          place, info_.excitation.names[static_cast<std::size_t>(axis)],
+          realizations_.front().realization));
+    }
+  }
+}
+
+RealizationSpectra PlantEstimation::measure(const RealizationRuns& realization,
+                                            const std::vector<RunExcitation>& excitation) {
+  std::vector<Eigen::MatrixXcd> R;
+  for (const RunExcitation& run : excitation) {
+    R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
+  }
+  RealizationSpectra spectra(realization.realization, std::move(R));
+  std::mutex mutex;
+  for_each_task(run_workers_, realization.runs.size(), [&](int worker, std::size_t e) {
+    RunSpectra run =
+        measure_run(realization.runs[e], excited_.lines, channels_, excitation[e].period,
+                    *workspaces_[static_cast<std::size_t>(worker)],
+                    [this](double bytes) { bytes_.add(bytes); });
+    const std::lock_guard lock(mutex);
+    spectra.add(e, std::move(run));
+  });
+  return spectra;
+}
+
+void PlantEstimation::note_quality(const RealizationRuns& realization,
+                                   const RealizationSpectra& spectra, FrfProvenance& provenance) {
+  const auto inputs = static_cast<Eigen::Index>(channels_.estimated.size());
+  for (std::size_t e = 0; e < realization.runs.size(); ++e) {
+    const RunSpectra& run = spectra.run(e);
+    provenance.add(realization.runs[e], run.fingerprint);
+    fewest_periods_ = std::min(fewest_periods_, run.periods);
+    for (Eigen::Index k = 0; k < run.mean.cols(); ++k) {
+      for (Eigen::Index i = run.mean.rows() - inputs; i < run.mean.rows(); ++i) {
+        input_power_ += std::norm(run.mean(i, k));
+      }
+    }
+    excluded_power_ += run.excluded_power;
+  }
+}
+
+FrfEstimate PlantEstimation::describe() const {
+  FrfEstimate frf;
+  for (const Eigen::Index i : channels_.outputs) {
+    frf.outputs.names.push_back(info_.sensors.names[static_cast<std::size_t>(i)]);
+    frf.outputs.units.push_back(info_.sensors.units[static_cast<std::size_t>(i)]);
+  }
+  for (const Eigen::Index i : channels_.estimated) {
+    frf.inputs.names.push_back(info_.actuators.names[static_cast<std::size_t>(i)]);
+    frf.inputs.units.push_back(info_.actuators.units[static_cast<std::size_t>(i)]);
+  }
+  for (const Eigen::Index i : channels_.excluded) {
+    frf.excluded_channels.push_back(info_.actuators.names[static_cast<std::size_t>(i)]);
+  }
+  frf.excluded_power = excluded_power_ / input_power_;
+  frf.sample_rate_hz = info_.sample_rate_hz;
+  frf.hold = Hold::zoh;
+  frf.periods = fewest_periods_;
+  frf.experiments = static_cast<int>(realizations_.front().runs.size());
+  return frf;
+}
+
+FrfEstimate PlantEstimation::estimate() {
+  std::unique_ptr<PlantAverage> average;
+  std::unique_ptr<FrfProvenance> provenance;
+  for (const RealizationRuns& realization : realizations_) {
+    const std::vector<RunExcitation> excitation = read_excitation(realization);
+    if (!average) {
+      excited_ = excited_part(realization, excitation);
+      channels_ = choose_channels(info_, excited_.axes, realization.runs.size(),
+                                  realization.realization, options_);
+      const FrequencyGrid grid(info_.sample_rate_hz, info_.period_samples, excited_.lines);
+      average = std::make_unique<PlantAverage>(
+          grid.frequency_hz(), excited_.lines, static_cast<Eigen::Index>(channels_.outputs.size()),
+          static_cast<Eigen::Index>(channels_.estimated.size()), options_.covariance);
+      provenance = std::make_unique<FrfProvenance>(info_, options_, channels_);
+      excluded_power_.setZero(static_cast<Eigen::Index>(channels_.excluded.size()));
+    }
+    check_excitation(realization, excitation);
+    if (realization.runs.size() < excited_.axes.size()) {
+      throw std::invalid_argument(
+          fmt::format("{} excited axes but only {} experiments in realization {}; "
+                      "leave this realization out",
+                      excited_.axes.size(), realization.runs.size(), realization.realization));
+    }
+    const RealizationSpectra spectra = measure(realization, excitation);
+    note_quality(realization, spectra, *provenance);
+    average->add(spectra, workers_);
+  }
+  FrfEstimate frf = describe();
+  average->finish(frf, workers_);
+  frf.provenance_json = provenance->json();
+  if (channels_.inputs == frf.inputs.names) return frf;
+  return select_channels(frf, channels_.inputs, frf.outputs.names);
+}
+
+}  // namespace
+
+FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
+                               const FrfOptions& options) {
+  if (options.method == FrfMethod::lpm) {
+    throw std::invalid_argument(
+        "method: 'lpm' is not available yet in this version; use 'periodic' with transient "
+        "periods");
+  }
+  PlantEstimation estimation(choose_runs(logs, options), options);
+  return estimation.estimate();
+}
+
+}  // namespace stageid

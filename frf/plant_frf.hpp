@@ -14,14 +14,15 @@ enum class FrfMethod : std::uint8_t { periodic, lpm };
 enum class CovarianceKind : std::uint8_t { diagonal, full };
 
 struct FrfOptions {
-  std::vector<std::string> inputs;   ///< actuator names; empty: those that are excited
-  std::vector<std::string> outputs;  ///< sensor names; empty: all
+  std::vector<std::string> inputs;       ///< actuator names; empty: those that are excited
+  std::vector<std::string> outputs;      ///< sensor names; empty: all
   std::optional<int> transient_periods;  ///< instead of the log's own
   FrfMethod method = FrfMethod::periodic;
   CovarianceKind covariance = CovarianceKind::diagonal;
   std::vector<int> realizations;  ///< which (0-based); empty: all complete ones
   int threads = 0;                ///< 0: as many as cores; the result does not depend on it
-  std::function<void(double done, double total)> progress;  ///< bytes; called from one thread at a time
+  std::function<void(double done, double total)>
+      progress;  ///< bytes; called from one thread at a time
 };
 
 /// Estimates the plant from closed-loop logs by the indirect method.
@@ -29,16 +30,17 @@ struct FrfOptions {
 /// For realization m, with Z = [Y; U] at the excited lines, averaged over the periods after the
 /// transient, Z_m = Z R^-1 over the n_r experiments, and
 ///   G = (mean_m Y_m) (mean_m U_m)^-1.
-/// Variances by first-order propagation, vec(dG) = (U^-T kron [I, -G]) vec(dZ): noise from the scatter
-/// over periods, total from the scatter over realizations. Both are of the mean. With one measured
-/// period noise_variance is empty, with one realization total_variance is.
-/// Incomplete runs are passed over; of several complete runs of one (realization, experiment) the last
-/// counts. Periods with a marked sample are dropped.
+/// Variances by first-order propagation, vec(dG) = (U^-T kron [I, -G]) vec(dZ): noise from the
+/// scatter over periods, total from the scatter over realizations. Both are of the mean. With one
+/// measured period noise_variance is empty, with one realization total_variance is. Incomplete runs
+/// are passed over; of several complete runs of one (realization, experiment) the last counts.
+/// Periods with a marked sample are dropped.
 ///
 /// Memory: bounded by one period per thread plus spectra of one realization.
 /// Source: method.md section 3; Pintelon and Schoukens, System Identification (2012).
 /// @throws std::invalid_argument / FormatError: fewer experiments than inputs, singular excitation
 ///         (names line and frequency), a period that does not divide the record, channels unknown.
-FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs, const FrfOptions& options = {});
+FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
+                               const FrfOptions& options = {});
 
 }  // namespace stageid

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+namespace stageid {
+
+enum class LineStatus : std::uint8_t { good, singular_excitation, singular_inputs };
+
+/// One realization on one line. Symbols: R axes x E, Z = [Y; U] (n_y + n_u) x E, n_u = axes <= E.
+struct LineEstimate {
+  LineStatus status = LineStatus::good;
+  Eigen::MatrixXcd Z_by_R;       ///< Z R^+, (n_y + n_u) x axes; of least squares if E > axes
+  Eigen::MatrixXcd Q;            ///< E x n_u, G = Y Q: U^-1 if E = n_u, else R^+ (U R^+)^-1
+  Eigen::MatrixXcd G;            ///< n_y x n_u
+  double input_condition = 0.0;  ///< |U| |Q| in the spectral norm: cond(U) if E = n_u
+};
+
+LineEstimate estimate_line(const Eigen::MatrixXcd& R, const Eigen::MatrixXcd& Z,
+                           Eigen::Index outputs);
+
+/// First-order noise covariance of one realization's G on one line.
+///
+/// dG = sum_e dE_e (row e of Q), dE = [I, -G] dZ, so with q_e that row written as a column
+///   Cov(vec G) = sum_e (q_e q_e^H) kron C_Ee = A kron C_E,  A = sum_e q_e q_e^H / P_e,
+/// where C_E, the covariance of one period's dE, is pooled over the experiments: in the loop
+/// dE is the open-loop noise, whatever was excited (facts: dY = S v, dU = -K S v, dE = v).
+/// Complex variances are E|v|^2, without a factor 1/2.
+struct LineNoise {
+  Eigen::MatrixXcd input_part;   ///< A, n_u x n_u
+  Eigen::MatrixXcd residual;     ///< C_E of one period, n_y x n_y
+  double mean_of_periods = 1.0;  ///< mean over the experiments of 1 / P_e
+};
+
+/// `scatter`: sum over experiments and periods of dZ dZ^H, with `dof` degrees of freedom;
+/// `periods`: P_e, a value an experiment.
+LineNoise line_noise(const LineEstimate& estimate, const Eigen::MatrixXcd& scatter, int dof,
+                     const Eigen::VectorXd& periods);
+
+}  // namespace stageid

@@ -1,0 +1,152 @@
+#include "frf/plant_average.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "frf/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kLinesATask = 64;
+
+void for_each_line(int workers, Eigen::Index lines, const std::function<void(Eigen::Index)>& work) {
+  const auto tasks = static_cast<std::size_t>((lines + kLinesATask - 1) / kLinesATask);
+  for_each_task(workers, tasks, [&](int, std::size_t task) {
+    const Eigen::Index first = static_cast<Eigen::Index>(task) * kLinesATask;
+    for (Eigen::Index k = first; k < std::min(first + kLinesATask, lines); ++k) work(k);
+  });
+}
+
+/// Column k of columns that are vec of a matrix with `rows` rows.
+Eigen::Map<Eigen::MatrixXcd> unvec(Eigen::MatrixXcd& columns, Eigen::Index k, Eigen::Index rows) {
+  return {columns.col(k).data(), rows, columns.rows() / rows};
+}
+
+[[noreturn]] void refuse(LineStatus status, int realization, int line, double frequency_hz) {
+  const std::string where =
+      fmt::format("realization {}, line {} ({} Hz)", realization, line, frequency_hz);
+  if (status == LineStatus::singular_excitation) {
+    throw std::invalid_argument(
+        fmt::format("singular excitation in {}: the axes are not excited independently of each "
+                    "other; excite one axis an "
+                    "experiment, or all with orthogonal phases",
+                    where));
+  }
+  throw std::invalid_argument(fmt::format(
+      "singular inputs in {}: the selected actuators do not move independently of each other; "
+      "select other inputs, or excite at the actuators",
+      where));
+}
+
+}  // namespace
+
+PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
+                           Eigen::Index outputs, Eigen::Index inputs, CovarianceKind covariance)
+    : frequency_hz_(std::move(frequency_hz)),
+      lines_(std::move(lines)),
+      outputs_(outputs),
+      inputs_(inputs),
+      covariance_kind_(covariance) {
+  const Eigen::Index N = frequency_hz_.size();
+  const Eigen::Index n_c = outputs * inputs;
+  Z_sum_.setZero((outputs + inputs) * inputs, N);
+  G_mean_.setZero(n_c, N);
+  G_scatter_.setZero(n_c, N);
+  noise_sum_.setZero(n_c, N);
+  residual_sum_.setZero(outputs * outputs, N);
+  if (covariance == CovarianceKind::full) covariance_sum_.setZero(n_c * n_c, N);
+  condition_.setZero(N);
+}
+
+void PlantAverage::add(const RealizationSpectra& spectra, int workers) {
+  ++realizations_;
+  noise_known_ = noise_known_ && spectra.scatter_dof() > 0;
+  noise_dof_ += spectra.scatter_dof();
+  Eigen::VectorXd periods(spectra.experiments());
+  for (Eigen::Index e = 0; e < periods.size(); ++e) {
+    periods[e] = spectra.periods(static_cast<std::size_t>(e));
+  }
+  for_each_line(workers, frequency_hz_.size(),
+                [&](Eigen::Index k) { add_line(spectra, periods, k); });
+}
+
+void PlantAverage::add_line(const RealizationSpectra& spectra, const Eigen::VectorXd& periods,
+                            Eigen::Index k) {
+  const LineEstimate line = estimate_line(spectra.excitation(k), spectra.response(k), outputs_);
+  if (line.status != LineStatus::good) {
+    refuse(line.status, spectra.realization(), lines_[static_cast<std::size_t>(k)],
+           frequency_hz_[k]);
+  }
+  unvec(Z_sum_, k, outputs_ + inputs_) += line.Z_by_R;
+  condition_[k] = std::max(condition_[k], line.input_condition);
+
+  // Welford again: mean and scatter of the realizations' own estimates.
+  for (Eigen::Index c = 0; c < G_mean_.rows(); ++c) {
+    const std::complex<double> deviation = line.G.data()[c] - G_mean_(c, k);
+    G_mean_(c, k) += deviation / static_cast<double>(realizations_);
+    G_scatter_(c, k) += (1.0 - 1.0 / realizations_) * std::norm(deviation);
+  }
+  if (noise_known_) {
+    add_noise(line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods), k);
+  }
+}
+
+void PlantAverage::add_noise(const LineNoise& noise, Eigen::Index k) {
+  unvec(residual_sum_, k, outputs_) += noise.mean_of_periods * noise.residual;
+  for (Eigen::Index j = 0; j < inputs_; ++j) {
+    for (Eigen::Index i = 0; i < outputs_; ++i) {
+      noise_sum_(i + outputs_ * j, k) +=
+          noise.input_part(j, j).real() * noise.residual(i, i).real();
+    }
+  }
+  if (covariance_kind_ != CovarianceKind::full) return;
+  Eigen::Map<Eigen::MatrixXcd> covariance = unvec(covariance_sum_, k, outputs_ * inputs_);
+  for (Eigen::Index j = 0; j < inputs_; ++j) {
+    for (Eigen::Index i = 0; i < inputs_; ++i) {
+      covariance.block(i * outputs_, j * outputs_, outputs_, outputs_) +=
+          noise.input_part(i, j) * noise.residual;
+    }
+  }
+}
+
+void PlantAverage::finish(FrfEstimate& frf, int workers) const {
+  const double M = realizations_;
+  frf.frequency_hz = frequency_hz_;
+  frf.realizations = realizations_;
+  frf.input_condition = condition_;
+  frf.response.resize(outputs_ * inputs_, frequency_hz_.size());
+  for_each_line(workers, frequency_hz_.size(), [&](Eigen::Index k) { finish_line(frf, k); });
+
+  if (realizations_ >= 2) {
+    frf.total_variance = G_scatter_ / (M * (M - 1.0));
+    frf.total_dof = M - 1.0;
+  }
+  if (!noise_known()) {
+    if (covariance_kind_ == CovarianceKind::full) {
+      throw std::invalid_argument(
+          "covariance: the full covariance comes from the scatter over periods, and there is only "
+          "one clean "
+          "period; measure two, or ask for the diagonal");
+    }
+    return;
+  }
+  frf.noise_dof = noise_dof_;
+  frf.noise_variance = noise_sum_ / (M * M);
+  frf.residual_covariance_re = residual_sum_.real() / M;
+  frf.residual_covariance_im = residual_sum_.imag() / M;
+  if (covariance_kind_ == CovarianceKind::full) frf.covariance = covariance_sum_ / (M * M);
+}
+
+void PlantAverage::finish_line(FrfEstimate& frf, Eigen::Index k) const {
+  const Eigen::Map<const Eigen::MatrixXcd> Z(Z_sum_.col(k).data(), outputs_ + inputs_, inputs_);
+  const Eigen::MatrixXcd Y = Z.topRows(outputs_);
+  const Eigen::MatrixXcd U = Z.bottomRows(inputs_);
+  unvec(frf.response, k, outputs_) = Y * U.partialPivLu().inverse();
+}
+
+}  // namespace stageid

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "frf/frf_estimate.hpp"
+#include "frf/line_estimate.hpp"
+#include "frf/plant_frf.hpp"
+#include "frf/realization_spectra.hpp"
+
+namespace stageid {
+
+/// Averages over realizations, one after the other: G = (mean_m Y_m)(mean_m U_m)^-1, Z_m = Z R^+,
+/// and the uncertainty of that mean.
+///   noise: C_n = sum_m C_n^[m] / M^2, each realization with its own U and G (memory stays
+///   bounded); total: sum_m |G^[m] - mean G|^2 / (M (M - 1)).
+class PlantAverage {
+ public:
+  PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines, Eigen::Index outputs,
+               Eigen::Index inputs, CovarianceKind covariance);
+
+  /// Lines are shared among `workers` threads; each line is worked on by one.
+  /// @throws std::invalid_argument "singular ..." naming realization, line and frequency.
+  void add(const RealizationSpectra& spectra, int workers);
+
+  /// Writes frequencies, response, variances, degrees of freedom, condition and covariances.
+  /// @throws std::invalid_argument if a full covariance is wanted and no noise could be seen.
+  void finish(FrfEstimate& frf, int workers) const;
+
+ private:
+  void add_line(const RealizationSpectra& spectra, const Eigen::VectorXd& periods, Eigen::Index k);
+  void add_noise(const LineNoise& noise, Eigen::Index k);
+  void finish_line(FrfEstimate& frf, Eigen::Index k) const;
+  bool noise_known() const noexcept { return realizations_ > 0 && noise_known_; }
+
+  Eigen::VectorXd frequency_hz_;
+  std::vector<int> lines_;
+  Eigen::Index outputs_;
+  Eigen::Index inputs_;
+  CovarianceKind covariance_kind_;
+
+  int realizations_ = 0;
+  bool noise_known_ = true;
+  double noise_dof_ = 0.0;
+  Eigen::MatrixXcd Z_sum_;           // vec(Z_m) x lines
+  Eigen::MatrixXcd G_mean_;          // vec(G) x lines, of the realizations' own estimates
+  Eigen::MatrixXd G_scatter_;        // sum |G^[m] - mean|^2
+  Eigen::MatrixXd noise_sum_;        // sum of the realizations' noise variances
+  Eigen::MatrixXcd residual_sum_;    // vec(C_E) of the mean of periods
+  Eigen::MatrixXcd covariance_sum_;  // vec(Cov(vec G)), on request
+  Eigen::VectorXd condition_;
+};
+
+}  // namespace stageid

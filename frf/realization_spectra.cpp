@@ -1,0 +1,63 @@
+#include "frf/realization_spectra.hpp"
+
+#include <utility>
+
+namespace stageid {
+
+RealizationSpectra::RealizationSpectra(int realization, std::vector<Eigen::MatrixXcd> excitation)
+    : realization_(realization),
+      excitation_(std::move(excitation)),
+      runs_(excitation_.size()),
+      arrived_(excitation_.size(), 0) {}
+
+void RealizationSpectra::add(std::size_t experiment, RunSpectra&& spectra) {
+  runs_[experiment] = std::move(spectra);
+  arrived_[experiment] = 1;
+  while (folded_ < runs_.size() && arrived_[folded_] != 0) fold(runs_[folded_++]);
+}
+
+void RealizationSpectra::fold(RunSpectra& spectra) {
+  if (spectra.periods >= 2) {
+    scatter_dof_ += spectra.periods - 1;
+    if (scatter_re_.size() == 0) {
+      scatter_re_ = std::move(spectra.scatter_re);
+      scatter_im_ = std::move(spectra.scatter_im);
+    } else {
+      scatter_re_ += spectra.scatter_re;
+      scatter_im_ += spectra.scatter_im;
+    }
+  }
+  spectra.scatter_re = Eigen::MatrixXd();
+  spectra.scatter_im = Eigen::MatrixXd();
+}
+
+Eigen::MatrixXcd RealizationSpectra::excitation(Eigen::Index k) const {
+  Eigen::MatrixXcd R(excitation_.front().rows(), experiments());
+  for (Eigen::Index e = 0; e < experiments(); ++e) {
+    R.col(e) = excitation_[static_cast<std::size_t>(e)].col(k);
+  }
+  return R;
+}
+
+Eigen::MatrixXcd RealizationSpectra::response(Eigen::Index k) const {
+  Eigen::MatrixXcd Z(runs_.front().mean.rows(), experiments());
+  for (Eigen::Index e = 0; e < experiments(); ++e) {
+    Z.col(e) = runs_[static_cast<std::size_t>(e)].mean.col(k);
+  }
+  return Z;
+}
+
+Eigen::MatrixXcd RealizationSpectra::scatter(Eigen::Index k) const {
+  const Eigen::Index n = runs_.front().mean.rows();
+  Eigen::MatrixXcd full(n, n);
+  Eigen::Index entry = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j, ++entry) {
+      full(i, j) = {scatter_re_(entry, k), scatter_im_(entry, k)};
+      full(j, i) = std::conj(full(i, j));
+    }
+  }
+  return full;
+}
+
+}  // namespace stageid

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "frf/excitation_spectrum.hpp"
+#include "frf/run_spectra.hpp"
+
+namespace stageid {
+
+/// The runs of one realization, gathered. Runs may arrive in any order: they are folded in the
+/// order of the experiments, so that the sums do not depend on which thread was faster, and their
+/// scatters, the largest part, are freed at once.
+class RealizationSpectra {
+ public:
+  /// `excitation`: R of each experiment, excited axes x lines.
+  RealizationSpectra(int realization, std::vector<Eigen::MatrixXcd> excitation);
+
+  /// One thread at a time.
+  void add(std::size_t experiment, RunSpectra&& spectra);
+
+  int realization() const noexcept { return realization_; }
+  Eigen::Index experiments() const noexcept { return static_cast<Eigen::Index>(runs_.size()); }
+
+  /// At line k, a column an experiment: R (axes x E) and Z = [Y; U] (n_y + n_u x E).
+  Eigen::MatrixXcd excitation(Eigen::Index k) const;
+  Eigen::MatrixXcd response(Eigen::Index k) const;
+
+  int periods(std::size_t experiment) const { return runs_[experiment].periods; }
+  const RunSpectra& run(std::size_t experiment) const { return runs_[experiment]; }
+
+  /// sum_e (P_e - 1): degrees of freedom of scatter().
+  int scatter_dof() const noexcept { return scatter_dof_; }
+  /// sum_e sum_p (Z_pe - Z_e)(Z_pe - Z_e)^H at line k, full Hermitian matrix.
+  Eigen::MatrixXcd scatter(Eigen::Index k) const;
+
+ private:
+  void fold(RunSpectra& spectra);
+
+  int realization_;
+  std::vector<Eigen::MatrixXcd> excitation_;
+  std::vector<RunSpectra> runs_;
+  std::vector<char> arrived_;
+  std::size_t folded_ = 0;
+  Eigen::MatrixXd scatter_re_;
+  Eigen::MatrixXd scatter_im_;
+  int scatter_dof_ = 0;
+};
+
+}  // namespace stageid

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "excitation/dft.hpp"
+#include "frf/channel_choice.hpp"
+#include "frf/run_table.hpp"
+
+namespace stageid {
+
+/// Spectra Z = [Y; U] of one run on the excited lines: DFT / samples, averaged over the clean
+/// periods.
+struct RunSpectra {
+  Eigen::MatrixXcd mean;  ///< (n_y + n_u) x lines
+  /// sum_p (Z_p - Z)(Z_p - Z)^H, lower half: a column a line, entry (i, j <= i) at row i (i + 1) /
+  /// 2 + j; empty if one period was recorded.
+  Eigen::MatrixXd scatter_re;
+  Eigen::MatrixXd scatter_im;
+  int periods = 0;                 ///< clean ones
+  Eigen::VectorXd excluded_power;  ///< sum over the lines of |U|^2 of the excluded actuators
+  std::string fingerprint;         ///< of the excitation and of every sample used
+};
+
+/// What one thread needs again and again: a plan, one period of samples, one period's spectra.
+struct RunWorkspace {
+  explicit RunWorkspace(int period_samples) : dft(period_samples) {}
+  RealDft dft;
+  LogSamples samples;
+  Eigen::MatrixXcd spectra;      // Z_p, channels x lines
+  Eigen::MatrixXd excluded_sum;  // of the periods, samples x excluded actuators
+  Eigen::VectorXd deviation_re;
+  Eigen::VectorXd deviation_im;
+};
+
+/// Reads a run period by period and averages. Periods with a marked sample are left out.
+/// `read_done` is told the bytes read, period by period.
+/// @throws FormatError if no clean period is left, and what LogReader::read() throws.
+RunSpectra measure_run(const UsedRun& run, const std::vector<int>& lines,
+                       const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
+                       RunWorkspace& workspace, const std::function<void(double bytes)>& read_done);
+
+}  // namespace stageid

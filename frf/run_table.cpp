@@ -1,0 +1,135 @@
+#include "frf/run_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+
+#include "excitation/file_error.hpp"
+
+namespace stageid {
+namespace {
+
+using RunsByExperiment = std::map<int, UsedRun>;
+using RunsByRealization = std::map<int, RunsByExperiment>;
+
+void check_log(const LogReader& log) {
+  const LogInfo& info = log.info();
+  if (!(info.sample_rate_hz > 0.0) || !std::isfinite(info.sample_rate_hz)) {
+    throw FormatError(log.path(), "/", "sample_rate_hz must be positive and finite");
+  }
+  if (info.period_samples < 4) {
+    throw FormatError(
+        log.path(), "/",
+        fmt::format("period_samples is {}; at least 4 are needed", info.period_samples));
+  }
+}
+
+void check_same_setup(const LogReader& first, const LogReader& other) {
+  const LogInfo& a = first.info();
+  const LogInfo& b = other.info();
+  const char* differs = nullptr;
+  if (a.sample_rate_hz != b.sample_rate_hz) differs = "sample rate";
+  if (a.period_samples != b.period_samples) differs = "period";
+  if (!(a.excitation == b.excitation)) differs = "excitation channels";
+  if (!(a.actuators == b.actuators)) differs = "actuator channels";
+  if (!(a.sensors == b.sensors)) differs = "sensor channels";
+  if (differs != nullptr) {
+    throw std::invalid_argument(
+        fmt::format("{}: other {} than in {}; logs used together must have the same",
+                    other.path().string(), differs, first.path().string()));
+  }
+}
+
+UsedRun measured_part(const LogReader& log, std::size_t index, const FrfOptions& options) {
+  const LogInfo& info = log.info();
+  UsedRun used{&log, index, options.transient_periods.value_or(info.transient_periods), 0};
+  const std::string place = fmt::format("/runs/{}", used.run().name);
+  const auto period = static_cast<std::uint64_t>(info.period_samples);
+  const std::uint64_t samples = used.run().samples;
+  if (samples == 0 || samples % period != 0) {
+    throw FormatError(
+        log.path(), place,
+        fmt::format("{} samples are not a whole number of periods of {} samples; correct "
+                    "period_samples or cut the record",
+                    samples, period));
+  }
+  used.periods = static_cast<int>(samples / period) - used.transient_periods;
+  if (used.periods < 1) {
+    throw FormatError(
+        log.path(), place,
+        fmt::format("{} periods were recorded and {} are transient: none is left; measure "
+                    "longer or give fewer transient periods",
+                    samples / period, used.transient_periods));
+  }
+  return used;
+}
+
+RunsByRealization complete_runs(const std::vector<const LogReader*>& logs,
+                                const FrfOptions& options) {
+  const auto wanted = [&options](int realization) {
+    const std::vector<int>& list = options.realizations;
+    return list.empty() || std::find(list.begin(), list.end(), realization) != list.end();
+  };
+  RunsByRealization table;
+  for (const LogReader* log : logs) {
+    for (std::size_t i = 0; i < log->runs().size(); ++i) {
+      const LogRun& run = log->runs()[i];
+      if (!run.complete || !wanted(run.realization)) continue;
+      table[run.realization].insert_or_assign(run.experiment, measured_part(*log, i, options));
+    }
+  }
+  return table;
+}
+
+void check_realizations_asked_for(const RunsByRealization& table, const FrfOptions& options,
+                                  const LogReader& first) {
+  for (const int realization : options.realizations) {
+    if (!table.contains(realization)) {
+      throw std::invalid_argument(
+          fmt::format("{}: realization {} has no complete run; leave it out", first.path().string(),
+                      realization));
+    }
+  }
+}
+
+}  // namespace
+
+std::string UsedRun::place() const {
+  return fmt::format("{}:/runs/{}", log->path().string(), run().name);
+}
+
+std::vector<RealizationRuns> choose_runs(const std::vector<const LogReader*>& logs,
+                                         const FrfOptions& options) {
+  if (logs.empty())
+    throw std::invalid_argument("estimate_plant_frf: no log given; give at least one");
+  if (options.transient_periods.value_or(0) < 0) {
+    throw std::invalid_argument("transient_periods: must not be negative");
+  }
+  for (const LogReader* log : logs) {
+    check_log(*log);
+    check_same_setup(*logs.front(), *log);
+  }
+  const RunsByRealization table = complete_runs(logs, options);
+  check_realizations_asked_for(table, options, *logs.front());
+  if (table.empty()) {
+    throw std::invalid_argument(
+        fmt::format("{}: no complete run; measure at least one realization to its end",
+                    logs.front()->path().string()));
+  }
+  std::size_t most = 0;
+  for (const auto& [realization, runs] : table) most = std::max(most, runs.size());
+
+  std::vector<RealizationRuns> chosen;
+  for (const auto& [realization, runs] : table) {
+    if (options.realizations.empty() && runs.size() < most) continue;
+    RealizationRuns entry{realization, {}};
+    for (const auto& [experiment, used] : runs) entry.runs.push_back(used);
+    chosen.push_back(std::move(entry));
+  }
+  return chosen;
+}
+
+}  // namespace stageid

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "acquisition/log_reader.hpp"
+#include "frf/plant_frf.hpp"
+
+namespace stageid {
+
+/// One run that is used, and where it stands.
+struct UsedRun {
+  const LogReader* log = nullptr;
+  std::size_t index = 0;  ///< of the run in its log
+  int transient_periods = 0;
+  int periods = 0;  ///< recorded after the transient
+
+  const LogRun& run() const { return log->runs()[index]; }
+  std::string place() const;  ///< "file:/runs/0003", for messages
+};
+
+/// The runs of one realization, by experiment.
+struct RealizationRuns {
+  int realization = 0;
+  std::vector<UsedRun> runs;
+};
+
+/// Chooses the runs: complete ones, of several of one (realization, experiment) the last, of the
+/// realizations asked for; without a wish, of those that lack no experiment which another one has.
+/// Ordered by realization and experiment, whatever their order in the logs.
+///
+/// @throws std::invalid_argument if the logs disagree in rate, period or channels, a realization
+/// asked
+///         for is not there, or nothing complete is; FormatError if a run is not a whole number of
+///         periods or has none after the transient.
+std::vector<RealizationRuns> choose_runs(const std::vector<const LogReader*>& logs,
+                                         const FrfOptions& options);
+
+}  // namespace stageid

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace stageid {
+
+/// `requested` threads, or as many as there are cores if it is not positive; at least one.
+int worker_count(int requested);
+
+/// Calls task(worker, i) once for every i = 0 .. count - 1, from `workers` threads (the caller is
+/// one of them), worker = 0 .. workers - 1. Tasks start in order of i and must not depend on each
+/// other.
+///
+/// After an exception no further task starts; the one of the smallest i is thrown, so that the
+/// message does not depend on the number of threads.
+void for_each_task(int workers, std::size_t count,
+                   const std::function<void(int worker, std::size_t i)>& task);
+
+}  // namespace stageid
