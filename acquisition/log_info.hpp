@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -26,6 +27,14 @@ struct LogInfo {
                                      ///< and provenance; native logs only
 };
 
+/// Puts the rules of a LogInfo: positive rate and period, transient_periods >= 0, one unit a name,
+/// at least one actuator and one sensor, no name twice in a group.
+/// @throws std::invalid_argument naming the field.
+void check_log_info(const LogInfo& info);
+
+/// True if both describe the same experiment: everything but the metadata is equal.
+bool same_measurement(const LogInfo& a, const LogInfo& b) noexcept;
+
 /// Counts of everything in a run that was not perfect.
 struct RunHealth {
   std::uint64_t cycles = 0;
@@ -33,17 +42,21 @@ struct RunHealth {
   std::uint64_t missing = 0;  ///< incomplete, stale, corrupt or link trouble
   std::uint64_t marked = 0;
   std::int64_t largest_lateness_ns = 0;
-  double seconds = 0.0;       ///< wall time of the run
+  double seconds = 0.0;  ///< wall time of the run
+
+  /// Adds the counts of another run; the larger lateness stays.
+  RunHealth& operator+=(const RunHealth& other) noexcept;
+  friend bool operator==(const RunHealth&, const RunHealth&) = default;
 };
 
 /// What holds for one run.
 struct LogRun {
-  std::string name;          ///< "0000", for messages
-  int realization = 0;       ///< 0-based
-  int experiment = 0;        ///< 0-based
-  std::uint64_t samples = 0; ///< recorded rows
+  std::string name;           ///< "0000", for messages
+  int realization = 0;        ///< 0-based
+  int experiment = 0;         ///< 0-based
+  std::uint64_t samples = 0;  ///< recorded rows
   bool complete = true;
-  std::string started_utc;   ///< ISO 8601, may be empty
+  std::string started_utc;  ///< ISO 8601, may be empty
   RunHealth health;
 };
 

@@ -12,8 +12,8 @@ namespace stageid {
 
 /// Samples of a stretch of one run. Column-major: one channel is contiguous in memory.
 struct LogSamples {
-  Eigen::MatrixXd actuators;  ///< rows x actuators, SI
-  Eigen::MatrixXd sensors;    ///< rows x sensors, SI
+  Eigen::MatrixXd actuators;                             ///< rows x actuators, SI
+  Eigen::MatrixXd sensors;                               ///< rows x sensors, SI
   Eigen::Array<std::uint8_t, Eigen::Dynamic, 1> marked;  ///< rows; nonzero: do not use
 };
 
@@ -30,9 +30,11 @@ class LogReader {
   virtual Eigen::MatrixXd excitation(std::size_t run) const = 0;
 
   /// Rows [first, first + count) of a run into `out`, whose matrices are resized if they must be.
-  /// Safe to call from several threads at once, each with its own `out` (the HDF5 reader serializes).
+  /// Safe to call from several threads at once, each with its own `out` (the HDF5 reader
+  /// serializes).
   /// @throws FormatError if a value is not finite or a block is damaged: names the run and the row.
-  virtual void read(std::size_t run, std::uint64_t first, std::uint64_t count, LogSamples& out) const = 0;
+  virtual void read(std::size_t run, std::uint64_t first, std::uint64_t count,
+                    LogSamples& out) const = 0;
 };
 
 /// Opens a native log or an HDF5 one, told apart by their first bytes.
@@ -40,6 +42,7 @@ class LogReader {
 /// A native log that was cut short or is damaged is a FormatError that names the remedy
 /// ("stageid log recover"), unless `damaged_is_error` is false: then what is intact is given.
 /// @throws FileError, FormatError
-std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool damaged_is_error = true);
+std::unique_ptr<LogReader> open_log(const std::filesystem::path& file,
+                                    bool damaged_is_error = true);
 
 }  // namespace stageid

@@ -1,1 +1,43 @@
 #pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "acquisition/log_reader.hpp"
+#include "acquisition/slog_index.hpp"
+
+namespace stageid {
+
+/// Reads the native log. Opening reads block headers only; read() checks the CRC of every block
+/// that it touches, wholly. All functions may be called from several threads at once.
+class SlogReader final : public LogReader {
+ public:
+  /// See open_log(). @throws FileError, FormatError
+  explicit SlogReader(const std::filesystem::path& file, bool damaged_is_error = true);
+
+  const std::filesystem::path& path() const noexcept override { return source_.path(); }
+  const LogInfo& info() const noexcept override { return index_.info; }
+  const std::vector<LogRun>& runs() const noexcept override { return runs_; }
+  Eigen::MatrixXd excitation(std::size_t run) const override;
+  void read(std::size_t run, std::uint64_t first, std::uint64_t count,
+            LogSamples& out) const override;
+
+  /// What is damaged; empty unless opened with damaged_is_error = false.
+  const std::vector<SlogDamage>& damage() const noexcept { return index_.damage; }
+
+  /// Exit status and message of the experiment, if the log was closed properly.
+  const std::optional<SlogEnd>& end() const noexcept { return index_.end; }
+
+ private:
+  struct Target;
+  const SlogRunIndex& run_index(std::size_t run) const;
+  void read_block(const SlogRunIndex& run, const SlogBlock& block, const Target& target) const;
+  [[noreturn]] void report_not_finite(const SlogRunIndex& run, const double* rows,
+                                      std::uint64_t first_row, std::size_t count) const;
+
+  SlogSource source_;
+  SlogIndex index_;
+  std::vector<LogRun> runs_;
+};
+
+}  // namespace stageid

@@ -1,0 +1,70 @@
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+#include "acquisition/log_reader.hpp"
+#include "acquisition/slog_index.hpp"
+#include "acquisition/slog_reader.hpp"
+#include "acquisition/slog_recover.hpp"
+#include "acquisition/slog_scan.hpp"
+#include "excitation/file_error.hpp"
+
+namespace stageid {
+
+namespace {
+
+constexpr std::uint64_t kPieceRows = 16384;
+
+/// Reads all rows: what cannot be read is damage.
+void check_values(const LogReader& reader, VerifyReport& report) {
+  LogSamples samples;
+  for (std::size_t run = 0; run < reader.runs().size(); ++run) {
+    const std::uint64_t rows = reader.runs()[run].samples;
+    try {
+      if (reader.runs()[run].complete) static_cast<void>(reader.excitation(run));
+      for (std::uint64_t first = 0; first < rows; first += kPieceRows) {
+        const std::uint64_t count = std::min(kPieceRows, rows - first);
+        reader.read(run, first, count, samples);
+        report.rows += count;
+        report.marked_rows += static_cast<std::uint64_t>((samples.marked != 0).count());
+      }
+    } catch (const FormatError& error) {
+      report.damage.push_back({0, 0, error.what()});
+    }
+  }
+}
+
+void count_runs(const LogReader& reader, VerifyReport& report) {
+  const std::vector<LogRun>& runs = reader.runs();
+  report.runs = static_cast<int>(runs.size());
+  report.complete_runs = static_cast<int>(
+      std::count_if(runs.begin(), runs.end(), [](const LogRun& run) { return run.complete; }));
+}
+
+}  // namespace
+
+VerifyReport verify_log(const std::filesystem::path& file) {
+  VerifyReport report;
+  const std::unique_ptr<LogReader> reader = open_log(file, false);
+  report.bytes = std::filesystem::file_size(file);
+  if (const auto* native = dynamic_cast<const SlogReader*>(reader.get())) {
+    const SlogSource source(file);
+    const SlogScan scan = scan_slog(source, SlogScanDepth::payloads);
+    report.blocks = scan.blocks.size();
+    for (const SlogDamage& damage : index_slog(source, scan).damage) {
+      report.damage.push_back({damage.offset, damage.bytes, damage.what});
+    }
+    report.closed = native->end().has_value();
+    if (report.closed) {
+      report.exit_code = native->end()->exit_code;
+      report.exit_message = native->end()->message;
+    }
+  } else {
+    report.closed = true;
+  }
+  count_runs(*reader, report);
+  check_values(*reader, report);
+  return report;
+}
+
+}  // namespace stageid
