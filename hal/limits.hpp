@@ -1,8 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <limits>
-#include <string>
+#include <cstdint>
 
 namespace stageid {
 
@@ -26,6 +25,7 @@ struct LimitViolation {
   double value = 0.0;
   double limit = 0.0;
   std::uint64_t cycle = 0;
+  bool of_sensor = false;  ///< what `channel` counts
 };
 
 }  // namespace stageid

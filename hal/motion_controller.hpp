@@ -7,11 +7,13 @@
 namespace stageid {
 
 /// Linear controller of one logical axis: integrator + lead + low pass (+ notches), in continuous
-/// time; discretized by Tustin with prewarping at the crossover.
-///   C(s) = gain_n_per_m (1 + w_i/s) (s/w_1 + 1)/(s/w_2 + 1) / (s^2/w_lp^2 + 2 d s/w_lp + 1) prod notch
+/// time; discretized by Tustin with prewarping at the crossover (a notch at its own frequency). A
+/// frequency of 0 leaves its factor out.
+///   C(s) = gain_n_per_m (1 + w_i/s) (s/w_1 + 1)/(s/w_2 + 1) / (s^2/w_lp^2 + 2 d s/w_lp + 1) prod
+///   notch
 struct AxisController {
   double crossover_hz = 0.0;  ///< 0: the axis is open
-  double gain = 0.0;          ///< N/m or Nm/rad
+  double gain = 0.0;          ///< N/m or Nm/rad; 0: motion_controller_spec() computes it
   double integrator_hz = 0.0;
   double lead_zero_hz = 0.0;
   double lead_pole_hz = 0.0;
@@ -49,15 +51,17 @@ class MotionController {
   Eigen::MatrixXcd response(double frequency_hz) const;
 
  private:
-  struct Section {  // direct form II transposed
-    double b0, b1, b2, a1, a2;
-  };
-  double sample_rate_hz_;
+  double sample_rate_hz_ = 0.0;
   Eigen::MatrixXd sensor_decoupling_;
   Eigen::MatrixXd actuator_decoupling_;
-  std::vector<std::vector<Section>> sections_;  // one list an axis
-  std::vector<double> state_;                   // two a section
-  Eigen::VectorXd axis_;
+  // The axes lie side by side in lanes of one vector register; all have as many sections as the
+  // longest, the others end in sections that pass everything.
+  Eigen::Index sections_ = 0;
+  Eigen::ArrayXXd sensor_columns_;    // padded axes x sensors
+  Eigen::ArrayXXd coefficients_;      // padded axes x 5 a section: b0 b1 b2 a1 a2
+  Eigen::ArrayXXd state_;             // padded axes x 2 a section
+  Eigen::ArrayXXd actuator_columns_;  // padded actuators x axes
+  Eigen::ArrayXd axis_;               // padded axes
 };
 
 }  // namespace stageid

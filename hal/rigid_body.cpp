@@ -17,27 +17,27 @@ Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix) {
   return matrix.completeOrthogonalDecomposition().pseudoInverse();
 }
 
-// J^+ J is the projection on the motions that the channels see; an axis lies wholly in it exactly if
-// its unit vector is left unchanged. J^+ mixes metres and radians, the row it leaves does not.
-void require_independent(const Jacobian& jacobian, const Eigen::MatrixXd& inverse, Eigen::Index axis,
-                         const char* what) {
+// J^+ J is the projection on the motions that the channels see; an axis lies wholly in it exactly
+// if its unit vector is left unchanged. J^+ mixes metres and radians, the row it leaves does not.
+void require_independent(const Jacobian& jacobian, const Eigen::MatrixXd& inverse,
+                         Eigen::Index axis, const char* what) {
   constexpr double kTolerance = 1e-9;
   Eigen::RowVectorXd row = inverse.row(axis) * jacobian;
   row[axis] -= 1.0;
   if (row.cwiseAbs().maxCoeff() > kTolerance) {
-    throw std::invalid_argument(
-        fmt::format("controller: axis {} is closed, but the {} do not reach it independently of the "
-                    "other axes; add {} or leave the axis open",
-                    kRigidAxisNames[static_cast<std::size_t>(axis)], what, what));
+    throw std::invalid_argument(fmt::format(
+        "controller: axis {} is closed, but the {} do not reach it independently of the "
+        "other axes; add {} or leave the axis open",
+        kRigidAxisNames[static_cast<std::size_t>(axis)], what, what));
   }
 }
 
 // The gain that makes |C(j w_c)| / (inertia w_c^2) = 1.
 double unit_crossover_gain(AxisController axis, double inertia, const char* name) {
   if (!(inertia > 0.0) || !std::isfinite(inertia)) {
-    throw std::invalid_argument(
-        fmt::format("controller: axis {} has gain 0 (automatic), which needs a positive inertia, not {}",
-                    name, inertia));
+    throw std::invalid_argument(fmt::format(
+        "controller: axis {} has gain 0 (automatic), which needs a positive inertia, not {}", name,
+        inertia));
   }
   axis.gain = 1.0;
   const double omega = 2.0 * pi * axis.crossover_hz;
@@ -71,8 +71,8 @@ std::complex<double> axis_response(const AxisController& axis, double frequency_
   }
   for (const auto& notch : axis.notches) {
     const std::complex<double> x = s / omega(notch.frequency_hz);
-    value *= (x * x + 2.0 * notch.zero_damping * x + 1.0) /
-             (x * x + 2.0 * notch.pole_damping * x + 1.0);
+    value *=
+        (x * x + 2.0 * notch.zero_damping * x + 1.0) / (x * x + 2.0 * notch.pole_damping * x + 1.0);
   }
   return value;
 }

@@ -31,7 +31,8 @@ Eigen::MatrixXd rigid_body_jacobian(const std::vector<Channel>& channels);
 ///
 /// @param axes in the order of kRigidAxisNames.
 /// @param axis_inertia mass (three times) in kg, then the inertias about x, y, z in kg m^2.
-/// @throws std::invalid_argument if a closed axis cannot be seen by the sensors, or not be driven by
+/// @throws std::invalid_argument if a closed axis cannot be seen by the sensors, or not be driven
+/// by
 ///         the actuators, independently of the other axes; if an inertia of a closed axis is not
 ///         positive; or for controller values that MotionController refuses.
 MotionControllerSpec motion_controller_spec(double sample_rate_hz,

@@ -11,7 +11,8 @@
 
 namespace stageid {
 
-/// One mode of a simulated plant:  shape_y shape_u^T / (s^2 + 2 zeta omega s + omega^2), mass-normalized.
+/// One mode of a simulated plant:  shape_y shape_u^T / (s^2 + 2 zeta omega s + omega^2),
+/// mass-normalized.
 struct PlantMode {
   double natural_frequency_hz = 0.0;
   double damping_ratio = 0.0;
@@ -27,7 +28,7 @@ struct WaferStageSpec {
 
   // Rigid body
   double mass_kg = 0.0;
-  double inertia_kg_m2[3] = {0., 0., 0.};       ///< about x, y, z
+  double inertia_kg_m2[3] = {0., 0., 0.};              ///< about x, y, z
   double suspension_hz[6] = {0., 0., 0., 0., 0., 0.};  ///< gravity compensators: x y z Rx Ry Rz
   double suspension_damping = 0.0;
 
@@ -36,23 +37,31 @@ struct WaferStageSpec {
   double length_y_m = 0.0;
   double first_mode_hz = 0.0;  ///< scales the plate's stiffness
   double poisson_ratio = 0.3;
-  int flexible_modes = 0;      ///< how many are kept, those above the band of interest included
+  int flexible_modes = 0;  ///< how many are kept, those above the band of interest included
   std::vector<double> flexible_damping;  ///< one a mode, the last repeats
   std::vector<PlantMode> in_plane_modes;
 
-  double delay_s = 0.0;  ///< computation delay: u[n] is held from t_n + delay_s on; any number of samples
-  double sensor_noise_m = 0.0;            ///< rms of the white part
-  double sensor_noise_coloured_m = 0.0;   ///< rms of the coloured floor (first-order low pass)
+  double delay_s =
+      0.0;  ///< computation delay: u[n] is held from t_n + delay_s on; any number of samples
+  double sensor_noise_m = 0.0;           ///< rms of the white part
+  double sensor_noise_coloured_m = 0.0;  ///< rms of the coloured floor (first-order low pass)
   double sensor_noise_corner_hz = 1.0;
-  double force_noise_n = 0.0;             ///< rms of white force disturbance at every actuator
-  double sensor_quantum_m = 0.0;          ///< 0: off
+  double force_noise_n = 0.0;     ///< rms of white force disturbance at every actuator
+  double sensor_quantum_m = 0.0;  ///< 0: off
   double actuator_quantum_n = 0.0;
-  double cubic_stiffness_n_m3 = 0.0;      ///< on the rigid z motion; 0: off (linear)
-  double actuator_saturation_n = 0.0;     ///< 0: off
+  double cubic_stiffness_n_m3 = 0.0;   ///< on the rigid z motion; 0: off (linear)
+  double actuator_saturation_n = 0.0;  ///< 0: off
 
   /// Faults on request, from a cycle of every run on.
   struct Fault {
-    enum class Kind : std::uint8_t { none, dead_sensor, nan_sensor, missed_cycle, interlock, stuck_actuator };
+    enum class Kind : std::uint8_t {
+      none,
+      dead_sensor,
+      nan_sensor,
+      missed_cycle,
+      interlock,
+      stuck_actuator
+    };
     Kind kind = Kind::none;
     int channel = 0;
     std::uint64_t from_cycle = 0;
@@ -71,8 +80,8 @@ std::vector<PlantMode> wafer_stage_modes(const WaferStageSpec& spec);
 /// The exact frequency response of the plant without controller, sensors x actuators.
 /// Sampled: through zero-order hold, delay and sampler, G_d(e^{j omega T}).
 Eigen::MatrixXcd continuous_response(const std::vector<PlantMode>& modes, double frequency_hz);
-Eigen::MatrixXcd sampled_response(const std::vector<PlantMode>& modes, double delay_s, double sample_rate_hz,
-                                  double frequency_hz);
+Eigen::MatrixXcd sampled_response(const std::vector<PlantMode>& modes, double delay_s,
+                                  double sample_rate_hz, double frequency_hz);
 
 /// The simulated stage. Modal, discretized exactly (zero-order hold, non-integer delay).
 ///
@@ -84,7 +93,8 @@ class SimulatedStage final : public CyclicStage {
 
   const StageInfo& info() const noexcept override;
   void start(std::uint64_t run_seed, Inputs& first) override;
-  [[nodiscard]] Outcome exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept override;
+  [[nodiscard]] Outcome exchange(const Outputs& outputs, Inputs& inputs,
+                                 Deadline deadline) noexcept override;
   void stop() noexcept override;
 
   const std::vector<PlantMode>& modes() const noexcept;

@@ -39,21 +39,29 @@ struct StageInfo {
 /// How one exchange ended. `ok` and `late` carry valid measurements.
 enum class Outcome : std::uint8_t {
   ok,
-  late,         ///< the deadline passed; measurement valid, marked
-  incomplete,   ///< some sensors missing: see Inputs::valid
-  stale,        ///< nothing new: the last measurement is held
-  corrupt,      ///< a frame or reply failed its check
+  late,        ///< the deadline passed; measurement valid, marked
+  incomplete,  ///< some sensors missing: see Inputs::valid
+  stale,       ///< nothing new: the last measurement is held
+  corrupt,     ///< a frame or reply failed its check
   bus_passive,
   bus_off,
   link_down,
-  fault,        ///< the stage reports a fault (interlock, amplifier, non-finite sensor)
-  limit         ///< a limit would have been or was exceeded: see LimitedStage::violation()
+  fault,  ///< the stage reports a fault (interlock, amplifier, non-finite sensor)
+  limit   ///< a limit would have been or was exceeded: see LimitedStage::violation()
 };
 const char* to_string(Outcome outcome) noexcept;
 
 /// CiA 402-like states.
 enum class NodeState : std::uint8_t {
-  not_ready, switch_on_disabled, ready, switched_on, operation_enabled, measuring, quick_stop, fault_reaction, fault
+  not_ready,
+  switch_on_disabled,
+  ready,
+  switched_on,
+  operation_enabled,
+  measuring,
+  quick_stop,
+  fault_reaction,
+  fault
 };
 const char* to_string(NodeState state) noexcept;
 
@@ -81,11 +89,12 @@ struct Deadline {
 
 /// The door for one exchange a sample: simulator, replay, CAN FD streaming, Modbus.
 ///
-/// The constructors, prepare() and start() may allocate, block and throw. Between start() and stop()
-/// only exchange() is called, from one thread; it does not allocate, lock, log or throw.
+/// The constructors, prepare() and start() may allocate, block and throw. Between start() and
+/// stop() only exchange() is called, from one thread; it does not allocate, lock, log or throw.
 ///
 /// Order: start() leaves the stage in closed-loop-ready standstill and gives the first measurement
-/// y[0]; exchange() with u[n], computed from y[n], waits for the next sample instant and gives y[n+1].
+/// y[0]; exchange() with u[n], computed from y[n], waits for the next sample instant and gives
+/// y[n+1].
 class CyclicStage {
  public:
   virtual ~CyclicStage() = default;
@@ -97,7 +106,8 @@ class CyclicStage {
   /// @throws StageError if the machine does not answer or refuses.
   virtual void start(std::uint64_t run_seed, Inputs& first) = 0;
 
-  [[nodiscard]] virtual Outcome exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept = 0;
+  [[nodiscard]] virtual Outcome exchange(const Outputs& outputs, Inputs& inputs,
+                                         Deadline deadline) noexcept = 0;
 
   /// Brings the outputs to a safe state (zero force, disabled). Idempotent.
   virtual void stop() noexcept = 0;

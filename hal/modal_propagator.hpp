@@ -1,0 +1,18 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace stageid {
+
+/// Exact motion of one mode, q'' + 2 zeta omega q' + omega^2 q = f, over `duration_s` with f
+/// constant: [q; q'] <- transition [q; q'] + input f.
+struct ModalPropagator {
+  Eigen::Matrix2d transition;
+  Eigen::Vector2d input;
+};
+
+/// By Taylor series of the scaled problem, doubled back: no cancellation, so it is right to
+/// rounding for a free mass (omega = 0), weak suspensions and any damping.
+ModalPropagator modal_propagator(double omega_rad_s, double damping_ratio, double duration_s);
+
+}  // namespace stageid

@@ -1,0 +1,52 @@
+#include "hal/pacer.hpp"
+
+#include <cmath>
+#include <ctime>
+
+namespace stageid {
+namespace {
+
+constexpr std::int64_t kSpin_ns = 60'000;
+
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
+}
+
+void sleep_until(std::int64_t t_ns) noexcept {
+  const timespec until{static_cast<std::time_t>(t_ns / 1'000'000'000),
+                       static_cast<long>(t_ns % 1'000'000'000)};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) != 0) {
+  }
+}
+
+}  // namespace
+
+Pacer::Pacer(double sample_rate_hz, double pace) noexcept
+    : period_ns_(1e9 / (pace > 0.0 ? sample_rate_hz * pace : sample_rate_hz)), wall_(pace > 0.0) {}
+
+Pacer::Instant Pacer::restart() noexcept {
+  index_ = 0;
+  origin_ns_ = wall_ ? monotonic_ns() : 0;
+  return {origin_ns_, origin_ns_, false};
+}
+
+Pacer::Instant Pacer::wait() noexcept {
+  ++index_;
+  const auto at = origin_ns_ + static_cast<std::int64_t>(static_cast<double>(index_) * period_ns_);
+  if (!wall_) return {at, at, false};
+
+  std::int64_t now = monotonic_ns();
+  if (now > at) {
+    const double periods = std::floor(static_cast<double>(now - at) / period_ns_);
+    origin_ns_ += static_cast<std::int64_t>(periods * period_ns_);
+    return {at, now, true};
+  }
+  if (at - now > kSpin_ns) sleep_until(at - kSpin_ns);
+  do now = monotonic_ns();
+  while (now < at);
+  return {at, now, false};
+}
+
+}  // namespace stageid

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+
+namespace stageid {
+
+/// Waits for sample instants: asleep until shortly before, then spinning, because a sleeping thread
+/// wakes up tens of microseconds late and a spinning one keeps others from running.
+class Pacer {
+ public:
+  /// @param pace 0: virtual time, no waiting; otherwise stage seconds per second of wall clock.
+  Pacer(double sample_rate_hz, double pace) noexcept;
+
+  struct Instant {
+    std::int64_t sample_ns = 0;  ///< the sample instant, of the stage's clock
+    std::int64_t now_ns = 0;     ///< when the wait ended
+    bool late = false;           ///< the instant had passed before the wait began
+  };
+
+  /// The first sample instant: now, or zero in virtual time.
+  Instant restart() noexcept;
+  /// Waits for the next instant. When whole periods were missed the schedule is shifted by them:
+  /// the phase is kept and no two samples come at once.
+  Instant wait() noexcept;
+
+ private:
+  double period_ns_;
+  bool wall_;
+  std::int64_t origin_ns_ = 0;
+  std::uint64_t index_ = 0;
+};
+
+}  // namespace stageid
