@@ -1,0 +1,123 @@
+#include "tools/report.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "excitation/output_file.hpp"
+#include "tools/report_assets.hpp"
+#include "tools/report_json.hpp"
+
+namespace stageid {
+namespace {
+
+template <typename Matrix>
+void check_shape(const char* name, const Matrix& matrix, Eigen::Index rows, Eigen::Index columns) {
+  if (matrix.size() == 0) return;
+  if (matrix.rows() != rows || matrix.cols() != columns)
+    throw std::invalid_argument(fmt::format("{}: {} x {}, but the response needs {} x {}", name,
+                                            matrix.rows(), matrix.cols(), rows, columns));
+  if (!matrix.allFinite()) throw std::invalid_argument(fmt::format("{}: not finite", name));
+}
+
+void check_variance(const char* name, const Eigen::MatrixXd& variance, Eigen::Index rows,
+                    Eigen::Index columns) {
+  check_shape(name, variance, rows, columns);
+  if (variance.size() > 0 && variance.minCoeff() < 0.0)
+    throw std::invalid_argument(fmt::format("{}: negative", name));
+}
+
+void check_data(const ReportData& data) {
+  if (!data.frf) {
+    if (data.model_response.size() > 0 || data.cmif_curves.size() > 0 || data.validation_frf)
+      throw std::invalid_argument(
+          "report: model_response, cmif_curves and validation_frf need the frf whose lines they "
+          "are on");
+    return;
+  }
+  const FrfEstimate& frf = *data.frf;
+  check(frf);
+  const Eigen::Index channels = frf.n_outputs() * frf.n_inputs();
+  check_shape("model_response", data.model_response, channels, frf.lines());
+  check_variance("model_variance", data.model_variance, channels, frf.lines());
+  check_variance("cmif_curves", data.cmif_curves, std::min(frf.n_outputs(), frf.n_inputs()),
+                 frf.lines());
+  if (data.validation && data.validation->channel_error.size() > 0)
+    check_shape("validation.channel_error", data.validation->channel_error, channels, 1);
+  if (!data.validation_frf) return;
+  check(*data.validation_frf);
+  check_shape("validation_frf", data.validation_frf->response, channels, frf.lines());
+  if (data.validation_frf->frequency_hz != frf.frequency_hz)
+    throw std::invalid_argument("validation_frf: its lines are not those of frf");
+}
+
+std::string escape_html(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+std::string block_elements(const std::vector<report::Block>& blocks) {
+  std::string out;
+  for (const report::Block& block : blocks)
+    out += fmt::format("<script type=\"text/plain\" id=\"data-{}\">{}</script>\n", block.id,
+                       block.base64);
+  return out;
+}
+
+/// Replaces every {{name}} of the template once, from left to right, so that nothing that was put
+/// in is looked at again.
+std::string fill(std::string_view page,
+                 const std::vector<std::pair<std::string_view, std::string_view>>& parts) {
+  std::string out;
+  while (true) {
+    const std::size_t begin = page.find("{{");
+    const std::size_t end = page.find("}}", begin);
+    out += page.substr(0, begin);
+    if (begin == std::string_view::npos || end == std::string_view::npos) return out;
+    const std::string_view name = page.substr(begin + 2, end - begin - 2);
+    for (const auto& [key, value] : parts)
+      if (key == name) out += value;
+    page.remove_prefix(end + 2);
+  }
+}
+
+}  // namespace
+
+std::string report_page(const ReportData& data) {
+  check_data(data);
+  const report::PageContent content = report::page_content(data);
+  return fill(report::page_html, {{"title", escape_html(data.title)},
+                                  {"library_css", report::library_css},
+                                  {"css", report::page_css},
+                                  {"library_js", report::library_js},
+                                  {"js", report::page_js},
+                                  {"licence", escape_html(report::library_licence)},
+                                  {"content", content.json},
+                                  {"blocks", block_elements(content.blocks)}});
+}
+
+void write_report(const std::filesystem::path& file, const ReportData& data) {
+  write_text_file(file, report_page(data));
+}
+
+}  // namespace stageid

@@ -1,0 +1,104 @@
+// The complex mode indicator function with its modes, and the cost over the iterations.
+
+const cmif = { graph: null };
+const cost = { graph: null };
+
+const cmifNames = {
+  response: 'squared singular values of G',
+  accelerance: 'squared singular values of \u03c9\u00b2G: without the slope of the rigid body',
+  whitened: 'squared singular values of G, every channel over its standard deviation: the noise floor is 1',
+};
+
+function buildCmif() {
+  const curves = content.arrays.cmif.curves;
+  const body = section('cmif', 'Complex mode indicator function', 'The ' + cmifNames[content.cmif_kind] + '.');
+  const legend = element('div', { class: 'legend' });
+  for (let i = 0; i < curves; ++i) legend.append(element('span', { class: 'swatch', style: '--colour:var(--curve-' + (i % 6) + ')' }, 'curve ' + (i + 1)));
+  if (content.candidates.length) legend.append(element('span', { class: 'mark ring' }, 'chosen as start (' + content.candidates.length + ')'));
+  if (identifiedModes().length) legend.append(element('span', { class: 'mark line' }, 'identified mode (' + identifiedModes().length + ')'));
+  body.append(legend, element('div', { class: 'plot tall', id: 'cmif-plot', role: 'img', 'aria-labelledby': 'cmif-title' }),
+    element('p', { class: 'axis-title' }, 'Frequency [Hz]'));
+  drawCmif();
+  onColours(drawCmif);
+}
+
+function identifiedModes() {
+  return (content.modes || []).filter((mode) => isNumber(mode.frequency_hz));
+}
+
+function drawCmif() {
+  const f = array('frequency');
+  const values = array('cmif');
+  const curves = content.arrays.cmif.curves;
+  let floor = Infinity;
+  for (const v of values) if (v > 0 && v < floor) floor = v;
+  const rows = Array.from(f, (hz, k) => {
+    const row = [hz];
+    for (let i = 0; i < curves; ++i) row.push(Math.max(values[i * f.length + k], floor));
+    return row;
+  });
+  const window_ = cmif.graph ? cmif.graph.xAxisRange() : null;
+  if (cmif.graph) cmif.graph.destroy();
+  const labels = Array.from({ length: curves }, (_, i) => 'curve ' + (i + 1));
+  const colours = palette().curves;
+  cmif.graph = new Dygraph(document.getElementById('cmif-plot'), rows, {
+    ...plotBasics, ...plotColours(), labels: ['f', ...labels], logscale: true,
+    series: Object.fromEntries(labels.map((label, i) => [label, { color: colours[i % colours.length] }])),
+    axes: { x: frequencyAxis, y: magnitudeAxis }, underlayCallback: markModes, dateWindow: window_,
+  });
+}
+
+// Identified modes as lines behind the curves, chosen ones as rings on their curve.
+function markModes(context, area, graph) {
+  const f = array('frequency');
+  const values = array('cmif');
+  const colours = palette();
+  const [low, high] = graph.xAxisRange();
+  const inside = (hz) => hz >= low && hz <= high;
+  context.save();
+  context.strokeStyle = colours.marker;
+  context.globalAlpha = 0.45;
+  context.lineWidth = 1;
+  for (const mode of identifiedModes()) {
+    if (!inside(mode.frequency_hz)) continue;
+    const x = graph.toDomXCoord(mode.frequency_hz);
+    context.beginPath();
+    context.moveTo(x, area.y);
+    context.lineTo(x, area.y + area.h);
+    context.stroke();
+  }
+  context.globalAlpha = 1;
+  context.strokeStyle = colours.text;
+  context.lineWidth = 1.5;
+  for (const mode of content.candidates) {
+    if (!inside(mode.frequency_hz)) continue;
+    let k = 0;
+    while (k < f.length - 1 && f[k] < mode.frequency_hz) ++k;
+    if (k > 0 && mode.frequency_hz - f[k - 1] < f[k] - mode.frequency_hz) --k;
+    const curve = Math.min(content.arrays.cmif.curves, Math.max(1, mode.curve)) - 1;
+    const v = values[curve * f.length + k];
+    if (!(v > 0)) continue;
+    context.beginPath();
+    context.arc(graph.toDomXCoord(mode.frequency_hz), graph.toDomYCoord(v), 5, 0, 2 * Math.PI);
+    context.stroke();
+  }
+  context.restore();
+}
+
+function buildCost() {
+  const body = section('cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines; it may never rise.');
+  body.append(element('div', { class: 'plot', id: 'cost-plot', role: 'img', 'aria-labelledby': 'cost-title' }),
+    element('p', { class: 'axis-title' }, 'Iteration'));
+  drawCost();
+  onColours(drawCost);
+}
+
+function drawCost() {
+  if (cost.graph) cost.graph.destroy();
+  const values = content.cost.filter((v) => isNumber(v) && v > 0);
+  cost.graph = new Dygraph(document.getElementById('cost-plot'), values.map((v, i) => [i, v]), {
+    ...plotBasics, ...plotColours(), labels: ['iteration', 'cost'], logscale: true, drawPoints: values.length < 200, pointSize: 2.5,
+    series: { cost: { color: palette().measured } }, xRangePad: 8,
+    axes: { x: { ticker: (min, max, pixels) => linearTicks(min, max, Math.max(2, pixels / 60), (v) => (Number.isInteger(v) ? String(v) : '')) }, y: magnitudeAxis },
+  });
+}

@@ -1,0 +1,184 @@
+// One entry of the response, large: magnitude and phase, linked.
+
+const entry = { magnitude: null, phase: null, channel: 0, hidden: new Set(), order: [] };
+
+// |dG|^2 of a circular complex Gaussian exceeds -ln(0.05) sigma^2 in 5 % of all cases.
+const bandFactor = Math.sqrt(-Math.log(0.05));
+
+const traceNames = {
+  measured: 'measured', model: 'model', residual: 'residual', validation: 'residual, held-back data', deviation: 'standard deviation',
+};
+
+function buildEntry() {
+  const { inputs, outputs } = content.frf;
+  const body = section('entry', 'One element');
+  const pick = (id, label, list) => {
+    const select = element('select', { id, onchange: pickEntry });
+    list.forEach((channel, i) => select.append(element('option', { value: i }, channel.name)));
+    return element('label', { for: id }, label + ' ', select);
+  };
+  const zoom = element('button', { type: 'button', class: 'plain', onclick: resetZoom }, 'Whole band');
+  body.append(
+    element('div', { class: 'entry-pick' }, pick('entry-output', 'Sensor', outputs), pick('entry-input', 'Actuator', inputs), zoom,
+      element('span', { id: 'entry-unit', class: 'quiet' })),
+    element('div', { class: 'legend', id: 'entry-legend' }),
+    element('p', { class: 'plot-title', id: 'magnitude-title' }, 'Magnitude'),
+    element('div', { class: 'plot tall', id: 'entry-magnitude', role: 'img', 'aria-labelledby': 'magnitude-title' }),
+    element('p', { class: 'plot-title', id: 'phase-title' }, 'Phase'),
+    element('div', { class: 'plot', id: 'entry-phase', role: 'img', 'aria-labelledby': 'phase-title' }),
+    element('p', { class: 'axis-title' }, 'Frequency [Hz]'),
+    element('p', { class: 'quiet' }, entryHelp()));
+  onColours(() => showEntry(entry.channel, true));
+}
+
+function entryHelp() {
+  const kind = content.frf.deviation;
+  const known = kind ? 'The shaded band holds the true value with 95 % (from the ' + (kind === 'total'
+    ? 'total variance: noise and nonlinear distortions' : 'noise variance') + '; circular complex Gaussian). ' : '';
+  return known + 'Drag to zoom, double-click for the whole band; both plots move together. ' +
+    'The names above switch traces on and off.';
+}
+
+function pickEntry() {
+  const output = Number(document.getElementById('entry-output').value);
+  const input = Number(document.getElementById('entry-input').value);
+  selectPanel(channelIndex(output, input));
+}
+
+function resetZoom() {
+  if (entry.magnitude) entry.magnitude.resetZoom();
+}
+
+// Shows part of the band, in Hz; used by the table of modes.
+function zoomEntry(low, high) {
+  if (!entry.magnitude) return;
+  entry.magnitude.updateOptions({ dateWindow: [low, high] });
+  document.getElementById('entry').scrollIntoView({ behavior: 'auto', block: 'start' });
+}
+
+// [low, value, high]; a logarithmic axis has no place for what is not positive.
+function bar(value, deviation, floor) {
+  const v = Math.max(value, floor);
+  if (!deviation) return [v, v, v];
+  return [Math.max(value - bandFactor * deviation, floor), v, value + bandFactor * deviation];
+}
+
+// Rows of dygraphs' own format, with the names of the columns.
+function magnitudeTable(channel) {
+  const scale = lineScale();
+  const curves = channelCurves(channel);
+  const get = (values) => scaled(values, scale);
+  const columns = [['measured', get(curves.measured), get(curves.deviation)]];
+  if (curves.model) columns.push(['model', get(curves.model), get(curves.modelDeviation)]);
+  if (curves.residual) columns.push(['residual', get(curves.residual), null]);
+  if (curves.validationResidual) columns.push(['validation', get(curves.validationResidual), null]);
+  if (curves.deviation) columns.push(['deviation', get(curves.deviation), null]);
+  let floor = Infinity;
+  for (const [, values] of columns) for (const v of values) if (v > 0 && v < floor) floor = v;
+  if (!Number.isFinite(floor)) floor = 1e-300;
+  const f = array('frequency');
+  const rows = Array.from(f, (hz, k) => [hz, ...columns.map(([, values, deviation]) => bar(values[k], deviation && deviation[k], floor))]);
+  return { rows, names: columns.map(([name]) => name) };
+}
+
+// Phases wrap: a row of gaps between two lines breaks the trace there instead of drawing a wall.
+function phaseTable(channel) {
+  const curves = channelCurves(channel);
+  const columns = [['measured', curves.measuredPhase, curves.measured, curves.deviation]];
+  if (curves.modelPhase) columns.push(['model', curves.modelPhase, curves.model, curves.modelDeviation]);
+  const f = array('frequency');
+  const rows = [];
+  for (let k = 0; k < f.length; ++k) {
+    const wraps = columns.map(([, phase]) => k > 0 && Math.abs(phase[k] - phase[k - 1]) > 180);
+    if (wraps.some(Boolean)) {
+      rows.push([Math.sqrt(f[k] * f[k - 1]), ...wraps.map((w) => (w ? [NaN, NaN, NaN] : null))]);
+    }
+    rows.push([f[k], ...columns.map(([, phase, magnitude, deviation]) => phaseBar(phase[k], magnitude[k], deviation && deviation[k]))]);
+  }
+  return { rows, names: columns.map(([name]) => name) };
+}
+
+function phaseBar(phase, magnitude, deviation) {
+  if (!deviation) return [phase, phase, phase];
+  const ratio = bandFactor * deviation / magnitude;
+  const half = ratio >= 1 ? 180 : Math.asin(ratio) * 180 / Math.PI;
+  return [Math.max(-180, phase - half), phase, Math.min(180, phase + half)];
+}
+
+function traceStyle(name) {
+  const colours = palette();
+  const styles = {
+    measured: { strokeWidth: 2.2 }, model: { strokeWidth: 1.2 }, residual: { strokeWidth: 0.9 },
+    validation: { strokeWidth: 0.9 }, deviation: { strokeWidth: 1.1, strokePattern: [5, 4] },
+  };
+  return { color: colours[name], ...styles[name] };
+}
+
+function plotTable(id, table, axisY, more) {
+  const options = {
+    ...plotBasics, ...plotColours(), customBars: true, labels: ['f', ...table.names],
+    series: Object.fromEntries(table.names.map((name) => [name, traceStyle(name)])),
+    visibility: table.names.map((name) => !entry.hidden.has(name)),
+    axes: { x: frequencyAxis, y: axisY }, highlightCallback: tellValues, unhighlightCallback: () => tellValues(),
+    ...more,
+  };
+  return new Dygraph(document.getElementById(id), table.rows, options);
+}
+
+function showEntry(channel, keepZoom) {
+  const window_ = keepZoom && entry.magnitude ? entry.magnitude.xAxisRange() : null;
+  entry.channel = channel;
+  const outputs = content.frf.outputs;
+  const output = outputs[channel % outputs.length];
+  const input = content.frf.inputs[Math.floor(channel / outputs.length)];
+  document.getElementById('entry-title').textContent = channelName(channel);
+  document.getElementById('entry-output').value = channel % outputs.length;
+  document.getElementById('entry-input').value = Math.floor(channel / outputs.length);
+  document.getElementById('entry-unit').textContent = 'magnitude in ' + unitOf(output, input) + (matrix.timesOmega ? ' \u00d7 (rad/s)\u00b2' : '');
+  if (entry.magnitude) {
+    entry.link.detach();
+    entry.magnitude.destroy();
+    entry.phase.destroy();
+  }
+  const table = magnitudeTable(channel);
+  entry.order = table.names;
+  const x = window_ ? { dateWindow: window_ } : {};
+  entry.magnitude = plotTable('entry-magnitude', table, magnitudeAxis, { logscale: true, ...x });
+  entry.phase = plotTable('entry-phase', phaseTable(channel), phaseAxis, { valueRange: [-185, 185], ...x });
+  entry.link = Dygraph.synchronize(entry.magnitude, entry.phase, { range: false, selection: false });
+  buildLegend();
+}
+
+function buildLegend() {
+  const legend = document.getElementById('entry-legend');
+  legend.replaceChildren(...entry.order.map((name) => element('button', {
+    type: 'button', class: 'swatch ' + name, 'aria-pressed': String(!entry.hidden.has(name)), onclick: () => toggleTrace(name),
+  }, traceNames[name])), element('output', { id: 'entry-values', class: 'values' }));
+}
+
+function toggleTrace(name) {
+  if (entry.hidden.has(name)) entry.hidden.delete(name);
+  else entry.hidden.add(name);
+  for (const graph of [entry.magnitude, entry.phase]) {
+    const place = graph.getLabels().indexOf(name) - 1;
+    if (place >= 0) graph.setVisibility(place, !entry.hidden.has(name));
+  }
+  buildLegend();
+}
+
+function tellValues(event, hz) {
+  const output = document.getElementById('entry-values');
+  if (!event || !isNumber(hz)) {
+    output.textContent = '';
+    return;
+  }
+  const f = array('frequency');
+  let k = 0;
+  while (k < f.length - 1 && f[k] < hz) ++k;
+  const curves = channelCurves(entry.channel);
+  const parts = [number(f[k], 6) + '\u00a0Hz', '|G| ' + number(curves.measured[k]) + ', ' + number(curves.measuredPhase[k]) + '\u00b0'];
+  if (curves.model) parts.push('|P| ' + number(curves.model[k]) + ', ' + number(curves.modelPhase[k]) + '\u00b0');
+  if (curves.residual) parts.push('|G\u2212P| ' + number(curves.residual[k]));
+  if (curves.deviation) parts.push('\u03c3 ' + number(curves.deviation[k]));
+  output.textContent = parts.join('   ');
+}

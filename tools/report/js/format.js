@@ -1,0 +1,87 @@
+// Text and elements. Names and texts come from outside: they only ever become text nodes.
+
+// element('p', {class: 'x', onclick: f}, 'text', child, ...)
+function element(tag, attributes, ...children) {
+  const node = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes || {})) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith('on')) node.addEventListener(name.slice(2), value);
+    else node.setAttribute(name, value === true ? '' : value);
+  }
+  for (const child of children) if (child !== null && child !== undefined) node.append(child);
+  return node;
+}
+
+function isNumber(value) {
+  return typeof value === 'number' && Number.isFinite(value);
+}
+
+const superscripts = { '-': '\u207b' };
+Array.from('\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079').forEach((c, i) => { superscripts[i] = c; });
+
+function powerOfTen(exponent) {
+  return '10' + Array.from(String(exponent), (c) => superscripts[c]).join('');
+}
+
+// 0.00012345 -> "1.23 x 10^-4", 1234.5 -> "1235": `digits` significant digits.
+function number(value, digits = 3) {
+  if (!isNumber(value)) return '\u2013';
+  if (value === 0) return '0';
+  const exponent = Math.floor(Math.log10(Math.abs(value)));
+  if (exponent < -3 || exponent > 5) {
+    const [mantissa, power] = value.toExponential(digits - 1).split('e');
+    return mantissa.replace('-', '\u2212') + '\u00a0\u00d7\u00a0' + powerOfTen(Number(power));
+  }
+  return value.toFixed(Math.max(0, digits - 1 - exponent)).replace('-', '\u2212');
+}
+
+function percent(value, digits = 2) {
+  if (!isNumber(value)) return '\u2013';
+  const text = Number((100 * value).toPrecision(digits));
+  return (Math.abs(text) < 1e-3 && text !== 0 ? number(text, digits) : String(text)) + '\u00a0%';
+}
+
+function hertz(value) {
+  if (!isNumber(value)) return '\u2013';
+  return value >= 1000 ? number(value / 1000, 4).replace(/\.?0+$/, '') + '\u00a0kHz'
+                       : String(Number(value.toPrecision(4))) + '\u00a0Hz';
+}
+
+function duration(seconds) {
+  if (!isNumber(seconds)) return '\u2013';
+  if (seconds === 0) return '0\u00a0s';
+  if (seconds < 1e-3) return number(1e6 * seconds, 3) + '\u00a0\u00b5s';
+  if (seconds < 1) return number(1e3 * seconds, 3) + '\u00a0ms';
+  if (seconds < 120) return number(seconds, 3) + '\u00a0s';
+  const minutes = Math.floor(seconds / 60);
+  if (minutes < 120) return minutes + '\u00a0min ' + Math.round(seconds - 60 * minutes) + '\u00a0s';
+  return Math.floor(minutes / 60) + '\u00a0h ' + (minutes % 60) + '\u00a0min';
+}
+
+function count(value) {
+  return String(value).replace(/\B(?=(\d{3})+(?!\d))/g, '\u202f');
+}
+
+function plural(n, one, many) {
+  return count(n) + ' ' + (n === 1 ? one : many || one + 's');
+}
+
+// A section of the page with its entry in the contents; returns the body to fill.
+function section(id, title, lead) {
+  const node = element('section', { id, 'aria-labelledby': id + '-title' },
+    element('h2', { id: id + '-title' }, title),
+    lead ? element('p', { class: 'lead' }, lead) : null);
+  document.getElementById('main').append(node);
+  document.getElementById('contents').append(element('a', { href: '#' + id }, title));
+  return node;
+}
+
+// A list of [label, value], value a text or an element.
+function facts(pairs) {
+  const list = element('dl', { class: 'facts' });
+  for (const [label, value] of pairs) {
+    if (value === null || value === undefined || value === '') continue;
+    list.append(element('div', null, element('dt', null, label), element('dd', null, value)));
+  }
+  return list;
+}

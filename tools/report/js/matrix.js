@@ -1,0 +1,245 @@
+// The element-wise Bode matrix: one small canvas a channel, drawn when it comes into view.
+
+const matrix = { panels: [], selected: -1, onselect: null, timesOmega: 0, drawn: 0 };
+
+// What multiplies a magnitude: 1 or omega^2 (acceleration instead of position).
+function lineScale() {
+  const f = array('frequency');
+  return matrix.timesOmega ? Float64Array.from(f, (hz) => (2 * Math.PI * hz) ** matrix.timesOmega) : null;
+}
+
+function scaled(values, scale) {
+  return scale && values ? Float64Array.from(values, (v, k) => v * scale[k]) : values;
+}
+
+// The common range: everything measured, and below it most of the residual.
+function matrixRange(scale) {
+  let high = 0;
+  let low = Infinity;
+  const small = [];
+  for (let c = 0; c < channelCount; ++c) {
+    const curves = channelCurves(c);
+    const measured = scaled(curves.measured, scale);
+    for (const v of measured) {
+      if (v > high) high = v;
+      if (v > 0 && v < low) low = v;
+    }
+    const residual = scaled(curves.residual, scale);
+    if (residual) for (let k = 0; k < residual.length; k += 7) if (residual[k] > 0) small.push(residual[k]);
+  }
+  if (small.length) low = Math.min(low, Float64Array.from(small).sort()[Math.floor(0.03 * small.length)]);
+  if (!(high > 0)) return [-1, 0];
+  return [Math.log10(low) - 0.2, Math.log10(high) + 0.3];
+}
+
+function buildMatrix() {
+  const { inputs, outputs } = content.frf;
+  const hasModel = Boolean(content.arrays.residual);
+  const body = section('response', 'Frequency response, element by element',
+    'Each panel is one actuator (column) to one sensor (row): magnitude over frequency, both logarithmic, ' +
+    'all on one scale. Choose a panel to see it large; the arrow keys move between panels.');
+  const legend = element('div', { class: 'legend' }, swatch('measured', 'measured'),
+    hasModel ? swatch('model', 'model') : null, hasModel ? swatch('residual', 'residual') : null,
+    hasModel ? element('span', { class: 'quiet' }, 'number: relative rms error of the channel') : null);
+  const times = element('input', { type: 'checkbox', id: 'times-omega' });
+  times.addEventListener('change', () => {
+    matrix.timesOmega = times.checked ? 2 : 0;
+    redrawMatrix();
+    if (matrix.onselect) matrix.onselect(matrix.selected);
+  });
+  legend.append(element('label', { class: 'toggle', for: 'times-omega' }, times, ' times \u03c9\u00b2'));
+  const grid = element('div', {
+    class: 'matrix', role: 'group', 'aria-label': 'Panels',
+    style: '--inputs:' + inputs.length + ';--outputs:' + outputs.length,
+  });
+  inputs.forEach((input, i) => grid.append(element('span', { class: 'input-name', style: '--i:' + i, title: input.name }, input.name)));
+  outputs.forEach((output, o) => grid.append(element('span', { class: 'output-name', style: '--o:' + o, title: output.name }, output.name)));
+  for (let i = 0; i < inputs.length; ++i) {
+    for (let o = 0; o < outputs.length; ++o) grid.append(makePanel(o, i));
+  }
+  body.append(legend, element('div', { class: 'matrix-scroll' }, grid),
+    element('p', { class: 'quiet', id: 'matrix-scale' }));
+  grid.addEventListener('keydown', moveFocus);
+  onColours(redrawMatrix);
+  watchPanels();
+}
+
+function swatch(kind, text) {
+  return element('span', { class: 'swatch ' + kind }, text);
+}
+
+function makePanel(output, input) {
+  const channel = channelIndex(output, input);
+  const canvas = element('canvas', { 'aria-hidden': 'true' });
+  const error = element('span', { class: 'error' });
+  const button = element('button', {
+    type: 'button', class: 'panel', style: '--i:' + input + ';--o:' + output, 'data-channel': channel,
+    tabindex: channel === 0 ? '0' : '-1', title: channelName(channel), 'aria-label': channelName(channel),
+    'aria-pressed': 'false', onclick: () => selectPanel(channel),
+  }, canvas, error);
+  matrix.panels[channel] = { button, canvas, error, drawn: false };
+  return button;
+}
+
+function selectPanel(channel) {
+  for (const panel of matrix.panels) {
+    panel.button.setAttribute('aria-pressed', 'false');
+    panel.button.tabIndex = -1;
+  }
+  matrix.panels[channel].button.setAttribute('aria-pressed', 'true');
+  matrix.panels[channel].button.tabIndex = 0;
+  matrix.selected = channel;
+  if (matrix.onselect) matrix.onselect(channel);
+}
+
+function moveFocus(event) {
+  const outputs = content.frf.outputs.length;
+  const inputs = content.frf.inputs.length;
+  const turned = getComputedStyle(event.currentTarget).getPropertyValue('--turned').trim() === '1';
+  const steps = turned
+    ? { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }
+    : { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
+  const step = steps[event.key];
+  const from = Number(event.target.dataset ? event.target.dataset.channel : NaN);
+  if (!step || !Number.isInteger(from)) return;
+  event.preventDefault();
+  const output = Math.min(outputs - 1, Math.max(0, (from % outputs) + step[0]));
+  const input = Math.min(inputs - 1, Math.max(0, Math.floor(from / outputs) + step[1]));
+  matrix.panels[from].button.tabIndex = -1;
+  const target = matrix.panels[channelIndex(output, input)].button;
+  target.tabIndex = 0;
+  target.focus();
+}
+
+// Panels in view are drawn at once, the others when the browser has nothing else to do.
+function watchPanels() {
+  const seen = new IntersectionObserver((entries) => {
+    for (const entry of entries) if (entry.isIntersecting) drawPanel(Number(entry.target.dataset.channel));
+  }, { rootMargin: '200px' });
+  for (const panel of matrix.panels) seen.observe(panel.button);
+  const idle = window.requestIdleCallback || ((f) => setTimeout(() => f({ timeRemaining: () => 8 }), 30));
+  let next = 0;
+  const work = (deadline) => {
+    while (next < matrix.panels.length && deadline.timeRemaining() > 3) drawPanel(next++);
+    if (next < matrix.panels.length) idle(work);
+  };
+  idle(work);
+  let width = window.innerWidth;
+  window.addEventListener('resize', () => {
+    if (window.innerWidth === width) return;
+    width = window.innerWidth;
+    redrawMatrix();
+  });
+}
+
+function redrawMatrix() {
+  matrix.range = null;
+  for (const panel of matrix.panels) panel.drawn = false;
+  matrix.panels.forEach((panel, channel) => drawPanel(channel));
+}
+
+function drawPanel(channel) {
+  const panel = matrix.panels[channel];
+  if (panel.drawn) return;
+  const scale = lineScale();
+  if (!matrix.range) {
+    matrix.range = matrixRange(scale);
+    tellScale();
+  }
+  const width = panel.canvas.clientWidth;
+  const height = panel.canvas.clientHeight;
+  if (width === 0) return;
+  panel.drawn = true;
+  ++matrix.drawn;
+  const ratio = Math.min(3, window.devicePixelRatio || 1);
+  panel.canvas.width = Math.round(width * ratio);
+  panel.canvas.height = Math.round(height * ratio);
+  const context = panel.canvas.getContext('2d');
+  context.scale(ratio, ratio);
+  const frame = panelFrame(width, height);
+  drawDecades(context, frame);
+  const curves = channelCurves(channel);
+  const colours = palette();
+  drawCurve(context, frame, scaled(curves.residual, scale), colours.residual, 0.7);
+  drawCurve(context, frame, scaled(curves.measured, scale), colours.measured, 1.9);
+  drawCurve(context, frame, scaled(curves.model, scale), colours.model, 0.9);
+  if (curves.relativeError !== null) panel.error.textContent = percent(curves.relativeError);
+}
+
+function tellScale() {
+  const f = array('frequency');
+  const [low, high] = matrix.range;
+  const units = new Set();
+  for (const output of content.frf.outputs) for (const input of content.frf.inputs) units.add(unitOf(output, input));
+  const unit = units.size === 1 ? ' ' + [...units][0] : ' (units differ between channels)';
+  document.getElementById('matrix-scale').textContent =
+    'Across: ' + hertz(f[0]) + ' to ' + hertz(f[f.length - 1]) + ', up: ' + powerOfTen(Math.ceil(low)) + ' to ' +
+    powerOfTen(Math.floor(high)) + unit + (matrix.timesOmega ? ', times \u03c9\u00b2' : '') + '; one grid line a decade.';
+}
+
+function unitOf(output, input) {
+  return (output.unit || '1') + '/' + (input.unit || '1');
+}
+
+function panelFrame(width, height) {
+  const f = array('frequency');
+  const x0 = Math.log10(f[0]);
+  const x1 = Math.log10(f[f.length - 1]);
+  const [y0, y1] = matrix.range;
+  return {
+    width, height, x0, x1, y0, y1,
+    x: (lg) => (x1 > x0 ? (lg - x0) / (x1 - x0) : 0.5) * width,
+    y: (lg) => (1 - (lg - y0) / (y1 - y0)) * height,
+  };
+}
+
+function drawDecades(context, frame) {
+  context.strokeStyle = palette().grid;
+  context.lineWidth = 1;
+  context.beginPath();
+  for (let d = Math.ceil(frame.x0); d <= frame.x1; ++d) {
+    const x = Math.round(frame.x(d)) + 0.5;
+    context.moveTo(x, 0);
+    context.lineTo(x, frame.height);
+  }
+  for (let d = Math.ceil(frame.y0); d <= frame.y1; ++d) {
+    const y = Math.round(frame.y(d)) + 0.5;
+    context.moveTo(0, y);
+    context.lineTo(frame.width, y);
+  }
+  context.stroke();
+}
+
+// First, least, largest and last of every half pixel column: peaks of one line survive.
+function drawCurve(context, frame, values, colour, width) {
+  if (!values) return;
+  const f = array('frequency');
+  const y = (v) => frame.y(Math.log10(Math.max(v, 1e-300)));
+  context.strokeStyle = colour;
+  context.lineWidth = width;
+  context.lineJoin = 'round';
+  context.beginPath();
+  let column = -1, low = 0, high = 0, last = 0, x = 0;
+  const flush = () => {
+    context.lineTo(x, y(low));
+    context.lineTo(x, y(high));
+    context.lineTo(x, y(last));
+  };
+  for (let k = 0; k < values.length; ++k) {
+    const at = frame.x(Math.log10(f[k]));
+    const here = Math.floor(2 * at);
+    if (here !== column) {
+      if (column >= 0) flush();
+      column = here;
+      x = at;
+      low = high = values[k];
+      if (k === 0) context.moveTo(x, y(values[k]));
+      else context.lineTo(x, y(values[k]));
+    }
+    low = Math.min(low, values[k]);
+    high = Math.max(high, values[k]);
+    last = values[k];
+  }
+  flush();
+  context.stroke();
+}

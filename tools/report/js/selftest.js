@@ -1,0 +1,75 @@
+// report.html#selftest checks itself and leaves the findings as JSON in the element "selftest".
+// The program's own browser test reads it; so can anyone who doubts a page.
+
+function selfTest(startedMs) {
+  const findings = {
+    title: document.title, verdict: content.verdict.level, sections: Array.from(document.querySelectorAll('main > section'), (s) => s.id),
+    ready_ms: Math.round(performance.now()), script_ms: Math.round(performance.now() - startedMs),
+    width: window.innerWidth, overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+    injected: document.querySelectorAll('main img, main iframe, main script, header img, header script, [onerror]').length,
+  };
+  if (content.frf) {
+    matrix.panels.forEach((_, channel) => drawPanel(channel));
+    Object.assign(findings, {
+      panels: matrix.panels.length, panels_with_ink: matrix.panels.filter((panel) => hasInk(panel.canvas)).length,
+      panel_sizes: smallestPanel(), arrays: Object.fromEntries(Object.keys(content.arrays).map((id) => [id, summary(id)])),
+      entries: matrix.panels.map((_, channel) => entrySummary(channel)),
+    });
+  }
+  findings.plots = Object.fromEntries(Array.from(document.querySelectorAll('.plot'), (plot) => [plot.id, inkOf(plot)]));
+  findings.rows = Object.fromEntries(Array.from(document.querySelectorAll('section'), (s) => [s.id, s.querySelectorAll('tbody tr').length]));
+  if (content.frf) findings.zoom = zoomCheck();
+  findings.errors = window.stageidReport.errors;
+  document.body.append(element('script', { type: 'application/json', id: 'selftest' }, JSON.stringify(findings).replace(/</g, '\\u003c')));
+}
+
+function hasInk(canvas) {
+  const { width, height } = canvas;
+  if (width === 0 || height === 0) return false;
+  const pixels = new Uint32Array(canvas.getContext('2d').getImageData(0, 0, width, height).data.buffer);
+  return new Set(pixels).size > 8;
+}
+
+function inkOf(plot) {
+  return Array.from(plot.querySelectorAll('canvas')).some(hasInk);
+}
+
+function smallestPanel() {
+  const widths = matrix.panels.map((panel) => panel.canvas.clientWidth);
+  const heights = matrix.panels.map((panel) => panel.canvas.clientHeight);
+  return { width: Math.min(...widths), height: Math.min(...heights) };
+}
+
+// Enough to tell a wrong order, sign, scale or type: count, extremes, and a sum with places as weights.
+function summary(id) {
+  const values = array(id);
+  let low = Infinity, high = -Infinity, weighted = 0;
+  values.forEach((v, i) => {
+    low = Math.min(low, v);
+    high = Math.max(high, v);
+    weighted += v * ((i % 1009) + 1);
+  });
+  return { count: values.length, low, high, weighted, first: values[0], last: values[values.length - 1] };
+}
+
+// What the large plot would draw: the traces and the extremes of each.
+function entrySummary(channel) {
+  const table = magnitudeTable(channel);
+  const phase = phaseTable(channel);
+  const extremes = table.names.map((name, i) => {
+    const values = table.rows.map((row) => row[i + 1][1]);
+    return [name, { low: values.reduce((a, b) => Math.min(a, b)), high: values.reduce((a, b) => Math.max(a, b)) }];
+  });
+  return { traces: table.names, phases: phase.names, lines: table.rows.length, extremes: Object.fromEntries(extremes) };
+}
+
+// A zoom of the magnitude must move the phase with it, and back.
+function zoomCheck() {
+  const f = array('frequency');
+  const whole = entry.magnitude.xAxisRange();
+  const asked = [f[Math.floor(f.length / 4)], f[Math.floor(f.length / 2)]];
+  entry.magnitude.updateOptions({ dateWindow: asked });
+  const got = { asked, magnitude: entry.magnitude.xAxisRange(), phase: entry.phase.xAxisRange() };
+  resetZoom();
+  return { ...got, whole, restored: entry.phase.xAxisRange() };
+}

@@ -1,0 +1,187 @@
+// Words and tables: the head, the modes, the validation, the decisions, where everything came from.
+
+function buildHead() {
+  const head = document.getElementById('head');
+  const { verdict, model, validation, frf } = content;
+  head.append(element('p', { class: 'brand' }, 'stageid ' + (content.version || '') + ' \u00b7 report'),
+    element('h1', null, content.title || 'Report'),
+    element('p', { class: 'verdict ' + verdict.level, id: 'verdict' }, element('span', { class: 'sign', 'aria-hidden': 'true' }), verdict.text));
+  if (verdict.reasons.length) head.append(element('ul', { class: 'reasons' }, ...verdict.reasons.map((reason) => element('li', null, reason))));
+  const figures = [];
+  if (model) {
+    figures.push(['modes', String(model.modes)], ['relative rms error', percent(model.relative_rms_error, 3)]);
+    figures.push(['fit', model.status ? model.status.replace(/_/g, ' ') + ', ' + plural(model.iterations, 'iteration') : '\u2013']);
+  }
+  if (validation) {
+    figures.push(['rms error, held-back data', percent(validation.relative_rms_error, 3)]);
+    if (validation.chi_square_per_dof > 0) figures.push(['chi-square per degree of freedom', number(validation.chi_square_per_dof)]);
+  }
+  if (frf) {
+    figures.push(['lines', count(frf.lines)], ['sensors \u00d7 actuators', frf.outputs.length + ' \u00d7 ' + frf.inputs.length]);
+    const f = array('frequency');
+    figures.push(['band', hertz(f[0]) + ' \u2013 ' + hertz(f[f.length - 1])]);
+  }
+  for (const figure of content.figures) figures.push([figure.label, figure.value]);
+  head.append(figureList(figures));
+  const notes = content.messages.filter((message) => message.severity === 'note');
+  if (notes.length) head.append(element('ul', { class: 'notes' }, ...notes.map((note) => element('li', null, note.text))));
+}
+
+function figureList(figures) {
+  const list = element('dl', { class: 'figures' });
+  for (const [label, value] of figures) list.append(element('div', null, element('dt', null, label), element('dd', null, value)));
+  return list;
+}
+
+// Columns: [title, sort key of a row, cell of a row, class]. Sorted by a click on a title.
+function sortableTable(columns, rows, caption) {
+  const body = element('tbody');
+  const heads = columns.map(([title], i) => element('th', { scope: 'col', 'aria-sort': 'none' },
+    element('button', { type: 'button', onclick: () => sort(i) }, title)));
+  let sorted = -1;
+  let up = true;
+  const fill = (list) => body.replaceChildren(...list.map((row) => element('tr', { class: row.rowClass || null },
+    ...columns.map(([, , cell, kind]) => element('td', { class: kind || null }, cell(row))))));
+  const sort = (i) => {
+    up = sorted === i ? !up : true;
+    sorted = i;
+    const key = columns[i][1];
+    const list = rows.slice().sort((a, b) => {
+      const x = key(a), y = key(b);
+      if (!isNumber(x) || !isNumber(y)) return Number(isNumber(y)) - Number(isNumber(x));
+      return up ? x - y : y - x;
+    });
+    heads.forEach((head, j) => head.setAttribute('aria-sort', j === i ? (up ? 'ascending' : 'descending') : 'none'));
+    fill(list);
+  };
+  fill(rows);
+  return element('div', { class: 'table-scroll' },
+    element('table', null, caption ? element('caption', null, caption) : null, element('thead', null, element('tr', null, ...heads)), body));
+}
+
+function buildModes() {
+  const known = content.modes.some((mode) => mode.truth);
+  const uncertain = content.modes.some((mode) => isNumber(mode.frequency_std_hz));
+  const body = section('modes', 'Modes', known
+    ? 'Identified modes beside the true ones of the simulated plant. Deviations are in standard deviations.' : null);
+  const rows = content.modes.map((mode, i) => ({ ...mode, place: i + 1, rowClass: isNumber(mode.frequency_hz) ? null : 'absent' }));
+  const sigmas = (value) => (isNumber(value) ? (value < 0 ? '\u2212' : '+') + Math.abs(value).toFixed(1) : '\u2013');
+  const deviation = (key) => (row) => element('span', { class: Math.abs(row[key]) > 3 ? 'far' : null }, sigmas(row[key]));
+  const columns = [
+    ['#', (row) => row.place, (row) => String(row.place)],
+    ['f\u2080 [Hz]', (row) => row.frequency_hz, frequencyCell],
+  ];
+  if (uncertain) columns.push(['\u03c3(f\u2080) [Hz]', (row) => row.frequency_std_hz, (row) => number(row.frequency_std_hz, 2)]);
+  columns.push(['\u03b6 [%]', (row) => row.damping_ratio, (row) => hundred(row.damping_ratio)]);
+  if (uncertain) columns.push(['\u03c3(\u03b6) [%]', (row) => row.damping_std, (row) => number(isNumber(row.damping_std) ? 100 * row.damping_std : null, 2)]);
+  if (known) {
+    columns.push(['true f\u2080 [Hz]', (row) => row.truth && row.truth.frequency_hz, (row) => fixed(row.truth && row.truth.frequency_hz)],
+      ['true \u03b6 [%]', (row) => row.truth && row.truth.damping_ratio, (row) => hundred(row.truth && row.truth.damping_ratio)]);
+    if (uncertain) columns.push(['\u0394f\u2080/\u03c3', (row) => row.frequency_deviation, deviation('frequency_deviation')],
+      ['\u0394\u03b6/\u03c3', (row) => row.damping_deviation, deviation('damping_deviation')]);
+  }
+  body.append(sortableTable(columns, rows));
+  const others = content.model.others.map((other) => other.integrators
+    ? 'rigid body (1/s' + (other.integrators === 1 ? '' : superscripts[other.integrators] || '^' + other.integrators) + ')'
+    : other.order === 0 ? 'direct term' : 'submodel of order ' + other.order);
+  if (others.length) body.append(element('p', { class: 'quiet' }, 'Beside the modes: ' + others.join(', ') + '.'));
+  body.append(fitFacts());
+}
+
+function fixed(value) {
+  return isNumber(value) ? value.toFixed(value >= 1000 ? 3 : 4) : '\u2013';
+}
+
+function hundred(value) {
+  return isNumber(value) ? (100 * value).toPrecision(4) : '\u2013';
+}
+
+function frequencyCell(row) {
+  if (!isNumber(row.frequency_hz)) {
+    return row.truth && !row.truth.observable ? 'no sensor sees it' : 'not identified';
+  }
+  if (!content.frf) return fixed(row.frequency_hz);
+  const half = Math.max(0.03, 12 * (row.damping_ratio || 0.01));
+  return element('button', {
+    type: 'button', class: 'plain number', title: 'Show in the large plot',
+    onclick: () => zoomEntry(row.frequency_hz * (1 - Math.min(half, 0.5)), row.frequency_hz * (1 + half)),
+  }, fixed(row.frequency_hz));
+}
+
+function delayText(delays) {
+  const values = new Set(delays);
+  if (values.size === 0) return null;
+  const most = Math.max(...values);
+  return values.size === 1 ? duration(most) : duration(Math.min(...values)) + ' to ' + duration(most);
+}
+
+function fitFacts() {
+  const model = content.model;
+  return facts([
+    ['status', model.status], ['weighting', model.weighting && model.weighting.replace(/_/g, ' ')],
+    ['cost', number(model.cost, 5)], ['iterations', count(model.iterations)], ['hold in the model', model.hold],
+    ['delay at the inputs', delayText(model.delay_s.inputs)], ['delay at the outputs', delayText(model.delay_s.outputs)],
+    ['band fitted', model.band_hz[1] > 0 ? hertz(model.band_hz[0]) + ' \u2013 ' + hertz(model.band_hz[1]) : null],
+    ['time', model.seconds > 0 ? duration(model.seconds) : null],
+  ]);
+}
+
+function buildValidation() {
+  const v = content.validation;
+  const body = section('validation', 'Validation', 'On data that the fit has not seen.');
+  body.append(facts([
+    ['relative rms error', percent(v.relative_rms_error, 3)], ['normalized error', percent(v.normalized_error, 3)],
+    ['chi-square per degree of freedom', v.chi_square_per_dof > 0 ? number(v.chi_square_per_dof) + ' (1: within the noise)' : 'unknown: no variances'],
+    ['whitened error above its 95 % point', v.chi_square_per_dof > 0 ? percent(v.whitened_above_95) + ' (5 % is right)' : null],
+    ['largest autocorrelation over lines', v.whiteness_limit > 0 ? number(v.whiteness) + ' (99 % limit ' + number(v.whiteness_limit) + ')' : null],
+  ]));
+  if (content.frf && v.channel_error.length === channelCount) body.append(channelErrors(v.channel_error));
+}
+
+// Relative rms error a channel, shaded on a logarithmic scale between the least and the largest.
+function channelErrors(errors) {
+  const { inputs, outputs } = content.frf;
+  const logs = errors.filter((e) => e > 0).map(Math.log);
+  const low = Math.min(...logs), high = Math.max(...logs);
+  const shade = (e) => (e > 0 && high > low ? (Math.log(e) - low) / (high - low) : 0);
+  const head = element('tr', null, element('th', { scope: 'col' }, ''), ...inputs.map((input) => element('th', { scope: 'col', class: 'name' }, input.name)));
+  const rows = outputs.map((output, o) => element('tr', null, element('th', { scope: 'row', class: 'name' }, output.name),
+    ...inputs.map((_, i) => {
+      const e = errors[channelIndex(o, i)];
+      return element('td', { class: 'heat', style: '--heat:' + shade(e).toFixed(3) }, percent(e));
+    })));
+  return element('div', { class: 'table-scroll' }, element('table', { class: 'heatmap' },
+    element('caption', null, 'Relative rms error of each channel'), element('thead', null, head), element('tbody', null, ...rows)));
+}
+
+function buildDecisions() {
+  const body = section('decisions', 'Decisions of the automatic fit');
+  const list = element('ol', { class: 'decisions' }, ...content.decisions.map((decision) => element('li', null, decision)));
+  body.append(content.decisions.length > 12
+    ? element('details', null, element('summary', null, plural(content.decisions.length, 'decision')), list) : list);
+}
+
+function buildProvenance() {
+  const body = section('provenance', 'Where it came from');
+  const frf = content.frf;
+  if (frf) {
+    body.append(facts([
+      ['realizations', frf.realizations || null], ['experiments each', frf.experiments || null], ['periods used', frf.periods || null],
+      ['sample rate', frf.sample_rate_hz > 0 ? hertz(frf.sample_rate_hz) : null], ['hold in the data', frf.hold],
+      ['compensated', frf.compensated + (frf.compensated === 'none' ? '' : ', ' + duration(frf.delay_s))],
+      ['standard deviation from', frf.deviation ? frf.deviation + ' variance' : 'unknown'],
+      ['degrees of freedom', frf.deviation ? number(frf.deviation === 'total' ? frf.total_dof : frf.noise_dof) : null],
+      ['worst condition of the inputs', isNumber(frf.worst_condition) ? number(frf.worst_condition) : null],
+    ]));
+    if (frf.excluded.length) body.append(element('p', null, 'Actuators outside the identified part, with their power over that of the inputs: ' +
+      frf.excluded.map((channel) => channel.name + ' (' + (isNumber(channel.power) ? number(channel.power) : 'unknown') + ')').join(', ') + '.'));
+  }
+  for (const { of, content: what } of content.provenance) {
+    body.append(folded('Provenance of the ' + of, typeof what === 'string' ? what : JSON.stringify(what, null, 2)));
+  }
+  for (const { name, text } of content.documents) body.append(folded(name, text));
+}
+
+function folded(title, text) {
+  return element('details', null, element('summary', null, title), element('pre', null, text));
+}

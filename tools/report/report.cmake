@@ -1,0 +1,38 @@
+# The report page: sources of ours and the plot library, built into stageid_tools.
+find_path(STAGEID_DYGRAPHS_DIR dygraph.min.js
+  PATHS /usr/share/javascript/dygraphs /usr/local/share/javascript/dygraphs NO_DEFAULT_PATH
+  DOC "Folder of dygraph.min.js")
+if(NOT STAGEID_DYGRAPHS_DIR)
+  message(FATAL_ERROR "The plot library of the report, dygraphs, was not found. Install it with\n"
+    "  apt-get install libjs-dygraphs\n"
+    "or set STAGEID_DYGRAPHS_DIR to the folder that holds dygraph.min.js.")
+endif()
+
+set(report_js data format theme axes matrix entry curves tables health selftest main)
+list(TRANSFORM report_js REPLACE "(.+)" "${CMAKE_CURRENT_LIST_DIR}/js/\\1.js")
+set(library_js ${STAGEID_DYGRAPHS_DIR}/dygraph.min.js
+  ${STAGEID_DYGRAPHS_DIR}/src/extras/synchronizer.js)
+set(report_single page.html report.css dygraphs_licence.txt embed.cmake)
+list(TRANSFORM report_single PREPEND "${CMAKE_CURRENT_LIST_DIR}/")
+
+string(REPLACE ";" "|" report_js_joined "${report_js}")
+string(REPLACE ";" "|" library_js_joined "${library_js}")
+set(report_assets
+  page_html=${CMAKE_CURRENT_LIST_DIR}/page.html
+  page_css=${CMAKE_CURRENT_LIST_DIR}/report.css
+  page_js=${report_js_joined}
+  library_css=${STAGEID_DYGRAPHS_DIR}/dygraph.min.css
+  library_js=${library_js_joined}
+  library_licence=${CMAKE_CURRENT_LIST_DIR}/dygraphs_licence.txt)
+string(REPLACE ";" "," report_assets "${report_assets}")
+
+set(report_assets_cpp ${CMAKE_CURRENT_BINARY_DIR}/report_assets.cpp)
+add_custom_command(OUTPUT ${report_assets_cpp}
+  COMMAND ${CMAKE_COMMAND} -DOUTPUT=${report_assets_cpp} "-DASSETS=${report_assets}"
+    -P ${CMAKE_CURRENT_LIST_DIR}/embed.cmake
+  DEPENDS ${report_js} ${library_js} ${report_single} ${STAGEID_DYGRAPHS_DIR}/dygraph.min.css
+  COMMENT "Embedding the report page" VERBATIM)
+
+target_sources(stageid_tools PRIVATE
+  report.cpp report_encoding.cpp report_json.cpp report_modes.cpp report_verdict.cpp
+  ${report_assets_cpp})

@@ -1,0 +1,108 @@
+#include "tools/report_verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tools/report_modes.hpp"
+
+namespace stageid {
+namespace {
+
+using Reasons = std::vector<std::string>;
+
+void judge_fit(const ReportData& data, Reasons& reasons) {
+  const std::string& status = data.model->fit.status;
+  if (status != "gradient_small" && status != "step_small")
+    reasons.push_back("the fit did not converge: " + (status.empty() ? "no status" : status));
+  if (!data.validation) return;
+  const double chi_square = data.validation->chi_square_per_dof;
+  if (chi_square > doubtful_chi_square)
+    reasons.push_back(fmt::format(
+        "on data not used for the fit the error is {:.3g} times what the noise explains "
+        "(chi-square per degree of freedom; 1 is right, above {:.0f} is doubted)",
+        chi_square, doubtful_chi_square));
+}
+
+void judge_modes(const ReportData& data, Reasons& reasons) {
+  if (data.true_modes.empty()) return;
+  for (const ModeRow& row : mode_table(*data.model, data.true_modes)) {
+    if (!row.truth) {
+      reasons.push_back(
+          fmt::format("a mode at {:.2f} Hz that the plant does not have", *row.frequency_hz));
+    } else if (!row.frequency_hz) {
+      if (row.truth->observable)
+        reasons.push_back(fmt::format("the true mode at {:.2f} Hz was not identified",
+                                      row.truth->natural_frequency_hz));
+    } else if (std::abs(row.frequency_deviation().value_or(0.0)) > 3.0 &&
+               *row.relative_frequency_error() > 1e-4) {
+      reasons.push_back(
+          fmt::format("the mode at {:.2f} Hz is {:.1f} standard deviations off the truth",
+                      *row.frequency_hz, std::abs(*row.frequency_deviation())));
+    }
+  }
+}
+
+void judge_runs(const ReportData& data, Reasons& reasons) {
+  std::uint64_t missing = 0;
+  std::uint64_t marked = 0;
+  int incomplete = 0;
+  for (const LogRun& run : data.runs) {
+    missing += run.health.missing;
+    marked += run.health.marked;
+    incomplete += run.complete ? 0 : 1;
+  }
+  if (missing > 0) reasons.push_back(fmt::format("{} cycles are missing", missing));
+  if (marked > 0) reasons.push_back(fmt::format("{} cycles are marked as not to be used", marked));
+  if (incomplete > 0) reasons.push_back(fmt::format("{} runs are incomplete", incomplete));
+}
+
+}  // namespace
+
+const char* to_string(Verdict::Level level) noexcept {
+  switch (level) {
+    case Verdict::Level::none:
+      return "none";
+    case Verdict::Level::good:
+      return "good";
+    case Verdict::Level::doubt:
+      return "doubt";
+    case Verdict::Level::bad:
+      return "bad";
+  }
+  return "none";
+}
+
+Verdict judge(const ReportData& data) {
+  Verdict verdict;
+  bool error = false;
+  for (const ReportMessage& message : data.messages) {
+    if (message.severity == ReportMessage::Severity::note) continue;
+    error = error || message.severity == ReportMessage::Severity::error;
+    verdict.reasons.push_back(message.text);
+  }
+  judge_runs(data, verdict.reasons);
+  if (data.model) {
+    judge_fit(data, verdict.reasons);
+    judge_modes(data, verdict.reasons);
+  }
+
+  if (error) {
+    verdict.level = Verdict::Level::bad;
+    verdict.text = "Not to be trusted";
+  } else if (!verdict.reasons.empty()) {
+    verdict.level = Verdict::Level::doubt;
+    verdict.text = data.model ? "Read this before you trust the model"
+                              : "Read this before you trust the measurement";
+  } else if (data.model) {
+    verdict.level = Verdict::Level::good;
+    verdict.text = data.validation && data.validation->chi_square_per_dof > 0.0
+                       ? "The fit converged, and the model holds on data it has not seen"
+                       : "The fit converged";
+  } else {
+    verdict.text = data.frf ? "Measured frequency response, no model" : "No model";
+  }
+  return verdict;
+}
+
+}  // namespace stageid
