@@ -1,0 +1,78 @@
+// One cycle of the wafer stage on one core: what the measurement loop asks of hal at every sample.
+#include <benchmark/benchmark.h>
+
+#include <memory>
+#include <vector>
+
+#include "hal/limited_stage.hpp"
+#include "hal/modal_plant.hpp"
+#include "hal/motion_controller.hpp"
+#include "hal/noise.hpp"
+#include "tests/support/wafer_stage.hpp"
+
+namespace {
+
+using namespace stageid;
+
+void plant_step(benchmark::State& state) {
+  const WaferStageSpec spec = test::wafer_stage_spec();
+  ModalPlant plant(wafer_stage_modes(spec), spec.delay_s, spec.info.sample_rate_hz);
+  std::vector<double> u(17, 0.1);
+  std::vector<double> y(7);
+  for (auto _ : state) {
+    plant.step(u.data());
+    plant.output(y.data());
+    benchmark::DoNotOptimize(y.data());
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(plant_step);
+
+void controller_update(benchmark::State& state) {
+  MotionController controller(test::wafer_stage_spec().controller);
+  std::vector<double> u(17);
+  std::vector<double> y(7, 1e-9);
+  for (auto _ : state) {
+    controller.update(y.data(), u.data());
+    benchmark::DoNotOptimize(u.data());
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(controller_update);
+
+void noise_sample(benchmark::State& state) {
+  StageNoise noise({17, 7, 1e4, 1e-3, 1e-10, 1e-10, 20.0});
+  noise.restart(1, 1);
+  for (auto _ : state) {
+    noise.next();
+    benchmark::DoNotOptimize(noise.sensor_m());
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(noise_sample);
+
+void limited_closed_loop_cycle(benchmark::State& state) {
+  const WaferStageSpec spec = test::wafer_stage_spec();
+  LimitedStage stage(std::make_unique<SimulatedStage>(spec), spec.limits);
+  MotionController controller(spec.controller);
+  std::vector<double> y(7);
+  std::vector<double> u(17);
+  Inputs inputs;
+  inputs.y = y;
+  stage.start(1, inputs);
+  Outputs outputs;
+  outputs.u = u;
+  for (auto _ : state) {
+    controller.update(y.data(), u.data());
+    outputs.cycle = inputs.cycle;
+    if (stage.exchange(outputs, inputs, {}) != Outcome::ok) state.SkipWithError("not ok");
+  }
+  state.counters["times_real_time"] =
+      benchmark::Counter(static_cast<double>(state.iterations()) / spec.info.sample_rate_hz,
+                         benchmark::Counter::kIsRate);
+}
+BENCHMARK(limited_closed_loop_cycle);
+
+}  // namespace
+
+BENCHMARK_MAIN();

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hal/simulated_stage.hpp"
+
+namespace stageid::test {
+
+/// The stage of configs/stage/wafer_stage.yaml, written out so that tests of the libraries need no
+/// file and no parser. A test in tests/tools holds the two together.
+WaferStageSpec wafer_stage_spec();
+
+/// The same without noise.
+WaferStageSpec silent_wafer_stage_spec();
+
+/// Two actuators, one sensor, all in z, and one flexible mode, at 1 kHz: for tests that need few numbers.
+WaferStageSpec small_stage_spec();
+
+/// Indices of the 13 z actuators and the 4 z sensors, which come first.
+inline constexpr int kZActuators = 13;
+inline constexpr int kZSensors = 4;
+inline constexpr int kModesInBand = 17;  ///< flexible, out of plane, below 2 kHz
+
+}  // namespace stageid::test
