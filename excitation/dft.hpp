@@ -7,7 +7,8 @@
 namespace stageid {
 
 /// Plans and runs real DFTs of one length with FFTW. Planning is guarded by one lock for the whole
-/// program; forward() and inverse() are safe to call from several threads, each with its own object.
+/// program; forward() and inverse() are safe to call from several threads, each with its own
+/// object.
 class RealDft {
  public:
   /// @throws std::invalid_argument if `length` < 2.
@@ -25,8 +26,8 @@ class RealDft {
   /// X(l) = sum_n x(n) exp(-2 pi j l n / N), l = 0 .. N/2; no scaling. Valid until the next call.
   std::span<const std::complex<double>> forward();
 
-  /// x(n) = sum over l of both signs of X(l) exp(2 pi j l n / N), without 1/N; `half_spectrum` holds
-  /// l = 0 .. N/2, size half_size().
+  /// x(n) = sum over l of both signs of X(l) exp(2 pi j l n / N), without 1/N; `half_spectrum`
+  /// holds l = 0 .. N/2, size half_size().
   Eigen::VectorXd inverse(const Eigen::Ref<const Eigen::VectorXcd>& half_spectrum);
 
  private:

@@ -13,16 +13,16 @@ namespace stageid {
 
 /// How the axes share the experiments of one realization.
 enum class ExcitationScheme : std::uint8_t {
-  single_axis,         ///< experiment e excites axis e alone
-  orthogonal_dft,      ///< all axes at once, axis p in experiment e times exp(2 pi j p e / n); any n
+  single_axis,     ///< experiment e excites axis e alone
+  orthogonal_dft,  ///< all axes at once, axis p in experiment e times exp(2 pi j p e / n); any n
   orthogonal_hadamard  ///< the same with a Hadamard matrix: n = 1, 2, 4, 8, 12, 16, 20 ...
 };
 
 /// One excited channel of the stage.
 struct ExcitationAxis {
-  std::string channel;            ///< actuator name
-  double level = 1.0;             ///< rms or peak, unit of the channel
-  Eigen::VectorXd shape;          ///< relative amplitude a line; empty: flat
+  std::string channel;    ///< actuator name
+  double level = 1.0;     ///< rms or peak, unit of the channel
+  Eigen::VectorXd shape;  ///< relative amplitude a line; empty: flat
 };
 
 struct ExperimentSpec {

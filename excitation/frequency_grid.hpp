@@ -15,18 +15,18 @@ enum class LineSelection : std::uint8_t {
 
 /// What to ask of FrequencyGrid::band(). Any values may stand here; band() checks them.
 struct LineSpec {
-  double low_hz = 0.0;                          ///< first frequency, inclusive
-  double high_hz = 0.0;                         ///< last frequency, inclusive
+  double low_hz = 0.0;   ///< first frequency, inclusive
+  double high_hz = 0.0;  ///< last frequency, inclusive
   LineSelection selection = LineSelection::odd;
-  int group_size = 4;                           ///< odd_random: one of so many odd lines is left out
-  std::uint64_t seed = 0;                       ///< odd_random: which one
+  int group_size = 4;      ///< odd_random: one of so many odd lines is left out
+  std::uint64_t seed = 0;  ///< odd_random: which one
 };
 
 /// The lines of one period of a periodic measurement: the only place where samples, lines, Hz and
 /// rad/s meet.
 ///
-/// Line l of a period of N samples at sample rate fs has the frequency l fs / N. Invariant: the lines
-/// are strictly increasing and in 1 .. ceil(N/2)-1 (never DC, never Nyquist).
+/// Line l of a period of N samples at sample rate fs has the frequency l fs / N. Invariant: the
+/// lines are strictly increasing and in 1 .. ceil(N/2)-1 (never DC, never Nyquist).
 class FrequencyGrid {
  public:
   /// @throws std::invalid_argument if the invariant does not hold or the rate is not positive.

@@ -1,0 +1,146 @@
+#include "excitation/hdf5_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include "excitation/file_error.hpp"
+#include "excitation/hdf5_support.hpp"
+
+namespace stageid {
+namespace {
+
+/// HDF5 prints its error stack on stderr unless told not to; we put its reason into the exception.
+void silence_error_stack() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+
+/// HDF5 does not tell a missing file from a forbidden one in words, the operating system does.
+void check_can_be_opened(const std::filesystem::path& file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    throw FileError(file.string() + ": cannot be read: " + std::strerror(errno));
+  }
+  struct stat status {};
+  const bool regular = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
+  ::close(descriptor);
+  if (!regular) throw FileError(file.string() + ": is not a file; give the name of an HDF5 file");
+}
+
+}  // namespace
+
+/// The datasets read or appended to last. A dataset that is opened anew for every block of rows
+/// starts with an empty chunk cache and unpacks its compressed chunks again and again.
+struct Hdf5File::OpenDatasets {
+  struct Entry {
+    std::string name;
+    Hdf5Handle handle;
+  };
+  static constexpr std::size_t kEntries = 4;  // the datasets of one run of a log
+  std::array<Entry, kEntries> entries;
+  std::size_t oldest = 0;
+};
+
+Hdf5File::Hdf5File(std::filesystem::path path, Hdf5Handle file)
+    : path_(std::move(path)),
+      file_(std::move(file)),
+      open_datasets_(std::make_unique<OpenDatasets>()) {}
+Hdf5File::~Hdf5File() = default;
+Hdf5File::Hdf5File(Hdf5File&&) noexcept = default;
+Hdf5File& Hdf5File::operator=(Hdf5File&&) noexcept = default;
+
+Hdf5File Hdf5File::open(const std::filesystem::path& file) {
+  silence_error_stack();
+  check_can_be_opened(file);
+  if (H5Fis_hdf5(file.c_str()) <= 0) {
+    H5Eclear2(H5E_DEFAULT);
+    throw FormatError(file, "",
+                      "is not an HDF5 file, or its beginning is damaged; give an HDF5 file");
+  }
+  Hdf5Handle handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (!handle) {
+    throw FormatError(file, "",
+                      "the HDF5 file is cut short, damaged or still being written (" +
+                          hdf5::take_reason() + "); copy it again or write it anew");
+  }
+  return {file, std::move(handle)};
+}
+
+Hdf5File Hdf5File::create(const std::filesystem::path& file) {
+  silence_error_stack();
+  const Hdf5Handle properties = hdf5::property_list(H5P_FILE_CREATE);
+  H5Pset_obj_track_times(properties.get(), false);
+  Hdf5Handle handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), H5P_DEFAULT),
+                    H5Fclose);
+  if (!handle) {
+    throw FileError(file.string() + ": cannot be created: " + hdf5::take_reason());
+  }
+  return {file, std::move(handle)};
+}
+
+void Hdf5File::close() {
+  if (!file_) return;
+  open_datasets_ = std::make_unique<OpenDatasets>();
+  const bool flushed = H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0;
+  const std::string reason = flushed ? "" : hdf5::take_reason();
+  file_.reset();
+  if (!flushed) throw FileError(path_.string() + ": cannot be written: " + reason);
+}
+
+bool Hdf5File::exists(const std::string& object) const {
+  // H5Lexists fails, rather than answers no, when a group on the way is missing.
+  for (std::size_t end = object.find('/', 1);; end = object.find('/', end + 1)) {
+    const std::string part = object.substr(0, end);
+    if (part != "/" && H5Lexists(file_.get(), part.c_str(), H5P_DEFAULT) <= 0) {
+      H5Eclear2(H5E_DEFAULT);
+      return false;
+    }
+    if (end == std::string::npos) break;
+  }
+  return object == "/" || H5Oexists_by_name(file_.get(), object.c_str(), H5P_DEFAULT) > 0;
+}
+
+std::vector<std::string> Hdf5File::children(const std::string& group) const {
+  const auto fail = [&](const std::string& what) { throw FormatError(path_, group, what); };
+  if (!exists(group)) fail("is missing; a group must stand here");
+  const Hdf5Handle handle(H5Gopen2(file_.get(), group.c_str(), H5P_DEFAULT), H5Gclose);
+  if (!handle) {
+    hdf5::take_reason();
+    fail("is not a group; a group must stand here");
+  }
+  const auto collect = [](hid_t, const char* name, const H5L_info_t*, void* names) -> herr_t {
+    static_cast<std::vector<std::string>*>(names)->emplace_back(name);
+    return 0;
+  };
+  std::vector<std::string> names;
+  if (H5Literate(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names) < 0) {
+    fail("cannot be listed (" + hdf5::take_reason() + "); the file is damaged");
+  }
+  return names;
+}
+
+hid_t Hdf5File::open_dataset(const std::string& dataset) const {
+  for (const OpenDatasets::Entry& entry : open_datasets_->entries) {
+    if (entry.handle && entry.name == dataset) return entry.handle.get();
+  }
+  if (!exists(dataset)) throw FormatError(path_, dataset, "is missing; a dataset must stand here");
+  // Room for a chunk across all columns of the usual logs; the default of 1 MiB holds few of them.
+  constexpr std::size_t kChunkCacheBytes = std::size_t{1} << 24;
+  constexpr std::size_t kChunkCacheSlots = 12421;  // a prime, as HDF5 advises
+  const Hdf5Handle access = hdf5::property_list(H5P_DATASET_ACCESS);
+  H5Pset_chunk_cache(access.get(), kChunkCacheSlots, kChunkCacheBytes, 1.0);
+  Hdf5Handle handle(H5Dopen2(file_.get(), dataset.c_str(), access.get()), H5Dclose);
+  if (!handle) {
+    throw FormatError(path_, dataset,
+                      "cannot be opened (" + hdf5::take_reason() + "); a dataset must stand here");
+  }
+  OpenDatasets::Entry& entry = open_datasets_->entries[open_datasets_->oldest];
+  open_datasets_->oldest = (open_datasets_->oldest + 1) % OpenDatasets::kEntries;
+  entry.handle = std::move(handle);
+  entry.name = dataset;
+  return entry.handle.get();
+}
+
+}  // namespace stageid

@@ -2,11 +2,12 @@
 
 #include <hdf5.h>
 
-#include <Eigen/Core>
 #include <complex>
+#include <cstdint>
 #include <filesystem>
-#include <optional>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace stageid {
@@ -39,49 +40,72 @@ class Hdf5Handle {
   Close close_ = nullptr;
 };
 
+/// What the elements of a dataset are, as far as stageid cares.
+enum class Hdf5Kind : std::uint8_t { real, integer, complex, text, other };
+
 /// A thin layer over the HDF5 C library: names the file and dataset in every error, checks shapes,
 /// and knows the few types that stageid's files hold. Paths are absolute ("/runs/0000/sensors").
 ///
 /// Reading: a missing object or a wrong type or shape is a FormatError, an unreadable file a
-/// FileError (not there) or FormatError (not HDF5, cut short).
-/// Concurrent use: Debian's HDF5 is not thread-safe; one thread at a time in the whole program.
+/// FileError (not there) or FormatError (not HDF5, cut short). A shape that the file is too short
+/// to hold is a FormatError too, so that a damaged size cannot ask for all the memory. Writing:
+/// FileError. Concurrent use: Debian's HDF5 is not thread-safe; one thread at a time in the whole
+/// program.
 class Hdf5File {
  public:
-  static Hdf5File open(const std::filesystem::path& file);    ///< read-only
-  static Hdf5File create(const std::filesystem::path& file);  ///< truncates; no track times: same content, same bytes
+  static Hdf5File open(const std::filesystem::path& file);  ///< read-only
+  static Hdf5File create(
+      const std::filesystem::path& file);  ///< truncates; no track times: same content, same bytes
+  ~Hdf5File();
+  Hdf5File(Hdf5File&&) noexcept;
+  Hdf5File& operator=(Hdf5File&&) noexcept;
 
   const std::filesystem::path& path() const noexcept { return path_; }
   bool exists(const std::string& object) const;
   bool has_attribute(const std::string& object, const std::string& name) const;
   std::vector<std::string> children(const std::string& group) const;  ///< by name; names only
   std::vector<hsize_t> shape(const std::string& dataset) const;
+  Hdf5Kind kind(const std::string& dataset) const;  ///< a bool counts as integer
   hid_t id() const noexcept { return file_.get(); }
 
   // Attributes: object "/" is the root. An integer may be stored as a float and the reverse.
   double read_real_attribute(const std::string& object, const std::string& name) const;
   long long read_integer_attribute(const std::string& object, const std::string& name) const;
   std::string read_text_attribute(const std::string& object, const std::string& name) const;
+  /// A numeric attribute of one or more numbers.
+  std::vector<double> read_reals_attribute(const std::string& object,
+                                           const std::string& name) const;
   /// A string attribute of one or more strings, fixed or variable length.
-  std::vector<std::string> read_texts_attribute(const std::string& object, const std::string& name) const;
+  std::vector<std::string> read_texts_attribute(const std::string& object,
+                                                const std::string& name) const;
   void write_attribute(const std::string& object, const std::string& name, double value);
   void write_attribute(const std::string& object, const std::string& name, long long value);
-  void write_attribute(const std::string& object, const std::string& name, const std::string& value);
-  void write_attribute(const std::string& object, const std::string& name, const std::vector<std::string>& values);
+  void write_attribute(const std::string& object, const std::string& name,
+                       const std::string& value);
+  void write_attribute(const std::string& object, const std::string& name,
+                       const std::vector<std::string>& values);
+  void write_attribute(const std::string& object, const std::string& name,
+                       const std::vector<double>& values);
 
   // Datasets. Numeric data come row-major (C order), as HDF5 stores them. NaN is not checked here.
-  std::vector<double> read_reals(const std::string& dataset) const;                      ///< any shape
-  std::vector<std::complex<double>> read_complex(const std::string& dataset) const;      ///< compound r, i
-  std::vector<std::string> read_texts(const std::string& dataset) const;                 ///< 1-D
+  std::vector<double> read_reals(const std::string& dataset) const;  ///< any shape
+  std::vector<std::complex<double>> read_complex(
+      const std::string& dataset) const;                                  ///< compound r, i
+  std::vector<std::string> read_texts(const std::string& dataset) const;  ///< 1-D
   /// Rows [first, first + count) of a 1-D or 2-D dataset as float64, row-major, into `out`.
   void read_rows(const std::string& dataset, hsize_t first, hsize_t count, double* out) const;
 
   void create_group(const std::string& group);
-  void write_reals(const std::string& dataset, const std::vector<hsize_t>& shape, const double* data);
-  void write_complex(const std::string& dataset, const std::vector<hsize_t>& shape, const std::complex<double>* data);
-  void write_integers(const std::string& dataset, const std::vector<hsize_t>& shape, const long long* data);
+  void write_reals(const std::string& dataset, const std::vector<hsize_t>& shape,
+                   const double* data);
+  void write_complex(const std::string& dataset, const std::vector<hsize_t>& shape,
+                     const std::complex<double>* data);
+  void write_integers(const std::string& dataset, const std::vector<hsize_t>& shape,
+                      const long long* data);
   void write_texts(const std::string& dataset, const std::vector<std::string>& values);
   /// An empty chunked dataset of `columns` columns (0: 1-D) that append_rows() extends.
-  void create_growing(const std::string& dataset, hsize_t columns, hid_t file_type, hsize_t chunk_rows);
+  void create_growing(const std::string& dataset, hsize_t columns, hid_t file_type,
+                      hsize_t chunk_rows);
   void append_rows(const std::string& dataset, hsize_t count, const double* data);
   void append_rows(const std::string& dataset, hsize_t count, const unsigned char* data);
 
@@ -89,9 +113,16 @@ class Hdf5File {
   void close();
 
  private:
+  struct OpenDatasets;
   Hdf5File(std::filesystem::path path, Hdf5Handle file);
+  hid_t open_dataset(const std::string& dataset) const;
+  void write_dataset(const std::string& dataset, const std::vector<hsize_t>& shape, hid_t file_type,
+                     hid_t memory_type, const void* data);
+  void append(const std::string& dataset, hsize_t count, hid_t memory_type, const void* data);
+
   std::filesystem::path path_;
   Hdf5Handle file_;
+  std::unique_ptr<OpenDatasets> open_datasets_;  ///< destroyed before file_
 };
 
 }  // namespace stageid
