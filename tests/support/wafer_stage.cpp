@@ -1,6 +1,6 @@
 #include "tests/support/wafer_stage.hpp"
 
-#include <array>
+#include <initializer_list>
 #include <string>
 
 #include "hal/rigid_body.hpp"
@@ -8,25 +8,21 @@
 namespace stageid::test {
 namespace {
 
-Channel channel(const std::string& name, const char* unit, double x_m, double y_m, char axis) {
-  Channel c;
-  c.name = name;
-  c.unit = unit;
-  c.position_m[0] = x_m;
-  c.position_m[1] = y_m;
-  c.direction[2] = 0.0;
+Channel channel(const char* name, const char* unit, double x_m, double y_m, char axis) {
+  Channel c{name, unit, {x_m, y_m, 0.0}, {0.0, 0.0, 0.0}};
   c.direction[axis - 'x'] = 1.0;
   return c;
 }
 
 std::vector<Channel> actuators() {
-  constexpr double kZ[13][2] = {{-0.26, -0.21}, {0.0, -0.26},  {0.26, -0.21}, {-0.11, -0.09},
-                                {0.11, -0.09},  {-0.26, 0.0},  {0.0, 0.0},    {0.26, 0.0},
-                                {-0.11, 0.09},  {0.11, 0.09},  {-0.26, 0.21}, {0.0, 0.26},
+  constexpr double kZ[13][2] = {{-0.26, -0.21}, {0.0, -0.26}, {0.26, -0.21}, {-0.11, -0.09},
+                                {0.11, -0.09},  {-0.26, 0.0}, {0.0, 0.0},    {0.26, 0.0},
+                                {-0.11, 0.09},  {0.11, 0.09}, {-0.26, 0.21}, {0.0, 0.26},
                                 {0.26, 0.21}};
+  constexpr const char* kNames[13] = {"z1", "z2", "z3",  "z4",  "z5",  "z6", "z7",
+                                      "z8", "z9", "z10", "z11", "z12", "z13"};
   std::vector<Channel> list;
-  for (int i = 0; i < 13; ++i)
-    list.push_back(channel(std::string("z").append(std::to_string(i + 1)), "N", kZ[i][0], kZ[i][1], 'z'));
+  for (int i = 0; i < 13; ++i) list.push_back(channel(kNames[i], "N", kZ[i][0], kZ[i][1], 'z'));
   list.push_back(channel("x1", "N", -0.28, -0.20, 'x'));
   list.push_back(channel("x2", "N", -0.28, 0.20, 'x'));
   list.push_back(channel("y1", "N", -0.20, -0.28, 'y'));
@@ -60,9 +56,9 @@ void set_plant(WaferStageSpec& spec) {
   spec.first_mode_hz = 180.0;
   spec.poisson_ratio = 0.17;
   spec.flexible_modes = 23;
-  spec.flexible_damping = {0.012,  0.010,  0.009, 0.006, 0.005,  0.006, 0.005, 0.0045,
-                           0.004,  0.005,  0.0035, 0.004, 0.005, 0.0045, 0.004, 0.005,
-                           0.0045, 0.005,  0.006, 0.006, 0.007,  0.008, 0.010};
+  spec.flexible_damping = {0.012,  0.010, 0.009,  0.006, 0.005, 0.006,  0.005, 0.0045,
+                           0.004,  0.005, 0.0035, 0.004, 0.005, 0.0045, 0.004, 0.005,
+                           0.0045, 0.005, 0.006,  0.006, 0.007, 0.008,  0.010};
   spec.in_plane_modes = {
       {820.0, 0.010, shape(17, 13, {0.10, -0.10, 0.04, 0.05}), shape(7, 4, {0.10, -0.10, 0.04})},
       {1240.0, 0.008, shape(17, 15, {0.12, 0.11}), shape(7, 4, {0.02, 0.02, -0.12})},
@@ -105,8 +101,8 @@ MotionControllerSpec controller(const WaferStageSpec& spec) {
 
 WaferStageSpec silent_wafer_stage_spec() {
   WaferStageSpec spec;
-  spec.info.name = "wafer stage";
-  spec.info.backend = "sim";
+  spec.info.name = std::string("wafer stage");
+  spec.info.backend = std::string("sim");
   spec.info.sample_rate_hz = 1e4;
   spec.info.actuators = actuators();
   spec.info.sensors = sensors();
@@ -128,8 +124,8 @@ WaferStageSpec wafer_stage_spec() {
 
 WaferStageSpec small_stage_spec() {
   WaferStageSpec spec;
-  spec.info.name = "small";
-  spec.info.backend = "sim";
+  spec.info.name = std::string("small");
+  spec.info.backend = std::string("sim");
   spec.info.sample_rate_hz = 1e3;
   spec.info.actuators = {channel("a1", "N", 0.2, 0.1, 'z'), channel("a2", "N", -0.1, 0.3, 'z')};
   spec.info.sensors = {channel("s1", "m", 0.5, 0.5, 'z')};

@@ -14,7 +14,8 @@ WaferStageSpec wafer_stage_spec();
 /// The same without noise.
 WaferStageSpec silent_wafer_stage_spec();
 
-/// Two actuators, one sensor, all in z, and one flexible mode, at 1 kHz: for tests that need few numbers.
+/// Two actuators, one sensor, all in z, and one flexible mode, at 1 kHz: for tests that need few
+/// numbers.
 WaferStageSpec small_stage_spec();
 
 /// Indices of the 13 z actuators and the 4 z sensors, which come first.
