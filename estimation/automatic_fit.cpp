@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <thread>
@@ -141,22 +142,58 @@ class AutomaticFit {
     return modes < affordable_modes() && squares(best_) > 1e-24 * signal_;
   }
 
+  /// What sum W |E|^2 must fall by for `modes` more modes to be worth their parameters.
+  double price(int modes) const {
+    const double data = static_cast<double>(frf_.response.size());
+    const double numerators = structure_.general_damping ? 2.0 : 1.0;
+    const double parameters =
+        modes * (2.0 + numerators * static_cast<double>(frf_.response.rows()));
+    return squares(best_) * -std::expm1(-parameters * std::log(2.0 * data) / (2.0 * data));
+  }
+
   /// Adds modes while they are worth it. @returns true if any was added.
   bool grow() {
     bool grown = false;
-    while (wanted_more() && add_one()) grown = true;
+    while (wanted_more()) {
+      const std::vector<ResidualMode> candidates =
+          residual_modes(frf_, best_.model, quick_.user_weights, kCandidates, threads_);
+      if (!add_clear_ones(candidates) && !add_one(candidates)) break;
+      grown = true;
+    }
     return grown;
   }
 
-  bool add_one() {
-    const std::vector<ResidualMode> candidates =
-        residual_modes(frf_, best_.model, quick_.user_weights, kCandidates, threads_);
+  /// Several at once where each is clearly worth it: pruning corrects what was one too many.
+  bool add_clear_ones(const std::vector<ResidualMode>& candidates) {
+    std::vector<ResidualMode> clear;
+    for (const ResidualMode& candidate : candidates)
+      if (candidate.gain > 4.0 * price(1)) clear.push_back(candidate);
+    const int room = (selection_.exactly > 0 ? selection_.exactly : affordable_modes()) -
+                     count_modes(best_.model);
+    if (clear.size() < 2 || room < static_cast<int>(clear.size())) return false;
+    FitResult trial = fit_with(clear);
+    if (trial.status == FitStatus::singular || !(bic(trial) < bic(best_))) return false;
+    for (const ResidualMode& candidate : clear)
+      say("added {:.6g} Hz, one of {} together: cost {:.6g} -> {:.6g}", candidate.mode.frequency_hz,
+          clear.size(), best_.model.fit.cost, trial.model.fit.cost);
+    best_ = std::move(trial);
+    return true;
+  }
+
+  FitResult fit_with(const std::vector<ResidualMode>& more) const {
+    AdditiveModel model = best_.model;
+    for (const ResidualMode& candidate : more)
+      model.submodels.push_back(mode_submodel(frf_, structure_, candidate.mode));
+    return fit_additive_model(frf_, model, quick_);
+  }
+
+  bool add_one(const std::vector<ResidualMode>& candidates) {
     FitResult best_trial;
     bool found = false;
     for (const ResidualMode& candidate : candidates) {
-      AdditiveModel model = best_.model;
-      model.submodels.push_back(mode_submodel(frf_, structure_, candidate.mode));
-      FitResult trial = fit_additive_model(frf_, model, quick_);
+      // The matched filter sees most of what a fit gains; far below the price none is needed.
+      if (selection_.exactly == 0 && candidate.gain < 0.2 * price(1)) continue;
+      FitResult trial = fit_with({candidate});
       if (trial.status == FitStatus::singular) continue;
       const bool better = !found || trial.model.fit.cost < best_trial.model.fit.cost;
       if (better) best_trial = std::move(trial);
@@ -165,7 +202,10 @@ class AutomaticFit {
       // parameters.
       if (bic(best_trial) < bic(best_)) break;
     }
-    if (!found) return false;
+    if (!found) {
+      say("no further mode: nothing in the weighted residual is worth a mode's parameters (BIC)");
+      return false;
+    }
     const Submodel& added = best_trial.model.submodels.back();
     if (selection_.exactly == 0 && !(bic(best_trial) < bic(best_))) {
       say("no further mode: the best, {:.6g} Hz, would lower the cost by {:.2g} % and is not worth "
@@ -176,40 +216,60 @@ class AutomaticFit {
     }
     say("added {:.6g} Hz (damping {:.3g}): cost {:.6g} -> {:.6g}", added.natural_frequency_hz(),
         added.damping_ratio(), best_.model.fit.cost, best_trial.model.fit.cost);
-    adopt(std::move(best_trial));
+    best_ = std::move(best_trial);
     return true;
   }
 
-  /// Drops modes that are not worth their parameters, the least worthy first.
+  /// The modes to try to do without: the least worthy first, no two that could stand in for each
+  /// other.
+  std::vector<std::size_t> unworthy(double price_of_one, std::size_t most) const {
+    const std::vector<Submodel>& all = best_.model.submodels;
+    std::vector<std::size_t> order;
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (all[i].is_mode() && best_.removal_cost[i] < price_of_one) order.push_back(i);
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return best_.removal_cost[a] < best_.removal_cost[b];
+    });
+    std::vector<std::size_t> out;
+    for (const std::size_t i : order) {
+      const double f = all[i].natural_frequency_hz();
+      const bool stands_in = std::any_of(out.begin(), out.end(), [&](std::size_t o) {
+        const double width = 4.0 * std::max(all[i].damping_ratio(), all[o].damping_ratio()) * f;
+        return std::abs(all[o].natural_frequency_hz() - f) < width;
+      });
+      if (!stands_in && out.size() < most) out.push_back(i);
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+  }
+
+  /// Drops modes that are not worth their parameters, several at a time, one by one where that
+  /// fails.
   void prune() {
-    while (count_modes(best_.model) > 1) {
-      const bool too_many = selection_.exactly > 0 && count_modes(best_.model) > selection_.exactly;
-      if (selection_.exactly > 0 && !too_many) return;
-      FitOptions numerators_only = quick_;
-      numerators_only.max_iterations = 0;
-      FitResult least;
-      double frequency = 0.0;
-      bool found = false;
-      for (std::size_t i = 0; i < best_.model.submodels.size(); ++i) {
-        if (!best_.model.submodels[i].is_mode()) continue;
-        AdditiveModel model = best_.model;
-        model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(i));
-        FitResult trial = fit_additive_model(frf_, model, numerators_only);
-        if (trial.status == FitStatus::singular ||
-            (found && trial.model.fit.cost >= least.model.fit.cost))
-          continue;
-        frequency = best_.model.submodels[i].natural_frequency_hz();
-        least = std::move(trial);
-        found = true;
+    std::size_t at_once = best_.model.submodels.size();
+    while (count_modes(best_.model) > 1 && at_once > 0) {
+      const int surplus =
+          selection_.exactly > 0 ? count_modes(best_.model) - selection_.exactly : 0;
+      if (selection_.exactly > 0 && surplus <= 0) return;
+      // A refit regains part of what the removal costs: ask twice the price here, and BIC
+      // afterwards.
+      const double limit = surplus > 0 ? std::numeric_limits<double>::infinity() : 2.0 * price(1);
+      const std::size_t most = surplus > 0 ? static_cast<std::size_t>((surplus + 1) / 2) : at_once;
+      const std::vector<std::size_t> out = unworthy(limit, most);
+      if (out.empty()) return;
+      AdditiveModel model = best_.model;
+      for (auto i = out.rbegin(); i != out.rend(); ++i)
+        model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(*i));
+      FitResult without = fit_additive_model(frf_, model, quick_);
+      if (surplus <= 0 && !(bic(without) < bic(best_))) {
+        at_once = out.size() / 2;
+        continue;
       }
-      if (!found) return;
-      // Only a mode that is nearly free deserves a fit without it.
-      if (!too_many && squares(least) > 1.2 * squares(best_)) return;
-      FitResult without = fit_additive_model(frf_, least.model, quick_);
-      if (!too_many && !(bic(without) < bic(best_))) return;
-      say("dropped {:.6g} Hz: cost {:.6g} -> {:.6g}", frequency, best_.model.fit.cost,
-          without.model.fit.cost);
-      adopt(std::move(without));
+      for (const std::size_t i : out)
+        say("dropped {:.6g} Hz: cost {:.6g} -> {:.6g}",
+            best_.model.submodels[i].natural_frequency_hz(), best_.model.fit.cost,
+            without.model.fit.cost);
+      best_ = std::move(without);
     }
   }
 
@@ -220,8 +280,6 @@ class AutomaticFit {
     result.decisions = std::move(decisions_);
     return result;
   }
-
-  void adopt(FitResult&& result) { best_ = std::move(result); }
 
   template <typename... Args>
   void say(fmt::format_string<Args...> format, Args&&... args) {

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "estimation/fit_iteration.hpp"
+#include "estimation/numerators.hpp"
 #include "estimation/parameter_covariance.hpp"
 
 namespace stageid {
@@ -194,6 +195,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   result.model.sample_rate_hz = frf.sample_rate_hz;
   result.model.hold = options.hold;
   fill_submodels(problem, beta, result.model);
+  result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
   if (options.uncertainty && result.status != FitStatus::singular)
     fill_uncertainty(frf, options, problem, beta, result);
 

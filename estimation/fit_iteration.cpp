@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "estimation/arrow_system.hpp"
+#include "estimation/numerators.hpp"
 
 namespace stageid {
 namespace {

@@ -63,8 +63,10 @@ struct FitResult {
   std::string message = "fit_additive_model was not called";
   std::vector<double> cost;            ///< one entry an iterate, the start first
   std::vector<std::string> decisions;  ///< what an automatic fit chose, and why, in order
-  Eigen::MatrixXd
-      response_variance;  ///< (n_y n_u) x N of P from the parameter covariance; may be empty
+  /// By how much sum W |E|^2 would rise without a submodel, the others re-solved; one entry each.
+  std::vector<double> removal_cost;
+  /// (n_y n_u) x N: of P, from the parameter covariance; may be empty.
+  Eigen::MatrixXd response_variance;
   bool trustworthy() const noexcept {
     return status == FitStatus::gradient_small || status == FitStatus::step_small;
   }

@@ -1,11 +1,8 @@
 #include "estimation/fit_problem.hpp"
 
-#include <Eigen/Cholesky>
 #include <atomic>
 #include <map>
 #include <thread>
-
-#include "estimation/weighted_products.hpp"
 
 namespace stageid {
 
@@ -115,67 +112,6 @@ Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& grou
   const double sum = (problem.W.array() * (E.re.array().square() + E.im.array().square())).sum();
   E.cost = sum / (2.0 * static_cast<double>(problem.size()));
   return E;
-}
-
-namespace {
-
-/// Solves the scaled normal equations of one channel for one right-hand side.
-class ScaledNormalEquations {
- public:
-  explicit ScaledNormalEquations(const Eigen::MatrixXd& M) {
-    scale_ = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    Eigen::MatrixXd scaled = scale_.asDiagonal() * M * scale_.asDiagonal();
-    // Far below the rounding of the sums: only keeps the factorization of coinciding poles alive.
-    scaled.diagonal().array() += 1e-14;
-    factor_.compute(scaled);
-  }
-  bool ok() const { return factor_.info() == Eigen::Success; }
-  Eigen::VectorXd solve(const Eigen::VectorXd& b) const {
-    return scale_.cwiseProduct(factor_.solve(scale_.cwiseProduct(b)));
-  }
-
- private:
-  Eigen::VectorXd scale_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
-};
-
-}  // namespace
-
-bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                      Eigen::MatrixXd& B, Residual& E) {
-  const Eigen::Index n_f = problem.functions();
-  const auto pairs = triangular_pairs(n_f);
-  B.setZero(problem.channels(), n_f);
-  bool regular = true;
-  std::vector<std::vector<ScaledNormalEquations>> factors(groups.size());
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const BasisGroup& group = groups[g];
-    const Eigen::MatrixXd W = rows_of(problem.W, group.channels);
-    const Eigen::MatrixXd gram = weighted_pair_sums(
-        W, {group.F_re, group.F_im}, {group.F_re, group.F_im}, pairs, problem.threads);
-    factors[g].reserve(group.channels.size());
-    Eigen::MatrixXd M(n_f, n_f);
-    for (std::size_t c = 0; c < group.channels.size(); ++c) {
-      for (std::size_t p = 0; p < pairs.size(); ++p)
-        M(pairs[p].left, pairs[p].right) = M(pairs[p].right, pairs[p].left) =
-            gram(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(p));
-      factors[g].emplace_back(M);
-      regular = regular && factors[g].back().ok();
-    }
-  }
-  if (!regular) return false;
-  // The first pass solves, the second refines with the residual itself.
-  E = residual(problem, groups, B);
-  for (int pass = 0; pass < 2; ++pass) {
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      const Eigen::MatrixXd e = numerator_gradient(problem, groups[g], E);
-      for (std::size_t c = 0; c < groups[g].channels.size(); ++c)
-        B.row(groups[g].channels[c]) +=
-            factors[g][c].solve(e.row(static_cast<Eigen::Index>(c)).transpose()).transpose();
-    }
-    E = residual(problem, groups, B);
-  }
-  return std::isfinite(E.cost);
 }
 
 void parallel_tasks(int count, int threads, const std::function<void(int)>& task) {

@@ -75,12 +75,6 @@ struct Residual {
 Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                   const Eigen::MatrixXd& B);
 
-/// The convex problem: numerators for fixed denominators, by channel, from normal equations scaled
-/// to unit diagonal with one step of refinement. Also returns the residual. `B` is overwritten.
-/// @returns false if a channel's equations are singular to rounding.
-bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                      Eigen::MatrixXd& B, Residual& E);
-
 /// The weights of a fit. Variances from few degrees of freedom are smoothed over neighbouring
 /// lines, so that a weight does not depend on the very noise that it weighs (facts.md section 8).
 /// @throws std::invalid_argument if what the weighting needs is missing, zero or not finite.
