@@ -1,0 +1,41 @@
+// How often a fit that is told nothing finds what is there: blind fits of random stages.
+//
+//   blind_fit_study [stages = 40] [first seed = 1] [threads = 0: all] [-v: every report]
+//
+// Prints a line a stage, the decisions of every failure, and the share and times at the end.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "tests/support/model_blind_fit.hpp"
+
+int main(int argc, char** argv) {
+  const int stages = argc > 1 ? std::atoi(argv[1]) : 40;
+  const auto first = static_cast<std::uint64_t>(argc > 2 ? std::atoll(argv[2]) : 1);
+  const int threads = argc > 3 ? std::atoi(argv[3]) : 0;
+  const bool verbose = argc > 4 && std::strcmp(argv[4], "-v") == 0;
+  std::vector<std::uint64_t> failed;
+  std::vector<double> seconds;
+  for (std::uint64_t seed = first; seed < first + static_cast<std::uint64_t>(stages); ++seed) {
+    const stageid::test::RandomStage stage = stageid::test::draw_random_stage(seed);
+    const stageid::test::BlindFit fit = stageid::test::fit_blind(stage, threads);
+    seconds.push_back(fit.seconds);
+    fmt::print("seed {}: {}\n", seed, stage.description());
+    const std::string report = fit.report();
+    fmt::print("{}", fit.success && !verbose ? report.substr(0, report.find('\n') + 1) : report);
+    std::fflush(stdout);
+    if (!fit.success) failed.push_back(seed);
+  }
+  if (seconds.empty()) return 2;
+  std::sort(seconds.begin(), seconds.end());
+  fmt::print("{} of {} succeeded; time a fit: median {:.2f} s, longest {:.2f} s; failing seeds:",
+             stages - static_cast<int>(failed.size()), stages, seconds[seconds.size() / 2],
+             seconds.back());
+  for (const std::uint64_t seed : failed) fmt::print(" {}", seed);
+  fmt::print("\n");
+  return 0;
+}

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "estimation/additive_model.hpp"
+#include "frf/frf_estimate.hpp"
+
+namespace stageid::test {
+
+/// Numbers that are the same on every machine.
+class RandomNumbers {
+ public:
+  explicit RandomNumbers(std::uint64_t seed) : state_(seed) {}
+  double uniform(double low = 0.0, double high = 1.0);
+  int integer(int low, int high);  ///< both included
+  double normal();
+  std::complex<double> circular();     ///< E|v|^2 = 1, E v^2 = 0
+  double chi_square_mean(double dof);  ///< chi^2 of 2 dof real degrees over its mean
+
+ private:
+  std::uint64_t next();
+  std::uint64_t state_;
+};
+
+/// What kind of stages to draw.
+struct RandomStageSpec {
+  int outputs = 4;
+  int inputs = 13;
+  int least_modes = 5;
+  int most_modes = 17;
+  int most_pairs = 3;  ///< of modes closer than twice their half-power width
+  double least_damping = 0.002;
+  double most_damping = 0.02;
+  double least_noise_db = -70.0;
+  double most_noise_db = -30.0;
+  double first_mode_hz = 80.0;
+  double last_mode_hz = 1900.0;
+  double band_low_hz = 20.25;  ///< lines of the paper: odd multiples of 0.25 Hz
+  double band_high_hz = 2000.0;
+  double line_spacing_hz = 0.5;
+  double sample_rate_hz = 10000.0;
+};
+
+/// A stage as drawn: rigid body of rank 3 and modes of rank one behind a hold and a delay.
+struct RandomStage {
+  AdditiveModel truth;
+  int pairs = 0;
+  double noise_db = 0.0;  ///< standard deviation over the median magnitude, channel by channel
+  int noise_slope = 0;    ///< the noise falls as omega^-slope
+  double delay_s = 0.0;
+  Eigen::MatrixXcd exact;    ///< n_c x N
+  Eigen::MatrixXd variance;  ///< n_c x N, what the noise was drawn with
+  FrfEstimate frf;           ///< exact + noise; noise_variance from 52 degrees of freedom
+  std::string description() const;
+};
+
+RandomStage draw_random_stage(std::uint64_t seed, const RandomStageSpec& spec = {});
+
+}  // namespace stageid::test
