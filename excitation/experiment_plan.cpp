@@ -1,0 +1,225 @@
+#include "excitation/experiment_plan.hpp"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <cmath>
+#include <complex>
+#include <future>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+#include <thread>
+
+#include "excitation/hadamard.hpp"
+#include "excitation/line_spectrum.hpp"
+#include "excitation/multisine_lines.hpp"
+#include "excitation/random_stream.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+
+void check_axis(const FrequencyGrid& grid, const ExcitationAxis& axis, std::size_t number) {
+  const std::string place = fmt::format("experiment: axes[{}]", number);
+  if (axis.channel.empty()) throw std::invalid_argument(place + ".channel: a name is needed");
+  if (!(axis.level > 0.0) || !std::isfinite(axis.level)) {
+    throw std::invalid_argument(fmt::format("{}.level ({}): must be positive and finite, not {}",
+                                            place, axis.channel, axis.level));
+  }
+  if (axis.shape.size() == 0) return;
+  if (axis.shape.size() != grid.size()) {
+    throw std::invalid_argument(
+        fmt::format("{}.shape ({}): has {} entries; one for each of the {} lines is needed", place,
+                    axis.channel, axis.shape.size(), grid.size()));
+  }
+  for (Index k = 0; k < grid.size(); ++k) {
+    // A line that one axis does not excite has no FRF: it must not be in the grid.
+    if (!(axis.shape[k] > 0.0) || !std::isfinite(axis.shape[k])) {
+      throw std::invalid_argument(fmt::format(
+          "{}.shape ({}): is {} at line {}; must be positive and finite on every line of the grid",
+          place, axis.channel, axis.shape[k], grid.lines()[static_cast<std::size_t>(k)]));
+    }
+  }
+}
+
+void check(const FrequencyGrid& grid, const ExperimentSpec& spec) {
+  const auto at_least = [](const char* field, int value, int least) {
+    if (value < least) {
+      throw std::invalid_argument(
+          fmt::format("experiment: {} must be at least {}, not {}", field, least, value));
+    }
+  };
+  at_least("realizations", spec.realizations, 1);
+  at_least("periods", spec.periods, 1);
+  at_least("transient_periods", spec.transient_periods, 0);
+  at_least("crest_iterations", spec.crest_iterations, 0);
+  if (spec.axes.empty()) throw std::invalid_argument("experiment: axes: at least one is needed");
+  std::set<std::string> channels;
+  for (std::size_t p = 0; p < spec.axes.size(); ++p) {
+    check_axis(grid, spec.axes[p], p);
+    if (!channels.insert(spec.axes[p].channel).second) {
+      throw std::invalid_argument(fmt::format("experiment: axes[{}].channel: '{}' is excited twice",
+                                              p, spec.axes[p].channel));
+    }
+  }
+}
+
+/// T, axes x experiments: T T^H = n I for the orthogonal schemes, I for single_axis.
+MatrixXcd mixing_matrix(ExcitationScheme scheme, int n) {
+  if (scheme == ExcitationScheme::single_axis) return MatrixXcd::Identity(n, n);
+  if (scheme == ExcitationScheme::orthogonal_hadamard) {
+    try {
+      return hadamard_matrix(n).cast<std::complex<double>>();
+    } catch (const std::invalid_argument& e) {
+      throw std::invalid_argument(
+          fmt::format("experiment: scheme orthogonal_hadamard with {} axes: {}; orthogonal_dft "
+                      "takes any number",
+                      n, e.what()));
+    }
+  }
+  MatrixXcd T(n, n);
+  for (long long p = 0; p < n; ++p) {
+    for (long long e = 0; e < n; ++e) {
+      const double turns = static_cast<double>(p * e % n) / n;
+      T(static_cast<Index>(p), static_cast<Index>(e)) =
+          std::polar(1.0, 2.0 * std::numbers::pi * turns);
+    }
+  }
+  return T;
+}
+
+Eigen::VectorXd draw_phase_rad(const FrequencyGrid& grid, const ExperimentSpec& spec,
+                               int realization, int axis) {
+  const Eigen::VectorXd& shape = spec.axes[static_cast<std::size_t>(axis)].shape;
+  return multisine_phase_rad(grid, unit_rms_amplitude(grid, shape),
+                             stream_seed(spec.seed, static_cast<std::uint64_t>(realization),
+                                         static_cast<std::uint64_t>(axis)),
+                             spec.crest_iterations);
+}
+
+/// All phases of a plan with crest reduction, on all cores: every realization is reduced by itself,
+/// so the result does not depend on who takes which.
+std::vector<MatrixXd> reduced_phases(const FrequencyGrid& grid, const ExperimentSpec& spec) {
+  const int axes = static_cast<int>(spec.axes.size());
+  std::vector<MatrixXd> phases(static_cast<std::size_t>(spec.realizations),
+                               MatrixXd(axes, grid.size()));
+  std::atomic<int> next = 0;
+  const auto work = [&] {
+    for (int m = next++; m < spec.realizations; m = next++) {
+      for (int p = 0; p < axes; ++p) {
+        phases[static_cast<std::size_t>(m)].row(p) = draw_phase_rad(grid, spec, m, p).transpose();
+      }
+    }
+  };
+  std::vector<std::future<void>> workers;
+  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) {
+    workers.push_back(std::async(std::launch::async, work));
+  }
+  work();
+  for (std::future<void>& worker : workers) worker.get();
+  return phases;
+}
+
+}  // namespace
+
+ExperimentPlan::ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec)
+    : ExperimentPlan(std::move(grid), std::move(spec), {}) {}
+
+ExperimentPlan::ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec,
+                               std::vector<MatrixXd> phase_rad)
+    : grid_(std::move(grid)), spec_(std::move(spec)), reduced_phase_rad_(std::move(phase_rad)) {
+  check(grid_, spec_);
+  mixing_ = mixing_matrix(spec_.scheme, experiments());
+  if (spec_.crest_iterations > 0 && reduced_phase_rad_.empty()) {
+    reduced_phase_rad_ = reduced_phases(grid_, spec_);
+  }
+  set_amplitude();
+}
+
+std::vector<RunId> ExperimentPlan::runs() const {
+  std::vector<RunId> runs;
+  for (int m = 0; m < spec_.realizations; ++m) {
+    for (int e = 0; e < experiments(); ++e) runs.push_back({m, e});
+  }
+  return runs;
+}
+
+long long ExperimentPlan::samples_per_run() const noexcept {
+  const long long periods = static_cast<long long>(spec_.transient_periods) + spec_.periods;
+  return periods * grid_.samples_per_period();
+}
+
+double ExperimentPlan::duration_s() const noexcept {
+  return static_cast<double>(spec_.realizations) * experiments() *
+         static_cast<double>(samples_per_run()) / grid_.sample_rate_hz();
+}
+
+void ExperimentPlan::check_run(RunId run) const {
+  if (run.realization < 0 || run.realization >= spec_.realizations || run.experiment < 0 ||
+      run.experiment >= experiments()) {
+    throw std::invalid_argument(fmt::format(
+        "experiment: there is no realization {}, experiment {}; there are {} realizations "
+        "of {} experiments",
+        run.realization, run.experiment, spec_.realizations, experiments()));
+  }
+}
+
+MatrixXd ExperimentPlan::phase_rad(int realization) const {
+  check_run({realization, 0});
+  if (!reduced_phase_rad_.empty()) return reduced_phase_rad_[static_cast<std::size_t>(realization)];
+  MatrixXd phase_rad(experiments(), grid_.size());
+  for (int p = 0; p < experiments(); ++p) {
+    phase_rad.row(p) = draw_phase_rad(grid_, spec_, realization, p).transpose();
+  }
+  return phase_rad;
+}
+
+MatrixXcd ExperimentPlan::spectrum(RunId run) const {
+  check_run(run);
+  const MatrixXd phases = phase_rad(run.realization);
+  MatrixXcd spectrum = MatrixXcd::Zero(experiments(), grid_.size());
+  for (int p = 0; p < experiments(); ++p) {
+    if (!excites(p, run.experiment)) continue;
+    spectrum.row(p) = line_coefficients(mixing_(p, run.experiment), amplitude_.row(p).transpose(),
+                                        phases.row(p).transpose())
+                          .transpose();
+  }
+  return spectrum;
+}
+
+MatrixXd ExperimentPlan::excitation(RunId run) const {
+  const MatrixXcd lines = spectrum(run);
+  LineSpectrum synthesis(grid_);
+  MatrixXd samples = MatrixXd::Zero(grid_.samples_per_period(), experiments());
+  for (int p = 0; p < experiments(); ++p) {
+    if (excites(p, run.experiment)) samples.col(p) = synthesis.samples(lines.row(p).transpose());
+  }
+  return samples;
+}
+
+/// One amplitude for all runs, also when peaks are prescribed: the best linear approximation of a
+/// stage that is not quite linear depends on the amplitudes, so they must not change between
+/// realizations.
+void ExperimentPlan::set_amplitude() {
+  amplitude_.resize(experiments(), grid_.size());
+  Eigen::VectorXd level(experiments());
+  for (int p = 0; p < experiments(); ++p) {
+    const ExcitationAxis& axis = spec_.axes[static_cast<std::size_t>(p)];
+    amplitude_.row(p) = unit_rms_amplitude(grid_, axis.shape).transpose();
+    level[p] = axis.level;
+  }
+  if (spec_.scaling == AmplitudeScaling::peak) {
+    Eigen::VectorXd peak = Eigen::VectorXd::Zero(experiments());
+    for (const RunId run : runs()) {
+      peak = peak.cwiseMax(excitation(run).cwiseAbs().colwise().maxCoeff().transpose());
+    }
+    level.array() /= peak.array();
+  }
+  amplitude_ = level.asDiagonal() * amplitude_;
+}
+
+}  // namespace stageid

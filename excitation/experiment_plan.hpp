@@ -44,8 +44,16 @@ struct RunId {
 };
 
 /// The whole experiment: every run's multisines follow from it, on every machine the same.
+///
+/// Axis p of realization m is a multisine with line coefficients A_p(l) / 2 exp(j phi_mp(l)); its
+/// amplitudes A_p are the same in all runs, its phases phi_mp come from a stream of their own and
+/// are new in every realization. In experiment e it plays times T(p, e), see ExcitationScheme: per
+/// line R R^H = n D_A^2 / 4 over the n experiments for the orthogonal schemes. With
+/// AmplitudeScaling::rms, `level` is the rms of the axis in every run that excites it; with peak,
+/// its largest absolute sample in all runs together.
 class ExperimentPlan {
  public:
+  /// Takes seconds per axis and realization if spec.crest_iterations > 0, else milliseconds.
   /// @throws std::invalid_argument naming the wrong field.
   ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec);
 
@@ -57,14 +65,36 @@ class ExperimentPlan {
   double duration_s() const noexcept;
 
   /// One period of the excitation of a run, samples_per_period x axes.
+  /// @throws std::invalid_argument if the plan has no such run.
   Eigen::MatrixXd excitation(RunId run) const;
 
   /// Its spectrum R(l_k), axes x lines: coefficient of exp(j 2 pi l n / N), i.e. DFT / N.
+  /// @throws std::invalid_argument if the plan has no such run.
   Eigen::MatrixXcd spectrum(RunId run) const;
 
+  /// A_p(l_k), axes x lines, unit of the channel.
+  const Eigen::MatrixXd& amplitude() const noexcept { return amplitude_; }
+  /// T, axes x experiments; the identity for single_axis.
+  const Eigen::MatrixXcd& mixing() const noexcept { return mixing_; }
+  /// phi_mp(l_k) of a realization, axes x lines, in [0, 2 pi).
+  Eigen::MatrixXd phase_rad(int realization) const;
+
  private:
+  friend ExperimentPlan read_experiment_plan(const std::filesystem::path& file);
+  /// Restores a plan whose crest-reduced phases, one matrix per realization, are known already.
+  ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec, std::vector<Eigen::MatrixXd> phase_rad);
+
+  bool excites(int axis, int experiment) const { return mixing_(axis, experiment) != 0.0; }
+  void check_run(RunId run) const;
+  void set_amplitude();
+
   FrequencyGrid grid_;
   ExperimentSpec spec_;
+  Eigen::MatrixXcd mixing_;
+  Eigen::MatrixXd amplitude_;
+  /// One matrix per realization if crest_iterations > 0, because reducing takes long; else empty,
+  /// because drawing again is cheaper than keeping.
+  std::vector<Eigen::MatrixXd> reduced_phase_rad_;
 };
 
 /// Writes / reads excitation.h5 (docs/formats.md).

@@ -68,16 +68,18 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
   return {file, std::move(handle)};
 }
 
-Hdf5File Hdf5File::create(const std::filesystem::path& file) {
+Hdf5File Hdf5File::create(const std::filesystem::path& file,
+                          const std::filesystem::path& shown_as) {
+  const std::filesystem::path& named = shown_as.empty() ? file : shown_as;
   silence_error_stack();
   const Hdf5Handle properties = hdf5::property_list(H5P_FILE_CREATE);
   H5Pset_obj_track_times(properties.get(), false);
   Hdf5Handle handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), H5P_DEFAULT),
                     H5Fclose);
   if (!handle) {
-    throw FileError(file.string() + ": cannot be created: " + hdf5::take_reason());
+    throw FileError(named.string() + ": cannot be created: " + hdf5::take_reason());
   }
-  return {file, std::move(handle)};
+  return {named, std::move(handle)};
 }
 
 void Hdf5File::close() {

@@ -54,8 +54,10 @@ enum class Hdf5Kind : std::uint8_t { real, integer, complex, text, other };
 class Hdf5File {
  public:
   static Hdf5File open(const std::filesystem::path& file);  ///< read-only
-  static Hdf5File create(
-      const std::filesystem::path& file);  ///< truncates; no track times: same content, same bytes
+  /// Truncates; no times are stored: same content, same bytes. Errors name `shown_as` if given: the
+  /// target of an OutputFile rather than its temporary file.
+  static Hdf5File create(const std::filesystem::path& file,
+                         const std::filesystem::path& shown_as = {});
   ~Hdf5File();
   Hdf5File(Hdf5File&&) noexcept;
   Hdf5File& operator=(Hdf5File&&) noexcept;

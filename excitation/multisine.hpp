@@ -40,7 +40,8 @@ struct Multisine {
 ///         a negative or non-finite entry, or is zero everywhere.
 Multisine random_phase_multisine(const FrequencyGrid& grid, const MultisineSpec& spec);
 
-/// max |x| / rms(x).
+/// max |x| / rms(x) of the samples as they stand: what lies between them may be larger.
+/// @throws std::invalid_argument if there are no samples or all are zero.
 double crest_factor(const Eigen::Ref<const Eigen::VectorXd>& samples);
 
 }  // namespace stageid
