@@ -128,8 +128,9 @@ Complex sampled(const RationalFunction& function, double omega_rad_s, double per
 AliasingSum aliasing_sum(const RationalFunction& function, double omega_rad_s, double period_s,
                          double delay_s, int terms) {
   const double sampling = 2.0 * std::numbers::pi / period_s;
-  // e^{-s_n T} is the same for every n.
-  const Complex held = 1.0 - std::exp(-kJ * omega_rad_s * period_s);
+  // 1 - e^{-s_n T}, the same for every n, without its cancellation on slow lines.
+  const double half = 0.5 * omega_rad_s * period_s;
+  const Complex held = std::polar(2.0 * std::sin(half), std::numbers::pi / 2.0 - half);
   AliasingSum out;
   // The smallest terms first.
   for (int n = terms; n >= 0; --n)
