@@ -72,7 +72,31 @@ function plotColours() {
   return { gridLineColor: colours.grid, axisLineColor: colours.frame };
 }
 
+// The band of one series as one polygon: dygraphs' own draws a quadrangle between any two lines, and
+// that takes most of the time of a plot.
+function drawBand(event) {
+  const context = event.drawingContext;
+  const area = event.plotArea;
+  context.save();
+  context.fillStyle = event.color;
+  context.globalAlpha = plotBasics.fillAlpha;
+  let run = [];
+  const fill = () => {
+    context.beginPath();
+    for (const point of run) context.lineTo(point.canvasx, area.y + point.y_top * area.h);
+    for (const point of run.reverse()) context.lineTo(point.canvasx, area.y + point.y_bottom * area.h);
+    context.fill();
+    run = [];
+  };
+  for (const point of event.points) {
+    if (Number.isFinite(point.y_top) && Number.isFinite(point.y_bottom)) run.push(point);
+    else if (Number.isNaN(point.yval)) fill();  // a wrap; null is a line that only the others have
+  }
+  fill();
+  context.restore();
+}
+
 const plotBasics = {
   legend: 'never', fillAlpha: 0.18, highlightCircleSize: 3, strokeWidth: 1.3, axisLabelFontSize: 12,
-  connectSeparatedPoints: true, animatedZooms: false, rightGap: 12, xRangePad: 0,
+  connectSeparatedPoints: true, animatedZooms: false, rightGap: 12, xRangePad: 0, yRangePad: 10,
 };

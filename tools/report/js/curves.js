@@ -11,14 +11,14 @@ const cmifNames = {
 
 function buildCmif() {
   const curves = content.arrays.cmif.curves;
-  const body = section('cmif', 'Complex mode indicator function', 'The ' + cmifNames[content.cmif_kind] + '.');
+  const body = section('cmif', 'CMIF', 'Complex mode indicator function', 'The ' + cmifNames[content.cmif_kind] + '.');
   const legend = element('div', { class: 'legend' });
   for (let i = 0; i < curves; ++i) legend.append(element('span', { class: 'swatch', style: '--colour:var(--curve-' + (i % 6) + ')' }, 'curve ' + (i + 1)));
   if (content.candidates.length) legend.append(element('span', { class: 'mark ring' }, 'chosen as start (' + content.candidates.length + ')'));
   if (identifiedModes().length) legend.append(element('span', { class: 'mark line' }, 'identified mode (' + identifiedModes().length + ')'));
   body.append(legend, element('div', { class: 'plot tall', id: 'cmif-plot', role: 'img', 'aria-labelledby': 'cmif-title' }),
     element('p', { class: 'axis-title' }, 'Frequency [Hz]'));
-  drawCmif();
+  afterFirstPaint(drawCmif);
   onColours(drawCmif);
 }
 
@@ -55,13 +55,15 @@ function markModes(context, area, graph) {
   const colours = palette();
   const [low, high] = graph.xAxisRange();
   const inside = (hz) => hz >= low && hz <= high;
+  // dygraphs' toDomXCoord() forgets that the axis is logarithmic; its percentage does not.
+  const across = (hz) => area.x + graph.toPercentXCoord(hz) * area.w;
   context.save();
   context.strokeStyle = colours.marker;
   context.globalAlpha = 0.45;
   context.lineWidth = 1;
   for (const mode of identifiedModes()) {
     if (!inside(mode.frequency_hz)) continue;
-    const x = graph.toDomXCoord(mode.frequency_hz);
+    const x = across(mode.frequency_hz);
     context.beginPath();
     context.moveTo(x, area.y);
     context.lineTo(x, area.y + area.h);
@@ -79,17 +81,17 @@ function markModes(context, area, graph) {
     const v = values[curve * f.length + k];
     if (!(v > 0)) continue;
     context.beginPath();
-    context.arc(graph.toDomXCoord(mode.frequency_hz), graph.toDomYCoord(v), 5, 0, 2 * Math.PI);
+    context.arc(across(mode.frequency_hz), graph.toDomYCoord(v), 5, 0, 2 * Math.PI);
     context.stroke();
   }
   context.restore();
 }
 
 function buildCost() {
-  const body = section('cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines; it may never rise.');
+  const body = section('cost', 'Cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines; it may never rise.');
   body.append(element('div', { class: 'plot', id: 'cost-plot', role: 'img', 'aria-labelledby': 'cost-title' }),
     element('p', { class: 'axis-title' }, 'Iteration'));
-  drawCost();
+  afterFirstPaint(drawCost);
   onColours(drawCost);
 }
 

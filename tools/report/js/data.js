@@ -15,8 +15,9 @@ function fromBlock16(bytes) {
   const mantissa = new Int16Array(bytes.buffer, 0, 2 * count);
   const exponent = new Int8Array(bytes.buffer, 4 * count, count);
   const out = new Float64Array(2 * count);
+  const scales = Float64Array.from({ length: 256 }, (_, i) => Math.pow(2, i - 128 - 15));
   for (let i = 0; i < count; ++i) {
-    const scale = Math.pow(2, exponent[i] - 15);
+    const scale = scales[exponent[i] + 128];
     out[2 * i] = mantissa[2 * i] * scale;
     out[2 * i + 1] = mantissa[2 * i + 1] * scale;
   }
@@ -28,9 +29,8 @@ function fromLogBytes(codes, low, step) {
   const columns = codes.length / low.length;
   const out = new Float64Array(codes.length);
   for (let row = 0; row < low.length; ++row) {
-    for (let k = row * columns; k < (row + 1) * columns; ++k) {
-      out[k] = codes[k] === 0 ? 0 : Math.pow(2, low[row] + (codes[k] - 1) * step[row]);
-    }
+    const values = Float64Array.from({ length: 256 }, (_, code) => (code === 0 ? 0 : Math.pow(2, low[row] + (code - 1) * step[row])));
+    for (let k = row * columns; k < (row + 1) * columns; ++k) out[k] = values[codes[k]];
   }
   return out;
 }
@@ -66,7 +66,7 @@ function channelName(channel) {
   return outputs[channel % outputs.length].name + ' \u2190 ' + content.frf.inputs[input].name;
 }
 
-// Everything that can be drawn of one channel. Magnitudes, one a line; null where not known.
+// Everything that the panels draw of one channel: magnitudes, one a line; null where not known.
 const curvesOfChannel = new Map();
 function channelCurves(channel) {
   if (!curvesOfChannel.has(channel)) curvesOfChannel.set(channel, makeCurves(channel));
@@ -82,9 +82,7 @@ function makeCurves(channel) {
   };
   const curves = {
     measured: magnitudes(measured),
-    measuredPhase: phases(measured),
     model: null,
-    modelPhase: null,
     residual: null,
     deviation: part('deviation'),
     modelDeviation: part('model_deviation'),
@@ -94,20 +92,36 @@ function makeCurves(channel) {
   const residuals = array('residual');
   if (residuals) {
     const residual = residuals.subarray(2 * channel * lines, 2 * (channel + 1) * lines);
-    const model = Float64Array.from(residual, (e, i) => measured[i] - e);
-    curves.model = magnitudes(model);
-    curves.modelPhase = phases(model);
+    curves.model = magnitudes(difference(measured, residual));
     curves.residual = magnitudes(residual);
     let sum = 0;
-    for (let k = 0; k < lines; ++k) sum += (curves.residual[k] / curves.measured[k]) ** 2;
+    for (let k = 0; k < lines; ++k) {
+      const relative = curves.residual[k] / curves.measured[k];
+      sum += relative * relative;
+    }
     curves.relativeError = Math.sqrt(sum / lines);
   }
   return curves;
 }
 
+// Phases of one channel in degrees, -180 to 180.
+function channelPhases(channel) {
+  const lines = content.frf.lines;
+  const part = (id) => array(id).subarray(2 * channel * lines, 2 * (channel + 1) * lines);
+  const measured = part('response');
+  return { measured: phases(measured), model: array('residual') ? phases(difference(measured, part('residual'))) : null };
+}
+
+function difference(a, b) {
+  const out = new Float64Array(a.length);
+  for (let i = 0; i < out.length; ++i) out[i] = a[i] - b[i];
+  return out;
+}
+
 function magnitudes(pairs) {
   const out = new Float64Array(pairs.length / 2);
-  for (let k = 0; k < out.length; ++k) out[k] = Math.hypot(pairs[2 * k], pairs[2 * k + 1]);
+  // Not Math.hypot(): ten times slower, and float32 squared neither overflows nor vanishes here.
+  for (let k = 0; k < out.length; ++k) out[k] = Math.sqrt(pairs[2 * k] * pairs[2 * k] + pairs[2 * k + 1] * pairs[2 * k + 1]);
   return out;
 }
 

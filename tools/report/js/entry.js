@@ -1,6 +1,6 @@
 // One entry of the response, large: magnitude and phase, linked.
 
-const entry = { magnitude: null, phase: null, channel: 0, hidden: new Set(), order: [] };
+const entry = { magnitude: null, phase: null, channel: 0, hidden: new Set(['validation']), order: [] };
 
 // |dG|^2 of a circular complex Gaussian exceeds -ln(0.05) sigma^2 in 5 % of all cases.
 const bandFactor = Math.sqrt(-Math.log(0.05));
@@ -11,7 +11,7 @@ const traceNames = {
 
 function buildEntry() {
   const { inputs, outputs } = content.frf;
-  const body = section('entry', 'One element');
+  const body = section('entry', 'Element', 'One element');
   const pick = (id, label, list) => {
     const select = element('select', { id, onchange: pickEntry });
     list.forEach((channel, i) => select.append(element('option', { value: i }, channel.name)));
@@ -84,34 +84,53 @@ function magnitudeTable(channel) {
 // Phases wrap: a row of gaps between two lines breaks the trace there instead of drawing a wall.
 function phaseTable(channel) {
   const curves = channelCurves(channel);
-  const columns = [['measured', curves.measuredPhase, curves.measured, curves.deviation]];
-  if (curves.modelPhase) columns.push(['model', curves.modelPhase, curves.model, curves.modelDeviation]);
+  const phases = channelPhases(channel);
+  const columns = [['measured', phases.measured, curves.measured, curves.deviation]];
+  if (phases.model) columns.push(['model', phases.model, curves.model, curves.modelDeviation]);
   const f = array('frequency');
+  const cut = calmestCut(columns.map(([, phase]) => phase));
+  for (const column of columns) column[1] = column[1].map((phase) => (phase < cut ? phase + 360 : phase >= cut + 360 ? phase - 360 : phase));
   const rows = [];
   for (let k = 0; k < f.length; ++k) {
     const wraps = columns.map(([, phase]) => k > 0 && Math.abs(phase[k] - phase[k - 1]) > 180);
     if (wraps.some(Boolean)) {
       rows.push([Math.sqrt(f[k] * f[k - 1]), ...wraps.map((w) => (w ? [NaN, NaN, NaN] : null))]);
     }
-    rows.push([f[k], ...columns.map(([, phase, magnitude, deviation]) => phaseBar(phase[k], magnitude[k], deviation && deviation[k]))]);
+    rows.push([f[k], ...columns.map(([, phase, magnitude, deviation]) => phaseBar(phase[k], magnitude[k], deviation && deviation[k], cut))]);
   }
-  return { rows, names: columns.map(([name]) => name) };
+  return { rows, names: columns.map(([name]) => name), cut };
 }
 
-function phaseBar(phase, magnitude, deviation) {
+// Where to cut the circle, such that the traces wrap least: a rigid body's phase lies on -180 degrees,
+// and noise would throw it from edge to edge. In doubt from -180 to 180.
+function calmestCut(phases) {
+  let best = -180;
+  let fewest = Infinity;
+  for (const cut of [-180, -225, -135, -270, -90, -315]) {
+    const turn = (p) => ((p - cut) % 360 + 360) % 360;
+    let wraps = 0;
+    for (const phase of phases) for (let k = 1; k < phase.length; ++k) if (Math.abs(turn(phase[k]) - turn(phase[k - 1])) > 180) ++wraps;
+    if (wraps < fewest) [best, fewest] = [cut, wraps];
+  }
+  return best;
+}
+
+function phaseBar(phase, magnitude, deviation, cut) {
   if (!deviation) return [phase, phase, phase];
   const ratio = bandFactor * deviation / magnitude;
   const half = ratio >= 1 ? 180 : Math.asin(ratio) * 180 / Math.PI;
-  return [Math.max(-180, phase - half), phase, Math.min(180, phase + half)];
+  return [Math.max(cut, phase - half), phase, Math.min(cut + 360, phase + half)];
 }
 
 function traceStyle(name) {
   const colours = palette();
   const styles = {
-    measured: { strokeWidth: 2.2 }, model: { strokeWidth: 1.2 }, residual: { strokeWidth: 0.9 },
+    measured: { strokeWidth: 3.2 }, model: { strokeWidth: 1.3 }, residual: { strokeWidth: 0.9 },
     validation: { strokeWidth: 0.9 }, deviation: { strokeWidth: 1.1, strokePattern: [5, 4] },
   };
-  return { color: colours[name], ...styles[name] };
+  const { linePlotter } = Dygraph.Plotters;
+  const banded = (name === 'measured' && content.arrays.deviation) || (name === 'model' && content.arrays.model_deviation);
+  return { color: colours[name], plotter: banded ? (event) => { drawBand(event); linePlotter(event); } : linePlotter, ...styles[name] };
 }
 
 function plotTable(id, table, axisY, more) {
@@ -144,7 +163,8 @@ function showEntry(channel, keepZoom) {
   entry.order = table.names;
   const x = window_ ? { dateWindow: window_ } : {};
   entry.magnitude = plotTable('entry-magnitude', table, magnitudeAxis, { logscale: true, ...x });
-  entry.phase = plotTable('entry-phase', phaseTable(channel), phaseAxis, { valueRange: [-185, 185], ...x });
+  const phase = phaseTable(channel);
+  entry.phase = plotTable('entry-phase', phase, phaseAxis, { valueRange: [phase.cut - 8, phase.cut + 368], ...x });
   entry.link = Dygraph.synchronize(entry.magnitude, entry.phase, { range: false, selection: false });
   buildLegend();
 }
@@ -176,8 +196,9 @@ function tellValues(event, hz) {
   let k = 0;
   while (k < f.length - 1 && f[k] < hz) ++k;
   const curves = channelCurves(entry.channel);
-  const parts = [number(f[k], 6) + '\u00a0Hz', '|G| ' + number(curves.measured[k]) + ', ' + number(curves.measuredPhase[k]) + '\u00b0'];
-  if (curves.model) parts.push('|P| ' + number(curves.model[k]) + ', ' + number(curves.modelPhase[k]) + '\u00b0');
+  const phases = channelPhases(entry.channel);
+  const parts = [number(f[k], 6) + '\u00a0Hz', '|G| ' + number(curves.measured[k]) + ', ' + number(phases.measured[k]) + '\u00b0'];
+  if (curves.model) parts.push('|P| ' + number(curves.model[k]) + ', ' + number(phases.model[k]) + '\u00b0');
   if (curves.residual) parts.push('|G\u2212P| ' + number(curves.residual[k]));
   if (curves.deviation) parts.push('\u03c3 ' + number(curves.deviation[k]));
   output.textContent = parts.join('   ');

@@ -67,12 +67,12 @@ function plural(n, one, many) {
 }
 
 // A section of the page with its entry in the contents; returns the body to fill.
-function section(id, title, lead) {
+function section(id, short, title, lead) {
   const node = element('section', { id, 'aria-labelledby': id + '-title' },
     element('h2', { id: id + '-title' }, title),
     lead ? element('p', { class: 'lead' }, lead) : null);
   document.getElementById('main').append(node);
-  document.getElementById('contents').append(element('a', { href: '#' + id }, title));
+  document.getElementById('contents').append(element('a', { href: '#' + id }, short));
   return node;
 }
 

@@ -4,7 +4,7 @@ const runTotals = { cycles: 0, late: 0, missing: 0, marked: 0, seconds: 0, recor
 for (const run of content.runs) for (const key of Object.keys(runTotals)) runTotals[key] += run[key];
 
 function buildHealth() {
-  const body = section('health', 'Timing and health of the run');
+  const body = section('health', 'Health', 'Timing and health of the run');
   if (content.runs.length) {
     const incomplete = content.runs.filter((run) => !run.complete).length;
     const lateness = Math.max(...content.runs.map((run) => run.largest_lateness_s));

@@ -20,9 +20,9 @@ function matrixRange(scale) {
   for (let c = 0; c < channelCount; ++c) {
     const curves = channelCurves(c);
     const measured = scaled(curves.measured, scale);
-    for (const v of measured) {
-      if (v > high) high = v;
-      if (v > 0 && v < low) low = v;
+    for (let k = 0; k < measured.length; ++k) {
+      if (measured[k] > high) high = measured[k];
+      if (measured[k] > 0 && measured[k] < low) low = measured[k];
     }
     const residual = scaled(curves.residual, scale);
     if (residual) for (let k = 0; k < residual.length; k += 7) if (residual[k] > 0) small.push(residual[k]);
@@ -35,7 +35,7 @@ function matrixRange(scale) {
 function buildMatrix() {
   const { inputs, outputs } = content.frf;
   const hasModel = Boolean(content.arrays.residual);
-  const body = section('response', 'Frequency response, element by element',
+  const body = section('response', 'Response', 'Frequency response, element by element',
     'Each panel is one actuator (column) to one sensor (row): magnitude over frequency, both logarithmic, ' +
     'all on one scale. Choose a panel to see it large; the arrow keys move between panels.');
   const legend = element('div', { class: 'legend' }, swatch('measured', 'measured'),
@@ -160,9 +160,9 @@ function drawPanel(channel) {
   drawDecades(context, frame);
   const curves = channelCurves(channel);
   const colours = palette();
-  drawCurve(context, frame, scaled(curves.residual, scale), colours.residual, 0.7);
-  drawCurve(context, frame, scaled(curves.measured, scale), colours.measured, 1.9);
-  drawCurve(context, frame, scaled(curves.model, scale), colours.model, 0.9);
+  drawCurve(context, frame, scaled(curves.residual, scale), colours.residual, 0.6);
+  drawCurve(context, frame, scaled(curves.measured, scale), colours.measured, curves.model ? 2.8 : 1.2);
+  drawCurve(context, frame, scaled(curves.model, scale), colours.model, 0.8);
   if (curves.relativeError !== null) panel.error.textContent = percent(curves.relativeError);
 }
 
@@ -210,10 +210,19 @@ function drawDecades(context, frame) {
   context.stroke();
 }
 
+// The line's half pixel column, and its place; the same for all curves of that width.
+function columnsOf(frame) {
+  if (!matrix.columns || matrix.columns.width !== frame.width) {
+    const x = Float64Array.from(array('frequency'), (f) => frame.x(Math.log10(f)));
+    matrix.columns = { width: frame.width, x, column: Int32Array.from(x, (v) => Math.floor(2 * v)) };
+  }
+  return matrix.columns;
+}
+
 // First, least, largest and last of every half pixel column: peaks of one line survive.
 function drawCurve(context, frame, values, colour, width) {
   if (!values) return;
-  const f = array('frequency');
+  const { x: places, column: columns } = columnsOf(frame);
   const y = (v) => frame.y(Math.log10(Math.max(v, 1e-300)));
   context.strokeStyle = colour;
   context.lineWidth = width;
@@ -226,18 +235,17 @@ function drawCurve(context, frame, values, colour, width) {
     context.lineTo(x, y(last));
   };
   for (let k = 0; k < values.length; ++k) {
-    const at = frame.x(Math.log10(f[k]));
-    const here = Math.floor(2 * at);
+    const here = columns[k];
     if (here !== column) {
       if (column >= 0) flush();
       column = here;
-      x = at;
+      x = places[k];
       low = high = values[k];
       if (k === 0) context.moveTo(x, y(values[k]));
       else context.lineTo(x, y(values[k]));
     }
-    low = Math.min(low, values[k]);
-    high = Math.max(high, values[k]);
+    if (values[k] < low) low = values[k];
+    if (values[k] > high) high = values[k];
     last = values[k];
   }
   flush();

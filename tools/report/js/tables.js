@@ -10,7 +10,7 @@ function buildHead() {
   const figures = [];
   if (model) {
     figures.push(['modes', String(model.modes)], ['relative rms error', percent(model.relative_rms_error, 3)]);
-    figures.push(['fit', model.status ? model.status.replace(/_/g, ' ') + ', ' + plural(model.iterations, 'iteration') : '\u2013']);
+    figures.push(['iterations' + (model.status ? ' (' + model.status.replace(/_/g, ' ') + ')' : ''), count(model.iterations)]);
   }
   if (validation) {
     figures.push(['rms error, held-back data', percent(validation.relative_rms_error, 3)]);
@@ -62,7 +62,7 @@ function sortableTable(columns, rows, caption) {
 function buildModes() {
   const known = content.modes.some((mode) => mode.truth);
   const uncertain = content.modes.some((mode) => isNumber(mode.frequency_std_hz));
-  const body = section('modes', 'Modes', known
+  const body = section('modes', 'Modes', 'Modes', known
     ? 'Identified modes beside the true ones of the simulated plant. Deviations are in standard deviations.' : null);
   const rows = content.modes.map((mode, i) => ({ ...mode, place: i + 1, rowClass: isNumber(mode.frequency_hz) ? null : 'absent' }));
   const sigmas = (value) => (isNumber(value) ? (value < 0 ? '\u2212' : '+') + Math.abs(value).toFixed(1) : '\u2013');
@@ -128,7 +128,7 @@ function fitFacts() {
 
 function buildValidation() {
   const v = content.validation;
-  const body = section('validation', 'Validation', 'On data that the fit has not seen.');
+  const body = section('validation', 'Validation', 'Validation', 'On data that the fit has not seen.');
   body.append(facts([
     ['relative rms error', percent(v.relative_rms_error, 3)], ['normalized error', percent(v.normalized_error, 3)],
     ['chi-square per degree of freedom', v.chi_square_per_dof > 0 ? number(v.chi_square_per_dof) + ' (1: within the noise)' : 'unknown: no variances'],
@@ -155,14 +155,14 @@ function channelErrors(errors) {
 }
 
 function buildDecisions() {
-  const body = section('decisions', 'Decisions of the automatic fit');
+  const body = section('decisions', 'Decisions', 'Decisions of the automatic fit');
   const list = element('ol', { class: 'decisions' }, ...content.decisions.map((decision) => element('li', null, decision)));
   body.append(content.decisions.length > 12
     ? element('details', null, element('summary', null, plural(content.decisions.length, 'decision')), list) : list);
 }
 
 function buildProvenance() {
-  const body = section('provenance', 'Where it came from');
+  const body = section('provenance', 'Provenance', 'Where it came from');
   const frf = content.frf;
   if (frf) {
     body.append(facts([

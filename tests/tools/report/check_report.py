@@ -1,0 +1,225 @@
+#!/usr/bin/env python3
+"""Opens report pages in headless Chromium and compares what the page finds in itself with what was
+written into it.
+
+usage: check_report.py --sample REPORT_SAMPLE --work DIRECTORY [--kind full|small|bare|hostile]
+
+Exit code 77 (skipped) when there is no Chromium and STAGEID_REQUIRE_BROWSER is not set.
+"""
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import zlib
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+FLAGS = ("--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+         "--disable-component-update --disable-sync --disable-dev-shm-usage --hide-scrollbars "
+         "--enable-logging=stderr --virtual-time-budget=4000").split()
+LARGEST_PAGE = 5_000_000  # bytes, of 4 x 13 x 4000
+
+failures = []
+
+
+def expect(condition, message):
+    if not condition:
+        failures.append(message)
+
+
+def near(got, want, tolerance, message):
+    expect(isinstance(got, (int, float)) and math.isclose(got, want, rel_tol=tolerance, abs_tol=0.0),
+           f"{message}: {got!r} instead of {want!r} (tolerance {tolerance:g})")
+
+
+def browse(browser, address, *flags):
+    """Runs the browser with a profile of its own; returns stdout. Console messages are failures."""
+    with tempfile.TemporaryDirectory() as profile:
+        done = subprocess.run([browser, *FLAGS, f"--user-data-dir={profile}", *flags, address],
+                              capture_output=True, text=True, timeout=240, check=False)
+    expect(done.returncode == 0, f"the browser ended with {done.returncode}: {done.stderr[-500:]}")
+    for line in done.stderr.splitlines():
+        expect("CONSOLE" not in line, f"console: {line}")
+    return done.stdout
+
+
+# A window is never narrower than 500 pixels; a frame is. The page in it reports to the one around it.
+FRAME = r"""<!DOCTYPE html><meta charset="utf-8"><body><script>
+addEventListener('message', function (event) {
+  var out = document.createElement('script');
+  out.type = 'application/json';
+  out.id = 'selftest';
+  out.textContent = JSON.stringify(event.data).replace(/</g, '\\u003c');
+  document.body.appendChild(out);
+});
+</script><iframe src="report.html#selftest" style="border:0;width:%dpx;height:1000px"></iframe></body>
+"""
+
+
+def findings(browser, page, width):
+    """What the page says of itself when it is `width` pixels wide."""
+    frame = page.with_name("frame.html")
+    frame.write_text(FRAME % width, encoding="utf-8")
+    dom = browse(browser, f"file://{frame}", "--window-size=1400,1100", "--dump-dom")
+    match = re.search(r'<script type="application/json" id="selftest">(.*?)</script>', dom, re.DOTALL)
+    if not match:
+        failures.append("the page did not finish its self-check")
+        return None
+    return json.loads(match.group(1))
+
+
+def check_arrays(found, expected):
+    # float64 and float32 are exact. Sums of up to 4e5 products round to eps sqrt(4e5) of the largest.
+    exact = {"frequency": 1e-15, "response": 1e-15, "cmif": 1e-15}
+    # Five bytes a complex number: 2^-15 of its larger part. One byte: half of 254 steps a row; the
+    # rows of the sample span at most 8 decades: a factor 10^(4/254).
+    coarse = {"residual": 2.0**-14, "deviation": 10 ** (4 / 254) - 1}
+    for name, want in expected["arrays"].items():
+        got = found["arrays"].get(name)
+        if got is None:
+            failures.append(f"the page has no {name}")
+            continue
+        tolerance = {**exact, **coarse}[name]
+        expect(got["count"] == want["count"], f"{name}: {got['count']} numbers instead of {want['count']}")
+        for key in ("low", "high"):
+            near(got[key], want[key], tolerance, f"{name}: {key}")
+        scale = max(abs(want["low"]), abs(want["high"]))
+        for key in ("first", "last"):
+            expect(abs(got[key] - want[key]) <= tolerance * scale, f"{name}: {key}: {got[key]} instead of {want[key]}")
+        slack = (tolerance if name in coarse else 1e-12) * scale * 1009 * want["count"]
+        expect(abs(got["weighted"] - want["weighted"]) <= slack,
+               f"{name}: weighted sum {got['weighted']} instead of {want['weighted']}")
+        if name in exact:
+            near(got["weighted"], want["weighted"], 1e-9, f"{name}: weighted sum")
+
+
+def check_response(found, expected):
+    """Panels, and what the large plot draws of every element."""
+    expect(found["panels"] == expected["panels"], f"{found['panels']} panels instead of {expected['panels']}")
+    expect(found["panels_with_ink"] == found["panels"], f"only {found['panels_with_ink']} panels are drawn")
+    expect(found["panel_sizes"]["width"] >= 55 and found["panel_sizes"]["height"] >= 50,
+           f"panels of {found['panel_sizes']} pixels")
+    check_arrays(found, expected)
+    traces = ["measured"] + (["model", "residual"] if "model" in expected else [])
+    for channel, entry in enumerate(found["entries"]):
+        expect(set(traces) <= set(entry["traces"]), f"element {channel} shows {entry['traces']}")
+        expect(entry["lines"] == expected["lines"], f"element {channel} has {entry['lines']} lines")
+        for name in ("measured", "model"):
+            if name not in expected:
+                continue
+            # Both are sums or differences of numbers kept to 2^-15 of the residual, float32 at worst.
+            want = expected[name][channel]
+            near(entry["extremes"][name]["high"], want["high"], 1e-4, f"element {channel}, {name}: high")
+            near(entry["extremes"][name]["low"], want["low"], 1e-2, f"element {channel}, {name}: low")
+
+
+def check_zoom(zoom):
+    for plot in ("magnitude", "phase"):
+        for got, want in zip(zoom[plot], zoom["asked"]):
+            near(got, want, 1e-9, f"zoom of the {plot}")
+    for got, want in zip(zoom["restored"], zoom["whole"]):
+        near(got, want, 1e-6, "zoom taken back")
+
+
+def check_page(found, expected, width):
+    expect(found["errors"] == [], f"errors: {found['errors']}")
+    expect(found["injected"] == 0, f"{found['injected']} elements came in with a text")
+    expect(found["width"] == width, f"the window is {found['width']} pixels wide instead of {width}")
+    expect(found["overflow"] <= 0, f"at {width} pixels the page is {found['overflow']} pixels too wide")
+    for name, ink in found["plots"].items():
+        expect(ink, f"the plot {name} is empty")
+    if "panels" in expected:
+        check_response(found, expected)
+        check_zoom(found["zoom"])
+    if expected["modes"]:
+        expect(found["rows"]["modes"] == expected["modes"], f"{found['rows']['modes']} modes in the table")
+
+
+def colours(png):
+    """Distinct colours of an 8-bit RGB or RGBA PNG (PNG specification, section 9: filters)."""
+    data = png.read_bytes()
+    place, packed, width, kind = 8, b"", 0, 0
+    while place < len(data):
+        size, name = struct.unpack(">I4s", data[place:place + 8])
+        body = data[place + 8:place + 8 + size]
+        if name == b"IHDR":
+            width, _, _, kind = struct.unpack(">IIBB", body[:10])
+        elif name == b"IDAT":
+            packed += body
+        place += 12 + size
+    pixel = 4 if kind == 6 else 3
+    raw, stride, above, seen = zlib.decompress(packed), width * pixel, bytearray(width * pixel), set()
+    for start in range(0, len(raw), stride + 1):
+        line = bytearray(raw[start + 1:start + 1 + stride])
+        unfilter(raw[start], line, above, pixel)
+        if (start // (stride + 1)) % 4 == 0:
+            seen.update(bytes(line[i:i + 3]) for i in range(0, stride, pixel))
+        above = line
+    return seen
+
+
+def unfilter(kind, line, above, pixel):
+    for i in range(len(line)) if kind else ():
+        left = line[i - pixel] if i >= pixel else 0
+        corner = above[i - pixel] if i >= pixel else 0
+        if kind == 1:
+            guess = left
+        elif kind == 2:
+            guess = above[i]
+        elif kind == 3:
+            guess = (left + above[i]) // 2
+        else:
+            estimate = left + above[i] - corner
+            guess = min((left, above[i], corner), key=lambda v: abs(estimate - v))
+        line[i] = (line[i] + guess) & 255
+
+
+def check_screenshot(browser, page, width, picture, *flags):
+    browse(browser, f"file://{page}", f"--window-size={width},1400", f"--screenshot={picture}", *flags)
+    if not picture.exists():
+        failures.append(f"no screenshot at {width} pixels")
+        return
+    expect(len(colours(picture)) > 200, f"the screenshot at {width} pixels is empty: {picture}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sample", required=True, help="program that writes the page and what to expect")
+    parser.add_argument("--work", required=True, type=pathlib.Path)
+    parser.add_argument("--kind", default="full")
+    options = parser.parse_args()
+
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        print("no Chromium found; install it with: apt-get install --no-install-recommends chromium")
+        return 1 if os.environ.get("STAGEID_REQUIRE_BROWSER") else 77
+
+    work = options.work.resolve() / options.kind
+    subprocess.run([options.sample, work, options.kind], check=True)
+    page = work / "report.html"
+    expected = json.loads((work / "expected.json").read_text(encoding="utf-8"))
+    expect(page.stat().st_size < LARGEST_PAGE, f"the page has {page.stat().st_size} bytes")
+    for width in (1280, 390):
+        found = findings(browser, page, width)
+        if found is None:
+            continue
+        check_page(found, expected, width)
+        print(f"{options.kind}, {width} pixels: {page.stat().st_size} bytes, sections {found['sections']}, "
+              f"built after {found['ready_ms']} ms, of them {found['script_ms']} ms our script")
+    if options.kind == "full":
+        check_screenshot(browser, page, 1280, work / "report_1280.png")
+        check_screenshot(browser, page, 390, work / "report_390.png")
+    for failure in failures:
+        print("FAILED:", failure)
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,143 @@
+// Writes report.html of a synthetic stage and expected.json, what a browser must find in it.
+//   report_sample DIRECTORY [full|small|bare|hostile]
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/tools/report/synthetic_report.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::json;
+
+/// As summary() of tools/report/js/selftest.js: channel after channel, float32 where the page has
+/// it.
+class Summary {
+ public:
+  void add(double value) {
+    low_ = count_ == 0 ? value : std::min(low_, value);
+    high_ = count_ == 0 ? value : std::max(high_, value);
+    if (count_ == 0) first_ = value;
+    last_ = value;
+    weighted_ += value * static_cast<double>(count_ % 1009 + 1);
+    ++count_;
+  }
+  Json json() const {
+    return {{"count", count_}, {"low", low_},   {"high", high_},
+            {"first", first_}, {"last", last_}, {"weighted", weighted_}};
+  }
+
+ private:
+  long count_ = 0;
+  double low_ = 0.0, high_ = 0.0, first_ = 0.0, last_ = 0.0, weighted_ = 0.0;
+};
+
+double as_float(double value) { return static_cast<double>(static_cast<float>(value)); }
+
+Json summary_of(const Eigen::MatrixXcd& values, bool floats) {
+  Summary out;
+  for (Eigen::Index c = 0; c < values.rows(); ++c)
+    for (const std::complex<double> value : values.row(c)) {
+      out.add(floats ? as_float(value.real()) : value.real());
+      out.add(floats ? as_float(value.imag()) : value.imag());
+    }
+  return out.json();
+}
+
+Json summary_of(const Eigen::MatrixXd& values, bool floats) {
+  Summary out;
+  for (Eigen::Index c = 0; c < values.rows(); ++c)
+    for (const double value : values.row(c)) out.add(floats ? as_float(value) : value);
+  return out.json();
+}
+
+/// Largest and smallest magnitude of every channel, as the large plot must show them.
+Json extremes(const Eigen::MatrixXcd& values) {
+  Json out = Json::array();
+  for (Eigen::Index c = 0; c < values.rows(); ++c)
+    out.push_back({{"low", values.row(c).cwiseAbs().minCoeff()},
+                   {"high", values.row(c).cwiseAbs().maxCoeff()}});
+  return out;
+}
+
+/// tolerance: of a value, relative to the largest one of its kind.
+Json expected(const ReportData& data) {
+  Json out = {{"title", data.title}, {"modes", data.model ? data.true_modes.size() : 0}};
+  if (!data.frf) return out;
+  const FrfEstimate& frf = *data.frf;
+  out["panels"] = frf.response.rows();
+  out["lines"] = frf.lines();
+  out["measured"] = extremes(frf.response);
+  out["arrays"]["frequency"] = summary_of(Eigen::MatrixXd(frf.frequency_hz.transpose()), false);
+  out["arrays"]["response"] = summary_of(frf.response, true);
+  if (data.model_response.size() > 0) {
+    out["arrays"]["residual"] =
+        summary_of(Eigen::MatrixXcd(frf.response - data.model_response), false);
+    out["model"] = extremes(data.model_response);
+  }
+  if (frf.total_variance.size() > 0)
+    out["arrays"]["deviation"] = summary_of(Eigen::MatrixXd(frf.total_variance.cwiseSqrt()), false);
+  if (data.cmif_curves.size() > 0) out["arrays"]["cmif"] = summary_of(data.cmif_curves, true);
+  return out;
+}
+
+/// Every text that comes from outside tries to become an element.
+void make_hostile(ReportData& data) {
+  const std::string attack = "</script><img src=x onerror=\"console.error('injected')\">&amp;<!--";
+  data.title = attack;
+  data.frf->inputs.names[0] = attack;
+  data.frf->inputs.units[0] = attack;
+  data.frf->outputs.names[0] = "z\xff\xc0 {{content}} " + attack;
+  data.validation_frf->inputs = data.frf->inputs;
+  data.validation_frf->outputs = data.frf->outputs;
+  data.decisions[0] = attack;
+  data.documents.push_back({attack, attack});
+  data.provenance_json = attack;
+  data.figures.push_back({attack, attack});
+  data.messages.push_back({ReportMessage::Severity::error, attack});
+  data.messages.push_back({ReportMessage::Severity::note, attack});
+  data.steps.push_back({attack, 1.0, attack});
+  data.runs[0].name = attack;
+  data.runs[0].started_utc = attack;
+  data.model->fit.status = attack;
+  data.model->fit.weighting = attack;
+  data.version = attack;
+}
+
+ReportData sample(const std::string& kind) {
+  if (kind == "full") return test::synthetic_report();
+  if (kind == "bare") {  // a measurement of a response, no variances, no model
+    ReportData data = test::synthetic_report({.outputs = 1, .inputs = 2, .lines = 60, .modes = 2});
+    ReportData bare;
+    bare.title = "Bare response";
+    bare.frf = data.frf;
+    bare.frf->total_variance.resize(0, 0);
+    bare.frf->noise_variance.resize(0, 0);
+    return bare;
+  }
+  ReportData data = test::synthetic_report({.outputs = 2, .inputs = 3, .lines = 300, .modes = 5});
+  if (kind == "hostile") make_hostile(data);
+  return data;
+}
+
+}  // namespace
+}  // namespace stageid
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::cerr << "usage: report_sample DIRECTORY [full|small|bare|hostile]\n";
+    return 2;
+  }
+  const std::filesystem::path directory = argv[1];
+  std::filesystem::create_directories(directory);
+  const stageid::ReportData data = stageid::sample(argc > 2 ? argv[2] : "full");
+  stageid::write_report(directory / "report.html", data);
+  std::ofstream(directory / "expected.json")
+      << stageid::expected(data).dump(1, ' ', true, nlohmann::json::error_handler_t::replace);
+}

@@ -1,0 +1,262 @@
+#include "tests/tools/report/synthetic_report.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <random>
+
+namespace stageid::test {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double delay_s = 1.63e-4;
+
+/// Uniform and normal numbers that do not depend on the standard library's distributions.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1.0p-53; }
+  double normal() {
+    return std::sqrt(-2.0 * std::log(1.0 - uniform())) * std::cos(2.0 * pi * uniform());
+  }
+  /// E|z|^2 = 1.
+  std::complex<double> circular() {
+    const double re = normal();
+    return std::complex<double>(re, normal()) / std::sqrt(2.0);
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+ChannelList named(const char* prefix, Eigen::Index count, const char* unit) {
+  ChannelList list;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    list.names.push_back(fmt::format("{}{}", prefix, i + 1));
+    list.units.emplace_back(unit);
+  }
+  return list;
+}
+
+/// Rough out-of-plane shapes: products of cosines over a plate of 2 x 2.
+double shape(int mode, double x, double y) {
+  return std::cos(0.5 * pi * (mode % 4) * (x + 1.0) + 0.3 * mode) *
+         std::cos(0.5 * pi * (mode / 4) * (y + 1.0) + 0.2 * mode);
+}
+
+AdditiveModel synthetic_model(const SyntheticSize& size, std::vector<TrueMode>& truth,
+                              Random& random) {
+  AdditiveModel model;
+  model.inputs = named("az", size.inputs, "N");
+  model.outputs = named("z", size.outputs, "m");
+  model.sample_rate_hz = 10000.0;
+  model.hold = HoldModel::exact;
+  model.input_delay_s = Eigen::VectorXd::Constant(size.inputs, delay_s);
+  model.output_delay_s = Eigen::VectorXd::Zero(size.outputs);
+  const auto position = [](Eigen::Index i, Eigen::Index of) {
+    const double turn = 2.0 * pi * static_cast<double>(i) / static_cast<double>(of);
+    return std::pair{0.9 * std::cos(turn), 0.8 * std::sin(turn)};
+  };
+  Submodel rigid{.integrators = 2,
+                 .denominator = {1.0},
+                 .numerator = {},
+                 .natural_frequency_std_hz = {},
+                 .damping_ratio_std = {}};
+  Eigen::MatrixXd b(size.outputs, size.inputs);
+  for (Eigen::Index o = 0; o < size.outputs; ++o)
+    for (Eigen::Index i = 0; i < size.inputs; ++i) {
+      const auto [xo, yo] = position(o, size.outputs);
+      const auto [xi, yi] = position(i, size.inputs);
+      b(o, i) = (1.0 + 1.9 * xo * xi + 1.7 * yo * yi) / 22.0;
+    }
+  rigid.numerator = {b};
+  model.submodels.push_back(rigid);
+
+  for (int mode = 0; mode < size.modes; ++mode) {
+    double f = 148.0 * std::pow(13.0, static_cast<double>(mode) / std::max(1, size.modes - 1));
+    if (mode == 4 || mode == 9) f = truth.back().natural_frequency_hz * 1.008;  // close pairs
+    const double zeta = 0.004 + 0.008 * random.uniform();
+    truth.push_back({.natural_frequency_hz = f, .damping_ratio = zeta, .observable = true});
+    const double omega = 2.0 * pi * f;
+    for (Eigen::Index o = 0; o < size.outputs; ++o)
+      for (Eigen::Index i = 0; i < size.inputs; ++i) {
+        const auto [xo, yo] = position(o, size.outputs);
+        const auto [xi, yi] = position(i, size.inputs);
+        b(o, i) = shape(mode + 1, xo, yo) * shape(mode + 1, xi, yi) / (11.0 * omega * omega);
+      }
+    Submodel submodel{.integrators = 0,
+                      .denominator = {1.0, 2.0 * zeta / omega, 1.0 / (omega * omega)},
+                      .numerator = {b},
+                      .natural_frequency_std_hz = 2e-5 * f,
+                      .damping_ratio_std = 2e-3 * zeta};
+    model.submodels.push_back(submodel);
+  }
+  return model;
+}
+
+/// The sum of the submodels and the delay, without hold.
+Eigen::MatrixXcd modal_sum(const AdditiveModel& model, const Eigen::VectorXd& frequency_hz) {
+  Eigen::MatrixXcd out =
+      Eigen::MatrixXcd::Zero(model.n_outputs() * model.n_inputs(), frequency_hz.size());
+  for (Eigen::Index k = 0; k < frequency_hz.size(); ++k) {
+    const std::complex<double> s(0.0, 2.0 * pi * frequency_hz[k]);
+    for (const Submodel& submodel : model.submodels) {
+      std::complex<double> denominator = 0.0;
+      for (std::size_t q = submodel.denominator.size(); q-- > 0;)
+        denominator = denominator * s + submodel.denominator[q];
+      const std::complex<double> gain =
+          std::exp(-s * delay_s) / (denominator * std::pow(s, submodel.integrators));
+      out.col(k) += gain * submodel.numerator[0].reshaped();
+    }
+  }
+  return out;
+}
+
+/// Noise that is relative near the resonances and has a floor that falls with frequency, as that of
+/// a position sensor in a loop does.
+Eigen::MatrixXd noise_variance(const Eigen::MatrixXcd& response, const Eigen::VectorXd& f,
+                               double relative) {
+  Eigen::MatrixXd variance(response.rows(), response.cols());
+  for (Eigen::Index k = 0; k < f.size(); ++k)
+    for (Eigen::Index c = 0; c < response.rows(); ++c) {
+      const double floor = 3e-11 * (1.0 + 300.0 / f[k]);
+      variance(c, k) = std::pow(relative * std::abs(response(c, k)), 2) + floor * floor;
+    }
+  return variance;
+}
+
+Eigen::MatrixXcd with_noise(const Eigen::MatrixXcd& response, const Eigen::MatrixXd& variance,
+                            Random& random) {
+  Eigen::MatrixXcd out = response;
+  for (Eigen::Index k = 0; k < out.cols(); ++k)
+    for (Eigen::Index c = 0; c < out.rows(); ++c)
+      out(c, k) += std::sqrt(variance(c, k)) * random.circular();
+  return out;
+}
+
+void add_measurement(ReportData& data, const SyntheticSize& size, Random& random) {
+  FrfEstimate frf;
+  const double step = 2000.0 / static_cast<double>(size.lines);
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(size.lines, 0.5 * step, 2000.0 - 0.5 * step);
+  frf.inputs = data.model->inputs;
+  frf.outputs = data.model->outputs;
+  data.model_response = modal_sum(*data.model, frf.frequency_hz);
+  frf.total_variance = noise_variance(data.model_response, frf.frequency_hz, size.relative_noise);
+  frf.noise_variance = 0.9 * frf.total_variance;
+  frf.sample_rate_hz = 10000.0;
+  frf.hold = Hold::zoh;
+  frf.realizations = 2;
+  frf.periods = 3;
+  frf.experiments = static_cast<int>(size.inputs);
+  frf.noise_dof = 4.0 * static_cast<double>(size.inputs);
+  frf.total_dof = 1.0;
+  frf.input_condition = Eigen::VectorXd::Constant(size.lines, 1.8);
+  frf.excluded_channels = {"ax1", "ay1"};
+  frf.excluded_power = Eigen::VectorXd{{2e-4, 1e-4}};
+  frf.provenance_json = R"({"log": "run.slog", "xxh3": "5f1d2c0a99b1e3d4"})";
+  data.validation_frf = frf;
+  frf.response = with_noise(data.model_response, frf.total_variance, random);
+  data.validation_frf->response = with_noise(data.model_response, frf.total_variance, random);
+  data.model_variance = 0.01 * frf.total_variance;
+  data.frf = std::move(frf);
+}
+
+Validation compare(const ReportData& data) {
+  const Eigen::MatrixXcd& g = data.validation_frf->response;
+  const Eigen::ArrayXXd error = (g - data.model_response).cwiseAbs2().array();
+  const Eigen::ArrayXXd relative = error / g.cwiseAbs2().array();
+  Validation out;
+  out.relative_rms_error = std::sqrt(relative.mean());
+  out.normalized_error = std::sqrt(error.sum() / g.cwiseAbs2().sum());
+  out.chi_square_per_dof = (error / data.validation_frf->total_variance.array()).mean();
+  out.whitened_above_95 = 0.0507;
+  out.whiteness = 0.021;
+  out.whiteness_limit = 0.041;
+  out.channel_error = relative.rowwise().mean().sqrt();
+  return out;
+}
+
+void add_cmif(ReportData& data) {
+  const FrfEstimate& frf = *data.frf;
+  data.cmif_curves.resize(std::min(frf.n_outputs(), frf.n_inputs()), frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const Eigen::MatrixXcd g = frf.response.col(k).reshaped(frf.n_outputs(), frf.n_inputs());
+    const double scale = std::pow(2.0 * pi * frf.frequency_hz[k], 4);
+    const Eigen::MatrixXcd square = g.rows() <= g.cols() ? Eigen::MatrixXcd(g * g.adjoint())
+                                                         : Eigen::MatrixXcd(g.adjoint() * g);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd> eigen(square, Eigen::EigenvaluesOnly);
+    data.cmif_curves.col(k) = (scale * eigen.eigenvalues().reverse()).cwiseMax(1e-30);
+  }
+  int curve = 1;
+  for (const TrueMode& mode : data.true_modes) {
+    const bool close = !data.chosen_modes.empty() &&
+                       mode.natural_frequency_hz < 1.01 * data.chosen_modes.back().frequency_hz;
+    curve = close ? 2 : 1;
+    data.chosen_modes.push_back({mode.natural_frequency_hz * 1.0004, 0.01, curve});
+  }
+}
+
+void add_runs(ReportData& data, const SyntheticSize& size) {
+  data.sample_rate_hz = 10000.0;
+  for (int realization = 0; realization < 3; ++realization)
+    for (int experiment = 0; experiment < static_cast<int>(size.inputs); ++experiment) {
+      LogRun run;
+      run.name = fmt::format("{:04}", realization * static_cast<int>(size.inputs) + experiment);
+      run.realization = realization;
+      run.experiment = experiment;
+      run.samples = 160000;
+      run.health = {.cycles = 160000,
+                    .late = experiment == 5 ? 2u : 0u,
+                    .missing = 0,
+                    .marked = 0,
+                    .largest_lateness_ns = 41000 + 700 * experiment,
+                    .seconds = 0.11};
+      data.runs.push_back(run);
+    }
+  data.steps = {{"design", 0.3, ""}, {"run", 4.6, "139 times real time"}, {"frf", 1.9, "612 MB/s"},
+                {"modes", 0.2, ""},  {"fit", 21.4, "34 iterations"},      {"validate", 0.4, ""}};
+}
+
+}  // namespace
+
+ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
+  Random random(seed);
+  ReportData data;
+  data.title = "Wafer stage, out of plane";
+  data.version = "0.1.0";
+  data.model = synthetic_model(size, data.true_modes, random);
+  add_measurement(data, size, random);
+  data.validation = compare(data);
+  add_cmif(data);
+  add_runs(data, size);
+
+  // The truth is as far from the model as the stated deviations say.
+  for (TrueMode& mode : data.true_modes) {
+    mode.natural_frequency_hz *= 1.0 + 2e-5 * 0.8 * random.normal();
+    mode.damping_ratio *= 1.0 + 2e-3 * 0.8 * random.normal();
+  }
+  for (int i = 0; i < 35; ++i)
+    data.cost.push_back(0.51 + 4e3 * std::exp(-0.55 * i) + 0.2 * std::exp(-0.1 * i));
+  data.model->fit = {.cost = data.cost.back(),
+                     .weighting = "total_variance",
+                     .iterations = 34,
+                     .status = "gradient_small",
+                     .relative_rms_error = data.validation->relative_rms_error,
+                     .band_hz = {data.frf->frequency_hz[0], data.frf->frequency_hz[size.lines - 1]},
+                     .seconds = 21.4};
+  data.decisions = {"start: 15 peaks of the CMIF", "delay: 163.0 us from the slope of the phase",
+                    "mode added at 271.3 Hz: BIC falls by 8.1e4",
+                    "mode added at 633.0 Hz: BIC falls by 5.7e4",
+                    "no further mode: best candidate at 1711.9 Hz would raise BIC by 212"};
+  data.figures = {{"error against the exact plant", "0.05 %"}};
+  data.documents = {{"configs/experiment/wafer_stage_quick.yaml",
+                     "realizations: 3\nperiods: 3\nband_hz: [0.25, 2000]\n"}};
+  data.provenance_json = R"({"seed": 1, "config_xxh3": "90ab12cd34ef5678"})";
+  return data;
+}
+
+}  // namespace stageid::test
