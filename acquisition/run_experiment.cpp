@@ -1,0 +1,346 @@
+#include "acquisition/run_experiment.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "acquisition/log_thread.hpp"
+#include "acquisition/measurement_loop.hpp"
+
+namespace stageid {
+
+namespace {
+
+constexpr std::chrono::milliseconds kProgressEvery{200};
+constexpr std::size_t kVirtualRingRows = std::size_t{1} << 15;
+constexpr double kWallRingSeconds = 8.0;  // a disk may stall for so long
+constexpr std::uint64_t kPublishEvery = 1024;
+
+int actuator_index(const StageInfo& stage, const std::string& channel) {
+  const auto found = std::find_if(stage.actuators.begin(), stage.actuators.end(),
+                                  [&](const Channel& c) { return c.name == channel; });
+  if (found == stage.actuators.end()) {
+    throw std::invalid_argument(
+        fmt::format("experiment: axis '{}' is no actuator of the stage '{}'", channel, stage.name));
+  }
+  return static_cast<int>(found - stage.actuators.begin());
+}
+
+ChannelList channel_list(const std::vector<Channel>& channels) {
+  ChannelList list;
+  for (const Channel& channel : channels) {
+    list.names.push_back(channel.name);
+    list.units.push_back(channel.unit);
+  }
+  return list;
+}
+
+std::uint64_t mix(std::uint64_t z) noexcept {
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
+  return z ^ (z >> 31);
+}
+
+std::string utc_now() {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+}
+
+/// Counts of the current run, for the thread that reports progress. Every number is right by
+/// itself; they may be some cycles apart from each other.
+class SharedProgress {
+ public:
+  void publish(const RunHealth& health) noexcept {
+    store(0, health.cycles);
+    store(1, health.late);
+    store(2, health.missing);
+    store(3, health.marked);
+    store(4, static_cast<std::uint64_t>(health.largest_lateness_ns));
+  }
+  RunHealth health() const noexcept {
+    RunHealth health;
+    health.cycles = load(0);
+    health.late = load(1);
+    health.missing = load(2);
+    health.marked = load(3);
+    health.largest_lateness_ns = static_cast<std::int64_t>(load(4));
+    return health;
+  }
+  void begin(RunId run, int done) noexcept {
+    publish({});
+    realization.store(run.realization, std::memory_order_relaxed);
+    experiment.store(run.experiment, std::memory_order_relaxed);
+    runs_done.store(done, std::memory_order_relaxed);
+  }
+  std::atomic<int> realization = 0;
+  std::atomic<int> experiment = 0;
+  std::atomic<int> runs_done = 0;
+
+ private:
+  void store(std::size_t i, std::uint64_t value) noexcept {
+    counts_[i].store(value, std::memory_order_relaxed);
+  }
+  std::uint64_t load(std::size_t i) const noexcept {
+    return counts_[i].load(std::memory_order_relaxed);
+  }
+  std::array<std::atomic<std::uint64_t>, 5> counts_{};
+};
+
+/// One experiment while it is performed.
+class Experiment {
+ public:
+  Experiment(const ExperimentPlan& plan, LimitedStage& stage, MotionController& controller,
+             SlogWriter& log, const RunExperimentOptions& options)
+      : plan_(plan),
+        stage_(stage),
+        options_(options),
+        ring_(log.info().actuators.size() + log.info().sensors.size() + 1, ring_rows(stage.info())),
+        loop_(stage, controller, ring_, {options.ramp_s, options.misses_allowed}),
+        log_(log, ring_) {
+    for (const ExcitationAxis& axis : plan.spec().axes) {
+      actuators_.push_back(actuator_index(stage.info(), axis.channel));
+    }
+    for (const RunId& run : plan.runs()) {
+      const bool skipped =
+          std::find(options.skip.begin(), options.skip.end(), run) != options.skip.end();
+      if (!skipped) runs_.push_back(run);
+    }
+  }
+
+  /// Lets the loop's thread do the work and reports progress meanwhile.
+  ExperimentResult perform() {
+    std::thread loop([this] {
+      try {
+        perform_runs();
+      } catch (...) {
+        failure_ = std::current_exception();
+      }
+      const std::lock_guard lock(mutex_);
+      done_ = true;
+      changed_.notify_all();
+    });
+    try {
+      report_until_done();
+    } catch (...) {  // from the progress function
+      abandoned_.store(true, std::memory_order_relaxed);
+      loop.join();
+      throw;
+    }
+    loop.join();
+    log_.drain();
+    if (failure_) std::rethrow_exception(failure_);
+    if (log_.failed()) {
+      result_.end = ExperimentEnd::log_failed;
+      result_.message = log_.error();
+    }
+    return std::move(result_);
+  }
+
+ private:
+  static std::size_t ring_rows(const StageInfo& info) {
+    if (info.clock == Clock::virtual_time) return kVirtualRingRows;
+    return std::max(kVirtualRingRows,
+                    static_cast<std::size_t>(kWallRingSeconds * info.sample_rate_hz));
+  }
+
+  void perform_runs() {
+    result_.end = ExperimentEnd::complete;
+    for (const RunId& run : runs_) {
+      if (interrupted()) {
+        finish(StopReason::interrupt);
+        break;
+      }
+      const StopReason reason = perform_run(run);
+      if (reason != StopReason::none) {
+        finish(reason);
+        break;
+      }
+    }
+    if (result_.end == ExperimentEnd::complete) {
+      result_.message = fmt::format("{} runs measured", result_.runs_done);
+    }
+  }
+
+  StopReason perform_run(RunId id) {
+    const auto started = std::chrono::steady_clock::now();
+    progress_.begin(id, result_.runs_done);
+    LoopExcitation excitation{plan_.excitation(id), actuators_,
+                              static_cast<std::uint64_t>(plan_.samples_per_run())};
+    LogRun run;
+    run.realization = id.realization;
+    run.experiment = id.experiment;
+    run.started_utc = utc_now();
+    loop_.start(run_seed(plan_.spec().seed, id), excitation);
+    log_.begin_run(run, std::move(excitation.period));
+    cycle_until_end();
+    run.complete = loop_.complete() && loop_.reason() != StopReason::log;
+    run.health = loop_.health();
+    run.health.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    log_.end_run(run);
+    result_.health += run.health;
+    result_.runs_done += run.complete ? 1 : 0;
+    progress_.publish(run.health);
+    return loop_.reason();
+  }
+
+  void cycle_until_end() {
+    const bool wall = stage_.info().clock == Clock::wall;
+    std::uint64_t until_publish = kPublishEvery;
+    while (true) {
+      const LoopStatus status = loop_.step();
+      if (status == LoopStatus::ended) return;
+      if (status == LoopStatus::ring_full) {
+        if (wall || log_.failed()) {
+          loop_.request_stop(StopReason::log);
+        } else {
+          std::this_thread::yield();
+        }
+      }
+      if (interrupted()) loop_.request_stop(StopReason::interrupt);
+      if (--until_publish == 0) {
+        until_publish = kPublishEvery;
+        progress_.publish(loop_.health());
+        if (log_.failed()) loop_.request_stop(StopReason::log);
+      }
+    }
+  }
+
+  bool interrupted() const noexcept {
+    return abandoned_.load(std::memory_order_relaxed) ||
+           (options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed));
+  }
+
+  void finish(StopReason reason) {
+    const StageInfo& info = stage_.info();
+    switch (reason) {
+      case StopReason::none:
+        return;
+      case StopReason::limit:
+        result_.end = ExperimentEnd::limit;
+        result_.message = describe(stage_.violation(), info);
+        return;
+      case StopReason::fault:
+        result_.end = ExperimentEnd::fault;
+        result_.message =
+            fmt::format("stage '{}' reports: {}", info.name, to_string(loop_.last_trouble()));
+        return;
+      case StopReason::misses:
+        result_.end = ExperimentEnd::fault;
+        result_.message = fmt::format("stage '{}': too many bad cycles in a row, the last: {}",
+                                      info.name, to_string(loop_.last_trouble()));
+        return;
+      case StopReason::interrupt:
+        result_.end = ExperimentEnd::interrupted;
+        result_.message = "interrupted; what was measured is kept";
+        return;
+      case StopReason::log:
+        result_.end = ExperimentEnd::log_failed;
+        result_.message = "the log could not be written as fast as the stage was measured";
+        return;
+    }
+  }
+
+  void report_until_done() {
+    std::unique_lock lock(mutex_);
+    while (!changed_.wait_for(lock, kProgressEvery, [this] { return done_; })) {
+      lock.unlock();
+      report();
+      lock.lock();
+    }
+    lock.unlock();
+    report();
+  }
+
+  void report() const {
+    if (!options_.progress) return;
+    ExperimentProgress progress;
+    progress.run = {progress_.realization.load(std::memory_order_relaxed),
+                    progress_.experiment.load(std::memory_order_relaxed)};
+    progress.runs_done = progress_.runs_done.load(std::memory_order_relaxed);
+    progress.runs_total = static_cast<int>(runs_.size());
+    progress.health = progress_.health();
+    const double run_s =
+        static_cast<double>(plan_.samples_per_run()) / plan_.grid().sample_rate_hz();
+    progress.seconds_total = run_s * progress.runs_total;
+    progress.seconds_done =
+        std::min(progress.seconds_total,
+                 run_s * progress.runs_done +
+                     static_cast<double>(progress.health.cycles) / plan_.grid().sample_rate_hz());
+    options_.progress(progress);
+  }
+
+  const ExperimentPlan& plan_;
+  LimitedStage& stage_;
+  const RunExperimentOptions& options_;
+  SampleRing ring_;
+  MeasurementLoop loop_;
+  LogThread log_;
+  std::vector<int> actuators_;
+  std::vector<RunId> runs_;
+  ExperimentResult result_;
+  std::exception_ptr failure_;
+  SharedProgress progress_;
+  std::atomic<bool> abandoned_ = false;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool done_ = false;
+};
+
+}  // namespace
+
+LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
+                            std::string metadata_json) {
+  const double rate_hz = plan.grid().sample_rate_hz();
+  if (std::abs(rate_hz - stage.sample_rate_hz) > 1e-9 * stage.sample_rate_hz) {
+    throw std::invalid_argument(fmt::format(
+        "experiment: designed for {} Hz, the stage runs at {} Hz", rate_hz, stage.sample_rate_hz));
+  }
+  if (stage.maximum_rate_hz > 0.0 && rate_hz > stage.maximum_rate_hz) {
+    throw std::invalid_argument(fmt::format("experiment: {} Hz, but the stage can do {} Hz at most",
+                                            rate_hz, stage.maximum_rate_hz));
+  }
+  LogInfo info;
+  info.sample_rate_hz = rate_hz;
+  info.period_samples = plan.grid().samples_per_period();
+  info.transient_periods = plan.spec().transient_periods;
+  info.actuators = channel_list(stage.actuators);
+  info.sensors = channel_list(stage.sensors);
+  for (const ExcitationAxis& axis : plan.spec().axes) {
+    const int index = actuator_index(stage, axis.channel);
+    info.excitation.names.push_back(axis.channel);
+    info.excitation.units.push_back(stage.actuators[static_cast<std::size_t>(index)].unit);
+  }
+  info.metadata_json = std::move(metadata_json);
+  check_log_info(info);
+  return info;
+}
+
+std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept {
+  constexpr std::uint64_t kIncrement = 0x9E3779B97F4A7C15U;
+  const auto step = [](int index) { return kIncrement * (static_cast<std::uint64_t>(index) + 1); };
+  return mix(mix(mix(plan_seed + kIncrement) + step(run.realization)) + step(run.experiment));
+}
+
+ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
+                                MotionController& controller, SlogWriter& log,
+                                const RunExperimentOptions& options) {
+  if (!same_measurement(log.info(), experiment_log_info(plan, stage.info()))) {
+    throw std::invalid_argument(
+        "experiment: the log was made for another plan or stage; make it with "
+        "experiment_log_info()");
+  }
+  return Experiment(plan, stage, controller, log, options).perform();
+}
+
+}  // namespace stageid

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "acquisition/slog_writer.hpp"
 #include "excitation/experiment_plan.hpp"
@@ -11,11 +13,12 @@
 
 namespace stageid {
 
+/// How far an experiment is. Runs that are skipped count in none of these.
 struct ExperimentProgress {
   RunId run;
   int runs_done = 0;
   int runs_total = 0;
-  double seconds_done = 0.0;  ///< of stage time, over the whole experiment
+  double seconds_done = 0.0;  ///< of stage time
   double seconds_total = 0.0;
   RunHealth health;  ///< of the current run
 };
@@ -25,7 +28,7 @@ struct RunExperimentOptions {
   const std::atomic<bool>* interrupt =
       nullptr;              ///< set by a signal handler: controlled stop, log kept
   double ramp_s = 0.1;      ///< excitation is ramped to zero over this before stopping
-  int misses_allowed = 10;  ///< leaky bucket: +2 a miss, -1 a good cycle, above: stop
+  int misses_allowed = 10;  ///< leaky bucket: +2 a bad cycle, -1 a good one, above: stop
   std::function<void(const ExperimentProgress&)>
       progress;  ///< from the calling thread, a few times a second
 };
@@ -35,9 +38,20 @@ enum class ExperimentEnd : std::uint8_t { complete, limit, fault, interrupted, l
 struct ExperimentResult {
   ExperimentEnd end = ExperimentEnd::complete;
   std::string message = "run_experiment was not called";
-  RunHealth health;  ///< over all runs
-  int runs_done = 0;
+  RunHealth health;   ///< over all runs
+  int runs_done = 0;  ///< complete ones, without those skipped
 };
+
+/// What a log of this plan on this stage says about itself. Its excitation channels are the plan's
+/// axes, in the plan's order. @throws std::invalid_argument if the stage lacks an axis or has
+/// another rate.
+LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
+                            std::string metadata_json = "{}");
+
+/// Seed of one run for CyclicStage::start(): with splitmix64's finalizer m and its increment g,
+///   m(m(m(plan_seed + g) + g (realization + 1)) + g (experiment + 1)).
+/// Source: Steele, Lea and Flood, Fast splittable pseudorandom number generators (2014).
+std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept;
 
 /// Performs every run of the plan on the stage: u = r + C(y), every sample logged.
 ///
@@ -47,7 +61,8 @@ struct ExperimentResult {
 /// controlled stop: the excitation is ramped down in closed loop, the stage stopped, the run logged
 /// as incomplete. Every run starts from standstill with the seed of (plan seed, realization,
 /// experiment), so that a repeated or resumed run is the same run.
-/// @throws StageError, FileError, std::invalid_argument if plan and stage do not fit.
+/// @throws StageError if a run cannot be started (the runs before it are in the log).
+/// @throws std::invalid_argument if plan, stage, controller and log do not fit.
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
                                 MotionController& controller, SlogWriter& log,
                                 const RunExperimentOptions& options = {});

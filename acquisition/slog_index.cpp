@@ -177,7 +177,7 @@ class Indexer {
       throw std::invalid_argument(
           fmt::format("ends {} rows where {} were written", end.samples, run.run.samples));
     }
-    if (!run.excitation && !run.excitation_columns.empty()) {
+    if (end.complete && !run.excitation && !run.excitation_columns.empty()) {
       throw std::invalid_argument("the run's excitation is missing");
     }
     run.run.complete = end.complete;

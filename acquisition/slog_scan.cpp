@@ -117,7 +117,7 @@ class Scanner {
   /// Offset of the next intact header of this log at or behind `from`, else the end of the file.
   std::uint64_t next_header(std::uint64_t from) const {
     const std::string_view magic(reinterpret_cast<const char*>(kSlogMagic.data()),
-                                     kSlogMagic.size());
+                                 kSlogMagic.size());
     std::vector<char> piece(kPieceBytes);
     while (from + sizeof(SlogBlockHeader) <= source_.bytes()) {
       const auto size =

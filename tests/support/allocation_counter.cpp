@@ -1,0 +1,76 @@
+#include "tests/support/allocation_counter.hpp"
+
+#include <cerrno>
+#include <cstddef>
+#include <cstdlib>
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
+#define STAGEID_MALLOC_IS_OURS 0
+#else
+#define STAGEID_MALLOC_IS_OURS 1
+#endif
+
+namespace {
+
+thread_local std::uint64_t allocations = 0;
+
+}  // namespace
+
+#if STAGEID_MALLOC_IS_OURS
+
+// glibc's own names for what is replaced here.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* old, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+void* malloc(std::size_t size) noexcept {
+  ++allocations;
+  return __libc_malloc(size);
+}
+
+void* calloc(std::size_t count, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+
+void* realloc(void* old, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_realloc(old, size);
+}
+
+void* memalign(std::size_t alignment, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+
+void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+
+int posix_memalign(void** to, std::size_t alignment, std::size_t size) noexcept {
+  ++allocations;
+  *to = __libc_memalign(alignment, size);
+  return *to == nullptr ? ENOMEM : 0;
+}
+}
+
+#endif
+
+namespace stageid::test {
+
+AllocationCounter::AllocationCounter() noexcept : before_(allocations) {}
+
+std::uint64_t AllocationCounter::count() const noexcept { return allocations - before_; }
+
+bool AllocationCounter::works() noexcept {
+  const AllocationCounter counter;
+  // Volatile: gcc removes an allocation that nobody looks at.
+  void* volatile memory = std::malloc(1);
+  std::free(memory);
+  return counter.count() == 1;
+}
+
+}  // namespace stageid::test
