@@ -74,7 +74,7 @@ class AutomaticFit {
   }
 
   FitResult run() {
-    best_ = fit_additive_model(frf_, start(), quick_);
+    adopt(fit_additive_model(frf_, start(), quick_));
     if (best_.status == FitStatus::singular) return finish();
     if (selection_.keep_modes) return finish();
     grow();
@@ -176,7 +176,7 @@ class AutomaticFit {
     for (const ResidualMode& candidate : clear)
       say("added {:.6g} Hz, one of {} together: cost {:.6g} -> {:.6g}", candidate.mode.frequency_hz,
           clear.size(), best_.model.fit.cost, trial.model.fit.cost);
-    best_ = std::move(trial);
+    adopt(std::move(trial));
     return true;
   }
 
@@ -216,7 +216,7 @@ class AutomaticFit {
     }
     say("added {:.6g} Hz (damping {:.3g}): cost {:.6g} -> {:.6g}", added.natural_frequency_hz(),
         added.damping_ratio(), best_.model.fit.cost, best_trial.model.fit.cost);
-    best_ = std::move(best_trial);
+    adopt(std::move(best_trial));
     return true;
   }
 
@@ -269,7 +269,7 @@ class AutomaticFit {
         say("dropped {:.6g} Hz: cost {:.6g} -> {:.6g}",
             best_.model.submodels[i].natural_frequency_hz(), best_.model.fit.cost,
             without.model.fit.cost);
-      best_ = std::move(without);
+      adopt(std::move(without));
     }
   }
 
@@ -278,7 +278,16 @@ class AutomaticFit {
     FitResult result = fit_additive_model(frf_, best_.model, options_);
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
+    result.cost.insert(result.cost.begin(), history_.begin(), history_.end());
+    result.model.cost_history = result.cost;
+    result.model.fit.iterations = static_cast<int>(result.cost.size()) - 1;
     return result;
+  }
+
+  /// Goes on from `result`; its way there becomes part of the history.
+  void adopt(FitResult&& result) {
+    best_ = std::move(result);
+    history_.insert(history_.end(), best_.cost.begin(), best_.cost.end());
   }
 
   template <typename... Args>
@@ -295,6 +304,7 @@ class AutomaticFit {
   double signal_ = 0.0;
   FitResult best_;
   std::vector<std::string> decisions_;
+  std::vector<double> history_;
 };
 
 }  // namespace

@@ -145,8 +145,9 @@ void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const F
     knowledge = VarianceKnowledge::weights;
   else if (known.size() > 0 && known.minCoeff() > 0.0)
     knowledge = VarianceKnowledge::given;
-  const Eigen::MatrixXd variance =
-      knowledge == VarianceKnowledge::given ? smoothed_variance(known, dof) : Eigen::MatrixXd();
+  const Eigen::MatrixXd variance = knowledge == VarianceKnowledge::given
+                                       ? smoothed_variance(frf, known, dof)
+                                       : Eigen::MatrixXd();
   const ParameterCovariance covariance =
       parameter_covariance(problem, beta, groups, E, gn, knowledge, variance);
   if (covariance.globals.size() == 0 && problem.globals() > 0) return;

@@ -80,8 +80,10 @@ Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& grou
 /// @throws std::invalid_argument if what the weighting needs is missing, zero or not finite.
 Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options);
 
-/// `variance` averaged over as many neighbouring lines as give about 100 degrees of freedom.
-Eigen::MatrixXd smoothed_variance(const Eigen::MatrixXd& variance, double dof);
+/// `variance` (noise or total, of `frf`) averaged over as many neighbouring lines as give about 25
+/// degrees of freedom; as it is where it has them, or where `dof` is 0 (unknown).
+Eigen::MatrixXd smoothed_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
+                                  double dof);
 
 /// Runs task(0) .. task(count - 1) on up to `threads` threads. Which thread runs a task does not
 /// matter to the result.
