@@ -128,6 +128,16 @@ def check_zoom(zoom):
         near(got, want, 1e-6, "zoom taken back")
 
 
+def check_use(use, expected, width):
+    expect(use["clicked"] == use["last"], f"a click on the last panel shows {use['clicked']!r}")
+    # To the right stands the next actuator; on a narrow page, which is turned, the next sensor.
+    outputs, inputs = expected["shape"]
+    step = min(1, outputs - 1) if width <= 700 else outputs * min(1, inputs - 1)
+    expect(use["walked"] == step, f"the right arrow leads to panel {use['walked']} instead of {step}")
+    expect(use["hidden"], "a trace that was switched off is still there")
+    near(use["scaled"], 1.0, 1e-12, "times omega squared")
+
+
 def check_page(found, expected, width):
     expect(found["errors"] == [], f"errors: {found['errors']}")
     expect(found["injected"] == 0, f"{found['injected']} elements came in with a text")
@@ -138,6 +148,7 @@ def check_page(found, expected, width):
     if "panels" in expected:
         check_response(found, expected)
         check_zoom(found["zoom"])
+        check_use(found["use"], expected, width)
     if expected["modes"]:
         expect(found["rows"]["modes"] == expected["modes"], f"{found['rows']['modes']} modes in the table")
 

@@ -66,13 +66,13 @@ Json extremes(const Eigen::MatrixXcd& values) {
   return out;
 }
 
-/// tolerance: of a value, relative to the largest one of its kind.
 Json expected(const ReportData& data) {
   Json out = {{"title", data.title}, {"modes", data.model ? data.true_modes.size() : 0}};
   if (!data.frf) return out;
   const FrfEstimate& frf = *data.frf;
   out["panels"] = frf.response.rows();
   out["lines"] = frf.lines();
+  out["shape"] = {frf.n_outputs(), frf.n_inputs()};
   out["measured"] = extremes(frf.response);
   out["arrays"]["frequency"] = summary_of(Eigen::MatrixXd(frf.frequency_hz.transpose()), false);
   out["arrays"]["response"] = summary_of(frf.response, true);

@@ -19,7 +19,7 @@ function buildCmif() {
   body.append(legend, element('div', { class: 'plot tall', id: 'cmif-plot', role: 'img', 'aria-labelledby': 'cmif-title' }),
     element('p', { class: 'axis-title' }, 'Frequency [Hz]'));
   afterFirstPaint(drawCmif);
-  onColours(drawCmif);
+  onColours(() => cmif.graph && cmif.graph.updateOptions({ ...plotColours(), series: cmifSeries() }));
 }
 
 function identifiedModes() {
@@ -37,15 +37,17 @@ function drawCmif() {
     for (let i = 0; i < curves; ++i) row.push(Math.max(values[i * f.length + k], floor));
     return row;
   });
-  const window_ = cmif.graph ? cmif.graph.xAxisRange() : null;
-  if (cmif.graph) cmif.graph.destroy();
-  const labels = Array.from({ length: curves }, (_, i) => 'curve ' + (i + 1));
-  const colours = palette().curves;
   cmif.graph = new Dygraph(document.getElementById('cmif-plot'), rows, {
-    ...plotBasics, ...plotColours(), labels: ['f', ...labels], logscale: true,
-    series: Object.fromEntries(labels.map((label, i) => [label, { color: colours[i % colours.length] }])),
-    axes: { x: frequencyAxis, y: magnitudeAxis }, underlayCallback: markModes, dateWindow: window_,
+    ...plotBasics, ...plotColours(), labels: ['f', ...Object.keys(cmifSeries())], logscale: true,
+    series: cmifSeries(),
+    axes: { x: frequencyAxis, y: magnitudeAxis }, underlayCallback: markModes,
   });
+  plots.add(cmif.graph);
+}
+
+function cmifSeries() {
+  const colours = palette().curves;
+  return Object.fromEntries(Array.from({ length: content.arrays.cmif.curves }, (_, i) => ['curve ' + (i + 1), { color: colours[i % colours.length] }]));
 }
 
 // Identified modes as lines behind the curves, chosen ones as rings on their curve.
@@ -92,15 +94,19 @@ function buildCost() {
   body.append(element('div', { class: 'plot', id: 'cost-plot', role: 'img', 'aria-labelledby': 'cost-title' }),
     element('p', { class: 'axis-title' }, 'Iteration'));
   afterFirstPaint(drawCost);
-  onColours(drawCost);
+  onColours(() => cost.graph && cost.graph.updateOptions({ ...plotColours(), series: costSeries() }));
 }
 
 function drawCost() {
-  if (cost.graph) cost.graph.destroy();
   const values = content.cost.filter((v) => isNumber(v) && v > 0);
   cost.graph = new Dygraph(document.getElementById('cost-plot'), values.map((v, i) => [i, v]), {
     ...plotBasics, ...plotColours(), labels: ['iteration', 'cost'], logscale: true, drawPoints: values.length < 200, pointSize: 2.5,
-    series: { cost: { color: palette().measured } }, xRangePad: 8,
+    series: costSeries(), xRangePad: 8,
     axes: { x: { ticker: (min, max, pixels) => linearTicks(min, max, Math.max(2, pixels / 60), (v) => (Number.isInteger(v) ? String(v) : '')) }, y: magnitudeAxis },
   });
+  plots.add(cost.graph);
+}
+
+function costSeries() {
+  return { cost: { color: palette().curves[0] } };
 }

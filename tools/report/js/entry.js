@@ -28,7 +28,7 @@ function buildEntry() {
     element('div', { class: 'plot', id: 'entry-phase', role: 'img', 'aria-labelledby': 'phase-title' }),
     element('p', { class: 'axis-title' }, 'Frequency [Hz]'),
     element('p', { class: 'quiet' }, entryHelp()));
-  onColours(() => showEntry(entry.channel, true));
+  onColours(recolourEntry);
 }
 
 function entryHelp() {
@@ -37,6 +37,12 @@ function entryHelp() {
     ? 'total variance: noise and nonlinear distortions' : 'noise variance') + '; circular complex Gaussian). ' : '';
   return known + 'Drag to zoom, double-click for the whole band; both plots move together. ' +
     'The names above switch traces on and off.';
+}
+
+function recolourEntry() {
+  for (const plot of [entry.magnitude, entry.phase]) {
+    if (plot) plot.updateOptions({ ...plotColours(), series: traceStyles(plot.getLabels().slice(1)) });
+  }
 }
 
 function pickEntry() {
@@ -133,15 +139,21 @@ function traceStyle(name) {
   return { color: colours[name], plotter: banded ? (event) => { drawBand(event); linePlotter(event); } : linePlotter, ...styles[name] };
 }
 
+function traceStyles(names) {
+  return Object.fromEntries(names.map((name) => [name, traceStyle(name)]));
+}
+
 function plotTable(id, table, axisY, more) {
   const options = {
     ...plotBasics, ...plotColours(), customBars: true, labels: ['f', ...table.names],
-    series: Object.fromEntries(table.names.map((name) => [name, traceStyle(name)])),
+    series: traceStyles(table.names),
     visibility: table.names.map((name) => !entry.hidden.has(name)),
     axes: { x: frequencyAxis, y: axisY }, highlightCallback: tellValues, unhighlightCallback: () => tellValues(),
     ...more,
   };
-  return new Dygraph(document.getElementById(id), table.rows, options);
+  const plot = new Dygraph(document.getElementById(id), table.rows, options);
+  plots.add(plot);
+  return plot;
 }
 
 function showEntry(channel, keepZoom) {
@@ -156,8 +168,10 @@ function showEntry(channel, keepZoom) {
   document.getElementById('entry-unit').textContent = 'magnitude in ' + unitOf(output, input) + (matrix.timesOmega ? ' \u00d7 (rad/s)\u00b2' : '');
   if (entry.magnitude) {
     entry.link.detach();
-    entry.magnitude.destroy();
-    entry.phase.destroy();
+    for (const plot of [entry.magnitude, entry.phase]) {
+      plots.delete(plot);
+      plot.destroy();
+    }
   }
   const table = magnitudeTable(channel);
   entry.order = table.names;
@@ -177,6 +191,8 @@ function buildLegend() {
 }
 
 function toggleTrace(name) {
+  // A logarithmic axis needs something to be scaled to: the last trace stays.
+  if (!entry.hidden.has(name) && entry.order.every((other) => other === name || entry.hidden.has(other))) return;
   if (entry.hidden.has(name)) entry.hidden.delete(name);
   else entry.hidden.add(name);
   for (const graph of [entry.magnitude, entry.phase]) {

@@ -28,7 +28,7 @@ function number(value, digits = 3) {
   if (!isNumber(value)) return '\u2013';
   if (value === 0) return '0';
   const exponent = Math.floor(Math.log10(Math.abs(value)));
-  if (exponent < -3 || exponent > 5) {
+  if (exponent < -4 || exponent > 5) {
     const [mantissa, power] = value.toExponential(digits - 1).split('e');
     return mantissa.replace('-', '\u2212') + '\u00a0\u00d7\u00a0' + powerOfTen(Number(power));
   }

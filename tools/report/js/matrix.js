@@ -160,7 +160,9 @@ function drawPanel(channel) {
   drawDecades(context, frame);
   const curves = channelCurves(channel);
   const colours = palette();
+  context.globalAlpha = 0.7;
   drawCurve(context, frame, scaled(curves.residual, scale), colours.residual, 0.6);
+  context.globalAlpha = 1;
   drawCurve(context, frame, scaled(curves.measured, scale), colours.measured, curves.model ? 2.8 : 1.2);
   drawCurve(context, frame, scaled(curves.model, scale), colours.model, 0.8);
   if (curves.relativeError !== null) panel.error.textContent = percent(curves.relativeError);

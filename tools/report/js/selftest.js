@@ -18,7 +18,7 @@ function selfTest(startedMs) {
   }
   findings.plots = Object.fromEntries(Array.from(document.querySelectorAll('.plot'), (plot) => [plot.id, inkOf(plot)]));
   findings.rows = Object.fromEntries(Array.from(document.querySelectorAll('section'), (s) => [s.id, s.querySelectorAll('tbody tr').length]));
-  if (content.frf) findings.zoom = zoomCheck();
+  if (content.frf) Object.assign(findings, { zoom: zoomCheck(), use: useCheck() });
   findings.errors = window.stageidReport.errors;
   if (window.parent !== window) window.parent.postMessage(findings, '*');  // the test's narrow frame
   document.body.append(element('script', { type: 'application/json', id: 'selftest' }, JSON.stringify(findings).replace(/</g, '\\u003c')));
@@ -73,4 +73,26 @@ function zoomCheck() {
   const got = { asked, magnitude: entry.magnitude.xAxisRange(), phase: entry.phase.xAxisRange() };
   resetZoom();
   return { ...got, whole, restored: entry.phase.xAxisRange() };
+}
+
+// What a reader does: choose a panel, walk with the keys, switch a trace, multiply by omega squared.
+function useCheck() {
+  const last = matrix.panels.length - 1;
+  const title = document.getElementById('entry-title');
+  const use = { last: channelName(last) };
+  matrix.panels[last].button.click();
+  use.clicked = title.textContent;
+  selectPanel(0);
+  matrix.panels[0].button.focus();
+  matrix.panels[0].button.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight', bubbles: true, cancelable: true }));
+  use.walked = Number(document.activeElement.dataset.channel);
+  toggleTrace('measured');
+  const only = entry.order.length === 1;
+  use.hidden = entry.magnitude.visibility()[0] === only && entry.phase.visibility()[0] === only;
+  if (!only) toggleTrace('measured');
+  const before = magnitudeTable(0).rows[0][1][1];
+  document.getElementById('times-omega').click();
+  use.scaled = magnitudeTable(0).rows[0][1][1] / before / (2 * Math.PI * array('frequency')[0]) ** 2;
+  document.getElementById('times-omega').click();
+  return use;
 }

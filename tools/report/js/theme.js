@@ -1,13 +1,14 @@
-// Colours of the plots. Lines follow Okabe and Ito: they are told apart without red-green vision too.
+// Colours of the plots, told apart without red-green vision too (after Okabe and Ito). The measurement is a wide pale
+// line, the model a thin strong one on it: where they agree, both are seen.
 
 const palettes = {
   light: {
-    measured: '#0072b2', model: '#d55e00', residual: '#3d9970', deviation: '#8a8f98', validation: '#b0569b',
+    measured: '#4aa5e0', model: '#b83a00', residual: '#3d9970', deviation: '#8a8f98', validation: '#b0569b',
     grid: '#e3e6ea', frame: '#b9c0c8', text: '#4a525c', marker: '#d55e00', background: '#ffffff',
     curves: ['#0072b2', '#d55e00', '#3d9970', '#b0569b', '#b58900', '#5b6b7b'],
   },
   dark: {
-    measured: '#5ab4e8', model: '#ff9a4d', residual: '#54d3a0', deviation: '#8c96a3', validation: '#e39ad0',
+    measured: '#3c86b8', model: '#ffc078', residual: '#54d3a0', deviation: '#8c96a3', validation: '#e39ad0',
     grid: '#2a323c', frame: '#4b5663', text: '#aab4c0', marker: '#ff9a4d', background: '#171c22',
     curves: ['#5ab4e8', '#ff9a4d', '#54d3a0', '#e39ad0', '#e6c04a', '#9fb0c2'],
   },
@@ -30,5 +31,16 @@ function recolour() {
 }
 
 darkScheme.addEventListener('change', recolour);
-window.addEventListener('beforeprint', () => { printing = true; recolour(); });
-window.addEventListener('afterprint', () => { printing = false; recolour(); });
+
+// Plots keep their pixels on paper: they get the size of the page (class "printing") before.
+const plots = new Set();  // of dygraphs
+
+function print(on) {
+  printing = on;
+  document.documentElement.classList.toggle('printing', on);
+  for (const plot of plots) plot.resize();
+  recolour();
+}
+
+window.addEventListener('beforeprint', () => print(true));
+window.addEventListener('afterprint', () => print(false));
