@@ -20,9 +20,9 @@ enum class ExcitationScheme : std::uint8_t {
 
 /// One excited channel of the stage.
 struct ExcitationAxis {
-  std::string channel;    ///< actuator name
-  double level = 1.0;     ///< rms or peak, unit of the channel
-  Eigen::VectorXd shape;  ///< relative amplitude a line; empty: flat
+  std::string channel;         ///< actuator name
+  double level = 1.0;          ///< rms or peak, unit of the channel
+  Eigen::VectorXd shape = {};  ///< relative amplitude a line; empty: flat
 };
 
 struct ExperimentSpec {

@@ -17,9 +17,9 @@ enum class AmplitudeScaling : std::uint8_t {
 struct MultisineSpec {
   double level = 1.0;  ///< in the unit of the excited channel, see `scaling`
   AmplitudeScaling scaling = AmplitudeScaling::rms;
-  std::uint64_t seed = 0;    ///< one seed, one realization, on every machine
-  Eigen::VectorXd shape;     ///< relative amplitude a line, size of the grid; empty: flat
-  int crest_iterations = 0;  ///< 0: phases stay random; else clipping iterations at most
+  std::uint64_t seed = 0;      ///< one seed, one realization, on every machine
+  Eigen::VectorXd shape = {};  ///< relative amplitude a line, size of the grid; empty: flat
+  int crest_iterations = 0;    ///< 0: phases stay random; else clipping iterations at most
 };
 
 /// One period of a multisine on `grid`:  x(n) = sum_k A_k cos(2 pi l_k n / N + phi_k).
