@@ -104,6 +104,8 @@ def check_response(found, expected):
     """Panels, and what the large plot draws of every element."""
     expect(found["panels"] == expected["panels"], f"{found['panels']} panels instead of {expected['panels']}")
     expect(found["panels_with_ink"] == found["panels"], f"only {found['panels_with_ink']} panels are drawn")
+    expect(found["panels_with_peak"] == found["panels"],
+           f"only {found['panels_with_peak']} of {found['panels']} panels show their highest peak")
     expect(found["panel_sizes"]["width"] >= 55 and found["panel_sizes"]["height"] >= 50,
            f"panels of {found['panel_sizes']} pixels")
     check_arrays(found, expected)
@@ -227,8 +229,10 @@ def main():
     if options.kind == "full":
         check_screenshot(browser, page, 1280, work / "report_1280.png")
         check_screenshot(browser, page, 390, work / "report_390.png")
-    for failure in failures:
+    for failure in failures[:30]:
         print("FAILED:", failure)
+    if len(failures) > 30:
+        print(f"and {len(failures) - 30} more")
     return 1 if failures else 0
 
 

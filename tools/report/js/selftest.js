@@ -10,8 +10,10 @@ function selfTest(startedMs) {
   };
   if (content.frf) {
     matrix.panels.forEach((_, channel) => drawPanel(channel));
+    const seen = matrix.panels.map((panel) => pixelsOf(panel.canvas));
     Object.assign(findings, {
-      panels: matrix.panels.length, panels_with_ink: matrix.panels.filter((panel) => hasInk(panel.canvas)).length,
+      panels: matrix.panels.length, panels_with_ink: seen.filter(hasInk).length,
+      panels_with_peak: seen.filter((pixels, channel) => showsPeak(channel, pixels)).length,
       panel_sizes: smallestPanel(), arrays: Object.fromEntries(Object.keys(content.arrays).map((id) => [id, summary(id)])),
       entries: matrix.panels.map((_, channel) => entrySummary(channel)),
     });
@@ -24,15 +26,38 @@ function selfTest(startedMs) {
   document.body.append(element('script', { type: 'application/json', id: 'selftest' }, JSON.stringify(findings).replace(/</g, '\\u003c')));
 }
 
-function hasInk(canvas) {
+// Once a canvas: a browser complains about more.
+function pixelsOf(canvas) {
   const { width, height } = canvas;
-  if (width === 0 || height === 0) return false;
-  const pixels = new Uint32Array(canvas.getContext('2d').getImageData(0, 0, width, height).data.buffer);
-  return new Set(pixels).size > 8;
+  return width > 0 && height > 0 ? canvas.getContext('2d').getImageData(0, 0, width, height) : null;
+}
+
+function hasInk(pixels) {
+  return pixels !== null && new Set(new Uint32Array(pixels.data.buffer)).size > 8;
+}
+
+// The highest line of the acceleration stands in the panel, however many lines share its pixel.
+function showsPeak(channel, pixels) {
+  const f = array('frequency');
+  const { measured } = channelCurves(channel);
+  let peak = 0;
+  for (let k = 1; k < f.length; ++k) if (measured[k] * f[k] * f[k] > measured[peak] * f[peak] * f[peak]) peak = k;
+  const { canvas } = matrix.panels[channel];
+  const frame = panelFrame(canvas.clientWidth, canvas.clientHeight);
+  const ratio = canvas.width / canvas.clientWidth;
+  const x = Math.min(canvas.width - 2, frame.x(Math.log10(f[peak])) * ratio);
+  const y = frame.y(Math.log10(measured[peak])) * ratio;
+  for (let row = Math.round(y) - 1; row <= Math.round(y) + 1; ++row) {
+    for (let column = Math.round(x) - 2; column < Math.round(x) + 2; ++column) {
+      const [red, green, blue, alpha] = pixels.data.subarray(4 * (row * canvas.width + column));
+      if (alpha > 100 && Math.max(red, green, blue) - Math.min(red, green, blue) > 40) return true;  // not the grey grid
+    }
+  }
+  return false;
 }
 
 function inkOf(plot) {
-  return Array.from(plot.querySelectorAll('canvas')).some(hasInk);
+  return Array.from(plot.querySelectorAll('canvas'), pixelsOf).some(hasInk);
 }
 
 function smallestPanel() {
