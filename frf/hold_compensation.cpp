@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <stdexcept>
 
 namespace stageid {
@@ -30,31 +31,54 @@ void check_request(const FrfEstimate& frf, double delay_s) {
   }
 }
 
+/// Response and everything that goes with its square, times a factor a line.
+void multiply(FrfEstimate& frf, const std::function<std::complex<double>(double)>& factor) {
+  const Eigen::VectorXd omega = frf.omega_rad_s();
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const std::complex<double> value = factor(omega[k]);
+    frf.response.col(k) *= value;
+    const double power = std::norm(value);
+    for (Eigen::MatrixXd* variance : {&frf.noise_variance, &frf.total_variance,
+                                      &frf.residual_covariance_re, &frf.residual_covariance_im}) {
+      if (variance->size() != 0) variance->col(k) *= power;
+    }
+    if (frf.covariance.size() != 0) frf.covariance.col(k) *= power;
+  }
+}
+
+/// What `kind` takes out at omega: (1 - e^{-j omega T}) / (j omega T) = e^{-j omega T / 2}
+/// sinc(omega T / 2), so both kinds turn by the same angle, and only `hold` changes the magnitude.
+std::complex<double> taken_out(Compensation kind, double delay_s, double T, double omega) {
+  const double gain = kind == Compensation::hold ? sinc(0.5 * omega * T) : 1.0;
+  return std::polar(gain, -omega * (delay_s + 0.5 * T));
+}
+
 }  // namespace
 
 FrfEstimate compensate(const FrfEstimate& frf, Compensation kind, double delay_s) {
   if (kind == Compensation::none) return frf;
   check_request(frf, delay_s);
   const double T = 1.0 / frf.sample_rate_hz;
-  const Eigen::VectorXd omega = frf.omega_rad_s();
-
   FrfEstimate result = frf;
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    // (1 - e^{-j omega T}) / (j omega T) = e^{-j omega T / 2} sinc(omega T / 2): both kinds turn by
-    // the same angle, and only `hold` changes the magnitude.
-    const double gain = kind == Compensation::hold ? 1.0 / sinc(0.5 * omega[k] * T) : 1.0;
-    result.response.col(k) *= std::polar(gain, omega[k] * (delay_s + 0.5 * T));
-    const double power = gain * gain;
-    for (Eigen::MatrixXd* variance :
-         {&result.noise_variance, &result.total_variance, &result.residual_covariance_re,
-          &result.residual_covariance_im}) {
-      if (variance->size() != 0) variance->col(k) *= power;
-    }
-    if (result.covariance.size() != 0) result.covariance.col(k) *= power;
-  }
+  multiply(result, [&](double omega) { return 1.0 / taken_out(kind, delay_s, T, omega); });
   if (kind == Compensation::hold) result.hold = Hold::none;
   result.compensated = kind;
   result.delay_s = delay_s;
+  return result;
+}
+
+FrfEstimate as_measured(const FrfEstimate& frf) {
+  if (frf.compensated == Compensation::none)
+    throw std::invalid_argument("the response was not compensated: it is as measured already");
+  if (!(frf.sample_rate_hz > 0.0) || !std::isfinite(frf.sample_rate_hz))
+    throw std::invalid_argument(
+        "the sample rate is unknown: what the compensation took out cannot be put back");
+  const double T = 1.0 / frf.sample_rate_hz;
+  FrfEstimate result = frf;
+  multiply(result, [&](double omega) { return taken_out(frf.compensated, frf.delay_s, T, omega); });
+  result.hold = Hold::zoh;
+  result.compensated = Compensation::none;
+  result.delay_s = 0.0;
   return result;
 }
 

@@ -11,4 +11,9 @@ namespace stageid {
 /// @throws std::invalid_argument if frf was compensated already or its sample rate is unknown.
 FrfEstimate compensate(const FrfEstimate& frf, Compensation kind, double delay_s);
 
+/// The response as it was measured: puts back what compensate() took out, so that a model can go
+/// through hold, delay and sampler exactly instead of meeting data in which the aliasing was left.
+/// @throws std::invalid_argument if nothing was taken out or the sample rate is unknown.
+FrfEstimate as_measured(const FrfEstimate& frf);
+
 }  // namespace stageid

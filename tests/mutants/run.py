@@ -1,0 +1,119 @@
+#!/usr/bin/python3
+"""Plants one fault at a time in a copy of the sources and shows which tests notice it.
+
+    tests/mutants/run.py [--work DIR] [--only NAME]
+
+Every mutant is one textual change; its folder's test program is built and run and must fail. A mutant
+that no test notices, or whose text is no longer in the source, makes the run fail. Needs git, cmake,
+ninja and the packages of tools/test; takes a few minutes, so it is not part of ctest.
+"""
+import argparse
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+# name, file, text, its replacement, test programs that should notice
+MUTANTS = [
+    ('transient not dropped', 'frf/run_spectra.cpp',
+     'used.transient_periods + p) * period', 'p) * period', ['frf']),
+    ('transpose of U', 'frf/plant_average.cpp',
+     'Y * U.partialPivLu().inverse()', 'Y * U.transpose().partialPivLu().inverse()', ['frf']),
+    ('transpose of U in the covariance', 'frf/line_estimate.cpp',
+     'estimate.Q.transpose() * weight.asDiagonal() * estimate.Q.conjugate()',
+     'estimate.Q * weight.asDiagonal() * estimate.Q.adjoint()', ['frf']),
+    ('missing conjugate in the covariance', 'frf/line_estimate.cpp',
+     'residual_of_Z * scatter * residual_of_Z.adjoint()',
+     'residual_of_Z * scatter * residual_of_Z.transpose()', ['frf']),
+    ('factor one half in the variance', 'frf/plant_average.cpp',
+     'frf.noise_variance = noise_sum_ / (M * M)', 'frf.noise_variance = 0.5 * noise_sum_ / (M * M)', ['frf']),
+    ('sinc of the hold forgotten', 'frf/hold_compensation.cpp',
+     'kind == Compensation::hold ? sinc(0.5 * omega * T) : 1.0', '1.0', ['frf']),
+    ('Hz for rad/s', 'frf/frf_estimate.cpp',
+     'return 2.0 * std::numbers::pi * frequency_hz;', 'return frequency_hz;', ['frf', 'estimation']),
+    ('Hz for rad/s in the natural frequency', 'estimation/additive_model.cpp',
+     '1.0 / (2.0 * std::numbers::pi * std::sqrt(denominator[2]))', '1.0 / std::sqrt(denominator[2])', ['estimation']),
+    ('missing conjugate in the arrow', 'estimation/weighted_products.cpp',
+     'im.col(p) = x_re.cwiseProduct(y_im) - x_im.cwiseProduct(y_re);',
+     'im.col(p) = x_re.cwiseProduct(y_im) + x_im.cwiseProduct(y_re);', ['estimation']),
+    ('equation error added, not subtracted', 'estimation/arrow_system.cpp',
+     'channel.ba(j, p) -= FY(r, j * n_a + p)', 'channel.ba(j, p) += FY(r, j * n_a + p)', ['estimation']),
+    ('relative weights are the paper\'s', 'estimation/weights.cpp',
+     'case Weighting::relative:\n      return inverse_magnitude(frf, 2.0);',
+     'case Weighting::relative:\n      return inverse_magnitude(frf, 1.0);', ['estimation']),
+    ('hold without the rest of the delay', 'estimation/basis.cpp',
+     'return {whole, samples - whole};', 'return {whole, 0.0};', ['estimation']),
+    ('a larger cost is accepted', 'estimation/fit_iteration.cpp',
+     'trial->E.cost < cost)', 'trial->E.cost < 1e9 * cost)', ['estimation']),
+    ('CMIF not squared', 'estimation/cmif.cpp', '.cwiseAbs2();\n', '.cwiseAbs();\n', ['estimation']),
+    ('even and odd lines swapped', 'excitation/frequency_grid.cpp',
+     'return line % 2 != 0;', 'return line % 2 == 0;', ['excitation']),
+    ('payload CRC not checked', 'acquisition/slog_reader.cpp',
+     'crc != block.header.payload_crc', 'false', ['acquisition']),
+    ('slew limit not enforced', 'hal/limited_stage.cpp',
+     'std::abs(wanted - last) > step', 'std::abs(wanted - last) > 1e9 * step', ['hal']),
+]
+
+
+def replace(path, old, new):
+    text = path.read_text()
+    # Formatting may break a line anywhere: white space matches white space.
+    pattern = r'\s*'.join(re.escape(part) for part in re.split(r'\s+', old))
+    changed, count = re.subn(pattern, lambda _: new, text, count=1)
+    if count == 0:
+        raise SystemExit(f'{path}: the text of the mutant is gone: {old}')
+    path.write_text(changed)
+    return text
+
+
+def run(*command, **options):
+    return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
+
+
+def test(build, folder):
+    """(compiled, passed, first failing test)"""
+    if run('ninja', '-C', build, f'{folder}_tests').returncode != 0:
+        return False, False, ''
+    result = run(f'{build}/tests/{folder}/{folder}_tests', '--gtest_brief=1', timeout=600)
+    failed = re.findall(r'\[  FAILED  \] (\S+)', result.stdout)
+    return True, result.returncode == 0, failed[0] if failed else f'exit code {result.returncode}'
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--work', default=str(ROOT / 'build' / 'mutants'))
+    parser.add_argument('--only', default='', help='mutants whose name contains this')
+    arguments = parser.parse_args()
+    work = pathlib.Path(arguments.work)
+    source, build = work / 'source', str(work / 'build')
+    if not source.exists():
+        subprocess.run(['git', 'clone', '--quiet', str(ROOT), str(source)], check=True)
+    subprocess.run(['git', '-C', str(source), 'pull', '--quiet', '--ff-only'], check=True)
+    subprocess.run(['cmake', '-S', str(source), '-B', build, '-G', 'Ninja', '-DCMAKE_BUILD_TYPE=Release'],
+                   check=True, stdout=subprocess.DEVNULL)
+    chosen = [m for m in MUTANTS if arguments.only in m[0]]
+    for folder in sorted({folder for m in chosen for folder in m[4]}):
+        compiled, passed, first = test(build, folder)
+        if not (compiled and passed):
+            raise SystemExit(f'{folder}_tests fail without a mutant: {first}')
+    survivors = 0
+    for name, file, old, new, folders in chosen:
+        original = replace(source / file, old, new)
+        noticed = []
+        for folder in folders:
+            compiled, passed, first = test(build, folder)
+            if not compiled:
+                raise SystemExit(f'{name}: the mutant does not compile')
+            if not passed:
+                noticed.append(first)
+        (source / file).write_text(original)
+        survivors += not noticed
+        print(f'{name:42s} {file:32s} ' + (f'noticed by {", ".join(noticed)}' if noticed else 'SURVIVED'), flush=True)
+    print(f'{len(chosen)} mutants, {survivors} survived')
+    return 1 if survivors else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
