@@ -100,7 +100,7 @@ ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Inde
       asked.size() < excited.size() && by_excitation.size() == excited.size() &&
       std::all_of(asked.begin(), asked.end(),
                   [&](Eigen::Index i) { return contains(by_excitation, i); });
-  choice.estimated = part_of_the_excited ? by_excitation : asked;
+  choice.estimated = asked.empty() || part_of_the_excited ? by_excitation : asked;
   choice.inputs = names_of(info.actuators, asked.empty() ? by_excitation : asked);
   check_counts(info, excited, choice.estimated.size(), experiments, realization);
   for (const Eigen::Index i : all_of(info.actuators)) {

@@ -14,15 +14,15 @@ enum class FrfMethod : std::uint8_t { periodic, lpm };
 enum class CovarianceKind : std::uint8_t { diagonal, full };
 
 struct FrfOptions {
-  std::vector<std::string> inputs;       ///< actuator names; empty: those that are excited
-  std::vector<std::string> outputs;      ///< sensor names; empty: all
-  std::optional<int> transient_periods;  ///< instead of the log's own
+  std::vector<std::string> inputs{};       ///< actuator names; empty: those that are excited
+  std::vector<std::string> outputs{};      ///< sensor names; empty: all
+  std::optional<int> transient_periods{};  ///< instead of the log's own
   FrfMethod method = FrfMethod::periodic;
   CovarianceKind covariance = CovarianceKind::diagonal;
-  std::vector<int> realizations;  ///< which (0-based); empty: all complete ones
-  int threads = 0;                ///< 0: as many as cores; the result does not depend on it
+  std::vector<int> realizations{};  ///< which (0-based); empty: all complete ones
+  int threads = 0;                  ///< 0: as many as cores; the result does not depend on it
   std::function<void(double done, double total)>
-      progress;  ///< bytes; called from one thread at a time
+      progress{};  ///< bytes; called from one thread at a time
 };
 
 /// Estimates the plant from closed-loop logs by the indirect method.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <stdexcept>
 
 #include "excitation/file_error.hpp"
@@ -84,15 +85,42 @@ RunsByRealization complete_runs(const std::vector<const LogReader*>& logs,
   return table;
 }
 
+/// Every experiment that was at least begun in some realization.
+std::set<int> begun_experiments(const std::vector<const LogReader*>& logs) {
+  std::set<int> begun;
+  for (const LogReader* log : logs) {
+    for (const LogRun& run : log->runs()) begun.insert(run.experiment);
+  }
+  return begun;
+}
+
 void check_realizations_asked_for(const RunsByRealization& table, const FrfOptions& options,
-                                  const LogReader& first) {
+                                  const std::string& log) {
   for (const int realization : options.realizations) {
     if (!table.contains(realization)) {
       throw std::invalid_argument(
-          fmt::format("{}: realization {} has no complete run; leave it out", first.path().string(),
-                      realization));
+          fmt::format("{}: realization {} has no complete run; leave it out", log, realization));
     }
   }
+}
+
+/// How many experiments a realization must have to be used without having been asked for.
+///
+/// As many as were begun: the missing ones excite inputs, which would silently not be estimated.
+/// Who names the inputs knows what is there, and gets what the best realization has.
+std::size_t needed_experiments(const RunsByRealization& table, std::size_t begun,
+                               const FrfOptions& options, const std::string& log) {
+  const auto best = std::max_element(table.begin(), table.end(), [](const auto& a, const auto& b) {
+    return a.second.size() < b.second.size();
+  });
+  const std::size_t most = best->second.size();
+  if (most < begun && options.inputs.empty()) {
+    throw std::invalid_argument(fmt::format(
+        "{}: no realization is complete, realization {} has {} of {} experiments; resume "
+        "the experiment, or name the inputs",
+        log, best->first, most, begun));
+  }
+  return most;
 }
 
 }  // namespace
@@ -113,18 +141,18 @@ std::vector<RealizationRuns> choose_runs(const std::vector<const LogReader*>& lo
     check_same_setup(*logs.front(), *log);
   }
   const RunsByRealization table = complete_runs(logs, options);
-  check_realizations_asked_for(table, options, *logs.front());
+  const std::string first = logs.front()->path().string();
+  check_realizations_asked_for(table, options, first);
   if (table.empty()) {
     throw std::invalid_argument(
-        fmt::format("{}: no complete run; measure at least one realization to its end",
-                    logs.front()->path().string()));
+        fmt::format("{}: no complete run; measure at least one realization to its end", first));
   }
-  std::size_t most = 0;
-  for (const auto& [realization, runs] : table) most = std::max(most, runs.size());
+  const std::size_t needed =
+      needed_experiments(table, begun_experiments(logs).size(), options, first);
 
   std::vector<RealizationRuns> chosen;
   for (const auto& [realization, runs] : table) {
-    if (options.realizations.empty() && runs.size() < most) continue;
+    if (options.realizations.empty() && runs.size() < needed) continue;
     RealizationRuns entry{realization, {}};
     for (const auto& [experiment, used] : runs) entry.runs.push_back(used);
     chosen.push_back(std::move(entry));

@@ -26,8 +26,8 @@ struct RealizationRuns {
 };
 
 /// Chooses the runs: complete ones, of several of one (realization, experiment) the last, of the
-/// realizations asked for; without a wish, of those that lack no experiment which another one has.
-/// Ordered by realization and experiment, whatever their order in the logs.
+/// realizations asked for; without a wish, of those that lack no experiment which was begun
+/// anywhere. Ordered by realization and experiment, whatever their order in the logs.
 ///
 /// @throws std::invalid_argument if the logs disagree in rate, period or channels, a realization
 /// asked
