@@ -1,0 +1,75 @@
+#include "tests/support/model_fit_problem.hpp"
+
+#include <fmt/format.h>
+
+#include <numbers>
+
+namespace stageid::test {
+
+AdditiveModel named_model(int outputs, int inputs) {
+  AdditiveModel model;
+  for (int y = 1; y <= outputs; ++y) model.outputs.names.push_back(fmt::format("z{}", y));
+  for (int u = 1; u <= inputs; ++u) model.inputs.names.push_back(fmt::format("a{}", u));
+  model.outputs.units.assign(model.outputs.size(), "m");
+  model.inputs.units.assign(model.inputs.size(), "N");
+  model.input_delay_s = Eigen::VectorXd::Zero(inputs);
+  model.output_delay_s = Eigen::VectorXd::Zero(outputs);
+  return model;
+}
+
+Submodel empty_submodel(const AdditiveModel& model, int integrators, std::vector<double> a,
+                        int matrices) {
+  Submodel s;
+  s.integrators = integrators;
+  s.denominator.insert(s.denominator.end(), a.begin(), a.end());
+  s.numerator.assign(static_cast<std::size_t>(matrices),
+                     Eigen::MatrixXd::Zero(model.n_outputs(), model.n_inputs()));
+  return s;
+}
+
+FitProblem fit_problem(const DenseProblem& problem, DelayModel delay) {
+  FitProblem out;
+  const double rate = problem.model.sample_rate_hz;
+  out.lines = {2.0 * std::numbers::pi * problem.frequency_hz, rate > 0.0 ? 1.0 / rate : 0.0,
+               problem.hold};
+  out.n_outputs = problem.model.n_outputs();
+  out.n_inputs = problem.model.n_inputs();
+  out.G_re = problem.G.real();
+  out.G_im = problem.G.imag();
+  out.W = problem.W;
+  for (const Submodel& s : problem.model.submodels)
+    out.shapes.push_back({s.integrators, static_cast<int>(s.denominator.size()) - 1,
+                          static_cast<int>(s.numerator.size()) - 1});
+  out.delay = delay;
+  return out;
+}
+
+FitParameters fit_parameters(const DenseProblem& problem) {
+  FitParameters beta;
+  Eigen::Index functions = 0;
+  for (const Submodel& s : problem.model.submodels) {
+    beta.a.push_back(Eigen::Map<const Eigen::VectorXd>(
+        s.denominator.data() + 1, static_cast<Eigen::Index>(s.denominator.size()) - 1));
+    functions += static_cast<Eigen::Index>(s.numerator.size());
+  }
+  beta.input_delay_s = problem.model.input_delay_s;
+  beta.output_delay_s = problem.model.output_delay_s;
+  beta.B.resize(problem.channels(), functions);
+  Eigen::Index f = 0;
+  for (const Submodel& s : problem.model.submodels)
+    for (const Eigen::MatrixXd& B : s.numerator) beta.B.col(f++) = B.reshaped();
+  return beta;
+}
+
+FrfEstimate frf_of(const DenseProblem& problem) {
+  FrfEstimate frf;
+  frf.frequency_hz = problem.frequency_hz;
+  frf.inputs = problem.model.inputs;
+  frf.outputs = problem.model.outputs;
+  frf.response = problem.G;
+  frf.sample_rate_hz = problem.model.sample_rate_hz;
+  frf.hold = problem.hold == HoldModel::none ? Hold::none : Hold::zoh;
+  return frf;
+}
+
+}  // namespace stageid::test
