@@ -44,13 +44,15 @@ std::filesystem::path directory_of(const std::filesystem::path& file) {
 /// The file that is to be replaced: a symbolic link stays, what it points to is replaced. Devices
 /// and directories are refused, because rename() would put a file in the place of /dev/null.
 std::filesystem::path resolve_target(const std::filesystem::path& target) {
+  // Not weakly_canonical(): it does not follow a link to a file that is yet to be made.
+  constexpr int kMaxLinks = 40;  // the kernel's own limit
   std::error_code ignored;
   std::filesystem::path resolved = target;
-  if (std::filesystem::is_symlink(target, ignored)) {
-    std::error_code broken;
-    resolved = std::filesystem::weakly_canonical(target, broken);
-    if (broken)
-      throw FileError(target.string() + ": cannot follow the symbolic link: " + broken.message());
+  for (int links = 0; std::filesystem::is_symlink(resolved, ignored); ++links) {
+    if (links == kMaxLinks) fail(target, "cannot follow the symbolic link", ELOOP);
+    std::error_code error;
+    resolved = resolved.parent_path() / std::filesystem::read_symlink(resolved, error);
+    if (error) fail(target, "cannot follow the symbolic link", error.value());
   }
   const std::filesystem::file_status status = std::filesystem::status(resolved, ignored);
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
