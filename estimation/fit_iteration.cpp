@@ -241,12 +241,14 @@ class Iteration {
 
 bool stabilize_mode(double before_a2, double largest_omega, Eigen::VectorXd& a) {
   if (!(a[1] > 0.0)) return false;
+  // Held at the bound, not refused: a mode that leans on it must not stop all the others.
+  a[1] = std::max(a[1], 1.0 / (largest_omega * largest_omega));
   a[0] = std::abs(a[0]);
   const double root = std::sqrt(a[1]);
   const double zeta = std::clamp(a[0] / (2.0 * root), kSmallestDamping, kLargestDamping);
   a[0] = 2.0 * zeta * root;
   const double move = std::sqrt(before_a2) / root;
-  return move < kLargestMove && move > 1.0 / kLargestMove && 1.0 / root < largest_omega;
+  return move < kLargestMove && move > 1.0 / kLargestMove;
 }
 
 }  // namespace
@@ -276,6 +278,14 @@ IterationResult iterate(const FitProblem& problem, FitParameters& beta, const Fi
 }
 
 void search_delay(const FitProblem& problem, FitParameters& beta) {
+  // The poles are not right yet, and under weights that follow the noise one sharp mode that is off
+  // by a part of its width would outweigh the phase of everything else. Relative errors do not.
+  FitProblem relative = problem;
+  const Eigen::ArrayXXd power = problem.G_re.array().square() + problem.G_im.array().square();
+  const Eigen::ArrayXd floor = 1e-6 * power.rowwise().mean() + 1e-300;
+  relative.W = (problem.W.array() > 0.0 && power > 0.0)
+                   .select((power.colwise() + floor).inverse(), 0.0)
+                   .matrix();
   const double highest = problem.lines.omega_rad_s.maxCoeff();
   const double step =
       0.5 / highest;  // rad at the highest line: well inside the basin of the best delay
@@ -284,9 +294,9 @@ void search_delay(const FitProblem& problem, FitParameters& beta) {
   FitParameters trial = beta;
   for (int i = 0; i <= 24; ++i) {
     trial.input_delay_s.setConstant(step * i);
-    const std::vector<BasisGroup> groups = evaluate_groups(problem, trial, false);
+    const std::vector<BasisGroup> groups = evaluate_groups(relative, trial, false);
     Residual E;
-    if (!solve_numerators(problem, groups, trial.B, E) || !(E.cost < best_cost)) continue;
+    if (!solve_numerators(relative, groups, trial.B, E) || !(E.cost < best_cost)) continue;
     best_cost = E.cost;
     best = trial.input_delay_s;
   }
