@@ -134,7 +134,7 @@ TEST(WaferStageModes, AreAllSeenBySensorsAndDrivenByActuators) {
     const auto rms = [&](const Eigen::VectorXd& shape) {
       return std::sqrt(spec.mass_kg * shape.squaredNorm() / static_cast<double>(shape.size()));
     };
-    EXPECT_GT(rms(modes[i].sensor_shape.head(test::kZSensors)), 0.6) << "mode " << i;
+    EXPECT_GT(rms(modes[i].sensor_shape.head(test::kZSensors)), 0.8) << "mode " << i;
     EXPECT_GT(rms(modes[i].actuator_shape.head(test::kZActuators)), 0.55) << "mode " << i;
     EXPECT_EQ(modes[i].sensor_shape.tail(3), Eigen::VectorXd::Zero(3));
     EXPECT_EQ(modes[i].actuator_shape.tail(4), Eigen::VectorXd::Zero(4));

@@ -196,7 +196,7 @@ TEST(SimulatedStage, StartsFromStandstillWithSensorNoiseOnly) {
   bench.start(3);
   for (const double y : bench.y) {
     EXPECT_NE(y, 0.0);
-    EXPECT_LT(std::abs(y), 6.0 * std::hypot(0.1e-9, 0.2e-9));
+    EXPECT_LT(std::abs(y), 6.0 * std::hypot(0.3e-9, 0.5e-9));
   }
   EXPECT_EQ(bench.inputs.valid, 0x7fU);
 }

@@ -116,9 +116,9 @@ WaferStageSpec silent_wafer_stage_spec() {
 
 WaferStageSpec wafer_stage_spec() {
   WaferStageSpec spec = silent_wafer_stage_spec();
-  spec.sensor_noise_m = 0.1e-9;
-  spec.sensor_noise_coloured_m = 0.2e-9;
-  spec.force_noise_n = 1e-3;
+  spec.sensor_noise_m = 0.3e-9;
+  spec.sensor_noise_coloured_m = 0.5e-9;
+  spec.force_noise_n = 3e-3;
   return spec;
 }
 
