@@ -123,11 +123,11 @@ void convert_run_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& fil
   copy_rows_to_hdf5(reader, run, file, group, progress);
 }
 
-void convert_to_hdf5(const LogReader& reader, const std::filesystem::path& to,
-                     const ConvertOptions& options) {
+void convert_to_hdf5(const LogReader& reader, const std::filesystem::path& temporary,
+                     const std::filesystem::path& to, const ConvertOptions& options) {
   Progress progress(reader, options);
   std::unique_lock lock(hdf5_mutex());
-  Hdf5File file = Hdf5File::create(to);
+  Hdf5File file = Hdf5File::create(temporary, to);
   write_hdf5_head(file, reader.info());
   for (std::size_t run = 0; run < reader.runs().size(); ++run) {
     if (!progress.wanted(reader.runs()[run])) continue;
@@ -263,7 +263,7 @@ void convert_log(const LogReader& reader, const std::filesystem::path& to,
   }
   OutputFile output(to);
   if (hdf5) {
-    convert_to_hdf5(reader, output.path(), options);
+    convert_to_hdf5(reader, output.path(), to, options);
   } else {
     convert_to_csv(reader, output.path(), options);
   }

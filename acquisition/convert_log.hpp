@@ -11,7 +11,7 @@ namespace stageid {
 struct ConvertOptions {
   bool incomplete_runs = true;  ///< false: leave runs out that were broken off
   /// Called after every piece with rows done and rows in all; may be empty.
-  std::function<void(std::uint64_t, std::uint64_t)> progress;
+  std::function<void(std::uint64_t, std::uint64_t)> progress = {};
 };
 
 /// Writes a log of either format to `to`, by its extension: .h5 or .hdf5 (the layout of

@@ -46,23 +46,16 @@ ChannelList read_channel_list(const Hdf5File& file, const std::string& dataset) 
 }
 
 /// A real attribute of one number or of `size` numbers.
-std::vector<double> read_reals_attribute(const Hdf5File& file, const std::string& object,
-                                         const std::string& name, std::size_t size) {
-  const Hdf5Handle attribute(
-      H5Aopen_by_name(file.id(), object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  const Hdf5Handle space(attribute ? H5Aget_space(attribute.get()) : -1, H5Sclose);
-  const hssize_t count = space ? H5Sget_simple_extent_npoints(space.get()) : -1;
-  if (count != 1 && count != static_cast<hssize_t>(size)) {
+std::vector<double> read_column_values(const Hdf5File& file, const std::string& dataset,
+                                       const std::string& name, std::size_t size) {
+  std::vector<double> values = file.read_reals_attribute(dataset, name);
+  if (values.size() != 1 && values.size() != size) {
     throw FormatError(
-        file.path(), object,
-        fmt::format("attribute {} has {} values; it must have 1 or {}", name, count, size));
-  }
-  std::vector<double> values(static_cast<std::size_t>(count));
-  if (H5Aread(attribute.get(), H5T_NATIVE_DOUBLE, values.data()) < 0) {
-    throw FormatError(file.path(), object, fmt::format("attribute {} is not numeric", name));
+        file.path(), dataset,
+        fmt::format("attribute {} has {} values; it must have 1 or {}", name, values.size(), size));
   }
   if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) {
-    throw FormatError(file.path(), object, fmt::format("attribute {} is not finite", name));
+    throw FormatError(file.path(), dataset, fmt::format("attribute {} is not finite", name));
   }
   if (values.size() == 1) values.assign(size, values.front());
   return values;
@@ -177,9 +170,9 @@ Hdf5LogReader::Scaling Hdf5LogReader::read_scaling(const std::string& dataset,
   const bool has_scale = file_->has_attribute(dataset, "scale");
   const bool has_offset = file_->has_attribute(dataset, "offset");
   if (!has_scale && !has_offset) return scaling;
-  scaling.scale = has_scale ? read_reals_attribute(*file_, dataset, "scale", columns)
+  scaling.scale = has_scale ? read_column_values(*file_, dataset, "scale", columns)
                             : std::vector<double>(columns, 1.0);
-  scaling.offset = has_offset ? read_reals_attribute(*file_, dataset, "offset", columns)
+  scaling.offset = has_offset ? read_column_values(*file_, dataset, "offset", columns)
                               : std::vector<double>(columns, 0.0);
   return scaling;
 }

@@ -76,14 +76,15 @@ class SharedProgress {
     health.largest_lateness_ns = static_cast<std::int64_t>(load(4));
     return health;
   }
-  void begin(RunId run, int done) noexcept {
+  void begin(RunId run) noexcept {
     publish({});
+    runs_begun.fetch_add(1, std::memory_order_relaxed);
     realization.store(run.realization, std::memory_order_relaxed);
     experiment.store(run.experiment, std::memory_order_relaxed);
-    runs_done.store(done, std::memory_order_relaxed);
   }
   std::atomic<int> realization = 0;
   std::atomic<int> experiment = 0;
+  std::atomic<int> runs_begun = 0;
   std::atomic<int> runs_done = 0;
 
  private:
@@ -173,7 +174,7 @@ class Experiment {
 
   StopReason perform_run(RunId id) {
     const auto started = std::chrono::steady_clock::now();
-    progress_.begin(id, result_.runs_done);
+    progress_.begin(id);
     LoopExcitation excitation{plan_.excitation(id), actuators_,
                               static_cast<std::uint64_t>(plan_.samples_per_run())};
     LogRun run;
@@ -191,6 +192,7 @@ class Experiment {
     result_.health += run.health;
     result_.runs_done += run.complete ? 1 : 0;
     progress_.publish(run.health);
+    progress_.runs_done.store(result_.runs_done, std::memory_order_relaxed);
     return loop_.reason();
   }
 
@@ -270,13 +272,13 @@ class Experiment {
     progress.runs_done = progress_.runs_done.load(std::memory_order_relaxed);
     progress.runs_total = static_cast<int>(runs_.size());
     progress.health = progress_.health();
-    const double run_s =
-        static_cast<double>(plan_.samples_per_run()) / plan_.grid().sample_rate_hz();
+    const double rate_hz = plan_.grid().sample_rate_hz();
+    const double run_s = static_cast<double>(plan_.samples_per_run()) / rate_hz;
+    const int before = std::max(0, progress_.runs_begun.load(std::memory_order_relaxed) - 1);
     progress.seconds_total = run_s * progress.runs_total;
     progress.seconds_done =
         std::min(progress.seconds_total,
-                 run_s * progress.runs_done +
-                     static_cast<double>(progress.health.cycles) / plan_.grid().sample_rate_hz());
+                 run_s * before + static_cast<double>(progress.health.cycles) / rate_hz);
     options_.progress(progress);
   }
 

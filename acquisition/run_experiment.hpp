@@ -24,13 +24,14 @@ struct ExperimentProgress {
 };
 
 struct RunExperimentOptions {
-  std::vector<RunId> skip;  ///< complete in the log already (--resume)
-  const std::atomic<bool>* interrupt =
-      nullptr;              ///< set by a signal handler: controlled stop, log kept
+  std::vector<RunId> skip = {};  ///< complete in the log already (--resume)
+  /// Set by a signal handler: controlled stop, log kept.
+  const std::atomic<bool>* interrupt = nullptr;
   double ramp_s = 0.1;      ///< excitation is ramped to zero over this before stopping
   int misses_allowed = 10;  ///< leaky bucket: +2 a bad cycle, -1 a good one, above: stop
-  std::function<void(const ExperimentProgress&)>
-      progress;  ///< from the calling thread, a few times a second
+  /// From the calling thread, a few times a second and once at the end. If it throws, the experiment
+  /// ends in a controlled stop and the exception goes on.
+  std::function<void(const ExperimentProgress&)> progress = {};
 };
 
 enum class ExperimentEnd : std::uint8_t { complete, limit, fault, interrupted, log_failed };

@@ -197,6 +197,9 @@ class Recovery {
       report_.bytes_lost += damage.bytes;
     }
     report_.blocks_lost = scan_.blocks.back().header.sequence + 1 - report_.blocks_kept;
+    const bool tail_lost =
+        !scan_.damage.empty() && scan_.damage.back().offset >= scan_.blocks.back().end();
+    report_.blocks_lost += tail_lost ? 1U : 0U;  // at least; nothing tells how many
   }
 
   const SlogSource& source_;

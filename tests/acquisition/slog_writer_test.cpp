@@ -2,14 +2,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <limits>
 
 #include "acquisition/slog_reader.hpp"
 #include "excitation/file_error.hpp"
 #include "tests/acquisition/small_log.hpp"
+#include "tests/support/file_size_limit.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
@@ -112,26 +111,6 @@ TEST(SlogWriter, OneWriterAtATime) {
               ThrowsMessage<FileError>(HasSubstr("another process")));
 }
 
-/// Lets no file grow beyond `bytes`, as a full disk would.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
-
 TEST(SlogWriter, AFullDiskKeepsWhatWasAcknowledgedAndCanBeResumed) {
   const TemporaryDirectory directory;
   const auto file = directory / "a.slog";
@@ -140,7 +119,7 @@ TEST(SlogWriter, AFullDiskKeepsWhatWasAcknowledgedAndCanBeResumed) {
     SlogWriter log = SlogWriter::create(file, test::small_info());
     log.begin_run(test::run_of(0), test::excitation_of(0));
     log.write(test::rows_of(0, 0, 10));
-    const FileSizeLimit limit(log.bytes() + 200);  // room for a part of the next block
+    const test::FileSizeLimit limit(log.bytes() + 200);  // room for a part of the next block
     EXPECT_THAT([&] { log.write(test::rows_of(0, 10, 10)); },
                 ThrowsMessage<FileError>(HasSubstr("are kept")));
     EXPECT_THROW(log.write(test::rows_of(0, 10, 1)), FileError) << "a gap would follow";
