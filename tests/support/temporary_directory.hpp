@@ -12,14 +12,13 @@ namespace stageid::test {
 class TemporaryDirectory {
  public:
   TemporaryDirectory() {
-    for (const std::filesystem::path& parent :
-         {std::filesystem::path("/dev/shm"), std::filesystem::temp_directory_path()}) {
-      std::string name = (parent / "stageid-test-XXXXXX").string();
-      if (::mkdtemp(name.data()) == nullptr) continue;
-      path_ = name;
-      return;
+    if (!make_in("/dev/shm") && !make_in(std::filesystem::temp_directory_path())) {
+      throw std::runtime_error("mkdtemp failed");
     }
-    throw std::runtime_error("mkdtemp failed");
+  }
+  /// Where the disk does matter.
+  explicit TemporaryDirectory(const std::filesystem::path& parent) {
+    if (!make_in(parent)) throw std::runtime_error("mkdtemp failed");
   }
   ~TemporaryDirectory() {
     std::error_code ignored;
@@ -32,6 +31,13 @@ class TemporaryDirectory {
   const std::filesystem::path& path() const noexcept { return path_; }
 
  private:
+  bool make_in(const std::filesystem::path& parent) {
+    std::string name = (parent / "stageid-test-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) return false;
+    path_ = name;
+    return true;
+  }
+
   std::filesystem::path path_;
 };
 

@@ -1,0 +1,240 @@
+// What the log and the loop cost, each beside what memcpy does on the same machine in the same run:
+// on a shared machine only the ratios can be compared from day to day.
+
+#include <benchmark/benchmark.h>
+
+#include <cstring>
+#include <ctime>
+#include <vector>
+
+#include "acquisition/crc32c.hpp"
+#include "acquisition/measurement_loop.hpp"
+#include "acquisition/row_transpose.hpp"
+#include "acquisition/slog_reader.hpp"
+#include "acquisition/slog_writer.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+// The wafer stage: 17 actuators, 7 sensors, periods of 40 000 samples.
+constexpr std::size_t kActuators = 17;
+constexpr std::size_t kSensors = 7;
+constexpr std::size_t kWords = kActuators + kSensors + 1;
+constexpr int kPeriod = 40'000;
+constexpr std::size_t kBlockRows = 2048;
+constexpr std::uint64_t kRows = 20 * kPeriod;
+
+/// Time that this thread has had a processor: others may be at work on this machine.
+double processor_seconds() {
+  timespec now{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Bytes a second of memcpy between two buffers larger than the caches.
+double memcpy_rate() {
+  static const double rate = [] {
+    std::vector<char> from(std::size_t{1} << 27, 1);
+    std::vector<char> to(from.size(), 2);
+    double best = 0.0;
+    for (int repeat = 0; repeat < 10; ++repeat) {
+      const double start = processor_seconds();
+      std::memcpy(to.data(), from.data(), from.size());
+      benchmark::DoNotOptimize(to.data());
+      best = std::max(best, static_cast<double>(from.size()) / (processor_seconds() - start));
+    }
+    return best;
+  }();
+  return rate;
+}
+
+void report_bytes(benchmark::State& state, double bytes_an_iteration) {
+  const double bytes = bytes_an_iteration * static_cast<double>(state.iterations());
+  state.SetBytesProcessed(static_cast<std::int64_t>(bytes));
+  state.counters["of_memcpy"] =
+      benchmark::Counter(bytes / memcpy_rate(), benchmark::Counter::kIsRate);
+}
+
+ChannelList channels(std::size_t count, const char* unit) {
+  ChannelList list;
+  for (std::size_t i = 0; i < count; ++i) {
+    list.names.push_back(std::to_string(i));
+    list.units.emplace_back(unit);
+  }
+  return list;
+}
+
+LogInfo info_of_stage() {
+  LogInfo info;
+  info.sample_rate_hz = 10'000.0;
+  info.period_samples = kPeriod;
+  info.excitation = channels(1, "N");
+  info.actuators = channels(kActuators, "N");
+  info.sensors = channels(kSensors, "m");
+  return info;
+}
+
+std::vector<double> some_rows(std::size_t rows) {
+  std::vector<double> words(rows * kWords, 0.0);
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (i % kWords != kWords - 1) words[i] = 1.0 / static_cast<double>(i + 1);
+  }
+  return words;
+}
+
+void write_log(const std::filesystem::path& file) {
+  SlogWriter log = SlogWriter::create(file, info_of_stage());
+  log.begin_run({}, Eigen::MatrixXd::Ones(kPeriod, 1));
+  const std::vector<double> block = some_rows(kBlockRows);
+  std::uint64_t left = kRows;
+  while (left > 0) {
+    const std::uint64_t rows = std::min<std::uint64_t>(left, kBlockRows);
+    log.write(std::span(block).first(rows * kWords));
+    left -= rows;
+  }
+  log.end_run({});
+  log.close(0, "");
+}
+
+void Memcpy(benchmark::State& state) {
+  std::vector<char> from(std::size_t{1} << 27, 1);
+  std::vector<char> to(from.size(), 2);
+  for (auto _ : state) {
+    std::memcpy(to.data(), from.data(), from.size());
+    benchmark::DoNotOptimize(to.data());
+  }
+  report_bytes(state, static_cast<double>(from.size()));
+}
+BENCHMARK(Memcpy)->Unit(benchmark::kMillisecond);
+
+template <std::uint32_t (*function)(std::span<const std::byte>, std::uint32_t) noexcept>
+void Crc(benchmark::State& state) {
+  const std::vector<std::byte> bytes(std::size_t{1} << 17, std::byte{5});
+  for (auto _ : state) benchmark::DoNotOptimize(function(bytes, 0));
+  report_bytes(state, static_cast<double>(bytes.size()));
+}
+BENCHMARK(Crc<crc32c>)->Name("Crc32c/128kB");
+BENCHMARK(Crc<crc32c_portable>)->Name("Crc32cPortable/128kB");
+
+void Transpose(benchmark::State& state) {
+  const std::vector<double> rows = some_rows(640);
+  std::vector<double> columns((kWords - 1) * kPeriod);
+  std::size_t at = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        transpose_rows(rows.data(), kWords, 640, kWords - 1, columns.data() + at, kPeriod));
+    at = at + 2 * 640 > kPeriod ? 0 : at + 640;
+  }
+  report_bytes(state, static_cast<double>(rows.size() * sizeof(double)));
+}
+BENCHMARK(Transpose);
+
+/// One period after another from page cache, checked and transposed; threads share the reader.
+void ReadPeriods(benchmark::State& state) {
+  static const test::TemporaryDirectory directory;
+  static const std::filesystem::path file = directory / "a.slog";
+  static const bool written = (write_log(file), true);
+  static const SlogReader reader(file);
+  benchmark::DoNotOptimize(written);
+  LogSamples samples;
+  std::uint64_t first = static_cast<std::uint64_t>(state.thread_index()) * kPeriod;
+  for (auto _ : state) {
+    reader.read(0, first, kPeriod, samples);
+    benchmark::DoNotOptimize(samples.actuators.data());
+    first = (first + kPeriod) % kRows;
+  }
+  report_bytes(state, static_cast<double>(kPeriod * kWords * sizeof(double)));
+}
+BENCHMARK(ReadPeriods)->Unit(benchmark::kMillisecond)->ThreadRange(1, 2);
+
+void Open(benchmark::State& state) {
+  const test::TemporaryDirectory directory;
+  write_log(directory / "a.slog");
+  for (auto _ : state) benchmark::DoNotOptimize(SlogReader(directory / "a.slog"));
+}
+BENCHMARK(Open)->Unit(benchmark::kMicrosecond);
+
+void WriteBlocks(benchmark::State& state) {
+  const test::TemporaryDirectory directory(std::filesystem::temp_directory_path());
+  SlogWriter log = SlogWriter::create(directory / "a.slog", info_of_stage());
+  log.begin_run({}, Eigen::MatrixXd::Ones(kPeriod, 1));
+  const std::vector<double> block = some_rows(kBlockRows);
+  for (auto _ : state) log.write(block);
+  report_bytes(state, static_cast<double>(block.size() * sizeof(double)));
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * kBlockRows));
+}
+BENCHMARK(WriteBlocks)->Unit(benchmark::kMicrosecond)->Iterations(2000);
+
+/// Does nothing, at once.
+class IdleStage final : public CyclicStage {
+ public:
+  IdleStage() {
+    info_.sample_rate_hz = 10'000.0;
+    info_.actuators.resize(kActuators);
+    info_.sensors.resize(kSensors);
+  }
+  const StageInfo& info() const noexcept override { return info_; }
+  void start(std::uint64_t, Inputs& first) override {
+    for (double& y : first.y) y = 0.0;
+    first.valid = ~std::uint64_t{0};
+  }
+  [[nodiscard]] Outcome exchange(const Outputs& outputs, Inputs& inputs,
+                                 Deadline) noexcept override {
+    inputs.y[0] = 1e-6 * outputs.u[0];
+    return Outcome::ok;
+  }
+  void stop() noexcept override {}
+
+ private:
+  StageInfo info_;
+};
+
+/// The smallest controller there is: one axis.
+MotionController small_controller() {
+  MotionControllerSpec spec;
+  spec.sample_rate_hz = 10'000.0;
+  spec.sensor_decoupling = Eigen::MatrixXd::Zero(1, kSensors);
+  spec.actuator_decoupling = Eigen::MatrixXd::Zero(kActuators, 1);
+  spec.axes.resize(1);
+  return MotionController(spec);
+}
+
+void Controller(benchmark::State& state) {
+  MotionController controller = small_controller();
+  const std::vector<double> y(kSensors, 0.0);
+  std::vector<double> u(kActuators, 0.0);
+  for (auto _ : state) {
+    controller.update(y.data(), u.data());
+    benchmark::DoNotOptimize(u.data());
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(Controller);
+
+/// One cycle with the row taken out again by the same thread, in batches. Less Controller, this is what
+/// the loop itself costs.
+void LoopStep(benchmark::State& state) {
+  IdleStage stage;
+  MotionController controller = small_controller();
+  SampleRing ring(kWords, 4096);
+  MeasurementLoop loop(stage, controller, ring);
+  LoopExcitation excitation;
+  excitation.period = Eigen::MatrixXd::Ones(kPeriod, state.range(0));
+  for (int i = 0; i < state.range(0); ++i) excitation.actuators.push_back(i);
+  excitation.samples = ~std::uint64_t{0} >> 1;
+  loop.start(1, excitation);
+  for (auto _ : state) {
+    if (loop.step() == LoopStatus::ring_full) {
+      ring.pop(ring.capacity_rows());
+      static_cast<void>(loop.step());
+    }
+  }
+  report_bytes(state, kWords * sizeof(double));
+}
+BENCHMARK(LoopStep)->Arg(1)->Arg(13);
+
+}  // namespace
+}  // namespace stageid
+
+BENCHMARK_MAIN();
