@@ -42,7 +42,7 @@ ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& d
   for (Eigen::Index c = 0; c < period.cols(); ++c) {
     if ((period.col(c).array() == period(0, c)).all()) continue;
     spectra.col(c) = channel_spectrum(period.col(c), dft);
-    largest[c] = spectra.col(c).segment(1, last).cwiseAbs().maxCoeff();
+    largest[c] = std::sqrt(spectra.col(c).segment(1, last).cwiseAbs2().maxCoeff());
   }
 
   ExcitationSpectrum result;
@@ -56,7 +56,7 @@ ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& d
                  std::min(kRoundingMargin * rounding, kRoundingAtMost * largest[c]));
     bool any = false;
     for (Eigen::Index l = 1; l <= last; ++l) {
-      if (std::abs(spectra(l, c)) <= threshold) continue;
+      if (std::norm(spectra(l, c)) <= threshold * threshold) continue;
       excited[static_cast<std::size_t>(l)] = 1;
       any = true;
     }

@@ -32,9 +32,15 @@ struct FrfOptions {
 ///   G = (mean_m Y_m) (mean_m U_m)^-1.
 /// Variances by first-order propagation, vec(dG) = (U^-T kron [I, -G]) vec(dZ): noise from the
 /// scatter over periods, total from the scatter over realizations. Both are of the mean. With one
-/// measured period noise_variance is empty, with one realization total_variance is. Incomplete runs
-/// are passed over; of several complete runs of one (realization, experiment) the last counts.
-/// Periods with a marked sample are dropped.
+/// measured period noise_variance is empty, with one realization total_variance is.
+///
+/// The noise of Y - G U is that of the open loop, whatever was excited, so its covariance C_E is
+/// pooled over the experiments of a realization: Cov(vec G) = sum_e (q_e q_e^H) kron C_E / P_e with
+/// q_e the e-th row of U^-1, and M E (P-1) degrees of freedom (each dropped period takes one).
+///
+/// Incomplete runs are passed over; of several complete runs of one (realization, experiment) the
+/// last counts. Periods with a marked sample are dropped. Inputs asked for that are only some of the
+/// excited actuators are columns of the whole estimate: the others move too.
 ///
 /// Memory: bounded by one period per thread plus spectra of one realization.
 /// Source: method.md section 3; Pintelon and Schoukens, System Identification (2012).

@@ -130,6 +130,28 @@ TEST(HoldCompensation, ALineAtZeroStaysFinite) {
   EXPECT_LT(std::abs(compensate(frf, Compensation::hold, 1e-4).response(0, 0) - 1.0), 1e-15);
 }
 
+TEST(AsMeasured, PutsBackWhatWasTakenOut) {
+  const FrfEstimate frf = sampled([](double omega) { return double_integrator(omega, 1e-4); });
+  for (const Compensation kind : {Compensation::delay, Compensation::hold}) {
+    const FrfEstimate back = as_measured(compensate(frf, kind, 3.7e-4));
+    // Out and in again: a handful of roundings.
+    EXPECT_LT((back.response - frf.response).norm(), 1e-14 * frf.response.norm());
+    EXPECT_LT((back.noise_variance - frf.noise_variance).norm(), 1e-13);
+    EXPECT_LT((back.total_variance - frf.total_variance).norm(), 1e-13);
+    EXPECT_EQ(back.hold, Hold::zoh);
+    EXPECT_EQ(back.compensated, Compensation::none);
+    EXPECT_EQ(back.delay_s, 0.0);
+  }
+}
+
+TEST(AsMeasured, Errors) {
+  const FrfEstimate frf = sampled([](double) { return Complex(1.0, 0.0); });
+  EXPECT_THROW(as_measured(frf), std::invalid_argument);
+  FrfEstimate unknown_rate = compensate(frf, Compensation::delay, 0.0);
+  unknown_rate.sample_rate_hz = 0.0;
+  EXPECT_THROW(as_measured(unknown_rate), std::invalid_argument);
+}
+
 TEST(HoldCompensation, Errors) {
   const FrfEstimate frf = sampled([](double) { return Complex(1.0, 0.0); });
   EXPECT_THROW(compensate(compensate(frf, Compensation::delay, 0.0), Compensation::hold, 0.0),
