@@ -1,1 +1,44 @@
-int main() { return 0; }
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <new>
+#include <stdexcept>
+
+#include "excitation/file_error.hpp"
+#include "hal/stage.hpp"
+#include "tools/exit_code.hpp"
+#include "tools/program.hpp"
+
+namespace {
+
+int report(const std::exception& error, int exit_code) {
+  fmt::print(stderr, "stageid: {}\n", error.what());
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return stageid::run_program(argc, argv);
+  } catch (const stageid::Interrupted& error) {
+    return report(error, stageid::kInterrupted);
+  } catch (const stageid::FormatError& error) {
+    return report(error, stageid::kRequestWrong);
+  } catch (const stageid::FileError& error) {
+    return report(error, stageid::kWorldFailed);
+  } catch (const stageid::StageError& error) {
+    return report(error, stageid::kWorldFailed);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return report(error, stageid::kWorldFailed);
+  } catch (const std::invalid_argument& error) {
+    return report(error, stageid::kRequestWrong);
+  } catch (const std::bad_alloc&) {
+    return report(std::runtime_error("out of memory; ask for fewer lines, channels or modes"),
+                  stageid::kWorldFailed);
+  } catch (const std::exception& error) {
+    return report(error, stageid::kWorldFailed);
+  }
+}

@@ -1,0 +1,90 @@
+#include "tools/config_command.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "excitation/file_error.hpp"
+#include "tools/command_line.hpp"
+#include "tools/config_schema.hpp"
+#include "tools/experiment_config.hpp"
+#include "tools/strict_yaml.hpp"
+
+namespace stageid {
+namespace {
+
+/// The value of `format`, which says what a file is.
+std::string format_of(const std::filesystem::path& file) {
+  const YamlDocument document = YamlDocument::read(file);
+  for (const YamlNode::Entry& entry : document.root().entries)
+    if (entry.key == "format") return document.node(entry.value).text;
+  document.fail(
+      document.root().mark,
+      "key 'format' is missing; write 'format: stageid-experiment' or 'format: stageid-stage'");
+}
+
+nlohmann::ordered_json schema_json(const std::vector<SchemaEntry>& entries) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const SchemaEntry& e : entries)
+    list.push_back({{"depth", e.depth},
+                    {"key", e.key},
+                    {"type", e.type},
+                    {"unit", e.unit},
+                    {"range", e.range},
+                    {"required", e.required},
+                    {"default", e.default_value},
+                    {"help", e.help}});
+  return list;
+}
+
+}  // namespace
+
+ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* config = add_command(app, "config", "What may stand in a configuration; check one");
+  config->require_subcommand(1);
+  CLI::App* schema_command =
+      add_command(*config, "schema", "Every key with type, unit, range, default");
+  schema_command->add_option("kind", kind_, "experiment | stage; default: both")
+      ->check(CLI::IsMember({"experiment", "stage"}));
+  schema_command->final_callback([this] { schema(); });
+  CLI::App* check_command = add_command(*config, "check", "Check experiment and stage files");
+  check_command->add_option("files", files_, "YAML files")->required();
+  check_command->final_callback([this] { check(); });
+}
+
+void ConfigCommand::schema() const {
+  nlohmann::ordered_json json;
+  if (kind_ != "stage") {
+    const std::vector<SchemaEntry> entries = config_schema(describe_experiment_keys);
+    console_.result("# An experiment file. Units stand in the keys; SI.\n" + schema_text(entries));
+    json["experiment"] = schema_json(entries);
+  }
+  if (kind_ != "experiment") {
+    const std::vector<SchemaEntry> entries = config_schema(describe_stage_keys);
+    console_.result("# A stage file. Units stand in the keys; SI.\n" + schema_text(entries));
+    json["stage"] = schema_json(entries);
+  }
+  console_.result(json);
+}
+
+void ConfigCommand::check() const {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const std::filesystem::path& file : files_) {
+    if (format_of(file) == "stageid-stage") {
+      const StageConfig stage = load_stage_config(file);
+      console_.result(fmt::format("{}: stage '{}', {} actuators, {} sensors, {} Hz", file.string(),
+                                  stage.spec.info.name, stage.spec.info.actuators.size(),
+                                  stage.spec.info.sensors.size(), stage.spec.info.sample_rate_hz));
+    } else {
+      const ExperimentConfig experiment = load_experiment_config(file);
+      const ExperimentPlan plan = make_plan(experiment);
+      console_.result(fmt::format("{}: {} runs, {:.1f} min, {} lines", file.string(),
+                                  plan.runs().size(), plan.duration_s() / 60.0,
+                                  plan.grid().size()));
+    }
+    json.push_back({{"file", file.string()}, {"valid", true}});
+  }
+  console_.result({{"files", json}});
+}
+
+}  // namespace stageid

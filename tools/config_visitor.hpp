@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace stageid {
+
+enum class Presence : std::uint8_t { optional, required };
+
+/// Which numbers are allowed. All must be finite.
+struct NumberRule {
+  std::string_view unit;  ///< for people; empty: none
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool low_excluded = false;
+};
+
+inline constexpr NumberRule positive(std::string_view unit) {
+  return {unit, 0.0, std::numeric_limits<double>::infinity(), true};
+}
+inline constexpr NumberRule not_negative(std::string_view unit) { return {unit, 0.0}; }
+inline constexpr NumberRule any_number(std::string_view unit) { return {unit}; }
+
+/// How many entries a list may have.
+struct CountRule {
+  std::size_t least = 0;
+  std::size_t most = std::numeric_limits<std::size_t>::max();
+};
+
+/// A value that may stand in several forms.
+struct FlexibleValue {
+  std::string word;             ///< set if a word stands there
+  std::vector<double> numbers;  ///< one entry for a bare number
+  bool is_list = false;         ///< the numbers stood in brackets
+  std::vector<std::pair<double, double>> pairs;
+};
+
+/// Which forms a FlexibleValue may take.
+struct FlexibleRule {
+  std::vector<std::string> words;  ///< allowed words
+  bool any_text = false;           ///< or any text, described by `text_meaning`
+  std::string_view text_meaning;
+  bool number = false;
+  bool list = false;
+  bool pairs = false;  ///< list of [number, number]
+  NumberRule rule;     ///< of every number
+};
+
+/// The one description of a configuration: functions `describe(ConfigVisitor&, Config&)` name every
+/// key once. A reader fills the values from a file, a schema printer prints type, unit, range and the
+/// default, which is what the value holds before.
+class ConfigVisitor {
+ public:
+  using Describe = std::function<void(ConfigVisitor&)>;
+  virtual ~ConfigVisitor() = default;
+
+  virtual void number(const char* key, double& value, const NumberRule& rule, Presence presence,
+                      const char* help) = 0;
+  virtual void numbers(const char* key, std::vector<double>& values, const NumberRule& rule,
+                       CountRule count, Presence presence, const char* help) = 0;
+  virtual void integer(const char* key, std::int64_t& value, std::int64_t low, std::int64_t high,
+                       Presence presence, const char* help) = 0;
+  virtual void text(const char* key, std::string& value, Presence presence, const char* help) = 0;
+  virtual void texts(const char* key, std::vector<std::string>& values, CountRule count,
+                     Presence presence, const char* help) = 0;
+  /// `index` into `names`.
+  virtual void choice(const char* key, std::size_t& index, const std::vector<std::string>& names,
+                      Presence presence, const char* help) = 0;
+  virtual void flexible(const char* key, FlexibleValue& value, const FlexibleRule& rule,
+                        Presence presence, const char* help) = 0;
+  /// A map whose keys are free names.
+  virtual void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,
+                             const NumberRule& rule, Presence presence, const char* help) = 0;
+  /// A map with keys of its own.
+  virtual void group(const char* key, const Describe& describe, Presence presence,
+                     const char* help) = 0;
+  /// A list of maps; `describe_item` is called once for each.
+  virtual void items(const char* key, const Describe& describe_item, CountRule count,
+                     Presence presence, const char* help) = 0;
+  /// A rule between values: unless `holds`, the file is wrong at `key`. Ignored for a schema.
+  virtual void require(bool holds, const char* key, const std::string& message) = 0;
+};
+
+/// choice() for an enumeration whose values are 0, 1, 2 ... in the order of `names`.
+template <typename Enum>
+void choose(ConfigVisitor& visitor, const char* key, Enum& value,
+            const std::vector<std::string>& names, Presence presence, const char* help) {
+  auto index = static_cast<std::size_t>(value);
+  visitor.choice(key, index, names, presence, help);
+  value = static_cast<Enum>(index);
+}
+
+/// integer() for a value of another integer type.
+template <typename Integer>
+void count(ConfigVisitor& visitor, const char* key, Integer& value, std::int64_t low,
+           std::int64_t high, Presence presence, const char* help) {
+  auto wide = static_cast<std::int64_t>(value);
+  visitor.integer(key, wide, low, high, presence, help);
+  value = static_cast<Integer>(wide);
+}
+
+}  // namespace stageid

@@ -1,0 +1,115 @@
+#include "tools/design_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "excitation/file_error.hpp"
+#include "tools/command_line.hpp"
+#include "tools/measurement.hpp"
+#include "tools/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string limit_text(const Eigen::VectorXd& limits, std::size_t index) {
+  return limits.size() == 0 ? "-" : fmt::format("{:.4g}", limits[static_cast<Eigen::Index>(index)]);
+}
+
+Json channel_json(const ChannelPrediction& channel) {
+  Json json = {
+      {"name", channel.name}, {"unit", channel.unit}, {"rms", channel.rms}, {"peak", channel.peak}};
+  if (channel.slew_per_s > 0.0) json["slew_per_s"] = channel.slew_per_s;
+  if (channel.thermal_rms > 0.0) json["thermal_rms"] = channel.thermal_rms;
+  return json;
+}
+
+Json design_json(const ExperimentConfig& config, const ExperimentPlan& plan,
+                 const DesignPrediction& prediction) {
+  Json json = {{"runs", plan.runs().size()},
+               {"duration_s", plan.duration_s()},
+               {"log_bytes", expected_log_bytes(plan, config.stage.spec.info)},
+               {"lines", plan.grid().size()},
+               {"resolution_hz", plan.grid().resolution_hz()},
+               {"crest_factors", prediction.crest_factor},
+               {"violations", prediction.violations()}};
+  for (const ChannelPrediction& channel : prediction.actuators)
+    json["actuators"].push_back(channel_json(channel));
+  for (const ChannelPrediction& channel : prediction.sensors)
+    json["sensors"].push_back(channel_json(channel));
+  return json;
+}
+
+}  // namespace
+
+std::vector<std::string> design_table(const ExperimentConfig& config, const ExperimentPlan& plan,
+                                      const DesignPrediction& prediction) {
+  const WaferStageSpec& stage = config.stage.spec;
+  const Eigen::VectorXd frequency_hz = plan.grid().frequency_hz();
+  std::vector<std::string> lines;
+  const auto [least, most] =
+      std::minmax_element(prediction.crest_factor.begin(), prediction.crest_factor.end());
+  lines.push_back(fmt::format(
+      "{} runs of {} + {} periods of {} s, {:.1f} min in all; log {:.1f} MB", plan.runs().size(),
+      plan.spec().transient_periods, plan.spec().periods, plan.grid().period_s(),
+      plan.duration_s() / 60.0, expected_log_bytes(plan, stage.info) / 1e6));
+  lines.push_back(fmt::format("{} lines, {} ... {} Hz; crest factors {:.2f} ... {:.2f}",
+                              plan.grid().size(), frequency_hz[0],
+                              frequency_hz[frequency_hz.size() - 1], *least, *most));
+  std::vector<std::vector<std::string>> rows = {
+      {"channel", "unit", "rms", "peak", "limit", "slew/s", "limit", "thermal rms", "limit", ""}};
+  for (std::size_t i = 0; i < prediction.actuators.size(); ++i) {
+    const ChannelPrediction& c = prediction.actuators[i];
+    rows.push_back({c.name, c.unit, fmt::format("{:.4g}", c.rms), fmt::format("{:.4g}", c.peak),
+                    limit_text(stage.limits.actuator_n, i), fmt::format("{:.4g}", c.slew_per_s),
+                    limit_text(stage.limits.slew_n_s, i), fmt::format("{:.4g}", c.thermal_rms),
+                    limit_text(stage.limits.thermal_rms_n, i),
+                    c.violations.empty() ? "" : "EXCEEDED"});
+  }
+  for (std::size_t i = 0; i < prediction.sensors.size(); ++i) {
+    const ChannelPrediction& c = prediction.sensors[i];
+    rows.push_back({c.name, c.unit, fmt::format("{:.4g}", c.rms), fmt::format("{:.4g}", c.peak),
+                    limit_text(stage.limits.position_window_m, i), "", "", "", "",
+                    c.violations.empty() ? "" : "EXCEEDED"});
+  }
+  for (std::string& line : table_lines(rows)) lines.push_back(std::move(line));
+  return lines;
+}
+
+void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction) {
+  const std::vector<std::string> violations = prediction.violations();
+  if (violations.empty()) return;
+  const std::string more =
+      violations.size() == 1 ? "" : fmt::format(" (and {} more)", violations.size() - 1);
+  throw FormatError(
+      config.file, "",
+      fmt::format("{}{}; lower the level, or insist with --force", violations.front(), more));
+}
+
+DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(
+      app, "design", "Draw the multisines; predict forces and motions against the limits");
+  command->add_option("config", config_, "experiment file (.yaml)")->required();
+  command->add_option("-o,--output", output_, "HDF5 file to write")->required();
+  command->add_flag("--force", force_, "write even if a limit would be exceeded");
+  command->final_callback([this] { run(); });
+}
+
+void DesignCommand::run() const {
+  const ExperimentConfig config = load_experiment_config(config_);
+  require_writable(output_);
+  const ExperimentPlan plan = make_plan(config);
+  const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
+  for (const std::string& line : design_table(config, plan, prediction)) console_.result(line);
+  if (!force_) require_within_limits(config, prediction);
+  for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
+  write_experiment_plan(output_, plan);
+  console_.result(fmt::format("wrote {}", output_.string()));
+  console_.result(design_json(config, plan, prediction));
+}
+
+}  // namespace stageid

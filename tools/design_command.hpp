@@ -1,0 +1,33 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "tools/closed_loop_prediction.hpp"
+#include "tools/console.hpp"
+#include "tools/experiment_config.hpp"
+
+namespace stageid {
+
+/// stageid design CONFIG -o excitation.h5
+class DesignCommand {
+ public:
+  DesignCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::filesystem::path config_;
+  std::filesystem::path output_;
+  bool force_ = false;
+};
+
+/// What the plan asks and what it will do, as a table.
+std::vector<std::string> design_table(const ExperimentConfig& config, const ExperimentPlan& plan,
+                                      const DesignPrediction& prediction);
+
+/// @throws std::invalid_argument naming the first limit that would be exceeded, and how many more.
+void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction);
+
+}  // namespace stageid

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "tools/console.hpp"
+
+namespace stageid {
+
+/// stageid export MODEL -o FILE.{json,h5,csv}
+class ExportCommand {
+ public:
+  ExportCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::filesystem::path model_;
+  std::filesystem::path output_;
+  std::filesystem::path frf_;
+};
+
+}  // namespace stageid

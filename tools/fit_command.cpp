@@ -1,0 +1,103 @@
+#include "tools/fit_command.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "excitation/fingerprint.hpp"
+#include "frf/frf_file.hpp"
+#include "tools/command_line.hpp"
+#include "tools/exit_code.hpp"
+#include "tools/fit_step.hpp"
+#include "tools/output_paths.hpp"
+
+namespace stageid {
+
+FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "fit", "Fit the additive model to an FRF");
+  command->add_option("frf", frf_, "frf.h5")->required();
+  command->add_option("-o,--output", output_, "model.json to write")->required();
+  command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: all lines")->expected(2);
+  command
+      ->add_option("--modes", request_.modes,
+                   "auto | how many | frequencies f1,f2,... in Hz | modes.json")
+      ->capture_default_str();
+  command->add_option(
+      "--weighting", request_.weighting,
+      "unit | inverse_magnitude | relative | noise_variance | total_variance | FILE.h5 "
+      "with /weights; default: by the variances in the FRF");
+  command->add_option("--hold", request_.hold, "none | phase | sinc | exact; default: by the FRF");
+  command->add_option("--delay", request_.delay,
+                      "SECONDS | estimate | per_channel; default: by the FRF");
+  command->add_option("--rigid-body", request_.rigid_body, "none | full: the term B_0 / s^2")
+      ->capture_default_str();
+  command
+      ->add_option("--direct-term", request_.direct_term,
+                   "none | full: a constant, the compliance of modes above the band")
+      ->capture_default_str();
+  command->add_option("--residue-rank", residue_rank_, "full")->capture_default_str();
+  command->add_option("--submodel", submodel_, "")->group("");
+  command
+      ->add_option("--damping", request_.damping,
+                   "proportional | general: numerators B_0, or B_0 + B_1 s")
+      ->capture_default_str();
+  command->add_option("--method", request_.method, "riv | gn | sk")->capture_default_str();
+  command->add_option("--max-iterations", request_.max_iterations, "of one fit")
+      ->capture_default_str();
+  command->add_option("--seed", seed_, "accepted; nothing in a fit is random");
+  command
+      ->add_option("--threads", request_.threads, "0: all cores; the result does not depend on it")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->final_callback([this] { run(); });
+}
+
+FitRequest FitCommand::checked_request() const {
+  if (!submodel_.empty())
+    throw std::invalid_argument(
+        "--submodel: not in this version; the model is a rigid body, modes and a direct term");
+  if (residue_rank_ != "full")
+    throw std::invalid_argument(
+        fmt::format("--residue-rank: '{}' is not in this version; there is full", residue_rank_));
+  if (request_.rigid_body != "none" && request_.rigid_body != "full")
+    throw std::invalid_argument(fmt::format(
+        "--rigid-body: '{}' is not in this version; there are none and full", request_.rigid_body));
+  FitRequest request = request_;
+  if (!band_hz_.empty()) request.band_hz = {band_hz_[0], band_hz_[1]};
+  return request;
+}
+
+void FitCommand::run() const {
+  const FitRequest request = checked_request();
+  require_writable(output_);
+  const FitSetup setup = make_fit_setup(request, read_frf(frf_));
+  const FitStep step =
+      fit_model(setup, frf_.filename().string(), fingerprint_of_file(frf_), console_);
+  const FitResult& result = step.result;
+  write_model(output_, result.model);
+
+  for (const std::string& line : result.decisions) console_.result(line);
+  console_.result(cost_line(result.cost));
+  for (const std::string& line : mode_table(result.model)) console_.result(line);
+  console_.result(fmt::format("{}: relative error {:.4g}, {} ({})", output_.string(),
+                              result.model.fit.relative_rms_error, to_string(result.status),
+                              result.message));
+  console_.exit_code = result.trustworthy() ? kDone : kNotTrustworthy;
+  console_.result({{"output", output_.string()},
+                   {"status", to_string(result.status)},
+                   {"message", result.message},
+                   {"trustworthy", result.trustworthy()},
+                   {"relative_rms_error", result.model.fit.relative_rms_error},
+                   {"cost", result.cost},
+                   {"decisions", result.decisions},
+                   {"modes", modes_json(result.model)},
+                   {"seconds", step.seconds}});
+  if (!result.trustworthy())
+    console_.warning(
+        fmt::format("{}: the fit did not converge: {}; the model is written, do not trust "
+                    "it before you know why",
+                    output_.string(), result.message));
+}
+
+}  // namespace stageid

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tools/console.hpp"
+#include "tools/fit_request.hpp"
+
+namespace stageid {
+
+/// stageid fit FRF -o model.json
+class FitCommand {
+ public:
+  FitCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  FitRequest checked_request() const;
+
+  Console& console_;
+  std::filesystem::path frf_;
+  std::filesystem::path output_;
+  FitRequest request_;
+  std::vector<double> band_hz_;
+  std::string residue_rank_ = "full";
+  std::string submodel_;
+  std::uint64_t seed_ = 0;
+};
+
+}  // namespace stageid

@@ -1,0 +1,339 @@
+#include "tools/fit_request.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "excitation/file_error.hpp"
+#include "excitation/fingerprint.hpp"
+#include "excitation/hdf5_file.hpp"
+#include "tools/key_suggestion.hpp"
+
+namespace stageid {
+namespace {
+
+const std::vector<std::string> kWeightings = {"unit",           "inverse_magnitude", "relative",
+                                              "noise_variance", "total_variance",    "user"};
+const std::vector<std::string> kHolds = {"none", "phase", "sinc", "exact"};
+const std::vector<std::string> kMethods = {"riv", "gn", "sk"};
+
+std::optional<double> to_number(std::string_view text) {
+  double value = 0.0;
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || stop != text.data() + text.size() || !std::isfinite(value))
+    return std::nullopt;
+  return value;
+}
+
+[[noreturn]] void refuse(const char* flag, const std::string& given, const std::string& right) {
+  throw std::invalid_argument(fmt::format("{}: '{}'; write {}", flag, given, right));
+}
+
+template <typename Enum>
+Enum pick(const char* flag, const std::string& word, const std::vector<std::string>& names) {
+  const auto found = std::find(names.begin(), names.end(), word);
+  if (found != names.end()) return static_cast<Enum>(found - names.begin());
+  const std::string nearest = nearest_word(word, names);
+  refuse(flag, word,
+         fmt::format("one of {}{}", fmt::join(names, ", "),
+                     nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
+}
+
+/// Sums up what the FRF decides where the request is silent.
+class FitDefaults {
+ public:
+  FitDefaults(const FitRequest& request, FitSetup& setup) : request_(request), setup_(setup) {}
+
+  void choose_hold() {
+    HoldModel& hold = setup_.options.hold;
+    if (!request_.hold.empty()) {
+      hold = pick<HoldModel>("--hold", request_.hold, kHolds);
+      return;
+    }
+    const FrfEstimate& frf = setup_.frf;
+    if (frf.hold == Hold::zoh) {
+      hold = HoldModel::exact;
+      note("hold: exact, the response was measured through a zero-order hold");
+    } else {
+      hold = HoldModel::none;
+      note(frf.compensated == Compensation::hold
+               ? "hold: none, it was taken out of the response"
+               : "hold: none, the response is that of a continuous-time plant");
+    }
+  }
+
+  /// A delay that was taken out is put back in and given to the model: only so does the model's
+  /// hold act on the samples as the loop saw them.
+  void restore_delay() {
+    FrfEstimate& frf = setup_.frf;
+    if (frf.compensated != Compensation::delay || setup_.options.hold == HoldModel::none) return;
+    const Eigen::VectorXd omega = frf.omega_rad_s();
+    const double taken_s = frf.delay_s + 0.5 / frf.sample_rate_hz;
+    for (Eigen::Index k = 0; k < frf.lines(); ++k)
+      frf.response.col(k) *= std::polar(1.0, -omega[k] * taken_s);
+    frf.compensated = Compensation::none;
+    known_delay_s_ = frf.delay_s;
+    frf.delay_s = 0.0;
+    note(fmt::format("delay: {} s was taken out of the response; it is put back and modelled",
+                     *known_delay_s_));
+  }
+
+  void choose_delay() {
+    FitOptions& options = setup_.options;
+    const FrfEstimate& frf = setup_.frf;
+    if (!request_.delay.empty()) {
+      parse_delay();
+      return;
+    }
+    if (known_delay_s_) {
+      options.delay_s = *known_delay_s_;
+      return;
+    }
+    if (frf.hold == Hold::zoh && options.hold != HoldModel::none) {
+      options.delay = DelayModel::estimate;
+      note("delay: estimated, one for the plant");
+      return;
+    }
+    options.delay = DelayModel::fixed;
+    note("delay: none");
+  }
+
+  void choose_weighting() {
+    FitOptions& options = setup_.options;
+    const FrfEstimate& frf = setup_.frf;
+    if (!request_.weighting.empty()) {
+      parse_weighting();
+      return;
+    }
+    options.weighting = frf.noise_variance.size() > 0   ? Weighting::noise_variance
+                        : frf.total_variance.size() > 0 ? Weighting::total_variance
+                                                        : Weighting::relative;
+    note(fmt::format(
+        "weighting: {}{}", to_string(options.weighting),
+        options.weighting == Weighting::relative ? ", the response comes without variances" : ""));
+  }
+
+  void choose_modes() {
+    ModeSelection& selection = setup_.selection;
+    const std::string& text = request_.modes;
+    if (text == "auto") return;
+    if (text.find(',') == std::string::npos) {
+      const std::optional<double> number = to_number(text);
+      if (number && text.find_first_of(".eE") == std::string::npos) {
+        if (*number < 1.0 || *number > 1000.0) refuse("--modes", text, "1 to 1000 modes");
+        selection.exactly = static_cast<int>(*number);
+        selection.most = std::max(selection.most, selection.exactly);
+        return;
+      }
+      if (!number && text.find_first_not_of("0123456789.eE+-") != std::string::npos) {
+        selection.modes = read_modes(text);
+        selection.keep_modes = true;
+        return;
+      }
+    }
+    parse_frequencies(text);
+  }
+
+ private:
+  void note(std::string text) { setup_.notes.push_back(std::move(text)); }
+
+  void parse_delay() {
+    FitOptions& options = setup_.options;
+    if (request_.delay == "estimate" || request_.delay == "per_channel") {
+      options.delay = request_.delay == "estimate" ? DelayModel::estimate : DelayModel::per_channel;
+      return;
+    }
+    const std::optional<double> delay_s = to_number(request_.delay);
+    if (!delay_s) refuse("--delay", request_.delay, "a number in s, estimate or per_channel");
+    options.delay = DelayModel::fixed;
+    options.delay_s = *delay_s;
+  }
+
+  void parse_weighting() {
+    FitOptions& options = setup_.options;
+    const std::string& text = request_.weighting;
+    const bool named = text != "user" &&
+                       std::find(kWeightings.begin(), kWeightings.end(), text) != kWeightings.end();
+    if (named) {
+      options.weighting = pick<Weighting>("--weighting", text, kWeightings);
+      return;
+    }
+    if (text.find('.') == std::string::npos && text.find('/') == std::string::npos) {
+      const std::vector<std::string> offered(kWeightings.begin(), kWeightings.end() - 1);
+      const std::string nearest = nearest_word(text, offered);
+      refuse(
+          "--weighting", text,
+          fmt::format("{}, or the name of an HDF5 file with /weights{}", fmt::join(offered, ", "),
+                      nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
+    }
+    options.weighting = Weighting::user;
+    read_weights(text);
+  }
+
+  /// /weights [N x n_y x n_u] on the lines of the whole FRF or on those of the band.
+  void read_weights(const std::string& file) {
+    const Hdf5File hdf5 = Hdf5File::open(file);
+    const std::vector<hsize_t> shape = hdf5.shape("/weights");
+    const FrfEstimate& frf = setup_.frf;
+    const std::vector<hsize_t> wanted = {static_cast<hsize_t>(frf.lines()),
+                                         static_cast<hsize_t>(frf.n_outputs()),
+                                         static_cast<hsize_t>(frf.n_inputs())};
+    if (shape != wanted)
+      throw FormatError(file, "/weights",
+                        fmt::format("is {}; must be {}, as the response in the band",
+                                    fmt::join(shape, " x "), fmt::join(wanted, " x ")));
+    const std::vector<double> values = hdf5.read_reals("/weights");
+    Eigen::MatrixXd& weights = setup_.options.user_weights;
+    weights.resize(frf.n_outputs() * frf.n_inputs(), frf.lines());
+    std::size_t at = 0;
+    for (Eigen::Index k = 0; k < frf.lines(); ++k)
+      for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
+        for (Eigen::Index j = 0; j < frf.n_inputs(); ++j, ++at) {
+          if (!std::isfinite(values[at]) || values[at] < 0.0)
+            throw FormatError(file, "/weights",
+                              fmt::format("line {}: {}; weights are 0 or more", k, values[at]));
+          weights(i + frf.n_outputs() * j, k) = values[at];
+        }
+  }
+
+  void parse_frequencies(const std::string& text) {
+    std::string_view rest = text;
+    while (!rest.empty()) {
+      const std::size_t comma = std::min(rest.find(','), rest.size());
+      const std::optional<double> frequency_hz = to_number(rest.substr(0, comma));
+      if (!frequency_hz || *frequency_hz <= 0.0)
+        refuse("--modes", text,
+               "auto, a number of modes, frequencies in Hz 'f1,f2,...', or a file");
+      setup_.selection.modes.push_back({*frequency_hz});
+      rest.remove_prefix(std::min(comma + 1, rest.size()));
+    }
+    std::sort(setup_.selection.modes.begin(), setup_.selection.modes.end(),
+              [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
+    setup_.selection.keep_modes = true;
+  }
+
+  const FitRequest& request_;
+  FitSetup& setup_;
+  std::optional<double> known_delay_s_;
+};
+
+std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
+  using Json = nlohmann::ordered_json;
+  const FitOptions& o = setup.options;
+  Json modes = request.modes;
+  if (!setup.selection.modes.empty()) {
+    modes = Json::array();
+    for (const ModeCandidate& mode : setup.selection.modes) modes.push_back(mode.frequency_hz);
+  }
+  Json json = {
+      {"band_hz", {setup.frf.frequency_hz[0], setup.frf.frequency_hz[setup.frf.lines() - 1]}},
+      {"modes", modes},
+      {"weighting", to_string(o.weighting)},
+      {"hold", to_string(o.hold)},
+      {"delay", o.delay == DelayModel::estimate      ? Json("estimate")
+                : o.delay == DelayModel::per_channel ? Json("per_channel")
+                                                     : Json(o.delay_s)},
+      {"rigid_body", request.rigid_body},
+      {"direct_term", request.direct_term},
+      {"damping", request.damping},
+      {"method", request.method},
+      {"max_iterations", o.max_iterations}};
+  if (o.weighting == Weighting::user) {
+    const auto* bytes = reinterpret_cast<const std::byte*>(o.user_weights.data());
+    Fingerprint fingerprint;
+    fingerprint.add({bytes, static_cast<std::size_t>(o.user_weights.size()) * sizeof(double)});
+    json["weights_fingerprint"] = fingerprint.hex();
+  }
+  return json.dump();
+}
+
+}  // namespace
+
+FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf) {
+  FitSetup setup;
+  setup.frf =
+      request.band_hz ? select_band(frf, (*request.band_hz)[0], (*request.band_hz)[1]) : frf;
+  FitDefaults defaults(request, setup);
+  defaults.choose_hold();
+  defaults.restore_delay();
+  defaults.choose_delay();
+  defaults.choose_weighting();
+  defaults.choose_modes();
+  setup.structure.rigid_body = pick<int>("--rigid-body", request.rigid_body, {"none", "full"}) == 1;
+  setup.structure.direct_term =
+      pick<int>("--direct-term", request.direct_term, {"none", "full"}) == 1;
+  setup.structure.general_damping =
+      pick<int>("--damping", request.damping, {"proportional", "general"}) == 1;
+  setup.options.method = pick<FitMethod>("--method", request.method, kMethods);
+  if (request.max_iterations < 1)
+    refuse("--max-iterations", fmt::format("{}", request.max_iterations), "1 or more");
+  setup.options.max_iterations = request.max_iterations;
+  setup.options.threads = request.threads;
+  setup.request_json = provenance_of(request, setup);
+  return setup;
+}
+
+void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
+  constexpr auto kOptional = Presence::optional;
+  std::vector<double> band_hz;
+  v.numbers("band_hz", band_hz, positive("Hz"), {2, 2}, kOptional, "left out: all lines");
+  if (band_hz.size() == 2) {
+    v.require(band_hz[0] < band_hz[1], "band_hz",
+              "band_hz: is empty; write [LOW, HIGH] with LOW < HIGH");
+    f.band_hz = {band_hz[0], band_hz[1]};
+  }
+
+  FlexibleValue modes = {"auto", {}, false, {}};
+  FlexibleRule modes_rule;
+  modes_rule.words = {"auto"};
+  modes_rule.number = true;
+  modes_rule.list = true;
+  modes_rule.rule = positive("");
+  v.flexible("modes", modes, modes_rule, kOptional,
+             "auto, how many, or a list of frequencies in Hz");
+  v.require(
+      modes.is_list || modes.numbers.empty() || std::floor(modes.numbers[0]) == modes.numbers[0],
+      "modes", "modes: a number says how many and is whole; write frequencies as a list [...]");
+  // A list of one frequency would read as a count without the comma.
+  f.modes = modes.word.empty()
+                ? fmt::format("{}{}", fmt::join(modes.numbers, ","), modes.is_list ? "," : "")
+                : modes.word;
+
+  const auto word = [&](const char* key, std::string& value, std::vector<std::string> names,
+                        const char* help) {
+    std::size_t index = names.size() - 1;
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (names[i] == value) index = i;
+    v.choice(key, index, names, kOptional, help);
+    value = names[index] == "by_frf" ? "" : names[index];
+  };
+  word("weighting", f.weighting,
+       {"unit", "inverse_magnitude", "relative", "noise_variance", "total_variance", "by_frf"},
+       "of the cost; by_frf: noise variance if known, else total variance, else relative");
+  word("hold", f.hold, {"none", "phase", "sinc", "exact", "by_frf"},
+       "how the model meets sampled data; by_frf: exact unless it was taken out");
+
+  FlexibleValue delay = {f.delay.empty() ? "by_frf" : f.delay, {}, false, {}};
+  FlexibleRule delay_rule;
+  delay_rule.words = {"estimate", "per_channel", "by_frf"};
+  delay_rule.number = true;
+  delay_rule.rule = any_number("s");
+  v.flexible("delay_s", delay, delay_rule, kOptional,
+             "a number, one for the plant, or one a channel");
+  f.delay = delay.word.empty() ? fmt::format("{}", delay.numbers.front())
+                               : (delay.word == "by_frf" ? "" : delay.word);
+
+  word("rigid_body", f.rigid_body, {"none", "full"}, "the term B_0 / s^2");
+  word("direct_term", f.direct_term, {"none", "full"},
+       "a constant: the compliance of modes above the band");
+  word("damping", f.damping, {"proportional", "general"}, "numerators B_0, or B_0 + B_1 s");
+  word("method", f.method, {"riv", "gn", "sk"}, "of the iteration");
+  count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "of one fit");
+}
+
+}  // namespace stageid

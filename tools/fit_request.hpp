@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimation/automatic_fit.hpp"
+#include "frf/frf_estimate.hpp"
+#include "tools/config_visitor.hpp"
+
+namespace stageid {
+
+/// What `stageid fit` is asked, by flags or by the section `fit` of an experiment file. Empty: by
+/// the FRF, see make_fit_setup().
+struct FitRequest {
+  std::optional<std::array<double, 2>> band_hz;
+  std::string modes = "auto";            ///< auto | N | f1,f2,... | FILE.json
+  std::string weighting;                 ///< unit | inverse_magnitude | relative | ... | FILE.h5
+  std::string hold;                      ///< none | phase | sinc | exact
+  std::string delay;                     ///< SECONDS | estimate | per_channel
+  std::string rigid_body = "full";       ///< none | full
+  std::string damping = "proportional";  ///< proportional | general
+  std::string method = "riv";            ///< riv | gn | sk
+  std::string direct_term = "none";      ///< none | full
+  int max_iterations = 100;
+  int threads = 0;
+};
+
+/// A request put into the terms of the estimation library.
+struct FitSetup {
+  FrfEstimate frf;  ///< the lines of the band
+  ModelStructure structure;
+  ModeSelection selection;
+  FitOptions options;
+  std::vector<std::string> notes;  ///< what was decided by the FRF, one line each
+  std::string request_json;        ///< the request with every default filled in: for provenance
+};
+
+/// Fills in the defaults by what the FRF holds:
+///   hold zoh                        -> hold exact, delay estimated
+///   hold zoh, delay taken out       -> the delay is put back into the response; hold exact, delay
+///                                      fixed to it
+///   hold none (or taken out)        -> no hold, delay 0
+/// and weights: noise variance if there is one, else total variance, else relative.
+/// @throws std::invalid_argument naming the flag; FileError, FormatError for files that it names.
+FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf);
+
+/// Keys of the section `fit`.
+void describe_fit_keys(ConfigVisitor& visitor, FitRequest& request);
+
+}  // namespace stageid

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "estimation/fit_additive_model.hpp"
+#include "tools/console.hpp"
+#include "tools/fit_request.hpp"
+
+namespace stageid {
+
+struct FitStep {
+  FitResult result;  ///< model with provenance; decisions begin with those of the setup
+  double seconds = 0.0;
+};
+
+/// Fits, shows progress, and completes the provenance of the model.
+/// @param frf_name, frf_fingerprint of the FRF that was fitted.
+/// @throws std::invalid_argument, Interrupted
+FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
+                  const std::string& frf_fingerprint, const Console& console);
+
+/// Names what is asked of a fit, see frf_request_id().
+std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint);
+
+/// The decisions that a model's provenance tells.
+std::vector<std::string> decisions_of(const AdditiveModel& model);
+
+/// For people: table of modes with standard deviations; cost history in one line.
+std::vector<std::string> mode_table(const AdditiveModel& model);
+std::string cost_line(const std::vector<double>& cost);
+/// The same for --json.
+nlohmann::ordered_json modes_json(const AdditiveModel& model);
+
+}  // namespace stageid

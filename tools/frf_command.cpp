@@ -1,0 +1,119 @@
+#include "tools/frf_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "acquisition/log_reader.hpp"
+#include "frf/frf_file.hpp"
+#include "frf/hold_compensation.hpp"
+#include "tools/command_line.hpp"
+#include "tools/exit_code.hpp"
+#include "tools/frf_step.hpp"
+#include "tools/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+/// The delay that a log of ours declares for its stage; 0 for others.
+double declared_delay_s(const std::filesystem::path& log) {
+  const auto json = nlohmann::json::parse(open_log(log)->info().metadata_json, nullptr, false);
+  return json.is_object() ? json.value("transport_delay_s", 0.0) : 0.0;
+}
+
+double median_relative_std(const FrfEstimate& frf, const Eigen::MatrixXd& variance) {
+  Eigen::ArrayXXd ratio = (variance.array() / frf.response.cwiseAbs2().array()).sqrt();
+  auto* middle = ratio.data() + ratio.size() / 2;
+  std::nth_element(ratio.data(), middle, ratio.data() + ratio.size());
+  return *middle;
+}
+
+nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
+                                const std::filesystem::path& output) {
+  nlohmann::ordered_json json = {{"output", output.string()},
+                                 {"inputs", frf.inputs.names},
+                                 {"outputs", frf.outputs.names},
+                                 {"lines", frf.lines()},
+                                 {"first_hz", frf.frequency_hz[0]},
+                                 {"last_hz", frf.frequency_hz[frf.lines() - 1]},
+                                 {"realizations", frf.realizations},
+                                 {"periods", frf.periods},
+                                 {"bytes_read", step.bytes},
+                                 {"seconds", step.seconds},
+                                 {"notes", step.notes}};
+  if (frf.noise_variance.size() > 0)
+    json["median_relative_noise_std"] = median_relative_std(frf, frf.noise_variance);
+  if (frf.total_variance.size() > 0)
+    json["median_relative_total_std"] = median_relative_std(frf, frf.total_variance);
+  return json;
+}
+
+}  // namespace
+
+FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "frf", "Estimate the plant's FRF from closed-loop logs");
+  command->add_option("logs", logs_, "logs (.slog or .h5)")->required();
+  command->add_option("-o,--output", output_, "HDF5 file to write")->required();
+  command->add_option("--inputs", inputs_, "actuators A,B,...; default: those that are excited")
+      ->delimiter(',');
+  command->add_option("--outputs", outputs_, "sensors C,D,...; default: all")->delimiter(',');
+  command->add_option("--realizations", realizations_, "1-based; default: all complete ones")
+      ->delimiter(',');
+  command->add_option("--transient-periods", transient_periods_,
+                      "dropped, instead of the log's own");
+  command->add_option("--method", method_, "periodic | lpm")
+      ->check(CLI::IsMember({"periodic", "lpm"}))
+      ->capture_default_str();
+  command->add_option("--covariance", covariance_, "diagonal | full")
+      ->check(CLI::IsMember({"diagonal", "full"}))
+      ->capture_default_str();
+  command->add_option("--compensate", compensate_, "take out: none | delay | hold (and delay)")
+      ->check(CLI::IsMember({"none", "delay", "hold"}))
+      ->capture_default_str();
+  command->add_option(
+      "--delay", delay_s_,
+      "with --compensate: delay beside the hold's half sample, s; default: the log's");
+  command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->final_callback([this] { run(); });
+}
+
+void FrfCommand::run() const {
+  FrfOptions options;
+  options.inputs = inputs_;
+  options.outputs = outputs_;
+  options.transient_periods = transient_periods_;
+  options.method = method_ == "lpm" ? FrfMethod::lpm : FrfMethod::periodic;
+  options.covariance = covariance_ == "full" ? CovarianceKind::full : CovarianceKind::diagonal;
+  options.threads = threads_;
+  for (const int realization : realizations_) {
+    if (realization < 1)
+      throw std::invalid_argument(
+          fmt::format("--realizations: {}; they are counted from 1", realization));
+    options.realizations.push_back(realization - 1);
+  }
+  require_writable(output_);
+  FrfStep step = estimate_frf(logs_, options, console_);
+  if (compensate_ != "none") {
+    const double delay_s = delay_s_ ? *delay_s_ : declared_delay_s(logs_.front());
+    if (!delay_s_)
+      step.notes.push_back(fmt::format("--compensate: delay {} s, as the log declares", delay_s));
+    step.frf = compensate(
+        step.frf, compensate_ == "hold" ? Compensation::hold : Compensation::delay, delay_s);
+  }
+  write_frf(output_, step.frf);
+  const double rate = step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0;
+  console_.result(fmt::format("{}: {}", output_.string(), describe(step.frf)));
+  console_.result(fmt::format("{:.1f} MB of samples in {:.2f} s, {:.0f} MB/s", step.bytes / 1e6,
+                              step.seconds, rate));
+  if (step.frf.noise_variance.size() > 0)
+    console_.result(fmt::format("median relative standard deviation by noise: {:.2e}",
+                                median_relative_std(step.frf, step.frf.noise_variance)));
+  for (const std::string& note : step.notes) console_.message("note: " + note);
+  console_.result(frf_json(step.frf, step, output_));
+}
+
+}  // namespace stageid

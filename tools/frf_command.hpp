@@ -1,0 +1,35 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/console.hpp"
+
+namespace stageid {
+
+/// stageid frf LOG... -o frf.h5
+class FrfCommand {
+ public:
+  FrfCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::vector<std::filesystem::path> logs_;
+  std::filesystem::path output_;
+  std::vector<std::string> inputs_;
+  std::vector<std::string> outputs_;
+  std::vector<int> realizations_;
+  std::optional<int> transient_periods_;
+  std::optional<double> delay_s_;
+  std::string method_ = "periodic";
+  std::string covariance_ = "diagonal";
+  std::string compensate_ = "none";
+  int threads_ = 0;
+};
+
+}  // namespace stageid

@@ -1,0 +1,106 @@
+#include "tools/frf_step.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "acquisition/log_reader.hpp"
+#include "excitation/fingerprint.hpp"
+#include "tools/interrupt.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kBytesPerMegabyte = 1e6;
+
+/// The lasting part of a log's metadata: all but times.
+Json lasting_metadata(const LogReader& log) {
+  Json metadata = Json::parse(log.info().metadata_json, nullptr, false);
+  if (!metadata.is_object()) return Json::object();
+  metadata.erase("started_utc");
+  return metadata;
+}
+
+Json options_json(const FrfOptions& options) {
+  return {{"inputs", options.inputs},
+          {"outputs", options.outputs},
+          {"transient_periods", options.transient_periods.value_or(-1)},
+          {"method", options.method == FrfMethod::lpm ? "lpm" : "periodic"},
+          {"covariance", options.covariance == CovarianceKind::full ? "full" : "diagonal"},
+          {"realizations", options.realizations}};
+}
+
+std::string complete_provenance(const FrfEstimate& frf, const std::vector<const LogReader*>& logs,
+                                const FrfOptions& options) {
+  Json provenance = Json::parse(frf.provenance_json, nullptr, false);
+  if (!provenance.is_object()) provenance = Json::object();
+  provenance["stageid_version"] = STAGEID_VERSION;
+  provenance["request_id"] = frf_request_id(logs, options);
+  provenance["realizations"] = options.realizations;
+  provenance["experiments"] = Json::array();
+  for (const LogReader* log : logs) provenance["experiments"].push_back(lasting_metadata(*log));
+  return provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::vector<std::string> notes_on(const FrfEstimate& frf) {
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < frf.excluded_channels.size(); ++i) {
+    const double power = frf.excluded_power[static_cast<Eigen::Index>(i)];
+    if (power > 1e-4)
+      notes.push_back(
+          fmt::format("actuator {} is not part of the response but moved: {:.2g} of the "
+                      "inputs' power; it biases the estimate",
+                      frf.excluded_channels[i], power));
+  }
+  return notes;
+}
+
+}  // namespace
+
+std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options) {
+  Json request = {{"version", STAGEID_VERSION}, {"options", options_json(options)}};
+  for (const LogReader* log : logs) request["experiments"].push_back(lasting_metadata(*log));
+  return fingerprint_of(request.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+std::string request_id_of(const std::string& provenance_json) {
+  const Json json = Json::parse(provenance_json, nullptr, false);
+  if (!json.is_object() || !json.contains("request_id") || !json["request_id"].is_string())
+    return "";
+  return json["request_id"].get<std::string>();
+}
+
+FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, FrfOptions options,
+                     const Console& console) {
+  std::vector<std::unique_ptr<LogReader>> readers;
+  std::vector<const LogReader*> logs;
+  for (const std::filesystem::path& file : files) {
+    readers.push_back(open_log(file));
+    logs.push_back(readers.back().get());
+  }
+  FrfStep step;
+  Progress progress(console, "frf", "MB", 1.0 / kBytesPerMegabyte);
+  options.progress = [&](double done, double total) {
+    throw_if_interrupted();
+    step.bytes = done;
+    progress.update(done, total);
+  };
+  step.frf = estimate_plant_frf(logs, options);
+  step.seconds = progress.seconds();
+  step.frf.provenance_json = complete_provenance(step.frf, logs, options);
+  step.notes = notes_on(step.frf);
+  return step;
+}
+
+std::string describe(const FrfEstimate& frf) {
+  return fmt::format("{} x {} on {} lines, {} ... {} Hz, {} realization{} x {} period{}",
+                     frf.n_outputs(), frf.n_inputs(), frf.lines(), frf.frequency_hz[0],
+                     frf.frequency_hz[frf.lines() - 1], frf.realizations,
+                     frf.realizations == 1 ? "" : "s", frf.periods, frf.periods == 1 ? "" : "s");
+}
+
+}  // namespace stageid

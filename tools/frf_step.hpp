@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "frf/plant_frf.hpp"
+#include "tools/console.hpp"
+
+namespace stageid {
+
+struct FrfStep {
+  FrfEstimate frf;
+  double seconds = 0.0;
+  double bytes = 0.0;              ///< of samples that were read
+  std::vector<std::string> notes;  ///< what the reader should know, one line each
+};
+
+/// Opens the logs, estimates, shows progress, and completes the provenance: configuration, seeds and
+/// the request's identity (frf_request_id()). Nothing of it depends on directory, time or threads.
+/// @throws FileError, FormatError, std::invalid_argument, Interrupted
+FrfStep estimate_frf(const std::vector<std::filesystem::path>& logs, FrfOptions options,
+                     const Console& console);
+
+/// Names what is asked of the estimate: version, options and what the logs say of their experiment.
+/// Two estimates of equal identity from the same samples are equal.
+std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options);
+
+/// "request_id" of a provenance; empty if there is none.
+std::string request_id_of(const std::string& provenance_json);
+
+/// One line for people: "4 x 13 on 4000 lines, 0.25 ... 1999.75 Hz, 2 realizations x 3 periods".
+std::string describe(const FrfEstimate& frf);
+
+}  // namespace stageid

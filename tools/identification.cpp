@@ -1,0 +1,262 @@
+#include "tools/identification.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+
+#include "acquisition/log_reader.hpp"
+#include "excitation/file_error.hpp"
+#include "excitation/fingerprint.hpp"
+#include "excitation/output_file.hpp"
+#include "frf/frf_file.hpp"
+#include "tools/closed_loop_prediction.hpp"
+#include "tools/design_command.hpp"
+#include "tools/exit_code.hpp"
+#include "tools/fit_step.hpp"
+#include "tools/frf_step.hpp"
+#include "tools/measurement.hpp"
+#include "tools/model_export.hpp"
+#include "tools/modes_command.hpp"
+#include "tools/output_paths.hpp"
+#include "tools/report_input.hpp"
+#include "tools/validate_command.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using SteadyClock = std::chrono::steady_clock;
+
+double seconds_since(SteadyClock::time_point start) {
+  return std::chrono::duration<double>(SteadyClock::now() - start).count();
+}
+
+bool newer_than(const std::filesystem::path& output, const std::filesystem::path& input) {
+  return std::filesystem::exists(output) &&
+         std::filesystem::last_write_time(output) >= std::filesystem::last_write_time(input);
+}
+
+/// A log that needs no more runs.
+bool is_complete(const std::filesystem::path& log, const ExperimentConfig& config,
+                 const ExperimentPlan& plan) {
+  if (!std::filesystem::exists(log)) return false;
+  const std::unique_ptr<LogReader> reader = open_log(log, false);
+  if (measurement_id_of(reader->info()) != config.measurement_id) return false;
+  for (const RunId run : plan.runs()) {
+    bool found = false;
+    for (const LogRun& recorded : reader->runs())
+      found = found || (recorded.complete && recorded.realization == run.realization &&
+                        recorded.experiment == run.experiment);
+    if (!found) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Identification::Identification(const ExperimentConfig& config, IdentificationRequest request,
+                               Console& console)
+    : config_(config), request_(std::move(request)), console_(console), plan_(make_plan(config)) {}
+
+int Identification::run() {
+  if (config_.stage.backend != Backend::sim)
+    throw std::invalid_argument(fmt::format("{}: backend {} is not in this version; there is sim",
+                                            config_.stage.file.string(),
+                                            to_string(config_.stage.backend)));
+  design();
+  const int measured = measure_all();
+  if (measured != kDone && measured != kNotTrustworthy) return measured;
+  estimate();
+  pick();
+  fit();
+  check_model();
+  write_outputs();
+  print_summary();
+  return exit_code_ != kDone || trustworthy_ ? exit_code_ : static_cast<int>(kNotTrustworthy);
+}
+
+void Identification::finish_step(const char* name, double seconds, std::string note) {
+  console_.message(fmt::format("{:<9} {:6.1f} s  {}", name, seconds, note));
+  steps_.push_back({name, seconds, std::move(note)});
+}
+
+void Identification::design() {
+  const SteadyClock::time_point start = SteadyClock::now();
+  if (request_.resume && std::filesystem::exists(path("excitation.h5")) &&
+      is_complete(path("run.slog"), config_, plan_)) {
+    finish_step("design", seconds_since(start), "up to date");
+    return;
+  }
+  const DesignPrediction prediction = predict_closed_loop(plan_, config_.stage.spec);
+  if (!request_.force) require_within_limits(config_, prediction);
+  require_directory(request_.directory);
+  write_experiment_plan(path("excitation.h5"), plan_);
+  for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
+  finish_step("design", seconds_since(start),
+              fmt::format("{} runs, {:.1f} min of stage time, {} lines", plan_.runs().size(),
+                          plan_.duration_s() / 60.0, plan_.grid().size()));
+}
+
+int Identification::measure_all() {
+  if (request_.resume && is_complete(path("run.slog"), config_, plan_)) {
+    finish_step("run", 0.0, "up to date");
+    return kDone;
+  }
+  MeasurementRequest request;
+  request.log = path("run.slog");
+  request.resume = request_.resume;
+  const MeasurementResult result = measure(config_, plan_, request, console_);
+  exit_code_ = result.exit_code;
+  if (exit_code_ == kNotTrustworthy) notes_.push_back(result.message);
+  const double stage_s =
+      static_cast<double>(result.experiment.health.cycles) / plan_.grid().sample_rate_hz();
+  finish_step("run", result.seconds,
+              fmt::format("{:.0f} s of stage time, {:.0f} times real time, {:.0f} MB", stage_s,
+                          result.seconds > 0.0 ? stage_s / result.seconds : 0.0,
+                          static_cast<double>(result.log_bytes) / 1e6));
+  if (exit_code_ != kDone && exit_code_ != kNotTrustworthy)
+    console_.warning(fmt::format(
+        "{}: {}; {} of {} runs are kept, continue with --resume", request.log.string(),
+        result.message, result.runs_before + result.experiment.runs_done, result.runs_total));
+  return exit_code_;
+}
+
+std::vector<int> Identification::fitted_realizations() const {
+  std::vector<int> realizations;
+  for (int m = 0; m < config_.experiment.realizations; ++m)
+    if (m != config_.validation_realization) realizations.push_back(m);
+  return realizations;
+}
+
+FrfEstimate Identification::estimate_into(const char* name, const std::vector<int>& realizations) {
+  FrfOptions options = config_.frf;
+  options.realizations = realizations;
+  options.threads = request_.threads;
+  const std::filesystem::path log = path("run.slog");
+  if (request_.resume && newer_than(path(name), log)) {
+    FrfEstimate frf = read_frf(path(name));
+    const std::unique_ptr<LogReader> reader = open_log(log);
+    if (request_id_of(frf.provenance_json) == frf_request_id({reader.get()}, options)) {
+      finish_step("frf", 0.0, fmt::format("{} up to date", name));
+      return frf;
+    }
+  }
+  FrfStep step = estimate_frf({log}, options, console_);
+  write_frf(path(name), step.frf);
+  notes_.insert(notes_.end(), step.notes.begin(), step.notes.end());
+  finish_step("frf", step.seconds,
+              fmt::format("{}: {}, {:.0f} MB/s", name, describe(step.frf),
+                          step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0));
+  return std::move(step.frf);
+}
+
+void Identification::estimate() {
+  frf_ = estimate_into("frf.h5", fitted_realizations());
+  if (config_.validation_realization >= 0)
+    validation_frf_ = estimate_into("frf_validation.h5", {config_.validation_realization});
+}
+
+void Identification::pick() {
+  const SteadyClock::time_point start = SteadyClock::now();
+  FitRequest request = config_.fit;
+  request.threads = request_.threads;
+  setup_ = make_fit_setup(request, *frf_);
+  std::vector<ModeCandidate> modes = setup_->selection.modes;
+  if (modes.empty()) modes = pick_modes(setup_->frf, default_peaks(setup_->frf));
+  write_modes(path("modes.json"), modes);
+  finish_step("modes", seconds_since(start), fmt::format("{} candidates", modes.size()));
+}
+
+bool Identification::fit_is_up_to_date(const FitSetup& setup,
+                                       const std::string& frf_fingerprint) const {
+  return request_.resume && std::filesystem::exists(path("model.json")) &&
+         std::filesystem::exists(path("model.h5")) &&
+         request_id_of(read_model(path("model.json")).provenance_json) ==
+             fit_request_id(setup, frf_fingerprint);
+}
+
+void Identification::fit() {
+  const std::string fingerprint = fingerprint_of_file(path("frf.h5"));
+  if (fit_is_up_to_date(*setup_, fingerprint)) {
+    model_ = read_model(path("model.json"));
+    model_variance_ = read_response_variance(path("model.h5"), setup_->frf.frequency_hz);
+    trustworthy_ = model_.fit.status == to_string(FitStatus::gradient_small) ||
+                   model_.fit.status == to_string(FitStatus::step_small);
+    finish_step("fit", 0.0, "up to date");
+    return;
+  }
+  FitStep step = fit_model(*setup_, "frf.h5", fingerprint, console_);
+  model_ = step.result.model;
+  model_variance_ = step.result.response_variance;
+  trustworthy_ = step.result.trustworthy();
+  if (!trustworthy_) notes_.push_back("the fit did not converge: " + step.result.message);
+  write_model(path("model.json"), model_);
+  finish_step("fit", step.seconds,
+              fmt::format("{} submodels, relative error {:.3g}, {}", model_.submodels.size(),
+                          model_.fit.relative_rms_error, cost_line(step.result.cost)));
+}
+
+void Identification::check_model() {
+  if (validation_frf_) {
+    const double low_hz = setup_->frf.frequency_hz[0];
+    const double high_hz = setup_->frf.frequency_hz[setup_->frf.lines() - 1];
+    validation_ = validate(model_, select_band(*validation_frf_, low_hz, high_hz));
+  }
+  truth_ = compare_with_truth(model_, setup_->frf, config_.stage.spec);
+}
+
+void Identification::write_outputs() {
+  const SteadyClock::time_point start = SteadyClock::now();
+  export_model(path("model.h5"), model_, {setup_->frf.frequency_hz, model_variance_});
+  export_model(path("model.csv"), model_, {});
+  finish_step("export", seconds_since(start), "model.h5, model.csv");
+  write_text_file(path("summary.json"),
+                  summary().dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  ReportData report = read_report_data(report_input({request_.directory}));
+  report.title = config_.stage.spec.info.name;
+  write_report(path("report.html"), report);
+}
+
+Json Identification::summary() const {
+  Json steps = Json::array();
+  for (const Step& step : steps_)
+    steps.push_back({{"name", step.name}, {"seconds", step.seconds}, {"note", step.note}});
+  Json json = {{"format", "stageid-summary"},
+               {"stageid_version", STAGEID_VERSION},
+               {"configuration", config_.file.filename().string()},
+               {"configuration_fingerprint", fingerprint_of(config_.text)},
+               {"stage_fingerprint", fingerprint_of(config_.stage.text)},
+               {"trustworthy", trustworthy_ && exit_code_ == kDone},
+               {"fit",
+                {{"status", model_.fit.status},
+                 {"weighting", model_.fit.weighting},
+                 {"cost", model_.fit.cost},
+                 {"relative_rms_error", model_.fit.relative_rms_error},
+                 {"band_hz", {model_.fit.band_hz[0], model_.fit.band_hz[1]}}}},
+               {"modes", modes_json(model_)}};
+  if (validation_) json["validation"] = validation_json(*validation_);
+  if (truth_) json["truth"] = truth_json(*truth_);
+  json["notes"] = notes_;
+  json["steps"] = steps;
+  return json;
+}
+
+void Identification::print_summary() const {
+  if (truth_) {
+    for (const std::string& line : truth_table(*truth_)) console_.result(line);
+    console_.result(
+        fmt::format("error of the model against the exact plant: {:.3e} (mean relative over "
+                    "lines and channels), {:.3e} (of the whole response)",
+                    truth_->relative_rms_error, truth_->normalized_error));
+  }
+  if (validation_) {
+    console_.result("on the realization that was held back:");
+    for (const std::string& line : validation_lines(*validation_)) console_.result("  " + line);
+  }
+  for (const std::string& note : notes_) console_.warning(note);
+  console_.result(fmt::format("report: {}", path("report.html").string()));
+  console_.result(summary());
+}
+
+}  // namespace stageid

@@ -1,0 +1,38 @@
+#include "tools/interrupt.hpp"
+
+#include <csignal>
+
+#include "tools/exit_code.hpp"
+
+namespace stageid {
+namespace {
+
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "the only kind a signal handler may touch");
+
+extern "C" void on_signal(int signal) {
+  interrupted = true;
+  std::signal(signal, SIG_DFL);
+}
+
+bool install() {
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+  return true;
+}
+
+}  // namespace
+
+const std::atomic<bool>& interrupt_flag() {
+  static const bool installed = install();
+  static_cast<void>(installed);
+  return interrupted;
+}
+
+void throw_if_interrupted() {
+  if (interrupt_flag()) throw Interrupted();
+}
+
+}  // namespace stageid

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <atomic>
+
+namespace stageid {
+
+/// From now on SIGINT and SIGTERM set this instead of ending the program. The second signal ends it.
+/// Also ignores SIGXFSZ and SIGPIPE, so that a full disk and a closed pipe are errors of the write.
+const std::atomic<bool>& interrupt_flag();
+
+/// @throws Interrupted if a signal came.
+void throw_if_interrupted();
+
+}  // namespace stageid

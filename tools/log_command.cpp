@@ -1,0 +1,184 @@
+#include "tools/log_command.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "acquisition/convert_log.hpp"
+#include "acquisition/log_reader.hpp"
+#include "acquisition/slog_recover.hpp"
+#include "excitation/file_error.hpp"
+#include "tools/command_line.hpp"
+#include "tools/exit_code.hpp"
+#include "tools/interrupt.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json health_json(const RunHealth& health) {
+  return {{"cycles", health.cycles},
+          {"late", health.late},
+          {"missing", health.missing},
+          {"marked", health.marked},
+          {"largest_lateness_ns", health.largest_lateness_ns},
+          {"seconds", health.seconds}};
+}
+
+Json damage_json(const std::vector<LogDamage>& damage) {
+  Json list = Json::array();
+  for (const LogDamage& d : damage)
+    list.push_back({{"offset", d.offset}, {"bytes", d.bytes}, {"what", d.what}});
+  return list;
+}
+
+std::string damage_line(const LogDamage& damage) {
+  return fmt::format("damaged at byte {}, {} bytes: {}", damage.offset, damage.bytes, damage.what);
+}
+
+Json info_json(const LogReader& log) {
+  const LogInfo& info = log.info();
+  Json json = {
+      {"file", log.path().string()},           {"sample_rate_hz", info.sample_rate_hz},
+      {"period_samples", info.period_samples}, {"transient_periods", info.transient_periods},
+      {"excitation", info.excitation.names},   {"actuators", info.actuators.names},
+      {"sensors", info.sensors.names},         {"runs", Json::array()}};
+  for (const LogRun& run : log.runs())
+    json["runs"].push_back({{"name", run.name},
+                            {"realization", run.realization},
+                            {"experiment", run.experiment},
+                            {"samples", run.samples},
+                            {"complete", run.complete},
+                            {"started_utc", run.started_utc},
+                            {"health", health_json(run.health)}});
+  json["metadata"] = Json::parse(info.metadata_json, nullptr, false);
+  return json;
+}
+
+}  // namespace
+
+LogCommand::LogCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* log = add_command(app, "log", "Look at, check, repair or convert a log");
+  log->require_subcommand(1);
+  CLI::App* info_command = add_command(*log, "info", "What a log holds, run by run");
+  info_command->add_option("file", file_, "log (.slog or .h5)")->required();
+  info_command->final_callback([this] { info(); });
+
+  CLI::App* verify_command = add_command(*log, "verify", "Read every byte and check it");
+  verify_command->add_option("file", file_, "log (.slog or .h5)")->required();
+  verify_command->final_callback([this] { verify(); });
+
+  CLI::App* recover_command = add_command(*log, "recover", "Save what is intact of a damaged log");
+  recover_command->add_option("file", file_, "damaged log (.slog)")->required();
+  recover_command->add_option("-o,--output", output_, "new log to write (.slog)")->required();
+  recover_command->final_callback([this] { recover(); });
+
+  CLI::App* convert_command =
+      add_command(*log, "convert", "Native log to HDF5 or CSV, HDF5 to CSV");
+  convert_command->add_option("file", file_, "log (.slog or .h5)")->required();
+  convert_command->add_option("-o,--output", output_, "file to write (.h5 or .csv)")->required();
+  convert_command->add_flag("--complete-only", complete_only_,
+                            "leave out runs that were broken off");
+  convert_command->final_callback([this] { convert(); });
+}
+
+void LogCommand::info() const {
+  const std::unique_ptr<LogReader> log = open_log(file_);
+  const LogInfo& info = log->info();
+  console_.result(fmt::format("{}: {} Hz, period {} samples ({} s), {} transient period{}",
+                              file_.string(), info.sample_rate_hz, info.period_samples,
+                              info.period_samples / info.sample_rate_hz, info.transient_periods,
+                              info.transient_periods == 1 ? "" : "s"));
+  console_.result(fmt::format("excitation {}", fmt::join(info.excitation.names, " ")));
+  console_.result(fmt::format("actuators  {}", fmt::join(info.actuators.names, " ")));
+  console_.result(fmt::format("sensors    {}", fmt::join(info.sensors.names, " ")));
+  std::vector<std::vector<std::string>> rows = {
+      {"run", "realization", "experiment", "samples", "late", "missing", "marked", "", "started"}};
+  for (const LogRun& run : log->runs())
+    rows.push_back({run.name, fmt::format("{}", run.realization + 1),
+                    fmt::format("{}", run.experiment + 1), fmt::format("{}", run.samples),
+                    fmt::format("{}", run.health.late), fmt::format("{}", run.health.missing),
+                    fmt::format("{}", run.health.marked), run.complete ? "complete" : "INCOMPLETE",
+                    run.started_utc});
+  for (const std::string& line : table_lines(rows)) console_.result(line);
+  console_.result(info_json(*log));
+}
+
+void LogCommand::verify() const {
+  const VerifyReport report = verify_log(file_);
+  throw_if_interrupted();
+  console_.result(
+      fmt::format("{}: {:.1f} MB, {} blocks, {} rows ({} marked), {} of {} runs complete",
+                  file_.string(), static_cast<double>(report.bytes) / 1e6, report.blocks,
+                  report.rows, report.marked_rows, report.complete_runs, report.runs));
+  for (const LogDamage& damage : report.damage) console_.result(damage_line(damage));
+  if (report.closed && !report.exit_message.empty())
+    console_.result(fmt::format("ended with {}: {}", report.exit_code, report.exit_message));
+  console_.result({{"file", file_.string()},
+                   {"intact", report.intact()},
+                   {"closed", report.closed},
+                   {"bytes", report.bytes},
+                   {"blocks", report.blocks},
+                   {"rows", report.rows},
+                   {"marked_rows", report.marked_rows},
+                   {"runs", report.runs},
+                   {"complete_runs", report.complete_runs},
+                   {"damage", damage_json(report.damage)}});
+  if (report.intact()) {
+    console_.result("intact");
+    return;
+  }
+  const std::string what = !report.damage.empty()
+                               ? fmt::format("damaged at {} place(s)", report.damage.size())
+                               : "was not closed: the experiment was cut off";
+  throw FormatError(file_, "",
+                    fmt::format("{}; save the rest with 'stageid log recover {} -o NEW.slog', "
+                                "or continue the experiment with --resume",
+                                what, file_.string()));
+}
+
+void LogCommand::recover() const {
+  if (std::filesystem::exists(output_))
+    throw std::invalid_argument(
+        fmt::format("{}: exists already; give the name of a new log", output_.string()));
+  const RecoverReport report = recover_log(file_, output_);
+  for (const LogDamage& damage : report.damage) console_.result(damage_line(damage));
+  console_.result(
+      fmt::format("{}: {} blocks, {} rows, {} of {} runs complete; lost: {} blocks, {} rows, "
+                  "{} bytes",
+                  output_.string(), report.blocks_kept, report.rows_kept, report.complete_runs,
+                  report.runs, report.blocks_lost, report.rows_lost, report.bytes_lost));
+  console_.result({{"output", output_.string()},
+                   {"blocks_kept", report.blocks_kept},
+                   {"blocks_lost", report.blocks_lost},
+                   {"rows_kept", report.rows_kept},
+                   {"rows_lost", report.rows_lost},
+                   {"bytes_lost", report.bytes_lost},
+                   {"runs", report.runs},
+                   {"complete_runs", report.complete_runs},
+                   {"damage", damage_json(report.damage)}});
+}
+
+void LogCommand::convert() const {
+  if (output_.extension() == ".mat")
+    throw std::invalid_argument(fmt::format(
+        "{}: MAT files are not in this version; there are .h5 and .csv", output_.string()));
+  const std::unique_ptr<LogReader> log = open_log(file_);
+  Progress progress(console_, "convert", "rows");
+  ConvertOptions options;
+  options.incomplete_runs = !complete_only_;
+  options.progress = [&](std::uint64_t done, std::uint64_t total) {
+    throw_if_interrupted();
+    progress.update(static_cast<double>(done), static_cast<double>(total));
+  };
+  convert_log(*log, output_, options);
+  console_.result(fmt::format("wrote {}, {:.1f} MB", output_.string(),
+                              static_cast<double>(std::filesystem::file_size(output_)) / 1e6));
+  console_.result({{"output", output_.string()}, {"bytes", std::filesystem::file_size(output_)}});
+}
+
+}  // namespace stageid

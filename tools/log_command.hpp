@@ -1,0 +1,27 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "tools/console.hpp"
+
+namespace stageid {
+
+/// stageid log info | verify | recover | convert FILE ...
+class LogCommand {
+ public:
+  LogCommand(CLI::App& app, Console& console);
+
+ private:
+  void info() const;
+  void verify() const;
+  void recover() const;
+  void convert() const;
+
+  Console& console_;
+  std::filesystem::path file_;
+  std::filesystem::path output_;
+  bool complete_only_ = false;
+};
+
+}  // namespace stageid

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "acquisition/run_experiment.hpp"
+#include "tools/console.hpp"
+#include "tools/experiment_config.hpp"
+
+namespace stageid {
+
+/// How `run` is asked to measure.
+struct MeasurementRequest {
+  std::filesystem::path log;
+  Backend backend = Backend::sim;
+  std::filesystem::path replay;  ///< backend replay: the log that is played
+  double replay_tolerance_n = 1e-9;
+  bool resume = false;
+  double pace = -1.0;  ///< < 0: as the stage file says
+};
+
+struct MeasurementResult {
+  ExperimentResult experiment;
+  int runs_total = 0;
+  int runs_before = 0;  ///< complete in the log already
+  int exit_code = 0;    ///< kDone, kWorldFailed, kNotTrustworthy, kStoppedForSafety or kInterrupted
+  std::string message;  ///< one line, why it ended
+  double seconds = 0.0;
+  std::uint64_t log_bytes = 0;
+};
+
+/// Performs the experiment and logs it. Complete runs of a log that is resumed are not repeated.
+/// @throws std::invalid_argument if the log exists and must not be resumed, or belongs to another
+/// experiment. @throws FileError, FormatError, StageError
+MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
+                          const MeasurementRequest& request, const Console& console);
+
+/// Bytes of the samples of a whole experiment in a native log.
+double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage);
+
+/// What the log's metadata say of the experiment it belongs to; empty if nothing.
+std::string measurement_id_of(const LogInfo& info);
+
+}  // namespace stageid

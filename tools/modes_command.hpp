@@ -1,0 +1,32 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "estimation/cmif.hpp"
+#include "tools/console.hpp"
+
+namespace stageid {
+
+/// stageid modes FRF [-o modes.json]
+class ModesCommand {
+ public:
+  ModesCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::filesystem::path frf_;
+  std::filesystem::path output_;
+  std::vector<double> band_hz_;
+  std::string kind_;
+  double prominence_db_ = 3.0;
+};
+
+/// How modes are picked where nothing else is asked: whitened if the noise is known.
+PeakOptions default_peaks(const FrfEstimate& frf);
+
+}  // namespace stageid

@@ -1,0 +1,151 @@
+#include "tools/program.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "excitation/file_error.hpp"
+#include "tools/config_command.hpp"
+#include "tools/console.hpp"
+#include "tools/design_command.hpp"
+#include "tools/exit_code.hpp"
+#include "tools/export_command.hpp"
+#include "tools/fit_command.hpp"
+#include "tools/frf_command.hpp"
+#include "tools/identify_command.hpp"
+#include "tools/import_command.hpp"
+#include "tools/interrupt.hpp"
+#include "tools/key_suggestion.hpp"
+#include "tools/log_command.hpp"
+#include "tools/modes_command.hpp"
+#include "tools/report_command.hpp"
+#include "tools/run_command.hpp"
+#include "tools/validate_command.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr const char* kWelcome =
+    R"(stageid measures and identifies multivariable motion stages in closed loop. Three things to try:
+
+  stageid identify configs/experiment/wafer_stage_quick.yaml -o first
+      the whole job on a simulated wafer stage, up to a model and first/report.html
+  stageid frf YOUR_LOG.h5 -o frf.h5 && stageid fit frf.h5 -o model.json
+      from a log of your own to a model
+  stageid config schema
+      everything that may stand in a configuration
+
+stageid --help lists the commands, stageid COMMAND --help their options.)";
+
+constexpr const char* kFooter =
+    R"(Exit codes: 0 done; 1 the world failed (file, link, interlock); 2 the request is wrong; 3 done but
+not to be trusted, the result says why; 4 stopped for safety; 130 interrupted, what was recorded is kept.)";
+
+/// Everything that CLI11 needs to know, and what the commands keep.
+class Program {
+ public:
+  Program()
+      : identify_(app_, console_),
+        design_(app_, console_),
+        run_(app_, console_),
+        log_(app_, console_),
+        frf_(app_, console_),
+        modes_(app_, console_),
+        fit_(app_, console_),
+        validate_(app_, console_),
+        export_(app_, console_),
+        report_(app_, console_),
+        config_(app_, console_) {
+    add_import_command(app_);
+    app_.name("stageid");
+    app_.set_version_flag("--version", "stageid " STAGEID_VERSION);
+    app_.add_flag("--json", console_.json, "the result as one JSON object on stdout");
+    const std::vector<std::pair<std::string, Verbosity>> levels = {
+        {"quiet", Verbosity::quiet}, {"normal", Verbosity::normal}, {"debug", Verbosity::debug}};
+    app_.add_option("--verbosity", console_.verbosity, "quiet | normal | debug")
+        ->transform(CLI::CheckedTransformer(levels).description(""));
+    app_.require_subcommand(0, 1);
+    app_.footer(kFooter);
+  }
+
+  int run(int argc, const char* const* argv) {
+    if (argc <= 1) {
+      fmt::print("{}\n", kWelcome);
+      return kDone;
+    }
+    refuse_unknown_command(argc, argv);
+    if (!parse(argc, argv)) return kDone;
+    if (app_.get_subcommands().empty())
+      throw std::invalid_argument("no command; 'stageid --help' lists them");
+    return console_.exit_code;
+  }
+
+ private:
+  void refuse_unknown_command(int argc, const char* const* argv) const {
+    std::vector<std::string> names;
+    for (const CLI::App* command : app_.get_subcommands([](const CLI::App*) { return true; }))
+      names.push_back(command->get_name());
+    int first = 1;
+    while (first < argc && argv[first][0] == '-')
+      first += std::string_view(argv[first]) == "--verbosity" ? 2 : 1;
+    if (first >= argc || std::find(names.begin(), names.end(), argv[first]) != names.end()) return;
+    const std::string nearest = nearest_word(argv[first], names);
+    throw std::invalid_argument(fmt::format("unknown command '{}'; {}", argv[first],
+                                            nearest.empty()
+                                                ? "'stageid --help' lists them"
+                                                : fmt::format("did you mean '{}'?", nearest)));
+  }
+
+  /// CLI11 speaks its own exceptions, for help too; translated here, at its border.
+  /// @returns false if only help or the version was asked for.
+  bool parse(int argc, const char* const* argv) {
+    try {
+      app_.parse(argc, argv);
+    } catch (const CLI::Success& success) {
+      app_.exit(success);
+      return false;
+    } catch (const CLI::ParseError& error) {
+      std::string command;
+      for (const CLI::App* sub : app_.get_subcommands()) command += " " + sub->get_name();
+      std::string what = error.what();
+      std::replace(what.begin(), what.end(), '\n', ' ');
+      throw std::invalid_argument(fmt::format("{}; see 'stageid{} --help'", what, command));
+    }
+    return true;
+  }
+
+  Console console_;
+  CLI::App app_{"Measures and identifies multivariable motion stages in closed loop"};
+  IdentifyCommand identify_;
+  DesignCommand design_;
+  RunCommand run_;
+  LogCommand log_;
+  FrfCommand frf_;
+  ModesCommand modes_;
+  FitCommand fit_;
+  ValidateCommand validate_;
+  ExportCommand export_;
+  ReportCommand report_;
+  ConfigCommand config_;
+};
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv) {
+  static_cast<void>(interrupt_flag());  // from the first moment on
+  Program program;
+  const int exit_code = program.run(argc, argv);
+  // A full disk or a closed pipe behind stdout must not end in silence.
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw FileError(fmt::format("stdout: cannot be written: {}", std::strerror(errno)));
+  return exit_code;
+}
+
+}  // namespace stageid

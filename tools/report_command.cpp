@@ -1,0 +1,30 @@
+#include "tools/report_command.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tools/command_line.hpp"
+#include "tools/output_paths.hpp"
+#include "tools/report_input.hpp"
+
+namespace stageid {
+
+ReportCommand::ReportCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "report", "One self-contained interactive page");
+  command
+      ->add_option("inputs", inputs_,
+                   "directory of identify, or files: FRF, held-back FRF, model, modes, log")
+      ->required();
+  command->add_option("-o,--output", output_, "page to write (.html)")->required();
+  command->final_callback([this] { run(); });
+}
+
+void ReportCommand::run() const {
+  require_writable(output_);
+  write_report(output_, read_report_data(report_input(inputs_)));
+  console_.result(fmt::format("wrote {}", output_.string()));
+  console_.result({{"output", output_.string()}});
+}
+
+}  // namespace stageid

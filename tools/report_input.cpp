@@ -1,0 +1,177 @@
+#include "tools/report_input.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "acquisition/log_reader.hpp"
+#include "excitation/file_error.hpp"
+#include "excitation/hdf5_file.hpp"
+#include "frf/frf_file.hpp"
+#include "tools/fit_step.hpp"
+#include "tools/model_export.hpp"
+#include "tools/modes_command.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw FileError(fmt::format("{}: cannot be read; check the path", file.string()));
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// "stageid-frf", "stageid-log", ... as the file says itself; empty if it does not.
+std::string kind_of(const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  if (ending == ".slog") return "stageid-log";
+  if (ending == ".json") {
+    const Json json = Json::parse(read_text(file), nullptr, false);
+    if (json.is_object() && json.contains("format") && json["format"].is_string())
+      return json["format"];
+    return "";
+  }
+  const Hdf5File hdf5 = Hdf5File::open(file);
+  if (!hdf5.has_attribute("/", "format")) return hdf5.exists("/response") ? "stageid-frf" : "";
+  const std::string format = hdf5.read_text_attribute("/", "format");
+  return format == "stageid-model" ? "stageid-model-h5" : format;
+}
+
+void put(std::filesystem::path& place, const std::filesystem::path& file) {
+  if (!place.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: {} is one of the same kind; give one", file.string(), place.string()));
+  place = file;
+}
+
+void put_if_there(std::filesystem::path& place, const std::filesystem::path& file) {
+  if (std::filesystem::exists(file)) put(place, file);
+}
+
+void add_directory(ReportInput& input, const std::filesystem::path& directory) {
+  put_if_there(input.frf, directory / "frf.h5");
+  put_if_there(input.validation_frf, directory / "frf_validation.h5");
+  put_if_there(input.model, directory / "model.json");
+  put_if_there(input.model_h5, directory / "model.h5");
+  put_if_there(input.modes, directory / "modes.json");
+  put_if_there(input.log, directory / "run.slog");
+  put_if_there(input.summary, directory / "summary.json");
+  if (input.frf.empty() && input.model.empty() && input.log.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: holds no frf.h5, model.json or run.slog; give the directory of 'stageid "
+                    "identify' or files",
+                    directory.string()));
+}
+
+void add_file(ReportInput& input, const std::filesystem::path& file) {
+  const std::string kind = kind_of(file);
+  if (kind == "stageid-frf") {
+    put(input.frf.empty() ? input.frf : input.validation_frf, file);
+  } else if (kind == "stageid-model") {
+    put(input.model, file);
+  } else if (kind == "stageid-model-h5") {
+    put(input.model_h5, file);
+  } else if (kind == "stageid-modes") {
+    put(input.modes, file);
+  } else if (kind == "stageid-log") {
+    put(input.log, file);
+  } else if (kind == "stageid-summary") {
+    put(input.summary, file);
+  } else {
+    throw std::invalid_argument(fmt::format(
+        "{}: is no log, FRF, model, modes or summary of stageid; leave it out", file.string()));
+  }
+}
+
+void add_response(ReportData& data, const ReportInput& input) {
+  const AdditiveModel& model = *data.model;
+  if (!data.frf) return;
+  if (model.fit.band_hz[1] > model.fit.band_hz[0]) {
+    data.frf = select_band(*data.frf, model.fit.band_hz[0], model.fit.band_hz[1]);
+    if (data.validation_frf)
+      data.validation_frf =
+          select_band(*data.validation_frf, model.fit.band_hz[0], model.fit.band_hz[1]);
+  }
+  data.model_response = response_like(model, *data.frf);
+  if (!input.model_h5.empty())
+    data.model_variance = read_response_variance(input.model_h5, data.frf->frequency_hz);
+  if (data.validation_frf) data.validation = validate(model, *data.validation_frf);
+}
+
+/// What only a summary knows: the truth of a simulated plant, and how long the steps took.
+void add_summary(ReportData& data, const std::filesystem::path& file) {
+  const Json summary = Json::parse(read_text(file), nullptr, false);
+  if (!summary.is_object()) throw FormatError(file, "", "is not JSON; write it anew with identify");
+  if (summary.contains("truth")) {
+    for (const Json& mode : summary["truth"].value("modes", Json::array()))
+      data.true_modes.push_back(
+          {mode.value("true_frequency_hz", 0.0), mode.value("true_damping_ratio", 0.0), true});
+    data.figures.push_back(
+        {"error against the exact plant",
+         fmt::format("{:.3g} %", 100.0 * summary["truth"].value("relative_rms_error", 0.0))});
+  }
+  for (const Json& step : summary.value("steps", Json::array()))
+    data.steps.push_back(
+        {step.value("name", ""), step.value("seconds", 0.0), step.value("note", "")});
+  for (const Json& note : summary.value("notes", Json::array()))
+    if (note.is_string())
+      data.messages.push_back({ReportMessage::Severity::warning, note.get<std::string>()});
+}
+
+void add_log(ReportData& data, const std::filesystem::path& file) {
+  const std::unique_ptr<LogReader> log = open_log(file, false);
+  data.runs = log->runs();
+  data.sample_rate_hz = log->info().sample_rate_hz;
+  const Json metadata = Json::parse(log->info().metadata_json, nullptr, false);
+  if (!metadata.is_object()) return;
+  for (const char* name : {"configuration", "stage"})
+    if (metadata.contains(name) && metadata[name].is_string())
+      data.documents.push_back({name, metadata[name].get<std::string>()});
+}
+
+}  // namespace
+
+ReportInput report_input(const std::vector<std::filesystem::path>& files) {
+  ReportInput input;
+  for (const std::filesystem::path& file : files) {
+    if (!std::filesystem::exists(file))
+      throw FileError(fmt::format("{}: does not exist; check the path", file.string()));
+    if (std::filesystem::is_directory(file)) {
+      add_directory(input, file);
+    } else {
+      add_file(input, file);
+    }
+  }
+  return input;
+}
+
+ReportData read_report_data(const ReportInput& input) {
+  ReportData data;
+  data.version = STAGEID_VERSION;
+  data.title = "stageid";
+  if (!input.frf.empty()) data.frf = read_frf(input.frf);
+  if (!input.validation_frf.empty()) data.validation_frf = read_frf(input.validation_frf);
+  if (!input.model.empty()) {
+    data.model = read_model(input.model);
+    data.cost = data.model->cost_history;
+    data.decisions = decisions_of(*data.model);
+    add_response(data, input);
+  }
+  if (data.frf) {
+    data.cmif_kind = default_peaks(*data.frf).kind;
+    data.cmif_curves = cmif(*data.frf, data.cmif_kind);
+  }
+  if (!input.modes.empty()) data.chosen_modes = read_modes(input.modes);
+  if (!input.log.empty()) add_log(data, input.log);
+  if (!input.summary.empty()) add_summary(data, input.summary);
+  return data;
+}
+
+}  // namespace stageid

@@ -1,0 +1,88 @@
+#include "tools/run_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "tools/command_line.hpp"
+#include "tools/experiment_config.hpp"
+#include "tools/measurement.hpp"
+
+namespace stageid {
+namespace {
+
+Backend backend_of(const std::string& name, Backend configured) {
+  if (name.empty()) return configured;
+  for (const Backend backend : {Backend::sim, Backend::can, Backend::modbus, Backend::replay})
+    if (name == to_string(backend)) return backend;
+  throw std::invalid_argument(
+      fmt::format("--backend: '{}'; write one of sim, can, modbus, replay", name));
+}
+
+}  // namespace
+
+RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
+  command->add_option("config", config_, "experiment file (.yaml)")->required();
+  command->add_option("-o,--output", output_, "log to write (.slog)")->required();
+  command->add_option("--backend", backend_, "sim | replay, instead of the stage file's");
+  command->add_option("--replay", replay_, "backend replay: the log that is played");
+  command
+      ->add_option("--replay-tolerance", replay_tolerance_n_,
+                   "backend replay: largest difference of a command from the recorded one, N")
+      ->capture_default_str();
+  command->add_option("--pace", pace_, "0: as fast as possible; 1: wall clock; default: stage file")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--resume", resume_,
+                    "continue an interrupted log: complete runs are not repeated");
+  command->add_option("--dashboard", dashboard_port_, "")->group("");
+  command->final_callback([this] { run(); });
+}
+
+void RunCommand::run() const {
+  if (dashboard_port_ >= 0)
+    throw std::invalid_argument("--dashboard: not in this version; leave it out");
+  const ExperimentConfig config = load_experiment_config(config_);
+  const ExperimentPlan plan = make_plan(config);
+  MeasurementRequest request;
+  request.log = output_;
+  request.backend = backend_of(backend_, config.stage.backend);
+  request.replay = replay_;
+  request.replay_tolerance_n = replay_tolerance_n_;
+  request.resume = resume_;
+  request.pace = pace_;
+  const MeasurementResult result = measure(config, plan, request, console_);
+  console_.exit_code = result.exit_code;
+
+  const RunHealth& health = result.experiment.health;
+  const double stage_s = static_cast<double>(health.cycles) / plan.grid().sample_rate_hz();
+  const int complete = result.runs_before + result.experiment.runs_done;
+  console_.result(fmt::format(
+      "{}: {} of {} runs complete{}", output_.string(), complete, result.runs_total,
+      result.runs_before > 0 ? fmt::format(" ({} of them before)", result.runs_before) : ""));
+  console_.result(
+      fmt::format("{} cycles, {} late, {} missing, {} marked; {:.1f} s of stage time in "
+                  "{:.1f} s, {:.1f} MB",
+                  health.cycles, health.late, health.missing, health.marked, stage_s,
+                  result.seconds, static_cast<double>(result.log_bytes) / 1e6));
+  console_.result({{"log", output_.string()},
+                   {"exit_code", result.exit_code},
+                   {"message", result.message},
+                   {"runs_complete", complete},
+                   {"runs_total", result.runs_total},
+                   {"cycles", health.cycles},
+                   {"late", health.late},
+                   {"missing", health.missing},
+                   {"marked", health.marked},
+                   {"stage_seconds", stage_s},
+                   {"seconds", result.seconds},
+                   {"log_bytes", result.log_bytes}});
+  if (result.exit_code != 0)
+    console_.warning(fmt::format("{}: {}{}", output_.string(), result.message,
+                                 complete < result.runs_total ? "; continue with --resume" : ""));
+}
+
+}  // namespace stageid

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hal/limited_stage.hpp"
+#include "hal/motion_controller.hpp"
+#include "hal/simulated_stage.hpp"
+#include "tools/config_visitor.hpp"
+
+namespace stageid {
+
+enum class Backend : std::uint8_t { sim, can, modbus, replay };
+const char* to_string(Backend backend) noexcept;
+
+/// A stage file as it stands, before the geometry becomes a WaferStageSpec.
+struct StageConfig {
+  std::filesystem::path file;
+  std::string text;  ///< of the file, kept for the log
+  Backend backend = Backend::sim;
+  WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
+};
+
+/// Reads a stage file and checks it through to a simulated stage that could be started.
+/// @throws FileError, FormatError "FILE:LINE:COLUMN: what is wrong; what would be right".
+StageConfig load_stage_config(const std::filesystem::path& file);
+
+/// The keys of a stage file. Used by `stageid config schema`.
+void describe_stage_keys(ConfigVisitor& visitor);
+
+/// The modes that the identified sub-plant can show: out of plane and flexible, seen by at least one
+/// of `sensors` and driven by at least one of `actuators` (names).
+std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
+                                           const std::vector<std::string>& actuators,
+                                           const std::vector<std::string>& sensors);
+
+/// Index of the channel of that name, -1 if there is none.
+int channel_index(const std::vector<Channel>& channels, const std::string& name);
+
+}  // namespace stageid

@@ -1,0 +1,128 @@
+#include "tools/validate_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <memory>
+
+#include "acquisition/log_reader.hpp"
+#include "excitation/hdf5_file.hpp"
+#include "frf/frf_file.hpp"
+#include "tools/command_line.hpp"
+#include "tools/frf_step.hpp"
+#include "tools/prediction_error.hpp"
+
+namespace stageid {
+namespace {
+
+/// An FRF is HDF5 that says so; everything else is taken for a log.
+bool is_frf(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  char head[8] = {};
+  stream.read(head, sizeof head);
+  constexpr char kHdf5[8] = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
+  if (!std::equal(std::begin(head), std::end(head), std::begin(kHdf5))) return false;
+  const Hdf5File hdf5 = Hdf5File::open(file);
+  if (hdf5.has_attribute("/", "format"))
+    return hdf5.read_text_attribute("/", "format") == "stageid-frf";
+  return hdf5.exists("/response");
+}
+
+nlohmann::ordered_json prediction_json(const PredictionError& error) {
+  return {{"sensors", error.sensors},
+          {"error_rms", std::vector<double>(error.error_rms.begin(), error.error_rms.end())},
+          {"signal_rms", std::vector<double>(error.signal_rms.begin(), error.signal_rms.end())},
+          {"normalized", error.normalized()},
+          {"runs", error.runs},
+          {"band_hz", {error.band_hz[0], error.band_hz[1]}}};
+}
+
+std::vector<std::string> prediction_lines(const PredictionError& error) {
+  std::vector<std::vector<std::string>> rows = {{"sensor", "error rms", "signal rms", "ratio"}};
+  for (std::size_t i = 0; i < error.sensors.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    rows.push_back({error.sensors[i], fmt::format("{:.4g}", error.error_rms[k]),
+                    fmt::format("{:.4g}", error.signal_rms[k]),
+                    fmt::format("{:.3e}", error.error_rms[k] / error.signal_rms[k])});
+  }
+  std::vector<std::string> lines = {
+      fmt::format("prediction of the samples from the actuators, {} runs, {} "
+                  "... {} Hz:",
+                  error.runs, error.band_hz[0], error.band_hz[1])};
+  for (std::string& line : table_lines(rows)) lines.push_back(std::move(line));
+  return lines;
+}
+
+}  // namespace
+
+std::vector<std::string> validation_lines(const Validation& v) {
+  std::vector<std::string> lines = {fmt::format(
+      "relative error {:.4e} (mean over lines and channels), {:.4e} (of the whole response)",
+      v.relative_rms_error, v.normalized_error)};
+  if (v.chi_square_per_dof > 0.0) {
+    lines.push_back(fmt::format("chi-square per degree of freedom {:.3f}; 1: within the noise",
+                                v.chi_square_per_dof));
+    lines.push_back(
+        fmt::format("residuals above their 95 % point: {:.1f} %; autocorrelation {:.4f}, 99 % "
+                    "limit {:.4f}",
+                    100.0 * v.whitened_above_95, v.whiteness, v.whiteness_limit));
+  } else {
+    lines.push_back("the data have no variances: nothing says whether the error is noise");
+  }
+  return lines;
+}
+
+nlohmann::ordered_json validation_json(const Validation& v) {
+  return {{"relative_rms_error", v.relative_rms_error},
+          {"normalized_error", v.normalized_error},
+          {"chi_square_per_dof", v.chi_square_per_dof},
+          {"whitened_above_95", v.whitened_above_95},
+          {"whiteness", v.whiteness},
+          {"whiteness_limit", v.whiteness_limit},
+          {"channel_error", std::vector<double>(v.channel_error.begin(), v.channel_error.end())}};
+}
+
+ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "validate", "Try a model on data that it was not fitted to");
+  command->add_option("model", model_, "model.json")->required();
+  command->add_option("data", data_, "frf.h5, or a log (.slog or .h5)")->required();
+  command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: the band of the fit")
+      ->expected(2);
+  command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->final_callback([this] { run(); });
+}
+
+void ValidateCommand::run() const {
+  const AdditiveModel model = read_model(model_);
+  const bool from_frf = is_frf(data_);
+  FrfOptions options;
+  options.inputs = model.inputs.names;
+  options.outputs = model.outputs.names;
+  options.threads = threads_;
+  FrfEstimate frf = from_frf ? read_frf(data_) : estimate_frf({data_}, options, console_).frf;
+  frf = select_channels(frf, model.inputs.names, model.outputs.names);
+  const bool fitted_band = model.fit.band_hz[1] > 0.0;
+  const double low_hz = !band_hz_.empty() ? band_hz_[0]
+                        : fitted_band     ? model.fit.band_hz[0]
+                                          : frf.frequency_hz[0];
+  const double high_hz = !band_hz_.empty() ? band_hz_[1]
+                         : fitted_band     ? model.fit.band_hz[1]
+                                           : frf.frequency_hz[frf.lines() - 1];
+  const Validation validation = validate(model, select_band(frf, low_hz, high_hz));
+  for (const std::string& line : validation_lines(validation)) console_.result(line);
+  nlohmann::ordered_json json = {{"model", model_.string()},
+                                 {"data", data_.string()},
+                                 {"band_hz", {low_hz, high_hz}},
+                                 {"frequency_domain", validation_json(validation)}};
+  if (!from_frf) {
+    const PredictionError error = prediction_error(model, *open_log(data_), low_hz, high_hz);
+    for (const std::string& line : prediction_lines(error)) console_.result(line);
+    json["time_domain"] = prediction_json(error);
+  }
+  console_.result(json);
+}
+
+}  // namespace stageid
