@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "excitation/file_error.hpp"
+#include "excitation/hdf5_heap_check.hpp"
 #include "excitation/hdf5_support.hpp"
 
 namespace stageid {
@@ -59,6 +60,7 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
     throw FormatError(file, "",
                       "is not an HDF5 file, or its beginning is damaged; give an HDF5 file");
   }
+  hdf5::check_global_heaps(file);
   Hdf5Handle handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!handle) {
     throw FormatError(file, "",
@@ -74,7 +76,11 @@ Hdf5File Hdf5File::create(const std::filesystem::path& file,
   silence_error_stack();
   const Hdf5Handle properties = hdf5::property_list(H5P_FILE_CREATE);
   H5Pset_obj_track_times(properties.get(), false);
-  Hdf5Handle handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), H5P_DEFAULT),
+  // The format of HDF5 1.8 has checksums on most of its structure, so that damage is noticed before
+  // the library stumbles over it; the newest one is closed to older MATLABs.
+  const Hdf5Handle access = hdf5::property_list(H5P_FILE_ACCESS);
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
+  Hdf5Handle handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), access.get()),
                     H5Fclose);
   if (!handle) {
     throw FileError(named.string() + ": cannot be created: " + hdf5::take_reason());
@@ -135,8 +141,9 @@ hid_t Hdf5File::open_dataset(const std::string& dataset) const {
   H5Pset_chunk_cache(access.get(), kChunkCacheSlots, kChunkCacheBytes, 1.0);
   Hdf5Handle handle(H5Dopen2(file_.get(), dataset.c_str(), access.get()), H5Dclose);
   if (!handle) {
-    throw FormatError(path_, dataset,
-                      "cannot be opened (" + hdf5::take_reason() + "); a dataset must stand here");
+    throw FormatError(
+        path_, dataset,
+        "is not a dataset, or damaged (" + hdf5::take_reason() + "); a dataset must stand here");
   }
   OpenDatasets::Entry& entry = open_datasets_->entries[open_datasets_->oldest];
   open_datasets_->oldest = (open_datasets_->oldest + 1) % OpenDatasets::kEntries;

@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <complex>
 #include <functional>
+#include <limits>
 #include <numeric>
 
 #include "excitation/file_error.hpp"
@@ -19,6 +21,33 @@ Hdf5Handle timeless(hid_t class_id) {
   Hdf5Handle properties = hdf5::property_list(class_id);
   H5Pset_obj_track_times(properties.get(), false);
   return properties;
+}
+
+/// Makes numbers that were never written, or whose place was lost by damage, read as NaN, which every
+/// reader refuses, instead of as zeros.
+void fill_with_nan(hid_t properties, hid_t file_type) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const std::complex<double> nan(kNan, kNan);
+  const Hdf5Kind kind = hdf5::kind_of(file_type);
+  if (kind == Hdf5Kind::real) H5Pset_fill_value(properties, H5T_NATIVE_DOUBLE, &nan);
+  if (kind == Hdf5Kind::complex) {
+    H5Pset_fill_value(properties, hdf5::complex_type(H5T_NATIVE_DOUBLE).get(), &nan);
+  }
+}
+
+/// Cuts the dataset into blocks of rows of about a megabyte, each with a checksum: without, a byte
+/// that changes on the way to the reader is a changed measurement.
+void protect(hid_t properties, const std::vector<hsize_t>& shape, std::size_t element_bytes) {
+  constexpr hsize_t kBlockBytes = hsize_t{1} << 20;
+  constexpr hsize_t kGreatestBlockBytes = hsize_t{1} << 31;  // HDF5 refuses from 4 GiB on
+  if (shape.empty()) return;
+  const hsize_t row_bytes =
+      std::accumulate(shape.begin() + 1, shape.end(), hsize_t{element_bytes}, std::multiplies<>());
+  if (shape[0] == 0 || row_bytes == 0 || row_bytes > kGreatestBlockBytes) return;
+  std::vector<hsize_t> block = shape;
+  block[0] = std::clamp<hsize_t>(kBlockBytes / row_bytes, 1, shape[0]);
+  H5Pset_chunk(properties, static_cast<int>(block.size()), block.data());
+  H5Pset_fletcher32(properties);
 }
 
 }  // namespace
@@ -43,6 +72,8 @@ void Hdf5File::write_dataset(const std::string& dataset, const std::vector<hsize
                     : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
       H5Sclose);
   const Hdf5Handle properties = timeless(H5P_DATASET_CREATE);
+  fill_with_nan(properties.get(), file_type);
+  protect(properties.get(), shape, H5Tget_size(file_type));
   const Hdf5Handle handle(H5Dcreate2(id(), dataset.c_str(), file_type, space.get(), H5P_DEFAULT,
                                      properties.get(), H5P_DEFAULT),
                           H5Dclose);
@@ -70,10 +101,19 @@ void Hdf5File::write_integers(const std::string& dataset, const std::vector<hsiz
 }
 
 void Hdf5File::write_texts(const std::string& dataset, const std::vector<std::string>& values) {
-  const Hdf5Handle type = hdf5::text_type(H5T_CSET_UTF8);
-  std::vector<const char*> pointers;
-  for (const std::string& value : values) pointers.push_back(value.c_str());
-  write_dataset(dataset, {values.size()}, type.get(), type.get(), pointers.data());
+  // Of fixed length, because texts of variable length stand apart from the dataset, without checksum.
+  std::size_t size = 1;
+  for (const std::string& value : values) size = std::max(size, value.size());
+  std::string padded;
+  for (const std::string& value : values) {
+    padded += value;
+    padded.resize(padded.size() + size - value.size(), '\0');
+  }
+  const Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.get(), size);
+  H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+  H5Tset_cset(type.get(), H5T_CSET_UTF8);
+  write_dataset(dataset, {values.size()}, type.get(), type.get(), padded.data());
 }
 
 void Hdf5File::create_growing(const std::string& dataset, hsize_t columns, hid_t file_type,
@@ -84,7 +124,9 @@ void Hdf5File::create_growing(const std::string& dataset, hsize_t columns, hid_t
   const hsize_t chunk[2] = {chunk_rows, columns};
   const Hdf5Handle space(H5Screate_simple(rank, empty, unlimited), H5Sclose);
   const Hdf5Handle properties = timeless(H5P_DATASET_CREATE);
-  const bool chunked = H5Pset_chunk(properties.get(), rank, chunk) >= 0;
+  fill_with_nan(properties.get(), file_type);
+  const bool chunked =
+      H5Pset_chunk(properties.get(), rank, chunk) >= 0 && H5Pset_fletcher32(properties.get()) >= 0;
   const Hdf5Handle handle(chunked ? H5Dcreate2(id(), dataset.c_str(), file_type, space.get(),
                                                H5P_DEFAULT, properties.get(), H5P_DEFAULT)
                                   : -1,
