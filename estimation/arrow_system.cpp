@@ -228,13 +228,21 @@ void ArrowSystem::eliminate() {
   }
 }
 
-Eigen::VectorXd ArrowSystem::solve_globals(double damping) const {
+Eigen::VectorXd ArrowSystem::solve_globals(double damping,
+                                           const std::vector<Eigen::Index>& frozen) const {
   // RIV's matrix is not symmetric: LU, scaled by the diagonal of its symmetric twin.
   const Eigen::VectorXd scale =
       M_.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd scaled = scale.asDiagonal() * schur_ * scale.asDiagonal();
   scaled.diagonal() += damping * scaled.diagonal().cwiseAbs().cwiseMax(1e-12);
-  return scale.cwiseProduct(scaled.partialPivLu().solve(scale.cwiseProduct(schur_e_)));
+  Eigen::VectorXd rhs = scale.cwiseProduct(schur_e_);
+  for (const Eigen::Index i : frozen) {
+    scaled.row(i).setZero();
+    scaled.col(i).setZero();
+    scaled(i, i) = 1.0;
+    rhs[i] = 0.0;
+  }
+  return scale.cwiseProduct(scaled.partialPivLu().solve(rhs));
 }
 
 ArrowSystem::Step ArrowSystem::solve(double damping) const {

@@ -32,7 +32,8 @@ class ArrowSystem {
   /// Solves with `damping` times the diagonal of the Schur complement added to it.
   Step solve(double damping) const;
   /// The globals only: enough where numerators are re-solved afterwards.
-  Eigen::VectorXd solve_globals(double damping) const;
+  /// `frozen` globals stay where they are.
+  Eigen::VectorXd solve_globals(double damping, const std::vector<Eigen::Index>& frozen = {}) const;
 
   /// One channel's part of M: border and numerator block.
   struct Channel {

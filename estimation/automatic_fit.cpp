@@ -65,6 +65,7 @@ class AutomaticFit {
     quick_.max_iterations = std::min(kGrowthIterations, options.max_iterations);
     quick_.gradient_tolerance = 1e-5;
     quick_.step_tolerance = 1e-7;
+    quick_.deviation_tolerance = 0.1;
     quick_.method = FitMethod::gn;  // the same minimum; the refined-IV iteration does the final fit
     quick_.progress = nullptr;
     threads_ = options.threads > 0

@@ -123,15 +123,19 @@ void fill_deviations(const Eigen::MatrixXd& covariance, AdditiveModel& model) {
       const double a2 = s.denominator[2];
       const Eigen::Vector2d df(0.0, -0.5 * s.natural_frequency_hz() / a2);
       const Eigen::Vector2d dz = s.damping_ratio() * Eigen::Vector2d(1.0 / a1, -0.5 / a2);
-      s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
-      s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
+      // Zero: the mode stands at a bound and its place is not in the data.
+      if (C(1, 1) > 0.0) {
+        s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
+        s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
+      }
     }
     first += order;
   }
 }
 
 void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
-                      const FitParameters& beta, FitResult& result) {
+                      const FitParameters& beta, const std::vector<Eigen::Index>& frozen,
+                      FitResult& result) {
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
   const Residual E = residual(problem, groups, beta.B);
   const ArrowSystem gn(problem, beta, groups, E, FitMethod::gn);
@@ -140,20 +144,21 @@ void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const F
   const Eigen::MatrixXd& known =
       frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
   const double dof = frf.noise_variance.size() > 0 ? frf.noise_dof : frf.total_dof;
-  VarianceKnowledge knowledge = VarianceKnowledge::none;
-  if (likelihood)
-    knowledge = VarianceKnowledge::weights;
-  else if (known.size() > 0 && known.minCoeff() > 0.0)
-    knowledge = VarianceKnowledge::given;
-  const Eigen::MatrixXd variance = knowledge == VarianceKnowledge::given
-                                       ? smoothed_variance(frf, known, dof)
-                                       : Eigen::MatrixXd();
+  DataNoise noise;
+  if (likelihood) {
+    noise.knowledge = VarianceKnowledge::weights;
+    noise.variance = problem.W.cwiseInverse();
+  } else if (known.size() > 0 && known.minCoeff() > 0.0) {
+    noise.knowledge = VarianceKnowledge::given;
+    noise.variance = smoothed_variance(frf, known, dof);
+  }
+  if (noise.knowledge != VarianceKnowledge::none) noise.correlation = output_correlation(frf);
   const ParameterCovariance covariance =
-      parameter_covariance(problem, beta, groups, E, gn, knowledge, variance);
+      parameter_covariance(problem, beta, groups, E, gn, noise, frozen);
   if (covariance.globals.size() == 0 && problem.globals() > 0) return;
   fill_deviations(covariance.globals, result.model);
   result.response_variance = covariance.response_variance;
-  if (knowledge == VarianceKnowledge::weights && covariance.residual_scale > 1.0)
+  if (likelihood && covariance.residual_scale > 1.0)
     result.decisions.push_back(
         fmt::format("the residual is {:.3g} times what the variances predict: the model does not "
                     "explain the data; "
@@ -198,7 +203,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   fill_submodels(problem, beta, result.model);
   result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
   if (options.uncertainty && result.status != FitStatus::singular)
-    fill_uncertainty(frf, options, problem, beta, result);
+    fill_uncertainty(frf, options, problem, beta, iteration.frozen, result);
 
   FitRecord& record = result.model.fit;
   record.cost = iteration.E.cost;

@@ -2,21 +2,20 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "estimation/arrow_system.hpp"
 #include "estimation/numerators.hpp"
+#include "estimation/pole_bounds.hpp"
 
 namespace stageid {
 namespace {
 
-constexpr double kSmallestDamping = 1e-5;
-constexpr double kLargestDamping = 0.9;
-constexpr double kLargestMove = 4.0 / 3.0;  // of a natural frequency in one iteration
 constexpr double kLargestLevenberg = 1e8;
-// Of the cost: what is gained below this is rounding.
-constexpr double kRoundingGain = 1e-13;
+// Where no step lowers the cost, it is at rounding if the stationary point is so many deviations away.
+constexpr double kRoundingDeviations = 0.05;
 
 /// A candidate with its numerators solved.
 struct Trial {
@@ -41,11 +40,11 @@ FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
   return out;
 }
 
-std::optional<Trial> try_step(const FitProblem& problem, const FitParameters& beta,
-                              const Eigen::VectorXd& step) {
+std::optional<Trial> try_step(const FitProblem& problem, const PoleBounds& bounds,
+                              const FitParameters& beta, const Eigen::VectorXd& step) {
   if (!step.allFinite()) return std::nullopt;
   Trial trial{stepped(problem, beta, step), {}};
-  if (!stabilize(problem, beta, trial.beta)) return std::nullopt;
+  if (!bounds.stabilize(beta, trial.beta)) return std::nullopt;
   const std::vector<BasisGroup> groups = evaluate_groups(problem, trial.beta, false);
   if (!solve_numerators(problem, groups, trial.beta.B, trial.E)) return std::nullopt;
   return trial;
@@ -66,20 +65,23 @@ double relative_step(const FitProblem& problem, const FitParameters& beta,
 
 /// max_i |e_i| / sqrt(M_ii 2 N cost): 0 to 1, the cosine between the residual and a parameter's
 /// effect.
-double scaled_gradient(const FitProblem& problem, const ArrowSystem& system, double cost) {
+double scaled_gradient(const FitProblem& problem, const ArrowSystem& system,
+                       const std::vector<Eigen::Index>& frozen, double cost) {
   const double total = 2.0 * static_cast<double>(problem.size()) * cost;
   double largest = 0.0;
-  for (Eigen::Index i = 0; i < system.schur_gradient().size(); ++i)
+  for (Eigen::Index i = 0; i < system.schur_gradient().size(); ++i) {
+    if (std::find(frozen.begin(), frozen.end(), i) != frozen.end()) continue;
     largest =
         std::max(largest, std::abs(system.schur_gradient()[i]) /
                               std::sqrt(std::max(std::abs(system.schur()(i, i)) * total, 1e-300)));
+  }
   return largest;
 }
 
 class Iteration {
  public:
   Iteration(const FitProblem& problem, FitParameters& beta, const FitOptions& options)
-      : problem_(problem), beta_(beta), options_(options) {
+      : problem_(problem), beta_(beta), options_(options), bounds_(problem, beta) {
     signal_cost_ =
         (problem.W.array() * (problem.G_re.array().square() + problem.G_im.array().square()))
             .sum() /
@@ -102,7 +104,7 @@ class Iteration {
 
  private:
   bool begin() {
-    stabilize(problem_, beta_, beta_);
+    bounds_.stabilize(beta_, beta_);
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, false);
     if (!solve_numerators(problem_, groups, beta_.B, result_.E)) return false;
     result_.cost.push_back(result_.E.cost);
@@ -115,6 +117,7 @@ class Iteration {
   }
   bool end(FitStatus status, std::string message) {
     result_.status = status;
+    result_.frozen = frozen_;
     result_.message = std::move(message);
     return false;
   }
@@ -129,10 +132,25 @@ class Iteration {
 
   /// True if the system says that the end is reached; `result_` is then complete.
   bool at_optimum(const ArrowSystem& system) {
-    gradient_ = scaled_gradient(problem_, system, result_.E.cost);
+    frozen_ = bounds_.leaning(beta_, system.schur_gradient());
+    gradient_ = scaled_gradient(problem_, system, frozen_, result_.E.cost);
     if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance) {
       end(FitStatus::gradient_small,
           fmt::format("the first-order condition holds: scaled gradient {:.2g}", gradient_));
+      return true;
+    }
+    // Newton decrement: the distance to the stationary point in standard deviations of the noise that the
+    // residual shows.
+    const double data = static_cast<double>(problem_.size() * problem_.channels());
+    const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.E.cost;
+    deviations_ = std::sqrt(
+        std::abs(system.solve_globals(0.0, frozen_).dot(system.schur_gradient())) * data / squares);
+    if (deviations_ < options_.deviation_tolerance) {
+      end(FitStatus::gradient_small,
+          fmt::format(
+              "the first-order condition holds: within {:.1g} standard deviations of it, scaled "
+              "gradient {:.2g}",
+              deviations_, gradient_));
       return true;
     }
     if (result_.E.cost < 1e-28 * signal_cost_) {
@@ -149,38 +167,32 @@ class Iteration {
       return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
     if (at_optimum(system)) return false;
     if (attempt(system, options_.method == FitMethod::riv ? 3 : 40)) return still_moving();
-    if (options_.method == FitMethod::riv && !ended_) {
+    if (options_.method == FitMethod::riv) {
       const ArrowSystem gauss_newton(problem_, beta_, groups, result_.E, FitMethod::gn);
       if (attempt(gauss_newton, 40)) return still_moving();
     }
-    if (!ended_)
-      end(FitStatus::cost_stalled,
-          fmt::format("no step lowers the cost; scaled gradient {:.2g}", gradient_));
-    return false;
+    if (deviations_ < kRoundingDeviations)
+      return end(FitStatus::step_small,
+                 fmt::format("the cost is at rounding, within {:.1g} standard deviations of the "
+                             "first-order condition; scaled gradient {:.2g}",
+                             deviations_, gradient_));
+    return end(FitStatus::cost_stalled,
+               fmt::format("no step lowers the cost; scaled gradient {:.2g}", gradient_));
   }
 
   /// Tries steps of growing damping; accepts the first that lowers the cost.
   bool attempt(const ArrowSystem& system, int tries) {
     const double cost = result_.E.cost;
     for (int i = 0; i < tries && levenberg_ <= kLargestLevenberg; ++i) {
-      const Eigen::VectorXd step = system.solve_globals(levenberg_);
-      const double gain =
-          step.dot(system.schur_gradient()) / (2.0 * static_cast<double>(problem_.size()) * cost);
+      const Eigen::VectorXd step = system.solve_globals(levenberg_, frozen_);
       step_size_ = relative_step(problem_, beta_, step);
-      std::optional<Trial> trial = try_step(problem_, beta_, step);
+      std::optional<Trial> trial = try_step(problem_, bounds_, beta_, step);
       if (trial && trial->E.cost < cost) {
-        gain_ = (cost - trial->E.cost) / cost;
         accept(std::move(*trial));
         levenberg_ = i == 0 ? (levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0) : levenberg_;
         return true;
       }
-      if (std::abs(gain) < kRoundingGain || step_size_ < options_.step_tolerance) {
-        ended_ = true;
-        end(FitStatus::step_small, fmt::format("the step is {:.1e} of the parameters and changes "
-                                               "the cost by rounding only; scaled gradient {:.2g}",
-                                               step_size_, gradient_));
-        return false;
-      }
+      if (step_size_ < 1e-15) break;  // nothing moves any more
       levenberg_ = std::max(10.0 * levenberg_, 1e-4);
     }
     if (levenberg_ > kLargestLevenberg) levenberg_ = 1e-4;
@@ -200,12 +212,12 @@ class Iteration {
     const ArrowSystem system(problem_, beta_, groups, result_.E, FitMethod::sk);
     if (!system.regular())
       return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
-    gradient_ = scaled_gradient(problem_, system, result_.E.cost);
+    gradient_ = scaled_gradient(problem_, system, frozen_, result_.E.cost);
     Eigen::VectorXd step = system.solve_globals(0.0);
     std::optional<Trial> trial;
     for (int halvings = 0; halvings < 12 && !trial; ++halvings, step *= 0.5) {
       step_size_ = relative_step(problem_, beta_, step);
-      trial = try_step(problem_, beta_, step);
+      trial = try_step(problem_, bounds_, beta_, step);
     }
     if (!trial) return end_at_best(FitStatus::cost_stalled, "no acceptable step");
     accept(std::move(*trial));
@@ -229,49 +241,18 @@ class Iteration {
   const FitProblem& problem_;
   FitParameters& beta_;
   const FitOptions& options_;
+  PoleBounds bounds_;
+  std::vector<Eigen::Index> frozen_;  // modes at their bounds
   IterationResult result_;
   double signal_cost_ = 0.0;
   double levenberg_ = 0.0;
   double gradient_ = 1.0;
   double step_size_ = 0.0;
-  double gain_ = 1.0;
-  bool ended_ = false;
+  double deviations_ = 0.0;
   Trial best_;
 };
 
-bool stabilize_mode(double before_a2, double largest_omega, Eigen::VectorXd& a) {
-  if (!(a[1] > 0.0)) return false;
-  // Held at the bound, not refused: a mode that leans on it must not stop all the others.
-  a[1] = std::max(a[1], 1.0 / (largest_omega * largest_omega));
-  a[0] = std::abs(a[0]);
-  const double root = std::sqrt(a[1]);
-  const double zeta = std::clamp(a[0] / (2.0 * root), kSmallestDamping, kLargestDamping);
-  a[0] = 2.0 * zeta * root;
-  const double move = std::sqrt(before_a2) / root;
-  return move < kLargestMove && move > 1.0 / kLargestMove;
-}
-
 }  // namespace
-
-bool stabilize(const FitProblem& problem, const FitParameters& before, FitParameters& beta) {
-  const double highest = problem.lines.omega_rad_s.maxCoeff();
-  const double nyquist =
-      problem.lines.sample_period_s > 0.0 ? 3.1 / problem.lines.sample_period_s : 1e300;
-  const double largest =
-      problem.lines.hold == HoldModel::exact ? std::max(nyquist, highest) : 10.0 * highest;
-  for (std::size_t i = 0; i < beta.a.size(); ++i) {
-    Eigen::VectorXd& a = beta.a[i];
-    if (a.size() == 1) {
-      if (!(a[0] > 0.0)) return false;
-    } else if (a.size() == 2) {
-      if (!stabilize_mode(before.a[i][1], largest, a)) return false;
-    } else {
-      for (const std::complex<double> pole : roots(a))
-        if (!(pole.real() < 0.0)) return false;
-    }
-  }
-  return true;
-}
 
 IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options) {
   return Iteration(problem, beta, options).run();

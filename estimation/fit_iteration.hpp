@@ -12,7 +12,8 @@ struct IterationResult {
   std::string message;
   std::vector<double> cost;  ///< the start (numerators solved) first
   int iterations = 0;
-  Residual E;  ///< at the returned parameters
+  Residual E;                        ///< at the returned parameters
+  std::vector<Eigen::Index> frozen;  ///< globals that ended at a bound: no longer unknowns
 };
 
 /// Improves `beta` in place until the first-order condition holds: solve the numerators, step the
@@ -25,11 +26,5 @@ IterationResult iterate(const FitProblem& problem, FitParameters& beta, const Fi
 /// Sets all input delays to the one of least cost on a grid (numerators solved for every
 /// candidate).
 void search_delay(const FitProblem& problem, FitParameters& beta);
-
-/// Makes the denominators stable where that is one sign (order 1 and 2), keeps damping in [1e-5,
-/// 0.9].
-/// @returns false if the denominators are not acceptable: unstable, or a mode moved by more than a
-/// third.
-bool stabilize(const FitProblem& problem, const FitParameters& before, FitParameters& beta);
 
 }  // namespace stageid

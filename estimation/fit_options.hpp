@@ -41,8 +41,10 @@ struct FitOptions {
   int max_iterations = 100;
   double gradient_tolerance = 1e-9;  ///< scaled: max_i |e_i| / sqrt(M_ii 2N cost)
   double step_tolerance = 1e-10;     ///< largest relative change of a pole, and of the cost
-  bool uncertainty = true;           ///< also standard deviations and the variance of the response
-  int threads = 0;                   ///< 0: all cores; the result does not depend on it
+  /// Largest distance of a parameter from the stationary point, in standard deviations (Newton decrement).
+  double deviation_tolerance = 1e-4;
+  bool uncertainty = true;  ///< also standard deviations and the variance of the response
+  int threads = 0;          ///< 0: all cores; the result does not depend on it
   std::function<void(int iteration, double cost)> progress;
 };
 

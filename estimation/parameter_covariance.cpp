@@ -1,6 +1,8 @@
 #include "estimation/parameter_covariance.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <cmath>
 
 #include "estimation/weighted_products.hpp"
 
@@ -23,18 +25,6 @@ struct Middle {
   const ArrowSystem& system;
   double scale;
 };
-
-Eigen::MatrixXd covariance_of_globals(const ArrowSystem& gn, const Middle& K,
-                                      const Eigen::MatrixXd& inverse) {
-  Eigen::MatrixXd middle = K.system.M_globals();
-  for (std::size_t c = 0; c < gn.channels().size(); ++c) {
-    const Eigen::MatrixXd& Z = gn.channels()[c].Z;
-    const ArrowSystem::Channel& k = K.system.channels()[c];
-    middle -= Z.transpose() * k.ba + k.ab * Z;
-    middle += Z.transpose() * k.bb * Z;
-  }
-  return 0.5 * K.scale * inverse * middle * inverse.transpose();
-}
 
 /// Columns d vec(P)_c / d globals on every line for one channel, real and imaginary.
 void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
@@ -66,6 +56,107 @@ void global_columns(const FitProblem& problem, const FitParameters& beta, const 
   }
 }
 
+/// The part of those columns that the channel's numerators cannot follow: J_a - F M_bb^-1 M_ba.
+void projected_columns(const FitProblem& problem, const FitParameters& beta,
+                       const BasisGroup& group, const ArrowSystem& gn, Eigen::Index c,
+                       const std::vector<DerivativeColumn>& columns, Eigen::MatrixXd& re,
+                       Eigen::MatrixXd& im) {
+  global_columns(problem, beta, group, c, columns, re, im);
+  const Eigen::MatrixXd& Z = gn.channels()[static_cast<std::size_t>(c)].Z;
+  re -= group.F_re * Z;
+  im -= group.F_im * Z;
+}
+
+/// Lower triangular L(k) with L L^H the correlation, (n_y n_y) x N.
+Eigen::MatrixXcd correlation_factors(const Eigen::MatrixXcd& correlation, Eigen::Index n_y) {
+  Eigen::MatrixXcd factors(correlation.rows(), correlation.cols());
+  for (Eigen::Index k = 0; k < correlation.cols(); ++k) {
+    Eigen::MatrixXcd matrix = correlation.col(k).reshaped(n_y, n_y);
+    matrix.diagonal().array() += 1e-9;  // fewer degrees of freedom than outputs: singular
+    factors.col(k) = Eigen::MatrixXcd(matrix.llt().matrixL()).reshaped();
+  }
+  return factors;
+}
+
+/// K on the globals, sum_k Re{J^H W C W J} with the outputs of one input correlated.
+Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
+                                  const std::vector<BasisGroup>& groups, const ArrowSystem& gn,
+                                  const DataNoise& noise) {
+  const Eigen::Index n_y = problem.n_outputs;
+  const auto columns = derivative_columns(problem);
+  const Eigen::MatrixXcd L = correlation_factors(noise.correlation, n_y);
+  std::vector<const BasisGroup*> group_of(static_cast<std::size_t>(problem.channels()));
+  for (const BasisGroup& group : groups)
+    for (const Eigen::Index c : group.channels) group_of[static_cast<std::size_t>(c)] = &group;
+  std::vector<Eigen::MatrixXd> parts(static_cast<std::size_t>(problem.n_inputs));
+  parallel_tasks(static_cast<int>(problem.n_inputs), problem.threads, [&](int u) {
+    std::vector<Eigen::MatrixXd> J_re(static_cast<std::size_t>(n_y));
+    std::vector<Eigen::MatrixXd> J_im(static_cast<std::size_t>(n_y));
+    for (Eigen::Index y = 0; y < n_y; ++y) {
+      const Eigen::Index c = y + n_y * u;
+      const auto at = static_cast<std::size_t>(y);
+      projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)], gn, c, columns,
+                        J_re[at], J_im[at]);
+      const Eigen::ArrayXd scale =
+          (problem.W.row(c).array() * noise.variance.row(c).array().sqrt()).transpose();
+      J_re[at].array().colwise() *= scale;
+      J_im[at].array().colwise() *= scale;
+    }
+    Eigen::MatrixXd& K = parts[static_cast<std::size_t>(u)];
+    K.setZero(problem.globals(), problem.globals());
+    for (Eigen::Index r = 0; r < n_y; ++r) {
+      Eigen::MatrixXd Y_re = Eigen::MatrixXd::Zero(problem.size(), problem.globals());
+      Eigen::MatrixXd Y_im = Y_re;
+      for (Eigen::Index y = r; y < n_y; ++y) {  // conj(J) L
+        const auto at = static_cast<std::size_t>(y);
+        const Eigen::ArrayXd re = L.row(y + n_y * r).real().transpose().array();
+        const Eigen::ArrayXd im = L.row(y + n_y * r).imag().transpose().array();
+        Y_re.array() += J_re[at].array().colwise() * re + J_im[at].array().colwise() * im;
+        Y_im.array() += J_re[at].array().colwise() * im - J_im[at].array().colwise() * re;
+      }
+      K.noalias() += Y_re.transpose() * Y_re;
+      K.noalias() += Y_im.transpose() * Y_im;
+    }
+  });
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(problem.globals(), problem.globals());
+  for (const Eigen::MatrixXd& part : parts) K += part;
+  return K;
+}
+
+/// K on the globals, the channels' noise uncorrelated.
+Eigen::MatrixXd diagonal_middle(const ArrowSystem& gn, const Middle& K) {
+  Eigen::MatrixXd middle = K.system.M_globals();
+  for (std::size_t c = 0; c < gn.channels().size(); ++c) {
+    const Eigen::MatrixXd& Z = gn.channels()[c].Z;
+    const ArrowSystem::Channel& k = K.system.channels()[c];
+    middle -= Z.transpose() * k.ba + k.ab * Z;
+    middle += Z.transpose() * k.bb * Z;
+  }
+  return middle;
+}
+
+/// S^-1 on the free globals, zero where one is frozen.
+Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen) {
+  if (S.size() == 0) return S;
+  Eigen::MatrixXd reduced = S;
+  for (const Eigen::Index i : frozen) {
+    reduced.row(i).setZero();
+    reduced.col(i).setZero();
+    reduced(i, i) = 1.0;
+  }
+  const Eigen::VectorXd scale =
+      reduced.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd inverse =
+      scale.asDiagonal() *
+      (scale.asDiagonal() * reduced * scale.asDiagonal()).fullPivLu().inverse() *
+      scale.asDiagonal();
+  for (const Eigen::Index i : frozen) {
+    inverse.row(i).setZero();
+    inverse.col(i).setZero();
+  }
+  return inverse;
+}
+
 /// Diagonal of X C Y^T summed over real and imaginary parts.
 Eigen::VectorXd quadratic(const Eigen::MatrixXd& X_re, const Eigen::MatrixXd& X_im,
                           const Eigen::MatrixXd& C, const Eigen::MatrixXd& Y_re,
@@ -76,30 +167,53 @@ Eigen::VectorXd quadratic(const Eigen::MatrixXd& X_re, const Eigen::MatrixXd& X_
 
 }  // namespace
 
+Eigen::MatrixXcd output_correlation(const FrfEstimate& frf) {
+  if (frf.residual_covariance_re.size() == 0) return {};
+  const Eigen::Index n_y = frf.n_outputs();
+  Eigen::MatrixXcd out(n_y * n_y, frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k)
+    for (Eigen::Index i = 0; i < n_y; ++i)
+      for (Eigen::Index l = 0; l < n_y; ++l) {
+        const double power = frf.residual_covariance_re(i * (n_y + 1), k) *
+                             frf.residual_covariance_re(l * (n_y + 1), k);
+        const Eigen::Index at = i + n_y * l;
+        if (i == l)
+          out(at, k) = 1.0;
+        else
+          out(at, k) = power > 0.0 ? std::complex<double>(frf.residual_covariance_re(at, k),
+                                                          frf.residual_covariance_im(at, k)) /
+                                         std::sqrt(power)
+                                   : 0.0;
+      }
+  return out;
+}
+
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
                                          const std::vector<BasisGroup>& groups, const Residual& E,
-                                         const ArrowSystem& gn, VarianceKnowledge knowledge,
-                                         const Eigen::MatrixXd& variance) {
+                                         const ArrowSystem& gn, const DataNoise& noise,
+                                         const std::vector<Eigen::Index>& frozen) {
   ParameterCovariance out;
   if (!gn.regular()) return out;
   const double per_degree = residual_per_degree(problem, E);
-  if (knowledge == VarianceKnowledge::none) out.residual_scale = per_degree;
-  if (knowledge == VarianceKnowledge::weights && per_degree > kClearlyTooLarge)
+  if (noise.knowledge == VarianceKnowledge::none) out.residual_scale = per_degree;
+  if (noise.knowledge == VarianceKnowledge::weights && per_degree > kClearlyTooLarge)
     out.residual_scale = per_degree;
 
   FitProblem sandwich;
   std::vector<ArrowSystem> other;
-  if (knowledge == VarianceKnowledge::given) {
+  if (noise.knowledge == VarianceKnowledge::given) {
     sandwich = problem;
-    sandwich.W = problem.W.cwiseProduct(problem.W).cwiseProduct(variance);
+    sandwich.W = problem.W.cwiseProduct(problem.W).cwiseProduct(noise.variance);
     other.emplace_back(sandwich, beta, groups, E, FitMethod::gn);
   }
   const Middle K{other.empty() ? gn : other.front(), out.residual_scale};
-  const Eigen::MatrixXd inverse = problem.globals() > 0
-                                      ? Eigen::MatrixXd(gn.schur().fullPivLu().inverse())
-                                      : Eigen::MatrixXd(0, 0);
-  out.globals =
-      problem.globals() > 0 ? covariance_of_globals(gn, K, inverse) : Eigen::MatrixXd(0, 0);
+  const Eigen::MatrixXd inverse = free_inverse(gn.schur(), frozen);
+  if (problem.globals() > 0) {
+    const bool correlated = noise.correlation.size() > 0 && noise.variance.size() > 0;
+    const Eigen::MatrixXd middle =
+        correlated ? correlated_middle(problem, beta, groups, gn, noise) : diagonal_middle(gn, K);
+    out.globals = 0.5 * K.scale * inverse * middle * inverse.transpose();
+  }
 
   out.response_variance.resize(problem.channels(), problem.size());
   const auto columns = derivative_columns(problem);
@@ -113,9 +227,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
       if (!solve_scaled(m.bb, unit, bb_inverse)) return;
       Eigen::MatrixXd J_re;
       Eigen::MatrixXd J_im;
-      global_columns(problem, beta, group, c, columns, J_re, J_im);
-      J_re -= group.F_re * m.Z;  // the part that numerators cannot follow
-      J_im -= group.F_im * m.Z;
+      projected_columns(problem, beta, group, gn, c, columns, J_re, J_im);
       const Eigen::MatrixXd own = 0.5 * K.scale * bb_inverse * k.bb * bb_inverse;
       const Eigen::MatrixXd cross =
           0.5 * K.scale * inverse * (k.ab - m.Z.transpose() * k.bb) * bb_inverse;

@@ -19,15 +19,29 @@ enum class VarianceKnowledge : std::uint8_t {
   none      ///< proportional to 1/W, scaled by the residual
 };
 
+/// The noise of the data as far as it is known.
+struct DataNoise {
+  VarianceKnowledge knowledge = VarianceKnowledge::none;
+  Eigen::MatrixXd variance;  ///< n_c x N; empty with `none`
+  Eigen::MatrixXcd
+      correlation;  ///< (n_y n_y) x N: of the outputs for one input; empty: uncorrelated
+};
+
+/// Correlation of the outputs' noise from the FRF's residual covariance; empty if it has none.
+Eigen::MatrixXcd output_correlation(const FrfEstimate& frf);
+
 /// First-order covariance of the estimate. With M = sum Re{J^H W J} and K = sum Re{J^H W C W J},
 ///   Cov(beta) = 1/2 M^-1 K M^-1,   which is [2 sum Re{J^H C^-1 J}]^-1 for W = C^-1
-/// (facts.md section 10), restricted to what is wanted by the arrow structure.
-/// Where W is the inverse variance but the residual is clearly larger than it predicts, the
-/// covariance is raised by that ratio (`residual_scale`).
+/// (facts.md section 10), restricted to what is wanted by the arrow structure. The outputs' noise is
+/// correlated wherever a disturbance force causes it; diagonal weights ignore that, the covariance of
+/// denominators and delays does not.
+/// Where W is the inverse variance but the residual is clearly larger than it predicts, the covariance is
+/// raised by that ratio (`residual_scale`).
 /// @param gn the Gauss-Newton system at the estimate
+/// @param frozen globals that are not unknowns (a mode at its bound): known exactly here
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
                                          const std::vector<BasisGroup>& groups, const Residual& E,
-                                         const ArrowSystem& gn, VarianceKnowledge knowledge,
-                                         const Eigen::MatrixXd& variance);
+                                         const ArrowSystem& gn, const DataNoise& noise,
+                                         const std::vector<Eigen::Index>& frozen = {});
 
 }  // namespace stageid
