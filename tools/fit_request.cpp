@@ -12,6 +12,7 @@
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
 #include "excitation/hdf5_file.hpp"
+#include "frf/hold_compensation.hpp"
 #include "tools/key_suggestion.hpp"
 
 namespace stageid {
@@ -49,38 +50,32 @@ class FitDefaults {
  public:
   FitDefaults(const FitRequest& request, FitSetup& setup) : request_(request), setup_(setup) {}
 
+  /// What was taken out is put back and given to the model, which goes through hold, delay and
+  /// sampler exactly; the data keep the aliasing, and no compensation can divide it out.
+  void restore_as_measured() {
+    FrfEstimate& frf = setup_.frf;
+    const bool wanted = request_.hold.empty() || request_.hold == "exact";
+    if (frf.compensated == Compensation::none || !(frf.sample_rate_hz > 0.0) || !wanted) return;
+    known_delay_s_ = frf.delay_s;
+    frf = as_measured(frf);
+    note(fmt::format(
+        "hold and delay: {} s was taken out of the response; it is put back and modelled",
+        *known_delay_s_));
+  }
+
   void choose_hold() {
     HoldModel& hold = setup_.options.hold;
     if (!request_.hold.empty()) {
       hold = pick<HoldModel>("--hold", request_.hold, kHolds);
       return;
     }
-    const FrfEstimate& frf = setup_.frf;
-    if (frf.hold == Hold::zoh) {
+    if (setup_.frf.hold == Hold::zoh) {
       hold = HoldModel::exact;
       note("hold: exact, the response was measured through a zero-order hold");
     } else {
       hold = HoldModel::none;
-      note(frf.compensated == Compensation::hold
-               ? "hold: none, it was taken out of the response"
-               : "hold: none, the response is that of a continuous-time plant");
+      note("hold: none, the response is that of a continuous-time plant");
     }
-  }
-
-  /// A delay that was taken out is put back in and given to the model: only so does the model's
-  /// hold act on the samples as the loop saw them.
-  void restore_delay() {
-    FrfEstimate& frf = setup_.frf;
-    if (frf.compensated != Compensation::delay || setup_.options.hold == HoldModel::none) return;
-    const Eigen::VectorXd omega = frf.omega_rad_s();
-    const double taken_s = frf.delay_s + 0.5 / frf.sample_rate_hz;
-    for (Eigen::Index k = 0; k < frf.lines(); ++k)
-      frf.response.col(k) *= std::polar(1.0, -omega[k] * taken_s);
-    frf.compensated = Compensation::none;
-    known_delay_s_ = frf.delay_s;
-    frf.delay_s = 0.0;
-    note(fmt::format("delay: {} s was taken out of the response; it is put back and modelled",
-                     *known_delay_s_));
   }
 
   void choose_delay() {
@@ -259,8 +254,8 @@ FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf) {
   setup.frf =
       request.band_hz ? select_band(frf, (*request.band_hz)[0], (*request.band_hz)[1]) : frf;
   FitDefaults defaults(request, setup);
+  defaults.restore_as_measured();
   defaults.choose_hold();
-  defaults.restore_delay();
   defaults.choose_delay();
   defaults.choose_weighting();
   defaults.choose_modes();

@@ -28,6 +28,10 @@ void judge_modes(const ReportData& data, Reasons& reasons) {
   if (data.true_modes.empty()) return;
   for (const ModeRow& row : mode_table(*data.model, data.true_modes)) {
     if (!row.truth) {
+      // Beside the band a mode stands for what the plant does there: suspension, modes above.
+      const auto& band_hz = data.model->fit.band_hz;
+      if (*row.frequency_hz < band_hz[0] || (*row.frequency_hz > band_hz[1] && band_hz[1] > 0.0))
+        continue;
       reasons.push_back(
           fmt::format("a mode at {:.2f} Hz that the plant does not have", *row.frequency_hz));
     } else if (!row.frequency_hz) {

@@ -1,6 +1,7 @@
 #include "tools/truth_comparison.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +29,8 @@ std::vector<const Submodel*> modes_of(const AdditiveModel& model) {
   return modes;
 }
 
-void match(const std::vector<const Submodel*>& estimated, TruthComparison& out) {
+void match(const std::vector<const Submodel*>& estimated, const FrfEstimate& frf,
+           TruthComparison& out) {
   std::vector<Pair> pairs;
   for (std::size_t t = 0; t < out.modes.size(); ++t)
     for (std::size_t e = 0; e < estimated.size(); ++e) {
@@ -50,8 +52,13 @@ void match(const std::vector<const Submodel*>& estimated, TruthComparison& out) 
     mode.frequency_std_hz = s.natural_frequency_std_hz.value_or(0.0);
     mode.damping_std = s.damping_ratio_std.value_or(0.0);
   }
-  for (std::size_t e = 0; e < estimated.size(); ++e)
-    if (!taken[e]) out.extra_hz.push_back(estimated[e]->natural_frequency_hz());
+  // Modes beside the lines stand for what the plant does there: suspension, modes above the band.
+  const double low_hz = frf.frequency_hz[0];
+  const double high_hz = frf.frequency_hz[frf.lines() - 1];
+  for (std::size_t e = 0; e < estimated.size(); ++e) {
+    const double f = estimated[e]->natural_frequency_hz();
+    if (!taken[e]) (f < low_hz || f > high_hz ? out.outside_hz : out.extra_hz).push_back(f);
+  }
 }
 
 /// The exact plant on the lines, channels as in `frf`, as the loop saw it.
@@ -94,7 +101,7 @@ TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate
       comparison.true_damping = mode.damping_ratio;
       out.modes.push_back(comparison);
     }
-  match(modes_of(model), out);
+  match(modes_of(model), frf, out);
   const Eigen::MatrixXcd G = exact_response(frf, stage);
   const Eigen::MatrixXcd E = response_like(model, frf) - G;
   out.relative_rms_error = std::sqrt((E.cwiseAbs2().array() / G.cwiseAbs2().array()).mean());
@@ -123,10 +130,11 @@ std::vector<std::string> truth_table(const TruthComparison& comparison) {
   }
   std::vector<std::string> lines = table_lines(rows);
   for (const double hz : comparison.extra_hz)
+    lines.push_back(fmt::format("also estimated, but not a mode of the plant: {:.4f} Hz", hz));
+  if (!comparison.outside_hz.empty())
     lines.push_back(
-        fmt::format("also estimated, but not a mode of the plant below the band's end: "
-                    "{:.4f} Hz",
-                    hz));
+        fmt::format("beside the band, standing for what the plant does there: {:.5g} Hz",
+                    fmt::join(comparison.outside_hz, ", ")));
   return lines;
 }
 
@@ -149,6 +157,7 @@ nlohmann::ordered_json truth_json(const TruthComparison& comparison) {
   }
   return {{"modes", modes},
           {"extra_modes_hz", comparison.extra_hz},
+          {"modes_beside_band_hz", comparison.outside_hz},
           {"relative_rms_error", comparison.relative_rms_error},
           {"normalized_error", comparison.normalized_error}};
 }

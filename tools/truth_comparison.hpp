@@ -25,7 +25,8 @@ struct ModeComparison {
 
 struct TruthComparison {
   std::vector<ModeComparison> modes;  ///< every true mode in the band
-  std::vector<double> extra_hz;       ///< estimated modes that belong to no true one
+  std::vector<double> extra_hz;       ///< estimated modes on the lines that belong to no true one
+  std::vector<double> outside_hz;     ///< estimated modes below or above the lines
   double relative_rms_error = 0.0;    ///< of the model against the exact plant, on the lines fitted
   double normalized_error = 0.0;      ///< sqrt(sum |P - G|^2 / sum |G|^2)
 };
