@@ -127,6 +127,10 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   if (request.backend == Backend::can || request.backend == Backend::modbus)
     throw std::invalid_argument(fmt::format(
         "--backend {}: not in this version; there are sim and replay", to_string(request.backend)));
+  // Killed before the first byte was written: nothing is lost by starting anew.
+  std::error_code no_size;
+  if (request.resume && std::filesystem::file_size(request.log, no_size) == 0 && !no_size)
+    std::filesystem::remove(request.log);
   const bool exists = std::filesystem::exists(request.log);
   if (exists && !request.resume)
     throw std::invalid_argument(fmt::format(
