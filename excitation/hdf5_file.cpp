@@ -16,7 +16,13 @@ namespace stageid {
 namespace {
 
 /// HDF5 prints its error stack on stderr unless told not to; we put its reason into the exception.
-void silence_error_stack() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+/// Before the first call of the library. Its own clean-up at exit crashes on a file that a full disk kept
+/// from being closed; every handle of ours closes itself.
+void prepare_library() {
+  static const herr_t no_clean_up_at_exit = H5dont_atexit();
+  static_cast<void>(no_clean_up_at_exit);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
 
 /// HDF5 does not tell a missing file from a forbidden one in words, the operating system does.
 void check_can_be_opened(const std::filesystem::path& file) {
@@ -53,7 +59,7 @@ Hdf5File::Hdf5File(Hdf5File&&) noexcept = default;
 Hdf5File& Hdf5File::operator=(Hdf5File&&) noexcept = default;
 
 Hdf5File Hdf5File::open(const std::filesystem::path& file) {
-  silence_error_stack();
+  prepare_library();
   check_can_be_opened(file);
   if (H5Fis_hdf5(file.c_str()) <= 0) {
     H5Eclear2(H5E_DEFAULT);
@@ -73,7 +79,7 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
 Hdf5File Hdf5File::create(const std::filesystem::path& file,
                           const std::filesystem::path& shown_as) {
   const std::filesystem::path& named = shown_as.empty() ? file : shown_as;
-  silence_error_stack();
+  prepare_library();
   const Hdf5Handle properties = hdf5::property_list(H5P_FILE_CREATE);
   H5Pset_obj_track_times(properties.get(), false);
   // The format of HDF5 1.8 has checksums on most of its structure, so that damage is noticed before

@@ -69,6 +69,7 @@ TEST(FitConvergence, ThePapersFirstOrderConditionHolds) {
       options.hold = hold;
       options.method = method;
       options.delay = hold == HoldModel::none ? DelayModel::fixed : DelayModel::estimate;
+      options.deviation_tolerance = 0.0;  // to the end of the digits, far below any noise
       const FitResult fit =
           fit_additive_model(test::frf_of(problem), moved(problem.model, 1.002, 1.5), options);
       ASSERT_TRUE(fit.trustworthy()) << fit.message;
@@ -228,6 +229,7 @@ TEST(FitStatus, StepSmall) {
   const DenseProblem problem = noisy_stage(HoldModel::none, 0.03);
   FitOptions options;
   options.gradient_tolerance = 0.0;
+  options.deviation_tolerance = 0.0;
   const FitResult fit =
       fit_additive_model(test::frf_of(problem), moved(problem.model, 1.002, 1.5), options);
   EXPECT_EQ(fit.status, FitStatus::step_small) << fit.message;
