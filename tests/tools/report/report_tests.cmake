@@ -17,6 +17,6 @@ if(Python3_Interpreter_FOUND)
         --kind ${kind})
     # 77: no browser on this machine and STAGEID_REQUIRE_BROWSER not set.
     set_tests_properties(report_in_browser.${kind} PROPERTIES
-      SKIP_RETURN_CODE 77 LABELS "tools;browser" TIMEOUT 600)
+      SKIP_RETURN_CODE 77 LABELS "tools;browser" TIMEOUT 1800)
   endforeach()
 endif()
