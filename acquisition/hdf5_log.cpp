@@ -16,7 +16,6 @@ namespace stageid {
 namespace {
 
 constexpr std::size_t kPieceBytes = std::size_t{4} << 20;
-constexpr std::uint64_t kLargestPeriodBytes = std::uint64_t{1} << 30;
 
 /// An integer attribute of the file that must fit an int.
 int read_int(const Hdf5File& file, const std::string& object, const std::string& name) {
@@ -98,6 +97,9 @@ void Hdf5LogReader::read_channels() {
   info_.sample_rate_hz = file_->read_real_attribute("/", "sample_rate_hz");
   info_.period_samples = read_int(*file_, "/", "period_samples");
   info_.transient_periods = read_int(*file_, "/", "transient_periods");
+  if (file_->has_attribute("/", "metadata_json")) {
+    info_.metadata_json = file_->read_text_attribute("/", "metadata_json");
+  }
   info_.excitation = read_channel_list(*file_, "/channels/excitation");
   info_.actuators = read_channel_list(*file_, "/channels/actuators");
   info_.sensors = read_channel_list(*file_, "/channels/sensors");
@@ -105,14 +107,6 @@ void Hdf5LogReader::read_channels() {
     check_log_info(info_);
   } catch (const std::invalid_argument& error) {
     throw FormatError(path_, "/", error.what());
-  }
-  const std::uint64_t period_bytes =
-      static_cast<std::uint64_t>(info_.period_samples) * sizeof(double) * info_.excitation.size();
-  if (period_bytes > kLargestPeriodBytes) {
-    throw FormatError(path_, "/",
-                      fmt::format("period_samples is {}: one period of the excitation would take "
-                                  "{} bytes; {} at most",
-                                  info_.period_samples, period_bytes, kLargestPeriodBytes));
   }
 }
 

@@ -10,6 +10,8 @@ namespace stageid {
 
 namespace {
 
+constexpr std::uint64_t kLargestPeriodBytes = std::uint64_t{1} << 30;
+
 void check_channels(const ChannelList& channels, const char* group) {
   if (channels.units.size() != channels.names.size()) {
     throw std::invalid_argument(fmt::format("log: {} has {} names and {} units; one unit a name",
@@ -33,6 +35,14 @@ void check_log_info(const LogInfo& info) {
   if (info.period_samples <= 0) {
     throw std::invalid_argument(
         fmt::format("log: period_samples is {}; it must be positive", info.period_samples));
+  }
+  const std::uint64_t period_bytes =
+      static_cast<std::uint64_t>(info.period_samples) * sizeof(double) * info.excitation.size();
+  if (period_bytes > kLargestPeriodBytes) {
+    throw std::invalid_argument(fmt::format(
+        "log: period_samples is {}: one period of the excitation would take {} bytes; {} "
+        "at most",
+        info.period_samples, period_bytes, kLargestPeriodBytes));
   }
   if (info.transient_periods < 0) {
     throw std::invalid_argument(

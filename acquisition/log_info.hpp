@@ -23,11 +23,13 @@ struct LogInfo {
   ChannelList excitation;
   ChannelList actuators;
   ChannelList sensors;
-  std::string metadata_json = "{}";  ///< configuration text, version, seeds, start time: for people
-                                     ///< and provenance; native logs only
+  /// Configuration text, version, seeds, start time: for people and provenance. A JSON object in native
+  /// logs and what was converted from them; of other HDF5 logs "{}".
+  std::string metadata_json = "{}";
 };
 
-/// Puts the rules of a LogInfo: positive rate and period, transient_periods >= 0, one unit a name,
+/// Checks the rules of a LogInfo: positive rate and period, one period of the excitation of 1 GiB at
+/// most, transient_periods >= 0, one unit a name,
 /// at least one actuator and one sensor, no name twice in a group.
 /// @throws std::invalid_argument naming the field.
 void check_log_info(const LogInfo& info);

@@ -1,5 +1,8 @@
 #include "acquisition/log_thread.hpp"
 
+#include <pthread.h>
+#include <sched.h>
+
 #include <algorithm>
 #include <chrono>
 #include <exception>
@@ -56,6 +59,9 @@ std::string LogThread::error() const {
 }
 
 void LogThread::run() noexcept {
+  // The loop's caller may have real-time priority: writing to a disk must not inherit it.
+  const sched_param normal{};
+  static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
   while (true) {
     bool stop = false;
     {
@@ -121,6 +127,7 @@ void LogThread::execute(const Command& command) {
     } else {
       log_.end_run(command.run);
       log_.synchronize();
+      complete_runs_.fetch_add(command.run.complete ? 1 : 0, std::memory_order_relaxed);
     }
   });
   last_synchronize_ns_ = now_ns();

@@ -38,6 +38,8 @@ class LogThread {
   void drain();
 
   bool failed() const noexcept { return failed_.load(std::memory_order_relaxed); }
+  /// Complete runs that are in the log wholly.
+  int complete_runs() const noexcept { return complete_runs_.load(std::memory_order_relaxed); }
   /// What went wrong, after failed().
   std::string error() const;
 
@@ -64,6 +66,7 @@ class LogThread {
   std::string error_;
   bool stop_ = false;
   std::atomic<bool> failed_ = false;
+  std::atomic<int> complete_runs_ = 0;
   std::int64_t last_write_ns_ = 0;
   std::int64_t last_synchronize_ns_ = 0;
   std::thread thread_;  // last: it uses all the others

@@ -23,7 +23,7 @@ namespace stageid {
 namespace {
 
 constexpr std::chrono::milliseconds kProgressEvery{200};
-constexpr std::size_t kVirtualRingRows = std::size_t{1} << 15;
+constexpr std::size_t kVirtualRingRows = std::size_t{1} << 16;
 constexpr double kWallRingSeconds = 8.0;  // a disk may stall for so long
 constexpr std::uint64_t kPublishEvery = 1024;
 
@@ -140,14 +140,20 @@ class Experiment {
     loop.join();
     log_.drain();
     if (failure_) std::rethrow_exception(failure_);
-    if (log_.failed()) {
-      result_.end = ExperimentEnd::log_failed;
-      result_.message = log_.error();
-    }
+    result_.runs_done = log_.complete_runs();
+    if (log_.failed()) take_log_failure();
     return std::move(result_);
   }
 
  private:
+  /// Why the stage was stopped counts for more than that its log has failed too.
+  void take_log_failure() {
+    const bool stage_ended_it =
+        result_.end == ExperimentEnd::limit || result_.end == ExperimentEnd::fault;
+    result_.message = stage_ended_it ? result_.message + "; " + log_.error() : log_.error();
+    if (!stage_ended_it) result_.end = ExperimentEnd::log_failed;
+  }
+
   static std::size_t ring_rows(const StageInfo& info) {
     if (info.clock == Clock::virtual_time) return kVirtualRingRows;
     return std::max(kVirtualRingRows,

@@ -95,7 +95,7 @@ void SlogAppender::continue_at(std::uint64_t bytes, std::uint32_t log_id,
     throw FileError(fmt::format("{}: cannot be cut to its intact {} bytes: {}", path_.string(),
                                 bytes, reason(errno)));
   }
-  bytes_ = bytes;
+  bytes_ = written_back_ = bytes;
   log_id_ = log_id;
   next_sequence_ = next_sequence;
 }
@@ -116,6 +116,17 @@ void SlogAppender::append(SlogBlockHeader header, std::span<const std::byte> pay
   write_whole(header, payload, padding);
   bytes_ += slog_block_bytes(header);
   ++next_sequence_;
+  start_writeback();
+}
+
+// Begun early and in the background, so that synchronize() finds little left to wait for.
+void SlogAppender::start_writeback() noexcept {
+  constexpr std::uint64_t kEvery = std::uint64_t{8} << 20;
+  if (bytes_ - written_back_ < kEvery) return;
+  static_cast<void>(::sync_file_range(file_.get(), static_cast<off64_t>(written_back_),
+                                      static_cast<off64_t>(bytes_ - written_back_),
+                                      SYNC_FILE_RANGE_WRITE));
+  written_back_ = bytes_;
 }
 
 void SlogAppender::append(const SlogBlockHeader& header, std::string_view json) {
@@ -124,7 +135,7 @@ void SlogAppender::append(const SlogBlockHeader& header, std::string_view json) 
 
 void SlogAppender::write_whole(const SlogBlockHeader& header, std::span<const std::byte> payload,
                                std::size_t padding) {
-  if (failed_ || !is_open()) fail("an earlier block was not written", failed_ ? ENOSPC : EBADF);
+  if (error_ != 0 || !is_open()) fail(error_ != 0 ? error_ : EBADF);
   const auto part = [](const void* data, std::size_t size) {
     return iovec{const_cast<void*>(data), size};  // writev only reads
   };
@@ -134,7 +145,7 @@ void SlogAppender::write_whole(const SlogBlockHeader& header, std::span<const st
     const ssize_t count =
         ::writev(file_.get(), parts.data() + first, static_cast<int>(parts.size() - first));
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) fail("cannot be written", count < 0 ? errno : ENOSPC);
+    if (count <= 0) fail(count < 0 ? errno : ENOSPC);
     auto written = static_cast<std::size_t>(count);
     while (first < parts.size() && written >= parts[first].iov_len) {
       written -= parts[first++].iov_len;
@@ -146,21 +157,22 @@ void SlogAppender::write_whole(const SlogBlockHeader& header, std::span<const st
   }
 }
 
-void SlogAppender::fail(const char* doing, int error) {
-  failed_ = true;
+void SlogAppender::fail(int error) {
+  error_ = error;
   // A partial block would be taken for damage by every reader.
   const bool cut = is_open() && ::ftruncate(file_.get(), static_cast<off_t>(bytes_)) == 0;
-  throw FileError(fmt::format(
-      "{}: {}: {}; the {} blocks ({} bytes) written before are kept{}; free some space, then "
-      "continue with --resume",
-      path_.string(), doing, reason(error), next_sequence_, bytes_,
-      cut ? "" : ", behind them may stand a part of one more"));
+  throw FileError(
+      fmt::format("{}: cannot be written: {}; the {} blocks ({} bytes) written before are kept{}; "
+                  "free some space, then "
+                  "continue with --resume",
+                  path_.string(), reason(error), next_sequence_, bytes_,
+                  cut ? "" : ", behind them may stand a part of one more"));
 }
 
 void SlogAppender::synchronize() {
   if (::fdatasync(file_.get()) == 0 || errno == EINVAL || errno == EROFS) return;
   const int error = errno;
-  failed_ = true;
+  error_ = error;
   throw FileError(
       fmt::format("{}: cannot be brought to the disk: {}; what was written since the "
                   "last synchronization may be lost",

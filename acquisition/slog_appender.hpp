@@ -64,14 +64,16 @@ class SlogAppender {
   SlogAppender(std::filesystem::path path, FileDescriptor file, std::uint32_t log_id);
   void write_whole(const SlogBlockHeader& header, std::span<const std::byte> payload,
                    std::size_t padding);
-  [[noreturn]] void fail(const char* doing, int error);
+  void start_writeback() noexcept;
+  [[noreturn]] void fail(int error);
 
   std::filesystem::path path_;
   FileDescriptor file_;
   std::uint32_t log_id_;
   std::uint64_t bytes_ = 0;
   std::uint64_t next_sequence_ = 0;
-  bool failed_ = false;
+  std::uint64_t written_back_ = 0;
+  int error_ = 0;  ///< errno of the first failure
 };
 
 }  // namespace stageid

@@ -20,6 +20,7 @@ class Indexer {
   Indexer(const SlogSource& source, const SlogScan& scan) : source_(source), scan_(scan) {
     index_.damage = scan.damage;
     index_.log_id = scan.log_id;
+    index_.blocks = scan.blocks.size();
     next_damage_ = scan.damage.begin();
   }
 
@@ -38,7 +39,7 @@ class Indexer {
     close_run();
     index_.next_sequence = scan_.blocks.back().header.sequence + 1;
     std::stable_sort(index_.damage.begin(), index_.damage.end(),
-                     [](const SlogDamage& a, const SlogDamage& b) { return a.offset < b.offset; });
+                     [](const LogDamage& a, const LogDamage& b) { return a.offset < b.offset; });
     return std::move(index_);
   }
 
@@ -191,7 +192,7 @@ class Indexer {
   const SlogSource& source_;
   const SlogScan& scan_;
   SlogIndex index_;
-  std::vector<SlogDamage>::const_iterator next_damage_;
+  std::vector<LogDamage>::const_iterator next_damage_;
   std::uint32_t number_ = 0;
   bool open_ = false;
 };

@@ -25,8 +25,9 @@ struct SlogRunIndex {
 struct SlogIndex {
   LogInfo info;
   std::vector<SlogRunIndex> runs;
-  std::vector<SlogDamage> damage;  ///< of the scan, and what does not fit together
-  std::optional<SlogEnd> end;      ///< the last block, if that is an end block
+  std::vector<LogDamage> damage;  ///< of the scan, and what does not fit together
+  std::optional<SlogEnd> end;     ///< the last block, if that is an end block
+  std::uint64_t blocks = 0;       ///< intact ones
   std::uint64_t next_sequence = 0;
   std::uint32_t log_id = 0;
 };

@@ -29,10 +29,12 @@ struct SlogReader::Target {
   LogSamples& out;
 };
 
-SlogReader::SlogReader(const std::filesystem::path& file, bool damaged_is_error) : source_(file) {
-  index_ = index_slog(source_, scan_slog(source_, SlogScanDepth::headers));
+SlogReader::SlogReader(const std::filesystem::path& file, bool damaged_is_error,
+                       SlogScanDepth depth)
+    : source_(file) {
+  index_ = index_slog(source_, scan_slog(source_, depth));
   if (damaged_is_error && !index_.damage.empty()) {
-    const SlogDamage& first = index_.damage.front();
+    const LogDamage& first = index_.damage.front();
     throw FormatError(file, "",
                       fmt::format("damaged at byte {}: {}; 'stageid log recover' gives back what "
                                   "is intact",

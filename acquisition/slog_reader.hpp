@@ -12,8 +12,10 @@ namespace stageid {
 /// that it touches, wholly. All functions may be called from several threads at once.
 class SlogReader final : public LogReader {
  public:
-  /// See open_log(). @throws FileError, FormatError
-  explicit SlogReader(const std::filesystem::path& file, bool damaged_is_error = true);
+  /// See open_log(). With SlogScanDepth::payloads every byte is read and checked here.
+  /// @throws FileError, FormatError
+  explicit SlogReader(const std::filesystem::path& file, bool damaged_is_error = true,
+                      SlogScanDepth depth = SlogScanDepth::headers);
 
   const std::filesystem::path& path() const noexcept override { return source_.path(); }
   const LogInfo& info() const noexcept override { return index_.info; }
@@ -23,7 +25,9 @@ class SlogReader final : public LogReader {
             LogSamples& out) const override;
 
   /// What is damaged; empty unless opened with damaged_is_error = false.
-  const std::vector<SlogDamage>& damage() const noexcept { return index_.damage; }
+  const std::vector<LogDamage>& damage() const noexcept { return index_.damage; }
+
+  std::uint64_t intact_blocks() const noexcept { return index_.blocks; }
 
   /// Exit status and message of the experiment, if the log was closed properly.
   const std::optional<SlogEnd>& end() const noexcept { return index_.end; }

@@ -32,7 +32,13 @@ class Recovery {
   RecoverReport run() {
     // The first block must describe the log, whatever the first intact one of the old log is.
     append_json(SlogBlockType::log, to_json(info_), 0);
-    for (const SlogBlock& block : scan_.blocks) take(block);
+    for (const SlogBlock& block : scan_.blocks) {
+      try {
+        take(block);
+      } catch (const std::invalid_argument&) {
+        lose(block);  // intact, but written by something that is not this program
+      }
+    }
     close_run();
     if (!ended_) {
       append_json(SlogBlockType::end,
@@ -192,8 +198,8 @@ class Recovery {
   }
 
   void count_losses() {
-    for (const SlogDamage& damage : scan_.damage) {
-      report_.damage.push_back({damage.offset, damage.bytes, damage.what});
+    for (const LogDamage& damage : scan_.damage) {
+      report_.damage.push_back(damage);
       report_.bytes_lost += damage.bytes;
     }
     report_.blocks_lost = scan_.blocks.back().header.sequence + 1 - report_.blocks_kept;

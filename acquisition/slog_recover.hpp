@@ -5,16 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/log_info.hpp"
+#include "acquisition/slog_scan.hpp"
 
 namespace stageid {
-
-/// A damaged place of a log, for people.
-struct LogDamage {
-  std::uint64_t offset = 0;  ///< byte of the file (native logs)
-  std::uint64_t bytes = 0;   ///< 0: something is missing there
-  std::string what;
-};
 
 /// What verify_log() found. The log is intact if `damage` is empty and `closed` is true.
 struct VerifyReport {

@@ -42,8 +42,8 @@ struct SlogBlock {
   std::uint64_t end() const noexcept { return offset + slog_block_bytes(header); }
 };
 
-/// A stretch of the file that is no intact block; bytes = 0: blocks are missing there.
-struct SlogDamage {
+/// A damaged stretch of a file, for people; bytes = 0: something is missing there.
+struct LogDamage {
   std::uint64_t offset = 0;
   std::uint64_t bytes = 0;
   std::string what;
@@ -51,7 +51,7 @@ struct SlogDamage {
 
 struct SlogScan {
   std::vector<SlogBlock> blocks;  ///< in order of the file; sequence strictly increasing
-  std::vector<SlogDamage> damage;
+  std::vector<LogDamage> damage;
   std::uint64_t file_bytes = 0;
   std::uint32_t log_id = 0;
 };

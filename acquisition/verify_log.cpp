@@ -1,12 +1,9 @@
 #include <algorithm>
-#include <array>
-#include <stdexcept>
+#include <memory>
 
 #include "acquisition/log_reader.hpp"
-#include "acquisition/slog_index.hpp"
 #include "acquisition/slog_reader.hpp"
 #include "acquisition/slog_recover.hpp"
-#include "acquisition/slog_scan.hpp"
 #include "excitation/file_error.hpp"
 
 namespace stageid {
@@ -45,22 +42,17 @@ void count_runs(const LogReader& reader, VerifyReport& report) {
 
 VerifyReport verify_log(const std::filesystem::path& file) {
   VerifyReport report;
-  const std::unique_ptr<LogReader> reader = open_log(file, false);
+  report.closed = true;
+  std::unique_ptr<LogReader> reader = open_log(file, false);
   report.bytes = std::filesystem::file_size(file);
-  if (const auto* native = dynamic_cast<const SlogReader*>(reader.get())) {
-    const SlogSource source(file);
-    const SlogScan scan = scan_slog(source, SlogScanDepth::payloads);
-    report.blocks = scan.blocks.size();
-    for (const SlogDamage& damage : index_slog(source, scan).damage) {
-      report.damage.push_back({damage.offset, damage.bytes, damage.what});
-    }
+  if (dynamic_cast<const SlogReader*>(reader.get()) != nullptr) {
+    auto native = std::make_unique<SlogReader>(file, false, SlogScanDepth::payloads);
+    report.blocks = native->intact_blocks();
+    report.damage = native->damage();
     report.closed = native->end().has_value();
-    if (report.closed) {
-      report.exit_code = native->end()->exit_code;
-      report.exit_message = native->end()->message;
-    }
-  } else {
-    report.closed = true;
+    report.exit_code = report.closed ? native->end()->exit_code : 0;
+    report.exit_message = report.closed ? native->end()->message : "";
+    reader = std::move(native);
   }
   count_runs(*reader, report);
   check_values(*reader, report);

@@ -221,7 +221,7 @@ TEST_F(RunExperiment, AFaultAndTooManyMissesAreTold) {
 }
 
 TEST_F(RunExperiment, AFullDiskEndsInAControlledStop) {
-  plan_ = plan_of(2, 500);  // 50 000 rows of 48 bytes a run: more than the ring holds
+  plan_ = plan_of(2, 900);  // 90 000 rows of 48 bytes a run: more than the ring holds
   const auto file = directory_ / "a.slog";
   SlogWriter log = create("a.slog");
   ExperimentResult result;
