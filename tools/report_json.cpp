@@ -55,7 +55,8 @@ struct Uncertainty {
 Uncertainty uncertainty(const FrfEstimate& frf) {
   constexpr double kEnoughDof = 4.0;
   const bool noise_known = frf.noise_variance.size() > 0;
-  if (frf.total_variance.size() > 0 && (frf.total_dof >= kEnoughDof || !noise_known))
+  if (frf.total_variance.size() > 0 &&
+      (frf.total_dof == 0.0 || frf.total_dof >= kEnoughDof || !noise_known))
     return {&frf.total_variance, "total"};
   if (noise_known) return {&frf.noise_variance, "noise"};
   return {};
