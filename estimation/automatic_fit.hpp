@@ -16,7 +16,7 @@ struct ModelStructure {
 
 /// What decides the number of modes.
 struct ModeSelection {
-  std::vector<ModeCandidate> modes{};  ///< start here; empty: from the CMIF
+  std::vector<ModeCandidate> modes;  ///< start here; empty: from the CMIF
   int exactly = 0;                   ///< > 0: so many modes; 0: by statistics (BIC)
   bool keep_modes = false;           ///< fit `modes` as they are: none added, none removed
   int most = 60;

@@ -46,19 +46,15 @@ const char* to_string(CmifKind kind) {
   return "response";
 }
 
-/// The variance that the standard deviation of the page stands for: the total one where enough
-/// realizations tell it, or nothing else does; from two it jumps by factors from line to line.
+/// The variance that the standard deviation of the page stands for: the total one where it is
+/// known.
 struct Uncertainty {
   const Eigen::MatrixXd* variance = nullptr;
   const char* kind = "";
 };
 Uncertainty uncertainty(const FrfEstimate& frf) {
-  constexpr double kEnoughDof = 4.0;
-  const bool noise_known = frf.noise_variance.size() > 0;
-  if (frf.total_variance.size() > 0 &&
-      (frf.total_dof == 0.0 || frf.total_dof >= kEnoughDof || !noise_known))
-    return {&frf.total_variance, "total"};
-  if (noise_known) return {&frf.noise_variance, "noise"};
+  if (frf.total_variance.size() > 0) return {&frf.total_variance, "total"};
+  if (frf.noise_variance.size() > 0) return {&frf.noise_variance, "noise"};
   return {};
 }
 
