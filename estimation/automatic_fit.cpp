@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <ranges>
 #include <stdexcept>
 #include <thread>
 
@@ -259,8 +260,8 @@ class AutomaticFit {
       const std::vector<std::size_t> out = unworthy(limit, most);
       if (out.empty()) return;
       AdditiveModel model = best_.model;
-      for (auto i = out.rbegin(); i != out.rend(); ++i)
-        model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(*i));
+      for (const std::size_t i : std::views::reverse(out))
+        model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(i));
       FitResult without = fit_additive_model(frf_, model, quick_);
       if (surplus <= 0 && !(bic(without) < bic(best_))) {
         at_once = out.size() / 2;

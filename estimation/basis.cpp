@@ -244,7 +244,7 @@ void evaluate_basis(const ModelLines& lines, const SubmodelShape& shape,
 
   out.value.setZero(N, shape.functions());
   out.delay.setZero(N, shape.functions());
-  if (with_gradient) out.gradient.setZero(N, shape.functions() * n);
+  if (with_gradient) out.gradient.setZero(N, Eigen::Index{shape.functions()} * n);
 
   for (int m = 0; m <= shape.numerator_degree; ++m) {
     const int cancelled = std::min(m, l);

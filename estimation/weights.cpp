@@ -27,7 +27,7 @@ Eigen::Index window_reach(double dof) {
 /// E{1/variance} of a sample variance with nu complex degrees of freedom is nu/(nu-1) too large.
 Eigen::MatrixXd unbiased_inverse(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
                                  double dof) {
-  const Eigen::MatrixXd inverse = smoothed_variance(frf, variance, dof).cwiseInverse();
+  Eigen::MatrixXd inverse = smoothed_variance(frf, variance, dof).cwiseInverse();
   if (!(dof > 0.0)) return inverse;
   const double nu = dof * static_cast<double>(2 * window_reach(dof) + 1);
   return nu > 2.0 ? Eigen::MatrixXd(inverse * ((nu - 1.0) / nu)) : inverse;

@@ -95,7 +95,7 @@ void write_all(int descriptor, std::string_view text, const std::filesystem::pat
 
 }  // namespace
 
-OutputFile::OutputFile(std::filesystem::path target)
+OutputFile::OutputFile(const std::filesystem::path& target)
     : target_(resolve_target(target)), temporary_(temporary_beside(target_)) {
   constexpr mode_t kMode = 0666;  // less the user's umask
   const Descriptor descriptor(

@@ -10,7 +10,7 @@ namespace stageid {
 class OutputFile {
  public:
   /// @throws FileError if the directory does not exist or cannot be written.
-  explicit OutputFile(std::filesystem::path target);
+  explicit OutputFile(const std::filesystem::path& target);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;

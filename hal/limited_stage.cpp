@@ -168,7 +168,7 @@ std::string describe(const LimitViolation& violation, const StageInfo& info) {
   if (violation.kind == LimitKind::none) return "no limit was hit";
   const std::vector<Channel>& channels = violation.of_sensor ? info.sensors : info.actuators;
   const auto index = static_cast<std::size_t>(violation.channel);
-  const std::string who = fmt::format(
+  std::string who = fmt::format(
       "{} {}", violation.of_sensor ? "sensor" : "actuator",
       index < channels.size() ? channels[index].name : std::to_string(violation.channel));
   const auto line = [&](const char* what, const char* unit) {

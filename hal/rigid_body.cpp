@@ -102,7 +102,7 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
       axis.gain = unit_crossover_gain(axis, axis_inertia[i], kRigidAxisNames[i]);
     }
   }
-  MotionController{spec};  // checks the rest
+  static_cast<void>(MotionController(spec));  // checks the rest
   return spec;
 }
 
