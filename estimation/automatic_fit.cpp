@@ -18,6 +18,9 @@ namespace {
 
 constexpr int kGrowthIterations = 12;   // a mode that is still moving is finished later
 constexpr std::size_t kCandidates = 4;  // tried before it is believed that no mode is missing
+// Part of the weighted power of the response below which a residual is rounding: no more precise
+// measurement exists (-160 dB), and without a limit noise-free data would ask for modes for ever.
+constexpr double kRounding = 1e-16;
 
 Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,
                        const ModeCandidate& mode) {
@@ -80,8 +83,8 @@ class AutomaticFit {
     if (best_.status == FitStatus::singular) return finish();
     if (selection_.keep_modes) return finish();
     grow();
-    prune();
-    if (grow() && selection_.exactly == 0) prune();
+    reduce();
+    if (grow() && selection_.exactly == 0) reduce();
     return finish();
   }
 
@@ -120,37 +123,41 @@ class AutomaticFit {
         std::max<Eigen::Index>(1, std::min<Eigen::Index>(limit, selection_.most)));
   }
 
+  /// sum W |E|^2, not below rounding.
   double squares(const FitResult& fit) const {
-    return 2.0 * static_cast<double>(frf_.lines()) * fit.model.fit.cost;
+    return std::max(2.0 * static_cast<double>(frf_.lines()) * fit.model.fit.cost,
+                    kRounding * signal_);
   }
 
-  /// BIC with the scale of the variances unknown: 2 N n_c ln V + n ln(2 N n_c). Where the variances
-  /// are right it decides like the one with known variance; where the model cannot be right, it
-  /// does not chase errors.
+  /// What a mode's parameters cost in units of 2 ln(likelihood): ln(data) for each of them (BIC), and
+  /// 2 ln(lines) for the choice of its place among them (extended BIC, Chen and Chen 2008): without
+  /// it the best of thousands of places is taken where none is right.
+  double cost_of_modes(int modes) const {
+    const double data = 2.0 * static_cast<double>(frf_.response.size());
+    const double numerators = structure_.general_damping ? 2.0 : 1.0;
+    const double parameters = 2.0 + numerators * static_cast<double>(frf_.response.rows());
+    return modes *
+           (parameters * std::log(data) + 2.0 * std::log(static_cast<double>(frf_.lines())));
+  }
+
+  /// Information criterion with the scale of the variances unknown. Where the variances are right it
+  /// decides like the one with known variance; where the model cannot be right, it does not chase
+  /// errors.
   double bic(const FitResult& fit) const {
-    const double data = static_cast<double>(frf_.response.size());
-    double parameters = 0.0;
-    for (const Submodel& s : fit.model.submodels)
-      parameters +=
-          static_cast<double>(s.denominator.size() - 1) +
-          static_cast<double>(s.numerator.size()) * static_cast<double>(frf_.response.rows());
-    return 2.0 * data * std::log(std::max(squares(fit), 1e-26 * signal_)) +
-           parameters * std::log(2.0 * data);
+    const double data = 2.0 * static_cast<double>(frf_.response.size());
+    return data * std::log(squares(fit)) + cost_of_modes(count_modes(fit.model));
   }
 
   bool wanted_more() const {
     const int modes = count_modes(best_.model);
     if (selection_.exactly > 0) return modes < selection_.exactly;
-    return modes < affordable_modes() && squares(best_) > 1e-24 * signal_;
+    return modes < affordable_modes() && squares(best_) > kRounding * signal_;
   }
 
   /// What sum W |E|^2 must fall by for `modes` more modes to be worth their parameters.
   double price(int modes) const {
-    const double data = static_cast<double>(frf_.response.size());
-    const double numerators = structure_.general_damping ? 2.0 : 1.0;
-    const double parameters =
-        modes * (2.0 + numerators * static_cast<double>(frf_.response.rows()));
-    return squares(best_) * -std::expm1(-parameters * std::log(2.0 * data) / (2.0 * data));
+    const double data = 2.0 * static_cast<double>(frf_.response.size());
+    return squares(best_) * -std::expm1(-cost_of_modes(modes) / data);
   }
 
   /// Adds modes while they are worth it. @returns true if any was added.
@@ -245,6 +252,42 @@ class AutomaticFit {
     return out;
   }
 
+  /// Replaces two modes closer than a half-power width by one where the second is not worth its
+  /// parameters: on a single resonance two nearly equal modes with large opposite residues fit as
+  /// well as one, and none of them can be dropped alone.
+  void merge() {
+    struct Pair {
+      std::size_t i, j;
+      double distance;
+    };
+    std::vector<Pair> pairs;
+    const std::vector<Submodel>& all = best_.model.submodels;
+    for (std::size_t i = 0; i < all.size(); ++i)
+      for (std::size_t j = i + 1; j < all.size(); ++j) {
+        if (!all[i].is_mode() || !all[j].is_mode()) continue;
+        const double f = all[i].natural_frequency_hz();
+        const double width = 2.0 * f * std::max(all[i].damping_ratio(), all[j].damping_ratio());
+        const double distance = std::abs(all[j].natural_frequency_hz() - f) / width;
+        if (distance < 1.0) pairs.push_back({i, j, distance});
+      }
+    std::stable_sort(pairs.begin(), pairs.end(),
+                     [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+    for (const auto& [i, j, distance] : pairs) {
+      AdditiveModel model = best_.model;
+      Submodel& one = model.submodels[i];
+      const double f = std::sqrt(one.natural_frequency_hz() * all[j].natural_frequency_hz());
+      const double damping = std::sqrt(one.damping_ratio() * all[j].damping_ratio());
+      one = mode_submodel(frf_, structure_, {f, damping, 1});
+      model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(j));
+      FitResult merged = fit_additive_model(frf_, model, quick_);
+      if (!(bic(merged) < bic(best_))) continue;
+      say("merged {:.6g} and {:.6g} Hz: cost {:.6g} -> {:.6g}", all[i].natural_frequency_hz(),
+          all[j].natural_frequency_hz(), best_.model.fit.cost, merged.model.fit.cost);
+      adopt(std::move(merged));
+      return merge();  // the other pairs' places have changed
+    }
+  }
+
   /// Drops modes that are not worth their parameters, several at a time, one by one where that
   /// fails.
   void prune() {
@@ -273,6 +316,11 @@ class AutomaticFit {
             without.model.fit.cost);
       adopt(std::move(without));
     }
+  }
+
+  void reduce() {
+    prune();
+    if (selection_.exactly == 0) merge();
   }
 
   FitResult finish() {

@@ -96,20 +96,39 @@ bool is_crossing(const Decomposition& d, Eigen::Index curve, Eigen::Index k) {
   return mac(curve, curve - 1) > 0.5 && mac(curve - 1, curve) > 0.5;
 }
 
-/// Height of a local maximum above the mean of its neighbours a few lines away, against the scatter
-/// there: below this a peak is noise.
-bool above_scatter(const Eigen::Ref<const Eigen::RowVectorXd>& curve, Eigen::Index k) {
-  const Eigen::Index reach = 12;
-  const Eigen::Index first = std::max<Eigen::Index>(0, k - reach);
-  const Eigen::Index last = std::min<Eigen::Index>(curve.size() - 1, k + reach);
-  if (last - first < reach) return true;
-  std::vector<double> steps;
-  for (Eigen::Index i = first; i < last; ++i)
-    steps.push_back(
-        std::abs(10.0 * std::log10(std::max(curve[i + 1], 1e-300) / std::max(curve[i], 1e-300))));
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
-                   steps.end());
-  return prominence_db(curve, k) > 6.0 * steps[steps.size() / 2] || prominence_db(curve, k) > 20.0;
+constexpr double kScatterFactor = 5.0;  // a peak of pure noise in thousands of lines stays below
+
+/// Scatter of the curve around a line in dB (standard deviation of its logarithm), from second
+/// differences: slopes and the tops of smooth peaks count for nothing.
+double scatter_db(const Eigen::RowVectorXd& curve_db, Eigen::Index line) {
+  constexpr Eigen::Index kReach = 24;
+  const Eigen::Index first = std::max<Eigen::Index>(1, line - kReach);
+  const Eigen::Index last = std::min<Eigen::Index>(curve_db.size() - 2, line + kReach);
+  std::vector<double> bends;
+  for (Eigen::Index i = first; i <= last; ++i)
+    bends.push_back(std::abs(curve_db[i - 1] - 2.0 * curve_db[i] + curve_db[i + 1]));
+  const auto median = bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2);
+  std::nth_element(bends.begin(), median, bends.end());
+  return *median / (0.6745 * std::sqrt(6.0));  // of normal numbers
+}
+
+/// Lower quartile of the lines beside a peak up to where the curve rises above it again: a base that
+/// the deepest dips of noise do not set.
+double base_db(const Eigen::RowVectorXd& curve_db, Eigen::Index peak, Eigen::Index direction) {
+  std::vector<double> values;
+  for (Eigen::Index k = peak + direction;
+       k >= 0 && k < curve_db.size() && curve_db[k] <= curve_db[peak]; k += direction)
+    values.push_back(curve_db[k]);
+  if (values.empty()) return curve_db[peak];
+  const auto quartile = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 4);
+  std::nth_element(values.begin(), quartile, values.end());
+  return *quartile;
+}
+
+/// Whether a local maximum stands above its surroundings by more than noise makes maxima stand.
+bool above_scatter(const Eigen::RowVectorXd& curve_db, Eigen::Index peak) {
+  const double base = std::max(base_db(curve_db, peak, -1), base_db(curve_db, peak, +1));
+  return curve_db[peak] - base > kScatterFactor * scatter_db(curve_db, peak);
 }
 
 }  // namespace
@@ -127,10 +146,11 @@ std::vector<ModeCandidate> pick_modes(const FrfEstimate& frf, const PeakOptions&
   std::vector<Peak> peaks;
   for (Eigen::Index c = 0; c < d.curves.rows(); ++c) {
     const Eigen::RowVectorXd curve = d.curves.row(c);
+    const Eigen::RowVectorXd curve_db = 10.0 * curve.array().max(1e-300).log10();
     for (Eigen::Index k = 1; k + 1 < curve.size(); ++k) {
       if (!(curve[k] > curve[k - 1] && curve[k] >= curve[k + 1])) continue;
       const double prominence = prominence_db(curve, k);
-      if (prominence < options.minimum_prominence_db || !above_scatter(curve, k) ||
+      if (prominence < options.minimum_prominence_db || !above_scatter(curve_db, k) ||
           is_crossing(d, c, k))
         continue;
       peaks.push_back({{frf.frequency_hz[k], half_power_damping(frf.frequency_hz, curve, k),

@@ -18,7 +18,7 @@ std::vector<JsonNode> JsonNode::elements() const {
   if (!value_.is_array()) fail("must be a list");
   std::vector<JsonNode> out;
   std::size_t i = 0;
-  for (const nlohmann::json& element : value_)
+  for (const nlohmann::ordered_json& element : value_)
     out.emplace_back(file_, place_ + "/" + std::to_string(i++), element);
   return out;
 }
@@ -74,8 +74,14 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
   if (text.str().empty())
     throw FormatError(file_, "", "is empty; a JSON file of format " + format + " is wanted");
   try {
-    value_ = nlohmann::json::parse(text.str());
-  } catch (const nlohmann::json::parse_error& error) {
+    value_ = nlohmann::ordered_json::parse(text.str());
+  } catch (const nlohmann::ordered_json::out_of_range& error) {
+    const std::string what = error.what();  // ... number overflow parsing '1e999'
+    const std::size_t start = what.find('\'');
+    throw FormatError(file_, "",
+                      "holds a number beyond double precision" +
+                          (start == std::string::npos ? "" : ": " + what.substr(start)));
+  } catch (const nlohmann::ordered_json::parse_error& error) {
     // The library's own text names line and column behind its error number.
     const std::string what = error.what();
     const std::size_t start = what.find("at line");

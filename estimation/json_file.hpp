@@ -12,7 +12,7 @@ namespace stageid {
 /// A place in a JSON file from outside: every access checks, every failure names file and place.
 class JsonNode {
  public:
-  JsonNode(const std::filesystem::path& file, std::string place, const nlohmann::json& value)
+  JsonNode(const std::filesystem::path& file, std::string place, const nlohmann::ordered_json& value)
       : file_(file), place_(std::move(place)), value_(value) {}
 
   bool has(const std::string& key) const { return value_.is_object() && value_.contains(key); }
@@ -26,13 +26,13 @@ class JsonNode {
   std::string text() const;
   std::vector<double> numbers() const;
   std::vector<std::string> texts() const;
-  const nlohmann::json& raw() const noexcept { return value_; }
+  const nlohmann::ordered_json& raw() const noexcept { return value_; }
   [[noreturn]] void fail(const std::string& what) const { throw FormatError(file_, place_, what); }
 
  private:
   const std::filesystem::path& file_;
   std::string place_;
-  const nlohmann::json& value_;
+  const nlohmann::ordered_json& value_;
 };
 
 /// A JSON file with its "format" checked.
@@ -46,7 +46,7 @@ class JsonFile {
 
  private:
   std::filesystem::path file_;
-  nlohmann::json value_;
+  nlohmann::ordered_json value_;
 };
 
 }  // namespace stageid

@@ -145,7 +145,7 @@ void write_model(const std::filesystem::path& file, const AdditiveModel& model) 
                  {"seconds", model.fit.seconds}};
   root["cost_history"] = model.cost_history;
   root["provenance"] = Json::parse(model.provenance_json);
-  write_text_file(file, root.dump(1) + "\n");
+  write_text_file(file, root.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 AdditiveModel read_model(const std::filesystem::path& file) {

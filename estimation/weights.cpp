@@ -18,19 +18,64 @@ std::string channel_name(const FrfEstimate& frf, Eigen::Index c, Eigen::Index k)
          std::to_string(frf.frequency_hz[k]) + " Hz";
 }
 
-/// How often the smoothing window holds a line's neighbours on each side.
-Eigen::Index window_reach(double dof) {
-  return static_cast<Eigen::Index>(
-      std::max(0.0, std::ceil(0.5 * (kWantedDof / std::max(dof, 1.0) - 1.0))));
+/// Variance of the logarithm of a sample variance with nu complex degrees of freedom: trigamma(nu),
+/// by recurrence and its asymptotic series.
+double log_variance(double nu) {
+  double sum = 0.0;
+  for (; nu < 8.0; nu += 1.0) sum += 1.0 / (nu * nu);
+  const double r = 1.0 / (nu * nu);
+  return sum + 1.0 / nu + 0.5 * r + r / nu * (1.0 / 6.0 - r * (1.0 / 30.0 - r / 42.0));
 }
 
-/// E{1/variance} of a sample variance with nu complex degrees of freedom is nu/(nu-1) too large.
-Eigen::MatrixXd unbiased_inverse(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
-                                 double dof) {
-  Eigen::MatrixXd inverse = smoothed_variance(frf, variance, dof).cwiseInverse();
-  if (!(dof > 0.0)) return inverse;
-  const double nu = dof * static_cast<double>(2 * window_reach(dof) + 1);
-  return nu > 2.0 ? Eigen::MatrixXd(inverse * ((nu - 1.0) / nu)) : inverse;
+/// Neighbours on each side of a line whose mean scatters like a variance of kWantedDof.
+Eigen::Index window_reach(double dof) {
+  if (!(dof > 0.0) || dof >= kWantedDof) return 0;  // 0: unknown, taken as exact
+  const double lines = kWantedDof * log_variance(std::max(dof, 1.0));
+  return static_cast<Eigen::Index>(std::ceil(0.5 * (lines - 1.0)));
+}
+
+/// E{g^power} of g, the geometric mean of n sample variances of true value 1 with nu complex degrees
+/// of freedom each (Gamma distributed, shape nu, mean 1).
+double expected_power(double power, double n, double nu) {
+  const double share = power / n;
+  if (!(nu + share > 0.0)) return 1.0;  // infinite: one line alone, and one degree of freedom
+  return std::exp(n * (std::lgamma(nu + share) - std::lgamma(nu) - share * std::log(nu)));
+}
+
+/// v^power for power 1 or -1, v being the geometric mean over neighbouring lines: a resonance that
+/// stands out of them does not spread. Its expectation is that of the true variance's power.
+Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, double power) {
+  if (!(dof > 0.0)) return power > 0.0 ? variance : Eigen::MatrixXd(variance.cwiseInverse());
+  const Eigen::Index half = window_reach(dof);
+  const double nu = std::max(dof, 1.0);
+  if (half == 0 && power > 0.0) return variance;
+  if (half == 0) return variance.cwiseInverse() * ((nu - 1.0) / nu);
+  const Eigen::MatrixXd logarithm = variance.array().log().matrix();
+  const Eigen::Index N = variance.cols();
+  Eigen::MatrixXd out(variance.rows(), N);
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const Eigen::Index first = std::max<Eigen::Index>(0, k - half);
+    const Eigen::Index count = std::min<Eigen::Index>(N - 1, k + half) - first + 1;
+    const double bias = std::log(expected_power(power, static_cast<double>(count), nu));
+    out.col(k) =
+        (power * logarithm.middleCols(first, count).rowwise().mean().array() - bias).exp().matrix();
+  }
+  return out;
+}
+
+/// Smoothed variance (power 1) or its inverse (power -1), each without bias.
+Eigen::MatrixXd smoothed_variance_power(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
+                                        double dof, double power) {
+  if (frf.residual_covariance_re.size() == 0 || &variance != &frf.noise_variance ||
+      window_reach(dof) == 0)
+    return smoothed_power(variance, dof, power);
+  // Var(G_ij) = C_E,ii [(U U^H)^-1]_jj, and only the first factor is random: smooth that one.
+  const Eigen::Index n_y = frf.n_outputs();
+  Eigen::MatrixXd C_E(n_y, variance.cols());
+  for (Eigen::Index y = 0; y < n_y; ++y) C_E.row(y) = frf.residual_covariance_re.row(y * (n_y + 1));
+  if (!(C_E.minCoeff() > 0.0)) return smoothed_power(variance, dof, power);
+  const Eigen::ArrayXXd ratio = smoothed_power(C_E, dof, power).array() * C_E.array().pow(-power);
+  return (variance.array().pow(power) * ratio.replicate(frf.n_inputs(), 1)).matrix();
 }
 
 Eigen::MatrixXd inverse_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
@@ -45,7 +90,7 @@ Eigen::MatrixXd inverse_variance(const FrfEstimate& frf, const Eigen::MatrixXd& 
         throw std::invalid_argument(
             std::string(name) + " of " + channel_name(frf, c, k) +
             " is zero or not finite; every variance must be positive to weigh with it");
-  return unbiased_inverse(frf, variance, dof);
+  return smoothed_variance_power(frf, variance, dof, -1.0);
 }
 
 Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
@@ -65,40 +110,9 @@ Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
 
 }  // namespace
 
-namespace {
-
-/// Geometric mean over neighbouring lines: a resonance that stands out of them does not spread. The
-/// bias of the logarithm of a variance (digamma(dof) - log(dof)) is taken back.
-Eigen::MatrixXd smoothed(const Eigen::MatrixXd& variance, double dof) {
-  const Eigen::Index half = window_reach(dof);
-  const Eigen::MatrixXd logarithm = variance.array().log().matrix();
-  const Eigen::Index N = variance.cols();
-  const double known = std::max(dof, 1.0);
-  const double bias = 0.5 / known + 1.0 / (12.0 * known * known);
-  Eigen::MatrixXd out(variance.rows(), N);
-  for (Eigen::Index k = 0; k < N; ++k) {
-    const Eigen::Index first = std::max<Eigen::Index>(0, k - half);
-    const Eigen::Index count = std::min<Eigen::Index>(N - 1, k + half) - first + 1;
-    out.col(k) =
-        (logarithm.middleCols(first, count).rowwise().mean().array() + bias).exp().matrix();
-  }
-  return out;
-}
-
-}  // namespace
-
 Eigen::MatrixXd smoothed_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
                                   double dof) {
-  if (!(dof > 0.0) || window_reach(dof) == 0) return variance;  // unknown: taken as exact
-  const Eigen::Index n_y = frf.n_outputs();
-  if (frf.residual_covariance_re.size() == 0 || &variance != &frf.noise_variance)
-    return smoothed(variance, dof);
-  // Var(G_ij) = C_E,ii [(U U^H)^-1]_jj, and only the first factor is random: smooth that one.
-  Eigen::MatrixXd C_E(n_y, variance.cols());
-  for (Eigen::Index y = 0; y < n_y; ++y) C_E.row(y) = frf.residual_covariance_re.row(y * (n_y + 1));
-  if (!(C_E.minCoeff() > 0.0)) return smoothed(variance, dof);
-  const Eigen::MatrixXd ratio = smoothed(C_E, dof).cwiseQuotient(C_E);
-  return variance.cwiseProduct(ratio.replicate(frf.n_inputs(), 1));
+  return smoothed_variance_power(frf, variance, dof, 1.0);
 }
 
 Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options) {

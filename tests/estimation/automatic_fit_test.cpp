@@ -1,0 +1,210 @@
+// A fit that is told nothing must find what is there.
+
+#include "estimation/automatic_fit.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "tests/support/model_blind_fit.hpp"
+#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/model_reference.hpp"
+
+namespace stageid {
+namespace {
+
+/// The paper's stage on every third of its lines: quick, and the sharpest modes (0.2 % at 100 Hz)
+/// have hardly a line in their half-power width.
+test::RandomStageSpec quick_stage() {
+  test::RandomStageSpec spec;
+  spec.line_spacing_hz = 1.5;
+  return spec;
+}
+
+// The share is a promise, and below it something has become worse: 40 of 40 stages on the paper's
+// full grid succeed in tests/benchmark/blind_fit_study.
+TEST(AutomaticFit, FindsWhatIsThereBlind) {
+  constexpr int kStages = 10;
+  constexpr int kDemanded = 9;
+  int successes = 0;
+  std::string failures;
+  for (std::uint64_t seed = 101; seed < 101 + kStages; ++seed) {
+    const test::RandomStage stage = test::draw_random_stage(seed, quick_stage());
+    const test::BlindFit fit = test::fit_blind(stage, 0);
+    if (fit.success)
+      ++successes;
+    else
+      failures += fmt::format("seed {}: {}\n{}\n", seed, stage.description(), fit.report());
+  }
+  RecordProperty("successes", successes);
+  EXPECT_GE(successes, kDemanded) << failures;
+  if (!failures.empty()) std::fputs(failures.c_str(), stdout);
+}
+
+// The measure itself must be able to fail: a fit of two modes too few is no success.
+TEST(AutomaticFit, TheMeasureOfSuccessSeesAMissingMode) {
+  const test::RandomStage stage = test::draw_random_stage(101, quick_stage());
+  FitOptions options;
+  options.weighting = Weighting::noise_variance;
+  options.hold = HoldModel::exact;
+  options.delay_s = stage.delay_s;
+  options.uncertainty = false;
+  AdditiveModel less = stage.truth;
+  less.submodels.pop_back();
+  const double all = fit_additive_model(stage.frf, stage.truth, options).model.fit.cost;
+  EXPECT_GT(fit_additive_model(stage.frf, less, options).model.fit.cost, 1.005 * all);
+}
+
+// Structures --------------------------------------------------------------------------------------
+
+/// A 2 x 2 stage with three well separated modes and 0.5 % relative noise; no sample rate.
+class SmallStage : public testing::Test {
+ protected:
+  void SetUp() override {
+    test::RandomNumbers random(55);
+    problem_.model = test::named_model(2, 2);
+    problem_.frequency_hz = Eigen::VectorXd::LinSpaced(500, 10.0, 1000.0);
+    problem_.model.submodels.push_back(test::empty_submodel(problem_.model, 2, {}, 1));
+    for (const double f : {120.0, 390.0, 640.0})
+      problem_.model.submodels.push_back(
+          test::empty_submodel(problem_.model, 0, test::mode_coefficients(f, 0.01), 1));
+    for (Submodel& s : problem_.model.submodels)
+      for (double& value : s.numerator[0].reshaped())
+        value = (s.is_mode() ? s.denominator[2] : 1.0) * (random.uniform() < 0.5 ? -1.0 : 1.0) *
+                random.uniform(0.5, 2.0);
+    problem_.G = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+    frf_ = test::frf_of(problem_);
+    for (std::complex<double>& value : frf_.response.reshaped())
+      value *= 1.0 + 0.005 * random.circular();
+  }
+
+  static std::vector<double> frequencies(const AdditiveModel& model) {
+    std::vector<double> out;
+    for (const Submodel& s : model.submodels)
+      if (s.is_mode()) out.push_back(s.natural_frequency_hz());
+    return out;
+  }
+
+  test::DenseProblem problem_;
+  FrfEstimate frf_;
+};
+
+testing::Matcher<std::vector<double>> near_hz(std::initializer_list<double> expected) {
+  std::vector<testing::Matcher<double>> each;
+  for (const double f : expected) each.push_back(testing::DoubleNear(f, 1e-4 * f));
+  return testing::ElementsAreArray(each);
+}
+
+TEST_F(SmallStage, FindsItsModesAndSaysWhatItDid) {
+  const FitResult fit = automatic_fit(frf_, {}, {}, {});
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_EQ(fit.model.submodels.size(), 4U);
+  EXPECT_EQ(fit.model.submodels[0].integrators, 2);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_THAT(fit.decisions.front(), testing::HasSubstr("peaks of the CMIF"));
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::HasSubstr("no further mode")));
+}
+
+TEST_F(SmallStage, CompletesAStartThatLacksAMode) {
+  const FitResult fit =
+      automatic_fit(frf_, {}, {.modes = {{121.0, 0.01, 1}, {638.0, 0.01, 1}}}, {});
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("added 39")));
+}
+
+TEST_F(SmallStage, DropsModesThatAreNotThereAndMergesTwoOnOnePeak) {
+  const std::vector<ModeCandidate> modes = {
+      {119.5, 0.01, 1}, {120.5, 0.01, 1}, {250.0, 0.01, 1}, {391.0, 0.01, 1}, {639.0, 0.01, 1}};
+  const FitResult fit = automatic_fit(frf_, {}, {.modes = modes}, {});
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("dropped")));
+}
+
+TEST_F(SmallStage, FitsSoManyModesAsAsked) {
+  for (const int count : {1, 2, 3, 4}) {
+    const FitResult fit = automatic_fit(frf_, {}, {.modes = {}, .exactly = count}, {});
+    EXPECT_EQ(frequencies(fit.model).size(), static_cast<std::size_t>(count));
+  }
+}
+
+TEST_F(SmallStage, KeepsTheModesThatItIsToldToKeep) {
+  const FitResult fit = automatic_fit(
+      frf_, {}, {.modes = {{121.0, 0.01, 1}, {638.0, 0.01, 1}}, .keep_modes = true}, {});
+  EXPECT_EQ(frequencies(fit.model).size(), 2U);
+}
+
+TEST_F(SmallStage, NeverExceedsTheMostModes) {
+  const FitResult fit = automatic_fit(frf_, {}, {.modes = {}, .most = 2}, {});
+  EXPECT_LE(frequencies(fit.model).size(), 2U);
+}
+
+TEST_F(SmallStage, NoiseFreeDataGetTheirModesAndNoMore) {
+  frf_.response = problem_.G;
+  const FitResult fit = automatic_fit(frf_, {}, {}, {});
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_LT(fit.model.fit.relative_rms_error, 1e-8);
+}
+
+TEST_F(SmallStage, GeneralDampingAndDirectTermAreFoundWhereTheyAre) {
+  for (Submodel& s : problem_.model.submodels)
+    if (s.is_mode()) s.numerator.push_back(3e-4 * s.numerator[0].colwise().reverse());
+  Submodel direct = test::empty_submodel(problem_.model, 0, {}, 1);
+  direct.numerator[0].setConstant(2e-8);
+  problem_.model.submodels.push_back(direct);
+  frf_.response = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+  const FitResult fit = automatic_fit(
+      frf_, {.rigid_body = true, .direct_term = true, .general_damping = true}, {}, {});
+  EXPECT_LT(fit.model.fit.relative_rms_error, 1e-7) << fit.message;
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+}
+
+TEST_F(SmallStage, WithoutRigidBodyThereIsNone) {
+  problem_.model.submodels.erase(problem_.model.submodels.begin());
+  frf_.response = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+  const FitResult fit = automatic_fit(frf_, {.rigid_body = false}, {}, {});
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_EQ(fit.model.submodels.size(), 3U);
+}
+
+TEST_F(SmallStage, TheNumberOfThreadsDoesNotChangeABit) {
+  FitOptions options;
+  options.threads = 1;
+  const FitResult one = automatic_fit(frf_, {}, {}, options);
+  options.threads = 2;
+  const FitResult two = automatic_fit(frf_, {}, {}, options);
+  ASSERT_EQ(one.model.submodels.size(), two.model.submodels.size());
+  EXPECT_EQ(one.cost, two.cost);
+  EXPECT_EQ(one.decisions, two.decisions);
+  for (std::size_t i = 0; i < one.model.submodels.size(); ++i) {
+    EXPECT_EQ(one.model.submodels[i].denominator, two.model.submodels[i].denominator);
+    EXPECT_EQ(one.model.submodels[i].numerator, two.model.submodels[i].numerator);
+  }
+}
+
+TEST_F(SmallStage, FewLinesAreNotOverfitted) {
+  const FrfEstimate few = select_band(frf_, 100.0, 140.0);  // 20 lines, one mode
+  const FitResult fit = automatic_fit(few, {}, {}, {});
+  EXPECT_LE(frequencies(fit.model).size(), 3U);
+  EXPECT_THAT(frequencies(fit.model), testing::Contains(testing::DoubleNear(120.0, 0.1)));
+}
+
+TEST_F(SmallStage, RefusesNumbersOfModesThatAreNone) {
+  const auto message = testing::ThrowsMessage<std::invalid_argument>(
+      testing::HasSubstr("number of modes must be positive"));
+  EXPECT_THAT([this] { (void)automatic_fit(frf_, {}, {.modes = {}, .exactly = -1}, {}); }, message);
+  EXPECT_THAT([this] { (void)automatic_fit(frf_, {}, {.modes = {}, .most = 0}, {}); }, message);
+}
+
+TEST_F(SmallStage, RefusesWeightsThatAreNotThere) {
+  FitOptions options;
+  options.weighting = Weighting::total_variance;
+  EXPECT_THAT([&] { (void)automatic_fit(frf_, {}, {}, options); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("total_variance")));
+}
+
+}  // namespace
+}  // namespace stageid
