@@ -79,6 +79,20 @@ TEST(Report, DescribesEveryBlockItHolds) {
   EXPECT_EQ(count(page, "id=\"data-"), 7u);
 }
 
+TEST(Report, ShowsTheTotalVarianceOnlyWhereEnoughRealizationsTellIt) {
+  ReportData data = small();
+  for (const auto& [dof, kind] : {std::pair{1.0, "noise"},
+                                  {3.0, "noise"},
+                                  {4.0, "total"},
+                                  {0.0, "total"}}) {  // 0: where it comes from is not known
+    data.frf->total_dof = dof;
+    EXPECT_EQ(content(report_page(data))["frf"]["deviation"], kind) << dof;
+  }
+  data.frf->total_dof = 1.0;
+  data.frf->noise_variance.resize(0, 0);
+  EXPECT_EQ(content(report_page(data))["frf"]["deviation"], "total");
+}
+
 TEST(Report, ShowsTheTotalVarianceWhereThereIsOneElseTheNoise) {
   ReportData data = small();
   EXPECT_EQ(content(report_page(data))["frf"]["deviation"], "total");

@@ -149,11 +149,11 @@ void add_measurement(ReportData& data, const SyntheticSize& size, Random& random
   frf.noise_variance = 0.9 * frf.total_variance;
   frf.sample_rate_hz = 10000.0;
   frf.hold = Hold::zoh;
-  frf.realizations = 2;
+  frf.realizations = 8;
   frf.periods = 3;
   frf.experiments = static_cast<int>(size.inputs);
-  frf.noise_dof = 4.0 * static_cast<double>(size.inputs);
-  frf.total_dof = 1.0;
+  frf.noise_dof = 16.0 * static_cast<double>(size.inputs);
+  frf.total_dof = 7.0;
   frf.input_condition = Eigen::VectorXd::Constant(size.lines, 1.8);
   frf.excluded_channels = {"ax1", "ay1"};
   frf.excluded_power = Eigen::VectorXd{{2e-4, 1e-4}};
