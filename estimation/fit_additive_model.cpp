@@ -123,11 +123,10 @@ void fill_deviations(const Eigen::MatrixXd& covariance, AdditiveModel& model) {
       const double a2 = s.denominator[2];
       const Eigen::Vector2d df(0.0, -0.5 * s.natural_frequency_hz() / a2);
       const Eigen::Vector2d dz = s.damping_ratio() * Eigen::Vector2d(1.0 / a1, -0.5 / a2);
-      // Zero: the mode stands at a bound and its place is not in the data.
-      if (C(1, 1) > 0.0) {
-        s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
+      // Zero: the mode stands at a bound and its place, or its damping, is not in the data.
+      if (C(1, 1) > 0.0) s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
+      if (C(1, 1) > 0.0 && C(0, 0) > 0.0)
         s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
-      }
     }
     first += order;
   }
