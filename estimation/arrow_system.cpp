@@ -34,6 +34,42 @@ void equation_error_columns(const FitProblem& problem, const FitParameters& beta
   }
 }
 
+/// sum_k Re{ conj(D_l) D_r } sum_c B(c, f_l) W(c, k) B(c, f_r) for l >= r: the channels are summed
+/// before the derivatives are multiplied, as one matrix product for all pairs of functions.
+Eigen::MatrixXd derivative_products(const Eigen::MatrixXd& W, const Eigen::MatrixXd& B,
+                                    const std::vector<DerivativeColumn>& columns,
+                                    const BasisGroup& group, int threads) {
+  const auto n_d = static_cast<Eigen::Index>(columns.size());
+  std::vector<std::vector<Eigen::Index>> of_function(static_cast<std::size_t>(B.cols()));
+  for (Eigen::Index d = 0; d < n_d; ++d)
+    of_function[static_cast<std::size_t>(columns[static_cast<std::size_t>(d)].function)].push_back(
+        d);
+  const std::vector<ColumnPair> pairs = triangular_pairs(B.cols());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n_d, n_d);
+  for_each_pair_block(
+      static_cast<Eigen::Index>(pairs.size()), W.cols(), threads,
+      [&](Eigen::Index first, Eigen::Index count, Eigen::Index k, Eigen::Index n) {
+        Eigen::MatrixXd BB(B.rows(), count);
+        for (Eigen::Index p = 0; p < count; ++p) {
+          const auto [f, g] = pairs[static_cast<std::size_t>(first + p)];
+          BB.col(p) = B.col(f).cwiseProduct(B.col(g));
+        }
+        const Eigen::MatrixXd weight = W.middleCols(k, n).transpose() * BB;
+        for (Eigen::Index p = 0; p < count; ++p) {
+          const auto [f, g] = pairs[static_cast<std::size_t>(first + p)];
+          for (const Eigen::Index l : of_function[static_cast<std::size_t>(f)])
+            for (const Eigen::Index r : of_function[static_cast<std::size_t>(g)])
+              if (l >= r)
+                out(l, r) += (weight.col(p).array() * (group.D_re.col(l).segment(k, n).array() *
+                                                           group.D_re.col(r).segment(k, n).array() +
+                                                       group.D_im.col(l).segment(k, n).array() *
+                                                           group.D_im.col(r).segment(k, n).array()))
+                                 .sum();
+        }
+      });
+  return out;
+}
+
 }  // namespace
 
 bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x) {
@@ -123,22 +159,7 @@ void ArrowSystem::add_denominator_block(const BasisGroup& group, const Eigen::Ma
                                         const Eigen::MatrixXd& WE_im) {
   const Eigen::Index n_a = problem_.denominators();
   const auto n_d = static_cast<Eigen::Index>(columns_.size());
-  // sum_c B(c,f) B(c,g) W(c,k): the channels are summed before the derivatives are multiplied.
-  Eigen::MatrixXd block = Eigen::MatrixXd::Zero(n_d, n_d);
-  parallel_tasks(static_cast<int>(n_d), problem_.threads, [&](int left) {
-    const Eigen::Index f = columns_[static_cast<std::size_t>(left)].function;
-    Eigen::Index last = -1;
-    Eigen::VectorXd weight;
-    for (Eigen::Index right = 0; right <= left; ++right) {
-      const Eigen::Index g = columns_[static_cast<std::size_t>(right)].function;
-      if (g != last) weight = W.transpose() * B.col(f).cwiseProduct(B.col(g));
-      last = g;
-      block(left, right) =
-          (weight.array() * (group.D_re.col(left).array() * group.D_re.col(right).array() +
-                             group.D_im.col(left).array() * group.D_im.col(right).array()))
-              .sum();
-    }
-  });
+  const Eigen::MatrixXd block = derivative_products(W, B, columns_, group, problem_.threads);
   // sum_c B(c,f) W(c,k) E(c,k)
   const Eigen::MatrixXd r_re = WE_re.transpose() * B;
   const Eigen::MatrixXd r_im = WE_im.transpose() * B;

@@ -22,39 +22,33 @@ std::vector<ColumnPair> all_pairs(Eigen::Index left, Eigen::Index right) {
   return pairs;
 }
 
-namespace {
-
-/// Calls sum(first pair, count, first line, lines) for every tile of every block, blocks in
-/// parallel.
-template <typename Sum>
-void for_each_block(Eigen::Index pairs, Eigen::Index lines, int threads, const Sum& sum) {
+void for_each_pair_block(Eigen::Index pairs, Eigen::Index lines, int threads,
+                         const PairBlockTask& task) {
   const auto blocks = static_cast<int>((pairs + kBlockPairs - 1) / kBlockPairs);
   parallel_tasks(blocks, threads, [&](int block) {
     const Eigen::Index first = block * kBlockPairs;
     const Eigen::Index count = std::min(kBlockPairs, pairs - first);
     for (Eigen::Index k = 0; k < lines; k += kTileLines)
-      sum(first, count, k, std::min(kTileLines, lines - k));
+      task(first, count, k, std::min(kTileLines, lines - k));
   });
 }
-
-}  // namespace
 
 Eigen::MatrixXd weighted_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X,
                                    const ComplexColumns& Y, const std::vector<ColumnPair>& pairs,
                                    int threads) {
   const auto n_pairs = static_cast<Eigen::Index>(pairs.size());
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(W.rows(), n_pairs);
-  for_each_block(n_pairs, W.cols(), threads,
-                 [&](Eigen::Index first, Eigen::Index count, Eigen::Index k, Eigen::Index n) {
-                   Eigen::MatrixXd products(n, count);
-                   for (Eigen::Index p = 0; p < count; ++p) {
-                     const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
-                     products.col(p) =
-                         X.re.col(i).segment(k, n).cwiseProduct(Y.re.col(j).segment(k, n)) +
-                         X.im.col(i).segment(k, n).cwiseProduct(Y.im.col(j).segment(k, n));
-                   }
-                   sums.middleCols(first, count).noalias() += W.middleCols(k, n) * products;
-                 });
+  for_each_pair_block(n_pairs, W.cols(), threads,
+                      [&](Eigen::Index first, Eigen::Index count, Eigen::Index k, Eigen::Index n) {
+                        Eigen::MatrixXd products(n, count);
+                        for (Eigen::Index p = 0; p < count; ++p) {
+                          const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
+                          products.col(p) =
+                              X.re.col(i).segment(k, n).cwiseProduct(Y.re.col(j).segment(k, n)) +
+                              X.im.col(i).segment(k, n).cwiseProduct(Y.im.col(j).segment(k, n));
+                        }
+                        sums.middleCols(first, count).noalias() += W.middleCols(k, n) * products;
+                      });
   return sums;
 }
 
@@ -63,22 +57,22 @@ Eigen::MatrixXd weighted_pair_sums(const ComplexColumns& V, const ComplexColumns
                                    int threads) {
   const auto n_pairs = static_cast<Eigen::Index>(pairs.size());
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(V.re.rows(), n_pairs);
-  for_each_block(n_pairs, V.re.cols(), threads,
-                 [&](Eigen::Index first, Eigen::Index count, Eigen::Index k, Eigen::Index n) {
-                   Eigen::MatrixXd re(n, count);
-                   Eigen::MatrixXd im(n, count);
-                   for (Eigen::Index p = 0; p < count; ++p) {
-                     const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
-                     const auto x_re = X.re.col(i).segment(k, n);
-                     const auto x_im = X.im.col(i).segment(k, n);
-                     const auto y_re = Y.re.col(j).segment(k, n);
-                     const auto y_im = Y.im.col(j).segment(k, n);
-                     re.col(p) = x_re.cwiseProduct(y_re) + x_im.cwiseProduct(y_im);
-                     im.col(p) = x_re.cwiseProduct(y_im) - x_im.cwiseProduct(y_re);
-                   }
-                   sums.middleCols(first, count).noalias() += V.re.middleCols(k, n) * re;
-                   sums.middleCols(first, count).noalias() -= V.im.middleCols(k, n) * im;
-                 });
+  for_each_pair_block(n_pairs, V.re.cols(), threads,
+                      [&](Eigen::Index first, Eigen::Index count, Eigen::Index k, Eigen::Index n) {
+                        Eigen::MatrixXd re(n, count);
+                        Eigen::MatrixXd im(n, count);
+                        for (Eigen::Index p = 0; p < count; ++p) {
+                          const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
+                          const auto x_re = X.re.col(i).segment(k, n);
+                          const auto x_im = X.im.col(i).segment(k, n);
+                          const auto y_re = Y.re.col(j).segment(k, n);
+                          const auto y_im = Y.im.col(j).segment(k, n);
+                          re.col(p) = x_re.cwiseProduct(y_re) + x_im.cwiseProduct(y_im);
+                          im.col(p) = x_re.cwiseProduct(y_im) - x_im.cwiseProduct(y_re);
+                        }
+                        sums.middleCols(first, count).noalias() += V.re.middleCols(k, n) * re;
+                        sums.middleCols(first, count).noalias() -= V.im.middleCols(k, n) * im;
+                      });
   return sums;
 }
 

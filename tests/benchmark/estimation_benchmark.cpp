@@ -1,0 +1,87 @@
+// The estimator at the paper's size: 3960 lines, 4 x 13 channels, rigid body and 17 modes, 970
+// parameters; beside it, in the same run, one 850 x 850 x 850 product of the same library.
+
+#include <benchmark/benchmark.h>
+
+#include <Eigen/Core>
+
+#include "estimation/arrow_system.hpp"
+#include "estimation/automatic_fit.hpp"
+#include "estimation/numerators.hpp"
+#include "tests/support/random_stage.hpp"
+
+namespace {
+
+using namespace stageid;
+
+const test::RandomStage& paper_stage() {
+  static const test::RandomStage stage = [] {
+    test::RandomStageSpec spec;
+    spec.least_modes = spec.most_modes = 17;
+    return test::draw_random_stage(1, spec);
+  }();
+  return stage;
+}
+
+FitOptions options_of(const test::RandomStage& stage, int threads) {
+  FitOptions options;
+  options.weighting = Weighting::noise_variance;
+  options.hold = HoldModel::exact;
+  options.delay_s = stage.delay_s;
+  options.threads = threads;
+  options.uncertainty = false;
+  return options;
+}
+
+void product_850(benchmark::State& state) {
+  const Eigen::MatrixXd A = Eigen::MatrixXd::Random(850, 850);
+  const Eigen::MatrixXd B = Eigen::MatrixXd::Random(850, 850);
+  Eigen::MatrixXd C(850, 850);
+  for (auto _ : state) {
+    C.noalias() = A * B;
+    benchmark::DoNotOptimize(C.data());
+  }
+  state.counters["GFLOP/s"] = benchmark::Counter(2.0 * 850 * 850 * 850 * 1e-9,
+                                                 benchmark::Counter::kIsIterationInvariantRate);
+}
+BENCHMARK(product_850)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+/// Ten iterations of a fit from a start a per mille away, without stopping.
+void iteration(benchmark::State& state) {
+  const test::RandomStage& stage = paper_stage();
+  FitOptions options = options_of(stage, static_cast<int>(state.range(0)));
+  options.method = state.range(1) == 0 ? FitMethod::gn : FitMethod::riv;
+  options.gradient_tolerance = options.step_tolerance = options.deviation_tolerance = 0.0;
+  AdditiveModel start = stage.truth;
+  for (Submodel& s : start.submodels)
+    if (s.is_mode()) s.denominator[2] *= 1.001;
+  const auto fit_of = [&](int iterations) {
+    options.max_iterations = iterations;
+    return fit_additive_model(stage.frf, start, options).model.fit.iterations;
+  };
+  int done = 0;
+  for (auto _ : state) done = fit_of(5);
+  state.counters["iterations"] = done;
+  state.counters["s/iteration"] =
+      benchmark::Counter(static_cast<double>(done), benchmark::Counter::kIsIterationInvariantRate |
+                                                        benchmark::Counter::kInvert);
+}
+BENCHMARK(iteration)
+    ->ArgNames({"threads", "riv"})
+    ->Args({1, 0})
+    ->Args({1, 1})
+    ->Args({2, 0})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+
+void blind_fit(benchmark::State& state) {
+  const test::RandomStage& stage = paper_stage();
+  const FitOptions options = options_of(stage, 2);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(automatic_fit(stage.frf, ModelStructure{}, ModeSelection{}, options));
+}
+BENCHMARK(blind_fit)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+
+BENCHMARK_MAIN();
