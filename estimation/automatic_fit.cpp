@@ -53,6 +53,14 @@ void sort_modes(AdditiveModel& model) {
                    });
 }
 
+/// More modes than this the lines cannot carry: a channel's functions are real combinations on 2 N
+/// real values, of which a third is left to tell noise from modes.
+Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure) {
+  const Eigen::Index per_mode = structure.general_damping ? 2 : 1;
+  const Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);
+  return std::max<Eigen::Index>(1, (2 * frf.lines() / 3 - fixed) / (per_mode + 1));
+}
+
 /// Grows and prunes a model; every decision is written down.
 class AutomaticFit {
  public:
@@ -114,13 +122,8 @@ class AutomaticFit {
     return {frf_.frequency_hz[k], 0.01, 1};
   }
 
-  /// More functions than this the lines cannot carry.
   int affordable_modes() const {
-    const Eigen::Index per_mode = structure_.general_damping ? 2 : 1;
-    const Eigen::Index fixed = (structure_.rigid_body ? 1 : 0) + (structure_.direct_term ? 1 : 0);
-    const Eigen::Index limit = (2 * frf_.lines() / 3 - fixed) / (per_mode + 1);
-    return static_cast<int>(
-        std::max<Eigen::Index>(1, std::min<Eigen::Index>(limit, selection_.most)));
+    return static_cast<int>(std::min<Eigen::Index>(most_modes(frf_, structure_), selection_.most));
   }
 
   /// sum W |E|^2, not below rounding.
@@ -364,6 +367,12 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
   check(frf);
   if (selection.exactly < 0 || selection.most < 1)
     throw std::invalid_argument("fit: the number of modes must be positive");
+  const Eigen::Index most = most_modes(frf, structure);
+  if (selection.exactly > most || selection.modes.size() > static_cast<std::size_t>(most))
+    throw std::invalid_argument(fmt::format(
+        "fit: {} lines cannot carry {} modes; ask for at most {}", frf.lines(),
+        std::max<std::size_t>(static_cast<std::size_t>(selection.exactly), selection.modes.size()),
+        most));
   return AutomaticFit(frf, structure, selection, options).run();
 }
 

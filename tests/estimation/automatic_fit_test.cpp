@@ -199,6 +199,15 @@ TEST_F(SmallStage, RefusesNumbersOfModesThatAreNone) {
   EXPECT_THAT([this] { (void)automatic_fit(frf_, {}, {.modes = {}, .most = 0}, {}); }, message);
 }
 
+TEST_F(SmallStage, RefusesMoreModesThanTheLinesCarryBeforeItTries) {
+  const FrfEstimate few = select_band(frf_, 100.0, 140.0);  // 21 lines
+  const auto message = testing::ThrowsMessage<std::invalid_argument>(
+      testing::HasSubstr("cannot carry 60 modes; ask for at most"));
+  EXPECT_THAT([&] { (void)automatic_fit(few, {}, {.modes = {}, .exactly = 60}, {}); }, message);
+  const std::vector<ModeCandidate> modes(60, {120.0, 0.01, 1});
+  EXPECT_THAT([&] { (void)automatic_fit(few, {}, {.modes = modes}, {}); }, message);
+}
+
 TEST_F(SmallStage, RefusesWeightsThatAreNotThere) {
   FitOptions options;
   options.weighting = Weighting::total_variance;
