@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "estimation/fit_iteration.hpp"
+#include "estimation/low_rank_iteration.hpp"
 #include "estimation/numerators.hpp"
 #include "estimation/parameter_covariance.hpp"
 
@@ -132,19 +133,34 @@ void fill_deviations(const Eigen::MatrixXd& covariance, AdditiveModel& model) {
   }
 }
 
+/// Whether the weights are taken for the inverse variances of the data.
+bool likelihood(const FitOptions& options) {
+  return options.weighting == Weighting::noise_variance ||
+         options.weighting == Weighting::total_variance;
+}
+
+void use_covariance(const ParameterCovariance& covariance, bool likelihood, FitResult& result) {
+  if (covariance.response_variance.size() == 0) return;
+  if (covariance.globals.size() > 0) fill_deviations(covariance.globals, result.model);
+  result.response_variance = covariance.response_variance;
+  if (likelihood && covariance.residual_scale > 1.0)
+    result.decisions.push_back(
+        fmt::format("the residual is {:.3g} times what the variances predict: the model does not "
+                    "explain the data; standard deviations are raised by {:.3g}",
+                    covariance.residual_scale, std::sqrt(covariance.residual_scale)));
+}
+
 void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
                       const FitParameters& beta, const std::vector<Eigen::Index>& frozen,
                       FitResult& result) {
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
   const Residual E = residual(problem, groups, beta.B);
   const ArrowSystem gn(problem, beta, groups, E, FitMethod::gn);
-  const bool likelihood = options.weighting == Weighting::noise_variance ||
-                          options.weighting == Weighting::total_variance;
   const Eigen::MatrixXd& known =
       frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
   const double dof = frf.noise_variance.size() > 0 ? frf.noise_dof : frf.total_dof;
   DataNoise noise;
-  if (likelihood) {
+  if (likelihood(options)) {
     noise.knowledge = VarianceKnowledge::weights;
     noise.variance = problem.W.cwiseInverse();
   } else if (known.size() > 0 && known.minCoeff() > 0.0) {
@@ -152,17 +168,27 @@ void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const F
     noise.variance = smoothed_variance(frf, known, dof);
   }
   if (noise.knowledge != VarianceKnowledge::none) noise.correlation = output_correlation(frf);
-  const ParameterCovariance covariance =
-      parameter_covariance(problem, beta, groups, E, gn, noise, frozen);
-  if (covariance.globals.size() == 0 && problem.globals() > 0) return;
-  fill_deviations(covariance.globals, result.model);
-  result.response_variance = covariance.response_variance;
-  if (likelihood && covariance.residual_scale > 1.0)
-    result.decisions.push_back(
-        fmt::format("the residual is {:.3g} times what the variances predict: the model does not "
-                    "explain the data; "
-                    "standard deviations are raised by {:.3g}",
-                    covariance.residual_scale, std::sqrt(covariance.residual_scale)));
+  use_covariance(parameter_covariance(problem, beta, groups, E, gn, noise, frozen),
+                 likelihood(options), result);
+}
+
+/// What giving up the free residues cost, and whether noise alone would have.
+std::string rank_decision(const FitProblem& problem, const IterationResult& free,
+                          const LowRankResult& constrained, bool likelihood) {
+  std::string text = fmt::format("residues of the given ranks: cost {:.6g} -> {:.6g}", free.E.cost,
+                                 constrained.iteration.E.cost);
+  if (!likelihood) return text;
+  // Twice the rise of sum W |E|^2 is chi-square distributed where the ranks are right.
+  const double rise =
+      4.0 * static_cast<double>(problem.size()) * (constrained.iteration.E.cost - free.E.cost);
+  const Eigen::Index unconstrained = problem.globals() + problem.channels() * problem.functions();
+  const auto given_up = static_cast<double>(unconstrained - constrained.parameters);
+  const double sigmas = (rise - given_up) / std::sqrt(2.0 * std::max(given_up, 1.0));
+  return text + fmt::format(", chi-square {:.4g} for {:.0f} parameters given up: {}", rise,
+                            given_up,
+                            sigmas < 3.0 ? "what noise explains"
+                                         : "more than noise explains, the ranks are too low or the "
+                                           "variances too small");
 }
 
 double relative_rms_error(const FrfEstimate& frf, const Residual& E) {
@@ -190,7 +216,18 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
     search_delay(problem, beta);
 
   FitResult result;
-  const IterationResult iteration = iterate(problem, beta, options);
+  IterationResult iteration = iterate(problem, beta, options);
+  const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
+  ParameterCovariance covariance;
+  if (low_rank && iteration.status != FitStatus::singular) {
+    LowRankResult constrained = iterate_low_rank(problem, beta, options, likelihood(options));
+    result.decisions.push_back(rank_decision(problem, iteration, constrained, likelihood(options)));
+    constrained.iteration.cost.insert(constrained.iteration.cost.begin(), iteration.cost.begin(),
+                                      iteration.cost.end());
+    constrained.iteration.iterations += iteration.iterations;
+    iteration = std::move(constrained.iteration);
+    covariance = std::move(constrained.covariance);
+  }
   result.status = iteration.status;
   result.message = iteration.message;
   result.cost = iteration.cost;
@@ -201,7 +238,9 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   result.model.hold = options.hold;
   fill_submodels(problem, beta, result.model);
   result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
-  if (options.uncertainty && result.status != FitStatus::singular)
+  if (low_rank)
+    use_covariance(covariance, likelihood(options), result);
+  else if (options.uncertainty && result.status != FitStatus::singular)
     fill_uncertainty(frf, options, problem, beta, iteration.frozen, result);
 
   FitRecord& record = result.model.fit;

@@ -23,6 +23,10 @@ struct IterationResult {
 /// iterate of least cost is returned.
 IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options);
 
+/// `beta` with denominators and delays moved by `step` (globals long).
+FitParameters stepped_globals(const FitProblem& problem, const FitParameters& beta,
+                              const Eigen::VectorXd& step);
+
 /// Sets all input delays to the one of least cost on a grid (numerators solved for every
 /// candidate).
 void search_delay(const FitProblem& problem, FitParameters& beta);

@@ -38,6 +38,8 @@ struct FitOptions {
   DelayModel delay = DelayModel::fixed;
   double delay_s = 0.0;  ///< fixed: the delay; else the start (0 for estimate: searched)
   FitMethod method = FitMethod::riv;
+  int residue_rank = 0;     ///< of every mode; 0: free
+  int rigid_body_rank = 0;  ///< of the submodel with integrators; 0: free
   int max_iterations = 100;
   double gradient_tolerance = 1e-9;  ///< scaled: max_i |e_i| / sqrt(M_ii 2N cost)
   double step_tolerance = 1e-10;     ///< largest relative change of a pole, and of the cost

@@ -12,7 +12,8 @@ namespace stageid {
 /// A place in a JSON file from outside: every access checks, every failure names file and place.
 class JsonNode {
  public:
-  JsonNode(const std::filesystem::path& file, std::string place, const nlohmann::ordered_json& value)
+  JsonNode(const std::filesystem::path& file, std::string place,
+           const nlohmann::ordered_json& value)
       : file_(file), place_(std::move(place)), value_(value) {}
 
   bool has(const std::string& key) const { return value_.is_object() && value_.contains(key); }

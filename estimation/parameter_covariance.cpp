@@ -12,49 +12,11 @@ namespace {
 /// Above this, a residual cannot be the noise alone.
 constexpr double kClearlyTooLarge = 1.5;
 
-double residual_per_degree(const FitProblem& problem, const Residual& E) {
-  const double data = static_cast<double>(problem.size() * problem.channels());
-  const double parameters =
-      static_cast<double>(problem.globals() + problem.channels() * problem.functions());
-  return 2.0 * static_cast<double>(problem.size()) * E.cost /
-         std::max(data - 0.5 * parameters, 1.0);
-}
-
 /// K as an arrow: its globals with channels not eliminated, and the channel blocks.
 struct Middle {
   const ArrowSystem& system;
   double scale;
 };
-
-/// Columns d vec(P)_c / d globals on every line for one channel, real and imaginary.
-void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
-                    Eigen::Index c, const std::vector<DerivativeColumn>& columns,
-                    Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
-  re.setZero(problem.size(), problem.globals());
-  im.setZero(problem.size(), problem.globals());
-  for (std::size_t d = 0; d < columns.size(); ++d) {
-    const auto column = static_cast<Eigen::Index>(d);
-    re.col(columns[d].parameter) += beta.B(c, columns[d].function) * group.D_re.col(column);
-    im.col(columns[d].parameter) += beta.B(c, columns[d].function) * group.D_im.col(column);
-  }
-  if (problem.delay == DelayModel::fixed) return;
-  const Eigen::VectorXd t_re = group.T_re * beta.B.row(c).transpose();
-  const Eigen::VectorXd t_im = group.T_im * beta.B.row(c).transpose();
-  const Eigen::Index first = problem.denominators();
-  if (problem.delay == DelayModel::estimate) {
-    re.col(first) = t_re;
-    im.col(first) = t_im;
-    return;
-  }
-  const Eigen::Index y = c % problem.n_outputs;
-  const Eigen::Index u = c / problem.n_outputs;
-  re.col(first + u) = t_re;
-  im.col(first + u) = t_im;
-  if (y + 1 < problem.n_outputs) {
-    re.col(first + problem.n_inputs + y) = t_re;
-    im.col(first + problem.n_inputs + y) = t_im;
-  }
-}
 
 /// The part of those columns that the channel's numerators cannot follow: J_a - F M_bb^-1 M_ba.
 void projected_columns(const FitProblem& problem, const FitParameters& beta,
@@ -135,7 +97,47 @@ Eigen::MatrixXd diagonal_middle(const ArrowSystem& gn, const Middle& K) {
   return middle;
 }
 
-/// S^-1 on the free globals, zero where one is frozen.
+}  // namespace
+
+double residual_per_degree(const FitProblem& problem, const Residual& E, Eigen::Index parameters) {
+  const double data = static_cast<double>(problem.size() * problem.channels());
+  return 2.0 * static_cast<double>(problem.size()) * E.cost /
+         std::max(data - 0.5 * static_cast<double>(parameters), 1.0);
+}
+
+double residual_scale(double per_degree, bool likelihood) {
+  return likelihood && per_degree < kClearlyTooLarge ? 1.0 : per_degree;
+}
+
+void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
+                    Eigen::Index c, const std::vector<DerivativeColumn>& columns,
+                    Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+  re.setZero(problem.size(), problem.globals());
+  im.setZero(problem.size(), problem.globals());
+  for (std::size_t d = 0; d < columns.size(); ++d) {
+    const auto column = static_cast<Eigen::Index>(d);
+    re.col(columns[d].parameter) += beta.B(c, columns[d].function) * group.D_re.col(column);
+    im.col(columns[d].parameter) += beta.B(c, columns[d].function) * group.D_im.col(column);
+  }
+  if (problem.delay == DelayModel::fixed) return;
+  const Eigen::VectorXd t_re = group.T_re * beta.B.row(c).transpose();
+  const Eigen::VectorXd t_im = group.T_im * beta.B.row(c).transpose();
+  const Eigen::Index first = problem.denominators();
+  if (problem.delay == DelayModel::estimate) {
+    re.col(first) = t_re;
+    im.col(first) = t_im;
+    return;
+  }
+  const Eigen::Index y = c % problem.n_outputs;
+  const Eigen::Index u = c / problem.n_outputs;
+  re.col(first + u) = t_re;
+  im.col(first + u) = t_im;
+  if (y + 1 < problem.n_outputs) {
+    re.col(first + problem.n_inputs + y) = t_re;
+    im.col(first + problem.n_inputs + y) = t_im;
+  }
+}
+
 Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen) {
   if (S.size() == 0) return S;
   Eigen::MatrixXd reduced = S;
@@ -157,15 +159,12 @@ Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::
   return inverse;
 }
 
-/// Diagonal of X C Y^T summed over real and imaginary parts.
 Eigen::VectorXd quadratic(const Eigen::MatrixXd& X_re, const Eigen::MatrixXd& X_im,
                           const Eigen::MatrixXd& C, const Eigen::MatrixXd& Y_re,
                           const Eigen::MatrixXd& Y_im) {
   return (X_re * C).cwiseProduct(Y_re).rowwise().sum() +
          (X_im * C).cwiseProduct(Y_im).rowwise().sum();
 }
-
-}  // namespace
 
 Eigen::MatrixXcd output_correlation(const FrfEstimate& frf) {
   if (frf.residual_covariance_re.size() == 0) return {};
@@ -194,10 +193,11 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
                                          const std::vector<Eigen::Index>& frozen) {
   ParameterCovariance out;
   if (!gn.regular()) return out;
-  const double per_degree = residual_per_degree(problem, E);
-  if (noise.knowledge == VarianceKnowledge::none) out.residual_scale = per_degree;
-  if (noise.knowledge == VarianceKnowledge::weights && per_degree > kClearlyTooLarge)
-    out.residual_scale = per_degree;
+  if (noise.knowledge != VarianceKnowledge::given)
+    out.residual_scale = residual_scale(
+        residual_per_degree(problem, E,
+                            problem.globals() + problem.channels() * problem.functions()),
+        noise.knowledge == VarianceKnowledge::weights);
 
   FitProblem sandwich;
   std::vector<ArrowSystem> other;

@@ -44,4 +44,26 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
                                          const ArrowSystem& gn, const DataNoise& noise,
                                          const std::vector<Eigen::Index>& frozen = {});
 
+// Parts of it that fits of another structure use too.
+
+/// sum W |E|^2 per complex degree of freedom: 1 where W is the inverse variance and the model right.
+double residual_per_degree(const FitProblem& problem, const Residual& E, Eigen::Index parameters);
+
+/// What variances are multiplied with: 1 where the weights are inverse variances (`likelihood`) and the
+/// residual is not clearly larger than they predict, else the residual per degree of freedom.
+double residual_scale(double per_degree, bool likelihood);
+
+/// Columns d vec(P)_c / d globals on every line for one channel, N x globals each.
+void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
+                    Eigen::Index c, const std::vector<DerivativeColumn>& columns,
+                    Eigen::MatrixXd& re, Eigen::MatrixXd& im);
+
+/// S^-1 on the free parameters, zero where one is frozen.
+Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen);
+
+/// Diagonal of X C Y^T, real and imaginary parts summed.
+Eigen::VectorXd quadratic(const Eigen::MatrixXd& X_re, const Eigen::MatrixXd& X_im,
+                          const Eigen::MatrixXd& C, const Eigen::MatrixXd& Y_re,
+                          const Eigen::MatrixXd& Y_im);
+
 }  // namespace stageid
