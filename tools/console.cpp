@@ -79,9 +79,16 @@ void Progress::draw(double done, double total, const std::string& note) {
   const double share = total > 0.0 ? std::clamp(done / total, 0.0, 1.0) : 0.0;
   const double left = share > 0.0 ? elapsed * (1.0 - share) / share : std::nan("");
   const double rate = elapsed > 0.0 ? done * scale_ / elapsed : 0.0;
-  const std::string numbers =
-      fmt::format("{:3.0f} %  {:.4g} {}/s  {} left{}{}", 100.0 * share, rate, unit_, duration(left),
-                  note.empty() ? "" : "  ", note);
+  const std::string tail = note.empty() ? "" : "  " + note;
+  if (!(total > 0.0)) {
+    fmt::print(stderr, "{}{}: {:.0f} s  {:.0f} {}{}{}", terminal_ ? "\r" : "", label_, elapsed,
+               done * scale_, unit_, tail, terminal_ ? "\x1b[K" : "\n");
+    std::fflush(stderr);
+    drawn_ = true;
+    return;
+  }
+  const std::string numbers = fmt::format("{:3.0f} %  {:.4g} {}/s  {} left{}", 100.0 * share, rate,
+                                          unit_, duration(left), tail);
   if (!terminal_) {
     fmt::print(stderr, "{}: {}\n", label_, numbers);
     return;

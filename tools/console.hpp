@@ -38,6 +38,7 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
+  /// `total` 0: nobody knows how much there is; then no share and no time left are shown.
   void update(double done, double total, const std::string& note = "");
   double seconds() const;
 

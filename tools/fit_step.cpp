@@ -44,7 +44,7 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
   Progress progress(console, "fit", "iterations");
   options.progress = [&](int iteration, double cost) {
     throw_if_interrupted();
-    progress.update(iteration, options.max_iterations, fmt::format("cost {:.6g}", cost));
+    progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));
   };
   step.result = automatic_fit(setup.frf, setup.structure, setup.selection, options);
   throw_if_interrupted();
