@@ -17,7 +17,6 @@
 #include "tools/frf_step.hpp"
 #include "tools/measurement.hpp"
 #include "tools/model_export.hpp"
-#include "tools/modes_command.hpp"
 #include "tools/output_paths.hpp"
 #include "tools/report_input.hpp"
 #include "tools/validate_command.hpp"
@@ -163,7 +162,7 @@ void Identification::pick() {
   request.threads = request_.threads;
   setup_ = make_fit_setup(request, *frf_);
   std::vector<ModeCandidate> modes = setup_->selection.modes;
-  if (modes.empty()) modes = pick_modes(setup_->frf, default_peaks(setup_->frf));
+  if (modes.empty()) modes = pick_modes(setup_->frf);
   write_modes(path("modes.json"), modes);
   finish_step("modes", seconds_since(start), fmt::format("{} candidates", modes.size()));
 }

@@ -5,28 +5,21 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "estimation/cmif.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
 #include "tools/output_paths.hpp"
 
 namespace stageid {
 
-PeakOptions default_peaks(const FrfEstimate& frf) {
-  PeakOptions options;
-  const bool known = frf.noise_variance.size() > 0 || frf.total_variance.size() > 0;
-  options.kind = known ? CmifKind::whitened : CmifKind::accelerance;
-  return options;
-}
-
 ModesCommand::ModesCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "modes", "Mode indicator and candidate modes of an FRF");
   command->add_option("frf", frf_, "frf.h5")->required();
   command->add_option("-o,--output", output_, "modes.json to write");
   command->add_option("--band", band_hz_, "LOW HIGH, Hz")->expected(2);
-  command
-      ->add_option("--kind", kind_,
-                   "response | accelerance | whitened; default: whitened if variances are known")
-      ->check(CLI::IsMember({"response", "accelerance", "whitened"}));
+  command->add_option("--kind", kind_, "response | accelerance | whitened (by the variances)")
+      ->check(CLI::IsMember({"response", "accelerance", "whitened"}))
+      ->capture_default_str();
   command->add_option("--prominence", prominence_db_, "of a peak, dB")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -37,9 +30,8 @@ void ModesCommand::run() const {
   if (!output_.empty()) require_writable(output_);
   FrfEstimate frf = read_frf(frf_);
   if (!band_hz_.empty()) frf = select_band(frf, band_hz_[0], band_hz_[1]);
-  PeakOptions options = default_peaks(frf);
+  PeakOptions options;
   if (kind_ == "response") options.kind = CmifKind::response;
-  if (kind_ == "accelerance") options.kind = CmifKind::accelerance;
   if (kind_ == "whitened") options.kind = CmifKind::whitened;
   options.minimum_prominence_db = prominence_db_;
   const std::vector<ModeCandidate> modes = pick_modes(frf, options);

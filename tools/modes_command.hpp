@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "estimation/cmif.hpp"
 #include "tools/console.hpp"
 
 namespace stageid {
@@ -22,11 +21,8 @@ class ModesCommand {
   std::filesystem::path frf_;
   std::filesystem::path output_;
   std::vector<double> band_hz_;
-  std::string kind_;
+  std::string kind_ = "accelerance";
   double prominence_db_ = 3.0;
 };
-
-/// How modes are picked where nothing else is asked: whitened if the noise is known.
-PeakOptions default_peaks(const FrfEstimate& frf);
 
 }  // namespace stageid

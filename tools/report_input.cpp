@@ -13,7 +13,6 @@
 #include "frf/frf_file.hpp"
 #include "tools/fit_step.hpp"
 #include "tools/model_export.hpp"
-#include "tools/modes_command.hpp"
 
 namespace stageid {
 namespace {
@@ -165,7 +164,7 @@ ReportData read_report_data(const ReportInput& input) {
     add_response(data, input);
   }
   if (data.frf) {
-    data.cmif_kind = default_peaks(*data.frf).kind;
+    data.cmif_kind = PeakOptions().kind;
     data.cmif_curves = cmif(*data.frf, data.cmif_kind);
   }
   if (!input.modes.empty()) data.chosen_modes = read_modes(input.modes);
