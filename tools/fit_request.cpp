@@ -54,7 +54,9 @@ class FitDefaults {
   /// sampler exactly; the data keep the aliasing, and no compensation can divide it out.
   void restore_as_measured() {
     FrfEstimate& frf = setup_.frf;
-    const bool wanted = request_.hold.empty() || request_.hold == "exact";
+    const bool only_delay = frf.compensated == Compensation::delay;
+    const bool wanted = request_.hold.empty() || request_.hold == "exact" ||
+                        (only_delay && request_.hold != "none");
     if (frf.compensated == Compensation::none || !(frf.sample_rate_hz > 0.0) || !wanted) return;
     known_delay_s_ = frf.delay_s;
     frf = as_measured(frf);
@@ -113,6 +115,19 @@ class FitDefaults {
         options.weighting == Weighting::relative ? ", the response comes without variances" : ""));
   }
 
+  /// Refused here: the fit would grow for hours towards a number that the lines cannot carry.
+  void require_affordable_modes() const {
+    const ModelStructure& structure = setup_.structure;
+    const Eigen::Index per_mode = structure.general_damping ? 2 : 1;
+    const Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);
+    const Eigen::Index lines = setup_.frf.lines();
+    const Eigen::Index most = std::max<Eigen::Index>(1, (2 * lines / 3 - fixed) / (per_mode + 1));
+    if (setup_.selection.exactly > most)
+      throw std::invalid_argument(fmt::format(
+          "--modes: {}; {} lines carry no more than {}; ask for fewer or take a wider band",
+          setup_.selection.exactly, lines, most));
+  }
+
   void choose_modes() {
     ModeSelection& selection = setup_.selection;
     const std::string& text = request_.modes;
@@ -127,6 +142,7 @@ class FitDefaults {
       }
       if (!number && text.find_first_not_of("0123456789.eE+-") != std::string::npos) {
         selection.modes = read_modes(text);
+        for (const ModeCandidate& mode : selection.modes) require_below_nyquist(mode.frequency_hz);
         selection.keep_modes = true;
         return;
       }
@@ -196,6 +212,16 @@ class FitDefaults {
         }
   }
 
+  /// Above, the sampled response cannot tell a mode from its alias.
+  void require_below_nyquist(double frequency_hz) const {
+    const double nyquist_hz = 0.5 * setup_.frf.sample_rate_hz;
+    if (nyquist_hz > 0.0 && setup_.options.hold != HoldModel::none && frequency_hz >= nyquist_hz)
+      throw std::invalid_argument(
+          fmt::format("--modes: {} Hz is not below half the sample rate, {} Hz; write lower "
+                      "frequencies",
+                      frequency_hz, nyquist_hz));
+  }
+
   void parse_frequencies(const std::string& text) {
     std::string_view rest = text;
     while (!rest.empty()) {
@@ -204,6 +230,7 @@ class FitDefaults {
       if (!frequency_hz || *frequency_hz <= 0.0)
         refuse("--modes", text,
                "auto, a number of modes, frequencies in Hz 'f1,f2,...', or a file");
+      require_below_nyquist(*frequency_hz);
       setup_.selection.modes.push_back({*frequency_hz});
       rest.remove_prefix(std::min(comma + 1, rest.size()));
     }
@@ -264,6 +291,7 @@ FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf) {
       pick<int>("--direct-term", request.direct_term, {"none", "full"}) == 1;
   setup.structure.general_damping =
       pick<int>("--damping", request.damping, {"proportional", "general"}) == 1;
+  defaults.require_affordable_modes();
   setup.options.method = pick<FitMethod>("--method", request.method, kMethods);
   if (request.max_iterations < 1)
     refuse("--max-iterations", fmt::format("{}", request.max_iterations), "1 or more");

@@ -39,9 +39,9 @@ struct FitSetup {
 
 /// Fills in the defaults by what the FRF holds:
 ///   hold zoh                        -> hold exact, delay estimated
-///   hold zoh, delay taken out       -> the delay is put back into the response; hold exact, delay
-///                                      fixed to it
-///   hold none (or taken out)        -> no hold, delay 0
+///   delay, or delay and hold, out   -> put back into the response; hold exact, delay fixed to what
+///                                      was taken out. With --hold none the response stays as it is
+///   hold none                       -> no hold, delay 0
 /// and weights: noise variance if there is one, else total variance, else relative.
 /// @throws std::invalid_argument naming the flag; FileError, FormatError for files that it names.
 FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf);

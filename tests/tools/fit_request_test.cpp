@@ -1,0 +1,212 @@
+#include "tools/fit_request.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <complex>
+#include <numbers>
+
+#include "estimation/cmif.hpp"
+#include "excitation/file_error.hpp"
+#include "excitation/hdf5_file.hpp"
+#include "frf/hold_compensation.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+
+/// One output, two inputs, four lines, measured through a hold.
+FrfEstimate measured() {
+  FrfEstimate frf;
+  frf.frequency_hz = Eigen::VectorXd{{10.0, 20.0, 30.0, 40.0}};
+  frf.inputs = {{"a", "b"}, {"N", "N"}};
+  frf.outputs = {{"y"}, {"m"}};
+  frf.response = Eigen::MatrixXcd::NullaryExpr(2, 4, [](Eigen::Index channel, Eigen::Index line) {
+    return std::polar(1.0 + static_cast<double>(channel), 0.7 * static_cast<double>(line));
+  });
+  frf.noise_variance = Eigen::MatrixXd::Constant(2, 4, 0.25);
+  frf.sample_rate_hz = 1000.0;
+  frf.hold = Hold::zoh;
+  return frf;
+}
+
+FrfEstimate without_variances() {
+  FrfEstimate frf = measured();
+  frf.noise_variance.resize(0, 0);
+  return frf;
+}
+
+TEST(FitRequest, AMeasuredResponseIsFittedExactlyWithEstimatedDelay) {
+  const FitSetup setup = make_fit_setup({}, measured());
+  EXPECT_EQ(setup.options.hold, HoldModel::exact);
+  EXPECT_EQ(setup.options.delay, DelayModel::estimate);
+  EXPECT_EQ(setup.options.weighting, Weighting::noise_variance);
+  EXPECT_TRUE(setup.structure.rigid_body);
+  EXPECT_FALSE(setup.structure.general_damping);
+  EXPECT_EQ(setup.selection.exactly, 0);
+  EXPECT_TRUE(setup.selection.modes.empty());
+}
+
+TEST(FitRequest, AContinuousResponseHasNoHoldAndNoDelay) {
+  FrfEstimate frf = without_variances();
+  frf.hold = Hold::none;
+  frf.sample_rate_hz = 0.0;
+  const FitSetup setup = make_fit_setup({}, frf);
+  EXPECT_EQ(setup.options.hold, HoldModel::none);
+  EXPECT_EQ(setup.options.delay, DelayModel::fixed);
+  EXPECT_EQ(setup.options.delay_s, 0.0);
+  EXPECT_EQ(setup.options.weighting, Weighting::relative);
+}
+
+TEST(FitRequest, WithoutNoiseTheTotalVarianceWeighs) {
+  FrfEstimate frf = without_variances();
+  frf.total_variance = Eigen::MatrixXd::Constant(2, 4, 0.5);
+  EXPECT_EQ(make_fit_setup({}, frf).options.weighting, Weighting::total_variance);
+}
+
+TEST(FitRequest, ADelayThatWasTakenOutIsPutBackAndModelled) {
+  const FrfEstimate raw = measured();
+  const FitSetup setup = make_fit_setup({}, compensate(raw, Compensation::delay, 1.3e-3));
+  // Two rotations on the unit circle that undo each other.
+  EXPECT_LT((setup.frf.response - raw.response).cwiseAbs().maxCoeff(), 1e-14);
+  EXPECT_EQ(setup.frf.compensated, Compensation::none);
+  EXPECT_EQ(setup.options.hold, HoldModel::exact);
+  EXPECT_EQ(setup.options.delay, DelayModel::fixed);
+  EXPECT_EQ(setup.options.delay_s, 1.3e-3);
+}
+
+TEST(FitRequest, WithHoldNoneACompensatedResponseStaysAsItIs) {
+  const FrfEstimate compensated = compensate(measured(), Compensation::delay, 1.3e-3);
+  FitRequest request;
+  request.hold = "none";
+  const FitSetup setup = make_fit_setup(request, compensated);
+  EXPECT_EQ(setup.frf.response, compensated.response);
+  EXPECT_EQ(setup.options.delay_s, 0.0);
+  EXPECT_EQ(setup.options.delay, DelayModel::fixed);
+}
+
+TEST(FitRequest, AHoldThatWasTakenOutIsPutBackUnlessNoHoldIsAsked) {
+  const FrfEstimate raw = measured();
+  const FrfEstimate compensated = compensate(raw, Compensation::hold, 1.3e-3);
+  const FitSetup setup = make_fit_setup({}, compensated);
+  EXPECT_LT((setup.frf.response - raw.response).cwiseAbs().maxCoeff(), 1e-14);
+  EXPECT_EQ(setup.options.hold, HoldModel::exact);
+  EXPECT_EQ(setup.options.delay_s, 1.3e-3);
+  FitRequest request;
+  request.hold = "none";
+  EXPECT_EQ(make_fit_setup(request, compensated).frf.response, compensated.response);
+  EXPECT_EQ(make_fit_setup(request, compensated).options.delay_s, 0.0);
+}
+
+TEST(FitRequest, ModesAreACountFrequenciesOrAFile) {
+  const test::TemporaryDirectory directory;
+  write_modes(directory / "modes.json", {{12.0, 0.02, 1}, {34.0, 0.03, 2}});
+  FitRequest request;
+  request.modes = "1";
+  EXPECT_EQ(make_fit_setup(request, measured()).selection.exactly, 1);
+  request.modes = "30.5,12";
+  FitSetup setup = make_fit_setup(request, measured());
+  ASSERT_EQ(setup.selection.modes.size(), 2U);
+  EXPECT_EQ(setup.selection.modes[0].frequency_hz, 12.0);
+  EXPECT_TRUE(setup.selection.keep_modes);
+  request.modes = "76.2";  // a point makes it a frequency
+  EXPECT_EQ(make_fit_setup(request, measured()).selection.modes.at(0).frequency_hz, 76.2);
+  request.modes = "76,";  // so does a comma
+  EXPECT_EQ(make_fit_setup(request, measured()).selection.modes.at(0).frequency_hz, 76.0);
+  request.modes = (directory / "modes.json").string();
+  setup = make_fit_setup(request, measured());
+  ASSERT_EQ(setup.selection.modes.size(), 2U);
+  EXPECT_EQ(setup.selection.modes[1].damping_ratio, 0.03);
+  EXPECT_TRUE(setup.selection.keep_modes);
+}
+
+TEST(FitRequest, ModesThatTheLinesCannotTellAreRefused) {
+  const auto error_of = [](FitRequest request, const FrfEstimate& frf) -> std::string {
+    try {
+      make_fit_setup(request, frf);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  // As the automatic fit counts: two functions for four lines, one of them the rigid body's. One mode
+  // is always granted.
+  FitRequest request;
+  request.modes = "2";
+  EXPECT_EQ(error_of(request, measured()),
+            "--modes: 2; 4 lines carry no more than 1; ask for fewer or take a wider band");
+  request.modes = "499.9";
+  EXPECT_EQ(error_of(request, measured()), "");
+  request.modes = "12,500";
+  EXPECT_EQ(error_of(request, measured()),
+            "--modes: 500 Hz is not below half the sample rate, 500 Hz; write lower frequencies");
+  const test::TemporaryDirectory directory;
+  write_modes(directory / "modes.json", {{12.0, 0.02, 1}, {500.0, 0.03, 2}});
+  FitRequest by_file;
+  by_file.modes = (directory / "modes.json").string();
+  EXPECT_THAT(error_of(by_file, measured()), HasSubstr("500 Hz is not below"));
+  FrfEstimate continuous = measured();
+  continuous.hold = Hold::none;
+  EXPECT_EQ(error_of(request, continuous), "");
+}
+
+TEST(FitRequest, WeightsComeFromAFileInTheOrderOfTheResponse) {
+  const test::TemporaryDirectory directory;
+  const std::filesystem::path path = directory / "w.h5";
+  std::vector<double> values = {0, 1, 2, 3, 4, 5, 6, 7};
+  {
+    Hdf5File file = Hdf5File::create(path);
+    file.write_reals("/weights", {4, 1, 2}, values.data());
+    file.write_reals("/other", {4, 2, 1}, values.data());
+    file.close();
+  }
+  FitRequest request;
+  request.weighting = path.string();
+  const FitSetup setup = make_fit_setup(request, measured());
+  EXPECT_EQ(setup.options.weighting, Weighting::user);
+  EXPECT_EQ(setup.options.user_weights(1, 0), 1.0);  // channel y <- b on the first line
+  EXPECT_EQ(setup.options.user_weights(0, 3), 6.0);
+  request.band_hz = {15.0, 45.0};
+  EXPECT_THROW(make_fit_setup(request, measured()), FormatError);
+  values[3] = -1.0;
+  {
+    Hdf5File file = Hdf5File::create(path);
+    file.write_reals("/weights", {4, 1, 2}, values.data());
+    file.close();
+  }
+  request.band_hz.reset();
+  EXPECT_THROW(make_fit_setup(request, measured()), FormatError);
+}
+
+TEST(FitRequest, EveryWordThatIsNotOneIsRefused) {
+  const auto refused = [](auto member, const char* value) {
+    FitRequest request;
+    request.*member = value;
+    EXPECT_THROW(make_fit_setup(request, measured()), std::invalid_argument) << value;
+  };
+  refused(&FitRequest::hold, "zoh");
+  refused(&FitRequest::weighting, "user");
+  refused(&FitRequest::weighting, "noise");
+  refused(&FitRequest::delay, "inf");
+  refused(&FitRequest::modes, "-3");
+  refused(&FitRequest::modes, "12,-3");
+  refused(&FitRequest::rigid_body, "half");
+  refused(&FitRequest::damping, "");
+  refused(&FitRequest::method, "lm");
+}
+
+TEST(FitRequest, TheRequestIsNamedWhole) {
+  FitRequest request;
+  request.threads = 1;
+  const std::string one = make_fit_setup(request, measured()).request_json;
+  request.threads = 2;
+  EXPECT_EQ(make_fit_setup(request, measured()).request_json, one);
+  request.method = "gn";
+  EXPECT_NE(make_fit_setup(request, measured()).request_json, one);
+  EXPECT_THAT(one, HasSubstr("\"hold\":\"exact\""));
+}
+
+}  // namespace
+}  // namespace stageid
