@@ -104,10 +104,11 @@ void DesignCommand::run() const {
   require_writable(output_);
   const ExperimentPlan plan = make_plan(config);
   const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
+  const bool written = force_ || prediction.violations().empty();
+  if (written) write_experiment_plan(output_, plan);
   for (const std::string& line : design_table(config, plan, prediction)) console_.result(line);
-  if (!force_) require_within_limits(config, prediction);
+  if (!written) require_within_limits(config, prediction);
   for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
-  write_experiment_plan(output_, plan);
   console_.result(fmt::format("wrote {}", output_.string()));
   console_.result(design_json(config, plan, prediction));
 }

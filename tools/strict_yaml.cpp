@@ -54,7 +54,7 @@ class YamlTreeBuilder final : public YAML::EventHandler {
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
-    add(YamlNode::Kind::null, mark, anchor);
+    document_.nodes_[add(YamlNode::Kind::null, mark, anchor)].mark = place_of_null(mark);
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto found = anchors_.find(anchor);
@@ -101,6 +101,15 @@ class YamlTreeBuilder final : public YAML::EventHandler {
   static YamlMark place(const YAML::Mark& mark) { return {mark.line + 1, mark.column + 1}; }
   bool is_map(const Open& open) const {
     return document_.nodes_[open.node].kind == YamlNode::Kind::map;
+  }
+  /// yaml-cpp puts a value that is not there where the next token is, lines further down; the user
+  /// has to write behind the key.
+  YamlMark place_of_null(const YAML::Mark& mark) const {
+    const YamlMark here = place(mark);
+    if (open_.empty() || !is_map(open_.back())) return here;
+    const YamlNode::Entry& last = document_.nodes_[open_.back().node].entries.back();
+    if (last.mark.line == here.line) return here;
+    return {last.mark.line, last.mark.column + static_cast<int>(last.key.size()) + 1};
   }
   void refuse_tag(const YAML::Mark& mark, const std::string& tag) const {
     if (tag != "" && tag != "!" && tag != "?")
