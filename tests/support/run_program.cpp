@@ -1,0 +1,77 @@
+#include "tests/support/run_program.hpp"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid::test {
+namespace {
+
+std::string read_whole(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+void redirect(const char* file, int flags, int descriptor) {
+  const int opened = ::open(file, flags, 0600);
+  if (opened < 0 || ::dup2(opened, descriptor) < 0) ::_exit(127);
+}
+
+[[noreturn]] void become(const std::string& program, std::vector<char*>& argv,
+                         const std::string& out, const std::string& err,
+                         const ProgramOptions& options) {
+  redirect("/dev/null", O_RDONLY, STDIN_FILENO);
+  redirect(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, STDOUT_FILENO);
+  redirect(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, STDERR_FILENO);
+  if (!options.working_directory.empty() && ::chdir(options.working_directory.c_str()) != 0)
+    ::_exit(127);
+  if (options.largest_file_bytes >= 0) {
+    const rlimit limit = {static_cast<rlim_t>(options.largest_file_bytes),
+                          static_cast<rlim_t>(options.largest_file_bytes)};
+    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(127);
+  }
+  ::execv(program.c_str(), argv.data());
+  ::_exit(127);
+}
+
+}  // namespace
+
+ProgramResult run_program(const std::filesystem::path& program,
+                          const std::vector<std::string>& arguments,
+                          const ProgramOptions& options) {
+  const TemporaryDirectory scratch;
+  const std::string name = program.string();
+  const std::string out = (scratch / "out").string();
+  const std::string err = (scratch / "err").string();
+  std::vector<std::string> words = {name};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+
+  const pid_t child = ::fork();
+  if (child < 0) throw std::runtime_error("fork failed");
+  if (child == 0) become(name, argv, out, err, options);
+  if (options.interrupt_after_s >= 0.0) {
+    std::this_thread::sleep_for(std::chrono::duration<double>(options.interrupt_after_s));
+    ::kill(child, SIGINT);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  return {code, read_whole(out), read_whole(err)};
+}
+
+}  // namespace stageid::test

@@ -1,0 +1,193 @@
+// Every request that is wrong, on the real program: one clear line, the right exit code, nothing
+// left behind.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/tools/program_fixture.hpp"
+
+namespace stageid::test {
+namespace {
+
+class BadRequest : public ProgramTest {};
+
+TEST_F(BadRequest, Usage) {
+  fail({"frff"}, 2, "unknown command 'frff'; did you mean 'frf'?");
+  fail({"--json"}, 2, "no command");
+  fail({"frf"}, 2, "required");
+  fail({"frf", "a.slog", "-o", "b.h5", "--no-such-flag"}, 2, "--no-such-flag");
+  fail({"frf", "a.slog", "-o", "b.h5", "--method", "guess"}, 2, "--method");
+  fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads");
+  fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
+  fail({"log"}, 2, "subcommand");
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "simulator"}, 2, "--backend");
+}
+
+TEST_F(BadRequest, WhatIsNotInThisVersionSaysSo) {
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "can"}, 2, "not in this version");
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "modbus"}, 2, "not in this version");
+  fail({"run", config_, "-o", name("x.slog"), "--dashboard", "8080"}, 2, "not in this version");
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
+  fail({"import", "x.mat", "-o", "frf.h5"}, 2, "not in this version");
+  fail({"fit", "frf.h5", "-o", "m.json", "--rigid-body", "3"}, 2, "not in this version");
+  fail({"fit", "frf.h5", "-o", "m.json", "--residue-rank", "1"}, 2, "not in this version");
+  fail({"fit", "frf.h5", "-o", "m.json", "--submodel", "2,0,0"}, 2, "not in this version");
+  fail({"export", "model.json", "-o", name("m.mat")}, 2, ".json, .h5 and .csv");
+}
+
+TEST_F(BadRequest, MissingFiles) {
+  fail({"run", name("none.yaml"), "-o", name("x.slog")}, 1, "none.yaml: cannot be read");
+  fail({"frf", name("none.slog"), "-o", name("x.h5")}, 1, "none.slog");
+  fail({"fit", name("none.h5"), "-o", name("m.json")}, 1, "none.h5");
+  fail({"validate", name("none.json"), name("none.h5")}, 1, "none.json");
+  fail({"report", name("none"), "-o", name("r.html")}, 1, "does not exist");
+  fail({"log", "info", name("none.slog")}, 1, "none.slog");
+}
+
+TEST_F(BadRequest, Configurations) {
+  const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
+    fail({"design", experiment("bad.yaml", from, to), "-o", name("e.h5")}, 2, text);
+  };
+  wrong("seed: 7", "sead: 7", "bad.yaml:15:3: unknown key 'sead'; did you mean 'seed'?");
+  wrong("rms_n", "rms_v", "unknown key 'rms_v'; the unit stands in the key: write 'rms_n'");
+  wrong("period_s: 0.25", "period_ms: 250", "write 'period_s'");
+  wrong("period_s: 0.25", "period_s: 250 ms", "the number alone, in s");
+  wrong("period_s: 0.25", "period_s: -1", "period_s: -1 is out of range; allowed is > 0 s");
+  wrong("period_s: 0.25", "period_s: .nan", "is not finite");
+  wrong("period_s: 0.25", "period_s: 0.00025", "must be a whole number of samples");
+  wrong("period_s: 0.25", "periods: 3\n  period_s: 0.25", "stands here twice");
+  wrong("band_hz: [16, 800]", "band_hz: [800, 16]", "band_hz: is empty");
+  wrong("band_hz: [16, 800]", "band_hz: [16, 1000]", "is not below half the sample rate");
+  wrong("band_hz: [16, 800]", "band_hz: [16.5, 17]",
+        "bad.yaml:10:12: frequency band: no line lies in 16.5 to 17 Hz");
+  wrong("axes: [a1, a2, a3]", "axes: [a1, a2, z3]",
+        "bad.yaml:7:18: axes: the stage has no actuator 'z3'");
+  wrong("axes: [a1, a2, a3]", "axes: [a1, a1]", "stands here twice");
+  wrong("{rms_n: 1.0}", "{rms_n: [1, 2]}", "2 numbers for 3 axes");
+  wrong("{rms_n: 1.0}", "{rms_n: 1, peak_n: 2}", "one of");
+  wrong("lines: all", "lines: every", "write one of all, odd, odd_random");
+  wrong("realization: 3 ", "realization: 4 ", "hold back one that is measured");
+  wrong("stage: small_stage.yaml", "stage: nowhere.yaml", "bad.yaml:4:8: stage: there is no file");
+  wrong("direct_term: full", "hold: perfect", "write one of none, phase, sinc, exact, by_frf");
+  write_bytes(at("cut.yaml"), read_bytes(config_).substr(0, 320));
+  fail({"design", name("cut.yaml"), "-o", name("e.h5")}, 2, "cut.yaml:");
+  write_bytes(at("binary.yaml"), std::string("\x7F"
+                                             "ELF\x02\x01\x01\x00",
+                                             8));
+  fail({"design", name("binary.yaml"), "-o", name("e.h5")}, 2,
+       "binary.yaml:1:1: byte 0x7F is not text");
+  write_bytes(at("deep.yaml"), std::string(500000, '['));
+  fail({"design", name("deep.yaml"), "-o", name("e.h5")}, 2, "deep.yaml:1:");
+}
+
+TEST_F(BadRequest, StageFiles) {
+  const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
+    fail({"design", stage("bad.yaml", from, to), "-o", name("e.h5")}, 2, text);
+  };
+  wrong("mass_kg: 8", "mass_kg: 0",
+        "stage_bad.yaml:18:12: mass_kg: 0 is out of range; allowed is > 0 kg");
+  wrong("mass_kg: 8", "mass_g: 8000", "the unit stands in the key: write 'mass_kg'");
+  wrong("limit_n: 40", "limit_v: 40", "write 'limit_n'");
+  wrong("direction: [0, 0, 1], limit_n", "direction: [0, 0, 2], limit_n", "write a unit vector");
+  wrong("name: a2", "name: a1", "stands twice");
+  wrong("backend: sim", "backend: cann", "did you mean 'can'?");
+  wrong("Ry: *loop", "Rx: *loop", "stage_bad.yaml: ");  // no sensor sees Rx
+  wrong("[-0.26, 0, 0]", "[-2.6, 0, 0]", "is not on the plate");
+  wrong("noise:", "faults: [{kind: dead_sensor, channel: s9}]\nnoise:", "there is no sensor 's9'");
+}
+
+TEST_F(BadRequest, BackEndsOfTheStageFile) {
+  const std::string can = stage("can.yaml", "backend: sim", "backend: can");
+  fail({"run", can, "-o", name("x.slog")}, 2, "not in this version");
+  fail({"identify", can, "-o", name("dir")}, 2, "not in this version");
+}
+
+TEST_F(BadRequest, AnExperimentPastTheLimitsIsNotDesigned) {
+  const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
+  fail({"identify", loud, "-o", name("dir")}, 2, "|u| would be");
+  const ProgramResult design = run({"design", loud, "-o", name("e.h5")});
+  EXPECT_EQ(design.exit_code, 2);
+  EXPECT_THAT(design.out, testing::HasSubstr("EXCEEDED"));
+  EXPECT_FALSE(std::filesystem::exists(at("e.h5")));
+  EXPECT_EQ(run({"design", loud, "-o", name("e.h5"), "--force"}).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(at("e.h5")));
+}
+
+TEST_F(BadRequest, AnExistingLogIsNotOverwritten) {
+  make_log();
+  fail({"run", config_, "-o", name("run.slog")}, 2, "exists already; continue it with --resume");
+  const std::string other = experiment("other.yaml", "seed: 7", "seed: 8");
+  fail({"run", other, "-o", name("run.slog"), "--resume"}, 2, "belongs to another experiment");
+}
+
+TEST_F(BadRequest, Outputs) {
+  make_model();
+  std::filesystem::create_directory(at("folder"));
+  const std::vector<std::vector<std::string>> commands = {
+      {"design", config_},        {"run", config_},
+      {"frf", name("run.slog")},  {"modes", name("frf.h5")},
+      {"fit", name("frf.h5")},    {"export", name("model.json")},
+      {"report", name("frf.h5")}, {"log", "convert", name("run.slog")}};
+  for (std::vector<std::string> command : commands) {
+    command.insert(command.end(), {"-o", ""});
+    for (const char* place : {"nowhere/x.h5", "experiment.yaml/x.h5"}) {
+      command.back() = name(place);
+      fail(command, 1, place);
+    }
+    if (command[0] == "export" || command[0] == "log" || command[0] == "run") continue;
+    command.back() = name("folder");
+    fail(command, 1, "is a directory");
+  }
+  fail({"identify", config_, "-o", name("experiment.yaml")}, 1, "experiment.yaml");
+  fail({"identify", config_, "-o", "/proc/stageid"}, 1, "/proc/stageid");
+}
+
+TEST_F(BadRequest, AFullDiskLeavesNothingBehind) {
+  make_model();
+  ProgramOptions full;
+  full.largest_file_bytes = 2000;
+  fail({"design", config_, "-o", name("e.h5")}, 1, "e.h5", full);
+  fail({"frf", name("run.slog"), "-o", name("f.h5")}, 1, "f.h5", full);
+  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--band", "120", "800"}, 1, "m.json", full);
+  fail({"export", name("model.json"), "-o", name("m.h5")}, 1, "m.h5", full);
+  fail({"export", name("model.json"), "-o", name("m.csv")}, 1, "m.csv", full);
+  fail({"report", name("frf.h5"), "-o", name("r.html")}, 1, "r.html", full);
+  fail({"log", "convert", name("run.slog"), "-o", name("l.h5")}, 1, "l.h5", full);
+  // What was recorded before the disk was full stays.
+  full.largest_file_bytes = 200000;
+  const ProgramResult run_full = run({"run", config_, "-o", name("full.slog")}, full);
+  EXPECT_EQ(run_full.exit_code, 1);
+  EXPECT_TRUE(std::filesystem::exists(at("full.slog")));
+}
+
+TEST_F(BadRequest, Fits) {
+  make_frf();
+  const auto wrong = [&](std::vector<std::string> flags, const std::string& text) {
+    flags.insert(flags.begin(), {"fit", name("frf.h5"), "-o", name("m.json")});
+    fail(flags, 2, text);
+  };
+  wrong({"--band", "900", "950"},
+        "no line lies in it; the frequency response has lines from 16 to 800 Hz");
+  wrong({"--band", "500", "100"}, "no line lies in it");
+  wrong({"--modes", "500"}, "--modes: 500; 197 lines carry no more than 65;");
+  wrong({"--modes", "0"}, "--modes");
+  wrong({"--modes", "12,x"}, "--modes");
+  wrong({"--modes", "100,5000"}, "--modes: 5000 Hz is not below half the sample rate, 1000 Hz");
+  wrong({"--weighting", "relativ"}, "did you mean 'relative'?");
+  wrong({"--hold", "exakt"}, "did you mean 'exact'?");
+  wrong({"--delay", "soon"}, "--delay");
+  wrong({"--delay", "nan"}, "--delay");
+  wrong({"--damping", "viscous"}, "--damping");
+  wrong({"--method", "sgd"}, "--method");
+  wrong({"--max-iterations", "0"}, "--max-iterations");
+  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--weighting", name("none.h5")}, 1, "none.h5");
+  fail({"modes", name("frf.h5"), "--band", "900", "950"}, 2, "no line lies in it");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--inputs", "a9"}, 2, "a9");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--outputs", "s9"}, 2, "s9");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "0"}, 2, "counted from 1");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "9"}, 2, "no complete run");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--transient-periods", "9"}, 2,
+       "5 periods were recorded and 9 are transient");
+}
+
+}  // namespace
+}  // namespace stageid::test

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid::test {
+
+std::string read_bytes(const std::filesystem::path& file);
+void write_bytes(const std::filesystem::path& file, const std::string& bytes);
+std::string replaced(std::string text, const std::string& from, const std::string& to);
+
+/// Says where two contents part, without printing them: most are binary or long.
+testing::AssertionResult same_bytes(const std::string& a, const std::string& b);
+
+/// Names and contents of everything below a directory: to show that nothing was left or changed.
+std::map<std::string, std::string> snapshot(const std::filesystem::path& directory);
+
+/// A directory with copies of the small configurations, and the real program.
+class ProgramTest : public testing::Test {
+ protected:
+  ProgramTest();
+
+  std::filesystem::path at(const std::string& name) const { return directory_ / name; }
+  std::string name(const std::string& file) const { return at(file).string(); }
+  ProgramResult run(const std::vector<std::string>& arguments, ProgramOptions options = {}) const;
+  /// Runs and expects exit code 0.
+  ProgramResult succeed(const std::vector<std::string>& arguments) const;
+  /// Expects `exit_code`, one line on stderr "stageid: ..." that contains `text`, nothing on stdout,
+  /// and that no file appeared or changed.
+  void fail(const std::vector<std::string>& arguments, int exit_code, const std::string& text,
+            ProgramOptions options = {}) const;
+
+  /// Writes a variant of the small experiment (or stage) and returns its name.
+  std::string experiment(const std::string& file, const std::string& from,
+                         const std::string& to) const;
+  std::string stage(const std::string& file, const std::string& from, const std::string& to) const;
+
+  /// run.slog of the small experiment; made once a test.
+  void make_log() const;
+  void make_frf() const;
+  /// model.json on the band of the configuration; makes frf.h5 too.
+  void make_model() const;
+
+  TemporaryDirectory directory_;
+  std::string config_;
+};
+
+}  // namespace stageid::test
