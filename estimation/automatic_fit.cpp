@@ -53,14 +53,6 @@ void sort_modes(AdditiveModel& model) {
                    });
 }
 
-/// More modes than this the lines cannot carry: a channel's functions are real combinations on 2 N
-/// real values, of which a third is left to tell noise from modes.
-Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure) {
-  const Eigen::Index per_mode = structure.general_damping ? 2 : 1;
-  const Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);
-  return std::max<Eigen::Index>(1, (2 * frf.lines() / 3 - fixed) / (per_mode + 1));
-}
-
 /// Grows and prunes a model; every decision is written down.
 class AutomaticFit {
  public:
@@ -79,7 +71,7 @@ class AutomaticFit {
     quick_.step_tolerance = 1e-7;
     quick_.deviation_tolerance = 0.1;
     quick_.method = FitMethod::gn;  // the same minimum; the refined-IV iteration does the final fit
-    quick_.progress = nullptr;
+    quick_.residue_rank = quick_.rigid_body_rank = 0;
     threads_ = options.threads > 0
                    ? options.threads
                    : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
@@ -361,6 +353,12 @@ class AutomaticFit {
 };
 
 }  // namespace
+
+Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure) {
+  const Eigen::Index per_mode = structure.general_damping ? 2 : 1;
+  const Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);
+  return std::max<Eigen::Index>(1, (2 * frf.lines() / 3 - fixed) / (per_mode + 1));
+}
 
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
                         const ModeSelection& selection, const FitOptions& options) {

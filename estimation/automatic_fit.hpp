@@ -22,9 +22,15 @@ struct ModeSelection {
   int most = 60;
 };
 
+/// More modes than this the lines of an FRF cannot carry: a channel's functions are real combinations
+/// on 2 N real values, of which a third is left to tell noise from modes.
+Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure);
+
 /// A fit that completes its own start: peaks of the CMIF, then modes at the peaks of the weighted
 /// residual's CMIF while they are worth their parameters, duplicates merged, worthless ones
-/// dropped. Every decision is in FitResult::decisions.
+/// dropped. Every decision is in FitResult::decisions. FitOptions::progress is called with the iterations of
+/// all fits on the way.
+/// @throws std::invalid_argument: as fit_additive_model(), and for more modes than the lines carry
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
                         const ModeSelection& selection, const FitOptions& options);
 

@@ -30,13 +30,16 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("--hold", request_.hold, "none | phase | sinc | exact; default: by the FRF");
   command->add_option("--delay", request_.delay,
                       "SECONDS | estimate | per_channel; default: by the FRF");
-  command->add_option("--rigid-body", request_.rigid_body, "none | full: the term B_0 / s^2")
+  command->add_option("--rigid-body", request_.rigid_body, "none | full | RANK: the term B_0 / s^2")
       ->capture_default_str();
   command
       ->add_option("--direct-term", request_.direct_term,
                    "none | full: a constant, the compliance of modes above the band")
       ->capture_default_str();
-  command->add_option("--residue-rank", residue_rank_, "full")->capture_default_str();
+  command
+      ->add_option("--residue-rank", request_.residue_rank,
+                   "full | 1: residues phi psi^T of mechanical modes")
+      ->capture_default_str();
   command->add_option("--submodel", submodel_, "")->group("");
   command
       ->add_option("--damping", request_.damping,
@@ -57,12 +60,6 @@ FitRequest FitCommand::checked_request() const {
   if (!submodel_.empty())
     throw std::invalid_argument(
         "--submodel: not in this version; the model is a rigid body, modes and a direct term");
-  if (residue_rank_ != "full")
-    throw std::invalid_argument(
-        fmt::format("--residue-rank: '{}' is not in this version; there is full", residue_rank_));
-  if (request_.rigid_body != "none" && request_.rigid_body != "full")
-    throw std::invalid_argument(fmt::format(
-        "--rigid-body: '{}' is not in this version; there are none and full", request_.rigid_body));
   FitRequest request = request_;
   if (!band_hz_.empty()) request.band_hz = {band_hz_[0], band_hz_[1]};
   return request;

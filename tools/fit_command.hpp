@@ -25,7 +25,6 @@ class FitCommand {
   std::filesystem::path output_;
   FitRequest request_;
   std::vector<double> band_hz_;
-  std::string residue_rank_ = "full";
   std::string submodel_;
   std::uint64_t seed_ = 0;
 };

@@ -117,15 +117,26 @@ class FitDefaults {
 
   /// Refused here: the fit would grow for hours towards a number that the lines cannot carry.
   void require_affordable_modes() const {
-    const ModelStructure& structure = setup_.structure;
-    const Eigen::Index per_mode = structure.general_damping ? 2 : 1;
-    const Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);
     const Eigen::Index lines = setup_.frf.lines();
-    const Eigen::Index most = std::max<Eigen::Index>(1, (2 * lines / 3 - fixed) / (per_mode + 1));
+    const Eigen::Index most = most_modes(setup_.frf, setup_.structure);
     if (setup_.selection.exactly > most)
       throw std::invalid_argument(fmt::format(
           "--modes: {}; {} lines carry no more than {}; ask for fewer or take a wider band",
           setup_.selection.exactly, lines, most));
+  }
+
+  void choose_ranks() {
+    setup_.structure.rigid_body = request_.rigid_body != "none";
+    setup_.options.rigid_body_rank =
+        request_.rigid_body == "none" || request_.rigid_body == "full"
+            ? 0
+            : rank("--rigid-body", request_.rigid_body, "none, full or a rank of 1 or more");
+    setup_.options.residue_rank =
+        request_.residue_rank == "full"
+            ? 0
+            : rank("--residue-rank", request_.residue_rank, "full or a rank of 1 or more");
+    if (setup_.structure.general_damping && setup_.options.residue_rank > 1)
+      refuse("--residue-rank", request_.residue_rank, "full or 1 with --damping general");
   }
 
   void choose_modes() {
@@ -152,6 +163,13 @@ class FitDefaults {
 
  private:
   void note(std::string text) { setup_.notes.push_back(std::move(text)); }
+
+  static int rank(const char* flag, const std::string& text, const char* allowed) {
+    const std::optional<double> number = to_number(text);
+    if (!number || *number < 1.0 || *number > 1000.0 || std::floor(*number) != *number)
+      refuse(flag, text, allowed);
+    return static_cast<int>(*number);
+  }
 
   void parse_delay() {
     FitOptions& options = setup_.options;
@@ -261,6 +279,7 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
                 : o.delay == DelayModel::per_channel ? Json("per_channel")
                                                      : Json(o.delay_s)},
       {"rigid_body", request.rigid_body},
+      {"residue_rank", request.residue_rank},
       {"direct_term", request.direct_term},
       {"damping", request.damping},
       {"method", request.method},
@@ -286,11 +305,11 @@ FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf) {
   defaults.choose_delay();
   defaults.choose_weighting();
   defaults.choose_modes();
-  setup.structure.rigid_body = pick<int>("--rigid-body", request.rigid_body, {"none", "full"}) == 1;
   setup.structure.direct_term =
       pick<int>("--direct-term", request.direct_term, {"none", "full"}) == 1;
   setup.structure.general_damping =
       pick<int>("--damping", request.damping, {"proportional", "general"}) == 1;
+  defaults.choose_ranks();
   defaults.require_affordable_modes();
   setup.options.method = pick<FitMethod>("--method", request.method, kMethods);
   if (request.max_iterations < 1)
@@ -299,64 +318,6 @@ FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf) {
   setup.options.threads = request.threads;
   setup.request_json = provenance_of(request, setup);
   return setup;
-}
-
-void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
-  constexpr auto kOptional = Presence::optional;
-  std::vector<double> band_hz;
-  v.numbers("band_hz", band_hz, positive("Hz"), {2, 2}, kOptional, "left out: all lines");
-  if (band_hz.size() == 2) {
-    v.require(band_hz[0] < band_hz[1], "band_hz",
-              "band_hz: is empty; write [LOW, HIGH] with LOW < HIGH");
-    f.band_hz = {band_hz[0], band_hz[1]};
-  }
-
-  FlexibleValue modes = {"auto", {}, false, {}};
-  FlexibleRule modes_rule;
-  modes_rule.words = {"auto"};
-  modes_rule.number = true;
-  modes_rule.list = true;
-  modes_rule.rule = positive("");
-  v.flexible("modes", modes, modes_rule, kOptional,
-             "auto, how many, or a list of frequencies in Hz");
-  v.require(
-      modes.is_list || modes.numbers.empty() || std::floor(modes.numbers[0]) == modes.numbers[0],
-      "modes", "modes: a number says how many and is whole; write frequencies as a list [...]");
-  // A list of one frequency would read as a count without the comma.
-  f.modes = modes.word.empty()
-                ? fmt::format("{}{}", fmt::join(modes.numbers, ","), modes.is_list ? "," : "")
-                : modes.word;
-
-  const auto word = [&](const char* key, std::string& value, std::vector<std::string> names,
-                        const char* help) {
-    std::size_t index = names.size() - 1;
-    for (std::size_t i = 0; i < names.size(); ++i)
-      if (names[i] == value) index = i;
-    v.choice(key, index, names, kOptional, help);
-    value = names[index] == "by_frf" ? "" : names[index];
-  };
-  word("weighting", f.weighting,
-       {"unit", "inverse_magnitude", "relative", "noise_variance", "total_variance", "by_frf"},
-       "of the cost; by_frf: noise variance if known, else total variance, else relative");
-  word("hold", f.hold, {"none", "phase", "sinc", "exact", "by_frf"},
-       "how the model meets sampled data; by_frf: exact unless it was taken out");
-
-  FlexibleValue delay = {f.delay.empty() ? "by_frf" : f.delay, {}, false, {}};
-  FlexibleRule delay_rule;
-  delay_rule.words = {"estimate", "per_channel", "by_frf"};
-  delay_rule.number = true;
-  delay_rule.rule = any_number("s");
-  v.flexible("delay_s", delay, delay_rule, kOptional,
-             "a number, one for the plant, or one a channel");
-  f.delay = delay.word.empty() ? fmt::format("{}", delay.numbers.front())
-                               : (delay.word == "by_frf" ? "" : delay.word);
-
-  word("rigid_body", f.rigid_body, {"none", "full"}, "the term B_0 / s^2");
-  word("direct_term", f.direct_term, {"none", "full"},
-       "a constant: the compliance of modes above the band");
-  word("damping", f.damping, {"proportional", "general"}, "numerators B_0, or B_0 + B_1 s");
-  word("method", f.method, {"riv", "gn", "sk"}, "of the iteration");
-  count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "of one fit");
 }
 
 }  // namespace stageid

@@ -19,7 +19,8 @@ struct FitRequest {
   std::string weighting;                 ///< unit | inverse_magnitude | relative | ... | FILE.h5
   std::string hold;                      ///< none | phase | sinc | exact
   std::string delay;                     ///< SECONDS | estimate | per_channel
-  std::string rigid_body = "full";       ///< none | full
+  std::string rigid_body = "full";       ///< none | full | RANK
+  std::string residue_rank = "full";     ///< full | 1 (or another rank)
   std::string damping = "proportional";  ///< proportional | general
   std::string method = "riv";            ///< riv | gn | sk
   std::string direct_term = "none";      ///< none | full
@@ -46,7 +47,7 @@ struct FitSetup {
 /// @throws std::invalid_argument naming the flag; FileError, FormatError for files that it names.
 FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf);
 
-/// Keys of the section `fit`.
+/// Keys of the section `fit` (fit_keys.cpp).
 void describe_fit_keys(ConfigVisitor& visitor, FitRequest& request);
 
 }  // namespace stageid

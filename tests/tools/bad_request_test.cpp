@@ -28,8 +28,6 @@ TEST_F(BadRequest, WhatIsNotInThisVersionSaysSo) {
   fail({"run", config_, "-o", name("x.slog"), "--dashboard", "8080"}, 2, "not in this version");
   fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
   fail({"import", "x.mat", "-o", "frf.h5"}, 2, "not in this version");
-  fail({"fit", "frf.h5", "-o", "m.json", "--rigid-body", "3"}, 2, "not in this version");
-  fail({"fit", "frf.h5", "-o", "m.json", "--residue-rank", "1"}, 2, "not in this version");
   fail({"fit", "frf.h5", "-o", "m.json", "--submodel", "2,0,0"}, 2, "not in this version");
   fail({"export", "model.json", "-o", name("m.mat")}, 2, ".json, .h5 and .csv");
 }
@@ -168,6 +166,9 @@ TEST_F(BadRequest, Fits) {
   wrong({"--band", "900", "950"},
         "no line lies in it; the frequency response has lines from 16 to 800 Hz");
   wrong({"--band", "500", "100"}, "no line lies in it");
+  wrong({"--rigid-body", "half"}, "--rigid-body: 'half'; write none, full or a rank");
+  wrong({"--residue-rank", "0"}, "--residue-rank: '0'; write full or a rank");
+  wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with --damping general");
   wrong({"--modes", "500"}, "--modes: 500; 197 lines carry no more than 65;");
   wrong({"--modes", "0"}, "--modes");
   wrong({"--modes", "12,x"}, "--modes");

@@ -197,6 +197,18 @@ TEST(FitRequest, EveryWordThatIsNotOneIsRefused) {
   refused(&FitRequest::method, "lm");
 }
 
+TEST(FitRequest, RanksAreWordsOrNumbers) {
+  FitRequest request;
+  EXPECT_EQ(make_fit_setup(request, measured()).options.residue_rank, 0);
+  request.rigid_body = "3";
+  request.residue_rank = "1";
+  const FitSetup setup = make_fit_setup(request, measured());
+  EXPECT_TRUE(setup.structure.rigid_body);
+  EXPECT_EQ(setup.options.rigid_body_rank, 3);
+  EXPECT_EQ(setup.options.residue_rank, 1);
+  EXPECT_NE(setup.request_json.find("\"residue_rank\":\"1\""), std::string::npos);
+}
+
 TEST(FitRequest, TheRequestIsNamedWhole) {
   FitRequest request;
   request.threads = 1;
