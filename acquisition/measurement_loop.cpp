@@ -53,7 +53,7 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
   }
   ramp_samples_ = static_cast<std::uint64_t>(std::llround(options.ramp_s * info.sample_rate_hz));
   wall_clock_ = info.clock == Clock::wall;
-  period_ns_ = std::llround(1e9 / info.sample_rate_hz);
+  period_ns_ = std::llround(1e9 / (info.sample_rate_hz * info.pace));
   u_.assign(actuators, 0.0);
   last_finite_u_.assign(actuators, 0.0);
   y_.assign(sensors, 0.0);

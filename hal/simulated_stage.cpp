@@ -35,6 +35,7 @@ StageInfo info_of(const WaferStageSpec& spec) {
   if (info.maximum_rate_hz == 0.0) info.maximum_rate_hz = info.sample_rate_hz;
   info.transport_delay_s = spec.delay_s;
   info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
+  if (spec.pace > 0.0) info.pace = spec.pace;
   return info;
 }
 

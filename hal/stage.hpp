@@ -32,6 +32,7 @@ struct StageInfo {
   double maximum_rate_hz = 0.0;
   double transport_delay_s = 0.0;  ///< declared, from command computed to hold output changed
   Clock clock = Clock::virtual_time;
+  double pace = 1.0;  ///< stage seconds per second of its clock; not 1 only where time is simulated
   std::vector<Channel> actuators;
   std::vector<Channel> sensors;
 };

@@ -315,6 +315,14 @@ TEST_F(MeasurementLoopTest, DeadlinesAreForTheWallClockOnly) {
   EXPECT_EQ(wall.last_deadline_ns(), 3'000'000);
 }
 
+TEST_F(MeasurementLoopTest, ASlowedStageIsLateByItsOwnPeriods) {
+  AnalyticStage slow(kActuators, kSensors, 1000.0, Clock::wall, 0.1);
+  MeasurementLoop timed(slow, controller_, ring_);
+  timed.start(1, excitation_);
+  static_cast<void>(timed.step());
+  EXPECT_EQ(slow.last_deadline_ns(), 20'000'000);
+}
+
 TEST_F(MeasurementLoopTest, RefusesWhatDoesNotFit) {
   EXPECT_THROW(make_loop({.ramp_s = -1.0}), std::invalid_argument);
   EXPECT_THROW(make_loop({.ramp_s = std::numeric_limits<double>::quiet_NaN()}),

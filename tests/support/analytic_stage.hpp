@@ -27,12 +27,13 @@ class AnalyticStage final : public CyclicStage {
   }
 
   AnalyticStage(int actuators, int sensors, double rate_hz = 1000.0,
-                Clock clock = Clock::virtual_time)
+                Clock clock = Clock::virtual_time, double pace = 1.0)
       : y_(Eigen::VectorXd::Zero(sensors)) {
     info_.name = "analytic";
     info_.backend = "test";
     info_.sample_rate_hz = rate_hz;
     info_.clock = clock;
+    info_.pace = pace;
     info_.actuators = channels('u', actuators, "N");
     info_.sensors = channels('y', sensors, "m");
     sent_.reserve(10'000'000 / sizeof(double));

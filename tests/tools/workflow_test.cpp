@@ -85,12 +85,13 @@ TEST_F(Workflow, ResumePassesOverWhatIsUpToDate) {
 }
 
 TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
-  // One run lasts 10.5 s on the wall clock, so the signal comes in the middle of the first.
-  const std::string config = experiment("long.yaml", "periods: 3", "periods: 40");
+  // One run lasts 25 s on the wall clock, so the signal comes in the middle of the first; and a cycle
+  // 5 ms, so that a busy machine is not late.
+  const std::string config = experiment("long.yaml", "periods: 3", "periods: 8");
   ProgramOptions interrupt;
   interrupt.interrupt_after_s = 1.5;
   const ProgramResult first =
-      run({"run", config, "-o", name("cut.slog"), "--pace", "1"}, interrupt);
+      run({"run", config, "-o", name("cut.slog"), "--pace", "0.1"}, interrupt);
   EXPECT_EQ(first.exit_code, 130) << first.err;
   EXPECT_THAT(first.err, HasSubstr("continue with --resume"));
   ASSERT_TRUE(std::filesystem::exists(at("cut.slog")));
