@@ -35,8 +35,8 @@ Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,
 std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructure& structure) {
   std::vector<Submodel> out;
   const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
-  if (structure.rigid_body) out.push_back({2, {1.0}, {zero}, {}, {}});
-  if (structure.direct_term) out.push_back({0, {1.0}, {zero}, {}, {}});
+  if (structure.rigid_body) out.push_back({2, {1.0}, {zero}, {}, {}, {}});
+  if (structure.direct_term) out.push_back({0, {1.0}, {zero}, {}, {}, {}});
   return out;
 }
 

@@ -216,9 +216,11 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
     search_delay(problem, beta);
 
   FitResult result;
+  result.model = start;
   IterationResult iteration = iterate(problem, beta, options);
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   ParameterCovariance covariance;
+  std::vector<int> ranks;
   if (low_rank && iteration.status != FitStatus::singular) {
     LowRankResult constrained = iterate_low_rank(problem, beta, options, likelihood(options));
     result.decisions.push_back(rank_decision(problem, iteration, constrained, likelihood(options)));
@@ -227,11 +229,18 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
     constrained.iteration.iterations += iteration.iterations;
     iteration = std::move(constrained.iteration);
     covariance = std::move(constrained.covariance);
+    ranks = std::move(constrained.ranks);
+    if (options.uncertainty && frf.residual_covariance_re.size() > 0)
+      result.decisions.emplace_back(
+          "standard deviations with residues of given rank take the outputs' noise as "
+          "uncorrelated");
   }
+  for (std::size_t i = 0; i < result.model.submodels.size(); ++i)
+    result.model.submodels[i].residue_rank =
+        i < ranks.size() && ranks[i] > 0 ? std::optional(ranks[i]) : std::nullopt;
   result.status = iteration.status;
   result.message = iteration.message;
   result.cost = iteration.cost;
-  result.model = start;
   result.model.inputs = frf.inputs;
   result.model.outputs = frf.outputs;
   result.model.sample_rate_hz = frf.sample_rate_hz;

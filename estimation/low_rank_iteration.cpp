@@ -28,10 +28,10 @@ class LowRankIteration {
     Eigen::Index function = 0;
     Eigen::Index denominator = 0;
     Eigen::Index parameter = problem.globals();
-    for (const SubmodelShape& shape : problem.shapes) {
-      const bool mode = shape.order == 2 && shape.integrators == 0;
-      const bool rigid_body = shape.integrators > 0;
-      const int rank = mode ? options.residue_rank : rigid_body ? options.rigid_body_rank : 0;
+    for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
+      const SubmodelShape& shape = problem.shapes[i];
+      const int rank = rank_of(shape, beta.a[i]);
+      ranks_.push_back(rank);
       Part part{ResidueForm(shape, rank, problem.n_outputs, problem.n_inputs), function,
                 denominator, parameter};
       function += shape.functions();
@@ -40,6 +40,15 @@ class LowRankIteration {
       parts_.push_back(std::move(part));
     }
     size_ = parameter;
+  }
+
+  /// A mode beside the lines stands for all that the plant does there: its residue stays free.
+  int rank_of(const SubmodelShape& shape, const Eigen::VectorXd& a) const {
+    if (shape.integrators > 0) return options_.rigid_body_rank;
+    if (shape.order != 2 || !(a[1] > 0.0)) return 0;
+    const double omega = 1.0 / std::sqrt(a[1]);
+    const Eigen::VectorXd& lines = problem_.lines.omega_rad_s;
+    return omega > lines.minCoeff() && omega < lines.maxCoeff() ? options_.residue_rank : 0;
   }
 
   LowRankResult run(bool likelihood) {
@@ -55,6 +64,7 @@ class LowRankIteration {
     if (options_.uncertainty && result_.status != FitStatus::singular) fill(out, likelihood);
     result_.frozen = frozen_;
     out.parameters = size_;
+    out.ranks = ranks_;
     out.iteration = std::move(result_);
     return out;
   }
@@ -253,6 +263,7 @@ class LowRankIteration {
   const FitOptions& options_;
   PoleBounds bounds_;
   std::vector<Part> parts_;
+  std::vector<int> ranks_;
   Eigen::Index size_ = 0;
   IterationResult result_;
   Eigen::MatrixXd N_;

@@ -33,6 +33,7 @@ Json submodel_to_json(const Submodel& s) {
     if (s.natural_frequency_std_hz) out["natural_frequency_std_hz"] = *s.natural_frequency_std_hz;
     if (s.damping_ratio_std) out["damping_ratio_std"] = *s.damping_ratio_std;
   }
+  if (s.residue_rank) out["residue_rank"] = *s.residue_rank;
   return out;
 }
 
@@ -73,6 +74,8 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
     s.natural_frequency_std_hz = node.member("natural_frequency_std_hz").number();
   if (node.has("damping_ratio_std"))
     s.damping_ratio_std = node.member("damping_ratio_std").number();
+  if (node.has("residue_rank"))
+    s.residue_rank = static_cast<int>(node.member("residue_rank").integer(1, 1'000'000));
   return s;
 }
 

@@ -137,6 +137,9 @@ TEST_F(LowRankFit, ComesCloserToTheTruthAndSaysThatNoiseExplainsTheRest) {
   const FitResult fit = fit_additive_model(stage_.frf, stage_.truth, options_);
   ASSERT_TRUE(fit.trustworthy()) << fit.message;
   EXPECT_LT(second_singular_value(fit.model.submodels[0].numerator[0], 3), 1e-12);
+  EXPECT_EQ(fit.model.submodels[0].residue_rank, 3);
+  EXPECT_EQ(fit.model.submodels[1].residue_rank, 1);
+  EXPECT_EQ(free.model.submodels[1].residue_rank, std::nullopt);
   for (const Submodel& s : fit.model.submodels)
     if (s.is_mode()) {
       EXPECT_LT(second_singular_value(s.numerator[0], 1), 1e-12);

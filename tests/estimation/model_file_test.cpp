@@ -51,6 +51,7 @@ AdditiveModel full_model() {
       for (double& value : B.reshaped()) value = random.normal() * 1e-7;
   model.submodels[1].natural_frequency_std_hz = 0.1 / 3.0;
   model.submodels[1].damping_ratio_std = 1e-5 / 3.0;
+  model.submodels[1].residue_rank = 1;
   model.fit = {1.0 / 7.0,  "noise_variance", 12, "gradient_small",
                0.01 / 3.0, {20.25, 1999.75}, 0.0};
   model.cost_history = {3.0, 1.0 / 3.0, 1.0 / 7.0};
@@ -99,6 +100,7 @@ TEST_F(ModelFile, RoundTripsEveryBit) {
     EXPECT_EQ(a.numerator, b.numerator);
     EXPECT_EQ(a.natural_frequency_std_hz, b.natural_frequency_std_hz);
     EXPECT_EQ(a.damping_ratio_std, b.damping_ratio_std);
+    EXPECT_EQ(a.residue_rank, b.residue_rank);
   }
   EXPECT_EQ(read.fit.cost, model.fit.cost);
   EXPECT_EQ(read.fit.weighting, model.fit.weighting);
