@@ -65,6 +65,7 @@ class AutomaticFit {
         quick_(options) {
     quick_.user_weights = make_weights(frf, options);
     quick_.weighting = Weighting::user;
+    quick_.user_weight_matrices.resize(0, 0);  // the final fit's only: their best diagonal chooses
     quick_.uncertainty = false;
     quick_.max_iterations = std::min(kGrowthIterations, options.max_iterations);
     quick_.gradient_tolerance = 1e-5;

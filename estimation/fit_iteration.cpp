@@ -14,31 +14,12 @@ namespace stageid {
 namespace {
 
 constexpr double kLargestLevenberg = 1e8;
-// Where no step lowers the cost, it is at rounding if the stationary point is so many deviations away.
-constexpr double kRoundingDeviations = 0.05;
 
 /// A candidate with its numerators solved.
 struct Trial {
   FitParameters beta;
   Residual E;
 };
-
-FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
-                      const Eigen::VectorXd& step) {
-  FitParameters out = beta;
-  Eigen::Index p = 0;
-  for (Eigen::VectorXd& a : out.a) {
-    a += step.segment(p, a.size());
-    p += a.size();
-  }
-  if (problem.delay == DelayModel::estimate) {
-    out.input_delay_s.array() += step[p];
-  } else if (problem.delay == DelayModel::per_channel) {
-    out.input_delay_s += step.segment(p, problem.n_inputs);
-    out.output_delay_s.head(problem.n_outputs - 1) += step.tail(problem.n_outputs - 1);
-  }
-  return out;
-}
 
 std::optional<Trial> try_step(const FitProblem& problem, const PoleBounds& bounds,
                               const FitParameters& beta, const Eigen::VectorXd& step) {
