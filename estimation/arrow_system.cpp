@@ -253,7 +253,7 @@ ArrowSystem::Step ArrowSystem::solve(double damping) const {
   return step;
 }
 
-Eigen::VectorXd ArrowSystem::solve(const Eigen::VectorXd& right_side,
+Eigen::VectorXd ArrowSystem::solve(const Eigen::VectorXd& right_side, double damping,
                                    const std::vector<Eigen::Index>& frozen) const {
   const Eigen::Index globals = problem_.globals();
   Eigen::VectorXd x(right_side.size());
@@ -269,7 +269,7 @@ Eigen::VectorXd ArrowSystem::solve(const Eigen::VectorXd& right_side,
     B.row(row) = own.transpose();
   }
   if (globals == 0) return x;
-  x.head(globals) = solve_schur(schur_e, 0.0, frozen);
+  x.head(globals) = solve_schur(schur_e, damping, frozen);
   for (std::size_t c = 0; c < channels_.size(); ++c)
     B.row(static_cast<Eigen::Index>(c)) -= (channels_[c].Z * x.head(globals)).transpose();
   return x;

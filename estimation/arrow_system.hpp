@@ -35,8 +35,8 @@ class ArrowSystem {
   /// `frozen` globals stay where they are.
   Eigen::VectorXd solve_globals(double damping, const std::vector<Eigen::Index>& frozen = {}) const;
 
-  /// M^-1 times another right-hand side than e, both (globals, vec B). @pre regular()
-  Eigen::VectorXd solve(const Eigen::VectorXd& right_side,
+  /// M^-1 times another right-hand side than e, both (globals, vec B); damped alike. @pre regular()
+  Eigen::VectorXd solve(const Eigen::VectorXd& right_side, double damping,
                         const std::vector<Eigen::Index>& frozen) const;
 
   /// One channel's part of M: border and numerator block.

@@ -25,7 +25,7 @@ struct IterationResult {
 IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options);
 
 /// The same for Hermitian weights, from all of `beta` (a fit with the diagonal weights): Gauss-Newton
-/// on all parameters at once, see JointEquations, halved until the cost falls. The cost is the true
+/// on all parameters at once, see JointEquations, damped until the cost falls. The cost is the true
 /// one, sum vec(E)^H W_k vec(E) / (2N). @pre problem.W is weights.marginal().
 IterationResult iterate(const FitProblem& problem, const WeightMatrices& weights,
                         FitParameters& beta, const FitOptions& options);

@@ -1,6 +1,7 @@
 #include "estimation/joint_equations.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "estimation/weighted_products.hpp"
 
@@ -145,25 +146,29 @@ void JointEquations::add_adjoint(const Eigen::MatrixXcd& X, Eigen::Index first,
 
 JointEquations::Solution JointEquations::solve(const Eigen::VectorXd& right_side,
                                                const std::vector<Eigen::Index>& frozen,
-                                               double tolerance) const {
+                                               double tolerance, double damping) const {
+  const Eigen::Index globals = problem_.globals();
+  const Eigen::VectorXd damped = damping * arrow_.schur().diagonal().cwiseAbs();
   const auto freeze = [&](Eigen::VectorXd v) {
     for (const Eigen::Index i : frozen) v[i] = 0.0;
     return v;
   };
   Solution solution{Eigen::VectorXd::Zero(size()), freeze(right_side), 0, false};
   Eigen::VectorXd& r = solution.residual;
-  Eigen::VectorXd z = arrow_.solve(r, frozen);
+  Eigen::VectorXd z = arrow_.solve(r, damping, frozen);
   Eigen::VectorXd direction = z;
   double rz = r.dot(z);
   const double wanted = tolerance * tolerance * rz;
   while (rz > wanted && solution.iterations < kMostIterations) {
-    const Eigen::VectorXd q = freeze(product(direction));
+    Eigen::VectorXd q = product(direction);
+    q.head(globals) += damped.cwiseProduct(direction.head(globals));
+    q = freeze(std::move(q));
     const double curvature = direction.dot(q);
     if (!(curvature > 0.0)) break;  // singular to rounding
     ++solution.iterations;
     solution.x += rz / curvature * direction;
     r -= rz / curvature * q;
-    z = arrow_.solve(r, frozen);
+    z = arrow_.solve(r, damping, frozen);
     const double next = r.dot(z);
     direction = z + next / rz * direction;
     rz = next;

@@ -34,14 +34,14 @@ class JointEquations {
 
   struct Solution {
     Eigen::VectorXd x;
-    Eigen::VectorXd residual;  ///< right_side - M x on the free parameters
+    Eigen::VectorXd residual;  ///< right_side less what x gives, on the free parameters
     int iterations = 0;
     bool converged = false;
   };
-  /// M^-1 right_side on the parameters that are free; `frozen` globals stay zero.
+  /// (M + damping D)^-1 right_side, D the diagonal of the arrow's Schur complement, on the parameters that are free; `frozen` globals stay zero.
   /// @param tolerance on the error of x relative to x, in the norm of the arrow
   Solution solve(const Eigen::VectorXd& right_side, const std::vector<Eigen::Index>& frozen,
-                 double tolerance) const;
+                 double tolerance, double damping = 0.0) const;
 
  private:
   template <typename Columns>

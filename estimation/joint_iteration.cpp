@@ -15,7 +15,7 @@ namespace {
 
 // Of the step, where the cost is quadratic: the next one corrects it.
 constexpr double kStepTolerance = 1e-2;
-constexpr int kMostHalvings = 30;
+constexpr double kLargestLevenberg = 1e8;
 
 class JointIteration {
  public:
@@ -65,7 +65,7 @@ class JointIteration {
                  fmt::format("stopped after {} iterations, {:.2g} standard deviations from the "
                              "first-order condition",
                              result_.iterations, deviations_));
-    if (descend(step)) return true;
+    if (descend(equations, step)) return true;
     if (deviations_ < kRoundingDeviations)
       return end(FitStatus::step_small,
                  fmt::format("the cost is at rounding, within {:.1g} standard deviations of the "
@@ -103,25 +103,34 @@ class JointIteration {
     return true;
   }
 
-  /// Takes the largest of the step, its half, its quarter, ... that lowers the cost.
-  bool descend(const Eigen::VectorXd& step) {
-    if (!step.allFinite()) return false;
-    const Eigen::Index globals = problem_.globals();
-    double part = 1.0;
-    for (int halvings = 0; halvings < kMostHalvings; ++halvings, part *= 0.5) {
-      FitParameters trial = stepped(problem_, beta_, part * step.head(globals));
-      trial.B += part * step.tail(step.size() - globals).reshaped(trial.B.rows(), trial.B.cols());
-      if (!bounds_.stabilize(beta_, trial)) continue;
-      Residual E = residual_at(trial);
-      if (!(E.cost < result_.E.cost)) continue;
-      beta_ = std::move(trial);
-      result_.E = std::move(E);
-      result_.cost.push_back(result_.E.cost);
-      ++result_.iterations;
-      if (options_.progress) options_.progress(result_.iterations, result_.E.cost);
-      return true;
+  /// Tries steps of growing damping, `step` being the first; takes the first that lowers the cost.
+  bool descend(const JointEquations& equations, Eigen::VectorXd step) {
+    for (bool first = true; levenberg_ <= kLargestLevenberg; first = false) {
+      if (levenberg_ > 0.0)
+        step = equations.solve(equations.gradient(), frozen_, kStepTolerance, levenberg_).x;
+      if (take(step)) {
+        if (first) levenberg_ = levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0;
+        return true;
+      }
+      levenberg_ = std::max(10.0 * levenberg_, 1e-4);
     }
     return false;
+  }
+
+  bool take(const Eigen::VectorXd& step) {
+    if (!step.allFinite()) return false;
+    const Eigen::Index globals = problem_.globals();
+    FitParameters trial = stepped(problem_, beta_, step.head(globals));
+    trial.B += step.tail(step.size() - globals).reshaped(trial.B.rows(), trial.B.cols());
+    if (!bounds_.stabilize(beta_, trial)) return false;
+    Residual E = residual_at(trial);
+    if (!(E.cost < result_.E.cost)) return false;
+    beta_ = std::move(trial);
+    result_.E = std::move(E);
+    result_.cost.push_back(result_.E.cost);
+    ++result_.iterations;
+    if (options_.progress) options_.progress(result_.iterations, result_.E.cost);
+    return true;
   }
 
   const FitProblem& problem_;
@@ -133,6 +142,7 @@ class JointIteration {
   IterationResult result_;
   double signal_cost_ = 0.0;
   double deviations_ = 0.0;
+  double levenberg_ = 0.0;
 };
 
 }  // namespace

@@ -63,7 +63,8 @@ std::vector<Eigen::Index> PoleBounds::leaning(const FitParameters& beta,
       const bool above = omega * kAtBound > highest_rad_s_ && descent[p + 1] < 0.0;
       const double zeta = 0.5 * a[0] * omega;
       const bool overdamped = zeta * kAtBound > kLargestDamping && descent[p] > 0.0;
-      if (below || above || overdamped) out.push_back(p);
+      const bool undamped = zeta < kSmallestDamping * kAtBound && descent[p] < 0.0;
+      if (below || above || overdamped || undamped) out.push_back(p);
       if (below || above) out.push_back(p + 1);
     }
     p += a.size();

@@ -15,10 +15,10 @@ namespace stageid {
 /// the FRF, see make_fit_setup().
 struct FitRequest {
   std::optional<std::array<double, 2>> band_hz;
-  std::string modes = "auto";            ///< auto | N | f1,f2,... | FILE.json
-  std::string weighting;                 ///< unit | inverse_magnitude | relative | ... | likelihood | FILE.h5
-  std::string hold;                      ///< none | phase | sinc | exact
-  std::string delay;                     ///< SECONDS | estimate | per_channel
+  std::string modes = "auto";  ///< auto | N | f1,f2,... | FILE.json
+  std::string weighting;       ///< unit | inverse_magnitude | relative | ... | likelihood | FILE.h5
+  std::string hold;            ///< none | phase | sinc | exact
+  std::string delay;           ///< SECONDS | estimate | per_channel
   std::string rigid_body = "full";       ///< none | full
   std::string damping = "proportional";  ///< proportional | general
   std::string method = "riv";            ///< riv | gn | sk

@@ -150,4 +150,26 @@ inline std::vector<Eigen::MatrixXcd> joint_jacobian(const DenseProblem& problem,
   return out;
 }
 
+/// One measurement of the 2 x 3 stage with strongly correlated noise.
+struct Measurement {
+  DenseProblem problem = noisy_stage(HoldModel::exact, 0.0);
+  CorrelatedNoise noise = correlated_noise(problem, 0.02, 0.95);
+  FrfEstimate frf;
+  explicit Measurement(std::uint64_t seed = 5, int dof = 0) {
+    RandomNumbers random(seed);
+    frf = measured(problem, noise, random, dof);
+  }
+  AdditiveModel start() const { return moved(problem.model, 1.003, 1.2); }
+};
+
+/// Options for that stage.
+inline FitOptions options_with(Weighting weighting) {
+  FitOptions options;
+  options.weighting = weighting;
+  options.hold = HoldModel::exact;
+  options.delay = DelayModel::estimate;
+  options.delay_s = 1.37e-4;
+  return options;
+}
+
 }  // namespace stageid::test

@@ -18,19 +18,9 @@ namespace {
 using test::correlated_noise;
 using test::CorrelatedNoise;
 using test::DenseProblem;
+using test::Measurement;
+using test::options_with;
 using test::RandomNumbers;
-
-constexpr double kDelay = 1.37e-4;
-constexpr double kCorrelation = 0.95;
-
-FitOptions options_with(Weighting weighting) {
-  FitOptions options;
-  options.weighting = weighting;
-  options.hold = HoldModel::exact;
-  options.delay = DelayModel::estimate;
-  options.delay_s = kDelay;
-  return options;
-}
 
 double dense_cost(const AdditiveModel& model, const FrfEstimate& frf,
                   const CorrelatedNoise& noise) {
@@ -75,18 +65,6 @@ double first_order_condition(const DenseEquations& dense, double cost, Eigen::In
   const double squares = 2.0 * static_cast<double>(lines) * cost;
   return (dense.e.array().abs() / (dense.M.diagonal().array() * squares).sqrt()).maxCoeff();
 }
-
-/// One measurement of the 2 x 3 stage with strongly correlated noise.
-struct Measurement {
-  DenseProblem problem = test::noisy_stage(HoldModel::exact, 0.0);
-  CorrelatedNoise noise = correlated_noise(problem, 0.02, kCorrelation);
-  FrfEstimate frf;
-  explicit Measurement(std::uint64_t seed = 5, int dof = 0) {
-    RandomNumbers random(seed);
-    frf = test::measured(problem, noise, random, dof);
-  }
-  AdditiveModel start() const { return test::moved(problem.model, 1.003, 1.2); }
-};
 
 TEST(LikelihoodFit, CostIsThatOfTheKroneckerProductWrittenOut) {
   const Measurement m;
@@ -265,7 +243,7 @@ TEST(LikelihoodFit, DoesNotDependOnTheNumberOfThreads) {
   m.problem.frequency_hz = Eigen::VectorXd::LinSpaced(700, 20.0, 1800.0);  // more than two tiles
   m.problem.G = test::reference_response(m.problem.model, m.problem.frequency_hz, m.problem.hold);
   RandomNumbers random(8);
-  m.frf = test::measured(m.problem, correlated_noise(m.problem, 0.02, kCorrelation), random, 3);
+  m.frf = test::measured(m.problem, correlated_noise(m.problem, 0.02, 0.95), random, 3);
   FitOptions options = options_with(Weighting::likelihood);
   options.threads = 1;
   const FitResult one = fit_additive_model(m.frf, m.start(), options);
@@ -319,67 +297,6 @@ TEST(LikelihoodFit, RefusesAMethodWithoutAMinimum) {
   options.method = FitMethod::sk;
   EXPECT_THAT([&] { (void)fit_additive_model(m.frf, m.start(), options); },
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("riv or gn")));
-}
-
-// Monte Carlo ----------------------------------------------------------------------------------------
-
-constexpr int kRuns = 150;
-// chi^2 of 149 degrees of freedom over its mean lies in here with 99.99 %.
-constexpr double kLowest = 0.62;
-constexpr double kHighest = 1.52;
-
-/// Scatter of frequencies and damping ratios over runs, what was reported, and the response's error.
-struct Repeated {
-  Eigen::VectorXd scatter = Eigen::VectorXd::Zero(6);
-  Eigen::VectorXd reported = Eigen::VectorXd::Zero(6);
-  Eigen::VectorXd bias = Eigen::VectorXd::Zero(6);
-  double response_ratio = 0.0;
-};
-
-Repeated repeat(Weighting weighting, int dof) {
-  Repeated out;
-  FitOptions options = options_with(weighting);
-  options.threads = 1;
-  Eigen::MatrixXd values(6, kRuns);
-  Eigen::VectorXd truth(6);
-  for (int run = 0; run < kRuns; ++run) {
-    const Measurement m(static_cast<std::uint64_t>(1000 + run), dof);
-    const FitResult fit = fit_additive_model(m.frf, m.problem.model, options);
-    EXPECT_TRUE(fit.trustworthy()) << fit.message;
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      const auto at = static_cast<std::size_t>(i) + 1;
-      const Submodel& s = fit.model.submodels[at];
-      values.col(run).segment<2>(2 * i) << s.natural_frequency_hz(), s.damping_ratio();
-      out.reported[2 * i] += std::pow(*s.natural_frequency_std_hz, 2) / kRuns;
-      out.reported[2 * i + 1] += std::pow(*s.damping_ratio_std, 2) / kRuns;
-      truth.segment<2>(2 * i) << m.problem.model.submodels[at].natural_frequency_hz(),
-          m.problem.model.submodels[at].damping_ratio();
-    }
-    const Eigen::MatrixXcd error =
-        test::reference_response(fit.model, m.problem.frequency_hz, m.problem.hold) - m.problem.G;
-    out.response_ratio += error.cwiseAbs2().cwiseQuotient(fit.response_variance).mean() / kRuns;
-  }
-  const Eigen::VectorXd mean = values.rowwise().mean();
-  out.scatter = (values.colwise() - mean).rowwise().squaredNorm() / (kRuns - 1);
-  out.bias = (mean - truth).cwiseAbs();
-  return out;
-}
-
-TEST(LikelihoodMonteCarlo, ScattersLessThanDiagonalWeightsAndAsMuchAsItSays) {
-  for (const int dof : {0, 2}) {
-    const Repeated likelihood = repeat(Weighting::likelihood, dof);
-    const Repeated diagonal = repeat(Weighting::noise_variance, dof);
-    for (Eigen::Index q = 0; q < 6; ++q) {
-      EXPECT_GT(likelihood.scatter[q] / likelihood.reported[q], kLowest) << dof << ", " << q;
-      EXPECT_LT(likelihood.scatter[q] / likelihood.reported[q], kHighest) << dof << ", " << q;
-      EXPECT_LT(likelihood.bias[q], 4.0 * std::sqrt(likelihood.reported[q] / kRuns)) << q;
-      // Half the standard deviation at most: far outside what 150 runs leave open.
-      EXPECT_LT(likelihood.scatter[q], 0.25 * diagonal.scatter[q]) << dof << ", " << q;
-    }
-    // Gauss-Markov: the band's variance is an upper bound, here of correlations that turn.
-    EXPECT_LT(likelihood.response_ratio, 1.05) << dof;
-    EXPECT_GT(likelihood.response_ratio, 0.5) << dof;
-  }
 }
 
 }  // namespace
