@@ -98,16 +98,6 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
   eliminate();
 }
 
-std::vector<Eigen::Index> ArrowSystem::delay_parameters(Eigen::Index channel) const {
-  const Eigen::Index first = problem_.denominators();
-  if (problem_.delay == DelayModel::estimate) return {first};
-  if (problem_.delay == DelayModel::fixed) return {};
-  const Eigen::Index y = channel % problem_.n_outputs;
-  std::vector<Eigen::Index> out{first + channel / problem_.n_outputs};
-  if (y + 1 < problem_.n_outputs) out.push_back(first + problem_.n_inputs + y);
-  return out;
-}
-
 void ArrowSystem::add_group(const BasisGroup& group) {
   const auto members = static_cast<Eigen::Index>(group.channels.size());
   const Eigen::Index n_f = problem_.functions();
@@ -210,7 +200,7 @@ void ArrowSystem::add_delay_columns(const BasisGroup& group, const Eigen::Matrix
 
   for (std::size_t r = 0; r < group.channels.size(); ++r) {
     const auto row = static_cast<Eigen::Index>(r);
-    const std::vector<Eigen::Index> delays = delay_parameters(group.channels[r]);
+    const std::vector<Eigen::Index> delays = delay_parameters(problem_, group.channels[r]);
     Channel& channel = channels_[static_cast<std::size_t>(group.channels[r])];
     for (const Eigen::Index t : delays) {
       channel.ab.row(t) += TF.row(row);
@@ -251,12 +241,17 @@ void ArrowSystem::eliminate() {
 
 Eigen::VectorXd ArrowSystem::solve_globals(double damping,
                                            const std::vector<Eigen::Index>& frozen) const {
+  return solve_schur(schur_e_, damping, frozen);
+}
+
+Eigen::VectorXd ArrowSystem::solve_schur(const Eigen::VectorXd& right_side, double damping,
+                                         const std::vector<Eigen::Index>& frozen) const {
   // RIV's matrix is not symmetric: LU, scaled by the diagonal of its symmetric twin.
   const Eigen::VectorXd scale =
       M_.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd scaled = scale.asDiagonal() * schur_ * scale.asDiagonal();
   scaled.diagonal() += damping * scaled.diagonal().cwiseAbs().cwiseMax(1e-12);
-  Eigen::VectorXd rhs = scale.cwiseProduct(schur_e_);
+  Eigen::VectorXd rhs = scale.cwiseProduct(right_side);
   for (const Eigen::Index i : frozen) {
     scaled.row(i).setZero();
     scaled.col(i).setZero();
@@ -277,6 +272,28 @@ ArrowSystem::Step ArrowSystem::solve(double damping) const {
   }
   step.ok = step.globals.allFinite() && step.B.allFinite();
   return step;
+}
+
+Eigen::VectorXd ArrowSystem::solve(const Eigen::VectorXd& right_side, double damping,
+                                   const std::vector<Eigen::Index>& frozen) const {
+  const Eigen::Index globals = problem_.globals();
+  Eigen::VectorXd x(right_side.size());
+  auto B = x.tail(right_side.size() - globals).reshaped(problem_.channels(), problem_.functions());
+  const auto e_b = right_side.tail(right_side.size() - globals)
+                       .reshaped(problem_.channels(), problem_.functions());
+  Eigen::VectorXd schur_e = right_side.head(globals);
+  Eigen::MatrixXd own;
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    const auto row = static_cast<Eigen::Index>(c);
+    solve_scaled(channels_[c].bb, e_b.row(row).transpose(), own);
+    schur_e.noalias() -= channels_[c].ab * own;
+    B.row(row) = own.transpose();
+  }
+  if (globals == 0) return x;
+  x.head(globals) = solve_schur(schur_e, damping, frozen);
+  for (std::size_t c = 0; c < channels_.size(); ++c)
+    B.row(static_cast<Eigen::Index>(c)) -= (channels_[c].Z * x.head(globals)).transpose();
+  return x;
 }
 
 }  // namespace stageid

@@ -35,6 +35,10 @@ class ArrowSystem {
   /// `frozen` globals stay where they are.
   Eigen::VectorXd solve_globals(double damping, const std::vector<Eigen::Index>& frozen = {}) const;
 
+  /// M^-1 times another right-hand side than e, both (globals, vec B); damped alike. @pre regular()
+  Eigen::VectorXd solve(const Eigen::VectorXd& right_side, double damping,
+                        const std::vector<Eigen::Index>& frozen) const;
+
   /// One channel's part of M: border and numerator block.
   struct Channel {
     Eigen::MatrixXd ab;  ///< globals x n_f
@@ -59,7 +63,8 @@ class ArrowSystem {
   void add_delay_columns(const BasisGroup& group, const Eigen::MatrixXd& B,
                          const Eigen::MatrixXd& W, const Eigen::MatrixXd& WE_re,
                          const Eigen::MatrixXd& WE_im);
-  std::vector<Eigen::Index> delay_parameters(Eigen::Index channel) const;
+  Eigen::VectorXd solve_schur(const Eigen::VectorXd& right_side, double damping,
+                              const std::vector<Eigen::Index>& frozen) const;
   void eliminate();
 
   const FitProblem& problem_;

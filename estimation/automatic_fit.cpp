@@ -35,8 +35,8 @@ Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,
 std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructure& structure) {
   std::vector<Submodel> out;
   const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
-  if (structure.rigid_body) out.push_back({2, {1.0}, {zero}, {}, {}, {}});
-  if (structure.direct_term) out.push_back({0, {1.0}, {zero}, {}, {}, {}});
+  if (structure.rigid_body) out.push_back({2, {1.0}, {zero}, {}, {}});
+  if (structure.direct_term) out.push_back({0, {1.0}, {zero}, {}, {}});
   return out;
 }
 
@@ -65,6 +65,7 @@ class AutomaticFit {
         quick_(options) {
     quick_.user_weights = make_weights(frf, options);
     quick_.weighting = Weighting::user;
+    quick_.user_weight_matrices.resize(0, 0);  // the final fit's only: their best diagonal chooses
     quick_.uncertainty = false;
     quick_.max_iterations = std::min(kGrowthIterations, options.max_iterations);
     quick_.gradient_tolerance = 1e-5;

@@ -4,13 +4,16 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "estimation/fit_iteration.hpp"
 #include "estimation/low_rank_iteration.hpp"
 #include "estimation/numerators.hpp"
 #include "estimation/parameter_covariance.hpp"
+#include "estimation/weight_matrices.hpp"
 
 namespace stageid {
 namespace {
@@ -32,6 +35,14 @@ void check_start(const FrfEstimate& frf, const AdditiveModel& start, const FitOp
   if (options.hold == HoldModel::exact)
     require(frf.frequency_hz.maxCoeff() < 0.5 * frf.sample_rate_hz,
             "fit: a line lies at or above half the sample rate; choose a smaller band");
+  const bool matrices =
+      options.weighting == Weighting::likelihood ||
+      (options.weighting == Weighting::user && options.user_weight_matrices.size() > 0);
+  require(!matrices || (options.residue_rank == 0 && options.rigid_body_rank == 0),
+          "fit: residues of given rank are fitted with one weight a channel; use --weighting "
+          "noise_variance");
+  require(!matrices || options.method != FitMethod::sk,
+          "fit: method sk takes diagonal weights only; use riv or gn");
   int biproper = 0;
   int integrating = 0;
   for (const Submodel& s : start.submodels) {
@@ -54,7 +65,7 @@ void check_start(const FrfEstimate& frf, const AdditiveModel& start, const FitOp
 }
 
 FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
-                        const FitOptions& options) {
+                        const FitOptions& options, Eigen::MatrixXd W) {
   FitProblem problem;
   problem.lines = {frf.omega_rad_s(), frf.sample_rate_hz > 0.0 ? 1.0 / frf.sample_rate_hz : 0.0,
                    options.hold};
@@ -62,7 +73,7 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
   problem.n_inputs = frf.n_inputs();
   problem.G_re = frf.response.real();
   problem.G_im = frf.response.imag();
-  problem.W = make_weights(frf, options);
+  problem.W = std::move(W);
   for (const Submodel& s : start.submodels)
     problem.shapes.push_back({s.integrators, static_cast<int>(s.denominator.size()) - 1,
                               static_cast<int>(s.numerator.size()) - 1});
@@ -113,6 +124,12 @@ void fill_submodels(const FitProblem& problem, const FitParameters& beta, Additi
   model.output_delay_s = beta.output_delay_s;
 }
 
+/// True if the weights claim to be the inverse of the noise's covariance.
+bool weighs_by_variance(Weighting weighting) {
+  return weighting == Weighting::noise_variance || weighting == Weighting::total_variance ||
+         weighting == Weighting::likelihood;
+}
+
 /// Delta method, facts.md section 10:  df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
 void fill_deviations(const Eigen::MatrixXd& covariance, AdditiveModel& model) {
   Eigen::Index first = 0;
@@ -133,12 +150,6 @@ void fill_deviations(const Eigen::MatrixXd& covariance, AdditiveModel& model) {
   }
 }
 
-/// Whether the weights are taken for the inverse variances of the data.
-bool likelihood(const FitOptions& options) {
-  return options.weighting == Weighting::noise_variance ||
-         options.weighting == Weighting::total_variance;
-}
-
 void use_covariance(const ParameterCovariance& covariance, bool likelihood, FitResult& result) {
   if (covariance.response_variance.size() == 0) return;
   if (covariance.globals.size() > 0) fill_deviations(covariance.globals, result.model);
@@ -150,17 +161,16 @@ void use_covariance(const ParameterCovariance& covariance, bool likelihood, FitR
                     covariance.residual_scale, std::sqrt(covariance.residual_scale)));
 }
 
-void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
-                      const FitParameters& beta, const std::vector<Eigen::Index>& frozen,
-                      FitResult& result) {
-  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
-  const Residual E = residual(problem, groups, beta.B);
+ParameterCovariance diagonal_covariance(const FrfEstimate& frf, const FitOptions& options,
+                                        const FitProblem& problem, const FitParameters& beta,
+                                        const std::vector<BasisGroup>& groups, const Residual& E,
+                                        const std::vector<Eigen::Index>& frozen) {
   const ArrowSystem gn(problem, beta, groups, E, FitMethod::gn);
   const Eigen::MatrixXd& known =
       frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
   const double dof = frf.noise_variance.size() > 0 ? frf.noise_dof : frf.total_dof;
   DataNoise noise;
-  if (likelihood(options)) {
+  if (weighs_by_variance(options.weighting)) {
     noise.knowledge = VarianceKnowledge::weights;
     noise.variance = problem.W.cwiseInverse();
   } else if (known.size() > 0 && known.minCoeff() > 0.0) {
@@ -168,8 +178,22 @@ void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const F
     noise.variance = smoothed_variance(frf, known, dof);
   }
   if (noise.knowledge != VarianceKnowledge::none) noise.correlation = output_correlation(frf);
-  use_covariance(parameter_covariance(problem, beta, groups, E, gn, noise, frozen),
-                 likelihood(options), result);
+  return parameter_covariance(problem, beta, groups, E, gn, noise, frozen);
+}
+
+void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
+                      const std::optional<WeightMatrices>& matrices, const FitParameters& beta,
+                      const IterationResult& iteration, FitResult& result) {
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
+  const Residual& E = iteration.E;
+  const bool likelihood = weighs_by_variance(options.weighting);
+  use_covariance(
+      matrices ? joint_covariance(problem, beta, groups, E,
+                                  JointEquations(problem, *matrices, beta, groups, E),
+                                  likelihood ? VarianceKnowledge::weights : VarianceKnowledge::none,
+                                  matrices->scatter_factor(), iteration.frozen)
+               : diagonal_covariance(frf, options, problem, beta, groups, E, iteration.frozen),
+      likelihood, result);
 }
 
 /// What giving up the free residues cost, and whether noise alone would have.
@@ -181,8 +205,7 @@ std::string rank_decision(const FitProblem& problem, const IterationResult& free
   // Twice the rise of sum W |E|^2 is chi-square distributed where the ranks are right.
   const double rise =
       4.0 * static_cast<double>(problem.size()) * (constrained.iteration.E.cost - free.E.cost);
-  const Eigen::Index unconstrained = problem.globals() + problem.channels() * problem.functions();
-  const auto given_up = static_cast<double>(unconstrained - constrained.parameters);
+  const auto given_up = static_cast<double>(problem.parameters() - constrained.parameters);
   const double sigmas = (rise - given_up) / std::sqrt(2.0 * std::max(given_up, 1.0));
   return text + fmt::format(", chi-square {:.4g} for {:.0f} parameters given up: {}", rise,
                             given_up,
@@ -209,7 +232,9 @@ double relative_rms_error(const FrfEstimate& frf, const Residual& E) {
 FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
                              const FitOptions& options) {
   check_start(frf, start, options);
-  const FitProblem problem = make_problem(frf, start, options);
+  const std::optional<WeightMatrices> matrices = make_weight_matrices(frf, options);
+  const FitProblem problem = make_problem(
+      frf, start, options, matrices ? matrices->marginal() : make_weights(frf, options));
   FitParameters beta = make_parameters(problem, start, options);
   if (options.delay != DelayModel::fixed && options.delay_s == 0.0 &&
       start.input_delay_s.size() == 0)
@@ -218,12 +243,21 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   FitResult result;
   result.model = start;
   IterationResult iteration = iterate(problem, beta, options);
+  if (matrices && iteration.status != FitStatus::singular) {
+    result.decisions.push_back(
+        fmt::format("weight matrices: started from their best diagonal, {} "
+                    "iterations ({})",
+                    iteration.iterations, to_string(iteration.status)));
+    iteration = iterate(problem, *matrices, beta, options);
+  }
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   ParameterCovariance covariance;
   std::vector<int> ranks;
   if (low_rank && iteration.status != FitStatus::singular) {
-    LowRankResult constrained = iterate_low_rank(problem, beta, options, likelihood(options));
-    result.decisions.push_back(rank_decision(problem, iteration, constrained, likelihood(options)));
+    LowRankResult constrained =
+        iterate_low_rank(problem, beta, options, weighs_by_variance(options.weighting));
+    result.decisions.push_back(
+        rank_decision(problem, iteration, constrained, weighs_by_variance(options.weighting)));
     constrained.iteration.cost.insert(constrained.iteration.cost.begin(), iteration.cost.begin(),
                                       iteration.cost.end());
     constrained.iteration.iterations += iteration.iterations;
@@ -248,9 +282,9 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   fill_submodels(problem, beta, result.model);
   result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
   if (low_rank)
-    use_covariance(covariance, likelihood(options), result);
+    use_covariance(covariance, weighs_by_variance(options.weighting), result);
   else if (options.uncertainty && result.status != FitStatus::singular)
-    fill_uncertainty(frf, options, problem, beta, iteration.frozen, result);
+    fill_uncertainty(frf, options, problem, matrices, beta, iteration, result);
 
   FitRecord& record = result.model.fit;
   record.cost = iteration.E.cost;

@@ -10,7 +10,8 @@ namespace stageid {
 /// Only the denominators (and delays) of `start` matter when its numerators are zero: they are then
 /// the solution of the convex problem (paper, eq. "convex problem"). Every iteration is damped so
 /// that the cost never rises, poles stay stable, and the numerators are re-solved after every
-/// denominator step. Source: paper, section 3; method.md section 6.
+/// denominator step. Weight matrices W_k (likelihood, or a user's) are fitted from there, see
+/// JointEquations. Source: paper, section 3; method.md section 6.
 /// @throws std::invalid_argument: shapes, weights (variances missing, zero, not finite), more
 ///         parameters than data, hold without sample rate.
 FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,

@@ -14,8 +14,9 @@ namespace stageid {
 namespace {
 
 constexpr double kLargestLevenberg = 1e8;
-// Where no step lowers the cost, it is at rounding if the stationary point is so many deviations away.
-constexpr double kRoundingDeviations = 0.05;
+// Part of the data's weighted power below which a residual that no step lowers is rounding, not a
+// fit that got stuck: 1e-12 of the amplitude.
+constexpr double kNothingLeft = 1e-24;
 
 /// A candidate with its numerators solved.
 struct Trial {
@@ -154,6 +155,9 @@ class Iteration {
       const ArrowSystem gauss_newton(problem_, beta_, groups, result_.E, FitMethod::gn);
       if (attempt(gauss_newton, 40)) return still_moving();
     }
+    if (result_.E.cost < kNothingLeft * signal_cost_)
+      return end(FitStatus::step_small,
+                 "the residual has reached rounding: no step lowers the cost any further");
     if (deviations_ < kRoundingDeviations)
       return end(FitStatus::step_small,
                  fmt::format("the cost is at rounding, within {:.1g} standard deviations of the "

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "estimation/fit_problem.hpp"
+#include "estimation/weight_matrices.hpp"
 
 namespace stageid {
 
@@ -26,6 +27,15 @@ IterationResult iterate(const FitProblem& problem, FitParameters& beta, const Fi
 /// `beta` with denominators and delays moved by `step` (globals long).
 FitParameters stepped_globals(const FitProblem& problem, const FitParameters& beta,
                               const Eigen::VectorXd& step);
+/// The same for Hermitian weights, from all of `beta` (a fit with the diagonal weights): Gauss-Newton
+/// on all parameters at once, see JointEquations, damped until the cost falls. The cost is the true
+/// one, sum vec(E)^H W_k vec(E) / (2N). @pre problem.W is weights.marginal().
+IterationResult iterate(const FitProblem& problem, const WeightMatrices& weights,
+                        FitParameters& beta, const FitOptions& options);
+
+/// Where no step lowers the cost, it is at rounding if the stationary point is so many standard
+/// deviations away.
+inline constexpr double kRoundingDeviations = 0.05;
 
 /// Sets all input delays to the one of least cost on a grid (numerators solved for every
 /// candidate).

@@ -14,6 +14,8 @@ const char* to_string(Weighting weighting) noexcept {
       return "noise_variance";
     case Weighting::total_variance:
       return "total_variance";
+    case Weighting::likelihood:
+      return "likelihood";
     case Weighting::user:
       return "user";
   }

@@ -10,14 +10,15 @@
 
 namespace stageid {
 
-/// Diagonal weights W of the cost 1/(2N) sum vec(E)^H W vec(E).
+/// Weights W of the cost 1/(2N) sum vec(E)^H W vec(E).
 enum class Weighting : std::uint8_t {
   unit,
   inverse_magnitude,  ///< 1/|G|: the paper's
   relative,           ///< 1/|G|^2
   noise_variance,     ///< 1/noise_variance: maximum likelihood for a linear plant
   total_variance,     ///< 1/total_variance
-  user                ///< FitOptions::user_weights
+  likelihood,         ///< S^-1 kron C_E^-1: the same with the correlations of the noise
+  user                ///< FitOptions::user_weights or user_weight_matrices
 };
 const char* to_string(Weighting weighting) noexcept;
 
@@ -33,7 +34,9 @@ enum class DelayModel : std::uint8_t { fixed, estimate, per_channel };
 /// What to fit and how. Checked once by fit_additive_model().
 struct FitOptions {
   Weighting weighting = Weighting::relative;
-  Eigen::MatrixXd user_weights;  ///< (n_y n_u) x N
+  Eigen::MatrixXd user_weights;  ///< (n_y n_u) x N: the diagonals of W_k
+  /// (n_c n_c) x N, n_c = n_y n_u: column k = vec(W_k), Hermitian; used instead unless empty
+  Eigen::MatrixXcd user_weight_matrices;
   HoldModel hold = HoldModel::none;
   DelayModel delay = DelayModel::fixed;
   double delay_s = 0.0;  ///< fixed: the delay; else the start (0 for estimate: searched)
@@ -67,7 +70,7 @@ struct FitResult {
   std::string message = "fit_additive_model was not called";
   std::vector<double> cost;            ///< one entry an iterate, the start first
   std::vector<std::string> decisions;  ///< what an automatic fit chose, and why, in order
-  /// By how much sum W |E|^2 would rise without a submodel, the others re-solved; one entry each.
+  /// By how much sum W |E|^2 (W diagonal, or the best diagonal) would rise without a submodel, the others re-solved; one entry each.
   std::vector<double> removal_cost;
   /// (n_y n_u) x N: of P, from the parameter covariance; may be empty.
   Eigen::MatrixXd response_variance;

@@ -43,6 +43,33 @@ std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem) {
   return columns;
 }
 
+std::vector<Eigen::Index> delay_parameters(const FitProblem& problem, Eigen::Index channel) {
+  const Eigen::Index first = problem.denominators();
+  if (problem.delay == DelayModel::estimate) return {first};
+  if (problem.delay == DelayModel::fixed) return {};
+  const Eigen::Index y = channel % problem.n_outputs;
+  std::vector<Eigen::Index> out{first + channel / problem.n_outputs};
+  if (y + 1 < problem.n_outputs) out.push_back(first + problem.n_inputs + y);
+  return out;
+}
+
+FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
+                      const Eigen::Ref<const Eigen::VectorXd>& step) {
+  FitParameters out = beta;
+  Eigen::Index p = 0;
+  for (Eigen::VectorXd& a : out.a) {
+    a += step.segment(p, a.size());
+    p += a.size();
+  }
+  if (problem.delay == DelayModel::estimate) {
+    out.input_delay_s.array() += step[p];
+  } else if (problem.delay == DelayModel::per_channel) {
+    out.input_delay_s += step.segment(p, problem.n_inputs);
+    out.output_delay_s.head(problem.n_outputs - 1) += step.tail(problem.n_outputs - 1);
+  }
+  return out;
+}
+
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
                                         bool with_derivatives) {
   std::map<double, std::vector<Eigen::Index>> members;

@@ -33,6 +33,7 @@ struct FitProblem {
   Eigen::Index denominators() const noexcept;  ///< number of denominator coefficients
   Eigen::Index delays() const noexcept;        ///< number of free delays: 0, 1 or n_y + n_u - 1
   Eigen::Index globals() const noexcept { return denominators() + delays(); }
+  Eigen::Index parameters() const noexcept { return globals() + channels() * functions(); }
 };
 
 /// beta: everything that is estimated.
@@ -62,6 +63,13 @@ struct DerivativeColumn {
 };
 std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem);
 
+/// Which globals delay a channel: none, the common one, or its input's and its output's.
+std::vector<Eigen::Index> delay_parameters(const FitProblem& problem, Eigen::Index channel);
+
+/// `beta` after a step of the globals; numerators stay.
+FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
+                      const Eigen::Ref<const Eigen::VectorXd>& step);
+
 /// Evaluates the functions of every group of channels at the parameters.
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
                                         bool with_derivatives);
@@ -75,7 +83,7 @@ struct Residual {
 Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                   const Eigen::MatrixXd& B);
 
-/// The weights of a fit. Variances from few degrees of freedom are smoothed over neighbouring
+/// The diagonal weights of a fit; for weight matrices their best diagonal. Variances from few degrees of freedom are smoothed over neighbouring
 /// lines, so that a weight does not depend on the very noise that it weighs (facts.md section 8).
 /// @throws std::invalid_argument if what the weighting needs is missing, zero or not finite.
 Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options);

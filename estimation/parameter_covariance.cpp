@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "estimation/weighted_products.hpp"
@@ -11,6 +12,8 @@ namespace {
 
 /// Above this, a residual cannot be the noise alone.
 constexpr double kClearlyTooLarge = 1.5;
+// Of conjugate gradients; with their residual, variances have its square.
+constexpr double kColumnTolerance = 1e-2;
 
 /// K as an arrow: its globals with channels not eliminated, and the channel blocks.
 struct Middle {
@@ -18,13 +21,13 @@ struct Middle {
   double scale;
 };
 
-/// The part of those columns that the channel's numerators cannot follow: J_a - F M_bb^-1 M_ba.
+/// The part of those columns that the channel's numerators cannot follow: J_a - F Z, with Z the
+/// channel's rows of M_bb^-1 M_ba.
 void projected_columns(const FitProblem& problem, const FitParameters& beta,
-                       const BasisGroup& group, const ArrowSystem& gn, Eigen::Index c,
+                       const BasisGroup& group, const Eigen::MatrixXd& Z, Eigen::Index c,
                        const std::vector<DerivativeColumn>& columns, Eigen::MatrixXd& re,
                        Eigen::MatrixXd& im) {
   global_columns(problem, beta, group, c, columns, re, im);
-  const Eigen::MatrixXd& Z = gn.channels()[static_cast<std::size_t>(c)].Z;
   re -= group.F_re * Z;
   im -= group.F_im * Z;
 }
@@ -57,8 +60,9 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
     for (Eigen::Index y = 0; y < n_y; ++y) {
       const Eigen::Index c = y + n_y * u;
       const auto at = static_cast<std::size_t>(y);
-      projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)], gn, c, columns,
-                        J_re[at], J_im[at]);
+      projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)],
+                        gn.channels()[static_cast<std::size_t>(c)].Z, c, columns, J_re[at],
+                        J_im[at]);
       const Eigen::ArrayXd scale =
           (problem.W.row(c).array() * noise.variance.row(c).array().sqrt()).transpose();
       J_re[at].array().colwise() *= scale;
@@ -122,19 +126,9 @@ void global_columns(const FitProblem& problem, const FitParameters& beta, const 
   if (problem.delay == DelayModel::fixed) return;
   const Eigen::VectorXd t_re = group.T_re * beta.B.row(c).transpose();
   const Eigen::VectorXd t_im = group.T_im * beta.B.row(c).transpose();
-  const Eigen::Index first = problem.denominators();
-  if (problem.delay == DelayModel::estimate) {
-    re.col(first) = t_re;
-    im.col(first) = t_im;
-    return;
-  }
-  const Eigen::Index y = c % problem.n_outputs;
-  const Eigen::Index u = c / problem.n_outputs;
-  re.col(first + u) = t_re;
-  im.col(first + u) = t_im;
-  if (y + 1 < problem.n_outputs) {
-    re.col(first + problem.n_inputs + y) = t_re;
-    im.col(first + problem.n_inputs + y) = t_im;
+  for (const Eigen::Index t : delay_parameters(problem, c)) {
+    re.col(t) = t_re;
+    im.col(t) = t_im;
   }
 }
 
@@ -194,10 +188,8 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   ParameterCovariance out;
   if (!gn.regular()) return out;
   if (noise.knowledge != VarianceKnowledge::given)
-    out.residual_scale = residual_scale(
-        residual_per_degree(problem, E,
-                            problem.globals() + problem.channels() * problem.functions()),
-        noise.knowledge == VarianceKnowledge::weights);
+    out.residual_scale = residual_scale(residual_per_degree(problem, E, problem.parameters()),
+                                        noise.knowledge == VarianceKnowledge::weights);
 
   FitProblem sandwich;
   std::vector<ArrowSystem> other;
@@ -227,7 +219,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
       if (!solve_scaled(m.bb, unit, bb_inverse)) return;
       Eigen::MatrixXd J_re;
       Eigen::MatrixXd J_im;
-      projected_columns(problem, beta, group, gn, c, columns, J_re, J_im);
+      projected_columns(problem, beta, group, m.Z, c, columns, J_re, J_im);
       const Eigen::MatrixXd own = 0.5 * K.scale * bb_inverse * k.bb * bb_inverse;
       const Eigen::MatrixXd cross =
           0.5 * K.scale * inverse * (k.ab - m.Z.transpose() * k.bb) * bb_inverse;
@@ -236,6 +228,57 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
         total += quadratic(J_re, J_im, out.globals, J_re, J_im);
         total += 2.0 * quadratic(J_re, J_im, cross, group.F_re, group.F_im);
       }
+      out.response_variance.row(c) = total.transpose();
+    });
+  }
+  return out;
+}
+
+ParameterCovariance joint_covariance(const FitProblem& problem, const FitParameters& beta,
+                                     const std::vector<BasisGroup>& groups, const Residual& E,
+                                     const JointEquations& equations, VarianceKnowledge knowledge,
+                                     double scatter_factor,
+                                     const std::vector<Eigen::Index>& frozen) {
+  ParameterCovariance out;
+  if (!equations.regular()) return out;
+  out.residual_scale = residual_scale(residual_per_degree(problem, E, problem.parameters()),
+                                      knowledge == VarianceKnowledge::weights);
+  const double half = 0.5 * scatter_factor * out.residual_scale;
+
+  // Columns of M^-1 for the globals: X_a of the globals themselves, X_b of the numerators. With X = M^-1
+  // - dX and residuals R = M dX,  X_a + X^T R = (M^-1)_aa - dX^T M dX.
+  const Eigen::Index globals = problem.globals();
+  Eigen::MatrixXd X = Eigen::MatrixXd::Zero(equations.size(), globals);
+  Eigen::MatrixXd R = X;
+  for (Eigen::Index i = 0; i < globals; ++i) {
+    if (std::find(frozen.begin(), frozen.end(), i) != frozen.end()) continue;
+    const Eigen::VectorXd unit = Eigen::VectorXd::Unit(equations.size(), i);
+    const JointEquations::Solution column = equations.solve(unit, frozen, kColumnTolerance);
+    X.col(i) = column.x;
+    R.col(i) = column.residual;
+  }
+  Eigen::MatrixXd X_a = X.topRows(globals) + X.transpose() * R;
+  X_a = (0.5 * (X_a + X_a.transpose())).eval();
+  out.globals = half * X_a;
+  const Eigen::MatrixXd Z = -X.bottomRows(X.rows() - globals) * free_inverse(X_a, frozen);
+
+  out.response_variance.resize(problem.channels(), problem.size());
+  const auto columns = derivative_columns(problem);
+  const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
+  for (const BasisGroup& group : groups) {
+    parallel_tasks(static_cast<int>(group.channels.size()), problem.threads, [&](int r) {
+      const Eigen::Index c = group.channels[static_cast<std::size_t>(r)];
+      const auto& arrow = equations.preconditioner().channels()[static_cast<std::size_t>(c)];
+      Eigen::MatrixXd own;
+      if (!solve_scaled(arrow.bb, unit, own)) return;
+      const Eigen::MatrixXd Z_c =
+          Z(Eigen::seqN(c, problem.functions(), problem.channels()), Eigen::all);
+      Eigen::MatrixXd J_re;
+      Eigen::MatrixXd J_im;
+      projected_columns(problem, beta, group, Z_c, c, columns, J_re, J_im);
+      const Eigen::VectorXd total =
+          half * quadratic(group.F_re, group.F_im, own, group.F_re, group.F_im) +
+          quadratic(J_re, J_im, out.globals, J_re, J_im);
       out.response_variance.row(c) = total.transpose();
     });
   }

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "estimation/arrow_system.hpp"
+#include "estimation/joint_equations.hpp"
 
 namespace stageid {
 
@@ -43,6 +44,22 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
                                          const std::vector<BasisGroup>& groups, const Residual& E,
                                          const ArrowSystem& gn, const DataNoise& noise,
                                          const std::vector<Eigen::Index>& frozen = {});
+
+/// The same for weight matrices that are the noise's inverse covariance (`knowledge` weights, then
+/// multiplied by WeightMatrices::scatter_factor()) or proportional to it (none):
+///   Cov(globals) = 1/2 [(sum Re{J^H W J})^-1]_aa, its columns by conjugate gradients.
+///
+/// Response: dP_c = (J_a - F Z) d a + F nu_c, where nu, the numerators' own part, does not depend on
+/// d a. The first part is exact. Cov(nu_c) is that of a fit to the channel alone, weighed by its own
+/// variance: never smaller than the true one (Gauss-Markov), and equal to it where the correlation of
+/// the noise is real and the same on all lines, because every channel has the same functions F
+/// (Zellner, J. Am. Stat. Assoc. 57 (1962) 348). The band is right there and too wide elsewhere, never
+/// too narrow; the exact one would take a solution for every numerator.
+ParameterCovariance joint_covariance(const FitProblem& problem, const FitParameters& beta,
+                                     const std::vector<BasisGroup>& groups, const Residual& E,
+                                     const JointEquations& equations, VarianceKnowledge knowledge,
+                                     double scatter_factor,
+                                     const std::vector<Eigen::Index>& frozen = {});
 
 // Parts of it that fits of another structure use too.
 

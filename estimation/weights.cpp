@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
 #include "estimation/fit_problem.hpp"
+#include "estimation/weight_matrices.hpp"
 
 namespace stageid {
 namespace {
@@ -115,7 +117,37 @@ Eigen::MatrixXd smoothed_variance(const FrfEstimate& frf, const Eigen::MatrixXd&
   return smoothed_variance_power(frf, variance, dof, 1.0);
 }
 
+SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {
+  const Eigen::Index n_y = frf.n_outputs();
+  const Eigen::Index N = frf.lines();
+  SmoothedCovariance out{Eigen::MatrixXcd(n_y * n_y, N), frf.noise_dof};
+  out.matrices.real() = frf.residual_covariance_re;
+  out.matrices.imag() = frf.residual_covariance_im;
+  if (!(frf.noise_dof > 0.0)) return out;
+  // An inverse of n_y x n_y scatters as that of a variance with n_y degrees of freedom less.
+  const double wanted = std::ceil((kWantedDof + static_cast<double>(n_y)) / frf.noise_dof);
+  const auto count = static_cast<Eigen::Index>(std::min(wanted, static_cast<double>(N)));
+  if (count == 1) return out;
+  out.dof = frf.noise_dof * static_cast<double>(count);
+
+  Eigen::MatrixXd variance(n_y, N);
+  for (Eigen::Index y = 0; y < n_y; ++y)
+    variance.row(y) = frf.residual_covariance_re.row(y * (n_y + 1));
+  const Eigen::MatrixXd deviation = smoothed_power(variance, frf.noise_dof, 1.0).cwiseSqrt();
+  Eigen::MatrixXd products(n_y * n_y, N);  // of the deviations of two outputs
+  for (Eigen::Index k = 0; k < N; ++k)
+    products.col(k) = (deviation.col(k) * deviation.col(k).transpose()).reshaped();
+  const Eigen::MatrixXcd correlation = out.matrices.cwiseQuotient(products);
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const Eigen::Index first = std::clamp<Eigen::Index>(k - count / 2, 0, N - count);
+    out.matrices.col(k) =
+        correlation.middleCols(first, count).rowwise().mean().cwiseProduct(products.col(k));
+  }
+  return out;
+}
+
 Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options) {
+  if (const auto matrices = make_weight_matrices(frf, options)) return matrices->marginal();
   switch (options.weighting) {
     case Weighting::unit:
       return Eigen::MatrixXd::Ones(frf.response.rows(), frf.response.cols());
@@ -127,6 +159,7 @@ Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options) 
       return inverse_variance(frf, frf.noise_variance, frf.noise_dof, "noise_variance");
     case Weighting::total_variance:
       return inverse_variance(frf, frf.total_variance, frf.total_dof, "total_variance");
+    case Weighting::likelihood:
     case Weighting::user:
       break;
   }

@@ -187,6 +187,7 @@ FrfEstimate select_band(const FrfEstimate& frf, double low_hz, double high_hz) {
   band.total_variance = columns(frf.total_variance);
   band.residual_covariance_re = columns(frf.residual_covariance_re);
   band.residual_covariance_im = columns(frf.residual_covariance_im);
+  band.input_factor = columns(frf.input_factor);
   band.covariance = columns(frf.covariance);
   if (frf.input_condition.size() != 0) band.input_condition = frf.input_condition(kept);
   return band;
@@ -210,6 +211,8 @@ FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::strin
   part.total_variance = rows_or_empty(frf.total_variance, entries);
   part.residual_covariance_re = rows_or_empty(frf.residual_covariance_re, residual_rows);
   part.residual_covariance_im = rows_or_empty(frf.residual_covariance_im, residual_rows);
+  // The other inputs' estimates are marginalized: a part of S, which is already an inverse.
+  part.input_factor = rows_or_empty(frf.input_factor, square_rows(input_at, frf.n_inputs()));
   part.covariance =
       rows_or_empty(frf.covariance, square_rows(entries, frf.n_outputs() * frf.n_inputs()));
   return part;
@@ -236,6 +239,7 @@ void check(const FrfEstimate& frf) {
   if (frf.residual_covariance_re.size() != frf.residual_covariance_im.size()) {
     refuse("residual_covariance", "real and imaginary part differ in size");
   }
+  check_optional("input_factor", frf.input_factor, frf.n_inputs() * frf.n_inputs(), frf.lines());
   check_optional("covariance", frf.covariance, n_channels * n_channels, frf.lines());
   if (frf.input_condition.size() != 0) {
     check_optional("input_condition", Eigen::MatrixXd(frf.input_condition.transpose()), 1,

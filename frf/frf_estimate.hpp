@@ -45,6 +45,9 @@ struct FrfEstimate {
   Eigen::VectorXd input_condition;         ///< N: cond(U(k)), 1 is perfect; empty if unknown
   Eigen::MatrixXd residual_covariance_re;  ///< (n_y n_y) x N: C_E, Hermitian, per experiment and
   Eigen::MatrixXd residual_covariance_im;  ///<   the mean of periods; empty if unknown
+  /// (n_u n_u) x N: S, Hermitian, with Cov(vec G) = S kron C_E for the mean over realizations; with one
+  /// realization S = [(U U^H)^-1]^T. Empty if unknown.
+  Eigen::MatrixXcd input_factor;
   Eigen::MatrixXcd covariance;  ///< (n_c n_c) x N on request, n_c = n_y n_u: Cov(vec G); else empty
   std::vector<std::string> excluded_channels;  ///< actuators outside the sub-plant
   Eigen::VectorXd excluded_power;              ///< their excited-line power over that of the inputs

@@ -10,6 +10,9 @@
 //     periods,
 //                                           of the spectra DFT / period_samples, unit of output
 //                                           squared; element [k, i, j] = E e_i conj(e_j)
+//     /input_factor [N x n_u x n_u] complex  S with Cov(vec G) = S kron C_E; element [k, j, l]
+//     belongs
+//                                           to E dG_ij conj(dG_hl) = S_jl C_E,ih
 //     /covariance [N x n_c x n_c] complex   Cov(vec G), n_c = n_y n_u, channel c = output + n_y *
 //     input;
 //                                           element [k, c, d] = E dG_c conj(dG_d)
@@ -134,6 +137,10 @@ void write_optional(Hdf5File& file, const FrfEstimate& frf) {
     file.write_complex("/residual_covariance", {N, n_y, n_y},
                        to_c_order<std::complex<double>>(residual, frf.n_outputs()).data());
   }
+  if (frf.input_factor.size() != 0) {
+    file.write_complex("/input_factor", {N, n_u, n_u},
+                       to_c_order<std::complex<double>>(frf.input_factor, frf.n_inputs()).data());
+  }
   if (frf.input_condition.size() != 0) {
     file.write_reals("/input_condition", {N}, frf.input_condition.data());
   }
@@ -253,6 +260,11 @@ void read_optional(const Hdf5File& file, FrfEstimate& frf) {
         from_c_order(file.read_complex("/residual_covariance"), frf.n_outputs(), frf.n_outputs());
     frf.residual_covariance_re = residual.real();
     frf.residual_covariance_im = residual.imag();
+  }
+  if (file.exists("/input_factor")) {
+    require_shape(file, "/input_factor", {N, n_u, n_u});
+    frf.input_factor =
+        from_c_order(file.read_complex("/input_factor"), frf.n_inputs(), frf.n_inputs());
   }
   const auto read_vector = [&](const std::string& dataset, hsize_t size) -> Eigen::VectorXd {
     require_shape(file, dataset, {size});

@@ -59,6 +59,7 @@ PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
   G_scatter_.setZero(n_c, N);
   noise_sum_.setZero(n_c, N);
   residual_sum_.setZero(outputs * outputs, N);
+  input_sum_.setZero(inputs * inputs, N);
   if (covariance == CovarianceKind::full) covariance_sum_.setZero(n_c * n_c, N);
   condition_.setZero(N);
 }
@@ -98,6 +99,9 @@ void PlantAverage::add_line(const RealizationSpectra& spectra, const Eigen::Vect
 
 void PlantAverage::add_noise(const LineNoise& noise, Eigen::Index k) {
   unvec(residual_sum_, k, outputs_) += noise.mean_of_periods * noise.residual;
+  // Hermitian in rounding too.
+  unvec(input_sum_, k, inputs_) +=
+      (0.5 / noise.mean_of_periods) * (noise.input_part + noise.input_part.adjoint());
   for (Eigen::Index j = 0; j < inputs_; ++j) {
     for (Eigen::Index i = 0; i < outputs_; ++i) {
       noise_sum_(i + outputs_ * j, k) +=
@@ -139,6 +143,7 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
   frf.noise_variance = noise_sum_ / (M * M);
   frf.residual_covariance_re = residual_sum_.real() / M;
   frf.residual_covariance_im = residual_sum_.imag() / M;
+  frf.input_factor = input_sum_ / (M * M);
   if (covariance_kind_ == CovarianceKind::full) frf.covariance = covariance_sum_ / (M * M);
 }
 

@@ -12,7 +12,8 @@ namespace stageid {
 /// Averages over realizations, one after the other: G = (mean_m Y_m)(mean_m U_m)^-1, Z_m = Z R^+,
 /// and the uncertainty of that mean.
 ///   noise: C_n = sum_m C_n^[m] / M^2, each realization with its own U and G (memory stays
-///   bounded); total: sum_m |G^[m] - mean G|^2 / (M (M - 1)).
+///   bounded); with one C_E common to all, that is S kron C_E with S = sum_m A_m / (M^2 mean 1/P_e),
+///   C_E being the mean of the realizations' and of the mean of periods; total: sum_m |G^[m] - mean G|^2 / (M (M - 1)).
 class PlantAverage {
  public:
   PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines, Eigen::Index outputs,
@@ -46,6 +47,7 @@ class PlantAverage {
   Eigen::MatrixXd G_scatter_;        // sum |G^[m] - mean|^2
   Eigen::MatrixXd noise_sum_;        // sum of the realizations' noise variances
   Eigen::MatrixXcd residual_sum_;    // vec(C_E) of the mean of periods
+  Eigen::MatrixXcd input_sum_;       // vec(A_m) over the mean of 1 / P_e
   Eigen::MatrixXcd covariance_sum_;  // vec(Cov(vec G)), on request
   Eigen::VectorXd condition_;
 };

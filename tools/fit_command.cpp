@@ -25,8 +25,8 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
       ->capture_default_str();
   command->add_option(
       "--weighting", request_.weighting,
-      "unit | inverse_magnitude | relative | noise_variance | total_variance | FILE.h5 "
-      "with /weights; default: by the variances in the FRF");
+      "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
+      "FILE.h5 with /weights or /weight_matrices; default: by the variances in the FRF");
   command->add_option("--hold", request_.hold, "none | phase | sinc | exact; default: by the FRF");
   command->add_option("--delay", request_.delay,
                       "SECONDS | estimate | per_channel; default: by the FRF");

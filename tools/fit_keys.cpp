@@ -43,7 +43,8 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
     value = names[index] == "by_frf" ? "" : names[index];
   };
   word("weighting", f.weighting,
-       {"unit", "inverse_magnitude", "relative", "noise_variance", "total_variance", "by_frf"},
+       {"unit", "inverse_magnitude", "relative", "noise_variance", "total_variance", "likelihood",
+        "by_frf"},
        "of the cost; by_frf: noise variance if known, else total variance, else relative");
   word("hold", f.hold, {"none", "phase", "sinc", "exact", "by_frf"},
        "how the model meets sampled data; by_frf: exact unless it was taken out");

@@ -11,15 +11,16 @@
 
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
-#include "excitation/hdf5_file.hpp"
 #include "frf/hold_compensation.hpp"
 #include "tools/key_suggestion.hpp"
+#include "tools/weight_file.hpp"
 
 namespace stageid {
 namespace {
 
-const std::vector<std::string> kWeightings = {"unit",           "inverse_magnitude", "relative",
-                                              "noise_variance", "total_variance",    "user"};
+const std::vector<std::string> kWeightings = {
+    "unit",           "inverse_magnitude", "relative", "noise_variance",
+    "total_variance", "likelihood",        "user"};
 const std::vector<std::string> kHolds = {"none", "phase", "sinc", "exact"};
 const std::vector<std::string> kMethods = {"riv", "gn", "sk"};
 
@@ -195,39 +196,13 @@ class FitDefaults {
     if (text.find('.') == std::string::npos && text.find('/') == std::string::npos) {
       const std::vector<std::string> offered(kWeightings.begin(), kWeightings.end() - 1);
       const std::string nearest = nearest_word(text, offered);
-      refuse(
-          "--weighting", text,
-          fmt::format("{}, or the name of an HDF5 file with /weights{}", fmt::join(offered, ", "),
-                      nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
+      refuse("--weighting", text,
+             fmt::format("{}, or the name of an HDF5 file with /weights or /weight_matrices{}",
+                         fmt::join(offered, ", "),
+                         nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
     }
     options.weighting = Weighting::user;
-    read_weights(text);
-  }
-
-  /// /weights [N x n_y x n_u] on the lines of the whole FRF or on those of the band.
-  void read_weights(const std::string& file) {
-    const Hdf5File hdf5 = Hdf5File::open(file);
-    const std::vector<hsize_t> shape = hdf5.shape("/weights");
-    const FrfEstimate& frf = setup_.frf;
-    const std::vector<hsize_t> wanted = {static_cast<hsize_t>(frf.lines()),
-                                         static_cast<hsize_t>(frf.n_outputs()),
-                                         static_cast<hsize_t>(frf.n_inputs())};
-    if (shape != wanted)
-      throw FormatError(file, "/weights",
-                        fmt::format("is {}; must be {}, as the response in the band",
-                                    fmt::join(shape, " x "), fmt::join(wanted, " x ")));
-    const std::vector<double> values = hdf5.read_reals("/weights");
-    Eigen::MatrixXd& weights = setup_.options.user_weights;
-    weights.resize(frf.n_outputs() * frf.n_inputs(), frf.lines());
-    std::size_t at = 0;
-    for (Eigen::Index k = 0; k < frf.lines(); ++k)
-      for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
-        for (Eigen::Index j = 0; j < frf.n_inputs(); ++j, ++at) {
-          if (!std::isfinite(values[at]) || values[at] < 0.0)
-            throw FormatError(file, "/weights",
-                              fmt::format("line {}: {}; weights are 0 or more", k, values[at]));
-          weights(i + frf.n_outputs() * j, k) = values[at];
-        }
+    read_weights(text, setup_.frf, options);
   }
 
   /// Above, the sampled response cannot tell a mode from its alias.
@@ -285,9 +260,13 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
       {"method", request.method},
       {"max_iterations", o.max_iterations}};
   if (o.weighting == Weighting::user) {
-    const auto* bytes = reinterpret_cast<const std::byte*>(o.user_weights.data());
     Fingerprint fingerprint;
-    fingerprint.add({bytes, static_cast<std::size_t>(o.user_weights.size()) * sizeof(double)});
+    const auto add = [&](const auto& matrix) {
+      const auto* bytes = reinterpret_cast<const std::byte*>(matrix.data());
+      fingerprint.add({bytes, static_cast<std::size_t>(matrix.size()) * sizeof(*matrix.data())});
+    };
+    add(o.user_weights);
+    add(o.user_weight_matrices);
     json["weights_fingerprint"] = fingerprint.hex();
   }
   return json.dump();

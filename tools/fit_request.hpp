@@ -16,7 +16,7 @@ namespace stageid {
 struct FitRequest {
   std::optional<std::array<double, 2>> band_hz;
   std::string modes = "auto";            ///< auto | N | f1,f2,... | FILE.json
-  std::string weighting;                 ///< unit | inverse_magnitude | relative | ... | FILE.h5
+  std::string weighting;                 ///< unit | inverse_magnitude | ... | likelihood | FILE.h5
   std::string hold;                      ///< none | phase | sinc | exact
   std::string delay;                     ///< SECONDS | estimate | per_channel
   std::string rigid_body = "full";       ///< none | full | RANK

@@ -350,8 +350,7 @@ TEST(Response, OfAModelIsTheSumOfItsSubmodelsThroughItsDelays) {
   const Eigen::MatrixXd B0{{1.0, -2.0, 3.0}, {0.5, 4.0, -0.25}};
   const Eigen::MatrixXd B1{{1e-4, 2e-4, -1e-4}, {3e-4, 0.0, 1e-4}};
   const std::vector<double> a = test::mode_coefficients(700.0, 0.01);
-  model.submodels = {{2, {1.0}, {1e5 * B0}, {}, {}, {}},
-                     {0, {1.0, a[0], a[1]}, {B0, B1}, {}, {}, {}}};
+  model.submodels = {{2, {1.0}, {1e5 * B0}, {}, {}}, {0, {1.0, a[0], a[1]}, {B0, B1}, {}, {}}};
   for (const HoldModel hold :
        {HoldModel::none, HoldModel::phase, HoldModel::sinc, HoldModel::exact}) {
     const Eigen::MatrixXcd P = response(model, lines_hz(), hold);
@@ -368,7 +367,7 @@ TEST(Response, NeedsASampleRateForAHoldAndLinesBelowNyquist) {
   AdditiveModel model;
   model.inputs = {{"a"}, {"N"}};
   model.outputs = {{"z"}, {"m"}};
-  model.submodels = {{2, {1.0}, {Eigen::MatrixXd::Ones(1, 1)}, {}, {}, {}}};
+  model.submodels = {{2, {1.0}, {Eigen::MatrixXd::Ones(1, 1)}, {}, {}}};
   const auto evaluate_at = [&](double hz, HoldModel hold) {
     return [&model, hz, hold] { (void)response(model, Eigen::VectorXd{{hz}}, hold); };
   };

@@ -35,6 +35,7 @@ TEST(FrfDeterminism, AnyNumberOfThreadsGivesTheSameBits) {
     EXPECT_EQ(one.total_variance, many.total_variance);
     EXPECT_EQ(one.covariance, many.covariance);
     EXPECT_EQ(one.residual_covariance_re, many.residual_covariance_re);
+    EXPECT_EQ(one.input_factor, many.input_factor);
     EXPECT_EQ(one.residual_covariance_im, many.residual_covariance_im);
     EXPECT_EQ(one.input_condition, many.input_condition);
     EXPECT_EQ(one.provenance_json, many.provenance_json);

@@ -62,6 +62,7 @@ TEST_F(FrfFile, GivesBackWhatWasWritten) {
   EXPECT_EQ(back.total_variance, frf.total_variance);
   EXPECT_EQ(back.covariance, frf.covariance);
   EXPECT_EQ(back.residual_covariance_re, frf.residual_covariance_re);
+  EXPECT_EQ(back.input_factor, frf.input_factor);
   EXPECT_EQ(back.residual_covariance_im, frf.residual_covariance_im);
   EXPECT_EQ(back.input_condition, frf.input_condition);
   EXPECT_EQ(back.inputs, frf.inputs);
@@ -112,6 +113,7 @@ TEST_F(FrfFile, TheLayoutIsLinesThenOutputsThenInputs) {
   EXPECT_EQ(file.read_texts_attribute("/outputs", "unit"), (std::vector<std::string>{"m"}));
   EXPECT_EQ(file.shape("/response"), (std::vector<hsize_t>{4, 2, 3}));
   EXPECT_EQ(file.shape("/covariance"), (std::vector<hsize_t>{4, 6, 6}));
+  EXPECT_EQ(file.shape("/input_factor"), (std::vector<hsize_t>{4, 3, 3}));
   EXPECT_EQ(file.shape("/residual_covariance"), (std::vector<hsize_t>{4, 2, 2}));
   const std::vector<std::complex<double>> response = file.read_complex("/response");
   const std::vector<double> variance = file.read_reals("/noise_variance");

@@ -32,6 +32,7 @@ struct Trials {
   Eigen::MatrixXd total_variance;
   Eigen::MatrixXcd covariance;
   Eigen::MatrixXcd residual;
+  Eigen::MatrixXcd input_factor;
 };
 
 Trials repeat(LoopExperiment x) {
@@ -53,6 +54,7 @@ Trials repeat(LoopExperiment x) {
       trials.total_variance.setZero(6, frf.lines());
       trials.covariance.setZero(36, frf.lines());
       trials.residual.setZero(4, frf.lines());
+      trials.input_factor.setZero(9, frf.lines());
     }
     trials.deviations.push_back(deviation);
     trials.noise_variance += frf.noise_variance / kSeeds;
@@ -60,6 +62,7 @@ Trials repeat(LoopExperiment x) {
     trials.covariance += frf.covariance / kSeeds;
     trials.residual.real() += frf.residual_covariance_re / kSeeds;
     trials.residual.imag() += frf.residual_covariance_im / kSeeds;
+    trials.input_factor += frf.input_factor / kSeeds;
     trials.frequency_hz = frf.frequency_hz;
   }
   return trials;
@@ -133,6 +136,26 @@ TEST_P(NoiseVariance, TheFullCovarianceWhitensTheDeviations) {
   }
   // The test can see the fault it is there for.
   EXPECT_GT(worst_if_transposed, 10.0 / std::sqrt(kSeeds));
+}
+
+// What a likelihood needs for each line is n_u^2 + n_y^2 numbers, not (n_u n_y)^2.
+TEST_P(NoiseVariance, InputFactorAndResidualCovarianceMakeUpTheFullCovariance) {
+  const LoopExperiment x{.realizations = 2, .periods = 3, .scheme = GetParam()};
+  const Trials trials = repeat(x);
+  for (Eigen::Index k = 0; k < trials.frequency_hz.size(); ++k) {
+    Eigen::MatrixXcd predicted(6, 6);
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      for (Eigen::Index l = 0; l < 3; ++l) {
+        predicted.block(2 * j, 2 * l, 2, 2) =
+            trials.input_factor(j + 3 * l, k) *
+            Eigen::Map<const Eigen::MatrixXcd>(trials.residual.col(k).data(), 2, 2);
+      }
+    }
+    const Eigen::MatrixXcd error =
+        whitened(trials, predicted, k) - Eigen::MatrixXcd::Identity(6, 6);
+    // As above: each entry has standard deviation 1 / sqrt(S); 360 of them.
+    EXPECT_LT(error.cwiseAbs().maxCoeff(), 5.0 / std::sqrt(kSeeds)) << "line " << k;
+  }
 }
 
 // In the loop Y - G U is the open-loop noise, whatever the controller: C_E = F F^H / P.

@@ -15,6 +15,7 @@ inline FrfEstimate numbered_frf() {
   frf.outputs = {{"z1", "z2"}, {"m", "m"}};
   frf.response.resize(6, 4);
   frf.covariance.resize(36, 4);
+  frf.input_factor.resize(9, 4);
   frf.noise_variance.resize(6, 4);
   frf.total_variance.resize(6, 4);
   frf.residual_covariance_re.resize(4, 4);
@@ -29,6 +30,9 @@ inline FrfEstimate numbered_frf() {
     }
     for (Eigen::Index c = 0; c < 36; ++c) {
       frf.covariance(c, k) = {line + static_cast<double>(c), 0.125 * static_cast<double>(c)};
+    }
+    for (Eigen::Index c = 0; c < 9; ++c) {
+      frf.input_factor(c, k) = {line + 2.0 * static_cast<double>(c), 0.5 * static_cast<double>(c)};
     }
     for (Eigen::Index c = 0; c < 4; ++c) {
       frf.residual_covariance_re(c, k) = line + static_cast<double>(c) + 0.75;

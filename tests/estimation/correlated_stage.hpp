@@ -1,0 +1,175 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "tests/estimation/noisy_stage.hpp"
+
+namespace stageid::test {
+
+/// Noise of a measured FRF, Cov(vec G) = S kron C_E on every line, both changing from line to line.
+struct CorrelatedNoise {
+  std::vector<Eigen::MatrixXcd> C;  ///< n_y x n_y a line
+  std::vector<Eigen::MatrixXcd> S;  ///< n_u x n_u a line
+
+  /// Written out, n_c x n_c.
+  Eigen::MatrixXcd covariance(std::size_t k) const {
+    const Eigen::Index n_y = C[k].rows();
+    const Eigen::Index n_c = n_y * S[k].rows();
+    Eigen::MatrixXcd out(n_c, n_c);
+    for (Eigen::Index c = 0; c < n_c; ++c)
+      for (Eigen::Index d = 0; d < n_c; ++d)
+        out(c, d) = S[k](c / n_y, d / n_y) * C[k](c % n_y, d % n_y);
+    return out;
+  }
+};
+
+/// L L^H with unit-like diagonal and correlations of magnitude up to `correlation`.
+inline Eigen::MatrixXcd correlated_matrix(RandomNumbers& random, Eigen::Index n,
+                                          double correlation) {
+  const std::complex<double> common = random.circular();
+  Eigen::VectorXcd together(n);
+  for (std::complex<double>& value : together) value = common + 0.3 * random.circular();
+  const Eigen::VectorXd size = together.cwiseAbs();
+  Eigen::MatrixXcd out =
+      correlation * (together.cwiseQuotient(size) * together.cwiseQuotient(size).adjoint());
+  out.diagonal().setOnes();
+  Eigen::VectorXd scale(n);
+  for (double& value : scale) value = std::exp(0.5 * random.normal());
+  return scale.asDiagonal() * out * scale.asDiagonal();
+}
+
+/// One disturbance that moves all outputs, inputs that are far from orthogonal, both drifting over
+/// the lines; deviations of about `level` times the mean response.
+inline CorrelatedNoise correlated_noise(const DenseProblem& problem, double level,
+                                        double correlation, std::uint64_t seed = 4) {
+  RandomNumbers random(seed);
+  const Eigen::Index n_y = problem.model.n_outputs();
+  const Eigen::Index n_u = problem.model.n_inputs();
+  const Eigen::MatrixXcd C_low = correlated_matrix(random, n_y, correlation);
+  const Eigen::MatrixXcd C_high = correlated_matrix(random, n_y, correlation);
+  const Eigen::MatrixXcd S_low = correlated_matrix(random, n_u, correlation);
+  const Eigen::MatrixXcd S_high = correlated_matrix(random, n_u, correlation);
+  const double size = level * problem.G.cwiseAbs().mean();
+  CorrelatedNoise noise;
+  const Eigen::Index N = problem.G.cols();
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const double high = static_cast<double>(k) / static_cast<double>(N);
+    noise.C.push_back(size * size * ((1.0 - high) * C_low + high * C_high));
+    noise.S.push_back((1.0 - high) * S_low + high * S_high);
+  }
+  return noise;
+}
+
+/// The exact response with such noise, and what a measurement of it tells: exactly if dof is 0, else
+/// C_E from that many degrees of freedom.
+inline FrfEstimate measured(const DenseProblem& problem, const CorrelatedNoise& noise,
+                            RandomNumbers& random, int dof = 0) {
+  FrfEstimate frf = frf_of(problem);
+  const Eigen::Index n_y = frf.n_outputs();
+  const Eigen::Index n_u = frf.n_inputs();
+  frf.noise_dof = dof;
+  frf.input_factor.resize(n_u * n_u, frf.lines());
+  frf.residual_covariance_re.resize(n_y * n_y, frf.lines());
+  frf.residual_covariance_im.resize(n_y * n_y, frf.lines());
+  frf.noise_variance.resize(n_y * n_u, frf.lines());
+  const auto draw = [&](Eigen::Index rows, Eigen::Index columns) {
+    Eigen::MatrixXcd out(rows, columns);
+    for (std::complex<double>& value : out.reshaped()) value = random.circular();
+    return out;
+  };
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const Eigen::MatrixXcd L_C = noise.C[at].llt().matrixL();
+    const Eigen::MatrixXcd L_S = noise.S[at].llt().matrixL();
+    // vec(L_C N L_S^T) = (L_S kron L_C) vec N
+    frf.response.col(k) += (L_C * draw(n_y, n_u) * L_S.transpose()).reshaped();
+    Eigen::MatrixXcd C = noise.C[at];
+    if (dof > 0) {
+      const Eigen::MatrixXcd samples = L_C * draw(n_y, dof);
+      C = samples * samples.adjoint() / static_cast<double>(dof);
+    }
+    frf.residual_covariance_re.col(k) = C.real().reshaped();
+    frf.residual_covariance_im.col(k) = C.imag().reshaped();
+    frf.input_factor.col(k) = noise.S[at].reshaped();
+    const Eigen::VectorXd y = C.diagonal().real();
+    const Eigen::RowVectorXd u = noise.S[at].diagonal().real().transpose();
+    frf.noise_variance.col(k) = (y * u).reshaped();
+  }
+  return frf;
+}
+
+/// Moves along one delay: all inputs (delay estimate), or input d, or output d - n_u.
+inline void shift_delay(AdditiveModel& model, DelayModel delay, Eigen::Index d, double by) {
+  if (delay == DelayModel::estimate)
+    model.input_delay_s.array() += by;
+  else
+    (d < model.n_inputs() ? model.input_delay_s[d] : model.output_delay_s[d - model.n_inputs()]) +=
+        by;
+}
+
+/// dP / d(all parameters) in the library's order, a matrix n_c x n a line: denominators, delays (by
+/// differences of the reference response), numerators function by function.
+inline std::vector<Eigen::MatrixXcd> joint_jacobian(const DenseProblem& problem, DelayModel delay) {
+  const AdditiveModel& model = problem.model;
+  const std::vector<Eigen::Index> first = first_of_theta(model);
+  std::vector<Eigen::Index> order;  // columns of instrument_rows: denominators, then numerators
+  std::vector<Eigen::Index> numerators;
+  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
+    const auto n = static_cast<Eigen::Index>(model.submodels[i].denominator.size()) - 1;
+    for (Eigen::Index p = first[i]; p < first[i + 1]; ++p)
+      (p < first[i] + n ? order : numerators).push_back(p);
+  }
+  const auto denominators = static_cast<Eigen::Index>(order.size());
+  order.insert(order.end(), numerators.begin(), numerators.end());
+  const Eigen::Index delays = delay == DelayModel::fixed ? 0
+                              : delay == DelayModel::estimate
+                                  ? 1
+                                  : model.n_outputs() + model.n_inputs() - 1;
+  std::vector<Eigen::MatrixXcd> slopes;
+  for (Eigen::Index d = 0; d < delays; ++d) {
+    const double h = 1e-7;  // omega h is 1e-3 at the fastest line, its fourth power 1e-12
+    const auto shifted = [&](double by) {
+      AdditiveModel moved_model = model;
+      shift_delay(moved_model, delay, d, by);
+      return reference_response(moved_model, problem.frequency_hz, problem.hold);
+    };
+    slopes.push_back((8.0 * (shifted(h) - shifted(-h)) - (shifted(2.0 * h) - shifted(-2.0 * h))) /
+                     (12.0 * h));
+  }
+  std::vector<Eigen::MatrixXcd> out;
+  for (Eigen::Index k = 0; k < problem.G.cols(); ++k) {
+    const Eigen::MatrixXcd rows = instrument_rows(problem, k)(Eigen::all, order);
+    Eigen::MatrixXcd J(rows.rows(), rows.cols() + delays);
+    J << rows.leftCols(denominators), Eigen::MatrixXcd(rows.rows(), delays),
+        rows.rightCols(rows.cols() - denominators);
+    for (Eigen::Index d = 0; d < delays; ++d)
+      J.col(denominators + d) = slopes[static_cast<std::size_t>(d)].col(k);
+    out.push_back(std::move(J));
+  }
+  return out;
+}
+
+/// One measurement of the 2 x 3 stage with strongly correlated noise.
+struct Measurement {
+  DenseProblem problem = noisy_stage(HoldModel::exact, 0.0);
+  CorrelatedNoise noise = correlated_noise(problem, 0.02, 0.95);
+  FrfEstimate frf;
+  explicit Measurement(std::uint64_t seed = 5, int dof = 0) {
+    RandomNumbers random(seed);
+    frf = measured(problem, noise, random, dof);
+  }
+  AdditiveModel start() const { return moved(problem.model, 1.003, 1.2); }
+};
+
+/// Options for that stage.
+inline FitOptions options_with(Weighting weighting) {
+  FitOptions options;
+  options.weighting = weighting;
+  options.hold = HoldModel::exact;
+  options.delay = DelayModel::estimate;
+  options.delay_s = 1.37e-4;
+  return options;
+}
+
+}  // namespace stageid::test

@@ -1,0 +1,76 @@
+#include "tools/weight_file.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "estimation/weight_matrices.hpp"
+#include "excitation/file_error.hpp"
+#include "excitation/hdf5_file.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr const char* kDiagonals = "/weights";
+constexpr const char* kMatrices = "/weight_matrices";
+
+void require_shape(const Hdf5File& file, const char* dataset, const std::vector<hsize_t>& wanted) {
+  const std::vector<hsize_t> shape = file.shape(dataset);
+  if (shape == wanted) return;
+  throw FormatError(file.path(), dataset,
+                    fmt::format("is {}; must be {}, as the response in the band",
+                                fmt::join(shape, " x "), fmt::join(wanted, " x ")));
+}
+
+void read_diagonals(const Hdf5File& file, const FrfEstimate& frf, Eigen::MatrixXd& weights) {
+  require_shape(file, kDiagonals,
+                {static_cast<hsize_t>(frf.lines()), static_cast<hsize_t>(frf.n_outputs()),
+                 static_cast<hsize_t>(frf.n_inputs())});
+  const std::vector<double> values = file.read_reals(kDiagonals);
+  weights.resize(frf.n_outputs() * frf.n_inputs(), frf.lines());
+  std::size_t at = 0;
+  for (Eigen::Index k = 0; k < frf.lines(); ++k)
+    for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
+      for (Eigen::Index j = 0; j < frf.n_inputs(); ++j, ++at) {
+        if (!std::isfinite(values[at]) || values[at] < 0.0)
+          throw FormatError(file.path(), kDiagonals,
+                            fmt::format("line {}: {}; weights are 0 or more", k, values[at]));
+        weights(i + frf.n_outputs() * j, k) = values[at];
+      }
+}
+
+void read_matrices(const Hdf5File& file, const FrfEstimate& frf, Eigen::MatrixXcd& matrices) {
+  const Eigen::Index n_c = frf.n_outputs() * frf.n_inputs();
+  require_shape(
+      file, kMatrices,
+      {static_cast<hsize_t>(frf.lines()), static_cast<hsize_t>(n_c), static_cast<hsize_t>(n_c)});
+  try {
+    require_memory_for_weight_matrices(n_c, frf.lines());
+    // Rows of a Hermitian matrix are its columns, conjugated; what is not Hermitian is refused.
+    const std::vector<std::complex<double>> values = file.read_complex(kMatrices);
+    matrices.resize(n_c * n_c, frf.lines());
+    for (Eigen::Index k = 0; k < frf.lines(); ++k)
+      matrices.col(k) =
+          Eigen::Map<const Eigen::VectorXcd>(values.data() + k * n_c * n_c, n_c * n_c).conjugate();
+    (void)WeightMatrices::user(frf, matrices);
+  } catch (const std::invalid_argument& error) {
+    throw FormatError(file.path(), kMatrices, error.what());
+  }
+}
+
+}  // namespace
+
+void read_weights(const std::filesystem::path& path, const FrfEstimate& frf, FitOptions& options) {
+  const Hdf5File file = Hdf5File::open(path);
+  if (!file.exists(kMatrices)) {
+    read_diagonals(file, frf, options.user_weights);
+    return;
+  }
+  if (file.exists(kDiagonals))
+    throw FormatError(path, kMatrices, "stands beside /weights; give one of the two");
+  read_matrices(file, frf, options.user_weight_matrices);
+}
+
+}  // namespace stageid

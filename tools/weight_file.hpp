@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+
+#include "estimation/fit_options.hpp"
+#include "frf/frf_estimate.hpp"
+
+namespace stageid {
+
+/// Reads the weights of docs/formats.md, on the lines of the band, into `options`:
+/// /weights [N x n_y x n_u], or /weight_matrices [N x n_c x n_c] complex.
+/// @throws FileError, FormatError: shape, a weight that is negative, a matrix that is not Hermitian and
+///         positive semidefinite, both datasets or none; too large for memory, before it is read.
+void read_weights(const std::filesystem::path& file, const FrfEstimate& frf, FitOptions& options);
+
+}  // namespace stageid
