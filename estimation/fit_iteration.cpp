@@ -27,7 +27,7 @@ struct Trial {
 std::optional<Trial> try_step(const FitProblem& problem, const PoleBounds& bounds,
                               const FitParameters& beta, const Eigen::VectorXd& step) {
   if (!step.allFinite()) return std::nullopt;
-  Trial trial{stepped_globals(problem, beta, step), {}};
+  Trial trial{stepped(problem, beta, step), {}};
   if (!bounds.stabilize(beta, trial.beta)) return std::nullopt;
   const std::vector<BasisGroup> groups = evaluate_groups(problem, trial.beta, false);
   if (!solve_numerators(problem, groups, trial.beta.B, trial.E)) return std::nullopt;
@@ -240,23 +240,6 @@ class Iteration {
 };
 
 }  // namespace
-
-FitParameters stepped_globals(const FitProblem& problem, const FitParameters& beta,
-                              const Eigen::VectorXd& step) {
-  FitParameters out = beta;
-  Eigen::Index p = 0;
-  for (Eigen::VectorXd& a : out.a) {
-    a += step.segment(p, a.size());
-    p += a.size();
-  }
-  if (problem.delay == DelayModel::estimate) {
-    out.input_delay_s.array() += step[p];
-  } else if (problem.delay == DelayModel::per_channel) {
-    out.input_delay_s += step.segment(p, problem.n_inputs);
-    out.output_delay_s.head(problem.n_outputs - 1) += step.tail(problem.n_outputs - 1);
-  }
-  return out;
-}
 
 IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options) {
   return Iteration(problem, beta, options).run();

@@ -24,9 +24,6 @@ struct IterationResult {
 /// iterate of least cost is returned.
 IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options);
 
-/// `beta` with denominators and delays moved by `step` (globals long).
-FitParameters stepped_globals(const FitProblem& problem, const FitParameters& beta,
-                              const Eigen::VectorXd& step);
 /// The same for Hermitian weights, from all of `beta` (a fit with the diagonal weights): Gauss-Newton
 /// on all parameters at once, see JointEquations, damped until the cost falls. The cost is the true
 /// one, sum vec(E)^H W_k vec(E) / (2N). @pre problem.W is weights.marginal().

@@ -185,7 +185,7 @@ class LowRankIteration {
                              "first-order condition, scaled gradient {:.2g}",
                              deviations, gradient_));
     if (attempt()) return true;
-    if (deviations < 0.05)
+    if (deviations < kRoundingDeviations)
       return end(FitStatus::step_small,
                  fmt::format("residues of given rank: the cost is at rounding, within {:.1g} "
                              "standard deviations of the first-order condition",
@@ -200,7 +200,7 @@ class LowRankIteration {
     for (; levenberg_ <= kLargestLevenberg; levenberg_ = std::max(10.0 * levenberg_, 1e-4)) {
       const Eigen::VectorXd step = solve(levenberg_);
       if (!step.allFinite()) continue;
-      FitParameters trial = stepped_globals(problem_, beta_, step.head(problem_.globals()));
+      FitParameters trial = stepped(problem_, beta_, step.head(problem_.globals()));
       if (!bounds_.stabilize(beta_, trial)) continue;
       std::vector<Part> parts = parts_;
       for (Part& part : parts) part.form.step(step.segment(part.first_parameter, part.form.size()));
