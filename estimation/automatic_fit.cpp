@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+#include <optional>
 #include <ranges>
 #include <stdexcept>
 #include <thread>
@@ -22,47 +22,17 @@ constexpr std::size_t kCandidates = 4;  // tried before it is believed that no m
 // measurement exists (-160 dB), and without a limit noise-free data would ask for modes for ever.
 constexpr double kRounding = 1e-16;
 
-Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,
-                       const ModeCandidate& mode) {
-  const double omega = 2.0 * std::numbers::pi * mode.frequency_hz;
-  Submodel s;
-  s.denominator = {1.0, 2.0 * mode.damping_ratio / omega, 1.0 / (omega * omega)};
-  s.numerator.assign(structure.general_damping ? 2 : 1,
-                     Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs()));
-  return s;
-}
-
-std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructure& structure) {
-  std::vector<Submodel> out;
-  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
-  if (structure.rigid_body) out.push_back({2, {1.0}, {zero}, {}, {}});
-  if (structure.direct_term) out.push_back({0, {1.0}, {zero}, {}, {}});
-  return out;
-}
-
-int count_modes(const AdditiveModel& model) {
-  return static_cast<int>(std::count_if(model.submodels.begin(), model.submodels.end(),
-                                        [](const Submodel& s) { return s.is_mode(); }));
-}
-
-void sort_modes(AdditiveModel& model) {
-  std::stable_sort(model.submodels.begin(), model.submodels.end(),
-                   [](const Submodel& a, const Submodel& b) {
-                     if (a.is_mode() != b.is_mode()) return b.is_mode();
-                     return a.is_mode() && a.natural_frequency_hz() < b.natural_frequency_hz();
-                   });
-}
-
 /// Grows and prunes a model; every decision is written down.
 class AutomaticFit {
  public:
   AutomaticFit(const FrfEstimate& frf, const ModelStructure& structure,
-               const ModeSelection& selection, const FitOptions& options)
+               const ModeSelection& selection, const FitOptions& options, int surplus = 0)
       : frf_(frf),
         structure_(structure),
         selection_(selection),
         options_(options),
-        quick_(options) {
+        quick_(options),
+        target_(selection.exactly + surplus) {
     quick_.user_weights = make_weights(frf, options);
     quick_.weighting = Weighting::user;
     quick_.user_weight_matrices.resize(0, 0);  // the final fit's only: their best diagonal chooses
@@ -79,14 +49,32 @@ class AutomaticFit {
     signal_ = (quick_.user_weights.array() * frf.response.cwiseAbs2().array()).sum();
   }
 
-  FitResult run() {
+  void search() {
     adopt(fit_additive_model(frf_, start(), quick_));
-    if (best_.status == FitStatus::singular) return finish();
-    if (selection_.keep_modes) return finish();
+    if (best_.status == FitStatus::singular || selection_.keep_modes) return;
     grow();
     reduce();
-    if (grow() && selection_.exactly == 0) reduce();
-    return finish();
+    if (selection_.exactly == 0) {
+      if (grow()) reduce();
+      return;
+    }
+    quick_.max_iterations = options_.max_iterations;
+    adopt(fit_additive_model(frf_, best_.model, quick_));
+    say("{} modes, by way of {}: cost {:.6g}", count_modes(best_.model), target_,
+        best_.model.fit.cost);
+  }
+
+  double cost() const { return best_.model.fit.cost; }
+
+  FitResult finish() {
+    sort_modes(best_.model);
+    FitResult result = fit_additive_model(frf_, best_.model, options_);
+    decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
+    result.decisions = std::move(decisions_);
+    result.cost.insert(result.cost.begin(), history_.begin(), history_.end());
+    result.model.cost_history = result.cost;
+    result.model.fit.iterations = static_cast<int>(result.cost.size()) - 1;
+    return result;
   }
 
  private:
@@ -146,7 +134,7 @@ class AutomaticFit {
 
   bool wanted_more() const {
     const int modes = count_modes(best_.model);
-    if (selection_.exactly > 0) return modes < selection_.exactly;
+    if (selection_.exactly > 0) return modes < target_;
     return modes < affordable_modes() && squares(best_) > kRounding * signal_;
   }
 
@@ -173,8 +161,8 @@ class AutomaticFit {
     std::vector<ResidualMode> clear;
     for (const ResidualMode& candidate : candidates)
       if (candidate.gain > 4.0 * price(1)) clear.push_back(candidate);
-    const int room = (selection_.exactly > 0 ? selection_.exactly : affordable_modes()) -
-                     count_modes(best_.model);
+    const int room =
+        (selection_.exactly > 0 ? target_ : affordable_modes()) - count_modes(best_.model);
     if (clear.size() < 2 || room < static_cast<int>(clear.size())) return false;
     FitResult trial = fit_with(clear);
     if (trial.status == FitStatus::singular || !(bic(trial) < bic(best_))) return false;
@@ -319,17 +307,6 @@ class AutomaticFit {
     if (selection_.exactly == 0) merge();
   }
 
-  FitResult finish() {
-    sort_modes(best_.model);
-    FitResult result = fit_additive_model(frf_, best_.model, options_);
-    decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
-    result.decisions = std::move(decisions_);
-    result.cost.insert(result.cost.begin(), history_.begin(), history_.end());
-    result.model.cost_history = result.cost;
-    result.model.fit.iterations = static_cast<int>(result.cost.size()) - 1;
-    return result;
-  }
-
   /// Goes on from `result`; its way there becomes part of the history.
   void adopt(FitResult&& result) {
     best_ = std::move(result);
@@ -346,6 +323,7 @@ class AutomaticFit {
   const ModeSelection& selection_;
   const FitOptions& options_;
   FitOptions quick_;
+  int target_;  ///< modes to grow to where their number is given
   int threads_ = 1;
   double signal_ = 0.0;
   FitResult best_;
@@ -353,13 +331,17 @@ class AutomaticFit {
   std::vector<double> history_;
 };
 
-}  // namespace
-
-Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure) {
-  const Eigen::Index per_mode = structure.general_damping ? 2 : 1;
-  const Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);
-  return std::max<Eigen::Index>(1, (2 * frf.lines() / 3 - fixed) / (per_mode + 1));
+/// Where the number of modes is given, the way to it decides which minimum is reached: it is also
+/// gone with modes too many, of which the least worthy are dropped again.
+std::vector<int> surpluses(const ModeSelection& selection, Eigen::Index most) {
+  std::vector<int> out = {0};
+  if (selection.exactly == 0 || selection.keep_modes) return out;
+  for (const int surplus : {1 + selection.exactly / 4, 2 + selection.exactly / 2})
+    if (selection.exactly + surplus <= most) out.push_back(surplus);
+  return out;
 }
+
+}  // namespace
 
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
                         const ModeSelection& selection, const FitOptions& options) {
@@ -372,7 +354,13 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
         "fit: {} lines cannot carry {} modes; ask for at most {}", frf.lines(),
         std::max<std::size_t>(static_cast<std::size_t>(selection.exactly), selection.modes.size()),
         most));
-  return AutomaticFit(frf, structure, selection, options).run();
+  std::optional<AutomaticFit> best;
+  for (const int surplus : surpluses(selection, most)) {
+    AutomaticFit attempt(frf, structure, selection, options, surplus);
+    attempt.search();
+    if (!best || attempt.cost() < best->cost()) best.emplace(std::move(attempt));
+  }
+  return best->finish();
 }
 
 }  // namespace stageid

@@ -4,15 +4,9 @@
 
 #include "estimation/cmif.hpp"
 #include "estimation/fit_additive_model.hpp"
+#include "estimation/model_structure.hpp"
 
 namespace stageid {
-
-/// Which submodels beside the modes.
-struct ModelStructure {
-  bool rigid_body = true;        ///< B_0 / s^2
-  bool direct_term = false;      ///< a constant matrix: compliance of modes above the band
-  bool general_damping = false;  ///< modes with B_0 + B_1 s (general viscous) instead of B_0
-};
 
 /// What decides the number of modes.
 struct ModeSelection {
@@ -21,10 +15,6 @@ struct ModeSelection {
   bool keep_modes = false;           ///< fit `modes` as they are: none added, none removed
   int most = 60;
 };
-
-/// More modes than this the lines of an FRF cannot carry: a channel's functions are real combinations
-/// on 2 N real values, of which a third is left to tell noise from modes.
-Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure);
 
 /// A fit that completes its own start: peaks of the CMIF, then modes at the peaks of the weighted
 /// residual's CMIF while they are worth their parameters, duplicates merged, worthless ones

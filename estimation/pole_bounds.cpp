@@ -26,15 +26,18 @@ PoleBounds::PoleBounds(const FitProblem& problem, const FitParameters& start) {
     if (a.size() == 2 && a[1] > 0.0) lowest_rad_s_ = std::min(lowest_rad_s_, 1.0 / std::sqrt(a[1]));
 }
 
-bool PoleBounds::stabilize_mode(double before_a2, Eigen::VectorXd& a) const {
+bool PoleBounds::stabilize_mode(const Eigen::VectorXd& before, Eigen::VectorXd& a) const {
   if (!(a[1] > 0.0)) return false;
-  const double move = std::sqrt(before_a2 / a[1]);
+  const double move = std::sqrt(before[1] / a[1]);
   // Held at the bound, not refused: a mode that leans on it must not stop all the others.
   a[1] = std::clamp(a[1], 1.0 / (highest_rad_s_ * highest_rad_s_),
                     1.0 / (lowest_rad_s_ * lowest_rad_s_));
   const double root = std::sqrt(a[1]);
-  a[0] = 2.0 * root * std::clamp(std::abs(a[0]) / (2.0 * root), kSmallestDamping, kLargestDamping);
-  return (move < kLargestMove && move > 1.0 / kLargestMove) || before_a2 == a[1];
+  // An unstable start is reflected; a step towards instability ends at the bound, where the mode is
+  // then held: reflected, it would bounce.
+  const double damping = before[0] > 0.0 ? std::max(a[0], 0.0) : std::abs(a[0]);
+  a[0] = 2.0 * root * std::clamp(damping / (2.0 * root), kSmallestDamping, kLargestDamping);
+  return (move < kLargestMove && move > 1.0 / kLargestMove) || before[1] == a[1];
 }
 
 bool PoleBounds::stabilize(const FitParameters& before, FitParameters& beta) const {
@@ -43,7 +46,7 @@ bool PoleBounds::stabilize(const FitParameters& before, FitParameters& beta) con
     if (a.size() == 1) {
       if (!(a[0] > 0.0)) return false;
     } else if (a.size() == 2) {
-      if (!stabilize_mode(before.a[i][1], a)) return false;
+      if (!stabilize_mode(before.a[i], a)) return false;
     } else {
       for (const std::complex<double> pole : roots(a))
         if (!(pole.real() < 0.0)) return false;

@@ -26,7 +26,7 @@ class PoleBounds {
                                     const Eigen::VectorXd& descent) const;
 
  private:
-  bool stabilize_mode(double before_a2, Eigen::VectorXd& a) const;
+  bool stabilize_mode(const Eigen::VectorXd& before, Eigen::VectorXd& a) const;
 
   double lowest_rad_s_ = 0.0;
   double highest_rad_s_ = 0.0;

@@ -131,6 +131,21 @@ TEST_F(SmallStage, FitsSoManyModesAsAsked) {
   }
 }
 
+// Growing mode by mode ends beside the best place for a given number; going by way of more modes and
+// dropping the least worthy finds it.
+TEST_F(SmallStage, TriesMoreThanOneWayToTheNumberAsked) {
+  const FitResult fit = automatic_fit(frf_, {}, {.modes = {}, .exactly = 2}, {});
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("2 modes, by way of ")));
+  double best = HUGE_VAL;  // of every pair of the three true modes
+  for (const auto& pair : {std::pair{120.0, 390.0}, {120.0, 640.0}, {390.0, 640.0}}) {
+    const FitResult two = automatic_fit(
+        frf_, {}, {.modes = {{pair.first, 0.01, 1}, {pair.second, 0.01, 1}}, .keep_modes = true},
+        {});
+    best = std::min(best, two.model.fit.cost);
+  }
+  EXPECT_LE(fit.model.fit.cost, best * (1.0 + 1e-9));
+}
+
 TEST_F(SmallStage, KeepsTheModesThatItIsToldToKeep) {
   const FitResult fit = automatic_fit(
       frf_, {}, {.modes = {{121.0, 0.01, 1}, {638.0, 0.01, 1}}, .keep_modes = true}, {});
