@@ -16,8 +16,9 @@
 namespace stageid {
 namespace {
 
-constexpr int kGrowthIterations = 12;   // a mode that is still moving is finished later
-constexpr std::size_t kCandidates = 4;  // tried before it is believed that no mode is missing
+constexpr int kGrowthIterations = 12;    // a mode that is still moving is finished later
+constexpr std::size_t kCandidates = 4;   // tried before it is believed that no mode is missing
+constexpr std::size_t kShareAtOnce = 5;  // models of many modes grow by a fifth at a time
 // Part of the weighted power of the response below which a residual is rounding: no more precise
 // measurement exists (-160 dB), and without a limit noise-free data would ask for modes for ever.
 constexpr double kRounding = 1e-16;
@@ -65,6 +66,7 @@ class AutomaticFit {
   }
 
   double cost() const { return best_.model.fit.cost; }
+  bool at_rounding() const { return squares(best_) <= kRounding * signal_; }
 
   FitResult finish() {
     sort_modes(best_.model);
@@ -148,8 +150,10 @@ class AutomaticFit {
   bool grow() {
     bool grown = false;
     while (wanted_more()) {
+      const std::size_t most =
+          std::max(kCandidates, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
       const std::vector<ResidualMode> candidates =
-          residual_modes(frf_, best_.model, quick_.user_weights, kCandidates, threads_);
+          residual_modes(frf_, best_.model, quick_.user_weights, most, threads_);
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
     }
@@ -163,7 +167,8 @@ class AutomaticFit {
       if (candidate.gain > 4.0 * price(1)) clear.push_back(candidate);
     const int room =
         (selection_.exactly > 0 ? target_ : affordable_modes()) - count_modes(best_.model);
-    if (clear.size() < 2 || room < static_cast<int>(clear.size())) return false;
+    if (room < static_cast<int>(clear.size())) clear.resize(static_cast<std::size_t>(room));
+    if (clear.size() < 2) return false;
     FitResult trial = fit_with(clear);
     if (trial.status == FitStatus::singular || !(bic(trial) < bic(best_))) return false;
     for (const ResidualMode& candidate : clear)
@@ -359,6 +364,7 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
     AutomaticFit attempt(frf, structure, selection, options, surplus);
     attempt.search();
     if (!best || attempt.cost() < best->cost()) best.emplace(std::move(attempt));
+    if (best->at_rounding()) break;
   }
   return best->finish();
 }
