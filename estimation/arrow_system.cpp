@@ -82,6 +82,14 @@ bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::Mat
   return x.allFinite();
 }
 
+void hold_unknowns(const std::vector<Eigen::Index>& frozen, Eigen::MatrixXd& M) {
+  for (const Eigen::Index i : frozen) {
+    M.row(i).setZero();
+    M.col(i).setZero();
+    M(i, i) = 1.0;
+  }
+}
+
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
                          const std::vector<BasisGroup>& groups, const Residual& E, FitMethod method)
     : problem_(problem),
@@ -252,12 +260,8 @@ Eigen::VectorXd ArrowSystem::solve_schur(const Eigen::VectorXd& right_side, doub
   Eigen::MatrixXd scaled = scale.asDiagonal() * schur_ * scale.asDiagonal();
   scaled.diagonal() += damping * scaled.diagonal().cwiseAbs().cwiseMax(1e-12);
   Eigen::VectorXd rhs = scale.cwiseProduct(right_side);
-  for (const Eigen::Index i : frozen) {
-    scaled.row(i).setZero();
-    scaled.col(i).setZero();
-    scaled(i, i) = 1.0;
-    rhs[i] = 0.0;
-  }
+  hold_unknowns(frozen, scaled);
+  for (const Eigen::Index i : frozen) rhs[i] = 0.0;
   return scale.cwiseProduct(scaled.partialPivLu().solve(rhs));
 }
 

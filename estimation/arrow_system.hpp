@@ -82,6 +82,9 @@ class ArrowSystem {
   bool regular_ = true;
 };
 
+/// Rows and columns of the unit matrix where an unknown stays where it is.
+void hold_unknowns(const std::vector<Eigen::Index>& frozen, Eigen::MatrixXd& M);
+
 /// x solving M x = b for symmetric positive M, scaled to unit diagonal; matrix of right-hand sides.
 /// @returns false if M is singular to rounding.
 bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x);

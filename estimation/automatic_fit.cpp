@@ -27,13 +27,13 @@ constexpr double kRounding = 1e-16;
 class AutomaticFit {
  public:
   AutomaticFit(const FrfEstimate& frf, const ModelStructure& structure,
-               const ModeSelection& selection, const FitOptions& options, int surplus = 0)
+               const ModeSelection& selection, const FitOptions& options)
       : frf_(frf),
         structure_(structure),
         selection_(selection),
         options_(options),
         quick_(options),
-        target_(selection.exactly + surplus) {
+        target_(selection.exactly) {
     quick_.user_weights = make_weights(frf, options);
     quick_.weighting = Weighting::user;
     quick_.user_weight_matrices.resize(0, 0);  // the final fit's only: their best diagonal chooses
@@ -50,8 +50,12 @@ class AutomaticFit {
     signal_ = (quick_.user_weights.array() * frf.response.cwiseAbs2().array()).sum();
   }
 
-  void search() {
-    adopt(fit_additive_model(frf_, start(), quick_));
+  /// The fit that every search begins with.
+  void begin() { adopt(fit_additive_model(frf_, start(), quick_)); }
+
+  /// @param surplus modes to grow by beyond the number that is asked for
+  void search(int surplus) {
+    target_ = selection_.exactly + surplus;
     if (best_.status == FitStatus::singular || selection_.keep_modes) return;
     grow();
     reduce();
@@ -359,10 +363,12 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
         "fit: {} lines cannot carry {} modes; ask for at most {}", frf.lines(),
         std::max<std::size_t>(static_cast<std::size_t>(selection.exactly), selection.modes.size()),
         most));
+  AutomaticFit begun(frf, structure, selection, options);
+  begun.begin();
   std::optional<AutomaticFit> best;
   for (const int surplus : surpluses(selection, most)) {
-    AutomaticFit attempt(frf, structure, selection, options, surplus);
-    attempt.search();
+    AutomaticFit attempt = begun;
+    attempt.search(surplus);
     if (!best || attempt.cost() < best->cost()) best.emplace(std::move(attempt));
     if (best->at_rounding()) break;
   }

@@ -13,7 +13,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kLargestLevenberg = 1e8;
 // Part of the data's weighted power below which a residual that no step lowers is rounding, not a
 // fit that got stuck: 1e-12 of the amplitude.
 constexpr double kNothingLeft = 1e-24;

@@ -34,6 +34,9 @@ IterationResult iterate(const FitProblem& problem, const WeightMatrices& weights
 /// deviations away.
 inline constexpr double kRoundingDeviations = 0.05;
 
+/// Damping beyond which no step is worth trying.
+inline constexpr double kLargestLevenberg = 1e8;
+
 /// Sets all input delays to the one of least cost on a grid (numerators solved for every
 /// candidate).
 void search_delay(const FitProblem& problem, FitParameters& beta);

@@ -15,7 +15,6 @@ namespace {
 
 // Of the step, where the cost is quadratic: the next one corrects it.
 constexpr double kStepTolerance = 1e-2;
-constexpr double kLargestLevenberg = 1e8;
 
 class JointIteration {
  public:

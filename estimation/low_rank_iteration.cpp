@@ -12,8 +12,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kLargestLevenberg = 1e8;
-
 /// What the free parameters, globals first, do to the numerators of one channel.
 struct Entry {
   Eigen::Index function;
@@ -149,12 +147,8 @@ class LowRankIteration {
     Eigen::MatrixXd scaled = scale.asDiagonal() * N_ * scale.asDiagonal();
     scaled.diagonal().array() += damping + 1e-13;
     Eigen::VectorXd rhs = scale.cwiseProduct(g_);
-    for (const Eigen::Index i : frozen_) {
-      scaled.row(i).setZero();
-      scaled.col(i).setZero();
-      scaled(i, i) = 1.0;
-      rhs[i] = 0.0;
-    }
+    hold_unknowns(frozen_, scaled);
+    for (const Eigen::Index i : frozen_) rhs[i] = 0.0;
     return scale.cwiseProduct(scaled.ldlt().solve(rhs));
   }
 

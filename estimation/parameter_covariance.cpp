@@ -135,11 +135,7 @@ void global_columns(const FitProblem& problem, const FitParameters& beta, const 
 Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen) {
   if (S.size() == 0) return S;
   Eigen::MatrixXd reduced = S;
-  for (const Eigen::Index i : frozen) {
-    reduced.row(i).setZero();
-    reduced.col(i).setZero();
-    reduced(i, i) = 1.0;
-  }
+  hold_unknowns(frozen, reduced);
   const Eigen::VectorXd scale =
       reduced.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd inverse =

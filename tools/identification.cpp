@@ -191,8 +191,6 @@ void Identification::fit() {
   trustworthy_ = step.result.trustworthy();
   if (!trustworthy_) notes_.push_back("the fit did not converge: " + step.result.message);
   write_model(path("model.json"), model_);
-  // The exports come from the file, as they do when a resumed job passes over the fit: same bytes.
-  model_ = read_model(path("model.json"));
   finish_step("fit", step.seconds,
               fmt::format("{} submodels, relative error {:.3g}, {}", model_.submodels.size(),
                           model_.fit.relative_rms_error, cost_line(step.result.cost)));
