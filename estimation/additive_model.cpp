@@ -61,20 +61,22 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
   const Eigen::Index channels = model.n_outputs() * model.n_inputs();
   Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(channels, frequency_hz.size());
   SubmodelBasis basis;
-  for (const auto& [delay, members] : channels_by_delay(model))
+  for (const auto& [delay, members] : channels_by_delay(model)) {
+    const LineOperator through(lines, delay);
     for (const Submodel& submodel : model.submodels) {
       const SubmodelShape shape{submodel.integrators,
                                 static_cast<int>(submodel.denominator.size()) - 1,
                                 static_cast<int>(submodel.numerator.size()) - 1};
       const Eigen::VectorXd a =
           Eigen::Map<const Eigen::VectorXd>(submodel.denominator.data() + 1, shape.order);
-      evaluate_basis(lines, shape, a, delay, false, basis);
+      evaluate_basis(through, shape, a, {}, basis);
       for (Eigen::Index k = 0; k < out.cols(); ++k)
         for (int m = 0; m <= shape.numerator_degree; ++m) {
           const double* B = submodel.numerator[static_cast<std::size_t>(m)].data();
           for (const Eigen::Index c : members) out(c, k) += B[c] * basis.value(k, m);
         }
     }
+  }
   return out;
 }
 

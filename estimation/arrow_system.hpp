@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "estimation/fit_problem.hpp"
+#include "estimation/line_sums.hpp"
 
 namespace stageid {
 
@@ -20,9 +20,11 @@ namespace stageid {
 /// eliminated one by one and the Schur complement on the globals is solved.
 class ArrowSystem {
  public:
-  /// @pre `groups` were evaluated with derivatives at `beta`, `E` is their residual.
+  /// @pre `groups` were evaluated with derivatives at `beta`.
+  /// @param keep_channels false where only solve_globals() is asked for: memory is then that of a block
+  ///        of channels, and channels() is empty.
   ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-              const std::vector<BasisGroup>& groups, const Residual& E, FitMethod method);
+              const std::vector<BasisGroup>& groups, FitMethod method, bool keep_channels = true);
 
   struct Step {
     Eigen::VectorXd globals;
@@ -56,23 +58,22 @@ class ArrowSystem {
   bool regular() const noexcept { return regular_; }
 
  private:
-  void add_group(const BasisGroup& group);
-  void add_denominator_block(const BasisGroup& group, const Eigen::MatrixXd& B,
-                             const Eigen::MatrixXd& W, const Eigen::MatrixXd& WE_re,
-                             const Eigen::MatrixXd& WE_im);
-  void add_delay_columns(const BasisGroup& group, const Eigen::MatrixXd& B,
-                         const Eigen::MatrixXd& W, const Eigen::MatrixXd& WE_re,
-                         const Eigen::MatrixXd& WE_im);
+  void add_block(const BasisGroup& group, const TileRange& block);
+  void add_denominators(const LineSums& sums);
+  void set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
+                   Channel& channel) const;
+  void add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
+                  Eigen::Index index, Channel& channel);
+  void eliminate(Channel& channel);
   Eigen::VectorXd solve_schur(const Eigen::VectorXd& right_side, double damping,
                               const std::vector<Eigen::Index>& frozen) const;
-  void eliminate();
 
   const FitProblem& problem_;
   const FitParameters& beta_;
-  const Residual& E_;
   FitMethod method_;
+  bool keep_channels_;
   std::vector<DerivativeColumn> columns_;
-  Eigen::MatrixXd Y_re_;  // N x denominators: (j omega)^q / A_i
+  Eigen::MatrixXd Y_re_;  // equation_error_columns()
   Eigen::MatrixXd Y_im_;
   Eigen::MatrixXd M_;
   Eigen::VectorXd e_;

@@ -9,153 +9,9 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// phi(t) = integral of e^{lambda v} over [0, t], and its derivative to lambda.
-struct Phi {
-  Complex value;
-  Complex derivative;
-};
-
-Phi phi(Complex lambda, double t) {
-  const Complex x = lambda * t;
-  if (std::abs(x) > 0.5) {
-    const Complex e = std::exp(x);
-    const Complex value = (e - 1.0) / lambda;
-    return {value, (t * e - value) / lambda};
-  }
-  // Series: the closed form cancels for slow poles. 0.5^18/18! is far below rounding.
-  Complex term = 1.0;
-  Complex value = 0.0;
-  Complex derivative = 0.0;
-  for (int n = 0; n < 18; ++n) {
-    value += term / static_cast<double>(n + 1);
-    derivative += term / static_cast<double>(n + 2);
-    term *= x / static_cast<double>(n + 1);
-  }
-  return {t * value, t * t * derivative};
-}
-
-/// 1/(s - lambda), 1/(s - lambda)^2 and the delay derivatives of both, on every line.
-struct Fractions {
-  Eigen::ArrayXcd simple;
-  Eigen::ArrayXcd squared;
-  Eigen::ArrayXcd simple_delay;
-  Eigen::ArrayXcd squared_delay;
-};
-
-/// Whole samples and the rest of a delay.
-struct SplitDelay {
-  double whole = 0.0;
-  double fraction = 0.0;
-};
-
-SplitDelay split(double delay_s, double period_s) {
-  const double samples = delay_s / period_s;
-  const double whole = std::floor(samples);
-  return {whole, samples - whole};
-}
-
-/// e^{-j omega n T}
-Eigen::ArrayXcd shift(const ModelLines& lines, double samples) {
-  const Eigen::ArrayXd angle = -lines.omega_rad_s.array() * (samples * lines.sample_period_s);
-  Eigen::ArrayXcd out(angle.size());
-  for (Eigen::Index k = 0; k < angle.size(); ++k) out[k] = std::polar(1.0, angle[k]);
-  return out;
-}
-
-/// What multiplies a continuous-time function: delay, and the hold's phase or phase and magnitude.
-Eigen::ArrayXcd continuous_factor(const ModelLines& lines, double delay_s) {
-  const double period = lines.sample_period_s;
-  Eigen::ArrayXcd out(lines.omega_rad_s.size());
-  for (Eigen::Index k = 0; k < out.size(); ++k) {
-    const double omega = lines.omega_rad_s[k];
-    double delay = delay_s;
-    double magnitude = 1.0;
-    if (lines.hold != HoldModel::none) delay += 0.5 * period;
-    if (lines.hold == HoldModel::sinc) {
-      const double x = 0.5 * omega * period;
-      magnitude = std::sin(x) / x;
-    }
-    out[k] = std::polar(magnitude, -omega * delay);
-  }
-  return out;
-}
-
-/// Everything about lines and delay that all poles share.
-class Operator {
- public:
-  Operator(const ModelLines& lines, double delay_s)
-      : lines_(lines), exact_(lines.hold == HoldModel::exact) {
-    if (exact_) {
-      delay_ = split(delay_s, lines.sample_period_s);
-      inverse_z_ = shift(lines, 1.0);
-      first_ = shift(lines, delay_.whole + 1.0);
-    } else {
-      s_ = Complex(0.0, 1.0) * lines.omega_rad_s.array().cast<Complex>();
-      first_ = continuous_factor(lines, delay_s);
-    }
-  }
-
-  Fractions fractions(Complex lambda, bool with_squares) const {
-    return exact_ ? sampled(lambda, with_squares) : continuous(lambda, with_squares);
-  }
-
-  /// The constant 1: a held input seen at the sampling instants.
-  Eigen::ArrayXcd constant() const {
-    if (!exact_) return first_;
-    return delay_.fraction > 0.0 ? first_ : Eigen::ArrayXcd(first_ * inverse_z_.conjugate());
-  }
-  Eigen::ArrayXcd constant_delay() const {
-    if (!exact_) return -s_ * first_;
-    return Eigen::ArrayXcd::Zero(first_.size());
-  }
-
- private:
-  Fractions continuous(Complex lambda, bool with_squares) const {
-    Fractions out;
-    const Eigen::ArrayXcd inverse = (s_ - lambda).inverse();
-    out.simple = first_ * inverse;
-    out.simple_delay = -s_ * out.simple;
-    if (with_squares) {
-      out.squared = out.simple * inverse;
-      out.squared_delay = -s_ * out.squared;
-    }
-    return out;
-  }
-
-  Fractions sampled(Complex lambda, bool with_squares) const {
-    const double period = lines_.sample_period_s;
-    const double rest = (1.0 - delay_.fraction) * period;
-    const Phi whole = phi(lambda, period);
-    const Phi part = phi(lambda, rest);
-    const Complex E = std::exp(lambda * period);
-    const Complex e1 = std::exp(lambda * rest);
-    Fractions out;
-    const Eigen::ArrayXcd q = inverse_z_ / (1.0 - E * inverse_z_);  // z^-1 / (1 - E z^-1)
-    out.simple = first_ * (part.value + whole.value * e1 * q);
-    out.simple_delay = -e1 * first_ * (1.0 + lambda * whole.value * q);
-    if (with_squares) {
-      const Complex slope = whole.derivative * e1 + whole.value * rest * e1;
-      out.squared = first_ * (part.derivative + slope * q + whole.value * e1 * period * E * q * q);
-      // d/dlambda of simple_delay
-      const Complex lambda_phi_slope = whole.value + lambda * whole.derivative;
-      out.squared_delay = -e1 * first_ *
-                          (rest * (1.0 + lambda * whole.value * q) + lambda_phi_slope * q +
-                           lambda * whole.value * period * E * q * q);
-    }
-    return out;
-  }
-
-  const ModelLines& lines_;
-  bool exact_;
-  SplitDelay delay_;
-  Eigen::ArrayXcd s_;
-  Eigen::ArrayXcd inverse_z_;
-  Eigen::ArrayXcd first_;  // exact: z^-(d+1); else delay and hold
-};
-
 /// A pole of a rational function with its fractions on the lines.
 struct Pole {
-  Complex lambda;
+  Complex lambda = 0.0;
   Fractions fractions;
 };
 
@@ -199,6 +55,12 @@ struct PartialFractions {
   }
 };
 
+/// out's column += factor x
+void add(Complex factor, const SplitMatrix& x, SplitMatrix& out, Eigen::Index column) {
+  out.re.col(column) += factor.real() * x.re.col(0) - factor.imag() * x.im.col(0);
+  out.im.col(column) += factor.real() * x.im.col(0) + factor.imag() * x.re.col(0);
+}
+
 }  // namespace
 
 std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>& a) {
@@ -226,51 +88,54 @@ std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>&
   return out;
 }
 
-void evaluate_basis(const ModelLines& lines, const SubmodelShape& shape,
-                    const Eigen::Ref<const Eigen::VectorXd>& a, double delay_s, bool with_gradient,
+void evaluate_basis(const LineOperator& through, const SubmodelShape& shape,
+                    const Eigen::Ref<const Eigen::VectorXd>& a, WantedBasis wanted,
                     SubmodelBasis& out) {
-  const Eigen::Index N = lines.omega_rad_s.size();
+  const Eigen::Index N = through.lines();
   const int n = shape.order;
   const int l = shape.integrators;
   if (shape.numerator_degree > n + l) throw std::invalid_argument("model: a submodel is improper");
   if (l > 2) throw std::invalid_argument("model: at most two integrators in a submodel");
-  const Operator through(lines, delay_s);
 
-  std::vector<Pole> poles;
-  poles.push_back({Complex(0.0), l > 0 ? through.fractions(Complex(0.0), true) : Fractions{}});
-  for (const Complex lambda : roots(a))
-    poles.push_back({lambda, through.fractions(lambda, with_gradient)});
+  std::vector<Pole> poles(1);  // [0]: the origin
+  if (l > 0) through.fractions(Complex(0.0), {true, wanted.delay}, poles[0].fractions);
+  for (const Complex lambda : roots(a)) {
+    poles.push_back({lambda, {}});
+    through.fractions(lambda, {wanted.gradient, wanted.delay}, poles.back().fractions);
+  }
   const double highest = n > 0 ? a[n - 1] : 1.0;
 
-  out.value.setZero(N, shape.functions());
-  out.delay.setZero(N, shape.functions());
-  if (with_gradient) out.gradient.setZero(N, Eigen::Index{shape.functions()} * n);
+  out.value.set_zero(N, shape.functions());
+  out.delay.set_zero(wanted.delay ? N : 0, wanted.delay ? shape.functions() : 0);
+  const Eigen::Index slopes = wanted.gradient ? Eigen::Index{shape.functions()} * n : 0;
+  out.gradient.set_zero(slopes > 0 ? N : 0, slopes);
 
   for (int m = 0; m <= shape.numerator_degree; ++m) {
     const int cancelled = std::min(m, l);
     const PartialFractions value{poles, l - cancelled, 1, m - cancelled, highest};
     value.for_each([&](std::size_t r, Complex simple, Complex squared) {
       const Fractions& f = poles[r].fractions;
-      out.value.col(m).array() += simple * f.simple;
-      out.delay.col(m).array() += simple * f.simple_delay;
-      if (squared == 0.0) return;
-      out.value.col(m).array() += squared * f.squared;
-      out.delay.col(m).array() += squared * f.squared_delay;
+      add(simple, f.simple, out.value, m);
+      if (squared != 0.0) add(squared, f.squared, out.value, m);
+      if (!wanted.delay) return;
+      add(simple, f.simple_delay, out.delay, m);
+      if (squared != 0.0) add(squared, f.squared_delay, out.delay, m);
     });
     if (m == n + l) {  // biproper
-      out.value.col(m).array() += through.constant() / highest;
-      out.delay.col(m).array() += through.constant_delay() / highest;
+      add(1.0 / highest, through.constant(), out.value, m);
+      if (wanted.delay) add(1.0 / highest, through.constant_delay(), out.delay, m);
     }
-    if (!with_gradient) continue;
+    if (!wanted.gradient) continue;
     for (int q = 1; q <= n; ++q) {  // d/da_q = -s^(m+q) / (s^l A^2)
       const int gone = std::min(m + q, l);
       const PartialFractions slope{poles, l - gone, 2, m + q - gone, highest * highest};
-      auto column = out.gradient.col(m * n + q - 1).array();
+      const Eigen::Index column = m * n + q - 1;
       slope.for_each([&](std::size_t r, Complex simple, Complex squared) {
-        column -= simple * poles[r].fractions.simple;
-        if (squared != 0.0) column -= squared * poles[r].fractions.squared;
+        add(-simple, poles[r].fractions.simple, out.gradient, column);
+        if (squared != 0.0) add(-squared, poles[r].fractions.squared, out.gradient, column);
       });
-      if (m + q == 2 * n + l) column -= through.constant() / (highest * highest);
+      if (m + q == 2 * n + l)
+        add(-1.0 / (highest * highest), through.constant(), out.gradient, column);
     }
   }
 }

@@ -165,7 +165,7 @@ ParameterCovariance diagonal_covariance(const FrfEstimate& frf, const FitOptions
                                         const FitProblem& problem, const FitParameters& beta,
                                         const std::vector<BasisGroup>& groups, const Residual& E,
                                         const std::vector<Eigen::Index>& frozen) {
-  const ArrowSystem gn(problem, beta, groups, E, FitMethod::gn);
+  const ArrowSystem gn(problem, beta, groups, FitMethod::gn);
   const Eigen::MatrixXd& known =
       frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
   const double dof = frf.noise_variance.size() > 0 ? frf.noise_dof : frf.total_dof;

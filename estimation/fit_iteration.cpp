@@ -16,20 +16,21 @@ namespace {
 // Part of the data's weighted power below which a residual that no step lowers is rounding, not a
 // fit that got stuck: 1e-12 of the amplitude.
 constexpr double kNothingLeft = 1e-24;
+constexpr bool kGlobalsOnly = false;  // numerators are solved again after every step
 
 /// A candidate with its numerators solved.
 struct Trial {
   FitParameters beta;
-  Residual E;
+  double cost = 0.0;
 };
 
 std::optional<Trial> try_step(const FitProblem& problem, const PoleBounds& bounds,
                               const FitParameters& beta, const Eigen::VectorXd& step) {
   if (!step.allFinite()) return std::nullopt;
-  Trial trial{stepped(problem, beta, step), {}};
+  Trial trial{stepped(problem, beta, step)};
   if (!bounds.stabilize(beta, trial.beta)) return std::nullopt;
   const std::vector<BasisGroup> groups = evaluate_groups(problem, trial.beta, false);
-  if (!solve_numerators(problem, groups, trial.beta.B, trial.E)) return std::nullopt;
+  if (!solve_numerators(problem, groups, trial.beta.B, trial.cost)) return std::nullopt;
   return trial;
 }
 
@@ -72,51 +73,54 @@ class Iteration {
   }
 
   IterationResult run() {
-    if (!begin())
-      return finish(FitStatus::singular,
-                    "the start's numerators are not determined: two modes coincide or the data do "
-                    "not excite them");
-    while (result_.iterations < options_.max_iterations) {
-      const bool go_on = options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
-      if (!go_on) return std::move(result_);
+    if (begin()) {
+      while (go_on()) {
+      }
+      result_.E = residual(problem_, evaluate_groups(problem_, beta_, false), beta_.B);
+      result_.E.cost = cost_;
     }
-    return finish(problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
-                  fmt::format("stopped after {} iterations, scaled gradient {:.2g}",
-                              result_.iterations, gradient_));
+    result_.frozen = frozen_;
+    return std::move(result_);
   }
 
  private:
   bool begin() {
     bounds_.stabilize(beta_, beta_);
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, false);
-    if (!solve_numerators(problem_, groups, beta_.B, result_.E)) return false;
-    result_.cost.push_back(result_.E.cost);
+    if (!solve_numerators(problem_, groups, beta_.B, cost_))
+      return end(FitStatus::singular,
+                 "the start's numerators are not determined: two modes coincide or the data do not "
+                 "excite them");
+    result_.cost.push_back(cost_);
     return true;
   }
 
-  IterationResult finish(FitStatus status, std::string message) {
-    end(status, std::move(message));
-    return std::move(result_);
+  bool go_on() {
+    if (result_.iterations >= options_.max_iterations)
+      return end(problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
+                 fmt::format("stopped after {} iterations, scaled gradient {:.2g}",
+                             result_.iterations, gradient_));
+    return options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
   }
+
   bool end(FitStatus status, std::string message) {
     result_.status = status;
-    result_.frozen = frozen_;
     result_.message = std::move(message);
     return false;
   }
 
   void accept(Trial&& trial) {
     beta_ = std::move(trial.beta);
-    result_.E = std::move(trial.E);
-    result_.cost.push_back(result_.E.cost);
+    cost_ = trial.cost;
+    result_.cost.push_back(cost_);
     ++result_.iterations;
-    if (options_.progress) options_.progress(result_.iterations, result_.E.cost);
+    if (options_.progress) options_.progress(result_.iterations, cost_);
   }
 
   /// True if the system says that the end is reached; `result_` is then complete.
   bool at_optimum(const ArrowSystem& system) {
     frozen_ = bounds_.leaning(beta_, system.schur_gradient());
-    gradient_ = scaled_gradient(problem_, system, frozen_, result_.E.cost);
+    gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
     if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance) {
       end(FitStatus::gradient_small,
           fmt::format("the first-order condition holds: scaled gradient {:.2g}", gradient_));
@@ -125,7 +129,7 @@ class Iteration {
     // Newton decrement: the distance to the stationary point in standard deviations of the noise that the
     // residual shows.
     const double data = static_cast<double>(problem_.size() * problem_.channels());
-    const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.E.cost;
+    const double squares = 2.0 * static_cast<double>(problem_.size()) * cost_;
     deviations_ = std::sqrt(
         std::abs(system.solve_globals(0.0, frozen_).dot(system.schur_gradient())) * data / squares);
     if (deviations_ < options_.deviation_tolerance) {
@@ -136,7 +140,7 @@ class Iteration {
               deviations_, gradient_));
       return true;
     }
-    if (result_.E.cost < 1e-28 * signal_cost_) {
+    if (cost_ < 1e-28 * signal_cost_) {
       end(FitStatus::gradient_small, "the residual has reached rounding");
       return true;
     }
@@ -145,16 +149,16 @@ class Iteration {
 
   bool descent_step() {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, result_.E, options_.method);
+    const ArrowSystem system(problem_, beta_, groups, options_.method, kGlobalsOnly);
     if (!system.regular())
       return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
     if (at_optimum(system)) return false;
     if (attempt(system, options_.method == FitMethod::riv ? 3 : 40)) return still_moving();
     if (options_.method == FitMethod::riv) {
-      const ArrowSystem gauss_newton(problem_, beta_, groups, result_.E, FitMethod::gn);
+      const ArrowSystem gauss_newton(problem_, beta_, groups, FitMethod::gn, kGlobalsOnly);
       if (attempt(gauss_newton, 40)) return still_moving();
     }
-    if (result_.E.cost < kNothingLeft * signal_cost_)
+    if (cost_ < kNothingLeft * signal_cost_)
       return end(FitStatus::step_small,
                  "the residual has reached rounding: no step lowers the cost any further");
     if (deviations_ < kRoundingDeviations)
@@ -168,12 +172,11 @@ class Iteration {
 
   /// Tries steps of growing damping; accepts the first that lowers the cost.
   bool attempt(const ArrowSystem& system, int tries) {
-    const double cost = result_.E.cost;
     for (int i = 0; i < tries && levenberg_ <= kLargestLevenberg; ++i) {
       const Eigen::VectorXd step = system.solve_globals(levenberg_, frozen_);
       step_size_ = relative_step(problem_, beta_, step);
       std::optional<Trial> trial = try_step(problem_, bounds_, beta_, step);
-      if (trial && trial->E.cost < cost) {
+      if (trial && trial->cost < cost_) {
         accept(std::move(*trial));
         levenberg_ = i == 0 ? (levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0) : levenberg_;
         return true;
@@ -193,12 +196,12 @@ class Iteration {
   }
 
   bool fixed_point_step() {
-    if (result_.iterations == 0) best_ = Trial{beta_, result_.E};
+    if (result_.iterations == 0) best_ = Trial{beta_, cost_};
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, result_.E, FitMethod::sk);
+    const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
     if (!system.regular())
       return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
-    gradient_ = scaled_gradient(problem_, system, frozen_, result_.E.cost);
+    gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
     Eigen::VectorXd step = system.solve_globals(0.0);
     std::optional<Trial> trial;
     for (int halvings = 0; halvings < 12 && !trial; ++halvings, step *= 0.5) {
@@ -207,7 +210,7 @@ class Iteration {
     }
     if (!trial) return end_at_best(FitStatus::cost_stalled, "no acceptable step");
     accept(std::move(*trial));
-    if (result_.E.cost < best_.E.cost) best_ = Trial{beta_, result_.E};
+    if (cost_ < best_.cost) best_ = Trial{beta_, cost_};
     if (step_size_ < std::max(options_.step_tolerance, 1e-9))
       return end_at_best(FitStatus::step_small,
                          "the fixed point of Sanathanan and Koerner is reached; it is not the "
@@ -220,7 +223,7 @@ class Iteration {
 
   bool end_at_best(FitStatus status, std::string message) {
     beta_ = best_.beta;
-    result_.E = best_.E;
+    cost_ = best_.cost;
     return end(status, std::move(message));
   }
 
@@ -231,6 +234,7 @@ class Iteration {
   std::vector<Eigen::Index> frozen_;  // modes at their bounds
   IterationResult result_;
   double signal_cost_ = 0.0;
+  double cost_ = 0.0;  // at beta_
   double levenberg_ = 0.0;
   double gradient_ = 1.0;
   double step_size_ = 0.0;
@@ -262,9 +266,9 @@ void search_delay(const FitProblem& problem, FitParameters& beta) {
   for (int i = 0; i <= 24; ++i) {
     trial.input_delay_s.setConstant(step * i);
     const std::vector<BasisGroup> groups = evaluate_groups(relative, trial, false);
-    Residual E;
-    if (!solve_numerators(relative, groups, trial.B, E) || !(E.cost < best_cost)) continue;
-    best_cost = E.cost;
+    double cost = 0.0;
+    if (!solve_numerators(relative, groups, trial.B, cost) || !(cost < best_cost)) continue;
+    best_cost = cost;
     best = trial.input_delay_s;
   }
   beta.input_delay_s = best;

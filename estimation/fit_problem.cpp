@@ -90,11 +90,15 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
   const auto n_d = static_cast<Eigen::Index>(derivative_columns(problem).size());
   parallel_tasks(static_cast<int>(groups.size()), problem.threads, [&](int g) {
     BasisGroup& group = groups[static_cast<std::size_t>(g)];
+    const LineOperator through(problem.lines, group.delay_s);
+    const WantedBasis wanted{with_derivatives, with_derivatives && problem.delays() > 0};
     group.F_re.resize(N, problem.functions());
     group.F_im.resize(N, problem.functions());
-    if (with_derivatives) {
+    if (wanted.gradient) {
       group.D_re.resize(N, n_d);
       group.D_im.resize(N, n_d);
+    }
+    if (wanted.delay) {
       group.T_re.resize(N, problem.functions());
       group.T_im.resize(N, problem.functions());
     }
@@ -102,17 +106,18 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
     Eigen::Index f = 0;
     Eigen::Index d = 0;
     for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
-      const SubmodelShape& shape = problem.shapes[i];
-      evaluate_basis(problem.lines, shape, beta.a[i], group.delay_s, with_derivatives, basis);
-      const Eigen::Index functions = shape.functions();
-      const Eigen::Index gradients = functions * shape.order;
-      group.F_re.middleCols(f, functions) = basis.value.real();
-      group.F_im.middleCols(f, functions) = basis.value.imag();
-      if (with_derivatives) {
-        group.D_re.middleCols(d, gradients) = basis.gradient.real();
-        group.D_im.middleCols(d, gradients) = basis.gradient.imag();
-        group.T_re.middleCols(f, functions) = basis.delay.real();
-        group.T_im.middleCols(f, functions) = basis.delay.imag();
+      evaluate_basis(through, problem.shapes[i], beta.a[i], wanted, basis);
+      const Eigen::Index functions = basis.value.cols();
+      group.F_re.middleCols(f, functions) = basis.value.re;
+      group.F_im.middleCols(f, functions) = basis.value.im;
+      const Eigen::Index gradients = basis.gradient.cols();
+      if (gradients > 0) {
+        group.D_re.middleCols(d, gradients) = basis.gradient.re;
+        group.D_im.middleCols(d, gradients) = basis.gradient.im;
+      }
+      if (wanted.delay) {
+        group.T_re.middleCols(f, functions) = basis.delay.re;
+        group.T_im.middleCols(f, functions) = basis.delay.im;
       }
       f += functions;
       d += gradients;

@@ -52,7 +52,7 @@ struct BasisGroup {
   Eigen::MatrixXd F_im;
   Eigen::MatrixXd D_re;  ///< N x n_d, see DerivativeColumn; empty unless asked for
   Eigen::MatrixXd D_im;
-  Eigen::MatrixXd T_re;  ///< N x n_f: derivative to the delay; empty unless asked for
+  Eigen::MatrixXd T_re;  ///< N x n_f: derivative to the delay; empty unless delays are free
   Eigen::MatrixXd T_im;
 };
 

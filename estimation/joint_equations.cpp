@@ -41,7 +41,7 @@ JointEquations::JointEquations(const FitProblem& problem, const WeightMatrices& 
       beta_(beta),
       groups_(groups),
       columns_(derivative_columns(problem)),
-      arrow_(problem, beta, groups, E, FitMethod::gn) {
+      arrow_(problem, beta, groups, FitMethod::gn) {
   if (problem.delays() > 0) {
     T_re_.resize(problem.channels(), problem.size());
     T_im_.resize(problem.channels(), problem.size());

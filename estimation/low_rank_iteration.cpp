@@ -78,8 +78,7 @@ class LowRankIteration {
   /// The unconstrained numerators, each weighted by its inverse variance.
   void project() {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const Residual E = residual(problem_, groups, beta_.B);
-    const ArrowSystem system(problem_, beta_, groups, E, FitMethod::gn);
+    const ArrowSystem system(problem_, beta_, groups, FitMethod::gn);
     Eigen::MatrixXd weight(problem_.channels(), problem_.functions());
     const Eigen::MatrixXd unit =
         Eigen::MatrixXd::Identity(problem_.functions(), problem_.functions());
@@ -161,7 +160,7 @@ class LowRankIteration {
   /// @returns whether to go on.
   bool iterate_once() {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, result_.E, FitMethod::gn);
+    const ArrowSystem system(problem_, beta_, groups, FitMethod::gn);
     reduce(system);
     if (!N_.allFinite()) return end(FitStatus::singular, "the residue factors are not determined");
     frozen_ = bounds_.leaning(beta_, g_.head(problem_.globals()));
@@ -215,7 +214,7 @@ class LowRankIteration {
 
   void fill(LowRankResult& out, bool likelihood) {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, result_.E, FitMethod::gn);
+    const ArrowSystem system(problem_, beta_, groups, FitMethod::gn);
     reduce(system);
     const double per_degree = residual_per_degree(problem_, result_.E, size_);
     const double scale = residual_scale(per_degree, likelihood);

@@ -8,6 +8,8 @@
 namespace stageid {
 namespace {
 
+constexpr double kSlightGain = 1e-3;
+
 /// Solves the scaled normal equations of one channel.
 class ScaledNormalEquations {
  public:
@@ -28,69 +30,156 @@ class ScaledNormalEquations {
   Eigen::LLT<Eigen::MatrixXd> factor_;
 };
 
-/// Of every channel of a group.
-std::vector<ScaledNormalEquations> normal_equations(const FitProblem& problem,
-                                                    const BasisGroup& group) {
-  const Eigen::Index n_f = problem.functions();
-  const auto pairs = triangular_pairs(n_f);
-  const Eigen::MatrixXd W = rows_of(problem.W, group.channels);
-  const Eigen::MatrixXd gram = weighted_pair_sums(W, {group.F_re, group.F_im},
-                                                  {group.F_re, group.F_im}, pairs, problem.threads);
+/// sums += sum Re{conj(F) W E} of a tile.
+void add_weighted_gradient(const BasisGroup& group, Eigen::Index first, const DataTile& data,
+                           Eigen::MatrixXd& sums) {
+  const Eigen::Index n = data.W.cols();
+  const Eigen::MatrixXd WE_re = data.W.cwiseProduct(data.E_re);
+  const Eigen::MatrixXd WE_im = data.W.cwiseProduct(data.E_im);
+  sums.noalias() += group.F_re.middleRows(first, n).transpose() * WE_re.transpose();
+  sums.noalias() += group.F_im.middleRows(first, n).transpose() * WE_im.transpose();
+}
+
+/// What the normal equations of a block's channels are made of; a column is a channel.
+struct GramSums {
+  Eigen::MatrixXd FF;  ///< triangle x members: sum W Re{conj(F_i) F_j}
+  Eigen::MatrixXd FG;  ///< n_f x members: sum Re{conj(F) W G}
+  GramSums& operator+=(const GramSums& other) {
+    FF += other.FF;
+    FG += other.FG;
+    return *this;
+  }
+};
+
+GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const TileRange& block) {
+  const auto pairs = triangular_pairs(problem.functions());
+  const ComplexColumns F{group.F_re, group.F_im};
+  return sum_over_shares<GramSums>(block, problem.threads, [&](const TileRange& share) {
+    GramSums sums;
+    sums.FF.setZero(static_cast<Eigen::Index>(pairs.size()), share.members);
+    sums.FG.setZero(problem.functions(), share.members);
+    DataTile data;
+    for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
+      data.load(problem, group, share, {}, first, n);
+      add_pair_sums(data.W, F, F, pairs, first, sums.FF);
+      add_weighted_gradient(group, first, data, sums.FG);
+    });
+    return sums;
+  });
+}
+
+struct ResidualSums {
+  Eigen::MatrixXd FE;    ///< n_f x members: sum Re{conj(F) W E}
+  double squares = 0.0;  ///< sum W |E|^2
+  ResidualSums& operator+=(const ResidualSums& other) {
+    FE += other.FE;
+    squares += other.squares;
+    return *this;
+  }
+};
+
+ResidualSums residual_sums(const FitProblem& problem, const BasisGroup& group,
+                           const TileRange& block, const Eigen::MatrixXd& B) {
+  return sum_over_shares<ResidualSums>(block, problem.threads, [&](const TileRange& share) {
+    ResidualSums sums;
+    sums.FE.setZero(problem.functions(), share.members);
+    DataTile data;
+    for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
+      data.load(problem, group, share, B, first, n);
+      sums.squares += data.squares();
+      add_weighted_gradient(group, first, data, sums.FE);
+    });
+    return sums;
+  });
+}
+
+std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, Eigen::Index n_f) {
   std::vector<ScaledNormalEquations> out;
-  out.reserve(group.channels.size());
+  out.reserve(static_cast<std::size_t>(FF.cols()));
   Eigen::MatrixXd M(n_f, n_f);
-  for (Eigen::Index c = 0; c < gram.rows(); ++c) {
-    for (std::size_t p = 0; p < pairs.size(); ++p)
-      M(pairs[p].left, pairs[p].right) = M(pairs[p].right, pairs[p].left) =
-          gram(c, static_cast<Eigen::Index>(p));
+  for (Eigen::Index c = 0; c < FF.cols(); ++c) {
+    Eigen::Index p = 0;
+    for (Eigen::Index i = 0; i < n_f; ++i)
+      for (Eigen::Index j = 0; j <= i; ++j) M(i, j) = M(j, i) = FF(p++, c);
     out.emplace_back(M);
   }
   return out;
 }
 
+/// A block's numerators, members x n_f, and its sum W |E|^2; false if they are not determined.
+///
+/// The first solution is refined with the residual itself. What the refinement d lowers the squares by
+/// is FE . d exactly, because they are quadratic; only where that is much of them are they summed anew.
+bool solve_block(const FitProblem& problem, const BasisGroup& group, const TileRange& block,
+                 Eigen::MatrixXd& B, double& squares) {
+  const GramSums gram = gram_sums(problem, group, block);
+  const std::vector<ScaledNormalEquations> factors = normal_equations(gram.FF, problem.functions());
+  for (const ScaledNormalEquations& channel : factors)
+    if (!channel.ok()) return false;
+  const auto solve = [&](const Eigen::MatrixXd& right_sides) {
+    Eigen::MatrixXd out(block.members, problem.functions());
+    for (Eigen::Index r = 0; r < block.members; ++r)
+      out.row(r) = factors[static_cast<std::size_t>(r)].solve(right_sides.col(r)).transpose();
+    return out;
+  };
+  B = solve(gram.FG);
+  const ResidualSums rest = residual_sums(problem, group, block, B);
+  const Eigen::MatrixXd refinement = solve(rest.FE);
+  B += refinement;
+  const double gain = refinement.cwiseProduct(rest.FE.transpose()).sum();
+  const bool slight = std::abs(gain) < kSlightGain * rest.squares;
+  squares = slight ? rest.squares - gain : residual_sums(problem, group, block, B).squares;
+  return true;
+}
+
+void add_removal_costs(const FitProblem& problem, const std::vector<ScaledNormalEquations>& factors,
+                       const Eigen::Index* channels, const Eigen::MatrixXd& B,
+                       std::vector<double>& costs) {
+  const Eigen::Index n_f = problem.functions();
+  for (std::size_t c = 0; c < factors.size(); ++c) {
+    if (!factors[c].ok()) continue;
+    const Eigen::MatrixXd inverse = factors[c].solve(Eigen::MatrixXd::Identity(n_f, n_f));
+    Eigen::Index f = 0;
+    for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
+      const Eigen::Index n = problem.shapes[i].functions();
+      const Eigen::VectorXd b = B.row(channels[c]).segment(f, n).transpose();
+      costs[i] += b.dot(Eigen::MatrixXd(inverse.block(f, f, n, n)).llt().solve(b));
+      f += n;
+    }
+  }
+}
+
 }  // namespace
 
 bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                      Eigen::MatrixXd& B, Residual& E) {
+                      Eigen::MatrixXd& B, double& cost) {
   B.setZero(problem.channels(), problem.functions());
-  std::vector<std::vector<ScaledNormalEquations>> factors;
-  for (const BasisGroup& group : groups) {
-    factors.push_back(normal_equations(problem, group));
-    for (const ScaledNormalEquations& channel : factors.back())
-      if (!channel.ok()) return false;
-  }
-  // The first pass solves, the second refines with the residual itself.
-  E = residual(problem, groups, B);
-  for (int pass = 0; pass < 2; ++pass) {
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      const Eigen::MatrixXd e = numerator_gradient(problem, groups[g], E);
-      for (std::size_t c = 0; c < groups[g].channels.size(); ++c)
-        B.row(groups[g].channels[c]) +=
-            factors[g][c].solve(e.row(static_cast<Eigen::Index>(c)).transpose()).transpose();
+  double sum = 0.0;
+  Eigen::MatrixXd of_block;
+  for (const BasisGroup& group : groups)
+    for (const TileRange& block :
+         member_blocks(static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
+      double squares = 0.0;
+      if (!solve_block(problem, group, block, of_block, squares)) return false;
+      sum += squares;
+      for (Eigen::Index r = 0; r < block.members; ++r)
+        B.row(group.channels[static_cast<std::size_t>(block.first_member + r)]) = of_block.row(r);
     }
-    E = residual(problem, groups, B);
-  }
-  return std::isfinite(E.cost);
+  cost = sum / (2.0 * static_cast<double>(problem.size()));
+  return std::isfinite(cost);
 }
 
 std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                                   const Eigen::MatrixXd& B) {
   const Eigen::Index n_f = problem.functions();
   std::vector<double> costs(problem.shapes.size(), 0.0);
-  for (const BasisGroup& group : groups) {
-    const std::vector<ScaledNormalEquations> factors = normal_equations(problem, group);
-    for (std::size_t c = 0; c < factors.size(); ++c) {
-      if (!factors[c].ok()) continue;
-      const Eigen::MatrixXd inverse = factors[c].solve(Eigen::MatrixXd::Identity(n_f, n_f));
-      Eigen::Index f = 0;
-      for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
-        const Eigen::Index n = problem.shapes[i].functions();
-        const Eigen::VectorXd b = B.row(group.channels[c]).segment(f, n).transpose();
-        costs[i] += b.dot(Eigen::MatrixXd(inverse.block(f, f, n, n)).llt().solve(b));
-        f += n;
-      }
+  for (const BasisGroup& group : groups)
+    for (const TileRange& block :
+         member_blocks(static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
+      const std::vector<ScaledNormalEquations> factors =
+          normal_equations(gram_sums(problem, group, block).FF, n_f);
+      add_removal_costs(problem, factors, group.channels.data() + block.first_member, B, costs);
     }
-  }
   return costs;
 }
 

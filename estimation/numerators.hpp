@@ -7,10 +7,10 @@
 namespace stageid {
 
 /// The convex problem: numerators for fixed denominators, by channel, from normal equations scaled
-/// to unit diagonal with one step of refinement. Also returns the residual. `B` is overwritten.
+/// to unit diagonal with one step of refinement. Also returns the cost. `B` is overwritten.
 /// @returns false if a channel's equations are singular to rounding.
 bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                      Eigen::MatrixXd& B, Residual& E);
+                      Eigen::MatrixXd& B, double& cost);
 
 /// What sum W |E|^2 would rise by if a submodel's numerators were taken away and the others solved
 /// again; one entry a submodel. @pre `B` solves the convex problem.

@@ -192,7 +192,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   if (noise.knowledge == VarianceKnowledge::given) {
     sandwich = problem;
     sandwich.W = problem.W.cwiseProduct(problem.W).cwiseProduct(noise.variance);
-    other.emplace_back(sandwich, beta, groups, E, FitMethod::gn);
+    other.emplace_back(sandwich, beta, groups, FitMethod::gn);
   }
   const Middle K{other.empty() ? gn : other.front(), out.residual_scale};
   const Eigen::MatrixXd inverse = free_inverse(gn.schur(), frozen);

@@ -1,10 +1,13 @@
 #include "estimation/weighted_products.hpp"
 
+#include <algorithm>
+
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kTileLines = 256;   // W's tile and the products' tile stay in the cache
-constexpr Eigen::Index kBlockPairs = 192;  // pairs a task
+constexpr Eigen::Index kBlockPairs = 192;
+constexpr Eigen::Index kMostMembers = 256;
+constexpr Eigen::Index kShares = 8;  // of a block, if the lines make as many tiles
 
 }  // namespace
 
@@ -22,58 +25,86 @@ std::vector<ColumnPair> all_pairs(Eigen::Index left, Eigen::Index right) {
   return pairs;
 }
 
-void for_each_pair_block(Eigen::Index pairs, Eigen::Index lines, int threads,
-                         const PairBlockTask& task) {
-  const auto blocks = static_cast<int>((pairs + kBlockPairs - 1) / kBlockPairs);
-  parallel_tasks(blocks, threads, [&](int block) {
-    const Eigen::Index first = block * kBlockPairs;
-    const Eigen::Index count = std::min(kBlockPairs, pairs - first);
-    for (Eigen::Index k = 0; k < lines; k += kTileLines)
-      task(first, count, k, std::min(kTileLines, lines - k));
-  });
+std::vector<TileRange> member_blocks(Eigen::Index members, Eigen::Index lines) {
+  std::vector<TileRange> blocks;
+  for (Eigen::Index m = 0; m < members; m += kMostMembers)
+    blocks.push_back({m, std::min(kMostMembers, members - m), 0, lines});
+  return blocks;
 }
 
-Eigen::MatrixXd weighted_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X,
-                                   const ComplexColumns& Y, const std::vector<ColumnPair>& pairs,
-                                   int threads) {
-  const auto n_pairs = static_cast<Eigen::Index>(pairs.size());
-  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(W.rows(), n_pairs);
-  for_each_pair_block(n_pairs, W.cols(), threads,
-                      [&](Eigen::Index first, Eigen::Index count, Eigen::Index k, Eigen::Index n) {
-                        Eigen::MatrixXd products(n, count);
-                        for (Eigen::Index p = 0; p < count; ++p) {
-                          const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
-                          products.col(p) =
-                              X.re.col(i).segment(k, n).cwiseProduct(Y.re.col(j).segment(k, n)) +
-                              X.im.col(i).segment(k, n).cwiseProduct(Y.im.col(j).segment(k, n));
-                        }
-                        sums.middleCols(first, count).noalias() += W.middleCols(k, n) * products;
-                      });
-  return sums;
+std::vector<TileRange> line_shares(const TileRange& block) {
+  const Eigen::Index tiles = (block.lines + kTileLines - 1) / kTileLines;
+  const Eigen::Index lines = (tiles + kShares - 1) / kShares * kTileLines;
+  std::vector<TileRange> shares;
+  for (Eigen::Index k = 0; k < block.lines; k += lines)
+    shares.push_back({block.first_member, block.members, block.first_line + k,
+                      std::min(lines, block.lines - k)});
+  return shares;
 }
 
-Eigen::MatrixXd weighted_pair_sums(const ComplexColumns& V, const ComplexColumns& X,
-                                   const ComplexColumns& Y, const std::vector<ColumnPair>& pairs,
-                                   int threads) {
+void DataTile::load(const FitProblem& problem, const BasisGroup& group, const TileRange& range,
+                    const Eigen::MatrixXd& B, Eigen::Index first_line, Eigen::Index lines) {
+  const Eigen::Index* channels = group.channels.data() + range.first_member;
+  const auto gather = [&](const Eigen::MatrixXd& source, Eigen::MatrixXd& out) {
+    out.resize(range.members, lines);
+    for (Eigen::Index k = 0; k < lines; ++k) {
+      const double* column = source.data() + source.rows() * (first_line + k);
+      double* to = out.data() + range.members * k;
+      for (Eigen::Index r = 0; r < range.members; ++r) to[r] = column[channels[r]];
+    }
+  };
+  gather(problem.W, W);
+  gather(problem.G_re, E_re);
+  gather(problem.G_im, E_im);
+  if (B.size() == 0) return;
+  E_re.noalias() -= B * group.F_re.middleRows(first_line, lines).transpose();
+  E_im.noalias() -= B * group.F_im.middleRows(first_line, lines).transpose();
+}
+
+double DataTile::squares() const {
+  return (W.array() * (E_re.array().square() + E_im.array().square())).sum();
+}
+
+void add_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X, const ComplexColumns& Y,
+                   const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
+                   Eigen::MatrixXd& sums) {
+  const Eigen::Index n = W.cols();
   const auto n_pairs = static_cast<Eigen::Index>(pairs.size());
-  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(V.re.rows(), n_pairs);
-  for_each_pair_block(n_pairs, V.re.cols(), threads,
-                      [&](Eigen::Index first, Eigen::Index count, Eigen::Index k, Eigen::Index n) {
-                        Eigen::MatrixXd re(n, count);
-                        Eigen::MatrixXd im(n, count);
-                        for (Eigen::Index p = 0; p < count; ++p) {
-                          const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
-                          const auto x_re = X.re.col(i).segment(k, n);
-                          const auto x_im = X.im.col(i).segment(k, n);
-                          const auto y_re = Y.re.col(j).segment(k, n);
-                          const auto y_im = Y.im.col(j).segment(k, n);
-                          re.col(p) = x_re.cwiseProduct(y_re) + x_im.cwiseProduct(y_im);
-                          im.col(p) = x_re.cwiseProduct(y_im) - x_im.cwiseProduct(y_re);
-                        }
-                        sums.middleCols(first, count).noalias() += V.re.middleCols(k, n) * re;
-                        sums.middleCols(first, count).noalias() -= V.im.middleCols(k, n) * im;
-                      });
-  return sums;
+  Eigen::MatrixXd products(n, std::min(kBlockPairs, n_pairs));
+  for (Eigen::Index first = 0; first < n_pairs; first += kBlockPairs) {
+    const Eigen::Index count = std::min(kBlockPairs, n_pairs - first);
+    for (Eigen::Index p = 0; p < count; ++p) {
+      const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
+      products.col(p) =
+          X.re.col(i).segment(first_line, n).cwiseProduct(Y.re.col(j).segment(first_line, n)) +
+          X.im.col(i).segment(first_line, n).cwiseProduct(Y.im.col(j).segment(first_line, n));
+    }
+    sums.middleRows(first, count).noalias() += products.leftCols(count).transpose() * W.transpose();
+  }
+}
+
+void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im,
+                   const ComplexColumns& X, const ComplexColumns& Y,
+                   const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
+                   Eigen::MatrixXd& sums) {
+  const Eigen::Index n = V_re.cols();
+  const auto n_pairs = static_cast<Eigen::Index>(pairs.size());
+  Eigen::MatrixXd V(V_re.rows(), 2 * n);
+  V << V_re, -V_im;
+  Eigen::MatrixXd products(2 * n, std::min(kBlockPairs, n_pairs));
+  for (Eigen::Index first = 0; first < n_pairs; first += kBlockPairs) {
+    const Eigen::Index count = std::min(kBlockPairs, n_pairs - first);
+    for (Eigen::Index p = 0; p < count; ++p) {
+      const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
+      const auto x_re = X.re.col(i).segment(first_line, n);
+      const auto x_im = X.im.col(i).segment(first_line, n);
+      const auto y_re = Y.re.col(j).segment(first_line, n);
+      const auto y_im = Y.im.col(j).segment(first_line, n);
+      products.col(p).head(n) = x_re.cwiseProduct(y_re) + x_im.cwiseProduct(y_im);
+      products.col(p).tail(n) = x_re.cwiseProduct(y_im) - x_im.cwiseProduct(y_re);
+    }
+    sums.middleRows(first, count).noalias() += products.leftCols(count).transpose() * V.transpose();
+  }
 }
 
 Eigen::MatrixXd rows_of(const Eigen::MatrixXd& matrix, const std::vector<Eigen::Index>& rows) {
@@ -81,14 +112,6 @@ Eigen::MatrixXd rows_of(const Eigen::MatrixXd& matrix, const std::vector<Eigen::
   for (std::size_t r = 0; r < rows.size(); ++r)
     out.row(static_cast<Eigen::Index>(r)) = matrix.row(rows[r]);
   return out;
-}
-
-Eigen::MatrixXd numerator_gradient(const FitProblem& problem, const BasisGroup& group,
-                                   const Residual& E) {
-  const Eigen::MatrixXd W = rows_of(problem.W, group.channels);
-  Eigen::MatrixXd e = W.cwiseProduct(rows_of(E.re, group.channels)) * group.F_re;
-  e.noalias() += W.cwiseProduct(rows_of(E.im, group.channels)) * group.F_im;
-  return e;
 }
 
 }  // namespace stageid

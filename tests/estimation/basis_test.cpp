@@ -102,9 +102,9 @@ TEST(Basis, PhaseAndSincDifferFromExactByWhatIsKnown) {
   const double sinc_ratio[] = {1.0000, 0.9993, 0.9965, 0.9882};
   const auto value = [&](HoldModel hold) {
     SubmodelBasis basis;
-    evaluate_basis({2.0 * std::numbers::pi * hz, kPeriod, hold}, c.shape(), Eigen::VectorXd(), 0.0,
-                   false, basis);
-    return Eigen::VectorXcd(basis.value.col(0));
+    evaluate_basis(LineOperator({2.0 * std::numbers::pi * hz, kPeriod, hold}, 0.0), c.shape(),
+                   Eigen::VectorXd(), {}, basis);
+    return Eigen::VectorXcd(basis.value.re + Complex(0.0, 1.0) * basis.value.im);
   };
   const Eigen::VectorXcd exact = value(HoldModel::exact);
   const Eigen::VectorXcd phase = value(HoldModel::phase);
@@ -272,8 +272,8 @@ TEST(Basis, AHeldConstantComesOutAtTheNextWholeSample) {
   for (const auto& [samples, shifts] :
        {std::pair{0.0, 0.0}, {0.3, 1.0}, {1.0, 1.0}, {1.3, 2.0}, {3.0, 3.0}}) {
     SubmodelBasis basis;
-    evaluate_basis(lines(HoldModel::exact), {0, 0, 0}, Eigen::VectorXd(), samples * kPeriod, true,
-                   basis);
+    evaluate_basis(LineOperator(lines(HoldModel::exact), samples * kPeriod), {0, 0, 0},
+                   Eigen::VectorXd(), {.gradient = true, .delay = true}, basis);
     for (Eigen::Index k = 0; k < lines_hz().size(); ++k) {
       const double angle = -2.0 * std::numbers::pi * lines_hz()[k] * kPeriod * shifts;
       EXPECT_LT(std::abs(basis.value(k, 0) - std::polar(1.0, angle)), 40.0 * kEps) << samples;
@@ -282,17 +282,22 @@ TEST(Basis, AHeldConstantComesOutAtTheNextWholeSample) {
   }
 }
 
-TEST(Basis, GradientAndValueAreAskedForSeparately) {
+TEST(Basis, WhatIsNotAskedForIsEmptyAndChangesNothing) {
+  const LineOperator through(lines(HoldModel::exact), 1e-5);
   for (const Case& c : cases()) {
     const std::vector<double> a = c.a();
     const Eigen::Map<const Eigen::VectorXd> coefficients(a.data(),
                                                          static_cast<Eigen::Index>(a.size()));
-    SubmodelBasis with;
-    SubmodelBasis without;
-    evaluate_basis(lines(HoldModel::exact), c.shape(), coefficients, 1e-5, true, with);
-    evaluate_basis(lines(HoldModel::exact), c.shape(), coefficients, 1e-5, false, without);
-    EXPECT_EQ(with.value, without.value) << c.name;
-    EXPECT_EQ(without.gradient.size(), 0) << c.name;
+    SubmodelBasis all;
+    evaluate_basis(through, c.shape(), coefficients, {.gradient = true, .delay = true}, all);
+    SubmodelBasis bare;
+    evaluate_basis(through, c.shape(), coefficients, {}, bare);
+    EXPECT_EQ(all.value, bare.value) << c.name;
+    EXPECT_EQ(bare.gradient.cols(), 0) << c.name;
+    EXPECT_EQ(bare.delay.cols(), 0) << c.name;
+    SubmodelBasis with_gradient;
+    evaluate_basis(through, c.shape(), coefficients, {.gradient = true}, with_gradient);
+    EXPECT_EQ(with_gradient.gradient, all.gradient) << c.name;
   }
 }
 
@@ -327,12 +332,13 @@ TEST(Basis, NearlyEqualRealRootsDoNotCancel) {
 }
 
 TEST(Basis, RefusesWhatIsNotAModel) {
+  const LineOperator through(lines(HoldModel::none), 0.0);
   SubmodelBasis out;
   const auto improper = [&] {
-    evaluate_basis(lines(HoldModel::none), {0, 1, 2}, Eigen::VectorXd{{1e-3}}, 0.0, false, out);
+    evaluate_basis(through, {0, 1, 2}, Eigen::VectorXd{{1e-3}}, {}, out);
   };
   const auto three_integrators = [&] {
-    evaluate_basis(lines(HoldModel::none), {3, 0, 0}, Eigen::VectorXd(), 0.0, false, out);
+    evaluate_basis(through, {3, 0, 0}, Eigen::VectorXd(), {}, out);
   };
   EXPECT_THAT(improper,
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("improper")));

@@ -89,7 +89,7 @@ Eigen::VectorXd library_step(const DenseProblem& problem, FitMethod method) {
   const FitParameters beta = test::fit_parameters(problem);
   const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
   const Residual E = residual(fit, groups, beta.B);
-  const ArrowSystem system(fit, beta, groups, E, method);
+  const ArrowSystem system(fit, beta, groups, method);
   const ArrowSystem::Step step = system.solve(0.0);
   EXPECT_TRUE(step.ok);
   const std::vector<Eigen::Index> first = test::first_of_theta(problem.model);
@@ -227,7 +227,7 @@ void expect_gradient(const DenseProblem& problem, DelayModel delay) {
       test::reference_cost(problem.model, problem.frequency_hz, problem.hold, problem.G, problem.W);
   EXPECT_NEAR(E.cost, cost, 1e-12 * cost);
   for (const FitMethod method : {FitMethod::riv, FitMethod::gn}) {
-    const ArrowSystem system(fit, beta, groups, E, method);
+    const ArrowSystem system(fit, beta, groups, method);
     const Eigen::VectorXd& e = system.e_globals();
     Eigen::Index p = 0;
     for (std::size_t i = 0; i < problem.model.submodels.size(); ++i)
@@ -298,7 +298,7 @@ TEST(FitStep, TheArrowWithDelaysSolvesItsOwnDenseEquations) {
   const FitParameters beta = test::fit_parameters(problem);
   const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
   const Residual E = residual(fit, groups, beta.B);
-  const ArrowSystem::Step step = ArrowSystem(fit, beta, groups, E, FitMethod::gn).solve(0.0);
+  const ArrowSystem::Step step = ArrowSystem(fit, beta, groups, FitMethod::gn).solve(0.0);
   ASSERT_TRUE(step.ok);
 
   const Eigen::Index n_theta = test::first_of_theta(problem.model).back();
@@ -349,9 +349,14 @@ TEST(WeightedProducts, AreTheSumsTheySay) {
   const Eigen::MatrixXd Y_re = random_matrix(random, N, 60);
   const Eigen::MatrixXd Y_im = random_matrix(random, N, 60);
   const auto pairs = all_pairs(4, 60);  // 240: more than one block
-  const Eigen::MatrixXd real = weighted_pair_sums(W, {X_re, X_im}, {Y_re, Y_im}, pairs, 2);
-  const Eigen::MatrixXd complex =
-      weighted_pair_sums(ComplexColumns{W, V}, {X_re, X_im}, {Y_re, Y_im}, pairs, 2);
+  Eigen::MatrixXd real = Eigen::MatrixXd::Zero(240, 3);
+  Eigen::MatrixXd complex = Eigen::MatrixXd::Zero(240, 3);
+  for_each_tile({0, 3, 0, N}, [&](Eigen::Index first, Eigen::Index n) {
+    const Eigen::MatrixXd W_tile = W.middleCols(first, n);
+    add_pair_sums(W_tile, {X_re, X_im}, {Y_re, Y_im}, pairs, first, real);
+    add_pair_sums(W_tile, V.middleCols(first, n), {X_re, X_im}, {Y_re, Y_im}, pairs, first,
+                  complex);
+  });
   for (std::size_t p = 0; p < pairs.size(); ++p)
     for (Eigen::Index c = 0; c < 3; ++c) {
       std::complex<double> with_weight = 0.0;
@@ -363,11 +368,25 @@ TEST(WeightedProducts, AreTheSumsTheySay) {
         with_error += std::complex<double>(W(c, k), V(c, k)) * std::conj(x) * y;
       }
       // Sums of N numbers of order one.
-      EXPECT_NEAR(real(c, static_cast<Eigen::Index>(p)), with_weight.real(), 1e-11);
-      EXPECT_NEAR(complex(c, static_cast<Eigen::Index>(p)), with_error.real(), 1e-11);
+      EXPECT_NEAR(real(static_cast<Eigen::Index>(p), c), with_weight.real(), 1e-11);
+      EXPECT_NEAR(complex(static_cast<Eigen::Index>(p), c), with_error.real(), 1e-11);
     }
-  const Eigen::MatrixXd alone = weighted_pair_sums(W, {X_re, X_im}, {Y_re, Y_im}, pairs, 1);
-  EXPECT_EQ(real, alone);
+}
+
+TEST(WeightedProducts, SharesCoverEveryLineOfEveryChannelOnce) {
+  for (const auto& [members, lines] : {std::pair<Eigen::Index, Eigen::Index>{1, 1},
+                                       {3, 256},
+                                       {52, 3960},
+                                       {257, 257},
+                                       {1000, 5000}}) {
+    Eigen::MatrixXi seen = Eigen::MatrixXi::Zero(members, lines);
+    for (const TileRange& block : member_blocks(members, lines))
+      for (const TileRange& share : line_shares(block))
+        for_each_tile(share, [&, rows = share](Eigen::Index first, Eigen::Index n) {
+          seen.block(rows.first_member, first, rows.members, n).array() += 1;
+        });
+    EXPECT_TRUE((seen.array() == 1).all()) << members << " x " << lines;
+  }
 }
 
 }  // namespace
