@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "estimation/fit_problem.hpp"
+#include "estimation/pole_relocation.hpp"
 #include "estimation/residual_modes.hpp"
 
 namespace stageid {
@@ -19,6 +20,7 @@ namespace {
 constexpr int kGrowthIterations = 12;    // a mode that is still moving is finished later
 constexpr std::size_t kCandidates = 4;   // tried before it is believed that no mode is missing
 constexpr std::size_t kShareAtOnce = 5;  // models of many modes grow by a fifth at a time
+constexpr int kMostGrown = 40;           // modes; more are placed at once, and only then grown
 // Part of the weighted power of the response below which a residual is rounding: no more precise
 // measurement exists (-160 dB), and without a limit noise-free data would ask for modes for ever.
 constexpr double kRounding = 1e-16;
@@ -52,6 +54,16 @@ class AutomaticFit {
 
   /// The fit that every search begins with.
   void begin() { adopt(fit_additive_model(frf_, start(), quick_)); }
+
+  /// The same with the number of modes that is asked for, all placed at once.
+  void begin_relocated() {
+    AdditiveModel model = start_of({});
+    const auto wanted = static_cast<std::size_t>(selection_.exactly);
+    const std::vector<ModeCandidate> modes =
+        relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
+    say("start: {} modes by pole relocation", modes.size());
+    adopt(fit_additive_model(frf_, start_of(modes), quick_));
+  }
 
   /// @param surplus modes to grow by beyond the number that is asked for
   void search(int surplus) {
@@ -94,12 +106,26 @@ class AutomaticFit {
     } else {
       say("start: {} modes given", modes.size());
     }
+    AdditiveModel model = start_of(modes);
+    if (model.submodels.empty())
+      model.submodels.push_back(mode_submodel(frf_, structure_, strongest_peak()));
+    return model;
+  }
+
+  /// Hold and delays as far as they are known, and these modes.
+  AdditiveModel start_of(const std::vector<ModeCandidate>& modes) const {
     AdditiveModel model;
+    model.hold = options_.hold;
+    if (!best_.model.submodels.empty()) {
+      model.input_delay_s = best_.model.input_delay_s;
+      model.output_delay_s = best_.model.output_delay_s;
+    } else if (options_.delay == DelayModel::fixed) {
+      model.input_delay_s.setConstant(frf_.n_inputs(), options_.delay_s);
+      model.output_delay_s.setZero(frf_.n_outputs());
+    }
     model.submodels = fixed_submodels(frf_, structure_);
     for (const ModeCandidate& mode : modes)
       model.submodels.push_back(mode_submodel(frf_, structure_, mode));
-    if (model.submodels.empty())
-      model.submodels.push_back(mode_submodel(frf_, structure_, strongest_peak()));
     return model;
   }
 
@@ -364,14 +390,22 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
         std::max<std::size_t>(static_cast<std::size_t>(selection.exactly), selection.modes.size()),
         most));
   AutomaticFit begun(frf, structure, selection, options);
-  begun.begin();
   std::optional<AutomaticFit> best;
-  for (const int surplus : surpluses(selection, most)) {
-    AutomaticFit attempt = begun;
+  const auto go = [&](AutomaticFit attempt, int surplus) {
     attempt.search(surplus);
     if (!best || attempt.cost() < best->cost()) best.emplace(std::move(attempt));
-    if (best->at_rounding()) break;
+    return best->at_rounding();
+  };
+  const bool placed = selection.exactly > 0 && selection.modes.empty() && !selection.keep_modes;
+  const bool too_many_to_grow = placed && selection.exactly > kMostGrown;
+  if (!too_many_to_grow || options.delay != DelayModel::fixed) begun.begin();
+  if (placed) {
+    AutomaticFit relocated = begun;
+    relocated.begin_relocated();
+    if (go(std::move(relocated), 0) || too_many_to_grow) return best->finish();
   }
+  for (const int surplus : surpluses(selection, most))
+    if (go(begun, surplus)) break;
   return best->finish();
 }
 

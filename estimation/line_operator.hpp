@@ -62,6 +62,11 @@ class LineOperator {
   };
   void fractions(std::complex<double> lambda, Wanted wanted, Fractions& out) const;
 
+  /// The variable x in which sampled functions are rational, z or s, on every line; and the factor
+  /// beside it: whole delays, or delay and hold. N x 1.
+  const SplitMatrix& x() const noexcept { return z_; }
+  const SplitMatrix& first() const noexcept { return first_; }
+
   /// The constant 1: a held input seen at the sampling instants; and its derivative to the delay.
   const SplitMatrix& constant() const noexcept { return constant_; }
   const SplitMatrix& constant_delay() const noexcept { return constant_delay_; }

@@ -45,8 +45,13 @@ std::vector<TileRange> line_shares(const TileRange& block) {
 void DataTile::load(const FitProblem& problem, const BasisGroup& group, const TileRange& range,
                     const Eigen::MatrixXd& B, Eigen::Index first_line, Eigen::Index lines) {
   const Eigen::Index* channels = group.channels.data() + range.first_member;
+  const bool in_order = channels[range.members - 1] - channels[0] == range.members - 1;  // sorted
   const auto gather = [&](const Eigen::MatrixXd& source, Eigen::MatrixXd& out) {
     out.resize(range.members, lines);
+    if (in_order) {
+      out = source.block(channels[0], first_line, range.members, lines);
+      return;
+    }
     for (Eigen::Index k = 0; k < lines; ++k) {
       const double* column = source.data() + source.rows() * (first_line + k);
       double* to = out.data() + range.members * k;

@@ -76,7 +76,8 @@ void add_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X, const Comp
                    const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
                    Eigen::MatrixXd& sums);
 
-/// The same with complex weights V: sum_k Re{ conj(X) Y V }.
+/// The same with complex weights V: sum_k Re{ conj(X) Y V }. Double precision here too: in single, the
+/// refined-IV step from a start with large residuals is wrong by up to a percent.
 void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im,
                    const ComplexColumns& X, const ComplexColumns& Y,
                    const std::vector<ColumnPair>& pairs, Eigen::Index first_line,

@@ -6,7 +6,9 @@
 #include <chrono>
 #include <cmath>
 
+#include "estimation/arrow_system.hpp"
 #include "estimation/automatic_fit.hpp"
+#include "estimation/numerators.hpp"
 
 namespace stageid::test {
 namespace {
@@ -51,7 +53,56 @@ std::vector<double> unmatched(const AdditiveModel& wanted, const AdditiveModel& 
   return out;
 }
 
+/// Peaks of the CMIF but for those that are to be missing, drawn from the stage's seed.
+std::vector<ModeCandidate> peaks_left(const RandomStage& stage) {
+  std::vector<ModeCandidate> peaks = pick_modes(stage.frf);
+  RandomNumbers random(stage.seed + 77);
+  for (int i = 0; i < stage.missing_peaks && peaks.size() > 1; ++i)
+    peaks.erase(peaks.begin() + random.integer(0, static_cast<int>(peaks.size()) - 1));
+  return peaks;
+}
+
 }  // namespace
+
+bool plain_iteration_succeeds(const RandomStage& stage, double wanted, int threads) {
+  constexpr int kIterations = 30;
+  const std::vector<ModeCandidate> peaks = peaks_left(stage);
+  if (peaks.size() > modes_of(stage.truth).size() + 1) return false;
+  FitOptions options;
+  options.weighting = Weighting::noise_variance;
+  FitProblem problem;
+  problem.lines = {stage.frf.omega_rad_s(), 1.0 / stage.frf.sample_rate_hz, HoldModel::exact};
+  problem.n_outputs = stage.frf.n_outputs();
+  problem.n_inputs = stage.frf.n_inputs();
+  problem.G_re = stage.frf.response.real();
+  problem.G_im = stage.frf.response.imag();
+  problem.W = make_weights(stage.frf, options);
+  problem.threads = threads;
+  FitParameters beta;
+  beta.input_delay_s.setConstant(problem.n_inputs, stage.delay_s);
+  beta.output_delay_s.setZero(problem.n_outputs);
+  problem.shapes.push_back({2, 0, 0});
+  beta.a.emplace_back();
+  for (const ModeCandidate& peak : peaks) {
+    const Submodel mode = mode_submodel(stage.frf, ModelStructure{}, peak);
+    problem.shapes.push_back({0, 2, 0});
+    beta.a.emplace_back(Eigen::Vector2d(mode.denominator[1], mode.denominator[2]));
+  }
+  double cost = 0.0;
+  if (!solve_numerators(problem, evaluate_groups(problem, beta, false), beta.B, cost)) return false;
+  for (int i = 0; i < kIterations; ++i) {
+    const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
+    const ArrowSystem::Step step = ArrowSystem(problem, beta, groups, FitMethod::riv).solve(0.0);
+    if (!step.ok) return false;
+    beta = stepped(problem, beta, step.globals);
+    beta.B += step.B;
+    const double next = residual(problem, evaluate_groups(problem, beta, false), beta.B).cost;
+    if (!std::isfinite(next) || next > 1e12 * wanted) return false;
+    if (std::abs(next - cost) < 1e-9 * cost) break;
+    cost = next;
+  }
+  return cost < (1.0 + kAllowedExcess) * wanted;
+}
 
 BlindFit fit_blind(const RandomStage& stage, int threads) {
   FitOptions options;
@@ -62,7 +113,9 @@ BlindFit fit_blind(const RandomStage& stage, int threads) {
 
   BlindFit out;
   const auto begin = std::chrono::steady_clock::now();
-  out.blind = automatic_fit(stage.frf, ModelStructure{}, ModeSelection{}, options);
+  ModeSelection selection;
+  if (stage.missing_peaks > 0) selection.modes = peaks_left(stage);
+  out.blind = automatic_fit(stage.frf, ModelStructure{}, selection, options);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 
   FitOptions reference = options;

@@ -23,7 +23,13 @@ struct BlindFit {
 };
 
 /// What `fit` does by default on the response of a digital loop: exact hold, delay searched and
-/// estimated, variance weights, modes found by itself, full rigid body.
+/// estimated, variance weights, modes found by itself, full rigid body. As many of the CMIF's peaks as
+/// the stage says are taken from its start.
 BlindFit fit_blind(const RandomStage& stage, int threads);
+
+/// The paper's iteration as it stands: peaks of the CMIF, numerators of the convex problem, then
+/// beta + M^-1 e without damping, on the same weights and with the delay given.
+/// @returns whether its cost came within 0.5 % of `wanted` with at most one mode too many
+bool plain_iteration_succeeds(const RandomStage& stage, double wanted, int threads);
 
 }  // namespace stageid::test

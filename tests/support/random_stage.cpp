@@ -139,9 +139,9 @@ double RandomNumbers::chi_square_mean(double dof) {
 
 std::string RandomStage::description() const {
   std::string text = fmt::format(
-      "{} modes, {} close pairs, noise {:.0f} dB falling as f^-{}, "
+      "{} modes, {} close pairs, {} peaks missing, noise {:.0f} dB falling as f^-{}, "
       "delay {:.1f} us;",
-      truth.submodels.size() - 1, pairs, noise_db, noise_slope, 1e6 * delay_s);
+      truth.submodels.size() - 1, pairs, missing_peaks, noise_db, noise_slope, 1e6 * delay_s);
   for (const Submodel& s : truth.submodels)
     if (s.is_mode())
       text += fmt::format(" {:.2f}({:.2f}%)", s.natural_frequency_hz(), 100.0 * s.damping_ratio());
@@ -152,6 +152,9 @@ RandomStage draw_random_stage(std::uint64_t seed, const RandomStageSpec& spec) {
   RandomNumbers random(seed);
   RandomStage stage;
   const int modes = random.integer(spec.least_modes, spec.most_modes);
+  stage.seed = seed;
+  // From numbers of its own: the stages of earlier seeds stay what they are.
+  stage.missing_peaks = RandomNumbers(seed + 0x9e3779b9U).integer(0, spec.most_missing_peaks);
   stage.pairs = random.integer(0, std::min(spec.most_pairs, modes / 2));
   stage.noise_db = random.uniform(spec.least_noise_db, spec.most_noise_db);
   stage.noise_slope = random.integer(0, 2);

@@ -30,8 +30,9 @@ struct RandomStageSpec {
   int outputs = 4;
   int inputs = 13;
   int least_modes = 5;
-  int most_modes = 17;
-  int most_pairs = 3;  ///< of modes closer than twice their half-power width
+  int most_modes = 25;
+  int most_missing_peaks = 3;  ///< of the CMIF, taken away from a blind fit's start on purpose
+  int most_pairs = 3;          ///< of modes closer than twice their half-power width
   double least_damping = 0.002;
   double most_damping = 0.02;
   double least_noise_db = -70.0;
@@ -47,7 +48,9 @@ struct RandomStageSpec {
 /// A stage as drawn: rigid body of rank 3 and modes of rank one behind a hold and a delay.
 struct RandomStage {
   AdditiveModel truth;
+  std::uint64_t seed = 0;
   int pairs = 0;
+  int missing_peaks = 0;
   double noise_db = 0.0;  ///< standard deviation over the median magnitude, channel by channel
   int noise_slope = 0;    ///< the noise falls as omega^-slope
   double delay_s = 0.0;
