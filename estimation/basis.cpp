@@ -4,35 +4,12 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "estimation/hold_integral.hpp"
+
 namespace stageid {
 namespace {
 
 using Complex = std::complex<double>;
-
-/// phi(t) = integral of e^{lambda v} over [0, t], and its derivative to lambda.
-struct Phi {
-  Complex value;
-  Complex derivative;
-};
-
-Phi phi(Complex lambda, double t) {
-  const Complex x = lambda * t;
-  if (std::abs(x) > 0.5) {
-    const Complex e = std::exp(x);
-    const Complex value = (e - 1.0) / lambda;
-    return {value, (t * e - value) / lambda};
-  }
-  // Series: the closed form cancels for slow poles. 0.5^18/18! is far below rounding.
-  Complex term = 1.0;
-  Complex value = 0.0;
-  Complex derivative = 0.0;
-  for (int n = 0; n < 18; ++n) {
-    value += term / static_cast<double>(n + 1);
-    derivative += term / static_cast<double>(n + 2);
-    term *= x / static_cast<double>(n + 1);
-  }
-  return {t * value, t * t * derivative};
-}
 
 /// 1/(s - lambda), 1/(s - lambda)^2 and the delay derivatives of both, on every line.
 struct Fractions {
@@ -41,18 +18,6 @@ struct Fractions {
   Eigen::ArrayXcd simple_delay;
   Eigen::ArrayXcd squared_delay;
 };
-
-/// Whole samples and the rest of a delay.
-struct SplitDelay {
-  double whole = 0.0;
-  double fraction = 0.0;
-};
-
-SplitDelay split(double delay_s, double period_s) {
-  const double samples = delay_s / period_s;
-  const double whole = std::floor(samples);
-  return {whole, samples - whole};
-}
 
 /// e^{-j omega n T}
 Eigen::ArrayXcd shift(const ModelLines& lines, double samples) {
@@ -86,7 +51,7 @@ class Operator {
   Operator(const ModelLines& lines, double delay_s)
       : lines_(lines), exact_(lines.hold == HoldModel::exact) {
     if (exact_) {
-      delay_ = split(delay_s, lines.sample_period_s);
+      delay_ = split_delay(delay_s, lines.sample_period_s);
       inverse_z_ = shift(lines, 1.0);
       first_ = shift(lines, delay_.whole + 1.0);
     } else {
@@ -125,8 +90,8 @@ class Operator {
   Fractions sampled(Complex lambda, bool with_squares) const {
     const double period = lines_.sample_period_s;
     const double rest = (1.0 - delay_.fraction) * period;
-    const Phi whole = phi(lambda, period);
-    const Phi part = phi(lambda, rest);
+    const HoldIntegral whole = hold_integral(lambda, period);
+    const HoldIntegral part = hold_integral(lambda, rest);
     const Complex E = std::exp(lambda * period);
     const Complex e1 = std::exp(lambda * rest);
     Fractions out;

@@ -44,7 +44,7 @@ MUTANTS = [
     ('relative weights are the paper\'s', 'estimation/weights.cpp',
      'case Weighting::relative:\n      return inverse_magnitude(frf, 2.0);',
      'case Weighting::relative:\n      return inverse_magnitude(frf, 1.0);', ['estimation']),
-    ('hold without the rest of the delay', 'estimation/basis.cpp',
+    ('hold without the rest of the delay', 'estimation/hold_integral.cpp',
      'return {whole, samples - whole};', 'return {whole, 0.0};', ['estimation']),
     ('a larger cost is accepted', 'estimation/fit_iteration.cpp',
      'trial->E.cost < cost)', 'trial->E.cost < 1e9 * cost)', ['estimation']),
