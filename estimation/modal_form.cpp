@@ -43,7 +43,8 @@ std::vector<ModeShape> mode_shapes(const AdditiveModel& model) {
   return out;
 }
 
-double driving_point_mass(const ModeShape& mode, Eigen::Index output, Eigen::Index input) {
+double driving_point_mass(const ModeShape& mode, const DrivingPoint& point) {
+  const auto [output, input] = point;
   if (output < 0 || output >= mode.output_shape.size() || input < 0 ||
       input >= mode.input_shape.size())
     throw std::invalid_argument(
@@ -53,23 +54,20 @@ double driving_point_mass(const ModeShape& mode, Eigen::Index output, Eigen::Ind
 }
 
 RigidBody rigid_body(const AdditiveModel& model) {
-  RigidBody out{Eigen::MatrixXd(model.n_outputs(), 0), Eigen::MatrixXd(model.n_inputs(), 0), {}};
-  bool found = false;
-  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
-    const Submodel& submodel = model.submodels[i];
-    if (submodel.integrators != 2) continue;
-    if (found)
-      throw std::invalid_argument(
-          fmt::format("model: submodel {} is the second with two integrators; a rigid body is in "
-                      "one, add their numerators",
-                      i));
-    found = true;
-    const auto shapes = singular_shapes(submodel.numerator.at(0));
-    const Eigen::Index rank = residue_rank(submodel, i, shapes.singular_value);
-    out = {shapes.output.leftCols(rank), shapes.input.leftCols(rank),
-           shapes.singular_value.head(rank).cwiseInverse()};
-  }
-  return out;
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(model.n_outputs(), model.n_inputs());
+  std::vector<std::size_t> members;
+  for (std::size_t i = 0; i < model.submodels.size(); ++i)
+    if (model.submodels[i].integrators == 2) {
+      sum += model.submodels[i].numerator.at(0);
+      members.push_back(i);
+    }
+  const auto shapes = singular_shapes(sum);
+  const Eigen::VectorXd& values = shapes.singular_value;
+  const Eigen::Index rank = members.size() == 1
+                                ? residue_rank(model.submodels[members[0]], members[0], values)
+                                : numerical_rank(values, values[0]);
+  return {shapes.output.leftCols(rank), shapes.input.leftCols(rank),
+          values.head(rank).cwiseInverse()};
 }
 
 }  // namespace stageid

@@ -34,16 +34,22 @@ struct ModeShape {
 /// (2000), section 2.8, for the shapes of general viscous damping.
 std::vector<ModeShape> mode_shapes(const AdditiveModel& model);
 
-/// Mass of a mode seen at a driving point, where output and input are one place and direction:
+/// An output and an input at one place, in one direction.
+struct DrivingPoint {
+  Eigen::Index output = 0;
+  Eigen::Index input = 0;
+};
+
+/// Mass of a mode seen at a driving point:
 /// modal_mass / Re(output_shape_i input_shape_j). It does not depend on the norm of the shapes, nor on
 /// which outputs and inputs there are beside. Negative if the mode contradicts a driving point,
 /// infinite in a node.
 /// @throws std::invalid_argument if an index is none of the model's.
-double driving_point_mass(const ModeShape& mode, Eigen::Index output, Eigen::Index input);
+double driving_point_mass(const ModeShape& mode, const DrivingPoint& point);
 
-/// The double integrator: sum over degrees of freedom r of output_r input_r^T / (mass_r s^2), by
+/// The double integrator, sum over degrees of freedom r of output_r input_r^T / (mass_r s^2), by
 /// singular values; norms, signs and units as for modes. The directions are those in which the
-/// channels see the body, largest first, not its centre of mass and principal axes.
+/// channels see the body, most mobile first, not its centre of mass and principal axes.
 struct RigidBody {
   Eigen::MatrixXd output_shape;  ///< n_y x rank
   Eigen::MatrixXd input_shape;   ///< n_u x rank
@@ -53,8 +59,7 @@ struct RigidBody {
 
 /// The rank is the submodel's residue_rank where that is held, else numerical: in a free fit noise
 /// makes it full, and only masses that are out of proportion tell. Rank 0 without double integrator.
-/// @throws std::invalid_argument if more than one submodel has two integrators, or if residue_rank
-/// contradicts the numerators.
+/// @throws std::invalid_argument if residue_rank contradicts the numerators.
 RigidBody rigid_body(const AdditiveModel& model);
 
 }  // namespace stageid

@@ -27,10 +27,6 @@ double in_samples(double delay_s, double period_s) {
   return split.whole + split.fraction;
 }
 
-Eigen::VectorXd delays_or_zero(const Eigen::VectorXd& delay_s, Eigen::Index size) {
-  return delay_s.size() > 0 ? delay_s : Eigen::VectorXd::Zero(size);
-}
-
 /// Output `first` gets no part; the others' are within [0, 1) above it, the inputs' within (-1, 0].
 DividedDelays divide_from(Eigen::Index first, const Eigen::VectorXd& input_s,
                           const Eigen::VectorXd& output_s, double period_s) {
@@ -62,8 +58,8 @@ DividedDelays divide_from(Eigen::Index first, const Eigen::VectorXd& input_s,
 }
 
 DividedDelays divide(const AdditiveModel& model, double period_s) {
-  const Eigen::VectorXd input_s = delays_or_zero(model.input_delay_s, model.n_inputs());
-  const Eigen::VectorXd output_s = delays_or_zero(model.output_delay_s, model.n_outputs());
+  const Eigen::VectorXd input_s = model.input_delays_s();
+  const Eigen::VectorXd output_s = model.output_delays_s();
   DividedDelays best = divide_from(0, input_s, output_s, period_s);
   for (Eigen::Index first = 1; first < output_s.size(); ++first) {
     DividedDelays other = divide_from(first, input_s, output_s, period_s);
