@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <stdexcept>
 
@@ -81,17 +80,6 @@ TEST(StateSpace, FreeResiduesHaveStatesForEveryRank) {
   EXPECT_EQ(state_space(model).order(), 4 * 2 + 17 * 4 * 2);
 }
 
-/// Smallest over largest singular value of [B, A B, ..., A^n-1 B], with A scaled to spectral norm 1.
-double conditioning(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) {
-  const Eigen::MatrixXd scaled = A / A.norm();
-  Eigen::MatrixXd all(A.rows(), A.rows() * B.cols());
-  Eigen::MatrixXd power = B;
-  for (Eigen::Index k = 0; k < A.rows(); ++k, power = scaled * power)
-    all.middleCols(k * B.cols(), B.cols()) = power;
-  const Eigen::VectorXd values = all.jacobiSvd().singularValues();
-  return values.tail(1).value() / values[0];
-}
-
 /// Rigid body of rank one with a second direction in 1/s alone, a general viscous mode of rank one and
 /// a real pole of rank two.
 AdditiveModel small_model() {
@@ -117,12 +105,12 @@ TEST(StateSpace, IsMinimal) {
   const StateSpace system = state_space(small_model());
   // 1/s^2: 2; 1/s outside its row and column: 2 x 3 less one of each has rank 1; mode: 2; lag: 2.
   ASSERT_EQ(system.order(), 2 + 1 + 2 + 2);
-  EXPECT_GT(conditioning(system.A, system.B), 1e-6);
-  EXPECT_GT(conditioning(system.A.transpose(), system.C.transpose()), 1e-6);
+  EXPECT_GT(test::controllability(system.A, system.B), 1e-6);
+  EXPECT_GT(test::controllability(system.A.transpose(), system.C.transpose()), 1e-6);
   // The measure would notice: one state more that repeats another.
   Eigen::MatrixXd B = system.B;
   B.row(5) = B.row(6);
-  EXPECT_LT(conditioning(system.A, B), 1e-12);
+  EXPECT_LT(test::controllability(system.A, B), 1e-12);
 }
 
 TEST(StateSpace, BlocksTellPolesAndSubmodels) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <numbers>
 
 #include "estimation/sampled_state_space.hpp"
@@ -37,6 +38,18 @@ inline Eigen::MatrixXcd response_of(const SampledStateSpace& sampled,
                                                        sampled.input_delay_samples[c / n_y]));
   }
   return out;
+}
+
+/// Smallest over largest singular value of [B, A B, ..., A^n-1 B], A scaled to norm one: 0 if (A, B) is
+/// not controllable; of (A^T, C^T), if (A, C) is not observable.
+inline double controllability(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) {
+  const Eigen::MatrixXd scaled = A / A.norm();
+  Eigen::MatrixXd all(A.rows(), A.rows() * B.cols());
+  Eigen::MatrixXd power = B;
+  for (Eigen::Index k = 0; k < A.rows(); ++k, power = scaled * power)
+    all.middleCols(k * B.cols(), B.cols()) = power;
+  const Eigen::VectorXd values = all.jacobiSvd().singularValues();
+  return values.tail(1).value() / values[0];
 }
 
 /// The largest |a - b| of a line relative to the norm of b there.
