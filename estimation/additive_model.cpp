@@ -17,6 +17,14 @@ double Submodel::damping_ratio() const {
   return denominator[1] / (2.0 * std::sqrt(denominator[2]));
 }
 
+Eigen::VectorXd AdditiveModel::input_delays_s() const {
+  return input_delay_s.size() > 0 ? input_delay_s : Eigen::VectorXd::Zero(n_inputs());
+}
+
+Eigen::VectorXd AdditiveModel::output_delays_s() const {
+  return output_delay_s.size() > 0 ? output_delay_s : Eigen::VectorXd::Zero(n_outputs());
+}
+
 const char* to_string(HoldModel hold) noexcept {
   switch (hold) {
     case HoldModel::none:
@@ -35,13 +43,12 @@ namespace {
 
 /// Channels c = output + n_y input that share one delay.
 std::map<double, std::vector<Eigen::Index>> channels_by_delay(const AdditiveModel& model) {
+  const Eigen::VectorXd input_s = model.input_delays_s();
+  const Eigen::VectorXd output_s = model.output_delays_s();
   std::map<double, std::vector<Eigen::Index>> groups;
   for (Eigen::Index u = 0; u < model.n_inputs(); ++u)
-    for (Eigen::Index y = 0; y < model.n_outputs(); ++y) {
-      const double delay = (model.input_delay_s.size() > 0 ? model.input_delay_s[u] : 0.0) +
-                           (model.output_delay_s.size() > 0 ? model.output_delay_s[y] : 0.0);
-      groups[delay].push_back(y + model.n_outputs() * u);
-    }
+    for (Eigen::Index y = 0; y < model.n_outputs(); ++y)
+      groups[input_s[u] + output_s[y]].push_back(y + model.n_outputs() * u);
   return groups;
 }
 

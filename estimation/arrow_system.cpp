@@ -4,8 +4,9 @@
 #include <Eigen/LU>
 #include <cmath>
 
-namespace stageid {
+#include "estimation/channel_equations.hpp"
 
+namespace stageid {
 bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x) {
   const Eigen::VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd scaled = scale.asDiagonal() * M * scale.asDiagonal();
@@ -39,10 +40,15 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
   schur_e_.setZero(globals);
   if (keep_channels) channels_.resize(static_cast<std::size_t>(problem.channels()));
   if (method != FitMethod::gn) equation_error_columns(problem, beta, Y_re_, Y_im_);
-  for (const BasisGroup& group : groups)
+  for (const BasisGroup& group : groups) {
+    if (static_cast<Eigen::Index>(group.channels.size()) < kFewChannels) {
+      add_few(group);
+      continue;
+    }
     for (const TileRange& block :
          member_blocks(static_cast<Eigen::Index>(group.channels.size()), problem.size()))
       if (regular_) add_block(group, block);
+  }
   schur_ += M_;
   schur_e_ += e_;
 }
@@ -62,6 +68,31 @@ void ArrowSystem::add_block(const BasisGroup& group, const TileRange& block) {
     Channel& channel = keep_channels_ ? channels_[static_cast<std::size_t>(index)] : passing;
     set_channel(sums, B, r, channel);
     if (problem_.delays() > 0) add_delays(sums, B, r, index, channel);
+    eliminate(channel);
+  }
+}
+
+void ArrowSystem::add_few(const BasisGroup& group) {
+  const ComplexColumns Y{Y_re_, Y_im_};
+  std::vector<ChannelEquations> own(group.channels.size());
+  parallel_tasks(static_cast<int>(own.size()), problem_.threads, [&](int r) {
+    const auto at = static_cast<std::size_t>(r);
+    own[at] = channel_equations(problem_, beta_, group, group.channels[at], columns_,
+                                method_ == FitMethod::gn ? nullptr : &Y, method_);
+  });
+  const Eigen::Index n_f = problem_.functions();
+  const Eigen::Index globals = problem_.globals();
+  Channel passing;
+  for (std::size_t r = 0; r < own.size() && regular_; ++r) {
+    Channel& channel =
+        keep_channels_ ? channels_[static_cast<std::size_t>(group.channels[r])] : passing;
+    const auto& [M, e] = own[r];
+    channel.bb = M.topLeftCorner(n_f, n_f);
+    channel.ab = M.bottomLeftCorner(globals, n_f);
+    channel.ba = M.topRightCorner(n_f, globals);
+    channel.e = e.head(n_f);
+    M_ += M.bottomRightCorner(globals, globals);
+    e_ += e.tail(globals);
     eliminate(channel);
   }
 }

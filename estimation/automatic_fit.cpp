@@ -190,17 +190,20 @@ class AutomaticFit {
     return grown;
   }
 
-  /// Several at once where each is clearly worth it: pruning corrects what was one too many.
+  /// Several at once where each is clearly worth it: pruning corrects what was one too many. Where very
+  /// many are asked for, whatever they are worth.
   bool add_clear_ones(const std::vector<ResidualMode>& candidates) {
+    const bool demanded = selection_.exactly > kMostGrown;
     std::vector<ResidualMode> clear;
     for (const ResidualMode& candidate : candidates)
-      if (candidate.gain > 4.0 * price(1)) clear.push_back(candidate);
+      if (demanded || candidate.gain > 4.0 * price(1)) clear.push_back(candidate);
     const int room =
         (selection_.exactly > 0 ? target_ : affordable_modes()) - count_modes(best_.model);
     if (room < static_cast<int>(clear.size())) clear.resize(static_cast<std::size_t>(room));
     if (clear.size() < 2) return false;
     FitResult trial = fit_with(clear);
-    if (trial.status == FitStatus::singular || !(bic(trial) < bic(best_))) return false;
+    if (trial.status == FitStatus::singular) return false;
+    if (!demanded && !(bic(trial) < bic(best_))) return false;
     for (const ResidualMode& candidate : clear)
       say("added {:.6g} Hz, one of {} together: cost {:.6g} -> {:.6g}", candidate.mode.frequency_hz,
           clear.size(), best_.model.fit.cost, trial.model.fit.cost);

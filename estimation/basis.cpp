@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "estimation/hold_integral.hpp"
+
 namespace stageid {
 namespace {
 

@@ -2,35 +2,12 @@
 
 #include <cmath>
 
+#include "estimation/hold_integral.hpp"
+
 namespace stageid {
 namespace {
 
 using Complex = std::complex<double>;
-
-/// phi(t) = integral of e^{lambda v} over [0, t], and its derivative to lambda.
-struct Phi {
-  Complex value;
-  Complex derivative;
-};
-
-Phi phi(Complex lambda, double t) {
-  const Complex x = lambda * t;
-  if (std::abs(x) > 0.5) {
-    const Complex e = std::exp(x);
-    const Complex value = (e - 1.0) / lambda;
-    return {value, (t * e - value) / lambda};
-  }
-  // Series: the closed form cancels for slow poles. 0.5^18/18! is far below rounding.
-  Complex term = 1.0;
-  Complex value = 0.0;
-  Complex derivative = 0.0;
-  for (int n = 0; n < 18; ++n) {
-    value += term / static_cast<double>(n + 1);
-    derivative += term / static_cast<double>(n + 2);
-    term *= x / static_cast<double>(n + 1);
-  }
-  return {t * value, t * t * derivative};
-}
 
 /// out = magnitude(k) e^{j angle(k)}
 template <typename Angle>
@@ -85,16 +62,15 @@ LineOperator::LineOperator(const ModelLines& lines, double delay_s)
   const Eigen::Index N = lines.omega_rad_s.size();
   const auto omega = [&](Eigen::Index k) { return lines.omega_rad_s[k]; };
   if (exact_) {
-    const double samples = delay_s / period_s_;
-    const double whole = std::floor(samples);
-    rest_s_ = (1.0 - (samples - whole)) * period_s_;
+    const auto [whole, fraction] = split_delay(delay_s, period_s_);
+    rest_s_ = (1.0 - fraction) * period_s_;
     fill_polar(
         N, [&](Eigen::Index k) { return std::pair(1.0, omega(k) * period_s_); }, z_);
     fill_polar(
         N, [&](Eigen::Index k) { return std::pair(1.0, -omega(k) * ((whole + 1.0) * period_s_)); },
         first_);
     constant_ = first_;
-    if (samples == whole)
+    if (fraction == 0.0)
       fill_polar(
           N, [&](Eigen::Index k) { return std::pair(1.0, -omega(k) * (whole * period_s_)); },
           constant_);
@@ -142,8 +118,8 @@ void LineOperator::continuous(Complex lambda, Wanted wanted, Fractions& out) con
 }
 
 void LineOperator::sampled(Complex lambda, Wanted wanted, Fractions& out) const {
-  const Phi whole = phi(lambda, period_s_);
-  const Phi part = phi(lambda, rest_s_);
+  const HoldIntegral whole = hold_integral(lambda, period_s_);
+  const HoldIntegral part = hold_integral(lambda, rest_s_);
   const Complex E = std::exp(lambda * period_s_);
   const Complex e1 = std::exp(lambda * rest_s_);
   SplitMatrix q;  // z^-1 / (1 - E z^-1)

@@ -51,6 +51,37 @@ struct GramSums {
   }
 };
 
+/// Lower triangles of F^H W F of every channel by itself: for few channels.
+class OwnGrams {
+ public:
+  OwnGrams(Eigen::Index members, Eigen::Index n_f)
+      : grams_(static_cast<std::size_t>(members), Eigen::MatrixXd::Zero(n_f, n_f)) {}
+
+  void add(const BasisGroup& group, Eigen::Index first, const DataTile& data) {
+    const Eigen::Index n = data.W.cols();
+    Eigen::MatrixXd X(group.F_re.cols(), 2 * n);
+    for (std::size_t r = 0; r < grams_.size(); ++r) {
+      const Eigen::VectorXd root = data.W.row(static_cast<Eigen::Index>(r)).cwiseSqrt().transpose();
+      X.leftCols(n) = group.F_re.middleRows(first, n).transpose() * root.asDiagonal();
+      X.rightCols(n) = group.F_im.middleRows(first, n).transpose() * root.asDiagonal();
+      grams_[r].selfadjointView<Eigen::Lower>().rankUpdate(X);
+    }
+  }
+
+  /// In the order of triangular_pairs().
+  void pack(Eigen::MatrixXd& FF) const {
+    for (std::size_t r = 0; r < grams_.size(); ++r) {
+      Eigen::Index p = 0;
+      for (Eigen::Index i = 0; i < grams_[r].rows(); ++i)
+        for (Eigen::Index j = 0; j <= i; ++j)
+          FF(p++, static_cast<Eigen::Index>(r)) = grams_[r](i, j);
+    }
+  }
+
+ private:
+  std::vector<Eigen::MatrixXd> grams_;
+};
+
 GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const TileRange& block) {
   const auto pairs = triangular_pairs(problem.functions());
   const ComplexColumns F{group.F_re, group.F_im};
@@ -58,12 +89,18 @@ GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const Til
     GramSums sums;
     sums.FF.setZero(static_cast<Eigen::Index>(pairs.size()), share.members);
     sums.FG.setZero(problem.functions(), share.members);
+    const bool few = block.members < kFewChannels;
+    OwnGrams own(few ? share.members : 0, problem.functions());
     DataTile data;
     for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
       data.load(problem, group, share, {}, first, n);
-      add_pair_sums(data.W, F, F, pairs, first, sums.FF);
+      if (few)
+        own.add(group, first, data);
+      else
+        add_pair_sums(data.W, F, F, pairs, first, sums.FF);
       add_weighted_gradient(group, first, data, sums.FG);
     });
+    if (few) own.pack(sums.FF);
     return sums;
   });
 }

@@ -113,25 +113,6 @@ double residual_scale(double per_degree, bool likelihood) {
   return likelihood && per_degree < kClearlyTooLarge ? 1.0 : per_degree;
 }
 
-void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
-                    Eigen::Index c, const std::vector<DerivativeColumn>& columns,
-                    Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
-  re.setZero(problem.size(), problem.globals());
-  im.setZero(problem.size(), problem.globals());
-  for (std::size_t d = 0; d < columns.size(); ++d) {
-    const auto column = static_cast<Eigen::Index>(d);
-    re.col(columns[d].parameter) += beta.B(c, columns[d].function) * group.D_re.col(column);
-    im.col(columns[d].parameter) += beta.B(c, columns[d].function) * group.D_im.col(column);
-  }
-  if (problem.delay == DelayModel::fixed) return;
-  const Eigen::VectorXd t_re = group.T_re * beta.B.row(c).transpose();
-  const Eigen::VectorXd t_im = group.T_im * beta.B.row(c).transpose();
-  for (const Eigen::Index t : delay_parameters(problem, c)) {
-    re.col(t) = t_re;
-    im.col(t) = t_im;
-  }
-}
-
 Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen) {
   if (S.size() == 0) return S;
   Eigen::MatrixXd reduced = S;

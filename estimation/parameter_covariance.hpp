@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "estimation/arrow_system.hpp"
+#include "estimation/channel_equations.hpp"
 #include "estimation/joint_equations.hpp"
 
 namespace stageid {
@@ -69,11 +70,6 @@ double residual_per_degree(const FitProblem& problem, const Residual& E, Eigen::
 /// What variances are multiplied with: 1 where the weights are inverse variances (`likelihood`) and the
 /// residual is not clearly larger than they predict, else the residual per degree of freedom.
 double residual_scale(double per_degree, bool likelihood);
-
-/// Columns d vec(P)_c / d globals on every line for one channel, N x globals each.
-void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
-                    Eigen::Index c, const std::vector<DerivativeColumn>& columns,
-                    Eigen::MatrixXd& re, Eigen::MatrixXd& im);
 
 /// S^-1 on the free parameters, zero where one is frozen.
 Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen);

@@ -23,6 +23,9 @@ struct ComplexColumns {
   const Eigen::MatrixXd& im;
 };
 
+/// Groups of fewer channels: the products of functions that channels share cost more than they save.
+constexpr Eigen::Index kFewChannels = 16;
+
 constexpr Eigen::Index kTileLines = 256;  // the weights' tile and the products' stay in the cache
 
 /// Some channels of a group on some lines: what one task works on.

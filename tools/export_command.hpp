@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "tools/console.hpp"
 
@@ -19,6 +21,7 @@ class ExportCommand {
   std::filesystem::path model_;
   std::filesystem::path output_;
   std::filesystem::path frf_;
+  std::vector<std::string> driving_point_;
 };
 
 }  // namespace stageid

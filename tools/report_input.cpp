@@ -12,7 +12,7 @@
 #include "excitation/hdf5_file.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/fit_step.hpp"
-#include "tools/model_export.hpp"
+#include "tools/model_hdf5.hpp"
 
 namespace stageid {
 namespace {

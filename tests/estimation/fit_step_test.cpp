@@ -8,50 +8,17 @@
 #include <limits>
 
 #include "estimation/arrow_system.hpp"
-#include "estimation/weighted_products.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/estimation/disturbed_problem.hpp"
 
 namespace stageid {
 namespace {
 
 using test::DenseProblem;
+using test::measure_and_disturb;
+using test::random_matrix;
 using test::RandomNumbers;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-
-Eigen::MatrixXd random_matrix(RandomNumbers& random, Eigen::Index rows, Eigen::Index columns) {
-  Eigen::MatrixXd out(rows, columns);
-  for (double& value : out.reshaped()) value = random.normal();
-  return out;
-}
-
-/// Fills the numerators at random, measures the model with noise, weighs arbitrarily, and then moves
-/// every parameter away: poles by 3 %, numerators by 30 %. Nothing is at an optimum.
-void measure_and_disturb(RandomNumbers& random, DenseProblem& problem, double time_scale_s) {
-  for (Submodel& s : problem.model.submodels) {
-    double size = std::pow(time_scale_s, -s.integrators);
-    for (Eigen::MatrixXd& B : s.numerator) {
-      B = size * random_matrix(random, B.rows(), B.cols());
-      size *= time_scale_s;
-    }
-  }
-  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
-  const double scale = problem.G.cwiseAbs().mean();
-  problem.W.resize(problem.G.rows(), problem.G.cols());
-  for (Eigen::Index k = 0; k < problem.G.cols(); ++k)
-    for (Eigen::Index c = 0; c < problem.G.rows(); ++c) {
-      problem.G(c, k) += 0.05 * scale * random.circular();
-      problem.W(c, k) = std::exp(random.normal()) / (scale * scale);
-    }
-  for (Submodel& s : problem.model.submodels) {
-    for (std::size_t q = 1; q < s.denominator.size(); ++q)
-      s.denominator[q] *= 1.0 + 0.03 * random.normal();
-    for (Eigen::MatrixXd& B : s.numerator)
-      B.array() *= 1.0 + 0.3 * random_matrix(random, B.rows(), B.cols()).array();
-  }
-}
 
 /// 2 x 2: rigid body, a mode, a mode with B_0 + B_1 s; rad/s of order one, so that the dense
 /// equations are well conditioned as they stand.
@@ -335,58 +302,6 @@ TEST(FitStep, TheArrowWithDelaysSolvesItsOwnDenseEquations) {
   const std::vector<Eigen::Index> first = test::first_of_theta(problem.model);
   EXPECT_NEAR(step.globals[0], dense[first[1]], 1e-6 * std::abs(dense[first[1]]));
   EXPECT_NEAR(step.globals[3], dense[first[2] + 1], 1e-6 * std::abs(dense[first[2] + 1]));
-}
-
-// Structure ----------------------------------------------------------------------------------------
-
-TEST(WeightedProducts, AreTheSumsTheySay) {
-  RandomNumbers random(21);
-  const Eigen::Index N = 700;  // more than two tiles
-  const Eigen::MatrixXd W = random_matrix(random, 3, N).cwiseAbs();
-  const Eigen::MatrixXd V = random_matrix(random, 3, N);
-  const Eigen::MatrixXd X_re = random_matrix(random, N, 4);
-  const Eigen::MatrixXd X_im = random_matrix(random, N, 4);
-  const Eigen::MatrixXd Y_re = random_matrix(random, N, 60);
-  const Eigen::MatrixXd Y_im = random_matrix(random, N, 60);
-  const auto pairs = all_pairs(4, 60);  // 240: more than one block
-  Eigen::MatrixXd real = Eigen::MatrixXd::Zero(240, 3);
-  Eigen::MatrixXd complex = Eigen::MatrixXd::Zero(240, 3);
-  for_each_tile({0, 3, 0, N}, [&](Eigen::Index first, Eigen::Index n) {
-    const Eigen::MatrixXd W_tile = W.middleCols(first, n);
-    add_pair_sums(W_tile, {X_re, X_im}, {Y_re, Y_im}, pairs, first, real);
-    add_pair_sums(W_tile, V.middleCols(first, n), {X_re, X_im}, {Y_re, Y_im}, pairs, first,
-                  complex);
-  });
-  for (std::size_t p = 0; p < pairs.size(); ++p)
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      std::complex<double> with_weight = 0.0;
-      std::complex<double> with_error = 0.0;
-      for (Eigen::Index k = 0; k < N; ++k) {
-        const std::complex<double> x(X_re(k, pairs[p].left), X_im(k, pairs[p].left));
-        const std::complex<double> y(Y_re(k, pairs[p].right), Y_im(k, pairs[p].right));
-        with_weight += W(c, k) * std::conj(x) * y;
-        with_error += std::complex<double>(W(c, k), V(c, k)) * std::conj(x) * y;
-      }
-      // Sums of N numbers of order one.
-      EXPECT_NEAR(real(static_cast<Eigen::Index>(p), c), with_weight.real(), 1e-11);
-      EXPECT_NEAR(complex(static_cast<Eigen::Index>(p), c), with_error.real(), 1e-11);
-    }
-}
-
-TEST(WeightedProducts, SharesCoverEveryLineOfEveryChannelOnce) {
-  for (const auto& [members, lines] : {std::pair<Eigen::Index, Eigen::Index>{1, 1},
-                                       {3, 256},
-                                       {52, 3960},
-                                       {257, 257},
-                                       {1000, 5000}}) {
-    Eigen::MatrixXi seen = Eigen::MatrixXi::Zero(members, lines);
-    for (const TileRange& block : member_blocks(members, lines))
-      for (const TileRange& share : line_shares(block))
-        for_each_tile(share, [&, rows = share](Eigen::Index first, Eigen::Index n) {
-          seen.block(rows.first_member, first, rows.members, n).array() += 1;
-        });
-    EXPECT_TRUE((seen.array() == 1).all()) << members << " x " << lines;
-  }
 }
 
 }  // namespace

@@ -1,39 +1,18 @@
 #include <gtest/gtest.h>
 
 #include <complex>
-#include <cstdlib>
-#include <fstream>
 #include <string>
 
 #include "excitation/experiment_plan.hpp"
 #include "excitation/file_error.hpp"
 #include "excitation/hdf5_file.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/python_script.hpp"
 
 /// Files that h5py writes are read, and ours are read by h5py.
 namespace stageid {
 namespace {
 
-using test::TemporaryDirectory;
-constexpr const char* kPython = "/usr/bin/python3";
-
-class Hdf5Python : public testing::Test {
- protected:
-  void SetUp() override {
-    const std::string probe = std::string(kPython) + " -c 'import h5py' 2> /dev/null";
-    if (std::system(probe.c_str()) != 0) GTEST_SKIP() << kPython << " has no h5py";
-  }
-  /// Runs a script in the directory; it fails by an assertion.
-  void run(const std::string& script) const {
-    std::ofstream(directory / "script.py") << "import h5py, numpy as np\n" << script;
-    const std::string command =
-        "cd '" + directory.path().string() + "' && " + kPython + " script.py > output.txt 2>&1";
-    const int status = std::system(command.c_str());
-    std::ifstream output(directory / "output.txt");
-    EXPECT_EQ(status, 0) << std::string(std::istreambuf_iterator<char>(output), {});
-  }
-  TemporaryDirectory directory;
-};
+using Hdf5Python = test::PythonScriptTest;
 
 TEST_F(Hdf5Python, ReadsTheAttributesOfH5py) {
   run(R"(

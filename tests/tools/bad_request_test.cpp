@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "estimation/additive_model.hpp"
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid::test {
@@ -30,6 +31,20 @@ TEST_F(BadRequest, WhatIsNotInThisVersionSaysSo) {
   fail({"import", "x.mat", "-o", "frf.h5"}, 2, "not in this version");
   fail({"fit", "frf.h5", "-o", "m.json", "--submodel", "2,0,0"}, 2, "not in this version");
   fail({"export", "model.json", "-o", name("m.mat")}, 2, ".json, .h5 and .csv");
+}
+
+TEST_F(BadRequest, WhatAModelHasNot) {
+  AdditiveModel model;
+  model.inputs = {{"a1"}, {"N"}};
+  model.outputs = {{"z1", "z2"}, {"m", "m"}};
+  model.submodels = {{0, {1.0, 2e-3, 1e-6}, {Eigen::MatrixXd::Ones(2, 1)}, {}, {}}};
+  write_model(at("model.json"), model);
+  const std::string file = name("model.json");
+  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z3", "a1"}, 2,
+       "--driving-point: 'z3' is no output of the model; there are z1, z2");
+  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1", "z1"}, 2, "'z1' is no input");
+  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1"}, 2, "--driving-point");
+  fail({"export", file, "-o", name("m.h5")}, 2, "submodel 0: its poles");
 }
 
 TEST_F(BadRequest, MissingFiles) {

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <complex>
+
+namespace stageid {
+
+/// A matrix (n_y x n_u) as a sum of products of an output shape and an input shape,
+///   M = sum_r singular_value_r  output_r  input_r^T     (transposed, not conjugated),
+/// columns of norm one, the largest singular value first. Of each pair of columns the output shape is
+/// turned so that its leading component is real and positive: the first whose magnitude is at least
+/// 0.9 of the largest, so that rounding does not choose among the equal ones of a symmetric shape.
+template <typename Scalar>
+struct SingularShapes {
+  Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> output;  ///< n_y x min(n_y, n_u)
+  Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> input;   ///< n_u x min(n_y, n_u)
+  Eigen::VectorXd singular_value;
+};
+
+SingularShapes<double> singular_shapes(const Eigen::MatrixXd& M);
+SingularShapes<std::complex<double>> singular_shapes(const Eigen::MatrixXcd& M);
+
+/// Singular values at most this much of their reference, most often the first, are rounding.
+constexpr double kRankTolerance = 1e-10;
+
+/// How many of the (falling) singular values are above kRankTolerance * reference.
+Eigen::Index numerical_rank(const Eigen::VectorXd& singular_values, double reference);
+
+}  // namespace stageid

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+
+#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/model_reference.hpp"
+#include "tests/support/random_stage.hpp"
+
+namespace stageid::test {
+
+inline Eigen::MatrixXd random_matrix(RandomNumbers& random, Eigen::Index rows,
+                                     Eigen::Index columns) {
+  Eigen::MatrixXd out(rows, columns);
+  for (double& value : out.reshaped()) value = random.normal();
+  return out;
+}
+
+/// Fills the numerators at random, measures the model with noise, weighs arbitrarily, and then moves
+/// every parameter away: poles by 3 %, numerators by 30 %. Nothing is at an optimum.
+inline void measure_and_disturb(RandomNumbers& random, DenseProblem& problem, double time_scale_s) {
+  for (Submodel& s : problem.model.submodels) {
+    double size = std::pow(time_scale_s, -s.integrators);
+    for (Eigen::MatrixXd& B : s.numerator) {
+      B = size * random_matrix(random, B.rows(), B.cols());
+      size *= time_scale_s;
+    }
+  }
+  problem.G = reference_response(problem.model, problem.frequency_hz, problem.hold);
+  const double scale = problem.G.cwiseAbs().mean();
+  problem.W.resize(problem.G.rows(), problem.G.cols());
+  for (Eigen::Index k = 0; k < problem.G.cols(); ++k)
+    for (Eigen::Index c = 0; c < problem.G.rows(); ++c) {
+      problem.G(c, k) += 0.05 * scale * random.circular();
+      problem.W(c, k) = std::exp(random.normal()) / (scale * scale);
+    }
+  for (Submodel& s : problem.model.submodels) {
+    for (std::size_t q = 1; q < s.denominator.size(); ++q)
+      s.denominator[q] *= 1.0 + 0.03 * random.normal();
+    for (Eigen::MatrixXd& B : s.numerator)
+      B.array() *= 1.0 + 0.3 * random_matrix(random, B.rows(), B.cols()).array();
+  }
+}
+
+}  // namespace stageid::test
