@@ -69,6 +69,8 @@ class AutomaticFit {
   void search(int surplus) {
     target_ = selection_.exactly + surplus;
     if (best_.status == FitStatus::singular || selection_.keep_modes) return;
+    // Two peaks of one mode keep a fit from converging, and what is left looks like more modes.
+    if (selection_.exactly == 0) merge();
     grow();
     reduce();
     if (selection_.exactly == 0) {
