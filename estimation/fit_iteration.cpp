@@ -13,10 +13,6 @@
 namespace stageid {
 namespace {
 
-// Part of the data's weighted power below which a residual that no step lowers is rounding, not a
-// fit that got stuck: 1e-12 of the amplitude.
-constexpr double kNothingLeft = 1e-24;
-
 /// A candidate with its numerators solved.
 struct Trial {
   FitParameters beta;
@@ -198,8 +194,9 @@ class Iteration {
     const ArrowSystem system(problem_, beta_, groups, result_.E, FitMethod::sk);
     if (!system.regular())
       return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+    frozen_ = bounds_.leaning(beta_, system.schur_gradient());
     gradient_ = scaled_gradient(problem_, system, frozen_, result_.E.cost);
-    Eigen::VectorXd step = system.solve_globals(0.0);
+    Eigen::VectorXd step = system.solve_globals(0.0, frozen_);
     std::optional<Trial> trial;
     for (int halvings = 0; halvings < 12 && !trial; ++halvings, step *= 0.5) {
       step_size_ = relative_step(problem_, beta_, step);
