@@ -18,6 +18,21 @@ enum class HoldModel : std::uint8_t {
   exact   ///< every basis function through hold, delay and sampler: aliasing included
 };
 
+/// What a fit knows about a submodel beyond its coefficients; not in model files.
+enum class SubmodelRole : std::uint8_t {
+  searched,   ///< an automatic search may drop it or merge it with another
+  given,      ///< asked for: it stays, and the data must determine its poles
+  suspension  ///< a rigid body's weak stiffness: it stays; below the lines its poles may be held
+};
+
+/// One pole (real) or one conjugate pair of a submodel.
+struct PoleEstimate {
+  double natural_frequency_hz = 0.0;  ///< |lambda| / (2 pi)
+  double damping_ratio = 1.0;         ///< -Re lambda / |lambda|; 1: real
+  std::optional<double> natural_frequency_std_hz = {};
+  std::optional<double> damping_ratio_std = {};
+};
+
 /// P_i(s) = (B_0 + B_1 s + ...) / (s^integrators (1 + a_1 s + ...)), s in rad/s.
 struct Submodel {
   int integrators = 0;
@@ -28,6 +43,10 @@ struct Submodel {
   std::optional<double> natural_frequency_std_hz;
   std::optional<double> damping_ratio_std;
   std::optional<int> residue_rank = {};  ///< that the numerators were held at; none: free
+  std::vector<PoleEstimate> poles = {};  ///< of a submodel with poles that is no mode, rising
+
+  SubmodelRole role = SubmodelRole::searched;
+  bool frequency_held = false;  ///< a mode whose a_2 stays where it is
 
   /// n = 2 with complex poles: 1/(2 pi sqrt(a_2)) and a_1/(2 sqrt(a_2)).
   bool is_mode() const noexcept { return integrators == 0 && denominator.size() == 3; }

@@ -101,7 +101,7 @@ class AutomaticFit {
   AdditiveModel start() {
     std::vector<ModeCandidate> modes = selection_.modes;
     if (modes.empty() && !selection_.keep_modes) {
-      modes = pick_modes(frf_);
+      modes = without_given(pick_modes(frf_), structure_);
       const std::size_t most = static_cast<std::size_t>(affordable_modes());
       if (modes.size() > most) modes.resize(most);
       say("start: {} peaks of the CMIF", modes.size());
@@ -259,7 +259,7 @@ class AutomaticFit {
     const std::vector<Submodel>& all = best_.model.submodels;
     std::vector<std::size_t> order;
     for (std::size_t i = 0; i < all.size(); ++i)
-      if (all[i].is_mode() && best_.removal_cost[i] < price_of_one) order.push_back(i);
+      if (is_searched_mode(all[i]) && best_.removal_cost[i] < price_of_one) order.push_back(i);
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
       return best_.removal_cost[a] < best_.removal_cost[b];
     });
@@ -288,7 +288,7 @@ class AutomaticFit {
     const std::vector<Submodel>& all = best_.model.submodels;
     for (std::size_t i = 0; i < all.size(); ++i)
       for (std::size_t j = i + 1; j < all.size(); ++j) {
-        if (!all[i].is_mode() || !all[j].is_mode()) continue;
+        if (!is_searched_mode(all[i]) || !is_searched_mode(all[j])) continue;
         const double f = all[i].natural_frequency_hz();
         const double width = 2.0 * f * std::max(all[i].damping_ratio(), all[j].damping_ratio());
         const double distance = std::abs(all[j].natural_frequency_hz() - f) / width;

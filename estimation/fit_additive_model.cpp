@@ -2,127 +2,23 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
-#include <stdexcept>
-#include <thread>
 #include <utility>
 
+#include "estimation/determinacy.hpp"
 #include "estimation/fit_iteration.hpp"
+#include "estimation/fit_start.hpp"
 #include "estimation/low_rank_iteration.hpp"
 #include "estimation/numerators.hpp"
 #include "estimation/parameter_covariance.hpp"
+#include "estimation/pole_bounds.hpp"
+#include "estimation/poles.hpp"
 #include "estimation/weight_matrices.hpp"
 
 namespace stageid {
 namespace {
-
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument(message);
-}
-
-void check_start(const FrfEstimate& frf, const AdditiveModel& start, const FitOptions& options) {
-  check(frf);
-  require(!start.submodels.empty(),
-          "fit: the start has no submodel; give at least one mode or the rigid body");
-  require(options.max_iterations >= 0, "fit: max_iterations must not be negative");
-  require(std::isfinite(options.delay_s), "fit: the delay must be finite");
-  if (options.hold != HoldModel::none)
-    require(frf.sample_rate_hz > 0.0,
-            fmt::format("fit: hold {} needs the sample rate, and the FRF has none; use hold none",
-                        to_string(options.hold)));
-  if (options.hold == HoldModel::exact)
-    require(frf.frequency_hz.maxCoeff() < 0.5 * frf.sample_rate_hz,
-            "fit: a line lies at or above half the sample rate; choose a smaller band");
-  const bool matrices =
-      options.weighting == Weighting::likelihood ||
-      (options.weighting == Weighting::user && options.user_weight_matrices.size() > 0);
-  require(!matrices || (options.residue_rank == 0 && options.rigid_body_rank == 0),
-          "fit: residues of given rank are fitted with one weight a channel; use --weighting "
-          "noise_variance");
-  require(!matrices || options.method != FitMethod::sk,
-          "fit: method sk takes diagonal weights only; use riv or gn");
-  int biproper = 0;
-  int integrating = 0;
-  for (const Submodel& s : start.submodels) {
-    const auto n = static_cast<int>(s.denominator.size()) - 1;
-    const auto m = static_cast<int>(s.numerator.size()) - 1;
-    require(n >= 0 && s.denominator[0] == 1.0, "fit: a denominator must start with 1");
-    require(s.integrators >= 0 && s.integrators <= 2,
-            "fit: a submodel may have 0, 1 or 2 integrators");
-    require(m >= 0 && m <= n + s.integrators,
-            "fit: a submodel must be proper and have a numerator");
-    biproper += m == n + s.integrators ? 1 : 0;
-    integrating += s.integrators > 0 ? 1 : 0;
-    for (const Eigen::MatrixXd& B : s.numerator)
-      require(B.rows() == frf.n_outputs() && B.cols() == frf.n_inputs(),
-              "fit: a numerator's shape is not outputs x inputs");
-  }
-  require(biproper <= 1, "fit: at most one submodel may be biproper, or the model is not unique");
-  require(integrating <= 1,
-          "fit: at most one submodel may have integrators, or the model is not unique");
-}
-
-FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
-                        const FitOptions& options, Eigen::MatrixXd W) {
-  FitProblem problem;
-  problem.lines = {frf.omega_rad_s(), frf.sample_rate_hz > 0.0 ? 1.0 / frf.sample_rate_hz : 0.0,
-                   options.hold};
-  problem.n_outputs = frf.n_outputs();
-  problem.n_inputs = frf.n_inputs();
-  problem.G_re = frf.response.real();
-  problem.G_im = frf.response.imag();
-  problem.W = std::move(W);
-  for (const Submodel& s : start.submodels)
-    problem.shapes.push_back({s.integrators, static_cast<int>(s.denominator.size()) - 1,
-                              static_cast<int>(s.numerator.size()) - 1});
-  problem.delay = options.delay;
-  const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  problem.threads = options.threads > 0 ? options.threads : cores;
-  const Eigen::Index per_channel = problem.functions();
-  require(
-      2 * problem.size() >= per_channel && 2 * problem.size() * problem.channels() >=
-                                               problem.globals() + per_channel * problem.channels(),
-      fmt::format("fit: {} lines of {} channels cannot carry {} parameters; choose fewer modes or "
-                  "a wider band",
-                  problem.size(), problem.channels(),
-                  problem.globals() + per_channel * problem.channels()));
-  return problem;
-}
-
-FitParameters make_parameters(const FitProblem& problem, const AdditiveModel& start,
-                              const FitOptions& options) {
-  FitParameters beta;
-  for (const Submodel& s : start.submodels)
-    beta.a.push_back(Eigen::Map<const Eigen::VectorXd>(
-        s.denominator.data() + 1, static_cast<Eigen::Index>(s.denominator.size()) - 1));
-  const bool from_start = options.delay != DelayModel::fixed &&
-                          start.input_delay_s.size() == problem.n_inputs &&
-                          start.output_delay_s.size() == problem.n_outputs;
-  beta.input_delay_s = from_start ? start.input_delay_s
-                                  : Eigen::VectorXd::Constant(problem.n_inputs, options.delay_s);
-  beta.output_delay_s =
-      from_start ? start.output_delay_s : Eigen::VectorXd::Zero(problem.n_outputs);
-  beta.B.setZero(problem.channels(), problem.functions());
-  Eigen::Index f = 0;
-  for (const Submodel& s : start.submodels)
-    for (const Eigen::MatrixXd& B : s.numerator) beta.B.col(f++) = B.reshaped();
-  return beta;
-}
-
-void fill_submodels(const FitProblem& problem, const FitParameters& beta, AdditiveModel& model) {
-  Eigen::Index f = 0;
-  for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
-    Submodel& s = model.submodels[i];
-    s.denominator.assign(1, 1.0);
-    s.denominator.insert(s.denominator.end(), beta.a[i].begin(), beta.a[i].end());
-    for (Eigen::MatrixXd& B : s.numerator)
-      B = beta.B.col(f++).reshaped(problem.n_outputs, problem.n_inputs);
-  }
-  model.input_delay_s = beta.input_delay_s;
-  model.output_delay_s = beta.output_delay_s;
-}
 
 /// True if the weights claim to be the inverse of the noise's covariance.
 bool weighs_by_variance(Weighting weighting) {
@@ -145,13 +41,19 @@ void fill_deviations(const Eigen::MatrixXd& covariance, AdditiveModel& model) {
       if (C(1, 1) > 0.0) s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
       if (C(1, 1) > 0.0 && C(0, 0) > 0.0)
         s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
+    } else if (order > 0) {
+      const Eigen::MatrixXd C = covariance.block(first, first, order, order);
+      if (C.diagonal().minCoeff() > 0.0)
+        s.poles = pole_estimates(Eigen::Map<const Eigen::VectorXd>(&s.denominator[1], order), C);
     }
     first += order;
   }
 }
 
 void use_covariance(const ParameterCovariance& covariance, bool likelihood, FitResult& result) {
-  if (covariance.response_variance.size() == 0) return;
+  if (covariance.response_variance.size() == 0 || !covariance.response_variance.allFinite() ||
+      !covariance.globals.allFinite())
+    return;
   if (covariance.globals.size() > 0) fill_deviations(covariance.globals, result.model);
   result.response_variance = covariance.response_variance;
   if (likelihood && covariance.residual_scale > 1.0)
@@ -181,19 +83,19 @@ ParameterCovariance diagonal_covariance(const FrfEstimate& frf, const FitOptions
   return parameter_covariance(problem, beta, groups, E, gn, noise, frozen);
 }
 
-void fill_uncertainty(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
-                      const std::optional<WeightMatrices>& matrices, const FitParameters& beta,
-                      const IterationResult& iteration, FitResult& result) {
+/// With free numerators.
+ParameterCovariance free_covariance(const FrfEstimate& frf, const FitOptions& options,
+                                    const FitProblem& problem,
+                                    const std::optional<WeightMatrices>& matrices,
+                                    const FitParameters& beta, const IterationResult& iteration) {
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
   const Residual& E = iteration.E;
-  const bool likelihood = weighs_by_variance(options.weighting);
-  use_covariance(
-      matrices ? joint_covariance(problem, beta, groups, E,
-                                  JointEquations(problem, *matrices, beta, groups, E),
-                                  likelihood ? VarianceKnowledge::weights : VarianceKnowledge::none,
-                                  matrices->scatter_factor(), iteration.frozen)
-               : diagonal_covariance(frf, options, problem, beta, groups, E, iteration.frozen),
-      likelihood, result);
+  if (!matrices)
+    return diagonal_covariance(frf, options, problem, beta, groups, E, iteration.frozen);
+  return joint_covariance(
+      problem, beta, groups, E, JointEquations(problem, *matrices, beta, groups, E),
+      weighs_by_variance(options.weighting) ? VarianceKnowledge::weights : VarianceKnowledge::none,
+      matrices->scatter_factor(), iteration.frozen);
 }
 
 /// What giving up the free residues cost, and whether noise alone would have.
@@ -227,6 +129,118 @@ double relative_rms_error(const FrfEstimate& frf, const Residual& E) {
   return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
 }
 
+void fill_model(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
+                const FitParameters& beta, FitResult& result) {
+  result.model.inputs = frf.inputs;
+  result.model.outputs = frf.outputs;
+  result.model.sample_rate_hz = frf.sample_rate_hz;
+  result.model.hold = options.hold;
+  fill_submodels(problem, beta, result.model);
+  for (std::size_t i = 0; i < beta.a.size(); ++i)
+    if (Submodel& s = result.model.submodels[i]; !s.is_mode())
+      s.poles = pole_estimates(beta.a[i], Eigen::MatrixXd());
+  result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
+}
+
+void fill_record(const FrfEstimate& frf, const FitOptions& options,
+                 const IterationResult& iteration, FitResult& result) {
+  FitRecord& record = result.model.fit;
+  record.cost = iteration.E.cost;
+  record.weighting = to_string(options.weighting);
+  record.iterations = iteration.iterations;
+  record.status = to_string(result.status);
+  record.relative_rms_error = relative_rms_error(frf, iteration.E);
+  record.band_hz[0] = frf.frequency_hz[0];
+  record.band_hz[1] = frf.frequency_hz[frf.lines() - 1];
+  result.model.cost_history = result.cost;
+}
+
+/// Goes on to residues of the given ranks. @returns the covariance there
+ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& options,
+                                    const FitProblem& problem, FitParameters& beta,
+                                    IterationResult& iteration, FitResult& result) {
+  const bool likelihood = weighs_by_variance(options.weighting);
+  LowRankResult constrained = iterate_low_rank(problem, beta, options, likelihood);
+  result.decisions.push_back(rank_decision(problem, iteration, constrained, likelihood));
+  constrained.iteration.cost.insert(constrained.iteration.cost.begin(), iteration.cost.begin(),
+                                    iteration.cost.end());
+  constrained.iteration.iterations += iteration.iterations;
+  iteration = std::move(constrained.iteration);
+  if (options.uncertainty && frf.residual_covariance_re.size() > 0)
+    result.decisions.emplace_back(
+        "standard deviations with residues of given rank take the outputs' noise as "
+        "uncorrelated");
+  for (std::size_t i = 0; i < constrained.ranks.size(); ++i)
+    if (constrained.ranks[i] > 0) result.model.submodels[i].residue_rank = constrained.ranks[i];
+  return std::move(constrained.covariance);
+}
+
+/// What an earlier fit knew about the start is not known about this one.
+void forget_results(AdditiveModel& model) {
+  for (Submodel& s : model.submodels) {
+    s.natural_frequency_std_hz.reset();
+    s.damping_ratio_std.reset();
+    s.residue_rank.reset();
+    s.poles.clear();
+  }
+}
+
+/// Where the start has no finite response there is nothing to return but itself, without numerators.
+void keep_finite(const FitProblem& problem, const FitParameters& start, FitParameters& beta,
+                 IterationResult& iteration) {
+  bool finite = beta.B.allFinite() && iteration.E.re.allFinite() && iteration.E.im.allFinite() &&
+                iteration.E.re.size() > 0;
+  for (const Eigen::VectorXd& a : beta.a) finite = finite && a.allFinite();
+  if (finite) return;
+  beta = start;
+  beta.B.setZero();
+  iteration.E = Residual{problem.G_re, problem.G_im, 0.0};
+  iteration.E.cost =
+      (problem.W.array() * (problem.G_re.array().square() + problem.G_im.array().square())).sum() /
+      (2.0 * static_cast<double>(problem.size()));
+  iteration.status = FitStatus::singular;
+  iteration.cost.assign(1, iteration.E.cost);
+  if (iteration.message.empty()) iteration.message = "the start has no finite response";
+}
+
+std::vector<std::size_t> held_submodels(const FitProblem& problem, const FitParameters& beta,
+                                        const std::vector<Eigen::Index>& frozen) {
+  const PoleBounds bounds(problem, beta);
+  std::vector<std::size_t> out;
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < beta.a.size(); ++i) {
+    const Eigen::Index n = beta.a[i].size();
+    const bool held = std::any_of(frozen.begin(), frozen.end(),
+                                  [&](Eigen::Index p) { return p >= first && p < first + n; });
+    if (held || (n > 2 && bounds.at_bound(i, beta.a[i]))) out.push_back(i);
+    first += n;
+  }
+  return out;
+}
+
+/// A fit that has converged is undetermined where the data leave a submodel open that was asked for;
+/// one that has not says so as well.
+void judge(const FitProblem& problem, const FitParameters& beta, const Residual& E,
+           const Eigen::MatrixXd& covariance, const std::vector<Eigen::Index>& frozen,
+           FitResult& result) {
+  const bool asked_for = std::any_of(
+      result.model.submodels.begin(), result.model.submodels.end(), [](const Submodel& s) {
+        return s.role == SubmodelRole::given || (s.denominator.size() > 1 && !s.is_mode());
+      });
+  const bool singular = result.status == FitStatus::singular;
+  if (!asked_for && !singular) return;
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
+  std::string reason = undetermined_numerators(problem, beta, groups);
+  if (reason.empty() && !singular) {
+    const ArrowSystem gn(problem, beta, groups, FitMethod::gn);
+    reason = undetermined_poles(problem, beta, E, gn, result.removal_cost, covariance, frozen,
+                                result.held);
+  }
+  if (reason.empty()) return;
+  result.message = result.trustworthy() ? reason : result.message + "; " + reason;
+  if (result.trustworthy()) result.status = FitStatus::undetermined;
+}
+
 }  // namespace
 
 FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
@@ -240,8 +254,10 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
       start.input_delay_s.size() == 0)
     search_delay(problem, beta);
 
+  const FitParameters begun = beta;
   FitResult result;
   result.model = start;
+  forget_results(result.model);
   IterationResult iteration = iterate(problem, beta, options);
   if (matrices && iteration.status != FitStatus::singular) {
     result.decisions.push_back(
@@ -250,51 +266,23 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
                     iteration.iterations, to_string(iteration.status)));
     iteration = iterate(problem, *matrices, beta, options);
   }
-  const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   ParameterCovariance covariance;
-  std::vector<int> ranks;
-  if (low_rank && iteration.status != FitStatus::singular) {
-    LowRankResult constrained =
-        iterate_low_rank(problem, beta, options, weighs_by_variance(options.weighting));
-    result.decisions.push_back(
-        rank_decision(problem, iteration, constrained, weighs_by_variance(options.weighting)));
-    constrained.iteration.cost.insert(constrained.iteration.cost.begin(), iteration.cost.begin(),
-                                      iteration.cost.end());
-    constrained.iteration.iterations += iteration.iterations;
-    iteration = std::move(constrained.iteration);
-    covariance = std::move(constrained.covariance);
-    ranks = std::move(constrained.ranks);
-    if (options.uncertainty && frf.residual_covariance_re.size() > 0)
-      result.decisions.emplace_back(
-          "standard deviations with residues of given rank take the outputs' noise as "
-          "uncorrelated");
-  }
-  for (std::size_t i = 0; i < result.model.submodels.size(); ++i)
-    result.model.submodels[i].residue_rank =
-        i < ranks.size() && ranks[i] > 0 ? std::optional(ranks[i]) : std::nullopt;
+  const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
+  if (low_rank && iteration.status != FitStatus::singular)
+    covariance = constrain_ranks(frf, options, problem, beta, iteration, result);
+  keep_finite(problem, begun, beta, iteration);
   result.status = iteration.status;
   result.message = iteration.message;
   result.cost = iteration.cost;
-  result.model.inputs = frf.inputs;
-  result.model.outputs = frf.outputs;
-  result.model.sample_rate_hz = frf.sample_rate_hz;
-  result.model.hold = options.hold;
-  fill_submodels(problem, beta, result.model);
-  result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
-  if (low_rank)
+  result.held = held_submodels(problem, beta, iteration.frozen);
+  fill_model(frf, options, problem, beta, result);
+  if (options.uncertainty) {
+    if (!low_rank && result.status != FitStatus::singular)
+      covariance = free_covariance(frf, options, problem, matrices, beta, iteration);
     use_covariance(covariance, weighs_by_variance(options.weighting), result);
-  else if (options.uncertainty && result.status != FitStatus::singular)
-    fill_uncertainty(frf, options, problem, matrices, beta, iteration, result);
-
-  FitRecord& record = result.model.fit;
-  record.cost = iteration.E.cost;
-  record.weighting = to_string(options.weighting);
-  record.iterations = iteration.iterations;
-  record.status = to_string(result.status);
-  record.relative_rms_error = relative_rms_error(frf, iteration.E);
-  record.band_hz[0] = frf.frequency_hz[0];
-  record.band_hz[1] = frf.frequency_hz[frf.lines() - 1];
-  result.model.cost_history = result.cost;
+    judge(problem, beta, iteration.E, covariance.globals, iteration.frozen, result);
+  }
+  fill_record(frf, options, iteration, result);
   return result;
 }
 

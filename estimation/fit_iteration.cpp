@@ -13,9 +13,6 @@
 namespace stageid {
 namespace {
 
-// Part of the data's weighted power below which a residual that no step lowers is rounding, not a
-// fit that got stuck: 1e-12 of the amplitude.
-constexpr double kNothingLeft = 1e-24;
 constexpr bool kGlobalsOnly = false;  // numerators are solved again after every step
 
 /// A candidate with its numerators solved.
@@ -201,8 +198,9 @@ class Iteration {
     const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
     if (!system.regular())
       return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+    frozen_ = bounds_.leaning(beta_, system.schur_gradient());
     gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
-    Eigen::VectorXd step = system.solve_globals(0.0);
+    Eigen::VectorXd step = system.solve_globals(0.0, frozen_);
     std::optional<Trial> trial;
     for (int halvings = 0; halvings < 12 && !trial; ++halvings, step *= 0.5) {
       step_size_ = relative_step(problem_, beta_, step);

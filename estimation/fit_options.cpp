@@ -46,6 +46,8 @@ const char* to_string(FitStatus status) noexcept {
       return "iteration_limit";
     case FitStatus::singular:
       return "singular";
+    case FitStatus::undetermined:
+      return "undetermined";
   }
   return "singular";
 }

@@ -58,7 +58,8 @@ enum class FitStatus : std::uint8_t {
   step_small,
   cost_stalled,
   iteration_limit,
-  singular
+  singular,
+  undetermined  ///< converged, but the data do not determine a submodel that was asked for
 };
 const char* to_string(FitStatus status) noexcept;
 
@@ -72,6 +73,7 @@ struct FitResult {
   std::vector<std::string> decisions;  ///< what an automatic fit chose, and why, in order
   /// By how much sum W |E|^2 (W diagonal, or the best diagonal) would rise without a submodel, the others re-solved; one entry each.
   std::vector<double> removal_cost;
+  std::vector<std::size_t> held;  ///< submodels with a pole at a bound, or held by request
   /// (n_y n_u) x N: of P, from the parameter covariance; may be empty.
   Eigen::MatrixXd response_variance;
   bool trustworthy() const noexcept {

@@ -24,6 +24,8 @@ struct FitProblem {
   Eigen::MatrixXd G_im;
   Eigen::MatrixXd W;  ///< n_c x N
   std::vector<SubmodelShape> shapes;
+  std::vector<SubmodelRole> roles;  ///< one a submodel; empty: all searched
+  std::vector<Eigen::Index> held;   ///< globals that are known and stay
   DelayModel delay = DelayModel::fixed;
   int threads = 1;
 

@@ -65,6 +65,9 @@ class JointIteration {
                              "first-order condition",
                              result_.iterations, deviations_));
     if (descend(equations, step)) return true;
+    if (result_.E.cost < kNothingLeft * signal_cost_)
+      return end(FitStatus::step_small,
+                 "the residual has reached rounding: no step lowers the cost any further");
     if (deviations_ < kRoundingDeviations)
       return end(FitStatus::step_small,
                  fmt::format("the cost is at rounding, within {:.1g} standard deviations of the "

@@ -33,6 +33,15 @@ Json submodel_to_json(const Submodel& s) {
     if (s.natural_frequency_std_hz) out["natural_frequency_std_hz"] = *s.natural_frequency_std_hz;
     if (s.damping_ratio_std) out["damping_ratio_std"] = *s.damping_ratio_std;
   }
+  for (const PoleEstimate& pole : s.poles) {
+    Json item;
+    item["natural_frequency_hz"] = pole.natural_frequency_hz;
+    item["damping_ratio"] = pole.damping_ratio;
+    if (pole.natural_frequency_std_hz)
+      item["natural_frequency_std_hz"] = *pole.natural_frequency_std_hz;
+    if (pole.damping_ratio_std) item["damping_ratio_std"] = *pole.damping_ratio_std;
+    out["poles"].push_back(std::move(item));
+  }
   if (s.residue_rank) out["residue_rank"] = *s.residue_rank;
   return out;
 }
@@ -56,6 +65,17 @@ Eigen::MatrixXd matrix_from_json(const JsonNode& node, std::size_t rows, std::si
   return out;
 }
 
+PoleEstimate pole_from_json(const JsonNode& node) {
+  PoleEstimate pole;
+  pole.natural_frequency_hz = node.member("natural_frequency_hz").positive();
+  pole.damping_ratio = node.member("damping_ratio").number();
+  if (node.has("natural_frequency_std_hz"))
+    pole.natural_frequency_std_hz = node.member("natural_frequency_std_hz").number();
+  if (node.has("damping_ratio_std"))
+    pole.damping_ratio_std = node.member("damping_ratio_std").number();
+  return pole;
+}
+
 Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::size_t n_inputs) {
   Submodel s;
   s.integrators = static_cast<int>(node.member("integrators").integer(0, 2));
@@ -74,6 +94,9 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
     s.natural_frequency_std_hz = node.member("natural_frequency_std_hz").number();
   if (node.has("damping_ratio_std"))
     s.damping_ratio_std = node.member("damping_ratio_std").number();
+  if (node.has("poles"))
+    for (const JsonNode& pole : node.member("poles").elements())
+      s.poles.push_back(pole_from_json(pole));
   if (node.has("residue_rank"))
     s.residue_rank = static_cast<int>(node.member("residue_rank").integer(1, 1'000'000));
   return s;

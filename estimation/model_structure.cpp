@@ -3,7 +3,14 @@
 #include <algorithm>
 #include <numbers>
 
+#include "estimation/basis.hpp"
+
 namespace stageid {
+namespace {
+
+constexpr double kTaken = 0.05;  // of a frequency: a neighbour as close shows in the residual
+
+}  // namespace
 
 Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,
                        const ModeCandidate& mode) {
@@ -20,25 +27,48 @@ std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructu
   const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
   if (structure.rigid_body) out.push_back({2, {1.0}, {zero}, {}, {}});
   if (structure.direct_term) out.push_back({0, {1.0}, {zero}, {}, {}});
+  out.insert(out.end(), structure.given.begin(), structure.given.end());
   return out;
 }
 
+std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candidates,
+                                         const ModelStructure& structure) {
+  std::vector<ModeCandidate> out = candidates;
+  for (const Submodel& s : structure.given) {
+    const Eigen::Map<const Eigen::VectorXd> a(s.denominator.data() + 1,
+                                              static_cast<Eigen::Index>(s.denominator.size()) - 1);
+    for (const std::complex<double> pole : roots(a))
+      std::erase_if(out, [&](const ModeCandidate& mode) {
+        const double omega = 2.0 * std::numbers::pi * mode.frequency_hz;
+        return pole.imag() != 0.0 && std::abs(std::abs(pole) - omega) < kTaken * omega;
+      });
+  }
+  return out;
+}
+
+bool is_searched_mode(const Submodel& submodel) noexcept {
+  return submodel.role == SubmodelRole::searched && submodel.is_mode();
+}
+
 int count_modes(const AdditiveModel& model) {
-  return static_cast<int>(std::count_if(model.submodels.begin(), model.submodels.end(),
-                                        [](const Submodel& s) { return s.is_mode(); }));
+  return static_cast<int>(
+      std::count_if(model.submodels.begin(), model.submodels.end(), is_searched_mode));
 }
 
 void sort_modes(AdditiveModel& model) {
   std::stable_sort(model.submodels.begin(), model.submodels.end(),
                    [](const Submodel& a, const Submodel& b) {
-                     if (a.is_mode() != b.is_mode()) return b.is_mode();
-                     return a.is_mode() && a.natural_frequency_hz() < b.natural_frequency_hz();
+                     const bool mode = is_searched_mode(a);
+                     if (mode != is_searched_mode(b)) return !mode;
+                     return mode && a.natural_frequency_hz() < b.natural_frequency_hz();
                    });
 }
 
 Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure) {
   const Eigen::Index per_mode = structure.general_damping ? 2 : 1;
-  const Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);
+  Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);
+  for (const Submodel& s : structure.given)
+    fixed += static_cast<Eigen::Index>(s.numerator.size() + s.denominator.size()) - 1;
   return std::max<Eigen::Index>(1, (2 * frf.lines() / 3 - fixed) / (per_mode + 1));
 }
 

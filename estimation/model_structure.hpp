@@ -10,9 +10,10 @@ namespace stageid {
 
 /// Which submodels beside the modes.
 struct ModelStructure {
-  bool rigid_body = true;        ///< B_0 / s^2
-  bool direct_term = false;      ///< a constant matrix: compliance of modes above the band
-  bool general_damping = false;  ///< modes with B_0 + B_1 s (general viscous) instead of B_0
+  bool rigid_body = true;            ///< B_0 / s^2
+  bool direct_term = false;          ///< a constant matrix: compliance of modes above the band
+  bool general_damping = false;      ///< modes with B_0 + B_1 s (general viscous) instead of B_0
+  std::vector<Submodel> given = {};  ///< further ones at their start; their role is not `searched`
 };
 
 /// A mode at its candidate's place, numerators zero.
@@ -22,9 +23,17 @@ Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,
 /// The submodels beside the modes, numerators zero.
 std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructure& structure);
 
+/// Those candidates that no given submodel stands for: none of its poles starts within 5 %.
+std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candidates,
+                                         const ModelStructure& structure);
+
+/// A mode that a search found and may drop again.
+bool is_searched_mode(const Submodel& submodel) noexcept;
+
+/// Of them.
 int count_modes(const AdditiveModel& model);
 
-/// Modes by frequency, behind the other submodels.
+/// Searched modes by frequency, behind the other submodels.
 void sort_modes(AdditiveModel& model);
 
 /// More modes than this the lines of an FRF cannot carry: a channel's functions are real combinations

@@ -19,7 +19,11 @@ constexpr Eigen::Index kBlock = 64;
 
 /// Frequencies a fraction of the half-power width apart, not finer than the lines.
 std::vector<ModeCandidate> candidate_grid(const FrfEstimate& frf, const AdditiveModel& model) {
-  const double low = kBelowBand * frf.frequency_hz[0];
+  // Below the lines a suspension stands for all that is there.
+  const bool suspended =
+      std::any_of(model.submodels.begin(), model.submodels.end(),
+                  [](const Submodel& s) { return s.role == SubmodelRole::suspension; });
+  const double low = (suspended ? 1.0 : kBelowBand) * frf.frequency_hz[0];
   double high = kAboveBand * frf.frequency_hz[frf.lines() - 1];
   if (model.hold == HoldModel::exact) high = std::min(high, 0.48 * frf.sample_rate_hz);
   const double spacing = frf.lines() > 1

@@ -11,6 +11,7 @@
 #include "tools/exit_code.hpp"
 #include "tools/fit_step.hpp"
 #include "tools/output_paths.hpp"
+#include "tools/submodel_text.hpp"
 
 namespace stageid {
 
@@ -19,10 +20,9 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("frf", frf_, "frf.h5")->required();
   command->add_option("-o,--output", output_, "model.json to write")->required();
   command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: all lines")->expected(2);
-  command
-      ->add_option("--modes", request_.modes,
-                   "auto | how many | frequencies f1,f2,... in Hz | modes.json")
-      ->capture_default_str();
+  command->add_option("--modes", request_.modes,
+                      "auto | none | how many | frequencies f1,f2,... in Hz | modes.json; default: "
+                      "auto, with --submodel none");
   command->add_option(
       "--weighting", request_.weighting,
       "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
@@ -30,8 +30,11 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("--hold", request_.hold, "none | phase | sinc | exact; default: by the FRF");
   command->add_option("--delay", request_.delay,
                       "SECONDS | estimate | per_channel; default: by the FRF");
-  command->add_option("--rigid-body", request_.rigid_body, "none | full | RANK: the term B_0 / s^2")
-      ->capture_default_str();
+  command->add_option(
+      "--rigid-body", request_.rigid_body,
+      "none | full | RANK: the term B_0 / s^2 | suspension: a mode below the lines "
+      "instead, for a rigid body on weak springs | suspension:F1:F2: at these known "
+      "frequencies, Hz; default: full, with --submodel none");
   command
       ->add_option("--direct-term", request_.direct_term,
                    "none | full: a constant, the compliance of modes above the band")
@@ -40,7 +43,13 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
       ->add_option("--residue-rank", request_.residue_rank,
                    "full | 1: residues phi psi^T of mechanical modes")
       ->capture_default_str();
-  command->add_option("--submodel", submodel_, "")->group("");
+  command
+      ->add_option("--submodel", submodels_,
+                   "(B_0 + ... + B_m s^m) / (s^l A), A of order n: l=0,n=4,m=3,f=120:180,"
+                   "zeta=0.01; repeatable. m: n + l - 1 unless given. f: Hz where the poles start, "
+                   "one a pair, last the real one of odd n; without it they are searched. n=auto: "
+                   "one denominator for all modes that a search finds")
+      ->allow_extra_args(false);
   command
       ->add_option("--damping", request_.damping,
                    "proportional | general: numerators B_0, or B_0 + B_1 s")
@@ -57,10 +66,8 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
 }
 
 FitRequest FitCommand::checked_request() const {
-  if (!submodel_.empty())
-    throw std::invalid_argument(
-        "--submodel: not in this version; the model is a rigid body, modes and a direct term");
   FitRequest request = request_;
+  for (const std::string& text : submodels_) request.submodels.push_back(parse_submodel(text));
   if (!band_hz_.empty()) request.band_hz = {band_hz_[0], band_hz_[1]};
   return request;
 }
@@ -91,10 +98,10 @@ void FitCommand::run() const {
                    {"modes", modes_json(result.model)},
                    {"seconds", step.seconds}});
   if (!result.trustworthy())
-    console_.warning(
-        fmt::format("{}: the fit did not converge: {}; the model is written, do not trust "
-                    "it before you know why",
-                    output_.string(), result.message));
+    console_.warning(fmt::format(
+        "{}: {}{}; the model is written, do not trust it before you know why", output_.string(),
+        result.status == FitStatus::undetermined ? "" : "the fit did not converge: ",
+        result.message));
 }
 
 }  // namespace stageid

@@ -25,7 +25,7 @@ class FitCommand {
   std::filesystem::path output_;
   FitRequest request_;
   std::vector<double> band_hz_;
-  std::string submodel_;
+  std::vector<std::string> submodels_;
   std::uint64_t seed_ = 0;
 };
 

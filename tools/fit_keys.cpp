@@ -1,12 +1,59 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tools/fit_request.hpp"
 #include "tools/number_range.hpp"
+#include "tools/submodel_text.hpp"
 
 namespace stageid {
+
+namespace {
+
+/// One entry of `submodels`: what --submodel says in one line.
+void describe_submodel(ConfigVisitor& v, SubmodelRequest& r) {
+  constexpr auto kOptional = Presence::optional;
+  FlexibleValue order = {"", {0.0}, false, {}};
+  FlexibleRule rule;
+  rule.words = {"auto"};
+  rule.number = true;
+  rule.rule = not_negative("");
+  v.flexible("n", order, rule, kOptional,
+             "order of the denominator; auto: twice the number of modes that a search finds");
+  r.order_by_search = order.word == "auto";
+  const double n = order.numbers.empty() ? 0.0 : order.numbers.front();
+  v.require(std::floor(n) == n && n <= kLargestOrder, "n",
+            fmt::format("n: an order is a whole number from 0 to {}", kLargestOrder));
+  r.shape.order = static_cast<int>(std::min(n, 1e6));
+  count(v, "l", r.shape.integrators, 0, 2, kOptional, "integrators: a power of 1/s");
+  r.shape.numerator_degree = -1;
+  count(v, "m", r.shape.numerator_degree, -1, 1000, kOptional,
+        "degree of the numerator; -1: n + l - 1, strictly proper");
+  if (r.shape.numerator_degree < 0) r.shape.numerator_degree = strictly_proper_degree(r);
+  v.numbers("frequency_hz", r.frequency_hz, positive("Hz"), {}, kOptional,
+            "where its poles start: one a conjugate pair, and last the real pole's if n is odd; "
+            "left out: searched");
+  v.numbers("damping_ratio", r.damping_ratio, {"", 0.0, 0.9, true}, {}, kOptional,
+            "where they start: one a pair, or one for all; left out: 0.01");
+  const std::string fault = fault_of(r);
+  v.require(fault.empty(), r.order_by_search ? "n" : "m", fault);
+}
+
+void describe_submodels(ConfigVisitor& v, FitRequest& f) {
+  v.items(
+      "submodels",
+      [&](ConfigVisitor& item) {
+        SubmodelRequest request;
+        describe_submodel(item, request);
+        f.submodels.push_back(std::move(request));
+      },
+      {}, Presence::optional,
+      "(B_0 + ... + B_m s^m) / (s^l (1 + a_1 s + ... + a_n s^n)), as fit --submodel");
+}
+
+}  // namespace
 
 void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   constexpr auto kOptional = Presence::optional;
@@ -18,21 +65,23 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
     f.band_hz = {band_hz[0], band_hz[1]};
   }
 
-  FlexibleValue modes = {"auto", {}, false, {}};
+  describe_submodels(v, f);
+  FlexibleValue modes = {"by_submodels", {}, false, {}};
   FlexibleRule modes_rule;
-  modes_rule.words = {"auto"};
+  modes_rule.words = {"auto", "none", "by_submodels"};
   modes_rule.number = true;
   modes_rule.list = true;
   modes_rule.rule = positive("");
   v.flexible("modes", modes, modes_rule, kOptional,
-             "auto, how many, or a list of frequencies in Hz");
+             "auto, none, how many, or a list of frequencies in Hz; by_submodels: none where "
+             "submodels are listed, else auto");
   v.require(
       modes.is_list || modes.numbers.empty() || std::floor(modes.numbers[0]) == modes.numbers[0],
       "modes", "modes: a number says how many and is whole; write frequencies as a list [...]");
   // A list of one frequency would read as a count without the comma.
   f.modes = modes.word.empty()
                 ? fmt::format("{}{}", fmt::join(modes.numbers, ","), modes.is_list ? "," : "")
-                : modes.word;
+                : (modes.word == "by_submodels" ? "" : modes.word);
 
   const auto word = [&](const char* key, std::string& value, std::vector<std::string> names,
                         const char* help) {
@@ -72,8 +121,17 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   f.delay = delay.word.empty() ? fmt::format("{}", delay.numbers.front())
                                : (delay.word == "by_frf" ? "" : delay.word);
 
-  rank("rigid_body", f.rigid_body, {"none", "full"},
-       "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom)");
+  if (f.rigid_body.empty()) f.rigid_body = "by_submodels";
+  rank("rigid_body", f.rigid_body, {"none", "full", "suspension", "by_submodels"},
+       "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); suspension: a "
+       "mode below the lines instead; by_submodels: none where submodels are listed, else full");
+  std::vector<double> suspension_hz;
+  v.numbers("suspension_hz", suspension_hz, positive("Hz"), {}, kOptional,
+            "with rigid_body: suspension, its frequencies where they are known; left out: fitted");
+  v.require(suspension_hz.empty() || f.rigid_body == "suspension", "suspension_hz",
+            "suspension_hz: goes with rigid_body: suspension");
+  if (!suspension_hz.empty()) f.rigid_body += fmt::format(":{}", fmt::join(suspension_hz, ":"));
+  if (f.rigid_body == "by_submodels") f.rigid_body.clear();
   rank("residue_rank", f.residue_rank, {"full"}, "of a mode: full, or 1 for mechanical modes");
   word("direct_term", f.direct_term, {"none", "full"},
        "a constant: the compliance of modes above the band");

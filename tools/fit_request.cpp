@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -12,7 +11,10 @@
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
 #include "frf/hold_compensation.hpp"
+#include "tools/flag_values.hpp"
 #include "tools/key_suggestion.hpp"
+#include "tools/structure_request.hpp"
+#include "tools/submodel_text.hpp"
 #include "tools/weight_file.hpp"
 
 namespace stageid {
@@ -23,28 +25,6 @@ const std::vector<std::string> kWeightings = {
     "total_variance", "likelihood",        "user"};
 const std::vector<std::string> kHolds = {"none", "phase", "sinc", "exact"};
 const std::vector<std::string> kMethods = {"riv", "gn", "sk"};
-
-std::optional<double> to_number(std::string_view text) {
-  double value = 0.0;
-  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || stop != text.data() + text.size() || !std::isfinite(value))
-    return std::nullopt;
-  return value;
-}
-
-[[noreturn]] void refuse(const char* flag, const std::string& given, const std::string& right) {
-  throw std::invalid_argument(fmt::format("{}: '{}'; write {}", flag, given, right));
-}
-
-template <typename Enum>
-Enum pick(const char* flag, const std::string& word, const std::vector<std::string>& names) {
-  const auto found = std::find(names.begin(), names.end(), word);
-  if (found != names.end()) return static_cast<Enum>(found - names.begin());
-  const std::string nearest = nearest_word(word, names);
-  refuse(flag, word,
-         fmt::format("one of {}{}", fmt::join(names, ", "),
-                     nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
-}
 
 /// Sums up what the FRF decides where the request is silent.
 class FitDefaults {
@@ -119,31 +99,21 @@ class FitDefaults {
   /// Refused here: the fit would grow for hours towards a number that the lines cannot carry.
   void require_affordable_modes() const {
     const Eigen::Index lines = setup_.frf.lines();
-    const Eigen::Index most = most_modes(setup_.frf, setup_.structure);
+    const Eigen::Index most = most_modes(setup_.frf, setup_.structure.common);
     if (setup_.selection.exactly > most)
       throw std::invalid_argument(fmt::format(
           "--modes: {}; {} lines carry no more than {}; ask for fewer or take a wider band",
           setup_.selection.exactly, lines, most));
   }
 
-  void choose_ranks() {
-    setup_.structure.rigid_body = request_.rigid_body != "none";
-    setup_.options.rigid_body_rank =
-        request_.rigid_body == "none" || request_.rigid_body == "full"
-            ? 0
-            : rank("--rigid-body", request_.rigid_body, "none, full or a rank of 1 or more");
-    setup_.options.residue_rank =
-        request_.residue_rank == "full"
-            ? 0
-            : rank("--residue-rank", request_.residue_rank, "full or a rank of 1 or more");
-    if (setup_.structure.general_damping && setup_.options.residue_rank > 1)
-      refuse("--residue-rank", request_.residue_rank, "full or 1 with --damping general");
-  }
-
   void choose_modes() {
     ModeSelection& selection = setup_.selection;
-    const std::string& text = request_.modes;
+    const std::string text = requested_modes(request_);
     if (text == "auto") return;
+    if (text == "none") {
+      selection.keep_modes = true;
+      return;
+    }
     if (text.find(',') == std::string::npos) {
       const std::optional<double> number = to_number(text);
       if (number && text.find_first_of(".eE") == std::string::npos) {
@@ -154,7 +124,8 @@ class FitDefaults {
       }
       if (!number && text.find_first_not_of("0123456789.eE+-") != std::string::npos) {
         selection.modes = read_modes(text);
-        for (const ModeCandidate& mode : selection.modes) require_below_nyquist(mode.frequency_hz);
+        for (const ModeCandidate& mode : selection.modes)
+          require_below_nyquist("--modes", setup_, mode.frequency_hz);
         selection.keep_modes = true;
         return;
       }
@@ -164,13 +135,6 @@ class FitDefaults {
 
  private:
   void note(std::string text) { setup_.notes.push_back(std::move(text)); }
-
-  static int rank(const char* flag, const std::string& text, const char* allowed) {
-    const std::optional<double> number = to_number(text);
-    if (!number || *number < 1.0 || *number > 1000.0 || std::floor(*number) != *number)
-      refuse(flag, text, allowed);
-    return static_cast<int>(*number);
-  }
 
   void parse_delay() {
     FitOptions& options = setup_.options;
@@ -205,16 +169,6 @@ class FitDefaults {
     read_weights(text, setup_.frf, options);
   }
 
-  /// Above, the sampled response cannot tell a mode from its alias.
-  void require_below_nyquist(double frequency_hz) const {
-    const double nyquist_hz = 0.5 * setup_.frf.sample_rate_hz;
-    if (nyquist_hz > 0.0 && setup_.options.hold != HoldModel::none && frequency_hz >= nyquist_hz)
-      throw std::invalid_argument(
-          fmt::format("--modes: {} Hz is not below half the sample rate, {} Hz; write lower "
-                      "frequencies",
-                      frequency_hz, nyquist_hz));
-  }
-
   void parse_frequencies(const std::string& text) {
     std::string_view rest = text;
     while (!rest.empty()) {
@@ -222,8 +176,8 @@ class FitDefaults {
       const std::optional<double> frequency_hz = to_number(rest.substr(0, comma));
       if (!frequency_hz || *frequency_hz <= 0.0)
         refuse("--modes", text,
-               "auto, a number of modes, frequencies in Hz 'f1,f2,...', or a file");
-      require_below_nyquist(*frequency_hz);
+               "auto, none, a number of modes, frequencies in Hz 'f1,f2,...', or a file");
+      require_below_nyquist("--modes", setup_, *frequency_hz);
       setup_.selection.modes.push_back({*frequency_hz});
       rest.remove_prefix(std::min(comma + 1, rest.size()));
     }
@@ -240,7 +194,7 @@ class FitDefaults {
 std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
   using Json = nlohmann::ordered_json;
   const FitOptions& o = setup.options;
-  Json modes = request.modes;
+  Json modes = requested_modes(request);
   if (!setup.selection.modes.empty()) {
     modes = Json::array();
     for (const ModeCandidate& mode : setup.selection.modes) modes.push_back(mode.frequency_hz);
@@ -253,12 +207,14 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
       {"delay", o.delay == DelayModel::estimate      ? Json("estimate")
                 : o.delay == DelayModel::per_channel ? Json("per_channel")
                                                      : Json(o.delay_s)},
-      {"rigid_body", request.rigid_body},
+      {"rigid_body", requested_rigid_body(request)},
       {"residue_rank", request.residue_rank},
       {"direct_term", request.direct_term},
       {"damping", request.damping},
       {"method", request.method},
       {"max_iterations", o.max_iterations}};
+  for (const SubmodelRequest& submodel : request.submodels)
+    json["submodels"].push_back(submodel_text(submodel));
   if (o.weighting == Weighting::user) {
     Fingerprint fingerprint;
     const auto add = [&](const auto& matrix) {
@@ -284,11 +240,7 @@ FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf) {
   defaults.choose_delay();
   defaults.choose_weighting();
   defaults.choose_modes();
-  setup.structure.direct_term =
-      pick<int>("--direct-term", request.direct_term, {"none", "full"}) == 1;
-  setup.structure.general_damping =
-      pick<int>("--damping", request.damping, {"proportional", "general"}) == 1;
-  defaults.choose_ranks();
+  choose_structure(request, setup);
   defaults.require_affordable_modes();
   setup.options.method = pick<FitMethod>("--method", request.method, kMethods);
   if (request.max_iterations < 1)

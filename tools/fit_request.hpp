@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/automatic_fit.hpp"
+#include "estimation/structured_fit.hpp"
 #include "frf/frf_estimate.hpp"
 #include "tools/config_visitor.hpp"
 
@@ -15,15 +15,17 @@ namespace stageid {
 /// the FRF, see make_fit_setup().
 struct FitRequest {
   std::optional<std::array<double, 2>> band_hz;
-  std::string modes = "auto";            ///< auto | N | f1,f2,... | FILE.json
+  std::string modes;                     ///< auto | none | N | f1,f2,... | FILE.json
   std::string weighting;                 ///< unit | inverse_magnitude | ... | likelihood | FILE.h5
   std::string hold;                      ///< none | phase | sinc | exact
   std::string delay;                     ///< SECONDS | estimate | per_channel
-  std::string rigid_body = "full";       ///< none | full | RANK
+  std::string rigid_body;                ///< none | full | RANK | suspension | suspension:F1:F2
   std::string residue_rank = "full";     ///< full | 1 (or another rank)
   std::string damping = "proportional";  ///< proportional | general
   std::string method = "riv";            ///< riv | gn | sk
   std::string direct_term = "none";      ///< none | full
+  std::vector<SubmodelRequest>
+      submodels;  ///< further ones; alone where `modes` and `rigid_body` are empty
   int max_iterations = 100;
   int threads = 0;
 };
@@ -31,7 +33,7 @@ struct FitRequest {
 /// A request put into the terms of the estimation library.
 struct FitSetup {
   FrfEstimate frf;  ///< the lines of the band
-  ModelStructure structure;
+  RequestedStructure structure;
   ModeSelection selection;
   FitOptions options;
   std::vector<std::string> notes;  ///< what was decided by the FRF, one line each
@@ -43,7 +45,9 @@ struct FitSetup {
 ///   delay, or delay and hold, out   -> put back into the response; hold exact, delay fixed to what
 ///                                      was taken out. With --hold none the response stays as it is
 ///   hold none                       -> no hold, delay 0
-/// and weights: noise variance if there is one, else total variance, else relative.
+/// Submodels that are asked for stand alone: then `modes` and `rigid_body` are none unless given, else
+/// auto and full.
+/// And weights: noise variance if there is one, else total variance, else relative.
 /// @throws std::invalid_argument naming the flag; FileError, FormatError for files that it names.
 FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf);
 

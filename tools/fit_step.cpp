@@ -30,6 +30,13 @@ std::string optional_number(const std::optional<double>& value) {
 
 Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
+/// A mode as its own pole; other submodels' as the fit left them.
+std::vector<PoleEstimate> poles_of(const Submodel& s) {
+  if (!s.is_mode()) return s.poles;
+  return {{s.natural_frequency_hz(), s.damping_ratio(), s.natural_frequency_std_hz,
+           s.damping_ratio_std}};
+}
+
 }  // namespace
 
 std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint) {
@@ -46,7 +53,7 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
     throw_if_interrupted();
     progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));
   };
-  step.result = automatic_fit(setup.frf, setup.structure, setup.selection, options);
+  step.result = structured_fit(setup.frf, setup.structure, setup.selection, options);
   throw_if_interrupted();
   step.seconds = progress.seconds();
   step.result.decisions.insert(step.result.decisions.begin(), setup.notes.begin(),
@@ -69,11 +76,11 @@ std::vector<std::string> mode_table(const AdditiveModel& model) {
   std::vector<std::vector<std::string>> rows = {
       {"mode", "frequency/Hz", "std/Hz", "damping", "std"}};
   for (const Submodel& s : model.submodels) {
-    if (!s.is_mode()) continue;
-    rows.push_back({fmt::format("{}", rows.size()), fmt::format("{:.5f}", s.natural_frequency_hz()),
-                    optional_number(s.natural_frequency_std_hz),
-                    fmt::format("{:.6f}", s.damping_ratio()),
-                    optional_number(s.damping_ratio_std)});
+    for (const PoleEstimate& pole : poles_of(s))
+      rows.push_back(
+          {fmt::format("{}", rows.size()), fmt::format("{:.5f}", pole.natural_frequency_hz),
+           optional_number(pole.natural_frequency_std_hz),
+           fmt::format("{:.6f}", pole.damping_ratio), optional_number(pole.damping_ratio_std)});
   }
   return table_lines(rows);
 }

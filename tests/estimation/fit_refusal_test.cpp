@@ -64,6 +64,12 @@ TEST_F(FitRefusal, ADenominatorThatDoesNotStartWithOne) {
   start_.submodels[1].denominator.clear();
   expect_refused("must start with 1");
 }
+TEST_F(FitRefusal, ADenominatorThatEndsWithZeroOrIsNotFinite) {
+  start_.submodels[1].denominator.back() = 0.0;
+  expect_refused("not end with 0");
+  start_.submodels[1].denominator.back() = std::nan("");
+  expect_refused("must be finite");
+}
 TEST_F(FitRefusal, ThreeIntegrators) {
   start_.submodels[0].integrators = 3;
   expect_refused("0, 1 or 2 integrators");

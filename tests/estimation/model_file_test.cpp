@@ -113,6 +113,21 @@ TEST_F(ModelFile, RoundTripsEveryBit) {
   EXPECT_EQ(Json::parse(read.provenance_json), Json::parse(model.provenance_json));
 }
 
+TEST_F(ModelFile, KeepsThePolesOfASubmodelThatIsNoMode) {
+  AdditiveModel model = full_model();
+  Submodel& s = model.submodels[0];
+  s.poles = {{30.0, 1.0, 0.5, {}}, {120.0, 0.01, {}, {}}, {180.0, 0.02, 0.01, 1e-4}};
+  write_model(file_, model);
+  const std::vector<PoleEstimate> poles = read_model(file_).submodels[0].poles;
+  ASSERT_EQ(poles.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(poles[i].natural_frequency_hz, s.poles[i].natural_frequency_hz);
+    EXPECT_EQ(poles[i].damping_ratio, s.poles[i].damping_ratio);
+    EXPECT_EQ(poles[i].natural_frequency_std_hz, s.poles[i].natural_frequency_std_hz);
+    EXPECT_EQ(poles[i].damping_ratio_std, s.poles[i].damping_ratio_std);
+  }
+}
+
 TEST_F(ModelFile, WrittenAgainIsTheSameFile) {
   write_model(file_, full_model());
   const std::filesystem::path again = directory_ / "again.json";

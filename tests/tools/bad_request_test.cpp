@@ -29,7 +29,6 @@ TEST_F(BadRequest, WhatIsNotInThisVersionSaysSo) {
   fail({"run", config_, "-o", name("x.slog"), "--dashboard", "8080"}, 2, "not in this version");
   fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
   fail({"import", "x.mat", "-o", "frf.h5"}, 2, "not in this version");
-  fail({"fit", "frf.h5", "-o", "m.json", "--submodel", "2,0,0"}, 2, "not in this version");
   fail({"export", "model.json", "-o", name("m.mat")}, 2, ".json, .h5 and .csv");
 }
 
@@ -45,6 +44,12 @@ TEST_F(BadRequest, WhatAModelHasNot) {
   fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1", "z1"}, 2, "'z1' is no input");
   fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1"}, 2, "--driving-point");
   fail({"export", file, "-o", name("m.h5")}, 2, "submodel 0: its poles");
+}
+
+TEST_F(BadRequest, SubmodelsThatAreNone) {
+  fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "2,0,0"}, 2,
+       "--submodel: '2,0,0': '2' is no key=value; write for example n=4,m=3");
+  fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "n=2,m=3"}, 2, "write at most 2");
 }
 
 TEST_F(BadRequest, MissingFiles) {
@@ -81,6 +86,13 @@ TEST_F(BadRequest, Configurations) {
   wrong("realization: 3 ", "realization: 4 ", "hold back one that is measured");
   wrong("stage: small_stage.yaml", "stage: nowhere.yaml", "bad.yaml:4:8: stage: there is no file");
   wrong("direct_term: full", "hold: perfect", "write one of none, phase, sinc, exact, by_frf");
+  wrong("direct_term: full", "submodels: [{n: 2, m: 3}]", "m=3 is above n + l = 2");
+  wrong("direct_term: full", "submodels: [{order: 2}]", "unknown key 'order'");
+  wrong("direct_term: full", "submodels: [{n: 17}]", "n: an order is a whole number from 0 to 16");
+  wrong("direct_term: full", "submodels: [{n: many}]", "n: ");
+  wrong("direct_term: full", "submodels: [{n: 2, damping_ratio: [2]}]", "damping_ratio");
+  wrong("rigid_body: suspension", "rigid_body: full", "goes with rigid_body: suspension");
+  wrong("suspension_hz: [0.4, 0.5]", "suspension_hz: [0.4, -1]", "suspension_hz");
   write_bytes(at("cut.yaml"), read_bytes(config_).substr(0, 320));
   fail({"design", name("cut.yaml"), "-o", name("e.h5")}, 2, "cut.yaml:");
   write_bytes(at("binary.yaml"), std::string("\x7F"

@@ -11,6 +11,7 @@
 #include "excitation/hdf5_file.hpp"
 #include "frf/hold_compensation.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tools/submodel_text.hpp"
 
 namespace stageid {
 namespace {
@@ -43,8 +44,8 @@ TEST(FitRequest, AMeasuredResponseIsFittedExactlyWithEstimatedDelay) {
   EXPECT_EQ(setup.options.hold, HoldModel::exact);
   EXPECT_EQ(setup.options.delay, DelayModel::estimate);
   EXPECT_EQ(setup.options.weighting, Weighting::noise_variance);
-  EXPECT_TRUE(setup.structure.rigid_body);
-  EXPECT_FALSE(setup.structure.general_damping);
+  EXPECT_TRUE(setup.structure.common.rigid_body);
+  EXPECT_FALSE(setup.structure.common.general_damping);
   EXPECT_EQ(setup.selection.exactly, 0);
   EXPECT_TRUE(setup.selection.modes.empty());
 }
@@ -203,10 +204,75 @@ TEST(FitRequest, RanksAreWordsOrNumbers) {
   request.rigid_body = "3";
   request.residue_rank = "1";
   const FitSetup setup = make_fit_setup(request, measured());
-  EXPECT_TRUE(setup.structure.rigid_body);
+  EXPECT_TRUE(setup.structure.common.rigid_body);
   EXPECT_EQ(setup.options.rigid_body_rank, 3);
   EXPECT_EQ(setup.options.residue_rank, 1);
   EXPECT_NE(setup.request_json.find("\"residue_rank\":\"1\""), std::string::npos);
+}
+
+TEST(FitRequest, SubmodelsStandAloneUnlessMoreIsAsked) {
+  FitRequest request;
+  request.submodels = {parse_submodel("n=1,m=0,f=15")};
+  FitSetup setup = make_fit_setup(request, measured());
+  EXPECT_FALSE(setup.structure.common.rigid_body);
+  EXPECT_TRUE(setup.selection.keep_modes);
+  EXPECT_TRUE(setup.selection.modes.empty());
+  EXPECT_EQ(setup.structure.submodels.size(), 1U);
+  EXPECT_THAT(setup.request_json, HasSubstr("\"submodels\":[\"l=0,n=1,m=0,f=15\"]"));
+  EXPECT_THAT(setup.request_json, HasSubstr("\"modes\":\"none\","));
+  request.modes = "auto";
+  request.rigid_body = "full";
+  setup = make_fit_setup(request, measured());
+  EXPECT_TRUE(setup.structure.common.rigid_body);
+  EXPECT_FALSE(setup.selection.keep_modes);
+}
+
+TEST(FitRequest, ASuspensionStandsInsteadOfTheRigidBody) {
+  FitRequest request;
+  request.rigid_body = "suspension";
+  FitSetup setup = make_fit_setup(request, measured());
+  EXPECT_FALSE(setup.structure.common.rigid_body);
+  EXPECT_TRUE(setup.structure.suspension);
+  EXPECT_TRUE(setup.structure.suspension_hz.empty());
+  request.rigid_body = "suspension:0.4:0.5";
+  setup = make_fit_setup(request, measured());
+  EXPECT_EQ(setup.structure.suspension_hz, (std::vector<double>{0.4, 0.5}));
+}
+
+TEST(FitRequest, StructuresThatAreNoneAreRefusedByTheirFlag) {
+  const auto error_of = [](const FitRequest& request) -> std::string {
+    try {
+      make_fit_setup(request, measured());
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  FitRequest request;
+  for (const char* text : {"suspension:", "suspension:10", "suspension:0.4:", "suspension0.4"}) {
+    request.rigid_body = text;
+    EXPECT_THAT(error_of(request), HasSubstr("below the lowest line, 10 Hz")) << text;
+  }
+  request = {};
+  request.rigid_body = request.modes = "none";
+  EXPECT_THAT(error_of(request), HasSubstr("--modes: 'none'"));
+  request = {};
+  request.submodels = {parse_submodel("l=1,n=0")};
+  EXPECT_EQ(error_of(request), "");
+  request.rigid_body = "full";
+  EXPECT_THAT(error_of(request), HasSubstr("--submodel: 2 terms with integrators"));
+  request = {};
+  request.submodels = {parse_submodel("n=2,m=2")};
+  request.direct_term = "full";
+  EXPECT_THAT(error_of(request), HasSubstr("--submodel: 2 biproper"));
+  request = {};
+  request.submodels = {parse_submodel("n=2,f=600")};
+  EXPECT_THAT(error_of(request), HasSubstr("--submodel: 600 Hz is not below"));
+  request.submodels = {parse_submodel("n=4,m=3")};
+  request.residue_rank = "1";
+  EXPECT_THAT(error_of(request), HasSubstr("not for --submodel l=0,n=4,m=3"));
+  request.submodels = {parse_submodel("n=2,m=1"), parse_submodel("n=0")};
+  EXPECT_EQ(error_of(request), "");
 }
 
 TEST(FitRequest, TheRequestIsNamedWhole) {

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace stageid {
+
+/// The whole text as a finite number, or nothing.
+std::optional<double> to_number(std::string_view text);
+
+/// @throws std::invalid_argument "FLAG: 'given'; write RIGHT"
+[[noreturn]] void refuse(const char* flag, const std::string& given, const std::string& right);
+
+/// @throws std::invalid_argument "FLAG: 'word'; write one of ..." with the nearest of them
+[[noreturn]] void refuse_word(const char* flag, const std::string& word,
+                              const std::vector<std::string>& names);
+
+/// The enumerator whose name stands at its place in `names`. @throws as refuse_word()
+template <typename Enum>
+Enum pick(const char* flag, const std::string& word, const std::vector<std::string>& names) {
+  const auto found = std::find(names.begin(), names.end(), word);
+  if (found == names.end()) refuse_word(flag, word, names);
+  return static_cast<Enum>(found - names.begin());
+}
+
+}  // namespace stageid
