@@ -28,6 +28,7 @@ struct Submodel {
   std::optional<double> natural_frequency_std_hz;
   std::optional<double> damping_ratio_std;
   std::optional<int> residue_rank = {};  ///< that the numerators were held at; none: free
+  std::vector<Eigen::MatrixXd> numerator_std = {};  ///< of every entry of numerator; empty: unknown
 
   /// n = 2 with complex poles: 1/(2 pi sqrt(a_2)) and a_1/(2 sqrt(a_2)).
   bool is_mode() const noexcept { return integrators == 0 && denominator.size() == 3; }
