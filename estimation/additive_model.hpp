@@ -46,7 +46,8 @@ struct Submodel {
   std::vector<PoleEstimate> poles = {};  ///< of a submodel with poles that is no mode, rising
 
   SubmodelRole role = SubmodelRole::searched;
-  bool frequency_held = false;  ///< a mode whose a_2 stays where it is
+  bool frequency_held = false;                      ///< a mode whose a_2 stays where it is
+  std::vector<Eigen::MatrixXd> numerator_std = {};  ///< of every entry of numerator; empty: unknown
 
   /// n = 2 with complex poles: 1/(2 pi sqrt(a_2)) and a_1/(2 sqrt(a_2)).
   bool is_mode() const noexcept { return integrators == 0 && denominator.size() == 3; }

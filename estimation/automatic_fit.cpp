@@ -11,19 +11,18 @@
 #include <thread>
 
 #include "estimation/fit_problem.hpp"
+#include "estimation/mode_worth.hpp"
 #include "estimation/pole_relocation.hpp"
 #include "estimation/residual_modes.hpp"
 
 namespace stageid {
 namespace {
 
-constexpr int kGrowthIterations = 12;    // a mode that is still moving is finished later
-constexpr std::size_t kCandidates = 4;   // tried before it is believed that no mode is missing
-constexpr std::size_t kShareAtOnce = 5;  // models of many modes grow by a fifth at a time
-constexpr int kMostGrown = 40;           // modes; more are placed at once, and only then grown
-// Part of the weighted power of the response below which a residual is rounding: no more precise
-// measurement exists (-160 dB), and without a limit noise-free data would ask for modes for ever.
-constexpr double kRounding = 1e-16;
+constexpr int kGrowthIterations = 12;       // a mode that is still moving is finished later
+constexpr std::size_t kCandidates = 4;      // tried before it is believed that no mode is missing
+constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
+constexpr double kSettledDeviations = 0.1;  // where ways to a number of modes are compared
+constexpr int kMostGrown = 40;              // modes; more are placed at once, and only then grown
 
 /// Grows and prunes a model; every decision is written down.
 class AutomaticFit {
@@ -43,13 +42,13 @@ class AutomaticFit {
     quick_.max_iterations = std::min(kGrowthIterations, options.max_iterations);
     quick_.gradient_tolerance = 1e-5;
     quick_.step_tolerance = 1e-7;
-    quick_.deviation_tolerance = 0.1;
     quick_.method = FitMethod::gn;  // the same minimum; the refined-IV iteration does the final fit
     quick_.residue_rank = quick_.rigid_body_rank = 0;
+    worth_ = ModeWorth(frf, structure, quick_.user_weights);
+    quick_.deviation_tolerance = worth_.deviation_tolerance();
     threads_ = options.threads > 0
                    ? options.threads
                    : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-    signal_ = (quick_.user_weights.array() * frf.response.cwiseAbs2().array()).sum();
   }
 
   /// The fit that every search begins with.
@@ -70,7 +69,7 @@ class AutomaticFit {
     target_ = selection_.exactly + surplus;
     if (best_.status == FitStatus::singular || selection_.keep_modes) return;
     // Two peaks of one mode keep a fit from converging, and what is left looks like more modes.
-    if (selection_.exactly == 0) merge();
+    if (selection_.exactly == 0) reduce();
     grow();
     reduce();
     if (selection_.exactly == 0) {
@@ -78,13 +77,14 @@ class AutomaticFit {
       return;
     }
     quick_.max_iterations = options_.max_iterations;
+    quick_.deviation_tolerance = kSettledDeviations;
     adopt(fit_additive_model(frf_, best_.model, quick_));
     say("{} modes, by way of {}: cost {:.6g}", count_modes(best_.model), target_,
         best_.model.fit.cost);
   }
 
   double cost() const { return best_.model.fit.cost; }
-  bool at_rounding() const { return squares(best_) <= kRounding * signal_; }
+  bool at_rounding() const { return worth_.at_rounding(best_); }
 
   FitResult finish() {
     sort_modes(best_.model);
@@ -141,41 +141,10 @@ class AutomaticFit {
     return static_cast<int>(std::min<Eigen::Index>(most_modes(frf_, structure_), selection_.most));
   }
 
-  /// sum W |E|^2, not below rounding.
-  double squares(const FitResult& fit) const {
-    return std::max(2.0 * static_cast<double>(frf_.lines()) * fit.model.fit.cost,
-                    kRounding * signal_);
-  }
-
-  /// What a mode's parameters cost in units of 2 ln(likelihood): ln(data) for each of them (BIC), and
-  /// 2 ln(lines) for the choice of its place among them (extended BIC, Chen and Chen 2008): without
-  /// it the best of thousands of places is taken where none is right.
-  double cost_of_modes(int modes) const {
-    const double data = 2.0 * static_cast<double>(frf_.response.size());
-    const double numerators = structure_.general_damping ? 2.0 : 1.0;
-    const double parameters = 2.0 + numerators * static_cast<double>(frf_.response.rows());
-    return modes *
-           (parameters * std::log(data) + 2.0 * std::log(static_cast<double>(frf_.lines())));
-  }
-
-  /// Information criterion with the scale of the variances unknown. Where the variances are right it
-  /// decides like the one with known variance; where the model cannot be right, it does not chase
-  /// errors.
-  double bic(const FitResult& fit) const {
-    const double data = 2.0 * static_cast<double>(frf_.response.size());
-    return data * std::log(squares(fit)) + cost_of_modes(count_modes(fit.model));
-  }
-
   bool wanted_more() const {
     const int modes = count_modes(best_.model);
     if (selection_.exactly > 0) return modes < target_;
-    return modes < affordable_modes() && squares(best_) > kRounding * signal_;
-  }
-
-  /// What sum W |E|^2 must fall by for `modes` more modes to be worth their parameters.
-  double price(int modes) const {
-    const double data = 2.0 * static_cast<double>(frf_.response.size());
-    return squares(best_) * -std::expm1(-cost_of_modes(modes) / data);
+    return modes < affordable_modes() && !worth_.at_rounding(best_);
   }
 
   /// Adds modes while they are worth it. @returns true if any was added.
@@ -198,14 +167,14 @@ class AutomaticFit {
     const bool demanded = selection_.exactly > kMostGrown;
     std::vector<ResidualMode> clear;
     for (const ResidualMode& candidate : candidates)
-      if (demanded || candidate.gain > 4.0 * price(1)) clear.push_back(candidate);
+      if (demanded || candidate.gain > 4.0 * worth_.price(best_)) clear.push_back(candidate);
     const int room =
         (selection_.exactly > 0 ? target_ : affordable_modes()) - count_modes(best_.model);
     if (room < static_cast<int>(clear.size())) clear.resize(static_cast<std::size_t>(room));
     if (clear.size() < 2) return false;
     FitResult trial = fit_with(clear);
     if (trial.status == FitStatus::singular) return false;
-    if (!demanded && !(bic(trial) < bic(best_))) return false;
+    if (!demanded && !(worth_.criterion(trial) < worth_.criterion(best_))) return false;
     for (const ResidualMode& candidate : clear)
       say("added {:.6g} Hz, one of {} together: cost {:.6g} -> {:.6g}", candidate.mode.frequency_hz,
           clear.size(), best_.model.fit.cost, trial.model.fit.cost);
@@ -225,7 +194,7 @@ class AutomaticFit {
     bool found = false;
     for (const ResidualMode& candidate : candidates) {
       // The matched filter sees most of what a fit gains; far below the price none is needed.
-      if (selection_.exactly == 0 && candidate.gain < 0.2 * price(1)) continue;
+      if (selection_.exactly == 0 && candidate.gain < 0.2 * worth_.price(best_)) continue;
       FitResult trial = fit_with({candidate});
       if (trial.status == FitStatus::singular) continue;
       const bool better = !found || trial.model.fit.cost < best_trial.model.fit.cost;
@@ -233,14 +202,14 @@ class AutomaticFit {
       found = true;
       // The first candidate is usually right; the others are asked only where it is not worth its
       // parameters.
-      if (bic(best_trial) < bic(best_)) break;
+      if (worth_.criterion(best_trial) < worth_.criterion(best_)) break;
     }
     if (!found) {
       say("no further mode: nothing in the weighted residual is worth a mode's parameters (BIC)");
       return false;
     }
     const Submodel& added = best_trial.model.submodels.back();
-    if (selection_.exactly == 0 && !(bic(best_trial) < bic(best_))) {
+    if (selection_.exactly == 0 && !(worth_.criterion(best_trial) < worth_.criterion(best_))) {
       say("no further mode: the best, {:.6g} Hz, would lower the cost by {:.2g} % and is not worth "
           "its parameters (BIC)",
           added.natural_frequency_hz(),
@@ -304,7 +273,7 @@ class AutomaticFit {
       one = mode_submodel(frf_, structure_, {f, damping, 1});
       model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(j));
       FitResult merged = fit_additive_model(frf_, model, quick_);
-      if (!(bic(merged) < bic(best_))) continue;
+      if (!(worth_.criterion(merged) < worth_.criterion(best_))) continue;
       say("merged {:.6g} and {:.6g} Hz: cost {:.6g} -> {:.6g}", all[i].natural_frequency_hz(),
           all[j].natural_frequency_hz(), best_.model.fit.cost, merged.model.fit.cost);
       adopt(std::move(merged));
@@ -322,7 +291,8 @@ class AutomaticFit {
       if (selection_.exactly > 0 && surplus <= 0) return;
       // A refit regains part of what the removal costs: ask twice the price here, and BIC
       // afterwards.
-      const double limit = surplus > 0 ? std::numeric_limits<double>::infinity() : 2.0 * price(1);
+      const double limit =
+          surplus > 0 ? std::numeric_limits<double>::infinity() : 2.0 * worth_.price(best_);
       const std::size_t most = surplus > 0 ? static_cast<std::size_t>((surplus + 1) / 2) : at_once;
       const std::vector<std::size_t> out = unworthy(limit, most);
       if (out.empty()) return;
@@ -330,7 +300,7 @@ class AutomaticFit {
       for (const std::size_t i : std::views::reverse(out))
         model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(i));
       FitResult without = fit_additive_model(frf_, model, quick_);
-      if (surplus <= 0 && !(bic(without) < bic(best_))) {
+      if (surplus <= 0 && !(worth_.criterion(without) < worth_.criterion(best_))) {
         at_once = out.size() / 2;
         continue;
       }
@@ -363,9 +333,9 @@ class AutomaticFit {
   const ModeSelection& selection_;
   const FitOptions& options_;
   FitOptions quick_;
+  ModeWorth worth_;
   int target_;  ///< modes to grow to where their number is given
   int threads_ = 1;
-  double signal_ = 0.0;
   FitResult best_;
   std::vector<std::string> decisions_;
   std::vector<double> history_;

@@ -27,12 +27,13 @@ bool weighs_by_variance(Weighting weighting) {
 }
 
 /// Delta method, facts.md section 10:  df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
-void fill_deviations(const Eigen::MatrixXd& covariance, AdditiveModel& model) {
+void fill_deviations(const ParameterCovariance& covariance, AdditiveModel& model) {
   Eigen::Index first = 0;
+  Eigen::Index f = 0;
   for (Submodel& s : model.submodels) {
     const auto order = static_cast<Eigen::Index>(s.denominator.size()) - 1;
     if (s.is_mode()) {
-      const Eigen::Matrix2d C = covariance.block<2, 2>(first, first);
+      const Eigen::Matrix2d C = covariance.globals.block<2, 2>(first, first);
       const double a1 = s.denominator[1];
       const double a2 = s.denominator[2];
       const Eigen::Vector2d df(0.0, -0.5 * s.natural_frequency_hz() / a2);
@@ -42,19 +43,28 @@ void fill_deviations(const Eigen::MatrixXd& covariance, AdditiveModel& model) {
       if (C(1, 1) > 0.0 && C(0, 0) > 0.0)
         s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
     } else if (order > 0) {
-      const Eigen::MatrixXd C = covariance.block(first, first, order, order);
+      const Eigen::MatrixXd C = covariance.globals.block(first, first, order, order);
       if (C.diagonal().minCoeff() > 0.0)
         s.poles = pole_estimates(Eigen::Map<const Eigen::VectorXd>(&s.denominator[1], order), C);
     }
     first += order;
+    for (const Eigen::MatrixXd& B : s.numerator)
+      s.numerator_std.emplace_back(
+          covariance.numerator_variance.col(f++).cwiseMax(0.0).cwiseSqrt().reshaped(B.rows(),
+                                                                                    B.cols()));
   }
 }
 
 void use_covariance(const ParameterCovariance& covariance, bool likelihood, FitResult& result) {
-  if (covariance.response_variance.size() == 0 || !covariance.response_variance.allFinite() ||
-      !covariance.globals.allFinite())
+  if (covariance.response_variance.size() == 0) return;
+  if (!covariance.globals.allFinite() || !covariance.numerator_variance.allFinite() ||
+      !covariance.response_variance.allFinite()) {
+    result.decisions.emplace_back(
+        "no standard deviations: the covariance of the parameters is not finite; some of them are "
+        "not in the data");
     return;
-  if (covariance.globals.size() > 0) fill_deviations(covariance.globals, result.model);
+  }
+  fill_deviations(covariance, result.model);
   result.response_variance = covariance.response_variance;
   if (likelihood && covariance.residual_scale > 1.0)
     result.decisions.push_back(
@@ -63,24 +73,23 @@ void use_covariance(const ParameterCovariance& covariance, bool likelihood, FitR
                     covariance.residual_scale, std::sqrt(covariance.residual_scale)));
 }
 
-ParameterCovariance diagonal_covariance(const FrfEstimate& frf, const FitOptions& options,
-                                        const FitProblem& problem, const FitParameters& beta,
-                                        const std::vector<BasisGroup>& groups, const Residual& E,
-                                        const std::vector<Eigen::Index>& frozen) {
-  const ArrowSystem gn(problem, beta, groups, FitMethod::gn);
+/// What is known of the noise under diagonal weights. The given variance is taken as it is: the
+/// covariance is linear in it, and smoothing would only lower its peaks. Nonlinear distortion moves
+/// an estimate from realization to realization as noise does: the total variance counts where there
+/// is one.
+DataNoise data_noise(const FrfEstimate& frf, const FitOptions& options) {
   const Eigen::MatrixXd& known =
-      frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
-  const double dof = frf.noise_variance.size() > 0 ? frf.noise_dof : frf.total_dof;
+      frf.total_variance.size() > 0 ? frf.total_variance : frf.noise_variance;
   DataNoise noise;
   if (weighs_by_variance(options.weighting)) {
     noise.knowledge = VarianceKnowledge::weights;
-    noise.variance = problem.W.cwiseInverse();
+    noise.variance = weighed_variance(frf, options.weighting);
   } else if (known.size() > 0 && known.minCoeff() > 0.0) {
     noise.knowledge = VarianceKnowledge::given;
-    noise.variance = smoothed_variance(frf, known, dof);
+    noise.variance = known;
   }
   if (noise.knowledge != VarianceKnowledge::none) noise.correlation = output_correlation(frf);
-  return parameter_covariance(problem, beta, groups, E, gn, noise, frozen);
+  return noise;
 }
 
 /// With free numerators.
@@ -91,7 +100,9 @@ ParameterCovariance free_covariance(const FrfEstimate& frf, const FitOptions& op
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
   const Residual& E = iteration.E;
   if (!matrices)
-    return diagonal_covariance(frf, options, problem, beta, groups, E, iteration.frozen);
+    return parameter_covariance(problem, beta, groups, E,
+                                ArrowSystem(problem, beta, groups, FitMethod::gn),
+                                data_noise(frf, options), iteration.frozen);
   return joint_covariance(
       problem, beta, groups, E, JointEquations(problem, *matrices, beta, groups, E),
       weighs_by_variance(options.weighting) ? VarianceKnowledge::weights : VarianceKnowledge::none,
@@ -160,16 +171,12 @@ ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& op
                                     const FitProblem& problem, FitParameters& beta,
                                     IterationResult& iteration, FitResult& result) {
   const bool likelihood = weighs_by_variance(options.weighting);
-  LowRankResult constrained = iterate_low_rank(problem, beta, options, likelihood);
+  LowRankResult constrained = iterate_low_rank(problem, beta, options, data_noise(frf, options));
   result.decisions.push_back(rank_decision(problem, iteration, constrained, likelihood));
   constrained.iteration.cost.insert(constrained.iteration.cost.begin(), iteration.cost.begin(),
                                     iteration.cost.end());
   constrained.iteration.iterations += iteration.iterations;
   iteration = std::move(constrained.iteration);
-  if (options.uncertainty && frf.residual_covariance_re.size() > 0)
-    result.decisions.emplace_back(
-        "standard deviations with residues of given rank take the outputs' noise as "
-        "uncorrelated");
   for (std::size_t i = 0; i < constrained.ranks.size(); ++i)
     if (constrained.ranks[i] > 0) result.model.submodels[i].residue_rank = constrained.ranks[i];
   return std::move(constrained.covariance);
@@ -180,6 +187,7 @@ void forget_results(AdditiveModel& model) {
   for (Submodel& s : model.submodels) {
     s.natural_frequency_std_hz.reset();
     s.damping_ratio_std.reset();
+    s.numerator_std.clear();
     s.residue_rank.reset();
     s.poles.clear();
   }

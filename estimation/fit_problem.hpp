@@ -90,10 +90,10 @@ Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& grou
 /// @throws std::invalid_argument if what the weighting needs is missing, zero or not finite.
 Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options);
 
-/// `variance` (noise or total, of `frf`) averaged over as many neighbouring lines as give about 25
-/// degrees of freedom; as it is where it has them, or where `dof` is 0 (unknown).
-Eigen::MatrixXd smoothed_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
-                                  double dof);
+/// The variance v, n_c x N, for which W v W is E{W C W} on the average, W = make_weights() of a
+/// variance that is itself an estimate: weight and variance come from the same sample. Empty where
+/// variances do not weigh, or are exact (their degrees of freedom unknown).
+Eigen::MatrixXd weighed_variance(const FrfEstimate& frf, Weighting weighting);
 
 /// Runs task(0) .. task(count - 1) on up to `threads` threads. Which thread runs a task does not
 /// matter to the result.

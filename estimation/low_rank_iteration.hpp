@@ -2,18 +2,15 @@
 
 #include "estimation/fit_iteration.hpp"
 #include "estimation/parameter_covariance.hpp"
-#include "estimation/residue_form.hpp"
 
 namespace stageid {
 
 /// The outcome of a fit with residues of given rank.
 struct LowRankResult {
   IterationResult iteration;
-  Eigen::Index parameters = 0;  ///< free ones
-  std::vector<int> ranks;       ///< of every submodel; 0: free
-  /// Covariance of denominators and delays and of the response, for maximum likelihood weights or, if
-  /// these are not known to be right, scaled by the residual. Empty where the system is singular.
-  ParameterCovariance covariance;
+  Eigen::Index parameters = 0;     ///< free ones
+  std::vector<int> ranks;          ///< of every submodel; 0: free
+  ParameterCovariance covariance;  ///< see low_rank_covariance(); empty unless asked for
 };
 
 /// Minimizes the cost over numerators whose ranks are given (FitOptions::residue_rank and
@@ -24,6 +21,6 @@ struct LowRankResult {
 /// an unconstrained one does. Source: facts.md section 11.
 /// @throws std::invalid_argument for a rank that a submodel cannot have
 LowRankResult iterate_low_rank(const FitProblem& problem, FitParameters& beta,
-                               const FitOptions& options, bool likelihood);
+                               const FitOptions& options, const DataNoise& noise);
 
 }  // namespace stageid

@@ -27,6 +27,8 @@ Json submodel_to_json(const Submodel& s) {
   out["denominator"] = s.denominator;
   out["numerator"] = Json::array();
   for (const Eigen::MatrixXd& B : s.numerator) out["numerator"].push_back(matrix_to_json(B));
+  for (const Eigen::MatrixXd& std : s.numerator_std)
+    out["numerator_std"].push_back(matrix_to_json(std));
   if (s.is_mode()) {
     out["natural_frequency_hz"] = s.natural_frequency_hz();
     out["damping_ratio"] = s.damping_ratio();
@@ -76,6 +78,20 @@ PoleEstimate pole_from_json(const JsonNode& node) {
   return pole;
 }
 
+/// numerator_std: as many matrices as `numerator`, no entry negative.
+std::vector<Eigen::MatrixXd> deviations_from_json(const JsonNode& node,
+                                                  const std::vector<Eigen::MatrixXd>& numerator) {
+  const JsonNode list = node.member("numerator_std");
+  std::vector<Eigen::MatrixXd> out;
+  for (const JsonNode& matrix : list.elements()) {
+    out.push_back(matrix_from_json(matrix, static_cast<std::size_t>(numerator[0].rows()),
+                                   static_cast<std::size_t>(numerator[0].cols())));
+    if (out.back().minCoeff() < 0.0) matrix.fail("must not hold a negative standard deviation");
+  }
+  if (out.size() != numerator.size()) list.fail("must have as many matrices as numerator");
+  return out;
+}
+
 Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::size_t n_inputs) {
   Submodel s;
   s.integrators = static_cast<int>(node.member("integrators").integer(0, 2));
@@ -97,6 +113,7 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
   if (node.has("poles"))
     for (const JsonNode& pole : node.member("poles").elements())
       s.poles.push_back(pole_from_json(pole));
+  if (node.has("numerator_std")) s.numerator_std = deviations_from_json(node, s.numerator);
   if (node.has("residue_rank"))
     s.residue_rank = static_cast<int>(node.member("residue_rank").integer(1, 1'000'000));
   return s;

@@ -3,7 +3,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
 
 #include "estimation/weighted_products.hpp"
 
@@ -15,10 +17,11 @@ constexpr double kClearlyTooLarge = 1.5;
 // Of conjugate gradients; with their residual, variances have its square.
 constexpr double kColumnTolerance = 1e-2;
 
-/// K as an arrow: its globals with channels not eliminated, and the channel blocks.
+/// K = sum Re{J^H W C W J} with the numerators' part of the globals' columns taken away: J_a - F Z.
 struct Middle {
-  const ArrowSystem& system;
-  double scale;
+  Eigen::MatrixXd globals;
+  std::vector<Eigen::MatrixXd> cross;  ///< globals x n_f, one a channel
+  std::vector<Eigen::MatrixXd> own;    ///< n_f x n_f, one a channel
 };
 
 /// The part of those columns that the channel's numerators cannot follow: J_a - F Z, with Z the
@@ -32,73 +35,95 @@ void projected_columns(const FitProblem& problem, const FitParameters& beta,
   im -= group.F_im * Z;
 }
 
-/// Lower triangular L(k) with L L^H the correlation, (n_y n_y) x N.
-Eigen::MatrixXcd correlation_factors(const Eigen::MatrixXcd& correlation, Eigen::Index n_y) {
-  Eigen::MatrixXcd factors(correlation.rows(), correlation.cols());
-  for (Eigen::Index k = 0; k < correlation.cols(); ++k) {
-    Eigen::MatrixXcd matrix = correlation.col(k).reshaped(n_y, n_y);
-    matrix.diagonal().array() += 1e-9;  // fewer degrees of freedom than outputs: singular
-    factors.col(k) = Eigen::MatrixXcd(matrix.llt().matrixL()).reshaped();
-  }
-  return factors;
-}
-
-/// K on the globals, sum_k Re{J^H W C W J} with the outputs of one input correlated.
-Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
-                                  const std::vector<BasisGroup>& groups, const ArrowSystem& gn,
-                                  const DataNoise& noise) {
-  const Eigen::Index n_y = problem.n_outputs;
-  const auto columns = derivative_columns(problem);
-  const Eigen::MatrixXcd L = correlation_factors(noise.correlation, n_y);
-  std::vector<const BasisGroup*> group_of(static_cast<std::size_t>(problem.channels()));
-  for (const BasisGroup& group : groups)
-    for (const Eigen::Index c : group.channels) group_of[static_cast<std::size_t>(c)] = &group;
-  std::vector<Eigen::MatrixXd> parts(static_cast<std::size_t>(problem.n_inputs));
-  parallel_tasks(static_cast<int>(problem.n_inputs), problem.threads, [&](int u) {
-    std::vector<Eigen::MatrixXd> J_re(static_cast<std::size_t>(n_y));
-    std::vector<Eigen::MatrixXd> J_im(static_cast<std::size_t>(n_y));
-    for (Eigen::Index y = 0; y < n_y; ++y) {
-      const Eigen::Index c = y + n_y * u;
-      const auto at = static_cast<std::size_t>(y);
-      projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)],
-                        gn.channels()[static_cast<std::size_t>(c)].Z, c, columns, J_re[at],
-                        J_im[at]);
-      const Eigen::ArrayXd scale =
-          (problem.W.row(c).array() * noise.variance.row(c).array().sqrt()).transpose();
-      J_re[at].array().colwise() *= scale;
-      J_im[at].array().colwise() *= scale;
-    }
-    Eigen::MatrixXd& K = parts[static_cast<std::size_t>(u)];
-    K.setZero(problem.globals(), problem.globals());
-    for (Eigen::Index r = 0; r < n_y; ++r) {
-      Eigen::MatrixXd Y_re = Eigen::MatrixXd::Zero(problem.size(), problem.globals());
-      Eigen::MatrixXd Y_im = Y_re;
-      for (Eigen::Index y = r; y < n_y; ++y) {  // conj(J) L
-        const auto at = static_cast<std::size_t>(y);
-        const Eigen::ArrayXd re = L.row(y + n_y * r).real().transpose().array();
-        const Eigen::ArrayXd im = L.row(y + n_y * r).imag().transpose().array();
-        Y_re.array() += J_re[at].array().colwise() * re + J_im[at].array().colwise() * im;
-        Y_im.array() += J_re[at].array().colwise() * im - J_im[at].array().colwise() * re;
-      }
-      K.noalias() += Y_re.transpose() * Y_re;
-      K.noalias() += Y_im.transpose() * Y_im;
-    }
-  });
-  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(problem.globals(), problem.globals());
-  for (const Eigen::MatrixXd& part : parts) K += part;
-  return K;
-}
-
-/// K on the globals, the channels' noise uncorrelated.
-Eigen::MatrixXd diagonal_middle(const ArrowSystem& gn, const Middle& K) {
-  Eigen::MatrixXd middle = K.system.M_globals();
+/// The channels' noise uncorrelated: `K` are the equations with the weights W C W.
+Middle diagonal_middle(const ArrowSystem& gn, const ArrowSystem& K) {
+  Middle out;
+  out.globals = K.M_globals();
   for (std::size_t c = 0; c < gn.channels().size(); ++c) {
     const Eigen::MatrixXd& Z = gn.channels()[c].Z;
-    const ArrowSystem::Channel& k = K.system.channels()[c];
-    middle -= Z.transpose() * k.ba + k.ab * Z;
-    middle += Z.transpose() * k.bb * Z;
+    const ArrowSystem::Channel& k = K.channels()[c];
+    out.globals -= Z.transpose() * k.ba + k.ab * Z;
+    out.globals += Z.transpose() * k.bb * Z;
+    out.cross.emplace_back(k.ab - Z.transpose() * k.bb);
+    out.own.push_back(k.bb);
   }
-  return middle;
+  return out;
+}
+
+/// Globals and cross terms again, the outputs of one input correlated.
+void correlate_outputs(const FitProblem& problem, const FitParameters& beta,
+                       const std::vector<BasisGroup>& groups, const ArrowSystem& gn,
+                       const DataNoise& noise, Middle& middle) {
+  const Eigen::Index n_y = problem.n_outputs;
+  const auto columns = derivative_columns(problem);
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
+  std::vector<Eigen::MatrixXd> parts(static_cast<std::size_t>(problem.n_inputs));
+  parallel_tasks(static_cast<int>(problem.n_inputs), problem.threads, [&](int u) {
+    OutputColumns X;
+    X.re.resize(static_cast<std::size_t>(n_y));
+    X.im.resize(static_cast<std::size_t>(n_y));
+    for (Eigen::Index y = 0; y < n_y; ++y) {
+      const auto c = static_cast<std::size_t>(y + n_y * u);
+      const auto at = static_cast<std::size_t>(y);
+      projected_columns(problem, beta, *group_of[c], gn.channels()[c].Z, y + n_y * u, columns,
+                        X.re[at], X.im[at]);
+      const Eigen::ArrayXd scale = noise_scale(problem, noise, y + n_y * u);
+      X.re[at].array().colwise() *= scale;
+      X.im[at].array().colwise() *= scale;
+    }
+    const OutputColumns Y = correlated(noise.correlation, X);
+    parts[static_cast<std::size_t>(u)] = correlated_gram(X, Y);
+    for (Eigen::Index y = 0; y < n_y; ++y) {
+      const auto c = static_cast<std::size_t>(y + n_y * u);
+      const auto at = static_cast<std::size_t>(y);
+      const Eigen::ArrayXd scale = noise_scale(problem, noise, y + n_y * u);
+      const Eigen::MatrixXd F_re = group_of[c]->F_re.array().colwise() * scale;
+      const Eigen::MatrixXd F_im = group_of[c]->F_im.array().colwise() * scale;
+      middle.cross[c] = Y.re[at].transpose() * F_re + Y.im[at].transpose() * F_im;
+    }
+  });
+  middle.globals.setZero();
+  for (const Eigen::MatrixXd& part : parts) middle.globals += part;
+}
+
+/// What is known of one channel's numerators: Cov(nu_c) and Cov(a, nu_c), and Z.
+struct ChannelCovariance {
+  Eigen::MatrixXd own;
+  Eigen::MatrixXd cross;
+  Eigen::MatrixXd Z;
+};
+
+/// The variances of the channel's numerators and response; out.globals stands.
+void fill_channel(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
+                  Eigen::Index c, const ChannelCovariance& channel, ParameterCovariance& out) {
+  Eigen::VectorXd numerators = channel.own.diagonal();
+  Eigen::VectorXd total = quadratic(group.F_re, group.F_im, channel.own, group.F_re, group.F_im);
+  if (problem.globals() > 0) {
+    const Eigen::MatrixXd& Z = channel.Z;
+    numerators +=
+        (Z * out.globals).cwiseProduct(Z).rowwise().sum() - 2.0 * (Z * channel.cross).diagonal();
+    Eigen::MatrixXd J_re;
+    Eigen::MatrixXd J_im;
+    projected_columns(problem, beta, group, Z, c, derivative_columns(problem), J_re, J_im);
+    total += quadratic(J_re, J_im, out.globals, J_re, J_im);
+    total += 2.0 * quadratic(J_re, J_im, channel.cross, group.F_re, group.F_im);
+  }
+  out.numerator_variance.row(c) = numerators.transpose();
+  out.response_variance.row(c) = total.transpose();
+}
+
+/// Calls task(group, channel) for all channels; the result is empty unless all return true.
+void fill_channels(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                   ParameterCovariance& out,
+                   const std::function<bool(const BasisGroup&, Eigen::Index)>& task) {
+  out.numerator_variance.setZero(problem.channels(), problem.functions());
+  out.response_variance.setZero(problem.channels(), problem.size());
+  std::atomic<bool> determined = true;
+  for (const BasisGroup& group : groups)
+    parallel_tasks(static_cast<int>(group.channels.size()), problem.threads, [&](int r) {
+      if (!task(group, group.channels[static_cast<std::size_t>(r)])) determined = false;
+    });
+  if (!determined) out = {};
 }
 
 }  // namespace
@@ -137,25 +162,34 @@ Eigen::VectorXd quadratic(const Eigen::MatrixXd& X_re, const Eigen::MatrixXd& X_
          (X_im * C).cwiseProduct(Y_im).rowwise().sum();
 }
 
-Eigen::MatrixXcd output_correlation(const FrfEstimate& frf) {
-  if (frf.residual_covariance_re.size() == 0) return {};
-  const Eigen::Index n_y = frf.n_outputs();
-  Eigen::MatrixXcd out(n_y * n_y, frf.lines());
-  for (Eigen::Index k = 0; k < frf.lines(); ++k)
-    for (Eigen::Index i = 0; i < n_y; ++i)
-      for (Eigen::Index l = 0; l < n_y; ++l) {
-        const double power = frf.residual_covariance_re(i * (n_y + 1), k) *
-                             frf.residual_covariance_re(l * (n_y + 1), k);
-        const Eigen::Index at = i + n_y * l;
-        if (i == l)
-          out(at, k) = 1.0;
-        else
-          out(at, k) = power > 0.0 ? std::complex<double>(frf.residual_covariance_re(at, k),
-                                                          frf.residual_covariance_im(at, k)) /
-                                         std::sqrt(power)
-                                   : 0.0;
-      }
+std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
+                                                  const std::vector<BasisGroup>& groups) {
+  std::vector<const BasisGroup*> out(static_cast<std::size_t>(problem.channels()));
+  for (const BasisGroup& group : groups)
+    for (const Eigen::Index c : group.channels) out[static_cast<std::size_t>(c)] = &group;
   return out;
+}
+
+Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c) {
+  const Eigen::ArrayXd W = problem.W.row(c).transpose().array();
+  if (noise.variance.size() == 0) return W.sqrt();
+  return W * noise.variance.row(c).transpose().array().sqrt();
+}
+
+std::optional<ArrowSystem> middle_equations(const FitProblem& problem, const FitParameters& beta,
+                                            const std::vector<BasisGroup>& groups,
+                                            const DataNoise& noise) {
+  if (noise.variance.size() == 0) return std::nullopt;
+  FitProblem sandwich = problem;
+  sandwich.W = problem.W.cwiseProduct(problem.W).cwiseProduct(noise.variance);
+  return ArrowSystem(sandwich, beta, groups, FitMethod::gn);
+}
+
+double covariance_scale(const FitProblem& problem, const Residual& E, Eigen::Index parameters,
+                        const DataNoise& noise) {
+  if (noise.knowledge == VarianceKnowledge::given) return 1.0;
+  return residual_scale(residual_per_degree(problem, E, parameters),
+                        noise.knowledge == VarianceKnowledge::weights);
 }
 
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
@@ -164,50 +198,27 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
                                          const std::vector<Eigen::Index>& frozen) {
   ParameterCovariance out;
   if (!gn.regular()) return out;
-  if (noise.knowledge != VarianceKnowledge::given)
-    out.residual_scale = residual_scale(residual_per_degree(problem, E, problem.parameters()),
-                                        noise.knowledge == VarianceKnowledge::weights);
+  out.residual_scale = covariance_scale(problem, E, problem.parameters(), noise);
+  const double half = 0.5 * out.residual_scale;
 
-  FitProblem sandwich;
-  std::vector<ArrowSystem> other;
-  if (noise.knowledge == VarianceKnowledge::given) {
-    sandwich = problem;
-    sandwich.W = problem.W.cwiseProduct(problem.W).cwiseProduct(noise.variance);
-    other.emplace_back(sandwich, beta, groups, FitMethod::gn);
-  }
-  const Middle K{other.empty() ? gn : other.front(), out.residual_scale};
+  const auto other = middle_equations(problem, beta, groups, noise);
+  Middle middle = diagonal_middle(gn, other ? *other : gn);
+  if (problem.globals() > 0 && noise.correlation.size() > 0)
+    correlate_outputs(problem, beta, groups, gn, noise, middle);
   const Eigen::MatrixXd inverse = free_inverse(gn.schur(), frozen);
-  if (problem.globals() > 0) {
-    const bool correlated = noise.correlation.size() > 0 && noise.variance.size() > 0;
-    const Eigen::MatrixXd middle =
-        correlated ? correlated_middle(problem, beta, groups, gn, noise) : diagonal_middle(gn, K);
-    out.globals = 0.5 * K.scale * inverse * middle * inverse.transpose();
-  }
+  if (problem.globals() > 0) out.globals = half * inverse * middle.globals * inverse.transpose();
 
-  out.response_variance.resize(problem.channels(), problem.size());
-  const auto columns = derivative_columns(problem);
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
-  for (const BasisGroup& group : groups) {
-    parallel_tasks(static_cast<int>(group.channels.size()), problem.threads, [&](int r) {
-      const Eigen::Index c = group.channels[static_cast<std::size_t>(r)];
-      const ArrowSystem::Channel& m = gn.channels()[static_cast<std::size_t>(c)];
-      const ArrowSystem::Channel& k = K.system.channels()[static_cast<std::size_t>(c)];
-      Eigen::MatrixXd bb_inverse;
-      if (!solve_scaled(m.bb, unit, bb_inverse)) return;
-      Eigen::MatrixXd J_re;
-      Eigen::MatrixXd J_im;
-      projected_columns(problem, beta, group, m.Z, c, columns, J_re, J_im);
-      const Eigen::MatrixXd own = 0.5 * K.scale * bb_inverse * k.bb * bb_inverse;
-      const Eigen::MatrixXd cross =
-          0.5 * K.scale * inverse * (k.ab - m.Z.transpose() * k.bb) * bb_inverse;
-      Eigen::VectorXd total = quadratic(group.F_re, group.F_im, own, group.F_re, group.F_im);
-      if (problem.globals() > 0) {
-        total += quadratic(J_re, J_im, out.globals, J_re, J_im);
-        total += 2.0 * quadratic(J_re, J_im, cross, group.F_re, group.F_im);
-      }
-      out.response_variance.row(c) = total.transpose();
-    });
-  }
+  fill_channels(problem, groups, out, [&](const BasisGroup& group, Eigen::Index c) {
+    const auto at = static_cast<std::size_t>(c);
+    Eigen::MatrixXd bb_inverse;
+    if (!solve_scaled(gn.channels()[at].bb, unit, bb_inverse)) return false;
+    fill_channel(problem, beta, group, c,
+                 {half * bb_inverse * middle.own[at] * bb_inverse,
+                  half * inverse * middle.cross[at] * bb_inverse, gn.channels()[at].Z},
+                 out);
+    return true;
+  });
   return out;
 }
 
@@ -239,26 +250,17 @@ ParameterCovariance joint_covariance(const FitProblem& problem, const FitParamet
   out.globals = half * X_a;
   const Eigen::MatrixXd Z = -X.bottomRows(X.rows() - globals) * free_inverse(X_a, frozen);
 
-  out.response_variance.resize(problem.channels(), problem.size());
-  const auto columns = derivative_columns(problem);
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
-  for (const BasisGroup& group : groups) {
-    parallel_tasks(static_cast<int>(group.channels.size()), problem.threads, [&](int r) {
-      const Eigen::Index c = group.channels[static_cast<std::size_t>(r)];
-      const auto& arrow = equations.preconditioner().channels()[static_cast<std::size_t>(c)];
-      Eigen::MatrixXd own;
-      if (!solve_scaled(arrow.bb, unit, own)) return;
-      const Eigen::MatrixXd Z_c =
-          Z(Eigen::seqN(c, problem.functions(), problem.channels()), Eigen::all);
-      Eigen::MatrixXd J_re;
-      Eigen::MatrixXd J_im;
-      projected_columns(problem, beta, group, Z_c, c, columns, J_re, J_im);
-      const Eigen::VectorXd total =
-          half * quadratic(group.F_re, group.F_im, own, group.F_re, group.F_im) +
-          quadratic(J_re, J_im, out.globals, J_re, J_im);
-      out.response_variance.row(c) = total.transpose();
-    });
-  }
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(globals, problem.functions());
+  fill_channels(problem, groups, out, [&](const BasisGroup& group, Eigen::Index c) {
+    const auto& arrow = equations.preconditioner().channels()[static_cast<std::size_t>(c)];
+    Eigen::MatrixXd own;
+    if (!solve_scaled(arrow.bb, unit, own)) return false;
+    const Eigen::MatrixXd Z_c =
+        Z(Eigen::seqN(c, problem.functions(), problem.channels()), Eigen::all);
+    fill_channel(problem, beta, group, c, {half * own, none, Z_c}, out);
+    return true;
+  });
   return out;
 }
 

@@ -1,22 +1,25 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "estimation/arrow_system.hpp"
 #include "estimation/channel_equations.hpp"
+#include "estimation/correlated_outputs.hpp"
 #include "estimation/joint_equations.hpp"
 
 namespace stageid {
 
 struct ParameterCovariance {
-  Eigen::MatrixXd globals;            ///< of denominator coefficients and delays
-  Eigen::MatrixXd response_variance;  ///< E|dP|^2, n_c x N
+  Eigen::MatrixXd globals;             ///< of denominator coefficients and delays
+  Eigen::MatrixXd numerator_variance;  ///< of B, n_c x n_f
+  Eigen::MatrixXd response_variance;   ///< E|dP|^2, n_c x N
   double residual_scale = 1.0;  ///< what variances were multiplied with (unknown or too small)
 };
 
 /// What is known about the data's variance.
 enum class VarianceKnowledge : std::uint8_t {
-  weights,  ///< W is its inverse: maximum likelihood
+  weights,  ///< W is its inverse, exactly or as far as it was estimated: maximum likelihood
   given,    ///< another variance than the weights': sandwich form
   none      ///< proportional to 1/W, scaled by the residual
 };
@@ -24,21 +27,20 @@ enum class VarianceKnowledge : std::uint8_t {
 /// The noise of the data as far as it is known.
 struct DataNoise {
   VarianceKnowledge knowledge = VarianceKnowledge::none;
-  Eigen::MatrixXd variance;  ///< n_c x N; empty with `none`
+  Eigen::MatrixXd variance;  ///< n_c x N; empty: 1/W, up to a scale with `none`
   Eigen::MatrixXcd
       correlation;  ///< (n_y n_y) x N: of the outputs for one input; empty: uncorrelated
 };
 
-/// Correlation of the outputs' noise from the FRF's residual covariance; empty if it has none.
-Eigen::MatrixXcd output_correlation(const FrfEstimate& frf);
-
 /// First-order covariance of the estimate. With M = sum Re{J^H W J} and K = sum Re{J^H W C W J},
 ///   Cov(beta) = 1/2 M^-1 K M^-1,   which is [2 sum Re{J^H C^-1 J}]^-1 for W = C^-1
-/// (facts.md section 10), restricted to what is wanted by the arrow structure. The outputs' noise is
-/// correlated wherever a disturbance force causes it; diagonal weights ignore that, the covariance of
-/// denominators and delays does not.
+/// (facts.md section 10), restricted to what is wanted by the arrow structure: with Z the channel's rows
+/// of M_bb^-1 M_ba and nu what its numerators would be for given globals a,
+///   b_c = nu_c - Z a,   dP_c = (J_a - F Z) a + F nu_c.
+/// The outputs' noise is correlated wherever a disturbance force causes it; diagonal weights ignore
+/// that, the covariance does not. Noise of different inputs counts as uncorrelated.
 /// Where W is the inverse variance but the residual is clearly larger than it predicts, the covariance is
-/// raised by that ratio (`residual_scale`).
+/// raised by that ratio (`residual_scale`). Empty where numerators are not determined.
 /// @param gn the Gauss-Newton system at the estimate
 /// @param frozen globals that are not unknowns (a mode at its bound): known exactly here
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
@@ -55,7 +57,8 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
 /// variance: never smaller than the true one (Gauss-Markov), and equal to it where the correlation of
 /// the noise is real and the same on all lines, because every channel has the same functions F
 /// (Zellner, J. Am. Stat. Assoc. 57 (1962) 348). The band is right there and too wide elsewhere, never
-/// too narrow; the exact one would take a solution for every numerator.
+/// too narrow; the exact one would take a solution for every numerator. The same holds for the
+/// numerators' variances.
 ParameterCovariance joint_covariance(const FitProblem& problem, const FitParameters& beta,
                                      const std::vector<BasisGroup>& groups, const Residual& E,
                                      const JointEquations& equations, VarianceKnowledge knowledge,
@@ -70,6 +73,23 @@ double residual_per_degree(const FitProblem& problem, const Residual& E, Eigen::
 /// What variances are multiplied with: 1 where the weights are inverse variances (`likelihood`) and the
 /// residual is not clearly larger than they predict, else the residual per degree of freedom.
 double residual_scale(double per_degree, bool likelihood);
+
+/// That scale for what is known of the noise: 1 where the variance is given apart from the weights.
+double covariance_scale(const FitProblem& problem, const Residual& E, Eigen::Index parameters,
+                        const DataNoise& noise);
+
+/// The equations of which K is the matrix for uncorrelated noise, their weights W C W; none where they
+/// are the Gauss-Newton equations themselves.
+std::optional<ArrowSystem> middle_equations(const FitProblem& problem, const FitParameters& beta,
+                                            const std::vector<BasisGroup>& groups,
+                                            const DataNoise& noise);
+
+/// W C^1/2 of one channel on every line, for correlated().
+Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c);
+
+/// A channel's group, one entry a channel.
+std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
+                                                  const std::vector<BasisGroup>& groups);
 
 /// S^-1 on the free parameters, zero where one is frozen.
 Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen);

@@ -60,7 +60,7 @@ struct SmoothedCovariance {
   double dof = 0.0;
 };
 /// Residual covariance averaged over as many neighbouring lines as its inverse needs: its correlations
-/// arithmetically, its variances as in smoothed_variance(). @pre its variances are positive.
+/// arithmetically, its variances geometrically, without bias, as make_weights() does. @pre its variances are positive.
 SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf);
 
 }  // namespace stageid

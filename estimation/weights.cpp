@@ -13,6 +13,9 @@ namespace {
 /// costs 4 % of the efficiency. Smoothing costs more wherever the variance has resonances of its
 /// own.
 constexpr double kWantedDof = 25.0;
+// Degrees of freedom of a smoothed variance below which the scatter of its inverse is not finite or
+// nearly so: only where the lines are fewer than a handful.
+constexpr double kLeastTogether = 4.0;
 
 std::string channel_name(const FrfEstimate& frf, Eigen::Index c, Eigen::Index k) {
   return frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())] + " <- " +
@@ -36,6 +39,11 @@ Eigen::Index window_reach(double dof) {
   return static_cast<Eigen::Index>(std::ceil(0.5 * (lines - 1.0)));
 }
 
+/// How many of N lines lie within the reach of line k.
+Eigen::Index window_lines(Eigen::Index k, Eigen::Index reach, Eigen::Index N) {
+  return std::min<Eigen::Index>(N - 1, k + reach) - std::max<Eigen::Index>(0, k - reach) + 1;
+}
+
 /// E{g^power} of g, the geometric mean of n sample variances of true value 1 with nu complex degrees
 /// of freedom each (Gamma distributed, shape nu, mean 1).
 double expected_power(double power, double n, double nu) {
@@ -57,7 +65,7 @@ Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, doub
   Eigen::MatrixXd out(variance.rows(), N);
   for (Eigen::Index k = 0; k < N; ++k) {
     const Eigen::Index first = std::max<Eigen::Index>(0, k - half);
-    const Eigen::Index count = std::min<Eigen::Index>(N - 1, k + half) - first + 1;
+    const Eigen::Index count = window_lines(k, half, N);
     const double bias = std::log(expected_power(power, static_cast<double>(count), nu));
     out.col(k) =
         (power * logarithm.middleCols(first, count).rowwise().mean().array() - bias).exp().matrix();
@@ -65,19 +73,19 @@ Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, doub
   return out;
 }
 
-/// Smoothed variance (power 1) or its inverse (power -1), each without bias.
-Eigen::MatrixXd smoothed_variance_power(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
-                                        double dof, double power) {
+/// The inverse of the smoothed variance, without bias.
+Eigen::MatrixXd smoothed_inverse(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
+                                 double dof) {
   if (frf.residual_covariance_re.size() == 0 || &variance != &frf.noise_variance ||
       window_reach(dof) == 0)
-    return smoothed_power(variance, dof, power);
+    return smoothed_power(variance, dof, -1.0);
   // Var(G_ij) = C_E,ii [(U U^H)^-1]_jj, and only the first factor is random: smooth that one.
   const Eigen::Index n_y = frf.n_outputs();
   Eigen::MatrixXd C_E(n_y, variance.cols());
   for (Eigen::Index y = 0; y < n_y; ++y) C_E.row(y) = frf.residual_covariance_re.row(y * (n_y + 1));
-  if (!(C_E.minCoeff() > 0.0)) return smoothed_power(variance, dof, power);
-  const Eigen::ArrayXXd ratio = smoothed_power(C_E, dof, power).array() * C_E.array().pow(-power);
-  return (variance.array().pow(power) * ratio.replicate(frf.n_inputs(), 1)).matrix();
+  if (!(C_E.minCoeff() > 0.0)) return smoothed_power(variance, dof, -1.0);
+  const Eigen::ArrayXXd ratio = smoothed_power(C_E, dof, -1.0).array() * C_E.array();
+  return (ratio.replicate(frf.n_inputs(), 1) / variance.array()).matrix();
 }
 
 Eigen::MatrixXd inverse_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
@@ -92,7 +100,7 @@ Eigen::MatrixXd inverse_variance(const FrfEstimate& frf, const Eigen::MatrixXd& 
         throw std::invalid_argument(
             std::string(name) + " of " + channel_name(frf, c, k) +
             " is zero or not finite; every variance must be positive to weigh with it");
-  return smoothed_variance_power(frf, variance, dof, -1.0);
+  return smoothed_inverse(frf, variance, dof);
 }
 
 Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
@@ -112,9 +120,20 @@ Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
 
 }  // namespace
 
-Eigen::MatrixXd smoothed_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
-                                  double dof) {
-  return smoothed_variance_power(frf, variance, dof, 1.0);
+// With g the geometric mean of n sample variances of nu degrees of freedom (Gamma distributed) and W
+// proportional to 1/g, v one of the n:  E{W^2 v} / (E{W^2} E{v}) = E{v^(1-2/n)} / E{v^(-2/n)} E{v}
+//   = 1 - 2 / (n nu).
+Eigen::MatrixXd weighed_variance(const FrfEstimate& frf, Weighting weighting) {
+  const bool noise = weighting == Weighting::noise_variance;
+  const double dof = noise ? frf.noise_dof : frf.total_dof;
+  if ((!noise && weighting != Weighting::total_variance) || !(dof > 0.0)) return {};
+  Eigen::MatrixXd out = noise ? frf.noise_variance : frf.total_variance;
+  const Eigen::Index half = window_reach(dof);
+  for (Eigen::Index k = 0; k < out.cols(); ++k) {
+    const double together = dof * static_cast<double>(window_lines(k, half, out.cols()));
+    out.col(k) /= 1.0 - 2.0 / std::max(together, kLeastTogether);
+  }
+  return out;
 }
 
 SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {

@@ -1,14 +1,15 @@
 // The estimator at the paper's size: 3960 lines, 4 x 13 channels, rigid body and 17 modes, 970
-// parameters; beside it, in the same run, one 850 x 850 x 850 product of the same library.
+// parameters; beside it, in the same run, one 850 x 850 x 850 product of the same library and the same
+// equations written out densely. Then how an iteration grows with lines and channels.
 
 #include <benchmark/benchmark.h>
+#include <sys/resource.h>
 
 #include <Eigen/Core>
-#include <chrono>
-#include <utility>
 
 #include "estimation/arrow_system.hpp"
 #include "estimation/automatic_fit.hpp"
+#include "estimation/channel_equations.hpp"
 #include "estimation/numerators.hpp"
 #include "tests/support/random_stage.hpp"
 
@@ -35,58 +36,200 @@ FitOptions options_of(const test::RandomStage& stage, int threads) {
   return options;
 }
 
+/// The paper's problem, its channels `times` times over, on every `every`-th line.
+struct Case {
+  FitProblem problem;
+  FitParameters beta;
+};
+
+Case make_case(int times, Eigen::Index every, int threads) {
+  const test::RandomStage& stage = paper_stage();
+  const Eigen::Index lines = stage.frf.lines() / every;
+  const Eigen::Index own = stage.frf.response.rows();
+  Case out;
+  FitProblem& problem = out.problem;
+  problem.lines.sample_period_s = 1.0 / stage.frf.sample_rate_hz;
+  problem.lines.hold = HoldModel::exact;
+  problem.lines.omega_rad_s = stage.frf.omega_rad_s()(Eigen::seqN(0, lines, every));
+  problem.n_outputs = stage.frf.n_outputs() * times;
+  problem.n_inputs = stage.frf.n_inputs();
+  problem.G_re.resize(own * times, lines);
+  problem.G_im.resize(own * times, lines);
+  problem.W.resize(own * times, lines);
+  const Eigen::MatrixXd W = make_weights(stage.frf, options_of(stage, threads));
+  for (Eigen::Index k = 0; k < lines; ++k)
+    for (int t = 0; t < times; ++t) {
+      problem.G_re.col(k).segment(t * own, own) = stage.frf.response.col(k * every).real();
+      problem.G_im.col(k).segment(t * own, own) = stage.frf.response.col(k * every).imag();
+      problem.W.col(k).segment(t * own, own) = W.col(k * every);
+    }
+  problem.threads = threads;
+  for (const Submodel& s : stage.truth.submodels) {
+    const auto order = static_cast<Eigen::Index>(s.denominator.size()) - 1;
+    problem.shapes.push_back({s.integrators, static_cast<int>(order), 0});
+    out.beta.a.emplace_back(Eigen::Map<const Eigen::VectorXd>(s.denominator.data() + 1, order));
+  }
+  out.beta.input_delay_s.setConstant(problem.n_inputs, stage.delay_s);
+  out.beta.output_delay_s.setZero(problem.n_outputs);
+  double cost = 0.0;
+  solve_numerators(problem, evaluate_groups(problem, out.beta, false), out.beta.B, cost);
+  return out;
+}
+
+/// What an iteration of iterate() does: equations, step, numerators at the new poles.
+double iterate_once(const Case& c, FitMethod method) {
+  const std::vector<BasisGroup> groups = evaluate_groups(c.problem, c.beta, true);
+  const ArrowSystem system(c.problem, c.beta, groups, method, false);
+  FitParameters next = stepped(c.problem, c.beta, system.solve_globals(1e-6));
+  double cost = 0.0;
+  solve_numerators(c.problem, evaluate_groups(c.problem, next, false), next.B, cost);
+  return cost;
+}
+
+/// Floating-point operations of the matrix products of one iteration: the sums FF (twice), FD, FY, DD,
+/// and the residual (three times) with its gradients.
+double operations(const FitProblem& p, FitMethod method) {
+  const auto N = static_cast<double>(p.size());
+  const auto C = static_cast<double>(p.channels());
+  const auto f = static_cast<double>(p.functions());
+  const auto a = static_cast<double>(p.denominators());
+  const double triangle = 0.5 * f * (f + 1.0);
+  const double pairs = 3.0 * triangle + f * a + (method == FitMethod::riv ? 2.0 * f * a : 0.0);
+  return 2.0 * N * C * (pairs + 2.0 * 6.0 * f);
+}
+
+double product_rate = 0.0;  // of product_850, for the fraction of it that an iteration reaches
+
 void product_850(benchmark::State& state) {
   const Eigen::MatrixXd A = Eigen::MatrixXd::Random(850, 850);
   const Eigen::MatrixXd B = Eigen::MatrixXd::Random(850, 850);
   Eigen::MatrixXd C(850, 850);
+  const auto begin = std::chrono::steady_clock::now();
   for (auto _ : state) {
     C.noalias() = A * B;
     benchmark::DoNotOptimize(C.data());
   }
-  state.counters["GFLOP/s"] = benchmark::Counter(2.0 * 850 * 850 * 850 * 1e-9,
-                                                 benchmark::Counter::kIsIterationInvariantRate);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+  const double each = 2.0 * 850 * 850 * 850;
+  product_rate = each * static_cast<double>(state.iterations()) / taken.count();
+  state.counters["GFLOP/s"] = 1e-9 * product_rate;
 }
 BENCHMARK(product_850)->Unit(benchmark::kMillisecond)->UseRealTime();
 
-/// One iteration, step and numerators: what ten more take than two, from a start a per mille away.
+void report_rate(benchmark::State& state, const FitProblem& problem, FitMethod method,
+                 double seconds) {
+  const double rate =
+      operations(problem, method) * static_cast<double>(state.iterations()) / seconds;
+  state.counters["GFLOP"] = 1e-9 * operations(problem, method);
+  state.counters["GFLOP/s"] = 1e-9 * rate;
+  if (product_rate > 0.0) state.counters["of_product"] = rate / product_rate;
+  state.counters["MB"] = 24e-6 * static_cast<double>(problem.G_re.size());  // data and weights
+}
+
 void iteration(benchmark::State& state) {
-  const test::RandomStage& stage = paper_stage();
-  FitOptions options = options_of(stage, static_cast<int>(state.range(0)));
-  options.method = state.range(1) == 0 ? FitMethod::gn : FitMethod::riv;
-  options.gradient_tolerance = options.step_tolerance = options.deviation_tolerance = 0.0;
-  AdditiveModel start = stage.truth;
-  for (Submodel& s : start.submodels)
-    if (s.is_mode()) s.denominator[2] *= 1.01;
-  const auto seconds_of = [&](int iterations) {
-    options.max_iterations = iterations;
-    const auto begin = std::chrono::steady_clock::now();
-    const int done = fit_additive_model(stage.frf, start, options).model.fit.iterations;
-    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
-    return std::pair(taken.count(), done);
-  };
-  for (auto _ : state) {
-    const auto [few_s, few] = seconds_of(2);
-    const auto [many_s, many] = seconds_of(7);
-    if (many <= few) state.SkipWithError("the fit ended early");
-    state.SetIterationTime((many_s - few_s) / std::max(many - few, 1));
-  }
+  const Case c = make_case(1, 1, static_cast<int>(state.range(0)));
+  const FitMethod method = state.range(1) == 0 ? FitMethod::gn : FitMethod::riv;
+  const auto begin = std::chrono::steady_clock::now();
+  for (auto _ : state) benchmark::DoNotOptimize(iterate_once(c, method));
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+  report_rate(state, c.problem, method, taken.count());
 }
 BENCHMARK(iteration)
     ->ArgNames({"threads", "riv"})
-    ->Args({1, 0})
-    ->Args({1, 1})
-    ->Args({2, 0})
-    ->Args({2, 1})
+    ->ArgsProduct({{1, 2}, {0, 1}})
     ->Unit(benchmark::kMillisecond)
-    ->UseManualTime();
+    ->UseRealTime();
+
+/// The same equations as the paper writes them: every parameter's column on every line of
+/// every channel, zeros and all. In slices of lines, so that it needs no 3 GB.
+void dense_equations(benchmark::State& state) {
+  constexpr Eigen::Index kSlice = 16;
+  const Case c = make_case(1, 1, 1);
+  const FitProblem& p = c.problem;
+  const std::vector<BasisGroup> groups = evaluate_groups(p, c.beta, true);
+  const auto columns = derivative_columns(p);
+  std::vector<Eigen::MatrixXd> re(static_cast<std::size_t>(p.channels()));
+  std::vector<Eigen::MatrixXd> im(re.size());
+  for (Eigen::Index k = 0; k < p.channels(); ++k)
+    global_columns(p, c.beta, groups[0], k, columns, re[static_cast<std::size_t>(k)],
+                   im[static_cast<std::size_t>(k)]);
+  for (auto _ : state) {
+    Eigen::MatrixXd M = Eigen::MatrixXd::Zero(p.parameters(), p.parameters());
+    for (Eigen::Index first = 0; first < p.size(); first += kSlice) {
+      const Eigen::Index n = std::min(kSlice, p.size() - first);
+      Eigen::MatrixXd J = Eigen::MatrixXd::Zero(2 * n * p.channels(), p.parameters());
+      for (Eigen::Index k = 0; k < p.channels(); ++k) {
+        const Eigen::VectorXd root = p.W.row(k).segment(first, n).transpose().cwiseSqrt();
+        const auto at = static_cast<std::size_t>(k);
+        const Eigen::Index own = p.globals() + k * p.functions();
+        J.block(2 * n * k, 0, n, p.globals()) = root.asDiagonal() * re[at].middleRows(first, n);
+        J.block(2 * n * k + n, 0, n, p.globals()) = root.asDiagonal() * im[at].middleRows(first, n);
+        J.block(2 * n * k, own, n, p.functions()) =
+            root.asDiagonal() * groups[0].F_re.middleRows(first, n);
+        J.block(2 * n * k + n, own, n, p.functions()) =
+            root.asDiagonal() * groups[0].F_im.middleRows(first, n);
+      }
+      M.noalias() += J.transpose() * J;
+    }
+    benchmark::DoNotOptimize(M.data());
+  }
+  state.counters["GFLOP"] = 4e-9 * static_cast<double>(p.size() * p.channels()) *
+                            static_cast<double>(p.parameters() * p.parameters());
+}
+BENCHMARK(dense_equations)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
+
+/// Linear in lines and in channels: ns is the time per line and channel.
+void scale(benchmark::State& state) {
+  const Case c = make_case(static_cast<int>(state.range(0)), state.range(1), 2);
+  const auto begin = std::chrono::steady_clock::now();
+  for (auto _ : state) benchmark::DoNotOptimize(iterate_once(c, FitMethod::gn));
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+  report_rate(state, c.problem, FitMethod::gn, taken.count());
+  state.counters["channels"] = static_cast<double>(c.problem.channels());
+  state.counters["lines"] = static_cast<double>(c.problem.size());
+  state.counters["ns"] = 1e9 * taken.count() / static_cast<double>(state.iterations()) /
+                         static_cast<double>(c.problem.G_re.size());
+}
+BENCHMARK(scale)
+    ->ArgNames({"times", "every"})
+    ->Args({1, 16})
+    ->Args({1, 4})
+    ->Args({1, 1})
+    ->Args({10, 16})
+    ->Args({100, 16})
+    ->Args({1924, 16})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 void blind_fit(benchmark::State& state) {
   const test::RandomStage& stage = paper_stage();
-  const FitOptions options = options_of(stage, 2);
+  FitOptions options = options_of(stage, 2);
+  options.residue_rank = static_cast<int>(state.range(0));
+  options.rigid_body_rank = options.residue_rank > 0 ? 3 : 0;
   for (auto _ : state)
     benchmark::DoNotOptimize(automatic_fit(stage.frf, ModelStructure{}, ModeSelection{}, options));
 }
-BENCHMARK(blind_fit)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(blind_fit)->ArgName("rank")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+/// 10 000 channels x 2000 lines x 20 modes, whole fits with their deviations: the peak of memory.
+void large_fit(benchmark::State& state) {
+  test::RandomStageSpec spec;
+  spec.outputs = 100;
+  spec.inputs = 100;
+  spec.least_modes = spec.most_modes = 20;
+  spec.line_spacing_hz = 0.99;
+  const test::RandomStage stage = test::draw_random_stage(2, spec);
+  FitOptions options = options_of(stage, 2);
+  options.uncertainty = true;
+  for (auto _ : state)
+    benchmark::DoNotOptimize(fit_additive_model(stage.frf, stage.truth, options));
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  state.counters["lines"] = static_cast<double>(stage.frf.lines());
+  state.counters["peak_GB"] = 1e-6 * static_cast<double>(usage.ru_maxrss);
+  state.counters["frf_GB"] = 24e-9 * static_cast<double>(stage.frf.response.size());
+}
+BENCHMARK(large_fit)->Unit(benchmark::kSecond)->UseRealTime()->Iterations(1);
 
 }  // namespace
 

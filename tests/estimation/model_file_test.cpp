@@ -52,6 +52,8 @@ AdditiveModel full_model() {
   model.submodels[1].natural_frequency_std_hz = 0.1 / 3.0;
   model.submodels[1].damping_ratio_std = 1e-5 / 3.0;
   model.submodels[1].residue_rank = 1;
+  for (const Eigen::MatrixXd& B : model.submodels[1].numerator)
+    model.submodels[1].numerator_std.push_back(B.cwiseAbs() / 3.0);
   model.fit = {1.0 / 7.0,  "noise_variance", 12, "gradient_small",
                0.01 / 3.0, {20.25, 1999.75}, 0.0};
   model.cost_history = {3.0, 1.0 / 3.0, 1.0 / 7.0};
@@ -101,6 +103,7 @@ TEST_F(ModelFile, RoundTripsEveryBit) {
     EXPECT_EQ(a.natural_frequency_std_hz, b.natural_frequency_std_hz);
     EXPECT_EQ(a.damping_ratio_std, b.damping_ratio_std);
     EXPECT_EQ(a.residue_rank, b.residue_rank);
+    EXPECT_EQ(a.numerator_std, b.numerator_std);
   }
   EXPECT_EQ(read.fit.cost, model.fit.cost);
   EXPECT_EQ(read.fit.weighting, model.fit.weighting);
@@ -166,6 +169,9 @@ TEST_F(ModelFile, HasTheFieldsOfTheContract) {
   EXPECT_NEAR(mode["damping_ratio"].get<double>(), 0.5, 1e-12);
   EXPECT_EQ(mode["natural_frequency_std_hz"].get<double>(), 0.1 / 3.0);
   EXPECT_EQ(mode["damping_ratio_std"].get<double>(), 1e-5 / 3.0);
+  EXPECT_EQ(mode["numerator_std"][1][1][2].get<double>(),
+            model.submodels[1].numerator_std[1](1, 2));
+  EXPECT_FALSE(rigid.contains("numerator_std")) << "unknown";
   const Json& fit = root["fit"];
   EXPECT_EQ(fit["cost"].get<double>(), 1.0 / 7.0);
   EXPECT_EQ(fit["weighting"], "noise_variance");
@@ -208,6 +214,17 @@ TEST_F(ModelFile, EveryHoldIsReadAsWritten) {
 }
 
 // Refusals ---------------------------------------------------------------------------------------
+
+TEST_F(ModelFile, DeviationsThatDoNotBelongToTheNumerators) {
+  const auto changed = [](const auto& change) {
+    return [change](Json& root) { change(root["submodels"][1]["numerator_std"]); };
+  };
+  expect_format_error(changed([](Json& std) { std.erase(1); }), "numerator_std",
+                      "as many matrices as numerator");
+  expect_format_error(changed([](Json& std) { std[0][1][2] = -1.0; }), "numerator_std",
+                      "negative standard deviation");
+  expect_format_error(changed([](Json& std) { std[0].erase(1); }), "numerator_std", "2 rows");
+}
 
 TEST_F(ModelFile, ThatIsNotThereIsAFileError) {
   EXPECT_THAT([this] { (void)read_model(directory_ / "no.json"); },

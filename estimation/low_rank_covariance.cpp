@@ -1,0 +1,121 @@
+#include "estimation/low_rank_covariance.hpp"
+
+#include <algorithm>
+
+namespace stageid {
+namespace {
+
+/// The free parameters that some channels depend on, in order.
+std::vector<Eigen::Index> parameters_of(const FitProblem& problem, const FitParameters& beta,
+                                        const ResidueFactors& factors, Eigen::Index first_channel,
+                                        Eigen::Index channels) {
+  std::vector<Eigen::Index> own;
+  for (Eigen::Index p = 0; p < problem.globals(); ++p) own.push_back(p);
+  std::vector<ResidueFactors::Entry> entries;
+  for (Eigen::Index c = first_channel; c < first_channel + channels; ++c) {
+    factors.channel_entries(beta, c, entries);
+    for (const ResidueFactors::Entry& t : entries) own.push_back(t.parameter);
+  }
+  std::sort(own.begin(), own.end());
+  own.erase(std::unique(own.begin(), own.end()), own.end());
+  return own;
+}
+
+/// Columns d vec(P)_c / d own parameters, N x own each.
+void free_columns(const FitProblem& problem, const FitParameters& beta,
+                  const ResidueFactors& factors, const BasisGroup& group, Eigen::Index c,
+                  const std::vector<Eigen::Index>& own, Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+  global_columns(problem, beta, group, c, derivative_columns(problem), re, im);
+  const auto n = static_cast<Eigen::Index>(own.size());
+  re.conservativeResizeLike(Eigen::MatrixXd::Zero(problem.size(), n));
+  im.conservativeResizeLike(Eigen::MatrixXd::Zero(problem.size(), n));
+  std::vector<ResidueFactors::Entry> entries;
+  factors.channel_entries(beta, c, entries);
+  for (const auto& [function, parameter, value] : entries) {
+    const auto at = std::lower_bound(own.begin(), own.end(), parameter) - own.begin();
+    re.col(at) += value * group.F_re.col(function);
+    im.col(at) += value * group.F_im.col(function);
+  }
+}
+
+/// T^T K T, the outputs of one input correlated.
+Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
+                                  const std::vector<BasisGroup>& groups,
+                                  const ResidueFactors& factors, const DataNoise& noise) {
+  const Eigen::Index n_y = problem.n_outputs;
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(factors.size(), factors.size());
+  std::vector<Eigen::MatrixXd> parts(static_cast<std::size_t>(problem.n_inputs));
+  std::vector<std::vector<Eigen::Index>> own(parts.size());
+  parallel_tasks(static_cast<int>(problem.n_inputs), problem.threads, [&](int u) {
+    const auto input = static_cast<std::size_t>(u);
+    own[input] = parameters_of(problem, beta, factors, n_y * u, n_y);
+    OutputColumns X;
+    X.re.resize(static_cast<std::size_t>(n_y));
+    X.im.resize(static_cast<std::size_t>(n_y));
+    for (Eigen::Index y = 0; y < n_y; ++y) {
+      const Eigen::Index c = y + n_y * u;
+      const auto at = static_cast<std::size_t>(y);
+      free_columns(problem, beta, factors, *group_of[static_cast<std::size_t>(c)], c, own[input],
+                   X.re[at], X.im[at]);
+      const Eigen::ArrayXd scale = noise_scale(problem, noise, c);
+      X.re[at].array().colwise() *= scale;
+      X.im[at].array().colwise() *= scale;
+    }
+    parts[input] = correlated_gram(X, correlated(noise.correlation, X));
+  });
+  for (std::size_t u = 0; u < parts.size(); ++u) K(own[u], own[u]) += parts[u];
+  return K;
+}
+
+/// Variances of one channel's numerators: rows of T over its functions.
+Eigen::VectorXd numerator_variances(const FitProblem& problem, const FitParameters& beta,
+                                    const ResidueFactors& factors, Eigen::Index c,
+                                    const Eigen::MatrixXd& C) {
+  std::vector<ResidueFactors::Entry> entries;
+  factors.channel_entries(beta, c, entries);
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(problem.functions());
+  for (const ResidueFactors::Entry& t : entries)
+    for (const ResidueFactors::Entry& o : entries)
+      if (t.function == o.function)
+        out[t.function] += t.value * C(t.parameter, o.parameter) * o.value;
+  return out;
+}
+
+}  // namespace
+
+ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitParameters& beta,
+                                        const Residual& E, const ResidueFactors& factors,
+                                        const DataNoise& noise,
+                                        const std::vector<Eigen::Index>& frozen) {
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
+  const ArrowSystem gn(problem, beta, groups, FitMethod::gn);
+  const Eigen::MatrixXd N = factors.reduced_matrix(beta, gn);
+  Eigen::MatrixXd K = N;
+  if (noise.correlation.size() > 0)
+    K = correlated_middle(problem, beta, groups, factors, noise);
+  else if (const auto other = middle_equations(problem, beta, groups, noise))
+    K = factors.reduced_matrix(beta, *other);
+  ParameterCovariance out;
+  out.residual_scale = covariance_scale(problem, E, factors.size(), noise);
+  const Eigen::MatrixXd inverse = free_inverse(N, frozen);
+  const Eigen::MatrixXd C = 0.5 * out.residual_scale * inverse * K * inverse.transpose();
+  if (!C.allFinite()) return {};
+
+  out.globals = C.topLeftCorner(problem.globals(), problem.globals());
+  out.numerator_variance.resize(problem.channels(), problem.functions());
+  out.response_variance.resize(problem.channels(), problem.size());
+  for (const BasisGroup& group : groups)
+    parallel_tasks(static_cast<int>(group.channels.size()), problem.threads, [&](int r) {
+      const Eigen::Index c = group.channels[static_cast<std::size_t>(r)];
+      const std::vector<Eigen::Index> own = parameters_of(problem, beta, factors, c, 1);
+      Eigen::MatrixXd re;
+      Eigen::MatrixXd im;
+      free_columns(problem, beta, factors, group, c, own, re, im);
+      out.response_variance.row(c) = quadratic(re, im, C(own, own), re, im).transpose();
+      out.numerator_variance.row(c) = numerator_variances(problem, beta, factors, c, C).transpose();
+    });
+  return out;
+}
+
+}  // namespace stageid

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "estimation/parameter_covariance.hpp"
+#include "estimation/residue_factors.hpp"
+
+namespace stageid {
+
+/// Covariance of a fit with residues of given rank, first order and sandwich form as in
+/// parameter_covariance(): with the free parameters' Jacobian J T (see ResidueFactors),
+///   Cov = 1/2 N^-1 (T^T K T) N^-1,   N = T^T M T,   K = sum Re{J^H W C W J}.
+/// The rank ties outputs and inputs of a mode together; their noise counts as correlated between the
+/// outputs of one input where noise.correlation says so. Empty where N is singular.
+ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitParameters& beta,
+                                        const Residual& E, const ResidueFactors& factors,
+                                        const DataNoise& noise,
+                                        const std::vector<Eigen::Index>& frozen);
+
+}  // namespace stageid
