@@ -24,8 +24,8 @@ test::RandomStageSpec quick_stage() {
   return spec;
 }
 
-// The share is a promise, and below it something has become worse: 40 of 40 stages on the paper's
-// full grid succeed in tests/benchmark/blind_fit_study.
+// The share is a promise, and below it something has become worse: 500 of 500 stages on the paper's
+// full grid succeed in tests/benchmark/blind_fit_study (docs/benchmarks.md).
 TEST(AutomaticFit, FindsWhatIsThereBlind) {
   constexpr int kStages = 10;
   constexpr int kDemanded = 9;
