@@ -92,10 +92,12 @@ ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitPara
   const ArrowSystem gn(problem, beta, groups, FitMethod::gn);
   const Eigen::MatrixXd N = factors.reduced_matrix(beta, gn);
   Eigen::MatrixXd K = N;
-  if (noise.correlation.size() > 0)
+  if (noise.correlation.size() > 0) {
     K = correlated_middle(problem, beta, groups, factors, noise);
-  else if (const auto other = middle_equations(problem, beta, groups, noise))
-    K = factors.reduced_matrix(beta, *other);
+  } else if (noise.variance.size() > 0) {
+    const FitProblem weighed = middle_problem(problem, noise);
+    K = factors.reduced_matrix(beta, ArrowSystem(weighed, beta, groups, FitMethod::gn));
+  }
   ParameterCovariance out;
   out.residual_scale = covariance_scale(problem, E, factors.size(), noise);
   const Eigen::MatrixXd inverse = free_inverse(N, frozen);

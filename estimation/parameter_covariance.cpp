@@ -176,13 +176,10 @@ Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Ei
   return W * noise.variance.row(c).transpose().array().sqrt();
 }
 
-std::optional<ArrowSystem> middle_equations(const FitProblem& problem, const FitParameters& beta,
-                                            const std::vector<BasisGroup>& groups,
-                                            const DataNoise& noise) {
-  if (noise.variance.size() == 0) return std::nullopt;
-  FitProblem sandwich = problem;
-  sandwich.W = problem.W.cwiseProduct(problem.W).cwiseProduct(noise.variance);
-  return ArrowSystem(sandwich, beta, groups, FitMethod::gn);
+FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise) {
+  FitProblem middle = problem;
+  middle.W = problem.W.cwiseProduct(problem.W).cwiseProduct(noise.variance);
+  return middle;
 }
 
 double covariance_scale(const FitProblem& problem, const Residual& E, Eigen::Index parameters,
@@ -201,8 +198,13 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   out.residual_scale = covariance_scale(problem, E, problem.parameters(), noise);
   const double half = 0.5 * out.residual_scale;
 
-  const auto other = middle_equations(problem, beta, groups, noise);
-  Middle middle = diagonal_middle(gn, other ? *other : gn);
+  Middle middle;
+  if (noise.variance.size() > 0) {
+    const FitProblem weighed = middle_problem(problem, noise);
+    middle = diagonal_middle(gn, ArrowSystem(weighed, beta, groups, FitMethod::gn));
+  } else {
+    middle = diagonal_middle(gn, gn);
+  }
   if (problem.globals() > 0 && noise.correlation.size() > 0)
     correlate_outputs(problem, beta, groups, gn, noise, middle);
   const Eigen::MatrixXd inverse = free_inverse(gn.schur(), frozen);

@@ -78,11 +78,9 @@ double residual_scale(double per_degree, bool likelihood);
 double covariance_scale(const FitProblem& problem, const Residual& E, Eigen::Index parameters,
                         const DataNoise& noise);
 
-/// The equations of which K is the matrix for uncorrelated noise, their weights W C W; none where they
-/// are the Gauss-Newton equations themselves.
-std::optional<ArrowSystem> middle_equations(const FitProblem& problem, const FitParameters& beta,
-                                            const std::vector<BasisGroup>& groups,
-                                            const DataNoise& noise);
+/// The problem whose Gauss-Newton matrix is K for uncorrelated noise: weights W C W.
+/// @pre noise.variance is known
+FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise);
 
 /// W C^1/2 of one channel on every line, for correlated().
 Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c);
