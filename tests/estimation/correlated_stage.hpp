@@ -89,8 +89,8 @@ inline FrfEstimate measured(const DenseProblem& problem, const CorrelatedNoise& 
       const Eigen::MatrixXcd samples = L_C * draw(n_y, dof);
       C = samples * samples.adjoint() / static_cast<double>(dof);
     }
-    frf.residual_covariance_re.col(k) = C.real().reshaped();
-    frf.residual_covariance_im.col(k) = C.imag().reshaped();
+    frf.residual_covariance_re.col(k) = C.reshaped().real();
+    frf.residual_covariance_im.col(k) = C.reshaped().imag();
     frf.input_factor.col(k) = noise.S[at].reshaped();
     const Eigen::VectorXd y = C.diagonal().real();
     const Eigen::RowVectorXd u = noise.S[at].diagonal().real().transpose();

@@ -106,8 +106,8 @@ TEST(WeightMatrices, FromFewDegreesOfFreedomAreUnbiased) {
       // The level drifts: 1 over the band, little over a window.
       const Eigen::MatrixXcd scaled = std::exp(0.00025 * static_cast<double>(k)) * L * samples;
       const Eigen::MatrixXcd estimate = scaled * scaled.adjoint() / static_cast<double>(dof);
-      frf.residual_covariance_re.col(k) = estimate.real().reshaped();
-      frf.residual_covariance_im.col(k) = estimate.imag().reshaped();
+      frf.residual_covariance_re.col(k) = estimate.reshaped().real();
+      frf.residual_covariance_im.col(k) = estimate.reshaped().imag();
     }
     const WeightMatrices weights = WeightMatrices::likelihood(frf);
     Eigen::MatrixXcd first = Eigen::MatrixXcd::Zero(kOutputs, kOutputs);
