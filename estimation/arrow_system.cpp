@@ -119,11 +119,7 @@ void ArrowSystem::set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Ei
   const Eigen::Index n_f = problem_.functions();
   const Eigen::Index n_a = problem_.denominators();
   const auto n_d = static_cast<Eigen::Index>(columns_.size());
-  channel.bb.resize(n_f, n_f);
-  Eigen::Index p = 0;
-  for (Eigen::Index i = 0; i < n_f; ++i)
-    for (Eigen::Index j = 0; j <= i; ++j)
-      channel.bb(i, j) = channel.bb(j, i) = sums.FF(p++, member);
+  channel.bb = from_triangle(sums.FF.col(member), n_f);
   channel.ab.setZero(problem_.globals(), n_f);
   const auto FD = sums.FD.col(member).reshaped(n_d, n_f);
   for (Eigen::Index d = 0; d < n_d; ++d) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/mode_worth.hpp"
 #include "estimation/parameter_covariance.hpp"
 #include "estimation/poles.hpp"
 
@@ -17,7 +18,6 @@ namespace {
 // 1e-9) and is determined; sums of thousands of terms are precise to 1e-15.
 constexpr double kSmallestDirection = 1e-12;  // of the numerators
 constexpr double kSmallestShare = 3e-14;      // of the denominators
-constexpr double kRoundingPower = 1e-16;      // of the data: no more precise measurement exists
 constexpr double kShareOfDirection = 0.1;     // from which a submodel is named
 constexpr double kLargestFrequencyDeviation = 0.5;
 constexpr double kLargestDampingDeviation = 1.0;

@@ -20,7 +20,7 @@ void fill_polar(Eigen::Index lines, const Angle& angle, SplitMatrix& out) {
   }
 }
 
-/// out = a b on every line, or a b conj.
+/// out = a b on every line.
 void multiply(const SplitMatrix& a, const SplitMatrix& b, SplitMatrix& out) {
   out.resize(a.re.rows(), 1);
   out.re = a.re.cwiseProduct(b.re) - a.im.cwiseProduct(b.im);

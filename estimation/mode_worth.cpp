@@ -4,11 +4,6 @@
 #include <cmath>
 
 namespace stageid {
-namespace {
-
-constexpr double kRounding = 1e-16;  // of the weighted power of the response: -160 dB
-
-}  // namespace
 
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
@@ -16,7 +11,7 @@ ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
       data_(2.0 * static_cast<double>(frf.response.size())),
       parameters_of_mode_(2.0 + (structure.general_damping ? 2.0 : 1.0) *
                                     static_cast<double>(frf.response.rows())),
-      rounding_(kRounding * (weights.array() * frf.response.cwiseAbs2().array()).sum()) {}
+      rounding_(kRoundingPower * (weights.array() * frf.response.cwiseAbs2().array()).sum()) {}
 
 double ModeWorth::squares(const FitResult& fit) const {
   return std::max(2.0 * lines_ * fit.model.fit.cost, rounding_);

@@ -5,6 +5,9 @@
 
 namespace stageid {
 
+/// Of the weighted power of the data (-160 dB): less is rounding, no more precise measurement exists.
+inline constexpr double kRoundingPower = 1e-16;
+
 /// Whether a mode is worth its parameters: an extended Bayesian information criterion (Chen and Chen,
 /// Biometrika 95 (2008) 759) with the scale of the variances unknown. Where the variances are right it
 /// decides like the one with known variance; where the model cannot be right, it does not chase errors.
@@ -25,7 +28,7 @@ class ModeWorth {
   /// by less than a hundredth of what a mode is worth: no decision needs them.
   double deviation_tolerance() const;
 
-  /// No more precise measurement exists: without this limit noise-free data ask for modes for ever.
+  /// Without this limit noise-free data ask for modes for ever.
   bool at_rounding(const FitResult& fit) const;
 
  private:

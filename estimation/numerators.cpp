@@ -133,13 +133,7 @@ ResidualSums residual_sums(const FitProblem& problem, const BasisGroup& group,
 std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, Eigen::Index n_f) {
   std::vector<ScaledNormalEquations> out;
   out.reserve(static_cast<std::size_t>(FF.cols()));
-  Eigen::MatrixXd M(n_f, n_f);
-  for (Eigen::Index c = 0; c < FF.cols(); ++c) {
-    Eigen::Index p = 0;
-    for (Eigen::Index i = 0; i < n_f; ++i)
-      for (Eigen::Index j = 0; j <= i; ++j) M(i, j) = M(j, i) = FF(p++, c);
-    out.emplace_back(M);
-  }
+  for (Eigen::Index c = 0; c < FF.cols(); ++c) out.emplace_back(from_triangle(FF.col(c), n_f));
   return out;
 }
 

@@ -20,12 +20,6 @@ constexpr double kSettled = 1e-3;  // move of every pole in its own half-power w
 constexpr double kLeastDamping = 0.01;
 constexpr double kRegularization = 1e-13;
 
-/// Columns of real coefficients on all lines.
-struct Columns {
-  Eigen::MatrixXd re;
-  Eigen::MatrixXd im;
-};
-
 Eigen::VectorXcd complex(const SplitMatrix& column) {
   return column.re.cast<Complex>() + Complex(0.0, 1.0) * column.im.cast<Complex>();
 }
@@ -91,10 +85,10 @@ class Relocation {
   Complex to_s(Complex x) const { return exact_ ? std::log(x) / lines_.sample_period_s : x; }
 
   /// Partial fractions of real coefficients: 1/(x-p) + 1/(x-p*) and j/(x-p) - j/(x-p*).
-  Columns fractions() const {
+  SplitMatrix fractions() const {
     const Eigen::Index N = x_.size();
     const auto pairs = static_cast<Eigen::Index>(poles_.size());
-    Columns phi{Eigen::MatrixXd(N, 2 * pairs), Eigen::MatrixXd(N, 2 * pairs)};
+    SplitMatrix phi{Eigen::MatrixXd(N, 2 * pairs), Eigen::MatrixXd(N, 2 * pairs)};
     for (Eigen::Index i = 0; i < pairs; ++i) {
       const Complex p = to_x(poles_[static_cast<std::size_t>(i)]);
       for (Eigen::Index k = 0; k < N; ++k) {
@@ -112,9 +106,9 @@ class Relocation {
   }
 
   /// What the numerators have beside the poles.
-  Columns beside() const {
+  SplitMatrix beside() const {
     const Eigen::Index count = integrators_ + (constant_ ? 1 : 0);
-    Columns out{Eigen::MatrixXd(x_.size(), count), Eigen::MatrixXd(x_.size(), count)};
+    SplitMatrix out{Eigen::MatrixXd(x_.size(), count), Eigen::MatrixXd(x_.size(), count)};
     for (int l = 1; l <= integrators_; ++l) {
       const Eigen::ArrayXcd inverse = (x_.array() - (exact_ ? 1.0 : 0.0)).inverse();
       const Eigen::ArrayXcd column = l == 1 ? inverse : Eigen::ArrayXcd(inverse.square());
@@ -128,11 +122,11 @@ class Relocation {
 
   /// One iteration. @returns the largest move of a pole, in half-power widths.
   double relocate() {
-    const Columns phi = fractions();
-    const Columns own = beside();
+    const SplitMatrix phi = fractions();
+    const SplitMatrix own = beside();
     const Eigen::Index n = phi.re.cols();
     const Eigen::Index n_r = n + own.re.cols();
-    Columns basis{Eigen::MatrixXd(x_.size(), n_r), Eigen::MatrixXd(x_.size(), n_r)};
+    SplitMatrix basis{Eigen::MatrixXd(x_.size(), n_r), Eigen::MatrixXd(x_.size(), n_r)};
     basis.re << phi.re, own.re;
     basis.im << phi.im, own.im;
 
@@ -161,7 +155,8 @@ class Relocation {
 
   /// Schur complement of a channel's numerators in the weighted normal matrix of
   /// [basis | -H phi, -H].
-  Eigen::MatrixXd eliminated(Eigen::Index c, const Columns& phi, const Columns& basis) const {
+  Eigen::MatrixXd eliminated(Eigen::Index c, const SplitMatrix& phi,
+                             const SplitMatrix& basis) const {
     const Eigen::Index N = x_.size();
     const Eigen::Index n_r = basis.re.cols();
     const Eigen::Index n_s = phi.re.cols() + 1;

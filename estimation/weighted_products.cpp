@@ -18,6 +18,14 @@ std::vector<ColumnPair> triangular_pairs(Eigen::Index n) {
   return pairs;
 }
 
+Eigen::MatrixXd from_triangle(const Eigen::Ref<const Eigen::VectorXd>& triangle, Eigen::Index n) {
+  Eigen::MatrixXd out(n, n);
+  Eigen::Index p = 0;
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j <= i; ++j) out(i, j) = out(j, i) = triangle[p++];
+  return out;
+}
+
 std::vector<ColumnPair> all_pairs(Eigen::Index left, Eigen::Index right) {
   std::vector<ColumnPair> pairs;
   for (Eigen::Index i = 0; i < left; ++i)

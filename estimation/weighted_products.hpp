@@ -14,7 +14,9 @@ struct ColumnPair {
   Eigen::Index left;
   Eigen::Index right;
 };
-std::vector<ColumnPair> triangular_pairs(Eigen::Index n);                  ///< left >= right
+std::vector<ColumnPair> triangular_pairs(Eigen::Index n);  ///< left >= right
+/// The symmetric n x n matrix whose lower triangle is given in that order.
+Eigen::MatrixXd from_triangle(const Eigen::Ref<const Eigen::VectorXd>& triangle, Eigen::Index n);
 std::vector<ColumnPair> all_pairs(Eigen::Index left, Eigen::Index right);  ///< left outermost
 
 /// Complex columns as two real matrices, N x n each.

@@ -8,6 +8,7 @@
 
 #include "estimation/arrow_system.hpp"
 #include "estimation/automatic_fit.hpp"
+#include "estimation/fit_start.hpp"
 #include "estimation/numerators.hpp"
 
 namespace stageid::test {
@@ -70,24 +71,16 @@ bool plain_iteration_succeeds(const RandomStage& stage, double wanted, int threa
   if (peaks.size() > modes_of(stage.truth).size() + 1) return false;
   FitOptions options;
   options.weighting = Weighting::noise_variance;
-  FitProblem problem;
-  problem.lines = {stage.frf.omega_rad_s(), 1.0 / stage.frf.sample_rate_hz, HoldModel::exact};
-  problem.n_outputs = stage.frf.n_outputs();
-  problem.n_inputs = stage.frf.n_inputs();
-  problem.G_re = stage.frf.response.real();
-  problem.G_im = stage.frf.response.imag();
-  problem.W = make_weights(stage.frf, options);
-  problem.threads = threads;
-  FitParameters beta;
-  beta.input_delay_s.setConstant(problem.n_inputs, stage.delay_s);
-  beta.output_delay_s.setZero(problem.n_outputs);
-  problem.shapes.push_back({2, 0, 0});
-  beta.a.emplace_back();
-  for (const ModeCandidate& peak : peaks) {
-    const Submodel mode = mode_submodel(stage.frf, ModelStructure{}, peak);
-    problem.shapes.push_back({0, 2, 0});
-    beta.a.emplace_back(Eigen::Vector2d(mode.denominator[1], mode.denominator[2]));
-  }
+  options.hold = HoldModel::exact;
+  options.delay_s = stage.delay_s;
+  options.threads = threads;
+  AdditiveModel start;
+  start.submodels = fixed_submodels(stage.frf, ModelStructure{});
+  for (const ModeCandidate& peak : peaks)
+    start.submodels.push_back(mode_submodel(stage.frf, ModelStructure{}, peak));
+  const FitProblem problem =
+      make_problem(stage.frf, start, options, make_weights(stage.frf, options));
+  FitParameters beta = make_parameters(problem, start, options);
   double cost = 0.0;
   if (!solve_numerators(problem, evaluate_groups(problem, beta, false), beta.B, cost)) return false;
   for (int i = 0; i < kIterations; ++i) {
