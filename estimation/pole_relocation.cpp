@@ -1,24 +1,28 @@
 #include "estimation/pole_relocation.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
 
 #include "estimation/fit_problem.hpp"
+#include "estimation/pole_set.hpp"
 
 namespace stageid {
 namespace {
 
 using Complex = std::complex<double>;
 
-constexpr int kIterations = 8;
+constexpr int kIterations = 10;
 constexpr int kShares = 8;
-constexpr double kSettled = 1e-3;  // move of every pole in its own half-power widths
-constexpr double kLeastDamping = 0.01;
-constexpr double kRegularization = 1e-13;
+constexpr double kSettled = 1e-3;   // move of every pole in its own half-power widths
+constexpr double kPathShare = 0.5;  // of the start: by the path of log H, the rest by lines
+constexpr double kStartDamping = 0.01;
+constexpr double kLeastDamping = 1e-5;
+constexpr double kShift = 1e-13;    // makes Gram matrices of unit columns factor
+constexpr double kAccurate = 1e-4;  // relative residual below which one Gram matrix loses too much
 
 Eigen::VectorXcd complex(const SplitMatrix& column) {
   return column.re.cast<Complex>() + Complex(0.0, 1.0) * column.im.cast<Complex>();
@@ -27,6 +31,29 @@ Eigen::VectorXcd complex(const SplitMatrix& column) {
 double mean_delay_s(const AdditiveModel& model) {
   if (model.input_delay_s.size() == 0) return 0.0;
   return model.input_delay_s.mean() + model.output_delay_s.mean();
+}
+
+/// R of A = Q R by the Cholesky factor of its Gram matrix; A becomes Q. Columns that depend on others to
+/// within 1e-7 are not orthonormal then: a second call, on Q, mends that (Yamamoto et al., ETNA 44
+/// (2015) 306).
+Eigen::MatrixXd gram_factor(Eigen::MatrixXd& A, bool orthogonalize) {
+  const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+  A *= scale.asDiagonal();
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(A.cols(), A.cols());
+  gram.selfadjointView<Eigen::Upper>().rankUpdate(A.transpose());
+  gram.diagonal().array() += kShift;
+  const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> factor(gram);
+  const Eigen::MatrixXd R = factor.matrixU();
+  if (orthogonalize) factor.matrixU().solveInPlace<Eigen::OnTheRight>(A);
+  return R * scale.cwiseInverse().asDiagonal();
+}
+
+/// The triangle R of [R; further] = Q R.
+void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
+  Eigen::MatrixXd both(R.rows() + further.rows(), R.cols());
+  both << R, further;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(std::move(both));
+  R = qr.matrixQR().topRows(R.cols()).triangularView<Eigen::Upper>();
 }
 
 class Relocation {
@@ -49,61 +76,50 @@ class Relocation {
       constant_ = constant_ || (s.integrators == 0 && s.denominator.size() == 1);
     }
     constant_ = constant_ || exact_;  // a held input leaves one
+    own_ = beside();
   }
 
   std::vector<ModeCandidate> run(std::size_t modes) {
     spread(modes);
     for (int i = 0; i < kIterations; ++i)
       if (!(relocate() > kSettled)) break;
-    std::vector<ModeCandidate> out;
-    for (const Complex s : poles_)
-      out.push_back({std::abs(s) / (2.0 * std::numbers::pi), -s.real() / std::abs(s), 1});
-    return out;
+    return modes_of_poles();
   }
 
  private:
-  /// As many lines between any two poles, each as wide as its distance to the next.
+  /// Poles where the response turns: as much of the path of log H, all channels together, between any two
+  /// of them, and as many lines, half and half.
   void spread(std::size_t modes) {
     const Eigen::VectorXd& omega = lines_.omega_rad_s;
-    const auto last = static_cast<double>(omega.size() - 1);
-    const auto at = [&](double line) {
-      const double k = std::clamp(line, 0.0, last);
-      const auto low = static_cast<Eigen::Index>(std::min(std::floor(k), last - 1.0));
-      return omega[low] + (k - static_cast<double>(low)) * (omega[low + 1] - omega[low]);
-    };
-    const double step = last / static_cast<double>(modes);
+    const Eigen::Index last = omega.size() - 1;
+    Eigen::VectorXd path = Eigen::VectorXd::Zero(omega.size());
+    for (Eigen::Index k = 1; k <= last; ++k) {
+      double step = 0.0;
+      for (Eigen::Index c = 0; c < H_.rows(); ++c) {
+        const double turn = std::abs(std::log(H_(c, k) / H_(c, k - 1)));
+        if (std::isfinite(turn)) step += turn;
+      }
+      path[k] = path[k - 1] + step;
+    }
+    const double length = std::max(path[last], 1e-300);
+    Eigen::Index k = 0;
     for (std::size_t i = 0; i < modes; ++i) {
-      const double middle = (static_cast<double>(i) + 0.5) * step;
-      const double width = at(middle + 0.5 * step) - at(middle - 0.5 * step);
-      const double w = at(middle);
-      const double zeta = std::max(kLeastDamping, 0.5 * width / w);
-      poles_.emplace_back(-std::min(zeta, 0.5) * w, w);
+      const double wanted = (static_cast<double>(i) + 0.5) / static_cast<double>(modes);
+      const auto passed = [&](Eigen::Index line) {
+        return kPathShare * path[line] / length +
+               (1.0 - kPathShare) * static_cast<double>(line) / static_cast<double>(last);
+      };
+      while (k + 1 < last && passed(k + 1) < wanted) ++k;
+      const double before = passed(k);
+      const double part =
+          std::clamp((wanted - before) / std::max(passed(k + 1) - before, 1e-300), 0.0, 1.0);
+      const double w = omega[k] + part * (omega[k + 1] - omega[k]);
+      poles_.pairs.push_back(to_x(Complex(-kStartDamping, 1.0) * w));
     }
   }
 
   Complex to_x(Complex s) const { return exact_ ? std::exp(s * lines_.sample_period_s) : s; }
   Complex to_s(Complex x) const { return exact_ ? std::log(x) / lines_.sample_period_s : x; }
-
-  /// Partial fractions of real coefficients: 1/(x-p) + 1/(x-p*) and j/(x-p) - j/(x-p*).
-  SplitMatrix fractions() const {
-    const Eigen::Index N = x_.size();
-    const auto pairs = static_cast<Eigen::Index>(poles_.size());
-    SplitMatrix phi{Eigen::MatrixXd(N, 2 * pairs), Eigen::MatrixXd(N, 2 * pairs)};
-    for (Eigen::Index i = 0; i < pairs; ++i) {
-      const Complex p = to_x(poles_[static_cast<std::size_t>(i)]);
-      for (Eigen::Index k = 0; k < N; ++k) {
-        const Complex a = 1.0 / (x_[k] - p);
-        const Complex b = 1.0 / (x_[k] - std::conj(p));
-        const Complex sum = a + b;
-        const Complex difference = Complex(0.0, 1.0) * (a - b);
-        phi.re(k, 2 * i) = sum.real();
-        phi.im(k, 2 * i) = sum.imag();
-        phi.re(k, 2 * i + 1) = difference.real();
-        phi.im(k, 2 * i + 1) = difference.imag();
-      }
-    }
-    return phi;
-  }
 
   /// What the numerators have beside the poles.
   SplitMatrix beside() const {
@@ -122,103 +138,118 @@ class Relocation {
 
   /// One iteration. @returns the largest move of a pole, in half-power widths.
   double relocate() {
-    const SplitMatrix phi = fractions();
-    const SplitMatrix own = beside();
-    const Eigen::Index n = phi.re.cols();
-    const Eigen::Index n_r = n + own.re.cols();
-    SplitMatrix basis{Eigen::MatrixXd(x_.size(), n_r), Eigen::MatrixXd(x_.size(), n_r)};
-    basis.re << phi.re, own.re;
-    basis.im << phi.im, own.im;
+    const SplitMatrix phi = partial_fractions(poles_, x_);
+    const Eigen::Index n = phi.cols();
 
-    // The normal equations of sigma's coefficients (c, d), the channels' own eliminated.
-    // A fixed number of shares: the sum does not depend on the threads.
+    // What the channels say of sigma's coefficients (c, d): a triangle for each of a fixed number of shares,
+    // so that the result does not depend on the threads.
     std::vector<Eigen::MatrixXd> shares(kShares, Eigen::MatrixXd::Zero(n + 1, n + 1));
     parallel_tasks(kShares, threads_, [&](int share) {
       for (Eigen::Index c = share; c < H_.rows(); c += kShares)
-        shares[static_cast<std::size_t>(share)] += eliminated(c, phi, basis);
+        append(shares[static_cast<std::size_t>(share)], eliminated(c, phi));
     });
-    Eigen::MatrixXd S = Eigen::MatrixXd::Zero(n + 1, n + 1);
-    for (const Eigen::MatrixXd& share : shares) S += share;
+    Eigen::MatrixXd R = shares[0];
+    for (std::size_t share = 1; share < kShares; ++share) append(R, shares[share]);
 
     // Relaxed: the mean of Re sigma over the lines is 1, so that sigma cannot vanish.
     Eigen::VectorXd mean(n + 1);
     mean << phi.re.colwise().mean().transpose(), 1.0;
-    Eigen::VectorXd scale = S.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    Eigen::MatrixXd scaled = scale.asDiagonal() * S * scale.asDiagonal();
-    scaled.diagonal().array() += kRegularization;
-    const Eigen::VectorXd direction =
-        scale.asDiagonal() * scaled.ldlt().solve(scale.cwiseProduct(mean));
-    const double d = direction[n];
-    if (!direction.allFinite() || d == 0.0) return 0.0;
-    return move(zeros(direction.head(n) / d));
+    const Eigen::VectorXd scale = R.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+    R *= scale.asDiagonal();
+    for (Eigen::Index i = 0; i <= n; ++i)
+      if (std::abs(R(i, i)) < 1e-15) R(i, i) = 1e-15;
+    Eigen::VectorXd sigma = scale.cwiseProduct(mean);
+    R.triangularView<Eigen::Upper>().transpose().solveInPlace(sigma);
+    const double squares = 1.0 / sigma.squaredNorm();  // of the residual, with mean sigma = 1
+    R.triangularView<Eigen::Upper>().solveInPlace(sigma);
+    sigma = scale.cwiseProduct(sigma);
+    const double d = sigma[n];
+    if (!sigma.allFinite() || d == 0.0) return 0.0;
+    accurate_ = squares < kAccurate * kAccurate * signal();
+    return move(zeros_of_sum(poles_, sigma.head(n) / d));
   }
 
-  /// Schur complement of a channel's numerators in the weighted normal matrix of
-  /// [basis | -H phi, -H].
-  Eigen::MatrixXd eliminated(Eigen::Index c, const SplitMatrix& phi,
-                             const SplitMatrix& basis) const {
+  double signal() const {
+    return (weights_.array() * (H_.cwiseAbs2() * size_.cwiseAbs2().asDiagonal()).array()).sum();
+  }
+
+  /// The lower right corner of R, n+1 x n+1, in  sqrt(w) [phi, own | -H phi, -H] = Q R: what remains of
+  /// the channel's equations once its numerators are eliminated.
+  Eigen::MatrixXd eliminated(Eigen::Index c, const SplitMatrix& phi) const {
     const Eigen::Index N = x_.size();
-    const Eigen::Index n_r = basis.re.cols();
-    const Eigen::Index n_s = phi.re.cols() + 1;
+    const Eigen::Index n = phi.cols();
+    const Eigen::Index numerators = n + own_.cols();
     const Eigen::ArrayXd w = weights_.row(c).transpose().cwiseSqrt().array() * size_.array();
-    Eigen::MatrixXd A(2 * N, n_r + n_s);
-    A.topLeftCorner(N, n_r) = basis.re.array().colwise() * w;
-    A.bottomLeftCorner(N, n_r) = basis.im.array().colwise() * w;
     const Eigen::ArrayXcd H = H_.row(c).transpose().array();
     const Eigen::ArrayXd h_re = -w * H.real();
     const Eigen::ArrayXd h_im = -w * H.imag();
-    A.block(0, n_r, N, n_s - 1) =
-        (phi.re.array().colwise() * h_re - phi.im.array().colwise() * h_im).matrix();
-    A.block(N, n_r, N, n_s - 1) =
-        (phi.re.array().colwise() * h_im + phi.im.array().colwise() * h_re).matrix();
+    Eigen::MatrixXd A(2 * N, numerators + n + 1);
+    A.topLeftCorner(N, n) = phi.re.array().colwise() * w;
+    A.bottomLeftCorner(N, n) = phi.im.array().colwise() * w;
+    A.block(0, n, N, own_.cols()) = own_.re.array().colwise() * w;
+    A.block(N, n, N, own_.cols()) = own_.im.array().colwise() * w;
+    A.block(0, numerators, N, n) =
+        phi.re.array().colwise() * h_re - phi.im.array().colwise() * h_im;
+    A.block(N, numerators, N, n) =
+        phi.re.array().colwise() * h_im + phi.im.array().colwise() * h_re;
     A.rightCols(1) << h_re.matrix(), h_im.matrix();
-    Eigen::MatrixXd M = Eigen::MatrixXd::Zero(n_r + n_s, n_r + n_s);
-    M.selfadjointView<Eigen::Lower>().rankUpdate(A.transpose());
-    const Eigen::VectorXd scale =
-        M.diagonal().head(n_r).cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    Eigen::MatrixXd own = scale.asDiagonal() * M.topLeftCorner(n_r, n_r) * scale.asDiagonal();
-    own.diagonal().array() += kRegularization;
-    const Eigen::LLT<Eigen::MatrixXd> factor(own);
-    const Eigen::MatrixXd border = M.bottomLeftCorner(n_s, n_r) * scale.asDiagonal();
-    Eigen::MatrixXd S = M.bottomRightCorner(n_s, n_s).selfadjointView<Eigen::Lower>();
-    if (factor.info() == Eigen::Success) {
-      const Eigen::MatrixXd half = factor.matrixL().solve(border.transpose());
-      S.noalias() -= half.transpose() * half;
-    }
-    return S;
+    const auto corner = [&](const Eigen::MatrixXd& R) {
+      return Eigen::MatrixXd(R.bottomRightCorner(n + 1, n + 1).triangularView<Eigen::Upper>());
+    };
+    const Eigen::MatrixXd first = corner(gram_factor(A, accurate_));
+    if (!accurate_) return first;
+    return corner(gram_factor(A, false)) * first;
   }
 
-  /// Zeros of 1 + sum c_i phi_i: eigenvalues of the poles' real block matrix minus b c^T.
-  Eigen::VectorXcd zeros(const Eigen::VectorXd& c) const {
-    const Eigen::Index n = c.size();
-    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
-    for (Eigen::Index i = 0; i < n / 2; ++i) {
-      const Complex p = to_x(poles_[static_cast<std::size_t>(i)]);
-      A.block<2, 2>(2 * i, 2 * i) << p.real(), p.imag(), -p.imag(), p.real();
-      A.row(2 * i) -= 2.0 * c.transpose();  // b = (2, 0)
+  /// Takes stable zeros as they are and unstable ones reflected.
+  double move(const Eigen::VectorXcd& zeros) {
+    const double highest = 10.0 * lines_.omega_rad_s.maxCoeff();
+    PoleSet found;
+    for (const Complex zero : zeros) {
+      if (!(std::abs(zero) > 0.0) || (exact_ && zero.imag() == 0.0 && zero.real() < 0.0)) continue;
+      Complex s = to_s(zero);
+      const double size = std::min(std::abs(s), highest);
+      if (s.imag() < 0.0) continue;  // the other of the pair
+      s *= size / std::abs(s);
+      s = {-std::max(std::abs(s.real()), kLeastDamping * size), s.imag()};
+      if (s.imag() == 0.0)
+        found.reals.push_back(to_x(s).real());
+      else
+        found.pairs.push_back(to_x(s));
     }
-    return A.eigenvalues();
-  }
-
-  /// Takes the upper half plane's, stable ones as they are and unstable ones reflected.
-  double move(const Eigen::VectorXcd& x) {
-    const double highest = lines_.omega_rad_s.maxCoeff();
-    std::vector<Complex> found;
-    for (const Complex value : x) {
-      if (!(std::abs(value) > 0.0)) continue;
-      Complex s = to_s(value);
-      if (!(s.imag() > 1e-3 * std::abs(s))) continue;  // real, or the other of the pair
-      if (s.real() > 0.0) s = {-s.real(), s.imag()};
-      if (std::abs(s) > 10.0 * highest) continue;
-      if (s.real() > -1e-5 * std::abs(s)) s = {-1e-5 * std::abs(s), s.imag()};
-      found.push_back(s);
+    std::sort(found.pairs.begin(), found.pairs.end(),
+              [&](Complex a, Complex b) { return to_s(a).imag() < to_s(b).imag(); });
+    std::sort(found.reals.begin(), found.reals.end());
+    double largest = found.pairs.size() == poles_.pairs.size() ? 0.0 : 1.0;
+    for (std::size_t i = 0; i < std::min(found.pairs.size(), poles_.pairs.size()); ++i) {
+      const Complex s = to_s(found.pairs[i]);
+      largest = std::max(largest, std::abs(s - to_s(poles_.pairs[i])) / (-2.0 * s.real()));
     }
-    std::sort(found.begin(), found.end(), [](Complex a, Complex b) { return a.imag() < b.imag(); });
-    double largest = found.size() == poles_.size() ? 0.0 : 1.0;
-    for (std::size_t i = 0; i < std::min(found.size(), poles_.size()); ++i)
-      largest = std::max(largest, std::abs(found[i] - poles_[i]) / (-2.0 * found[i].real()));
     poles_ = std::move(found);
-    return poles_.empty() ? 0.0 : largest;
+    return poles_.size() == 0 ? 0.0 : largest;
+  }
+
+  /// Two real poles are an overdamped mode; of an odd number the fastest is left over.
+  std::vector<ModeCandidate> modes_of_poles() const {
+    std::vector<ModeCandidate> modes;
+    const auto add = [&](double omega_rad_s, double damping_ratio) {
+      modes.push_back({omega_rad_s / (2.0 * std::numbers::pi), damping_ratio, 1});
+    };
+    for (const Complex pair : poles_.pairs) {
+      const Complex s = to_s(pair);
+      add(std::abs(s), -s.real() / std::abs(s));
+    }
+    std::vector<double> decays;
+    for (const double real : poles_.reals) decays.push_back(-to_s(real).real());
+    std::sort(decays.begin(), decays.end());
+    for (std::size_t i = 0; i + 1 < decays.size(); i += 2) {
+      const double omega = std::sqrt(decays[i] * decays[i + 1]);
+      add(omega, 0.5 * (decays[i] + decays[i + 1]) / omega);
+    }
+    std::sort(modes.begin(), modes.end(), [](const ModeCandidate& a, const ModeCandidate& b) {
+      return a.frequency_hz < b.frequency_hz;
+    });
+    return modes;
   }
 
   const Eigen::MatrixXd& weights_;
@@ -227,10 +258,12 @@ class Relocation {
   ModelLines lines_;
   int integrators_ = 0;
   bool constant_ = false;
+  bool accurate_ = false;
   Eigen::VectorXcd x_;
-  Eigen::MatrixXcd H_;          // n_c x N
-  Eigen::VectorXd size_;        // |G| / |H| on every line
-  std::vector<Complex> poles_;  // s, upper half plane
+  Eigen::MatrixXcd H_;    // n_c x N
+  Eigen::VectorXd size_;  // |G| / |H| on every line
+  SplitMatrix own_;
+  PoleSet poles_;  // x
 };
 
 }  // namespace

@@ -16,12 +16,12 @@ namespace stageid {
 /// channel c is fitted to
 ///   sigma(x) H_c(x) = N_c(x),   sigma = d + sum_i c_i phi_i(x),   N_c = sum_i r_ci phi_i(x) + ...
 /// with the partial fractions phi_i of the current poles; sigma's coefficients are the channels' common
-/// ones, its zeros are the next poles. Costs one elimination of n_c small normal matrices an iteration,
+/// ones, its zeros are the next poles. The first poles stand where the response turns. Costs one elimination of n_c small normal matrices an iteration,
 /// whatever the number of modes; the fixed point is near the minimum, not in it: a fit follows.
 ///
 /// @param model what stands beside the modes, hold and delays; its modes are not looked at
 /// @param weights n_c x N
-/// @returns at most `modes` modes, sorted by frequency; fewer where poles came out real
+/// @returns at most `modes` modes, sorted by frequency; two real poles are an overdamped one
 std::vector<ModeCandidate> relocate_poles(const FrfEstimate& frf, const AdditiveModel& model,
                                           const Eigen::MatrixXd& weights, std::size_t modes,
                                           int threads);
