@@ -145,6 +145,30 @@ TEST(FitRecovery, OfGeneralViscousDampingAndOfADelayAChannel) {
   EXPECT_LT((fit.model.output_delay_s - problem.model.output_delay_s).cwiseAbs().maxCoeff(), 1e-10);
 }
 
+// 17 delays of the paper's channels, noise of a hundredth of the response on every line.
+TEST(FitRecovery, DelaysOfAllChannelsAt40DecibelWithinATenthOfAMicrosecond) {
+  test::RandomStageSpec spec;
+  spec.least_modes = spec.most_modes = 8;
+  spec.line_spacing_hz = 1.0;
+  test::RandomStage stage = test::draw_random_stage(9, spec);
+  test::RandomNumbers random(10);
+  for (std::complex<double>& value : stage.exact.reshaped())
+    value *= 1.0 + 0.01 * random.circular();
+  stage.frf.response = stage.exact;
+  stage.frf.noise_variance = 1e-4 * stage.exact.cwiseAbs2();
+  FitOptions options;
+  options.hold = HoldModel::exact;
+  options.delay = DelayModel::per_channel;
+  AdditiveModel start;
+  start.submodels = stage.truth.submodels;
+  const FitResult fit = fit_additive_model(stage.frf, start, options);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  ASSERT_EQ(fit.model.input_delay_s.size(), 13);
+  for (const double input : fit.model.input_delay_s)
+    for (const double output : fit.model.output_delay_s)
+      EXPECT_NEAR(input + output, stage.delay_s, 1e-7);
+}
+
 TEST(FitRecovery, OfSubmodelsThatAreNoModes) {
   DenseProblem problem;
   problem.model = test::named_model(2, 2);
