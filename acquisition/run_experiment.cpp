@@ -134,6 +134,7 @@ class Experiment {
   /// Passes on what the loop has left behind. By the reporting thread.
   void tell_events() {
     while (const std::optional<LoopEvent> event = loop_.events().pop()) {
+      if (event->kind == LoopEvent::Kind::state) node_state_ = static_cast<NodeState>(event->code);
       if (options_.events == nullptr) continue;
       const RunId run = runs_[static_cast<std::size_t>(event->run)];
       const bool state = event->kind == LoopEvent::Kind::state;
@@ -269,6 +270,7 @@ class Experiment {
     tell_events();
     if (!options_.progress) return;
     ExperimentProgress progress;
+    progress.node_state = node_state_;
     progress.run = {progress_.realization.load(std::memory_order_relaxed),
                     progress_.experiment.load(std::memory_order_relaxed)};
     progress.runs_done = progress_.runs_done.load(std::memory_order_relaxed);
@@ -298,6 +300,7 @@ class Experiment {
   ExperimentResult result_;
   std::exception_ptr failure_;
   SharedProgress progress_;
+  NodeState node_state_ = NodeState::not_ready;  // the reporting thread's
   std::atomic<bool> abandoned_ = false;
   std::mutex mutex_;
   std::condition_variable changed_;

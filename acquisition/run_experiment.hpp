@@ -23,8 +23,9 @@ struct ExperimentProgress {
   int runs_total = 0;
   double seconds_done = 0.0;  ///< of stage time
   double seconds_total = 0.0;
-  RunHealth health;  ///< of the current run
-  RunTiming timing;  ///< of the current run; empty in virtual time
+  RunHealth health;                             ///< of the current run
+  RunTiming timing;                             ///< of the current run; empty in virtual time
+  NodeState node_state = NodeState::not_ready;  ///< the newest that the stage told
 };
 
 struct RunExperimentOptions {
