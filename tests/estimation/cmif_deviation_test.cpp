@@ -44,8 +44,7 @@ void expect_the_scatter_of_draws(CmifKind kind, int outputs, int inputs) {
   FrfEstimate drawn = truth;
   for (int draw = 0; draw < kDraws; ++draw) {
     for (Eigen::Index i = 0; i < truth.response.size(); ++i)
-      drawn.response(i) =
-          truth.response(i) + std::sqrt(truth.noise_variance(i)) * gaussian(engine);
+      drawn.response(i) = truth.response(i) + std::sqrt(truth.noise_variance(i)) * gaussian(engine);
     squares += (cmif(drawn, kind) - exact).cwiseAbs2();
   }
   const Eigen::MatrixXd scatter = (squares / kDraws).cwiseSqrt();

@@ -37,7 +37,9 @@ TEST(DashboardToken, IsLongAndNeverTheSame) {
   EXPECT_NE(token, make_token());
   EXPECT_TRUE(same_token(token, token));
   EXPECT_FALSE(same_token(token, token.substr(1)));
-  EXPECT_FALSE(same_token(token, "x" + token.substr(1)));
+  std::string other = token;
+  other[0] = 'x';
+  EXPECT_FALSE(same_token(token, other));
   EXPECT_FALSE(same_token("", token));
 }
 

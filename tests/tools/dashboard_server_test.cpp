@@ -131,19 +131,24 @@ TEST_F(DashboardServerTest, ReachableFromOutsideItAsksForTheToken) {
   EXPECT_EQ(client().Post("/abort", {{"X-Stageid", "abort"}}, "", "text/plain")->status, 403);
   EXPECT_EQ(aborts_, 0);
   EXPECT_EQ(client().Get("/?token=" + token_)->status, 200);
-  EXPECT_EQ(client()
-                .Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, "", "text/plain")
-                ->status,
-            200);
+  EXPECT_EQ(
+      client().Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, "", "text/plain")->status,
+      200);
 }
 
 TEST_F(DashboardServerTest, AnAddressThatCannotBeHadIsAnError) {
   serve();
   DashboardContent other;
-  EXPECT_THAT([&] { DashboardServer({"127.0.0.1", port_}, other); },
-              testing::ThrowsMessage<StageError>(testing::HasSubstr("another port")));
-  EXPECT_THAT([&] { DashboardServer({"203.0.113.7", 0}, other); },
-              testing::ThrowsMessage<StageError>(testing::HasSubstr("203.0.113.7")));
+  EXPECT_THAT(
+      [&] {
+        DashboardServer({"127.0.0.1", port_}, other);
+      },
+      testing::ThrowsMessage<StageError>(testing::HasSubstr("another port")));
+  EXPECT_THAT(
+      [&] {
+        DashboardServer({"203.0.113.7", 0}, other);
+      },
+      testing::ThrowsMessage<StageError>(testing::HasSubstr("203.0.113.7")));
 }
 
 TEST_F(DashboardServerTest, TooManyWatchersAreSentAwayAndPlacesComeFree) {

@@ -60,7 +60,8 @@ TEST_F(RealTimeKeysTest, AWallClockRunTellsItsTimingEverywhere) {
   ASSERT_EQ(info["runs"].size(), 9U);
   for (const auto& run : info["runs"]) {
     std::uint64_t counted = 0;
-    for (const auto& bin : run["timing"]["lateness"]["bins"]) counted += bin[2].get<std::uint64_t>();
+    for (const auto& bin : run["timing"]["lateness"]["bins"])
+      counted += bin[2].get<std::uint64_t>();
     EXPECT_EQ(counted, run["samples"].get<std::uint64_t>());
     EXPECT_GT(run["timing"]["execution"]["median_s"].get<double>(), 0.0);
   }
@@ -72,7 +73,8 @@ TEST_F(RealTimeKeysTest, AWallClockRunTellsItsTimingEverywhere) {
 TEST_F(RealTimeKeysTest, EventsStandBesideTheLogAlsoOfAResumedOne) {
   make_log();
   EXPECT_THAT(read_bytes(at("run.events.jsonl")), testing::HasSubstr(R"("event":"start")"));
-  EXPECT_THAT(read_bytes(at("run.events.jsonl")), testing::HasSubstr(R"("event":"end","exit_code":0)"));
+  EXPECT_THAT(read_bytes(at("run.events.jsonl")),
+              testing::HasSubstr(R"("event":"end","exit_code":0)"));
   succeed({"run", config_, "-o", name("run.slog"), "--resume"});
   EXPECT_THAT(read_bytes(at("run.events.jsonl")), testing::HasSubstr(R"("event":"resume")"));
 }

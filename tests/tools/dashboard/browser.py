@@ -26,7 +26,7 @@ class Browser:
     """One page. `problems` gathers console messages of weight, uncaught errors and log entries."""
 
     def __init__(self, program):
-        self.profile = tempfile.TemporaryDirectory()
+        self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)  # its children end a moment later
         ours, theirs = os.pipe(), os.pipe()
 
         def place_pipes():  # the browser reads descriptor 3 and writes 4
@@ -94,7 +94,8 @@ class Browser:
         """True once the expression is; False if it never was."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
-            if self.evaluate(script):
+            # The page before this one has nothing to show: not an error.
+            if self.evaluate(f"(() => {{ try {{ return {script}; }} catch (e) {{ return false; }} }})()"):
                 return True
             time.sleep(0.1)
         return False

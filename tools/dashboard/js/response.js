@@ -17,9 +17,17 @@ function showResponse() {
     matrix.onselect = (channel) => showEntry(channel, true);
     selectPanel(0);
     buildCmif();
+    for (const id of ['timing', 'events']) moveToEnd(id);
     return;
   }
   redrawMatrix();
   showEntry(entry.channel, true);
   drawCmif();
+}
+
+function moveToEnd(id) {
+  const body = document.getElementById(id);
+  if (!body) return;
+  document.getElementById('main').append(body);
+  document.getElementById('contents').append(document.querySelector('#contents a[href="#' + id + '"]'));
 }
