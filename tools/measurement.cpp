@@ -184,6 +184,21 @@ void tell_end(EventLog& events, const LimitedStage& stage, const MeasurementResu
   events.write("end", {{"exit_code", std::int64_t{result.exit_code}}, {"message", result.message}});
 }
 
+/// Who is told what while it is measured.
+void listen(RunExperimentOptions& options, EventLog& events, Progress& progress,
+            Dashboard* dashboard) {
+  options.interrupt = &interrupt_flag();
+  options.events = &events;
+  options.progress = [&progress, dashboard](const ExperimentProgress& p) {
+    progress.update(p.seconds_done, p.seconds_total,
+                    fmt::format("run {}/{}", p.runs_done + 1, p.runs_total));
+    if (dashboard != nullptr) dashboard->update(p);
+  };
+  if (dashboard == nullptr) return;
+  options.observers = dashboard->observers();
+  dashboard->watch(events);
+}
+
 }  // namespace
 
 std::string measurement_id_of(const LogInfo& info) {
@@ -219,34 +234,25 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   options.real_time = config.stage.real_time.options;
   options.misses_allowed = config.stage.real_time.misses_allowed;
   if (stage->info().clock == Clock::wall) warn_of_real_time(options.real_time, console);
+  std::optional<EventLog> events;  // outlives the dashboard, whose watchers write to it
   const std::unique_ptr<Dashboard> dashboard =
       make_dashboard(config, plan, request, *stage, result.runs_before, console);
   const LogInfo info =
       experiment_log_info(plan, stage->info(), metadata(config, request, stage->info()));
   SlogWriter log = open_writer(request, info, exists);
-  EventLog events(event_log_of(request.log));
-  tell_begin(events, config, stage->info(), result);
+  events.emplace(event_log_of(request.log));
+  tell_begin(*events, config, stage->info(), result);
 
-  options.interrupt = &interrupt_flag();
-  options.events = &events;
   Progress progress(console, "run", "s of stage time");
-  options.progress = [&](const ExperimentProgress& p) {
-    progress.update(p.seconds_done, p.seconds_total,
-                    fmt::format("run {}/{}", p.runs_done + 1, p.runs_total));
-    if (dashboard) dashboard->update(p);
-  };
-  if (dashboard) {
-    options.observers = dashboard->observers();
-    dashboard->watch(events);
-  }
+  listen(options, *events, progress, dashboard.get());
   result.experiment = run_experiment(plan, *stage, controller, log, options);
   result.seconds = progress.seconds();
   conclude(*stage, result);
   if (result.experiment.end != ExperimentEnd::log_failed)
     log.close(result.exit_code, result.message.c_str());
-  tell_end(events, *stage, result);
+  tell_end(*events, *stage, result);
   if (dashboard) dashboard->finish(result.exit_code, result.message);
-  if (const std::string error = events.error(); !error.empty()) console.warning(error);
+  if (const std::string error = events->error(); !error.empty()) console.warning(error);
   result.log_bytes = std::filesystem::file_size(request.log);
   return result;
 }
