@@ -106,7 +106,11 @@ void Dashboard::update(const ExperimentProgress& progress) {
 
 void Dashboard::finish(int exit_code, const std::string& message) {
   State& s = *state_;
-  if (s.server->watchers() > 0) s.response.catch_up();
+  if (s.server->watchers() > 0) {
+    s.shown.state = "estimating";
+    s.publish();
+    s.response.catch_up();
+  }
   s.shown.state = "ended";
   s.shown.exit_code = exit_code;
   s.shown.message = message;

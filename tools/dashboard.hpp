@@ -36,7 +36,7 @@ class Dashboard {
   /// have left, or after kFarewell_s.
   void finish(int exit_code, const std::string& message);
 
-  static constexpr int kFarewell_s = 3;
+  static constexpr int kFarewell_s = 10;  ///< a page may be busy drawing
 
  private:
   struct State;

@@ -12,7 +12,7 @@ namespace stageid {
 
 /// What changes while an experiment is measured; the page's script is the reader.
 struct DashboardState {
-  const char* state = "starting";  ///< starting, running, stopping, ended
+  const char* state = "starting";  ///< starting, running, stopping, estimating, ended
   ExperimentProgress progress;
   int runs_before = 0;      ///< complete in the log already
   double wall_s = 0.0;      ///< since the first cycle

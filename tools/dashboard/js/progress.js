@@ -18,7 +18,8 @@ function buildProgress() {
     element('div', { class: 'status' }, head.verdict, head.abort), head.track, head.figures, head.note);
 }
 
-const stateWords = { starting: 'starting', running: 'measuring', stopping: 'stopping: the excitation is ramped down in closed loop' };
+const stateWords = { starting: 'starting', running: 'measuring', stopping: 'stopping: the excitation is ramped down in closed loop',
+  estimating: 'measured; the last response is being estimated' };
 
 function endOf(state) {
   if (state.exit_code === 0) return ['good', 'done'];
@@ -32,13 +33,13 @@ function showProgress(state) {
   head.verdict.className = 'verdict ' + level;
   // Only when it changes: it is read aloud.
   if (head.text.textContent !== text) head.text.textContent = text;
-  head.abort.disabled = state.state === 'ended' || state.state === 'stopping';
+  head.abort.disabled = state.state !== 'running' && state.state !== 'starting';
   const share = state.seconds_total > 0 ? Math.min(1, state.seconds_done / state.seconds_total) : 0;
   head.bar.style.width = (100 * share).toFixed(2) + '%';
   head.track.setAttribute('aria-valuenow', Math.round(100 * share));
   head.figures.replaceChildren(...figures(state).map(([label, value]) => element('div', null, element('dt', null, label), element('dd', null, value))));
-  head.note.textContent = 'Response: ' + state.response.status + '. Run now: realization ' + (state.run.realization + 1) + ' of ' + shown.realizations +
-    ', experiment ' + (state.run.experiment + 1) + '.';
+  const now = 'Run now: realization ' + (state.run.realization + 1) + ' of ' + shown.realizations + ', experiment ' + (state.run.experiment + 1) + '. ';
+  head.note.textContent = (state.state === 'running' ? now : '') + 'Response: ' + state.response.status + '.';
 }
 
 function figures(state) {
@@ -46,7 +47,7 @@ function figures(state) {
     ['runs complete', state.runs_done + ' of ' + state.runs_total],
     ['time left', state.state === 'ended' ? '\u2013' : duration(state.seconds_left)],
     ['measured', duration(state.seconds_done)],
-    ['stage', state.node_state],
+    ['stage', state.state === 'ended' ? '\u2013' : state.node_state],
     ['late', flaggedCount(state.health.late)], ['missing', flaggedCount(state.health.missing)], ['marked', flaggedCount(state.health.marked)],
   ];
   if (state.timing) list.push(['execution, 99.9 %', percent(state.timing.execution.p99_9_s / shown.period_s) + ' of a period']);
