@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/run_timing.hpp"
+
 namespace stageid {
 
 /// Names and units of one group of channels.
@@ -60,6 +62,7 @@ struct LogRun {
   bool complete = true;
   std::string started_utc;  ///< ISO 8601, may be empty
   RunHealth health;
+  RunTiming timing;  ///< against the wall clock; empty in virtual time and in HDF5 logs
 };
 
 }  // namespace stageid

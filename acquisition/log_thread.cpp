@@ -24,8 +24,12 @@ std::int64_t now_ns() {
 
 }  // namespace
 
-LogThread::LogThread(SlogWriter& log, SampleRing& ring)
-    : log_(log), ring_(ring), last_write_ns_(now_ns()), last_synchronize_ns_(last_write_ns_) {
+LogThread::LogThread(SlogWriter& log, SampleRing& ring, std::vector<RunObserver*> observers)
+    : log_(log),
+      ring_(ring),
+      observers_(std::move(observers)),
+      last_write_ns_(now_ns()),
+      last_synchronize_ns_(last_write_ns_) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -115,6 +119,7 @@ bool LogThread::write_rows(std::uint64_t available, bool all) {
   const std::span<const double> rows =
       ring_.front(static_cast<std::size_t>(std::min<std::uint64_t>(available, kBlockRows)));
   guarded([&] { log_.write(rows); });
+  for (RunObserver* observer : observers_) observer->rows(rows);
   ring_.pop(rows.size() / ring_.row_words());
   last_write_ns_ = now_ns();
   return true;
@@ -131,6 +136,13 @@ void LogThread::execute(const Command& command) {
     }
   });
   last_synchronize_ns_ = now_ns();
+  for (RunObserver* observer : observers_) {
+    if (command.excitation) {
+      observer->begin_run(command.run);
+    } else {
+      observer->end_run(command.run);
+    }
+  }
 }
 
 template <typename Action>

@@ -9,8 +9,10 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "acquisition/log_info.hpp"
+#include "acquisition/run_observer.hpp"
 #include "acquisition/sample_ring.hpp"
 #include "acquisition/slog_writer.hpp"
 
@@ -21,10 +23,10 @@ namespace stageid {
 /// Starts and ends of runs are queued with the row at which they belong: the loop may go on with
 /// the next run while the last one is still being written. The log is synchronized once a second
 /// and behind every run. When the log fails, rows are thrown away from then on and failed() is
-/// true.
+/// true. Observers are told of everything behind the log, of a log that has failed too.
 class LogThread {
  public:
-  LogThread(SlogWriter& log, SampleRing& ring);
+  LogThread(SlogWriter& log, SampleRing& ring, std::vector<RunObserver*> observers = {});
   /// Writes everything that is queued, then ends.
   ~LogThread();
   LogThread(const LogThread&) = delete;
@@ -60,6 +62,7 @@ class LogThread {
 
   SlogWriter& log_;
   SampleRing& ring_;
+  std::vector<RunObserver*> observers_;
   mutable std::mutex mutex_;  // of the four below
   std::condition_variable written_;
   std::deque<Command> commands_;

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "hal/pacer.hpp"
 
 namespace stageid {
 
@@ -30,6 +33,11 @@ bool gives_measurement(Outcome outcome) noexcept {
 }
 
 }  // namespace
+
+const char* to_string(StopReason reason) noexcept {
+  constexpr std::array kNames = {"none", "limit", "fault", "misses", "interrupt", "log"};
+  return kNames[static_cast<std::size_t>(reason)];
+}
 
 MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controller, SampleRing& ring,
                                  const LoopOptions& options)
@@ -92,13 +100,17 @@ void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excita
   reason_ = StopReason::none;
   last_trouble_ = Outcome::ok;
   health_ = {};
+  timing_ = {};
   status_ = {};
+  ++run_;
   std::fill(y_.begin(), y_.end(), 0.0);
   std::fill(last_finite_u_.begin(), last_finite_u_.end(), 0.0);
   controller_.reset();
   inputs_ = {};
   inputs_.y = fresh_;
   stage_.start(run_seed, inputs_);
+  if (wall_clock_) awake_ns_ = monotonic_ns();
+  tell_state();
   phase_ = Phase::measuring;
   take_measurement(Outcome::ok);
   const std::uint64_t all = ~std::uint64_t{0} >> (64 - y_.size());
@@ -115,7 +127,15 @@ LoopStatus MeasurementLoop::step() noexcept {
   const SampleStatus status = status_;
   const bool odd_command = write_row(row);
   const Deadline deadline{wall_clock_ ? inputs_.t_sample_ns + 2 * period_ns_ : 0};
+  std::int64_t computed_ns = 0;
+  if (wall_clock_) [[unlikely]]
+    computed_ns = monotonic_ns();
+  inputs_.t_ready_ns = 0;
   const Outcome outcome = stage_.exchange({cycle_, inputs_.t_sample_ns, u_}, inputs_, deadline);
+  if (wall_clock_) [[unlikely]]
+    time_cycle(computed_ns, outcome);
+  if (inputs_.node_state != node_state_) [[unlikely]]
+    tell_state();
 
   if (recording()) {
     // u[n] may not have been applied as it stands here: then this sample is no good either.
@@ -128,6 +148,28 @@ LoopStatus MeasurementLoop::step() noexcept {
   }
   take_measurement(outcome);
   return advance();
+}
+
+/// A stage that does not tell when it began to wait counts as having waited from the start.
+void MeasurementLoop::time_cycle(std::int64_t computed_ns, Outcome outcome) noexcept {
+  const std::int64_t ready_ns = std::max(computed_ns, inputs_.t_ready_ns);
+  if (recording()) {
+    const std::int64_t lateness_ns = inputs_.t_rx_ns - inputs_.t_sample_ns;
+    timing_.execution.add(ready_ns - awake_ns_);
+    timing_.lateness.add(lateness_ns);
+    if (outcome == Outcome::late && lateness_ns > 0)
+      timing_.skipped += static_cast<std::uint64_t>(lateness_ns / period_ns_);
+  }
+  awake_ns_ = monotonic_ns();
+}
+
+void MeasurementLoop::tell_state() noexcept {
+  node_state_ = inputs_.node_state;
+  tell(LoopEvent::Kind::state, static_cast<std::uint8_t>(node_state_));
+}
+
+void MeasurementLoop::tell(LoopEvent::Kind kind, std::uint8_t code) noexcept {
+  events_.push({run_, cycle_, kind, code});
 }
 
 void MeasurementLoop::compute_command() noexcept {
@@ -207,6 +249,7 @@ void MeasurementLoop::request_stop(StopReason reason) noexcept {
   }
   if (phase_ != Phase::measuring) return;
   reason_ = reason;
+  tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason));
   bucket_ = 0;  // a fresh allowance for the ramp
   ramp_left_ = ramp_samples_;
   phase_ = reason == StopReason::log ? Phase::landing : Phase::stopping;
@@ -214,7 +257,10 @@ void MeasurementLoop::request_stop(StopReason reason) noexcept {
 
 void MeasurementLoop::end(StopReason reason) noexcept {
   // A stage that is gone in the unrecorded ramp of a good run has spoilt nothing.
-  if (reason_ == StopReason::none && phase_ != Phase::landing) reason_ = reason;
+  if (reason_ == StopReason::none && phase_ != Phase::landing && reason != StopReason::none) {
+    reason_ = reason;
+    tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason));
+  }
   stage_.stop();
   phase_ = Phase::idle;
 }

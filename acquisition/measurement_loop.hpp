@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "acquisition/log_info.hpp"
+#include "acquisition/loop_events.hpp"
 #include "acquisition/sample_ring.hpp"
 #include "acquisition/slog_format.hpp"
 #include "hal/motion_controller.hpp"
@@ -33,6 +34,7 @@ enum class LoopStatus : std::uint8_t {
 
 /// Why a run ended before its time.
 enum class StopReason : std::uint8_t { none, limit, fault, misses, interrupt, log };
+const char* to_string(StopReason reason) noexcept;
 
 /// One closed-loop run, cycle by cycle:  u[n] = C(y[n]) + g r[n],  exchange(u[n]) -> y[n+1].
 ///
@@ -60,7 +62,8 @@ class MeasurementLoop {
   /// on sizes, an actuator that does not exist, or an excitation that is not finite.
   void start(std::uint64_t run_seed, const LoopExcitation& excitation);
 
-  /// One cycle. Does not allocate, lock, log or throw; no system call but the exchange's.
+  /// One cycle. Does not allocate, lock, log or throw; no system call but the exchange's. Against a
+  /// wall clock it reads the time twice, for timing().
   [[nodiscard]] LoopStatus step() noexcept;
 
   /// Begins a controlled stop; a second one is ignored, and so is any but a limit when all samples
@@ -74,6 +77,10 @@ class MeasurementLoop {
   Outcome last_trouble() const noexcept { return last_trouble_; }
   /// Of the current run; `seconds` is left to the caller.
   const RunHealth& health() const noexcept { return health_; }
+  /// Of the current run; empty in virtual time.
+  const RunTiming& timing() const noexcept { return timing_; }
+  /// Changes of state and stops of all runs so far; pop() is for one other thread.
+  LoopEvents& events() noexcept { return events_; }
 
  private:
   enum class Phase : std::uint8_t { idle, measuring, stopping, landing };
@@ -83,6 +90,9 @@ class MeasurementLoop {
   void take_measurement(Outcome outcome) noexcept;
   void hold_missing(std::uint64_t valid) noexcept;
   void count_bad_cycle(Outcome outcome) noexcept;
+  void time_cycle(std::int64_t computed_ns, Outcome outcome) noexcept;
+  void tell_state() noexcept;
+  void tell(LoopEvent::Kind kind, std::uint8_t code) noexcept;
   void end(StopReason reason) noexcept;
   LoopStatus advance() noexcept;
   bool recording() const noexcept { return phase_ != Phase::landing; }
@@ -117,6 +127,11 @@ class MeasurementLoop {
   StopReason reason_ = StopReason::none;
   Outcome last_trouble_ = Outcome::ok;
   RunHealth health_;
+  RunTiming timing_;
+  std::int64_t awake_ns_ = 0;  // when the loop got hold of y_
+  NodeState node_state_ = NodeState::not_ready;
+  int run_ = -1;
+  LoopEvents events_;
 };
 
 }  // namespace stageid

@@ -4,19 +4,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 
+#include "acquisition/event_recorder.hpp"
 #include "acquisition/log_thread.hpp"
 #include "acquisition/measurement_loop.hpp"
+#include "acquisition/shared_progress.hpp"
 
 namespace stageid {
 
@@ -56,47 +58,6 @@ std::string utc_now() {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
-/// Counts of the current run, for the thread that reports progress. Every number is right by
-/// itself; they may be some cycles apart from each other.
-class SharedProgress {
- public:
-  void publish(const RunHealth& health) noexcept {
-    store(0, health.cycles);
-    store(1, health.late);
-    store(2, health.missing);
-    store(3, health.marked);
-    store(4, static_cast<std::uint64_t>(health.largest_lateness_ns));
-  }
-  RunHealth health() const noexcept {
-    RunHealth health;
-    health.cycles = load(0);
-    health.late = load(1);
-    health.missing = load(2);
-    health.marked = load(3);
-    health.largest_lateness_ns = static_cast<std::int64_t>(load(4));
-    return health;
-  }
-  void begin(RunId run) noexcept {
-    publish({});
-    runs_begun.fetch_add(1, std::memory_order_relaxed);
-    realization.store(run.realization, std::memory_order_relaxed);
-    experiment.store(run.experiment, std::memory_order_relaxed);
-  }
-  std::atomic<int> realization = 0;
-  std::atomic<int> experiment = 0;
-  std::atomic<int> runs_begun = 0;
-  std::atomic<int> runs_done = 0;
-
- private:
-  void store(std::size_t i, std::uint64_t value) noexcept {
-    counts_[i].store(value, std::memory_order_relaxed);
-  }
-  std::uint64_t load(std::size_t i) const noexcept {
-    return counts_[i].load(std::memory_order_relaxed);
-  }
-  std::array<std::atomic<std::uint64_t>, 5> counts_{};
-};
-
 /// One experiment while it is performed.
 class Experiment {
  public:
@@ -107,7 +68,9 @@ class Experiment {
         options_(options),
         ring_(log.info().actuators.size() + log.info().sensors.size() + 1, ring_rows(stage.info())),
         loop_(stage, controller, ring_, {options.ramp_s, options.misses_allowed}),
-        log_(log, ring_) {
+        recorder_(make_recorder(options, ring_.row_words())),
+        log_(log, ring_, observers()),
+        wall_(stage.info().clock == Clock::wall) {
     for (const ExcitationAxis& axis : plan.spec().axes) {
       actuators_.push_back(actuator_index(stage.info(), axis.channel));
     }
@@ -122,6 +85,7 @@ class Experiment {
   ExperimentResult perform() {
     std::thread loop([this] {
       try {
+        const RealTime real_time(wall_ ? options_.real_time : RealTimeOptions{});
         perform_runs();
       } catch (...) {
         failure_ = std::current_exception();
@@ -142,6 +106,7 @@ class Experiment {
     if (failure_) std::rethrow_exception(failure_);
     result_.runs_done = log_.complete_runs();
     if (log_.failed()) take_log_failure();
+    tell_events();
     return std::move(result_);
   }
 
@@ -152,6 +117,36 @@ class Experiment {
         result_.end == ExperimentEnd::limit || result_.end == ExperimentEnd::fault;
     result_.message = stage_ended_it ? result_.message + "; " + log_.error() : log_.error();
     if (!stage_ended_it) result_.end = ExperimentEnd::log_failed;
+  }
+
+  static std::unique_ptr<EventRecorder> make_recorder(const RunExperimentOptions& options,
+                                                      std::size_t row_words) {
+    return options.events == nullptr ? nullptr
+                                     : std::make_unique<EventRecorder>(*options.events, row_words);
+  }
+
+  std::vector<RunObserver*> observers() const {
+    std::vector<RunObserver*> all = options_.observers;
+    if (recorder_) all.push_back(recorder_.get());
+    return all;
+  }
+
+  /// Passes on what the loop has left behind. By the reporting thread.
+  void tell_events() {
+    while (const std::optional<LoopEvent> event = loop_.events().pop()) {
+      if (event->kind == LoopEvent::Kind::state) node_state_ = static_cast<NodeState>(event->code);
+      if (options_.events == nullptr) continue;
+      const RunId run = runs_[static_cast<std::size_t>(event->run)];
+      const bool state = event->kind == LoopEvent::Kind::state;
+      options_.events->write(
+          state ? "state" : "stop",
+          {{"realization", std::int64_t{run.realization}},
+           {"experiment", std::int64_t{run.experiment}},
+           {"cycle", static_cast<std::int64_t>(event->cycle)},
+           state ? EventField{"state", std::string(to_string(static_cast<NodeState>(event->code)))}
+                 : EventField{"reason",
+                              std::string(to_string(static_cast<StopReason>(event->code)))}});
+    }
   }
 
   static std::size_t ring_rows(const StageInfo& info) {
@@ -180,7 +175,7 @@ class Experiment {
 
   StopReason perform_run(RunId id) {
     const auto started = std::chrono::steady_clock::now();
-    progress_.begin(id);
+    progress_.begin(id, wall_);
     LoopExcitation excitation{plan_.excitation(id), actuators_,
                               static_cast<std::uint64_t>(plan_.samples_per_run())};
     LogRun run;
@@ -194,22 +189,23 @@ class Experiment {
     run.health = loop_.health();
     run.health.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    run.timing = loop_.timing();
     log_.end_run(run);
     result_.health += run.health;
+    result_.timing += run.timing;
     result_.runs_done += run.complete ? 1 : 0;
-    progress_.publish(run.health);
+    progress_.publish(run.health, run.timing, wall_);
     progress_.runs_done.store(result_.runs_done, std::memory_order_relaxed);
     return loop_.reason();
   }
 
   void cycle_until_end() {
-    const bool wall = stage_.info().clock == Clock::wall;
     std::uint64_t until_publish = kPublishEvery;
     while (true) {
       const LoopStatus status = loop_.step();
       if (status == LoopStatus::ended) return;
       if (status == LoopStatus::ring_full) {
-        if (wall || log_.failed()) {
+        if (wall_ || log_.failed()) {
           loop_.request_stop(StopReason::log);
         } else {
           std::this_thread::yield();
@@ -218,7 +214,7 @@ class Experiment {
       if (interrupted()) loop_.request_stop(StopReason::interrupt);
       if (--until_publish == 0) {
         until_publish = kPublishEvery;
-        progress_.publish(loop_.health());
+        progress_.publish(loop_.health(), loop_.timing(), wall_);
         if (log_.failed()) loop_.request_stop(StopReason::log);
       }
     }
@@ -270,14 +266,17 @@ class Experiment {
     report();
   }
 
-  void report() const {
+  void report() {
+    tell_events();
     if (!options_.progress) return;
     ExperimentProgress progress;
+    progress.node_state = node_state_;
     progress.run = {progress_.realization.load(std::memory_order_relaxed),
                     progress_.experiment.load(std::memory_order_relaxed)};
     progress.runs_done = progress_.runs_done.load(std::memory_order_relaxed);
     progress.runs_total = static_cast<int>(runs_.size());
     progress.health = progress_.health();
+    if (wall_) progress.timing = progress_.timing();
     const double rate_hz = plan_.grid().sample_rate_hz();
     const double run_s = static_cast<double>(plan_.samples_per_run()) / rate_hz;
     const int before = std::max(0, progress_.runs_begun.load(std::memory_order_relaxed) - 1);
@@ -293,12 +292,15 @@ class Experiment {
   const RunExperimentOptions& options_;
   SampleRing ring_;
   MeasurementLoop loop_;
+  std::unique_ptr<EventRecorder> recorder_;
   LogThread log_;
+  bool wall_;
   std::vector<int> actuators_;
   std::vector<RunId> runs_;
   ExperimentResult result_;
   std::exception_ptr failure_;
   SharedProgress progress_;
+  NodeState node_state_ = NodeState::not_ready;  // the reporting thread's
   std::atomic<bool> abandoned_ = false;
   std::mutex mutex_;
   std::condition_variable changed_;

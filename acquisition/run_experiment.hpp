@@ -6,10 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/event_log.hpp"
+#include "acquisition/run_observer.hpp"
 #include "acquisition/slog_writer.hpp"
 #include "excitation/experiment_plan.hpp"
 #include "hal/limited_stage.hpp"
 #include "hal/motion_controller.hpp"
+#include "hal/real_time.hpp"
 
 namespace stageid {
 
@@ -20,15 +23,20 @@ struct ExperimentProgress {
   int runs_total = 0;
   double seconds_done = 0.0;  ///< of stage time
   double seconds_total = 0.0;
-  RunHealth health;  ///< of the current run
+  RunHealth health;                             ///< of the current run
+  RunTiming timing;                             ///< of the current run; empty in virtual time
+  NodeState node_state = NodeState::not_ready;  ///< the newest that the stage told
 };
 
 struct RunExperimentOptions {
   std::vector<RunId> skip = {};  ///< complete in the log already (--resume)
   /// Set by a signal handler: controlled stop, log kept.
   const std::atomic<bool>* interrupt = nullptr;
-  double ramp_s = 0.1;      ///< excitation is ramped to zero over this before stopping
-  int misses_allowed = 10;  ///< leaky bucket: +2 a bad cycle, -1 a good one, above: stop
+  double ramp_s = 0.1;             ///< excitation is ramped to zero over this before stopping
+  int misses_allowed = 10;         ///< leaky bucket: +2 a bad cycle, -1 a good one, above: stop
+  RealTimeOptions real_time = {};  ///< of the loop's thread, where the clock is the wall's
+  EventLog* events = nullptr;      ///< told of runs, misses, states, limits and stops
+  std::vector<RunObserver*> observers = {};  ///< told of every row, by the log's thread
   /// From the calling thread, a few times a second and once at the end. If it throws, the experiment
   /// ends in a controlled stop and the exception goes on.
   std::function<void(const ExperimentProgress&)> progress = {};
@@ -40,6 +48,7 @@ struct ExperimentResult {
   ExperimentEnd end = ExperimentEnd::complete;
   std::string message = "run_experiment was not called";
   RunHealth health;   ///< over all runs
+  RunTiming timing;   ///< over all runs
   int runs_done = 0;  ///< complete ones, without those skipped
 };
 
@@ -56,13 +65,14 @@ std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept;
 
 /// Performs every run of the plan on the stage: u = r + C(y), every sample logged.
 ///
-/// The calling thread is the loop; a thread of its own empties the ring into the log. In virtual
-/// time the loop waits for the log, against the wall clock a full ring ends the experiment
+/// A thread of its own is the loop, another empties the ring into the log; the calling thread
+/// reports. In virtual time the loop waits for the log, against the wall clock a full ring ends the experiment
 /// (log_failed). A limit, a fault, too many misses or an interrupt ends the current run in a
 /// controlled stop: the excitation is ramped down in closed loop, the stage stopped, the run logged
 /// as incomplete. Every run starts from standstill with the seed of (plan seed, realization,
 /// experiment), so that a repeated or resumed run is the same run.
-/// @throws StageError if a run cannot be started (the runs before it are in the log).
+/// @throws StageError if a run cannot be started (the runs before it are in the log), or if
+/// real time is required and not to be had.
 /// @throws std::invalid_argument if plan, stage, controller and log do not fit.
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
                                 MotionController& controller, SlogWriter& log,

@@ -183,6 +183,7 @@ class Indexer {
     }
     run.run.complete = end.complete;
     run.run.health = end.health;
+    run.run.timing = end.timing;
     run.ended = true;
     open_ = false;
   }

@@ -38,6 +38,41 @@ ChannelList channels_of(const Json& json) {
           json.at("units").get<std::vector<std::string>>()};
 }
 
+/// [[from_ns, to_ns, count], ...] of the bins that hold something.
+Json json_of(const TimingHistogram& histogram) {
+  Json bins = Json::array();
+  for (std::size_t bin = 0; bin < TimingHistogram::kBins; ++bin)
+    if (histogram.count(bin) > 0)
+      bins.push_back(
+          {TimingHistogram::lower_ns(bin), TimingHistogram::upper_ns(bin), histogram.count(bin)});
+  return bins;
+}
+
+TimingHistogram histogram_of(const Json& json) {
+  TimingHistogram histogram;
+  for (const Json& bin : json) {
+    const auto lower = bin.at(0).get<std::uint64_t>();
+    if (lower > 0xFFFF'FFFF || TimingHistogram::lower_ns(TimingHistogram::bin_of(
+                                   static_cast<std::uint32_t>(lower))) != lower)
+      throw std::invalid_argument(
+          fmt::format("end of a run: no bin of a timing histogram begins at {} ns", lower));
+    histogram.add_bin(TimingHistogram::bin_of(static_cast<std::uint32_t>(lower)),
+                      bin.at(2).get<std::uint64_t>());
+  }
+  return histogram;
+}
+
+Json json_of(const RunTiming& timing) {
+  return {{"execution", json_of(timing.execution)},
+          {"lateness", json_of(timing.lateness)},
+          {"skipped", timing.skipped}};
+}
+
+RunTiming timing_of(const Json& json) {
+  return {histogram_of(json.at("execution")), histogram_of(json.at("lateness")),
+          json.at("skipped").get<std::uint64_t>()};
+}
+
 }  // namespace
 
 std::string to_json(const LogInfo& info) {
@@ -89,17 +124,19 @@ SlogRunBegin parse_run_begin(std::string_view text) {
 
 std::string to_json(const SlogRunEnd& end) {
   const RunHealth& health = end.health;
-  return text_of({{"realization", end.realization},
-                  {"experiment", end.experiment},
-                  {"samples", end.samples},
-                  {"complete", end.complete},
-                  {"health",
-                   {{"cycles", health.cycles},
-                    {"late", health.late},
-                    {"missing", health.missing},
-                    {"marked", health.marked},
-                    {"largest_lateness_ns", health.largest_lateness_ns},
-                    {"seconds", health.seconds}}}});
+  Json json = {{"realization", end.realization},
+               {"experiment", end.experiment},
+               {"samples", end.samples},
+               {"complete", end.complete},
+               {"health",
+                {{"cycles", health.cycles},
+                 {"late", health.late},
+                 {"missing", health.missing},
+                 {"marked", health.marked},
+                 {"largest_lateness_ns", health.largest_lateness_ns},
+                 {"seconds", health.seconds}}}};
+  if (!end.timing.empty()) json["timing"] = json_of(end.timing);
+  return text_of(json);
 }
 
 SlogRunEnd parse_run_end(std::string_view text) {
@@ -116,6 +153,7 @@ SlogRunEnd parse_run_end(std::string_view text) {
     end.health.marked = health.at("marked").get<std::uint64_t>();
     end.health.largest_lateness_ns = health.at("largest_lateness_ns").get<std::int64_t>();
     end.health.seconds = health.at("seconds").get<double>();
+    if (json.contains("timing")) end.timing = timing_of(json.at("timing"));
     return end;
   });
 }

@@ -23,6 +23,7 @@ struct SlogRunEnd {
   std::uint64_t samples = 0;
   bool complete = false;
   RunHealth health;
+  RunTiming timing;
 };
 
 struct SlogEnd {

@@ -58,6 +58,7 @@ class Recovery {
     bool usable = true;  ///< its start and excitation are there
     bool excitation = false;
     RunHealth health;
+    RunTiming timing;
   };
 
   void take(const SlogBlock& block) {
@@ -142,6 +143,7 @@ class Recovery {
     open_orphan(block);
     const bool whole = end.samples >= run_->rows && fill(end.samples);
     run_->health = end.health;
+    run_->timing = end.timing;
     close_run(end.complete && whole, block.header.time_ns);
   }
 
@@ -153,7 +155,7 @@ class Recovery {
     run_->health.marked += filled_;
     append_json(SlogBlockType::run_end,
                 to_json(SlogRunEnd{run_->begin.realization, run_->begin.experiment, run_->rows,
-                                   usable, run_->health}),
+                                   usable, run_->health, run_->timing}),
                 time_ns);
     report_.rows_lost += filled_;
     filled_ = 0;

@@ -177,7 +177,8 @@ void SlogWriter::write(std::span<const double> rows) {
 void SlogWriter::end_run(const LogRun& run) {
   State& state = *state_;
   const LogRun& open = state.run("end_run");
-  const SlogRunEnd end{open.realization, open.experiment, open.samples, run.complete, run.health};
+  const SlogRunEnd end{open.realization, open.experiment, open.samples,
+                       run.complete,     run.health,      run.timing};
   state.appender.append(state.header(SlogBlockType::run_end), to_json(end));
   state.open_run.reset();
 }

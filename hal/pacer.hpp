@@ -4,6 +4,9 @@
 
 namespace stageid {
 
+/// CLOCK_MONOTONIC.
+std::int64_t monotonic_ns() noexcept;
+
 /// Waits for sample instants: asleep until shortly before, then spinning, because a sleeping thread
 /// wakes up tens of microseconds late and a spinning one keeps others from running.
 class Pacer {
@@ -14,6 +17,7 @@ class Pacer {
   struct Instant {
     std::int64_t sample_ns = 0;  ///< the sample instant, of the stage's clock
     std::int64_t now_ns = 0;     ///< when the wait ended
+    std::int64_t ready_ns = 0;   ///< when it began; 0 in virtual time
     bool late = false;           ///< the instant had passed before the wait began
   };
 
@@ -25,6 +29,7 @@ class Pacer {
 
  private:
   double period_ns_;
+  std::int64_t spin_ns_;
   bool wall_;
   std::int64_t origin_ns_ = 0;
   std::uint64_t index_ = 0;

@@ -184,6 +184,7 @@ Outcome SimulatedStage::exchange(const Outputs& outputs, Inputs& inputs,
   inputs.cycle = s.cycle;
   inputs.t_sample_ns = now.sample_ns;
   inputs.t_rx_ns = now.now_ns;
+  inputs.t_ready_ns = now.ready_ns;
   inputs.node_state = off || !accepted ? NodeState::fault : NodeState::operation_enabled;
   inputs.valid = missed ? 0 : s.all_sensors & ~missing;
   if (missed) {

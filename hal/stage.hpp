@@ -74,6 +74,9 @@ struct Inputs {
   std::span<double> y;
   std::uint64_t valid = 0;
   NodeState node_state = NodeState::not_ready;
+  /// When nothing but the wait for t_sample was left to do, CLOCK_MONOTONIC; 0: not told. What lies
+  /// behind it is no execution time.
+  std::int64_t t_ready_ns = 0;
 };
 
 /// What the stage shall do. `u`: size actuators, SI.

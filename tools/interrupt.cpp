@@ -31,6 +31,8 @@ const std::atomic<bool>& interrupt_flag() {
   return interrupted;
 }
 
+void request_interrupt() noexcept { interrupted = true; }
+
 void throw_if_interrupted() {
   if (interrupt_flag()) throw Interrupted();
 }

@@ -8,6 +8,9 @@ namespace stageid {
 /// Also ignores SIGXFSZ and SIGPIPE, so that a full disk and a closed pipe are errors of the write.
 const std::atomic<bool>& interrupt_flag();
 
+/// As if the first signal had come. From any thread.
+void request_interrupt() noexcept;
+
 /// @throws Interrupted if a signal came.
 void throw_if_interrupted();
 

@@ -14,6 +14,8 @@
 #include "tools/command_line.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/interrupt.hpp"
+#include "tools/measurement.hpp"
+#include "tools/timing_json.hpp"
 
 namespace stageid {
 namespace {
@@ -27,6 +29,26 @@ Json health_json(const RunHealth& health) {
           {"marked", health.marked},
           {"largest_lateness_ns", health.largest_lateness_ns},
           {"seconds", health.seconds}};
+}
+
+/// How the loop kept time over all runs; nothing in virtual time.
+std::vector<std::string> timing_lines(const LogReader& log) {
+  RunTiming timing;
+  for (const LogRun& run : log.runs()) timing += run.timing;
+  if (timing.empty()) return {};
+  const double period_s = wall_period_s(log.info());
+  const auto line = [&](const char* what, const TimingHistogram& histogram) {
+    const auto of = [&](double share) {
+      const double seconds = histogram.quantile_s(share);
+      const std::string part =
+          period_s > 0.0 ? fmt::format(" ({:.2g} %)", 100.0 * seconds / period_s) : "";
+      return fmt::format("{:.3g} us{}", 1e6 * seconds, part);
+    };
+    return fmt::format("{} median < {}, 99 % < {}, 99.9 % < {}, all < {}", what, of(0.5), of(0.99),
+                       of(0.999), of(1.0));
+  };
+  return {line("execution ", timing.execution), line("lateness  ", timing.lateness),
+          fmt::format("skipped    {} periods of {:.4g} us", timing.skipped, 1e6 * period_s)};
 }
 
 Json damage_json(const std::vector<LogDamage>& damage) {
@@ -54,7 +76,8 @@ Json info_json(const LogReader& log) {
                             {"samples", run.samples},
                             {"complete", run.complete},
                             {"started_utc", run.started_utc},
-                            {"health", health_json(run.health)}});
+                            {"health", health_json(run.health)},
+                            {"timing", timing_json(run.timing)}});
   json["metadata"] = Json::parse(info.metadata_json, nullptr, false);
   return json;
 }
@@ -105,6 +128,7 @@ void LogCommand::info() const {
                     fmt::format("{}", run.health.marked), run.complete ? "complete" : "INCOMPLETE",
                     run.started_utc});
   for (const std::string& line : table_lines(rows)) console_.result(line);
+  for (const std::string& line : timing_lines(*log)) console_.result(line);
   console_.result(info_json(*log));
 }
 

@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "acquisition/run_experiment.hpp"
 #include "tools/console.hpp"
+#include "tools/dashboard_address.hpp"
 #include "tools/experiment_config.hpp"
 
 namespace stageid {
@@ -18,6 +20,7 @@ struct MeasurementRequest {
   double replay_tolerance_n = 1e-9;
   bool resume = false;
   double pace = -1.0;  ///< < 0: as the stage file says
+  std::optional<DashboardAddress> dashboard = {};
 };
 
 struct MeasurementResult {
@@ -38,6 +41,10 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
 
 /// Bytes of the samples of a whole experiment in a native log.
 double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage);
+
+/// The period of the loop on its wall clock; 0 if the log was measured in virtual time, or does not
+/// say.
+double wall_period_s(const LogInfo& info);
 
 /// What the log's metadata say of the experiment it belongs to; empty if nothing.
 std::string measurement_id_of(const LogInfo& info);

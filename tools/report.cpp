@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <stdexcept>
-#include <string_view>
-#include <utility>
 
 #include "excitation/output_file.hpp"
+#include "tools/page_template.hpp"
 #include "tools/report_assets.hpp"
 #include "tools/report_json.hpp"
 
@@ -53,29 +52,6 @@ void check_data(const ReportData& data) {
     throw std::invalid_argument("validation_frf: its lines are not those of frf");
 }
 
-std::string escape_html(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
 std::string block_elements(const std::vector<report::Block>& blocks) {
   std::string out;
   for (const report::Block& block : blocks)
@@ -84,36 +60,19 @@ std::string block_elements(const std::vector<report::Block>& blocks) {
   return out;
 }
 
-/// Replaces every {{name}} of the template once, from left to right, so that nothing that was put
-/// in is looked at again.
-std::string fill(std::string_view page,
-                 const std::vector<std::pair<std::string_view, std::string_view>>& parts) {
-  std::string out;
-  while (true) {
-    const std::size_t begin = page.find("{{");
-    const std::size_t end = page.find("}}", begin);
-    out += page.substr(0, begin);
-    if (begin == std::string_view::npos || end == std::string_view::npos) return out;
-    const std::string_view name = page.substr(begin + 2, end - begin - 2);
-    for (const auto& [key, value] : parts)
-      if (key == name) out += value;
-    page.remove_prefix(end + 2);
-  }
-}
-
 }  // namespace
 
 std::string report_page(const ReportData& data) {
   check_data(data);
   const report::PageContent content = report::page_content(data);
-  return fill(report::page_html, {{"title", escape_html(data.title)},
-                                  {"library_css", report::library_css},
-                                  {"css", report::page_css},
-                                  {"library_js", report::library_js},
-                                  {"js", report::page_js},
-                                  {"licence", escape_html(report::library_licence)},
-                                  {"content", content.json},
-                                  {"blocks", block_elements(content.blocks)}});
+  return fill_page(report::page_html, {{"title", escape_html(data.title)},
+                                       {"library_css", report::library_css},
+                                       {"css", report::page_css},
+                                       {"library_js", report::library_js},
+                                       {"js", report::page_js},
+                                       {"licence", escape_html(report::library_licence)},
+                                       {"content", content.json},
+                                       {"blocks", block_elements(content.blocks)}});
 }
 
 void write_report(const std::filesystem::path& file, const ReportData& data) {

@@ -73,6 +73,7 @@ struct ReportData {
 
   std::vector<LogRun> runs;     ///< timing and health of the measurement
   double sample_rate_hz = 0.0;  ///< of the runs; with it their speed against real time is told
+  double period_s = 0.0;        ///< of the loop's own clock; 0: virtual time
   std::vector<ReportStep> steps;
 
   std::vector<ReportFigure> figures;    ///< further figures for the header

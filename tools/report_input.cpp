@@ -12,6 +12,7 @@
 #include "excitation/hdf5_file.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/fit_step.hpp"
+#include "tools/measurement.hpp"
 #include "tools/model_hdf5.hpp"
 
 namespace stageid {
@@ -130,6 +131,7 @@ void add_log(ReportData& data, const std::filesystem::path& file) {
   data.sample_rate_hz = log->info().sample_rate_hz;
   const Json metadata = Json::parse(log->info().metadata_json, nullptr, false);
   if (!metadata.is_object()) return;
+  data.period_s = wall_period_s(log->info());
   for (const char* name : {"configuration", "stage"})
     if (metadata.contains(name) && metadata[name].is_string())
       data.documents.push_back({name, metadata[name].get<std::string>()});

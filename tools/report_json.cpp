@@ -4,9 +4,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "estimation/cmif_deviation.hpp"
+#include "tools/page_template.hpp"
 #include "tools/report_encoding.hpp"
 #include "tools/report_modes.hpp"
 #include "tools/report_verdict.hpp"
+#include "tools/timing_json.hpp"
 
 namespace stageid::report {
 namespace {
@@ -93,11 +96,14 @@ void add_response(const ReportData& data, Arrays& arrays) {
   const FrfEstimate& frf = *data.frf;
   arrays.add("frequency", "f64", encode_float64(frf.frequency_hz));
   arrays.add("response", "c64", encode_complex_float32(frf.response));
-  if (const Uncertainty known = uncertainty(frf); known.variance != nullptr)
-    arrays.add_deviation("deviation", *known.variance);
-  if (data.cmif_curves.size() > 0)
+  const Eigen::MatrixXd* const variance = uncertainty(frf).variance;
+  if (variance != nullptr) arrays.add_deviation("deviation", *variance);
+  if (data.cmif_curves.size() > 0) {
     arrays.add("cmif", "f32", encode_float32(data.cmif_curves),
                {{"curves", data.cmif_curves.rows()}});
+    if (variance != nullptr)
+      arrays.add_log_bytes("cmif_deviation", cmif_deviation(frf, data.cmif_kind, *variance));
+  }
   if (data.model_response.size() == 0) return;
   // The model travels as the residual: small errors of small numbers stay small in both.
   const Eigen::MatrixXcd residual = frf.response - data.model_response;
@@ -256,18 +262,9 @@ Json candidates_json(const std::vector<ModeCandidate>& candidates) {
   return out;
 }
 
-/// Inside <script> only "</script" and "<!--" matter, and both begin with '<'.
-std::string script_safe(const Json& json) {
-  const std::string text = json.dump(-1, ' ', true, Json::error_handler_t::replace);
-  std::string out;
-  out.reserve(text.size());
-  for (const char c : text) {
-    if (c == '<')
-      out += "\\u003c";
-    else
-      out += c;
-  }
-  return out;
+/// Valid UTF-8 whatever came in, and safe inside <script>.
+std::string text_of(const Json& json) {
+  return script_safe(json.dump(-1, ' ', true, Json::error_handler_t::replace));
 }
 
 }  // namespace
@@ -286,6 +283,10 @@ PageContent page_content(const ReportData& data) {
   json["cmif_kind"] = to_string(data.cmif_kind);
   json["candidates"] = candidates_json(data.chosen_modes);
   json["cost"] = data.cost.empty() && data.model ? data.model->cost_history : data.cost;
+  RunTiming timing;
+  for (const LogRun& run : data.runs) timing += run.timing;
+  json["timing"] = timing_json(timing);
+  json["period_s"] = data.period_s > 0.0 ? Json(data.period_s) : Json();
   json["runs"] = Json::array();
   for (const LogRun& run : data.runs) json["runs"].push_back(run_json(run, data.sample_rate_hz));
   json["sample_rate_hz"] = data.sample_rate_hz;
@@ -299,7 +300,7 @@ PageContent page_content(const ReportData& data) {
   }
   if (data.validation) json["validation"] = validation_json(*data.validation);
   json["arrays"] = std::move(arrays.description());
-  return {script_safe(json), std::move(arrays.blocks())};
+  return {text_of(json), std::move(arrays.blocks())};
 }
 
 }  // namespace stageid::report

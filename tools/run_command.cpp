@@ -38,13 +38,13 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--resume", resume_,
                     "continue an interrupted log: complete runs are not repeated");
-  command->add_option("--dashboard", dashboard_port_, "")->group("");
+  command->add_option("--dashboard", dashboard_,
+                      "PORT: show the experiment in a browser on this machine (0: any free port); "
+                      "HOST:PORT: on others too, who need the token in the address it prints");
   command->final_callback([this] { run(); });
 }
 
 void RunCommand::run() const {
-  if (dashboard_port_ >= 0)
-    throw std::invalid_argument("--dashboard: not in this version; leave it out");
   const ExperimentConfig config = load_experiment_config(config_);
   const ExperimentPlan plan = make_plan(config);
   MeasurementRequest request;
@@ -54,6 +54,7 @@ void RunCommand::run() const {
   request.replay_tolerance_n = replay_tolerance_n_;
   request.resume = resume_;
   request.pace = pace_;
+  if (!dashboard_.empty()) request.dashboard = parse_dashboard_address(dashboard_);
   const MeasurementResult result = measure(config, plan, request, console_);
   console_.exit_code = result.exit_code;
 

@@ -23,7 +23,7 @@ class RunCommand {
   std::filesystem::path replay_;
   double replay_tolerance_n_ = 1e-9;
   double pace_ = -1.0;
-  int dashboard_port_ = -1;
+  std::string dashboard_;
   bool resume_ = false;
 };
 

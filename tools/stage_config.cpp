@@ -52,6 +52,7 @@ struct StageFile {
   std::vector<InPlaneModeConfig> in_plane_modes;
   std::array<AxisController, kRigidAxes> axes;
   std::vector<FaultConfig> faults;
+  RealTimeKeys real_time;
   WaferStageSpec spec;
 };
 
@@ -241,6 +242,9 @@ void describe(ConfigVisitor& v, StageFile& f) {
       kRequired, "one entry a degree of freedom that is closed: x y z Rx Ry Rz");
   v.number("pace", s.pace, not_negative(""), kOptional,
            "0: virtual time, as fast as possible; 1: wall clock");
+  v.group(
+      "realtime", [&](ConfigVisitor& keys) { describe_real_time(keys, f.real_time); }, kOptional,
+      "of the loop's thread; without meaning in virtual time");
   v.items(
       "faults", [&](ConfigVisitor& fault) { describe_fault(fault, f.faults); }, {}, kOptional,
       "faults on request, to try the safety");
@@ -354,6 +358,7 @@ StageConfig load_stage_config(const std::filesystem::path& path) {
   config.file = path;
   config.text = document.text();
   config.backend = static_cast<Backend>(file.backend);
+  config.real_time = file.real_time;
   // What the libraries refuse gets the file's name; the place is in their own words.
   try {
     complete_spec(config, file);

@@ -10,6 +10,7 @@
 #include "hal/motion_controller.hpp"
 #include "hal/simulated_stage.hpp"
 #include "tools/config_visitor.hpp"
+#include "tools/real_time_keys.hpp"
 
 namespace stageid {
 
@@ -21,6 +22,7 @@ struct StageConfig {
   std::filesystem::path file;
   std::string text;  ///< of the file, kept for the log
   Backend backend = Backend::sim;
+  RealTimeKeys real_time;
   WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
 };
 

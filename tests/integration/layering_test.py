@@ -37,6 +37,7 @@ DOORS = {
     "H5": {"excitation"},
     "yaml-cpp/": {"tools"},
     "CLI/": {"tools"},
+    "httplib": {"tools"},
     "nlohmann/": {"record", "frf", "estimation", "tools"},
 }
 

@@ -71,12 +71,12 @@ TEST(Report, DescribesEveryBlockItHolds) {
   const std::string page = report_page(small());
   const json arrays = content(page)["arrays"];
   for (const char* id : {"frequency", "response", "residual", "deviation", "model_deviation",
-                         "validation_residual", "cmif"}) {
+                         "validation_residual", "cmif", "cmif_deviation"}) {
     EXPECT_TRUE(arrays.contains(id)) << id;
     EXPECT_FALSE(element(page, std::string("data-") + id).empty()) << id;
   }
-  EXPECT_EQ(arrays.size(), 7u);
-  EXPECT_EQ(count(page, "id=\"data-"), 7u);
+  EXPECT_EQ(arrays.size(), 8u);
+  EXPECT_EQ(count(page, "id=\"data-"), 8u);
 }
 
 TEST(Report, ShowsTheTotalVarianceOnlyWhereEnoughRealizationsTellIt) {

@@ -151,6 +151,8 @@ def check_page(found, expected, width):
         check_response(found, expected)
         check_zoom(found["zoom"])
         check_use(found["use"], expected, width)
+    expect(found["timed_cycles"] == expected["timed_cycles"],
+           f"histograms of {found['timed_cycles']} cycles instead of {expected['timed_cycles']}")
     if expected["modes"]:
         expect(found["rows"]["modes"] == expected["modes"], f"{found['rows']['modes']} modes in the table")
 

@@ -68,6 +68,9 @@ Json extremes(const Eigen::MatrixXcd& values) {
 
 Json expected(const ReportData& data) {
   Json out = {{"title", data.title}, {"modes", data.model ? data.true_modes.size() : 0}};
+  RunTiming timing;
+  for (const LogRun& run : data.runs) timing += run.timing;
+  out["timed_cycles"] = timing.lateness.total() + timing.execution.total();
   if (!data.frf) return out;
   const FrfEstimate& frf = *data.frf;
   out["panels"] = frf.response.rows();

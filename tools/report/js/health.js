@@ -17,6 +17,7 @@ function buildHealth() {
       ['speed', runTotals.seconds > 0 && runTotals.recorded_s > 0 ? number(runTotals.recorded_s / runTotals.seconds) + ' \u00d7 real time' : null],
     ]));
   }
+  if (content.timing) body.append(timingBars(content.timing, content.period_s));
   if (content.steps.length) body.append(stepBars());
   if (content.runs.length) body.append(element('details', null, element('summary', null, 'Every run'), runTable()));
 }

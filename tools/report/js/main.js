@@ -2,12 +2,6 @@
 
 const startedMs = performance.now();
 
-// The reader sees the head and the tables at once, the plots a moment later. The self-check waits for nothing.
-function afterFirstPaint(work) {
-  if (location.hash === '#selftest') work();
-  else requestAnimationFrame(() => setTimeout(work));
-}
-
 buildHead();
 if (content.frf) {
   buildMatrix();

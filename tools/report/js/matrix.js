@@ -17,7 +17,7 @@ function matrixRange(scale) {
   let high = 0;
   let low = Infinity;
   const small = [];
-  for (let c = 0; c < channelCount; ++c) {
+  for (let c = 0; c < channelCount(); ++c) {
     const curves = channelCurves(c);
     const measured = scaled(curves.measured, scale);
     for (let k = 0; k < measured.length; ++k) {

@@ -21,6 +21,8 @@ function selfTest(startedMs) {
   findings.plots = Object.fromEntries(Array.from(document.querySelectorAll('.plot'), (plot) => [plot.id, inkOf(plot)]));
   findings.rows = Object.fromEntries(Array.from(document.querySelectorAll('section'), (s) => [s.id, s.querySelectorAll('tbody tr').length]));
   if (content.frf) Object.assign(findings, { zoom: zoomCheck(), use: useCheck() });
+  findings.timed_cycles = Array.from(document.querySelectorAll('.histogram .step-time'), (cell) => Number(cell.textContent.replace(/\u202f/g, '')))
+    .reduce((a, b) => a + b, 0);
   findings.errors = window.stageidReport.errors;
   if (window.parent !== window) window.parent.postMessage(findings, '*');  // the test's narrow frame
   document.body.append(element('script', { type: 'application/json', id: 'selftest' }, JSON.stringify(findings).replace(/</g, '\\u003c')));

@@ -135,7 +135,7 @@ function buildValidation() {
     ['whitened error above its 95 % point', v.chi_square_per_dof > 0 ? percent(v.whitened_above_95) + ' (5 % is right)' : null],
     ['largest autocorrelation over lines', v.whiteness_limit > 0 ? number(v.whiteness) + ' (99 % limit ' + number(v.whiteness_limit) + ')' : null],
   ]));
-  if (content.frf && v.channel_error.length === channelCount) body.append(channelErrors(v.channel_error));
+  if (content.frf && v.channel_error.length === channelCount()) body.append(channelErrors(v.channel_error));
 }
 
 // Relative rms error a channel, shaded on a logarithmic scale between the least and the largest.

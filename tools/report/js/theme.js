@@ -44,3 +44,9 @@ function print(on) {
 
 window.addEventListener('beforeprint', () => print(true));
 window.addEventListener('afterprint', () => print(false));
+
+// The reader sees the head and the tables at once, the plots a moment later. The self-check waits for nothing.
+function afterFirstPaint(work) {
+  if (location.hash === '#selftest') work();
+  else requestAnimationFrame(() => setTimeout(work));
+}

@@ -1,7 +1,6 @@
-// The complex mode indicator function with its modes, and the cost over the iterations.
+// The complex mode indicator function with its modes.
 
 const cmif = { graph: null };
-const cost = { graph: null };
 
 const cmifNames = {
   response: 'squared singular values of G',
@@ -17,7 +16,8 @@ function buildCmif() {
   if (content.candidates.length) legend.append(element('span', { class: 'mark ring' }, 'chosen as start (' + content.candidates.length + ')'));
   if (identifiedModes().length) legend.append(element('span', { class: 'mark line' }, 'identified mode (' + identifiedModes().length + ')'));
   body.append(legend, element('div', { class: 'plot tall', id: 'cmif-plot', role: 'img', 'aria-labelledby': 'cmif-title' }),
-    element('p', { class: 'axis-title' }, 'Frequency [Hz]'));
+    element('p', { class: 'axis-title' }, 'Frequency [Hz]'),
+    content.arrays.cmif_deviation ? element('p', { class: 'quiet' }, 'The shaded bands hold the true values with 95 %, to first order in the errors of the elements.') : null);
   afterFirstPaint(drawCmif);
   onColours(() => cmif.graph && cmif.graph.updateOptions({ ...plotColours(), series: cmifSeries() }));
 }
@@ -32,22 +32,37 @@ function drawCmif() {
   const curves = content.arrays.cmif.curves;
   let floor = Infinity;
   for (const v of values) if (v > 0 && v < floor) floor = v;
+  const deviation = array('cmif_deviation');
   const rows = Array.from(f, (hz, k) => {
     const row = [hz];
-    for (let i = 0; i < curves; ++i) row.push(Math.max(values[i * f.length + k], floor));
+    for (let i = 0; i < curves; ++i) row.push(cmifBar(values[i * f.length + k], deviation && deviation[i * f.length + k], floor));
     return row;
   });
+  const zoom = cmif.graph ? { dateWindow: cmif.graph.xAxisRange() } : {};
+  if (cmif.graph) {
+    plots.delete(cmif.graph);
+    cmif.graph.destroy();
+  }
   cmif.graph = new Dygraph(document.getElementById('cmif-plot'), rows, {
     ...plotBasics, ...plotColours(), labels: ['f', ...Object.keys(cmifSeries())], logscale: true,
-    series: cmifSeries(),
+    customBars: true, series: cmifSeries(), ...zoom,
     axes: { x: frequencyAxis, y: magnitudeAxis }, underlayCallback: markModes,
   });
   plots.add(cmif.graph);
 }
 
+// [low, value, high]: a real Gaussian is within 1.96 standard deviations with 95 %.
+function cmifBar(value, deviation, floor) {
+  const v = Math.max(value, floor);
+  if (!deviation) return [v, v, v];
+  return [Math.max(v - 1.96 * deviation, floor), v, v + 1.96 * deviation];
+}
+
 function cmifSeries() {
   const colours = palette().curves;
-  return Object.fromEntries(Array.from({ length: content.arrays.cmif.curves }, (_, i) => ['curve ' + (i + 1), { color: colours[i % colours.length] }]));
+  const { linePlotter } = Dygraph.Plotters;
+  const plotter = array('cmif_deviation') ? (event) => { drawBand(event); linePlotter(event); } : linePlotter;
+  return Object.fromEntries(Array.from({ length: content.arrays.cmif.curves }, (_, i) => ['curve ' + (i + 1), { color: colours[i % colours.length], plotter }]));
 }
 
 // Identified modes as lines behind the curves, chosen ones as rings on their curve.
@@ -87,26 +102,4 @@ function markModes(context, area, graph) {
     context.stroke();
   }
   context.restore();
-}
-
-function buildCost() {
-  const body = section('cost', 'Cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines; it may never rise.');
-  body.append(element('div', { class: 'plot', id: 'cost-plot', role: 'img', 'aria-labelledby': 'cost-title' }),
-    element('p', { class: 'axis-title' }, 'Iteration'));
-  afterFirstPaint(drawCost);
-  onColours(() => cost.graph && cost.graph.updateOptions({ ...plotColours(), series: costSeries() }));
-}
-
-function drawCost() {
-  const values = content.cost.filter((v) => isNumber(v) && v > 0);
-  cost.graph = new Dygraph(document.getElementById('cost-plot'), values.map((v, i) => [i, v]), {
-    ...plotBasics, ...plotColours(), labels: ['iteration', 'cost'], logscale: true, drawPoints: values.length < 200, pointSize: 2.5,
-    series: costSeries(), xRangePad: 8,
-    axes: { x: { ticker: (min, max, pixels) => linearTicks(min, max, Math.max(2, pixels / 60), (v) => (Number.isInteger(v) ? String(v) : '')) }, y: magnitudeAxis },
-  });
-  plots.add(cost.graph);
-}
-
-function costSeries() {
-  return { cost: { color: palette().curves[0] } };
 }

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+
+namespace stageid::test {
+
+/// Counts what the calling thread asks of locks between its construction and count(): mutexes,
+/// read-write locks, condition variables, semaphores, those that try and those that signal. Link
+/// lock_counter.cpp into the test executable.
+class LockCounter {
+ public:
+  LockCounter() noexcept;
+  std::uint64_t count() const noexcept;
+
+  /// False where these functions are not ours (thread sanitizer brings its own): skip the test then.
+  static bool works() noexcept;
+
+ private:
+  std::uint64_t before_;
+};
+
+}  // namespace stageid::test

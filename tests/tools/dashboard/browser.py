@@ -1,0 +1,122 @@
+"""Headless Chromium by its own debugging protocol over a pair of pipes: no package needed.
+
+Source: Chrome DevTools Protocol, --remote-debugging-pipe: JSON texts, each ended by a zero byte.
+"""
+
+import base64
+import json
+import os
+import select
+import shutil
+import subprocess
+import tempfile
+import time
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+FLAGS = ("--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+         "--disable-component-update --disable-sync --disable-dev-shm-usage --hide-scrollbars "
+         "--remote-debugging-pipe").split()
+
+
+def find_browser():
+    return next(filter(None, map(shutil.which, BROWSERS)), None)
+
+
+class Browser:
+    """One page. `problems` gathers console messages of weight, uncaught errors and log entries."""
+
+    def __init__(self, program):
+        self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)  # its children end a moment later
+        ours, theirs = os.pipe(), os.pipe()
+
+        def place_pipes():  # the browser reads descriptor 3 and writes 4
+            end_in, end_out = os.dup(ours[0]), os.dup(theirs[1])
+            os.dup2(end_in, 3)
+            os.dup2(end_out, 4)
+
+        self.process = subprocess.Popen([program, *FLAGS, f"--user-data-dir={self.profile.name}", "about:blank"],
+                                        preexec_fn=place_pipes, close_fds=False, stderr=subprocess.DEVNULL)
+        os.close(ours[0])
+        os.close(theirs[1])
+        self.to, self.back = ours[1], theirs[0]
+        self.buffer, self.number, self.problems = b"", 0, []
+        self.session = None
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Runtime", "Log", "Page", "Network"):
+            self.call(domain + ".enable")
+
+    def _read(self, timeout):
+        end = time.monotonic() + timeout
+        while b"\0" not in self.buffer:
+            if not select.select([self.back], [], [], max(0, end - time.monotonic()))[0]:
+                return None
+            piece = os.read(self.back, 1 << 16)
+            if not piece:
+                raise RuntimeError("the browser is gone")
+            self.buffer += piece
+        text, self.buffer = self.buffer.split(b"\0", 1)
+        message = json.loads(text)
+        self._note(message)
+        return message
+
+    def _note(self, message):
+        method, more = message.get("method"), message.get("params", {})
+        if method == "Runtime.exceptionThrown":
+            self.problems.append("uncaught: " + json.dumps(more["exceptionDetails"])[:400])
+        if method == "Runtime.consoleAPICalled" and more["type"] in ("error", "warning", "assert"):
+            self.problems.append("console: " + json.dumps(more["args"])[:400])
+        if method == "Log.entryAdded" and more["entry"]["level"] in ("error", "warning"):
+            self.problems.append("log: " + more["entry"]["text"] + " " + more["entry"].get("url", ""))
+
+    def call(self, method, **parameters):
+        self.number += 1
+        message = {"id": self.number, "method": method, "params": parameters}
+        if self.session:
+            message["sessionId"] = self.session
+        os.write(self.to, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._read(60)
+            if answer is None:
+                raise RuntimeError(f"{method}: the browser does not answer")
+            if answer.get("id") == self.number:
+                if "error" in answer:
+                    raise RuntimeError(f"{method}: {answer['error']}")
+                return answer["result"]
+
+    def evaluate(self, script):
+        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in answer:
+            raise RuntimeError(f"{script}: {answer['exceptionDetails']}")
+        return answer["result"].get("value")
+
+    def wait_for(self, script, seconds=60):
+        """True once the expression is; False if it never was."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            # The page before this one has nothing to show: not an error.
+            if self.evaluate(f"(() => {{ try {{ return {script}; }} catch (e) {{ return false; }} }})()"):
+                return True
+            time.sleep(0.1)
+        return False
+
+    def resize(self, width, height, dark=False):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        self.call("Emulation.setEmulatedMedia",
+                  features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+
+    def press(self, key):
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode={"Enter": 13, "Tab": 9}[key],
+                      **({"text": "\r"} if key == "Enter" and kind == "keyDown" else {}))
+
+    def screenshot(self, file):
+        data = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=True)["data"]
+        file.write_bytes(base64.b64decode(data))
+
+    def close(self):
+        self.process.terminate()
+        self.process.wait()
+        os.close(self.to)
+        os.close(self.back)
+        self.profile.cleanup()

@@ -1,0 +1,172 @@
+#!/usr/bin/env python3
+"""Opens the dashboard of a running measurement in headless Chromium, at 1280 and 390 pixels, light and
+dark; compares what it draws with what `stageid frf` makes of the finished log; stops another measurement
+by its button, with the keyboard.
+
+    check_dashboard.py PROGRAM CONFIGS WORK
+
+Exit code 77 (skipped) when there is no Chromium and STAGEID_REQUIRE_BROWSER is not set, or no h5py.
+"""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+from browser import Browser, find_browser
+from running_program import RunningProgram, with_experiment
+
+try:
+    import h5py
+    import numpy as np
+except ImportError:
+    h5py = None
+
+failures = []
+
+
+def expect(condition, message):
+    if not condition:
+        failures.append(message)
+
+
+def start(program, configs, work, name, **numbers):
+    """A paced run of a stage that may be late: its log, the program, a browser that shows it."""
+    folder = work / name
+    folder.mkdir(parents=True)
+    config = with_experiment(configs, folder, **numbers)
+    stage = folder / "stage.yaml"
+    stage.write_text((configs / "stage/small_stage.yaml").read_text() + "\nrealtime: {policy: try, misses_allowed: 1000000}\n")
+    config.write_text(config.read_text().replace(str(configs / "stage/small_stage.yaml"), str(stage)))
+    log = folder / "run.slog"
+    running = RunningProgram(program, config, "-o", log, "--pace", "1")
+    browser = Browser(find_browser())
+    browser.resize(1280, 1600)
+    browser.call("Page.navigate", url=running.url)
+    return log, running, browser
+
+
+def check_widths(browser, work, what):
+    for width, dark in ((1280, False), (1280, True), (390, False)):
+        browser.resize(width, 1600, dark)
+        browser.evaluate("new Promise((f) => setTimeout(f, 400))")
+        overflow = browser.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        expect(overflow <= 0, f"{what}: at {width} pixels the page is {overflow} pixels too wide")
+        browser.screenshot(work / f"{what}_{width}{'_dark' if dark else ''}.png")
+    browser.resize(1280, 1600)
+
+
+def check_levels(browser):
+    levels = browser.evaluate("Array.from(document.querySelectorAll('.level-value'), (e) => e.textContent)")
+    expect(len(levels) == 5, f"{len(levels)} levels instead of 3 actuators and 2 sensors")
+    expect(all(" of " in level for level in levels), f"levels without limits: {levels}")
+    state = browser.evaluate("window.stageidDashboard.state")
+    expect(all(v > 0 for v in state["levels"]["largest_peak"]), "a channel that never moved")
+    expect(state["timing"]["lateness"]["bins"], "no timing")
+    expect(browser.evaluate("document.querySelectorAll('.histogram .step-bar > span').length") > 2, "no histogram")
+    expect(browser.evaluate("document.querySelectorAll('.events tr').length") > 2, "no events")
+
+
+RESPONSE = """(() => { const d = window.stageidDashboard; const f = d.content().frf; return {
+  inputs: f.inputs.map((c) => c.name), outputs: f.outputs.map((c) => c.name), realizations: f.realizations,
+  frequency: Array.from(d.array('frequency')), response: Array.from(d.array('response')), cmif: Array.from(d.array('cmif')),
+  deviation: Array.from(d.array('deviation')), band: Array.from(d.array('cmif_deviation')),
+  drawn: d.channelCurves(1).measured.length, panels: document.querySelectorAll('.panel').length,
+  plots: Array.from(document.querySelectorAll('.plot'), (p) => p.id) }; })()"""
+
+
+def check_numbers(program, log, seen):
+    """What the page draws is what `stageid frf` estimates from the finished log."""
+    file = log.with_name("frf.h5")
+    subprocess.run([program, "frf", log, "-o", file], check=True, capture_output=True)
+    with h5py.File(file) as frf:
+        G = frf["response"][()]
+        G = G["r"] + 1j * G["i"] if G.dtype.names else G
+        f = frf["frequency_hz"][()]
+        variance = frf["noise_variance"][()]
+        expect(frf.attrs["realizations"] == seen["realizations"], "realizations")
+    lines, outputs, inputs = G.shape
+    expect([len(seen["outputs"]), len(seen["inputs"])] == [outputs, inputs], "channels")
+    expect(np.array_equal(np.array(seen["frequency"]), f), "frequencies differ")
+    # Channel-major, channel = output + outputs * input; float32 on the way and no other difference.
+    want = np.transpose(G, (2, 1, 0)).reshape(inputs * outputs, lines)
+    got = np.array(seen["response"]).reshape(inputs * outputs, lines, 2)
+    expect(np.array_equal(got[..., 0], want.real.astype(np.float32)), "real parts differ")
+    expect(np.array_equal(got[..., 1], want.imag.astype(np.float32)), "imaginary parts differ")
+    # One byte each on a logarithmic scale of 254 steps over a row's range.
+    std = np.sqrt(np.transpose(variance, (2, 1, 0)).reshape(inputs * outputs, lines))
+    step = (std.max(axis=1) / std.min(axis=1)) ** (0.5 / 253)
+    ratio = np.array(seen["deviation"]).reshape(std.shape) / std
+    expect(np.all(np.maximum(ratio, 1 / ratio) <= 1.0001 * step[:, None]), "deviations differ")
+    # The CMIF by numpy's own singular values.
+    accelerance = G * ((2 * np.pi * f) ** 2)[:, None, None]
+    singular = np.linalg.svd(accelerance, compute_uv=False) ** 2
+    got = np.array(seen["cmif"]).reshape(singular.shape[1], lines).T
+    expect(np.allclose(got, singular, rtol=1e-6), "CMIF differs from numpy's")
+    expect(len(seen["band"]) == singular.size and min(seen["band"]) > 0, "no bands of the CMIF")
+    expect(seen["panels"] == inputs * outputs and seen["drawn"] == lines, "panels")
+    expect(set(seen["plots"]) >= {"entry-magnitude", "entry-phase", "cmif-plot"}, f"plots {seen['plots']}")
+
+
+def watch_one(program, configs, work):
+    log, running, browser = start(program, configs, work, "whole", realizations=3)
+    try:
+        expect(browser.wait_for("window.stageidDashboard.state && window.stageidDashboard.state.state === 'running'"), "no state came")
+        expect(browser.wait_for("window.stageidDashboard.edition() >= 1"), "no response came")
+        expect(browser.evaluate("window.stageidDashboard.state.state") == "running", "the first response came after the end only")
+        check_levels(browser)
+        check_widths(browser, work, "running")
+        expect(browser.wait_for("window.stageidDashboard.left"), "the page did not see the end")
+        code, out = running.wait()
+        expect(code in (0, 3), f"exit code {code}: {out}")
+        expect(browser.evaluate("window.stageidDashboard.state.exit_code") == code, "the page knows another exit code")
+        seen = browser.evaluate(RESPONSE)
+        check_widths(browser, work, "ended")
+        check_numbers(program, log, seen)
+        expect(browser.problems == [], f"the browser complains: {browser.problems}")
+        expect(browser.evaluate("window.stageidDashboard.errors") == [], "errors on the page")
+    finally:
+        browser.close()
+        running.close()
+
+
+def stop_one(program, configs, work):
+    log, running, browser = start(program, configs, work, "stopped", realizations=40)
+    try:
+        expect(browser.wait_for("!!document.querySelector('#abort:enabled')"), "no button")
+        browser.evaluate("document.getElementById('abort').focus()")
+        browser.press("Enter")
+        expect(browser.evaluate("document.getElementById('abort').textContent") == "Press again to stop", "one press was enough")
+        expect(running.process.poll() is None, "one press ended it")
+        browser.press("Enter")
+        expect(browser.wait_for("window.stageidDashboard.left"), "the page did not see the end")
+        code, _ = running.wait()
+        expect(code == 130, f"exit code {code} instead of 130")
+        browser.screenshot(work / "stopped_1280.png")
+        verify = subprocess.run([program, "log", "verify", log], capture_output=True, text=True, check=False)
+        expect(verify.returncode == 0, f"the log is not whole: {verify.stderr}")
+        events = log.with_name("run.events.jsonl").read_text()
+        expect('"event":"abort","from":"dashboard"' in events and '"reason":"interrupt"' in events, "no abort among the events")
+        expect(browser.problems == [], f"the browser complains: {browser.problems}")
+    finally:
+        browser.close()
+        running.close()
+
+
+def main():
+    program, configs, work = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
+    if find_browser() is None or h5py is None:
+        print("no Chromium or no h5py found; install chromium, python3-h5py")
+        return 1 if os.environ.get("STAGEID_REQUIRE_BROWSER") else 77
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    watch_one(program, configs, work)
+    stop_one(program, configs, work)
+    for failure in failures:
+        print("FAILED:", failure)
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

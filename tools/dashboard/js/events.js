@@ -1,0 +1,48 @@
+// Timing, temperatures where there is a supervisor, and the newest events.
+
+const side = {};
+
+function buildTiming() {
+  if (!shown.period_s) return;
+  side.timing = element('div');
+  section('timing', 'Timing', 'How the loop keeps time').append(side.timing);
+}
+
+function showTiming(state) {
+  if (side.timing && state.timing) side.timing.replaceChildren(timingBars(state.timing, shown.period_s));
+}
+
+// state.supervisor: null, or { state, values: [{ name, value, unit }] }.
+function showSupervisor(state) {
+  if (!state.supervisor) return;
+  if (!side.supervisor) {
+    side.supervisor = element('div');
+    section('supervisor', 'Supervisor', 'Temperatures and interlocks').append(side.supervisor);
+  }
+  side.supervisor.replaceChildren(facts([['state', state.supervisor.state],
+    ...state.supervisor.values.map((v) => [v.name, number(v.value, 4) + '\u00a0' + v.unit])]));
+}
+
+function buildEvents() {
+  side.events = element('tbody');
+  section('events', 'Events', 'Events', 'The newest last. All of them stand in the event log beside the log.').append(
+    element('div', { class: 'table-scroll' }, element('table', { class: 'events' }, side.events)));
+}
+
+function showEvents(state) {
+  const key = JSON.stringify(state.events[state.events.length - 1] || null) + state.events.length;
+  if (side.key === key) return;
+  side.key = key;
+  side.events.replaceChildren(...state.events.filter(Boolean).map((event) => element('tr', null,
+    element('td', null, String(event.time_utc).slice(11, 23)), element('td', null, String(event.event).replace(/_/g, ' ')),
+    element('td', { class: 'quiet' }, eventText(event)))));
+}
+
+const hiddenFields = new Set(['time_utc', 'event', 'measurement_id']);
+
+function eventText(event) {
+  const place = isNumber(event.realization) ? 'realization ' + (event.realization + 1) + ', experiment ' + (event.experiment + 1) : '';
+  const rest = Object.entries(event).filter(([name]) => !hiddenFields.has(name) && name !== 'realization' && name !== 'experiment')
+    .map(([name, value]) => name.replace(/_s$/, '').replace(/_/g, ' ') + ' ' + (name.endsWith('_s') ? duration(value) : isNumber(value) ? number(value, 6).replace(/\.0+$/, '') : String(value)));
+  return [place, ...rest].filter(Boolean).join(', ');
+}

@@ -1,0 +1,35 @@
+// The order of the page, and the stream.
+
+let ended = false;
+
+function showState(state) {
+  window.stageidDashboard.state = state;
+  showProgress(state);
+  showLevels(state);
+  showTiming(state);
+  showSupervisor(state);
+  showEvents(state);
+  const loaded = fetchResponse(state.response.edition);
+  if (state.state !== 'ended') return;
+  ended = true;
+  // The program waits for this page to leave: first the last response, then good-bye.
+  loaded.then(() => fetchResponse(state.response.edition)).finally(() => {
+    stream.close();
+    window.stageidDashboard.left = true;
+  });
+}
+
+buildProgress();
+buildLevels();
+buildTiming();
+buildEvents();
+
+const stream = new EventSource('events' + link.search);
+stream.onmessage = (message) => showState(JSON.parse(message.data));
+stream.onerror = () => {
+  if (ended) return;
+  head.verdict.className = 'verdict doubt';
+  head.text.textContent = 'no connection to the program; trying again';
+};
+window.addEventListener('pagehide', () => stream.close());
+Object.assign(window.stageidDashboard, { shown, array, channelCurves, content: () => content, edition: () => link.edition });

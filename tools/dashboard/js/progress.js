@@ -1,0 +1,81 @@
+// The head: what happens, how far it is, and the button that stops it.
+
+const head = {};
+const armedFor_ms = 5000;
+
+function buildProgress() {
+  head.verdict = element('p', { class: 'verdict none', id: 'state', role: 'status' }, element('span', { class: 'sign', 'aria-hidden': 'true' }));
+  head.text = element('span', null, 'connecting');
+  head.verdict.append(head.text);
+  head.abort = element('button', { type: 'button', class: 'abort', id: 'abort', onclick: pressAbort, disabled: true }, 'Stop the measurement');
+  head.bar = element('span');
+  head.track = element('div', { class: 'progress', role: 'progressbar', 'aria-label': 'Progress', 'aria-valuemin': 0, 'aria-valuemax': 100 }, head.bar);
+  head.figures = element('dl', { class: 'figures' });
+  head.note = element('p', { class: 'quiet', id: 'note' });
+  document.getElementById('head').append(
+    element('p', { class: 'brand' }, 'stageid \u00b7 ' + shown.backend + (shown.period_s ? '' : ', virtual time')),
+    element('h1', null, shown.stage + ': ' + shown.experiment),
+    element('div', { class: 'status' }, head.verdict, head.abort), head.track, head.figures, head.note);
+}
+
+const stateWords = { starting: 'starting', running: 'measuring', stopping: 'stopping: the excitation is ramped down in closed loop',
+  estimating: 'measured; the last response is being estimated' };
+
+function endOf(state) {
+  if (state.exit_code === 0) return ['good', 'done'];
+  if (state.exit_code === 3) return ['doubt', 'done, but not to be trusted: ' + state.message];
+  if (state.exit_code === 130) return ['doubt', state.message];
+  return ['bad', state.message];
+}
+
+function showProgress(state) {
+  const [level, text] = state.state === 'ended' ? endOf(state) : [state.state === 'running' ? 'running' : 'none', stateWords[state.state]];
+  head.verdict.className = 'verdict ' + level;
+  // Only when it changes: it is read aloud.
+  if (head.text.textContent !== text) head.text.textContent = text;
+  head.abort.disabled = state.state !== 'running' && state.state !== 'starting';
+  const share = state.seconds_total > 0 ? Math.min(1, state.seconds_done / state.seconds_total) : 0;
+  head.bar.style.width = (100 * share).toFixed(2) + '%';
+  head.track.setAttribute('aria-valuenow', Math.round(100 * share));
+  head.figures.replaceChildren(...figures(state).map(([label, value]) => element('div', null, element('dt', null, label), element('dd', null, value))));
+  const now = 'Run now: realization ' + (state.run.realization + 1) + ' of ' + shown.realizations + ', experiment ' + (state.run.experiment + 1) + '. ';
+  head.note.textContent = (state.state === 'running' ? now : '') + 'Response: ' + state.response.status + '.';
+}
+
+function figures(state) {
+  const list = [
+    ['runs complete', state.runs_done + ' of ' + state.runs_total],
+    ['time left', state.state === 'ended' ? '\u2013' : duration(state.seconds_left)],
+    ['measured', duration(state.seconds_done)],
+    ['stage', state.state === 'ended' ? '\u2013' : state.node_state],
+    ['late', flaggedCount(state.health.late)], ['missing', flaggedCount(state.health.missing)], ['marked', flaggedCount(state.health.marked)],
+  ];
+  if (state.timing) list.push(['execution, 99.9 %', percent(state.timing.execution.p99_9_s / shown.period_s) + ' of a period']);
+  else list.push(['speed', number(state.speed) + ' \u00d7 real time']);
+  return list;
+}
+
+function flaggedCount(value) {
+  return element('span', { class: value > 0 ? 'far' : null }, count(value));
+}
+
+// Twice within a few seconds: a slip of the hand must not end a measurement of two hours.
+function pressAbort() {
+  if (!head.abort.classList.contains('armed')) {
+    head.abort.classList.add('armed');
+    head.abort.textContent = 'Press again to stop';
+    head.disarm = setTimeout(disarm, armedFor_ms);
+    return;
+  }
+  clearTimeout(head.disarm);
+  disarm();
+  head.abort.disabled = true;
+  fetch('abort' + link.search, { method: 'POST', headers: { 'X-Stageid': 'abort' } }).then((answer) => {
+    if (!answer.ok) head.text.textContent = 'the program did not take the order to stop (' + answer.status + ')';
+  }, () => { head.text.textContent = 'the program does not answer; stop it with Ctrl-C'; });
+}
+
+function disarm() {
+  head.abort.classList.remove('armed');
+  head.abort.textContent = 'Stop the measurement';
+}

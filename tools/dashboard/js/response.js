@@ -1,0 +1,33 @@
+// Response and CMIF: fetched whenever the stream tells of a new edition, drawn by the report's own pieces.
+
+function fetchResponse(edition) {
+  if (edition <= link.edition || link.loading) return Promise.resolve();
+  link.loading = true;
+  return fetch('response.json' + link.search).then((answer) => answer.json()).then((fresh) => {
+    link.edition = edition;
+    setResponse(fresh);
+    showResponse();
+  }).finally(() => { link.loading = false; });
+}
+
+function showResponse() {
+  if (matrix.panels.length === 0) {
+    buildMatrix();
+    buildEntry();
+    matrix.onselect = (channel) => showEntry(channel, true);
+    selectPanel(0);
+    buildCmif();
+    for (const id of ['timing', 'events']) moveToEnd(id);
+    return;
+  }
+  redrawMatrix();
+  showEntry(entry.channel, true);
+  drawCmif();
+}
+
+function moveToEnd(id) {
+  const body = document.getElementById(id);
+  if (!body) return;
+  document.getElementById('main').append(body);
+  document.getElementById('contents').append(document.querySelector('#contents a[href="#' + id + '"]'));
+}

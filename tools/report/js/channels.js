@@ -1,0 +1,63 @@
+// The response channel by channel.
+
+// Of the response that `content` and array() hold.
+function channelCount() {
+  return content.frf ? content.frf.inputs.length * content.frf.outputs.length : 0;
+}
+
+// Channel c = output + outputs * input, as in the paper's vec.
+function channelIndex(output, input) {
+  return output + content.frf.outputs.length * input;
+}
+
+function channelName(channel) {
+  const outputs = content.frf.outputs;
+  const input = Math.floor(channel / outputs.length);
+  return outputs[channel % outputs.length].name + ' \u2190 ' + content.frf.inputs[input].name;
+}
+
+// Everything that the panels draw of one channel: magnitudes, one a line; null where not known.
+const curvesOfChannel = new Map();
+function channelCurves(channel) {
+  if (!curvesOfChannel.has(channel)) curvesOfChannel.set(channel, makeCurves(channel));
+  return curvesOfChannel.get(channel);
+}
+
+function makeCurves(channel) {
+  const lines = content.frf.lines;
+  const measured = array('response').subarray(2 * channel * lines, 2 * (channel + 1) * lines);
+  const part = (id) => {
+    const all = array(id);
+    return all ? all.subarray(channel * lines, (channel + 1) * lines) : null;
+  };
+  const curves = {
+    measured: magnitudes(measured),
+    model: null,
+    residual: null,
+    deviation: part('deviation'),
+    modelDeviation: part('model_deviation'),
+    validationResidual: part('validation_residual'),
+    relativeError: null,
+  };
+  const residuals = array('residual');
+  if (residuals) {
+    const residual = residuals.subarray(2 * channel * lines, 2 * (channel + 1) * lines);
+    curves.model = magnitudes(difference(measured, residual));
+    curves.residual = magnitudes(residual);
+    let sum = 0;
+    for (let k = 0; k < lines; ++k) {
+      const relative = curves.residual[k] / curves.measured[k];
+      sum += relative * relative;
+    }
+    curves.relativeError = Math.sqrt(sum / lines);
+  }
+  return curves;
+}
+
+// Phases of one channel in degrees, -180 to 180.
+function channelPhases(channel) {
+  const lines = content.frf.lines;
+  const part = (id) => array(id).subarray(2 * channel * lines, 2 * (channel + 1) * lines);
+  const measured = part('response');
+  return { measured: phases(measured), model: array('residual') ? phases(difference(measured, part('residual'))) : null };
+}

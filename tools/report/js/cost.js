@@ -1,0 +1,25 @@
+// The cost over the iterations.
+
+const cost = { graph: null };
+
+function buildCost() {
+  const body = section('cost', 'Cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines; it may never rise.');
+  body.append(element('div', { class: 'plot', id: 'cost-plot', role: 'img', 'aria-labelledby': 'cost-title' }),
+    element('p', { class: 'axis-title' }, 'Iteration'));
+  afterFirstPaint(drawCost);
+  onColours(() => cost.graph && cost.graph.updateOptions({ ...plotColours(), series: costSeries() }));
+}
+
+function drawCost() {
+  const values = content.cost.filter((v) => isNumber(v) && v > 0);
+  cost.graph = new Dygraph(document.getElementById('cost-plot'), values.map((v, i) => [i, v]), {
+    ...plotBasics, ...plotColours(), labels: ['iteration', 'cost'], logscale: true, drawPoints: values.length < 200, pointSize: 2.5,
+    series: costSeries(), xRangePad: 8,
+    axes: { x: { ticker: (min, max, pixels) => linearTicks(min, max, Math.max(2, pixels / 60), (v) => (Number.isInteger(v) ? String(v) : '')) }, y: magnitudeAxis },
+  });
+  plots.add(cost.graph);
+}
+
+function costSeries() {
+  return { cost: { color: palette().curves[0] } };
+}

@@ -1,0 +1,38 @@
+// How the loop kept time: bins of nanoseconds, gathered into a bar a doubling.
+
+const shortestBar = 9;  // 2^9 ns: what is below is no matter here
+
+// [[from_s, to_s, count], ...] -> the same, a row a doubling of the time.
+function octaves(bins) {
+  const rows = new Map();
+  for (const [from, , n] of bins) {
+    const place = Math.max(shortestBar - 1, Math.floor(Math.log2(from * 1e9 + 0.5)));
+    rows.set(place, (rows.get(place) || 0) + n);
+  }
+  return Array.from(rows, ([place, n]) => ({ to: 2 ** (place + 1) * 1e-9, n })).sort((a, b) => a.to - b.to);
+}
+
+// Lengths are logarithmic in the count: one late cycle among a million is what matters.
+function histogramBars(title, histogram, period) {
+  const rows = octaves(histogram.bins);
+  const most = Math.max(...rows.map((row) => row.n), 1);
+  const list = element('div', { class: 'steps', role: 'list' });
+  for (const row of rows) {
+    const width = 4 + 96 * Math.log10(row.n) / Math.max(1, Math.log10(most));
+    list.append(element('div', { role: 'listitem' }, element('span', { class: 'step-name' }, '< ' + number(row.to * 1e6, 2) + '\u00a0\u00b5s'),
+      element('span', { class: 'step-bar' }, element('span', { class: period && row.to > period ? 'over' : null, style: 'width:' + Math.min(100, width).toFixed(1) + '%' })),
+      element('span', { class: 'step-time' }, count(row.n)), element('span', { class: 'quiet' })));
+  }
+  const share = (seconds) => duration(seconds) + (period ? ' (' + percent(seconds / period) + ' of the period)' : '');
+  return element('div', { class: 'histogram' }, element('h3', null, title),
+    element('p', { class: 'quiet' }, 'median below ' + share(histogram.median_s) + ', 99.9 % below ' + share(histogram.p99_9_s) +
+      ', all below ' + duration(histogram.largest_s)), list);
+}
+
+function timingBars(timing, period) {
+  const both = element('div', { class: 'histograms' },
+    histogramBars('Execution time of a cycle', timing.execution, period),
+    histogramBars('Lateness of a cycle', timing.lateness, period));
+  return element('div', null, both, element('p', { class: 'quiet' }, 'Cycles by time, the bars logarithmic in their number' +
+      (timing.skipped > 0 ? '; ' + plural(timing.skipped, 'period') + ' left out behind late cycles, to keep the phase.' : '; no period was left out.')));
+}
