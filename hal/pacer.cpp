@@ -8,12 +8,6 @@ namespace {
 
 constexpr std::int64_t kSpin_ns = 60'000;
 
-std::int64_t monotonic_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
-}
-
 void sleep_until(std::int64_t t_ns) noexcept {
   const timespec until{static_cast<std::time_t>(t_ns / 1'000'000'000),
                        static_cast<long>(t_ns % 1'000'000'000)};
@@ -22,6 +16,12 @@ void sleep_until(std::int64_t t_ns) noexcept {
 }
 
 }  // namespace
+
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
+}
 
 Pacer::Pacer(double sample_rate_hz, double pace) noexcept
     : period_ns_(1e9 / (pace > 0.0 ? sample_rate_hz * pace : sample_rate_hz)), wall_(pace > 0.0) {}

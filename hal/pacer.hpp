@@ -4,6 +4,9 @@
 
 namespace stageid {
 
+/// CLOCK_MONOTONIC.
+std::int64_t monotonic_ns() noexcept;
+
 /// Waits for sample instants: asleep until shortly before, then spinning, because a sleeping thread
 /// wakes up tens of microseconds late and a spinning one keeps others from running.
 class Pacer {
