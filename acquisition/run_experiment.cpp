@@ -167,6 +167,10 @@ class Experiment {
         finish(StopReason::interrupt);
         break;
       }
+      if (plant_tripped()) {
+        finish(StopReason::plant);
+        break;
+      }
       const StopReason reason = perform_run(run);
       if (reason != StopReason::none) {
         finish(reason);
@@ -216,6 +220,7 @@ class Experiment {
         }
       }
       if (interrupted()) loop_.request_stop(StopReason::interrupt);
+      if (plant_tripped()) loop_.request_stop(StopReason::plant);
       if (--until_publish == 0) {
         until_publish = kPublishEvery;
         progress_.publish(loop_.health());
@@ -229,6 +234,17 @@ class Experiment {
            (options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed));
   }
 
+  bool plant_tripped() const noexcept {
+    return options_.plant_tripped != nullptr &&
+           options_.plant_tripped->load(std::memory_order_relaxed);
+  }
+
+  /// What the back end knows beyond the outcome.
+  std::string stage_trouble() const {
+    const std::string trouble = stage_.trouble();
+    return trouble.empty() ? "" : "; " + trouble;
+  }
+
   void finish(StopReason reason) {
     const StageInfo& info = stage_.info();
     switch (reason) {
@@ -240,13 +256,17 @@ class Experiment {
         return;
       case StopReason::fault:
         result_.end = ExperimentEnd::fault;
-        result_.message =
-            fmt::format("stage '{}' reports: {}", info.name, to_string(loop_.last_trouble()));
+        result_.message = fmt::format("stage '{}' reports: {}{}", info.name,
+                                      to_string(loop_.last_trouble()), stage_trouble());
         return;
       case StopReason::misses:
         result_.end = ExperimentEnd::fault;
-        result_.message = fmt::format("stage '{}': too many bad cycles in a row, the last: {}",
-                                      info.name, to_string(loop_.last_trouble()));
+        result_.message = fmt::format("stage '{}': too many bad cycles in a row, the last: {}{}",
+                                      info.name, to_string(loop_.last_trouble()), stage_trouble());
+        return;
+      case StopReason::plant:
+        result_.end = ExperimentEnd::fault;
+        result_.message = options_.plant_reason ? options_.plant_reason() : "the plant tripped";
         return;
       case StopReason::interrupt:
         result_.end = ExperimentEnd::interrupted;

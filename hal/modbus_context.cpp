@@ -1,13 +1,24 @@
 #include "hal/modbus_context.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <modbus/modbus.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <stdexcept>
 #include <string>
 
 namespace stageid {
+namespace {
+
+// Of other rates libmodbus makes 9600 in silence.
+constexpr std::array kBaudRates = {1200,    2400,    4800,    9600,    19200,   38400,   57600,
+                                   115200,  230400,  460800,  500000,  576000,  921600,  1000000,
+                                   1152000, 1500000, 2000000, 2500000, 3000000, 3500000, 4000000};
+
+}  // namespace
 
 void ModbusContextFree::operator()(_modbus* context) const noexcept {
   modbus_close(context);
@@ -17,6 +28,9 @@ void ModbusContextFree::operator()(_modbus* context) const noexcept {
 ModbusContext make_modbus_context(const ModbusAddress& address) {
   ModbusContext context;
   if (address.serial()) {
+    if (std::find(kBaudRates.begin(), kBaudRates.end(), address.baud) == kBaudRates.end())
+      throw std::invalid_argument(fmt::format("{}: no such baud rate; write one of {}",
+                                              to_string(address), fmt::join(kBaudRates, ", ")));
     context.reset(modbus_new_rtu(address.device.c_str(), address.baud, address.parity, 8,
                                  address.parity == 'N' ? 2 : 1));
   } else {

@@ -48,14 +48,13 @@ ModbusLink::ModbusLink(const ModbusAddress& address, const ModbusTiming& timing)
 }
 
 void ModbusLink::connect() {
-  if (!try_connect()) throw StageError(describe_trouble());
+  if (!try_connect()) throw StageError(describe(last_));
 }
 
 bool ModbusLink::try_connect() noexcept {
   if (connected_) return true;
   if (modbus_connect(context_.get()) != 0) {
-    last_ = LinkStatus::disconnected;
-    last_error_ = errno;
+    last_ = {LinkStatus::disconnected, errno};
     return false;
   }
   connected_ = true;
@@ -74,25 +73,30 @@ void ModbusLink::begin() noexcept {
 }
 
 LinkStatus ModbusLink::judge(int done, std::size_t wanted) noexcept {
-  last_error_ = done < 0 ? errno : 0;
+  const int error = done < 0 ? errno : 0;
+  last_ = {LinkStatus::disconnected, error};
   if (done == static_cast<int>(wanted)) {
-    last_ = LinkStatus::ok;
-  } else if (done >= 0 || is_bad_reply(last_error_)) {
-    last_ = LinkStatus::corrupt;
-  } else if (is_exception(last_error_)) {
-    last_ = LinkStatus::refused;
-  } else if (last_error_ == ETIMEDOUT) {
-    last_ = LinkStatus::timeout;
+    last_.status = LinkStatus::ok;
+  } else if (done >= 0 || is_bad_reply(error)) {
+    last_.status = LinkStatus::corrupt;
+  } else if (is_exception(error)) {
+    last_.status = LinkStatus::refused;
+  } else if (error == ETIMEDOUT) {
+    last_.status = LinkStatus::timeout;
   } else {
-    last_ = LinkStatus::disconnected;
     close();
   }
-  return last_;
+  return last_.status;
+}
+
+LinkStatus ModbusLink::not_connected() noexcept {
+  last_ = {LinkStatus::disconnected, ENOTCONN};
+  return last_.status;
 }
 
 LinkStatus ModbusLink::exchange(int write_first, std::span<const std::uint16_t> written,
                                 int read_first, std::span<std::uint16_t> read) noexcept {
-  if (!connected_) return last_ = LinkStatus::disconnected;
+  if (!connected_) return not_connected();
   begin();
   return judge(modbus_write_and_read_registers(
                    context_.get(), write_first, static_cast<int>(written.size()), written.data(),
@@ -101,7 +105,7 @@ LinkStatus ModbusLink::exchange(int write_first, std::span<const std::uint16_t> 
 }
 
 LinkStatus ModbusLink::read(int first, std::span<std::uint16_t> registers) noexcept {
-  if (!connected_) return last_ = LinkStatus::disconnected;
+  if (!connected_) return not_connected();
   begin();
   return judge(modbus_read_registers(context_.get(), first, static_cast<int>(registers.size()),
                                      registers.data()),
@@ -115,23 +119,22 @@ void ModbusLink::drain() noexcept {
   modbus_flush(context_.get());
 }
 
-std::string ModbusLink::describe_trouble() const {
+std::string ModbusLink::describe(const Trouble& trouble) const {
   const auto line = [this](const std::string& what) {
     return fmt::format("{}: {}", to_string(address_), what);
   };
-  switch (last_) {
+  switch (trouble.status) {
     case LinkStatus::ok:
       return line("no trouble");
     case LinkStatus::timeout:
       return line(fmt::format("no reply within {:.4g} s; is it running, and the unit right?",
                               timing_.response_s));
     case LinkStatus::corrupt:
-      return line(fmt::format("a reply failed its check: {}", modbus_strerror(last_error_)));
+      return line(fmt::format("a reply failed its check: {}", modbus_strerror(trouble.error)));
     case LinkStatus::refused:
-      return line(fmt::format("refused: {}", modbus_strerror(last_error_)));
+      return line(fmt::format("refused: {}", modbus_strerror(trouble.error)));
     case LinkStatus::disconnected:
-      return line(fmt::format("not connected: {}",
-                              modbus_strerror(last_error_ == 0 ? ENOTCONN : last_error_)));
+      return line(fmt::format("not connected: {}; is it running?", modbus_strerror(trouble.error)));
   }
   return line("unknown trouble");
 }

@@ -45,19 +45,24 @@ class ModbusLink {
 
   const ModbusAddress& address() const noexcept { return address_; }
   const ModbusTiming& timing() const noexcept { return timing_; }
-  /// What went wrong last, for people: "Modbus TCP 127.0.0.1:502, unit 1: no reply within 0.2 s".
-  std::string describe_trouble() const;
+  struct Trouble {
+    LinkStatus status = LinkStatus::ok;
+    int error = 0;  ///< errno, libmodbus' own values included
+  };
+  const Trouble& last() const noexcept { return last_; }
+  /// For people: "Modbus TCP 127.0.0.1:502, unit 1: no reply within 0.2 s".
+  std::string describe(const Trouble& trouble) const;
 
  private:
   void begin() noexcept;
+  LinkStatus not_connected() noexcept;
   LinkStatus judge(int done, std::size_t wanted) noexcept;
 
   ModbusAddress address_;
   ModbusTiming timing_;
   ModbusContext context_;
   bool connected_ = false;
-  LinkStatus last_ = LinkStatus::ok;
-  int last_error_ = 0;
+  Trouble last_;
   std::int64_t request_ns_ = 0;
 };
 

@@ -69,7 +69,7 @@ void transact(ModbusLink& link, int first, const std::array<std::uint16_t, Count
     if (attempt > 0) link.drain();
     if (link.exchange(first, request, read_first, reply) == LinkStatus::ok && answered()) return;
   }
-  throw StageError(link.describe_trouble());
+  throw StageError(link.describe(link.last()));
 }
 
 }  // namespace
@@ -82,7 +82,7 @@ std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size
     if (link.read(first + static_cast<int>(at), part) == LinkStatus::ok) continue;
     link.drain();
     if (link.read(first + static_cast<int>(at), part) == LinkStatus::ok) continue;
-    const std::string trouble = link.describe_trouble();
+    const std::string trouble = link.describe(link.last());
     link.close();
     throw StageError(trouble);
   }

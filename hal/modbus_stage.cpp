@@ -136,6 +136,7 @@ Outcome ModbusStage::transact() noexcept {
 
 Outcome ModbusStage::judge(LinkStatus status) noexcept {
   trouble_ = status == LinkStatus::ok ? Trouble::none : Trouble::link;
+  link_trouble_ = link_.last();
   switch (status) {
     case LinkStatus::ok:
       return judge_reply();
@@ -201,7 +202,7 @@ std::string ModbusStage::trouble() const {
     case Trouble::none:
       return "";
     case Trouble::link:
-      return link_.describe_trouble();
+      return link_.describe(link_trouble_);
     case Trouble::restarted:
       return fmt::format("{}: the node was restarted", to_string(link_.address()));
     case Trouble::foreign_reply:

@@ -143,12 +143,12 @@ void ModbusSupervisor::run() {
 bool ModbusSupervisor::connect() {
   if (link_.connected()) return true;
   if (!link_.try_connect()) {
-    set_trouble(link_.describe_trouble());
+    set_trouble(link_.describe(link_.last()));
     return false;
   }
   std::array<std::uint16_t, map::kStatusRegisters> status{};
   if (link_.read(map::kMagic, status) != LinkStatus::ok) {
-    set_trouble(link_.describe_trouble());
+    set_trouble(link_.describe(link_.last()));
   } else if (std::string wrong = map_trouble(status); !wrong.empty()) {
     set_trouble(fmt::format("{}: {}", to_string(link_.address()), wrong));
   } else {
@@ -178,7 +178,7 @@ bool ModbusSupervisor::poll() {
     done = transact(status);
   }
   if (done == LinkStatus::ok) return take_status(status);
-  set_trouble(link_.describe_trouble());
+  set_trouble(link_.describe(link_.last()));
   link_.drain();
   link_.close();
   const std::lock_guard lock(mutex_);

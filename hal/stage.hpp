@@ -113,8 +113,7 @@ class CyclicStage {
   /// Brings the outputs to a safe state (zero force, disabled). Idempotent.
   virtual void stop() noexcept = 0;
 
-  /// One line: what the back end knows of the last outcome that was not `ok`; empty if nothing. Not
-  /// from the loop: it may allocate.
+  /// One line on what went wrong in the last run, beyond its Outcome; empty: nothing to add.
   virtual std::string trouble() const { return {}; }
 };
 

@@ -10,7 +10,10 @@
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/file_error.hpp"
+#include "hal/modbus_stage.hpp"
+#include "hal/modbus_supervisor.hpp"
 #include "hal/motion_controller.hpp"
+#include "hal/plant_watch.hpp"
 #include "hal/replay_stage.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/interrupt.hpp"
@@ -57,6 +60,28 @@ std::vector<RunId> complete_runs(const ExperimentConfig& config,
   return runs;
 }
 
+/// The supervisor of the stage file, with the plant brought up and watched.
+struct SupervisedPlant {
+  explicit SupervisedPlant(const SupervisorConfig& config)
+      : supervisor(config.link.address, config.link.timing, config.options),
+        watch(supervisor, config.conditions) {}
+  ModbusSupervisor supervisor;
+  PlantWatch watch;
+};
+
+std::unique_ptr<LimitedStage> make_modbus_stage(const ExperimentConfig& config, double pace) {
+  if (!config.stage.modbus)
+    throw std::invalid_argument(
+        fmt::format("--backend modbus: {} has no group 'modbus:' that says where the stage is",
+                    config.stage.file.string()));
+  const WaferStageSpec& spec = config.stage.spec;
+  const ModbusConfig& modbus = *config.stage.modbus;
+  return std::make_unique<LimitedStage>(
+      std::make_unique<ModbusStage>(spec.info, modbus.address, modbus.timing,
+                                    pace >= 0.0 ? pace : spec.pace),
+      spec.limits);
+}
+
 std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const ExperimentPlan& plan,
                                          const MeasurementRequest& request,
                                          const std::vector<RunId>& skip) {
@@ -66,6 +91,7 @@ std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const E
     spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
     return std::make_unique<LimitedStage>(std::make_unique<SimulatedStage>(spec), spec.limits);
   }
+  if (request.backend == Backend::modbus) return make_modbus_stage(config, request.pace);
   if (request.replay.empty())
     throw std::invalid_argument("--backend replay: no log to play; add --replay LOG");
   std::vector<RunId> runs;
@@ -124,9 +150,10 @@ double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage) {
 
 MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
                           const MeasurementRequest& request, const Console& console) {
-  if (request.backend == Backend::can || request.backend == Backend::modbus)
-    throw std::invalid_argument(fmt::format(
-        "--backend {}: not in this version; there are sim and replay", to_string(request.backend)));
+  if (request.backend == Backend::can)
+    throw std::invalid_argument(
+        fmt::format("--backend {}: not in this version; there are sim, modbus and replay",
+                    to_string(request.backend)));
   // Killed before the first byte was written: nothing is lost by starting anew.
   std::error_code no_size;
   if (request.resume && std::filesystem::file_size(request.log, no_size) == 0 && !no_size)
@@ -144,7 +171,15 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   const std::unique_ptr<LimitedStage> stage = make_stage(config, plan, request, options.skip);
   MotionController controller(config.stage.spec.controller);
   const LogInfo info = experiment_log_info(plan, stage->info(), metadata(config, request));
+  std::unique_ptr<SupervisedPlant> plant;
+  // What is played back has no plant around it any more.
+  if (config.stage.supervisor && request.backend != Backend::replay)
+    plant = std::make_unique<SupervisedPlant>(*config.stage.supervisor);
   SlogWriter log = open_writer(request, info, exists);
+  if (plant) {
+    options.plant_tripped = &plant->watch.tripped();
+    options.plant_reason = [&plant] { return plant->watch.reason(); };
+  }
 
   options.interrupt = &interrupt_flag();
   Progress progress(console, "run", "s of stage time");

@@ -28,7 +28,7 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
   command->add_option("config", config_, "experiment file (.yaml)")->required();
   command->add_option("-o,--output", output_, "log to write (.slog)")->required();
-  command->add_option("--backend", backend_, "sim | replay, instead of the stage file's");
+  command->add_option("--backend", backend_, "sim | modbus | replay, instead of the stage file's");
   command->add_option("--replay", replay_, "backend replay: the log that is played");
   command
       ->add_option("--replay-tolerance", replay_tolerance_n_,

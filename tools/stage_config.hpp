@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "hal/motion_controller.hpp"
 #include "hal/simulated_stage.hpp"
 #include "tools/config_visitor.hpp"
+#include "tools/modbus_config.hpp"
 
 namespace stageid {
 
@@ -21,7 +23,9 @@ struct StageConfig {
   std::filesystem::path file;
   std::string text;  ///< of the file, kept for the log
   Backend backend = Backend::sim;
-  WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
+  WaferStageSpec spec;                 ///< complete: limits, controller from the geometry, faults
+  std::optional<ModbusConfig> modbus;  ///< of the stage
+  std::optional<SupervisorConfig> supervisor;  ///< of what stands around it
 };
 
 /// Reads a stage file and checks it through to a simulated stage that could be started.
