@@ -76,13 +76,14 @@ ModbusFault parse_modbus_fault(std::string_view text) {
   std::string_view rest = text;
   const bool has_value = rest.find('=') != std::string_view::npos;
   const std::string_view value = cut(rest, '=');
+  const bool has_place = rest.find('@') != std::string_view::npos;
   std::string_view place = cut(rest, '@');
   const std::string_view count = cut(place, 'x');
   ModbusFault fault;
   const std::size_t kind = kind_index(text, rest);
   fault.kind = static_cast<Kind>(kind);
   fault.count = kRules[kind].lasting ? 0 : 1;
-  if (!place.empty()) fault.from = parse<std::uint64_t>(text, place, "REQUEST");
+  if (has_place) fault.from = parse<std::uint64_t>(text, place, "REQUEST");
   if (fault.from == 0) refuse(text, "requests are counted from 1");
   if (!count.empty()) fault.count = parse<std::uint64_t>(text, count, "COUNT");
   if (has_value != kRules[kind].needs_value)

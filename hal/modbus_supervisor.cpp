@@ -153,7 +153,8 @@ bool ModbusSupervisor::connect() {
     set_trouble(fmt::format("{}: {}", to_string(link_.address()), wrong));
   } else {
     command_sequence_ = u32(status, map::kCommandEcho);
-    heartbeat_ = std::max(heartbeat_, u32(status, map::kHeartbeatEcho));
+    // So far ahead that the first poll counts only if the echo moves.
+    heartbeat_ = u32(status, map::kHeartbeatEcho) + kEchoPolls;
     return true;
   }
   link_.drain();

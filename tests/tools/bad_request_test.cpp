@@ -25,7 +25,6 @@ TEST_F(BadRequest, Usage) {
 
 TEST_F(BadRequest, WhatIsNotInThisVersionSaysSo) {
   fail({"run", config_, "-o", name("x.slog"), "--backend", "can"}, 2, "not in this version");
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "modbus"}, 2, "not in this version");
   fail({"run", config_, "-o", name("x.slog"), "--dashboard", "8080"}, 2, "not in this version");
   fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
   fail({"import", "x.mat", "-o", "frf.h5"}, 2, "not in this version");
@@ -118,6 +117,42 @@ TEST_F(BadRequest, StageFiles) {
   wrong("Ry: *loop", "Rx: *loop", "stage_bad.yaml: ");  // no sensor sees Rx
   wrong("[-0.26, 0, 0]", "[-2.6, 0, 0]", "is not on the plate");
   wrong("noise:", "faults: [{kind: dead_sensor, channel: s9}]\nnoise:", "there is no sensor 's9'");
+}
+
+TEST_F(BadRequest, Modbus) {
+  const auto wrong = [&](const std::string& group, const std::string& text) {
+    fail({"design", stage("bad.yaml", "noise:", group + "\nnoise:"), "-o", name("e.h5")}, 2, text);
+  };
+  wrong("modbus: {unit: 1}", "modbus: write one of tcp and rtu");
+  wrong("modbus: {tcp: {port: 1}, rtu: {device: x}}", "modbus: write one of tcp and rtu");
+  wrong("modbus: {tcp: {port: 0}}", "port: 0 is out of range");
+  wrong("modbus: {rtu: {baud: 9600}}", "key 'device' is missing in rtu");
+  wrong("modbus: {rtu: {device: x, parity: S}}", "parity: 'S' stands here; write one of N, E, O");
+  wrong("modbus: {tcp: {port: 1}, response_s: 2}", "worst_reply_s: below response_s");
+  wrong("supervisor: {modbus: {tcp: {port: 1}}, temperature_k: [1, 2]}",
+        "key 'gravity_compensator_n' is missing in supervisor");
+  wrong(
+      "supervisor: {modbus: {tcp: {port: 1}}, temperature_k: [2, 1], gravity_compensator_n: [1, "
+      "2]}",
+      "temperature_k: write [low, high]");
+  wrong(
+      "modbus: {rtu: {device: x}}\nsupervisor: {modbus: {rtu: {device: x}}, temperature_k: [1, 2], "
+      "gravity_compensator_n: [1, 2]}",
+      "a serial line carries one conversation");
+  fail({"design", stage("bad.yaml", "backend: sim", "backend: modbus"), "-o", name("e.h5")}, 2,
+       "backend: modbus needs a group 'modbus:'");
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "modbus"}, 2, "has no group 'modbus:'");
+}
+
+TEST_F(BadRequest, NodesThatCannotBeServed) {
+  const std::string file = std::string(STAGEID_SOURCE_DIR) + "/configs/stage/small_stage.yaml";
+  fail({"node", file}, 2, "--modbus-tcp PORT");
+  fail({"node", file, "--modbus-tcp", "70000"}, 2, "--modbus-tcp");
+  fail({"node", file, "--modbus-tcp", "0", "--modbus-fault", "late"}, 2,
+       "--modbus-fault: fault 'late'");
+  fail({"node", file, "--modbus-rtu", "/dev/there-is-none"}, 1, "cannot be opened");
+  fail({"node", file, "--modbus-rtu", "/dev/null", "--modbus-baud", "9601"}, 2,
+       "no such baud rate");
 }
 
 TEST_F(BadRequest, BackEndsOfTheStageFile) {
