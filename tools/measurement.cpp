@@ -10,6 +10,9 @@
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/file_error.hpp"
+#include "hal/can_bus_load.hpp"
+#include "hal/can_socket.hpp"
+#include "hal/can_stage.hpp"
 #include "hal/motion_controller.hpp"
 #include "hal/replay_stage.hpp"
 #include "tools/exit_code.hpp"
@@ -57,6 +60,20 @@ std::vector<RunId> complete_runs(const ExperimentConfig& config,
   return runs;
 }
 
+/// The stage behind SocketCAN. The spec is that of the simulated stage on the other side.
+std::unique_ptr<CyclicStage> make_can_stage(const ExperimentConfig& config,
+                                            const MeasurementRequest& request) {
+  const WaferStageSpec& spec = config.stage.spec;
+  const CanSpec& can = config.stage.can.spec;
+  const CanLayout layout = can_layout(can, spec.info);
+  require_bus_carries(can, layout, spec.info.sample_rate_hz);  // before anything is opened
+  std::vector<std::string> interfaces;
+  for (const CanBusSpec& bus : can.buses) interfaces.push_back(bus.interface);
+  return std::make_unique<CanStage>(
+      spec.info, can, std::make_unique<SocketCan>(interfaces, can_host_identifiers(layout)),
+      CanHostOptions{request.pace >= 0.0 ? request.pace : spec.pace, request.reset_fault});
+}
+
 std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const ExperimentPlan& plan,
                                          const MeasurementRequest& request,
                                          const std::vector<RunId>& skip) {
@@ -66,6 +83,8 @@ std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const E
     spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
     return std::make_unique<LimitedStage>(std::make_unique<SimulatedStage>(spec), spec.limits);
   }
+  if (request.backend == Backend::can)
+    return std::make_unique<LimitedStage>(make_can_stage(config, request), spec.limits);
   if (request.replay.empty())
     throw std::invalid_argument("--backend replay: no log to play; add --replay LOG");
   std::vector<RunId> runs;
@@ -107,6 +126,23 @@ void judge_replay(LimitedStage& stage, MeasurementResult& result) {
   if (result.exit_code == kDone) result.exit_code = kNotTrustworthy;
 }
 
+/// What the stage itself knows of its trouble is part of the message.
+void explain_trouble(const LimitedStage& stage, MeasurementResult& result) {
+  const bool stage_ended_it = result.experiment.end == ExperimentEnd::fault ||
+                              result.experiment.end == ExperimentEnd::limit;
+  if (stage_ended_it && !stage.trouble().empty()) result.message += "; " + stage.trouble();
+}
+
+void require_backend(const ExperimentConfig& config, Backend backend) {
+  if (backend == Backend::modbus)
+    throw std::invalid_argument(
+        "--backend modbus: not in this version; there are sim, can and replay");
+  if (backend == Backend::can && !config.stage.can.present)
+    throw std::invalid_argument(
+        fmt::format("--backend can: {} has no group 'can'; see 'stageid config schema'",
+                    config.stage.file.string()));
+}
+
 }  // namespace
 
 std::string measurement_id_of(const LogInfo& info) {
@@ -124,9 +160,7 @@ double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage) {
 
 MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
                           const MeasurementRequest& request, const Console& console) {
-  if (request.backend == Backend::can || request.backend == Backend::modbus)
-    throw std::invalid_argument(fmt::format(
-        "--backend {}: not in this version; there are sim and replay", to_string(request.backend)));
+  require_backend(config, request.backend);
   // Killed before the first byte was written: nothing is lost by starting anew.
   std::error_code no_size;
   if (request.resume && std::filesystem::file_size(request.log, no_size) == 0 && !no_size)
@@ -160,6 +194,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
     result.message =
         fmt::format("{} samples are marked or missing",
                     result.experiment.health.marked + result.experiment.health.missing);
+  explain_trouble(*stage, result);
   judge_replay(*stage, result);
   if (result.experiment.end != ExperimentEnd::log_failed)
     log.close(result.exit_code, result.message.c_str());

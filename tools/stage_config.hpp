@@ -9,6 +9,7 @@
 #include "hal/limited_stage.hpp"
 #include "hal/motion_controller.hpp"
 #include "hal/simulated_stage.hpp"
+#include "tools/can_config.hpp"
 #include "tools/config_visitor.hpp"
 
 namespace stageid {
@@ -22,6 +23,7 @@ struct StageConfig {
   std::string text;  ///< of the file, kept for the log
   Backend backend = Backend::sim;
   WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
+  CanConfig can;
 };
 
 /// Reads a stage file and checks it through to a simulated stage that could be started.
