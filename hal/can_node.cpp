@@ -146,7 +146,10 @@ std::string CanNode::execute(const CanCommand& command) {
     case CanCommandCode::start:
       return start(command);
     case CanCommandCode::stop:
-      player_.abandon();
+      if (player_.busy()) {  // comes to rest under control, as nobody else holds the stage
+        player_.abandon();
+        return request(SupervisorCommand::quick_stop);
+      }
       stage_.end_run();
       return request(SupervisorCommand::disable);
     case CanCommandCode::quick_stop:

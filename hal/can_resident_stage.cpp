@@ -65,7 +65,7 @@ CanState CanResidentStage::command(CanCommandCode code, std::uint64_t a, std::ui
   return link_.command(command, other);
 }
 
-void CanResidentStage::greet() {
+void CanResidentStage::connect() {
   if (greeted_) return;
   const CanState node = link_.greet(std::exchange(reset_fault_, false));
   run_ = static_cast<std::uint8_t>(node.run + 1);
@@ -145,9 +145,9 @@ void CanResidentStage::send_all() {
                   transport_->name(0), first, total));
 }
 
-Progress CanResidentStage::upload(const Waveforms& waveforms) {
+JobProgress CanResidentStage::upload(const Waveforms& waveforms) {
   pack(waveforms);
-  greet();
+  connect();
   command(CanCommandCode::upload, mask_, digest_, period_samples_);
   send_all();
   std::vector<std::uint8_t> back;
@@ -163,8 +163,8 @@ Progress CanResidentStage::upload(const Waveforms& waveforms) {
   return {JobStatus::done, waveform_.size(), waveform_.size(), ""};
 }
 
-Progress CanResidentStage::arm(const Trigger& trigger) {
-  greet();
+JobProgress CanResidentStage::arm(const Trigger& trigger) {
+  connect();
   const double ramp = std::round(trigger.ramp_s * info_.sample_rate_hz);
   if (!(ramp >= 0.0 && ramp < 1e9))
     throw std::invalid_argument(
@@ -176,14 +176,16 @@ Progress CanResidentStage::arm(const Trigger& trigger) {
   return poll();
 }
 
-Progress CanResidentStage::poll() {
+JobProgress CanResidentStage::poll() {
   const CanState node = command(CanCommandCode::hello);
-  Progress progress;
+  JobProgress progress;
   progress.done = std::min(node.sample, samples_);
   progress.total = samples_;
   if (node.resident == CanResident::playing || node.resident == CanResident::armed) return progress;
   const bool done = node.resident == CanResident::done;
   progress.status = done ? JobStatus::done : JobStatus::failed;
+  const bool limited = node.cause == FaultCause::limit || node.cause == FaultCause::not_finite;
+  if (!done) progress.outcome = limited ? Outcome::limit : Outcome::fault;
   if (!done)
     progress.message = fmt::format("the node stopped in state {}{}{}", to_string(node.state),
                                    link_.text().empty() ? "" : ": ", link_.text());
@@ -231,7 +233,7 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
   return chunks_done == total;
 }
 
-Progress CanResidentStage::download(TraceSink& sink) {
+JobProgress CanResidentStage::download(TraceSink& sink) {
   const CanState node = command(CanCommandCode::hello);
   const std::uint64_t rows = std::min(node.sample, samples_);
   trace_.resize(rows * row_bytes());

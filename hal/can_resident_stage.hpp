@@ -24,12 +24,15 @@ class CanResidentStage final : public ResidentStage {
   CanResidentStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTransport> transport,
                    const CanHostOptions& options);
 
+  /// Looks whether a node answers that fits; upload() and arm() do too. @throws StageError
+  void connect();
+
   const StageInfo& info() const noexcept override { return info_; }
   std::uint64_t depth_samples() const noexcept override;
-  Progress upload(const Waveforms& waveforms) override;
-  Progress arm(const Trigger& trigger) override;
-  Progress poll() override;
-  Progress download(TraceSink& sink) override;
+  JobProgress upload(const Waveforms& waveforms) override;
+  JobProgress arm(const Trigger& trigger) override;
+  JobProgress poll() override;
+  JobProgress download(TraceSink& sink) override;
   void stop() noexcept override;
 
   /// Chunks that were sent or asked for more than once.
@@ -38,7 +41,6 @@ class CanResidentStage final : public ResidentStage {
  private:
   CanState command(CanCommandCode code, std::uint64_t a = 0, std::uint64_t b = 0,
                    std::uint32_t c = 0, std::uint32_t d = 0, const CanLink::Other& other = {});
-  void greet();
   void pack(const Waveforms& waveforms);
   void send_missing(const std::vector<std::uint32_t>& chunks);
   void send_all();

@@ -45,6 +45,8 @@ CanStage::CanStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTrans
   decoded_.assign(info_.sensors.size(), kNone);
 }
 
+void CanStage::connect() { static_cast<void>(link_.greet(std::exchange(reset_fault_, false))); }
+
 void CanStage::start(std::uint64_t run_seed, Inputs& first) {
   trouble_at_stop_.clear();
   const CanState node = link_.greet(std::exchange(reset_fault_, false));

@@ -43,6 +43,10 @@ class CanStage final : public CyclicStage {
   CanStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTransport> transport,
            const CanHostOptions& options);
 
+  /// Looks whether a node answers that fits, before anything else is done; start() does too.
+  /// @throws StageError as start().
+  void connect();
+
   const StageInfo& info() const noexcept override { return info_; }
   /// @throws StageError if no node answers, it refuses, or it runs another stage file.
   void start(std::uint64_t run_seed, Inputs& first) override;

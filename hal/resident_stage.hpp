@@ -24,11 +24,12 @@ struct Trigger {
 
 enum class JobStatus : std::uint8_t { running, done, failed };
 
-struct Progress {
+struct JobProgress {
   JobStatus status = JobStatus::running;
   std::uint64_t done = 0;  ///< bytes or samples
   std::uint64_t total = 0;
   std::string message;
+  Outcome outcome = Outcome::ok;  ///< why it failed: Outcome::limit or another
 };
 
 /// Receives a downloaded trace in rows of actuators + sensors, SI, in order.
@@ -52,13 +53,13 @@ class ResidentStage {
   virtual std::uint64_t depth_samples() const noexcept = 0;
   /// Brings the waveforms into the node and verifies them by reading them back.
   /// @throws std::invalid_argument if they do not fit the stage or its memory.
-  virtual Progress upload(const Waveforms& waveforms) = 0;
+  virtual JobProgress upload(const Waveforms& waveforms) = 0;
   /// Brings the node to operation and starts the run that was uploaded.
-  virtual Progress arm(const Trigger& trigger) = 0;
+  virtual JobProgress arm(const Trigger& trigger) = 0;
   /// How far the run is; `failed` says why in `message`.
-  virtual Progress poll() = 0;
+  virtual JobProgress poll() = 0;
   /// The recorded rows, from those on that earlier calls gave to a sink already.
-  virtual Progress download(TraceSink& sink) = 0;
+  virtual JobProgress download(TraceSink& sink) = 0;
   /// Ends a run, disables the stage. Idempotent.
   virtual void stop() noexcept = 0;
 };

@@ -9,12 +9,11 @@
 #include <stdexcept>
 
 #include "acquisition/log_reader.hpp"
+#include "acquisition/run_resident.hpp"
 #include "excitation/file_error.hpp"
-#include "hal/can_bus_load.hpp"
-#include "hal/can_socket.hpp"
-#include "hal/can_stage.hpp"
 #include "hal/motion_controller.hpp"
 #include "hal/replay_stage.hpp"
+#include "tools/can_backend.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/interrupt.hpp"
 #include "tools/replay_log.hpp"
@@ -60,18 +59,8 @@ std::vector<RunId> complete_runs(const ExperimentConfig& config,
   return runs;
 }
 
-/// The stage behind SocketCAN. The spec is that of the simulated stage on the other side.
-std::unique_ptr<CyclicStage> make_can_stage(const ExperimentConfig& config,
-                                            const MeasurementRequest& request) {
-  const WaferStageSpec& spec = config.stage.spec;
-  const CanSpec& can = config.stage.can.spec;
-  const CanLayout layout = can_layout(can, spec.info);
-  require_bus_carries(can, layout, spec.info.sample_rate_hz);  // before anything is opened
-  std::vector<std::string> interfaces;
-  for (const CanBusSpec& bus : can.buses) interfaces.push_back(bus.interface);
-  return std::make_unique<CanStage>(
-      spec.info, can, std::make_unique<SocketCan>(interfaces, can_host_identifiers(layout)),
-      CanHostOptions{request.pace >= 0.0 ? request.pace : spec.pace, request.reset_fault});
+CanHostOptions can_options(const ExperimentConfig& config, const MeasurementRequest& request) {
+  return {request.pace >= 0.0 ? request.pace : config.stage.spec.pace, request.reset_fault};
 }
 
 std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const ExperimentPlan& plan,
@@ -84,7 +73,8 @@ std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const E
     return std::make_unique<LimitedStage>(std::make_unique<SimulatedStage>(spec), spec.limits);
   }
   if (request.backend == Backend::can)
-    return std::make_unique<LimitedStage>(make_can_stage(config, request), spec.limits);
+    return std::make_unique<LimitedStage>(
+        make_can_stage(config.stage, can_options(config, request)), spec.limits);
   if (request.replay.empty())
     throw std::invalid_argument("--backend replay: no log to play; add --replay LOG");
   std::vector<RunId> runs;
@@ -96,10 +86,6 @@ std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const E
                                     std::make_unique<ReplayLog>(open_log(request.replay), runs),
                                     request.replay_tolerance_n),
       spec.limits);
-}
-
-SlogWriter open_writer(const MeasurementRequest& request, const LogInfo& info, bool exists) {
-  return exists ? SlogWriter::resume(request.log, info) : SlogWriter::create(request.log, info);
 }
 
 int exit_code_of(const ExperimentResult& result) {
@@ -128,9 +114,63 @@ void judge_replay(LimitedStage& stage, MeasurementResult& result) {
 
 /// What the stage itself knows of its trouble is part of the message.
 void explain_trouble(const LimitedStage& stage, MeasurementResult& result) {
-  const bool stage_ended_it = result.experiment.end == ExperimentEnd::fault ||
-                              result.experiment.end == ExperimentEnd::limit;
-  if (stage_ended_it && !stage.trouble().empty()) result.message += "; " + stage.trouble();
+  const ExperimentEnd end = result.experiment.end;
+  const std::string trouble = stage.trouble();
+  if (trouble.empty() || (end != ExperimentEnd::fault && end != ExperimentEnd::limit)) return;
+  // A limit that only the node saw is no violation on this side of the wires.
+  const bool node_only = end == ExperimentEnd::limit && stage.violation().kind == LimitKind::none;
+  result.message = node_only ? trouble : result.message + "; " + trouble;
+}
+
+void take_experiment(ExperimentResult experiment, MeasurementResult& result) {
+  result.experiment = std::move(experiment);
+  result.message = result.experiment.message;
+  result.exit_code = exit_code_of(result.experiment);
+  if (result.exit_code == kNotTrustworthy)
+    result.message =
+        fmt::format("{} samples are marked or missing",
+                    result.experiment.health.marked + result.experiment.health.missing);
+}
+
+void close_log(SlogWriter& log, const MeasurementResult& result) {
+  if (result.experiment.end != ExperimentEnd::log_failed)
+    log.close(result.exit_code, result.message.c_str());
+}
+
+/// What perform() and perform_resident() need.
+struct Performance {
+  const ExperimentConfig& config;
+  const ExperimentPlan& plan;
+  const MeasurementRequest& request;
+  const RunExperimentOptions& options;
+  bool log_exists;
+
+  SlogWriter open_log(const StageInfo& stage) const {
+    const LogInfo info = experiment_log_info(plan, stage, metadata(config, request));
+    return log_exists ? SlogWriter::resume(request.log, info)
+                      : SlogWriter::create(request.log, info);
+  }
+};
+
+/// The host closes the loop.
+void perform(const Performance& p, MeasurementResult& result) {
+  const std::unique_ptr<LimitedStage> stage =
+      make_stage(p.config, p.plan, p.request, p.options.skip);
+  MotionController controller(p.config.stage.spec.controller);
+  SlogWriter log = p.open_log(stage->info());
+  take_experiment(run_experiment(p.plan, *stage, controller, log, p.options), result);
+  explain_trouble(*stage, result);
+  judge_replay(*stage, result);
+  close_log(log, result);
+}
+
+/// The stage closes the loop.
+void perform_resident(const Performance& p, MeasurementResult& result) {
+  const std::unique_ptr<ResidentStage> stage =
+      make_can_resident_stage(p.config.stage, can_options(p.config, p.request));
+  SlogWriter log = p.open_log(stage->info());
+  take_experiment(run_resident_experiment(p.plan, *stage, log, p.options), result);
+  close_log(log, result);
 }
 
 void require_backend(const ExperimentConfig& config, Backend backend) {
@@ -175,29 +215,21 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   MeasurementResult result;
   result.runs_total = static_cast<int>(plan.runs().size());
   result.runs_before = static_cast<int>(options.skip.size());
-  const std::unique_ptr<LimitedStage> stage = make_stage(config, plan, request, options.skip);
-  MotionController controller(config.stage.spec.controller);
-  const LogInfo info = experiment_log_info(plan, stage->info(), metadata(config, request));
-  SlogWriter log = open_writer(request, info, exists);
-
   options.interrupt = &interrupt_flag();
   Progress progress(console, "run", "s of stage time");
   options.progress = [&](const ExperimentProgress& p) {
     progress.update(p.seconds_done, p.seconds_total,
                     fmt::format("run {}/{}", p.runs_done + 1, p.runs_total));
   };
-  result.experiment = run_experiment(plan, *stage, controller, log, options);
+  const bool resident =
+      request.backend == Backend::can && config.stage.can.mode == CanMode::resident;
+  const Performance performance{config, plan, request, options, exists};
+  if (resident) {
+    perform_resident(performance, result);
+  } else {
+    perform(performance, result);
+  }
   result.seconds = progress.seconds();
-  result.message = result.experiment.message;
-  result.exit_code = exit_code_of(result.experiment);
-  if (result.exit_code == kNotTrustworthy)
-    result.message =
-        fmt::format("{} samples are marked or missing",
-                    result.experiment.health.marked + result.experiment.health.missing);
-  explain_trouble(*stage, result);
-  judge_replay(*stage, result);
-  if (result.experiment.end != ExperimentEnd::log_failed)
-    log.close(result.exit_code, result.message.c_str());
   result.log_bytes = std::filesystem::file_size(request.log);
   return result;
 }
