@@ -239,12 +239,6 @@ class Experiment {
            options_.plant_tripped->load(std::memory_order_relaxed);
   }
 
-  /// What the back end knows beyond the outcome.
-  std::string stage_trouble() const {
-    const std::string trouble = stage_.trouble();
-    return trouble.empty() ? "" : "; " + trouble;
-  }
-
   void finish(StopReason reason) {
     const StageInfo& info = stage_.info();
     switch (reason) {
@@ -256,13 +250,13 @@ class Experiment {
         return;
       case StopReason::fault:
         result_.end = ExperimentEnd::fault;
-        result_.message = fmt::format("stage '{}' reports: {}{}", info.name,
-                                      to_string(loop_.last_trouble()), stage_trouble());
+        result_.message =
+            fmt::format("stage '{}' reports: {}", info.name, to_string(loop_.last_trouble()));
         return;
       case StopReason::misses:
         result_.end = ExperimentEnd::fault;
-        result_.message = fmt::format("stage '{}': too many bad cycles in a row, the last: {}{}",
-                                      info.name, to_string(loop_.last_trouble()), stage_trouble());
+        result_.message = fmt::format("stage '{}': too many bad cycles in a row, the last: {}",
+                                      info.name, to_string(loop_.last_trouble()));
         return;
       case StopReason::plant:
         result_.end = ExperimentEnd::fault;

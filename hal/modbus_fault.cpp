@@ -33,7 +33,7 @@ constexpr std::array<KindRule, 9> kRules = {{{"late_reply", false, true},
 
 [[noreturn]] void refuse(std::string_view text, const std::string& what) {
   throw std::invalid_argument(
-      fmt::format("fault '{}': {}; write KIND[@REQUEST][xCOUNT][=VALUE]", text, what));
+      fmt::format("fault '{}': {}; write KIND[@REQUEST][xCOUNT][:VALUE]", text, what));
 }
 
 /// Cuts off what stands behind `separator`, if it is there.
@@ -74,8 +74,8 @@ void check_value(std::string_view whole, const ModbusFault& fault) {
 
 ModbusFault parse_modbus_fault(std::string_view text) {
   std::string_view rest = text;
-  const bool has_value = rest.find('=') != std::string_view::npos;
-  const std::string_view value = cut(rest, '=');
+  const bool has_value = rest.find(':') != std::string_view::npos;
+  const std::string_view value = cut(rest, ':');
   const bool has_place = rest.find('@') != std::string_view::npos;
   std::string_view place = cut(rest, '@');
   const std::string_view count = cut(place, 'x');

@@ -118,6 +118,10 @@ bool read_enabled(ModbusLink& link) {
   return (Block(link, map::kFlags, 2)[map::kFlags] & map::kFlagEnabled) != 0;
 }
 
+NodeState read_state(ModbusLink& link) {
+  return static_cast<NodeState>(Block(link, map::kState, 2)[map::kState] & 0xFFU);
+}
+
 void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
   const std::uint32_t sequence = Block(link, map::kCommandEcho, 2)[map::kCommandEcho] + 1;
   std::array<std::uint16_t, 4> request{};

@@ -29,6 +29,9 @@ ModbusDescription read_description(ModbusLink& link, const StageInfo& expected);
 /// Whether the stage stands in operation_enabled or measuring. @throws StageError
 bool read_enabled(ModbusLink& link);
 
+/// @throws StageError
+NodeState read_state(ModbusLink& link);
+
 /// @throws StageError if it is refused; the message names state and cause.
 void give_supervisor_command(ModbusLink& link, SupervisorCommand command);
 

@@ -49,12 +49,15 @@ double checked_rate_hz(const StageInfo& info, const ModbusAddress& address,
 }  // namespace
 
 ModbusStage::ModbusStage(StageInfo info, const ModbusAddress& address, const ModbusTiming& timing,
-                         double pace)
-    : info_(std::move(info)), link_(address, timing), pacer_(info_.sample_rate_hz, pace) {
+                         const ModbusHostOptions& options)
+    : info_(std::move(info)),
+      link_(address, timing),
+      pacer_(info_.sample_rate_hz, options.pace),
+      reset_fault_(options.reset_fault) {
   info_.backend = "modbus";
   info_.maximum_rate_hz = checked_rate_hz(info_, address, timing);
-  info_.clock = pace > 0.0 ? Clock::wall : Clock::virtual_time;
-  info_.pace = pace > 0.0 ? pace : 1.0;
+  info_.clock = options.pace > 0.0 ? Clock::wall : Clock::virtual_time;
+  info_.pace = options.pace > 0.0 ? options.pace : 1.0;
   request_.assign(kSetpointHead + 2 * info_.actuators.size(), 0);
   reply_.assign(kMeasurementHead + 2 * info_.sensors.size(), 0);
 }
@@ -71,6 +74,8 @@ void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
     link_.connect();
     description_ = read_description(link_, info_);
   }
+  if (std::exchange(reset_fault_, false) && read_state(link_) == NodeState::fault)
+    give_supervisor_command(link_, SupervisorCommand::reset_fault);
   if (!read_enabled(link_)) {
     give_supervisor_command(link_, SupervisorCommand::enable);
     enabled_here_ = true;
@@ -172,9 +177,7 @@ Outcome ModbusStage::take_measurement(Inputs& inputs) noexcept {
                   get_i32(pair_at(reply_, static_cast<int>(kMeasurementHead + 2 * i)));
   const auto outcome = static_cast<Outcome>(node_status_ & 0xFFU);
   if (outcome != Outcome::ok) trouble_ = Trouble::node;
-  // A limit of the node's has taken the stage out of our hands.
-  if (outcome == Outcome::limit || outcome > Outcome::limit) return Outcome::fault;
-  return outcome;
+  return outcome > Outcome::limit ? Outcome::fault : outcome;
 }
 
 void ModbusStage::stop() noexcept {

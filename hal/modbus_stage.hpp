@@ -11,6 +11,11 @@
 
 namespace stageid {
 
+struct ModbusHostOptions {
+  double pace = 0.0;         ///< see Pacer
+  bool reset_fault = false;  ///< clear a fault of the node at the first start()
+};
+
 /// A stage behind Modbus, one function 23 a sample: u[n] out, y[n+1] in. For low rates: what one
 /// transaction takes is computed, and a faster stage is refused.
 ///
@@ -23,11 +28,11 @@ namespace stageid {
 /// start() enables the stage if nobody has, and stop() disables it only then.
 class ModbusStage final : public CyclicStage {
  public:
-  /// Nothing is sent. `info`: names, rate, transport delay; `pace`: see Pacer.
+  /// Nothing is sent. `info`: names, rate, transport delay.
   /// @throws std::invalid_argument if the link cannot carry info.sample_rate_hz or the channels; the
   /// message tells the computed transaction time.
   ModbusStage(StageInfo info, const ModbusAddress& address, const ModbusTiming& timing,
-              double pace);
+              const ModbusHostOptions& options = {});
 
   const StageInfo& info() const noexcept override { return info_; }
   /// @throws StageError also if another stage is found there, or one that another program measures.
@@ -56,6 +61,7 @@ class ModbusStage final : public CyclicStage {
   std::uint32_t sequence_ = 0;
   bool running_ = false;
   bool enabled_here_ = false;
+  bool reset_fault_;
 
   /// What the last exchange ran into; text is made of it when somebody asks.
   enum class Trouble : std::uint8_t { none, link, restarted, foreign_reply, node, not_finite };

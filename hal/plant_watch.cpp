@@ -74,9 +74,10 @@ std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& 
   return "";
 }
 
-PlantWatch::PlantWatch(Supervisor& supervisor, const PlantConditions& conditions)
+PlantWatch::PlantWatch(Supervisor& supervisor, const PlantConditions& conditions, bool reset_fault)
     : supervisor_(supervisor), conditions_(conditions) {
   check(conditions);
+  if (reset_fault) clear_fault();
   std::string trouble = wait_until_good(false);
   if (!trouble.empty()) throw StageError(trouble);
   const SupervisorReply reply = supervisor_.request(SupervisorCommand::enable);
@@ -98,6 +99,13 @@ PlantWatch::~PlantWatch() {
   changed_.notify_all();
   thread_.join();
   supervisor_.request(SupervisorCommand::disable);
+}
+
+/// Waits for the plant to be there, and takes it out of its fault, if it is in one and lets itself.
+void PlantWatch::clear_fault() {
+  static_cast<void>(wait_until_good(false));
+  if (supervisor_.snapshot().state == NodeState::fault)
+    static_cast<void>(supervisor_.request(SupervisorCommand::reset_fault));
 }
 
 /// The last trouble, if it did not go within enable_s.

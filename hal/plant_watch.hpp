@@ -33,10 +33,10 @@ std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& 
 class PlantWatch {
  public:
   /// Waits for a fresh snapshot in which all conditions hold, enables the plant, waits for it, and
-  /// watches it in a thread of its own. `supervisor` must outlive the watch.
+  /// watches it in a thread of its own. A fault is cleared first if `reset_fault`. `supervisor` must outlive the watch.
   /// @throws StageError that says which condition does not hold, or why it cannot be enabled.
   /// @throws std::invalid_argument if a condition is no number or a range is empty.
-  PlantWatch(Supervisor& supervisor, const PlantConditions& conditions);
+  PlantWatch(Supervisor& supervisor, const PlantConditions& conditions, bool reset_fault = false);
   /// Disables the plant.
   ~PlantWatch();
   PlantWatch(const PlantWatch&) = delete;
@@ -47,6 +47,7 @@ class PlantWatch {
   std::string reason() const;
 
  private:
+  void clear_fault();
   std::string wait_until_good(bool enabled);
   void watch();
 

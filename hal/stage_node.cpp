@@ -216,7 +216,6 @@ void StageNode::hold(std::int64_t now_ns) {
   for (; controlled && held_samples_ < due; ++held_samples_) {
     std::copy(control_.begin(), control_.end(), command_.begin());
     const Outcome outcome = stage_.exchange({sample_, now_ns, command_}, inputs, {});
-    ++sample_;
     controller_.update(y_.data(), control_.data());
     controlled = outcome != Outcome::fault && outcome != Outcome::link_down;
   }

@@ -57,7 +57,7 @@ class StageNode {
   FaultCause cause() const;
   /// One line: why the node is in fault; empty if it is not.
   std::string trouble() const;
-  std::uint64_t sample() const;  ///< of the current run
+  std::uint64_t sample() const;  ///< of the current run; those of a safe stop do not count
   NodePanel panel() const;
   /// Takes effect with the next tick().
   void set_panel(NodePanel panel);

@@ -9,14 +9,14 @@
 #include <stdexcept>
 
 #include "acquisition/log_reader.hpp"
+#include "acquisition/run_resident.hpp"
 #include "excitation/file_error.hpp"
-#include "hal/modbus_stage.hpp"
-#include "hal/modbus_supervisor.hpp"
 #include "hal/motion_controller.hpp"
-#include "hal/plant_watch.hpp"
 #include "hal/replay_stage.hpp"
+#include "tools/can_backend.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/interrupt.hpp"
+#include "tools/modbus_backend.hpp"
 #include "tools/replay_log.hpp"
 
 namespace stageid {
@@ -60,26 +60,8 @@ std::vector<RunId> complete_runs(const ExperimentConfig& config,
   return runs;
 }
 
-/// The supervisor of the stage file, with the plant brought up and watched.
-struct SupervisedPlant {
-  explicit SupervisedPlant(const SupervisorConfig& config)
-      : supervisor(config.link.address, config.link.timing, config.options),
-        watch(supervisor, config.conditions) {}
-  ModbusSupervisor supervisor;
-  PlantWatch watch;
-};
-
-std::unique_ptr<LimitedStage> make_modbus_stage(const ExperimentConfig& config, double pace) {
-  if (!config.stage.modbus)
-    throw std::invalid_argument(
-        fmt::format("--backend modbus: {} has no group 'modbus:' that says where the stage is",
-                    config.stage.file.string()));
-  const WaferStageSpec& spec = config.stage.spec;
-  const ModbusConfig& modbus = *config.stage.modbus;
-  return std::make_unique<LimitedStage>(
-      std::make_unique<ModbusStage>(spec.info, modbus.address, modbus.timing,
-                                    pace >= 0.0 ? pace : spec.pace),
-      spec.limits);
+CanHostOptions can_options(const ExperimentConfig& config, const MeasurementRequest& request) {
+  return {request.pace >= 0.0 ? request.pace : config.stage.spec.pace, request.reset_fault};
 }
 
 std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const ExperimentPlan& plan,
@@ -91,7 +73,14 @@ std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const E
     spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
     return std::make_unique<LimitedStage>(std::make_unique<SimulatedStage>(spec), spec.limits);
   }
-  if (request.backend == Backend::modbus) return make_modbus_stage(config, request.pace);
+  if (request.backend == Backend::can)
+    return std::make_unique<LimitedStage>(
+        make_can_stage(config.stage, can_options(config, request)), spec.limits);
+  if (request.backend == Backend::modbus)
+    return std::make_unique<LimitedStage>(
+        make_modbus_stage(config.stage,
+                          {request.pace >= 0.0 ? request.pace : spec.pace, request.reset_fault}),
+        spec.limits);
   if (request.replay.empty())
     throw std::invalid_argument("--backend replay: no log to play; add --replay LOG");
   std::vector<RunId> runs;
@@ -103,10 +92,6 @@ std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const E
                                     std::make_unique<ReplayLog>(open_log(request.replay), runs),
                                     request.replay_tolerance_n),
       spec.limits);
-}
-
-SlogWriter open_writer(const MeasurementRequest& request, const LogInfo& info, bool exists) {
-  return exists ? SlogWriter::resume(request.log, info) : SlogWriter::create(request.log, info);
 }
 
 int exit_code_of(const ExperimentResult& result) {
@@ -133,6 +118,93 @@ void judge_replay(LimitedStage& stage, MeasurementResult& result) {
   if (result.exit_code == kDone) result.exit_code = kNotTrustworthy;
 }
 
+/// What the stage itself knows of its trouble is part of the message.
+void explain_trouble(const LimitedStage& stage, MeasurementResult& result) {
+  const ExperimentEnd end = result.experiment.end;
+  const std::string trouble = stage.trouble();
+  if (trouble.empty() || (end != ExperimentEnd::fault && end != ExperimentEnd::limit)) return;
+  // A limit that only the node saw is no violation on this side of the wires.
+  const bool node_only = end == ExperimentEnd::limit && stage.violation().kind == LimitKind::none;
+  result.message = node_only ? trouble : result.message + "; " + trouble;
+}
+
+void take_experiment(ExperimentResult experiment, MeasurementResult& result) {
+  result.experiment = std::move(experiment);
+  result.message = result.experiment.message;
+  result.exit_code = exit_code_of(result.experiment);
+  if (result.exit_code == kNotTrustworthy)
+    result.message =
+        fmt::format("{} samples are marked or missing",
+                    result.experiment.health.marked + result.experiment.health.missing);
+}
+
+void close_log(SlogWriter& log, const MeasurementResult& result) {
+  if (result.experiment.end != ExperimentEnd::log_failed)
+    log.close(result.exit_code, result.message.c_str());
+}
+
+/// What perform() and perform_resident() need.
+struct Performance {
+  const ExperimentConfig& config;
+  const ExperimentPlan& plan;
+  const MeasurementRequest& request;
+  const RunExperimentOptions& options;
+  bool log_exists;
+
+  SlogWriter open_log(const StageInfo& stage) const {
+    const LogInfo info = experiment_log_info(plan, stage, metadata(config, request));
+    return log_exists ? SlogWriter::resume(request.log, info)
+                      : SlogWriter::create(request.log, info);
+  }
+};
+
+/// Brings up the plant around the stage, if the stage file tells of one, and lets it end the
+/// experiment. What is played back has no plant any more.
+std::unique_ptr<SupervisedPlant> supervise(const Performance& p, RunExperimentOptions& options) {
+  const std::optional<SupervisorConfig>& supervisor = p.config.stage.supervisor;
+  if (!supervisor || p.request.backend == Backend::replay) return nullptr;
+  auto plant = std::make_unique<SupervisedPlant>(*supervisor, p.request.reset_fault);
+  options.plant_tripped = &plant->watch().tripped();
+  options.plant_reason = [&watch = plant->watch()] { return watch.reason(); };
+  return plant;
+}
+
+/// The host closes the loop.
+void perform(const Performance& p, MeasurementResult& result) {
+  const std::unique_ptr<LimitedStage> stage =
+      make_stage(p.config, p.plan, p.request, p.options.skip);
+  MotionController controller(p.config.stage.spec.controller);
+  RunExperimentOptions options = p.options;
+  const std::unique_ptr<SupervisedPlant> plant = supervise(p, options);
+  SlogWriter log = p.open_log(stage->info());
+  take_experiment(run_experiment(p.plan, *stage, controller, log, options), result);
+  explain_trouble(*stage, result);
+  judge_replay(*stage, result);
+  close_log(log, result);
+}
+
+/// The stage closes the loop.
+void perform_resident(const Performance& p, MeasurementResult& result) {
+  const std::unique_ptr<ResidentStage> stage =
+      make_can_resident_stage(p.config.stage, can_options(p.config, p.request));
+  RunExperimentOptions options = p.options;
+  const std::unique_ptr<SupervisedPlant> plant = supervise(p, options);
+  SlogWriter log = p.open_log(stage->info());
+  take_experiment(run_resident_experiment(p.plan, *stage, log, options), result);
+  close_log(log, result);
+}
+
+void require_backend(const ExperimentConfig& config, Backend backend) {
+  if (backend == Backend::modbus && !config.stage.modbus)
+    throw std::invalid_argument(
+        fmt::format("--backend modbus: {} has no group 'modbus'; see 'stageid config schema'",
+                    config.stage.file.string()));
+  if (backend == Backend::can && !config.stage.can.present)
+    throw std::invalid_argument(
+        fmt::format("--backend can: {} has no group 'can'; see 'stageid config schema'",
+                    config.stage.file.string()));
+}
+
 }  // namespace
 
 std::string measurement_id_of(const LogInfo& info) {
@@ -150,10 +222,7 @@ double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage) {
 
 MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
                           const MeasurementRequest& request, const Console& console) {
-  if (request.backend == Backend::can)
-    throw std::invalid_argument(
-        fmt::format("--backend {}: not in this version; there are sim, modbus and replay",
-                    to_string(request.backend)));
+  require_backend(config, request.backend);
   // Killed before the first byte was written: nothing is lost by starting anew.
   std::error_code no_size;
   if (request.resume && std::filesystem::file_size(request.log, no_size) == 0 && !no_size)
@@ -168,36 +237,21 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   MeasurementResult result;
   result.runs_total = static_cast<int>(plan.runs().size());
   result.runs_before = static_cast<int>(options.skip.size());
-  const std::unique_ptr<LimitedStage> stage = make_stage(config, plan, request, options.skip);
-  MotionController controller(config.stage.spec.controller);
-  const LogInfo info = experiment_log_info(plan, stage->info(), metadata(config, request));
-  std::unique_ptr<SupervisedPlant> plant;
-  // What is played back has no plant around it any more.
-  if (config.stage.supervisor && request.backend != Backend::replay)
-    plant = std::make_unique<SupervisedPlant>(*config.stage.supervisor);
-  SlogWriter log = open_writer(request, info, exists);
-  if (plant) {
-    options.plant_tripped = &plant->watch.tripped();
-    options.plant_reason = [&plant] { return plant->watch.reason(); };
-  }
-
   options.interrupt = &interrupt_flag();
   Progress progress(console, "run", "s of stage time");
   options.progress = [&](const ExperimentProgress& p) {
     progress.update(p.seconds_done, p.seconds_total,
                     fmt::format("run {}/{}", p.runs_done + 1, p.runs_total));
   };
-  result.experiment = run_experiment(plan, *stage, controller, log, options);
+  const bool resident =
+      request.backend == Backend::can && config.stage.can.mode == CanMode::resident;
+  const Performance performance{config, plan, request, options, exists};
+  if (resident) {
+    perform_resident(performance, result);
+  } else {
+    perform(performance, result);
+  }
   result.seconds = progress.seconds();
-  result.message = result.experiment.message;
-  result.exit_code = exit_code_of(result.experiment);
-  if (result.exit_code == kNotTrustworthy)
-    result.message =
-        fmt::format("{} samples are marked or missing",
-                    result.experiment.health.marked + result.experiment.health.missing);
-  judge_replay(*stage, result);
-  if (result.experiment.end != ExperimentEnd::log_failed)
-    log.close(result.exit_code, result.message.c_str());
   result.log_bytes = std::filesystem::file_size(request.log);
   return result;
 }

@@ -17,7 +17,8 @@ struct MeasurementRequest {
   std::filesystem::path replay;  ///< backend replay: the log that is played
   double replay_tolerance_n = 1e-9;
   bool resume = false;
-  double pace = -1.0;  ///< < 0: as the stage file says
+  double pace = -1.0;        ///< < 0: as the stage file says
+  bool reset_fault = false;  ///< backend can: clear a fault of the node first
 };
 
 struct MeasurementResult {

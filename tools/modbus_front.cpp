@@ -38,9 +38,9 @@ void ModbusFront::add_options(CLI::App& command) {
       ->capture_default_str();
   command.add_option(
       "--modbus-fault", faults_,
-      "KIND[@REQUEST][xCOUNT][=VALUE], counted from the first request: late_reply=SECONDS, "
-      "half_frame, wrong_unit, exception=CODE, dead_server, heartbeat, interlock, "
-      "temperature=KELVIN, gravity=NEWTON");
+      "KIND[@REQUEST][xCOUNT][:VALUE], counted from the first request: late_reply:SECONDS, "
+      "half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, interlock, "
+      "temperature:KELVIN, gravity:NEWTON");
 }
 
 void ModbusFront::start(StageNode& node, const StageLimits& limits) {

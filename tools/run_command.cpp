@@ -28,7 +28,8 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
   command->add_option("config", config_, "experiment file (.yaml)")->required();
   command->add_option("-o,--output", output_, "log to write (.slog)")->required();
-  command->add_option("--backend", backend_, "sim | modbus | replay, instead of the stage file's");
+  command->add_option("--backend", backend_,
+                      "sim | can | modbus | replay, instead of the stage file's");
   command->add_option("--replay", replay_, "backend replay: the log that is played");
   command
       ->add_option("--replay-tolerance", replay_tolerance_n_,
@@ -38,6 +39,8 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--resume", resume_,
                     "continue an interrupted log: complete runs are not repeated");
+  command->add_flag("--reset-fault", reset_fault_,
+                    "backend can: clear a fault of the node before the first run");
   command->add_option("--dashboard", dashboard_port_, "")->group("");
   command->final_callback([this] { run(); });
 }
@@ -54,6 +57,7 @@ void RunCommand::run() const {
   request.replay_tolerance_n = replay_tolerance_n_;
   request.resume = resume_;
   request.pace = pace_;
+  request.reset_fault = reset_fault_;
   const MeasurementResult result = measure(config, plan, request, console_);
   console_.exit_code = result.exit_code;
 

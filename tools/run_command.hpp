@@ -25,6 +25,7 @@ class RunCommand {
   double pace_ = -1.0;
   int dashboard_port_ = -1;
   bool resume_ = false;
+  bool reset_fault_ = false;
 };
 
 }  // namespace stageid

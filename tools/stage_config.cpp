@@ -52,6 +52,7 @@ struct StageFile {
   std::vector<InPlaneModeConfig> in_plane_modes;
   std::array<AxisController, kRigidAxes> axes;
   std::vector<FaultConfig> faults;
+  CanFile can;
   std::optional<ModbusConfig> modbus;
   std::optional<SupervisorConfig> supervisor;
   WaferStageSpec spec;
@@ -263,6 +264,9 @@ void describe(ConfigVisitor& v, StageFile& f) {
   v.items(
       "faults", [&](ConfigVisitor& fault) { describe_fault(fault, f.faults); }, {}, kOptional,
       "faults on request, to try the safety");
+  v.group(
+      "can", [&](ConfigVisitor& can) { describe_can(can, f.can); }, kOptional,
+      "the stage behind CAN FD; needed by backend can and by 'stageid node --can'");
 }
 
 template <typename Member>
@@ -378,6 +382,8 @@ StageConfig load_stage_config(const std::filesystem::path& path) {
   // What the libraries refuse gets the file's name; the place is in their own words.
   try {
     complete_spec(config, file);
+    if (file.can.config.present)
+      config.can = complete_can(file.can, config.spec.info, config.spec.limits);
     const LimitedStage stage(std::make_unique<SimulatedStage>(config.spec), config.spec.limits);
     const MotionController controller(config.spec.controller);
   } catch (const std::invalid_argument& error) {

@@ -10,6 +10,7 @@
 #include "hal/limited_stage.hpp"
 #include "hal/motion_controller.hpp"
 #include "hal/simulated_stage.hpp"
+#include "tools/can_config.hpp"
 #include "tools/config_visitor.hpp"
 #include "tools/modbus_config.hpp"
 
@@ -23,8 +24,9 @@ struct StageConfig {
   std::filesystem::path file;
   std::string text;  ///< of the file, kept for the log
   Backend backend = Backend::sim;
-  WaferStageSpec spec;                 ///< complete: limits, controller from the geometry, faults
-  std::optional<ModbusConfig> modbus;  ///< of the stage
+  WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
+  CanConfig can;
+  std::optional<ModbusConfig> modbus;          ///< of the stage
   std::optional<SupervisorConfig> supervisor;  ///< of what stands around it
 };
 

@@ -49,7 +49,7 @@ TEST_P(ModbusLinkTest, WritesBeforeItReads) {
 }
 
 TEST_P(ModbusLinkTest, AfterADrainALateReplyIsNotTakenForTheNextAnswer) {
-  serve({"late_reply=0.15"});
+  serve({"late_reply:0.15"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::timeout);
   EXPECT_THAT(link_->describe(link_->last()), HasSubstr("no reply within 0.1 s"));
@@ -68,7 +68,7 @@ TEST_P(ModbusLinkTest, HalfAReplyIsNone) {
 }
 
 TEST_P(ModbusLinkTest, ARefusalIsNamed) {
-  serve({"exception=6"});
+  serve({"exception:6"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::refused);
   EXPECT_THAT(link_->describe(link_->last()), HasSubstr("busy"));
@@ -84,7 +84,7 @@ INSTANTIATE_TEST_SUITE_P(Wires, ModbusRtuLink, testing::Values(true));
 
 // What drain() is there for: RTU replies have no number.
 TEST_P(ModbusRtuLink, WithoutADrainTheLateReplyWouldBeTakenForTheNextAnswer) {
-  serve({"late_reply=0.15"});
+  serve({"late_reply:0.15"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::timeout);
   std::this_thread::sleep_for(std::chrono::milliseconds(150));

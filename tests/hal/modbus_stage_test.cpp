@@ -22,7 +22,7 @@ using testing::HasSubstr;
 class Host {
  public:
   explicit Host(const ModbusBench& bench, const StageInfo& info = ModbusBench::info())
-      : stage(info, bench.address(), test::kQuickTiming, 0.0) {
+      : stage(info, bench.address(), test::kQuickTiming) {
     inputs.y = y;
   }
   void start(std::uint64_t seed = 1) { stage.start(seed, inputs); }
@@ -93,18 +93,18 @@ TEST_P(ModbusStageFault, EndsAsItShould) {
 
 INSTANTIATE_TEST_SUITE_P(
     Table, ModbusStageFault,
-    testing::Values(FaultCase{"late_reply#=0.15", false, Outcome::late, 3, ""},
-                    FaultCase{"late_reply#=0.15", true, Outcome::late, 3, ""},
+    testing::Values(FaultCase{"late_reply#:0.15", false, Outcome::late, 3, ""},
+                    FaultCase{"late_reply#:0.15", true, Outcome::late, 3, ""},
                     FaultCase{"half_frame#", false, Outcome::late, 3, ""},
                     FaultCase{"half_frame#", true, Outcome::late, 3, ""},
                     FaultCase{"wrong_unit#", false, Outcome::late, 3, ""},
                     FaultCase{"wrong_unit#", true, Outcome::late, 3, ""},
-                    FaultCase{"exception#=6", false, Outcome::late, 3, ""},
+                    FaultCase{"exception#:6", false, Outcome::late, 3, ""},
                     FaultCase{"half_frame#x2", false, Outcome::link_down, 2, "no reply within"},
                     FaultCase{"half_frame#x2", true, Outcome::link_down, 2, "no reply within"},
                     FaultCase{"wrong_unit#x2", false, Outcome::corrupt, 2, "do not belong"},
                     FaultCase{"wrong_unit#x2", true, Outcome::corrupt, 2, "failed its check"},
-                    FaultCase{"exception#x2=4", false, Outcome::fault, 1, "refused"},
+                    FaultCase{"exception#x2:4", false, Outcome::fault, 1, "refused"},
                     FaultCase{"dead_server#", false, Outcome::link_down, 1, "not connected"},
                     FaultCase{"interlock#", false, Outcome::fault, 1, "interlock"}));
 
@@ -150,7 +150,7 @@ TEST(ModbusStage, StartsOnNothingButItsOwnStage) {
   std::swap(info.actuators[0], info.actuators[1]);
   EXPECT_THAT(refusal(bench, info), HasSubstr("another stage"));
   Inputs wrong_size;
-  ModbusStage stage(ModbusBench::info(), bench.address(), test::kQuickTiming, 0.0);
+  ModbusStage stage(ModbusBench::info(), bench.address(), test::kQuickTiming);
   EXPECT_THROW(stage.start(1, wrong_size), std::invalid_argument);
   EXPECT_EQ(refusal(bench), "started");
 }
@@ -167,7 +167,7 @@ TEST(ModbusStage, SaysWhyAStageDoesNotStart) {
 
   test::NumberedRegisters foreign;
   const test::ServerThread server(foreign, nullptr);
-  ModbusStage stage(ModbusBench::info(), server.address(), test::kQuickTiming, 0.0);
+  ModbusStage stage(ModbusBench::info(), server.address(), test::kQuickTiming);
   std::vector<double> y(1);
   Inputs inputs;
   inputs.y = y;
@@ -205,7 +205,7 @@ TEST(ModbusNode, RefusesWhatTheMapCannotShow) {
   panel.temperature_k.assign(9, 295.0);
   EXPECT_THROW(ModbusBench({}, false, 1.0, panel), std::invalid_argument);
   panel.temperature_k.clear();
-  EXPECT_THROW(ModbusBench({"temperature=400"}, false, 1.0, panel), std::invalid_argument);
+  EXPECT_THROW(ModbusBench({"temperature:400"}, false, 1.0, panel), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(modbus_scales(Eigen::VectorXd(), 2, "actuator")),
                std::invalid_argument);
 }

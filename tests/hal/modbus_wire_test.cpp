@@ -46,7 +46,7 @@ StageInfo info(double rate_hz, std::size_t actuators, std::size_t sensors) {
 
 std::string refusal(const StageInfo& stage, const ModbusAddress& address) {
   try {
-    const ModbusStage refused(stage, address, {}, 0.0);
+    const ModbusStage refused(stage, address, {});
   } catch (const std::invalid_argument& error) {
     return error.what();
   }

@@ -58,7 +58,7 @@ class Bench:
             process = self.start(self.program, 'node', stage, *(['--modbus-tcp', 0] if tcp else []), '--watchdog',
                                  0.5, *options, stdout=out, stderr=subprocess.STDOUT)
         process.said = said
-        while 'served on' not in said.read_text():
+        while 'ends it' not in said.read_text():
             if process.poll() is not None:
                 raise RuntimeError(f'the node ended: {said.read_text()}')
             time.sleep(0.01)
