@@ -24,7 +24,7 @@ namespace stageid {
 class ModbusServer {
  public:
   static constexpr std::size_t kMostClients = 16;
-  static constexpr int kSilence_ms = 20;
+  static constexpr int kSilence_ms = 50;
 
   /// TCP: listens on address.host and address.port (0: a free one). RTU: opens the device.
   /// `faults` may be null; it and `registers` must outlive the server.

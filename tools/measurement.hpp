@@ -18,7 +18,7 @@ struct MeasurementRequest {
   double replay_tolerance_n = 1e-9;
   bool resume = false;
   double pace = -1.0;        ///< < 0: as the stage file says
-  bool reset_fault = false;  ///< backend can: clear a fault of the node first
+  bool reset_fault = false;  ///< clear a fault of the node or plant first
 };
 
 struct MeasurementResult {

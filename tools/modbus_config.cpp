@@ -34,8 +34,6 @@ void describe_range(ConfigVisitor& v, const char* key, double& low, double& high
   high = range[1];
 }
 
-}  // namespace
-
 void describe_modbus(ConfigVisitor& v, ModbusConfig& c) {
   bool tcp = false;
   bool rtu = false;
@@ -78,6 +76,24 @@ void describe_supervisor(ConfigVisitor& v, SupervisorConfig& c) {
   v.number("enable_s", c.conditions.enable_s, positive("s"), kOptional,
            "the plant may take so long to answer and to come up");
   c.conditions.stale_s = kStalePolls * c.options.poll_period_s;
+}
+
+}  // namespace
+
+void describe_modbus_groups(ConfigVisitor& v, bool behind_modbus, ModbusGroups& g) {
+  v.group(
+      "modbus", [&](ConfigVisitor& keys) { describe_modbus(keys, g.stage.emplace()); }, kOptional,
+      "backend modbus: where the stage is");
+  v.require(!behind_modbus || g.stage.has_value(), "backend",
+            "backend: modbus needs a group 'modbus:' that says where the stage is");
+  v.group(
+      "supervisor", [&](ConfigVisitor& keys) { describe_supervisor(keys, g.supervisor.emplace()); },
+      kOptional, "enable chain, gravity compensators, temperatures and interlocks, behind Modbus");
+  const bool one_line = g.stage && g.supervisor && g.stage->address.serial() &&
+                        g.stage->address.device == g.supervisor->link.address.device;
+  v.require(!one_line, "supervisor",
+            "supervisor: a serial line carries one conversation; give the stage another line, or "
+            "take tcp");
 }
 
 }  // namespace stageid

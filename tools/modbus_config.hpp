@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "hal/modbus_supervisor.hpp"
 #include "hal/modbus_wire.hpp"
 #include "hal/plant_watch.hpp"
@@ -20,7 +22,13 @@ struct SupervisorConfig {
   PlantConditions conditions;
 };
 
-void describe_modbus(ConfigVisitor& visitor, ModbusConfig& config);
-void describe_supervisor(ConfigVisitor& visitor, SupervisorConfig& config);
+/// What a stage file says of Modbus.
+struct ModbusGroups {
+  std::optional<ModbusConfig> stage;
+  std::optional<SupervisorConfig> supervisor;
+};
+
+/// The groups `modbus` and `supervisor`; the first is needed if the stage is `behind_modbus`.
+void describe_modbus_groups(ConfigVisitor& visitor, bool behind_modbus, ModbusGroups& groups);
 
 }  // namespace stageid

@@ -53,8 +53,7 @@ struct StageFile {
   std::array<AxisController, kRigidAxes> axes;
   std::vector<FaultConfig> faults;
   CanFile can;
-  std::optional<ModbusConfig> modbus;
-  std::optional<SupervisorConfig> supervisor;
+  ModbusGroups modbus;
   WaferStageSpec spec;
 };
 
@@ -216,22 +215,6 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
   list.push_back(std::move(f));
 }
 
-void describe_wires(ConfigVisitor& v, StageFile& f) {
-  v.group(
-      "modbus", [&](ConfigVisitor& keys) { describe_modbus(keys, f.modbus.emplace()); }, kOptional,
-      "backend modbus: where the stage is");
-  v.require(f.backend != static_cast<std::size_t>(Backend::modbus) || f.modbus.has_value(),
-            "backend", "backend: modbus needs a group 'modbus:' that says where the stage is");
-  v.group(
-      "supervisor", [&](ConfigVisitor& keys) { describe_supervisor(keys, f.supervisor.emplace()); },
-      kOptional, "enable chain, gravity compensators, temperatures and interlocks, behind Modbus");
-  const bool one_line = f.modbus && f.supervisor && f.modbus->address.serial() &&
-                        f.modbus->address.device == f.supervisor->link.address.device;
-  v.require(!one_line, "supervisor",
-            "supervisor: a serial line carries one conversation; give the stage another line, or "
-            "take tcp");
-}
-
 void describe(ConfigVisitor& v, StageFile& f) {
   WaferStageSpec& s = f.spec;
   v.choice("format", f.format, {"stageid-stage"}, kRequired, "what this file is");
@@ -260,7 +243,7 @@ void describe(ConfigVisitor& v, StageFile& f) {
       kRequired, "one entry a degree of freedom that is closed: x y z Rx Ry Rz");
   v.number("pace", s.pace, not_negative(""), kOptional,
            "0: virtual time, as fast as possible; 1: wall clock");
-  describe_wires(v, f);
+  describe_modbus_groups(v, f.backend == static_cast<std::size_t>(Backend::modbus), f.modbus);
   v.items(
       "faults", [&](ConfigVisitor& fault) { describe_fault(fault, f.faults); }, {}, kOptional,
       "faults on request, to try the safety");
@@ -377,8 +360,8 @@ StageConfig load_stage_config(const std::filesystem::path& path) {
   config.file = path;
   config.text = document.text();
   config.backend = static_cast<Backend>(file.backend);
-  config.modbus = file.modbus;
-  config.supervisor = file.supervisor;
+  config.modbus = file.modbus.stage;
+  config.supervisor = file.modbus.supervisor;
   // What the libraries refuse gets the file's name; the place is in their own words.
   try {
     complete_spec(config, file);

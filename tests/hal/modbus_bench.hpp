@@ -64,11 +64,11 @@ class ServerThread {
 /// A node with two actuators and one sensor at 50 Hz behind Modbus.
 class ModbusBench {
  public:
+  /// A safe stop holds the stage for less than a sample: what moves it is the host.
   explicit ModbusBench(const std::vector<std::string>& faults = {}, bool serial = false,
                        double heartbeat_s = 1.0, NodePanel panel = good_panel())
       : script_(modbus_faults(faults)),
-        node_(make_stage(&fake), limits(), controller(), std::move(panel),
-              {10.0, 0.01})  // held for less than a sample,
+        node_(make_stage(&fake), limits(), controller(), std::move(panel), {10.0, 0.01}),
         registers_(node_, limits(), kBootId, &script_, heartbeat_s),
         server_(std::make_unique<ServerThread>(registers_, &script_, serial)) {}
 
