@@ -9,6 +9,7 @@ the log intact. The times within which faults are detected are exact in tests/ha
 where the clock is the bus'; here everything must only end.
 """
 
+import csv
 import pathlib
 import re
 import signal
@@ -85,7 +86,7 @@ class Equality(CanTest):
         name = self.machine.configure("resume")
         with self.machine.node(name):
             process = self.machine.start(name)
-            self.machine.wait_until_running()
+            self.machine.wait_until_running(process)
             process.send_signal(signal.SIGINT)
             self.assertEqual(self.machine.finish(process)[0], 130)
             process = subprocess.run(
@@ -129,9 +130,8 @@ class Decoding(CanTest):
             candump.wait()
         converted = self.machine.call("log", "convert", "run.slog", "-o", "run.csv")
         self.assertEqual(converted.returncode, 0, converted.stderr)
-        rows = [line.split(",") for line in (self.machine.at / "run.csv").read_text().splitlines()
-                if not line.startswith("#")]
-        head, rows = rows[0], rows[1:]
+        with open(self.machine.at / "run.csv", newline="") as file:
+            head, *rows = csv.reader(file)
         signals = self.signals(self.machine.at / "stage.dbc")
         columns = {0x100: ["a1", "a2", "a3"], 0x180: ["s1", "s2"]}
         decoded = {0x100: [], 0x180: []}
@@ -150,8 +150,9 @@ class Decoding(CanTest):
             for column in names:
                 signal_ = signals[identifier, column]
                 wire = np.array([self.value(data, *signal_) for data in frames[:samples]])
-                index = [i for i, title in enumerate(head) if title.split(" ")[0] == column]
-                logged = np.array([float(row[index[-1]]) for row in rows[:samples]])
+                title = f"actuator {column} [N]" if identifier == 0x100 else f"sensor {column} [m]"
+                index = head.index(title)
+                logged = np.array([float(row[index]) for row in rows[:samples]])
                 # Measurements are logged as they came, commands before they were rounded.
                 tolerance = 0.5001 * signal_[3] if identifier == 0x100 else 1e-6 * signal_[3]
                 self.assertLess(abs(wire - logged).max(), tolerance, column)
@@ -204,7 +205,7 @@ class Interventions(CanTest):
 
     def begin(self, *arguments):
         process = self.machine.start(self.name, "run", *arguments)
-        self.machine.wait_until_running()
+        self.machine.wait_until_running(process)
         return process
 
     def test_node_killed(self):
@@ -285,11 +286,10 @@ class Interventions(CanTest):
 
     def test_garbage_of_others_does_no_harm(self):
         with self.machine.node(self.name):
-            process = self.begin()
             garbage = [subprocess.Popen(["cangen", "vcan0", "-f", "-g", "3", "-I", i, "-L", "r"])
                        for i in ("080", "100", "180", "200", "r")]
             try:
-                out = self.ends(process, 0)
+                out = self.ends(self.machine.start(self.name), 0)
             finally:
                 for sender in garbage:
                     sender.kill()
@@ -355,7 +355,7 @@ class Resident(CanTest):
     def test_node_killed(self):
         with self.machine.node(self.name, "--pace", "1") as node:
             process = self.machine.start(self.name)
-            self.machine.wait_until_running()
+            self.machine.wait_until_running(process)
             node.kill()
             self.ends(process, 1, "no node answers")
 

@@ -86,13 +86,15 @@ class Machine:
     def run(self, name="a", log="run", *arguments):
         return self.finish(self.start(name, log, *arguments))
 
-    def wait_until_running(self, log="run"):
+    def wait_until_running(self, process, log="run"):
         """The log has samples."""
         until = time.monotonic() + 30
         while time.monotonic() < until:
             with contextlib.suppress(FileNotFoundError):
                 if (self.at / f"{log}.slog").stat().st_size > 20000:
                     return
+            if process.poll() is not None:
+                raise AssertionError(f"the run ends before it begins: {self.finish(process)}")
             time.sleep(0.02)
         raise AssertionError("the run does not begin")
 
