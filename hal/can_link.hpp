@@ -19,7 +19,7 @@ class CanLink {
 
   CanLink(CanTransport& transport, std::uint32_t fingerprint);
 
-  /// Sends the command until the node answers, three times at most, and waits for the answer.
+  /// Sends the command until the node answers, ten times at most, and waits for the answer.
   /// @throws StageError if nobody answers, or the node refuses (in its own words).
   CanState command(CanCommand command, const Other& other = {});
   /// The same without exceptions. @returns false if it was not answered or refused.

@@ -38,11 +38,11 @@ void CanNode::serve(std::int64_t until_ns) {
   if (!player_.busy() && until_ns > now_ns) transport_.wait(until_ns);
   while (true) {
     const std::size_t count = transport_.receive(inbox_);
+    watch_bus();  // before what came in with the news: a bus that is off outweighs a last command
     for (std::size_t i = 0; i < count; ++i) handle(inbox_[i]);
     if (count < inbox_.size()) break;
   }
   player_.work(transport_.now_ns(), transport_);
-  watch_bus();
   stage_.tick(transport_.now_ns());
   announce();
   flush();

@@ -40,7 +40,7 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_flag("--resume", resume_,
                     "continue an interrupted log: complete runs are not repeated");
   command->add_flag("--reset-fault", reset_fault_,
-                    "backend can: clear a fault of the node before the first run");
+                    "clear a fault of the node or plant before the first run");
   command->add_option("--dashboard", dashboard_port_, "")->group("");
   command->final_callback([this] { run(); });
 }
