@@ -17,7 +17,8 @@ struct ModbusConfig {
 
 /// The group `supervisor` of a stage file: the plant around the stage, whatever its back end.
 struct SupervisorConfig {
-  ModbusConfig link;
+  /// So quick that a poll can be repeated before three periods are over and its status is stale.
+  ModbusConfig link{{}, {0.08, 0.15, 1e-3}};
   ModbusSupervisorOptions options;
   PlantConditions conditions;
 };

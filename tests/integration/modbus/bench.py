@@ -71,8 +71,8 @@ class Bench:
         group = f'modbus: {{{door}, unit: {unit}, response_s: 0.1, worst_reply_s: 0.3, device_s: 1e-3}}\n'
         text = text.replace('backend: modbus', f'backend: {backend}') + group
         if supervisor:
-            text += (f'supervisor:\n  modbus: {{tcp: {{port: {supervisor}}}, response_s: 0.1, worst_reply_s: 0.3}}\n'
-                     '  poll_period_s: 0.05\n  gravity_compensator_n: [20, 32]\n  temperature_k: [285, 310]\n'
+            text += (f'supervisor:\n  modbus: {{tcp: {{port: {supervisor}}}}}\n'
+                     '  poll_period_s: 0.1\n  gravity_compensator_n: [20, 32]\n  temperature_k: [285, 310]\n'
                      '  enable_s: 1\n')
         path = self.work / f'{name}.yaml'
         path.write_text(text)

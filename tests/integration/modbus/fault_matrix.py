@@ -39,7 +39,7 @@ def fault(text):
     return ('--modbus-fault', text)
 
 
-# The requests of a run are two or more for its start and one a sample; a plant is polled at 20 Hz.
+# The requests of a run are two or more for its start and one a sample; a plant is polled at 10 Hz.
 REPEATED = [
     Row('late reply', MARKED, 'marked', fault('late_reply@300:0.2'), repeated=True),
     Row('half a frame', MARKED, 'marked', fault('half_frame@300'), repeated=True),
@@ -61,10 +61,10 @@ ROWS = REPEATED + [dataclasses.replace(row, name=f'{row.name}, RTU', line='rtu')
     Row('gravity compensator seen by the node', FAILED, 'gravity', fault('gravity@300:5')),
     Row('host interrupted', INTERRUPTED, 'interrupted', pace=1, disturb='interrupt'),
     Row('host killed', -signal.SIGKILL, '', pace=1, disturb='kill host', state=('fault',)),
-    Row('interlock opens', FAILED, 'interlock is open', fault('interlock@30'), line='plant', pace=1),
-    Row('over-temperature', FAILED, '400 K', fault('temperature@30:400'), line='plant', pace=1),
-    Row('gravity compensator fails', FAILED, '5 N', fault('gravity@30:5'), line='plant', pace=1),
-    Row('heartbeat stands still', FAILED, 'heartbeat stands still', fault('heartbeat@30'), line='plant', pace=1),
+    Row('interlock opens', FAILED, 'interlock is open', fault('interlock@15'), line='plant', pace=1),
+    Row('over-temperature', FAILED, '400 K', fault('temperature@15:400'), line='plant', pace=1),
+    Row('gravity compensator fails', FAILED, '5 N', fault('gravity@15:5'), line='plant', pace=1),
+    Row('heartbeat stands still', FAILED, 'heartbeat stands still', fault('heartbeat@15'), line='plant', pace=1),
     Row('supervisor frozen', FAILED, 'no fresh status', line='plant', pace=1, disturb='freeze'),
     Row('supervisor killed', FAILED, 'no fresh status', line='plant', pace=1, disturb='kill', state=()),
     Row('supervisor late once', DONE, '', fault('late_reply@2:0.12'), line='plant'),
