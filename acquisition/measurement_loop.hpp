@@ -33,7 +33,7 @@ enum class LoopStatus : std::uint8_t {
 };
 
 /// Why a run ended before its time.
-enum class StopReason : std::uint8_t { none, limit, fault, misses, interrupt, log };
+enum class StopReason : std::uint8_t { none, limit, fault, misses, interrupt, log, plant };
 const char* to_string(StopReason reason) noexcept;
 
 /// One closed-loop run, cycle by cycle:  u[n] = C(y[n]) + g r[n],  exchange(u[n]) -> y[n+1].

@@ -162,6 +162,10 @@ class Experiment {
         finish(StopReason::interrupt);
         break;
       }
+      if (plant_tripped()) {
+        finish(StopReason::plant);
+        break;
+      }
       const StopReason reason = perform_run(run);
       if (reason != StopReason::none) {
         finish(reason);
@@ -212,6 +216,7 @@ class Experiment {
         }
       }
       if (interrupted()) loop_.request_stop(StopReason::interrupt);
+      if (plant_tripped()) loop_.request_stop(StopReason::plant);
       if (--until_publish == 0) {
         until_publish = kPublishEvery;
         progress_.publish(loop_.health(), loop_.timing(), wall_);
@@ -223,6 +228,11 @@ class Experiment {
   bool interrupted() const noexcept {
     return abandoned_.load(std::memory_order_relaxed) ||
            (options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed));
+  }
+
+  bool plant_tripped() const noexcept {
+    return options_.plant_tripped != nullptr &&
+           options_.plant_tripped->load(std::memory_order_relaxed);
   }
 
   void finish(StopReason reason) {
@@ -243,6 +253,10 @@ class Experiment {
         result_.end = ExperimentEnd::fault;
         result_.message = fmt::format("stage '{}': too many bad cycles in a row, the last: {}",
                                       info.name, to_string(loop_.last_trouble()));
+        return;
+      case StopReason::plant:
+        result_.end = ExperimentEnd::fault;
+        result_.message = options_.plant_reason ? options_.plant_reason() : "the plant tripped";
         return;
       case StopReason::interrupt:
         result_.end = ExperimentEnd::interrupted;

@@ -32,6 +32,9 @@ struct RunExperimentOptions {
   std::vector<RunId> skip = {};  ///< complete in the log already (--resume)
   /// Set by a signal handler: controlled stop, log kept.
   const std::atomic<bool>* interrupt = nullptr;
+  /// Set when something around the stage does not hold any more: controlled stop, `fault`.
+  const std::atomic<bool>* plant_tripped = nullptr;
+  std::function<std::string()> plant_reason = {};  ///< why; asked once the stage is stopped
   double ramp_s = 0.1;             ///< excitation is ramped to zero over this before stopping
   int misses_allowed = 10;         ///< leaky bucket: +2 a bad cycle, -1 a good one, above: stop
   RealTimeOptions real_time = {};  ///< of the loop's thread, where the clock is the wall's
@@ -67,7 +70,7 @@ std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept;
 ///
 /// A thread of its own is the loop, another empties the ring into the log; the calling thread
 /// reports. In virtual time the loop waits for the log, against the wall clock a full ring ends the experiment
-/// (log_failed). A limit, a fault, too many misses or an interrupt ends the current run in a
+/// (log_failed). A limit, a fault, too many misses, the plant or an interrupt ends the current run in a
 /// controlled stop: the excitation is ramped down in closed loop, the stage stopped, the run logged
 /// as incomplete. Every run starts from standstill with the seed of (plan seed, realization,
 /// experiment), so that a repeated or resumed run is the same run.

@@ -34,9 +34,10 @@ class LimitedStage final : public CyclicStage {
   [[nodiscard]] Outcome exchange(const Outputs& outputs, Inputs& inputs,
                                  Deadline deadline) noexcept override;
   void stop() noexcept override;
+  std::string trouble() const override { return stage_->trouble(); }
 
   const LimitViolation& violation() const noexcept { return violation_; }
-  CyclicStage& inner() noexcept { return *stage_; }
+  const CyclicStage& inner() const noexcept { return *stage_; }
 
  private:
   void guard(const Outputs& outputs) noexcept;

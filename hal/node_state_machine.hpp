@@ -7,21 +7,6 @@
 
 namespace stageid {
 
-/// Why a node went to fault. The values travel in frames and registers: append only.
-enum class FaultCause : std::uint8_t {
-  none,
-  watchdog,       ///< the host fell silent while it measured
-  limit,          ///< a limit was hit
-  not_finite,     ///< a command or a measurement was no number
-  interlock,      ///< the interlock chain opened
-  amplifier,      ///< the stage itself reported a fault
-  gravity,        ///< a gravity compensator is out of range
-  temperature,    ///< a temperature is out of range
-  bus_off,        ///< the node's bus left
-  host_heartbeat  ///< the supervisor's heartbeat stood still
-};
-const char* to_string(FaultCause cause) noexcept;
-
 /// The states of a drive after CiA 402, as far as a stage needs them.
 ///
 ///   not_ready -> switch_on_disabled -> ready -> switched_on -> operation_enabled <-> measuring

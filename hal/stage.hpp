@@ -115,6 +115,9 @@ class CyclicStage {
 
   /// Brings the outputs to a safe state (zero force, disabled). Idempotent.
   virtual void stop() noexcept = 0;
+
+  /// One line on what went wrong in the last run, beyond its Outcome; empty: nothing to add.
+  virtual std::string trouble() const { return {}; }
 };
 
 }  // namespace stageid

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "excitation/file_error.hpp"
+#include "excitation/output_file.hpp"
+#include "hal/can_dbc.hpp"
 #include "tools/command_line.hpp"
 #include "tools/config_schema.hpp"
 #include "tools/experiment_config.hpp"
@@ -50,6 +53,11 @@ ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console
   CLI::App* check_command = add_command(*config, "check", "Check experiment and stage files");
   check_command->add_option("files", files_, "YAML files")->required();
   check_command->final_callback([this] { check(); });
+  CLI::App* dbc_command = add_command(
+      *config, "dbc", "Write the CAN frames of a stage file as a database for can-utils, SavvyCAN");
+  dbc_command->add_option("stage", stage_file_, "stage file with a group 'can'")->required();
+  dbc_command->add_option("-o,--output", output_, "file to write (.dbc)")->required();
+  dbc_command->final_callback([this] { dbc(); });
 }
 
 void ConfigCommand::schema() const {
@@ -85,6 +93,17 @@ void ConfigCommand::check() const {
     json.push_back({{"file", file.string()}, {"valid", true}});
   }
   console_.result({{"files", json}});
+}
+
+void ConfigCommand::dbc() const {
+  const StageConfig stage = load_stage_config(stage_file_);
+  if (!stage.can.present)
+    throw std::invalid_argument(
+        fmt::format("{}: has no group 'can'; see 'stageid config schema'", stage_file_.string()));
+  const StageInfo& info = stage.spec.info;
+  write_text_file(output_, can_dbc(can_layout(stage.can.spec, info), info));
+  console_.result(fmt::format("wrote {}", output_.string()));
+  console_.result({{"file", output_.string()}});
 }
 
 }  // namespace stageid

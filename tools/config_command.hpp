@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// stageid config schema | check FILE...
+/// stageid config schema | check FILE... | dbc STAGE -o FILE
 class ConfigCommand {
  public:
   ConfigCommand(CLI::App& app, Console& console);
@@ -17,10 +17,13 @@ class ConfigCommand {
  private:
   void schema() const;
   void check() const;
+  void dbc() const;
 
   Console& console_;
   std::string kind_;
   std::vector<std::filesystem::path> files_;
+  std::filesystem::path stage_file_;
+  std::filesystem::path output_;
 };
 
 }  // namespace stageid

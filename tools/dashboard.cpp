@@ -60,12 +60,14 @@ struct Dashboard::State {
     shown.response_status = response.status();
     shown.response_edition = content.response.get().number;
     shown.watchers = server->watchers();
+    if (plant) shown.plant = plant();
     if (const EventLog* const log = events) shown.events = log->latest(kEventsShown);
     content.state.publish(dashboard_state_json(shown));
   }
 
   DashboardContent content;
   DashboardState shown;
+  std::function<PlantSnapshot()> plant;
   std::atomic<EventLog*> events = nullptr;
   std::atomic<bool> aborted = false;
   SteadyClock::time_point start = SteadyClock::now();
@@ -93,6 +95,10 @@ std::vector<RunObserver*> Dashboard::observers() noexcept {
 void Dashboard::watch(EventLog& events) noexcept {
   state_->events = &events;
   state_->start = SteadyClock::now();
+}
+
+void Dashboard::watch(std::function<PlantSnapshot()> snapshot) {
+  state_->plant = std::move(snapshot);
 }
 
 void Dashboard::update(const ExperimentProgress& progress) {

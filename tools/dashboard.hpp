@@ -1,11 +1,13 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "acquisition/event_log.hpp"
 #include "acquisition/run_experiment.hpp"
+#include "hal/supervisor.hpp"
 #include "tools/dashboard_address.hpp"
 #include "tools/experiment_config.hpp"
 
@@ -29,6 +31,8 @@ class Dashboard {
   std::vector<RunObserver*> observers() noexcept;
   /// Shows the newest events of it from now on, and books an abort there.
   void watch(EventLog& events) noexcept;
+  /// Shows what stands around the stage; `snapshot` may be called while *this lives.
+  void watch(std::function<PlantSnapshot()> snapshot);
 
   /// A few times a second, from one thread.
   void update(const ExperimentProgress& progress);

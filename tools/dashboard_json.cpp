@@ -1,5 +1,7 @@
 #include "tools/dashboard_json.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -55,6 +57,22 @@ void add_counts(const DashboardState& s, Json& json) {
   json["timing"] = timing_json(timing);
 }
 
+/// The page shows the values as they come, under their names.
+Json plant_json(const PlantSnapshot& plant) {
+  Json values = Json::array();
+  const auto add = [&](const char* name, const std::vector<double>& numbers, const char* unit) {
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      values.push_back(
+          {{"name", fmt::format("{} {}", name, i + 1)}, {"value", numbers[i]}, {"unit", unit}});
+  };
+  add("temperature", plant.temperature_k, "K");
+  add("gravity compensator", plant.gravity_compensator_n, "N");
+  std::string state = to_string(plant.state);
+  if (plant.cause != FaultCause::none) state += fmt::format(": {}", to_string(plant.cause));
+  if (!plant.interlock_closed) state += ", interlock open";
+  return {{"state", state}, {"values", values}};
+}
+
 }  // namespace
 
 std::string dashboard_state_json(const DashboardState& s) {
@@ -75,7 +93,7 @@ std::string dashboard_state_json(const DashboardState& s) {
         {"rms", list(s.levels.rms)},
         {"largest_peak", list(s.levels.largest_peak)}}},
       {"response", {{"edition", s.response_edition}, {"status", s.response_status}}},
-      {"supervisor", nullptr},
+      {"supervisor", s.plant ? plant_json(*s.plant) : Json()},
       {"watchers", s.watchers},
       {"message", s.message},
       {"exit_code", s.exit_code ? Json(*s.exit_code) : Json()}};

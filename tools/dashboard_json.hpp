@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "acquisition/run_experiment.hpp"
+#include "hal/supervisor.hpp"
 #include "tools/experiment_config.hpp"
 #include "tools/live_levels.hpp"
 
@@ -20,7 +21,8 @@ struct DashboardState {
   Levels levels;
   std::string response_status;
   std::uint64_t response_edition = 0;
-  std::vector<std::string> events;  ///< JSON objects, oldest first
+  std::optional<PlantSnapshot> plant;  ///< what stands around the stage
+  std::vector<std::string> events;     ///< JSON objects, oldest first
   int watchers = 0;
   std::optional<int> exit_code;  ///< once it has ended
   std::string message;

@@ -19,6 +19,7 @@
 #include "tools/model_export.hpp"
 #include "tools/output_paths.hpp"
 #include "tools/report_input.hpp"
+#include "tools/run_metadata.hpp"
 #include "tools/validate_command.hpp"
 
 namespace stageid {

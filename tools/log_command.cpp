@@ -14,7 +14,7 @@
 #include "tools/command_line.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/interrupt.hpp"
-#include "tools/measurement.hpp"
+#include "tools/run_metadata.hpp"
 #include "tools/timing_json.hpp"
 
 namespace stageid {

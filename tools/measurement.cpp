@@ -1,51 +1,23 @@
 #include "tools/measurement.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <array>
-#include <chrono>
-#include <ctime>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "acquisition/event_recorder.hpp"
 #include "acquisition/log_reader.hpp"
 #include "excitation/file_error.hpp"
-#include "hal/motion_controller.hpp"
 #include "hal/real_time.hpp"
-#include "hal/replay_stage.hpp"
 #include "tools/dashboard.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/interrupt.hpp"
-#include "tools/replay_log.hpp"
+#include "tools/measured_stage.hpp"
+#include "tools/modbus_backend.hpp"
+#include "tools/run_metadata.hpp"
 
 namespace stageid {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-std::string utc_now() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-}
-
-std::string metadata(const ExperimentConfig& config, const MeasurementRequest& request,
-                     const StageInfo& stage) {
-  Json json = {
-      {"program", "stageid"},
-      {"stageid_version", STAGEID_VERSION},
-      {"started_utc", utc_now()},
-      {"backend", to_string(request.backend)},
-      {"measurement_id", config.measurement_id},
-      {"seeds", {{"experiment", config.experiment.seed}, {"noise", config.stage.spec.seed}}},
-      {"transport_delay_s", config.stage.spec.info.transport_delay_s},
-      {"configuration_file", config.file.filename().string()},
-      {"configuration", config.text},
-      {"stage_file", config.stage.file.filename().string()},
-      {"stage", config.stage.text}};
-  // Virtual time has no pace, and its logs say nothing of one.
-  if (stage.clock == Clock::wall) json["pace"] = stage.pace;
-  return json.dump();
-}
 
 /// The runs that a log holds completely, and the check that it is the log of this experiment.
 std::vector<RunId> complete_runs(const ExperimentConfig& config,
@@ -61,28 +33,6 @@ std::vector<RunId> complete_runs(const ExperimentConfig& config,
   for (const LogRun& run : log->runs())
     if (run.complete) runs.push_back({run.realization, run.experiment});
   return runs;
-}
-
-std::unique_ptr<LimitedStage> make_stage(const ExperimentConfig& config, const ExperimentPlan& plan,
-                                         const MeasurementRequest& request,
-                                         const std::vector<RunId>& skip) {
-  WaferStageSpec spec = config.stage.spec;
-  if (request.backend == Backend::sim) {
-    if (request.pace >= 0.0) spec.pace = request.pace;
-    spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
-    return std::make_unique<LimitedStage>(std::make_unique<SimulatedStage>(spec), spec.limits);
-  }
-  if (request.replay.empty())
-    throw std::invalid_argument("--backend replay: no log to play; add --replay LOG");
-  std::vector<RunId> runs;
-  for (const RunId run : plan.runs())
-    if (std::find(skip.begin(), skip.end(), run) == skip.end()) runs.push_back(run);
-  spec.info.backend = "replay";
-  return std::make_unique<LimitedStage>(
-      std::make_unique<ReplayStage>(spec.info,
-                                    std::make_unique<ReplayLog>(open_log(request.replay), runs),
-                                    request.replay_tolerance_n),
-      spec.limits);
 }
 
 SlogWriter open_writer(const MeasurementRequest& request, const LogInfo& info, bool exists) {
@@ -104,42 +54,42 @@ int exit_code_of(const ExperimentResult& result) {
   return kWorldFailed;
 }
 
-/// The replay stage also compares: what it saw is part of the result.
-void judge_replay(LimitedStage& stage, MeasurementResult& result) {
-  const auto* replay = dynamic_cast<const ReplayStage*>(&stage.inner());
-  if (replay == nullptr || replay->mismatches() == 0) return;
-  result.message += fmt::format("; {} commands differ from the recorded ones, by up to {:.3g} N",
-                                replay->mismatches(), replay->largest_mismatch_n());
-  if (result.exit_code == kDone) result.exit_code = kNotTrustworthy;
-}
-
-void conclude(LimitedStage& stage, MeasurementResult& result) {
+void conclude(const MeasuredStage& stage, MeasurementResult& result) {
   result.message = result.experiment.message;
   result.exit_code = exit_code_of(result.experiment);
   if (result.exit_code == kNotTrustworthy)
     result.message =
         fmt::format("{} samples are marked or missing",
                     result.experiment.health.marked + result.experiment.health.missing);
-  judge_replay(stage, result);
+  stage.explain(result);
+}
+
+/// Brings up the plant around the stage, if the stage file tells of one, and lets it end the
+/// experiment. What is played back has no plant any more.
+std::unique_ptr<SupervisedPlant> supervise(const ExperimentConfig& config,
+                                           const MeasurementRequest& request,
+                                           RunExperimentOptions& options) {
+  const std::optional<SupervisorConfig>& supervisor = config.stage.supervisor;
+  if (!supervisor || request.backend == Backend::replay) return nullptr;
+  auto plant = std::make_unique<SupervisedPlant>(*supervisor, request.reset_fault);
+  options.plant_tripped = &plant->watch().tripped();
+  options.plant_reason = [&watch = plant->watch()] { return watch.reason(); };
+  return plant;
 }
 
 std::unique_ptr<Dashboard> make_dashboard(const ExperimentConfig& config,
                                           const ExperimentPlan& plan,
-                                          const MeasurementRequest& request,
-                                          const LimitedStage& stage, int runs_before,
-                                          const Console& console) {
+                                          const MeasurementRequest& request, const StageInfo& stage,
+                                          int runs_before, const Console& console) {
   if (!request.dashboard) return nullptr;
-  auto dashboard = std::make_unique<Dashboard>(*request.dashboard, config, plan, stage.info(),
-                                               request.log, runs_before);
+  auto dashboard = std::make_unique<Dashboard>(*request.dashboard, config, plan, stage, request.log,
+                                               runs_before);
   console.warning("dashboard: " + dashboard->url());
   return dashboard;
 }
 
-/// Refuses what is there and must not be, or cannot be done at all.
+/// Refuses what is there and must not be. @returns whether there is a log to continue.
 bool check_log(const MeasurementRequest& request) {
-  if (request.backend == Backend::can || request.backend == Backend::modbus)
-    throw std::invalid_argument(fmt::format(
-        "--backend {}: not in this version; there are sim and replay", to_string(request.backend)));
   // Killed before the first byte was written: nothing is lost by starting anew.
   std::error_code no_size;
   if (request.resume && std::filesystem::file_size(request.log, no_size) == 0 && !no_size)
@@ -171,9 +121,9 @@ void tell_begin(EventLog& events, const ExperimentConfig& config, const StageInf
                 {"realtime", std::string(kPolicies[static_cast<std::size_t>(real_time.policy)])}});
 }
 
-void tell_end(EventLog& events, const LimitedStage& stage, const MeasurementResult& result) {
-  if (result.exit_code == kStoppedForSafety) {
-    const LimitViolation& hit = stage.violation();
+void tell_end(EventLog& events, const MeasuredStage& stage, const MeasurementResult& result) {
+  const LimitViolation hit = stage.violation();
+  if (result.exit_code == kStoppedForSafety && hit.kind != LimitKind::none) {
     const auto& channels = hit.of_sensor ? stage.info().sensors : stage.info().actuators;
     events.write("limit", {{"channel", channels[static_cast<std::size_t>(hit.channel)].name},
                            {"value", hit.value},
@@ -201,20 +151,6 @@ void listen(RunExperimentOptions& options, EventLog& events, Progress& progress,
 
 }  // namespace
 
-std::string measurement_id_of(const LogInfo& info) {
-  const Json json = Json::parse(info.metadata_json, nullptr, false);
-  if (!json.is_object() || !json.contains("measurement_id") || !json["measurement_id"].is_string())
-    return "";
-  return json["measurement_id"].get<std::string>();
-}
-
-double wall_period_s(const LogInfo& info) {
-  const Json json = Json::parse(info.metadata_json, nullptr, false);
-  if (!json.is_object() || !json.contains("pace") || !json["pace"].is_number()) return 0.0;
-  const double pace = json["pace"].get<double>();
-  return pace > 0.0 ? 1.0 / (info.sample_rate_hz * pace) : 0.0;
-}
-
 double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage) {
   const auto words = static_cast<double>(stage.actuators.size() + stage.sensors.size() + 1);
   return static_cast<double>(plan.samples_per_run()) * static_cast<double>(plan.runs().size()) *
@@ -229,23 +165,26 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   MeasurementResult result;
   result.runs_total = static_cast<int>(plan.runs().size());
   result.runs_before = static_cast<int>(options.skip.size());
-  const std::unique_ptr<LimitedStage> stage = make_stage(config, plan, request, options.skip);
-  MotionController controller(config.stage.spec.controller);
+  const std::unique_ptr<MeasuredStage> stage =
+      make_measured_stage(config, plan, request, options.skip);
+  const StageInfo& info = stage->info();
   options.real_time = config.stage.real_time.options;
   options.misses_allowed = config.stage.real_time.misses_allowed;
-  if (stage->info().clock == Clock::wall) warn_of_real_time(options.real_time, console);
+  if (info.clock == Clock::wall) warn_of_real_time(options.real_time, console);
+  const std::unique_ptr<SupervisedPlant> plant = supervise(config, request, options);
   std::optional<EventLog> events;  // outlives the dashboard, whose watchers write to it
   const std::unique_ptr<Dashboard> dashboard =
-      make_dashboard(config, plan, request, *stage, result.runs_before, console);
-  const LogInfo info =
-      experiment_log_info(plan, stage->info(), metadata(config, request, stage->info()));
-  SlogWriter log = open_writer(request, info, exists);
+      make_dashboard(config, plan, request, info, result.runs_before, console);
+  if (dashboard && plant) dashboard->watch([&plant] { return plant->snapshot(); });
+  SlogWriter log = open_writer(
+      request, experiment_log_info(plan, info, run_metadata(config, request.backend, info)),
+      exists);
   events.emplace(event_log_of(request.log));
-  tell_begin(*events, config, stage->info(), result);
+  tell_begin(*events, config, info, result);
 
   Progress progress(console, "run", "s of stage time");
   listen(options, *events, progress, dashboard.get());
-  result.experiment = run_experiment(plan, *stage, controller, log, options);
+  result.experiment = stage->perform(log, options);
   result.seconds = progress.seconds();
   conclude(*stage, result);
   if (result.experiment.end != ExperimentEnd::log_failed)

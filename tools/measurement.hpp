@@ -19,7 +19,8 @@ struct MeasurementRequest {
   std::filesystem::path replay;  ///< backend replay: the log that is played
   double replay_tolerance_n = 1e-9;
   bool resume = false;
-  double pace = -1.0;  ///< < 0: as the stage file says
+  double pace = -1.0;        ///< < 0: as the stage file says
+  bool reset_fault = false;  ///< clear a fault of the node or plant first
   std::optional<DashboardAddress> dashboard = {};
 };
 
@@ -41,12 +42,5 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
 
 /// Bytes of the samples of a whole experiment in a native log.
 double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage);
-
-/// The period of the loop on its wall clock; 0 if the log was measured in virtual time, or does not
-/// say.
-double wall_period_s(const LogInfo& info);
-
-/// What the log's metadata say of the experiment it belongs to; empty if nothing.
-std::string measurement_id_of(const LogInfo& info);
 
 }  // namespace stageid

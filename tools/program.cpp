@@ -25,6 +25,7 @@
 #include "tools/key_suggestion.hpp"
 #include "tools/log_command.hpp"
 #include "tools/modes_command.hpp"
+#include "tools/node_command.hpp"
 #include "tools/report_command.hpp"
 #include "tools/run_command.hpp"
 #include "tools/validate_command.hpp"
@@ -62,7 +63,8 @@ class Program {
         validate_(app_, console_),
         export_(app_, console_),
         report_(app_, console_),
-        config_(app_, console_) {
+        config_(app_, console_),
+        node_(app_, console_) {
     add_import_command(app_);
     app_.name("stageid");
     app_.set_version_flag("--version", "stageid " STAGEID_VERSION);
@@ -134,6 +136,7 @@ class Program {
   ExportCommand export_;
   ReportCommand report_;
   ConfigCommand config_;
+  NodeCommand node_;
 };
 
 }  // namespace

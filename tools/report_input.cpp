@@ -12,8 +12,8 @@
 #include "excitation/hdf5_file.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/fit_step.hpp"
-#include "tools/measurement.hpp"
 #include "tools/model_hdf5.hpp"
+#include "tools/run_metadata.hpp"
 
 namespace stageid {
 namespace {

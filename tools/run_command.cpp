@@ -28,7 +28,8 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
   command->add_option("config", config_, "experiment file (.yaml)")->required();
   command->add_option("-o,--output", output_, "log to write (.slog)")->required();
-  command->add_option("--backend", backend_, "sim | replay, instead of the stage file's");
+  command->add_option("--backend", backend_,
+                      "sim | can | modbus | replay, instead of the stage file's");
   command->add_option("--replay", replay_, "backend replay: the log that is played");
   command
       ->add_option("--replay-tolerance", replay_tolerance_n_,
@@ -41,6 +42,8 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("--dashboard", dashboard_,
                       "PORT: show the experiment in a browser on this machine (0: any free port); "
                       "HOST:PORT: on others too, who need the token in the address it prints");
+  command->add_flag("--reset-fault", reset_fault_,
+                    "clear a fault of the node or plant before the first run");
   command->final_callback([this] { run(); });
 }
 
@@ -55,6 +58,7 @@ void RunCommand::run() const {
   request.resume = resume_;
   request.pace = pace_;
   if (!dashboard_.empty()) request.dashboard = parse_dashboard_address(dashboard_);
+  request.reset_fault = reset_fault_;
   const MeasurementResult result = measure(config, plan, request, console_);
   console_.exit_code = result.exit_code;
 

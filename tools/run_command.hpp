@@ -25,6 +25,7 @@ class RunCommand {
   double pace_ = -1.0;
   std::string dashboard_;
   bool resume_ = false;
+  bool reset_fault_ = false;
 };
 
 }  // namespace stageid

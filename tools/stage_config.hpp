@@ -3,13 +3,16 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "hal/limited_stage.hpp"
 #include "hal/motion_controller.hpp"
 #include "hal/simulated_stage.hpp"
+#include "tools/can_config.hpp"
 #include "tools/config_visitor.hpp"
+#include "tools/modbus_config.hpp"
 #include "tools/real_time_keys.hpp"
 
 namespace stageid {
@@ -24,6 +27,9 @@ struct StageConfig {
   Backend backend = Backend::sim;
   RealTimeKeys real_time;
   WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
+  CanConfig can;
+  std::optional<ModbusConfig> modbus;          ///< of the stage
+  std::optional<SupervisorConfig> supervisor;  ///< of what stands around it
 };
 
 /// Reads a stage file and checks it through to a simulated stage that could be started.

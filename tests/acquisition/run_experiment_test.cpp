@@ -183,6 +183,28 @@ TEST_F(RunExperiment, AnInterruptBeforeTheFirstRunMeasuresNothing) {
   EXPECT_TRUE(inner_->seeds().empty());
 }
 
+TEST_F(RunExperiment, APlantThatTripsEndsInAControlledStopWithItsReason) {
+  std::atomic<bool> tripped = false;
+  inner_->raise = {{150, &tripped}};
+  SlogWriter log = create("a.slog");
+  const RunExperimentOptions options{
+      .plant_tripped = &tripped, .plant_reason = [] { return "too hot"; }, .ramp_s = 0.02};
+  const ExperimentResult result = measure(log, options);
+  log.close(1, result.message.c_str());
+  EXPECT_EQ(result.end, ExperimentEnd::fault);
+  EXPECT_EQ(result.message, "too hot");
+  EXPECT_EQ(inner_->stops(), 1);
+  EXPECT_EQ(inner_->seeds().size(), 1U) << "no further run";
+  const SlogReader reader(directory_ / "a.slog");
+  // As with an interrupt: the row of the exchange that raised it is good, then the stop and its ramp.
+  EXPECT_EQ(reader.runs()[0].samples, 151U + 1 + 20);
+  const LogSamples samples = all_samples(reader, 0);
+  EXPECT_TRUE((samples.marked.head(151) == 0).all() && (samples.marked.tail(21) == 1).all());
+  SlogWriter next = create("b.slog");
+  EXPECT_EQ(measure(next, options).end, ExperimentEnd::fault) << "before a run";
+  EXPECT_EQ(inner_->seeds().size(), 1U);
+}
+
 TEST_F(RunExperiment, ALimitEndsInAControlledStopAndKeepsTheLog) {
   inner_->first_sensor = {{140, 1e9}};  // far off: the controller asks for more than 50 N
   SlogWriter log = create("a.slog");

@@ -35,6 +35,7 @@ DOORS = {
     "xxhash": {"excitation"},
     "hdf5": {"excitation"},
     "H5": {"excitation"},
+    "modbus": {"hal"},
     "yaml-cpp/": {"tools"},
     "CLI/": {"tools"},
     "httplib": {"tools"},

@@ -24,8 +24,7 @@ TEST_F(BadRequest, Usage) {
 }
 
 TEST_F(BadRequest, WhatIsNotInThisVersionSaysSo) {
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "can"}, 2, "not in this version");
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "modbus"}, 2, "not in this version");
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "can"}, 2, "has no group 'can'");
   fail({"run", config_, "-o", name("x.slog"), "--dashboard", "http://a"}, 2, "--dashboard");
   fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
   fail({"import", "x.mat", "-o", "frf.h5"}, 2, "not in this version");
@@ -120,10 +119,74 @@ TEST_F(BadRequest, StageFiles) {
   wrong("noise:", "faults: [{kind: dead_sensor, channel: s9}]\nnoise:", "there is no sensor 's9'");
 }
 
+TEST_F(BadRequest, Modbus) {
+  const auto wrong = [&](const std::string& group, const std::string& text) {
+    fail({"design", stage("bad.yaml", "noise:", group + "\nnoise:"), "-o", name("e.h5")}, 2, text);
+  };
+  wrong("modbus: {unit: 1}", "modbus: write one of tcp and rtu");
+  wrong("modbus: {tcp: {port: 1}, rtu: {device: x}}", "modbus: write one of tcp and rtu");
+  wrong("modbus: {tcp: {port: 0}}", "port: 0 is out of range");
+  wrong("modbus: {rtu: {baud: 9600}}", "key 'device' is missing in rtu");
+  wrong("modbus: {rtu: {device: x, parity: S}}", "parity: 'S' stands here; write one of N, E, O");
+  wrong("modbus: {tcp: {port: 1}, response_s: 2}", "worst_reply_s: below response_s");
+  wrong("supervisor: {modbus: {tcp: {port: 1}}, temperature_k: [1, 2]}",
+        "key 'gravity_compensator_n' is missing in supervisor");
+  wrong(
+      "supervisor: {modbus: {tcp: {port: 1}}, temperature_k: [2, 1], gravity_compensator_n: [1, "
+      "2]}",
+      "temperature_k: write [low, high]");
+  wrong(
+      "modbus: {rtu: {device: x}}\nsupervisor: {modbus: {rtu: {device: x}}, temperature_k: [1, 2], "
+      "gravity_compensator_n: [1, 2]}",
+      "a serial line carries one conversation");
+  fail({"design", stage("bad.yaml", "backend: sim", "backend: modbus"), "-o", name("e.h5")}, 2,
+       "backend: modbus needs a group 'modbus:'");
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "modbus"}, 2, "has no group 'modbus'");
+}
+
+TEST_F(BadRequest, NodesThatCannotBeServed) {
+  const std::string file = std::string(STAGEID_SOURCE_DIR) + "/configs/stage/small_stage.yaml";
+  fail({"node", file}, 2, "nothing to serve; add --can INTERFACE, --modbus-tcp PORT");
+  fail({"node", file, "--modbus-tcp", "70000"}, 2, "--modbus-tcp");
+  fail({"node", file, "--modbus-tcp", "0", "--modbus-fault", "late"}, 2,
+       "--modbus-fault: fault 'late'");
+  fail({"node", file, "--modbus-rtu", "/dev/there-is-none"}, 1, "cannot be opened");
+  fail({"node", file, "--modbus-rtu", "/dev/null", "--modbus-baud", "9601"}, 2,
+       "no such baud rate");
+}
+
 TEST_F(BadRequest, BackEndsOfTheStageFile) {
   const std::string can = stage("can.yaml", "backend: sim", "backend: can");
-  fail({"run", can, "-o", name("x.slog")}, 2, "not in this version");
-  fail({"identify", can, "-o", name("dir")}, 2, "not in this version");
+  fail({"run", can, "-o", name("x.slog")}, 2, "has no group 'can'");
+  fail({"identify", can, "-o", name("dir")}, 2, "has no group 'can'");
+}
+
+TEST_F(BadRequest, WhatACanBusCannotCarry) {
+  const auto behind_can = [&](const std::string& group) {
+    return stage("can.yaml", "backend: sim", "backend: can\ncan: {" + group + "}");
+  };
+  // Frames of 20 and 16 bytes at 1 and 0.5 Mbit/s: (34 + 476) + (34 + 386) us; heartbeats: 1.07 %.
+  fail({"run", behind_can("buses: [{interface: can0, data_bit_rate_hz: 500e3}]"), "-o",
+        name("x.slog")},
+       2,
+       "can: can0 would be loaded to 187 % at 2000 Hz (930 us a cycle), 80 % are allowed; at most "
+       "849 Hz");
+  const auto wrong = [&](const std::string& group, const std::string& text) {
+    fail({"run", behind_can(group), "-o", name("x.slog")}, 2, text);
+  };
+  wrong("mode: resident", "'buses'");
+  wrong("buses: []", "buses");
+  wrong("buses: [{interface: can0, actuators: [a1]}]", "channel 'a2' stands on no bus");
+  wrong("buses: [{interface: can0, actuators: [a9]}]", "there is no channel 'a9'");
+  wrong("buses: [{interface: can0}, {interface: can0}]", "interface can0 stands twice");
+  wrong("actuator_range_n: [1, 2], buses: [{interface: can0}]", "2 entries for 3 channels");
+  wrong("buses: [{interface: can0, data_bitrate: 5e6}]", "write 'data_bit_rate_hz'");
+  wrong("mode: residential, buses: [{interface: can0}]", "did you mean 'resident'?");
+}
+
+TEST_F(BadRequest, ANodeThatServesNothing) {
+  fail({"node", name("small_stage.yaml")}, 2, "nothing to serve; add --can INTERFACE");
+  fail({"node", name("small_stage.yaml"), "--can", "can0"}, 2, "has no group 'can'");
 }
 
 TEST_F(BadRequest, AnExperimentPastTheLimitsIsNotDesigned) {

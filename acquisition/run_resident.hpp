@@ -1,0 +1,20 @@
+#pragma once
+
+#include "acquisition/run_experiment.hpp"
+#include "acquisition/slog_writer.hpp"
+#include "excitation/experiment_plan.hpp"
+#include "hal/resident_stage.hpp"
+
+namespace stageid {
+
+/// Performs every run of the plan on a stage that closes the loop by itself: upload, arm, wait,
+/// download, log. The log is the one run_experiment() writes: rows of u, y and status.
+///
+/// A run that the stage ends before its time is logged as far as it was recorded, incomplete, and
+/// ends the experiment. So does a stage that is lost on the way.
+/// @throws std::invalid_argument if the log was made for another plan or stage, or a run is longer
+/// than the stage can record. @throws StageError if the stage does not answer before the first run.
+ExperimentResult run_resident_experiment(const ExperimentPlan& plan, ResidentStage& stage,
+                                         SlogWriter& log, const RunExperimentOptions& options);
+
+}  // namespace stageid

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hal/modbus_link.hpp"
+#include "hal/stage.hpp"
+#include "hal/supervisor.hpp"
+
+namespace stageid {
+
+// What a host says to a stage behind Modbus before and after a run, when time does not matter.
+// Everything is tried twice, with a drain between.
+
+/// Reads `count` registers from `first` on, in as many transactions as it takes.
+/// @throws StageError, the link closed.
+std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size_t count);
+
+struct ModbusDescription {
+  std::uint32_t boot_id = 0;
+  std::vector<double> actuator_scale;  ///< SI per count
+  std::vector<double> sensor_scale;
+};
+
+/// Reads what the node says of itself, and checks it against what is expected.
+/// @throws StageError if it is no stage, has another map, other channels or another rate.
+ModbusDescription read_description(ModbusLink& link, const StageInfo& expected);
+
+/// Whether the stage stands in operation_enabled or measuring. @throws StageError
+bool read_enabled(ModbusLink& link);
+
+/// @throws StageError
+NodeState read_state(ModbusLink& link);
+
+/// @throws StageError if it is refused; the message names state and cause.
+void give_supervisor_command(ModbusLink& link, SupervisorCommand command);
+
+/// Begins or ends a run; `reply` receives the measurement block. @return the run's sequence number.
+/// @throws StageError if there is no answer.
+std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uint64_t run_seed,
+                               std::vector<std::uint16_t>& reply);
+
+}  // namespace stageid

@@ -1,0 +1,115 @@
+"""A `stageid node` and a `stageid run` in processes of their own, and what stands between them."""
+import os
+import pathlib
+import re
+import select
+import signal
+import subprocess
+import time
+
+from pymodbus.client import ModbusTcpClient
+
+STATUS, STATE, CAUSE, BOOT_ID = 200, 208, 210, 204
+STATES = ['not ready', 'switch on disabled', 'ready', 'switched on', 'operation enabled', 'measuring', 'quick stop',
+          'fault reaction', 'fault']
+
+
+class Bench:
+    """Files and processes of one test in one folder."""
+
+    def __init__(self, program, source, work):
+        self.program, self.work = program, pathlib.Path(work)
+        self.work.mkdir(parents=True, exist_ok=True)
+        self.stage_text = (pathlib.Path(source) / 'configs/stage/small_stage_modbus.yaml').read_text()
+        self.experiment_text = (pathlib.Path(source) / 'configs/experiment/small_stage_modbus.yaml').read_text()
+        self.processes = []
+        self.nodes = 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for process in self.processes:
+            if process.poll() is None:
+                process.send_signal(signal.SIGCONT)
+                process.kill()
+            process.wait()
+
+    def start(self, *command, **keywords):
+        process = subprocess.Popen([str(word) for word in command], text=True, **keywords)
+        self.processes.append(process)
+        return process
+
+    def serial_line(self):
+        """Two ends of a line. Parity N only: a pty takes no other one twice."""
+        ends = [self.work / f'line{len(self.processes)}{end}' for end in 'ab']
+        self.start('socat', *[f'pty,raw,echo=0,link={end}' for end in ends])
+        while not all(end.exists() for end in ends):
+            time.sleep(0.01)
+        return ends
+
+    def node(self, *options, tcp=True):
+        """A node that is ready, and its port (TCP)."""
+        stage = self.stage('node', backend='sim')
+        # A file, not a pipe, which nobody would empty.
+        said = self.work / f'node{self.nodes}.txt'
+        self.nodes += 1
+        with open(said, 'w') as out:
+            process = self.start(self.program, 'node', stage, *(['--modbus-tcp', 0] if tcp else []), '--watchdog',
+                                 0.5, *options, stdout=out, stderr=subprocess.STDOUT)
+        process.said = said
+        while 'ends it' not in said.read_text():
+            if process.poll() is not None:
+                raise RuntimeError(f'the node ended: {said.read_text()}')
+            time.sleep(0.01)
+        found = re.search(r'127\.0\.0\.1:(\d+)', said.read_text())
+        return process, int(found.group(1)) if found else None
+
+    def stage(self, name, backend='modbus', door='tcp: {port: 1502}', supervisor=None, unit=1):
+        text = re.sub(r'# What stands.*?(?=actuators:)', '', self.stage_text, flags=re.S)
+        text = re.sub(r'modbus:\n(  .*\n)+', '', text)
+        group = f'modbus: {{{door}, unit: {unit}, response_s: 0.1, worst_reply_s: 0.3, device_s: 1e-3}}\n'
+        text = text.replace('backend: modbus', f'backend: {backend}') + group
+        if supervisor:
+            text += (f'supervisor:\n  modbus: {{tcp: {{port: {supervisor}}}}}\n'
+                     '  poll_period_s: 0.1\n  gravity_compensator_n: [20, 32]\n  temperature_k: [285, 310]\n'
+                     '  enable_s: 1\n')
+        path = self.work / f'{name}.yaml'
+        path.write_text(text)
+        return path
+
+    def experiment(self, stage, name='experiment'):
+        path = self.work / f'{name}.yaml'
+        path.write_text(self.experiment_text.replace('../stage/small_stage_modbus.yaml', str(stage)))
+        return path
+
+    def start_run(self, experiment, log, *options):
+        return self.start(self.program, 'run', experiment, '-o', log, *options, stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE)
+
+    def run(self, *arguments):
+        return subprocess.run([self.program, *map(str, arguments)], capture_output=True, text=True, timeout=120)
+
+
+def registers(port, first, count, unit=1):
+    client = ModbusTcpClient('127.0.0.1', port=port)
+    assert client.connect(), 'nobody listens'
+    reply = client.read_holding_registers(first, count, slave=unit)
+    client.close()
+    assert not reply.isError(), reply
+    return reply.registers
+
+
+def number(port, address, unit=1):
+    high, low = registers(port, address, 2, unit)
+    return high << 16 | low
+
+
+def wait_for_state(port, wanted):
+    """Up to ten seconds; whatever is found then is returned."""
+    for _ in range(500):
+        state = STATES[number(port, STATE)]
+        if state in wanted:
+            return state
+        time.sleep(0.02)
+    return state

@@ -1,0 +1,166 @@
+#!/usr/bin/python3
+"""Experiments over Modbus TCP and RTU, and other programs at our node.
+
+    peer_test.py PROGRAM SOURCE_DIR WORK_DIR
+
+The FRF measured through the wire is that of the simulator in the process, but for the wire's quantization;
+mbpoll and pymodbus read what docs/modbus-map.md says; a link that is too slow is refused with its figures.
+"""
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import unittest
+
+import h5py
+import numpy as np
+from pymodbus.client import ModbusTcpClient
+
+from bench import Bench, BOOT_ID, STATE, STATUS, number, registers, wait_for_state
+
+PROGRAM, SOURCE, WORK = sys.argv[1:4]
+MAP = (pathlib.Path(SOURCE) / 'docs/modbus-map.md').read_text()
+
+
+def map_row(name):
+    """Address and type of an entry, as the document for people says."""
+    for line in MAP.splitlines():
+        cells = [cell.strip() for cell in line.strip('|').split('|')]
+        if len(cells) == 7 and cells[2].split('[')[0] == name:
+            return int(cells[0]), cells[3]
+    raise KeyError(name)
+
+
+class ModbusTest(unittest.TestCase):
+    def setUp(self):
+        folder = pathlib.Path(WORK) / self._testMethodName
+        shutil.rmtree(folder, ignore_errors=True)
+        self.bench = Bench(PROGRAM, SOURCE, folder)
+        self.addCleanup(self.bench.__exit__)
+
+    def frf(self, stage, name, *options):
+        log, frf = self.bench.work / f'{name}.slog', self.bench.work / f'{name}.h5'
+        for command in (('run', self.bench.experiment(stage, name), '-o', log, '--pace', 0, *options),
+                        ('frf', log, '-o', frf)):
+            done = self.bench.run(*command)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        with h5py.File(frf) as file:
+            return file['response'][:], file['noise_variance'][:]
+
+    def expect_same_frf(self, stage):
+        through_wire, _ = self.frf(stage, 'wire')
+        inside, variance = self.frf(stage, 'inside', '--backend', 'sim')
+        # One count: u 2^-29 N (2 N in 2^31 - 1 counts), y 2^-35 m (40 mm); each adds a white error of count / sqrt(12). The
+        # sensor noise of 1e-7 m rms is 1e4 times that, so the quantization's part of the FRF is 1e-4 of its
+        # standard deviation; three times that for three actuators and the loop, ten for the extremes.
+        deviation = np.abs(through_wire - inside) / np.sqrt(variance)
+        self.assertLess(np.median(deviation), 3e-4)
+        self.assertLess(np.sqrt(np.mean(np.abs(through_wire - inside) ** 2) / np.mean(variance)), 3e-3)
+        self.assertGreater(np.max(deviation), 0.0, 'nothing was quantized: was it the wire at all?')
+
+    def test_tcp_gives_the_same_frf(self):
+        _, port = self.bench.node()
+        self.expect_same_frf(self.bench.stage('stage', door=f'tcp: {{port: {port}}}'))
+
+    def test_rtu_gives_the_same_frf(self):
+        here, there = self.bench.serial_line()
+        self.bench.node('--modbus-rtu', there, '--modbus-parity', 'N', tcp=False)
+        self.expect_same_frf(self.bench.stage('stage', door=f'rtu: {{device: {here}, parity: N}}'))
+
+    def test_a_supervised_stage_is_enabled_and_disabled(self):
+        _, port = self.bench.node()
+        stage = self.bench.stage('stage', door=f'tcp: {{port: {port}}}', supervisor=port)
+        self.assertEqual(wait_for_state(port, ('switch on disabled',)), 'switch on disabled')
+        self.frf(stage, 'supervised')
+        self.assertEqual(wait_for_state(port, ('switch on disabled',)), 'switch on disabled')
+
+    def test_an_interrupted_experiment_is_resumed_with_a_new_node(self):
+        node, port = self.bench.node('--modbus-fault', 'dead_server@3500')
+        stage = self.bench.stage('stage', door=f'tcp: {{port: {port}}}')
+        experiment, log = self.bench.experiment(stage), self.bench.work / 'run.slog'
+        self.assertEqual(self.bench.run('run', experiment, '-o', log, '--pace', 0).returncode, 1)
+        node.terminate()
+        self.assertEqual(node.wait(), 0)
+        self.bench.start(PROGRAM, 'node', self.bench.stage('node', backend='sim'), '--modbus-tcp', port,
+                         '--watchdog', 0.5, stdout=subprocess.DEVNULL)
+        while subprocess.run(['mbpoll', '-m', 'tcp', '-p', str(port), '-1', '127.0.0.1'],
+                             capture_output=True).returncode != 0:
+            pass
+        done = self.bench.run('run', experiment, '-o', log, '--pace', 0, '--resume')
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn('3 of 3 runs complete (1 of them before)', done.stdout)
+
+    def test_mbpoll_reads_our_map(self):
+        _, port = self.bench.node()
+        # mbpoll counts references from 1; -B: the more significant word first.
+        for name, wanted in (('magic', 0x53544749), ('map_version', 1), ('actuators', 3), ('sensors', 2)):
+            address, _ = map_row(name)
+            done = subprocess.run(['mbpoll', '-m', 'tcp', '-p', str(port), '-r', str(address + 1), '-t', '4:int', '-B',
+                                   '-1', '127.0.0.1'], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertRegex(done.stdout, rf'\[{address + 1}\]:\s+{wanted}\b')
+
+    def test_mbpoll_enables_the_stage_over_rtu(self):
+        here, there = self.bench.serial_line()
+        _, port = self.bench.node('--modbus-rtu', there, '--modbus-parity', 'N')
+        address, _ = map_row('command')
+        done = subprocess.run(['mbpoll', '-m', 'rtu', '-b', '115200', '-P', 'none', '-s', '2', '-r', str(address + 1),
+                               '-t', '4:int', '-B', str(here), '1', '77'], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertEqual(wait_for_state(port, ('operation enabled',)), 'operation enabled')
+        echo = map_row('command_echo')[0] + 1
+        done = subprocess.run(['mbpoll', '-m', 'rtu', '-b', '115200', '-P', 'none', '-s', '2', '-r', str(echo), '-t',
+                               '4:int', '-B', '-1', str(here)], capture_output=True, text=True)
+        self.assertRegex(done.stdout, rf'\[{echo}\]:\s+77\b')
+
+    def test_pymodbus_reads_numbers_of_every_type(self):
+        _, port = self.bench.node()
+        for name, wanted in (('gravity_compensator', 8 * 9.81 / 3), ('temperature', 295.0), ('sample_rate', 50.0),
+                             ('actuator_scale', 2.0 ** -29), ('sensor_scale', 2.0 ** -35)):
+            address, kind = map_row(name)
+            self.assertEqual(kind, 'float32')
+            raw = struct.pack('>2H', *registers(port, address, 2))
+            self.assertAlmostEqual(struct.unpack('>f', raw)[0] / wanted, 1.0, places=6)
+
+    def test_pymodbus_is_refused_what_it_may_not(self):
+        _, port = self.bench.node()
+        client = ModbusTcpClient('127.0.0.1', port=port)
+        client.connect()
+        self.addCleanup(client.close)
+        # Beyond the map, a read-only register, too many, another unit, a function that is not there.
+        self.assertEqual(client.read_holding_registers(9999, 2, slave=1).exception_code, 2)
+        self.assertEqual(client.write_register(STATUS, 1, slave=1).exception_code, 2)
+        self.assertEqual(client.read_holding_registers(STATE, 2, slave=9).exception_code, 11)
+        self.assertEqual(client.read_coils(0, 1, slave=1).exception_code, 1)
+        self.assertEqual(number(port, STATE), 1, 'the node must have come through unharmed')
+
+    def test_two_starts_have_two_boot_ids(self):
+        ids = [number(self.bench.node()[1], BOOT_ID) for _ in range(2)]
+        self.assertNotEqual(ids[0], ids[1])
+
+    def expect_refusal(self, exit_code, message, **stage):
+        stage = self.bench.stage('stage', **stage)
+        done = self.bench.run('run', self.bench.experiment(stage), '-o', self.bench.work / 'run.slog', '--pace', 0)
+        self.assertEqual(done.returncode, exit_code, done.stderr)
+        self.assertIn(message, done.stderr)
+        self.assertEqual(done.stderr.count('\n'), 1)
+        self.assertFalse((self.bench.work / 'run.slog').exists() and exit_code == 2)
+
+    def test_a_link_that_is_too_slow_is_refused_with_its_figures(self):
+        # Written 2 + 2 x 3 registers, read 12 + 2 x 2: 29 + 37 bytes of 11 bits and two gaps of 3.5 characters at
+        # 9600 baud are 83.6 ms, the device takes 1 ms.
+        self.expect_refusal(2, '84.6 ms (29 + 37 bytes at 9600 baud)', door='rtu: {device: /dev/null, baud: 9600}')
+
+    def test_another_unit_is_named(self):
+        _, port = self.bench.node('--modbus-unit', 5)
+        self.expect_refusal(1, 'unit 1: refused: Target device failed to respond', door=f'tcp: {{port: {port}}}')
+
+    def test_silence_is_named(self):
+        here, there = self.bench.serial_line()
+        self.bench.node('--modbus-rtu', there, '--modbus-parity', 'N', '--modbus-unit', 5)
+        self.expect_refusal(1, 'unit 1: no reply within 0.1 s', door=f'rtu: {{device: {here}, parity: N}}')
+
+
+if __name__ == '__main__':
+    unittest.main(argv=sys.argv[:1] + sys.argv[4:])

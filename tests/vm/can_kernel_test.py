@@ -1,0 +1,441 @@
+#!/usr/bin/env python3
+"""The stage behind a real CAN kernel: `stageid run` against `stageid node` in another process.
+
+    can_kernel_test.py PROGRAM SOURCE_DIR [unittest arguments]
+
+To be run inside the machine of vmrun.sh, which has vcan0. Every row of the fault matrix says what
+happens, the exit code and the words that the user reads; the outputs must be safe afterwards and
+the log intact. The times within which faults are detected are exact in tests/hal/can_stage_test.cpp,
+where the clock is the bus'; here everything must only end.
+"""
+
+import csv
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import unittest
+
+from can_machine import (Machine, counts, node_state, send_error, shell, wait_for_state)
+
+PROGRAM, SOURCE = (str(pathlib.Path(p).resolve()) for p in sys.argv[1:3])
+ERROR_CONTROLLER, ERROR_BUS_OFF, TX_PASSIVE = 0x4, 0x40, 0x20
+FOREVER = "x1000000000"
+
+
+class CanTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.machine = Machine(PROGRAM, SOURCE, "/tmp/can")
+
+    def ends(self, process, code, *texts):
+        """The run ends with this code and one line that says these words; its log is intact."""
+        result, out, err = self.machine.finish(process)
+        self.assertEqual(result, code, f"{out}\n{err}")
+        for text in texts:
+            self.assertIn(text, err)
+        if code:
+            self.assertEqual(len(err.splitlines()), 1, err)
+        verified = self.machine.call("log", "verify", "run.slog")
+        self.assertEqual(verified.returncode, 0, verified.stdout + verified.stderr)
+        return out
+
+
+class Equality(CanTest):
+    def frf(self, log):
+        import h5py
+        made = self.machine.call("frf", f"{log}.slog", "-o", f"{log}.h5")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        with h5py.File(self.machine.at / f"{log}.h5") as file:
+            return file["response"][:]
+
+    def compare(self, mode, tolerance):
+        name = self.machine.configure(mode, mode=mode, axes="[a1, a2, a3]")
+        with self.machine.node(name):
+            code, out, err = self.machine.run(name, mode)
+            self.assertEqual(code, 0, err)
+        self.assertEqual(counts(out), {"cycles": 22500, "late": 0, "missing": 0, "marked": 0})
+        code, out, err = self.machine.run(name, "sim", "--backend", "sim")
+        self.assertEqual(code, 0, err)
+        wire, here = self.frf(mode), self.frf("sim")
+        error = abs(wire - here).max() / abs(here).max()
+        print(f"{mode}: FRF differs by {error:.2e} of its largest entry")
+        self.assertLess(error, tolerance)
+        self.assertGreater(error, 0.0, "the same bytes would mean that nothing went over the wire")
+
+    # A count is 40 N 1.25 / 2^23 = 6e-6 N against 1 N rms on 197 lines (0.1 N a line), and 1.5e-10 m
+    # against 1e-7 m: rounding of 1e-4 a sample, white, less by sqrt(1000 samples 3 periods 3 times).
+    def test_streaming_gives_the_frf_of_the_simulator(self):
+        self.compare("streaming", 1e-5)
+
+    # float32: 6e-8 a sample.
+    def test_resident_gives_the_frf_of_the_simulator(self):
+        self.compare("resident", 1e-7)
+
+    def test_two_buses(self):
+        shell("ip link add dev vcan1 type vcan && ip link set dev vcan1 mtu 72 up")
+        name = self.machine.configure("two", interfaces=("vcan0", "vcan1"))
+        with self.machine.node(name, interface="vcan0,vcan1"):
+            code, out, err = self.machine.run(name)
+        shell("ip link del vcan1")
+        self.assertEqual(code, 0, err)
+        self.assertEqual(counts(out)["missing"], 0)
+
+    def test_a_resumed_experiment_is_complete(self):
+        name = self.machine.configure("resume")
+        with self.machine.node(name):
+            process = self.machine.start(name)
+            self.machine.wait_until_running(process)
+            process.send_signal(signal.SIGINT)
+            self.assertEqual(self.machine.finish(process)[0], 130)
+            process = subprocess.run(
+                [PROGRAM, "run", f"{name}.yaml", "-o", "run.slog", "--resume"],
+                cwd=self.machine.at, capture_output=True, text=True, timeout=120)
+        self.assertEqual(process.returncode, 0, process.stderr)
+        self.assertIn("3 of 3 runs complete", process.stdout)
+
+
+class Decoding(CanTest):
+    """What candump records, read with nothing but the DBC file, is what the log says."""
+
+    SIGNAL = re.compile(r' SG_ (\w+) : (\d+)\|(\d+)@1([+-]) \(([^,]+),([^)]+)\)')
+
+    def signals(self, file):
+        message, found = None, {}
+        for line in file.read_text().splitlines():
+            if line.startswith("BO_ "):
+                message = int(line.split()[1])
+            elif match := self.SIGNAL.match(line):
+                name, start, length, sign, scale, offset = match.groups()
+                found[message, name] = (int(start), int(length), sign == "-", float(scale),
+                                        float(offset))
+        return found
+
+    def value(self, data, start, length, signed, scale, offset):
+        raw = int.from_bytes(data, "little") >> start & (1 << length) - 1
+        if signed and raw >> length - 1:
+            raw -= 1 << length
+        return scale * raw + offset
+
+    def test_candump_and_dbc_give_the_log(self):
+        import numpy as np
+        name = self.machine.configure("decode")
+        written = self.machine.call("config", "dbc", f"{name}_stage.yaml", "-o", "stage.dbc")
+        self.assertEqual(written.returncode, 0, written.stderr)
+        with self.machine.node(name), open(self.machine.at / "dump", "w") as dump:
+            candump = subprocess.Popen(["candump", "-L", "vcan0"], stdout=dump)
+            self.ends(self.machine.start(name), 0)
+            candump.terminate()
+            candump.wait()
+        converted = self.machine.call("log", "convert", "run.slog", "-o", "run.csv")
+        self.assertEqual(converted.returncode, 0, converted.stderr)
+        with open(self.machine.at / "run.csv", newline="") as file:
+            head, *rows = csv.reader(file)
+        signals = self.signals(self.machine.at / "stage.dbc")
+        columns = {0x100: ["a1", "a2", "a3"], 0x180: ["s1", "s2"]}
+        decoded = {0x100: [], 0x180: []}
+        for line in (self.machine.at / "dump").read_text().splitlines():
+            identifier, _, data = line.split()[2].partition("##")
+            if int(identifier, 16) in decoded:
+                decoded[int(identifier, 16)].append(bytes.fromhex(data[1:]))
+        samples = 2500
+        for identifier, names in columns.items():
+            frames, seen = [], None
+            for data in decoded[identifier]:
+                key = [self.value(data, *signals[identifier, s]) for s in ("run", "sequence")]
+                if key != seen:  # a setpoint that was asked for twice
+                    frames.append(data)
+                seen = key
+            for column in names:
+                signal_ = signals[identifier, column]
+                wire = np.array([self.value(data, *signal_) for data in frames[:samples]])
+                title = f"actuator {column} [N]" if identifier == 0x100 else f"sensor {column} [m]"
+                index = head.index(title)
+                logged = np.array([float(row[index]) for row in rows[:samples]])
+                # Measurements are logged as they came, commands before they were rounded.
+                tolerance = 0.5001 * signal_[3] if identifier == 0x100 else 1e-6 * signal_[3]
+                self.assertLess(abs(wire - logged).max(), tolerance, column)
+
+
+class FrameFaults(CanTest):
+    """Faults of measurement frames, as the node is asked to make them."""
+
+    ROWS = [
+        ("lost", "lost@3000", 0, ""),
+        ("repeated", "repeated@3000x500", 0, ""),
+        ("swapped", "swapped@3000x1", 0, ""),
+        ("late", "late@3000:0.004", 0, ""),
+        ("corrupt", "corrupt@3000x2", 0, ""),
+        ("short", "shortened@3000x2", 0, ""),
+        ("foreign", "foreign@3000x2", 0, ""),
+        ("four lost", "lost@3000x4", 3, "samples are marked or missing"),
+        ("four corrupt", "corrupt@3000x4", 3, "samples are marked or missing"),
+        ("all lost", "lost@3000" + FOREVER, 1, "too many bad cycles in a row, the last: stale"),
+        ("all corrupt", "corrupt@3000" + FOREVER, 1, "the last: corrupt"),
+        ("all short", "shortened@3000" + FOREVER, 1, "the last: corrupt"),
+        ("all foreign", "foreign@3000" + FOREVER, 1, "the last: stale"),
+        ("all late", "late@3000" + FOREVER + ":0.5", 1, "the last: stale"),
+    ]
+
+    def test_rows(self):
+        name = self.machine.configure("frames")
+        for label, fault, code, text in self.ROWS:
+            with self.subTest(label), self.machine.node(name, "--can-fault", fault):
+                out = self.ends(self.machine.start(name), code, text)
+                if code == 0:
+                    self.assertEqual(counts(out)["marked"], 0)
+                self.assertIn(wait_for_rest(), ("switch on disabled", "fault"))
+
+
+def wait_for_rest():
+    """The state in which no force acts; fails if none comes."""
+    for _ in range(40):
+        state = node_state()[0]
+        if state in ("switch on disabled", "fault"):
+            return state
+    raise AssertionError(f"forces still act: {state}")
+
+
+class Interventions(CanTest):
+    """Something happens to a process or an interface in the middle of a run."""
+
+    def setUp(self):
+        self.name = self.machine.configure("b")
+
+    def begin(self, *arguments):
+        process = self.machine.start(self.name, "run", *arguments)
+        self.machine.wait_until_running(process)
+        return process
+
+    def test_node_killed(self):
+        with self.machine.node(self.name) as node:
+            process = self.begin()
+            node.kill()
+            self.ends(process, 1, "too many bad cycles in a row, the last: stale", "did not answer")
+
+    def test_node_frozen(self):
+        with self.machine.node(self.name) as node:
+            process = self.begin()
+            node.send_signal(signal.SIGSTOP)
+            self.ends(process, 1, "stale")
+            node.send_signal(signal.SIGCONT)
+            self.assertIn(wait_for_rest(), ("switch on disabled", "fault"))
+
+    def test_node_restarted(self):
+        with self.machine.node(self.name) as node:
+            process = self.begin()
+            process.send_signal(signal.SIGSTOP)  # the host must not see the gap, only the new node
+            node.kill()
+            node.wait()
+            with self.machine.node(self.name):
+                process.send_signal(signal.SIGCONT)
+                self.ends(process, 1, "the node was started anew")
+
+    def test_node_told_to_end(self):
+        with self.machine.node(self.name) as node:
+            process = self.begin()
+            node.terminate()
+            self.assertEqual(node.wait(10), 0)
+            self.assertIn("at rest: switch on disabled", node.stdout.read())
+            self.ends(process, 1, "stage 'small stage' reports: fault", "quick stop")
+
+    def test_host_killed(self):
+        with self.machine.node(self.name):
+            process = self.begin()
+            process.kill()
+            process.communicate()
+            self.assertEqual(wait_for_state("fault"), ("fault", "watchdog"))
+            code, _, err = self.machine.run(self.name)
+            self.assertEqual(code, 1)
+            self.assertIn("in fault (the host fell silent); remove the cause and add --reset-fault",
+                          err)
+            self.ends(self.machine.start(self.name, "run", "--reset-fault"), 0)
+
+    def test_host_interrupted(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.subTest(number.name), self.machine.node(self.name):
+                process = self.begin()
+                process.send_signal(number)
+                self.ends(process, 130, "interrupted; what was measured is kept")
+                wait_for_state("switch on disabled")
+
+    def test_bus_off(self):
+        with self.machine.node(self.name):
+            process = self.begin()
+            send_error("vcan0", ERROR_BUS_OFF)
+            self.ends(process, 1, "reports: bus off", "vcan0: bus off")
+            self.assertEqual(wait_for_state("fault"), ("fault", "bus off"))
+
+    def test_error_passive(self):
+        with self.machine.node(self.name):
+            process = self.begin()
+            send_error("vcan0", ERROR_CONTROLLER, TX_PASSIVE)
+            self.ends(process, 1, "the last: bus passive", "vcan0: error passive")
+            self.assertIn(wait_for_rest(), ("switch on disabled", "fault"))
+
+    def test_interface_down(self):
+        with self.machine.node(self.name):
+            process = self.begin()
+            shell("ip link set vcan0 down")
+            try:
+                self.ends(process, 1, "vcan0: interface down")
+            finally:
+                shell("ip link set vcan0 up")
+            self.assertEqual(wait_for_state("fault")[0], "fault")
+
+    def test_garbage_of_others_does_no_harm(self):
+        with self.machine.node(self.name):
+            garbage = [subprocess.Popen(["cangen", "vcan0", "-f", "-g", "3", "-I", i, "-L", "r"])
+                       for i in ("080", "100", "180", "200", "r")]
+            try:
+                out = self.ends(self.machine.start(self.name), 0)
+            finally:
+                for sender in garbage:
+                    sender.kill()
+                    sender.wait()
+        self.assertEqual(counts(out)["marked"], 0)
+
+
+class StageFaults(CanTest):
+    """What the stage itself does wrong, seen through the wire."""
+
+    ROWS = [
+        ("sensor no number", "kind: nan_sensor, channel: s1", 4,
+         "sensor s1: the measurement is not finite"),
+        ("sensor dead", "kind: dead_sensor, channel: s2", 1, "the last: incomplete"),
+        ("samples missed", "kind: missed_cycle, cycles: 100", 1, "the last: stale"),
+        ("interlock", "kind: interlock", 1, "the stage reported a fault"),
+        # No wire tells that a force stays as it was: only the FRF does.
+        ("actuator stuck", "kind: stuck_actuator, channel: a1", 0, ""),
+    ]
+
+    def test_rows(self):
+        for label, fault, code, text in self.ROWS:
+            name = self.machine.configure(
+                "faults", stage=[("noise:", "faults: [{%s, from_cycle: 700}]\nnoise:" % fault)])
+            with self.subTest(label), self.machine.node(name):
+                self.ends(self.machine.start(name), code, text)
+                self.assertIn(wait_for_rest(), ("switch on disabled", "fault"))
+
+    def test_limits(self):
+        for mode in ("streaming", "resident"):
+            name = self.machine.configure("limits", mode=mode,
+                                          experiment=[("rms_n: 1.0", "rms_n: 30")])
+            with self.subTest(mode), self.machine.node(name):
+                self.ends(self.machine.start(name), 4, "actuator a", "limit")
+                self.assertIn(wait_for_rest(), ("switch on disabled", "fault"))
+
+    def test_no_node(self):
+        name = self.machine.configure("alone")
+        code, _, err = self.machine.run(name)
+        self.assertEqual(code, 1)
+        self.assertIn("can: vcan0: no node answers", err)
+        self.assertFalse((self.machine.at / "run.slog").exists(), "nothing was measured: no log")
+
+    def test_no_interface(self):
+        name = self.machine.configure("nowhere", interfaces=("vcan9",))
+        code, _, err = self.machine.run(name)
+        self.assertEqual(code, 1)
+        self.assertIn("can: vcan9: there is no such interface", err)
+
+    def test_another_stage_file(self):
+        self.machine.configure("mine")
+        self.machine.configure("yours", group=", actuator_range_n: [60]")
+        with self.machine.node("yours"):
+            code, _, err = self.machine.run("mine")
+        self.assertEqual(code, 1)
+        self.assertIn("started with another stage file", err)
+
+
+class Resident(CanTest):
+    def setUp(self):
+        self.name = self.machine.configure("r", mode="resident")
+
+    def test_node_killed(self):
+        with self.machine.node(self.name, "--pace", "1") as node:
+            process = self.machine.start(self.name)
+            self.machine.wait_until_running(process)
+            node.kill()
+            self.ends(process, 1, "no node answers")
+
+    def test_host_killed(self):
+        with self.machine.node(self.name, "--pace", "0.2"):
+            process = self.machine.start(self.name)
+            wait_for_state("measuring")
+            process.kill()
+            process.communicate()
+            self.assertEqual(wait_for_state("fault"), ("fault", "watchdog"))
+
+    def test_host_interrupted(self):
+        with self.machine.node(self.name, "--pace", "0.2"):
+            process = self.machine.start(self.name)
+            wait_for_state("measuring")
+            process.send_signal(signal.SIGTERM)
+            self.ends(process, 130, "interrupted; what was measured is kept")
+            wait_for_state("switch on disabled")
+
+
+class Netem(CanTest):
+    """Loss, delay and a bus that is too slow: a vxcan pair, the node in a network of its own."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        shell("ip netns add node; ip link add vxa type vxcan peer name vxb; ip link set vxb netns node;"
+              "ip link set vxa mtu 72 up; ip -n node link set vxb mtu 72 up;"
+              "insmod /usr/lib/uml/modules/$(uname -r)/kernel/net/sched/sch_netem.ko")
+
+    def disturbed(self, disturbance, code, *texts, mode="streaming", arguments=()):
+        stage = self.machine.configure("vx", interfaces=("vxa",), mode=mode)
+        prefix = ("ip", "netns", "exec", "node")
+        shell(f"tc qdisc replace dev vxa root netem {disturbance}")
+        try:
+            with self.machine.node(stage, interface="vxb", prefix=prefix):
+                return self.ends(self.machine.start(stage, "run", *arguments), code, *texts)
+        finally:
+            shell("tc qdisc del dev vxa root")
+
+    def test_loss_heals_in_virtual_time(self):
+        out = self.disturbed("loss 2%", 0)
+        self.assertEqual(counts(out)["marked"], 0)
+
+    def test_loss_of_half_ends_a_run_by_the_wall_clock(self):
+        self.disturbed("loss 50%", 1, "too many bad cycles in a row", arguments=("--pace", "0.1"))
+
+    def test_delay_is_nothing_in_virtual_time(self):
+        self.disturbed("delay 1ms", 0)
+
+    def test_delay_of_many_samples_ends_a_run_by_the_wall_clock(self):
+        self.disturbed("delay 20ms", 1, "too many bad cycles in a row", arguments=("--pace", "1"))
+
+    def test_a_bus_that_is_too_slow(self):
+        self.disturbed("rate 200kbit limit 2", 1, "the bus is too slow", arguments=("--pace", "1"))
+
+    def test_resident_transfers_heal(self):
+        self.disturbed("loss 20%", 0, mode="resident")
+
+
+class Endurance(CanTest):
+    """A minute at 1 kHz by the wall clock; only where the machine has a processor for itself."""
+
+    def test_a_minute_at_1_khz(self):
+        name = self.machine.configure(
+            "minute", stage=[("sample_rate_hz: 2000", "sample_rate_hz: 1000"),
+                             ("modes: 6", "modes: 1"), ("crossover_hz: 20", "crossover_hz: 10"),
+                             ("lowpass_hz: 200", "lowpass_hz: 100"), ("lead_pole_hz: 80", "lead_pole_hz: 40"),
+                             ("lead_zero_hz: 6", "lead_zero_hz: 3"), ("integrator_hz: 2", "integrator_hz: 1")],
+            experiment=[("band_hz: [16, 800]", "band_hz: [16, 400]"), ("period_s: 0.25", "period_s: 0.5"),
+                        ("realizations: 3", "realizations: 4"),
+                        ("transient_periods: 2", "transient_periods: 1"), ("periods: 3", "periods: 29")])
+        with self.machine.node(name):
+            out = self.ends(self.machine.start(name, "run", "--pace", "1"), 0)
+            state = node_state()
+        print(out.strip(), state)
+        found = counts(out)
+        self.assertEqual(found["cycles"], 60000)
+        self.assertEqual((found["missing"], found["marked"] - found["late"]), (0, 0))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]], verbosity=2)

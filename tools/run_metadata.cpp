@@ -1,0 +1,45 @@
+#include "tools/run_metadata.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+namespace stageid {
+
+using Json = nlohmann::ordered_json;
+
+std::string run_metadata(const ExperimentConfig& config, Backend backend, const StageInfo& stage) {
+  Json json = {
+      {"program", "stageid"},
+      {"stageid_version", STAGEID_VERSION},
+      {"started_utc", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},
+      {"backend", to_string(backend)},
+      {"measurement_id", config.measurement_id},
+      {"seeds", {{"experiment", config.experiment.seed}, {"noise", config.stage.spec.seed}}},
+      {"transport_delay_s", config.stage.spec.info.transport_delay_s},
+      {"configuration_file", config.file.filename().string()},
+      {"configuration", config.text},
+      {"stage_file", config.stage.file.filename().string()},
+      {"stage", config.stage.text}};
+  // Virtual time has no pace, and its logs say nothing of one.
+  if (stage.clock == Clock::wall) json["pace"] = stage.pace;
+  return json.dump();
+}
+
+std::string measurement_id_of(const LogInfo& info) {
+  const Json json = Json::parse(info.metadata_json, nullptr, false);
+  if (!json.is_object() || !json.contains("measurement_id") || !json["measurement_id"].is_string())
+    return "";
+  return json["measurement_id"].get<std::string>();
+}
+
+double wall_period_s(const LogInfo& info) {
+  const Json json = Json::parse(info.metadata_json, nullptr, false);
+  if (!json.is_object() || !json.contains("pace") || !json["pace"].is_number()) return 0.0;
+  const double pace = json["pace"].get<double>();
+  return pace > 0.0 ? 1.0 / (info.sample_rate_hz * pace) : 0.0;
+}
+
+}  // namespace stageid

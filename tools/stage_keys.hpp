@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hal/rigid_body.hpp"
+#include "hal/simulated_stage.hpp"
+#include "tools/can_config.hpp"
+#include "tools/config_visitor.hpp"
+#include "tools/modbus_config.hpp"
+#include "tools/real_time_keys.hpp"
+
+namespace stageid {
+
+inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
+struct ChannelConfig {
+  Channel channel;
+  std::vector<double> position_m = {0.0, 0.0, 0.0};
+  std::vector<double> direction = {0.0, 0.0, 1.0};
+  double limit_n = kNoLimit;
+  double slew_n_s = kNoLimit;
+  double thermal_rms_n = kNoLimit;
+  double window_m = kNoLimit;
+};
+
+struct InPlaneModeConfig {
+  double natural_frequency_hz = 0.0;
+  double damping_ratio = 0.0;
+  std::vector<std::pair<std::string, double>> actuators;
+  std::vector<std::pair<std::string, double>> sensors;
+};
+
+struct FaultConfig {
+  WaferStageSpec::Fault fault;
+  std::string channel;
+};
+
+/// What stands in the file, key by key.
+struct StageFile {
+  std::size_t format = 0;
+  std::size_t backend = 0;
+  double thermal_time_constant_s = 10.0;
+  std::vector<ChannelConfig> actuators;
+  std::vector<ChannelConfig> sensors;
+  std::vector<double> inertia_kg_m2;
+  std::vector<double> suspension_hz;
+  std::vector<InPlaneModeConfig> in_plane_modes;
+  std::array<AxisController, kRigidAxes> axes;
+  std::vector<FaultConfig> faults;
+  RealTimeKeys real_time;
+  CanFile can;
+  ModbusGroups modbus;
+  WaferStageSpec spec;
+};
+
+/// The keys of a stage file, each named once.
+void describe_stage_file(ConfigVisitor& v, StageFile& f);
+
+}  // namespace stageid
