@@ -98,8 +98,8 @@ void ConfigCommand::check() const {
 void ConfigCommand::dbc() const {
   const StageConfig stage = load_stage_config(stage_file_);
   if (!stage.can.present)
-    throw std::invalid_argument(fmt::format("{}: has no group 'can'; see 'stageid config schema'",
-                                            stage_file_.string()));
+    throw std::invalid_argument(
+        fmt::format("{}: has no group 'can'; see 'stageid config schema'", stage_file_.string()));
   const StageInfo& info = stage.spec.info;
   write_text_file(output_, can_dbc(can_layout(stage.can.spec, info), info));
   console_.result(fmt::format("wrote {}", output_.string()));

@@ -173,6 +173,8 @@ void perform_resident(const Performance& p, MeasurementResult& result) {
   close_log(log, result);
 }
 
+}  // namespace
+
 void require_backend(const ExperimentConfig& config, Backend backend) {
   if (backend == Backend::modbus)
     throw std::invalid_argument(
@@ -182,8 +184,6 @@ void require_backend(const ExperimentConfig& config, Backend backend) {
         fmt::format("--backend can: {} has no group 'can'; see 'stageid config schema'",
                     config.stage.file.string()));
 }
-
-}  // namespace
 
 std::string measurement_id_of(const LogInfo& info) {
   const Json json = Json::parse(info.metadata_json, nullptr, false);

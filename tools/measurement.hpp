@@ -31,6 +31,10 @@ struct MeasurementResult {
   std::uint64_t log_bytes = 0;
 };
 
+/// @throws std::invalid_argument if there is no such back end, or the stage file does not have what it
+/// needs.
+void require_backend(const ExperimentConfig& config, Backend backend);
+
 /// Performs the experiment and logs it. Complete runs of a log that is resumed are not repeated.
 /// @throws std::invalid_argument if the log exists and must not be resumed, or belongs to another
 /// experiment. @throws FileError, FormatError, StageError
