@@ -220,7 +220,7 @@ Outcome CanStage::judge(Inputs& inputs) noexcept {
 
 void CanStage::stop() noexcept {
   try {
-    if (trouble_at_stop_.empty()) trouble_at_stop_ = trouble();
+    if (running_) trouble_at_stop_ = trouble();
   } catch (const std::exception&) {  // no memory for a text: it is only a text
   }
   running_ = false;
@@ -231,7 +231,7 @@ void CanStage::stop() noexcept {
 }
 
 std::string CanStage::trouble() const {
-  if (!trouble_at_stop_.empty()) return trouble_at_stop_;
+  if (!running_) return trouble_at_stop_;
   const WorstBus worst = worst_bus(*transport_);
   if (worst.state >= CanBusState::passive)
     return fmt::format("{}: {}", transport_->name(worst.bus), to_string(worst.state));
@@ -244,7 +244,7 @@ std::string CanStage::trouble() const {
     if (transport_->health(bus).send_refused > 0)
       return fmt::format("{}: {} frames found no room in the queue: the bus is too slow",
                          transport_->name(bus), transport_->health(bus).send_refused);
-  if (!complete() && running_)
+  if (!complete())
     return fmt::format(
         "the node did not answer sample {} in time ({} damaged, {} old, {} foreign "
         "frames so far)",

@@ -15,7 +15,7 @@
 #include "tools/exit_code.hpp"
 #include "tools/fit_step.hpp"
 #include "tools/frf_step.hpp"
-#include "tools/measurement.hpp"
+#include "tools/measured_stage.hpp"
 #include "tools/model_export.hpp"
 #include "tools/output_paths.hpp"
 #include "tools/report_input.hpp"
@@ -60,10 +60,7 @@ Identification::Identification(const ExperimentConfig& config, IdentificationReq
     : config_(config), request_(std::move(request)), console_(console), plan_(make_plan(config)) {}
 
 int Identification::run() {
-  if (config_.stage.backend != Backend::sim)
-    throw std::invalid_argument(fmt::format("{}: backend {} is not in this version; there is sim",
-                                            config_.stage.file.string(),
-                                            to_string(config_.stage.backend)));
+  require_backend(config_, config_.stage.backend);
   design();
   const int measured = measure_all();
   if (measured != kDone && measured != kNotTrustworthy) return measured;
@@ -106,6 +103,7 @@ int Identification::measure_all() {
   MeasurementRequest request;
   request.log = path("run.slog");
   request.resume = request_.resume;
+  request.backend = config_.stage.backend;
   const MeasurementResult result = measure(config_, plan_, request, console_);
   exit_code_ = result.exit_code;
   if (exit_code_ == kNotTrustworthy) notes_.push_back(result.message);

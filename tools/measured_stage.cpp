@@ -96,19 +96,23 @@ std::unique_ptr<CyclicStage> replayed_stage(const ExperimentConfig& config,
                                        request.replay_tolerance_n);
 }
 
-void require_group(const ExperimentConfig& config, bool there, const char* name) {
+}  // namespace
+
+void require_backend(const ExperimentConfig& config, Backend backend) {
+  const bool there = backend == Backend::can      ? config.stage.can.present
+                     : backend == Backend::modbus ? config.stage.modbus.has_value()
+                                                  : true;
   if (!there)
     throw std::invalid_argument(
-        fmt::format("--backend {0}: {1} has no group '{0}'; see 'stageid config schema'", name,
-                    config.stage.file.string()));
+        fmt::format("--backend {0}: {1} has no group '{0}'; see 'stageid config schema'",
+                    to_string(backend), config.stage.file.string()));
 }
-
-}  // namespace
 
 std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& config,
                                                    const ExperimentPlan& plan,
                                                    const MeasurementRequest& request,
                                                    const std::vector<RunId>& skip) {
+  require_backend(config, request.backend);
   WaferStageSpec spec = config.stage.spec;
   if (request.pace >= 0.0) spec.pace = request.pace;
   const auto streamed = [&](std::unique_ptr<CyclicStage> stage) {
@@ -119,14 +123,12 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
       spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
       return streamed(std::make_unique<SimulatedStage>(spec));
     case Backend::can: {
-      require_group(config, config.stage.can.present, "can");
       const CanHostOptions options{spec.pace, request.reset_fault};
       if (config.stage.can.mode == CanMode::resident)
         return std::make_unique<PlayingStage>(plan, make_can_resident_stage(config.stage, options));
       return streamed(make_can_stage(config.stage, options));
     }
     case Backend::modbus:
-      require_group(config, config.stage.modbus.has_value(), "modbus");
       return streamed(make_modbus_stage(config.stage, {spec.pace, request.reset_fault}));
     case Backend::replay:
       break;

@@ -22,6 +22,9 @@ class MeasuredStage {
   virtual LimitViolation violation() const noexcept = 0;
 };
 
+/// @throws std::invalid_argument if the stage file does not have what the back end needs.
+void require_backend(const ExperimentConfig& config, Backend backend);
+
 /// @param skip runs that are not performed
 /// @throws std::invalid_argument if the files lack what the back end needs, or it cannot carry the
 /// experiment. @throws StageError, FileError, FormatError

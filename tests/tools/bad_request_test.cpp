@@ -180,7 +180,7 @@ TEST_F(BadRequest, WhatACanBusCannotCarry) {
   wrong("buses: [{interface: can0, actuators: [a9]}]", "there is no channel 'a9'");
   wrong("buses: [{interface: can0}, {interface: can0}]", "interface can0 stands twice");
   wrong("actuator_range_n: [1, 2], buses: [{interface: can0}]", "2 entries for 3 channels");
-  wrong("buses: [{interface: can0, data_bitrate: 5e6}]", "write 'data_bit_rate_hz'");
+  wrong("buses: [{interface: can0, data_bit_rate: 5e6}]", "unknown key 'data_bit_rate'");
   wrong("mode: residential, buses: [{interface: can0}]", "did you mean 'resident'?");
 }
 

@@ -5,157 +5,20 @@
 
 To be run inside the machine of vmrun.sh, which has vcan0. Every row of the fault matrix says what
 happens, the exit code and the words that the user reads; the outputs must be safe afterwards and
-the log intact. The times within which faults are detected are exact in tests/hal/can_stage_test.cpp,
+the log intact. The times within which faults are detected are exact in tests/hal/can_fault_test.cpp,
 where the clock is the bus'; here everything must only end.
 """
 
-import csv
-import pathlib
-import re
 import signal
 import subprocess
 import sys
 import unittest
 
-from can_machine import (Machine, counts, node_state, send_error, shell, wait_for_state)
+from can_equality_test import Decoding, Equality  # noqa: F401, found by unittest
+from can_machine import CanTest, counts, node_state, send_error, shell, wait_for_state
 
-PROGRAM, SOURCE = (str(pathlib.Path(p).resolve()) for p in sys.argv[1:3])
 ERROR_CONTROLLER, ERROR_BUS_OFF, TX_PASSIVE = 0x4, 0x40, 0x20
 FOREVER = "x1000000000"
-
-
-class CanTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.machine = Machine(PROGRAM, SOURCE, "/tmp/can")
-
-    def ends(self, process, code, *texts):
-        """The run ends with this code and one line that says these words; its log is intact."""
-        result, out, err = self.machine.finish(process)
-        self.assertEqual(result, code, f"{out}\n{err}")
-        for text in texts:
-            self.assertIn(text, err)
-        if code:
-            self.assertEqual(len(err.splitlines()), 1, err)
-        verified = self.machine.call("log", "verify", "run.slog")
-        self.assertEqual(verified.returncode, 0, verified.stdout + verified.stderr)
-        return out
-
-
-class Equality(CanTest):
-    def frf(self, log):
-        import h5py
-        made = self.machine.call("frf", f"{log}.slog", "-o", f"{log}.h5")
-        self.assertEqual(made.returncode, 0, made.stderr)
-        with h5py.File(self.machine.at / f"{log}.h5") as file:
-            return file["response"][:]
-
-    def compare(self, mode, tolerance):
-        name = self.machine.configure(mode, mode=mode, axes="[a1, a2, a3]")
-        with self.machine.node(name):
-            code, out, err = self.machine.run(name, mode)
-            self.assertEqual(code, 0, err)
-        self.assertEqual(counts(out), {"cycles": 22500, "late": 0, "missing": 0, "marked": 0})
-        code, out, err = self.machine.run(name, "sim", "--backend", "sim")
-        self.assertEqual(code, 0, err)
-        wire, here = self.frf(mode), self.frf("sim")
-        error = abs(wire - here).max() / abs(here).max()
-        print(f"{mode}: FRF differs by {error:.2e} of its largest entry")
-        self.assertLess(error, tolerance)
-        self.assertGreater(error, 0.0, "the same bytes would mean that nothing went over the wire")
-
-    # A count is 40 N 1.25 / 2^23 = 6e-6 N against 1 N rms on 197 lines (0.1 N a line), and 1.5e-10 m
-    # against 1e-7 m: rounding of 1e-4 a sample, white, less by sqrt(1000 samples 3 periods 3 times).
-    def test_streaming_gives_the_frf_of_the_simulator(self):
-        self.compare("streaming", 1e-5)
-
-    # float32: 6e-8 a sample.
-    def test_resident_gives_the_frf_of_the_simulator(self):
-        self.compare("resident", 1e-7)
-
-    def test_two_buses(self):
-        shell("ip link add dev vcan1 type vcan && ip link set dev vcan1 mtu 72 up")
-        name = self.machine.configure("two", interfaces=("vcan0", "vcan1"))
-        with self.machine.node(name, interface="vcan0,vcan1"):
-            code, out, err = self.machine.run(name)
-        shell("ip link del vcan1")
-        self.assertEqual(code, 0, err)
-        self.assertEqual(counts(out)["missing"], 0)
-
-    def test_a_resumed_experiment_is_complete(self):
-        name = self.machine.configure("resume")
-        with self.machine.node(name):
-            process = self.machine.start(name)
-            self.machine.wait_until_running(process)
-            process.send_signal(signal.SIGINT)
-            self.assertEqual(self.machine.finish(process)[0], 130)
-            process = subprocess.run(
-                [PROGRAM, "run", f"{name}.yaml", "-o", "run.slog", "--resume"],
-                cwd=self.machine.at, capture_output=True, text=True, timeout=120)
-        self.assertEqual(process.returncode, 0, process.stderr)
-        self.assertIn("3 of 3 runs complete", process.stdout)
-
-
-class Decoding(CanTest):
-    """What candump records, read with nothing but the DBC file, is what the log says."""
-
-    SIGNAL = re.compile(r' SG_ (\w+) : (\d+)\|(\d+)@1([+-]) \(([^,]+),([^)]+)\)')
-
-    def signals(self, file):
-        message, found = None, {}
-        for line in file.read_text().splitlines():
-            if line.startswith("BO_ "):
-                message = int(line.split()[1])
-            elif match := self.SIGNAL.match(line):
-                name, start, length, sign, scale, offset = match.groups()
-                found[message, name] = (int(start), int(length), sign == "-", float(scale),
-                                        float(offset))
-        return found
-
-    def value(self, data, start, length, signed, scale, offset):
-        raw = int.from_bytes(data, "little") >> start & (1 << length) - 1
-        if signed and raw >> length - 1:
-            raw -= 1 << length
-        return scale * raw + offset
-
-    def test_candump_and_dbc_give_the_log(self):
-        import numpy as np
-        name = self.machine.configure("decode")
-        written = self.machine.call("config", "dbc", f"{name}_stage.yaml", "-o", "stage.dbc")
-        self.assertEqual(written.returncode, 0, written.stderr)
-        with self.machine.node(name), open(self.machine.at / "dump", "w") as dump:
-            candump = subprocess.Popen(["candump", "-L", "vcan0"], stdout=dump)
-            self.ends(self.machine.start(name), 0)
-            candump.terminate()
-            candump.wait()
-        converted = self.machine.call("log", "convert", "run.slog", "-o", "run.csv")
-        self.assertEqual(converted.returncode, 0, converted.stderr)
-        with open(self.machine.at / "run.csv", newline="") as file:
-            head, *rows = csv.reader(file)
-        signals = self.signals(self.machine.at / "stage.dbc")
-        columns = {0x100: ["a1", "a2", "a3"], 0x180: ["s1", "s2"]}
-        decoded = {0x100: [], 0x180: []}
-        for line in (self.machine.at / "dump").read_text().splitlines():
-            identifier, _, data = line.split()[2].partition("##")
-            if int(identifier, 16) in decoded:
-                decoded[int(identifier, 16)].append(bytes.fromhex(data[1:]))
-        samples = 2500
-        for identifier, names in columns.items():
-            frames, seen = [], None
-            for data in decoded[identifier]:
-                key = [self.value(data, *signals[identifier, s]) for s in ("run", "sequence")]
-                if key != seen:  # a setpoint that was asked for twice
-                    frames.append(data)
-                seen = key
-            for column in names:
-                signal_ = signals[identifier, column]
-                wire = np.array([self.value(data, *signal_) for data in frames[:samples]])
-                title = f"actuator {column} [N]" if identifier == 0x100 else f"sensor {column} [m]"
-                index = head.index(title)
-                logged = np.array([float(row[index]) for row in rows[:samples]])
-                # Measurements are logged as they came, commands before they were rounded.
-                tolerance = 0.5001 * signal_[3] if identifier == 0x100 else 1e-6 * signal_[3]
-                self.assertLess(abs(wire - logged).max(), tolerance, column)
 
 
 class FrameFaults(CanTest):
@@ -414,27 +277,6 @@ class Netem(CanTest):
 
     def test_resident_transfers_heal(self):
         self.disturbed("loss 20%", 0, mode="resident")
-
-
-class Endurance(CanTest):
-    """A minute at 1 kHz by the wall clock; only where the machine has a processor for itself."""
-
-    def test_a_minute_at_1_khz(self):
-        name = self.machine.configure(
-            "minute", stage=[("sample_rate_hz: 2000", "sample_rate_hz: 1000"),
-                             ("modes: 6", "modes: 1"), ("crossover_hz: 20", "crossover_hz: 10"),
-                             ("lowpass_hz: 200", "lowpass_hz: 100"), ("lead_pole_hz: 80", "lead_pole_hz: 40"),
-                             ("lead_zero_hz: 6", "lead_zero_hz: 3"), ("integrator_hz: 2", "integrator_hz: 1")],
-            experiment=[("band_hz: [16, 800]", "band_hz: [16, 400]"), ("period_s: 0.25", "period_s: 0.5"),
-                        ("realizations: 3", "realizations: 4"),
-                        ("transient_periods: 2", "transient_periods: 1"), ("periods: 3", "periods: 29")])
-        with self.machine.node(name):
-            out = self.ends(self.machine.start(name, "run", "--pace", "1"), 0)
-            state = node_state()
-        print(out.strip(), state)
-        found = counts(out)
-        self.assertEqual(found["cycles"], 60000)
-        self.assertEqual((found["missing"], found["marked"] - found["late"]), (0, 0))
 
 
 if __name__ == "__main__":

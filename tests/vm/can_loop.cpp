@@ -1,7 +1,7 @@
 // Streams a small simulated stage over SocketCAN against the wall clock and counts what went wrong.
 //   can_loop INTERFACE RATE_HZ SECONDS process|thread
-// Exit code 0: every sample answered, none late or missing in "process" mode; none missing in
-// "thread" mode, which is there for sanitizers that slow everything down.
+// Exit code 0: every sample was answered in its cycle or late, none is missing, and in "process" mode
+// less than one in a thousand is late; "thread" is there for sanitizers that slow everything down.
 
 #include <fmt/format.h>
 #include <sys/wait.h>
@@ -43,7 +43,7 @@ Setup make_setup(const std::string& interface, double rate_hz) {
   axis.crossover_hz = 10.0;
   axis.gain = 100.0;
   setup.stage.controller.axes = {axis};
-  setup.can.buses = {{interface, 1e6, 8e6, {0, 1}, {0}}};
+  setup.can.buses = {{interface, 4e6, 8e6, {0, 1}, {0}}};
   setup.can.actuator_range_n = {100.0, 100.0};
   setup.can.sensor_range_m = {0.1};
   setup.can.watchdog_s = 1.0;
@@ -105,12 +105,16 @@ int run(const Setup& setup, double seconds, bool threaded) {
     kill(child, SIGKILL);
     waitpid(child, nullptr, 0);
   }
-  bool good = true;
+  int samples = 0;
+  bool missing = false;
   for (const auto& [outcome, count] : outcomes) {
     fmt::print("{}: {}\n", to_string(outcome), count);
-    good &= outcome == Outcome::ok || (threaded && outcome == Outcome::late);
+    samples += count;
+    missing |= outcome != Outcome::ok && outcome != Outcome::late;
   }
-  return good ? 0 : 1;
+  const auto late = outcomes.find(Outcome::late);
+  const bool many_late = late != outcomes.end() && 1000 * late->second > samples;
+  return missing || (many_late && !threaded) ? 1 : 0;
 }
 
 }  // namespace

@@ -8,7 +8,9 @@ import signal
 import socket
 import struct
 import subprocess
+import sys
 import time
+import unittest
 
 ERROR_FLAG = 0x20000000
 FRAME = struct.Struct("=IBBBB64s")
@@ -22,7 +24,7 @@ class Machine:
     """Runs the program on copies of the small configurations in an empty directory."""
 
     def __init__(self, program, source, directory):
-        self.program = program
+        self.program = str(pathlib.Path(program).resolve())
         self.at = pathlib.Path(directory)
         self.at.mkdir(parents=True, exist_ok=True)
         configs = pathlib.Path(source) / "configs"
@@ -147,3 +149,21 @@ def wait_for_state(wanted, interface="vcan0"):
 def shell(command):
     return subprocess.run(["/bin/sh", "-c", command], check=True, capture_output=True, text=True,
                           timeout=60, env={**os.environ, "PATH": "/usr/sbin:/sbin:/usr/bin:/bin"})
+
+
+class CanTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.machine = Machine(*sys.argv[1:3], "/tmp/can")
+
+    def ends(self, process, code, *texts):
+        """The run ends with this code and one line that says these words; its log is intact."""
+        result, out, err = self.machine.finish(process)
+        self.assertEqual(result, code, f"{out}\n{err}")
+        for text in texts:
+            self.assertIn(text, err)
+        if code:
+            self.assertEqual(len(err.splitlines()), 1, err)
+        verified = self.machine.call("log", "verify", "run.slog")
+        self.assertEqual(verified.returncode, 0, verified.stdout + verified.stderr)
+        return out
