@@ -113,6 +113,7 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
   }
   const Outcome outcome = judge(inputs);
   const Pacer::Instant now = pacer_.wait();
+  inputs.t_ready_ns = now.ready_ns;
   inputs.cycle = outputs.cycle + 1;
   inputs.t_sample_ns = now.sample_ns;
   inputs.t_rx_ns = now.now_ns;

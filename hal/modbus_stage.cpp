@@ -119,6 +119,7 @@ Outcome ModbusStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline d
   const Outcome link = transact();
   const Pacer::Instant now = pacer_.wait();
   inputs.cycle = sequence_;
+  inputs.t_ready_ns = now.ready_ns;
   inputs.t_sample_ns = now.sample_ns;
   inputs.t_rx_ns = now.now_ns;
   if (link != Outcome::ok && link != Outcome::late) return link;

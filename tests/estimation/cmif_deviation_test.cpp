@@ -1,5 +1,6 @@
 #include "estimation/cmif_deviation.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,8 +23,8 @@ FrfEstimate some_frf(std::mt19937_64& engine, int outputs, int inputs) {
   constexpr Eigen::Index kLines = 3;
   FrfEstimate frf;
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(kLines, 1.0, 3.0);
-  for (int i = 0; i < outputs; ++i) frf.outputs.names.push_back("y" + std::to_string(i));
-  for (int i = 0; i < inputs; ++i) frf.inputs.names.push_back("u" + std::to_string(i));
+  for (int i = 0; i < outputs; ++i) frf.outputs.names.push_back(fmt::format("y{}", i));
+  for (int i = 0; i < inputs; ++i) frf.inputs.names.push_back(fmt::format("u{}", i));
   frf.outputs.units.assign(frf.outputs.names.size(), "m");
   frf.inputs.units.assign(frf.inputs.names.size(), "N");
   frf.response.resize(outputs * inputs, kLines);
