@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The loop over SocketCAN in machines that qemu emulates (downloads a kernel of 70 MB the first time):
 #   time that counts instructions: a minute at 1 kHz and 3 s at 10 kHz, not one sample lost
-#   AddressSanitizer with UndefinedBehaviorSanitizer, and ThreadSanitizer: 200 Hz, nothing to report
+#   AddressSanitizer with UndefinedBehaviorSanitizer, and ThreadSanitizer: nothing to report
 # Usage: can_qemu.sh [release|sanitize|tsan]...   Builds in build/qemu-*, for a processor without AVX-512.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
