@@ -28,15 +28,24 @@ FaultCause cause_of(std::uint32_t status) {
   return static_cast<FaultCause>((status >> 16) & 0xFFU);
 }
 
+struct Exchange {
+  int written = 0;  // registers
+  int read = 0;
+};
+
+Exchange exchange_of(const StageInfo& info) {
+  return {static_cast<int>(kSetpointHead + 2 * info.actuators.size()),
+          static_cast<int>(kMeasurementHead + 2 * info.sensors.size())};
+}
+
 double checked_rate_hz(const StageInfo& info, const ModbusAddress& address,
                        const ModbusTiming& timing) {
   if (info.actuators.size() > map::kMostChannels || info.sensors.size() > map::kMostChannels)
     throw std::invalid_argument(
         fmt::format("modbus: {} actuators and {} sensors; one transaction carries {} of each",
                     info.actuators.size(), info.sensors.size(), map::kMostChannels));
-  const int written = static_cast<int>(kSetpointHead + 2 * info.actuators.size());
-  const int read = static_cast<int>(kMeasurementHead + 2 * info.sensors.size());
-  const double longest_hz = 1.0 / modbus_transaction_s(address, timing, written, read);
+  const double longest_hz = 1.0 / modbus_exchange_s(address, timing, info);
+  const auto [written, read] = exchange_of(info);
   if (info.sample_rate_hz > longest_hz)
     throw std::invalid_argument(fmt::format(
         "modbus: {:.6g} Hz is faster than the link: one transaction takes {}, so {:.3g} "
@@ -47,6 +56,12 @@ double checked_rate_hz(const StageInfo& info, const ModbusAddress& address,
 }
 
 }  // namespace
+
+double modbus_exchange_s(const ModbusAddress& address, const ModbusTiming& timing,
+                         const StageInfo& info) {
+  const auto [written, read] = exchange_of(info);
+  return modbus_transaction_s(address, timing, written, read);
+}
 
 ModbusStage::ModbusStage(StageInfo info, const ModbusAddress& address, const ModbusTiming& timing,
                          const ModbusHostOptions& options)

@@ -16,6 +16,10 @@ struct ModbusHostOptions {
   bool reset_fault = false;  ///< clear a fault of the node at the first start()
 };
 
+/// Seconds that one sample of the stage takes on the wire: setpoints out, measurements in.
+double modbus_exchange_s(const ModbusAddress& address, const ModbusTiming& timing,
+                         const StageInfo& info);
+
 /// A stage behind Modbus, one function 23 a sample: u[n] out, y[n+1] in. For low rates: what one
 /// transaction takes is computed, and a faster stage is refused.
 ///

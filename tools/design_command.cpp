@@ -8,6 +8,7 @@
 
 #include "excitation/file_error.hpp"
 #include "tools/command_line.hpp"
+#include "tools/link_load.hpp"
 #include "tools/measurement.hpp"
 #include "tools/output_paths.hpp"
 
@@ -37,6 +38,11 @@ Json design_json(const ExperimentConfig& config, const ExperimentPlan& plan,
                {"resolution_hz", plan.grid().resolution_hz()},
                {"crest_factors", prediction.crest_factor},
                {"violations", prediction.violations()}};
+  for (const LinkLoad& link : link_loads(config.stage))
+    json["links"].push_back({{"link", link.link},
+                             {"load", link.load},
+                             {"cycle_s", link.cycle_s},
+                             {"highest_rate_hz", link.most_hz}});
   for (const ChannelPrediction& channel : prediction.actuators)
     json["actuators"].push_back(channel_json(channel));
   for (const ChannelPrediction& channel : prediction.sensors)
@@ -60,6 +66,7 @@ std::vector<std::string> design_table(const ExperimentConfig& config, const Expe
   lines.push_back(fmt::format("{} lines, {} ... {} Hz; crest factors {:.2f} ... {:.2f}",
                               plan.grid().size(), frequency_hz[0],
                               frequency_hz[frequency_hz.size() - 1], *least, *most));
+  for (const LinkLoad& link : link_loads(config.stage)) lines.push_back(to_string(link));
   std::vector<std::vector<std::string>> rows = {
       {"channel", "unit", "rms", "peak", "limit", "slew/s", "limit", "thermal rms", "limit", ""}};
   for (std::size_t i = 0; i < prediction.actuators.size(); ++i) {

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
+#include "hal/can_dbc.hpp"
 #include "tests/support/wafer_stage.hpp"
 #include "tools/closed_loop_prediction.hpp"
 #include "tools/experiment_config.hpp"
+#include "tools/link_load.hpp"
 #include "tools/stage_config.hpp"
 
 namespace stageid {
@@ -33,6 +36,35 @@ TEST(Configs, EveryExperimentLoads) {
     ++count;
   }
   EXPECT_GE(count, 3);
+}
+
+TEST(Configs, WhatTheWiresHaveToCarryIsForetold) {
+  StageConfig can = load_stage_config(kConfigs / "stage/small_stage_can.yaml");
+  can.can.mode = CanMode::streaming;
+  const std::vector<LinkLoad> buses = link_loads(can);
+  ASSERT_FALSE(buses.empty());
+  for (const LinkLoad& bus : buses) {
+    EXPECT_GE(bus.load, bus.cycle_s * can.spec.info.sample_rate_hz);  // states beside the cycle
+    EXPECT_LT(bus.load, 0.8);
+    EXPECT_GT(bus.most_hz, can.spec.info.sample_rate_hz);
+  }
+  can.can.mode = CanMode::resident;
+  EXPECT_TRUE(link_loads(can).empty());
+
+  const StageConfig modbus = load_stage_config(kConfigs / "stage/small_stage_modbus.yaml");
+  const std::vector<LinkLoad> links = link_loads(modbus);
+  ASSERT_EQ(links.size(), 1U);
+  EXPECT_DOUBLE_EQ(links[0].load, links[0].cycle_s * modbus.spec.info.sample_rate_hz);
+  EXPECT_LE(links[0].load, 1.0);
+  EXPECT_TRUE(link_loads(load_stage_config(kConfigs / "stage/small_stage.yaml")).empty());
+}
+
+// The file for can-utils and SavvyCAN is what `config dbc` writes for the wafer stage today.
+TEST(Configs, TheDatabaseOfFramesIsOfTheWaferStage) {
+  const StageConfig stage = load_stage_config(kConfigs / "stage/wafer_stage_can.yaml");
+  std::ifstream file(std::filesystem::path(STAGEID_SOURCE_DIR) / "docs/wafer_stage_can.dbc");
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  EXPECT_EQ(text, can_dbc(can_layout(stage.can.spec, stage.spec.info), stage.spec.info));
 }
 
 TEST(Configs, TheMainJobHasItsNumbers) {
