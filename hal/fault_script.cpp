@@ -14,8 +14,9 @@ FaultScript::FaultScript(std::vector<WaferStageSpec::Fault> faults, std::size_t 
     : faults_(std::move(faults)) {
   for (std::size_t i = 0; i < faults_.size(); ++i) {
     const Fault& fault = faults_[i];
-    const bool of_sensor =
-        fault.kind == Fault::Kind::dead_sensor || fault.kind == Fault::Kind::nan_sensor;
+    const bool of_sensor = fault.kind == Fault::Kind::dead_sensor ||
+                           fault.kind == Fault::Kind::nan_sensor ||
+                           fault.kind == Fault::Kind::stuck_sensor;
     const bool of_actuator = fault.kind == Fault::Kind::stuck_actuator;
     const std::size_t channels = of_sensor ? sensors : actuators;
     if ((of_sensor || of_actuator) && !std::in_range<std::size_t>(fault.channel)) {
@@ -74,6 +75,8 @@ std::uint64_t FaultScript::spoil(std::uint64_t cycle, std::span<double> fresh,
     if (fault.kind == Fault::Kind::dead_sensor) {
       fresh[channel] = last[channel];
       missing |= std::uint64_t{1} << channel;
+    } else if (fault.kind == Fault::Kind::stuck_sensor) {
+      fresh[channel] = last[channel];
     } else if (fault.kind == Fault::Kind::nan_sensor) {
       fresh[channel] = std::numeric_limits<double>::quiet_NaN();
     }

@@ -12,8 +12,9 @@ namespace stageid {
 /// u[n] is taken and the measurement y[n+1] given.
 ///
 ///   stuck_actuator  keeps the force of its last good cycle, silently
-///   missed_cycle    the command does not arrive, the last one stays; nothing new is measured:
-///   stale dead_sensor     does not answer: its valid bit is cleared, its value held: incomplete
+///   missed_cycle    the command does not arrive, the last one stays; nothing new is measured: stale
+///   dead_sensor     does not answer: its valid bit is cleared, its value held: incomplete
+///   stuck_sensor    shows its last value for ever and calls it valid
 ///   nan_sensor      measures NaN and calls it valid: only a check of the value can tell
 ///   interlock       the amplifiers go off: forces zero, measurements go on: fault
 ///

@@ -48,10 +48,17 @@ LimitedStage::LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limit
         fmt::format("limits: thermal_time_constant_s must be positive, not {}",
                     limits_.thermal_time_constant_s));
   decay_ = std::exp(-1.0 / (info.sample_rate_hz * limits_.thermal_time_constant_s));
+  const double repeats = limits_.stuck_sensor_s * info.sample_rate_hz;
+  if (!(repeats >= 0.0 && repeats < 1e9) || (repeats > 0.0 && repeats < 2.0))
+    throw std::invalid_argument(
+        fmt::format("limits: stuck_sensor_s is {} s at {} Hz; allowed: 0, or two samples and more",
+                    limits_.stuck_sensor_s, info.sample_rate_hz));
+  repeats_allowed_ = static_cast<std::uint32_t>(std::llround(repeats));
   wanted_.setZero(largest_n_.size());
   applied_.setZero(largest_n_.size());
   mean_square_.setZero(largest_n_.size());
   last_y_.setZero(window_m_.size());
+  repeats_.setZero(window_m_.size());
 }
 
 void LimitedStage::start(std::uint64_t run_seed, Inputs& first) {
@@ -59,7 +66,8 @@ void LimitedStage::start(std::uint64_t run_seed, Inputs& first) {
   limited_ = false;
   applied_.setZero();
   mean_square_.setZero();
-  last_y_.setZero();
+  last_y_.setConstant(std::numeric_limits<double>::quiet_NaN());  // equal to nothing
+  repeats_.setZero();
   stage_->start(run_seed, first);
   inspect(first);
   if (limited_) {
@@ -151,12 +159,24 @@ void LimitedStage::inspect(Inputs& inputs) noexcept {
     if (!std::isfinite(y)) {
       report({LimitKind::not_finite, static_cast<int>(i), y, 0.0, inputs.cycle, true});
       inputs.valid &= ~(std::uint64_t{1} << i);
-      y = last_y_[i];
+      y = std::isfinite(last_y_[i]) ? last_y_[i] : 0.0;
     } else if (std::abs(y) > window_m_[i]) {
       report({LimitKind::position, static_cast<int>(i), y, window_m_[i], inputs.cycle, true});
     }
   }
+  if (repeats_allowed_ > 0) count_repeats(inputs);
   std::copy(inputs.y.begin(), inputs.y.end(), last_y_.begin());
+}
+
+void LimitedStage::count_repeats(const Inputs& inputs) noexcept {
+  for (Eigen::Index i = 0; i < repeats_.size(); ++i) {
+    if (((inputs.valid >> i) & 1U) == 0) continue;
+    const double y = inputs.y[static_cast<std::size_t>(i)];
+    repeats_[i] = y == last_y_[i] ? repeats_[i] + 1 : 0;
+    if (repeats_[i] >= repeats_allowed_)
+      report({LimitKind::stuck_sensor, static_cast<int>(i), y, limits_.stuck_sensor_s, inputs.cycle,
+              true});
+  }
 }
 
 void LimitedStage::report(const LimitViolation& violation) noexcept {
@@ -189,6 +209,9 @@ std::string describe(const LimitViolation& violation, const StageInfo& info) {
     case LimitKind::not_finite:
       return fmt::format("{}: {} is not finite (cycle {})", who,
                          violation.of_sensor ? "the measurement" : "the command", violation.cycle);
+    case LimitKind::stuck_sensor:
+      return fmt::format("{}: has shown {:.6g} m and nothing else for {:.4g} s (cycle {})", who,
+                         violation.value, violation.limit, violation.cycle);
   }
   return who;
 }

@@ -21,6 +21,8 @@ namespace stageid {
 ///
 /// The thermal limit is on sqrt(m), m[n] = a m[n-1] + (1 - a) u[n]^2, a = exp(-T / time constant),
 /// from m = 0 at start(). Where a slew limit and a limit on |u| contradict each other, |u| wins.
+/// A sensor that gives bit for bit the same value for longer than stuck_sensor_s is reported likewise:
+/// a live one has noise. Samples in which it gives nothing do not count.
 /// Worse news of the back end (fault, bus off, link down) is passed on in place of Outcome::limit.
 class LimitedStage final : public CyclicStage {
  public:
@@ -44,6 +46,7 @@ class LimitedStage final : public CyclicStage {
   void limit_command(std::uint64_t cycle) noexcept;
   double limit_channel(Eigen::Index channel, double wanted, std::uint64_t cycle) noexcept;
   void inspect(Inputs& inputs) noexcept;
+  void count_repeats(const Inputs& inputs) noexcept;
   void report(const LimitViolation& violation) noexcept;
 
   std::unique_ptr<CyclicStage> stage_;
@@ -60,6 +63,8 @@ class LimitedStage final : public CyclicStage {
   Eigen::ArrayXd applied_;
   Eigen::ArrayXd mean_square_;
   Eigen::ArrayXd last_y_;
+  std::uint32_t repeats_allowed_ = 0;  // of a sensor's value; 0: any number
+  Eigen::Array<std::uint32_t, Eigen::Dynamic, 1> repeats_;
 };
 
 /// One line for people: "actuator z3: |u| would be 12.4 N, limit 10 N (cycle 40123)".

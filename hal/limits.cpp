@@ -16,6 +16,8 @@ const char* to_string(LimitKind kind) noexcept {
       return "position";
     case LimitKind::not_finite:
       return "not finite";
+    case LimitKind::stuck_sensor:
+      return "stuck sensor";
   }
   return "unknown limit";
 }

@@ -13,9 +13,19 @@ struct StageLimits {
   Eigen::VectorXd thermal_rms_n;         ///< rms of u over an exponential window
   double thermal_time_constant_s = 10.;  ///< of that window
   Eigen::VectorXd position_window_m;     ///< |y|
+  double stuck_sensor_s =
+      0.0;  ///< a sensor may show one and the same value for so long; 0: for ever
 };
 
-enum class LimitKind : std::uint8_t { none, actuator, slew, thermal_rms, position, not_finite };
+enum class LimitKind : std::uint8_t {
+  none,
+  actuator,
+  slew,
+  thermal_rms,
+  position,
+  not_finite,
+  stuck_sensor
+};
 const char* to_string(LimitKind kind) noexcept;
 
 /// The first limit that was hit in a run.

@@ -60,7 +60,8 @@ struct WaferStageSpec {
       nan_sensor,
       missed_cycle,
       interlock,
-      stuck_actuator
+      stuck_actuator,
+      stuck_sensor
     };
     Kind kind = Kind::none;
     int channel = 0;

@@ -149,14 +149,15 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
   FaultConfig f;
   using Kind = WaferStageSpec::Fault::Kind;
   auto kind = static_cast<std::size_t>(Kind::dead_sensor) - 1;
-  v.choice("kind", kind,
-           {"dead_sensor", "nan_sensor", "missed_cycle", "interlock", "stuck_actuator"}, kRequired,
-           "what happens");
+  v.choice(
+      "kind", kind,
+      {"dead_sensor", "nan_sensor", "missed_cycle", "interlock", "stuck_actuator", "stuck_sensor"},
+      kRequired, "what happens");
   f.fault.kind = static_cast<Kind>(kind + 1);
   v.text("channel", f.channel, kOptional, "name of the sensor or actuator");
-  const bool needs_channel = f.fault.kind == Kind::dead_sensor ||
-                             f.fault.kind == Kind::nan_sensor ||
-                             f.fault.kind == Kind::stuck_actuator;
+  const bool needs_channel =
+      f.fault.kind == Kind::dead_sensor || f.fault.kind == Kind::nan_sensor ||
+      f.fault.kind == Kind::stuck_actuator || f.fault.kind == Kind::stuck_sensor;
   v.require(!needs_channel || !f.channel.empty(), "channel",
             "a fault of this kind needs 'channel: NAME'");
   count(v, "from_cycle", f.fault.from_cycle, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
@@ -184,6 +185,9 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   v.items(
       "sensors", [&](ConfigVisitor& item) { describe_sensor(item, f.sensors); }, {1, 64}, kRequired,
       "in the order of the log");
+  v.number("stuck_sensor_s", s.limits.stuck_sensor_s, not_negative("s"), kOptional,
+           "a sensor may show one and the same value for so long, then the stage is stopped; 0: "
+           "for ever");
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
            "of the thermal rms limit");
   v.group(

@@ -197,6 +197,45 @@ TEST_F(LimitedStageTest, PassesOnTheOutcomeWhileInsideTheLimits) {
   }
 }
 
+StageLimits with_stuck_sensors() {
+  StageLimits limits = generous();
+  limits.stuck_sensor_s = 4e-3;  // 4 samples
+  return limits;
+}
+
+class StuckSensorTest : public LimitedStageTest {
+ protected:
+  StuckSensorTest() : LimitedStageTest(with_stuck_sensors()) { start(); }
+  Outcome show(double y0, double y1, double y2) {
+    fake_->measurement = {y0, y1, y2};
+    return give(0.0);
+  }
+};
+
+TEST_F(StuckSensorTest, IsReportedAfterItsTime) {
+  for (int n = 1; n <= 3; ++n) EXPECT_EQ(show(1e-5 * n, 2e-5, 1e-5 * n), Outcome::ok) << n;
+  EXPECT_EQ(show(4e-5, 2e-5, 4e-5), Outcome::ok);  // shown four times: repeated three times
+  EXPECT_EQ(show(5e-5, 2e-5, 5e-5), Outcome::limit);
+  EXPECT_EQ(describe(stage_->violation(), stage_->info()),
+            "sensor t: has shown 2e-05 m and nothing else for 0.004 s (cycle 5)");
+}
+
+TEST_F(StuckSensorTest, AChangeBeginsAnew) {
+  for (int n = 1; n <= 40; ++n)
+    EXPECT_EQ(show(1e-6 * n, 2e-5 + 1e-9 * (n / 4), -1e-6 * n), Outcome::ok) << n;
+}
+
+TEST_F(StuckSensorTest, StandsAtZeroToo) {
+  for (int n = 1; n <= 3; ++n) EXPECT_EQ(show(1e-5 * n, 1e-5 * n, 0.0), Outcome::ok) << n;
+  EXPECT_EQ(show(4e-5, 4e-5, 0.0), Outcome::limit);  // the first value of the run was zero
+}
+
+TEST_F(LimitedStageTest, ASensorMayStandStillIfNobodySaysHowLong) {
+  start();
+  fake_->measurement = {1e-5, 1e-5, 1e-5};
+  for (int n = 0; n < 1000; ++n) ASSERT_EQ(give(0.0), Outcome::ok);
+}
+
 class UnlimitedStageTest : public LimitedStageTest {
  protected:
   UnlimitedStageTest() : LimitedStageTest(StageLimits{}) {}
@@ -228,6 +267,9 @@ TEST(LimitedStage, RefusesLimitsThatDoNotFit) {
   EXPECT_THROW(make([](StageLimits& l) { l.position_window_m.resize(2); }), std::invalid_argument);
   EXPECT_THROW(make([](StageLimits& l) { l.thermal_time_constant_s = 0.0; }),
                std::invalid_argument);
+  EXPECT_THROW(make([](StageLimits& l) { l.stuck_sensor_s = -1.0; }), std::invalid_argument);
+  EXPECT_THROW(make([](StageLimits& l) { l.stuck_sensor_s = kNan; }), std::invalid_argument);
+  EXPECT_THROW(make([](StageLimits& l) { l.stuck_sensor_s = 1e-3; }), std::invalid_argument);
   EXPECT_THROW(LimitedStage(nullptr, generous()), std::invalid_argument);
   EXPECT_THROW(LimitedStage(std::make_unique<test::FakeStage>(2, 3, 0.0), generous()),
                std::invalid_argument);
@@ -241,6 +283,7 @@ TEST(LimitedStage, DescribesEveryKind) {
   EXPECT_STREQ(to_string(LimitKind::thermal_rms), "thermal rms");
   EXPECT_STREQ(to_string(LimitKind::position), "position");
   EXPECT_STREQ(to_string(LimitKind::not_finite), "not finite");
+  EXPECT_STREQ(to_string(LimitKind::stuck_sensor), "stuck sensor");
 }
 
 }  // namespace

@@ -252,6 +252,18 @@ TEST_F(FaultTest, ANanSensorClaimsToBeWell) {
   }
 }
 
+TEST_F(FaultTest, AStuckSensorShowsItsLastValueAndClaimsToBeWell) {
+  begin(with_fault(Kind::stuck_sensor, 1, 3));
+  double held = 0.0;
+  for (int n = 0; n < 6; ++n) {
+    EXPECT_EQ(step(1.0, -1.0), Outcome::ok);
+    if (n == 2) held = faulty_->y[1];
+    EXPECT_EQ(faulty_->inputs.valid, 0b11U);
+    EXPECT_EQ(faulty_->y[0], healthy_->y[0]);
+    EXPECT_EQ(faulty_->y[1], n < 3 ? healthy_->y[1] : held);
+  }
+}
+
 TEST_F(FaultTest, MissedCyclesHoldCommandAndMeasurement) {
   begin(with_fault(Kind::missed_cycle, 0, 2, 2));
   std::vector<double> held;

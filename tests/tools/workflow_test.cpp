@@ -128,6 +128,15 @@ TEST_F(Workflow, AnInterlockEndsTheRunWithCodeOne) {
   EXPECT_FALSE(info["runs"][1]["complete"]);
 }
 
+TEST_F(Workflow, AStuckSensorStopsTheRunWithCodeFour) {
+  const std::string config =
+      stage("stuck.yaml",
+            "noise:", "faults: [{kind: stuck_sensor, channel: s1, from_cycle: 1700}]\nnoise:");
+  const ProgramResult result = run({"run", config, "-o", name("stuck.slog")});
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("sensor s1: has shown"));
+}
+
 TEST_F(Workflow, AMissedCycleIsMarkedAndSaid) {
   const std::string config = stage(
       "miss.yaml", "noise:", "faults: [{kind: missed_cycle, from_cycle: 1700, run: 2}]\nnoise:");

@@ -166,6 +166,7 @@ class StageFaults(CanTest):
     ROWS = [
         ("sensor no number", "kind: nan_sensor, channel: s1", 4,
          "sensor s1: the measurement is not finite"),
+        ("sensor stuck", "kind: stuck_sensor, channel: s1", 4, "sensor s1: has shown"),
         ("sensor dead", "kind: dead_sensor, channel: s2", 1, "the last: incomplete"),
         ("samples missed", "kind: missed_cycle, cycles: 100", 1, "the last: stale"),
         ("interlock", "kind: interlock", 1, "the stage reported a fault"),
