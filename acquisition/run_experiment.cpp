@@ -166,11 +166,15 @@ class Experiment {
         finish(StopReason::plant);
         break;
       }
-      const StopReason reason = perform_run(run);
-      if (reason != StopReason::none) {
+      try {
+        const StopReason reason = perform_run(run);
+        if (reason == StopReason::none) continue;
         finish(reason);
-        break;
+      } catch (const StageError& error) {  // it does not start
+        result_.end = ExperimentEnd::fault;
+        result_.message = fmt::format("stage '{}': {}", stage_.info().name, error.what());
       }
+      break;
     }
     if (result_.end == ExperimentEnd::complete) {
       result_.message = fmt::format("{} runs measured", result_.runs_done);

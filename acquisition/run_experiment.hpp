@@ -74,8 +74,8 @@ std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept;
 /// controlled stop: the excitation is ramped down in closed loop, the stage stopped, the run logged
 /// as incomplete. Every run starts from standstill with the seed of (plan seed, realization,
 /// experiment), so that a repeated or resumed run is the same run.
-/// @throws StageError if a run cannot be started (the runs before it are in the log), or if
-/// real time is required and not to be had.
+/// A run that cannot be started ends it with a fault too. @throws StageError if real time is required
+/// and not to be had.
 /// @throws std::invalid_argument if plan, stage, controller and log do not fit.
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
                                 MotionController& controller, SlogWriter& log,

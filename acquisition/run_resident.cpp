@@ -79,8 +79,6 @@ class ResidentExperiment {
   void perform_run(RunId id) {
     const auto started = std::chrono::steady_clock::now();
     const Waveforms waveforms = waveforms_of(id);
-    if (result_.runs_done == 0)
-      static_cast<void>(stage_.upload(waveforms));  // may throw: no log yet
     LogRun run;
     run.realization = id.realization;
     run.experiment = id.experiment;
@@ -88,7 +86,7 @@ class ResidentExperiment {
     log_.begin_run(run, plan_.excitation(id));
     LogSink sink(log_, stage_.info().actuators.size() + stage_.info().sensors.size());
     try {
-      if (result_.runs_done > 0) static_cast<void>(stage_.upload(waveforms));
+      static_cast<void>(stage_.upload(waveforms));
       play(id);
       static_cast<void>(stage_.download(sink));
     } catch (const StageError& error) {

@@ -13,7 +13,7 @@ namespace stageid {
 /// A run that the stage ends before its time is logged as far as it was recorded, incomplete, and
 /// ends the experiment. So does a stage that is lost on the way.
 /// @throws std::invalid_argument if the log was made for another plan or stage, or a run is longer
-/// than the stage can record. @throws StageError if the stage does not answer before the first run.
+/// than the stage can record.
 ExperimentResult run_resident_experiment(const ExperimentPlan& plan, ResidentStage& stage,
                                          SlogWriter& log, const RunExperimentOptions& options);
 

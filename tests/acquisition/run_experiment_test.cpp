@@ -261,10 +261,13 @@ TEST_F(RunExperiment, AFullDiskEndsInAControlledStop) {
   EXPECT_EQ(reader->runs()[0].samples, log.acknowledged_rows());
 }
 
-TEST_F(RunExperiment, AStageThatDoesNotStartIsAnErrorAndTheLogIsKept) {
+TEST_F(RunExperiment, AStageThatDoesNotStartIsAFaultAndTheLogIsKept) {
   inner_->refuse_run = 2;
   SlogWriter log = create("a.slog");
-  EXPECT_THAT([&] { measure(log); }, ThrowsMessage<StageError>(HasSubstr("refuses")));
+  const ExperimentResult result = measure(log);
+  EXPECT_EQ(result.end, ExperimentEnd::fault);
+  EXPECT_THAT(result.message, HasSubstr("refuses"));
+  EXPECT_EQ(result.runs_done, 2);
   log.close(1, "");
   const SlogReader reader(directory_ / "a.slog");
   ASSERT_EQ(reader.runs().size(), 2U);

@@ -153,9 +153,13 @@ TEST_F(RunResident, AStageLostInADownloadKeepsItsRows) {
   EXPECT_FALSE(complete(1));
 }
 
-TEST_F(RunResident, AStageThatIsNotThereIsAnErrorBeforeTheFirstRun) {
-  stage_.loses_upload = 0;
-  EXPECT_THROW(measure(), StageError);
+TEST_F(RunResident, AStageLostInAnUploadLeavesTheRunsBefore) {
+  stage_.loses_upload = 2;
+  const ExperimentResult result = measure();
+  EXPECT_EQ(result.end, ExperimentEnd::fault);
+  EXPECT_EQ(result.runs_done, 2);
+  EXPECT_THAT(samples_of_runs(), testing::ElementsAre(kSamples, kSamples, 0U));
+  EXPECT_FALSE(complete(2));
 }
 
 TEST_F(RunResident, ARunLongerThanTheTraceIsRefused) {

@@ -68,12 +68,12 @@ class Bench:
     def stage(self, name, backend='modbus', door='tcp: {port: 1502}', supervisor=None, unit=1):
         text = re.sub(r'# What stands.*?(?=actuators:)', '', self.stage_text, flags=re.S)
         text = re.sub(r'modbus:\n(  .*\n)+', '', text)
-        group = f'modbus: {{{door}, unit: {unit}, response_s: 0.1, worst_reply_s: 0.3, device_s: 1e-3}}\n'
+        group = f'modbus: {{{door}, unit: {unit}, response_s: 0.4, worst_reply_s: 1.0, device_s: 1e-3}}\n'
         text = text.replace('backend: modbus', f'backend: {backend}') + group
         if supervisor:
             text += (f'supervisor:\n  modbus: {{tcp: {{port: {supervisor}}}}}\n'
-                     '  poll_period_s: 0.1\n  gravity_compensator_n: [20, 32]\n  temperature_k: [285, 310]\n'
-                     '  enable_s: 1\n')
+                     '  poll_period_s: 0.2\n  gravity_compensator_n: [20, 32]\n  temperature_k: [285, 310]\n'
+                     '  enable_s: 3\n')
         path = self.work / f'{name}.yaml'
         path.write_text(text)
         return path

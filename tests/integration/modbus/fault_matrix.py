@@ -41,13 +41,13 @@ def fault(text):
 
 # The requests of a run are two or more for its start and one a sample; a plant is polled at 10 Hz.
 REPEATED = [
-    Row('late reply', MARKED, 'marked', fault('late_reply@300:0.2'), repeated=True),
+    Row('late reply', MARKED, 'marked', fault('late_reply@300:0.6'), repeated=True),
     Row('half a frame', MARKED, 'marked', fault('half_frame@300'), repeated=True),
     Row('wrong unit once', MARKED, 'marked', fault('wrong_unit@300'), repeated=True),
     Row('busy once', MARKED, 'marked', fault('exception@300:6'), repeated=True),
 ]
 ROWS = REPEATED + [dataclasses.replace(row, name=f'{row.name}, RTU', line='rtu') for row in REPEATED] + [
-    Row('no reply for good', FAILED, 'no reply within', fault('late_reply@300x0:0.6'), state=()),
+    Row('no reply for good', FAILED, 'no reply within', fault('late_reply@300x0:1.6'), state=()),
     Row('wrong unit for good', FAILED, 'corrupt', fault('wrong_unit@300x0'), state=()),
     Row('wrong unit for good, RTU', FAILED, 'corrupt', fault('wrong_unit@300x0'), line='rtu', state=()),
     Row('exception for good', FAILED, 'refused', fault('exception@300x0:4'), state=()),
