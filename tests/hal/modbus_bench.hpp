@@ -16,7 +16,7 @@
 
 namespace stageid::test {
 
-inline constexpr ModbusTiming kQuickTiming = {0.1, 0.3, 1e-3};
+inline constexpr ModbusTiming kQuickTiming = {0.4, 1.2, 1e-3};
 
 inline std::vector<ModbusFault> modbus_faults(const std::vector<std::string>& texts) {
   std::vector<ModbusFault> faults;

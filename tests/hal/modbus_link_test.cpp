@@ -49,10 +49,10 @@ TEST_P(ModbusLinkTest, WritesBeforeItReads) {
 }
 
 TEST_P(ModbusLinkTest, AfterADrainALateReplyIsNotTakenForTheNextAnswer) {
-  serve({"late_reply:0.15"});
+  serve({"late_reply:0.6"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::timeout);
-  EXPECT_THAT(link_->describe(link_->last()), HasSubstr("no reply within 0.1 s"));
+  EXPECT_THAT(link_->describe(link_->last()), HasSubstr("no reply within 0.4 s"));
   link_->drain();
   EXPECT_EQ(read(10, values), LinkStatus::ok);
   EXPECT_EQ(values, (Pair{10, 11}));
@@ -84,10 +84,10 @@ INSTANTIATE_TEST_SUITE_P(Wires, ModbusRtuLink, testing::Values(true));
 
 // What drain() is there for: RTU replies have no number.
 TEST_P(ModbusRtuLink, WithoutADrainTheLateReplyWouldBeTakenForTheNextAnswer) {
-  serve({"late_reply:0.15"});
+  serve({"late_reply:0.6"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::timeout);
-  std::this_thread::sleep_for(std::chrono::milliseconds(150));
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));
   EXPECT_EQ(read(10, values), LinkStatus::ok);
   EXPECT_EQ(values, (Pair{0, 1}));
 }

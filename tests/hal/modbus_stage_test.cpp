@@ -93,8 +93,8 @@ TEST_P(ModbusStageFault, EndsAsItShould) {
 
 INSTANTIATE_TEST_SUITE_P(
     Table, ModbusStageFault,
-    testing::Values(FaultCase{"late_reply#:0.15", false, Outcome::late, 3, ""},
-                    FaultCase{"late_reply#:0.15", true, Outcome::late, 3, ""},
+    testing::Values(FaultCase{"late_reply#:0.6", false, Outcome::late, 3, ""},
+                    FaultCase{"late_reply#:0.6", true, Outcome::late, 3, ""},
                     FaultCase{"half_frame#", false, Outcome::late, 3, ""},
                     FaultCase{"half_frame#", true, Outcome::late, 3, ""},
                     FaultCase{"wrong_unit#", false, Outcome::late, 3, ""},

@@ -74,7 +74,7 @@ TEST(ModbusSupervisor, AHeartbeatThatStandsStillMakesNoFreshSnapshot) {
 }
 
 TEST(ModbusSupervisor, OneFailedPollIsRepeatedWithoutTrouble) {
-  for (const char* fault : {"late_reply@10:0.15", "half_frame@10", "exception@10:6"}) {
+  for (const char* fault : {"late_reply@10:0.6", "half_frame@10", "exception@10:6"}) {
     const ModbusBench bench({fault}, true);
     const ModbusSupervisor supervisor(bench.address(), test::kQuickTiming, kQuick);
     ASSERT_TRUE(comes([&] { return fresh(supervisor); }));

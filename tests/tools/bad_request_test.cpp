@@ -108,7 +108,7 @@ TEST_F(BadRequest, StageFiles) {
     fail({"design", stage("bad.yaml", from, to), "-o", name("e.h5")}, 2, text);
   };
   wrong("mass_kg: 8", "mass_kg: 0",
-        "stage_bad.yaml:18:12: mass_kg: 0 is out of range; allowed is > 0 kg");
+        "stage_bad.yaml:19:12: mass_kg: 0 is out of range; allowed is > 0 kg");
   wrong("mass_kg: 8", "mass_g: 8000", "the unit stands in the key: write 'mass_kg'");
   wrong("limit_n: 40", "limit_v: 40", "write 'limit_n'");
   wrong("direction: [0, 0, 1], limit_n", "direction: [0, 0, 2], limit_n", "write a unit vector");
