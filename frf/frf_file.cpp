@@ -20,6 +20,8 @@
 //     realizations /excluded_channels strings, /excluded_power [n]   actuators outside the
 //     sub-plant and their power
 //                                           on the excited lines over that of all inputs
+//     /confidence_radius [N x n_y x n_u]    95 % circles, from the variance that attribute of names
+//                                           ("total" or "noise"); follows from the others, not read
 //     /provenance strings [1]               JSON: inputs with their hash, options
 // Only the format attribute, frequency_hz, response, inputs and outputs are required to read a
 // file.
@@ -33,12 +35,14 @@
 #include "excitation/file_error.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "excitation/output_file.hpp"
+#include "frf/confidence.hpp"
 
 namespace stageid {
 namespace {
 
 constexpr const char* kFormat = "stageid-frf";
 constexpr long long kFormatVersion = 1;
+constexpr double kConfidenceLevel = 0.95;
 
 hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
 
@@ -115,6 +119,18 @@ void write_attributes(Hdf5File& file, const FrfEstimate& frf) {
   file.write_attribute("/", "total_dof", frf.total_dof);
 }
 
+/// Of the total variance if it is known: what another measurement would show.
+template <typename WriteVariance>
+void write_confidence(Hdf5File& file, const FrfEstimate& frf, const WriteVariance& write) {
+  const bool total = frf.total_variance.size() != 0 && frf.total_dof > 0.0;
+  if (!total && (frf.noise_variance.size() == 0 || !(frf.noise_dof > 0.0))) return;
+  const char* dataset = "/confidence_radius";
+  write(dataset, confidence_radius(frf, kConfidenceLevel,
+                                   total ? VarianceKind::total : VarianceKind::noise));
+  file.write_attribute(dataset, "level", kConfidenceLevel);
+  file.write_attribute(dataset, "of", std::string(total ? "total" : "noise"));
+}
+
 void write_optional(Hdf5File& file, const FrfEstimate& frf) {
   const hsize_t N = size_of(frf.lines());
   const hsize_t n_y = size_of(frf.n_outputs());
@@ -125,6 +141,7 @@ void write_optional(Hdf5File& file, const FrfEstimate& frf) {
   };
   write_variance("/noise_variance", frf.noise_variance);
   write_variance("/total_variance", frf.total_variance);
+  write_confidence(file, frf, write_variance);
   if (frf.covariance.size() != 0) {
     const Eigen::Index n_c = frf.n_outputs() * frf.n_inputs();
     file.write_complex("/covariance", {N, n_y * n_u, n_y * n_u},

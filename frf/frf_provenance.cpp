@@ -32,10 +32,10 @@ std::string FrfProvenance::json() const {
     outputs.push_back(info_.sensors.names[static_cast<std::size_t>(i)]);
   }
   const Json options = {
-      {"method", "periodic"},
+      {"method", options_.method == FrfMethod::lpm ? "lpm" : "periodic"},
       {"inputs", channels_.inputs},
       {"outputs", outputs},
-      {"transient_periods", options_.transient_periods.value_or(info_.transient_periods)},
+      {"transient_periods", transient_periods(info_, options_)},
       {"covariance", options_.covariance == CovarianceKind::full ? "full" : "diagonal"}};
   return Json{{"stageid_version", STAGEID_VERSION},
               {"made_by", "estimate_plant_frf"},

@@ -15,6 +15,7 @@
 #include "frf/frf_provenance.hpp"
 #include "frf/plant_average.hpp"
 #include "frf/realization_spectra.hpp"
+#include "frf/record_spectra.hpp"
 #include "frf/run_spectra.hpp"
 #include "frf/run_table.hpp"
 #include "frf/worker_pool.hpp"
@@ -180,10 +181,13 @@ RealizationSpectra PlantEstimation::measure(const RealizationRuns& realization,
   RealizationSpectra spectra(realization.realization, std::move(R));
   std::mutex mutex;
   for_each_task(run_workers_, realization.runs.size(), [&](int worker, std::size_t e) {
-    RunSpectra run =
-        measure_run(realization.runs[e], excited_.lines, channels_, excitation[e].period,
-                    *workspaces_[static_cast<std::size_t>(worker)],
-                    [this](double bytes) { bytes_.add(bytes); });
+    RunWorkspace& workspace = *workspaces_[static_cast<std::size_t>(worker)];
+    const auto read_done = [this](double bytes) { bytes_.add(bytes); };
+    RunSpectra run = options_.method == FrfMethod::lpm
+                         ? measure_record(realization.runs[e], excitation[e].spectrum, channels_,
+                                          excitation[e].period, workspace, read_done)
+                         : measure_run(realization.runs[e], excited_.lines, channels_,
+                                       excitation[e].period, workspace, read_done);
     const std::lock_guard lock(mutex);
     spectra.add(e, std::move(run));
   });
@@ -265,11 +269,6 @@ FrfEstimate PlantEstimation::estimate() {
 
 FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
                                const FrfOptions& options) {
-  if (options.method == FrfMethod::lpm) {
-    throw std::invalid_argument(
-        "method: 'lpm' is not available yet in this version; use 'periodic' with transient "
-        "periods");
-  }
   PlantEstimation estimation(choose_runs(logs, options), options);
   return estimation.estimate();
 }

@@ -10,13 +10,16 @@
 
 namespace stageid {
 
-enum class FrfMethod : std::uint8_t { periodic, lpm };
+enum class FrfMethod : std::uint8_t {
+  periodic,  ///< means over the periods after the transient ones
+  lpm        ///< whole records; the transient is modelled between the lines, nothing is passed over
+};
 enum class CovarianceKind : std::uint8_t { diagonal, full };
 
 struct FrfOptions {
   std::vector<std::string> inputs{};       ///< actuator names; empty: those that are excited
   std::vector<std::string> outputs{};      ///< sensor names; empty: all
-  std::optional<int> transient_periods{};  ///< instead of the log's own
+  std::optional<int> transient_periods{};  ///< instead of the log's own, or of 0 with lpm
   FrfMethod method = FrfMethod::periodic;
   CovarianceKind covariance = CovarianceKind::diagonal;
   std::vector<int> realizations{};  ///< which (0-based); empty: all complete ones
@@ -38,14 +41,21 @@ struct FrfOptions {
 /// pooled over the experiments of a realization: Cov(vec G) = sum_e (q_e q_e^H) kron C_E / P_e with
 /// q_e the e-th row of U^-1, and M E (P-1) degrees of freedom (each dropped period takes one).
 ///
+/// With FrfMethod::lpm Z is the steady state of the whole record, the transient removed by a local
+/// polynomial or rational model (transient_model.hpp), and C_E comes from what that leaves beside
+/// the lines: 9 degrees of freedom a run, from one period on. Neighbouring lines share bins, so
+/// their variances are correlated over some 12 bins. Of a run with marked samples the longest clean
+/// stretch is used. Memory: one record per thread.
+///
 /// Incomplete runs are passed over; of several complete runs of one (realization, experiment) the
 /// last counts. Periods with a marked sample are dropped. Inputs asked for that are only some of the
 /// excited actuators are columns of the whole estimate: the others move too.
 ///
-/// Memory: bounded by one period per thread plus spectra of one realization.
+/// Memory (periodic): bounded by one period per thread plus spectra of one realization.
 /// Source: method.md section 3; Pintelon and Schoukens, System Identification (2012).
 /// @throws std::invalid_argument / FormatError: fewer experiments than inputs, singular excitation
-///         (names line and frequency), a period that does not divide the record, channels unknown.
+///         (names line and frequency), a period that does not divide the record, channels unknown; with lpm a single period without empty
+///         lines.
 FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
                                const FrfOptions& options = {});
 

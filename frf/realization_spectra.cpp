@@ -17,8 +17,8 @@ void RealizationSpectra::add(std::size_t experiment, RunSpectra&& spectra) {
 }
 
 void RealizationSpectra::fold(RunSpectra& spectra) {
-  if (spectra.periods >= 2) {
-    scatter_dof_ += spectra.periods - 1;
+  if (spectra.scatter_dof > 0) {
+    scatter_dof_ += spectra.scatter_dof;
     if (scatter_re_.size() == 0) {
       scatter_re_ = std::move(spectra.scatter_re);
       scatter_im_ = std::move(spectra.scatter_im);

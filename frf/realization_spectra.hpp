@@ -29,9 +29,10 @@ class RealizationSpectra {
   int periods(std::size_t experiment) const { return runs_[experiment].periods; }
   const RunSpectra& run(std::size_t experiment) const { return runs_[experiment]; }
 
-  /// sum_e (P_e - 1): degrees of freedom of scatter().
+  /// Degrees of freedom of scatter(): sum_e (P_e - 1), or those of the transient models.
   int scatter_dof() const noexcept { return scatter_dof_; }
-  /// sum_e sum_p (Z_pe - Z_e)(Z_pe - Z_e)^H at line k, full Hermitian matrix.
+  /// sum_e sum_p (Z_pe - Z_e)(Z_pe - Z_e)^H at line k, or what the transient models leave in its
+  /// place; full Hermitian matrix.
   Eigen::MatrixXcd scatter(Eigen::Index k) const;
 
  private:

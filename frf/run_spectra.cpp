@@ -1,26 +1,9 @@
 #include "frf/run_spectra.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-
-#include "excitation/file_error.hpp"
-#include "excitation/fingerprint.hpp"
+#include "frf/run_steps.hpp"
 
 namespace stageid {
 namespace {
-
-template <typename Matrix>
-void add_matrix(Fingerprint& fingerprint, const Matrix& matrix) {
-  fingerprint.add(std::as_bytes(std::span(matrix.data(), static_cast<std::size_t>(matrix.size()))));
-}
-
-std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
-                                                Eigen::Index channel, RealDft& dft) {
-  std::copy(samples.col(channel).data(), samples.col(channel).data() + samples.rows(),
-            dft.input().begin());
-  return dft.forward();
-}
 
 /// Z_p of the period in workspace.samples.
 void transform_period(const std::vector<int>& lines, const ChannelChoice& channels,
@@ -37,22 +20,6 @@ void transform_period(const std::vector<int>& lines, const ChannelChoice& channe
   };
   for (const Eigen::Index sensor : channels.outputs) take(w.samples.sensors, sensor);
   for (const Eigen::Index actuator : channels.estimated) take(w.samples.actuators, actuator);
-}
-
-/// Adds w d d^H to the packed lower half of one line. In real arithmetic, and without a reduction:
-/// the compiler may use any vector width, the bits stay the same.
-void add_outer_product(double weight, const Eigen::VectorXd& re, const Eigen::VectorXd& im,
-                       double* packed_re, double* packed_im) {
-  for (Eigen::Index i = 0; i < re.size(); ++i) {
-    const double a = weight * re[i];
-    const double b = weight * im[i];
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      packed_re[j] += a * re[j] + b * im[j];
-      packed_im[j] += b * re[j] - a * im[j];
-    }
-    packed_re += i + 1;
-    packed_im += i + 1;
-  }
 }
 
 /// One more period into mean and scatter, by Welford's recursion: a difference of two large sums
@@ -89,18 +56,6 @@ void prepare(std::size_t lines, const ChannelChoice& channels, int periods, RunW
   run.scatter_im.setZero(n * (n + 1) / 2, n_lines);
 }
 
-/// Power of the excluded actuators' mean over the periods: one transform a run, not one a period.
-Eigen::VectorXd excluded_power(const std::vector<int>& lines, int periods, RunWorkspace& w) {
-  const double scale = 1.0 / (static_cast<double>(w.dft.length()) * periods);
-  Eigen::VectorXd power = Eigen::VectorXd::Zero(w.excluded_sum.cols());
-  for (Eigen::Index c = 0; c < power.size(); ++c) {
-    const auto spectrum = transform(w.excluded_sum, c, w.dft);
-    for (const int line : lines)
-      power[c] += std::norm(scale * spectrum[static_cast<std::size_t>(line)]);
-  }
-  return power;
-}
-
 }  // namespace
 
 RunSpectra measure_run(const UsedRun& used, const std::vector<int>& lines,
@@ -127,12 +82,8 @@ RunSpectra measure_run(const UsedRun& used, const std::vector<int>& lines,
           w.samples.actuators.col(channels.excluded[c]);
     }
   }
-  if (run.periods == 0) {
-    throw FormatError(used.log->path(), fmt::format("/runs/{}", used.run().name),
-                      fmt::format("each of its {} periods after the transient has a marked sample; "
-                                  "measure this run again",
-                                  used.periods));
-  }
+  if (run.periods == 0) refuse_marked_run(used);
+  run.scatter_dof = run.periods - 1;
   run.excluded_power = excluded_power(lines, run.periods, w);
   run.fingerprint = fingerprint.hex();
   return run;

@@ -16,9 +16,10 @@ namespace stageid {
 struct RunSpectra {
   Eigen::MatrixXcd mean;  ///< (n_y + n_u) x lines
   /// sum_p (Z_p - Z)(Z_p - Z)^H, lower half: a column a line, entry (i, j <= i) at row i (i + 1) /
-  /// 2 + j; empty if one period was recorded.
+  /// 2 + j; empty without degrees of freedom.
   Eigen::MatrixXd scatter_re;
   Eigen::MatrixXd scatter_im;
+  int scatter_dof = 0;             ///< scatter / scatter_dof / periods estimates Cov(mean)
   int periods = 0;                 ///< clean ones
   Eigen::VectorXd excluded_power;  ///< sum over the lines of |U|^2 of the excluded actuators
   std::string fingerprint;         ///< of the excitation and of every sample used

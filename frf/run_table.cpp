@@ -46,7 +46,7 @@ void check_same_setup(const LogReader& first, const LogReader& other) {
 
 UsedRun measured_part(const LogReader& log, std::size_t index, const FrfOptions& options) {
   const LogInfo& info = log.info();
-  UsedRun used{&log, index, options.transient_periods.value_or(info.transient_periods), 0};
+  UsedRun used{&log, index, transient_periods(info, options), 0};
   const std::string place = fmt::format("/runs/{}", used.run().name);
   const auto period = static_cast<std::uint64_t>(info.period_samples);
   const std::uint64_t samples = used.run().samples;
@@ -124,6 +124,11 @@ std::size_t needed_experiments(const RunsByRealization& table, std::size_t begun
 }
 
 }  // namespace
+
+int transient_periods(const LogInfo& info, const FrfOptions& options) {
+  return options.transient_periods.value_or(
+      options.method == FrfMethod::lpm ? 0 : info.transient_periods);
+}
 
 std::string UsedRun::place() const {
   return fmt::format("{}:/runs/{}", log->path().string(), run().name);

@@ -19,6 +19,10 @@ struct UsedRun {
   std::string place() const;  ///< "file:/runs/0003", for messages
 };
 
+/// Periods that are passed over: those asked for, else the log's own, or none if the transient is
+/// modelled.
+int transient_periods(const LogInfo& info, const FrfOptions& options);
+
 /// The runs of one realization, by experiment.
 struct RealizationRuns {
   int realization = 0;

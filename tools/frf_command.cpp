@@ -62,8 +62,8 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("--realizations", realizations_, "1-based; default: all complete ones")
       ->delimiter(',');
   command->add_option("--transient-periods", transient_periods_,
-                      "dropped, instead of the log's own");
-  command->add_option("--method", method_, "periodic | lpm")
+                      "dropped, instead of the log's own (lpm: of none)");
+  command->add_option("--method", method_, "periodic | lpm (whole records, transient modelled)")
       ->check(CLI::IsMember({"periodic", "lpm"}))
       ->capture_default_str();
   command->add_option("--covariance", covariance_, "diagonal | full")

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -133,6 +134,27 @@ TEST_F(FrfFile, TheLayoutIsLinesThenOutputsThenInputs) {
       }
     }
   }
+}
+
+TEST_F(FrfFile, TheConfidenceRadiusNamesItsVariance) {
+  FrfEstimate frf = numbered_frf();
+  frf.noise_dof = 4.0;
+  frf.total_dof = 2.0;
+  write_frf(folder_ / "total.h5", frf);
+  const Hdf5File total = Hdf5File::open(folder_ / "total.h5");
+  EXPECT_EQ(total.read_text_attribute("/confidence_radius", "of"), "total");
+  EXPECT_EQ(total.read_real_attribute("/confidence_radius", "level"), 0.95);
+  // F_{2,4;0.95} = 2 (1 / sqrt(0.05) - 1); channel 0 is the first in either order.
+  EXPECT_NEAR(total.read_reals("/confidence_radius").front(),
+              std::sqrt(6.944271909999157 * frf.total_variance(0, 0)), 1e-9);
+
+  frf.total_variance = Eigen::MatrixXd();
+  write_frf(folder_ / "noise.h5", frf);
+  EXPECT_EQ(Hdf5File::open(folder_ / "noise.h5").read_text_attribute("/confidence_radius", "of"),
+            "noise");
+  frf.noise_dof = 0.0;
+  write_frf(folder_ / "none.h5", frf);
+  EXPECT_FALSE(Hdf5File::open(folder_ / "none.h5").exists("/confidence_radius"));
 }
 
 TEST_F(FrfFile, SameContentSameBytes) {

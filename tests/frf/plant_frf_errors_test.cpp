@@ -33,10 +33,18 @@ TEST(PlantFrfErrors, NoLog) {
   EXPECT_THAT(message_of<std::invalid_argument>({}), HasSubstr("no log given"));
 }
 
-TEST(PlantFrfErrors, TheLocalPolynomialMethodIsNotThereYet) {
-  const MemoryLog log = small_log();
-  EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.method = FrfMethod::lpm}),
-              AllOf(HasSubstr("'lpm' is not available yet"), HasSubstr("'periodic'")));
+TEST(PlantFrfErrors, OnePeriodWithoutEmptyLinesHidesTheTransient) {
+  const MemoryLog log = small_log({.lines = {1, 2, 3, 4, 5, 6, 8}, .periods = 1});
+  EXPECT_THAT(
+      message_of<std::invalid_argument>({&log}, {.transient_periods = 1, .method = FrfMethod::lpm}),
+      AllOf(HasSubstr("memory.slog:/runs/0000"), HasSubstr("excite odd lines")));
+}
+
+TEST(PlantFrfErrors, TooShortForALocalModel) {
+  const MemoryLog log = small_log({.period_samples = 16, .lines = {1, 3, 5}, .periods = 1});
+  EXPECT_THAT(
+      message_of<std::invalid_argument>({&log}, {.transient_periods = 1, .method = FrfMethod::lpm}),
+      AllOf(HasSubstr("needs 12 bins"), HasSubstr("of 1 period has 4")));
 }
 
 TEST(PlantFrfErrors, UnknownChannels) {

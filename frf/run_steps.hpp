@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <complex>
+#include <span>
+#include <vector>
+
+#include "excitation/fingerprint.hpp"
+#include "frf/run_spectra.hpp"
+
+/// What both ways of measuring a run, period by period and as a whole record, have in common.
+namespace stageid {
+
+template <typename Matrix>
+void add_matrix(Fingerprint& fingerprint, const Matrix& matrix) {
+  fingerprint.add(std::as_bytes(std::span(matrix.data(), static_cast<std::size_t>(matrix.size()))));
+}
+
+/// Unscaled DFT of one column; valid until the next. @pre samples.rows() == dft.length()
+std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
+                                                Eigen::Index channel, RealDft& dft);
+
+/// Adds w d d^H to the packed lower half of one line (RunSpectra::scatter_re, scatter_im). In real
+/// arithmetic, and without a reduction: the compiler may use any vector width, the bits stay the
+/// same.
+void add_outer_product(double weight, const Eigen::VectorXd& re, const Eigen::VectorXd& im,
+                       double* packed_re, double* packed_im);
+
+/// Power on the lines of the excluded actuators' mean over the periods, from their sum in the
+/// workspace: one transform a run, not one a period.
+Eigen::VectorXd excluded_power(const std::vector<int>& lines, int periods, RunWorkspace& workspace);
+
+/// @throws FormatError always: no period of the run is clean.
+[[noreturn]] void refuse_marked_run(const UsedRun& run);
+
+}  // namespace stageid

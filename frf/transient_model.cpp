@@ -1,0 +1,112 @@
+// Symbols: l a line, b = P l its bin, r = (bin - b) / half of the window's width; regressors of T are
+// 1, r, r^2.
+#include "frf/transient_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "frf/local_fit.hpp"
+#include "frf/run_steps.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kOrder = 2;
+constexpr int kMostPoles = 2;  // two modes close to each other
+// Degrees of freedom left by the polynomials. More give a better noise estimate for a run, fewer a
+// narrower window, on which the polynomials hold.
+constexpr Eigen::Index kDof = 9;
+
+/// Adds weight e e^H, packed as in RunSpectra, for each column e.
+void add_scatter(double weight, const Eigen::MatrixXcd& columns, Eigen::Index k, RunSpectra& run) {
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+    add_outer_product(weight, columns.col(c).real(), columns.col(c).imag(),
+                      run.scatter_re.col(k).data(), run.scatter_im.col(k).data());
+  }
+}
+
+}  // namespace
+
+TransientModel::TransientModel(int period_samples, int periods,
+                               const ExcitationSpectrum& excitation, Eigen::Index outputs,
+                               const std::string& place)
+    : periods_(periods),
+      bins_((static_cast<Eigen::Index>(period_samples) * periods + 1) / 2),
+      excitation_(excitation),
+      outputs_(outputs) {
+  std::vector<char> taken(static_cast<std::size_t>(bins_), 0);
+  taken[0] = 1;  // an offset, not a transient
+  if (periods > 1) {
+    // Every line, excited or not: distortions of the plant stand there.
+    for (Eigen::Index b = 0; b < bins_; b += periods) taken[static_cast<std::size_t>(b)] = 1;
+  } else {
+    for (const int line : excitation.lines) taken[static_cast<std::size_t>(line)] = 1;
+  }
+  const auto first = taken.begin() + static_cast<Eigen::Index>(excitation.lines.front());
+  const auto last = taken.begin() + static_cast<Eigen::Index>(excitation.lines.back());
+  if (periods == 1 && 2 * std::count(first, last, char{0}) + 1 <
+                          static_cast<Eigen::Index>(excitation.lines.size())) {
+    throw std::invalid_argument(fmt::format(
+        "{}: method 'lpm' tells the transient of a single period on lines that are left empty, and "
+        "here hardly any are; excite odd lines only, or measure two periods",
+        place));
+  }
+  for (Eigen::Index b = 0; b < bins_; ++b) {
+    if (taken[static_cast<std::size_t>(b)] == 0) usable_.push_back(b);
+  }
+  window_ = kOrder + 1 + kDof;
+  dof_ = static_cast<int>(kDof);
+  if (static_cast<Eigen::Index>(usable_.size()) < window_) {
+    throw std::invalid_argument(fmt::format(
+        "{}: method 'lpm' needs {} bins beside the lines, this record of {} period{} has {}; "
+        "measure more periods",
+        place, window_, periods, periods == 1 ? "" : "s", usable_.size()));
+  }
+}
+
+std::vector<Eigen::Index> TransientModel::window(Eigen::Index bin) const {
+  const auto above = std::lower_bound(usable_.begin(), usable_.end(), bin) - usable_.begin();
+  const auto last_first = static_cast<Eigen::Index>(usable_.size()) - window_;
+  const Eigen::Index first = std::clamp<Eigen::Index>(above - window_ / 2, 0, last_first);
+  return {usable_.begin() + first, usable_.begin() + first + window_};
+}
+
+void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
+                                   RunSpectra& run) const {
+  const Eigen::Index bin = periods_ * excitation_.lines[static_cast<std::size_t>(k)];
+  const std::vector<Eigen::Index> bins = window(bin);
+  const double reach =
+      static_cast<double>(std::max(std::abs(bins.front() - bin), std::abs(bins.back() - bin)));
+  LocalProblem problem;
+  problem.Z = Z(Eigen::all, bins);
+  problem.r.resize(window_);
+  problem.independent_noise = outputs_;
+  problem.K.resize(kOrder + 1, window_);
+  for (Eigen::Index i = 0; i < window_; ++i) {
+    const double r = static_cast<double>(bins[static_cast<std::size_t>(i)] - bin) / reach;
+    problem.r[i] = r;
+    problem.K.col(i) << 1.0, r, r * r;
+  }
+  problem.k0 = Eigen::VectorXcd::Unit(kOrder + 1, 0);
+
+  const LocalFit fit = fit_locally(problem, kMostPoles);
+  run.mean.col(k) = Z.col(bin) - fit.value;
+  // The line's own noise and that of T, as of one period: the scatter is of single periods.
+  add_scatter(periods_ * (1.0 + fit.leverage) * dof_ / fit.dof, fit.residual, k, run);
+  if (fit.poles > 0) add_scatter(periods_ * static_cast<double>(dof_), fit.pole_spread, k, run);
+}
+
+void TransientModel::separate(const Eigen::MatrixXcd& Z, RunSpectra& run) const {
+  const auto lines = static_cast<Eigen::Index>(excitation_.lines.size());
+  const Eigen::Index n = Z.rows();
+  run.mean.resize(n, lines);
+  run.scatter_re.setZero(n * (n + 1) / 2, lines);
+  run.scatter_im.setZero(n * (n + 1) / 2, lines);
+  run.scatter_dof = dof_;
+  for (Eigen::Index k = 0; k < lines; ++k) separate_line(Z, k, run);
+}
+
+}  // namespace stageid

@@ -1,0 +1,121 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <cmath>
+#include <complex>
+#include <cstdint>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "tests/support/closed_loop.hpp"
+#include "tests/support/memory_log.hpp"
+
+/// A loop simulated sample by sample from rest, so that its records hold a true transient:
+///   x[n+1] = A x[n] + B u[n],  y[n] = C x[n] + v[n],  u[n] = r[n] - K y[n] (+ distortions of u).
+/// The truth is exact: G(z) = C (z I - A)^-1 B.
+namespace stageid::test {
+
+struct SampledPlant {
+  Eigen::MatrixXd A, B, C;
+  Eigen::MatrixXd K;  ///< n_u x n_y
+
+  Eigen::MatrixXcd response(double omega_rad_s, double sample_rate_hz) const {
+    const std::complex<double> z = std::polar(1.0, omega_rad_s / sample_rate_hz);
+    const Eigen::MatrixXcd pencil =
+        z * Eigen::MatrixXcd::Identity(A.rows(), A.cols()) - A.cast<std::complex<double>>();
+    return C.cast<std::complex<double>>() *
+           pencil.partialPivLu().solve(B.cast<std::complex<double>>());
+  }
+};
+
+struct PlantMode {
+  double frequency_hz;
+  double decay_s;  ///< time constant of the amplitude
+};
+
+/// Modes with shapes that depend on mode and channel and have no symmetry; unit gain at resonance
+/// over decay. Weak feedback K = gain C B-like: stable for small gains.
+inline SampledPlant sampled_plant(int outputs, int inputs, const std::vector<PlantMode>& modes,
+                                  double sample_rate_hz, double gain) {
+  const auto n = static_cast<Eigen::Index>(2 * modes.size());
+  SampledPlant plant{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, inputs),
+                     Eigen::MatrixXd::Zero(outputs, n), Eigen::MatrixXd(inputs, outputs)};
+  for (std::size_t m = 0; m < modes.size(); ++m) {
+    const double angle = 2.0 * std::numbers::pi * modes[m].frequency_hz / sample_rate_hz;
+    const double radius = std::exp(-1.0 / (modes[m].decay_s * sample_rate_hz));
+    const auto i = static_cast<Eigen::Index>(2 * m);
+    plant.A.block<2, 2>(i, i) << radius * std::cos(angle), radius * std::sin(angle),
+        -radius * std::sin(angle), radius * std::cos(angle);
+    for (int u = 0; u < inputs; ++u) {
+      plant.B(i, u) = 0.1 * std::cos(1.3 * u + 0.7 * static_cast<double>(m) + 0.2);
+    }
+    for (int y = 0; y < outputs; ++y) {
+      plant.C(y, i + 1) = 0.3 * std::cos(0.9 * y - 1.1 * static_cast<double>(m) + 0.4);
+    }
+  }
+  for (int u = 0; u < inputs; ++u) {
+    for (int y = 0; y < outputs; ++y) plant.K(u, y) = gain * std::cos(0.5 * u + 1.7 * y);
+  }
+  return plant;
+}
+
+/// Gaussian, real, variance 1.
+inline double real_gaussian(ComplexNoise& random) {
+  return std::numbers::sqrt2 * random.gaussian().real();
+}
+
+/// Samples of one run from rest; `cubic`: y gains cubic * y^3 before the noise.
+inline LogSamples simulate_sampled_run(const SampledPlant& plant, const LoopExperiment& x,
+                                       const Eigen::MatrixXd& period, double noise_std,
+                                       ComplexNoise& random, double cubic = 0.0) {
+  const Eigen::Index total = (x.transient_periods + x.periods) * x.period_samples;
+  LogSamples record;
+  record.actuators.resize(total, plant.B.cols());
+  record.sensors.resize(total, plant.C.rows());
+  record.marked.setZero(total);
+  Eigen::VectorXd state = Eigen::VectorXd::Zero(plant.A.rows());
+  for (Eigen::Index n = 0; n < total; ++n) {
+    Eigen::VectorXd y = plant.C * state;
+    y.array() += cubic * y.array().cube();
+    for (Eigen::Index i = 0; i < y.size(); ++i) y[i] += noise_std * real_gaussian(random);
+    const Eigen::VectorXd u = period.row(n % x.period_samples).transpose() - plant.K * y;
+    record.sensors.row(n) = y;
+    record.actuators.row(n) = u;
+    state = plant.A * state + plant.B * u;
+  }
+  return record;
+}
+
+/// As simulate_log(), from rest. x.transient_periods are periods like all others, only declared.
+inline MemoryLog simulate_sampled_log(const SampledPlant& plant, const LoopExperiment& x,
+                                      double noise_std, double cubic = 0.0) {
+  MemoryLog log;
+  log.log_info.sample_rate_hz = x.sample_rate_hz;
+  log.log_info.period_samples = x.period_samples;
+  log.log_info.transient_periods = x.transient_periods;
+  log.log_info.excitation = channels("a", plant.B.cols(), "N");
+  log.log_info.actuators = channels("a", plant.B.cols(), "N");
+  log.log_info.sensors = channels("z", plant.C.rows(), "m");
+  ComplexNoise random(x.seed);
+  RealDft dft(x.period_samples);
+  for (int m = 0; m < x.realizations; ++m) {
+    const std::vector<Eigen::MatrixXcd> R = excitation_spectra(x, plant.B.cols(), random);
+    for (std::size_t e = 0; e < R.size(); ++e) {
+      const Eigen::MatrixXd period = synthesize(R[e], x.lines, dft);
+      log.append(m, static_cast<int>(e), period,
+                 simulate_sampled_run(plant, x, period, noise_std, random, cubic));
+    }
+  }
+  return log;
+}
+
+/// First, first + step, ..., last.
+inline std::vector<int> line_range(int first, int last, int step) {
+  std::vector<int> lines;
+  for (int l = first; l <= last; l += step) lines.push_back(l);
+  return lines;
+}
+
+}  // namespace stageid::test
