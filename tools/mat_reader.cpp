@@ -6,6 +6,7 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <string_view>
 
 #include "excitation/file_error.hpp"
 #include "tools/mat_file.hpp"
@@ -178,6 +179,30 @@ void require_plausible(const std::filesystem::path& path, const matvar_t& variab
                       "is said to be larger than the file can hold; the file is damaged");
 }
 
+/// libmatio takes the end of a file that was cut short for that of its variables. In v5 files the elements
+/// behind the head of 128 bytes, each with type and size in front, end where the file does.
+void require_whole(const std::filesystem::path& path, std::uintmax_t file_bytes) {
+  constexpr std::uintmax_t kHeadBytes = 128;
+  std::ifstream stream(path, std::ios::binary);
+  char head[kHeadBytes] = {};
+  if (!stream.read(head, sizeof(head)) || !std::string_view(head, 10).starts_with("MATLAB 5.0"))
+    return;
+  const bool big_endian = head[126] == 'M';
+  std::uintmax_t at = kHeadBytes;
+  while (at < file_bytes) {
+    unsigned char tag[8] = {};
+    stream.seekg(static_cast<std::streamoff>(at));
+    stream.read(reinterpret_cast<char*>(tag), sizeof(tag));
+    std::uint32_t bytes = 0;
+    for (unsigned k = 0; k < 4; ++k)
+      bytes |= static_cast<std::uint32_t>(tag[4 + k]) << (8 * (big_endian ? 3 - k : k));
+    at += sizeof(tag) + bytes;
+  }
+  if (at != file_bytes)
+    throw FormatError(path, "",
+                      "ends before its variables do; the file was cut short or is damaged");
+}
+
 }  // namespace
 
 ArrayList read_mat(const std::filesystem::path& path) {
@@ -187,6 +212,7 @@ ArrayList read_mat(const std::filesystem::path& path) {
   if (!file)
     throw FormatError(path, "", "is no MATLAB file, or a damaged one; a .mat file must stand here");
   const std::uintmax_t bytes = std::filesystem::file_size(path);
+  require_whole(path, bytes);
   ArrayList list{path, {}};
   Reader reader(list);
   while (true) {

@@ -151,7 +151,7 @@ class ReadByOthers(Case):
         given = random_frf()
         frf = self.frf(given)
         self.succeed("export", frf, "-o", "a.mat")
-        mat = scipy.io.loadmat(WORK / "a.mat", squeeze_me=True)
+        mat = scipy.io.loadmat(WORK / "a.mat", squeeze_me=True, uint16_codec="utf-16-le")
         np.testing.assert_array_equal(mat["response"], np.moveaxis(given["response"], 0, -1))
         np.testing.assert_array_equal(mat["frequency_hz"], given["frequency_hz"])
         self.assertEqual(list(mat["outputs"]), ["z1", "x\u00b52"])
