@@ -99,7 +99,12 @@ void ExportCommand::export_from_frf() const {
         fmt::format("{}: is HDF5 and no model; --frf and --driving-point go with a model.json",
                     input_.string()));
   const FrfEstimate frf = read_frf(input_);
-  require_frf_export_format(output_);
+  try {
+    require_frf_export_format(output_);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(
+        fmt::format("{}: holds a frequency response; {}", input_.string(), error.what()));
+  }
   export_frf(output_, frf, mat_version());
 }
 
