@@ -97,6 +97,26 @@ bool Hdf5File::has_attribute(const std::string& object, const std::string& name)
   return found;
 }
 
+std::vector<std::string> Hdf5File::attributes(const std::string& object) const {
+  if (!exists(object)) throw FormatError(path_, object, "is missing");
+  const auto collect = [](hid_t, const char* name, const H5A_info_t*, void* names) -> herr_t {
+    static_cast<std::vector<std::string>*>(names)->emplace_back(name);
+    return 0;
+  };
+  std::vector<std::string> names;
+  if (H5Aiterate_by_name(id(), object.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names,
+                         H5P_DEFAULT) < 0) {
+    throw FormatError(
+        path_, object,
+        "its attributes cannot be listed (" + hdf5::take_reason() + "); the file is damaged");
+  }
+  return names;
+}
+
+Hdf5Kind Hdf5File::attribute_kind(const std::string& object, const std::string& name) const {
+  return Attribute(*this, object, name).kind;
+}
+
 double Hdf5File::read_real_attribute(const std::string& object, const std::string& name) const {
   const Attribute attribute(*this, object, name);
   attribute.expect(attribute.is_number(), "a number");

@@ -116,6 +116,14 @@ bool Hdf5File::exists(const std::string& object) const {
   return object == "/" || H5Oexists_by_name(file_.get(), object.c_str(), H5P_DEFAULT) > 0;
 }
 
+bool Hdf5File::is_group(const std::string& object) const {
+  if (!exists(object)) return false;
+  const Hdf5Handle handle(H5Oopen(file_.get(), object.c_str(), H5P_DEFAULT), H5Oclose);
+  const bool found = handle && H5Iget_type(handle.get()) == H5I_GROUP;
+  H5Eclear2(H5E_DEFAULT);
+  return found;
+}
+
 std::vector<std::string> Hdf5File::children(const std::string& group) const {
   const auto fail = [&](const std::string& what) { throw FormatError(path_, group, what); };
   if (!exists(group)) fail("is missing; a group must stand here");

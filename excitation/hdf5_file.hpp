@@ -65,9 +65,12 @@ class Hdf5File {
   const std::filesystem::path& path() const noexcept { return path_; }
   bool exists(const std::string& object) const;
   bool has_attribute(const std::string& object, const std::string& name) const;
-  std::vector<std::string> children(const std::string& group) const;  ///< by name; names only
+  bool is_group(const std::string& object) const;
+  std::vector<std::string> children(const std::string& group) const;     ///< by name; names only
+  std::vector<std::string> attributes(const std::string& object) const;  ///< by name; names only
   std::vector<hsize_t> shape(const std::string& dataset) const;
   Hdf5Kind kind(const std::string& dataset) const;  ///< a bool counts as integer
+  Hdf5Kind attribute_kind(const std::string& object, const std::string& name) const;
   hid_t id() const noexcept { return file_.get(); }
 
   // Attributes: object "/" is the root. An integer may be stored as a float and the reverse.

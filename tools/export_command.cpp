@@ -4,9 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <fstream>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
 
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
@@ -25,6 +28,13 @@ Eigen::VectorXd default_lines(const AdditiveModel& model) {
   return exponent.exp();
 }
 
+bool is_hdf5(const std::filesystem::path& file) {
+  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
+  std::array<char, 8> head = {};
+  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
+  return std::string_view(head.data(), head.size()) == kSignature;
+}
+
 Eigen::Index place_of(const std::string& name, const ChannelList& channels, const char* kind) {
   const auto found = std::find(channels.names.begin(), channels.names.end(), name);
   if (found == channels.names.end())
@@ -37,22 +47,36 @@ Eigen::Index place_of(const std::string& name, const ChannelList& channels, cons
 }  // namespace
 
 ExportCommand::ExportCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(
-      app, "export", "Write a model for other programs: state space, mode shapes, response");
-  command->add_option("model", model_, "model.json")->required();
-  command->add_option("-o,--output", output_, "file to write: .json, .h5 or .csv")->required();
-  command->add_option("--frf", frf_,
-                      ".h5: the response on the lines of this FRF within the fit's band");
+  CLI::App* command = add_command(app, "export",
+                                  "Write a model or a frequency response for other programs: state "
+                                  "space, mode shapes, response");
+  command->add_option("input", input_, "model.json or frf.h5")->required();
   command
-      ->add_option("--driving-point", driving_point_,
-                   "OUTPUT INPUT, at one place in one direction; .h5: each mode's mass there")
+      ->add_option(
+          "-o,--output", output_,
+          "file to write: .h5, .mat, .npz, .unv (UFF text), .uff (UFF binary); of a model also "
+          ".json, .csv, .py, .m")
+      ->required();
+  command->add_option("--frf", frf_,
+                      "of a model: the response on the lines of this FRF within the fit's band");
+  command
+      ->add_option(
+          "--driving-point", driving_point_,
+          "OUTPUT INPUT, at one place in one direction; .h5, .mat, .npz: each mode's mass there")
       ->expected(2);
+  command->add_option("--mat-version", mat_version_, "of a .mat file: 5 or 7.3 (HDF5)")
+      ->check(CLI::IsMember({"5", "7.3"}))
+      ->capture_default_str();
   command->final_callback([this] { run(); });
 }
 
-void ExportCommand::run() const {
+MatVersion ExportCommand::mat_version() const {
+  return mat_version_ == "5" ? MatVersion::v5 : MatVersion::v73;
+}
+
+void ExportCommand::export_from_model() const {
   require_export_format(output_);
-  const AdditiveModel model = read_model(model_);
+  const AdditiveModel model = read_model(input_);
   ExportedResponse exported;
   exported.frequency_hz = default_lines(model);
   if (!frf_.empty()) {
@@ -66,7 +90,29 @@ void ExportCommand::run() const {
   if (!driving_point_.empty())
     driving_point = {place_of(driving_point_[0], model.outputs, "output"),
                      place_of(driving_point_[1], model.inputs, "input")};
-  export_model(output_, model, exported, driving_point);
+  export_model(output_, model, exported, driving_point, mat_version());
+}
+
+void ExportCommand::export_from_frf() const {
+  if (!frf_.empty() || !driving_point_.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: is HDF5 and no model; --frf and --driving-point go with a model.json",
+                    input_.string()));
+  const FrfEstimate frf = read_frf(input_);
+  try {
+    require_frf_export_format(output_);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(
+        fmt::format("{}: holds a frequency response; {}", input_.string(), error.what()));
+  }
+  export_frf(output_, frf, mat_version());
+}
+
+void ExportCommand::run() const {
+  if (is_hdf5(input_))
+    export_from_frf();
+  else
+    export_from_model();
   console_.result(
       fmt::format("wrote {}, {} bytes", output_.string(), std::filesystem::file_size(output_)));
   console_.result({{"output", output_.string()}, {"bytes", std::filesystem::file_size(output_)}});

@@ -6,22 +6,27 @@
 #include <vector>
 
 #include "tools/console.hpp"
+#include "tools/mat_file.hpp"
 
 namespace stageid {
 
-/// stageid export MODEL -o FILE.{json,h5,csv}
+/// stageid export MODEL|FRF -o FILE.{json,h5,csv,mat,npz,unv,uff,py,m}
 class ExportCommand {
  public:
   ExportCommand(CLI::App& app, Console& console);
 
  private:
   void run() const;
+  void export_from_model() const;
+  void export_from_frf() const;
+  MatVersion mat_version() const;
 
   Console& console_;
-  std::filesystem::path model_;
+  std::filesystem::path input_;
   std::filesystem::path output_;
   std::filesystem::path frf_;
   std::vector<std::string> driving_point_;
+  std::string mat_version_ = "5";
 };
 
 }  // namespace stageid

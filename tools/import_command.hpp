@@ -1,10 +1,24 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "tools/console.hpp"
 
 namespace stageid {
 
-/// stageid import is announced and not in this version: it says so, and is not in --help.
-void add_import_command(CLI::App& app);
+/// stageid import FILE.{unv,uff,mat,csv,h5,npz,sNp} -o frf.h5|run.slog [--map MAP.yaml]
+class ImportCommand {
+ public:
+  ImportCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::filesystem::path input_;
+  std::filesystem::path output_;
+  std::filesystem::path map_;
+};
 
 }  // namespace stageid

@@ -1,91 +1,113 @@
 #include "tools/model_export.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "excitation/output_file.hpp"
+#include "tools/frf_arrays.hpp"
+#include "tools/model_csv.hpp"
+#include "tools/model_script.hpp"
+#include "tools/npz_file.hpp"
+#include "tools/uff_frf.hpp"
+#include "tools/uff_modes.hpp"
 
 namespace stageid {
 namespace {
 
-enum class Format { json, hdf5, csv };
+const std::vector<std::string> kModelEndings = {".json", ".h5",  ".hdf5", ".csv", ".mat",
+                                                ".npz",  ".unv", ".uff",  ".py",  ".m"};
+const std::vector<std::string> kFrfEndings = {".mat", ".npz", ".unv", ".uff"};
 
-Format format_of(const std::filesystem::path& file) {
+void require_ending(const std::filesystem::path& file, const std::vector<std::string>& endings,
+                    const char* what) {
   const std::string ending = file.extension().string();
-  if (ending == ".json") return Format::json;
-  if (ending == ".h5" || ending == ".hdf5") return Format::hdf5;
-  if (ending == ".csv") return Format::csv;
-  throw std::invalid_argument(fmt::format(
-      "{}: models are not exported as '{}'; there are .json, .h5 and .csv", file.string(), ending));
+  if (std::find(endings.begin(), endings.end(), ending) != endings.end()) return;
+  throw std::invalid_argument(fmt::format("{}: {} are not exported as '{}'; there are {}",
+                                          file.string(), what, ending, fmt::join(endings, ", ")));
 }
 
-/// A field of a CSV file, quoted if it must be.
-std::string field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
+void write_arrays(const std::filesystem::path& file, ArrayList list, MatVersion mat_version) {
+  list.file = file;
+  if (file.extension() == ".mat")
+    write_mat(file, list, mat_version);
+  else
+    write_npz(file, list);
 }
 
-std::string number_or_nothing(const std::optional<double>& value) {
-  return value ? fmt::format("{}", *value) : "";
+UffEncoding encoding_of(const std::filesystem::path& file) {
+  return file.extension() == ".uff" ? UffEncoding::binary : UffEncoding::text;
 }
 
-std::string csv_text(const AdditiveModel& model) {
-  std::string text = fmt::format(
-      "# stageid-model 1, written by stageid {}; hold {}, sample rate {} Hz\n"
-      "# P(s) = sum over submodels of coefficient s^power_of_s / (s^integrators A(s)), SI units, s "
-      "in "
-      "rad/s\n"
-      "# A(s) = 1 + 2 zeta s/omega + s^2/omega^2, or 1 where natural_frequency_hz is empty\n"
-      "submodel,integrators,natural_frequency_hz,natural_frequency_std_hz,damping_ratio,"
-      "damping_ratio_std,power_of_s,output,input,coefficient\n",
-      STAGEID_VERSION, to_string(model.hold), model.sample_rate_hz);
-  for (std::size_t index = 0; index < model.submodels.size(); ++index) {
-    const Submodel& s = model.submodels[index];
-    if (s.denominator.size() > 1 && !s.is_mode())
-      throw std::invalid_argument(fmt::format(
-          "submodel {} is no mode and no integrator; the .csv table cannot hold it, export "
-          "as .json or .h5",
-          index));
-    const std::string head =
-        s.is_mode()
-            ? fmt::format("{},{},{},{},{},{}", index, s.integrators, s.natural_frequency_hz(),
-                          number_or_nothing(s.natural_frequency_std_hz), s.damping_ratio(),
-                          number_or_nothing(s.damping_ratio_std))
-            : fmt::format("{},{},,,,", index, s.integrators);
-    for (std::size_t power = 0; power < s.numerator.size(); ++power)
-      for (Eigen::Index i = 0; i < model.n_outputs(); ++i)
-        for (Eigen::Index j = 0; j < model.n_inputs(); ++j)
-          text += fmt::format("{},{},{},{},{}\n", head, power,
-                              field(model.outputs.names[static_cast<std::size_t>(i)]),
-                              field(model.inputs.names[static_cast<std::size_t>(j)]),
-                              s.numerator[power](i, j));
-  }
-  return text;
+/// What the model's .h5 file holds: it goes through one beside the target.
+ArrayList arrays_of_model(const std::filesystem::path& beside, const AdditiveModel& model,
+                          const ExportedResponse& response,
+                          const std::optional<DrivingPoint>& driving_point) {
+  const OutputFile scratch(beside.string() + ".h5");
+  write_model_hdf5(scratch.path(), model, response, driving_point);
+  return read_hdf5_arrays(scratch.path());
+}
+
+UffContent uff_of_model(const std::filesystem::path& file, const AdditiveModel& model,
+                        const Eigen::VectorXd& frequency_hz) {
+  if (frequency_hz.size() == 0)
+    throw std::invalid_argument(fmt::format(
+        "{}: the model does not tell its band; name the lines of the response with --frf FRF",
+        file.string()));
+  FrfEstimate frf;
+  frf.frequency_hz = frequency_hz;
+  frf.inputs = model.inputs;
+  frf.outputs = model.outputs;
+  frf.sample_rate_hz = model.sample_rate_hz;
+  frf.hold = model.hold == HoldModel::none ? Hold::none : Hold::zoh;
+  frf.response = stageid::response(model, frequency_hz, model.hold);
+  UffContent content = uff_of_frf(frf);
+  content.model_name = "stageid model";
+  content.modes = uff_modes(model);
+  return content;
 }
 
 }  // namespace
 
 void require_export_format(const std::filesystem::path& file) {
-  static_cast<void>(format_of(file));
+  require_ending(file, kModelEndings, "models");
+}
+
+void require_frf_export_format(const std::filesystem::path& file) {
+  require_ending(file, kFrfEndings, "frequency responses");
 }
 
 void export_model(const std::filesystem::path& file, const AdditiveModel& model,
                   const ExportedResponse& response,
-                  const std::optional<DrivingPoint>& driving_point) {
-  switch (format_of(file)) {
-    case Format::json:
-      write_model(file, model);
-      return;
-    case Format::hdf5:
-      write_model_hdf5(file, model, response, driving_point);
-      return;
-    case Format::csv:
-      write_text_file(file, csv_text(model));
-      return;
-  }
+                  const std::optional<DrivingPoint>& driving_point, MatVersion mat_version) {
+  require_export_format(file);
+  const std::string ending = file.extension().string();
+  if (ending == ".json")
+    write_model(file, model);
+  else if (ending == ".csv")
+    write_text_file(file, model_csv(model));
+  else if (ending == ".py" || ending == ".m")
+    write_text_file(
+        file, model_script(model, ending == ".m" ? ScriptLanguage::matlab : ScriptLanguage::python,
+                           file.stem().string()));
+  else if (ending == ".unv" || ending == ".uff")
+    write_uff(file, uff_of_model(file, model, response.frequency_hz), encoding_of(file));
+  else if (ending == ".mat" || ending == ".npz")
+    write_arrays(file, arrays_of_model(file, model, response, driving_point), mat_version);
+  else
+    write_model_hdf5(file, model, response, driving_point);
+}
+
+void export_frf(const std::filesystem::path& file, const FrfEstimate& frf, MatVersion mat_version) {
+  require_frf_export_format(file);
+  if (file.extension() == ".unv" || file.extension() == ".uff")
+    write_uff(file, uff_of_frf(frf), encoding_of(file));
+  else
+    write_arrays(file, arrays_of_frf(frf, file), mat_version);
 }
 
 }  // namespace stageid

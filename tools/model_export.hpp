@@ -1,32 +1,36 @@
 #pragma once
 
-// Exported models.
+// Exported models and frequency responses, by the ending of the file; docs/exchange.md.
 //
-// FILE.h5: tools/model_hdf5.hpp.
-//
-// FILE.csv
-//   Lines that begin with # tell the format, version and channels. Then one line a coefficient:
-//   submodel, integrators, natural_frequency_hz, natural_frequency_std_hz, damping_ratio,
-//   damping_ratio_std, power_of_s, output, input, coefficient. SI units, s in rad/s:
-//   P(s) = sum over submodels of  coefficient s^power / (s^integrators A(s)),
-//   A(s) = 1 + 2 zeta s/omega + s^2/omega^2, or 1 where the frequency is empty.
+//   .json        the model                        .h5, .hdf5   tools/model_hdf5.hpp
+//   .csv         one line a coefficient           .npz, .mat   the content of .h5 for numpy and MATLAB
+//   .unv, .uff   tools/uff_frf.hpp, text and binary: response and modes
+//   .py, .m      tools/model_script.hpp
 
 #include <filesystem>
 #include <optional>
 
+#include "frf/frf_estimate.hpp"
+#include "tools/mat_file.hpp"
 #include "tools/model_hdf5.hpp"
 
 namespace stageid {
 
-/// Writes by the extension of `file`: .json, .h5, .hdf5, .csv.
-/// @throws std::invalid_argument for another extension, listing those there are, and for a model that
-/// the format cannot hold (.csv: submodels that are no modes; .h5: those without a state space).
+/// @throws std::invalid_argument for another ending, listing those there are, and for a model that
+/// the format cannot hold (.csv: submodels that are no modes; state spaces: those that have none; .unv:
+/// names or units that are too long, no frequencies).
 /// @throws FileError
 void export_model(const std::filesystem::path& file, const AdditiveModel& model,
                   const ExportedResponse& response,
-                  const std::optional<DrivingPoint>& driving_point = {});
+                  const std::optional<DrivingPoint>& driving_point = {},
+                  MatVersion mat_version = MatVersion::v5);
 
-/// @throws std::invalid_argument as export_model(), before any work is done.
+/// .mat, .npz, .unv, .uff. @throws as export_model().
+void export_frf(const std::filesystem::path& file, const FrfEstimate& frf,
+                MatVersion mat_version = MatVersion::v5);
+
+/// @throws std::invalid_argument as export_model() and export_frf(), before any work is done.
 void require_export_format(const std::filesystem::path& file);
+void require_frf_export_format(const std::filesystem::path& file);
 
 }  // namespace stageid

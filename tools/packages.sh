@@ -4,12 +4,12 @@
 # To build and run the program.
 build_packages="g++ cmake ninja-build pkg-config
   libeigen3-dev libfftw3-dev libhdf5-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev
-  libfmt-dev libxxhash-dev libcpp-httplib-dev libmodbus-dev libjs-dygraphs"
+  libfmt-dev libxxhash-dev libcpp-httplib-dev libmodbus-dev libmatio-dev zlib1g-dev libjs-dygraphs"
 
 # What the tests need beside that: the references in Python, the report in a browser, the format,
 # a kernel that has CAN.
 test_packages="libgtest-dev libgmock-dev libbenchmark-dev
-  python3 python3-numpy python3-scipy python3-h5py chromium clang-format git
+  python3-dev pybind11-dev python3 python3-numpy python3-scipy python3-h5py chromium clang-format git
   mbpoll python3-pymodbus socat
   user-mode-linux busybox-static iproute2 kmod can-utils"
 

@@ -62,10 +62,10 @@ class Program {
         fit_(app_, console_),
         validate_(app_, console_),
         export_(app_, console_),
+        import_(app_, console_),
         report_(app_, console_),
         config_(app_, console_),
         node_(app_, console_) {
-    add_import_command(app_);
     app_.name("stageid");
     app_.set_version_flag("--version", "stageid " STAGEID_VERSION);
     app_.add_flag("--json", console_.json, "the result as one JSON object on stdout");
@@ -134,6 +134,7 @@ class Program {
   FitCommand fit_;
   ValidateCommand validate_;
   ExportCommand export_;
+  ImportCommand import_;
   ReportCommand report_;
   ConfigCommand config_;
   NodeCommand node_;

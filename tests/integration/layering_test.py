@@ -36,6 +36,8 @@ DOORS = {
     "hdf5": {"excitation"},
     "H5": {"excitation"},
     "modbus": {"hal"},
+    "matio": {"tools"},
+    "zlib": {"tools"},
     "yaml-cpp/": {"tools"},
     "CLI/": {"tools"},
     "httplib": {"tools"},

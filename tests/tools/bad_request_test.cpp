@@ -27,8 +27,7 @@ TEST_F(BadRequest, WhatIsNotInThisVersionSaysSo) {
   fail({"run", config_, "-o", name("x.slog"), "--backend", "can"}, 2, "has no group 'can'");
   fail({"run", config_, "-o", name("x.slog"), "--dashboard", "http://a"}, 2, "--dashboard");
   fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
-  fail({"import", "x.mat", "-o", "frf.h5"}, 2, "not in this version");
-  fail({"export", "model.json", "-o", name("m.mat")}, 2, ".json, .h5 and .csv");
+  fail({"export", "model.json", "-o", name("m.step")}, 2, ".json, .h5, .hdf5, .csv, .mat");
 }
 
 TEST_F(BadRequest, WhatAModelHasNot) {

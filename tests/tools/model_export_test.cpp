@@ -97,7 +97,7 @@ TEST(ModelExport, CsvHasOneLineACoefficient) {
 TEST(ModelExport, WhatAFormatCannotHoldIsRefused) {
   const test::TemporaryDirectory directory;
   AdditiveModel model = small_model();
-  EXPECT_THROW(export_model(directory / "m.mat", model, {}), std::invalid_argument);
+  EXPECT_THROW(export_model(directory / "m.step", model, {}), std::invalid_argument);
   EXPECT_THROW(require_export_format("m"), std::invalid_argument);
   model.submodels[1].denominator = {1.0, 1.0, 1.0, 1.0};
   EXPECT_THROW(export_model(directory / "m.csv", model, {}), std::invalid_argument);

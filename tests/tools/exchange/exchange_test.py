@@ -1,0 +1,273 @@
+#!/usr/bin/python3
+"""Exchange of files with other programs: what ours writes is read by scipy, numpy, h5py and a reader of
+universal files of its own; what they write is imported; every malformed file is a one-line error.
+
+    exchange_test.py PROGRAM WORK_DIR
+"""
+
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import unittest
+
+import h5py
+import numpy as np
+import scipy.io
+
+import uff_reader
+
+PROGRAM, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
+N, N_Y, N_U = 23, 2, 3
+# Uneven, and of no grid that single precision or six digits hold.
+FREQUENCY_HZ = np.cumsum(np.random.default_rng(1).uniform(0.1, 3.0, N))
+
+
+def run(*arguments):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, cwd=WORK)
+
+
+def random_frf(frequency_hz=FREQUENCY_HZ):
+    g = np.random.default_rng(2)
+    shape = (len(frequency_hz), N_Y, N_U)
+    return {
+        "frequency_hz": frequency_hz,
+        "response": (g.normal(size=shape) + 1j * g.normal(size=shape)) * 1e-7,
+        "noise_variance": g.uniform(1e-20, 2e-20, shape),
+        "total_variance": g.uniform(2e-20, 3e-20, shape),
+    }
+
+
+def write_frf(path, arrays, outputs=("z1", "x\u00b52"), inputs=("a1", "a,2", "a3")):
+    with h5py.File(path, "w") as f:
+        f.attrs["format"], f.attrs["format_version"] = "stageid-frf", 1
+        f.attrs["sample_rate_hz"], f.attrs["hold"] = 1000 / 3, "zoh"
+        f.attrs["compensated"], f.attrs["delay_s"] = "delay", 1.3e-4
+        f.attrs["noise_dof"] = 7.0
+        for name, values in arrays.items():
+            f[name] = values
+        f["outputs"] = list(outputs)
+        f["outputs"].attrs["unit"] = ["m", "rad"]
+        f["inputs"] = list(inputs)
+        f["inputs"].attrs["unit"] = "N"
+
+
+def everything(path):
+    """All datasets and attributes of an HDF5 file as bytes and texts; provenance apart."""
+    found = {}
+
+    def add(name, item):
+        for key, value in item.attrs.items():
+            found[f"{name}@{key}"] = np.asarray(value).tolist()
+        if isinstance(item, h5py.Dataset) and name != "provenance":
+            value = item[()]
+            found[name] = value.tolist() if value.dtype == object else value.tobytes()
+
+    with h5py.File(path) as f:
+        add("", f)
+        f.visititems(add)
+    return found
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        shutil.rmtree(WORK, ignore_errors=True)
+        WORK.mkdir(parents=True)
+
+    def succeed(self, *arguments):
+        result = run(*arguments)
+        self.assertEqual((result.returncode, result.stderr), (0, ""), arguments)
+        return result
+
+    def refuse(self, text, *arguments, code=2):
+        before = sorted(WORK.iterdir())
+        result = run(*arguments)
+        self.assertEqual(result.returncode, code, (arguments, result.stderr))
+        self.assertIn(text, result.stderr)
+        self.assertTrue(result.stderr.startswith("stageid: "), result.stderr)
+        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        self.assertEqual(sorted(WORK.iterdir()), before, "a file was left")
+
+    def frf(self, arrays=None):
+        """The program's own writing of a foreign frf.h5."""
+        write_frf(WORK / "foreign.h5", arrays or random_frf())
+        self.succeed("import", "foreign.h5", "-o", "frf.h5")
+        return WORK / "frf.h5"
+
+
+class RoundTrips(Case):
+    def test_mat_npz_and_binary_uff_come_back_to_the_bit(self):
+        frf = self.frf()
+        for name, flags in (("a.mat", []), ("b.mat", ["--mat-version", "7.3"]), ("c.npz", [])):
+            with self.subTest(name):
+                self.succeed("export", frf, "-o", name, *flags)
+                self.succeed("import", name, "-o", "back.h5")
+                self.assertEqual(everything(WORK / "back.h5"), everything(frf))
+        self.succeed("export", frf, "-o", "d.uff")
+        self.succeed("import", "d.uff", "-o", "back.h5")
+        back, given = everything(WORK / "back.h5"), everything(frf)
+        lost = {"@noise_dof", "@provenance"}  # what a universal file has no place for
+        for name in set(given) - lost:
+            self.assertEqual(back.get(name), given[name], name)
+
+    def test_one_line_and_one_channel_keep_their_axes(self):
+        for shape in ((1, 2, 3), (5, 1, 1), (1, 1, 1)):
+            f = np.arange(1.0, 1.0 + shape[0])
+            with h5py.File(WORK / "one.h5", "w") as file:
+                file.attrs["format"] = "stageid-frf"
+                file["frequency_hz"], file["response"] = f, np.full(shape, 1 + 2j)
+                for name, count in (("outputs", shape[1]), ("inputs", shape[2])):
+                    file[name] = [f"{name}{k}" for k in range(count)]
+                    file[name].attrs["unit"] = "m"
+            for name in ("a.mat", "a.npz", "a.uff"):
+                with self.subTest(shape=shape, name=name):
+                    self.succeed("export", "one.h5", "-o", name)
+                    self.succeed("import", name, "-o", "back.h5")
+                    with h5py.File(WORK / "back.h5") as back:
+                        self.assertEqual(back["response"].shape, shape)
+
+    def test_text_uff_keeps_thirteen_digits(self):
+        frf = self.frf()
+        self.succeed("export", frf, "-o", "a.unv")
+        self.succeed("import", "a.unv", "-o", "back.h5")
+        with h5py.File(frf) as a, h5py.File(WORK / "back.h5") as b:
+            for name in ("frequency_hz", "response", "noise_variance"):
+                x, y = a[name][()], b[name][()]
+                # 1PE20.12: half a unit of the thirteenth digit, of each part.
+                self.assertLess(np.max(np.abs(x - y) / np.abs(x)), 1e-12)
+                self.assertFalse(np.array_equal(x, y))
+
+    def test_the_same_file_has_the_same_bytes(self):
+        frf = self.frf()
+        for ending in ("mat", "npz", "unv", "uff"):
+            self.succeed("export", frf, "-o", "a." + ending)
+            self.succeed("export", frf, "-o", "b." + ending)
+            self.assertEqual((WORK / f"a.{ending}").read_bytes(), (WORK / f"b.{ending}").read_bytes())
+
+
+class ReadByOthers(Case):
+    def test_scipy_and_numpy(self):
+        given = random_frf()
+        frf = self.frf(given)
+        self.succeed("export", frf, "-o", "a.mat")
+        mat = scipy.io.loadmat(WORK / "a.mat", squeeze_me=True, uint16_codec="utf-16-le")
+        np.testing.assert_array_equal(mat["response"], np.moveaxis(given["response"], 0, -1))
+        np.testing.assert_array_equal(mat["frequency_hz"], given["frequency_hz"])
+        self.assertEqual(list(mat["outputs"]), ["z1", "x\u00b52"])
+        self.assertEqual(mat["hold"], "zoh")
+        self.succeed("export", frf, "-o", "a.npz")
+        with np.load(WORK / "a.npz") as npz:
+            np.testing.assert_array_equal(npz["response"], given["response"])
+            self.assertEqual(list(npz["outputs"]), ["z1", "x\u00b52"])
+            self.assertEqual(npz["@delay_s"], 1.3e-4)
+
+    def test_universal_files(self):
+        given = random_frf(0.5 * np.arange(1, 41))  # six digits hold this grid: even abscissas
+        frf = self.frf(given)
+        for name, tolerance in (("a.unv", 1e-12), ("a.uff", 0.0)):
+            self.succeed("export", frf, "-o", name)
+            datasets = uff_reader.read(WORK / name)
+            self.assertEqual([d["dataset"] for d in datasets[:2]], [151, 164])
+            self.assertEqual((datasets[1]["code"], datasets[1]["factors"][:2]), (1, [1.0, 1.0]))
+            functions = [d for d in datasets if d.get("type") == 4]
+            self.assertEqual(len(functions), N_Y * N_U)
+            for k, function in enumerate(functions):
+                i, j = k % N_Y, k // N_Y
+                np.testing.assert_array_equal(function["x"], given["frequency_hz"])
+                np.testing.assert_allclose(function["y"], given["response"][:, i, j], rtol=tolerance)
+                self.assertEqual(function["response"][1:], [str(i + 1), "3" if i == 0 else "1"])
+                self.assertEqual(function["reference"][1], str(1001 + j))
+                self.assertEqual(function["axes"][0][0], "18")
+
+
+MODEL = {
+    "format": "stageid-model", "format_version": 1, "inputs": ["a1", "a2"], "outputs": ["z1", "z'2"],
+    "sample_rate_hz": 1000.0, "hold": "exact", "input_delay_s": [0.0013, 0.0004],
+    "output_delay_s": [0.0, 0.0002],
+    "submodels": [
+        {"integrators": 2, "denominator": [1], "numerator": [[[0.1, 0.2], [0.3, -0.4]]]},
+        {"integrators": 0, "denominator": [1, 1e-4, 1e-5],
+         "numerator": [[[1e-6, 2e-6], [3e-6, 6e-6]]]}],
+    "fit": {"cost": 1.0, "weighting": "unit", "iterations": 1, "status": "gradient_small",
+            "relative_rms_error": 0.1, "band_hz": [5.0, 200.0], "seconds": 0}}
+
+
+def transfer(frequency_hz):
+    """The continuous model without delays, from the coefficients as they stand in the file."""
+    total = 0
+    s = 2j * np.pi * np.asarray(frequency_hz)
+    for sub in MODEL["submodels"]:
+        b = sum(np.multiply.outer(s**k, np.array(m)) for k, m in enumerate(sub["numerator"]))
+        a = s ** sub["integrators"] * sum(c * s**k for k, c in enumerate(sub["denominator"]))
+        total = total + b / a[:, None, None]
+    return total
+
+
+class Models(Case):
+    def setUp(self):
+        super().setUp()
+        (WORK / "model.json").write_text(json.dumps(MODEL))
+
+    def test_mat_and_npz_hold_what_h5_holds(self):
+        for name in ("m.h5", "m.mat", "m.npz"):
+            self.succeed("export", "model.json", "-o", name, "--driving-point", "z1", "a1")
+        mat = scipy.io.loadmat(WORK / "m.mat", squeeze_me=True, struct_as_record=False)
+        with h5py.File(WORK / "m.h5") as h5, np.load(WORK / "m.npz") as npz:
+            np.testing.assert_array_equal(mat["response"], np.moveaxis(h5["response"][()], 0, -1))
+            for system in ("continuous", "discrete"):
+                for name in "ABCD":
+                    path = f"state_space/{system}/{name}"
+                    fields = getattr(mat["state_space"], system)
+                    np.testing.assert_array_equal(getattr(fields, name), h5[path][()])
+                    np.testing.assert_array_equal(npz[path], h5[path][()])
+            self.assertEqual(mat["modes"].modal_mass, h5["modes/modal_mass"][0])
+            self.assertEqual(mat["modes"].driving_point_mass_output, "z1")
+            self.assertEqual(json.loads(str(npz["model_json"][0]))["submodels"][1]["integrators"], 0)
+
+    def test_the_python_script_rebuilds_the_model(self):
+        f = [5.0, 40.0, 50.3, 180.0, 470.0]
+        self.succeed("export", "model.json", "-o", "m.py")
+        self.succeed("export", "model.json", "-o", "m.h5")
+        space = {"__name__": "model"}
+        exec((WORK / "m.py").read_text(), space)
+        s = 2j * np.pi * np.array(f)
+        delays = np.exp(-np.multiply.outer(s, np.add.outer([0.0, 0.0002], [0.0013, 0.0004])))
+        np.testing.assert_allclose(space["continuous_response"](f), transfer(f) * delays, rtol=1e-9)
+        with h5py.File(WORK / "m.h5") as h5:
+            # A sum of a rigid body and modes loses digits by cancellation: measured 3e-12, margin 100.
+            np.testing.assert_allclose(space["response"](h5["frequency_hz"][()]), h5["response"][()],
+                                       rtol=3e-10)
+        self.assertEqual(space["OUTPUTS"], ["z1", "z'2"])
+
+    def test_the_matlab_function_rebuilds_the_model(self):
+        octave = shutil.which("octave-cli")
+        self.succeed("export", "model.json", "-o", "m.m")
+        self.assertIn("function model = m()", (WORK / "m.m").read_text())
+        if octave is None:
+            self.skipTest("no octave-cli")
+        self.succeed("export", "model.json", "-o", "m.mat")
+        script = ("load m.mat; model = m(); P = model.response(frequency_hz);"
+                  "e = max(abs(P(:) - response(:)) ./ abs(response(:))); assert(e < 3e-10);")
+        result = subprocess.run([octave, "--eval", script], capture_output=True, text=True, cwd=WORK)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_universal_files_hold_response_and_modes(self):
+        self.succeed("export", "model.json", "-o", "m.unv")
+        self.succeed("export", "model.json", "-o", "m.h5")
+        datasets = uff_reader.read(WORK / "m.unv")
+        mode = next(d for d in datasets if d["dataset"] == 55)
+        with h5py.File(WORK / "m.h5") as h5:
+            f, z = h5["modes/natural_frequency_hz"][0], h5["modes/damping_ratio"][0]
+            np.testing.assert_allclose(mode["reals"][:3], [f, h5["modes/modal_mass"][0], z], rtol=1e-5)
+            shape = h5["modes/output_shape"][0].real
+        self.assertEqual((mode["analysis"], mode["data_type"], mode["nodes"]), (2, 2, [1, 2]))
+        np.testing.assert_allclose(mode["values"], [[0, 0, shape[0]], [0, 0, shape[1]]], rtol=1e-5)
+        self.succeed("import", "m.unv", "-o", "back.h5")
+        with h5py.File(WORK / "m.h5") as a, h5py.File(WORK / "back.h5") as b:
+            np.testing.assert_allclose(b["response"][()], a["response"][()], rtol=1e-12)
+
+
+if __name__ == "__main__":
+    sys.argv = sys.argv[:1] + sys.argv[3:]
+    unittest.main()

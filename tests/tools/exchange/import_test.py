@@ -1,0 +1,233 @@
+#!/usr/bin/python3
+"""Files of other programs come in: by themselves, with a map, or with an error that says what is missing.
+
+    import_test.py PROGRAM WORK_DIR
+"""
+
+import sys
+import unittest
+
+import h5py
+import numpy as np
+import scipy.io
+
+from exchange_test import FREQUENCY_HZ, WORK, Case, random_frf
+
+G = random_frf()["response"]  # lines x 2 x 3
+
+
+def imported(name="back.h5"):
+    with h5py.File(WORK / name) as f:
+        return f["frequency_hz"][()], f["response"][()]
+
+
+def write_map(text):
+    (WORK / "map.yaml").write_text(text)
+
+
+def uff_function(y, reference, response, x=None, kind=4, double=True, binary=None):
+    """A dataset 58 as other programs write it: no names, uneven abscissas, 1PE20.11."""
+    complex_data = np.iscomplexobj(y)
+    x = FREQUENCY_HZ if x is None else x
+    table = np.column_stack([x, y.real, y.imag] if complex_data else [x, y])
+    type_code = {(False, False): 2, (False, True): 4, (True, False): 5, (True, True): 6}[complex_data, double]
+    head = ["NONE"] * 5 + [
+        f"{kind:5}{1:10}{0:5}{0:10} {'NONE':10}{response[0]:10}{response[1]:4} {'NONE':10}{reference[0]:10}{reference[1]:4}",
+        f"{type_code:10}{len(x):10}{0:10}{0:13.5e}{0:13.5e}{0:13.5e}",
+        f"{18:10}{0:5}{0:5}{0:5} {'Frequency':20} {'Hz':20}",
+        f"{12:10}{0:5}{0:5}{0:5} {'NONE':20} {'NONE':20}",
+        f"{13:10}{0:5}{0:5}{0:5} {'NONE':20} {'NONE':20}",
+        f"{0:10}{0:5}{0:5}{0:5} {'NONE':20} {'NONE':20}"]
+    head = "".join(line + "\n" for line in head).encode()
+    edge = b"    -1\n"
+    if binary is not None:
+        order = 1 if binary == "<" else 2
+        # pyuff counts 8 bytes a value here, whatever they are: readers cannot trust it.
+        line = f"    58b{order:6}{2:6}{11:12}{8 * len(x):12}{0:6}{0:6}{0:12}{0:12}\n".encode()
+        return edge + line + head + table.astype(binary + "f8").tobytes() + edge
+    rows = "".join(f"{row[0]:13.5e}" + "".join(f"{v:20.11e}" for v in row[1:]) + "\n" for row in table)
+    return edge + b"    58\n" + head + rows.encode() + edge
+
+
+class ByThemselves(Case):
+    def test_universal_files_of_others(self):
+        for binary, tolerance in ((None, 1e-11), ("<", 0.0), (">", 0.0)):
+            with self.subTest(binary):
+                (WORK / "x.uff").write_bytes(b"".join(
+                    uff_function(G[:, i, j], (101 + j, -3), (i + 1, 3), binary=binary)
+                    for i in range(2) for j in range(3)))
+                self.succeed("import", "x.uff", "-o", "back.h5")
+                f, g = imported()
+                np.testing.assert_allclose(f, FREQUENCY_HZ, rtol=1e-5 if binary is None else 0)
+                np.testing.assert_allclose(g, G, rtol=tolerance)
+                with h5py.File(WORK / "back.h5") as h5:
+                    self.assertEqual(list(h5["outputs"].asstr()), ["1+Z", "2+Z"])
+                    self.assertEqual(list(h5["inputs"].asstr()), ["101-Z", "102-Z", "103-Z"])
+                    self.assertEqual(h5["outputs"].attrs["unit"], "m/s^2")
+
+    def test_units_of_a_universal_file_become_si(self):
+        units = (f"    -1\n   164\n{5:10}{'mm (milli newton)':20}{2:10}\n"
+                 + "".join(f"{v:25.16e}".replace("e", "D") for v in (1000.0, 1000.0, 1.0)) + f"\n{0:25.16e}\n    -1\n")
+        # mm/s^2 over mN are m/s^2 over N; length alone counts for the ordinate, force for the reference.
+        (WORK / "x.unv").write_bytes(units.replace("D+03", "D+03", 1).encode()
+                                     + uff_function(G[:, 0, 0], (1, 3), (2, 3), binary="<"))
+        self.succeed("import", "x.unv", "-o", "back.h5")
+        np.testing.assert_allclose(imported()[1][:, 0, 0], G[:, 0, 0], rtol=1e-15)
+        inches = units.replace(f"{1000.0:25.16e}".replace("e", "D"), f"{40.0:25.16e}".replace("e", "D"), 1)
+        (WORK / "x.unv").write_bytes(inches.encode() + uff_function(G[:, 0, 0], (1, 3), (2, 3), binary="<"))
+        self.succeed("import", "x.unv", "-o", "back.h5")
+        np.testing.assert_allclose(imported()[1][:, 0, 0], G[:, 0, 0] * 1000 / 40, rtol=1e-15)
+
+    def test_touchstone(self):
+        s = G[:4, :2, :2] * 1e7
+        order = [(0, 0), (1, 0), (0, 1), (1, 1)]
+        for form, pair in (("RI", lambda v: (v.real, v.imag)),
+                           ("MA", lambda v: (abs(v), np.degrees(np.angle(v)))),
+                           ("DB", lambda v: (20 * np.log10(abs(v)), np.degrees(np.angle(v))))):
+            lines = [f"! two ports\n# MHz S {form} R 50\n"]
+            for k in range(4):
+                numbers = [v for i, j in order for v in pair(s[k, i, j])]
+                lines.append(f"{k + 1} " + " ".join(f"{v:.17g}" for v in numbers) + " ! here\n")
+            (WORK / "x.s2p").write_text("".join(lines))
+            self.succeed("import", "x.s2p", "-o", "back.h5")
+            f, g = imported()
+            np.testing.assert_array_equal(f, [1e6, 2e6, 3e6, 4e6])
+            np.testing.assert_allclose(g, s, rtol=1e-13)
+        self.refuse("Touchstone 2", "import", self.text("y.s1p", "[Version] 2.0\n"),
+                    "-o", "n.h5")
+        self.refuse("whole lines", "import", self.text("y.s3p", "# Hz S RI\n1 2 3\n"), "-o", "n.h5")
+        self.refuse("'x'", "import", self.text("y.s1p", "1 2 x\n"), "-o", "n.h5")
+
+    def text(self, name, content):
+        (WORK / name).write_text(content)
+        return name
+
+
+class WithAMap(Case):
+    def test_arrays_of_every_format_and_order(self):
+        turned = np.transpose(G, (1, 2, 0))  # output, input, line
+        scipy.io.savemat(WORK / "x.mat", {"s": {"w": 2 * np.pi * FREQUENCY_HZ, "G": turned}})
+        np.savez_compressed(WORK / "x.npz", w=2 * np.pi * FREQUENCY_HZ, G=np.asfortranarray(turned))
+        with h5py.File(WORK / "x.h5", "w") as f:
+            f["s/w"], f["s/G"] = 2 * np.pi * FREQUENCY_HZ, turned
+        for name, prefix in (("x.mat", "s."), ("x.npz", ""), ("x.h5", "s/")):
+            with self.subTest(name):
+                write_map(f"kind: frf\nfrequency: {prefix}w\nfrequency_unit: rad/s\nresponse: {prefix}G\n"
+                          "axes: [output, input, line]\noutputs: [p, q]\noutput_unit: m rad\n"
+                          "input_unit: N\n")
+                self.succeed("import", name, "-o", "back.h5", "--map", "map.yaml")
+                f, g = imported()
+                np.testing.assert_allclose(f, FREQUENCY_HZ, rtol=1e-15)
+                np.testing.assert_array_equal(g, G)
+                with h5py.File(WORK / "back.h5") as h5:
+                    self.assertEqual(list(h5["outputs"].asstr()), ["p", "q"])
+                    self.assertEqual(list(h5["inputs"].asstr()), ["u1", "u2", "u3"])
+                    self.assertEqual(list(h5["outputs"].attrs["unit"]), ["m", "rad"])
+        self.refuse("write a map", "import", "x.npz", "-o", "n.h5")
+        write_map("kind: frf\nfrequency: w\nresponse: G\n")
+        self.refuse("key 'axes' is missing", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        write_map("kind: frf\nfrequency: v\nresponse: G\n")
+        self.refuse("has no 'v'; there are w, G", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        write_map("kind: frf\nfrequency: w\n")
+        self.refuse("map.yaml:1:", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_columns_of_a_table(self):
+        y = G[:, 0, 0]
+        rows = np.column_stack([FREQUENCY_HZ, abs(y), np.degrees(np.angle(y)), y.real, y.imag])
+        text = "f;mag;deg;re;im;\n" + "".join(
+            ";".join(repr(float(v)).replace(".", ",") for v in row) + ";\n" for row in rows)
+        (WORK / "x.csv").write_text(text)
+        write_map("kind: frf\nfrequency: f\nchannels:\n"
+                  "- {output: y, input: a, magnitude: mag, phase_deg: deg}\n"
+                  "- {output: y, input: b, real: re, imaginary: im}\n")
+        self.succeed("import", "x.csv", "-o", "back.h5", "--map", "map.yaml")
+        f, g = imported()
+        np.testing.assert_array_equal(f, FREQUENCY_HZ)
+        np.testing.assert_allclose(g[:, 0, 0], y, rtol=1e-14)
+        np.testing.assert_array_equal(g[:, 0, 1], y)
+        (WORK / "x.csv").write_text(text.replace(";deg;", ";mag;"))
+        self.refuse("x.csv:1: two columns", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
+        (WORK / "x.csv").write_text(text + "1;2;nonsense;4;5;\n")
+        self.refuse("'nonsense' stands in column 3", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_a_log(self):
+        g = np.random.default_rng(4)
+        r = np.tile(g.normal(size=(50, 1)), (4, 1))
+        u, y = g.normal(size=(200, 1)), g.normal(size=(200, 2))
+        scipy.io.savemat(WORK / "x.mat", {"r": r, "u": u, "y": y})
+        text = ("kind: log\nsample_rate_hz: 100\nperiod_samples: 50\ntransient_periods: 1\n"
+                "excitation: {arrays: [r], unit: N}\nactuators: {arrays: [u], unit: N}\n"
+                "sensors: {arrays: [y], names: [y1, y2], unit: m rad, scale: [0.001, 1]}\n")
+        write_map(text)
+        for name in ("run.h5", "run.slog"):
+            self.succeed("import", "x.mat", "-o", name, "--map", "map.yaml")
+            self.succeed("log", "verify", name)
+        with h5py.File(WORK / "run.h5") as h5:
+            run = h5["runs/0000"]
+            np.testing.assert_array_equal(run["excitation"][()], r[:50])
+            np.testing.assert_array_equal(run["actuators"][()], u)
+            np.testing.assert_array_equal(run["sensors"][()], y * [0.001, 1])
+            self.assertEqual(list(h5["channels/sensors"].asstr()), ["y1", "y2"])
+        write_map(text.replace("names: [y1, y2], ", ""))
+        self.refuse("give names", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+        write_map(text.replace("sample_rate_hz: 100\n", ""))
+        self.refuse("needs sample_rate_hz", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+        write_map(text.replace("period_samples: 50", "period_samples: 60"))
+        self.refuse("all whole", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+        scipy.io.savemat(WORK / "x.mat", {"r": r + 1e-3 * g.normal(size=r.shape), "u": u, "y": y})
+        write_map(text)
+        self.refuse("excitation_period: mean", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+        write_map(text + "excitation_period: mean\nruns: [{experiment: 2, first_row: 100, rows: 100}]\n")
+        self.succeed("import", "x.mat", "-o", "run.h5", "--map", "map.yaml")
+        with h5py.File(WORK / "run.h5") as h5:
+            self.assertEqual(h5["runs/0000"].attrs["experiment"], 2)
+            np.testing.assert_array_equal(h5["runs/0000/actuators"][()], u[100:])
+
+
+class Damaged(Case):
+    def test_every_file_cut_short_is_one_line(self):
+        frf = self.frf()
+        for ending in ("mat", "npz", "unv", "uff"):
+            self.succeed("export", frf, "-o", "a." + ending)
+            whole = (WORK / f"a.{ending}").read_bytes()
+            for part in (0.03, 0.4, 0.77, 0.98):
+                (WORK / f"cut.{ending}").write_bytes(whole[:int(part * len(whole))])
+                with self.subTest(ending=ending, part=part):
+                    self.refuse("cut." + ending, "import", "cut." + ending, "-o", "n.h5")
+
+    def test_what_is_no_such_file(self):
+        for ending in ("mat", "npz", "unv", "h5", "s2p"):
+            (WORK / ("text." + ending)).write_text("hello\n")
+            self.refuse("text." + ending, "import", "text." + ending, "-o", "n.h5")
+            self.refuse("none." + ending, "import", "none." + ending, "-o", "n.h5", code=1)
+        (WORK / "x.doc").write_text("")
+        self.refuse("'.doc' is not imported", "import", "x.doc", "-o", "n.h5")
+        self.refuse("is imported as .h5", "import", "text.unv", "-o", "n.csv")
+        frf = self.frf()
+        self.refuse("are not exported as '.h5'", "export", frf, "-o", "n.h5")
+        self.refuse("--mat-version", "export", frf, "-o", "n.mat", "--mat-version", "6")
+
+    def test_what_a_universal_file_cannot_hold(self):
+        for name, unit, text in (("y" * 73, "m", "names of 72 characters"), ("y", "m" * 21, "20 characters")):
+            with h5py.File(WORK / "long.h5", "w") as f:
+                f.attrs["format"] = "stageid-frf"
+                f["frequency_hz"], f["response"] = [1.0], np.ones((1, 1, 1), complex)
+                f["outputs"], f["inputs"] = [name], ["a"]
+                f["outputs"].attrs["unit"], f["inputs"].attrs["unit"] = unit, "N"
+            self.refuse(text, "export", "long.h5", "-o", "n.unv")
+
+    def test_channels_that_do_not_match(self):
+        one = uff_function(G[:, 0, 0], (1, 3), (1, 3))
+        for data, text in ((one + one, "second time"),
+                           (one + uff_function(G[:, 0, 0], (2, 3), (2, 3)), "each pair"),
+                           (one + uff_function(G[:, 0, 0], (2, 3), (1, 3), FREQUENCY_HZ + 1), "other frequencies"),
+                           (one.replace(b"         6        23", b"         7        23"), "ordinate data type"),
+                           (one.replace(b"    4         1", b"    1         1"), "no frequency response"),
+                           (one.replace(b"e-0", b"x-0", 3), "finite number")):
+            (WORK / "x.unv").write_bytes(data)
+            self.refuse(text, "import", "x.unv", "-o", "n.h5")
+
+
+if __name__ == "__main__":
+    sys.argv = sys.argv[:1] + sys.argv[3:]
+    unittest.main()

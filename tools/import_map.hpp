@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace stageid {
+
+/// What a map says about a foreign file: which of its arrays are what. Names are those of variables,
+/// datasets or columns; fields of structs are "struct/field" or "struct.field".
+struct ImportMap {
+  enum class Kind : std::uint8_t { frf, log };
+  enum class FrequencyUnit : std::uint8_t { hz, rad_s };
+  enum class FrfHold : std::uint8_t { none, zoh };
+  enum class ExcitationPeriod : std::uint8_t { repeats, mean };
+
+  /// One channel of a response that is not in one array: values, or real and imaginary part, or magnitude
+  /// and phase.
+  struct Channel {
+    std::string output, input;
+    std::string response, real, imaginary, magnitude, phase_deg;
+  };
+  /// A group of channels of a log: arrays of samples, or of samples x channels.
+  struct Signals {
+    std::vector<std::string> arrays;
+    std::vector<std::string> names;  ///< empty: those of the arrays
+    std::string unit;                ///< see units_of()
+    std::vector<double> scale;       ///< empty: 1; unit = scale x number in the file
+  };
+  struct Run {
+    std::int64_t realization = 0, experiment = 0, first_row = 0;
+    std::int64_t rows = 0;  ///< 0: to the end
+  };
+
+  std::filesystem::path file;
+  Kind kind = Kind::frf;
+  double sample_rate_hz = 0.0;  ///< 0: unknown (FRF only)
+
+  std::string frequency;
+  FrequencyUnit frequency_unit = FrequencyUnit::hz;
+  FrfHold hold = FrfHold::none;
+  std::string response, response_imaginary, noise_variance, total_variance;
+  std::vector<std::string> axes;
+  std::vector<std::string> inputs, outputs;
+  std::string input_unit, output_unit;  ///< see units_of()
+  std::vector<Channel> channels;
+
+  std::int64_t period_samples = 0, transient_periods = 0;
+  Signals excitation, actuators, sensors;
+  ExcitationPeriod excitation_period = ExcitationPeriod::repeats;
+  std::vector<Run> runs;
+};
+
+/// The units of `count` channels from the text of a map: one for all, or one a channel with blanks between;
+/// empty: 1.
+/// @throws FormatError naming the map and `key`.
+std::vector<std::string> units_of(const ImportMap& map, const char* key, const std::string& words,
+                                  std::size_t count);
+
+/// @throws FileError, FormatError "FILE:LINE:COLUMN: ..."
+ImportMap read_import_map(const std::filesystem::path& file);
+
+}  // namespace stageid

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace stageid {
+
+/// A whole file in memory, read line by line; lines end with LF or CR LF.
+class TextLines {
+ public:
+  /// @throws FileError
+  explicit TextLines(const std::filesystem::path& file);
+
+  const std::filesystem::path& file() const noexcept { return file_; }
+  bool at_end() const noexcept { return at_ >= text_.size(); }
+  std::size_t line_number() const noexcept { return line_; }  ///< of the line read last, 1-based
+  /// The next line without its end; @throws FormatError at the end of the file.
+  std::string_view next();
+  std::string_view rest() const noexcept { return std::string_view(text_).substr(at_); }
+  void skip(std::size_t bytes) noexcept { at_ += bytes; }  ///< of rest()
+  /// @throws FormatError "FILE:LINE: message", always.
+  [[noreturn]] void fail(const std::string& message) const;
+
+ private:
+  std::filesystem::path file_;
+  std::string text_;
+  std::size_t at_ = 0;
+  std::size_t line_ = 0;
+};
+
+/// Without blanks at both ends.
+std::string_view trimmed(std::string_view text);
+
+/// A finite number in any form that Fortran and C write: 1e-3, 1.D+00, -.5, +2.
+std::optional<double> parse_number(std::string_view text);
+
+}  // namespace stageid
