@@ -67,6 +67,15 @@ TEST(PoleRelocationShares, DoNotDependOnTheThreads) {
   for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one[i].frequency_hz, two[i].frequency_hz);
 }
 
+// The conjugate of a stable plant's response is that of one with its poles on the other side.
+TEST(PoleRelocationShares, DataOfAnUnstablePlantGiveStableModes) {
+  DenseProblem problem = test::noisy_stage(HoldModel::none, 1e-4);
+  problem.G = problem.G.conjugate().eval();
+  const std::vector<ModeCandidate> modes = relocate(problem, 3);
+  ASSERT_FALSE(modes.empty());
+  for (const ModeCandidate& mode : modes) EXPECT_GT(mode.damping_ratio, 0.0);
+}
+
 TEST(PoleRelocationShares, NothingAskedForNothingFound) {
   EXPECT_TRUE(relocate(test::noisy_stage(HoldModel::none, 0.0), 0).empty());
 }
