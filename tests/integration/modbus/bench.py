@@ -56,7 +56,7 @@ class Bench:
         self.nodes += 1
         with open(said, 'w') as out:
             process = self.start(self.program, 'node', stage, *(['--modbus-tcp', 0] if tcp else []), '--watchdog',
-                                 0.5, *options, stdout=out, stderr=subprocess.STDOUT)
+                                 3, *options, stdout=out, stderr=subprocess.STDOUT)
         process.said = said
         while 'ends it' not in said.read_text():
             if process.poll() is not None:
