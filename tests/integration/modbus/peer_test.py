@@ -159,7 +159,7 @@ class ModbusTest(unittest.TestCase):
     def test_silence_is_named(self):
         here, there = self.bench.serial_line()
         self.bench.node('--modbus-rtu', there, '--modbus-parity', 'N', '--modbus-unit', 5)
-        self.expect_refusal(1, 'unit 1: no reply within 0.1 s', door=f'rtu: {{device: {here}, parity: N}}')
+        self.expect_refusal(1, 'unit 1: no reply within 0.4 s', door=f'rtu: {{device: {here}, parity: N}}')
 
 
 if __name__ == '__main__':
