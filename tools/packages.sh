@@ -10,7 +10,7 @@ build_packages="g++ cmake ninja-build pkg-config
 # a kernel that has CAN.
 test_packages="libgtest-dev libgmock-dev libbenchmark-dev
   python3-dev pybind11-dev python3 python3-numpy python3-scipy python3-h5py chromium clang-format git
-  mbpoll python3-pymodbus socat
+  mbpoll python3-pymodbus python3-serial-asyncio socat
   user-mode-linux busybox-static iproute2 kmod can-utils"
 
 # Only for tools/test --tidy.
