@@ -1,15 +1,14 @@
 #include "acquisition/event_log.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <exception>
 #include <nlohmann/json.hpp>
 
+#include "acquisition/utc_time.hpp"
 #include "excitation/file_error.hpp"
 
 namespace stageid {
@@ -20,15 +19,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kKept = 100;
 
-std::string utc_now() {
-  using namespace std::chrono;
-  const auto now = system_clock::now();
-  const auto ms = duration_cast<milliseconds>(now.time_since_epoch()).count() % 1000;
-  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(system_clock::to_time_t(now)), ms);
-}
-
 std::string line_of(std::string_view event, const std::vector<EventField>& fields) {
-  Json json = {{"time_utc", utc_now()}, {"event", event}};
+  Json json = {{"time_utc", utc_now_ms()}, {"event", event}};
   for (const EventField& field : fields)
     std::visit([&](const auto& value) { json[field.name] = value; }, field.value);
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -1,6 +1,5 @@
 #include "acquisition/run_experiment.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,9 +15,11 @@
 #include <utility>
 
 #include "acquisition/event_recorder.hpp"
+#include "acquisition/excited_actuators.hpp"
 #include "acquisition/log_thread.hpp"
 #include "acquisition/measurement_loop.hpp"
 #include "acquisition/shared_progress.hpp"
+#include "acquisition/utc_time.hpp"
 
 namespace stageid {
 
@@ -28,16 +29,6 @@ constexpr std::chrono::milliseconds kProgressEvery{200};
 constexpr std::size_t kVirtualRingRows = std::size_t{1} << 16;
 constexpr double kWallRingSeconds = 8.0;  // a disk may stall for so long
 constexpr std::uint64_t kPublishEvery = 1024;
-
-int actuator_index(const StageInfo& stage, const std::string& channel) {
-  const auto found = std::find_if(stage.actuators.begin(), stage.actuators.end(),
-                                  [&](const Channel& c) { return c.name == channel; });
-  if (found == stage.actuators.end()) {
-    throw std::invalid_argument(
-        fmt::format("experiment: axis '{}' is no actuator of the stage '{}'", channel, stage.name));
-  }
-  return static_cast<int>(found - stage.actuators.begin());
-}
 
 ChannelList channel_list(const std::vector<Channel>& channels) {
   ChannelList list;
@@ -54,10 +45,6 @@ std::uint64_t mix(std::uint64_t z) noexcept {
   return z ^ (z >> 31);
 }
 
-std::string utc_now() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-}
-
 /// One experiment while it is performed.
 class Experiment {
  public:
@@ -70,16 +57,9 @@ class Experiment {
         loop_(stage, controller, ring_, {options.ramp_s, options.misses_allowed}),
         recorder_(make_recorder(options, ring_.row_words())),
         log_(log, ring_, observers()),
-        wall_(stage.info().clock == Clock::wall) {
-    for (const ExcitationAxis& axis : plan.spec().axes) {
-      actuators_.push_back(actuator_index(stage.info(), axis.channel));
-    }
-    for (const RunId& run : plan.runs()) {
-      const bool skipped =
-          std::find(options.skip.begin(), options.skip.end(), run) != options.skip.end();
-      if (!skipped) runs_.push_back(run);
-    }
-  }
+        wall_(stage.info().clock == Clock::wall),
+        actuators_(excited_actuators(plan, stage.info())),
+        runs_(plan.runs_without(options.skip)) {}
 
   /// Lets the loop's thread do the work and reports progress meanwhile.
   ExperimentResult perform() {
@@ -162,7 +142,7 @@ class Experiment {
         finish(StopReason::interrupt);
         break;
       }
-      if (plant_tripped()) {
+      if (options_.tripped()) {
         finish(StopReason::plant);
         break;
       }
@@ -220,7 +200,7 @@ class Experiment {
         }
       }
       if (interrupted()) loop_.request_stop(StopReason::interrupt);
-      if (plant_tripped()) loop_.request_stop(StopReason::plant);
+      if (options_.tripped()) loop_.request_stop(StopReason::plant);
       if (--until_publish == 0) {
         until_publish = kPublishEvery;
         progress_.publish(loop_.health(), loop_.timing(), wall_);
@@ -230,13 +210,7 @@ class Experiment {
   }
 
   bool interrupted() const noexcept {
-    return abandoned_.load(std::memory_order_relaxed) ||
-           (options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed));
-  }
-
-  bool plant_tripped() const noexcept {
-    return options_.plant_tripped != nullptr &&
-           options_.plant_tripped->load(std::memory_order_relaxed);
+    return abandoned_.load(std::memory_order_relaxed) || options_.interrupted();
   }
 
   void finish(StopReason reason) {
@@ -260,7 +234,7 @@ class Experiment {
         return;
       case StopReason::plant:
         result_.end = ExperimentEnd::fault;
-        result_.message = options_.plant_reason ? options_.plant_reason() : "the plant tripped";
+        result_.message = options_.trip_reason();
         return;
       case StopReason::interrupt:
         result_.end = ExperimentEnd::interrupted;
@@ -344,14 +318,26 @@ LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
   info.transient_periods = plan.spec().transient_periods;
   info.actuators = channel_list(stage.actuators);
   info.sensors = channel_list(stage.sensors);
-  for (const ExcitationAxis& axis : plan.spec().axes) {
-    const int index = actuator_index(stage, axis.channel);
-    info.excitation.names.push_back(axis.channel);
-    info.excitation.units.push_back(stage.actuators[static_cast<std::size_t>(index)].unit);
+  for (const int index : excited_actuators(plan, stage)) {
+    const Channel& actuator = stage.actuators[static_cast<std::size_t>(index)];
+    info.excitation.names.push_back(actuator.name);
+    info.excitation.units.push_back(actuator.unit);
   }
   info.metadata_json = std::move(metadata_json);
   check_log_info(info);
   return info;
+}
+
+bool RunExperimentOptions::interrupted() const noexcept {
+  return interrupt != nullptr && interrupt->load(std::memory_order_relaxed);
+}
+
+bool RunExperimentOptions::tripped() const noexcept {
+  return plant_tripped != nullptr && plant_tripped->load(std::memory_order_relaxed);
+}
+
+std::string RunExperimentOptions::trip_reason() const {
+  return plant_reason ? plant_reason() : "the plant tripped";
 }
 
 std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept {

@@ -43,6 +43,10 @@ struct RunExperimentOptions {
   /// From the calling thread, a few times a second and once at the end. If it throws, the experiment
   /// ends in a controlled stop and the exception goes on.
   std::function<void(const ExperimentProgress&)> progress = {};
+
+  bool interrupted() const noexcept;
+  bool tripped() const noexcept;
+  std::string trip_reason() const;
 };
 
 enum class ExperimentEnd : std::uint8_t { complete, limit, fault, interrupted, log_failed };

@@ -1,17 +1,16 @@
 #include "acquisition/run_resident.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 #include <chrono>
-#include <ctime>
 #include <stdexcept>
 #include <thread>
 #include <vector>
 
+#include "acquisition/excited_actuators.hpp"
 #include "acquisition/slog_format.hpp"
+#include "acquisition/utc_time.hpp"
 
 namespace stageid {
 namespace {
@@ -53,17 +52,18 @@ class ResidentExperiment {
  public:
   ResidentExperiment(const ExperimentPlan& plan, ResidentStage& stage, SlogWriter& log,
                      const RunExperimentOptions& options)
-      : plan_(plan), stage_(stage), log_(log), options_(options) {
-    for (const RunId& run : plan.runs())
-      if (std::find(options.skip.begin(), options.skip.end(), run) == options.skip.end())
-        runs_.push_back(run);
-  }
+      : plan_(plan),
+        stage_(stage),
+        log_(log),
+        options_(options),
+        actuators_(excited_actuators(plan, stage.info())),
+        runs_(plan.runs_without(options.skip)) {}
 
   ExperimentResult perform() {
     result_.end = ExperimentEnd::complete;
     for (const RunId& run : runs_) {
-      if (interrupted()) result_.end = ExperimentEnd::interrupted;
-      if (plant_tripped()) end_with_plant();
+      if (options_.interrupted()) result_.end = ExperimentEnd::interrupted;
+      if (options_.tripped()) end_with_plant();
       if (result_.end != ExperimentEnd::complete) break;
       perform_run(run);
     }
@@ -82,7 +82,7 @@ class ResidentExperiment {
     LogRun run;
     run.realization = id.realization;
     run.experiment = id.experiment;
-    run.started_utc = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+    run.started_utc = utc_now();
     log_.begin_run(run, plan_.excitation(id));
     LogSink sink(log_, stage_.info().actuators.size() + stage_.info().sensors.size());
     try {
@@ -110,12 +110,12 @@ class ResidentExperiment {
     JobProgress progress = stage_.arm(trigger);
     while (progress.status == JobStatus::running) {
       report(id, progress);
-      if (interrupted()) {
+      if (options_.interrupted()) {
         stage_.stop();
         result_.end = ExperimentEnd::interrupted;
         return;
       }
-      if (plant_tripped()) {
+      if (options_.tripped()) {
         stage_.stop();
         end_with_plant();
         return;
@@ -131,17 +131,13 @@ class ResidentExperiment {
 
   Waveforms waveforms_of(RunId id) const {
     const Eigen::MatrixXd excitation = plan_.excitation(id);
-    const std::vector<Channel>& actuators = stage_.info().actuators;
     Waveforms waveforms;
     waveforms.periods = plan_.spec().periods;
     waveforms.transient_periods = plan_.spec().transient_periods;
-    waveforms.samples.setZero(excitation.rows(), static_cast<Eigen::Index>(actuators.size()));
-    for (Eigen::Index column = 0; column < excitation.cols(); ++column) {
-      const std::string& name = plan_.spec().axes[static_cast<std::size_t>(column)].channel;
-      for (std::size_t i = 0; i < actuators.size(); ++i)
-        if (actuators[i].name == name)
-          waveforms.samples.col(static_cast<Eigen::Index>(i)) = excitation.col(column);
-    }
+    waveforms.samples.setZero(excitation.rows(),
+                              static_cast<Eigen::Index>(stage_.info().actuators.size()));
+    for (Eigen::Index axis = 0; axis < excitation.cols(); ++axis)
+      waveforms.samples.col(actuators_[static_cast<std::size_t>(axis)]) = excitation.col(axis);
     return waveforms;
   }
 
@@ -151,19 +147,7 @@ class ResidentExperiment {
     result_.message = std::move(message);
   }
 
-  bool plant_tripped() const noexcept {
-    return options_.plant_tripped != nullptr &&
-           options_.plant_tripped->load(std::memory_order_relaxed);
-  }
-
-  void end_with_plant() {
-    end_with(ExperimentEnd::fault,
-             options_.plant_reason ? options_.plant_reason() : "the plant tripped");
-  }
-
-  bool interrupted() const noexcept {
-    return options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed);
-  }
+  void end_with_plant() { end_with(ExperimentEnd::fault, options_.trip_reason()); }
 
   void report(RunId id, const JobProgress& progress) const {
     if (!options_.progress) return;
@@ -182,6 +166,7 @@ class ResidentExperiment {
   ResidentStage& stage_;
   SlogWriter& log_;
   const RunExperimentOptions& options_;
+  std::vector<int> actuators_;
   std::vector<RunId> runs_;
   ExperimentResult result_;
 };

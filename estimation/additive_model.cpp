@@ -25,6 +25,13 @@ Eigen::VectorXd AdditiveModel::output_delays_s() const {
   return output_delay_s.size() > 0 ? output_delay_s : Eigen::VectorXd::Zero(n_outputs());
 }
 
+double AdditiveModel::mean_delay_s() const {
+  double delay_s = 0.0;
+  if (input_delay_s.size() > 0) delay_s += input_delay_s.mean();
+  if (output_delay_s.size() > 0) delay_s += output_delay_s.mean();
+  return delay_s;
+}
+
 const char* to_string(HoldModel hold) noexcept {
   switch (hold) {
     case HoldModel::none:

@@ -83,6 +83,7 @@ struct AdditiveModel {
   Eigen::Index n_inputs() const noexcept { return static_cast<Eigen::Index>(inputs.size()); }
   Eigen::VectorXd input_delays_s() const;   ///< n_u, also where input_delay_s is empty
   Eigen::VectorXd output_delays_s() const;  ///< n_y
+  double mean_delay_s() const;              ///< from an input to an output, over the channels
 };
 
 /// The model's response on a list of frequencies, (n_y n_u) x N, column k = vec(P(j omega_k)),

@@ -28,11 +28,6 @@ Eigen::VectorXcd complex(const SplitMatrix& column) {
   return column.re.cast<Complex>() + Complex(0.0, 1.0) * column.im.cast<Complex>();
 }
 
-double mean_delay_s(const AdditiveModel& model) {
-  if (model.input_delay_s.size() == 0) return 0.0;
-  return model.input_delay_s.mean() + model.output_delay_s.mean();
-}
-
 /// R of A = Q R by the Cholesky factor of its Gram matrix; A becomes Q. Columns that depend on others to
 /// within 1e-7 are not orthonormal then: a second call, on Q, mends that (Yamamoto et al., ETNA 44
 /// (2015) 306).
@@ -65,12 +60,13 @@ class Relocation {
         exact_(model.hold == HoldModel::exact),
         lines_{frf.omega_rad_s(), frf.sample_rate_hz > 0.0 ? 1.0 / frf.sample_rate_hz : 0.0,
                model.hold} {
-    const LineOperator through(lines_, mean_delay_s(model));
+    const LineOperator through(lines_, model.mean_delay_s());
     x_ = complex(through.x());
     // Delay and hold out of the data: the rest is rational in x.
     const Eigen::VectorXcd factor = complex(through.first());
     H_ = frf.response * factor.cwiseInverse().asDiagonal();
     size_ = factor.cwiseAbs();
+    signal_ = (weights.array() * frf.response.cwiseAbs2().array()).sum();
     for (const Submodel& s : model.submodels) {
       integrators_ = std::max(integrators_, s.integrators);
       constant_ = constant_ || (s.integrators == 0 && s.denominator.size() == 1);
@@ -165,12 +161,8 @@ class Relocation {
     sigma = scale.cwiseProduct(sigma);
     const double d = sigma[n];
     if (!sigma.allFinite() || d == 0.0) return 0.0;
-    accurate_ = squares < kAccurate * kAccurate * signal();
+    accurate_ = squares < kAccurate * kAccurate * signal_;
     return move(zeros_of_sum(poles_, sigma.head(n) / d));
-  }
-
-  double signal() const {
-    return (weights_.array() * (H_.cwiseAbs2() * size_.cwiseAbs2().asDiagonal()).array()).sum();
   }
 
   /// The lower right corner of R, n+1 x n+1, in  sqrt(w) [phi, own | -H phi, -H] = Q R: what remains of
@@ -262,6 +254,7 @@ class Relocation {
   Eigen::VectorXcd x_;
   Eigen::MatrixXcd H_;    // n_c x N
   Eigen::VectorXd size_;  // |G| / |H| on every line
+  double signal_ = 0.0;   // sum w |G|^2
   SplitMatrix own_;
   PoleSet poles_;  // x
 };

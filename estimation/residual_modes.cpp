@@ -52,9 +52,7 @@ Eigen::VectorXcd candidate_function(const Eigen::VectorXd& f, const Eigen::Vecto
 }
 
 Eigen::VectorXcd delay_factor(const FrfEstimate& frf, const AdditiveModel& model) {
-  double delay = model.input_delay_s.size() > 0
-                     ? model.input_delay_s.mean() + model.output_delay_s.mean()
-                     : 0.0;
+  double delay = model.mean_delay_s();
   if (model.hold != HoldModel::none) delay += 0.5 / frf.sample_rate_hz;
   const Eigen::VectorXd omega = frf.omega_rad_s();
   Eigen::VectorXcd out(omega.size());

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <complex>
@@ -146,6 +147,12 @@ std::vector<RunId> ExperimentPlan::runs() const {
     for (int e = 0; e < experiments(); ++e) runs.push_back({m, e});
   }
   return runs;
+}
+
+std::vector<RunId> ExperimentPlan::runs_without(const std::vector<RunId>& done) const {
+  std::vector<RunId> left = runs();
+  std::erase_if(left, [&](RunId run) { return std::ranges::find(done, run) != done.end(); });
+  return left;
 }
 
 long long ExperimentPlan::samples_per_run() const noexcept {

@@ -61,6 +61,8 @@ class ExperimentPlan {
   const ExperimentSpec& spec() const noexcept { return spec_; }
   int experiments() const noexcept { return static_cast<int>(spec_.axes.size()); }
   std::vector<RunId> runs() const;  ///< in the order of measuring: realization by realization
+  /// runs() without those of `done`, for an experiment that is resumed.
+  std::vector<RunId> runs_without(const std::vector<RunId>& done) const;
   long long samples_per_run() const noexcept;
   double duration_s() const noexcept;
 

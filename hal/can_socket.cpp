@@ -15,6 +15,7 @@
 #include <cstring>
 #include <ctime>
 
+#include "hal/pacer.hpp"
 #include "hal/stage.hpp"
 
 namespace stageid {
@@ -122,11 +123,7 @@ const CanBusHealth& SocketCan::health(std::size_t bus) const noexcept {
   return buses_[bus]->health;
 }
 
-std::int64_t SocketCan::now_ns() const noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
-}
+std::int64_t SocketCan::now_ns() const noexcept { return monotonic_ns(); }
 
 std::size_t SocketCan::send(std::span<const CanFrame> frames) noexcept {
   std::size_t sent = 0;

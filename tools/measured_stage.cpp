@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <stdexcept>
 
 #include "acquisition/log_reader.hpp"
@@ -86,14 +85,12 @@ std::unique_ptr<CyclicStage> replayed_stage(const ExperimentConfig& config,
                                             const std::vector<RunId>& skip) {
   if (request.replay.empty())
     throw std::invalid_argument("--backend replay: no log to play; add --replay LOG");
-  std::vector<RunId> runs;
-  for (const RunId run : plan.runs())
-    if (std::find(skip.begin(), skip.end(), run) == skip.end()) runs.push_back(run);
   StageInfo info = config.stage.spec.info;
   info.backend = "replay";
-  return std::make_unique<ReplayStage>(std::move(info),
-                                       std::make_unique<ReplayLog>(open_log(request.replay), runs),
-                                       request.replay_tolerance_n);
+  return std::make_unique<ReplayStage>(
+      std::move(info),
+      std::make_unique<ReplayLog>(open_log(request.replay), plan.runs_without(skip)),
+      request.replay_tolerance_n);
 }
 
 }  // namespace

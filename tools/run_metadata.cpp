@@ -1,10 +1,8 @@
 #include "tools/run_metadata.hpp"
 
-#include <fmt/chrono.h>
-#include <fmt/format.h>
-
-#include <ctime>
 #include <nlohmann/json.hpp>
+
+#include "acquisition/utc_time.hpp"
 
 namespace stageid {
 
@@ -14,7 +12,7 @@ std::string run_metadata(const ExperimentConfig& config, Backend backend, const 
   Json json = {
       {"program", "stageid"},
       {"stageid_version", STAGEID_VERSION},
-      {"started_utc", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},
+      {"started_utc", utc_now()},
       {"backend", to_string(backend)},
       {"measurement_id", config.measurement_id},
       {"seeds", {{"experiment", config.experiment.seed}, {"noise", config.stage.spec.seed}}},

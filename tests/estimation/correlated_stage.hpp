@@ -162,14 +162,4 @@ struct Measurement {
   AdditiveModel start() const { return moved(problem.model, 1.003, 1.2); }
 };
 
-/// Options for that stage.
-inline FitOptions options_with(Weighting weighting) {
-  FitOptions options;
-  options.weighting = weighting;
-  options.hold = HoldModel::exact;
-  options.delay = DelayModel::estimate;
-  options.delay_s = 1.37e-4;
-  return options;
-}
-
 }  // namespace stageid::test

@@ -4,14 +4,15 @@
 
 #include "estimation/fit_additive_model.hpp"
 #include "tests/estimation/covariance_stage.hpp"
+#include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
 namespace {
 
-using test::covariance_options;
 using test::covariance_stage;
 using test::DenseProblem;
 using test::noisy;
+using test::options_with;
 
 constexpr int kRuns = 150;
 // chi^2 of 149 degrees of freedom over its mean lies in here with 99.99 %: 1 +- 3.9 sqrt(2 / 149)
@@ -24,7 +25,7 @@ constexpr double kHighest = 1.52;
 void expect_honest(Weighting weighting, const Eigen::MatrixXd& variance, bool tell_variance) {
   const DenseProblem problem = covariance_stage();
   test::RandomNumbers random(77);
-  FitOptions options = covariance_options(weighting);
+  FitOptions options = options_with(weighting);
   options.threads = 1;
   constexpr Eigen::Index kQuantities = 6;  // f and zeta of three modes
   Eigen::MatrixXd values(kQuantities, kRuns);

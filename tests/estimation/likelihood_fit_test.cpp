@@ -11,6 +11,7 @@
 #include "estimation/fit_additive_model.hpp"
 #include "estimation/joint_equations.hpp"
 #include "tests/estimation/correlated_stage.hpp"
+#include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
 namespace {

@@ -1,14 +1,18 @@
 #pragma once
 
+#include <utility>
+#include <vector>
+
 #include "tests/support/model_fit_problem.hpp"
 #include "tests/support/model_reference.hpp"
 #include "tests/support/random_stage.hpp"
 
 namespace stageid::test {
 
-/// A 2 x 3 stage, rigid body and three modes (two of them 1.5 % apart), relative noise.
-inline DenseProblem noisy_stage(HoldModel hold, double noise, std::uint64_t seed = 1) {
-  RandomNumbers random(seed);
+/// A 2 x 3 stage behind `hold` and, if there is one, 0.137 ms: rigid body, modes {Hz, damping ratio},
+/// random numerators. No response yet.
+inline DenseProblem stage_2x3(HoldModel hold, RandomNumbers& random,
+                              const std::vector<std::pair<double, double>>& modes) {
   DenseProblem problem;
   problem.model = named_model(2, 3);
   problem.hold = hold;
@@ -16,14 +20,21 @@ inline DenseProblem noisy_stage(HoldModel hold, double noise, std::uint64_t seed
     problem.model.sample_rate_hz = 1e4;
     problem.model.input_delay_s.setConstant(1.37e-4);
   }
-  problem.frequency_hz = Eigen::VectorXd::LinSpaced(400, 20.0, 1800.0);
-  problem.model.submodels = {empty_submodel(problem.model, 2, {}, 1),
-                             empty_submodel(problem.model, 0, mode_coefficients(260.0, 0.02), 1),
-                             empty_submodel(problem.model, 0, mode_coefficients(900.0, 0.012), 1),
-                             empty_submodel(problem.model, 0, mode_coefficients(914.0, 0.010), 1)};
+  problem.model.submodels = {empty_submodel(problem.model, 2, {}, 1)};
+  for (const auto& [frequency_hz, damping_ratio] : modes)
+    problem.model.submodels.push_back(
+        empty_submodel(problem.model, 0, mode_coefficients(frequency_hz, damping_ratio), 1));
   for (Submodel& s : problem.model.submodels)
     for (double& value : s.numerator[0].reshaped())
       value = (s.is_mode() ? s.denominator[2] : 1.0) * random.normal();
+  return problem;
+}
+
+/// One with two modes 1.5 % apart, and relative noise.
+inline DenseProblem noisy_stage(HoldModel hold, double noise, std::uint64_t seed = 1) {
+  RandomNumbers random(seed);
+  DenseProblem problem = stage_2x3(hold, random, {{260.0, 0.02}, {900.0, 0.012}, {914.0, 0.010}});
+  problem.frequency_hz = Eigen::VectorXd::LinSpaced(400, 20.0, 1800.0);
   problem.G = reference_response(problem.model, problem.frequency_hz, problem.hold);
   for (std::complex<double>& value : problem.G.reshaped()) value *= 1.0 + noise * random.circular();
   problem.W = problem.G.cwiseAbs2().cwiseInverse();

@@ -10,14 +10,15 @@
 
 #include "estimation/fit_additive_model.hpp"
 #include "tests/estimation/covariance_stage.hpp"
+#include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
 namespace {
 
-using test::covariance_options;
 using test::covariance_stage;
 using test::DenseProblem;
 using test::noisy;
+using test::options_with;
 
 // Dense ----------------------------------------------------------------------------------------------
 
@@ -112,13 +113,13 @@ TEST(Covariance, OfMaximumLikelihoodIsTheInverseFisherMatrix) {
   frf.response = noisy(random, problem, variance);
   frf.noise_variance = variance;
   const FitResult fit =
-      fit_additive_model(frf, problem.model, covariance_options(Weighting::noise_variance));
+      fit_additive_model(frf, problem.model, options_with(Weighting::noise_variance));
   ASSERT_TRUE(fit.trustworthy()) << fit.message;
   expect_dense_uncertainty(problem, fit, problem.W, variance);
   frf.total_variance = variance;
   frf.noise_variance.resize(0, 0);
   const FitResult total =
-      fit_additive_model(frf, problem.model, covariance_options(Weighting::total_variance));
+      fit_additive_model(frf, problem.model, options_with(Weighting::total_variance));
   expect_dense_uncertainty(problem, total, problem.W, variance);
 }
 
@@ -131,7 +132,7 @@ TEST(Covariance, OfOtherWeightsIsTheSandwich) {
   frf.noise_variance = variance;
   for (const Weighting weighting :
        {Weighting::relative, Weighting::inverse_magnitude, Weighting::unit}) {
-    const FitOptions options = covariance_options(weighting);
+    const FitOptions options = options_with(weighting);
     const FitResult fit = fit_additive_model(frf, problem.model, options);
     ASSERT_TRUE(fit.trustworthy()) << fit.message;
     expect_dense_uncertainty(problem, fit, make_weights(frf, options), variance);
@@ -147,7 +148,7 @@ TEST(Covariance, OfOtherWeightsTakesTheTotalVarianceWhereThereIsOne) {
   frf.response = noisy(random, problem, variance);
   frf.noise_variance = 0.1 * variance;
   frf.total_variance = variance;
-  const FitOptions options = covariance_options(Weighting::relative);
+  const FitOptions options = options_with(Weighting::relative);
   const FitResult fit = fit_additive_model(frf, problem.model, options);
   ASSERT_TRUE(fit.trustworthy()) << fit.message;
   expect_dense_uncertainty(problem, fit, make_weights(frf, options), variance);
@@ -163,7 +164,7 @@ TEST(Covariance, OfEstimatedVariancesCountsTheScatterOfTheWeights) {
   frf.noise_dof = 9.0;
   frf.noise_variance = variance;
   for (double& value : frf.noise_variance.reshaped()) value *= random.chi_square_mean(9.0);
-  const FitOptions options = covariance_options(Weighting::noise_variance);
+  const FitOptions options = options_with(Weighting::noise_variance);
   const FitResult fit = fit_additive_model(frf, problem.model, options);
   ASSERT_TRUE(fit.trustworthy()) << fit.message;
   expect_dense_uncertainty(problem, fit, make_weights(frf, options),
@@ -175,8 +176,7 @@ TEST(Covariance, WithoutVariancesIsScaledByTheResidual) {
   test::RandomNumbers random(33);
   FrfEstimate frf = test::frf_of(problem);
   frf.response = noisy(random, problem, 1e-4 * problem.G.cwiseAbs2());
-  const FitResult fit =
-      fit_additive_model(frf, problem.model, covariance_options(Weighting::relative));
+  const FitResult fit = fit_additive_model(frf, problem.model, options_with(Weighting::relative));
   ASSERT_TRUE(fit.trustworthy()) << fit.message;
   const auto N = static_cast<double>(problem.G.cols());
   const double parameters = 4.0 * 6.0 + 6.0 + 1.0;
@@ -193,7 +193,7 @@ TEST(Covariance, IsRaisedAndSaidSoWhereTheModelDoesNotExplainTheData) {
   frf.response = noisy(random, problem, 4.0 * variance);
   frf.noise_variance = variance;  // claims a quarter of what is there
   const FitResult fit =
-      fit_additive_model(frf, problem.model, covariance_options(Weighting::noise_variance));
+      fit_additive_model(frf, problem.model, options_with(Weighting::noise_variance));
   ASSERT_FALSE(fit.decisions.empty());
   EXPECT_THAT(fit.decisions.back(), testing::HasSubstr("does not explain the data"));
   const auto N = static_cast<double>(problem.G.cols());
@@ -229,7 +229,7 @@ TEST(Covariance, CountsTheCorrelationOfTheOutputs) {
   frf.residual_covariance_im.colwise() =  // (2,1) before (1,2): columns are stacked
       Eigen::Vector4d(0.0, -a * b * rho.imag(), a * b * rho.imag(), 0.0);
   const FitResult fit =
-      fit_additive_model(frf, problem.model, covariance_options(Weighting::noise_variance));
+      fit_additive_model(frf, problem.model, options_with(Weighting::noise_variance));
   ASSERT_TRUE(fit.trustworthy()) << fit.message;
 
   DenseProblem at_estimate = problem;
@@ -276,7 +276,7 @@ TEST(Covariance, CountsTheCorrelationOfTheOutputs) {
 
 TEST(Covariance, IsNotComputedUnlessAsked) {
   const DenseProblem problem = covariance_stage();
-  FitOptions options = covariance_options(Weighting::relative);
+  FitOptions options = options_with(Weighting::relative);
   options.uncertainty = false;
   const FitResult fit = fit_additive_model(test::frf_of(problem), problem.model, options);
   EXPECT_EQ(fit.response_variance.size(), 0);

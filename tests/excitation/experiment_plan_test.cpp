@@ -249,6 +249,16 @@ TEST(ExperimentPlan, NamesTheFieldThatIsWrong) {
   expect_refused([](auto& s) { s.scheme = ExcitationScheme::orthogonal_hadamard; }, "2 and 4");
 }
 
+TEST(ExperimentPlan, LeavesOutWhatIsDone) {
+  const ExperimentPlan plan(small_grid(), spec_of(3, ExcitationScheme::single_axis));
+  EXPECT_EQ(plan.runs_without({}), plan.runs());
+  const std::vector<RunId> left = plan.runs_without({{0, 0}, {0, 2}, {7, 7}});
+  ASSERT_EQ(left.size(), plan.runs().size() - 2);
+  EXPECT_EQ(left[0], (RunId{0, 1}));
+  EXPECT_EQ(left[1], (RunId{1, 0}));
+  EXPECT_TRUE(plan.runs_without(plan.runs()).empty());
+}
+
 TEST(ExperimentPlan, RefusesRunsThatItDoesNotHave) {
   const ExperimentPlan plan(small_grid(), spec_of(3, ExcitationScheme::single_axis));
   for (const RunId run : {RunId{3, 0}, RunId{0, 3}, RunId{-1, 0}, RunId{0, -1}}) {

@@ -12,6 +12,7 @@
 #include "hal/modbus_server.hpp"
 #include "hal/stage_node.hpp"
 #include "tests/hal/fake_stage.hpp"
+#include "tests/hal/small_node.hpp"
 #include "tests/support/pty_pair.hpp"
 
 namespace stageid::test {
@@ -68,38 +69,19 @@ class ModbusBench {
   explicit ModbusBench(const std::vector<std::string>& faults = {}, bool serial = false,
                        double heartbeat_s = 1.0, NodePanel panel = good_panel())
       : script_(modbus_faults(faults)),
-        node_(make_stage(&fake), limits(), controller(), std::move(panel), {10.0, 0.01}),
+        node_(make_stage(&fake), limits(), one_axis_controller(50.0, 1.0, 1.0), std::move(panel),
+              {10.0, 0.01}),
         registers_(node_, limits(), kBootId, &script_, heartbeat_s),
         server_(std::make_unique<ServerThread>(registers_, &script_, serial)) {}
 
   static constexpr std::uint32_t kBootId = 4711;
 
-  static NodePanel good_panel() {
-    NodePanel panel;
-    panel.gravity_compensator_n = {50.0, 51.5};
-    panel.gravity_low_n = 40.0;
-    panel.gravity_high_n = 60.0;
-    panel.temperature_k = {295.25};
-    panel.temperature_high_k = 320.0;
-    return panel;
-  }
   static StageInfo info() { return FakeStage(2, 1, 50.0).info(); }
   static StageLimits limits() {
     StageLimits limits;
     limits.actuator_n = Eigen::Vector2d(10.0, 10.0);
     limits.position_window_m = Eigen::VectorXd::Constant(1, 1e-2);
     return limits;
-  }
-  static MotionControllerSpec controller() {
-    MotionControllerSpec spec;
-    spec.sample_rate_hz = 50.0;
-    spec.sensor_decoupling = Eigen::MatrixXd::Ones(1, 1);
-    spec.actuator_decoupling = Eigen::MatrixXd::Identity(2, 1);
-    AxisController axis;
-    axis.crossover_hz = 1.0;
-    axis.gain = 1.0;
-    spec.axes = {axis};
-    return spec;
   }
 
   ModbusAddress address() const { return server_->address(); }

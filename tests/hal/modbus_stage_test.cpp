@@ -156,7 +156,7 @@ TEST(ModbusStage, StartsOnNothingButItsOwnStage) {
 }
 
 TEST(ModbusStage, SaysWhyAStageDoesNotStart) {
-  NodePanel panel = ModbusBench::good_panel();
+  NodePanel panel = test::good_panel();
   panel.interlock_closed = false;
   EXPECT_THAT(refusal(ModbusBench({}, false, 1.0, panel)), HasSubstr("the interlock is open"));
 
@@ -201,7 +201,7 @@ TEST(ModbusNode, OnlyANewerSetpointMovesTheStage) {
 }
 
 TEST(ModbusNode, RefusesWhatTheMapCannotShow) {
-  NodePanel panel = ModbusBench::good_panel();
+  NodePanel panel = test::good_panel();
   panel.temperature_k.assign(9, 295.0);
   EXPECT_THROW(ModbusBench({}, false, 1.0, panel), std::invalid_argument);
   panel.temperature_k.clear();

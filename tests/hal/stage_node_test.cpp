@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/hal/fake_stage.hpp"
+#include "tests/hal/small_node.hpp"
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
@@ -18,27 +19,9 @@ constexpr double kRate_hz = 1e3;
 constexpr std::int64_t kMs_ns = 1'000'000;
 constexpr double kGain_n_per_m = 100.0;
 
-/// u = -100 N/m (1 + 3 Hz integrator) y of the one sensor, on the first of two actuators.
+/// u = -100 N/m (1 + 3 Hz integrator) y.
 MotionControllerSpec controller() {
-  MotionControllerSpec spec;
-  spec.sample_rate_hz = kRate_hz;
-  spec.sensor_decoupling = Eigen::MatrixXd::Ones(1, 1);
-  spec.actuator_decoupling = Eigen::MatrixXd::Identity(2, 1);
-  AxisController axis;
-  axis.crossover_hz = 10.0;
-  axis.gain = kGain_n_per_m;
-  spec.axes = {axis};
-  return spec;
-}
-
-NodePanel panel() {
-  NodePanel panel;
-  panel.gravity_compensator_n = {50.0, 51.0};
-  panel.gravity_low_n = 40.0;
-  panel.gravity_high_n = 60.0;
-  panel.temperature_k = {295.0};
-  panel.temperature_high_k = 320.0;
-  return panel;
+  return test::one_axis_controller(kRate_hz, 10.0, kGain_n_per_m);
 }
 
 class StageNodeTest : public testing::Test {
@@ -52,7 +35,8 @@ class StageNodeTest : public testing::Test {
     NodeOptions options;
     options.watchdog_s = 0.02;
     options.hold_s = 0.1;
-    node_ = std::make_unique<StageNode>(std::move(fake), limits, controller(), panel(), options);
+    node_ = std::make_unique<StageNode>(std::move(fake), limits, controller(), test::good_panel(),
+                                        options);
     inputs_.y = y_;
   }
   void measure() {
@@ -185,14 +169,14 @@ TEST_F(StageNodeTest, AFaultOfTheStageCutsPowerWithoutHolding) {
 
 TEST_F(StageNodeTest, ThePanelMustBeInRange) {
   const auto refused = [&](auto change, FaultCause cause, const char* message) {
-    NodePanel bad = panel();
+    NodePanel bad = test::good_panel();
     change(bad);
     node_->set_panel(bad);
     const SupervisorReply reply = node_->request(SupervisorCommand::enable);
     EXPECT_FALSE(reply.accepted);
     EXPECT_EQ(reply.message, message);
     EXPECT_FALSE(node_->request(SupervisorCommand::reset_fault).accepted);
-    node_->set_panel(panel());
+    node_->set_panel(test::good_panel());
     measure();
     node_->set_panel(bad);
     tick_for(1);
@@ -200,7 +184,7 @@ TEST_F(StageNodeTest, ThePanelMustBeInRange) {
     EXPECT_EQ(node_->trouble(), message);
     tick_for(120);
     EXPECT_EQ(node_->state(), NodeState::fault);
-    node_->set_panel(panel());
+    node_->set_panel(test::good_panel());
     EXPECT_TRUE(node_->request(SupervisorCommand::reset_fault).accepted);
   };
   refused([](NodePanel& p) { p.interlock_closed = false; }, FaultCause::interlock,
