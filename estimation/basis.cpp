@@ -4,58 +4,12 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "estimation/hold_integral.hpp"
+#include "estimation/partial_fractions.hpp"
 
 namespace stageid {
 namespace {
 
 using Complex = std::complex<double>;
-
-/// A pole of a rational function with its fractions on the lines.
-struct Pole {
-  Complex lambda = 0.0;
-  Fractions fractions;
-};
-
-/// How often each pole of s^power / (s^l A^times) stands there: the origin first, then the roots.
-struct PartialFractions {
-  const std::vector<Pole>& poles;  // [0] is the origin
-  int origin_multiplicity;
-  int root_multiplicity;
-  int power;
-  double leading;  // coefficient of the highest power of s^l A^times
-
-  int multiplicity(std::size_t r) const { return r == 0 ? origin_multiplicity : root_multiplicity; }
-
-  /// (s - lambda_r)^multiplicity F(s) at s = lambda_r, and its derivative.
-  std::pair<Complex, Complex> cofactor(std::size_t r) const {
-    const Complex s = poles[r].lambda;
-    Complex value = std::pow(s, power) / leading;
-    Complex slope = power > 0 ? static_cast<double>(power) / s : Complex(0.0);
-    for (std::size_t o = 0; o < poles.size(); ++o) {
-      const int times = multiplicity(o);
-      if (o == r || times == 0) continue;
-      const Complex distance = s - poles[o].lambda;
-      value /= times == 1 ? distance : distance * distance;
-      slope -= static_cast<double>(times) / distance;
-    }
-    return {value, value * slope};
-  }
-
-  template <typename Add>
-  void for_each(Add&& add) const {
-    for (std::size_t r = 0; r < poles.size(); ++r) {
-      const int times = multiplicity(r);
-      if (times == 0) continue;
-      const auto [value, slope] = cofactor(r);
-      if (times == 1) {
-        add(r, value, Complex(0.0));
-      } else {
-        add(r, slope, value);  // slope / (s - lambda) + value / (s - lambda)^2
-      }
-    }
-  }
-};
 
 /// out's column += factor x
 void add(Complex factor, const SplitMatrix& x, SplitMatrix& out, Eigen::Index column) {
@@ -99,12 +53,11 @@ void evaluate_basis(const LineOperator& through, const SubmodelShape& shape,
   if (shape.numerator_degree > n + l) throw std::invalid_argument("model: a submodel is improper");
   if (l > 2) throw std::invalid_argument("model: at most two integrators in a submodel");
 
-  std::vector<Pole> poles(1);  // [0]: the origin
-  if (l > 0) through.fractions(Complex(0.0), {true, wanted.delay}, poles[0].fractions);
-  for (const Complex lambda : roots(a)) {
-    poles.push_back({lambda, {}});
-    through.fractions(lambda, {wanted.gradient, wanted.delay}, poles.back().fractions);
-  }
+  std::vector<Complex> poles(1);  // [0]: the origin
+  for (const Complex lambda : roots(a)) poles.push_back(lambda);
+  std::vector<Fractions> fractions(poles.size());
+  for (std::size_t r = l > 0 ? 0 : 1; r < poles.size(); ++r)
+    through.fractions(poles[r], {r == 0 || wanted.gradient, wanted.delay}, fractions[r]);
   const double highest = n > 0 ? a[n - 1] : 1.0;
 
   out.value.set_zero(N, shape.functions());
@@ -116,7 +69,7 @@ void evaluate_basis(const LineOperator& through, const SubmodelShape& shape,
     const int cancelled = std::min(m, l);
     const PartialFractions value{poles, l - cancelled, 1, m - cancelled, highest};
     value.for_each([&](std::size_t r, Complex simple, Complex squared) {
-      const Fractions& f = poles[r].fractions;
+      const Fractions& f = fractions[r];
       add(simple, f.simple, out.value, m);
       if (squared != 0.0) add(squared, f.squared, out.value, m);
       if (!wanted.delay) return;
@@ -133,8 +86,8 @@ void evaluate_basis(const LineOperator& through, const SubmodelShape& shape,
       const PartialFractions slope{poles, l - gone, 2, m + q - gone, highest * highest};
       const Eigen::Index column = m * n + q - 1;
       slope.for_each([&](std::size_t r, Complex simple, Complex squared) {
-        add(-simple, poles[r].fractions.simple, out.gradient, column);
-        if (squared != 0.0) add(-squared, poles[r].fractions.squared, out.gradient, column);
+        add(-simple, fractions[r].simple, out.gradient, column);
+        if (squared != 0.0) add(-squared, fractions[r].squared, out.gradient, column);
       });
       if (m + q == 2 * n + l)
         add(-1.0 / (highest * highest), through.constant(), out.gradient, column);

@@ -91,6 +91,9 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
   parallel_tasks(static_cast<int>(groups.size()), problem.threads, [&](int g) {
     BasisGroup& group = groups[static_cast<std::size_t>(g)];
     const LineOperator through(problem.lines, group.delay_s);
+    if (static_cast<Eigen::Index>(group.channels.size()) >= kFewChannels)
+      group.fractions = fraction_columns(through, problem.lines.omega_rad_s.maxCoeff(),
+                                         problem.shapes, beta.a, with_derivatives);
     const WantedBasis wanted{with_derivatives, with_derivatives && problem.delays() > 0};
     group.F_re.resize(N, problem.functions());
     group.F_im.resize(N, problem.functions());

@@ -5,6 +5,7 @@
 
 #include "estimation/basis.hpp"
 #include "estimation/fit_options.hpp"
+#include "estimation/fraction_columns.hpp"
 #include "frf/frf_estimate.hpp"
 
 namespace stageid {
@@ -46,6 +47,9 @@ struct FitParameters {
   Eigen::MatrixXd B;               ///< n_c x n_f
 };
 
+/// Groups of fewer channels: what channels share costs more than it saves.
+constexpr Eigen::Index kFewChannels = 16;
+
 /// Channels that share one delay, and the functions that they see.
 struct BasisGroup {
   double delay_s = 0.0;
@@ -56,6 +60,7 @@ struct BasisGroup {
   Eigen::MatrixXd D_im;
   Eigen::MatrixXd T_re;  ///< N x n_f: derivative to the delay; empty unless delays are free
   Eigen::MatrixXd T_im;
+  FractionColumns fractions;  ///< of groups of kFewChannels and more
 };
 
 /// What column of D belongs to what: dF_function / da_parameter.

@@ -20,16 +20,9 @@ void fill_polar(Eigen::Index lines, const Angle& angle, SplitMatrix& out) {
   }
 }
 
-/// out = a b on every line.
-void multiply(const SplitMatrix& a, const SplitMatrix& b, SplitMatrix& out) {
-  out.resize(a.re.rows(), 1);
-  out.re = a.re.cwiseProduct(b.re) - a.im.cwiseProduct(b.im);
-  out.im = a.re.cwiseProduct(b.im) + a.im.cwiseProduct(b.re);
-}
-
 /// out = first (c0 + c1 q + c2 q^2) on every line.
-void polynomial(const SplitMatrix& first, const SplitMatrix& q, Complex c0, Complex c1, Complex c2,
-                SplitMatrix& out) {
+void polynomial(const SplitMatrix& first, const SplitMatrix& q,
+                const FractionExpansion::Coefficients& c, SplitMatrix& out) {
   const Eigen::Index lines = q.re.rows();
   out.resize(lines, 1);
   const auto q_re = q.re.col(0).array();
@@ -37,22 +30,12 @@ void polynomial(const SplitMatrix& first, const SplitMatrix& q, Complex c0, Comp
   const auto f_re = first.re.col(0).array();
   const auto f_im = first.im.col(0).array();
   // Horner: c1 + c2 q, then c0 + q (...).
-  const auto i_re = c1.real() + c2.real() * q_re - c2.imag() * q_im;
-  const auto i_im = c1.imag() + c2.real() * q_im + c2.imag() * q_re;
-  const auto p_re = c0.real() + q_re * i_re - q_im * i_im;
-  const auto p_im = c0.imag() + q_re * i_im + q_im * i_re;
+  const auto i_re = c[1].real() + c[2].real() * q_re - c[2].imag() * q_im;
+  const auto i_im = c[1].imag() + c[2].real() * q_im + c[2].imag() * q_re;
+  const auto p_re = c[0].real() + q_re * i_re - q_im * i_im;
+  const auto p_im = c[0].imag() + q_re * i_im + q_im * i_re;
   out.re.col(0) = (f_re * p_re - f_im * p_im).matrix();
   out.im.col(0) = (f_re * p_im + f_im * p_re).matrix();
-}
-
-/// out = 1 / (z - pole) on every line.
-void reciprocal(const SplitMatrix& z, Complex pole, SplitMatrix& out) {
-  out.resize(z.re.rows(), 1);
-  const auto re = z.re.col(0).array() - pole.real();
-  const auto im = z.im.col(0).array() - pole.imag();
-  const auto scale = (re * re + im * im).inverse();
-  out.re.col(0) = (re * scale).matrix();
-  out.im.col(0) = (-im * scale).matrix();
 }
 
 }  // namespace
@@ -94,47 +77,54 @@ LineOperator::LineOperator(const ModelLines& lines, double delay_s)
   constant_delay_.im = -z_.im.cwiseProduct(first_.re);
 }
 
+std::complex<double> LineOperator::place(Complex lambda) const {
+  return exact_ ? std::exp(lambda * period_s_) : lambda;
+}
+
+std::complex<double> LineOperator::place_slope(Complex lambda) const {
+  return exact_ ? period_s_ * std::exp(lambda * period_s_) : Complex(1.0);
+}
+
+void LineOperator::reciprocal(Complex lambda, SplitMatrix& q) const {
+  const Complex pole = place(lambda);
+  q.resize(z_.re.rows(), 1);
+  const auto re = z_.re.col(0).array() - pole.real();
+  const auto im = z_.im.col(0).array() - pole.imag();
+  const auto scale = (re * re + im * im).inverse();
+  q.re.col(0) = (re * scale).matrix();
+  q.im.col(0) = (-im * scale).matrix();
+}
+
 void LineOperator::fractions(Complex lambda, Wanted wanted, Fractions& out) const {
-  if (exact_)
-    sampled(lambda, wanted, out);
-  else
-    continuous(lambda, wanted, out);
+  SplitMatrix q;
+  reciprocal(lambda, q);
+  const FractionExpansion c = expansion(lambda);
+  polynomial(first_, q, c.simple, out.simple);
+  if (wanted.squares) polynomial(first_, q, c.squared, out.squared);
+  if (wanted.delay) polynomial(first_, q, c.simple_delay, out.simple_delay);
+  if (wanted.squares && wanted.delay) polynomial(first_, q, c.squared_delay, out.squared_delay);
 }
 
-void LineOperator::continuous(Complex lambda, Wanted wanted, Fractions& out) const {
-  SplitMatrix inverse;
-  reciprocal(z_, lambda, inverse);
-  multiply(first_, inverse, out.simple);
-  if (wanted.squares) multiply(out.simple, inverse, out.squared);
-  if (!wanted.delay) return;
-  // d/d delay: times -j omega.
-  const auto delayed = [&](const SplitMatrix& x, SplitMatrix& slope) {
-    slope.resize(x.re.rows(), 1);
-    slope.re = z_.im.cwiseProduct(x.im);
-    slope.im = -z_.im.cwiseProduct(x.re);
-  };
-  delayed(out.simple, out.simple_delay);
-  if (wanted.squares) delayed(out.squared, out.squared_delay);
-}
-
-void LineOperator::sampled(Complex lambda, Wanted wanted, Fractions& out) const {
+FractionExpansion LineOperator::expansion(Complex lambda) const {
+  FractionExpansion c;
+  if (!exact_) {
+    c.simple = {0.0, 1.0, 0.0};
+    c.squared = {0.0, 0.0, 1.0};
+    c.simple_delay = {-1.0, -lambda, 0.0};  // times -s, and s q = 1 + lambda q
+    c.squared_delay = {0.0, -1.0, -lambda};
+    return c;
+  }
   const HoldIntegral whole = hold_integral(lambda, period_s_);
   const HoldIntegral part = hold_integral(lambda, rest_s_);
-  const Complex E = std::exp(lambda * period_s_);
   const Complex e1 = std::exp(lambda * rest_s_);
-  SplitMatrix q;  // z^-1 / (1 - E z^-1)
-  reciprocal(z_, E, q);
-  polynomial(first_, q, part.value, whole.value * e1, 0.0, out.simple);
-  const Complex square = whole.value * e1 * period_s_ * E;
-  if (wanted.squares)
-    polynomial(first_, q, part.derivative, whole.derivative * e1 + whole.value * rest_s_ * e1,
-               square, out.squared);
-  if (!wanted.delay) return;
-  polynomial(first_, q, -e1, -e1 * lambda * whole.value, 0.0, out.simple_delay);
-  if (!wanted.squares) return;
-  // d/dlambda of simple_delay
+  const Complex square = whole.value * e1 * place_slope(lambda);
+  // d/dlambda of simple, and of simple_delay
   const Complex slope = rest_s_ * lambda * whole.value + whole.value + lambda * whole.derivative;
-  polynomial(first_, q, -e1 * rest_s_, -e1 * slope, -lambda * square, out.squared_delay);
+  c.simple = {part.value, whole.value * e1, 0.0};
+  c.squared = {part.derivative, whole.derivative * e1 + whole.value * rest_s_ * e1, square};
+  c.simple_delay = {-e1, -e1 * lambda * whole.value, 0.0};
+  c.squared_delay = {-e1 * rest_s_, -e1 * slope, -lambda * square};
+  return c;
 }
 
 }  // namespace stageid

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <complex>
 
 #include "estimation/additive_model.hpp"
@@ -43,6 +44,15 @@ struct Fractions {
   SplitMatrix squared_delay;  ///< N x 1
 };
 
+/// What a Fractions column is made of: first() (c[0] + c[1] q + c[2] q^2), q = 1/(x - x_lambda).
+struct FractionExpansion {
+  using Coefficients = std::array<std::complex<double>, 3>;
+  Coefficients simple = {};
+  Coefficients squared = {};
+  Coefficients simple_delay = {};
+  Coefficients squared_delay = {};
+};
+
 /// Hold, delay and sampler on given lines: everything that all poles share.
 ///
 /// Hold, delay and sampler act on each fraction 1/(s - lambda) and 1/(s - lambda)^2 in closed form
@@ -61,9 +71,16 @@ class LineOperator {
     bool delay = false;
   };
   void fractions(std::complex<double> lambda, Wanted wanted, Fractions& out) const;
+  FractionExpansion expansion(std::complex<double> lambda) const;
+  /// A pole's place x_lambda: e^{lambda T} or lambda; and its derivative to lambda.
+  std::complex<double> place(std::complex<double> lambda) const;
+  std::complex<double> place_slope(std::complex<double> lambda) const;
+  /// q = 1/(x - x_lambda) on every line, N x 1.
+  void reciprocal(std::complex<double> lambda, SplitMatrix& q) const;
 
   /// The variable x in which sampled functions are rational, z or s, on every line; and the factor
   /// beside it: whole delays, or delay and hold. N x 1.
+  bool exact() const noexcept { return exact_; }
   const SplitMatrix& x() const noexcept { return z_; }
   const SplitMatrix& first() const noexcept { return first_; }
 
@@ -72,9 +89,6 @@ class LineOperator {
   const SplitMatrix& constant_delay() const noexcept { return constant_delay_; }
 
  private:
-  void continuous(std::complex<double> lambda, Wanted wanted, Fractions& out) const;
-  void sampled(std::complex<double> lambda, Wanted wanted, Fractions& out) const;
-
   bool exact_;
   double period_s_;
   double rest_s_ = 0.0;  // (1 - f) T

@@ -1,18 +1,44 @@
 #include "estimation/line_sums.hpp"
 
 #include <complex>
+#include <map>
 
 namespace stageid {
 namespace {
 
+/// Which products a group's sums need.
+struct Products {
+  Products(const FitProblem& problem, const BasisGroup& group,
+           const std::vector<DerivativeColumn>& columns)
+      : FF(group.fractions, group.fractions.F, group.fractions.F,
+           triangular_pairs(problem.functions())),
+        FD(group.fractions, group.fractions.F, group.fractions.D,
+           all_pairs(problem.functions(), static_cast<Eigen::Index>(columns.size()))),
+        FY(group.fractions, group.fractions.F, group.fractions.Y,
+           all_pairs(problem.functions(), problem.denominators())),
+        DD(group.fractions, group.fractions.D, group.fractions.D,
+           triangular_pairs(static_cast<Eigen::Index>(columns.size()))) {
+    for (const auto& [l, r] : DD.direct()) {
+      const Eigen::Index f = columns[static_cast<std::size_t>(l)].function;
+      const Eigen::Index g = columns[static_cast<std::size_t>(r)].function;
+      functions[{f, g}].push_back({l, r});
+    }
+  }
+
+  PairReduction FF, FD, FY, DD;
+  /// The direct pairs of DD by the functions that they are derivatives of.
+  std::map<std::pair<Eigen::Index, Eigen::Index>, std::vector<ColumnPair>> functions;
+};
+
 /// The sums of one share of channels and lines, tile by tile.
 class Share {
  public:
-  Share(const FitProblem& problem, const BasisGroup& group, const Eigen::MatrixXd& B,
-        const std::vector<DerivativeColumn>& columns, const ComplexColumns* Y, FitMethod method,
-        const TileRange& range)
+  Share(const FitProblem& problem, const BasisGroup& group, const Products& products,
+        const Eigen::MatrixXd& B, const std::vector<DerivativeColumn>& columns,
+        const ComplexColumns* Y, FitMethod method, const TileRange& range)
       : problem_(problem),
         group_(group),
+        products_(products),
         B_(B),
         columns_(columns),
         Y_(Y),
@@ -20,18 +46,11 @@ class Share {
         range_(range),
         n_f_(problem.functions()),
         n_a_(problem.denominators()),
-        n_d_(static_cast<Eigen::Index>(columns.size())),
-        triangle_(triangular_pairs(n_f_)),
-        derivatives_(all_pairs(n_f_, n_d_)),
-        errors_(all_pairs(n_f_, n_a_)) {
-    BB_.resize(range.members, static_cast<Eigen::Index>(triangle_.size()));
-    for (std::size_t p = 0; p < triangle_.size(); ++p)
-      BB_.col(static_cast<Eigen::Index>(p)) =
-          B_.col(triangle_[p].left).cwiseProduct(B_.col(triangle_[p].right));
-    of_function_.resize(static_cast<std::size_t>(n_f_));
-    for (Eigen::Index d = 0; d < n_d_; ++d)
-      of_function_[static_cast<std::size_t>(columns[static_cast<std::size_t>(d)].function)]
-          .push_back(d);
+        n_d_(static_cast<Eigen::Index>(columns.size())) {
+    BB_.resize(range.members, static_cast<Eigen::Index>(products.functions.size()));
+    Eigen::Index p = 0;
+    for (const auto& [functions, pairs] : products.functions)
+      BB_.col(p++) = B_.col(functions.first).cwiseProduct(B_.col(functions.second));
     clear();
   }
 
@@ -45,6 +64,7 @@ class Share {
             W_.cwiseProduct(WE_re_.cwiseAbs2() + WE_im_.cwiseAbs2()).colwise().sum().transpose();
       WE_re_.array() *= W_.array();
       WE_im_.array() *= W_.array();
+      add_fractions();
       add_numerators();
       add_denominators();
       if (problem_.delays() > 0) add_delays();
@@ -55,12 +75,20 @@ class Share {
  private:
   void clear() {
     const Eigen::Index members = range_.members;
-    sums_.FF.setZero(static_cast<Eigen::Index>(triangle_.size()), members);
-    sums_.FD.setZero(n_f_ * n_d_, members);
+    const auto direct = [&](const PairReduction& pairs, Eigen::MatrixXd& sums) {
+      sums.setZero(static_cast<Eigen::Index>(pairs.direct().size()), members);
+    };
+    direct(products_.FF, sums_.FF);
+    direct(products_.FD, sums_.FD);
+    sums_.S.setZero(members, group_.fractions.base.cols());
     sums_.FE.setZero(n_f_, members);
     sums_.DD.setZero(n_d_, n_d_);
     sums_.ZE.setZero(n_a_);
-    if (Y_ != nullptr) sums_.FY.setZero(n_f_ * n_a_, members);
+    if (Y_ != nullptr) {
+      direct(products_.FY, sums_.FY);
+      sums_.S_re.setZero(members, simple_columns());
+      sums_.S_im = sums_.S_re;
+    }
     if (Y_ != nullptr) sums_.ZY.setZero(n_a_, n_a_);
     if (method_ == FitMethod::sk) sums_.YY.setZero(n_a_, n_a_);
     if (method_ == FitMethod::sk) sums_.YE.setZero(n_a_);
@@ -74,11 +102,31 @@ class Share {
 
   auto tile(const Eigen::MatrixXd& columns) const { return columns.middleRows(first_, n_); }
 
+  Eigen::Index simple_columns() const {
+    return group_.fractions.pairs() > 0 ? group_.fractions.simple_columns() : 0;
+  }
+
+  void add_fractions() {
+    const FractionColumns& fractions = group_.fractions;
+    if (fractions.pairs() == 0) return;
+    const Eigen::VectorXd re = tile(fractions.first.re);
+    const Eigen::VectorXd im = tile(fractions.first.im);
+    const Eigen::MatrixXd W = W_ * (re.cwiseAbs2() + im.cwiseAbs2()).asDiagonal();
+    sums_.S.noalias() += W * tile(fractions.base);
+    if (Y_ == nullptr) return;
+    const auto base = fractions.base.block(first_, 0, n_, simple_columns());
+    const Eigen::MatrixXd V_re = WE_re_ * re.asDiagonal() + WE_im_ * im.asDiagonal();
+    const Eigen::MatrixXd V_im = WE_im_ * re.asDiagonal() - WE_re_ * im.asDiagonal();
+    sums_.S_re.noalias() += V_re * base;
+    sums_.S_im.noalias() += V_im * base;
+  }
+
   void add_numerators() {
     const ComplexColumns F{group_.F_re, group_.F_im};
-    add_pair_sums(W_, F, F, triangle_, first_, sums_.FF);
-    add_pair_sums(W_, F, {group_.D_re, group_.D_im}, derivatives_, first_, sums_.FD);
-    if (Y_ != nullptr) add_pair_sums(WE_re_, WE_im_, F, *Y_, errors_, first_, sums_.FY);
+    add_pair_sums(W_, F, F, products_.FF.direct(), first_, sums_.FF);
+    add_pair_sums(W_, F, {group_.D_re, group_.D_im}, products_.FD.direct(), first_, sums_.FD);
+    if (Y_ != nullptr)
+      add_pair_sums(WE_re_, WE_im_, F, *Y_, products_.FY.direct(), first_, sums_.FY);
     sums_.FE.noalias() += tile(group_.F_re).transpose() * WE_re_.transpose();
     sums_.FE.noalias() += tile(group_.F_im).transpose() * WE_im_.transpose();
   }
@@ -113,16 +161,18 @@ class Share {
     const Eigen::MatrixXd weight = W_.transpose() * BB_;
     Eigen::VectorXd re(n_);
     Eigen::VectorXd im(n_);
-    for (std::size_t p = 0; p < triangle_.size(); ++p) {
-      const auto [f, g] = triangle_[p];
-      for (const Eigen::Index l : of_function_[static_cast<std::size_t>(f)]) {
-        const auto w = weight.col(static_cast<Eigen::Index>(p));
-        re = w.cwiseProduct(group_.D_re.col(l).segment(first_, n_));
-        im = w.cwiseProduct(group_.D_im.col(l).segment(first_, n_));
-        for (const Eigen::Index r : of_function_[static_cast<std::size_t>(g)])
-          if (l >= r)
-            sums_.DD(l, r) += re.dot(group_.D_re.col(r).segment(first_, n_)) +
-                              im.dot(group_.D_im.col(r).segment(first_, n_));
+    Eigen::Index p = 0;
+    for (const auto& [functions, pairs] : products_.functions) {
+      const auto w = weight.col(p++);
+      Eigen::Index weighted = -1;
+      for (const auto& [l, r] : pairs) {
+        if (weighted != l) {
+          re = w.cwiseProduct(group_.D_re.col(l).segment(first_, n_));
+          im = w.cwiseProduct(group_.D_im.col(l).segment(first_, n_));
+          weighted = l;
+        }
+        sums_.DD(l, r) += re.dot(group_.D_re.col(r).segment(first_, n_)) +
+                          im.dot(group_.D_im.col(r).segment(first_, n_));
       }
     }
   }
@@ -147,15 +197,14 @@ class Share {
 
   const FitProblem& problem_;
   const BasisGroup& group_;
+  const Products& products_;
   const Eigen::MatrixXd& B_;
   const std::vector<DerivativeColumn>& columns_;
   const ComplexColumns* Y_;
   FitMethod method_;
   TileRange range_;
   Eigen::Index n_f_, n_a_, n_d_;
-  std::vector<ColumnPair> triangle_, derivatives_, errors_;
-  std::vector<std::vector<Eigen::Index>> of_function_;
-  Eigen::MatrixXd BB_;  // members x triangle
+  Eigen::MatrixXd BB_;  // members x pairs of functions with direct products of derivatives
   Eigen::Index first_ = 0, n_ = 0;
   DataTile data_;
   Eigen::MatrixXd& W_ = data_.W;
@@ -164,6 +213,22 @@ class Share {
   Eigen::VectorXd power_;
   LineSums sums_;
 };
+
+/// What was left to fractions goes where it belongs.
+void expand(const Products& products, const std::vector<DerivativeColumn>& columns,
+            const Eigen::MatrixXd& B, LineSums& sums) {
+  sums.FF = products.FF.expand(sums.S, sums.FF);
+  sums.FD = products.FD.expand(sums.S, sums.FD);
+  if (sums.FY.cols() > 0) sums.FY = products.FY.expand(sums.S_re, sums.S_im, sums.FY);
+  const std::vector<ColumnPair>& pairs = products.DD.pairs();
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    if (!products.DD.is_reduced(p)) continue;
+    const auto [l, r] = pairs[p];
+    const auto left = B.col(columns[static_cast<std::size_t>(l)].function);
+    const auto right = B.col(columns[static_cast<std::size_t>(r)].function);
+    sums.DD(l, r) += products.DD.sum(p, sums.S).dot(left.cwiseProduct(right));
+  }
+}
 
 }  // namespace
 
@@ -182,6 +247,9 @@ LineSums& LineSums::operator+=(const LineSums& other) {
   TY += other.TY;
   TT += other.TT;
   TE += other.TE;
+  S += other.S;
+  S_re += other.S_re;
+  S_im += other.S_im;
   return *this;
 }
 
@@ -189,21 +257,22 @@ void equation_error_columns(const FitProblem& problem, const FitParameters& beta
                             Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
   re.resize(problem.size(), problem.denominators());
   im.resize(problem.size(), problem.denominators());
+  const LineOperator through(problem.lines, 0.0);
   Eigen::Index column = 0;
-  for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
-    const Eigen::VectorXd& a = beta.a[i];
-    for (Eigen::Index k = 0; k < problem.size(); ++k) {
-      const std::complex<double> s(0.0, problem.lines.omega_rad_s[k]);
-      std::complex<double> A = 0.0;
-      for (Eigen::Index q = a.size(); q > 0; --q) A = (A + a[q - 1]) * s;
-      A += 1.0;
-      std::complex<double> power = 1.0 / A;
-      for (Eigen::Index q = 0; q < a.size(); ++q) {
-        power *= s;
-        re(k, column + q) = power.real();
-        im(k, column + q) = power.imag();
+  SplitMatrix fraction;
+  for (const Eigen::VectorXd& a : beta.a) {
+    re.middleCols(column, a.size()).setZero();
+    im.middleCols(column, a.size()).setZero();
+    for (const std::complex<double> lambda : roots(a)) {
+      through.reciprocal(lambda, fraction);
+      for (Eigen::Index q = 1; q <= a.size(); ++q) {
+        const std::complex<double> c = equation_error_residue(through, a, lambda, q);
+        re.col(column + q - 1) += c.real() * fraction.re - c.imag() * fraction.im;
+        im.col(column + q - 1) += c.real() * fraction.im + c.imag() * fraction.re;
       }
     }
+    if (!through.exact() && a.size() > 0)
+      re.col(column + a.size() - 1).array() += 1.0 / a[a.size() - 1];
     column += a.size();
   }
 }
@@ -211,9 +280,12 @@ void equation_error_columns(const FitProblem& problem, const FitParameters& beta
 LineSums line_sums(const FitProblem& problem, const BasisGroup& group, const TileRange& block,
                    const Eigen::MatrixXd& B, const std::vector<DerivativeColumn>& columns,
                    const ComplexColumns* Y, FitMethod method) {
-  return sum_over_shares<LineSums>(block, problem.threads, [&](const TileRange& share) {
-    return Share(problem, group, B, columns, Y, method, share).run();
+  const Products products(problem, group, columns);
+  LineSums sums = sum_over_shares<LineSums>(block, problem.threads, [&](const TileRange& share) {
+    return Share(problem, group, products, B, columns, Y, method, share).run();
   });
+  expand(products, columns, B, sums);
+  return sums;
 }
 
 }  // namespace stageid

@@ -43,9 +43,11 @@ void add_weighted_gradient(const BasisGroup& group, Eigen::Index first, const Da
 /// What the normal equations of a block's channels are made of; a column is a channel.
 struct GramSums {
   Eigen::MatrixXd FF;  ///< triangle x members: sum W Re{conj(F_i) F_j}
+  Eigen::MatrixXd S;   ///< members x base columns: sum W |first|^2 base; see PairReduction
   Eigen::MatrixXd FG;  ///< n_f x members: sum Re{conj(F) W G}
   GramSums& operator+=(const GramSums& other) {
     FF += other.FF;
+    S += other.S;
     FG += other.FG;
     return *this;
   }
@@ -83,26 +85,38 @@ class OwnGrams {
 };
 
 GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const TileRange& block) {
-  const auto pairs = triangular_pairs(problem.functions());
+  const bool few = block.members < kFewChannels;
+  const PairReduction pairs(group.fractions, group.fractions.F, group.fractions.F,
+                            triangular_pairs(problem.functions()));
+  const Eigen::Index base = few ? 0 : group.fractions.simple_columns();
   const ComplexColumns F{group.F_re, group.F_im};
-  return sum_over_shares<GramSums>(block, problem.threads, [&](const TileRange& share) {
+  GramSums all = sum_over_shares<GramSums>(block, problem.threads, [&](const TileRange& share) {
     GramSums sums;
-    sums.FF.setZero(static_cast<Eigen::Index>(pairs.size()), share.members);
+    sums.FF.setZero(static_cast<Eigen::Index>(few ? pairs.pairs().size() : pairs.direct().size()),
+                    share.members);
     sums.FG.setZero(problem.functions(), share.members);
-    const bool few = block.members < kFewChannels;
+    sums.S.setZero(share.members, base);
     OwnGrams own(few ? share.members : 0, problem.functions());
     DataTile data;
     for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
       data.load(problem, group, share, {}, first, n);
-      if (few)
+      if (few) {
         own.add(group, first, data);
-      else
-        add_pair_sums(data.W, F, F, pairs, first, sums.FF);
+      } else {
+        add_pair_sums(data.W, F, F, pairs.direct(), first, sums.FF);
+        const auto size = [&](const Eigen::MatrixXd& x) { return x.col(0).segment(first, n); };
+        const Eigen::MatrixXd W = data.W * (size(group.fractions.first.re).cwiseAbs2() +
+                                            size(group.fractions.first.im).cwiseAbs2())
+                                               .asDiagonal();
+        sums.S.noalias() += W * group.fractions.base.block(first, 0, n, base);
+      }
       add_weighted_gradient(group, first, data, sums.FG);
     });
     if (few) own.pack(sums.FF);
     return sums;
   });
+  if (!few) all.FF = pairs.expand(all.S, all.FF);
+  return all;
 }
 
 struct ResidualSums {

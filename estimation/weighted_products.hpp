@@ -6,14 +6,10 @@
 #include <vector>
 
 #include "estimation/fit_problem.hpp"
+#include "estimation/pair_reduction.hpp"
 
 namespace stageid {
 
-/// Two columns whose product over the lines is summed.
-struct ColumnPair {
-  Eigen::Index left;
-  Eigen::Index right;
-};
 std::vector<ColumnPair> triangular_pairs(Eigen::Index n);  ///< left >= right
 /// The symmetric n x n matrix whose lower triangle is given in that order.
 Eigen::MatrixXd from_triangle(const Eigen::Ref<const Eigen::VectorXd>& triangle, Eigen::Index n);
@@ -24,9 +20,6 @@ struct ComplexColumns {
   const Eigen::MatrixXd& re;
   const Eigen::MatrixXd& im;
 };
-
-/// Groups of fewer channels: the products of functions that channels share cost more than they save.
-constexpr Eigen::Index kFewChannels = 16;
 
 constexpr Eigen::Index kTileLines = 256;  // the weights' tile and the products' stay in the cache
 
@@ -74,9 +67,9 @@ struct DataTile {
   double squares() const;  ///< sum W |E|^2
 };
 
-/// sums(p, c) += sum_k W(c, k) Re{ conj(X(k, left_p)) Y(k, right_p) } over lines first_line + k: the sums
-/// that the arrow matrix is made of. The products are functions of frequency alone and shared by all
-/// channels, so that this is one (pairs x lines) (lines x channels) matrix product.
+/// sums(p, c) += sum_k W(c, k) Re{ conj(X(k, left_p)) Y(k, right_p) } over lines first_line + k, for pairs
+/// that are multiplied out. The products are functions of frequency alone and shared by all channels, so
+/// that this is one (pairs x lines) (lines x channels) matrix product.
 void add_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X, const ComplexColumns& Y,
                    const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
                    Eigen::MatrixXd& sums);
