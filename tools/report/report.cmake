@@ -8,18 +8,39 @@ if(NOT STAGEID_DYGRAPHS_DIR)
     "or set STAGEID_DYGRAPHS_DIR to the folder that holds dygraph.min.js.")
 endif()
 
-set(report_js decode data channels format theme axes matrix entry cmif cost tables timing health selftest main)
+# What draws a response; the dashboard draws with the same pieces.
+set(response_js
+  decode
+  channels
+  format
+  theme
+  axes
+  band
+  svg
+  figure
+  matrix
+  matrix_use
+  entry
+  nyquist
+  cmif
+  timing)
+set(report_js
+  data
+  ${response_js}
+  cost
+  tables
+  health
+  selftest
+  main)
 list(TRANSFORM report_js REPLACE "(.+)" "${CMAKE_CURRENT_LIST_DIR}/js/\\1.js")
-# The dashboard draws with the same pieces.
 set(dashboard_dir ${CMAKE_CURRENT_LIST_DIR}/../dashboard)
-set(dashboard_js decode channels format theme axes matrix entry cmif timing)
+set(dashboard_js ${response_js})
 list(TRANSFORM dashboard_js REPLACE "(.+)" "${CMAKE_CURRENT_LIST_DIR}/js/\\1.js")
 list(PREPEND dashboard_js ${dashboard_dir}/js/data.js)
 foreach(name progress levels events response main)
   list(APPEND dashboard_js ${dashboard_dir}/js/${name}.js)
 endforeach()
-set(library_js ${STAGEID_DYGRAPHS_DIR}/dygraph.min.js
-  ${STAGEID_DYGRAPHS_DIR}/src/extras/synchronizer.js)
+set(library_js ${STAGEID_DYGRAPHS_DIR}/dygraph.min.js)
 set(report_single page.html report.css dygraphs_licence.txt embed.cmake)
 list(TRANSFORM report_single PREPEND "${CMAKE_CURRENT_LIST_DIR}/")
 list(APPEND report_single ${dashboard_dir}/page.html ${dashboard_dir}/dashboard.css)

@@ -123,11 +123,51 @@ def check_response(found, expected):
 
 
 def check_zoom(zoom):
-    for plot in ("magnitude", "phase"):
-        for got, want in zip(zoom[plot], zoom["asked"]):
-            near(got, want, 1e-9, f"zoom of the {plot}")
-    for got, want in zip(zoom["restored"], zoom["whole"]):
-        near(got, want, 1e-6, "zoom taken back")
+    for plot, got in zoom["ranges"].items():
+        for bound, want in zip(got, zoom["asked"]):
+            near(bound, want, 1e-9, f"zoom of {plot}")
+    expect(zoom["points"] == zoom["wanted"], f"{zoom['points']} points in the complex plane instead of {zoom['wanted']}")
+    for plot, got in zoom["restored"].items():
+        for bound, want in zip(got, zoom["whole"][plot]):
+            near(bound, want, 1e-6, f"zoom of {plot} taken back")
+
+
+def check_drag(drag):
+    low, high = drag["whole"]
+    middle = math.sqrt(low * high)
+    for got, want in zip(drag["got"], (middle, high)):
+        near(got, want, 1e-3, "drag across half a panel")
+    width = math.log(high / middle)
+    near(math.log(drag["nearer"][1] / drag["nearer"][0]), width / 2, 5e-3, "the key + shows half of it")
+
+
+def check_summary(got, want, tolerance, what):
+    expect(got["count"] == want["count"], f"{what}: {got['count']} numbers instead of {want['count']}")
+    scale = max(abs(want["low"]), abs(want["high"]))
+    for key in ("low", "high", "first", "last"):
+        expect(abs(got[key] - want[key]) <= tolerance * scale, f"{what}: {key}: {got[key]} instead of {want[key]}")
+    expect(abs(got["weighted"] - want["weighted"]) <= tolerance * scale * 1009 * want["count"],
+           f"{what}: weighted sum {got['weighted']} instead of {want['weighted']}")
+
+
+def check_nyquist(found, expected):
+    """Tolerances as in check_arrays(); the model is the float32 response less the residual."""
+    for got, want in zip(found, expected):
+        name = f"element {got['channel']} in the complex plane"
+        check_summary(got["measured"], want["measured"], 1e-15, f"{name}, measured")
+        for key, tolerance in (("model", 2.0**-14), ("radius", 10 ** (4 / 254) - 1)):
+            if key in want:
+                check_summary(got[key], want[key], tolerance, f"{name}, {key}")
+
+
+def check_saved(saved):
+    for name, file in saved.items():
+        expect(not file["broken"], f"the saved {name} is no sound SVG")
+        expect(file["marks"] > 3 and file["ink"], f"the saved {name} is empty: {file}")
+        expect(file["png"] == [round(file["width"]), round(file["height"])], f"the saved {name} has {file['png']} pixels")
+    if "element" in saved:
+        peak = saved["element"]["peak"]
+        expect(abs(peak["found"] - peak["wanted"]) < 0.1, f"the saved element has its peak elsewhere: {peak}")
 
 
 def check_use(use, expected, width):
@@ -147,9 +187,12 @@ def check_page(found, expected, width):
     expect(found["overflow"] <= 0, f"at {width} pixels the page is {found['overflow']} pixels too wide")
     for name, ink in found["plots"].items():
         expect(ink, f"the plot {name} is empty")
+    check_saved(found["saved"])
     if "panels" in expected:
         check_response(found, expected)
         check_zoom(found["zoom"])
+        check_drag(found["drag"])
+        check_nyquist(found["nyquist"], expected["nyquist"])
         check_use(found["use"], expected, width)
     expect(found["timed_cycles"] == expected["timed_cycles"],
            f"histograms of {found['timed_cycles']} cycles instead of {expected['timed_cycles']}")

@@ -66,6 +66,24 @@ Json extremes(const Eigen::MatrixXcd& values) {
   return out;
 }
 
+/// First and last element in the complex plane: points, model, radius of the 95 % circle
+/// (|dG|^2 of a circular complex Gaussian exceeds -ln(0.05) sigma^2 in 5 % of all cases).
+Json expected_nyquist(const ReportData& data) {
+  Json out = Json::array();
+  for (const Eigen::Index c : {Eigen::Index{0}, data.frf->response.rows() - 1}) {
+    Json element = {{"measured", summary_of(Eigen::MatrixXcd(data.frf->response.row(c)), true)}};
+    if (data.model_response.size() > 0)
+      element["model"] = summary_of(Eigen::MatrixXcd(data.model_response.row(c)), false);
+    if (data.frf->total_variance.size() > 0) {
+      const Eigen::MatrixXd radius =
+          std::sqrt(-std::log(0.05)) * data.frf->total_variance.row(c).cwiseSqrt();
+      element["radius"] = summary_of(radius, false);
+    }
+    out.push_back(element);
+  }
+  return out;
+}
+
 Json expected(const ReportData& data) {
   Json out = {{"title", data.title}, {"modes", data.model ? data.true_modes.size() : 0}};
   RunTiming timing;
@@ -77,6 +95,7 @@ Json expected(const ReportData& data) {
   out["lines"] = frf.lines();
   out["shape"] = {frf.n_outputs(), frf.n_inputs()};
   out["measured"] = extremes(frf.response);
+  out["nyquist"] = expected_nyquist(data);
   out["arrays"]["frequency"] = summary_of(Eigen::MatrixXd(frf.frequency_hz.transpose()), false);
   out["arrays"]["response"] = summary_of(frf.response, true);
   if (data.model_response.size() > 0) {

@@ -14,14 +14,14 @@ function showResponse() {
   if (matrix.panels.length === 0) {
     buildMatrix();
     buildEntry();
-    matrix.onselect = (channel) => showEntry(channel, true);
+    matrix.onselect = (channel) => showEntry(channel);
     selectPanel(0);
     buildCmif();
     for (const id of ['timing', 'events']) moveToEnd(id);
     return;
   }
   redrawMatrix();
-  showEntry(entry.channel, true);
+  showEntry(entry.channel);
   drawCmif();
 }
 

@@ -15,11 +15,21 @@ function buildCmif() {
   for (let i = 0; i < curves; ++i) legend.append(element('span', { class: 'swatch', style: '--colour:var(--curve-' + (i % 6) + ')' }, 'curve ' + (i + 1)));
   if (content.candidates.length) legend.append(element('span', { class: 'mark ring' }, 'chosen as start (' + content.candidates.length + ')'));
   if (identifiedModes().length) legend.append(element('span', { class: 'mark line' }, 'identified mode (' + identifiedModes().length + ')'));
-  body.append(legend, element('div', { class: 'plot tall', id: 'cmif-plot', role: 'img', 'aria-labelledby': 'cmif-title' }),
+  legend.append(saveButtons('CMIF', savedCmif));
+  const plot = element('div', { class: 'plot tall', id: 'cmif-plot', role: 'img', 'aria-labelledby': 'cmif-title', tabindex: '0' });
+  plot.addEventListener('keydown', bandKey);
+  followBand(() => showBandIn(cmif.graph));
+  body.append(legend, plot,
     element('p', { class: 'axis-title' }, 'Frequency [Hz]'),
     content.arrays.cmif_deviation ? element('p', { class: 'quiet' }, 'The shaded bands hold the true values with 95 %, to first order in the errors of the elements.') : null);
   afterFirstPaint(drawCmif);
   onColours(() => cmif.graph && cmif.graph.updateOptions({ ...plotColours(), series: cmifSeries() }));
+}
+
+function savedCmif() {
+  const { curves } = palette();
+  const legend = Array.from({ length: content.arrays.cmif.curves }, (_, i) => ['curve ' + (i + 1), curves[i % curves.length]]);
+  return { title: 'Complex mode indicator function', legend, panels: [graphPanel(cmif.graph, 'Over frequency in Hz')] };
 }
 
 function identifiedModes() {
@@ -38,14 +48,13 @@ function drawCmif() {
     for (let i = 0; i < curves; ++i) row.push(cmifBar(values[i * f.length + k], deviation && deviation[i * f.length + k], floor));
     return row;
   });
-  const zoom = cmif.graph ? { dateWindow: cmif.graph.xAxisRange() } : {};
   if (cmif.graph) {
     plots.delete(cmif.graph);
     cmif.graph.destroy();
   }
   cmif.graph = new Dygraph(document.getElementById('cmif-plot'), rows, {
     ...plotBasics, ...plotColours(), labels: ['f', ...Object.keys(cmifSeries())], logscale: true,
-    customBars: true, series: cmifSeries(), ...zoom,
+    customBars: true, series: cmifSeries(), ...tiedToBand(),
     axes: { x: frequencyAxis, y: magnitudeAxis }, underlayCallback: markModes,
   });
   plots.add(cmif.graph);

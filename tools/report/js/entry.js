@@ -1,4 +1,4 @@
-// One entry of the response, large: magnitude and phase, linked.
+// One entry of the response, large: magnitude, phase and Nyquist, linked.
 
 const entry = { magnitude: null, phase: null, channel: 0, hidden: new Set(['validation']), order: [] };
 
@@ -17,25 +17,36 @@ function buildEntry() {
     list.forEach((channel, i) => select.append(element('option', { value: i }, channel.name)));
     return element('label', { for: id }, label + ' ', select);
   };
-  const zoom = element('button', { type: 'button', class: 'plain', onclick: resetZoom }, 'Whole band');
   body.append(
-    element('div', { class: 'entry-pick' }, pick('entry-output', 'Sensor', outputs), pick('entry-input', 'Actuator', inputs), zoom,
-      element('span', { id: 'entry-unit', class: 'quiet' })),
+    element('div', { class: 'entry-pick' }, pick('entry-output', 'Sensor', outputs), pick('entry-input', 'Actuator', inputs), bandBar(),
+      saveButtons('element', savedEntry)),
     element('div', { class: 'legend', id: 'entry-legend' }),
-    element('p', { class: 'plot-title', id: 'magnitude-title' }, 'Magnitude'),
-    element('div', { class: 'plot tall', id: 'entry-magnitude', role: 'img', 'aria-labelledby': 'magnitude-title' }),
-    element('p', { class: 'plot-title', id: 'phase-title' }, 'Phase'),
-    element('div', { class: 'plot', id: 'entry-phase', role: 'img', 'aria-labelledby': 'phase-title' }),
-    element('p', { class: 'axis-title' }, 'Frequency [Hz]'),
+    element('div', { class: 'entry-plots' },
+      element('div', { class: 'bode' },
+        element('p', { class: 'plot-title', id: 'magnitude-title' }, 'Magnitude'), entryPlot('entry-magnitude', 'tall', 'magnitude-title'),
+        element('p', { class: 'plot-title', id: 'phase-title' }, 'Phase'), entryPlot('entry-phase', '', 'phase-title'),
+        element('p', { class: 'axis-title' }, 'Frequency [Hz]')),
+      buildNyquist()),
     element('p', { class: 'quiet' }, entryHelp()));
   onColours(recolourEntry);
+  followBand(() => {
+    showBandIn(entry.magnitude);
+    showBandIn(entry.phase);
+    if (entry.magnitude) showNyquist(entry.channel);
+  });
+}
+
+function entryPlot(id, kind, title) {
+  const node = element('div', { class: 'plot ' + kind, id, role: 'img', 'aria-labelledby': 'entry-title ' + title, tabindex: '0' });
+  node.addEventListener('keydown', bandKey);
+  return node;
 }
 
 function entryHelp() {
   const kind = content.frf.deviation;
   const known = kind ? 'The shaded band holds the true value with 95 % (from the ' + (kind === 'total'
     ? 'total variance: noise and nonlinear distortions' : 'noise variance') + '; circular complex Gaussian). ' : '';
-  return known + 'Drag to zoom, double-click for the whole band; both plots move together. ' +
+  return known + 'Drag to zoom, with Shift to pan, double-click for the whole band; all plots of the page move together. ' +
     'The names above switch traces on and off.';
 }
 
@@ -51,14 +62,9 @@ function pickEntry() {
   selectPanel(channelIndex(output, input));
 }
 
-function resetZoom() {
-  if (entry.magnitude) entry.magnitude.resetZoom();
-}
-
 // Shows part of the band, in Hz; used by the table of modes.
 function zoomEntry(low, high) {
-  if (!entry.magnitude) return;
-  entry.magnitude.updateOptions({ dateWindow: [low, high] });
+  setBand(low, high);
   document.getElementById('entry').scrollIntoView({ behavior: 'auto', block: 'start' });
 }
 
@@ -149,25 +155,26 @@ function plotTable(id, table, axisY, more) {
     series: traceStyles(table.names),
     visibility: table.names.map((name) => !entry.hidden.has(name)),
     axes: { x: frequencyAxis, y: axisY }, highlightCallback: tellValues, unhighlightCallback: () => tellValues(),
-    ...more,
+    ...tiedToBand(), ...more,
   };
   const plot = new Dygraph(document.getElementById(id), table.rows, options);
   plots.add(plot);
   return plot;
 }
 
-function showEntry(channel, keepZoom) {
-  const window_ = keepZoom && entry.magnitude ? entry.magnitude.xAxisRange() : null;
+function entryUnit(channel) {
+  const { inputs, outputs } = content.frf;
+  return unitOf(outputs[channel % outputs.length], inputs[Math.floor(channel / outputs.length)]) + (matrix.timesOmega ? '\u00a0\u00d7\u00a0(rad/s)\u00b2' : '');
+}
+
+function showEntry(channel) {
   entry.channel = channel;
   const outputs = content.frf.outputs;
-  const output = outputs[channel % outputs.length];
-  const input = content.frf.inputs[Math.floor(channel / outputs.length)];
   document.getElementById('entry-title').textContent = channelName(channel);
   document.getElementById('entry-output').value = channel % outputs.length;
   document.getElementById('entry-input').value = Math.floor(channel / outputs.length);
-  document.getElementById('entry-unit').textContent = 'magnitude in ' + unitOf(output, input) + (matrix.timesOmega ? ' \u00d7 (rad/s)\u00b2' : '');
+  document.getElementById('magnitude-title').textContent = 'Magnitude [' + entryUnit(channel) + ']';
   if (entry.magnitude) {
-    entry.link.detach();
     for (const plot of [entry.magnitude, entry.phase]) {
       plots.delete(plot);
       plot.destroy();
@@ -175,12 +182,20 @@ function showEntry(channel, keepZoom) {
   }
   const table = magnitudeTable(channel);
   entry.order = table.names;
-  const x = window_ ? { dateWindow: window_ } : {};
-  entry.magnitude = plotTable('entry-magnitude', table, magnitudeAxis, { logscale: true, ...x });
+  entry.magnitude = plotTable('entry-magnitude', table, magnitudeAxis, { logscale: true });
   const phase = phaseTable(channel);
-  entry.phase = plotTable('entry-phase', phase, phaseAxis, { valueRange: [phase.cut - 8, phase.cut + 368], ...x });
-  entry.link = Dygraph.synchronize(entry.magnitude, entry.phase, { range: false, selection: false });
+  entry.phase = plotTable('entry-phase', phase, phaseAxis, { valueRange: [phase.cut - 8, phase.cut + 368] });
   buildLegend();
+  showNyquist(channel);
+}
+
+function savedEntry() {
+  const colours = palette();
+  const shown = entry.order.filter((name) => !entry.hidden.has(name));
+  return {
+    title: channelName(entry.channel), legend: shown.map((name) => [traceNames[name], colours[name]]),
+    panels: [graphPanel(entry.magnitude, 'Magnitude [' + entryUnit(entry.channel) + ']'), graphPanel(entry.phase, 'Phase over frequency in Hz')],
+  };
 }
 
 function buildLegend() {

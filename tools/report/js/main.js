@@ -6,7 +6,7 @@ buildHead();
 if (content.frf) {
   buildMatrix();
   buildEntry();
-  matrix.onselect = (channel) => showEntry(channel, true);
+  matrix.onselect = (channel) => showEntry(channel);
   afterFirstPaint(() => selectPanel(0));
 }
 if (content.arrays.cmif) buildCmif();

@@ -1,6 +1,6 @@
 // The element-wise Bode matrix: one small canvas a channel, drawn when it comes into view.
 
-const matrix = { panels: [], selected: -1, onselect: null, timesOmega: 0, drawn: 0 };
+const matrix = { panels: [], selected: -1, onselect: null, timesOmega: 0, pending: 0 };
 
 // What multiplies a magnitude: 1 or omega^2 (acceleration instead of position).
 function lineScale() {
@@ -12,20 +12,21 @@ function scaled(values, scale) {
   return scale && values ? Float64Array.from(values, (v, k) => v * scale[k]) : values;
 }
 
-// The common range: everything measured, and below it most of the residual.
+// The common range in the band shown: everything measured, and below it most of the residual.
 function matrixRange(scale) {
   let high = 0;
   let low = Infinity;
   const small = [];
+  const [first, last] = bandLines(...shownBand());
   for (let c = 0; c < channelCount(); ++c) {
     const curves = channelCurves(c);
     const measured = scaled(curves.measured, scale);
-    for (let k = 0; k < measured.length; ++k) {
+    for (let k = first; k <= last; ++k) {
       if (measured[k] > high) high = measured[k];
       if (measured[k] > 0 && measured[k] < low) low = measured[k];
     }
     const residual = scaled(curves.residual, scale);
-    if (residual) for (let k = 0; k < residual.length; k += 7) if (residual[k] > 0) small.push(residual[k]);
+    if (residual) for (let k = first; k <= last; k += 7) if (residual[k] > 0) small.push(residual[k]);
   }
   if (small.length) low = Math.min(low, Float64Array.from(small).sort()[Math.floor(0.03 * small.length)]);
   if (!(high > 0)) return [-1, 0];
@@ -37,7 +38,8 @@ function buildMatrix() {
   const hasModel = Boolean(content.arrays.residual);
   const body = section('response', 'Response', 'Frequency response, element by element',
     'Each panel is one actuator (column) to one sensor (row): magnitude over frequency, both logarithmic, ' +
-    'all on one scale. Choose a panel to see it large; the arrow keys move between panels.');
+    'all on one scale. Choose a panel to see it large, drag across one to zoom them all; the arrow keys move between panels, ' +
+    '+ and \u2212 zoom, Page Up and Page Down pan, Home shows the whole band.');
   const legend = element('div', { class: 'legend' }, swatch('measured', 'measured'),
     hasModel ? swatch('model', 'model') : null, hasModel ? swatch('residual', 'residual') : null,
     hasModel ? element('span', { class: 'quiet' }, 'number: relative rms error of the channel') : null);
@@ -57,9 +59,14 @@ function buildMatrix() {
   for (let i = 0; i < inputs.length; ++i) {
     for (let o = 0; o < outputs.length; ++o) grid.append(makePanel(o, i));
   }
-  body.append(legend, element('div', { class: 'matrix-scroll' }, grid),
+  legend.append(saveButtons('frequency response', savedMatrix));
+  body.append(legend, bandBar(), element('div', { class: 'matrix-scroll' }, grid),
     element('p', { class: 'quiet', id: 'matrix-scale' }));
   grid.addEventListener('keydown', moveFocus);
+  grid.addEventListener('pointerdown', dragAcross);
+  followBand(() => {
+    if (!matrix.pending) matrix.pending = requestAnimationFrame(redrawMatrix);
+  });
   onColours(redrawMatrix);
   watchPanels();
 }
@@ -93,6 +100,7 @@ function selectPanel(channel) {
 }
 
 function moveFocus(event) {
+  if (bandKey(event)) return;
   const outputs = content.frf.outputs.length;
   const inputs = content.frf.inputs.length;
   const turned = getComputedStyle(event.currentTarget).getPropertyValue('--turned').trim() === '1';
@@ -133,6 +141,8 @@ function watchPanels() {
 }
 
 function redrawMatrix() {
+  cancelAnimationFrame(matrix.pending);
+  matrix.pending = 0;
   matrix.range = null;
   for (const panel of matrix.panels) panel.drawn = false;
   matrix.panels.forEach((panel, channel) => drawPanel(channel));
@@ -141,21 +151,28 @@ function redrawMatrix() {
 function drawPanel(channel) {
   const panel = matrix.panels[channel];
   if (panel.drawn) return;
-  const scale = lineScale();
-  if (!matrix.range) {
-    matrix.range = matrixRange(scale);
-    tellScale();
-  }
   const width = panel.canvas.clientWidth;
   const height = panel.canvas.clientHeight;
   if (width === 0) return;
   panel.drawn = true;
-  ++matrix.drawn;
   const ratio = Math.min(3, window.devicePixelRatio || 1);
   panel.canvas.width = Math.round(width * ratio);
   panel.canvas.height = Math.round(height * ratio);
   const context = panel.canvas.getContext('2d');
   context.scale(ratio, ratio);
+  paintPanel(channel, context, width, height);
+  const { relativeError } = channelCurves(channel);
+  if (relativeError === null) return;
+  panel.error.textContent = percent(relativeError);
+  panel.button.setAttribute('aria-label', channelName(channel) + ', relative rms error ' + percent(relativeError));
+}
+
+function paintPanel(channel, context, width, height) {
+  const scale = lineScale();
+  if (!matrix.range) {
+    matrix.range = matrixRange(scale);
+    tellScale();
+  }
   const frame = panelFrame(width, height);
   drawDecades(context, frame);
   const curves = channelCurves(channel);
@@ -165,18 +182,16 @@ function drawPanel(channel) {
   context.globalAlpha = 1;
   drawCurve(context, frame, scaled(curves.measured, scale), colours.measured, curves.model ? 2.8 : 1.2);
   drawCurve(context, frame, scaled(curves.model, scale), colours.model, 0.8);
-  if (curves.relativeError !== null) panel.error.textContent = percent(curves.relativeError);
 }
 
 function tellScale() {
-  const f = array('frequency');
   const [low, high] = matrix.range;
   const units = new Set();
   for (const output of content.frf.outputs) for (const input of content.frf.inputs) units.add(unitOf(output, input));
   const unit = units.size === 1 ? ' ' + [...units][0] : ' (units differ between channels)';
   document.getElementById('matrix-scale').textContent =
-    'Across: ' + hertz(f[0]) + ' to ' + hertz(f[f.length - 1]) + ', up: ' + powerOfTen(Math.ceil(low)) + ' to ' +
-    powerOfTen(Math.floor(high)) + unit + (matrix.timesOmega ? ', times \u03c9\u00b2' : '') + '; one grid line a decade.';
+    'Across: ' + bandText() + ', up: ' + magnitudeLabel(10 ** low, 10 ** low) + ' to ' +
+    magnitudeLabel(10 ** high, 10 ** high) + unit + (matrix.timesOmega ? ', times \u03c9\u00b2' : '') + '.';
 }
 
 function unitOf(output, input) {
@@ -184,9 +199,7 @@ function unitOf(output, input) {
 }
 
 function panelFrame(width, height) {
-  const f = array('frequency');
-  const x0 = Math.log10(f[0]);
-  const x1 = Math.log10(f[f.length - 1]);
+  const [x0, x1] = shownBand().map(Math.log10);
   const [y0, y1] = matrix.range;
   return {
     width, height, x0, x1, y0, y1,
@@ -199,8 +212,9 @@ function drawDecades(context, frame) {
   context.strokeStyle = palette().grid;
   context.lineWidth = 1;
   context.beginPath();
-  for (let d = Math.ceil(frame.x0); d <= frame.x1; ++d) {
-    const x = Math.round(frame.x(d)) + 0.5;
+  for (const { v, label } of logTicks(10 ** frame.x0, 10 ** frame.x1, frame.width, frequencyLabel, 46)) {
+    if (!label) continue;
+    const x = Math.round(frame.x(Math.log10(v))) + 0.5;
     context.moveTo(x, 0);
     context.lineTo(x, frame.height);
   }
@@ -212,11 +226,12 @@ function drawDecades(context, frame) {
   context.stroke();
 }
 
-// The line's half pixel column, and its place; the same for all curves of that width.
+// The line's half pixel column, and its place; the same for all curves of that width and band.
 function columnsOf(frame) {
-  if (!matrix.columns || matrix.columns.width !== frame.width) {
+  const { width, x0, x1, columns } = { ...frame, columns: matrix.columns };
+  if (!columns || columns.width !== width || columns.x0 !== x0 || columns.x1 !== x1) {
     const x = Float64Array.from(array('frequency'), (f) => frame.x(Math.log10(f)));
-    matrix.columns = { width: frame.width, x, column: Int32Array.from(x, (v) => Math.floor(2 * v)) };
+    matrix.columns = { width, x0, x1, x, column: Int32Array.from(x, (v) => Math.floor(2 * v)) };
   }
   return matrix.columns;
 }
@@ -236,14 +251,17 @@ function drawCurve(context, frame, values, colour, width) {
     context.lineTo(x, y(high));
     context.lineTo(x, y(last));
   };
-  for (let k = 0; k < values.length; ++k) {
+  // One line beyond the band on either side: curves run to the edge.
+  const [inside, end] = bandLines(...shownBand());
+  const start = Math.max(0, inside - 1);
+  for (let k = start; k <= Math.min(values.length - 1, end + 1); ++k) {
     const here = columns[k];
     if (here !== column) {
       if (column >= 0) flush();
       column = here;
       x = places[k];
       low = high = values[k];
-      if (k === 0) context.moveTo(x, y(values[k]));
+      if (k === start) context.moveTo(x, y(values[k]));
       else context.lineTo(x, y(values[k]));
     }
     if (values[k] < low) low = values[k];

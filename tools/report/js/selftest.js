@@ -1,7 +1,7 @@
 // report.html#selftest checks itself and leaves the findings as JSON in the element "selftest".
 // The program's own browser test reads it; so can anyone who doubts a page.
 
-function selfTest(startedMs) {
+async function selfTest(startedMs) {
   const findings = {
     title: document.title, verdict: content.verdict.level, sections: Array.from(document.querySelectorAll('main > section'), (s) => s.id),
     ready_ms: Math.round(performance.now()), script_ms: Math.round(performance.now() - startedMs),
@@ -20,7 +20,8 @@ function selfTest(startedMs) {
   }
   findings.plots = Object.fromEntries(Array.from(document.querySelectorAll('.plot'), (plot) => [plot.id, inkOf(plot)]));
   findings.rows = Object.fromEntries(Array.from(document.querySelectorAll('section'), (s) => [s.id, s.querySelectorAll('tbody tr').length]));
-  if (content.frf) Object.assign(findings, { zoom: zoomCheck(), use: useCheck() });
+  if (content.frf) Object.assign(findings, { zoom: zoomCheck(), use: useCheck(), nyquist: nyquistCheck(), drag: dragCheck() });
+  findings.saved = await savedCheck();
   findings.timed_cycles = Array.from(document.querySelectorAll('.histogram .step-time'), (cell) => Number(cell.textContent.replace(/\u202f/g, '')))
     .reduce((a, b) => a + b, 0);
   findings.errors = window.stageidReport.errors;
@@ -70,7 +71,10 @@ function smallestPanel() {
 
 // Enough to tell a wrong order, sign, scale or type: count, extremes, and a sum with places as weights.
 function summary(id) {
-  const values = array(id);
+  return summaryOf(array(id));
+}
+
+function summaryOf(values) {
   let low = Infinity, high = -Infinity, weighted = 0;
   values.forEach((v, i) => {
     low = Math.min(low, v);
@@ -91,15 +95,73 @@ function entrySummary(channel) {
   return { traces: table.names, phases: phase.names, lines: table.rows.length, extremes: Object.fromEntries(extremes) };
 }
 
-// A zoom of the magnitude must move the phase with it, and back.
+// A zoom of the magnitude must move all the others with it, and back.
 function zoomCheck() {
   const f = array('frequency');
-  const whole = entry.magnitude.xAxisRange();
+  const ranges = () => ({ magnitude: entry.magnitude.xAxisRange(), phase: entry.phase.xAxisRange(), matrix: matrixBand(), ...(cmif.graph ? { cmif: cmif.graph.xAxisRange() } : {}) });
+  const matrixBand = () => {
+    redrawMatrix();
+    const frame = panelFrame(100, 100);
+    return [10 ** frame.x0, 10 ** frame.x1];
+  };
+  const whole = ranges();
   const asked = [f[Math.floor(f.length / 4)], f[Math.floor(f.length / 2)]];
   entry.magnitude.updateOptions({ dateWindow: asked });
-  const got = { asked, magnitude: entry.magnitude.xAxisRange(), phase: entry.phase.xAxisRange() };
-  resetZoom();
-  return { ...got, whole, restored: entry.phase.xAxisRange() };
+  const zoomed = { ranges: ranges(), points: nyquist.shown.points.length, wanted: Math.floor(f.length / 2) - Math.floor(f.length / 4) + 1 };
+  document.getElementById('entry-phase').dispatchEvent(new KeyboardEvent('keydown', { key: 'Home', bubbles: true }));
+  return { asked, ...zoomed, whole, restored: ranges() };
+}
+
+// A drag over the right half of the first panel shows the upper half of the (logarithmic) band everywhere.
+function dragCheck() {
+  const { button } = matrix.panels[0];
+  const box = button.getBoundingClientRect();
+  const at = (share) => ({ clientX: box.left + share * box.width, clientY: box.top + 5, bubbles: true, pointerType: 'mouse', button: 0 });
+  button.dispatchEvent(new PointerEvent('pointerdown', at(0.5)));
+  window.dispatchEvent(new PointerEvent('pointermove', at(0.8)));
+  window.dispatchEvent(new PointerEvent('pointerup', at(1)));
+  const got = shownBand();
+  button.dispatchEvent(new KeyboardEvent('keydown', { key: '+', bubbles: true }));
+  const nearer = shownBand();
+  resetBand();
+  return { got, nearer, whole: wholeBand() };
+}
+
+// The points, circles and model of the first and the last element, over the whole band.
+function nyquistCheck() {
+  const flat = (points) => points.flatMap((p) => [p.re, p.im]);
+  return [0, channelCount() - 1].map((channel) => {
+    const { points, model } = nyquistData(channel, ...wholeBand());
+    return { channel, measured: summaryOf(flat(points)), model: model.length ? summaryOf(flat(model)) : null, radius: summaryOf(points.map((p) => p.radius)) };
+  });
+}
+
+// Every figure as a file: SVG that parses and holds only numbers, PNG with ink; the peak stands where it belongs.
+async function savedCheck() {
+  const saved = {};
+  for (const name of savable.keys()) {
+    const { text, width, height } = svgOf(name);
+    const file = new DOMParser().parseFromString(text, 'image/svg+xml');
+    const png = await pngOf(name, 1);
+    saved[name] = {
+      bytes: text.length, width, height, broken: Boolean(file.querySelector('parsererror')) || /NaN|Infinity|undefined/.test(text.replace(/<text.*?<\/text>|<title>.*?<\/title>/gs, '')),
+      marks: file.querySelectorAll('path, text').length, ink: hasInk(pixelsOf(png)), png: [png.width, png.height],
+    };
+  }
+  if (saved.element) saved.element.peak = savedPeak();
+  return saved;
+}
+
+// Height of the highest point of the measured trace in the file, and where its magnitude belongs.
+function savedPeak() {
+  const file = new DOMParser().parseFromString(svgOf('element').text, 'image/svg+xml');
+  const heights = Array.from(file.querySelectorAll('path[stroke-width="3.2"]')).slice(0, 1)
+    .flatMap((path) => Array.from(path.getAttribute('d').matchAll(/[ML]\S+ (\S+?)(?=[MLZ]|$)/g), (m) => Number(m[1])));
+  const most = Math.max(...magnitudeTable(entry.channel).rows.map((row) => row[1][1]));
+  const [low, high] = entry.magnitude.yAxisRange();
+  const area = entry.magnitude.getArea();
+  const top = savedMargin + 22 + 24 + 20 + area.y;
+  return { found: Math.min(...heights), wanted: top + area.h * Math.log(high / most) / Math.log(high / low) };
 }
 
 // What a reader does: choose a panel, walk with the keys, switch a trace, multiply by omega squared.

@@ -1,0 +1,128 @@
+// The part of the band that is looked at: one for the whole page. Whoever changes it moves all the others.
+
+const band = { low: null, high: null, telling: false, followers: [], texts: [] };
+
+const leastLines = 4;  // what a zoom leaves at the least
+
+function wholeBand() {
+  const f = array('frequency');
+  return [f[0], f[f.length - 1]];
+}
+
+function shownBand() {
+  const [low, high] = wholeBand();
+  return band.low === null ? [low, high] : [Math.max(low, band.low), Math.min(high, band.high)];
+}
+
+function isWholeBand() {
+  const [low, high] = wholeBand();
+  const shown = shownBand();
+  return shown[0] <= low * (1 + 1e-9) && shown[1] >= high * (1 - 1e-9);
+}
+
+// follower(low, high) is called whenever another part of the page has zoomed or panned.
+function followBand(follower) {
+  band.followers.push(follower);
+}
+
+function setBand(low, high) {
+  if (band.telling || !(high > low)) return;
+  const [least, most] = wholeBand();
+  const next = [Math.max(least, low), Math.min(most, high)];
+  const before = shownBand();
+  if (!(next[1] > next[0]) || linesBetween(...next) < Math.min(leastLines, array('frequency').length)) return;
+  if (Math.abs(next[0] / before[0] - 1) < 1e-12 && Math.abs(next[1] / before[1] - 1) < 1e-12) return;
+  [band.low, band.high] = next;
+  tellBand();
+}
+
+function resetBand() {
+  band.low = band.high = null;
+  tellBand();
+}
+
+function tellBand() {
+  band.telling = true;
+  try {
+    for (const follower of band.followers) follower(...shownBand());
+  } finally {
+    band.telling = false;
+  }
+  for (const text of band.texts) text.textContent = bandText();
+}
+
+function linesBetween(low, high) {
+  const [first, last] = bandLines(low, high);
+  return Math.max(0, last - first + 1);
+}
+
+// First and last line within the band, by bisection: the lines rise.
+function bandLines(low, high) {
+  const f = array('frequency');
+  const least = (wanted) => {
+    let from = 0, to = f.length;
+    while (from < to) {
+      const middle = (from + to) >> 1;
+      if (wanted(f[middle])) to = middle;
+      else from = middle + 1;
+    }
+    return from;
+  };
+  return [least((hz) => hz >= low), least((hz) => hz > high) - 1];
+}
+
+// Half as wide or twice as wide about the middle (factor), and to the side (shift, in widths); the axis is logarithmic.
+function moveBand(factor, shift) {
+  const [low, high] = shownBand().map(Math.log);
+  const [least, most] = wholeBand().map(Math.log);
+  const width = Math.min((high - low) * factor, most - least);
+  const middle = (low + high) / 2 + shift * (high - low);
+  const from = Math.min(Math.max(least, middle - width / 2), most - width);
+  if (width >= (most - least) * (1 - 1e-9)) resetBand();
+  else setBand(Math.exp(from), Math.exp(from + width));
+}
+
+const bandKeys = { '+': [0.5, 0], '=': [0.5, 0], '-': [2, 0], PageUp: [1, 0.25], PageDown: [1, -0.25] };
+
+// Keys that zoom and pan wherever a figure has the focus. @returns true if the key was one.
+function bandKey(event) {
+  if (event.ctrlKey || event.metaKey || event.altKey) return false;
+  if (event.key === 'Home') resetBand();
+  else if (bandKeys[event.key]) moveBand(...bandKeys[event.key]);
+  else return false;
+  event.preventDefault();
+  return true;
+}
+
+function bandText() {
+  const digits = (hz) => {
+    const [low, high] = shownBand();
+    return hertz(Number(hz.toPrecision(Math.min(9, Math.max(4, 2 + Math.ceil(Math.log10(hz / (high - low))))))));
+  };
+  return shownBand().map(digits).join(' \u2013 ');
+}
+
+function bandBar() {
+  const button = (text, name, act) => element('button', { type: 'button', class: 'plain small', 'aria-label': name, title: name, onclick: act }, text);
+  const text = element('output', { class: 'band-text', 'aria-live': 'polite' }, bandText());
+  band.texts.push(text);
+  return element('div', { class: 'band-bar', role: 'group', 'aria-label': 'Part of the band, for all plots' },
+    button('\u25c2', 'To lower frequencies', () => moveBand(1, -0.5)), button('\u25b8', 'To higher frequencies', () => moveBand(1, 0.5)),
+    button('+', 'Zoom in', () => moveBand(0.5, 0)), button('\u2212', 'Zoom out', () => moveBand(2, 0)),
+    element('button', { type: 'button', class: 'plain small', onclick: resetBand }, 'Whole band'), text);
+}
+
+// Options that tie a dygraph to the band: a zoom or pan in it moves the others.
+function tiedToBand() {
+  return {
+    dateWindow: shownBand(),
+    drawCallback: (graph, first) => { if (!first) setBand(...graph.xAxisRange()); },
+  };
+}
+
+function showBandIn(graph) {
+  if (!graph) return;
+  const [low, high] = graph.xAxisRange();
+  const shown = shownBand();
+  if (Math.abs(low / shown[0] - 1) > 1e-12 || Math.abs(high / shown[1] - 1) > 1e-12) graph.updateOptions({ dateWindow: shown });
+}

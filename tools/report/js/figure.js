@@ -1,0 +1,151 @@
+// Figures of our own on a canvas, and files of every figure: SVG, and PNG made from it.
+
+const figureFont = 'system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
+
+function font(pixels, weight) {
+  return (weight ? weight + ' ' : '') + pixels + 'px ' + figureFont;
+}
+
+// draw(context, width, height) on a canvas that follows its element, the colours and the paper.
+function canvasFigure(id, label, draw, kind) {
+  const canvas = element('canvas', { 'aria-hidden': 'true' });
+  const node = element('div', { class: 'plot ' + (kind || ''), id, role: 'img', 'aria-label': label, tabindex: '0' }, canvas);
+  const figure = { node, canvas, draw, redraw: () => paintFigure(figure), resize: () => paintFigure(figure) };
+  plots.add(figure);
+  onColours(figure.redraw);
+  new ResizeObserver(figure.redraw).observe(node);
+  return figure;
+}
+
+function paintFigure(figure) {
+  const { canvas, node } = figure;
+  const width = node.clientWidth;
+  const height = node.clientHeight;
+  if (width === 0 || height === 0) return;
+  const ratio = Math.min(3, window.devicePixelRatio || 1);
+  const pixels = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== pixels[0] || canvas.height !== pixels[1]) [canvas.width, canvas.height] = pixels;
+  const context = canvas.getContext('2d');
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  figure.draw(context, width, height);
+}
+
+// What can be saved: name -> {title, legend, panels}; a panel is {width, height, draw}.
+const savable = new Map();
+
+// Buttons that save a figure. describe() gives {title, legend: [[name, colour]], panels} of the moment.
+function saveButtons(name, describe) {
+  savable.set(name, describe);
+  const button = (kind) => element('button', {
+    type: 'button', class: 'plain small', 'aria-label': 'Save as ' + kind + ': ' + name, title: 'Save as ' + kind, onclick: () => saveFigure(name, kind),
+  }, kind);
+  return element('span', { class: 'save', role: 'group', 'aria-label': 'Save figure' }, button('SVG'), button('PNG'));
+}
+
+function canvasPanel(figure) {
+  return { width: figure.node.clientWidth, height: figure.node.clientHeight, draw: figure.draw };
+}
+
+// dygraphs draws into the context that it is given; its labels are elements of the page.
+function graphPanel(graph, title) {
+  return { width: graph.width_, height: graph.height_, title, draw: (context) => drawGraph(graph, context) };
+}
+
+function drawGraph(graph, context) {
+  const { hidden_ctx_: own, plotter_: plotter } = graph;
+  graph.hidden_ctx_ = plotter.elementContext = context;
+  context.save();
+  try {
+    graph.renderGraph_(false);
+  } finally {
+    graph.hidden_ctx_ = plotter.elementContext = own;
+    context.restore();
+  }
+  graph.renderGraph_(false);
+  const frame = graph.graphDiv.getBoundingClientRect();
+  context.font = font(12);
+  context.fillStyle = palette().text;
+  context.textBaseline = 'middle';
+  for (const label of graph.graphDiv.querySelectorAll('.dygraph-axis-label')) {
+    const box = label.getBoundingClientRect();
+    const across = label.classList.contains('dygraph-axis-label-y');
+    context.textAlign = across ? 'right' : 'center';
+    context.fillText(label.textContent, (across ? box.right : (box.left + box.right) / 2) - frame.left, (box.top + box.bottom) / 2 - frame.top);
+  }
+}
+
+const savedMargin = 14;
+
+// The file's text, and its size.
+function svgOf(name) {
+  const { title, legend, panels } = savable.get(name)();
+  const context = new SvgContext();
+  const colours = palette();
+  const width = Math.max(...panels.map((panel) => panel.width)) + 2 * savedMargin;
+  const hasLegend = legend && legend.length > 0;
+  const height = 2 * savedMargin + 22 + (hasLegend ? 24 : 0) + panels.reduce((sum, panel) => sum + panel.height + (panel.title ? 20 : 0), 0);
+  context.fillStyle = colours.background;
+  context.fillRect(0, 0, width, height);
+  context.font = font(15, '600');
+  context.fillStyle = colours.ink;
+  context.fillText(title, savedMargin, savedMargin + 12);
+  let y = savedMargin + 22;
+  if (hasLegend) y = drawLegend(context, legend, y);
+  for (const panel of panels) {
+    if (panel.title) {
+      context.font = font(12.5);
+      context.fillStyle = colours.text;
+      context.textAlign = 'start';
+      context.textBaseline = 'alphabetic';
+      context.fillText(panel.title, savedMargin, y + 13);
+      y += 20;
+    }
+    context.save();
+    context.translate(savedMargin, y);
+    panel.draw(context, panel.width, panel.height);
+    context.restore();
+    y += panel.height;
+  }
+  return { width, height, text: context.text(width, height, title) };
+}
+
+function drawLegend(context, legend, y) {
+  let x = savedMargin;
+  context.font = font(12.5);
+  context.lineWidth = 3;
+  for (const [text, colour] of legend) {
+    context.strokeStyle = colour;
+    context.beginPath();
+    context.moveTo(x, y + 9);
+    context.lineTo(x + 20, y + 9);
+    context.stroke();
+    context.fillStyle = palette().text;
+    context.fillText(text, x + 26, y + 13);
+    x += 26 + 7.2 * text.length + 18;
+  }
+  return y + 24;
+}
+
+// Pixels for a slide: twice the size on the page.
+async function pngOf(name, scale = 2) {
+  const { width, height, text } = svgOf(name);
+  const image = new Image();
+  image.src = 'data:image/svg+xml;charset=utf-8,' + encodeURIComponent(text);
+  await image.decode();
+  const canvas = element('canvas', { width: Math.round(width * scale), height: Math.round(height * scale) });
+  canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);
+  return canvas;
+}
+
+function download(blob, file) {
+  const address = URL.createObjectURL(blob);
+  element('a', { href: address, download: file }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 60000);
+}
+
+async function saveFigure(name, kind) {
+  const file = name.replace(/[^\w]+/g, '_') + '.' + kind.toLowerCase();
+  if (kind === 'PNG') (await pngOf(name)).toBlob((blob) => download(blob, file));
+  else download(new Blob([svgOf(name).text], { type: 'image/svg+xml' }), file);
+}

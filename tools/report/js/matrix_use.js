@@ -1,0 +1,79 @@
+// What the pointer does in the matrix, and the matrix as one picture.
+
+// Drags over less than this are clicks.
+const leastDrag = 6;
+
+// A drag across a panel zooms all of them; a click stays a choice. Fingers scroll the page instead.
+function dragAcross(event) {
+  const button = event.target.closest('.panel');
+  if (!button || event.button !== 0 || event.pointerType === 'touch') return;
+  const box = button.getBoundingClientRect();
+  const frame = panelFrame(box.width, box.height);
+  const within = (x) => Math.min(box.width, Math.max(0, x - box.left));
+  const from = within(event.clientX);
+  const mark = element('span', { class: 'drag-mark' });
+  const move = (at) => {
+    const to = within(at.clientX);
+    if (Math.abs(to - from) < leastDrag) return mark.remove();
+    mark.style.left = Math.min(from, to) + 'px';
+    mark.style.width = Math.abs(to - from) + 'px';
+    button.append(mark);
+    return undefined;
+  };
+  const stop = (at) => {
+    for (const kind of ['pointermove', 'pointerup', 'pointercancel']) window.removeEventListener(kind, kind === 'pointermove' ? move : stop);
+    const dragged = mark.isConnected;
+    mark.remove();
+    if (!dragged || at.type !== 'pointerup') return;
+    swallowClick(button);
+    const [low, high] = [from, within(at.clientX)].sort((a, b) => a - b).map((x) => 10 ** (frame.x0 + (frame.x1 - frame.x0) * x / box.width));
+    setBand(low, high);
+  };
+  window.addEventListener('pointermove', move);
+  window.addEventListener('pointerup', stop);
+  window.addEventListener('pointercancel', stop);
+}
+
+function swallowClick(button) {
+  const swallow = (click) => click.stopPropagation();
+  button.addEventListener('click', swallow, { capture: true, once: true });
+  setTimeout(() => button.removeEventListener('click', swallow, { capture: true }));
+}
+
+// The whole matrix for a slide: 16 to 9 or so, names beside rows and above columns.
+function savedMatrix() {
+  const { inputs, outputs } = content.frf;
+  const width = Math.max(80, Math.min(300, Math.floor(1240 / inputs.length)));
+  const height = Math.max(70, Math.min(220, Math.floor(640 / outputs.length)));
+  const left = 64, top = 22;
+  const draw = (context) => {
+    const colours = palette();
+    for (const [o, output] of outputs.entries()) drawName(context, output.name, 'right', left - 8, top + (o + 0.5) * height);
+    for (const [i, input] of inputs.entries()) drawName(context, input.name, 'center', left + (i + 0.5) * width, top / 2);
+    for (let c = 0; c < channelCount(); ++c) {
+      context.save();
+      context.translate(left + Math.floor(c / outputs.length) * width, top + (c % outputs.length) * height);
+      context.beginPath();
+      context.rect(1, 1, width - 3, height - 3);
+      context.clip();
+      paintPanel(c, context, width - 2, height - 2);
+      context.restore();
+      context.strokeStyle = colours.frame;
+      context.lineWidth = 1;
+      context.strokeRect(left + Math.floor(c / outputs.length) * width + 0.5, top + (c % outputs.length) * height + 0.5, width - 3, height - 3);
+    }
+  };
+  const colours = palette();
+  const legend = [['measured', colours.measured]];
+  if (content.arrays.residual) legend.push(['model', colours.model], ['residual', colours.residual]);
+  const panel = { width: left + inputs.length * width, height: top + outputs.length * height, draw };
+  return { title: 'Frequency response, ' + bandText() + (matrix.timesOmega ? ', times \u03c9\u00b2' : ''), legend, panels: [panel] };
+}
+
+function drawName(context, name, align, x, y) {
+  context.font = font(12);
+  context.fillStyle = palette().text;
+  context.textAlign = align;
+  context.textBaseline = 'middle';
+  context.fillText(name.length > 12 ? name.slice(0, 11) + '\u2026' : name, x, y);
+}

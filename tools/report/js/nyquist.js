@@ -1,0 +1,186 @@
+// The chosen element in the complex plane: measured lines with their 95 % circles, and the model.
+
+const nyquist = { figure: null, shown: null, text: null };
+
+function buildNyquist() {
+  const figure = canvasFigure('entry-nyquist', 'Element in the complex plane', drawNyquist, 'square');
+  const title = element('p', { class: 'plot-title', id: 'nyquist-title' }, 'Nyquist');
+  const text = element('output', { class: 'values', id: 'nyquist-values' });
+  Object.assign(nyquist, { figure, title, text });
+  figure.node.addEventListener('pointermove', tellNearest);
+  figure.node.addEventListener('pointerleave', () => { text.textContent = ''; });
+  figure.node.addEventListener('keydown', bandKey);
+  return element('div', { class: 'nyquist' }, element('div', { class: 'plot-head' }, title, saveButtons('Nyquist', savedNyquist)), figure.node,
+    element('p', { class: 'plot-title' }, text));
+}
+
+// What to look at: the zoom, or the strongest resonance, as the whole band is nothing but its steepest part.
+function nyquistBand(channel) {
+  if (!isWholeBand()) return shownBand();
+  const f = array('frequency');
+  const { measured } = channelCurves(channel);
+  let peak = 0;
+  let level = 0;
+  for (let k = 1; k < f.length - 1; ++k) {
+    const here = measured[k] * f[k] * f[k];
+    if (here > level && measured[k] > measured[k - 1] && measured[k] > measured[k + 1]) [peak, level] = [k, here];
+  }
+  if (level === 0) return shownBand();
+  const mode = (content.modes || []).find((one) => isNumber(one.frequency_hz) && Math.abs(one.frequency_hz / f[peak] - 1) < 0.01);
+  const half = mode ? Math.max(0.01, 8 * mode.damping_ratio) : 0.05;
+  let [low, high] = [f[peak] * (1 - Math.min(0.5, half)), f[peak] * (1 + half)];
+  while (linesBetween(low, high) < 12 && high < 2 * f[peak]) [low, high] = [low - (f[peak] - low), high + (high - f[peak])];
+  return [Math.max(f[0], low), Math.min(f[f.length - 1], high)];
+}
+
+// {points: [{k, re, im, radius}], model: [{re, im}]} on the lines of that band, with the factor of the moment.
+function nyquistData(channel, low, high) {
+  const [first, last] = bandLines(low, high);
+  const lines = content.frf.lines;
+  const scale = lineScale();
+  const response = array('response');
+  const residual = array('residual');
+  const { deviation } = channelCurves(channel);
+  const points = [], model = [];
+  for (let k = first; k <= last; ++k) {
+    const place = 2 * (channel * lines + k);
+    const s = scale ? scale[k] : 1;
+    points.push({ k, re: s * response[place], im: s * response[place + 1], radius: deviation ? s * bandFactor * deviation[k] : 0 });
+    if (residual) model.push({ re: s * (response[place] - residual[place]), im: s * (response[place + 1] - residual[place + 1]) });
+  }
+  return { points, model };
+}
+
+function showNyquist(channel) {
+  const [low, high] = nyquistBand(channel);
+  nyquist.shown = { channel, low, high, ...nyquistData(channel, low, high) };
+  nyquist.title.textContent = 'Nyquist, ' + hertz(low) + ' \u2013 ' + hertz(high) + (isWholeBand() ? ' (the strongest resonance)' : '');
+  nyquist.figure.node.setAttribute('aria-label', channelName(channel) + ' in the complex plane, ' + hertz(low) + ' to ' + hertz(high) + ', ' +
+    plural(nyquist.shown.points.length, 'line'));
+  nyquist.figure.redraw();
+}
+
+// Equal scales on both axes, the data in the middle.
+function planeFrame(data, width, height) {
+  const all = data.points.concat(data.model);
+  const range = (part) => [Math.min(...all.map((p) => p[part])), Math.max(...all.map((p) => p[part]))];
+  const [left, right] = range('re');
+  const [low, high] = range('im');
+  const area = { x: 46, y: 8, w: width - 58, h: height - 48 };
+  const unit = Math.max((right - left) / area.w, (high - low) / area.h, 1e-300) * 1.12;
+  const re0 = (left + right) / 2, im0 = (low + high) / 2;
+  return {
+    area, unit, x: (re) => area.x + area.w / 2 + (re - re0) / unit, y: (im) => area.y + area.h / 2 - (im - im0) / unit,
+    re: [re0 - unit * area.w / 2, re0 + unit * area.w / 2], im: [im0 - unit * area.h / 2, im0 + unit * area.h / 2],
+  };
+}
+
+function drawNyquist(context, width, height) {
+  const data = nyquist.shown;
+  if (!data || data.points.length === 0) return;
+  const frame = planeFrame(data, width, height);
+  const colours = palette();
+  drawPlane(context, frame, height);
+  context.save();
+  context.beginPath();
+  context.rect(frame.area.x, frame.area.y, frame.area.w, frame.area.h);
+  context.clip();
+  drawCircles(context, frame, data.points, colours.measured);
+  const path = (points, colour, thickness) => {
+    context.strokeStyle = colour;
+    context.lineWidth = thickness;
+    context.beginPath();
+    points.forEach((p, i) => (i ? context.lineTo(frame.x(p.re), frame.y(p.im)) : context.moveTo(frame.x(p.re), frame.y(p.im))));
+    context.stroke();
+  };
+  path(data.points, colours.measured, data.model.length ? 3 : 1.4);
+  context.fillStyle = colours.measured;
+  if (data.points.length < 400) {
+    for (const p of data.points) {
+      context.beginPath();
+      context.arc(frame.x(p.re), frame.y(p.im), 2.6, 0, 2 * Math.PI);
+      context.fill();
+    }
+  }
+  if (data.model.length) path(data.model, colours.model, 1.3);
+  context.restore();
+}
+
+// Circles that would hide each other are left out: every one shown stands for its neighbours.
+function drawCircles(context, frame, points, colour) {
+  let last = null;
+  for (const p of points) {
+    const at = [frame.x(p.re), frame.y(p.im)];
+    const radius = p.radius / frame.unit;
+    if (radius < 1 || (last && Math.hypot(at[0] - last[0], at[1] - last[1]) < 10)) continue;
+    last = at;
+    context.beginPath();
+    context.arc(at[0], at[1], radius, 0, 2 * Math.PI);
+    context.fillStyle = colour;
+    context.globalAlpha = 0.12;
+    context.fill();
+    context.globalAlpha = 0.5;
+    context.strokeStyle = colour;
+    context.lineWidth = 0.8;
+    context.stroke();
+    context.globalAlpha = 1;
+  }
+}
+
+function drawPlane(context, frame, height) {
+  const { area } = frame;
+  const largest = Math.max(...frame.re.map(Math.abs), ...frame.im.map(Math.abs));
+  const power = 3 * Math.floor(Math.log10(largest) / 3);
+  const colours = palette();
+  const label = (v, step) => {
+    const scaledStep = step / 10 ** power;
+    return (v / 10 ** power).toFixed(Math.max(0, -Math.floor(Math.log10(scaledStep) + 1e-9))).replace('-', '\u2212');
+  };
+  context.font = font(12);
+  context.lineWidth = 1;
+  const line = (x0, y0, x1, y1, axis) => {
+    context.strokeStyle = axis ? colours.frame : colours.grid;
+    context.beginPath();
+    context.moveTo(x0, y0);
+    context.lineTo(x1, y1);
+    context.stroke();
+  };
+  context.fillStyle = colours.text;
+  for (const { v, label: text } of linearTicks(...frame.re, Math.max(2, area.w / 70), label)) {
+    const x = Math.round(frame.x(v)) + 0.5;
+    line(x, area.y, x, area.y + area.h, Math.abs(v) < frame.unit);
+    context.textAlign = 'center';
+    context.textBaseline = 'top';
+    context.fillText(text, x, area.y + area.h + 5);
+  }
+  for (const { v, label: text } of linearTicks(...frame.im, Math.max(2, area.h / 50), label)) {
+    const y = Math.round(frame.y(v)) + 0.5;
+    line(area.x, y, area.x + area.w, y, Math.abs(v) < frame.unit);
+    context.textAlign = 'right';
+    context.textBaseline = 'middle';
+    context.fillText(text, area.x - 5, y);
+  }
+  context.textAlign = 'center';
+  context.textBaseline = 'alphabetic';
+  context.fillText('Re, Im [' + (power ? powerOfTen(power) + '\u00a0' : '') + entryUnit(nyquist.shown.channel) + ']', area.x + area.w / 2, height - 6);
+}
+
+function tellNearest(event) {
+  const data = nyquist.shown;
+  if (!data || data.points.length === 0) return;
+  const { node } = nyquist.figure;
+  const frame = planeFrame(data, node.clientWidth, node.clientHeight);
+  const distance = (p) => Math.hypot(frame.x(p.re) - event.offsetX, frame.y(p.im) - event.offsetY);
+  const nearest = data.points.reduce((a, b) => (distance(b) < distance(a) ? b : a));
+  nyquist.text.textContent = number(array('frequency')[nearest.k], 6) + '\u00a0Hz   ' + number(nearest.re) + (nearest.im < 0 ? ' \u2212 ' : ' + ') +
+    number(Math.abs(nearest.im)) + 'j' + (nearest.radius > 0 ? '   95\u00a0%: \u00b1' + number(nearest.radius) : '');
+}
+
+function savedNyquist() {
+  const colours = palette();
+  return {
+    title: channelName(nyquist.shown.channel) + ', ' + hertz(nyquist.shown.low) + ' \u2013 ' + hertz(nyquist.shown.high),
+    legend: [['measured', colours.measured]].concat(nyquist.shown.model.length ? [['model', colours.model]] : []),
+    panels: [canvasPanel(nyquist.figure)],
+  };
+}
