@@ -12,6 +12,7 @@
 #include "estimation/cmif.hpp"
 #include "estimation/validation.hpp"
 #include "frf/frf_estimate.hpp"
+#include "tools/stage_geometry.hpp"
 
 namespace stageid {
 
@@ -61,6 +62,8 @@ struct ReportData {
   std::optional<AdditiveModel> model;
   Eigen::MatrixXcd model_response;  ///< (n_y n_u) x N on frf's lines, as measured; 0 x 0: none
   Eigen::MatrixXd model_variance;   ///< same shape, E|dP|^2; 0 x 0: unknown
+
+  StageGeometry geometry;  ///< channels by name; empty: shapes are drawn as bars
 
   Eigen::MatrixXd cmif_curves;  ///< min(n_y, n_u) x N on frf's lines, largest first; 0 x 0: none
   CmifKind cmif_kind = CmifKind::accelerance;

@@ -14,7 +14,8 @@ ReportCommand::ReportCommand(CLI::App& app, Console& console) : console_(console
   CLI::App* command = add_command(app, "report", "One self-contained interactive page");
   command
       ->add_option("inputs", inputs_,
-                   "directory of identify, or files: FRF, held-back FRF, model, modes, log")
+                   "directory of identify, or files: FRF, held-back FRF, model, modes, log, "
+                   "stage file (for the positions)")
       ->required();
   command->add_option("-o,--output", output_, "page to write (.html)")->required();
   command->final_callback([this] { run(); });

@@ -32,6 +32,7 @@ std::string read_text(const std::filesystem::path& file) {
 std::string kind_of(const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
   if (ending == ".slog") return "stageid-log";
+  if (ending == ".yaml" || ending == ".yml") return "stageid-stage";
   if (ending == ".json") {
     const Json json = Json::parse(read_text(file), nullptr, false);
     if (json.is_object() && json.contains("format") && json["format"].is_string())
@@ -84,9 +85,13 @@ void add_file(ReportInput& input, const std::filesystem::path& file) {
     put(input.log, file);
   } else if (kind == "stageid-summary") {
     put(input.summary, file);
+  } else if (kind == "stageid-stage") {
+    put(input.stage, file);
   } else {
-    throw std::invalid_argument(fmt::format(
-        "{}: is no log, FRF, model, modes or summary of stageid; leave it out", file.string()));
+    throw std::invalid_argument(
+        fmt::format("{}: is no log, FRF, model, modes or summary of stageid and no stage file; "
+                    "leave it out",
+                    file.string()));
   }
 }
 
@@ -125,6 +130,17 @@ void add_summary(ReportData& data, const std::filesystem::path& file) {
       data.messages.push_back({ReportMessage::Severity::warning, note.get<std::string>()});
 }
 
+/// A log keeps the stage file as it was; one of another version may have keys that are unknown here,
+/// and the shapes do without.
+StageGeometry geometry_of_log(const std::filesystem::path& file, const Json& metadata) {
+  if (!metadata.contains("stage") || !metadata["stage"].is_string()) return {};
+  try {
+    return stage_geometry(file, metadata["stage"].get<std::string>());
+  } catch (const FormatError&) {
+    return {};
+  }
+}
+
 void add_log(ReportData& data, const std::filesystem::path& file) {
   const std::unique_ptr<LogReader> log = open_log(file, false);
   data.runs = log->runs();
@@ -132,6 +148,7 @@ void add_log(ReportData& data, const std::filesystem::path& file) {
   const Json metadata = Json::parse(log->info().metadata_json, nullptr, false);
   if (!metadata.is_object()) return;
   data.period_s = wall_period_s(log->info());
+  data.geometry = geometry_of_log(file, metadata);
   for (const char* name : {"configuration", "stage"})
     if (metadata.contains(name) && metadata[name].is_string())
       data.documents.push_back({name, metadata[name].get<std::string>()});
@@ -171,6 +188,7 @@ ReportData read_report_data(const ReportInput& input) {
   }
   if (!input.modes.empty()) data.chosen_modes = read_modes(input.modes);
   if (!input.log.empty()) add_log(data, input.log);
+  if (!input.stage.empty()) data.geometry = stage_geometry(input.stage, read_text(input.stage));
   if (!input.summary.empty()) add_summary(data, input.summary);
   return data;
 }

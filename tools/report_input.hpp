@@ -17,6 +17,7 @@ struct ReportInput {
   std::filesystem::path modes;
   std::filesystem::path log;
   std::filesystem::path summary;
+  std::filesystem::path stage;  ///< for the positions; without it those of the log
 };
 
 /// Sorts files (or the files of a directory of `identify`) by what they hold.

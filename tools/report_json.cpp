@@ -8,6 +8,7 @@
 #include "tools/page_template.hpp"
 #include "tools/report_encoding.hpp"
 #include "tools/report_modes.hpp"
+#include "tools/report_shapes.hpp"
 #include "tools/report_verdict.hpp"
 #include "tools/timing_json.hpp"
 
@@ -297,6 +298,10 @@ PageContent page_content(const ReportData& data) {
   if (data.model) {
     json["model"] = model_json(*data.model);
     json["modes"] = modes_json(data);
+    json["shapes"] = shapes_json(*data.model);
+    json["shape_channels"] = {{"outputs", channels(data.model->outputs)},
+                              {"inputs", channels(data.model->inputs)}};
+    json["geometry"] = geometry_json(data.geometry, data.model->outputs, data.model->inputs);
   }
   if (data.validation) json["validation"] = validation_json(*data.validation);
   json["arrays"] = std::move(arrays.description());

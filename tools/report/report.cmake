@@ -29,6 +29,10 @@ set(report_js
   ${response_js}
   cost
   tables
+  plate
+  shapes
+  shape_scene
+  mac
   health
   selftest
   main)
@@ -68,5 +72,10 @@ add_custom_command(OUTPUT ${report_assets_cpp}
   COMMENT "Embedding the report page" VERBATIM)
 
 target_sources(stageid_tools PRIVATE
-  report.cpp report_encoding.cpp report_json.cpp report_modes.cpp report_verdict.cpp
+  report.cpp
+  report_encoding.cpp
+  report_json.cpp
+  report_modes.cpp
+  report_shapes.cpp
+  report_verdict.cpp
   ${report_assets_cpp})

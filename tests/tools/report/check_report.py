@@ -160,6 +160,29 @@ def check_nyquist(found, expected):
                 check_summary(got[key], want[key], tolerance, f"{name}, {key}")
 
 
+def mac(a, b):
+    """|a^H b|^2 / (|a|^2 |b|^2) of shapes given as [re, im, ...]."""
+    a, b = ([complex(*v[i:i + 2]) for i in range(0, len(v), 2)] for v in (a, b))
+    inner = sum(x.conjugate() * y for x, y in zip(a, b))
+    return abs(inner) ** 2 / (sum(abs(x) ** 2 for x in a) * sum(abs(y) ** 2 for y in b))
+
+
+def check_shapes(found, expected):
+    want = expected["shapes"]
+    expect(len(found["modes"]) == len(want), f"{len(found['modes'])} shapes instead of {len(want)}")
+    for i, (got, mode) in enumerate(zip(found["modes"], want)):
+        for kind in ("outputs", "inputs"):  # five decimals
+            error = max(abs(x - y) for x, y in zip(got[kind], mode[kind]))
+            expect(error <= 0.6e-5 and len(got[kind]) == len(mode[kind]), f"shape {i}, {kind}: off by {error}")
+    for kind, name in (("outputs", "output_mac"), ("inputs", "input_mac")):
+        for i, row in enumerate(found[name]):
+            for j, value in enumerate(row):
+                expect(abs(value - mac(want[i][kind], want[j][kind])) <= 0.6e-4, f"{name} {i}, {j}: {value}")
+    expect(found["places"] == expected["places"], f"{found['places']} channels with a place")
+    expect(found["surface"] == (expected["places"] > 3), "surface where there are no places, or none where there are")
+    expect(found["plane_error"] < 1e-9 and found["meet_error"] < 1e-9 and found["on_a_line"], f"surface: {found}")
+
+
 def check_saved(saved):
     for name, file in saved.items():
         expect(not file["broken"], f"the saved {name} is no sound SVG")
@@ -188,6 +211,8 @@ def check_page(found, expected, width):
     for name, ink in found["plots"].items():
         expect(ink, f"the plot {name} is empty")
     check_saved(found["saved"])
+    if "shapes" in expected:
+        check_shapes(found["shapes"], expected)
     if "panels" in expected:
         check_response(found, expected)
         check_zoom(found["zoom"])

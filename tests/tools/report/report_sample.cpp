@@ -84,10 +84,42 @@ Json expected_nyquist(const ReportData& data) {
   return out;
 }
 
+Json pairs_of(Eigen::VectorXd shape) {
+  shape.normalize();
+  Json out = Json::array();
+  for (const double value : shape) {
+    out.push_back(value);
+    out.push_back(0.0);
+  }
+  return out;
+}
+
+/// The shapes of the synthetic modes by hand: their numerators are products of two vectors.
+Json expected_shapes(const AdditiveModel& model) {
+  Json out = Json::array();
+  for (const Submodel& submodel : model.submodels) {
+    if (!submodel.is_mode()) continue;
+    const Eigen::MatrixXd& b = submodel.numerator[0];
+    Eigen::Index row = 0;
+    Eigen::Index column = 0;
+    const double most = b.cwiseAbs().maxCoeff(&row, &column);
+    Eigen::VectorXd output = b.col(column);
+    for (const double value : b.col(column)) {
+      if (std::abs(value) < 0.9 * most) continue;
+      if (value < 0.0) output = -output;
+      break;
+    }
+    out.push_back({{"outputs", pairs_of(output)}, {"inputs", pairs_of(b.transpose() * output)}});
+  }
+  return out;
+}
+
 Json expected(const ReportData& data) {
   Json out = {{"title", data.title}, {"modes", data.model ? data.true_modes.size() : 0}};
   RunTiming timing;
   for (const LogRun& run : data.runs) timing += run.timing;
+  if (data.model) out["shapes"] = expected_shapes(*data.model);
+  out["places"] = data.geometry.actuators.size() + data.geometry.sensors.size();
   out["timed_cycles"] = timing.lateness.total() + timing.execution.total();
   if (!data.frf) return out;
   const FrfEstimate& frf = *data.frf;
@@ -116,6 +148,8 @@ void make_hostile(ReportData& data) {
   data.frf->inputs.names[0] = attack;
   data.frf->inputs.units[0] = attack;
   data.frf->outputs.names[0] = "z\xff\xc0 {{content}} " + attack;
+  data.model->inputs.names[0] = attack;
+  data.geometry.actuators[0].name = attack;
   data.validation_frf->inputs = data.frf->inputs;
   data.validation_frf->outputs = data.frf->outputs;
   data.decisions[0] = attack;
@@ -144,6 +178,7 @@ ReportData sample(const std::string& kind) {
     return bare;
   }
   ReportData data = test::synthetic_report({.outputs = 2, .inputs = 3, .lines = 300, .modes = 5});
+  if (kind == "small") data.geometry = {};  // shapes as bars
   if (kind == "hostile") make_hostile(data);
   return data;
 }

@@ -1,6 +1,10 @@
 # Tests of the report page: in C++, and in a browser.
 target_sources(tools_tests PRIVATE
-  report_encoding_test.cpp report_modes_test.cpp report_page_test.cpp report_verdict_test.cpp
+  report_encoding_test.cpp
+  report_modes_test.cpp
+  report_page_test.cpp
+  report_shapes_test.cpp
+  report_verdict_test.cpp
   report/synthetic_report.cpp)
 target_link_libraries(tools_tests PRIVATE fmt::fmt nlohmann_json::nlohmann_json)
 
@@ -19,4 +23,8 @@ if(Python3_Interpreter_FOUND)
     set_tests_properties(report_in_browser.${kind} PROPERTIES
       SKIP_RETURN_CODE 77 LABELS "tools;browser" TIMEOUT 1800)
   endforeach()
+  add_test(NAME report_in_motion
+    COMMAND Python3::Interpreter ${CMAKE_CURRENT_LIST_DIR}/check_motion.py
+      --sample $<TARGET_FILE:report_sample> --work ${CMAKE_CURRENT_BINARY_DIR}/report_in_motion)
+  set_tests_properties(report_in_motion PROPERTIES SKIP_RETURN_CODE 77 LABELS "tools;browser" TIMEOUT 600)
 endif()

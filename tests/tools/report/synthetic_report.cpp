@@ -48,6 +48,22 @@ double shape(int mode, double x, double y) {
          std::cos(0.5 * pi * (mode / 4) * (y + 1.0) + 0.2 * mode);
 }
 
+/// On an ellipse.
+std::pair<double, double> position(Eigen::Index i, Eigen::Index of) {
+  const double turn = 2.0 * pi * static_cast<double>(i) / static_cast<double>(of);
+  return {0.9 * std::cos(turn), 0.8 * std::sin(turn)};
+}
+
+std::vector<ChannelPlace> places(const ChannelList& channels) {
+  std::vector<ChannelPlace> out;
+  for (const std::string& name : channels.names) {
+    const auto [x, y] = position(static_cast<Eigen::Index>(out.size()),
+                                 static_cast<Eigen::Index>(channels.names.size()));
+    out.push_back({name, {0.3 * x, 0.3 * y, 0.0}, Eigen::Vector3d::UnitZ()});
+  }
+  return out;
+}
+
 AdditiveModel synthetic_model(const SyntheticSize& size, std::vector<TrueMode>& truth,
                               Random& random) {
   AdditiveModel model;
@@ -57,10 +73,6 @@ AdditiveModel synthetic_model(const SyntheticSize& size, std::vector<TrueMode>& 
   model.hold = HoldModel::exact;
   model.input_delay_s = Eigen::VectorXd::Constant(size.inputs, delay_s);
   model.output_delay_s = Eigen::VectorXd::Zero(size.outputs);
-  const auto position = [](Eigen::Index i, Eigen::Index of) {
-    const double turn = 2.0 * pi * static_cast<double>(i) / static_cast<double>(of);
-    return std::pair{0.9 * std::cos(turn), 0.8 * std::sin(turn)};
-  };
   Submodel rigid{.integrators = 2,
                  .denominator = {1.0},
                  .numerator = {},
@@ -236,6 +248,7 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
   data.title = "Wafer stage, out of plane";
   data.version = "0.1.0";
   data.model = synthetic_model(size, data.true_modes, random);
+  data.geometry = {places(data.model->inputs), places(data.model->outputs)};
   add_measurement(data, size, random);
   data.validation = compare(data);
   add_cmif(data);

@@ -2,9 +2,11 @@
 // The program's own browser test reads it; so can anyone who doubts a page.
 
 async function selfTest(startedMs) {
+  const builtMs = performance.now();
+  await new Promise((done) => setTimeout(done, 100));  // figures draw when they get their size
   const findings = {
     title: document.title, verdict: content.verdict.level, sections: Array.from(document.querySelectorAll('main > section'), (s) => s.id),
-    ready_ms: Math.round(performance.now()), script_ms: Math.round(performance.now() - startedMs),
+    ready_ms: Math.round(builtMs), script_ms: Math.round(builtMs - startedMs),
     width: window.innerWidth, overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
     injected: document.querySelectorAll('main img, main iframe, main script, header img, header script, [onerror]').length,
   };
@@ -21,6 +23,7 @@ async function selfTest(startedMs) {
   findings.plots = Object.fromEntries(Array.from(document.querySelectorAll('.plot'), (plot) => [plot.id, inkOf(plot)]));
   findings.rows = Object.fromEntries(Array.from(document.querySelectorAll('section'), (s) => [s.id, s.querySelectorAll('tbody tr').length]));
   if (content.frf) Object.assign(findings, { zoom: zoomCheck(), use: useCheck(), nyquist: nyquistCheck(), drag: dragCheck() });
+  if (content.shapes) findings.shapes = shapesCheck();
   findings.saved = await savedCheck();
   findings.timed_cycles = Array.from(document.querySelectorAll('.histogram .step-time'), (cell) => Number(cell.textContent.replace(/\u202f/g, '')))
     .reduce((a, b) => a + b, 0);
@@ -134,6 +137,19 @@ function nyquistCheck() {
     const { points, model } = nyquistData(channel, ...wholeBand());
     return { channel, measured: summaryOf(flat(points)), model: model.length ? summaryOf(flat(model)) : null, radius: summaryOf(points.map((p) => p.radius)) };
   });
+}
+
+// The numbers behind shapes and MACs; and how far the surface is from a plane and from values that it must meet.
+function shapesCheck() {
+  const corners = [[-0.5, -0.5], [0.5, -0.4], [0.4, 0.5], [-0.5, 0.4], [0.1, 0]];
+  const plane = plateThrough(corners, corners.map(([x, y]) => 1 + 2 * x - 3 * y));
+  const values = [1, -1, 0.5, 2, 0.3];
+  const exact = plateThrough(corners, values, 0);
+  return {
+    ...content.shapes, places: shapes.scene.placed.length, surface: Boolean(shapes.scene.grid), text: shapes.text.textContent,
+    plane_error: Math.abs(plane(0.2, 0.3) - (1 + 0.4 - 0.9)), meet_error: Math.max(...corners.map(([x, y], i) => Math.abs(exact(x, y) - values[i]))),
+    on_a_line: plateThrough([[0, 0], [1, 1], [2, 2], [3, 3]], [1, 2, 3, 4], 0) === null,
+  };
 }
 
 // Every figure as a file: SVG that parses and holds only numbers, PNG with ink; the peak stands where it belongs.

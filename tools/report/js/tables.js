@@ -68,7 +68,7 @@ function buildModes() {
   const sigmas = (value) => (isNumber(value) ? (value < 0 ? '\u2212' : '+') + Math.abs(value).toFixed(1) : '\u2013');
   const deviation = (key) => (row) => element('span', { class: Math.abs(row[key]) > 3 ? 'far' : null }, sigmas(row[key]));
   const columns = [
-    ['#', (row) => row.place, (row) => String(row.place)],
+    ['#', (row) => row.place, shapeCell],
     ['f\u2080 [Hz]', (row) => row.frequency_hz, frequencyCell],
   ];
   if (uncertain) columns.push(['\u03c3(f\u2080) [Hz]', (row) => row.frequency_std_hz, (row) => number(row.frequency_std_hz, 2)]);
@@ -94,6 +94,18 @@ function fixed(value) {
 
 function hundred(value) {
   return isNumber(value) ? (100 * value).toPrecision(4) : '\u2013';
+}
+
+// The mode's number, and the way to its shape.
+function shapeCell(row) {
+  const index = content.shapes ? content.shapes.modes.findIndex((mode) => mode.frequency_hz === row.frequency_hz) : -1;
+  if (index < 0) return String(row.place);
+  return element('button', {
+    type: 'button', class: 'plain number', title: 'Show its shape', 'aria-label': 'Mode ' + row.place + ': show its shape', onclick: () => {
+      showShape(index);
+      document.getElementById('shapes').scrollIntoView({ behavior: 'auto', block: 'start' });
+    },
+  }, String(row.place));
 }
 
 function frequencyCell(row) {
@@ -182,6 +194,7 @@ function buildProvenance() {
   for (const { name, text } of content.documents) body.append(folded(name, text));
 }
 
-function folded(title, text) {
-  return element('details', null, element('summary', null, title), element('pre', null, text));
+// A text, or an element, behind its title.
+function folded(title, text, node) {
+  return element('details', null, element('summary', null, title), node || element('pre', null, text));
 }

@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""Opens a report page in headless Chromium on the wall clock: the mode shape moves, rests where the reader
+wants no motion, and the page is used with the keyboard alone.
+
+    check_motion.py --sample REPORT_SAMPLE --work DIRECTORY
+
+Prints frames a second, time of the first paint and size. Exit code 77 (skipped) when there is no Chromium and
+STAGEID_REQUIRE_BROWSER is not set.
+"""
+
+import argparse
+import os
+import pathlib
+import subprocess
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "dashboard"))
+from browser import Browser, find_browser
+
+failures = []
+SHAPES = "window.stageidReport.shapes"
+
+
+def expect(condition, message):
+    if not condition:
+        failures.append(message)
+
+
+def open_page(page, still=False):
+    browser = Browser(find_browser())
+    browser.resize(1280, 1000)
+    browser.call("Emulation.setEmulatedMedia",
+                 features=[{"name": "prefers-reduced-motion", "value": "reduce" if still else "no-preference"}])
+    browser.call("Page.navigate", url=f"file://{page}")
+    expect(browser.wait_for("window.stageidReport.shapes.figure !== null && document.readyState === 'complete'"), "the page does not come up")
+    browser.evaluate("document.getElementById('shape-plot').scrollIntoView({block: 'center'})")
+    return browser
+
+
+def check_motion(page):
+    browser = open_page(page)
+    expect(browser.wait_for(f"{SHAPES}.frames > 5"), "the mode shape does not move")
+    rate = browser.evaluate(f"""new Promise((done) => {{ const first = {SHAPES}.frames, start = performance.now();
+        setTimeout(() => done(1000 * ({SHAPES}.frames - first) / (performance.now() - start)), 1500); }})""")
+    paint = browser.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
+    print(f"{page.stat().st_size / 1e6:.2f} MB, first paint after {paint:.0f} ms, animation at {rate:.0f} frames/s")
+    browser.evaluate("document.getElementById('shape-play').click()")
+    before = browser.evaluate(f"(async () => {{ await new Promise(requestAnimationFrame); return {SHAPES}.frames; }})()")
+    after = browser.evaluate(f"(async () => {{ for (let i = 0; i < 5; ++i) await new Promise(requestAnimationFrame); return {SHAPES}.frames; }})()")
+    expect(after == before, f"paused, it draws {after - before} frames")
+    expect(browser.problems == [], f"console: {browser.problems}")
+    browser.close()
+
+
+def check_stillness(page):
+    browser = open_page(page, still=True)
+    browser.evaluate("(async () => { for (let i = 0; i < 10; ++i) await new Promise(requestAnimationFrame); })()")
+    expect(browser.evaluate(f"{SHAPES}.frames") == 0, "it moves although the reader wants no motion")
+    browser.evaluate("document.getElementById('shape-play').click()")
+    expect(browser.wait_for(f"{SHAPES}.frames > 3"), "it does not move when asked to")
+    browser.close()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sample", required=True, help="program that writes the page")
+    parser.add_argument("--work", required=True, type=pathlib.Path)
+    options = parser.parse_args()
+    if find_browser() is None:
+        print("no Chromium found; install it with: apt-get install --no-install-recommends chromium")
+        return 1 if os.environ.get("STAGEID_REQUIRE_BROWSER") else 77
+    work = options.work.resolve()
+    subprocess.run([options.sample, work, "full"], check=True)
+    check_motion(work / "report.html")
+    check_stillness(work / "report.html")
+    for failure in failures:
+        print("FAILED:", failure)
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
