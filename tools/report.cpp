@@ -30,10 +30,14 @@ void check_variance(const char* name, const Eigen::MatrixXd& variance, Eigen::In
 
 void check_data(const ReportData& data) {
   if (!data.frf) {
-    if (data.model_response.size() > 0 || data.cmif_curves.size() > 0 || data.validation_frf)
+    const bool other = data.comparison && (data.comparison->response.size() > 0 ||
+                                           data.comparison->model_response.size() > 0);
+    if (data.nonlinearity || data.model_response.size() > 0 || data.cmif_curves.size() > 0 ||
+        data.validation_frf || other)
       throw std::invalid_argument(
-          "report: model_response, cmif_curves and validation_frf need the frf whose lines they "
-          "are on");
+          "report: model_response, cmif_curves, validation_frf, nonlinearity and the responses of "
+          "a comparison "
+          "need the frf whose lines they are on");
     return;
   }
   const FrfEstimate& frf = *data.frf;
@@ -43,6 +47,16 @@ void check_data(const ReportData& data) {
   check_variance("model_variance", data.model_variance, channels, frf.lines());
   check_variance("cmif_curves", data.cmif_curves, std::min(frf.n_outputs(), frf.n_inputs()),
                  frf.lines());
+  if (data.comparison) {
+    check_shape("comparison.response", data.comparison->response, channels, frf.lines());
+    check_shape("comparison.model_response", data.comparison->model_response, channels,
+                frf.lines());
+  }
+  if (data.nonlinearity) {
+    const Eigen::Index bands = data.nonlinearity->band_hz.rows();
+    check_shape("nonlinearity.p_value", data.nonlinearity->p_value, channels, bands);
+    check_shape("nonlinearity.distortion", data.nonlinearity->distortion, channels, bands);
+  }
   if (data.validation && data.validation->channel_error.size() > 0)
     check_shape("validation.channel_error", data.validation->channel_error, channels, 1);
   if (!data.validation_frf) return;
@@ -61,6 +75,11 @@ std::string block_elements(const std::vector<report::Block>& blocks) {
 }
 
 }  // namespace
+
+const char* to_string(ReportMessage::Severity severity) noexcept {
+  static constexpr const char* names[] = {"note", "warning", "error"};
+  return names[static_cast<int>(severity)];
+}
 
 std::string report_page(const ReportData& data) {
   check_data(data);

@@ -10,8 +10,10 @@
 #include "acquisition/log_info.hpp"
 #include "estimation/additive_model.hpp"
 #include "estimation/cmif.hpp"
+#include "estimation/stabilization.hpp"
 #include "estimation/validation.hpp"
 #include "frf/frf_estimate.hpp"
+#include "frf/nonlinearity.hpp"
 #include "tools/stage_geometry.hpp"
 
 namespace stageid {
@@ -28,6 +30,17 @@ struct ReportMessage {
   enum class Severity : std::uint8_t { note, warning, error };
   Severity severity = Severity::note;
   std::string text;
+};
+
+const char* to_string(ReportMessage::Severity severity) noexcept;  ///< "note", "warning", "error"
+
+/// What a check of the data found, as a row of the table of findings.
+struct ReportFinding {
+  ReportMessage::Severity severity = ReportMessage::Severity::note;
+  std::string channel;  ///< names; empty: the whole measurement
+  std::string what;
+  std::string figure;  ///< the number that says so
+  std::string remedy;
 };
 
 /// A labelled number or word for the header, as it is to be read: {"error against the plant", "0.12
@@ -50,6 +63,15 @@ struct ReportDocument {
   std::string text;
 };
 
+/// Another day or another model beside the one reported; its own parts may be absent. The channels are those
+/// of the report.
+struct ReportComparison {
+  std::string title;  ///< how the page calls it
+  std::optional<AdditiveModel> model;
+  Eigen::MatrixXcd response;        ///< (n_y n_u) x N on frf's lines; 0 x 0: none, or the same
+  Eigen::MatrixXcd model_response;  ///< same shape; 0 x 0: none
+};
+
 /// What the page shows. Every part may be absent; the page then leaves its section out.
 struct ReportData {
   std::string title;
@@ -69,12 +91,17 @@ struct ReportData {
   CmifKind cmif_kind = CmifKind::accelerance;
   std::vector<ModeCandidate> chosen_modes;  ///< where the fit started
   std::vector<TrueMode> true_modes;
+  std::vector<StabilizationPole> stabilization;  ///< empty: no diagram
+  std::optional<NonlinearityTest> nonlinearity;  ///< of frf's channels
+
+  std::optional<ReportComparison> comparison;
 
   std::optional<Validation> validation;
   std::vector<double> cost;            ///< one entry an iterate; empty: the model's cost_history
   std::vector<std::string> decisions;  ///< in order
 
-  std::vector<LogRun> runs;     ///< timing and health of the measurement
+  std::vector<ReportFinding> findings;  ///< of the checks of the data, in any order
+  std::vector<LogRun> runs;             ///< timing and health of the measurement
   double sample_rate_hz = 0.0;  ///< of the runs; with it their speed against real time is told
   double period_s = 0.0;        ///< of the loop's own clock; 0: virtual time
   std::vector<ReportStep> steps;

@@ -17,13 +17,17 @@ ReportCommand::ReportCommand(CLI::App& app, Console& console) : console_(console
                    "directory of identify, or files: FRF, held-back FRF, model, modes, log, "
                    "stage file (for the positions)")
       ->required();
+  command->add_option("--compare", compare_,
+                      "another day or model: directory of identify, or its FRF and model");
   command->add_option("-o,--output", output_, "page to write (.html)")->required();
   command->final_callback([this] { run(); });
 }
 
 void ReportCommand::run() const {
   require_writable(output_);
-  write_report(output_, read_report_data(report_input(inputs_)));
+  ReportData data = read_report_data(report_input(inputs_));
+  if (!compare_.empty()) add_comparison(data, compare_);
+  write_report(output_, data);
   console_.result(fmt::format("wrote {}", output_.string()));
   console_.result({{"output", output_.string()}});
 }

@@ -18,6 +18,7 @@ class ReportCommand {
 
   Console& console_;
   std::vector<std::filesystem::path> inputs_;
+  std::vector<std::filesystem::path> compare_;
   std::filesystem::path output_;
 };
 

@@ -13,6 +13,7 @@
 #include "frf/frf_file.hpp"
 #include "tools/fit_step.hpp"
 #include "tools/model_hdf5.hpp"
+#include "tools/report_comparison.hpp"
 #include "tools/run_metadata.hpp"
 
 namespace stageid {
@@ -110,6 +111,35 @@ void add_response(ReportData& data, const ReportInput& input) {
   if (data.validation_frf) data.validation = validate(model, *data.validation_frf);
 }
 
+/// All that delays the response, which no polynomial in z should have to imitate.
+double delay_in(const FrfEstimate& frf, const std::optional<AdditiveModel>& model) {
+  double delay_s = 0.0;
+  if (frf.hold == Hold::zoh && frf.compensated != Compensation::hold && frf.sample_rate_hz > 0.0)
+    delay_s += 0.5 / frf.sample_rate_hz;
+  if (model && frf.compensated == Compensation::none)
+    delay_s += model->input_delays_s().mean() + model->output_delays_s().mean();
+  return delay_s;
+}
+
+/// The test needs independent lines, both variances and their degrees of freedom.
+bool can_test_linearity(const FrfEstimate& frf) {
+  const Json provenance = Json::parse(frf.provenance_json, nullptr, false);
+  const Json options =
+      provenance.is_object() ? provenance.value("options", Json::object()) : Json::object();
+  const bool periodic = options.is_object() && options.value("method", Json()) == "periodic";
+  return periodic && frf.noise_variance.size() > 0 && frf.total_variance.size() > 0 &&
+         frf.total_dof >= 1.0 && frf.noise_dof > 0.0;
+}
+
+void add_diagrams(ReportData& data) {
+  const FrfEstimate& frf = *data.frf;
+  data.cmif_kind = PeakOptions().kind;
+  data.cmif_curves = cmif(frf, data.cmif_kind);
+  if (can_test_linearity(frf)) data.nonlinearity = nonlinearity_test(frf);
+  const StabilizationOptions options{.delay_s = delay_in(frf, data.model)};
+  if (frf.lines() > 2 * options.most_order) data.stabilization = stabilization(frf, options);
+}
+
 /// What only a summary knows: the truth of a simulated plant, and how long the steps took.
 void add_summary(ReportData& data, const std::filesystem::path& file) {
   const Json summary = Json::parse(read_text(file), nullptr, false);
@@ -182,15 +212,29 @@ ReportData read_report_data(const ReportInput& input) {
     data.decisions = decisions_of(*data.model);
     add_response(data, input);
   }
-  if (data.frf) {
-    data.cmif_kind = PeakOptions().kind;
-    data.cmif_curves = cmif(*data.frf, data.cmif_kind);
-  }
+  if (data.frf) add_diagrams(data);
   if (!input.modes.empty()) data.chosen_modes = read_modes(input.modes);
   if (!input.log.empty()) add_log(data, input.log);
   if (!input.stage.empty()) data.geometry = stage_geometry(input.stage, read_text(input.stage));
   if (!input.summary.empty()) add_summary(data, input.summary);
   return data;
+}
+
+void add_comparison(ReportData& data, const std::vector<std::filesystem::path>& files) {
+  const ReportInput input = report_input(files);
+  if (input.frf.empty() && input.model.empty())
+    throw std::invalid_argument(fmt::format(
+        "--compare {}: holds no FRF and no model; give the directory of 'stageid identify', or an "
+        "FRF or model file",
+        files.at(0).string()));
+  std::optional<FrfEstimate> frf;
+  if (!input.frf.empty()) frf = read_frf(input.frf);
+  std::optional<AdditiveModel> model;
+  if (!input.model.empty()) model = read_model(input.model);
+  const std::filesystem::path first = std::filesystem::absolute(files.at(0)).lexically_normal();
+  const std::filesystem::path name =
+      first.has_filename() ? first.filename() : first.parent_path().filename();
+  data.comparison = report::make_comparison(data, name.string(), std::move(model), frf);
 }
 
 }  // namespace stageid

@@ -29,4 +29,8 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files);
 /// @throws FileError, FormatError, std::invalid_argument
 ReportData read_report_data(const ReportInput& input);
 
+/// Adds another day or model: a directory of `identify`, or its FRF and model.
+/// @throws as report_input() and report::make_comparison(); std::invalid_argument if neither is there.
+void add_comparison(ReportData& data, const std::vector<std::filesystem::path>& files);
+
 }  // namespace stageid

@@ -6,6 +6,8 @@
 
 #include "estimation/cmif_deviation.hpp"
 #include "tools/page_template.hpp"
+#include "tools/report_comparison.hpp"
+#include "tools/report_diagrams.hpp"
 #include "tools/report_encoding.hpp"
 #include "tools/report_modes.hpp"
 #include "tools/report_shapes.hpp"
@@ -105,6 +107,10 @@ void add_response(const ReportData& data, Arrays& arrays) {
     if (variance != nullptr)
       arrays.add_log_bytes("cmif_deviation", cmif_deviation(frf, data.cmif_kind, *variance));
   }
+  if (data.comparison && data.comparison->response.size() > 0)
+    arrays.add("other_response", "c40", encode_complex_block16(data.comparison->response));
+  if (data.comparison && data.comparison->model_response.size() > 0)
+    arrays.add("other_model", "c40", encode_complex_block16(data.comparison->model_response));
   if (data.model_response.size() == 0) return;
   // The model travels as the residual: small errors of small numbers stay small in both.
   const Eigen::MatrixXcd residual = frf.response - data.model_response;
@@ -223,14 +229,13 @@ Json provenance(const std::string& text) {
 }
 
 Json texts_json(const ReportData& data) {
-  static constexpr const char* severity[] = {"note", "warning", "error"};
   std::vector<ReportMessage> sorted = data.messages;
   std::ranges::stable_sort(sorted, std::ranges::greater{}, &ReportMessage::severity);
   Json out;
   out["messages"] = Json::array();
   for (const ReportMessage& message : sorted)
     out["messages"].push_back(
-        {{"severity", severity[static_cast<int>(message.severity)]}, {"text", message.text}});
+        {{"severity", stageid::to_string(message.severity)}, {"text", message.text}});
   out["figures"] = Json::array();
   for (const ReportFigure& figure : data.figures)
     out["figures"].push_back({{"label", figure.label}, {"value", figure.value}});
@@ -303,6 +308,10 @@ PageContent page_content(const ReportData& data) {
                               {"inputs", channels(data.model->inputs)}};
     json["geometry"] = geometry_json(data.geometry, data.model->outputs, data.model->inputs);
   }
+  json["findings"] = findings_json(data.findings);
+  if (!data.stabilization.empty()) json["stabilization"] = stabilization_json(data.stabilization);
+  if (data.nonlinearity) json["nonlinearity"] = nonlinearity_json(*data.nonlinearity);
+  if (data.comparison) json["comparison"] = comparison_json(data);
   if (data.validation) json["validation"] = validation_json(*data.validation);
   json["arrays"] = std::move(arrays.description());
   return {text_of(json), std::move(arrays.blocks())};

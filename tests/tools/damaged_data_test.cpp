@@ -171,7 +171,7 @@ TEST_F(DamagedData, FilesOfAnotherKind) {
   fail({"fit", name("run.slog"), "-o", name("m.json")}, 2, "run.slog");
   fail({"frf", name("frf.h5"), "-o", name("f.h5")}, 2, "frf.h5");
   fail({"export", name("frf.h5"), "-o", name("m.h5")}, 2, "frf.h5");
-  fail({"report", config_, "-o", name("r.html")}, 2, "experiment.yaml");
+  fail({"report", config_, "-o", name("r.html")}, 2, "experiment.yaml:");
   fail({"fit", name("frf.h5"), "-o", name("m.json"), "--modes", name("model.json")}, 2,
        "model.json");
   write_bytes(at("cut.json"), read_bytes(at("model.json")).substr(0, 500));

@@ -193,6 +193,17 @@ TEST_F(Workflow, TheDesignForetellsWhatTheRunDoes) {
   }
 }
 
+TEST_F(Workflow, AReportComparesWithAnotherDay) {
+  make_frf();
+  succeed({"fit", name("frf.h5"), "-o", name("model.json"), "--band", "120", "800"});
+  succeed({"report", name("frf.h5"), name("model.json"), "--compare", name("frf.h5"),
+           name("model.json"), "-o", name("r.html")});
+  EXPECT_THAT(read_bytes(at("r.html")), HasSubstr(R"("comparison":{)"));
+  EXPECT_THAT(read_bytes(at("r.html")), HasSubstr("it is the same response"));
+  fail({"report", name("frf.h5"), "--compare", name("run.slog"), "-o", name("no.html")}, 2,
+       "run.slog: holds no FRF and no model");
+}
+
 TEST_F(Workflow, EveryCommandSpeaksOneJsonObject) {
   make_frf();
   const std::vector<std::vector<std::string>> commands = {

@@ -33,6 +33,9 @@ set(report_js
   shapes
   shape_scene
   mac
+  compare
+  stabilization
+  nonlinearity
   health
   selftest
   main)
@@ -73,6 +76,8 @@ add_custom_command(OUTPUT ${report_assets_cpp}
 
 target_sources(stageid_tools PRIVATE
   report.cpp
+  report_comparison.cpp
+  report_diagrams.cpp
   report_encoding.cpp
   report_json.cpp
   report_modes.cpp

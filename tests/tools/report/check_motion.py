@@ -61,6 +61,28 @@ def check_stillness(page):
     browser.close()
 
 
+def check_keyboard(page):
+    """The first stop of the Tab key skips to the plots; every control and figure has a name that can be read out."""
+    browser = Browser(find_browser())
+    browser.resize(1280, 1000)
+    browser.call("Page.navigate", url=f"file://{page}")
+    expect(browser.wait_for("document.readyState === 'complete' && window.stageidReport.shapes.figure !== null"), "the page does not come up")
+    browser.press("Tab")
+    expect(browser.evaluate("document.activeElement.className") == "skip", "the first stop is not the way past the head")
+    browser.press("Enter")
+    expect(browser.evaluate("document.activeElement.id") == "main", "the way past the head leads nowhere")
+    browser.press("Tab")
+    expect(browser.evaluate("document.getElementById('main').contains(document.activeElement)"), "after the head comes no plot")
+    nameless = browser.evaluate("""Array.from(document.querySelectorAll('button, select, input, a, [role=img], [role=group]')).filter((e) => {
+        const label = e.getAttribute('aria-label') || e.textContent.trim() || (e.labels && e.labels.length && e.labels[0].textContent.trim())
+            || (e.getAttribute('aria-labelledby') || '').split(' ').filter(Boolean).every((id) => document.getElementById(id)) && e.getAttribute('aria-labelledby');
+        return !label; }).map((e) => e.outerHTML.slice(0, 120))""")
+    expect(nameless == [], f"without a name: {nameless}")
+    stops = browser.evaluate("document.querySelectorAll('.panel[tabindex=\"0\"]').length")
+    expect(stops == 1, f"the matrix has {stops} stops of the Tab key instead of one")
+    browser.close()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sample", required=True, help="program that writes the page")
@@ -73,6 +95,7 @@ def main():
     subprocess.run([options.sample, work, "full"], check=True)
     check_motion(work / "report.html")
     check_stillness(work / "report.html")
+    check_keyboard(work / "report.html")
     for failure in failures:
         print("FAILED:", failure)
     return 1 if failures else 0

@@ -2,7 +2,7 @@
 """Opens report pages in headless Chromium and compares what the page finds in itself with what was
 written into it.
 
-usage: check_report.py --sample REPORT_SAMPLE --work DIRECTORY [--kind full|small|bare|hostile]
+usage: check_report.py --sample REPORT_SAMPLE --work DIRECTORY [--kind full|small|compared|bare|hostile]
 
 Exit code 77 (skipped) when there is no Chromium and STAGEID_REQUIRE_BROWSER is not set.
 """
@@ -80,7 +80,7 @@ def check_arrays(found, expected):
     exact = {"frequency": 1e-15, "response": 1e-15, "cmif": 1e-15}
     # Five bytes a complex number: 2^-15 of its larger part. One byte: half of 254 steps a row; the
     # rows of the sample span at most 8 decades: a factor 10^(4/254).
-    coarse = {"residual": 2.0**-14, "deviation": 10 ** (4 / 254) - 1}
+    coarse = {"residual": 2.0**-14, "other_response": 2.0**-14, "other_model": 2.0**-14, "deviation": 10 ** (4 / 254) - 1}
     for name, want in expected["arrays"].items():
         got = found["arrays"].get(name)
         if got is None:
@@ -183,6 +183,36 @@ def check_shapes(found, expected):
     expect(found["plane_error"] < 1e-9 and found["meet_error"] < 1e-9 and found["on_a_line"], f"surface: {found}")
 
 
+def check_comparison(found, want, entries):
+    expect(len(found["pairs"]) == len(want["pairs"]), f"{len(found['pairs'])} pairs of modes")
+    for got, pair in zip(found["pairs"], want["pairs"]):
+        expect((got["own"], got["other"]) == (pair["own"], pair["other"]), f"pair {got}")
+        for key in ("frequency_difference", "frequency_deviation"):
+            near(got[key], pair[key], 1e-9, f"pair {pair['own']}: {key}")
+        for key in ("output_mac", "input_mac"):
+            near(got[key], 1.0, 1e-9, f"pair {pair['own']}: {key}")
+    expect(found["rows"] == len(want["pairs"]), f"{found['rows']} rows in the table of pairs")
+    for channel, entry in enumerate(entries):
+        for key in ("low", "high"):
+            near(entry["extremes"]["other"][key], want["other"][channel][key], 1e-4, f"element {channel}, other: {key}")
+        # the other day is 2 % smaller: the change is that of the measured
+        near(entry["extremes"]["change"]["high"], 0.02 * entry["extremes"]["measured"]["high"], 1e-2, f"element {channel}, change")
+
+
+def check_diagrams(found, expected):
+    poles = expected["stabilization"]
+    expect(len(found["stabilization"]["poles"]) == len(poles), "poles of the stabilization diagram")
+    for got, want in zip(found["stabilization"]["poles"], poles):
+        expect(got[0] == want[0] and got[3] == want[3] and abs(got[1] - want[1]) < 1e-4 and abs(got[2] / want[2] - 1) < 1e-3,
+               f"pole {got} instead of {want}")
+    stable = sum(pole[3] == 2 for pole in poles)
+    expect(found["stabilization"]["drawn"] == stable, f"{found['stabilization']['drawn']} stable poles drawn instead of {stable}")
+    expect(found["distorted"] == expected["distorted"], f"{found['distorted']} coloured bars instead of {expected['distorted']}")
+    expect(found["findings"] == expected["findings"], f"{found['findings']} findings instead of {expected['findings']}")
+    if found["findings"]:
+        expect(found["first_finding"] == "error", f"the first finding is {found['first_finding']}")
+
+
 def check_saved(saved):
     for name, file in saved.items():
         expect(not file["broken"], f"the saved {name} is no sound SVG")
@@ -217,6 +247,9 @@ def check_page(found, expected, width):
         check_response(found, expected)
         check_zoom(found["zoom"])
         check_drag(found["drag"])
+        check_diagrams(found["diagrams"], expected)
+        if "comparison" in expected:
+            check_comparison(found["comparison"], expected["comparison"], found["entries"])
         check_nyquist(found["nyquist"], expected["nyquist"])
         check_use(found["use"], expected, width)
     expect(found["timed_cycles"] == expected["timed_cycles"],

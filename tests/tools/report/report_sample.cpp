@@ -1,8 +1,9 @@
 // Writes report.html of a synthetic stage and expected.json, what a browser must find in it.
-//   report_sample DIRECTORY [full|small|bare|hostile]
+//   report_sample DIRECTORY [full|small|compared|bare|hostile]
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -114,6 +115,42 @@ Json expected_shapes(const AdditiveModel& model) {
   return out;
 }
 
+constexpr double kShift = 4e-4;
+
+/// Another day: every frequency higher by kShift, the first mode gone, the response 2 % smaller.
+void add_other_day(ReportData& data) {
+  ReportComparison other;
+  other.title = "Tuesday";
+  other.model = data.model;
+  std::vector<Submodel>& submodels = other.model->submodels;
+  submodels.erase(std::ranges::find_if(submodels, &Submodel::is_mode));
+  for (Submodel& submodel : submodels)
+    if (submodel.is_mode()) {
+      submodel.denominator[1] /= 1.0 + kShift;
+      submodel.denominator[2] /= (1.0 + kShift) * (1.0 + kShift);
+    }
+  other.response = 0.98 * data.frf->response;
+  other.model_response = 0.98 * data.model_response;
+  data.comparison = other;
+}
+
+Json expected_comparison(const ReportData& data) {
+  Json pairs = Json::array();
+  int own = 0;
+  for (const Submodel& submodel : data.model->submodels) {
+    if (!submodel.is_mode()) continue;
+    const double f = submodel.natural_frequency_hz();
+    if (own > 0)
+      pairs.push_back({{"own", own},
+                       {"other", own - 1},
+                       {"frequency_difference", kShift},
+                       {"frequency_deviation",
+                        kShift * f / (std::sqrt(2.0) * *submodel.natural_frequency_std_hz)}});
+    ++own;
+  }
+  return {{"pairs", pairs}, {"other", extremes(data.comparison->response)}};
+}
+
 Json expected(const ReportData& data) {
   Json out = {{"title", data.title}, {"modes", data.model ? data.true_modes.size() : 0}};
   RunTiming timing;
@@ -123,6 +160,18 @@ Json expected(const ReportData& data) {
   out["timed_cycles"] = timing.lateness.total() + timing.execution.total();
   if (!data.frf) return out;
   const FrfEstimate& frf = *data.frf;
+  if (data.comparison) {
+    out["comparison"] = expected_comparison(data);
+    out["arrays"]["other_response"] = summary_of(data.comparison->response, false);
+    out["arrays"]["other_model"] = summary_of(data.comparison->model_response, false);
+  }
+  out["stabilization"] = Json::array();
+  for (const StabilizationPole& pole : data.stabilization)
+    out["stabilization"].push_back(
+        {pole.order, pole.frequency_hz, pole.damping_ratio,
+         pole.stable_damping ? 2 : static_cast<int>(pole.stable_frequency)});
+  out["findings"] = data.findings.size();
+  out["distorted"] = data.nonlinearity ? 1 : 0;
   out["panels"] = frf.response.rows();
   out["lines"] = frf.lines();
   out["shape"] = {frf.n_outputs(), frf.n_inputs()};
@@ -148,6 +197,10 @@ void make_hostile(ReportData& data) {
   data.frf->inputs.names[0] = attack;
   data.frf->inputs.units[0] = attack;
   data.frf->outputs.names[0] = "z\xff\xc0 {{content}} " + attack;
+  add_other_day(data);
+  data.comparison->title = attack;
+  for (ReportFinding& finding : data.findings)
+    finding.channel = finding.what = finding.figure = finding.remedy = attack;
   data.model->inputs.names[0] = attack;
   data.geometry.actuators[0].name = attack;
   data.validation_frf->inputs = data.frf->inputs;
@@ -179,6 +232,7 @@ ReportData sample(const std::string& kind) {
   }
   ReportData data = test::synthetic_report({.outputs = 2, .inputs = 3, .lines = 300, .modes = 5});
   if (kind == "small") data.geometry = {};  // shapes as bars
+  if (kind == "compared") add_other_day(data);
   if (kind == "hostile") make_hostile(data);
   return data;
 }
@@ -188,7 +242,7 @@ ReportData sample(const std::string& kind) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::cerr << "usage: report_sample DIRECTORY [full|small|bare|hostile]\n";
+    std::cerr << "usage: report_sample DIRECTORY [full|small|compared|bare|hostile]\n";
     return 2;
   }
   const std::filesystem::path directory = argv[1];

@@ -1,5 +1,7 @@
 # Tests of the report page: in C++, and in a browser.
 target_sources(tools_tests PRIVATE
+  report_comparison_test.cpp
+  report_diagrams_test.cpp
   report_encoding_test.cpp
   report_modes_test.cpp
   report_page_test.cpp
@@ -14,7 +16,7 @@ target_link_libraries(report_sample PRIVATE stageid::tools fmt::fmt nlohmann_jso
 
 find_package(Python3 3.9 COMPONENTS Interpreter)
 if(Python3_Interpreter_FOUND)
-  foreach(kind full small bare hostile)
+  foreach(kind full small compared bare hostile)
     add_test(NAME report_in_browser.${kind}
       COMMAND Python3::Interpreter ${CMAKE_CURRENT_LIST_DIR}/check_report.py
         --sample $<TARGET_FILE:report_sample> --work ${CMAKE_CURRENT_BINARY_DIR}/report_in_browser

@@ -240,6 +240,24 @@ void add_runs(ReportData& data, const SyntheticSize& size) {
                 {"modes", 0.2, ""},  {"fit", 21.4, "34 iterations"},      {"validate", 0.4, ""}};
 }
 
+/// More than noise in one pair and band only; one finding of each weight, the gravest last.
+void add_checks(ReportData& data) {
+  const Eigen::Index channels = data.frf->response.rows();
+  NonlinearityTest test;
+  test.band_hz = Eigen::MatrixXd{{1.0, 10.0}, {10.5, 100.0}, {101.0, 2000.0}};
+  test.p_value = Eigen::MatrixXd::Constant(channels, 3, 0.4);
+  test.distortion = Eigen::MatrixXd::Constant(channels, 3, 2e-4);
+  test.p_value(channels - 1, 1) = 3.25e-7;
+  test.distortion(channels - 1, 1) = 0.0471;
+  data.nonlinearity = test;
+  using Severity = ReportMessage::Severity;
+  data.findings = {
+      {Severity::note, "", "linearity not checked per axis", "", "measure two realizations"},
+      {Severity::warning, "z1", "hum at 50 Hz", "12 dB above its neighbours", "look at the shield"},
+      {Severity::error, "az2", "clips", "312 samples at the limit", "less excitation"}};
+  if (data.frf->lines() > 160) data.stabilization = stabilization(*data.frf, {.delay_s = delay_s});
+}
+
 }  // namespace
 
 ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
@@ -253,6 +271,7 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
   data.validation = compare(data);
   add_cmif(data);
   add_runs(data, size);
+  add_checks(data);
 
   // The truth is as far from the model as the stated deviations say.
   for (TrueMode& mode : data.true_modes) {

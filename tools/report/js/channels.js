@@ -38,6 +38,7 @@ function makeCurves(channel) {
     modelDeviation: part('model_deviation'),
     validationResidual: part('validation_residual'),
     relativeError: null,
+    ...otherCurves(channel, measured),
   };
   const residuals = array('residual');
   if (residuals) {
@@ -54,10 +55,31 @@ function makeCurves(channel) {
   return curves;
 }
 
+// Of another day or model: its magnitudes, and that of its difference from what is here.
+function otherCurves(channel, measured) {
+  const lines = content.frf.lines;
+  const part = (id) => {
+    const all = array(id);
+    return all ? all.subarray(2 * channel * lines, 2 * (channel + 1) * lines) : null;
+  };
+  const other = part('other_response');
+  const otherModel = part('other_model');
+  const residual = part('residual');
+  const own = other ? measured : otherModel && residual ? difference(measured, residual) : null;
+  return {
+    other: other && magnitudes(other), otherModel: otherModel && magnitudes(otherModel),
+    change: own && magnitudes(difference(other || otherModel, own)),
+  };
+}
+
 // Phases of one channel in degrees, -180 to 180.
 function channelPhases(channel) {
   const lines = content.frf.lines;
   const part = (id) => array(id).subarray(2 * channel * lines, 2 * (channel + 1) * lines);
   const measured = part('response');
-  return { measured: phases(measured), model: array('residual') ? phases(difference(measured, part('residual'))) : null };
+  const of = (id) => (array(id) ? phases(part(id)) : null);
+  return {
+    measured: phases(measured), model: array('residual') ? phases(difference(measured, part('residual'))) : null,
+    other: of('other_response'), otherModel: of('other_model'),
+  };
 }

@@ -9,6 +9,11 @@ const traceNames = {
   measured: 'measured', model: 'model', residual: 'residual', validation: 'residual, held-back data', deviation: 'standard deviation',
 };
 
+function traceName(name) {
+  const other = content.comparison ? content.comparison.title : '';
+  return traceNames[name] || { other: 'measured, ' + other, otherModel: 'model, ' + other, change: 'difference from ' + other }[name];
+}
+
 function buildEntry() {
   const { inputs, outputs } = content.frf;
   const body = section('entry', 'Element', 'One element');
@@ -84,6 +89,7 @@ function magnitudeTable(channel) {
   if (curves.model) columns.push(['model', get(curves.model), get(curves.modelDeviation)]);
   if (curves.residual) columns.push(['residual', get(curves.residual), null]);
   if (curves.validationResidual) columns.push(['validation', get(curves.validationResidual), null]);
+  for (const name of ['other', 'otherModel', 'change']) if (curves[name]) columns.push([name, get(curves[name]), null]);
   if (curves.deviation) columns.push(['deviation', get(curves.deviation), null]);
   let floor = Infinity;
   for (const [, values] of columns) for (const v of values) if (v > 0 && v < floor) floor = v;
@@ -99,6 +105,7 @@ function phaseTable(channel) {
   const phases = channelPhases(channel);
   const columns = [['measured', phases.measured, curves.measured, curves.deviation]];
   if (phases.model) columns.push(['model', phases.model, curves.model, curves.modelDeviation]);
+  for (const name of ['other', 'otherModel']) if (phases[name]) columns.push([name, phases[name], curves[name], null]);
   const f = array('frequency');
   const cut = calmestCut(columns.map(([, phase]) => phase));
   for (const column of columns) column[1] = column[1].map((phase) => (phase < cut ? phase + 360 : phase >= cut + 360 ? phase - 360 : phase));
@@ -139,6 +146,7 @@ function traceStyle(name) {
   const styles = {
     measured: { strokeWidth: 3.2 }, model: { strokeWidth: 1.3 }, residual: { strokeWidth: 0.9 },
     validation: { strokeWidth: 0.9 }, deviation: { strokeWidth: 1.1, strokePattern: [5, 4] },
+    other: { strokeWidth: 2 }, otherModel: { strokeWidth: 1.3, strokePattern: [7, 3] }, change: { strokeWidth: 0.9 },
   };
   const { linePlotter } = Dygraph.Plotters;
   const banded = (name === 'measured' && content.arrays.deviation) || (name === 'model' && content.arrays.model_deviation);
@@ -193,7 +201,7 @@ function savedEntry() {
   const colours = palette();
   const shown = entry.order.filter((name) => !entry.hidden.has(name));
   return {
-    title: channelName(entry.channel), legend: shown.map((name) => [traceNames[name], colours[name]]),
+    title: channelName(entry.channel), legend: shown.map((name) => [traceName(name), colours[name]]),
     panels: [graphPanel(entry.magnitude, 'Magnitude [' + entryUnit(entry.channel) + ']'), graphPanel(entry.phase, 'Phase over frequency in Hz')],
   };
 }
@@ -202,7 +210,7 @@ function buildLegend() {
   const legend = document.getElementById('entry-legend');
   legend.replaceChildren(...entry.order.map((name) => element('button', {
     type: 'button', class: 'swatch ' + name, 'aria-pressed': String(!entry.hidden.has(name)), onclick: () => toggleTrace(name),
-  }, traceNames[name])), element('output', { id: 'entry-values', class: 'values' }));
+  }, traceName(name))), element('output', { id: 'entry-values', class: 'values' }));
 }
 
 function toggleTrace(name) {

@@ -5,6 +5,7 @@ for (const run of content.runs) for (const key of Object.keys(runTotals)) runTot
 
 function buildHealth() {
   const body = section('health', 'Health', 'Timing and health of the run');
+  if (content.findings.length) body.append(findingTable());
   if (content.runs.length) {
     const incomplete = content.runs.filter((run) => !run.complete).length;
     const lateness = Math.max(...content.runs.map((run) => run.largest_lateness_s));
@@ -20,6 +21,16 @@ function buildHealth() {
   if (content.timing) body.append(timingBars(content.timing, content.period_s));
   if (content.steps.length) body.append(stepBars());
   if (content.runs.length) body.append(element('details', null, element('summary', null, 'Every run'), runTable()));
+}
+
+// What the checks of the data found; words beside the colours.
+function findingTable() {
+  const grave = { error: 2, warning: 1, note: 0 };
+  const heads = ['severity', 'channel', 'what', 'figure', 'remedy'].map((title) => element('th', { scope: 'col' }, title));
+  const rows = content.findings.map((finding) => element('tr', null, element('td', null, element('span', { class: 'severity level-' + grave[finding.severity] }, finding.severity)),
+    element('td', { class: 'name' }, finding.channel || 'all'), element('td', null, finding.what), element('td', null, finding.figure || '\u2013'), element('td', null, finding.remedy || '\u2013')));
+  return element('div', { class: 'table-scroll' }, element('table', { class: 'findings' }, element('caption', null, 'Findings of the checks of the data, the gravest first'),
+    element('thead', null, element('tr', null, ...heads)), element('tbody', null, ...rows)));
 }
 
 function flagged(value) {

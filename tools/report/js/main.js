@@ -10,12 +10,15 @@ if (content.frf) {
   afterFirstPaint(() => selectPanel(0));
 }
 if (content.arrays.cmif) buildCmif();
+if (content.stabilization) buildStabilization();
 if (content.modes) buildModes();
 if (content.shapes && content.shapes.modes.length) buildShapes();
+if (content.comparison) buildComparison();
 if (content.validation) buildValidation();
+if (content.frf && content.nonlinearity) buildNonlinearity();
 if (content.cost.length > 1) buildCost();
 if (content.decisions.length) buildDecisions();
-if (content.runs.length || content.steps.length) buildHealth();
+if (content.runs.length || content.steps.length || content.findings.length) buildHealth();
 buildProvenance();
 
 Object.assign(window.stageidReport, { content, array, channelCurves, shapes });

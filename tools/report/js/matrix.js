@@ -43,6 +43,7 @@ function buildMatrix() {
   const legend = element('div', { class: 'legend' }, swatch('measured', 'measured'),
     hasModel ? swatch('model', 'model') : null, hasModel ? swatch('residual', 'residual') : null,
     hasModel ? element('span', { class: 'quiet' }, 'number: relative rms error of the channel') : null);
+  if (otherTrace()) legend.append(swatch(otherTrace(), traceName(otherTrace())));
   const times = element('input', { type: 'checkbox', id: 'times-omega' });
   times.addEventListener('change', () => {
     matrix.timesOmega = times.checked ? 2 : 0;
@@ -69,6 +70,12 @@ function buildMatrix() {
   });
   onColours(redrawMatrix);
   watchPanels();
+}
+
+// What the panels show of another day or model: its measurement, else its model.
+function otherTrace() {
+  if (content.arrays.other_response) return 'other';
+  return content.arrays.other_model ? 'otherModel' : null;
 }
 
 function swatch(kind, text) {
@@ -181,6 +188,8 @@ function paintPanel(channel, context, width, height) {
   drawCurve(context, frame, scaled(curves.residual, scale), colours.residual, 0.6);
   context.globalAlpha = 1;
   drawCurve(context, frame, scaled(curves.measured, scale), colours.measured, curves.model ? 2.8 : 1.2);
+  if (curves.other) drawCurve(context, frame, scaled(curves.other, scale), colours.other, 1.2);
+  else drawCurve(context, frame, scaled(curves.otherModel, scale), colours.otherModel, 1.2);
   drawCurve(context, frame, scaled(curves.model, scale), colours.model, 0.8);
 }
 

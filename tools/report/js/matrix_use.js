@@ -66,6 +66,7 @@ function savedMatrix() {
   const colours = palette();
   const legend = [['measured', colours.measured]];
   if (content.arrays.residual) legend.push(['model', colours.model], ['residual', colours.residual]);
+  if (otherTrace()) legend.push([traceName(otherTrace()), colours[otherTrace()]]);
   const panel = { width: left + inputs.length * width, height: top + outputs.length * height, draw };
   return { title: 'Frequency response, ' + bandText() + (matrix.timesOmega ? ', times \u03c9\u00b2' : ''), legend, panels: [panel] };
 }

@@ -33,7 +33,7 @@ function nyquistBand(channel) {
   return [Math.max(f[0], low), Math.min(f[f.length - 1], high)];
 }
 
-// {points: [{k, re, im, radius}], model: [{re, im}]} on the lines of that band, with the factor of the moment.
+// {points: [{k, re, im, radius}], model: [{re, im}], other: [{re, im}]} on the lines of that band, with the factor of the moment.
 function nyquistData(channel, low, high) {
   const [first, last] = bandLines(low, high);
   const lines = content.frf.lines;
@@ -41,14 +41,16 @@ function nyquistData(channel, low, high) {
   const response = array('response');
   const residual = array('residual');
   const { deviation } = channelCurves(channel);
-  const points = [], model = [];
+  const otherOne = otherTrace() && array(otherTrace() === 'other' ? 'other_response' : 'other_model');
+  const points = [], model = [], other = [];
   for (let k = first; k <= last; ++k) {
     const place = 2 * (channel * lines + k);
     const s = scale ? scale[k] : 1;
     points.push({ k, re: s * response[place], im: s * response[place + 1], radius: deviation ? s * bandFactor * deviation[k] : 0 });
     if (residual) model.push({ re: s * (response[place] - residual[place]), im: s * (response[place + 1] - residual[place + 1]) });
+    if (otherOne) other.push({ re: s * otherOne[place], im: s * otherOne[place + 1] });
   }
-  return { points, model };
+  return { points, model, other };
 }
 
 function showNyquist(channel) {
@@ -62,7 +64,7 @@ function showNyquist(channel) {
 
 // Equal scales on both axes, the data in the middle.
 function planeFrame(data, width, height) {
-  const all = data.points.concat(data.model);
+  const all = data.points.concat(data.model, data.other);
   const range = (part) => [Math.min(...all.map((p) => p[part])), Math.max(...all.map((p) => p[part]))];
   const [left, right] = range('re');
   const [low, high] = range('im');
@@ -103,6 +105,7 @@ function drawNyquist(context, width, height) {
     }
   }
   if (data.model.length) path(data.model, colours.model, 1.3);
+  if (data.other.length) path(data.other, colours[otherTrace()], 1.6);
   context.restore();
 }
 
@@ -180,7 +183,8 @@ function savedNyquist() {
   const colours = palette();
   return {
     title: channelName(nyquist.shown.channel) + ', ' + hertz(nyquist.shown.low) + ' \u2013 ' + hertz(nyquist.shown.high),
-    legend: [['measured', colours.measured]].concat(nyquist.shown.model.length ? [['model', colours.model]] : []),
+    legend: [['measured', colours.measured]].concat(nyquist.shown.model.length ? [['model', colours.model]] : [])
+      .concat(nyquist.shown.other.length ? [[traceName(otherTrace()), colours[otherTrace()]]] : []),
     panels: [canvasPanel(nyquist.figure)],
   };
 }

@@ -23,6 +23,8 @@ async function selfTest(startedMs) {
   findings.plots = Object.fromEntries(Array.from(document.querySelectorAll('.plot'), (plot) => [plot.id, inkOf(plot)]));
   findings.rows = Object.fromEntries(Array.from(document.querySelectorAll('section'), (s) => [s.id, s.querySelectorAll('tbody tr').length]));
   if (content.frf) Object.assign(findings, { zoom: zoomCheck(), use: useCheck(), nyquist: nyquistCheck(), drag: dragCheck() });
+  findings.diagrams = diagramCheck();
+  if (content.comparison) findings.comparison = { ...content.comparison, rows: document.querySelectorAll('#comparison .compared > div:first-child tbody tr').length };
   if (content.shapes) findings.shapes = shapesCheck();
   findings.saved = await savedCheck();
   findings.timed_cycles = Array.from(document.querySelectorAll('.histogram .step-time'), (cell) => Number(cell.textContent.replace(/\u202f/g, '')))
@@ -137,6 +139,17 @@ function nyquistCheck() {
     const { points, model } = nyquistData(channel, ...wholeBand());
     return { channel, measured: summaryOf(flat(points)), model: model.length ? summaryOf(flat(model)) : null, radius: summaryOf(points.map((p) => p.radius)) };
   });
+}
+
+// What stands in the diagrams: symbols counted in the files that would be saved.
+function diagramCheck() {
+  const symbols = (name, fill) => (savable.has(name) ? svgOf(name).text.split('fill="' + fill + '"').length - 1 : 0);
+  const severity = document.querySelector('.findings .severity');
+  return {
+    stabilization: { poles: content.stabilization || [], drawn: symbols('stabilization diagram', palette().curves[0]) },
+    distorted: symbols('nonlinear distortions', palette().marker), findings: document.querySelectorAll('.findings tbody tr').length,
+    first_finding: severity && severity.textContent,
+  };
 }
 
 // The numbers behind shapes and MACs; and how far the surface is from a plane and from values that it must meet.

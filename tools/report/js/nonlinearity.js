@@ -1,0 +1,99 @@
+// Where the scatter over realizations is more than noise: nonlinear distortions, a pair and a band at a time.
+
+const distortion = { figure: null, text: null };
+
+function buildNonlinearity() {
+  const { bands, chance } = content.nonlinearity;
+  const body = section('nonlinearity', 'Nonlinearity', 'Nonlinear distortions', 'Each cell is one actuator (column) to one sensor (row), each bar one octave from low to high; ' +
+    'the height is the distortion of one realization over |G| on a logarithmic scale from 0.01 % to 100 %. ' +
+    'Coloured: more than noise (p < ' + chance + ' of the F test); grey: within the noise.');
+  distortion.text = element('output', { class: 'values' });
+  distortion.figure = canvasFigure('nonlinearity-plot', distortionSummary(), drawNonlinearity, 'tall');
+  distortion.figure.node.addEventListener('pointermove', tellDistortion);
+  distortion.figure.node.addEventListener('pointerleave', () => { distortion.text.textContent = ''; });
+  body.append(element('div', { class: 'plot-head' }, element('p', null, distortionSummary() + '.'), saveButtons('nonlinear distortions', savedNonlinearity)),
+    distortion.figure.node, element('p', { class: 'plot-title' }, distortion.text),
+    folded('Bands and pairs that are more than noise, as a table', '', distortionTable(bands)));
+}
+
+// [{channel, band, p, level}] of everything tested.
+function distortionTests() {
+  const { p_value: p, distortion: level } = content.nonlinearity;
+  return p.flatMap((row, channel) => row.map((value, i) => ({ channel, band: i, p: value, level: level[channel][i] })));
+}
+
+function isDistorted(test) {
+  return isNumber(test.p) && test.p < content.nonlinearity.chance;
+}
+
+function distortionSummary() {
+  const tests = distortionTests();
+  const found = tests.filter(isDistorted).length;
+  return count(found) + ' of ' + count(tests.length) + ' pairs and bands scatter more than noise does; a linear plant would show about ' +
+    number(content.nonlinearity.chance * tests.length, 2);
+}
+
+function bandName([low, high]) {
+  return hertz(low) + ' \u2013 ' + hertz(high);
+}
+
+function distortionTable(bands) {
+  const rows = distortionTests().filter(isDistorted).sort((a, b) => b.level - a.level).slice(0, 200);
+  if (!rows.length) return element('p', null, 'None.');
+  return sortableTable([
+    ['pair', (row) => row.channel, (row) => channelName(row.channel)], ['band', (row) => row.band, (row) => bandName(bands[row.band])],
+    ['distortion', (row) => row.level, (row) => percent(row.level)], ['p', (row) => row.p, (row) => number(row.p, 2)],
+  ], rows);
+}
+
+function distortionFrame(width, height) {
+  const { inputs, outputs } = content.frf;
+  const area = { x: 64, y: 22, w: width - 70, h: height - 28 };
+  return { area, cell: [area.w / inputs.length, area.h / outputs.length] };
+}
+
+// 0 at 0.01 %, 1 at 100 %.
+function distortionHeight(level) {
+  return level > 0 ? Math.min(1, Math.max(0.04, 1 + Math.log10(level) / 4)) : 0.04;
+}
+
+function drawNonlinearity(context, width, height) {
+  const { inputs, outputs } = content.frf;
+  const { area, cell: [w, h] } = distortionFrame(width, height);
+  const bands = content.nonlinearity.bands.length;
+  const colours = palette();
+  outputs.forEach((output, o) => drawName(context, output.name.slice(0, 8), 'right', area.x - 8, area.y + (o + 0.5) * h));
+  inputs.forEach((input, i) => drawName(context, input.name.slice(0, Math.max(2, Math.floor(w / 8))), 'center', area.x + (i + 0.5) * w, area.y / 2));
+  context.lineWidth = 1;
+  for (const test of distortionTests()) {
+    const left = area.x + Math.floor(test.channel / outputs.length) * w + 2;
+    const bottom = area.y + (test.channel % outputs.length + 1) * h - 3;
+    const tall = (h - 8) * distortionHeight(test.level);
+    const wide = (w - 5) / bands;
+    context.fillStyle = isDistorted(test) ? colours.marker : colours.frame;
+    context.fillRect(left + test.band * wide, bottom - tall, Math.max(1, wide - 1), tall);
+  }
+  context.strokeStyle = colours.grid;
+  for (let c = 0; c < channelCount(); ++c) {
+    context.strokeRect(area.x + Math.floor(c / outputs.length) * w + 0.5, area.y + (c % outputs.length) * h + 0.5, w - 2, h - 2);
+  }
+}
+
+function tellDistortion(event) {
+  const { node } = distortion.figure;
+  const { area, cell: [w, h] } = distortionFrame(node.clientWidth, node.clientHeight);
+  const input = Math.floor((event.offsetX - area.x) / w);
+  const output = Math.floor((event.offsetY - area.y) / h);
+  const { bands, p_value: p, distortion: level } = content.nonlinearity;
+  if (!content.frf.inputs[input] || !content.frf.outputs[output]) {
+    distortion.text.textContent = '';
+    return;
+  }
+  const place = Math.min(bands.length - 1, Math.max(0, Math.floor((event.offsetX - area.x - input * w - 2) / ((w - 5) / bands.length))));
+  const channel = channelIndex(output, input);
+  distortion.text.textContent = channelName(channel) + ', ' + bandName(bands[place]) + ': ' + percent(level[channel][place]) + ', p = ' + number(p[channel][place], 2);
+}
+
+function savedNonlinearity() {
+  return { title: 'Nonlinear distortions, 0.01 % to 100 % of |G|', legend: [['more than noise', palette().marker], ['within the noise', palette().frame]], panels: [canvasPanel(distortion.figure)] };
+}
