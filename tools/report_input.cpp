@@ -216,6 +216,7 @@ ReportData read_report_data(const ReportInput& input) {
   if (!input.modes.empty()) data.chosen_modes = read_modes(input.modes);
   if (!input.log.empty()) add_log(data, input.log);
   if (!input.stage.empty()) data.geometry = stage_geometry(input.stage, read_text(input.stage));
+  if (!data.geometry.stage.empty()) data.title = data.geometry.stage;
   if (!input.summary.empty()) add_summary(data, input.summary);
   return data;
 }

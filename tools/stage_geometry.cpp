@@ -24,7 +24,7 @@ StageGeometry stage_geometry(const std::filesystem::path& file, const std::strin
   StageFile stage;
   read_config(YamlDocument::parse(file, text),
               [&](ConfigVisitor& visitor) { describe_stage_file(visitor, stage); });
-  return {places(stage.actuators), places(stage.sensors)};
+  return {stage.spec.info.name, places(stage.actuators), places(stage.sensors)};
 }
 
 }  // namespace stageid

@@ -15,6 +15,7 @@ struct ChannelPlace {
 };
 
 struct StageGeometry {
+  std::string stage;  ///< its name
   std::vector<ChannelPlace> actuators;
   std::vector<ChannelPlace> sensors;
   bool empty() const noexcept { return actuators.empty() && sensors.empty(); }

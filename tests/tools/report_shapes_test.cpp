@@ -25,6 +25,7 @@ std::string text_of(const std::string& file) {
 TEST(StageGeometry, IsWhatTheStageFileSays) {
   const std::string file = STAGEID_SOURCE_DIR "/configs/stage/wafer_stage.yaml";
   const StageGeometry geometry = stage_geometry(file, text_of(file));
+  EXPECT_EQ(geometry.stage, "wafer stage");
   ASSERT_EQ(geometry.actuators.size(), 17u);
   ASSERT_EQ(geometry.sensors.size(), 7u);
   EXPECT_EQ(geometry.actuators[2].name, "z3");

@@ -73,7 +73,7 @@ def check_keyboard(page):
     expect(browser.evaluate("document.activeElement.id") == "main", "the way past the head leads nowhere")
     browser.press("Tab")
     expect(browser.evaluate("document.getElementById('main').contains(document.activeElement)"), "after the head comes no plot")
-    nameless = browser.evaluate("""Array.from(document.querySelectorAll('button, select, input, a, [role=img], [role=group]')).filter((e) => {
+    nameless = browser.evaluate("""Array.from(document.querySelectorAll('button, select, input, a, [role=img], [role=group]')).filter((e) => e.offsetParent !== null).filter((e) => {
         const label = e.getAttribute('aria-label') || e.textContent.trim() || (e.labels && e.labels.length && e.labels[0].textContent.trim())
             || (e.getAttribute('aria-labelledby') || '').split(' ').filter(Boolean).every((id) => document.getElementById(id)) && e.getAttribute('aria-labelledby');
         return !label; }).map((e) => e.outerHTML.slice(0, 120))""")

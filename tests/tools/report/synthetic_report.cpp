@@ -266,7 +266,7 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
   data.title = "Wafer stage, out of plane";
   data.version = "0.1.0";
   data.model = synthetic_model(size, data.true_modes, random);
-  data.geometry = {places(data.model->inputs), places(data.model->outputs)};
+  data.geometry = {"synthetic stage", places(data.model->inputs), places(data.model->outputs)};
   add_measurement(data, size, random);
   data.validation = compare(data);
   add_cmif(data);

@@ -63,7 +63,7 @@ function drawNonlinearity(context, width, height) {
   const bands = content.nonlinearity.bands.length;
   const colours = palette();
   outputs.forEach((output, o) => drawName(context, output.name.slice(0, 8), 'right', area.x - 8, area.y + (o + 0.5) * h));
-  inputs.forEach((input, i) => drawName(context, input.name.slice(0, Math.max(2, Math.floor(w / 8))), 'center', area.x + (i + 0.5) * w, area.y / 2));
+  inputs.forEach((input, i) => drawName(context, input.name.slice(0, Math.max(2, Math.floor(w / 6.5))), 'center', area.x + (i + 0.5) * w, area.y / 2));
   context.lineWidth = 1;
   for (const test of distortionTests()) {
     const left = area.x + Math.floor(test.channel / outputs.length) * w + 2;

@@ -78,7 +78,7 @@ function makeScene(mode) {
   return { points, placed, most, ...(placed.length ? surfaceOf(placed) : { grid: null }) };
 }
 
-const gridCells = 20;
+const gridCells = 16;
 
 // Size and middle of the stage, and heights on a grid from the channels that act or look across its plane.
 function surfaceOf(placed) {
