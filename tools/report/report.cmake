@@ -21,6 +21,7 @@ set(response_js
   matrix
   matrix_use
   entry
+  entry_table
   nyquist
   cmif
   timing)

@@ -247,6 +247,7 @@ def check_page(found, expected, width):
         check_response(found, expected)
         check_zoom(found["zoom"])
         check_drag(found["drag"])
+        expect(found["table"] == {"rows": 10, "right": True}, f"table of the element: {found['table']}")
         check_diagrams(found["diagrams"], expected)
         if "comparison" in expected:
             check_comparison(found["comparison"], expected["comparison"], found["entries"])

@@ -32,12 +32,14 @@ function buildEntry() {
         element('p', { class: 'plot-title', id: 'phase-title' }, 'Phase'), entryPlot('entry-phase', '', 'phase-title'),
         element('p', { class: 'axis-title' }, 'Frequency [Hz]')),
       buildNyquist()),
+    buildEntryTable(),
     element('p', { class: 'quiet' }, entryHelp()));
   onColours(recolourEntry);
   followBand(() => {
     showBandIn(entry.magnitude);
     showBandIn(entry.phase);
     if (entry.magnitude) showNyquist(entry.channel);
+    fillEntryTable();
   });
 }
 
@@ -195,6 +197,7 @@ function showEntry(channel) {
   entry.phase = plotTable('entry-phase', phase, phaseAxis, { valueRange: [phase.cut - 8, phase.cut + 368] });
   buildLegend();
   showNyquist(channel);
+  fillEntryTable();
 }
 
 function savedEntry() {

@@ -22,7 +22,7 @@ async function selfTest(startedMs) {
   }
   findings.plots = Object.fromEntries(Array.from(document.querySelectorAll('.plot'), (plot) => [plot.id, inkOf(plot)]));
   findings.rows = Object.fromEntries(Array.from(document.querySelectorAll('section'), (s) => [s.id, s.querySelectorAll('tbody tr').length]));
-  if (content.frf) Object.assign(findings, { zoom: zoomCheck(), use: useCheck(), nyquist: nyquistCheck(), drag: dragCheck() });
+  if (content.frf) Object.assign(findings, { zoom: zoomCheck(), use: useCheck(), nyquist: nyquistCheck(), drag: dragCheck(), table: tableCheck() });
   findings.diagrams = diagramCheck();
   if (content.comparison) findings.comparison = { ...content.comparison, rows: document.querySelectorAll('#comparison .compared > div:first-child tbody tr').length };
   if (content.shapes) findings.shapes = shapesCheck();
@@ -115,6 +115,20 @@ function zoomCheck() {
   const zoomed = { ranges: ranges(), points: nyquist.shown.points.length, wanted: Math.floor(f.length / 2) - Math.floor(f.length / 4) + 1 };
   document.getElementById('entry-phase').dispatchEvent(new KeyboardEvent('keydown', { key: 'Home', bubbles: true }));
   return { asked, ...zoomed, whole, restored: ranges() };
+}
+
+// The table of the last ten lines holds their numbers, to its five digits.
+function tableCheck() {
+  const f = array('frequency');
+  entryTable.details.open = true;
+  setBand(f[f.length - 10], f[f.length - 1]);
+  fillEntryTable();
+  const cells = Array.from(entryTable.body.querySelectorAll('tbody tr'), (row) => Array.from(row.children, (cell) => cell.textContent));
+  const { measured } = channelCurves(entry.channel);
+  const right = cells.every(([hz, g], i) => hz === number(f[f.length - 10 + i], 7) && g === number(measured[f.length - 10 + i], 5));
+  resetBand();
+  entryTable.details.open = false;
+  return { rows: cells.length, right };
 }
 
 // A drag over the right half of the first panel shows the upper half of the (logarithmic) band everywhere.
