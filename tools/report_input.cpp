@@ -116,8 +116,7 @@ double delay_in(const FrfEstimate& frf, const std::optional<AdditiveModel>& mode
   double delay_s = 0.0;
   if (frf.hold == Hold::zoh && frf.compensated != Compensation::hold && frf.sample_rate_hz > 0.0)
     delay_s += 0.5 / frf.sample_rate_hz;
-  if (model && frf.compensated == Compensation::none)
-    delay_s += model->mean_delay_s();
+  if (model && frf.compensated == Compensation::none) delay_s += model->mean_delay_s();
   return delay_s;
 }
 
