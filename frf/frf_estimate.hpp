@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "acquisition/log_info.hpp"
+#include "frf/nonlinearity.hpp"
 
 namespace stageid {
 
@@ -16,6 +17,20 @@ enum class Hold : std::uint8_t { none, zoh };
 /// What was divided out of the response: nothing; e^{-j omega delay_s}; or the delay and the hold's
 /// (1 - e^{-j omega T}) / (j omega T).
 enum class Compensation : std::uint8_t { none, delay, hold };
+
+enum class FrfMethod : std::uint8_t {
+  periodic,  ///< means over the periods after the transient ones
+  lpm        ///< whole records; the transient is modelled between the lines, nothing is passed over
+};
+
+/// A recorded period that was left out of the means.
+struct DroppedPeriod {
+  int realization = 0;  ///< all three are counted from 0,
+  int experiment = 0;
+  int period = 0;  ///< the periods after the transient ones
+  std::string reason;
+  friend bool operator==(const DroppedPeriod&, const DroppedPeriod&) = default;
+};
 
 /// A frequency response with its uncertainty: what frf.h5 holds.
 ///
@@ -37,6 +52,7 @@ struct FrfEstimate {
   Compensation compensated = Compensation::none;
   double delay_s = 0.0;  ///< what `compensated` took out (without the hold's own T/2)
 
+  FrfMethod method = FrfMethod::periodic;
   int realizations = 0;
   int periods = 0;  ///< used, of each run
   int experiments = 0;
@@ -49,6 +65,10 @@ struct FrfEstimate {
   /// realization S = [(U U^H)^-1]^T. Empty if unknown.
   Eigen::MatrixXcd input_factor;
   Eigen::MatrixXcd covariance;  ///< (n_c n_c) x N on request, n_c = n_y n_u: Cov(vec G); else empty
+  int covariance_lines = 1;     ///< C_E is the mean over so many lines: smooth_covariance()
+  DetectionLines detection;     ///< empty if unknown
+  NonlinearityTest nonlinearity;  ///< empty unless there are two periods and two realizations
+  std::vector<DroppedPeriod> dropped_periods;
   std::vector<std::string> excluded_channels;  ///< actuators outside the sub-plant
   Eigen::VectorXd excluded_power;              ///< their excited-line power over that of the inputs
   std::string provenance_json = "{}";          ///< inputs (hash), configuration, version, seeds

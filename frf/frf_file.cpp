@@ -1,30 +1,5 @@
-// frf.h5. Beyond the contract (frequency_hz, response, inputs, outputs, noise_variance,
-// total_variance, and the root attributes format, format_version, sample_rate_hz, hold,
-// compensated, delay_s) these optional objects are written when known, and read when present:
-//
-//   attributes of the root
-//     realizations, periods, experiments   integers: what was averaged (periods: of each run)
-//     noise_dof, total_dof                  real: degrees of freedom of the two variances
-//   datasets
-//     /residual_covariance [N x n_y x n_y] complex   C_E of one experiment and the mean of its
-//     periods,
-//                                           of the spectra DFT / period_samples, unit of output
-//                                           squared; element [k, i, j] = E e_i conj(e_j)
-//     /input_factor [N x n_u x n_u] complex  S with Cov(vec G) = S kron C_E; element [k, j, l]
-//     belongs
-//                                           to E dG_ij conj(dG_hl) = S_jl C_E,ih
-//     /covariance [N x n_c x n_c] complex   Cov(vec G), n_c = n_y n_u, channel c = output + n_y *
-//     input;
-//                                           element [k, c, d] = E dG_c conj(dG_d)
-//     /input_condition [N]                  condition number of the inputs, largest over
-//     realizations /excluded_channels strings, /excluded_power [n]   actuators outside the
-//     sub-plant and their power
-//                                           on the excited lines over that of all inputs
-//     /confidence_radius [N x n_y x n_u]    95 % circles, from the variance that attribute of names
-//                                           ("total" or "noise"); follows from the others, not read
-//     /provenance strings [1]               JSON: inputs with their hash, options
-// Only the format attribute, frequency_hz, response, inputs and outputs are required to read a
-// file.
+// The layout stands in docs/formats.md. Only the format attribute, frequency_hz, response, inputs and
+// outputs are required to read a file; /confidence_radius follows from the others and is not read.
 #include "frf/frf_file.hpp"
 
 #include <fmt/format.h>
@@ -36,6 +11,8 @@
 #include "excitation/hdf5_file.hpp"
 #include "excitation/output_file.hpp"
 #include "frf/confidence.hpp"
+#include "frf/frf_file_quality.hpp"
+#include "frf/line_datasets.hpp"
 
 namespace stageid {
 namespace {
@@ -43,39 +20,6 @@ namespace {
 constexpr const char* kFormat = "stageid-frf";
 constexpr long long kFormatVersion = 1;
 constexpr double kConfidenceLevel = 0.95;
-
-hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
-
-/// C order [N x rows x columns] from columns that are vec of a rows x columns matrix, and back.
-template <typename Scalar>
-using VecColumns = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
-
-template <typename Scalar>
-using RowMajor = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-template <typename Scalar>
-std::vector<Scalar> to_c_order(const VecColumns<Scalar>& columns, Eigen::Index rows) {
-  const Eigen::Index n = columns.rows();
-  std::vector<Scalar> data(static_cast<std::size_t>(columns.size()));
-  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
-    Eigen::Map<RowMajor<Scalar>>(data.data() + k * n, rows, n / rows) =
-        Eigen::Map<const VecColumns<Scalar>>(columns.col(k).data(), rows, n / rows);
-  }
-  return data;
-}
-
-template <typename Scalar>
-VecColumns<Scalar> from_c_order(const std::vector<Scalar>& data, Eigen::Index rows,
-                                Eigen::Index columns) {
-  const Eigen::Index n = rows * columns;
-  const Eigen::Index lines = static_cast<Eigen::Index>(data.size()) / n;
-  VecColumns<Scalar> result(n, lines);
-  for (Eigen::Index k = 0; k < lines; ++k) {
-    Eigen::Map<VecColumns<Scalar>>(result.col(k).data(), rows, columns) =
-        Eigen::Map<const RowMajor<Scalar>>(data.data() + k * n, rows, columns);
-  }
-  return result;
-}
 
 const char* text_of(Hold hold) { return hold == Hold::zoh ? "zoh" : "none"; }
 
@@ -90,6 +34,8 @@ const char* text_of(Compensation kind) {
   }
   return "none";
 }
+
+const char* text_of(FrfMethod method) { return method == FrfMethod::lpm ? "lpm" : "periodic"; }
 
 // Writing -----------------------------------------------------------------------------------------
 
@@ -112,6 +58,8 @@ void write_attributes(Hdf5File& file, const FrfEstimate& frf) {
   file.write_attribute("/", "hold", std::string(text_of(frf.hold)));
   file.write_attribute("/", "compensated", std::string(text_of(frf.compensated)));
   file.write_attribute("/", "delay_s", frf.delay_s);
+  file.write_attribute("/", "method", std::string(text_of(frf.method)));
+  file.write_attribute("/", "covariance_lines", static_cast<long long>(frf.covariance_lines));
   file.write_attribute("/", "realizations", static_cast<long long>(frf.realizations));
   file.write_attribute("/", "periods", static_cast<long long>(frf.periods));
   file.write_attribute("/", "experiments", static_cast<long long>(frf.experiments));
@@ -166,24 +114,11 @@ void write_optional(Hdf5File& file, const FrfEstimate& frf) {
     file.write_reals("/excluded_power", {size_of(frf.excluded_power.size())},
                      frf.excluded_power.data());
   }
+  write_quality(file, frf);
   file.write_texts("/provenance", {frf.provenance_json});
 }
 
 // Reading -----------------------------------------------------------------------------------------
-
-std::string join_shape(const std::vector<hsize_t>& shape) {
-  return fmt::format("[{}]", fmt::join(shape, " x "));
-}
-
-void require_shape(const Hdf5File& file, const std::string& dataset,
-                   const std::vector<hsize_t>& wanted) {
-  const std::vector<hsize_t> shape = file.shape(dataset);
-  if (shape != wanted) {
-    throw FormatError(
-        file.path(), dataset,
-        fmt::format("shape is {}; {} belongs there", join_shape(shape), join_shape(wanted)));
-  }
-}
 
 double real_or(const Hdf5File& file, const std::string& name, double otherwise) {
   return file.has_attribute("/", name) ? file.read_real_attribute("/", name) : otherwise;
@@ -242,6 +177,16 @@ Compensation read_compensation(const Hdf5File& file) {
       fmt::format("compensated is '{}'; 'none', 'delay' or 'hold' belongs there", text));
 }
 
+FrfMethod read_method(const Hdf5File& file) {
+  if (!file.has_attribute("/", "method")) return FrfMethod::periodic;
+  const std::string text = file.read_text_attribute("/", "method");
+  for (const FrfMethod method : {FrfMethod::periodic, FrfMethod::lpm}) {
+    if (text == text_of(method)) return method;
+  }
+  throw FormatError(file.path(), "/",
+                    fmt::format("method is '{}'; 'periodic' or 'lpm' belongs there", text));
+}
+
 ChannelList read_channels(const Hdf5File& file, const std::string& dataset) {
   ChannelList channels;
   channels.names = file.read_texts(dataset);
@@ -294,6 +239,7 @@ void read_optional(const Hdf5File& file, FrfEstimate& frf) {
     frf.excluded_channels = file.read_texts("/excluded_channels");
     frf.excluded_power = read_vector("/excluded_power", frf.excluded_channels.size());
   }
+  read_quality(file, frf);
   if (file.exists("/provenance")) {
     const std::vector<std::string> text = file.read_texts("/provenance");
     if (text.size() == 1) frf.provenance_json = text.front();
@@ -337,6 +283,8 @@ FrfEstimate read_frf(const std::filesystem::path& path) {
   frf.hold = read_hold(file);
   frf.compensated = read_compensation(file);
   frf.delay_s = real_or(file, "delay_s", 0.0);
+  frf.method = read_method(file);
+  frf.covariance_lines = std::max(1, integer_or_zero(file, "covariance_lines"));
   frf.realizations = integer_or_zero(file, "realizations");
   frf.periods = integer_or_zero(file, "periods");
   frf.experiments = integer_or_zero(file, "experiments");

@@ -36,7 +36,9 @@ std::string FrfProvenance::json() const {
       {"inputs", channels_.inputs},
       {"outputs", outputs},
       {"transient_periods", transient_periods(info_, options_)},
-      {"covariance", options_.covariance == CovarianceKind::full ? "full" : "diagonal"}};
+      {"covariance", options_.covariance == CovarianceKind::full ? "full" : "diagonal"},
+      {"covariance_lines", options_.covariance_lines},
+      {"periods", options_.periods == PeriodChoice::consistent ? "consistent" : "unmarked"}};
   return Json{{"stageid_version", STAGEID_VERSION},
               {"made_by", "estimate_plant_frf"},
               {"inputs", inputs},

@@ -5,92 +5,124 @@
 #include <stdexcept>
 #include <vector>
 
+#include "frf/frequency_bands.hpp"
+#include "frf/frf_estimate.hpp"
+#include "frf/tail_probability.hpp"
+
 namespace stageid {
 namespace {
 
 constexpr Eigen::Index kFewestLines = 8;
+constexpr double kCertain = 1e3;  // -ln p of a scatter where there is no noise at all
 
-/// ln P(F > x) for F(2 a, 2 b), a whole: with w = b / (b + a x) that is the incomplete beta function
-///   I_w(b, a) = w^b sum_{j < a} Gamma(b + j) / (Gamma(b) j!) (1 - w)^j.
-double log_tail_of_f(double x, int a, double b) {
-  const double rest = a * x / (b + a * x);  // 1 - w
-  double term = 1.0;
-  double sum = 1.0;
-  for (int j = 1; j < a; ++j) {
-    term *= (b + j - 1.0) / j * rest;
-    sum += term;
-  }
-  return std::min(0.0, b * std::log1p(-rest) + std::log(sum));
+constexpr double kRounding = 1e-24;  // of the linear power: what double precision leaves of nothing
+
+/// -ln p of one line. Without any noise every scatter is certain; without either there is nothing
+/// to see, nor in the rounding of `linear` power.
+double evidence(double power, double noise, double linear, int power_dof, double noise_dof) {
+  if (power <= kRounding * linear) return 0.0;
+  if (noise > 0.0) return -log_tail_of_f(power / noise, power_dof, noise_dof);
+  return kCertain;
 }
 
-/// P(chi-square with 2 K degrees of freedom > 2 h) = exp(-h) sum_{j < K} h^j / j!.
-double tail_of_chi_square(double h, Eigen::Index K) {
-  if (!(h > 0.0)) return 1.0;
-  double sum = 0.0;
-  for (Eigen::Index j = 0; j < K; ++j) {
-    const double n = static_cast<double>(j);
-    sum += std::exp(n * std::log(h) - std::lgamma(n + 1.0) - h);
+/// From the scatter of the realizations: column b of p_value and distortion.
+void test_scatter(const FrfEstimate& frf, Eigen::Index first, Eigen::Index K, Eigen::Index b,
+                  NonlinearityTest& test) {
+  const int a = static_cast<int>(frf.total_dof);
+  for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
+    double sum = 0.0;
+    double excess = 0.0;
+    for (Eigen::Index k = first; k < first + K; ++k) {
+      const double total = frf.total_variance(c, k);
+      const double noise = frf.noise_variance(c, k);
+      sum += evidence(total, noise, std::norm(frf.response(c, k)), a, frf.noise_dof);
+      excess += std::max(0.0, total - noise);
+    }
+    test.p_value(c, b) = tail_of_evidence(sum, K);
+    test.distortion(c, b) =
+        std::sqrt((a + 1) * excess / frf.response.row(c).segment(first, K).squaredNorm());
   }
-  return std::min(1.0, sum);
 }
 
-/// First line of each band, and the number of lines at the end.
-std::vector<Eigen::Index> band_limits(const Eigen::VectorXd& frequency_hz) {
-  std::vector<Eigen::Index> limits = {0};
-  double first_hz = frequency_hz[0];
-  for (Eigen::Index k = 1; k < frequency_hz.size(); ++k) {
-    if (frequency_hz[k] < 2.0 * first_hz || k - limits.back() < kFewestLines) continue;
-    limits.push_back(k);
-    first_hz = frequency_hz[k];
+/// Detection lines of one parity in [low_hz, high_hz).
+std::vector<Eigen::Index> lines_of(const DetectionLines& detection, int parity, double low_hz,
+                                   double high_hz) {
+  std::vector<Eigen::Index> lines;
+  for (Eigen::Index d = 0; d < detection.line.size(); ++d) {
+    const double f = detection.frequency_hz[d];
+    if (detection.line[d] % 2 == parity && f >= low_hz && f < high_hz) lines.push_back(d);
   }
-  // What is left over belongs to the band before it.
-  if (limits.size() > 1 && frequency_hz.size() - limits.back() < kFewestLines) limits.pop_back();
-  limits.push_back(frequency_hz.size());
-  return limits;
+  return lines;
 }
 
-void require_variances(const FrfEstimate& frf) {
-  if (frf.noise_variance.size() == 0 || !(frf.noise_dof > 0.0)) {
-    throw std::invalid_argument(
-        "nonlinearity test: the noise variance or its noise_dof is unknown; measure two periods");
-  }
-  if (frf.total_variance.size() == 0 || !(frf.total_dof >= 1.0) ||
-      frf.total_dof != std::floor(frf.total_dof)) {
-    throw std::invalid_argument(
-        "nonlinearity test: the total variance or its total_dof, realizations - 1, is unknown; "
-        "measure two realizations");
+void test_detection(const DetectionLines& detection, const std::vector<Eigen::Index>& lines,
+                    const Eigen::VectorXd& linear_power, Eigen::Index b,
+                    DetectedDistortion& found) {
+  const Eigen::Index n_y = detection.noise.rows();
+  const auto K = static_cast<Eigen::Index>(lines.size());
+  for (Eigen::Index c = 0; c < detection.power.rows(); ++c) {
+    double sum = 0.0;
+    double excess = 0.0;
+    for (const Eigen::Index d : lines) {
+      const double power = detection.power(c, d);
+      const double noise = detection.noise(c % n_y, d);
+      sum += evidence(power, noise, linear_power[c], static_cast<int>(detection.runs[c / n_y]),
+                      detection.noise_dof);
+      excess += std::max(0.0, power - noise);
+    }
+    found.p_value(c, b) = tail_of_evidence(sum, K);
+    found.level(c, b) = K == 0 || !(linear_power[c] > 0.0)
+                            ? 0.0
+                            : std::sqrt(excess / static_cast<double>(K) / linear_power[c]);
   }
 }
 
 }  // namespace
 
+std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
+  if (frf.method != FrfMethod::periodic)
+    return "nonlinearity test: neighbouring lines of method 'lpm' share bins; estimate with "
+           "'periodic'";
+  if (frf.covariance_lines > 1)
+    return "nonlinearity test: neighbouring lines share their smoothed noise; estimate without "
+           "smoothing";
+  if (frf.noise_variance.size() == 0 || !(frf.noise_dof > 0.0))
+    return "nonlinearity test: the noise variance or its noise_dof is unknown; measure two periods";
+  if (frf.total_variance.size() == 0 || !(frf.total_dof >= 1.0) ||
+      frf.total_dof != std::floor(frf.total_dof))
+    return "nonlinearity test: the total variance or its total_dof, realizations - 1, is unknown; "
+           "measure two realizations";
+  return "";
+}
+
 NonlinearityTest nonlinearity_test(const FrfEstimate& frf) {
-  require_variances(frf);
-  const std::vector<Eigen::Index> limits = band_limits(frf.frequency_hz);
+  if (const std::string why = why_linearity_cannot_be_tested(frf); !why.empty())
+    throw std::invalid_argument(why);
+  const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kFewestLines);
   const auto bands = static_cast<Eigen::Index>(limits.size()) - 1;
   const Eigen::Index n_c = frf.response.rows();
-  const int a = static_cast<int>(frf.total_dof);
-  NonlinearityTest test{Eigen::MatrixXd(bands, 2), Eigen::MatrixXd(n_c, bands),
-                        Eigen::MatrixXd(n_c, bands)};
+  NonlinearityTest test;
+  test.band_hz.resize(bands, 2);
+  test.p_value.resize(n_c, bands);
+  test.distortion.resize(n_c, bands);
+  const DetectionLines& detection = frf.detection;
+  if (detection.line.size() > 0) {
+    test.even.p_value.resize(detection.power.rows(), bands);
+    test.even.level = test.even.p_value;
+    test.odd = test.even;
+  }
   for (Eigen::Index b = 0; b < bands; ++b) {
     const Eigen::Index first = limits[static_cast<std::size_t>(b)];
-    const Eigen::Index K = limits[static_cast<std::size_t>(b) + 1] - first;
-    test.band_hz.row(b) << frf.frequency_hz[first], frf.frequency_hz[first + K - 1];
-    for (Eigen::Index c = 0; c < n_c; ++c) {
-      double evidence = 0.0;  // -sum ln p
-      double excess = 0.0;
-      for (Eigen::Index k = first; k < first + K; ++k) {
-        const double total = frf.total_variance(c, k);
-        const double noise = frf.noise_variance(c, k);
-        // Without any noise every scatter is certain; without either there is nothing to see.
-        if (noise > 0.0) evidence -= log_tail_of_f(total / noise, a, frf.noise_dof);
-        if (noise == 0.0 && total > 0.0) evidence += 1e3;
-        excess += std::max(0.0, total - noise);
-      }
-      test.p_value(c, b) = tail_of_chi_square(evidence, K);
-      test.distortion(c, b) =
-          std::sqrt((a + 1) * excess / frf.response.row(c).segment(first, K).squaredNorm());
-    }
+    const Eigen::Index next = limits[static_cast<std::size_t>(b) + 1];
+    test.band_hz.row(b) << frf.frequency_hz[first], frf.frequency_hz[next - 1];
+    test_scatter(frf, first, next - first, b, test);
+    if (detection.line.size() == 0) continue;
+    const Eigen::VectorXd linear_power =
+        detection.linear_power.middleCols(first, next - first).rowwise().mean();
+    const double low_hz = frf.frequency_hz[first];
+    const double high_hz = frf.frequency_hz[std::min(next, frf.lines() - 1)];
+    test_detection(detection, lines_of(detection, 0, low_hz, high_hz), linear_power, b, test.even);
+    test_detection(detection, lines_of(detection, 1, low_hz, high_hz), linear_power, b, test.odd);
   }
   return test;
 }

@@ -1,17 +1,48 @@
 #pragma once
 
 #include <Eigen/Core>
-
-#include "frf/frf_estimate.hpp"
+#include <string>
+#include <vector>
 
 namespace stageid {
 
-/// Is the scatter over realizations more than noise? One answer for each output, input and band.
+struct FrfEstimate;
+
+/// What the outputs do on lines that were not excited, after the linear response to what the
+/// controller feeds back there has been taken out: E = Y - G U, G interpolated between the excited
+/// lines. On a linear plant that is noise alone, in closed loop too.
+///
+/// Runs are gathered by what they excite: one group for each axis if every run excites one axis,
+/// else one group of all.
+struct DetectionLines {
+  Eigen::VectorXd frequency_hz;     ///< D, within 4 lines of an excited one; empty if unknown
+  Eigen::VectorXi line;             ///< D: of the DFT of one period; odd or even
+  std::vector<std::string> groups;  ///< n_g: the excited channel of each, or "all"
+  Eigen::VectorXd runs;             ///< n_g: power has so many complex degrees of freedom
+  Eigen::MatrixXd power;            ///< (n_y n_g) x D: |E|^2 of the means of periods, over the runs
+  Eigen::MatrixXd noise;            ///< n_y x D: how much of it noise is, from the periods
+  double noise_dof = 0.0;
+  Eigen::MatrixXd linear_power;  ///< (n_y n_g) x N: |Y|^2 on the excited lines
+};
+
+/// Distortions of one kind, seen on detection lines: even-order ones on even lines, odd-order ones
+/// on odd lines. Rows are output + n_y * group.
+struct DetectedDistortion {
+  Eigen::MatrixXd p_value;  ///< x bands: chance of so much power on a linear plant; 1: no line
+  Eigen::MatrixXd level;    ///< x bands: rms of a line's distortion over that of an excited line
+};
+
+/// Is the plant linear, as far as can be told? One answer for each output, input and band.
 struct NonlinearityTest {
-  Eigen::MatrixXd band_hz;     ///< bands x 2: first and last frequency, both in the band
+  Eigen::MatrixXd band_hz;     ///< bands x 2: first and last frequency, both in the band; or empty
   Eigen::MatrixXd p_value;     ///< (n_y n_u) x bands: chance of so much scatter on a linear plant
   Eigen::MatrixXd distortion;  ///< (n_y n_u) x bands, relative to |G|: see nonlinearity_test()
+  DetectedDistortion even;     ///< empty without detection lines
+  DetectedDistortion odd;
 };
+
+/// A p-value below this is called nonlinear: one of a hundred verdicts on a linear plant.
+inline constexpr double kNonlinearBelow = 0.01;
 
 /// Noise against stochastic nonlinear contributions.
 ///
@@ -24,10 +55,17 @@ struct NonlinearityTest {
 ///   distortion^2 = sum_k max(0, M (total - noise)) / sum_k |G|^2,
 /// the power of the stochastic nonlinear contributions of one realization.
 ///
-/// The estimate must come from FrfMethod::periodic: with lpm neighbouring lines share bins.
+/// On detection lines F = power / noise is F(2 runs, 2 nu) in the same way, for each output and
+/// group, whatever G was interpolated; a wrong G blurs the level only, by its relative error times
+/// the loop's T. level^2 = mean_k max(0, power - noise) / mean linear_power over the band.
+///
 /// Source: Pintelon and Schoukens, System Identification (2012), sections 4.3 and 7.3.
-/// @throws std::invalid_argument without both variances, or if total_dof is not M - 1 >= 1 or
-///         noise_dof is unknown.
+/// @throws std::invalid_argument with the text of why_linearity_cannot_be_tested().
 NonlinearityTest nonlinearity_test(const FrfEstimate& frf);
+
+/// Empty, or what is missing: two periods, two realizations with total_dof = M - 1, the periodic
+/// method (with lpm neighbouring lines share bins), noise that was not smoothed over lines (they
+/// would not be independent).
+std::string why_linearity_cannot_be_tested(const FrfEstimate& frf);
 
 }  // namespace stageid

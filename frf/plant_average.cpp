@@ -12,16 +12,6 @@
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kLinesATask = 64;
-
-void for_each_line(int workers, Eigen::Index lines, const std::function<void(Eigen::Index)>& work) {
-  const auto tasks = static_cast<std::size_t>((lines + kLinesATask - 1) / kLinesATask);
-  for_each_task(workers, tasks, [&](int, std::size_t task) {
-    const Eigen::Index first = static_cast<Eigen::Index>(task) * kLinesATask;
-    for (Eigen::Index k = first; k < std::min(first + kLinesATask, lines); ++k) work(k);
-  });
-}
-
 /// Column k of columns that are vec of a matrix with `rows` rows.
 Eigen::Map<Eigen::MatrixXcd> unvec(Eigen::MatrixXcd& columns, Eigen::Index k, Eigen::Index rows) {
   return {columns.col(k).data(), rows, columns.rows() / rows};

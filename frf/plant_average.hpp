@@ -23,6 +23,9 @@ class PlantAverage {
   /// @throws std::invalid_argument "singular ..." naming realization, line and frequency.
   void add(const RealizationSpectra& spectra, int workers);
 
+  /// Mean of the realizations' own estimates so far, vec(G) x lines.
+  const Eigen::MatrixXcd& mean_response() const noexcept { return G_mean_; }
+
   /// Writes frequencies, response, variances, degrees of freedom, condition and covariances.
   /// @throws std::invalid_argument if a full covariance is wanted and no noise could be seen.
   void finish(FrfEstimate& frf, int workers) const;

@@ -11,6 +11,8 @@
 
 #include "excitation/frequency_grid.hpp"
 #include "frf/channel_choice.hpp"
+#include "frf/covariance_smoothing.hpp"
+#include "frf/detection_average.hpp"
 #include "frf/excitation_spectrum.hpp"
 #include "frf/frf_provenance.hpp"
 #include "frf/plant_average.hpp"
@@ -33,6 +35,7 @@ struct RunExcitation {
 struct ExcitedPart {
   std::vector<int> lines;
   std::vector<Eigen::Index> axes;
+  bool single_axis = true;  ///< in every run
 };
 
 /// Tells FrfOptions::progress how many bytes are done, from one thread at a time.
@@ -92,8 +95,9 @@ class PlantEstimation {
                         const std::vector<RunExcitation>& excitation) const;
   RealizationSpectra measure(const RealizationRuns& realization,
                              const std::vector<RunExcitation>& excitation);
-  void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra,
-                    FrfProvenance& provenance);
+  void prepare(const RealizationRuns& realization, const std::vector<RunExcitation>& excitation);
+  void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra);
+  void include(const RealizationSpectra& spectra, const std::vector<RunExcitation>& excitation);
   FrfEstimate describe() const;
 
   std::vector<RealizationRuns> realizations_;
@@ -104,7 +108,12 @@ class PlantEstimation {
   ByteCounter bytes_;
   std::vector<std::unique_ptr<RunWorkspace>> workspaces_;
   ExcitedPart excited_;
+  SpectrumLines lines_;
   ChannelChoice channels_;
+  std::unique_ptr<PlantAverage> average_;
+  std::unique_ptr<DetectionAverage> detection_;
+  std::unique_ptr<FrfProvenance> provenance_;
+  std::vector<DroppedPeriod> dropped_;
   int fewest_periods_ = std::numeric_limits<int>::max();
   double input_power_ = 0.0;
   Eigen::VectorXd excluded_power_;
@@ -137,6 +146,7 @@ ExcitedPart PlantEstimation::excited_part(const RealizationRuns& realization,
   }
   for (const RunExcitation& run : excitation) {
     part.axes.insert(part.axes.end(), run.spectrum.channels.begin(), run.spectrum.channels.end());
+    part.single_axis = part.single_axis && run.spectrum.channels.size() == 1;
   }
   std::sort(part.axes.begin(), part.axes.end());
   part.axes.erase(std::unique(part.axes.begin(), part.axes.end()), part.axes.end());
@@ -186,8 +196,8 @@ RealizationSpectra PlantEstimation::measure(const RealizationRuns& realization,
     RunSpectra run = options_.method == FrfMethod::lpm
                          ? measure_record(realization.runs[e], excitation[e].spectrum, channels_,
                                           excitation[e].period, workspace, read_done)
-                         : measure_run(realization.runs[e], excited_.lines, channels_,
-                                       excitation[e].period, workspace, read_done);
+                         : measure_run(realization.runs[e], lines_, channels_, excitation[e].period,
+                                       options_.periods, workspace, read_done);
     const std::lock_guard lock(mutex);
     spectra.add(e, std::move(run));
   });
@@ -195,13 +205,18 @@ RealizationSpectra PlantEstimation::measure(const RealizationRuns& realization,
 }
 
 void PlantEstimation::note_quality(const RealizationRuns& realization,
-                                   const RealizationSpectra& spectra, FrfProvenance& provenance) {
+                                   const RealizationSpectra& spectra) {
   const auto inputs = static_cast<Eigen::Index>(channels_.estimated.size());
   for (std::size_t e = 0; e < realization.runs.size(); ++e) {
     const RunSpectra& run = spectra.run(e);
-    provenance.add(realization.runs[e], run.fingerprint);
+    provenance_->add(realization.runs[e], run.fingerprint);
     fewest_periods_ = std::min(fewest_periods_, run.periods);
-    for (Eigen::Index k = 0; k < run.mean.cols(); ++k) {
+    for (DroppedPeriod dropped : run.dropped) {
+      dropped.realization = realization.realization;
+      dropped.experiment = realization.runs[e].run().experiment;
+      dropped_.push_back(std::move(dropped));
+    }
+    for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(excited_.lines.size()); ++k) {
       for (Eigen::Index i = run.mean.rows() - inputs; i < run.mean.rows(); ++i) {
         input_power_ += std::norm(run.mean(i, k));
       }
@@ -226,27 +241,53 @@ FrfEstimate PlantEstimation::describe() const {
   frf.excluded_power = excluded_power_ / input_power_;
   frf.sample_rate_hz = info_.sample_rate_hz;
   frf.hold = Hold::zoh;
+  frf.method = options_.method;
+  frf.dropped_periods = dropped_;
   frf.periods = fewest_periods_;
   frf.experiments = static_cast<int>(realizations_.front().runs.size());
   return frf;
 }
 
+void PlantEstimation::prepare(const RealizationRuns& realization,
+                              const std::vector<RunExcitation>& excitation) {
+  excited_ = excited_part(realization, excitation);
+  channels_ = choose_channels(info_, excited_.axes, realization.runs.size(),
+                              realization.realization, options_);
+  const FrequencyGrid grid(info_.sample_rate_hz, info_.period_samples, excited_.lines);
+  const auto outputs = static_cast<Eigen::Index>(channels_.outputs.size());
+  average_ = std::make_unique<PlantAverage>(grid.frequency_hz(), excited_.lines, outputs,
+                                            static_cast<Eigen::Index>(channels_.estimated.size()),
+                                            options_.covariance);
+  provenance_ = std::make_unique<FrfProvenance>(info_, options_, channels_);
+  excluded_power_.setZero(static_cast<Eigen::Index>(channels_.excluded.size()));
+  lines_ = {excited_.lines, excited_.lines.size()};
+  if (options_.method == FrfMethod::lpm) return;
+  const std::vector<int> detection = detection_lines(excited_.lines);
+  lines_.lines.insert(lines_.lines.end(), detection.begin(), detection.end());
+  std::vector<std::string> axes;
+  for (const Eigen::Index axis : excited_.axes)
+    axes.push_back(info_.excitation.names[static_cast<std::size_t>(axis)]);
+  detection_ =
+      std::make_unique<DetectionAverage>(excited_.lines, axes, excited_.single_axis, outputs);
+}
+
+void PlantEstimation::include(const RealizationSpectra& spectra,
+                              const std::vector<RunExcitation>& excitation) {
+  average_->add(spectra, workers_);
+  if (!detection_) return;
+  std::vector<std::size_t> axis;
+  for (const RunExcitation& run : excitation) {
+    const auto at =
+        std::lower_bound(excited_.axes.begin(), excited_.axes.end(), run.spectrum.channels.front());
+    axis.push_back(static_cast<std::size_t>(at - excited_.axes.begin()));
+  }
+  detection_->add(spectra, average_->mean_response(), axis, workers_);
+}
+
 FrfEstimate PlantEstimation::estimate() {
-  std::unique_ptr<PlantAverage> average;
-  std::unique_ptr<FrfProvenance> provenance;
   for (const RealizationRuns& realization : realizations_) {
     const std::vector<RunExcitation> excitation = read_excitation(realization);
-    if (!average) {
-      excited_ = excited_part(realization, excitation);
-      channels_ = choose_channels(info_, excited_.axes, realization.runs.size(),
-                                  realization.realization, options_);
-      const FrequencyGrid grid(info_.sample_rate_hz, info_.period_samples, excited_.lines);
-      average = std::make_unique<PlantAverage>(
-          grid.frequency_hz(), excited_.lines, static_cast<Eigen::Index>(channels_.outputs.size()),
-          static_cast<Eigen::Index>(channels_.estimated.size()), options_.covariance);
-      provenance = std::make_unique<FrfProvenance>(info_, options_, channels_);
-      excluded_power_.setZero(static_cast<Eigen::Index>(channels_.excluded.size()));
-    }
+    if (!average_) prepare(realization, excitation);
     check_excitation(realization, excitation);
     if (realization.runs.size() < excited_.axes.size()) {
       throw std::invalid_argument(
@@ -255,12 +296,15 @@ FrfEstimate PlantEstimation::estimate() {
                       excited_.axes.size(), realization.runs.size(), realization.realization));
     }
     const RealizationSpectra spectra = measure(realization, excitation);
-    note_quality(realization, spectra, *provenance);
-    average->add(spectra, workers_);
+    note_quality(realization, spectra);
+    include(spectra, excitation);
   }
   FrfEstimate frf = describe();
-  average->finish(frf, workers_);
-  frf.provenance_json = provenance->json();
+  average_->finish(frf, workers_);
+  if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);
+  if (why_linearity_cannot_be_tested(frf).empty()) frf.nonlinearity = nonlinearity_test(frf);
+  frf.provenance_json = provenance_->json();
+  if (options_.covariance_lines != 1) frf = smooth_covariance(frf, options_.covariance_lines);
   if (channels_.inputs == frf.inputs.names) return frf;
   return select_channels(frf, channels_.inputs, frf.outputs.names);
 }

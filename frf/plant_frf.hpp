@@ -10,11 +10,11 @@
 
 namespace stageid {
 
-enum class FrfMethod : std::uint8_t {
-  periodic,  ///< means over the periods after the transient ones
-  lpm        ///< whole records; the transient is modelled between the lines, nothing is passed over
-};
 enum class CovarianceKind : std::uint8_t { diagonal, full };
+enum class PeriodChoice : std::uint8_t {
+  consistent,  ///< periods with a glitch, a bump or a transient in them are left out
+  unmarked     ///< all without a marked sample
+};
 
 struct FrfOptions {
   std::vector<std::string> inputs{};       ///< actuator names; empty: those that are excited
@@ -22,8 +22,10 @@ struct FrfOptions {
   std::optional<int> transient_periods{};  ///< instead of the log's own, or of 0 with lpm
   FrfMethod method = FrfMethod::periodic;
   CovarianceKind covariance = CovarianceKind::diagonal;
-  std::vector<int> realizations{};  ///< which (0-based); empty: all complete ones
-  int threads = 0;                  ///< 0: as many as cores; the result does not depend on it
+  PeriodChoice periods = PeriodChoice::consistent;  ///< lpm: unmarked ones, always
+  int covariance_lines = 1;                         ///< smooth_covariance() over so many lines; odd
+  std::vector<int> realizations{};                  ///< which (0-based); empty: all complete ones
+  int threads = 0;  ///< 0: as many as cores; the result does not depend on it
   std::function<void(double done, double total)>
       progress{};  ///< bytes; called from one thread at a time
 };
@@ -48,14 +50,17 @@ struct FrfOptions {
 /// stretch is used. Memory: one record per thread.
 ///
 /// Incomplete runs are passed over; of several complete runs of one (realization, experiment) the
-/// last counts. Periods with a marked sample are dropped. Inputs asked for that are only some of the
+/// last counts. Periods with a marked sample are dropped, and (periodic, three periods or more)
+/// those whose scatter shows that they do not belong with the others: period_check.hpp. With two
+/// periods and two realizations the plant's linearity is tested, see nonlinearity_test(). Inputs asked for that are only some of the
 /// excited actuators are columns of the whole estimate: the others move too.
 ///
-/// Memory (periodic): bounded by one period per thread plus spectra of one realization.
+/// Memory (periodic): one period of samples and 16 of spectra a thread, and the spectra of one
+/// realization.
 /// Source: method.md section 3; Pintelon and Schoukens, System Identification (2012).
 /// @throws std::invalid_argument / FormatError: fewer experiments than inputs, singular excitation
-///         (names line and frequency), a period that does not divide the record, channels unknown; with lpm a single period without empty
-///         lines.
+///         (names line and frequency), a period that does not divide the record, channels unknown;
+///         with lpm a single period without empty lines; covariance_lines as smooth_covariance().
 FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
                                const FrfOptions& options = {});
 

@@ -1,90 +1,171 @@
 #include "frf/run_spectra.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+
+#include "frf/period_check.hpp"
 #include "frf/run_steps.hpp"
 
 namespace stageid {
 namespace {
 
-/// Z_p of the period in workspace.samples.
-void transform_period(const std::vector<int>& lines, const ChannelChoice& channels,
-                      RunWorkspace& w) {
-  const double scale = 1.0 / static_cast<double>(w.dft.length());
-  Eigen::Index row = 0;
-  const auto take = [&](const Eigen::MatrixXd& samples, Eigen::Index channel) {
-    const auto spectrum = transform(samples, channel, w.dft);
-    for (Eigen::Index k = 0; k < w.spectra.cols(); ++k) {
-      w.spectra(row, k) =
-          scale * spectrum[static_cast<std::size_t>(lines[static_cast<std::size_t>(k)])];
-    }
-    ++row;
-  };
-  for (const Eigen::Index sensor : channels.outputs) take(w.samples.sensors, sensor);
-  for (const Eigen::Index actuator : channels.estimated) take(w.samples.actuators, actuator);
-}
+/// Periods that are compared with each other, and whose spectra are held for it.
+constexpr int kMostCompared = 16;
 
-/// One more period into mean and scatter, by Welford's recursion: a difference of two large sums
-/// would lose the noise, which is 1e-6 of the signal, in rounding; and this way the diagonal stays
-/// >= 0.
-void include_period(RunWorkspace& w, RunSpectra& run) {
-  ++run.periods;
-  const double inverse_count = 1.0 / run.periods;
-  const double weight = 1.0 - inverse_count;
-  for (Eigen::Index k = 0; k < run.mean.cols(); ++k) {
-    for (Eigen::Index i = 0; i < run.mean.rows(); ++i) {
-      const std::complex<double> deviation = w.spectra(i, k) - run.mean(i, k);
-      run.mean(i, k) += deviation * inverse_count;
-      w.deviation_re[i] = deviation.real();
-      w.deviation_im[i] = deviation.imag();
-    }
-    if (run.periods < 2) continue;
-    add_outer_product(weight, w.deviation_re, w.deviation_im, run.scatter_re.col(k).data(),
-                      run.scatter_im.col(k).data());
+/// One run in the making.
+class RunMeasurement {
+ public:
+  RunMeasurement(const UsedRun& used, const SpectrumLines& lines, const ChannelChoice& channels,
+                 PeriodChoice choice, RunWorkspace& workspace)
+      : used_(used), lines_(lines), channels_(channels), w_(workspace) {
+    // Groups of equal size: a last one of one or two periods could not be judged.
+    const int groups = (used.periods + kMostCompared - 1) / kMostCompared;
+    compared_ = choice == PeriodChoice::consistent ? (used.periods + groups - 1) / groups : 1;
+    const auto n_lines = static_cast<Eigen::Index>(lines.lines.size());
+    const auto n = static_cast<Eigen::Index>(channels.outputs.size() + channels.estimated.size());
+    w_.spectra.resize(static_cast<std::size_t>(compared_));
+    for (Eigen::MatrixXcd& spectrum : w_.spectra) spectrum.resize(n, n_lines);
+    w_.deviation_re.resize(n);
+    w_.deviation_im.resize(n);
+    w_.excluded_sum.setZero(w_.dft.length(), static_cast<Eigen::Index>(channels.excluded.size()));
+    run_.mean.setZero(n, n_lines);
+    if (used.periods < 2) return;
+    run_.scatter_re.setZero(n * (n + 1) / 2, n_lines);
+    run_.scatter_im.setZero(n * (n + 1) / 2, n_lines);
   }
-}
 
-void prepare(std::size_t lines, const ChannelChoice& channels, int periods, RunWorkspace& w,
-             RunSpectra& run) {
-  const auto n_lines = static_cast<Eigen::Index>(lines);
-  const auto n = static_cast<Eigen::Index>(channels.outputs.size() + channels.estimated.size());
-  w.spectra.resize(n, n_lines);
-  w.deviation_re.resize(n);
-  w.deviation_im.resize(n);
-  w.excluded_sum.setZero(w.dft.length(), static_cast<Eigen::Index>(channels.excluded.size()));
-  run.mean.setZero(n, n_lines);
-  if (periods < 2) return;
-  run.scatter_re.setZero(n * (n + 1) / 2, n_lines);
-  run.scatter_im.setZero(n * (n + 1) / 2, n_lines);
-}
+  /// The period in workspace.samples.
+  void take(int period) {
+    ++unmarked_;
+    transform_period(w_.spectra[waiting_.size()]);
+    waiting_.push_back(period);
+    for (std::size_t c = 0; c < channels_.excluded.size(); ++c)
+      w_.excluded_sum.col(static_cast<Eigen::Index>(c)) +=
+          w_.samples.actuators.col(channels_.excluded[c]);
+    if (static_cast<int>(waiting_.size()) == compared_) include_waiting();
+  }
+  void leave_out_marked(int period) { run_.dropped.push_back({0, 0, period, "a marked sample"}); }
+
+  RunSpectra finish() {
+    include_waiting();
+    if (run_.periods == 0) refuse_marked_run(used_);
+    run_.scatter_dof = run_.periods - 1;
+    const std::vector<int> excited(
+        lines_.lines.begin(), lines_.lines.begin() + static_cast<std::ptrdiff_t>(lines_.excited));
+    run_.excluded_power = excluded_power(excited, unmarked_, w_);
+    std::sort(run_.dropped.begin(), run_.dropped.end(),
+              [](const auto& a, const auto& b) { return a.period < b.period; });
+    return std::move(run_);
+  }
+
+ private:
+  void transform_period(Eigen::MatrixXcd& spectra) {
+    const double scale = 1.0 / static_cast<double>(w_.dft.length());
+    Eigen::Index row = 0;
+    const auto take = [&](const Eigen::MatrixXd& samples, Eigen::Index channel) {
+      const auto spectrum = transform(samples, channel, w_.dft);
+      for (Eigen::Index k = 0; k < spectra.cols(); ++k) {
+        spectra(row, k) =
+            scale * spectrum[static_cast<std::size_t>(lines_.lines[static_cast<std::size_t>(k)])];
+      }
+      ++row;
+    };
+    for (const Eigen::Index sensor : channels_.outputs) take(w_.samples.sensors, sensor);
+    for (const Eigen::Index actuator : channels_.estimated) take(w_.samples.actuators, actuator);
+  }
+
+  void include_waiting() {
+    std::vector<char> in(waiting_.size(), 1);
+    if (waiting_.size() >= 3) {
+      const Eigen::VectorXd frequency_hz = excited_frequency_hz();
+      for (const PeriodOutlier& outlier :
+           find_outliers(std::span(w_.spectra).first(waiting_.size()), frequency_hz)) {
+        in[outlier.period] = 0;
+        run_.dropped.push_back({0, 0, waiting_[outlier.period], reason(outlier, frequency_hz)});
+      }
+    }
+    for (std::size_t i = 0; i < waiting_.size(); ++i)
+      if (in[i] != 0) include(w_.spectra[i]);
+    waiting_.clear();
+  }
+
+  /// One more period into mean and scatter, by Welford's recursion: a difference of two large sums
+  /// would lose the noise, which is 1e-6 of the signal, in rounding; and this way the diagonal stays
+  /// >= 0.
+  void include(const Eigen::MatrixXcd& spectra) {
+    ++run_.periods;
+    const double inverse_count = 1.0 / run_.periods;
+    const double weight = 1.0 - inverse_count;
+    for (Eigen::Index k = 0; k < run_.mean.cols(); ++k) {
+      for (Eigen::Index i = 0; i < run_.mean.rows(); ++i) {
+        const std::complex<double> deviation = spectra(i, k) - run_.mean(i, k);
+        run_.mean(i, k) += deviation * inverse_count;
+        w_.deviation_re[i] = deviation.real();
+        w_.deviation_im[i] = deviation.imag();
+      }
+      if (run_.periods < 2) continue;
+      add_outer_product(weight, w_.deviation_re, w_.deviation_im, run_.scatter_re.col(k).data(),
+                        run_.scatter_im.col(k).data());
+    }
+  }
+
+  Eigen::VectorXd excited_frequency_hz() const {
+    const LogInfo& info = used_.log->info();
+    Eigen::VectorXd frequency_hz(static_cast<Eigen::Index>(lines_.excited));
+    for (std::size_t k = 0; k < lines_.excited; ++k)
+      frequency_hz[static_cast<Eigen::Index>(k)] =
+          lines_.lines[k] * info.sample_rate_hz / info.period_samples;
+    return frequency_hz;
+  }
+
+  std::string reason(const PeriodOutlier& outlier, const Eigen::VectorXd& frequency_hz) const {
+    const LogInfo& info = used_.log->info();
+    const auto c = static_cast<std::size_t>(outlier.channel);
+    const std::size_t n_y = channels_.outputs.size();
+    const std::string& name =
+        c < n_y ? info.sensors.names[static_cast<std::size_t>(channels_.outputs[c])]
+                : info.actuators.names[static_cast<std::size_t>(channels_.estimated[c - n_y])];
+    return fmt::format("{:.3g} times the scatter of the other periods on {}, {:.4g} ... {:.4g} Hz",
+                       outlier.ratio, name, frequency_hz[outlier.first_line],
+                       frequency_hz[outlier.last_line]);
+  }
+
+  const UsedRun& used_;
+  const SpectrumLines& lines_;
+  const ChannelChoice& channels_;
+  RunWorkspace& w_;
+  int compared_ = 1;
+  int unmarked_ = 0;
+  std::vector<int> waiting_;  // periods whose spectra are in the workspace
+  RunSpectra run_;
+};
 
 }  // namespace
 
-RunSpectra measure_run(const UsedRun& used, const std::vector<int>& lines,
+RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
                        const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
-                       RunWorkspace& w, const std::function<void(double bytes)>& read_done) {
-  RunSpectra run;
-  prepare(lines.size(), channels, used.periods, w, run);
+                       PeriodChoice choice, RunWorkspace& w,
+                       const std::function<void(double bytes)>& read_done) {
+  RunMeasurement measurement(used, lines, channels, choice, w);
   Fingerprint fingerprint;
   add_matrix(fingerprint, excitation_period);
-
   const auto period = static_cast<std::uint64_t>(w.dft.length());
   for (int p = 0; p < used.periods; ++p) {
     const auto first = static_cast<std::uint64_t>(used.transient_periods + p) * period;
     used.log->read(used.index, first, period, w.samples);
     read_done(static_cast<double>(w.samples.actuators.size() + w.samples.sensors.size()) *
               sizeof(double));
-    if ((w.samples.marked != 0).any()) continue;
+    if ((w.samples.marked != 0).any()) {
+      measurement.leave_out_marked(p);
+      continue;
+    }
     add_matrix(fingerprint, w.samples.actuators);
     add_matrix(fingerprint, w.samples.sensors);
-    transform_period(lines, channels, w);
-    include_period(w, run);
-    for (std::size_t c = 0; c < channels.excluded.size(); ++c) {
-      w.excluded_sum.col(static_cast<Eigen::Index>(c)) +=
-          w.samples.actuators.col(channels.excluded[c]);
-    }
+    measurement.take(p);
   }
-  if (run.periods == 0) refuse_marked_run(used);
-  run.scatter_dof = run.periods - 1;
-  run.excluded_power = excluded_power(lines, run.periods, w);
+  RunSpectra run = measurement.finish();
   run.fingerprint = fingerprint.hex();
   return run;
 }

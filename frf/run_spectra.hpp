@@ -22,7 +22,15 @@ struct RunSpectra {
   int scatter_dof = 0;             ///< scatter / scatter_dof / periods estimates Cov(mean)
   int periods = 0;                 ///< clean ones
   Eigen::VectorXd excluded_power;  ///< sum over the lines of |U|^2 of the excluded actuators
-  std::string fingerprint;         ///< of the excitation and of every sample used
+  std::string fingerprint;         ///< of the excitation and of every sample that is not marked
+  /// By period; which realization and experiment this is, others know.
+  std::vector<DroppedPeriod> dropped;
+};
+
+/// The lines that spectra are wanted on: the excited ones, ascending, then others.
+struct SpectrumLines {
+  std::vector<int> lines;
+  std::size_t excited = 0;
 };
 
 /// What one thread needs again and again: a plan, one period of samples, one period's spectra.
@@ -30,17 +38,19 @@ struct RunWorkspace {
   explicit RunWorkspace(int period_samples) : dft(period_samples) {}
   RealDft dft;
   LogSamples samples;
-  Eigen::MatrixXcd spectra;      // Z_p, channels x lines
-  Eigen::MatrixXd excluded_sum;  // of the periods, samples x excluded actuators
+  std::vector<Eigen::MatrixXcd> spectra;  // Z_p of some periods, channels x lines
+  Eigen::MatrixXd excluded_sum;           // of the periods, samples x excluded actuators
   Eigen::VectorXd deviation_re;
   Eigen::VectorXd deviation_im;
 };
 
-/// Reads a run period by period and averages. Periods with a marked sample are left out.
+/// Reads a run period by period and averages. Periods with a marked sample are left out, and with
+/// PeriodChoice::consistent those that find_outliers() finds among (about) 16 neighbours.
 /// `read_done` is told the bytes read, period by period.
 /// @throws FormatError if no clean period is left, and what LogReader::read() throws.
-RunSpectra measure_run(const UsedRun& run, const std::vector<int>& lines,
+RunSpectra measure_run(const UsedRun& run, const SpectrumLines& lines,
                        const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
-                       RunWorkspace& workspace, const std::function<void(double bytes)>& read_done);
+                       PeriodChoice choice, RunWorkspace& workspace,
+                       const std::function<void(double bytes)>& read_done);
 
 }  // namespace stageid

@@ -8,6 +8,11 @@
 #include <vector>
 
 namespace stageid {
+namespace {
+
+constexpr Eigen::Index kLinesATask = 64;
+
+}  // namespace
 
 int worker_count(int requested) {
   if (requested > 0) return requested;
@@ -47,6 +52,14 @@ void for_each_task(int workers, std::size_t count,
   work(0);
   threads.clear();  // joins
   if (failure) std::rethrow_exception(failure);
+}
+
+void for_each_line(int workers, Eigen::Index lines, const std::function<void(Eigen::Index)>& work) {
+  const auto tasks = static_cast<std::size_t>((lines + kLinesATask - 1) / kLinesATask);
+  for_each_task(workers, tasks, [&](int, std::size_t task) {
+    const Eigen::Index first = static_cast<Eigen::Index>(task) * kLinesATask;
+    for (Eigen::Index k = first; k < std::min(first + kLinesATask, lines); ++k) work(k);
+  });
 }
 
 }  // namespace stageid

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <functional>
 
@@ -16,5 +17,8 @@ int worker_count(int requested);
 /// message does not depend on the number of threads.
 void for_each_task(int workers, std::size_t count,
                    const std::function<void(int worker, std::size_t i)>& task);
+
+/// Calls work(k) once for every line k = 0 .. lines - 1, in tasks of a fixed number of lines.
+void for_each_line(int workers, Eigen::Index lines, const std::function<void(Eigen::Index)>& work);
 
 }  // namespace stageid

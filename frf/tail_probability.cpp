@@ -1,0 +1,41 @@
+#include "frf/tail_probability.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stageid {
+namespace {
+
+constexpr double kRescaleAbove = 1e200;
+
+}  // namespace
+
+// With w = b / (b + a x) that is the incomplete beta function
+//   I_w(b, a) = w^b sum_{j < a} Gamma(b + j) / (Gamma(b) j!) (1 - w)^j.
+double log_tail_of_f(double x, int a, double b) {
+  const double rest = a * x / (b + a * x);  // 1 - w
+  double term = 1.0;
+  double sum = 1.0;
+  double log_scale = 0.0;
+  for (int j = 1; j < a; ++j) {
+    term *= (b + j - 1.0) / j * rest;
+    sum += term;
+    if (sum < kRescaleAbove) continue;  // thousands of degrees of freedom pass the largest double
+    log_scale += std::log(sum);
+    term /= sum;
+    sum = 1.0;
+  }
+  return std::min(0.0, b * std::log1p(-rest) + std::log(sum) + log_scale);
+}
+
+double tail_of_evidence(double h, Eigen::Index K) {
+  if (!(h > 0.0) || K == 0) return 1.0;
+  double sum = 0.0;
+  for (Eigen::Index j = 0; j < K; ++j) {
+    const double n = static_cast<double>(j);
+    sum += std::exp(n * std::log(h) - std::lgamma(n + 1.0) - h);
+  }
+  return std::min(1.0, sum);
+}
+
+}  // namespace stageid
