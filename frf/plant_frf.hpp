@@ -45,9 +45,9 @@ struct FrfOptions {
 ///
 /// With FrfMethod::lpm Z is the steady state of the whole record, the transient removed by a local
 /// polynomial or rational model (transient_model.hpp), and C_E comes from what that leaves beside
-/// the lines: 9 degrees of freedom a run, from one period on. Neighbouring lines share bins, so
-/// their variances are correlated over some 12 bins. Of a run with marked samples the longest clean
-/// stretch is used. Memory: one record per thread.
+/// the lines: 9 degrees of freedom a stretch, from one period on. Neighbouring lines share bins, so
+/// their variances are correlated over some 12 bins. Stretches end at marked periods and after 16
+/// periods at most: record_spectra.hpp. Memory: 16 periods a thread.
 ///
 /// Incomplete runs are passed over; of several complete runs of one (realization, experiment) the
 /// last counts. Periods with a marked sample are dropped, and (periodic, three periods or more)

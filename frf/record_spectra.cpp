@@ -1,6 +1,8 @@
 #include "frf/record_spectra.hpp"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 #include "frf/run_steps.hpp"
 #include "frf/transient_model.hpp"
@@ -8,99 +10,161 @@
 namespace stageid {
 namespace {
 
-/// The chosen channels of a run, samples x channels, and which periods are clean.
-struct Record {
-  Eigen::MatrixXd samples;  ///< outputs, estimated, excluded
-  std::vector<char> clean;  ///< a value a period
-};
+/// Periods that are transformed together. More would cost memory and gain nothing: the noise of the
+/// mean is the same, and a window of 12 bins is narrow enough.
+constexpr int kLongest = 16;
 
-/// Half open, in periods.
-struct Stretch {
-  int first = 0;
+/// Clean periods in a row: samples of the chosen channels, outputs, estimated, excluded.
+struct Segment {
+  Eigen::MatrixXd samples;  ///< rows of `periods` periods are filled
+  int first = 0;            ///< period of the run
   int periods = 0;
 };
 
-Stretch longest_clean(const std::vector<char>& clean) {
-  Stretch longest;
-  Stretch current;
-  for (int p = 0; p < static_cast<int>(clean.size()); ++p) {
-    if (clean[static_cast<std::size_t>(p)] == 0) {
-      current = {p + 1, 0};
-    } else if (++current.periods > longest.periods) {
-      longest = current;
-    }
+/// One run in the making, segment by segment.
+class RecordMeasurement {
+ public:
+  RecordMeasurement(const UsedRun& used, const ExcitationSpectrum& excitation,
+                    const ChannelChoice& channels, RunWorkspace& workspace)
+      : used_(used),
+        excitation_(excitation),
+        channels_(channels),
+        w_(workspace),
+        N_(workspace.dft.length()),
+        outputs_(static_cast<Eigen::Index>(channels.outputs.size())),
+        n_(outputs_ + static_cast<Eigen::Index>(channels.estimated.size())) {
+    const int segments = (used.periods + kLongest - 1) / kLongest;
+    longest_ = (used.periods + segments - 1) / segments;
+    const auto excluded = static_cast<Eigen::Index>(channels.excluded.size());
+    segment_.samples.resize(N_ * longest_, n_ + excluded);
+    w_.excluded_sum.setZero(N_, excluded);
   }
-  return longest;
-}
 
-Record read_record(const UsedRun& used, const ChannelChoice& channels, RunWorkspace& w,
-                   const std::function<void(double bytes)>& read_done) {
-  const Eigen::Index N = w.dft.length();
-  const std::size_t n = channels.outputs.size() + channels.estimated.size();
-  Record record;
-  record.samples.resize(N * used.periods, static_cast<Eigen::Index>(n + channels.excluded.size()));
-  for (int p = 0; p < used.periods; ++p) {
-    const auto first = static_cast<std::uint64_t>((used.transient_periods + p) * N);
-    used.log->read(used.index, first, static_cast<std::uint64_t>(N), w.samples);
-    read_done(static_cast<double>(w.samples.actuators.size() + w.samples.sensors.size()) *
-              sizeof(double));
-    record.clean.push_back((w.samples.marked != 0).any() ? 0 : 1);
+  void add_excitation(const Eigen::MatrixXd& period) { add_matrix(fingerprint_, period); }
+
+  /// The period in workspace.samples.
+  void take(int period) {
+    if (segment_.periods == 0) segment_.first = period;
     Eigen::Index column = 0;
-    const auto take = [&](const Eigen::MatrixXd& samples, const std::vector<Eigen::Index>& which) {
-      for (const Eigen::Index c : which) {
-        record.samples.col(column++).segment(p * N, N) = samples.col(c);
-      }
+    const auto copy = [&](const Eigen::MatrixXd& samples, const std::vector<Eigen::Index>& which) {
+      for (const Eigen::Index c : which)
+        segment_.samples.col(column++).segment(segment_.periods * N_, N_) = samples.col(c);
     };
-    take(w.samples.sensors, channels.outputs);
-    take(w.samples.actuators, channels.estimated);
-    take(w.samples.actuators, channels.excluded);
+    copy(w_.samples.sensors, channels_.outputs);
+    copy(w_.samples.actuators, channels_.estimated);
+    copy(w_.samples.actuators, channels_.excluded);
+    if (++segment_.periods == longest_) close_segment();
   }
-  return record;
-}
 
-/// DFT / samples of the first `channels` columns, channels x bins.
-Eigen::MatrixXcd record_spectrum(const Eigen::MatrixXd& samples, Eigen::Index channels,
-                                 Eigen::Index bins, RealDft& dft) {
-  Eigen::MatrixXcd Z(channels, bins);
-  const double scale = 1.0 / static_cast<double>(dft.length());
-  for (Eigen::Index c = 0; c < channels; ++c) {
-    const auto spectrum = transform(samples, c, dft);
-    for (Eigen::Index b = 0; b < bins; ++b) Z(c, b) = scale * spectrum[static_cast<std::size_t>(b)];
+  void leave_out_marked(int period) {
+    close_segment();
+    run_.dropped.push_back({0, 0, period, "a marked sample"});
   }
-  return Z;
-}
+
+  RunSpectra finish() {
+    close_segment();
+    if (run_.periods == 0 && alone_) include(*std::exchange(alone_, std::nullopt));
+    if (run_.periods == 0) refuse_marked_run(used_);
+    run_.mean /= static_cast<double>(run_.periods);
+    run_.excluded_power = excluded_power(excitation_.lines, run_.periods, w_);
+    run_.fingerprint = fingerprint_.hex();
+    std::sort(run_.dropped.begin(), run_.dropped.end(),
+              [](const auto& a, const auto& b) { return a.period < b.period; });
+    return std::move(run_);
+  }
+
+ private:
+  /// A period on its own is worse off (the noise must be seen on lines that are left empty): it is
+  /// used if there is nothing else.
+  void close_segment() {
+    if (segment_.periods == 1 && used_.periods > 1) {
+      if (run_.periods == 0 && !alone_) {
+        alone_ = segment_;
+      } else {
+        drop_alone(segment_);
+      }
+    } else if (segment_.periods > 0) {
+      include(segment_);
+      if (alone_) drop_alone(*std::exchange(alone_, std::nullopt));
+    }
+    segment_.periods = 0;
+  }
+
+  void drop_alone(const Segment& segment) {
+    run_.dropped.push_back({0, 0, segment.first, "between marked periods, too short for a record"});
+  }
+
+  void include(const Segment& segment) {
+    const Eigen::Index rows = N_ * segment.periods;
+    add_matrix(fingerprint_, Eigen::MatrixXd(segment.samples.topRows(rows)));
+    const TransientModel model(static_cast<int>(N_), segment.periods, excitation_, outputs_,
+                               used_.place());
+    RunSpectra part;
+    model.separate(spectrum(segment.samples, rows, model.bins()), part);
+    const Eigen::Index excluded = w_.excluded_sum.cols();
+    for (int p = 0; p < segment.periods; ++p)
+      w_.excluded_sum += segment.samples.rightCols(excluded).middleRows(p * N_, N_);
+    if (run_.periods == 0) {
+      run_.mean.setZero(part.mean.rows(), part.mean.cols());
+      run_.scatter_re.setZero(part.scatter_re.rows(), part.scatter_re.cols());
+      run_.scatter_im.setZero(part.scatter_im.rows(), part.scatter_im.cols());
+    }
+    run_.periods += segment.periods;
+    run_.mean += static_cast<double>(segment.periods) * part.mean;
+    run_.scatter_re += part.scatter_re;  // of single periods, however many there are
+    run_.scatter_im += part.scatter_im;
+    run_.scatter_dof += part.scatter_dof;
+  }
+
+  /// DFT / samples of the first `rows` samples, outputs and estimated x bins.
+  Eigen::MatrixXcd spectrum(const Eigen::MatrixXd& samples, Eigen::Index rows,
+                            Eigen::Index bins) const {
+    RealDft dft(static_cast<int>(rows));
+    Eigen::MatrixXcd Z(n_, bins);
+    const double scale = 1.0 / static_cast<double>(rows);
+    for (Eigen::Index c = 0; c < n_; ++c) {
+      std::copy(samples.col(c).data(), samples.col(c).data() + rows, dft.input().begin());
+      const auto transformed = dft.forward();
+      for (Eigen::Index b = 0; b < bins; ++b)
+        Z(c, b) = scale * transformed[static_cast<std::size_t>(b)];
+    }
+    return Z;
+  }
+
+  const UsedRun& used_;
+  const ExcitationSpectrum& excitation_;
+  const ChannelChoice& channels_;
+  RunWorkspace& w_;
+  Eigen::Index N_;
+  Eigen::Index outputs_;
+  Eigen::Index n_;
+  int longest_ = 1;
+  Fingerprint fingerprint_;
+  Segment segment_;
+  std::optional<Segment> alone_;  // of one period, until something better comes
+  RunSpectra run_;
+};
 
 }  // namespace
 
 RunSpectra measure_record(const UsedRun& used, const ExcitationSpectrum& excitation,
                           const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
                           RunWorkspace& w, const std::function<void(double bytes)>& read_done) {
-  Record record = read_record(used, channels, w, read_done);
-  const Stretch stretch = longest_clean(record.clean);
-  if (stretch.periods == 0) refuse_marked_run(used);
-  const Eigen::Index N = w.dft.length();
-  record.samples = record.samples.middleRows(stretch.first * N, stretch.periods * N).eval();
-
-  RunSpectra run;
-  run.periods = stretch.periods;
-  Fingerprint fingerprint;
-  add_matrix(fingerprint, excitation_period);
-  add_matrix(fingerprint, record.samples);
-  run.fingerprint = fingerprint.hex();
-
-  const auto outputs = static_cast<Eigen::Index>(channels.outputs.size());
-  const Eigen::Index n = outputs + static_cast<Eigen::Index>(channels.estimated.size());
-  const TransientModel model(static_cast<int>(N), stretch.periods, excitation, outputs,
-                             used.place());
-  RealDft dft(static_cast<int>(record.samples.rows()));
-  model.separate(record_spectrum(record.samples, n, model.bins(), dft), run);
-
-  w.excluded_sum.setZero(N, record.samples.cols() - n);
-  for (int p = 0; p < stretch.periods; ++p) {
-    w.excluded_sum += record.samples.rightCols(record.samples.cols() - n).middleRows(p * N, N);
+  RecordMeasurement measurement(used, excitation, channels, w);
+  measurement.add_excitation(excitation_period);
+  const auto period = static_cast<std::uint64_t>(w.dft.length());
+  for (int p = 0; p < used.periods; ++p) {
+    const auto first = static_cast<std::uint64_t>(used.transient_periods + p) * period;
+    used.log->read(used.index, first, period, w.samples);
+    read_done(static_cast<double>(w.samples.actuators.size() + w.samples.sensors.size()) *
+              sizeof(double));
+    if ((w.samples.marked != 0).any()) {
+      measurement.leave_out_marked(p);
+    } else {
+      measurement.take(p);
+    }
   }
-  run.excluded_power = excluded_power(excitation.lines, stretch.periods, w);
-  return run;
+  return measurement.finish();
 }
 
 }  // namespace stageid

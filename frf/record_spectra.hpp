@@ -5,10 +5,11 @@
 
 namespace stageid {
 
-/// Spectra of one run by the local polynomial method: the whole record is transformed at once and
-/// the transient modelled (TransientModel) instead of waited for. Of a run with marked samples the
-/// longest stretch of clean periods is used: a record must not have a gap.
-/// Memory: the run's samples and spectra of the chosen channels.
+/// Spectra of one run by the local polynomial method: stretches of clean periods, as long as there
+/// are up to 16, are transformed as a whole and their transient modelled (TransientModel) instead of
+/// waited for. A stretch must not have a gap, so a marked period ends one; the means are weighted by
+/// the stretches' periods. A single period between marked ones is used only if there is nothing else.
+/// Memory: samples and spectra of 16 periods of the chosen channels, however long the run.
 /// @throws FormatError if no clean period is left; std::invalid_argument as TransientModel; what
 ///         LogReader::read() throws.
 RunSpectra measure_record(const UsedRun& run, const ExcitationSpectrum& excitation,

@@ -39,7 +39,10 @@ class RunMeasurement {
   /// The period in workspace.samples.
   void take(int period) {
     ++unmarked_;
-    transform_period(w_.spectra[waiting_.size()]);
+    Eigen::MatrixXcd& spectra = w_.spectra[waiting_.size()];
+    line_spectra(w_.samples.sensors, channels_.outputs, lines_.lines, 0, w_.dft, spectra);
+    line_spectra(w_.samples.actuators, channels_.estimated, lines_.lines,
+                 static_cast<Eigen::Index>(channels_.outputs.size()), w_.dft, spectra);
     waiting_.push_back(period);
     for (std::size_t c = 0; c < channels_.excluded.size(); ++c)
       w_.excluded_sum.col(static_cast<Eigen::Index>(c)) +=
@@ -61,21 +64,6 @@ class RunMeasurement {
   }
 
  private:
-  void transform_period(Eigen::MatrixXcd& spectra) {
-    const double scale = 1.0 / static_cast<double>(w_.dft.length());
-    Eigen::Index row = 0;
-    const auto take = [&](const Eigen::MatrixXd& samples, Eigen::Index channel) {
-      const auto spectrum = transform(samples, channel, w_.dft);
-      for (Eigen::Index k = 0; k < spectra.cols(); ++k) {
-        spectra(row, k) =
-            scale * spectrum[static_cast<std::size_t>(lines_.lines[static_cast<std::size_t>(k)])];
-      }
-      ++row;
-    };
-    for (const Eigen::Index sensor : channels_.outputs) take(w_.samples.sensors, sensor);
-    for (const Eigen::Index actuator : channels_.estimated) take(w_.samples.actuators, actuator);
-  }
-
   void include_waiting() {
     std::vector<char> in(waiting_.size(), 1);
     if (waiting_.size() >= 3) {

@@ -15,6 +15,21 @@ std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
   return dft.forward();
 }
 
+void line_spectra(const Eigen::MatrixXd& samples, const std::vector<Eigen::Index>& channels,
+                  const std::vector<int>& lines, Eigen::Index first_row, RealDft& dft,
+                  Eigen::MatrixXcd& spectra) {
+  const double scale = 1.0 / static_cast<double>(dft.length());
+  Eigen::Index row = first_row;
+  for (const Eigen::Index channel : channels) {
+    const auto spectrum = transform(samples, channel, dft);
+    for (Eigen::Index k = 0; k < spectra.cols(); ++k) {
+      spectra(row, k) =
+          scale * spectrum[static_cast<std::size_t>(lines[static_cast<std::size_t>(k)])];
+    }
+    ++row;
+  }
+}
+
 void add_outer_product(double weight, const Eigen::VectorXd& re, const Eigen::VectorXd& im,
                        double* packed_re, double* packed_im) {
   for (Eigen::Index i = 0; i < re.size(); ++i) {

@@ -20,6 +20,12 @@ void add_matrix(Fingerprint& fingerprint, const Matrix& matrix) {
 std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
                                                 Eigen::Index channel, RealDft& dft);
 
+/// DFT / samples of one period of the chosen channels, on `lines`, into the rows of `spectra` from
+/// `first_row` on.
+void line_spectra(const Eigen::MatrixXd& samples, const std::vector<Eigen::Index>& channels,
+                  const std::vector<int>& lines, Eigen::Index first_row, RealDft& dft,
+                  Eigen::MatrixXcd& spectra);
+
 /// Adds w d d^H to the packed lower half of one line (RunSpectra::scatter_re, scatter_im). In real
 /// arithmetic, and without a reduction: the compiler may use any vector width, the bits stay the
 /// same.

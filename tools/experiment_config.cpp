@@ -98,6 +98,12 @@ void describe_frf(ConfigVisitor& v, FrfOptions& f) {
   v.texts("outputs", f.outputs, {1}, kOptional, "sensors of the response; left out: all");
   choose(v, "covariance", f.covariance, {"diagonal", "full"}, kOptional, "of the response");
   choose(v, "method", f.method, {"periodic", "lpm"}, kOptional, "of the estimate");
+  choose(v, "periods", f.periods, {"consistent", "unmarked"}, kOptional,
+         "consistent: periods with a glitch, a bump or a transient are left out");
+  count(v, "smooth_covariance", f.covariance_lines, 1, 9999, kOptional,
+        "lines (odd) over which the noise covariance is averaged");
+  v.require(f.covariance_lines % 2 == 1, "smooth_covariance",
+            "smooth_covariance: must be odd, the line and as many neighbours on either side");
 }
 
 void describe(ConfigVisitor& v, ExperimentFile& f) {

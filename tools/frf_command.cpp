@@ -11,6 +11,7 @@
 #include "frf/hold_compensation.hpp"
 #include "tools/command_line.hpp"
 #include "tools/exit_code.hpp"
+#include "tools/frf_quality.hpp"
 #include "tools/frf_step.hpp"
 #include "tools/output_paths.hpp"
 
@@ -47,6 +48,8 @@ nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
     json["median_relative_noise_std"] = median_relative_std(frf, frf.noise_variance);
   if (frf.total_variance.size() > 0)
     json["median_relative_total_std"] = median_relative_std(frf, frf.total_variance);
+  json["nonlinearity"] = linearity_json(frf);
+  json["dropped_periods"] = dropped_json(frf);
   return json;
 }
 
@@ -65,6 +68,18 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
                       "dropped, instead of the log's own (lpm: of none)");
   command->add_option("--method", method_, "periodic | lpm (whole records, transient modelled)")
       ->check(CLI::IsMember({"periodic", "lpm"}))
+      ->capture_default_str();
+  command
+      ->add_option("--periods", periods_,
+                   "consistent (glitches, bumps and transients left out) | unmarked (all)")
+      ->check(CLI::IsMember({"consistent", "unmarked"}))
+      ->capture_default_str();
+  command
+      ->add_option("--smooth-covariance", covariance_lines_,
+                   "of the noise: mean over LINES (odd) neighbouring lines, with their degrees "
+                   "of freedom")
+      ->type_name("LINES")
+      ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_option("--covariance", covariance_, "diagonal | full")
       ->check(CLI::IsMember({"diagonal", "full"}))
@@ -88,6 +103,8 @@ void FrfCommand::run() const {
   options.transient_periods = transient_periods_;
   options.method = method_ == "lpm" ? FrfMethod::lpm : FrfMethod::periodic;
   options.covariance = covariance_ == "full" ? CovarianceKind::full : CovarianceKind::diagonal;
+  options.periods = periods_ == "unmarked" ? PeriodChoice::unmarked : PeriodChoice::consistent;
+  options.covariance_lines = covariance_lines_;
   options.threads = threads_;
   for (const int realization : realizations_) {
     if (realization < 1)
@@ -112,6 +129,7 @@ void FrfCommand::run() const {
   if (step.frf.noise_variance.size() > 0)
     console_.result(fmt::format("median relative standard deviation by noise: {:.2e}",
                                 median_relative_std(step.frf, step.frf.noise_variance)));
+  for (const std::string& line : linearity_lines(step.frf)) console_.message(line);
   for (const std::string& note : step.notes) console_.message("note: " + note);
   console_.result(frf_json(step.frf, step, output_));
 }

@@ -27,6 +27,8 @@ class FrfCommand {
   std::optional<int> transient_periods_;
   std::optional<double> delay_s_;
   std::string method_ = "periodic";
+  std::string periods_ = "consistent";
+  int covariance_lines_ = 1;
   std::string covariance_ = "diagonal";
   std::string compensate_ = "none";
   int threads_ = 0;

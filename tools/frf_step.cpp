@@ -8,6 +8,7 @@
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/fingerprint.hpp"
+#include "tools/frf_quality.hpp"
 #include "tools/interrupt.hpp"
 
 namespace stageid {
@@ -31,6 +32,8 @@ Json options_json(const FrfOptions& options) {
           {"transient_periods", options.transient_periods.value_or(-1)},
           {"method", options.method == FrfMethod::lpm ? "lpm" : "periodic"},
           {"covariance", options.covariance == CovarianceKind::full ? "full" : "diagonal"},
+          {"covariance_lines", options.covariance_lines},
+          {"periods", options.periods == PeriodChoice::consistent ? "consistent" : "unmarked"},
           {"realizations", options.realizations}};
 }
 
@@ -56,6 +59,7 @@ std::vector<std::string> notes_on(const FrfEstimate& frf) {
                       "inputs' power; it biases the estimate",
                       frf.excluded_channels[i], power));
   }
+  for (std::string& line : dropped_lines(frf)) notes.push_back(std::move(line));
   return notes;
 }
 

@@ -14,6 +14,7 @@
 #include "tools/design_command.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/fit_step.hpp"
+#include "tools/frf_quality.hpp"
 #include "tools/frf_step.hpp"
 #include "tools/measured_stage.hpp"
 #include "tools/model_export.hpp"
@@ -233,6 +234,8 @@ Json Identification::summary() const {
                  {"relative_rms_error", model_.fit.relative_rms_error},
                  {"band_hz", {model_.fit.band_hz[0], model_.fit.band_hz[1]}}}},
                {"modes", modes_json(model_)}};
+  json["nonlinearity"] = linearity_json(*frf_);
+  json["dropped_periods"] = dropped_json(*frf_);
   if (validation_) json["validation"] = validation_json(*validation_);
   if (truth_) json["truth"] = truth_json(*truth_);
   json["notes"] = notes_;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "frf/plant_frf.hpp"
+#include "tests/support/estimate_trials.hpp"
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
@@ -31,39 +32,8 @@ LoopExperiment slow_experiment(int periods) {
   return x;
 }
 
-struct Trials {
-  double error = 0.0;        ///< rms over seeds and lines of |G - truth| / |truth|
-  double over_stated = 0.0;  ///< mean over entries of (empirical / reported variance)
-  double bias = 0.0;         ///< mean over entries of |mean error|^2 over its variance
-};
-
-Trials repeat(LoopExperiment x, const FrfOptions& options, int seeds) {
-  const SampledPlant plant = slow_stage();
-  Eigen::MatrixXcd sum;
-  Eigen::MatrixXd squares, stated;
-  Trials trials;
-  for (int seed = 1; seed <= seeds; ++seed) {
-    x.seed = static_cast<std::uint64_t>(seed);
-    const MemoryLog log = test::simulate_sampled_log(plant, x, kNoise);
-    const FrfEstimate frf = estimate_plant_frf({&log}, options);
-    Eigen::MatrixXcd deviation = frf.response;
-    for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-      const Eigen::MatrixXcd G = plant.response(frf.omega_rad_s()[k], kSampleRateHz);
-      deviation.col(k) -= G.reshaped();
-      trials.error += deviation.col(k).squaredNorm() / G.squaredNorm();
-    }
-    if (seed == 1) {
-      sum = Eigen::MatrixXcd::Zero(4, frf.lines());
-      squares = stated = Eigen::MatrixXd::Zero(4, frf.lines());
-    }
-    sum += deviation;
-    squares += deviation.cwiseAbs2();
-    stated += frf.noise_variance;
-  }
-  trials.error = std::sqrt(trials.error / (seeds * static_cast<double>(sum.cols())));
-  trials.over_stated = (squares.array() / stated.array()).mean();
-  trials.bias = (sum.cwiseAbs2().array() / stated.array()).mean();
-  return trials;
+test::Trials repeat(const LoopExperiment& x, const FrfOptions& options, int seeds) {
+  return test::repeat(slow_stage(), x, kNoise, options, seeds);
 }
 
 TEST(LocalPolynomial, WithoutNoiseTheTransientIsRemoved) {
@@ -87,8 +57,8 @@ TEST(LocalPolynomial, WithoutNoiseTheTransientIsRemoved) {
 // At equal time: four periods from the start against three after one that is passed over.
 TEST(LocalPolynomial, IsAsAccurateAsPassingOverAPeriod) {
   constexpr int kSeeds = 40;
-  const Trials lpm = repeat(slow_experiment(4), {.method = FrfMethod::lpm}, kSeeds);
-  const Trials periodic = repeat(slow_experiment(4), {.transient_periods = 1}, kSeeds);
+  const test::Trials lpm = repeat(slow_experiment(4), {.method = FrfMethod::lpm}, kSeeds);
+  const test::Trials periodic = repeat(slow_experiment(4), {.transient_periods = 1}, kSeeds);
   // 71 lines x 4 entries x 40 seeds: 1 % for an rms; the modelled transient costs (1 + leverage),
   // the period more gives 4 / 3.
   EXPECT_LT(lpm.error, 1.02 * periodic.error);
@@ -96,38 +66,57 @@ TEST(LocalPolynomial, IsAsAccurateAsPassingOverAPeriod) {
 
 class Variance : public testing::TestWithParam<int> {};
 
-// A single period too: the noise is seen on the lines that are left empty.
+// A single period too: the noise is seen on the lines that are left empty; 18 are two records.
 TEST_P(Variance, IsThatOverSeedsAndTheMeanIsUnbiased) {
   constexpr int kSeeds = 80;
   for (const AxisScheme scheme : {AxisScheme::single_axis, AxisScheme::orthogonal}) {
     LoopExperiment x = slow_experiment(GetParam());
     x.scheme = scheme;
-    const Trials trials = repeat(x, {.method = FrfMethod::lpm}, kSeeds);
+    const test::Trials trials = repeat(x, {.method = FrfMethod::lpm}, kSeeds);
     // 284 entries of 80 seeds, transients of neighbouring lines share some 6 lines: sqrt(6 / (284 *
     // 80)) = 1.6 %; a bias as large as the standard error would double the second.
     EXPECT_NEAR(trials.over_stated, 1.0, 0.08);
     EXPECT_NEAR(trials.bias, 1.0, 0.5);
   }
 }
-INSTANTIATE_TEST_SUITE_P(Periods, Variance, testing::Values(1, 2, 4));
+INSTANTIATE_TEST_SUITE_P(Periods, Variance, testing::Values(1, 2, 4, 18));
 
-// Marked samples: the longest stretch of clean periods, whatever came before it.
-TEST(LocalPolynomial, AMarkedPeriodLeavesTheLongestCleanStretch) {
+/// Mean over lines and entries of |error|^2 over the stated variance.
+double error_over_stated(const FrfEstimate& frf) {
+  double sum = 0.0;
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const Eigen::MatrixXcd error =
+        frf.at(k) - slow_stage().response(frf.omega_rad_s()[k], kSampleRateHz);
+    sum += (error.reshaped().cwiseAbs2().array() / frf.noise_variance.col(k).array()).mean();
+  }
+  return sum / static_cast<double>(frf.lines());
+}
+
+// A marked period, whatever is in it, ends one record and begins another; both count.
+TEST(LocalPolynomial, StretchesBesideAMarkedPeriodAreBothUsed) {
   MemoryLog log = test::simulate_sampled_log(slow_stage(), slow_experiment(6), kNoise);
-  MemoryLog cut = test::simulate_sampled_log(slow_stage(), slow_experiment(6), kNoise);
   for (std::size_t run = 0; run < 2; ++run) {
     log.records[run].marked[2 * 800 + 17] = 1;
     log.records[run].sensors.middleRows(2 * 800, 800).setConstant(1e6);
-    cut.records[run].sensors = cut.records[run].sensors.bottomRows(3 * 800).eval();
-    cut.records[run].actuators = cut.records[run].actuators.bottomRows(3 * 800).eval();
-    cut.records[run].marked = cut.records[run].marked.tail(3 * 800).eval();
-    cut.log_runs[run].samples = 3 * 800;
   }
   const FrfEstimate marked = estimate_plant_frf({&log}, {.method = FrfMethod::lpm});
-  const FrfEstimate rest = estimate_plant_frf({&cut}, {.method = FrfMethod::lpm});
-  EXPECT_EQ(marked.periods, 3);
-  EXPECT_TRUE(marked.response == rest.response);
-  EXPECT_TRUE(marked.noise_variance == rest.noise_variance);
+  EXPECT_EQ(marked.periods, 5);
+  EXPECT_EQ(marked.noise_dof, 2 * 2 * 9.0);
+  ASSERT_EQ(marked.dropped_periods.size(), 2u);
+  EXPECT_EQ(marked.dropped_periods[0].period, 2);
+  // 284 entries of lines that share some 6: standard deviation 15 %.
+  EXPECT_NEAR(error_over_stated(marked), 1.0, 0.5);
+}
+
+TEST(LocalPolynomial, APeriodOnItsOwnIsLeftOutUnlessNothingElseIsThere) {
+  MemoryLog log = test::simulate_sampled_log(slow_stage(), slow_experiment(4), kNoise);
+  for (std::size_t run = 0; run < 2; ++run) log.records[run].marked[800 + 5] = 1;
+  const FrfEstimate two = estimate_plant_frf({&log}, {.method = FrfMethod::lpm});
+  EXPECT_EQ(two.periods, 2);
+  EXPECT_EQ(two.dropped_periods.size(), 4u);
+  for (std::size_t run = 0; run < 2; ++run) log.records[run].marked[2 * 800 + 5] = 1;
+  const FrfEstimate one = estimate_plant_frf({&log}, {.method = FrfMethod::lpm});
+  EXPECT_EQ(one.periods, 1);
 }
 
 TEST(LocalPolynomial, TheNumberOfThreadsDoesNotMatter) {

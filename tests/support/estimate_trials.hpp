@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+
+#include "frf/plant_frf.hpp"
+#include "tests/support/sampled_loop.hpp"
+
+/// One loop measured from rest again and again, with other noise.
+namespace stageid::test {
+
+struct Trials {
+  double error = 0.0;        ///< rms over seeds and lines of |G - truth| / |truth|
+  double over_stated = 0.0;  ///< mean over entries of (empirical / reported variance)
+  double bias = 0.0;         ///< mean over entries of |mean error|^2 over its variance
+};
+
+inline Trials repeat(const SampledPlant& plant, LoopExperiment x, double noise_std,
+                     const FrfOptions& options, int seeds) {
+  Eigen::MatrixXcd sum;
+  Eigen::MatrixXd squares, stated;
+  Trials trials;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    x.seed = static_cast<std::uint64_t>(seed);
+    const MemoryLog log = simulate_sampled_log(plant, x, noise_std);
+    const FrfEstimate frf = estimate_plant_frf({&log}, options);
+    Eigen::MatrixXcd deviation = frf.response;
+    for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+      const Eigen::MatrixXcd G = plant.response(frf.omega_rad_s()[k], x.sample_rate_hz);
+      deviation.col(k) -= G.reshaped();
+      trials.error += deviation.col(k).squaredNorm() / G.squaredNorm();
+    }
+    if (seed == 1) {
+      sum = Eigen::MatrixXcd::Zero(frf.response.rows(), frf.lines());
+      squares = stated = Eigen::MatrixXd::Zero(frf.response.rows(), frf.lines());
+    }
+    sum += deviation;
+    squares += deviation.cwiseAbs2();
+    stated += frf.noise_variance;
+  }
+  trials.error = std::sqrt(trials.error / (seeds * static_cast<double>(sum.cols())));
+  trials.over_stated = (squares.array() / stated.array()).mean();
+  trials.bias = (sum.cwiseAbs2().array() / stated.array()).mean();
+  return trials;
+}
+
+}  // namespace stageid::test

@@ -1,0 +1,141 @@
+#include "tools/frf_quality.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "frf/nonlinearity.hpp"
+#include "tools/console.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostLines = 10;
+
+std::string decibels(double ratio) {
+  return ratio > 0.0 ? fmt::format("{:.0f} dB", 20.0 * std::log10(ratio)) : std::string("none");
+}
+
+/// The least probable verdict of a column.
+struct Verdict {
+  Eigen::Index at = 0;
+  double p_value = 1.0;
+};
+
+Verdict least(const Eigen::MatrixXd& p_value, Eigen::Index band) {
+  Verdict verdict;
+  verdict.p_value = p_value.col(band).minCoeff(&verdict.at);
+  return verdict;
+}
+
+std::string pair_name(const FrfEstimate& frf, Eigen::Index c) {
+  return fmt::format("{} <- {}", frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())],
+                     frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]);
+}
+
+std::string detected(const DetectedDistortion& found, Eigen::Index band) {
+  if (found.p_value.size() == 0) return "-";
+  const Verdict verdict = least(found.p_value, band);
+  if (verdict.p_value >= kNonlinearBelow / static_cast<double>(found.p_value.rows())) return "-";
+  return decibels(found.level(verdict.at, band));
+}
+
+Json detected_json(const DetectedDistortion& found, Eigen::Index band) {
+  if (found.p_value.size() == 0) return nullptr;
+  const Verdict verdict = least(found.p_value, band);
+  return {{"p_value", verdict.p_value}, {"level", found.level(verdict.at, band)}};
+}
+
+/// Whether any verdict stands out more than the least probable of so many does by chance.
+bool anything_nonlinear(const NonlinearityTest& test) {
+  double smallest = test.p_value.minCoeff();
+  auto tests = static_cast<double>(test.p_value.size());
+  for (const DetectedDistortion* kind : {&test.even, &test.odd}) {
+    if (kind->p_value.size() == 0) continue;
+    smallest = std::min(smallest, kind->p_value.minCoeff());
+    tests += static_cast<double>(kind->p_value.size());
+  }
+  return smallest * tests < kNonlinearBelow;
+}
+
+std::string why_not_tested(const FrfEstimate& frf) {
+  const std::string why = why_linearity_cannot_be_tested(frf);
+  return why.empty() ? "nonlinearity test: the file holds none; estimate again from the logs" : why;
+}
+
+}  // namespace
+
+std::vector<std::string> linearity_lines(const FrfEstimate& frf) {
+  const NonlinearityTest& test = frf.nonlinearity;
+  if (test.band_hz.rows() == 0) return {why_not_tested(frf)};
+  std::vector<std::vector<std::string>> rows = {
+      {"band, Hz", "nonlinear pairs", "most", "distortion", "even lines", "odd lines"}};
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
+    const Verdict verdict = least(test.p_value, b);
+    const auto count = (test.p_value.col(b).array() < kNonlinearBelow).count();
+    rows.push_back({fmt::format("{:.4g} ... {:.4g}", test.band_hz(b, 0), test.band_hz(b, 1)),
+                    fmt::format("{} of {}", count, test.p_value.rows()),
+                    count > 0 ? pair_name(frf, verdict.at) : "-",
+                    count > 0 ? decibels(test.distortion(verdict.at, b)) : "-",
+                    detected(test.even, b), detected(test.odd, b)});
+  }
+  std::vector<std::string> lines = table_lines(rows);
+  lines.push_back(fmt::format(
+      "{}; a linear plant shows {:.1f} nonlinear pairs by chance",
+      anything_nonlinear(test) ? "the plant is not linear" : "no sign that the plant is not linear",
+      kNonlinearBelow * static_cast<double>(test.p_value.size())));
+  return lines;
+}
+
+Json linearity_json(const FrfEstimate& frf) {
+  const NonlinearityTest& test = frf.nonlinearity;
+  if (test.band_hz.rows() == 0) return {{"tested", false}, {"reason", why_not_tested(frf)}};
+  Json bands = Json::array();
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
+    const Verdict verdict = least(test.p_value, b);
+    bands.push_back(
+        {{"band_hz", {test.band_hz(b, 0), test.band_hz(b, 1)}},
+         {"tests", test.p_value.rows()},
+         {"nonlinear", (test.p_value.col(b).array() < kNonlinearBelow).count()},
+         {"output", frf.outputs.names[static_cast<std::size_t>(verdict.at % frf.n_outputs())]},
+         {"input", frf.inputs.names[static_cast<std::size_t>(verdict.at / frf.n_outputs())]},
+         {"p_value", verdict.p_value},
+         {"distortion", test.distortion(verdict.at, b)},
+         {"even", detected_json(test.even, b)},
+         {"odd", detected_json(test.odd, b)}});
+  }
+  return {{"tested", true},
+          {"nonlinear", anything_nonlinear(test)},
+          {"false_alarm_rate", kNonlinearBelow},
+          {"bands", bands}};
+}
+
+std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
+  std::vector<std::string> lines;
+  for (const DroppedPeriod& period : frf.dropped_periods) {
+    if (lines.size() == kMostLines) {
+      lines.push_back(fmt::format("... and {} more periods, see /dropped_periods",
+                                  frf.dropped_periods.size() - kMostLines));
+      break;
+    }
+    lines.push_back(fmt::format("realization {}, experiment {}: period {} left out: {}",
+                                period.realization + 1, period.experiment + 1, period.period + 1,
+                                period.reason));
+  }
+  return lines;
+}
+
+Json dropped_json(const FrfEstimate& frf) {
+  Json list = Json::array();
+  for (const DroppedPeriod& period : frf.dropped_periods)
+    list.push_back({{"realization", period.realization + 1},
+                    {"experiment", period.experiment + 1},
+                    {"period", period.period + 1},
+                    {"reason", period.reason}});
+  return list;
+}
+
+}  // namespace stageid
