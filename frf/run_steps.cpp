@@ -15,18 +15,24 @@ std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
   return dft.forward();
 }
 
+// Spectra lie line by line. One channel's lines are so far apart that every value would cost a cache
+// line of its own; four channels at a time fill it.
 void line_spectra(const Eigen::MatrixXd& samples, const std::vector<Eigen::Index>& channels,
                   const std::vector<int>& lines, Eigen::Index first_row, RealDft& dft,
                   Eigen::MatrixXcd& spectra) {
+  constexpr Eigen::Index kTogether = 4;
   const double scale = 1.0 / static_cast<double>(dft.length());
-  Eigen::Index row = first_row;
-  for (const Eigen::Index channel : channels) {
-    const auto spectrum = transform(samples, channel, dft);
-    for (Eigen::Index k = 0; k < spectra.cols(); ++k) {
-      spectra(row, k) =
-          scale * spectrum[static_cast<std::size_t>(lines[static_cast<std::size_t>(k)])];
+  const auto count = static_cast<Eigen::Index>(channels.size());
+  Eigen::MatrixXcd some(spectra.cols(), kTogether);
+  for (Eigen::Index first = 0; first < count; first += kTogether) {
+    const Eigen::Index n = std::min(kTogether, count - first);
+    for (Eigen::Index c = 0; c < n; ++c) {
+      const auto spectrum = transform(samples, channels[static_cast<std::size_t>(first + c)], dft);
+      for (Eigen::Index k = 0; k < some.rows(); ++k)
+        some(k, c) = scale * spectrum[static_cast<std::size_t>(lines[static_cast<std::size_t>(k)])];
     }
-    ++row;
+    for (Eigen::Index k = 0; k < some.rows(); ++k)
+      for (Eigen::Index c = 0; c < n; ++c) spectra(first_row + first + c, k) = some(k, c);
   }
 }
 

@@ -31,9 +31,9 @@ constexpr Dataset kDatasets[] = {{"frequency_hz", 1},
                                  {"provenance", 0}};
 
 constexpr const char* kAttributes[] = {
-    "@format",    "@format_version", "@sample_rate_hz", "@hold",        "@compensated",
-    "@delay_s",   "@realizations",   "@periods",        "@experiments", "@noise_dof",
-    "@total_dof", "inputs@unit",     "outputs@unit"};
+    "@format",      "@format_version",   "@sample_rate_hz", "@hold",         "@compensated",
+    "@method",      "@covariance_lines", "@delay_s",        "@realizations", "@periods",
+    "@experiments", "@noise_dof",        "@total_dof",      "inputs@unit",   "outputs@unit"};
 
 /// As MATLAB's variables are called: "@hold" is hold, "inputs@unit" inputs_unit.
 std::string identifier(std::string name) {
