@@ -3,18 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <complex>
-#include <future>
 #include <numbers>
 #include <set>
 #include <stdexcept>
-#include <thread>
 
 #include "excitation/hadamard.hpp"
 #include "excitation/line_spectrum.hpp"
 #include "excitation/multisine_lines.hpp"
+#include "excitation/parallel_for.hpp"
 #include "excitation/random_stream.hpp"
 
 namespace stageid {
@@ -108,20 +106,10 @@ std::vector<MatrixXd> reduced_phases(const FrequencyGrid& grid, const Experiment
   const int axes = static_cast<int>(spec.axes.size());
   std::vector<MatrixXd> phases(static_cast<std::size_t>(spec.realizations),
                                MatrixXd(axes, grid.size()));
-  std::atomic<int> next = 0;
-  const auto work = [&] {
-    for (int m = next++; m < spec.realizations; m = next++) {
-      for (int p = 0; p < axes; ++p) {
-        phases[static_cast<std::size_t>(m)].row(p) = draw_phase_rad(grid, spec, m, p).transpose();
-      }
-    }
-  };
-  std::vector<std::future<void>> workers;
-  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) {
-    workers.push_back(std::async(std::launch::async, work));
-  }
-  work();
-  for (std::future<void>& worker : workers) worker.get();
+  parallel_for(spec.realizations, [&](int m) {
+    for (int p = 0; p < axes; ++p)
+      phases[static_cast<std::size_t>(m)].row(p) = draw_phase_rad(grid, spec, m, p).transpose();
+  });
   return phases;
 }
 

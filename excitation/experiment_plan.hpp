@@ -57,6 +57,11 @@ class ExperimentPlan {
   /// @throws std::invalid_argument naming the wrong field.
   ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec);
 
+  /// A plan whose phases are known already, one matrix (axes x lines, in [0, 2 pi)) a realization.
+  /// @pre spec.crest_iterations > 0: with 0 the phases follow from the seed.
+  /// @throws std::invalid_argument naming the wrong field.
+  ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec, std::vector<Eigen::MatrixXd> phase_rad);
+
   const FrequencyGrid& grid() const noexcept { return grid_; }
   const ExperimentSpec& spec() const noexcept { return spec_; }
   int experiments() const noexcept { return static_cast<int>(spec_.axes.size()); }
@@ -82,10 +87,6 @@ class ExperimentPlan {
   Eigen::MatrixXd phase_rad(int realization) const;
 
  private:
-  friend ExperimentPlan read_experiment_plan(const std::filesystem::path& file);
-  /// Restores a plan whose crest-reduced phases, one matrix per realization, are known already.
-  ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec, std::vector<Eigen::MatrixXd> phase_rad);
-
   bool excites(int axis, int experiment) const { return mixing_(axis, experiment) != 0.0; }
   void check_run(RunId run) const;
   void set_amplitude();

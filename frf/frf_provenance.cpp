@@ -36,6 +36,7 @@ std::string FrfProvenance::json() const {
       {"inputs", channels_.inputs},
       {"outputs", outputs},
       {"transient_periods", transient_periods(info_, options_)},
+      {"period_samples", info_.period_samples},
       {"covariance", options_.covariance == CovarianceKind::full ? "full" : "diagonal"},
       {"covariance_lines", options_.covariance_lines},
       {"periods", options_.periods == PeriodChoice::consistent ? "consistent" : "unmarked"}};

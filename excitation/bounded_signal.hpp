@@ -1,0 +1,37 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <complex>
+#include <cstdint>
+#include <limits>
+#include <string>
+
+namespace stageid {
+
+/// What of a channel is bounded.
+enum class SignalKind : std::uint8_t {
+  value,       ///< x
+  difference,  ///< (x[n] - x[n-1]) fs: slew, as a digital limit sees it
+  derivative   ///< dx/dt: velocity
+};
+
+/// A signal of the closed loop that must stay inside its limits. Linear in the excitation:
+/// X(l) = sum_p transfer(p, l) R_p(l), times what `kind` says.
+struct BoundedSignal {
+  std::string name;
+  SignalKind kind = SignalKind::value;
+  Eigen::MatrixXcd transfer;  ///< axes x lines, from the excitation of each axis to the value
+  double peak_limit = std::numeric_limits<double>::infinity();
+  double rms_limit = std::numeric_limits<double>::infinity();
+  double rms_time_constant_s = 0.0;  ///< of the rms limit's exponential window; 0: over a period
+  double reserve = 0.0;  ///< of the peak limit, left to noise and to what is not in the excitation
+};
+
+/// What `kind` makes of exp(j 2 pi f t): 1, (1 - exp(-j 2 pi f / fs)) fs, or j 2 pi f.
+std::complex<double> kind_factor(SignalKind kind, double frequency_hz, double sample_rate_hz);
+
+/// Largest rms of a periodic signal over an exponential window, in steady state.
+double windowed_rms(const Eigen::Ref<const Eigen::VectorXd>& period, double sample_rate_hz,
+                    double time_constant_s);
+
+}  // namespace stageid
