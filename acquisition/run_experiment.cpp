@@ -137,6 +137,8 @@ class Experiment {
 
   void perform_runs() {
     result_.end = ExperimentEnd::complete;
+    std::string enough;
+    int realization = -1;
     for (const RunId& run : runs_) {
       if (interrupted()) {
         finish(StopReason::interrupt);
@@ -145,6 +147,11 @@ class Experiment {
       if (options_.tripped()) {
         finish(StopReason::plant);
         break;
+      }
+      if (options_.enough && run.realization != std::exchange(realization, run.realization)) {
+        log_.drain();
+        enough = options_.enough();
+        if (!enough.empty()) break;
       }
       try {
         const StopReason reason = perform_run(run);
@@ -157,7 +164,8 @@ class Experiment {
       break;
     }
     if (result_.end == ExperimentEnd::complete) {
-      result_.message = fmt::format("{} runs measured", result_.runs_done);
+      result_.message = fmt::format("{}{}{} runs measured", enough, enough.empty() ? "" : "; ",
+                                    result_.runs_done);
     }
   }
 

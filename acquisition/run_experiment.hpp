@@ -35,6 +35,9 @@ struct RunExperimentOptions {
   /// Set when something around the stage does not hold any more: controlled stop, `fault`.
   const std::atomic<bool>* plant_tripped = nullptr;
   std::function<std::string()> plant_reason = {};  ///< why; asked once the stage is stopped
+  /// Asked between realizations, with all that was measured in the log, while the stage stands: why it
+  /// is enough, or nothing. With a reason the experiment ends as complete.
+  std::function<std::string()> enough = {};
   double ramp_s = 0.1;             ///< excitation is ramped to zero over this before stopping
   int misses_allowed = 10;         ///< leaky bucket: +2 a bad cycle, -1 a good one, above: stop
   RealTimeOptions real_time = {};  ///< of the loop's thread, where the clock is the wall's

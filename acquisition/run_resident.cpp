@@ -6,6 +6,7 @@
 #include <chrono>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "acquisition/excited_actuators.hpp"
@@ -61,15 +62,22 @@ class ResidentExperiment {
 
   ExperimentResult perform() {
     result_.end = ExperimentEnd::complete;
+    std::string enough;
+    int realization = -1;
     for (const RunId& run : runs_) {
       if (options_.interrupted()) result_.end = ExperimentEnd::interrupted;
       if (options_.tripped()) end_with_plant();
       if (result_.end != ExperimentEnd::complete) break;
+      if (options_.enough && run.realization != std::exchange(realization, run.realization)) {
+        enough = options_.enough();
+        if (!enough.empty()) break;
+      }
       perform_run(run);
     }
     stage_.stop();
     if (result_.end == ExperimentEnd::complete)
-      result_.message = fmt::format("{} runs measured", result_.runs_done);
+      result_.message = fmt::format("{}{}{} runs measured", enough, enough.empty() ? "" : "; ",
+                                    result_.runs_done);
     if (result_.end == ExperimentEnd::interrupted)
       result_.message = "interrupted; what was measured is kept";
     return std::move(result_);

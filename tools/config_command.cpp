@@ -9,6 +9,7 @@
 #include "excitation/output_file.hpp"
 #include "hal/can_dbc.hpp"
 #include "tools/command_line.hpp"
+#include "tools/config_plan.hpp"
 #include "tools/config_schema.hpp"
 #include "tools/experiment_config.hpp"
 #include "tools/strict_yaml.hpp"
@@ -85,7 +86,7 @@ void ConfigCommand::check() const {
                                   stage.spec.info.sensors.size(), stage.spec.info.sample_rate_hz));
     } else {
       const ExperimentConfig experiment = load_experiment_config(file);
-      const ExperimentPlan plan = make_plan(experiment);
+      const ExperimentPlan plan = outline_plan(experiment);
       console_.result(fmt::format("{}: {} runs, {:.1f} min, {} lines", file.string(),
                                   plan.runs().size(), plan.duration_s() / 60.0,
                                   plan.grid().size()));

@@ -8,6 +8,8 @@
 
 #include "excitation/file_error.hpp"
 #include "tools/command_line.hpp"
+#include "tools/config_plan.hpp"
+#include "tools/limited_plan.hpp"
 #include "tools/link_load.hpp"
 #include "tools/measurement.hpp"
 #include "tools/output_paths.hpp"
@@ -102,6 +104,11 @@ DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console
       app, "design", "Draw the multisines; predict forces and motions against the limits");
   command->add_option("config", config_, "experiment file (.yaml)")->required();
   command->add_option("-o,--output", output_, "HDF5 file to write")->required();
+  command
+      ->add_option("--accuracy", accuracy_,
+                   "with level.limits: mean relative variance that is wanted, e.g. 1e-6 for 0.1 %; "
+                   "prints how many minutes reach it")
+      ->check(CLI::PositiveNumber);
   command->add_flag("--force", force_, "write even if a limit would be exceeded");
   command->final_callback([this] { run(); });
 }
@@ -109,6 +116,15 @@ DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console
 void DesignCommand::run() const {
   const ExperimentConfig config = load_experiment_config(config_);
   require_writable(output_);
+  if (config.limits) {
+    design_within(config);
+    return;
+  }
+  if (accuracy_ > 0.0)
+    throw FormatError(
+        config.file, "",
+        "--accuracy: the noise is known from the prior of 'level: {limits: ...}' only; "
+        "use that level");
   const ExperimentPlan plan = make_plan(config);
   const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
   const bool written = force_ || prediction.violations().empty();
@@ -118,6 +134,24 @@ void DesignCommand::run() const {
   for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
   console_.result(fmt::format("wrote {}", output_.string()));
   console_.result(design_json(config, plan, prediction));
+}
+
+void DesignCommand::design_within(const ExperimentConfig& config) const {
+  const LimitedPlan limited = make_limited_plan(config);
+  const ExperimentPlan& plan = limited.design.plan;
+  write_experiment_plan(output_, plan);
+  console_.result(fmt::format("{} runs, {:.1f} min in all; {} lines; prior {}", plan.runs().size(),
+                              plan.duration_s() / 60.0, plan.grid().size(),
+                              config.limits->prior.string()));
+  for (const LinkLoad& link : link_loads(config.stage)) console_.result(to_string(link));
+  for (const std::string& line : limited_table(limited, accuracy_)) console_.result(line);
+  console_.result(fmt::format("wrote {}", output_.string()));
+  Json json = {{"runs", plan.runs().size()},
+               {"duration_s", plan.duration_s()},
+               {"log_bytes", expected_log_bytes(plan, config.stage.spec.info)},
+               {"lines", plan.grid().size()}};
+  json.update(limited_json(limited, accuracy_));
+  console_.result(json);
 }
 
 }  // namespace stageid

@@ -16,10 +16,12 @@ class DesignCommand {
 
  private:
   void run() const;
+  void design_within(const ExperimentConfig& config) const;
 
   Console& console_;
   std::filesystem::path config_;
   std::filesystem::path output_;
+  double accuracy_ = 0.0;
   bool force_ = false;
 };
 

@@ -8,6 +8,7 @@
 
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
+#include "tools/config_plan.hpp"
 #include "tools/config_reader.hpp"
 #include "tools/key_suggestion.hpp"
 #include "tools/strict_yaml.hpp"
@@ -24,6 +25,7 @@ struct ExperimentFile {
   std::vector<std::string> axes;
   FlexibleValue rms_n;
   FlexibleValue peak_n;
+  std::optional<LimitRequest> limits;
   FlexibleValue shape = {"flat", {}, false, {}};
   std::vector<double> band_hz;
   double period_s = 0.0;
@@ -36,6 +38,19 @@ struct ExperimentFile {
 
 bool is_set(const FlexibleValue& value) { return !value.numbers.empty(); }
 
+void describe_limits(ConfigVisitor& v, std::optional<LimitRequest>& limits) {
+  LimitRequest request;
+  std::string prior;
+  v.text("prior", prior, kRequired,
+         "frf.h5 of a pilot, or model.json, relative to this file: what the plant is known by");
+  v.number("safety", request.safety, {"", 0.0, 1.0, true}, kOptional,
+           "largest predicted use of any limit of the stage file");
+  v.number("velocity_m_s", request.velocity_m_s, positive("m/s"), kOptional,
+           "of every sensor; left out: no limit");
+  request.prior = prior;
+  limits = std::move(request);
+}
+
 void describe_level(ConfigVisitor& v, ExperimentFile& f) {
   FlexibleRule rule;
   rule.number = true;
@@ -43,11 +58,15 @@ void describe_level(ConfigVisitor& v, ExperimentFile& f) {
   rule.rule = positive("N");
   v.flexible("rms_n", f.rms_n, rule, kOptional, "rms of each axis; a list gives one an axis");
   v.flexible("peak_n", f.peak_n, rule, kOptional, "or its largest sample");
-  v.require(is_set(f.rms_n) != is_set(f.peak_n), is_set(f.rms_n) ? "peak_n" : "rms_n",
-            "level: give one of 'rms_n: NUMBER' and 'peak_n: NUMBER'");
+  v.group(
+      "limits", [&](ConfigVisitor& limits) { describe_limits(limits, f.limits); }, kOptional,
+      "or as large as the limits allow, spread for the smallest mean relative variance");
+  const char* key = f.limits ? "limits" : is_set(f.rms_n) ? "rms_n" : "peak_n";
+  v.require(int{is_set(f.rms_n)} + int{is_set(f.peak_n)} + int{f.limits.has_value()} == 1, key,
+            "level: give one of 'rms_n: NUMBER', 'peak_n: NUMBER' and 'limits: {prior: FILE}'");
   const std::size_t given = std::max(f.rms_n.numbers.size(), f.peak_n.numbers.size());
   v.require(
-      given <= 1 || given == f.axes.size(), is_set(f.rms_n) ? "rms_n" : "peak_n",
+      given <= 1 || given == f.axes.size(), key,
       fmt::format("level: {} numbers for {} axes; give one, or one an axis", given, f.axes.size()));
 }
 
@@ -88,6 +107,10 @@ void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
   count(v, "realizations", f.spec.realizations, 1, 10000, kOptional, "of the random phases");
   count(v, "crest_iterations", f.spec.crest_iterations, 0, 100000, kOptional,
         "of crest-factor reduction; 0: phases stay random");
+  v.require(!f.limits || f.spec.crest_iterations > 0, "crest_iterations",
+            "crest_iterations: with 'limits' the phases are designed too; write 20");
+  v.require(!f.limits || f.shape.pairs.empty(), "shape",
+            "shape: with 'limits' the spectrum is designed; leave 'shape' out");
   count(v, "seed", f.spec.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
         "same seed, same experiment, on every machine");
 }
@@ -205,7 +228,10 @@ class ExperimentChecker {
 };
 
 std::vector<ExcitationAxis> excitation_axes(const ExperimentFile& file, const FrequencyGrid& grid) {
-  const std::vector<double>& levels = is_set(file.rms_n) ? file.rms_n.numbers : file.peak_n.numbers;
+  const std::vector<double> designed = {1.0};
+  const std::vector<double>& levels = file.limits          ? designed
+                                      : is_set(file.rms_n) ? file.rms_n.numbers
+                                                           : file.peak_n.numbers;
   const Eigen::VectorXd shape = shape_on(grid, file.shape.pairs);
   std::vector<ExcitationAxis> axes;
   for (std::size_t i = 0; i < file.axes.size(); ++i)
@@ -225,6 +251,11 @@ std::string measurement_id(const ExperimentFile& f, const StageConfig& stage) {
       s.crest_iterations, s.seed, f.lines.low_hz, f.lines.high_hz);
   for (const ExcitationAxis& axis : s.axes)
     text += fmt::format(" axis {} {}", axis.channel, axis.level);
+  if (f.limits)
+    text +=
+        fmt::format(" limits {} {} {}", f.limits->safety, f.limits->velocity_m_s,
+                    std::filesystem::exists(f.limits->prior) ? fingerprint_of_file(f.limits->prior)
+                                                             : "not there yet");
   for (const auto& [frequency_hz, amplitude] : f.shape.pairs)
     text += fmt::format(" shape {} {}", frequency_hz, amplitude);
   return fingerprint_of(text + "\n" + stage.text);
@@ -241,18 +272,19 @@ void complete(ExperimentConfig& config, ExperimentFile& file, const YamlDocument
   file.lines.low_hz = file.band_hz[0];
   file.lines.high_hz = file.band_hz[1];
   file.lines.seed = file.spec.seed;
-  file.spec.scaling = is_set(file.rms_n) ? AmplitudeScaling::rms : AmplitudeScaling::peak;
+  file.spec.scaling = is_set(file.peak_n) ? AmplitudeScaling::peak : AmplitudeScaling::rms;
   // What the excitation library refuses gets the place of the section that asked for it.
   try {
     const auto grid =
         FrequencyGrid::band(info.sample_rate_hz, config.samples_per_period, file.lines);
     file.spec.axes = excitation_axes(file, grid);
-    const ExperimentPlan plan(grid, file.spec);
+    config.lines = file.lines;
+    config.experiment = file.spec;
+    config.limits = file.limits;
+    outline_plan(config);
   } catch (const std::invalid_argument& error) {
     checker.fail("band_hz", error.what());
   }
-  config.lines = file.lines;
-  config.experiment = file.spec;
   config.frf = file.frf;
   config.fit = file.fit;
   config.validation_realization = file.validation_realization - 1;
@@ -284,14 +316,10 @@ ExperimentConfig load_experiment_config(const std::filesystem::path& path) {
                         stage_file.string()));
   }
   config.stage = load_stage_config(stage_file);
+  if (file.limits)
+    file.limits->prior = (path.parent_path() / file.limits->prior).lexically_normal();
   complete(config, file, document);
   return config;
-}
-
-ExperimentPlan make_plan(const ExperimentConfig& config) {
-  return ExperimentPlan(FrequencyGrid::band(config.stage.spec.info.sample_rate_hz,
-                                            config.samples_per_period, config.lines),
-                        config.experiment);
 }
 
 }  // namespace stageid

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,13 @@
 
 namespace stageid {
 
+/// Level of the excitation as the limits allow it.
+struct LimitRequest {
+  std::filesystem::path prior;  ///< frf.h5 or model.json
+  double safety = 0.9;          ///< largest predicted use of any limit
+  double velocity_m_s = 0.0;    ///< of every sensor; 0: no limit
+};
+
 /// An experiment file and the stage file it names, checked through.
 struct ExperimentConfig {
   std::filesystem::path file;
@@ -20,7 +28,8 @@ struct ExperimentConfig {
   StageConfig stage;
   LineSpec lines;
   int samples_per_period = 0;
-  ExperimentSpec experiment;
+  ExperimentSpec experiment;           ///< with `limits`, levels are still to be designed
+  std::optional<LimitRequest> limits;  ///< level.limits
   FrfOptions frf;
   FitRequest fit;
   int validation_realization = -1;  ///< 0-based; -1: none is held back
@@ -29,9 +38,6 @@ struct ExperimentConfig {
 
 /// @throws FileError, FormatError "FILE:LINE:COLUMN: what is wrong; what would be right".
 ExperimentConfig load_experiment_config(const std::filesystem::path& file);
-
-/// The plan; drawing its multisines may take a second when crest factors are reduced.
-ExperimentPlan make_plan(const ExperimentConfig& config);
 
 /// The keys of an experiment file. Used by `stageid config schema`.
 void describe_experiment_keys(ConfigVisitor& visitor);

@@ -11,6 +11,7 @@
 #include "excitation/output_file.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/closed_loop_prediction.hpp"
+#include "tools/config_plan.hpp"
 #include "tools/design_command.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/fit_step.hpp"
@@ -86,7 +87,9 @@ void Identification::design() {
     finish_step("design", seconds_since(start), "up to date");
     return;
   }
-  const DesignPrediction prediction = predict_closed_loop(plan_, config_.stage.spec);
+  // Within limits it was designed from what a pilot knows; the stage file's plant must not help.
+  const DesignPrediction prediction =
+      config_.limits ? DesignPrediction{} : predict_closed_loop(plan_, config_.stage.spec);
   if (!request_.force) require_within_limits(config_, prediction);
   require_directory(request_.directory);
   write_experiment_plan(path("excitation.h5"), plan_);

@@ -17,17 +17,6 @@ namespace {
 
 constexpr int kLowest = 19;
 
-/// Complete realizations of the log: those with as many different complete experiments as any has.
-int complete_realizations(const LogReader& log) {
-  std::map<int, std::set<int>> experiments;
-  for (const LogRun& run : log.runs())
-    if (run.complete) experiments[run.realization].insert(run.experiment);
-  const std::size_t needed = log.info().excitation.size();
-  int complete = 0;
-  for (const auto& [realization, done] : experiments) complete += done.size() >= needed ? 1 : 0;
-  return complete;
-}
-
 std::string page_json(const FrfEstimate& frf) {
   ReportData data;
   data.cmif_kind = PeakOptions().kind;
@@ -43,6 +32,16 @@ std::string page_json(const FrfEstimate& frf) {
 }
 
 }  // namespace
+
+int complete_realizations(const LogReader& log) {
+  std::map<int, std::set<int>> experiments;
+  for (const LogRun& run : log.runs())
+    if (run.complete) experiments[run.realization].insert(run.experiment);
+  const std::size_t needed = log.info().excitation.size();
+  int complete = 0;
+  for (const auto& [realization, done] : experiments) complete += done.size() >= needed ? 1 : 0;
+  return complete;
+}
 
 LiveResponse::LiveResponse(std::filesystem::path log, FrfOptions options, LatestText& response)
     : log_(std::move(log)), options_(std::move(options)), response_(response) {

@@ -13,6 +13,11 @@
 
 namespace stageid {
 
+class LogReader;
+
+/// Complete realizations of a log: those with as many different complete experiments as any has.
+int complete_realizations(const LogReader& log);
+
 /// The frequency response and its CMIF while they form: estimated by estimate_plant_frf(), as
 /// `stageid frf` does, from the log that is being written, whenever one more realization is complete
 /// in it. A thread of its own of the lowest priority; nothing is computed while nobody watches.

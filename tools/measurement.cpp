@@ -15,6 +15,7 @@
 #include "tools/measured_stage.hpp"
 #include "tools/modbus_backend.hpp"
 #include "tools/run_metadata.hpp"
+#include "tools/until_variance.hpp"
 
 namespace stageid {
 namespace {
@@ -134,6 +135,18 @@ void tell_end(EventLog& events, const MeasuredStage& stage, const MeasurementRes
   events.write("end", {{"exit_code", std::int64_t{result.exit_code}}, {"message", result.message}});
 }
 
+/// The variance that all of it leaves, where the plan ended before it was small enough too.
+void tell_reached(UntilVariance& until, MeasurementResult& result, const Console& console) {
+  const std::string reason = until.enough();
+  if (reason.empty() && until.reached())
+    result.message += fmt::format(
+        "; the plan is at its end with a mean relative variance of {:.3g}", *until.reached());
+  else if (!reason.empty() && result.message.find(reason) == std::string::npos)
+    result.message += "; " + reason;
+  if (!until.failure().empty()) console.warning("--until: " + until.failure());
+  result.variance = until.reached();
+}
+
 /// Who is told what while it is measured.
 void listen(RunExperimentOptions& options, EventLog& events, Progress& progress,
             Dashboard* dashboard) {
@@ -182,11 +195,18 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   events.emplace(event_log_of(request.log));
   tell_begin(*events, config, info, result);
 
+  std::optional<UntilVariance> until;
+  if (request.until) {
+    until.emplace(request.log, config.frf, *request.until);
+    options.enough = [&until] { return until->enough(); };
+  }
   Progress progress(console, "run", "s of stage time");
   listen(options, *events, progress, dashboard.get());
   result.experiment = stage->perform(log, options);
   result.seconds = progress.seconds();
   conclude(*stage, result);
+  if (until && result.experiment.end == ExperimentEnd::complete)
+    tell_reached(*until, result, console);
   if (result.experiment.end != ExperimentEnd::log_failed)
     log.close(result.exit_code, result.message.c_str());
   tell_end(*events, *stage, result);

@@ -22,6 +22,7 @@ struct MeasurementRequest {
   double pace = -1.0;        ///< < 0: as the stage file says
   bool reset_fault = false;  ///< clear a fault of the node or plant first
   std::optional<DashboardAddress> dashboard = {};
+  std::optional<double> until = {};  ///< mean relative variance that is enough
 };
 
 struct MeasurementResult {
@@ -30,6 +31,7 @@ struct MeasurementResult {
   int runs_before = 0;  ///< complete in the log already
   int exit_code = 0;    ///< kDone, kWorldFailed, kNotTrustworthy, kStoppedForSafety or kInterrupted
   std::string message;  ///< one line, why it ended
+  std::optional<double> variance = {};  ///< mean relative, at the last look; with `until` only
   double seconds = 0.0;
   std::uint64_t log_bytes = 0;
 };

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "tools/command_line.hpp"
+#include "tools/config_plan.hpp"
 #include "tools/experiment_config.hpp"
 #include "tools/measurement.hpp"
 
@@ -37,6 +38,14 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
       ->capture_default_str();
   command->add_option("--pace", pace_, "0: as fast as possible; 1: wall clock; default: stage file")
       ->check(CLI::NonNegativeNumber);
+  command->add_option("--excitation", excitation_,
+                      "excitation.h5 of 'stageid design': play it instead of designing again");
+  command
+      ->add_option(
+          "--until", until_,
+          "VARIANCE: end as soon as the mean relative variance of the response is as small, "
+          "e.g. 1e-6 for 0.1 %; asked after every realization")
+      ->check(CLI::PositiveNumber);
   command->add_flag("--resume", resume_,
                     "continue an interrupted log: complete runs are not repeated");
   command->add_option("--dashboard", dashboard_,
@@ -49,7 +58,8 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
 
 void RunCommand::run() const {
   const ExperimentConfig config = load_experiment_config(config_);
-  const ExperimentPlan plan = make_plan(config);
+  const ExperimentPlan plan =
+      excitation_.empty() ? make_plan(config) : read_plan_of(config, excitation_);
   MeasurementRequest request;
   request.log = output_;
   request.backend = backend_of(backend_, config.stage.backend);
@@ -59,6 +69,7 @@ void RunCommand::run() const {
   request.pace = pace_;
   if (!dashboard_.empty()) request.dashboard = parse_dashboard_address(dashboard_);
   request.reset_fault = reset_fault_;
+  if (until_ > 0.0) request.until = until_;
   const MeasurementResult result = measure(config, plan, request, console_);
   console_.exit_code = result.exit_code;
 
@@ -73,18 +84,21 @@ void RunCommand::run() const {
                   "{:.1f} s, {:.1f} MB",
                   health.cycles, health.late, health.missing, health.marked, stage_s,
                   result.seconds, static_cast<double>(result.log_bytes) / 1e6));
-  console_.result({{"log", output_.string()},
-                   {"exit_code", result.exit_code},
-                   {"message", result.message},
-                   {"runs_complete", complete},
-                   {"runs_total", result.runs_total},
-                   {"cycles", health.cycles},
-                   {"late", health.late},
-                   {"missing", health.missing},
-                   {"marked", health.marked},
-                   {"stage_seconds", stage_s},
-                   {"seconds", result.seconds},
-                   {"log_bytes", result.log_bytes}});
+  if (result.variance) console_.result(result.message);
+  nlohmann::ordered_json json = {{"log", output_.string()},
+                                 {"exit_code", result.exit_code},
+                                 {"message", result.message},
+                                 {"runs_complete", complete},
+                                 {"runs_total", result.runs_total},
+                                 {"cycles", health.cycles},
+                                 {"late", health.late},
+                                 {"missing", health.missing},
+                                 {"marked", health.marked},
+                                 {"stage_seconds", stage_s},
+                                 {"seconds", result.seconds},
+                                 {"log_bytes", result.log_bytes}};
+  if (result.variance) json["relative_variance"] = *result.variance;
+  console_.result(json);
   if (result.exit_code != 0)
     console_.warning(fmt::format("{}: {}{}", output_.string(), result.message,
                                  complete < result.runs_total ? "; continue with --resume" : ""));

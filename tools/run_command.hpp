@@ -23,6 +23,8 @@ class RunCommand {
   std::filesystem::path replay_;
   double replay_tolerance_n_ = 1e-9;
   double pace_ = -1.0;
+  std::filesystem::path excitation_;
+  double until_ = 0.0;
   std::string dashboard_;
   bool resume_ = false;
   bool reset_fault_ = false;

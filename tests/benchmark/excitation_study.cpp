@@ -18,6 +18,7 @@
 #include "acquisition/run_experiment.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/plant_frf.hpp"
+#include "frf/relative_variance.hpp"
 #include "hal/simulated_stage.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tools/limited_excitation.hpp"
@@ -75,17 +76,6 @@ FrfEstimate measure(const Study& study, const ExperimentPlan& plan, const FrfOpt
   return estimate_plant_frf({reader.get()}, options);
 }
 
-/// Mean over lines and outputs of sum_j var G_ij / sum_j |G_ij|^2.
-double relative_variance_of(const FrfEstimate& frf) {
-  double sum = 0.0;
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    const Eigen::Map<const Eigen::MatrixXd> variance(frf.noise_variance.col(k).data(),
-                                                     frf.n_outputs(), frf.n_inputs());
-    sum += (variance.rowwise().sum().array() / frf.at(k).rowwise().squaredNorm().array()).mean();
-  }
-  return sum / static_cast<double>(frf.lines());
-}
-
 /// The mean over lines, outputs and inputs of the ratio of both variances.
 void compare_schemes(const Study& study) {
   FrfOptions options;
@@ -100,13 +90,15 @@ void compare_schemes(const Study& study) {
     const double high = std::min(4.0 * low, study.high_hz);
     const FrfEstimate a = select_band(single, low, high);
     fmt::print("  {:8.2f} ... {:8.2f} Hz: {:.3f}; {:.2e}\n", low, high,
-               relative_variance_of(a) / relative_variance_of(select_band(orthogonal, low, high)),
-               relative_variance_of(a));
+               mean_relative_variance(a, VarianceKind::noise) /
+                   mean_relative_variance(select_band(orthogonal, low, high), VarianceKind::noise),
+               mean_relative_variance(a, VarianceKind::noise));
   }
   // Both means carry few degrees of freedom a line; over the lines they are as good as exact.
   fmt::print("orthogonal: {:.3f} times less variance than single axis, {} axes at {} N rms\n",
-             relative_variance_of(single) / relative_variance_of(orthogonal), study.axes,
-             study.rms_n);
+             mean_relative_variance(single, VarianceKind::noise) /
+                 mean_relative_variance(orthogonal, VarianceKind::noise),
+             study.axes, study.rms_n);
 }
 
 /// Amplitudes of flat random-phase multisines that use `safety` of the tightest limit.

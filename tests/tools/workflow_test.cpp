@@ -10,6 +10,7 @@
 #include "frf/frf_file.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tools/closed_loop_prediction.hpp"
+#include "tools/config_plan.hpp"
 #include "tools/experiment_config.hpp"
 
 namespace stageid::test {
