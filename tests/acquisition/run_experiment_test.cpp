@@ -332,5 +332,23 @@ TEST(RunSeed, IsTheDocumentedMix) {
   EXPECT_EQ(seeds.size(), 800U);
 }
 
+// Asked before every realization, with all before it in the log.
+TEST_F(RunExperiment, EndsCompleteBetweenRealizationsWhenItIsEnough) {
+  plan_ = plan_of(3);
+  SlogWriter log = create("enough.slog");
+  std::vector<std::size_t> seen;
+  RunExperimentOptions options;
+  options.enough = [&]() -> std::string {
+    seen.push_back(SlogReader(directory_ / "enough.slog").runs().size());
+    return seen.size() == 3 ? "good enough" : "";
+  };
+  const ExperimentResult result = measure(log, options);
+  log.close(0, result.message.c_str());
+  EXPECT_EQ(result.end, ExperimentEnd::complete);
+  EXPECT_EQ(result.message, "good enough; 4 runs measured");
+  EXPECT_EQ(seen, (std::vector<std::size_t>{0, 2, 4}));
+  EXPECT_EQ(SlogReader(directory_ / "enough.slog").runs().size(), 4U);
+}
+
 }  // namespace
 }  // namespace stageid

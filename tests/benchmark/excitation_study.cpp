@@ -6,12 +6,16 @@
 //                    [realizations = 3] [crest iterations = 40] [pilot rms/N = 0.5] [rms/N = 1]
 //
 // The first actuators and all sensors in the direction of the first actuator are used. The prior of
-// the design is the FRF of a simulated pilot: its noise and its errors are in it.
+// the design is the FRF of a simulated pilot: its noise and its errors are in it. Exit code 1 unless the
+// gain by orthogonality is the number of axes within 5 %, that by design 2 or more, and no limit was hit.
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <memory>
 
 #include "acquisition/measurement_loop.hpp"
@@ -76,8 +80,11 @@ FrfEstimate measure(const Study& study, const ExperimentPlan& plan, const FrfOpt
   return estimate_plant_frf({reader.get()}, options);
 }
 
-/// The mean over lines, outputs and inputs of the ratio of both variances.
-void compare_schemes(const Study& study) {
+// Below, the loop holds the stage and the response is not identified from this experiment.
+constexpr double kLowest_hz = 20.0;
+
+/// How many times less variance orthogonal multisines leave, over all lines from kLowest_hz on.
+double gain_of_orthogonality(const Study& study) {
   FrfOptions options;
   options.outputs = study.outputs;
   const FrequencyGrid grid = study.grid(study.period_s);
@@ -86,23 +93,32 @@ void compare_schemes(const Study& study) {
   };
   const FrfEstimate single = frf(ExcitationScheme::single_axis);
   const FrfEstimate orthogonal = frf(ExcitationScheme::orthogonal_dft);
-  for (double low = grid.resolution_hz(); low < study.high_hz; low *= 4.0) {
-    const double high = std::min(4.0 * low, study.high_hz);
-    const FrfEstimate a = select_band(single, low, high);
-    fmt::print("  {:8.2f} ... {:8.2f} Hz: {:.3f}; {:.2e}\n", low, high,
-               mean_relative_variance(a, VarianceKind::noise) /
-                   mean_relative_variance(select_band(orthogonal, low, high), VarianceKind::noise),
-               mean_relative_variance(a, VarianceKind::noise));
-  }
-  // Both means carry few degrees of freedom a line; over the lines they are as good as exact.
-  fmt::print("orthogonal: {:.3f} times less variance than single axis, {} axes at {} N rms\n",
-             mean_relative_variance(single, VarianceKind::noise) /
-                 mean_relative_variance(orthogonal, VarianceKind::noise),
-             study.axes, study.rms_n);
+  const auto gain = [&](double low_hz, double high_hz) {
+    const auto variance = [&](const FrfEstimate& whole) {
+      return mean_relative_variance(select_band(whole, low_hz, high_hz), VarianceKind::noise);
+    };
+    return variance(single) / variance(orthogonal);
+  };
+  for (double low_hz = grid.resolution_hz(); low_hz < study.high_hz; low_hz *= 4.0)
+    fmt::print("  {:8.2f} ... {:8.2f} Hz: {:.3f}\n", low_hz, std::min(4.0 * low_hz, study.high_hz),
+               gain(low_hz, std::min(4.0 * low_hz, study.high_hz)));
+  const double whole = gain(kLowest_hz, study.high_hz);
+  fmt::print(
+      "orthogonal: {:.3f} times less variance than single axis from {} Hz on, {} axes at {} N "
+      "rms\n",
+      whole, kLowest_hz, study.axes, study.rms_n);
+  return whole;
 }
 
-/// Amplitudes of flat random-phase multisines that use `safety` of the tightest limit.
-double flat_variance(const Study& study, const BoundedLoop& loop, double safety) {
+/// The part of a cost that stands for lines from `low_hz` on.
+Eigen::MatrixXd cost_above(const FrequencyGrid& grid, Eigen::MatrixXd cost, double low_hz) {
+  for (Eigen::Index k = 0; k < grid.size(); ++k)
+    if (grid.frequency_hz()[k] < low_hz) cost.col(k).setZero();
+  return cost;
+}
+
+/// Flat random-phase multisines that use `safety` of the tightest limit.
+ExperimentPlan flat_plan(const Study& study, const BoundedLoop& loop, double safety) {
   ExperimentSpec spec = study.spec(ExcitationScheme::orthogonal_dft, 1.0, 5);
   spec.realizations = study.realizations;
   const FrequencyGrid grid = study.grid(study.period_s);
@@ -120,7 +136,8 @@ double flat_variance(const Study& study, const BoundedLoop& loop, double safety)
                       safety * b.rms_limit / peaks[s].rms});
   }
   fmt::print("flat random phases: {:.3g} N rms\n", scale);
-  return relative_variance(plan, loop.cost) / (scale * scale);
+  for (ExcitationAxis& axis : spec.axes) axis.level = scale;
+  return {grid, spec};
 }
 
 void print_use(const BoundedLoop& loop, const LimitedDesign& design) {
@@ -161,7 +178,8 @@ int violations(const Study& study, const ExperimentPlan& plan, int runs) {
   return hit;
 }
 
-void design_within(const Study& study) {
+/// Whether the design is worth a factor of two and keeps all limits.
+bool design_within(const Study& study) {
   const test::TemporaryDirectory directory;
   FrfOptions options;
   options.method = FrfMethod::lpm;
@@ -186,13 +204,20 @@ void design_within(const Study& study) {
   fmt::print("pilot of {:.0f} s; design of {} runs in {:.1f} s\n", pilot_plan.duration_s(),
              design.plan.runs().size(), since(start));
   print_use(loop, design);
-  const double flat = flat_variance(study, loop, spec.safety);
-  const double designed = relative_variance(design.plan, loop.cost);
-  fmt::print("within limits: {:.3e} against {:.3e} of flat random phases, {:.2f} times less\n",
-             designed, flat, flat / designed);
+  const ExperimentPlan flat = flat_plan(study, loop, spec.safety);
+  double least_gain = std::numeric_limits<double>::infinity();
+  for (const double low_hz : {0.0, kLowest_hz}) {
+    const Eigen::MatrixXd cost = cost_above(grid, loop.cost, low_hz);
+    const double gain = relative_variance(flat, cost) / relative_variance(design.plan, cost);
+    fmt::print(
+        "within limits: {:.2f} times less variance than flat random phases, lines from {} Hz on\n",
+        gain, low_hz);
+    least_gain = std::min(least_gain, gain);
+  }
   const auto begin = Clock::now();
   const int hit = violations(study, design.plan, study.runs);
   fmt::print("{} of {} simulated runs hit a limit, in {:.0f} s\n", hit, study.runs, since(begin));
+  return hit == 0 && least_gain >= 2.0;
 }
 
 }  // namespace
@@ -221,7 +246,8 @@ int main(int argc, char** argv) {
   for (const Channel& channel : study.stage.info.sensors)
     if (std::equal(std::begin(direction), std::end(direction), std::begin(channel.direction)))
       study.outputs.push_back(channel.name);
-  compare_schemes(study);
-  design_within(study);
-  return 0;
+  const bool orthogonal = std::abs(gain_of_orthogonality(study) / study.axes - 1.0) <= 0.05;
+  const bool within = design_within(study);
+  if (!orthogonal || !within) fmt::print("the figures are not reached\n");
+  return orthogonal && within ? 0 : 1;
 }
