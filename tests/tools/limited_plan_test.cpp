@@ -158,8 +158,10 @@ TEST_F(LimitedPlanTest, WithTheExactPlantThePredictionIsThatOfTheStage) {
     const ChannelPrediction& channel = s < 3 ? other.actuators[s] : other.sensors[s - 3];
     EXPECT_EQ(loop.signals[s].name, channel.name);
     EXPECT_GE(peaks[s].steady, channel.peak);
-    EXPECT_LT(peaks[s].steady, 1.15 * channel.peak);
-    if (s >= 3) EXPECT_NEAR(peaks[s].rms, channel.rms, 1e-9 * channel.rms);
+    // The lines reach 0.8 of Nyquist: a good deal lies between the samples of `other`.
+    EXPECT_LT(peaks[s].steady, 1.4 * channel.peak);
+    if (s < 3) continue;
+    EXPECT_NEAR(peaks[s].rms, channel.rms, 1e-9 * channel.rms);
   }
   EXPECT_FALSE(loop.noise_known);
   PlantPrior blind = exact;
