@@ -339,7 +339,7 @@ TEST_F(RunExperiment, EndsCompleteBetweenRealizationsWhenItIsEnough) {
   std::vector<std::size_t> seen;
   RunExperimentOptions options;
   options.enough = [&]() -> std::string {
-    seen.push_back(SlogReader(directory_ / "enough.slog").runs().size());
+    seen.push_back(SlogReader(directory_ / "enough.slog", false).runs().size());  // not closed yet
     return seen.size() == 3 ? "good enough" : "";
   };
   const ExperimentResult result = measure(log, options);
