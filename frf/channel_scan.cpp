@@ -1,0 +1,68 @@
+#include "frf/channel_scan.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stageid {
+namespace {
+
+double log_p_of_pile(const Extreme& extreme) noexcept {
+  const double n = static_cast<double>(extreme.count + extreme.next_count);
+  const double share = static_cast<double>(extreme.count) / n;
+  if (!(n > 0.0) || share <= 0.5) return 0.0;
+  const double rest = 1.0 - share;
+  const double divergence =
+      std::log(2.0) + share * std::log(share) + (rest > 0.0 ? rest * std::log(rest) : 0.0);
+  return -n * divergence;
+}
+
+}  // namespace
+
+void Extreme::add(double v, std::uint64_t times) noexcept {
+  if (v < next || times == 0) return;
+  if (v == value) {
+    count += times;
+  } else if (v > value) {
+    next = value;
+    next_count = count;
+    value = v;
+    count = times;
+  } else if (v == next) {
+    next_count += times;
+  } else {
+    next = v;
+    next_count = times;
+  }
+}
+
+void Extreme::add(const Extreme& other) noexcept {
+  add(other.value, other.count);
+  add(other.next, other.next_count);
+}
+
+void ChannelScan::add(const Eigen::Ref<const Eigen::VectorXd>& samples) noexcept {
+  for (const double v : samples) {
+    high_.add(v);
+    low_.add(-v);
+    stretch_ = stretch_ > 0 && v == last_ ? stretch_ + 1 : 1;
+    longest_ = std::max(longest_, stretch_);
+    last_ = v;
+  }
+  samples_ += static_cast<std::uint64_t>(samples.size());
+}
+
+void ChannelScan::add(const ChannelScan& other) noexcept {
+  high_.add(other.high_);
+  low_.add(other.low_);
+  samples_ += other.samples_;
+  longest_ = std::max(longest_, other.longest_);
+}
+
+Extreme ChannelScan::low() const noexcept {
+  return {-low_.value, -low_.next, low_.count, low_.next_count};
+}
+
+double ChannelScan::log_p_high() const noexcept { return log_p_of_pile(high_); }
+double ChannelScan::log_p_low() const noexcept { return log_p_of_pile(low_); }
+
+}  // namespace stageid

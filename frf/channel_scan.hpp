@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+
+namespace stageid {
+
+/// The two largest distinct values that occurred, and how often.
+struct Extreme {
+  double value = -std::numeric_limits<double>::infinity();
+  double next = -std::numeric_limits<double>::infinity();
+  std::uint64_t count = 0;
+  std::uint64_t next_count = 0;
+
+  void add(double v, std::uint64_t times = 1) noexcept;
+  void add(const Extreme& other) noexcept;
+};
+
+/// What the samples of one channel look like in time.
+class ChannelScan {
+ public:
+  void add(const Eigen::Ref<const Eigen::VectorXd>& samples) noexcept;
+  /// The next samples follow no earlier ones: another run, or a gap.
+  void break_off() noexcept { stretch_ = 0; }
+  void add(const ChannelScan& other) noexcept;
+
+  std::uint64_t samples() const noexcept { return samples_; }
+  /// The longest row of equal samples.
+  std::uint64_t longest_constant() const noexcept { return longest_; }
+  const Extreme& high() const noexcept { return high_; }
+  Extreme low() const noexcept;  ///< of the negated samples, with their sign back
+
+  /// ln p of the hypothesis that the channel is not clipped. The density of an excited channel falls
+  /// towards its ends, so that of the n = count + next_count samples on the two outermost values at
+  /// most half lie on the outermost one; clipped samples pile up there:
+  ///   p <= P(B(n, 1/2) >= count) <= exp(-n KL(count / n, 1/2))   (Chernoff).
+  double log_p_high() const noexcept;
+  double log_p_low() const noexcept;
+
+ private:
+  Extreme high_;
+  Extreme low_;  // of the negated samples
+  std::uint64_t samples_ = 0;
+  std::uint64_t stretch_ = 0;
+  std::uint64_t longest_ = 0;
+  double last_ = 0.0;
+};
+
+}  // namespace stageid

@@ -1,0 +1,312 @@
+#include "frf/controller_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "frf/significance.hpp"
+
+namespace stageid {
+namespace {
+
+using Index = Eigen::Index;
+
+constexpr double kEpsilon = 1e-3;           // what the model of the controller may be off, of C y
+constexpr double kEpsilonOnePeriod = 5e-2;  // no scatter says what noise is
+constexpr double kRounding = 1e-9;          // of u: float32 records, and u - r of two large numbers
+constexpr double kDeviations = 6.0;
+constexpr double kLeastGain = 0.05;
+constexpr double kLeastSkew_s = 2e-6;
+constexpr double kLeastShare = 0.3;
+constexpr double kLeastMisfit = 0.05;
+constexpr double kSignificance = 1e-4;
+constexpr int kMostChanges = 40;
+
+/// One line with the changes found so far undone.
+struct Line {
+  double omega_rad_s = 0.0;
+  Eigen::MatrixXcd F;  // -C, n_u x n_y
+  Eigen::MatrixXcd Y;  // means, n_y x E
+  Eigen::MatrixXcd U;
+  Eigen::MatrixXcd E;        // U - R - F Y
+  Eigen::VectorXd variance;  // of E
+  Eigen::VectorXd weight;    // n_u
+};
+
+struct Candidate {
+  ChannelChange change;
+  double explained = 0.0;
+  double share = 0.0;  // of the misfit of the rows that it touches
+};
+
+class Search {
+ public:
+  Search(HealthRecord& record, const NominalStage& nominal);
+  ControllerCheck run();
+
+ private:
+  void refresh();
+  std::optional<Candidate> best() const;
+  double row_cost(Index row) const;
+  bool follows(Index row) const;
+  /// E - d X with X of `direction`, rows x E.
+  template <typename Direction>
+  void try_direction(ChannelChange change, double cost, Index first, Index rows,
+                     const Direction& direction);
+  template <typename Difference>
+  void try_swap(ChannelChange change, double cost, const Difference& changed_cost);
+  void try_sensors();
+  void try_actuators();
+  std::vector<ControllerMisfit> misfits() const;
+  bool significant(Index row) const;
+
+  HealthRecord& record_;
+  std::vector<Eigen::MatrixXcd> R_;
+  std::vector<Line> lines_;
+  bool noise_known_;
+  double total_ = 0.0;
+  std::vector<Candidate> candidates_;
+};
+
+Search::Search(HealthRecord& record, const NominalStage& nominal)
+    : record_(record), lines_(record.lines.size()), noise_known_(record.scatter_dof() > 0) {
+  std::string missing;
+  const auto u = positions_in(nominal.actuators, record.info.actuators.names, missing);
+  const auto y = positions_in(nominal.sensors, record.info.sensors.names, missing);
+  std::vector<Index> actuator_of_axis;
+  for (const Index axis : record.axes) {
+    const auto& names = record.info.actuators.names;
+    actuator_of_axis.push_back(
+        std::find(names.begin(), names.end(),
+                  record.info.excitation.names[static_cast<std::size_t>(axis)]) -
+        names.begin());
+  }
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    const double frequency_hz = record.frequency_hz[static_cast<Index>(k)];
+    lines_[k].omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
+    lines_[k].F = nominal.controller(frequency_hz)(u, y);
+    Eigen::MatrixXcd R = Eigen::MatrixXcd::Zero(record.n_u(), record.experiments());
+    for (std::size_t a = 0; a < actuator_of_axis.size(); ++a)
+      R.row(actuator_of_axis[a]) = record.lines[k].R.row(record.axes[a]);
+    R_.push_back(std::move(R));
+  }
+}
+
+void Search::refresh() {
+  const double epsilon = noise_known_ ? kEpsilon : kEpsilonOnePeriod;
+  total_ = 0.0;
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    Line& line = lines_[k];
+    const Eigen::MatrixXcd& Z = record_.lines[k].Z;
+    const Eigen::MatrixXcd controlled = line.F * Z.topRows(record_.n_y());
+    line.Y = record_.mean(Z.topRows(record_.n_y()));
+    line.U = record_.mean(Z.bottomRows(record_.n_u()));
+    line.E = line.U - R_[k] - line.F * line.Y;
+    line.variance = record_.variance_of_mean(Z.bottomRows(record_.n_u()) - controlled);
+    const auto squares = [&](const Eigen::MatrixXcd& X) {
+      return Eigen::VectorXd(X.rowwise().squaredNorm() / static_cast<double>(X.cols()));
+    };
+    line.weight = (line.variance + epsilon * epsilon * squares(line.F * line.Y) +
+                   kRounding * kRounding * (squares(line.U) + squares(R_[k])))
+                      .cwiseMax(1e-300)
+                      .cwiseInverse();
+    total_ += (line.weight.asDiagonal() * line.E.cwiseAbs2()).sum();
+  }
+}
+
+double Search::row_cost(Index row) const {
+  double cost = 0.0;
+  for (const Line& line : lines_) cost += line.weight[row] * line.E.row(row).squaredNorm();
+  return cost;
+}
+
+/// Is u of this actuator, but for a factor, r - C y? Without this an actuator that moves by itself
+/// would be explained by a factor that makes it vanish.
+bool Search::follows(Index row) const {
+  double along = 0.0;
+  double recorded = 0.0;
+  double asked = 0.0;
+  for (const Line& line : lines_) {
+    const Eigen::RowVectorXcd V = line.U.row(row) - line.E.row(row);
+    along += line.weight[row] * line.U.row(row).conjugate().cwiseProduct(V).sum().real();
+    recorded += line.weight[row] * line.U.row(row).squaredNorm();
+    asked += line.weight[row] * V.squaredNorm();
+  }
+  return along * along > 0.5 * recorded * asked;
+}
+
+template <typename Direction>
+void Search::try_direction(ChannelChange change, double cost, Index first, Index rows,
+                           const Direction& direction) {
+  double along = 0.0;
+  double length = 0.0;
+  for (const Line& line : lines_) {
+    const Eigen::MatrixXcd X = direction(line);
+    const auto w = line.weight.segment(first, rows);
+    along +=
+        (w.asDiagonal() * X.cwiseProduct(line.E.middleRows(first, rows).conjugate()).real()).sum();
+    length += (w.asDiagonal() * X.cwiseAbs2()).sum();
+  }
+  if (!(length > 0.0)) return;
+  const double d = along / length;
+  const double deviation = 1.0 / std::sqrt(2.0 * length);
+  if (std::abs(d) < kDeviations * deviation) return;
+  if (change.kind == ChannelChange::Kind::gain) {
+    // The true signal is (1 + d) times the recorded one.
+    change.value = 1.0 / (1.0 + d);
+    change.deviation = noise_known_ ? deviation * change.value * change.value : 0.0;
+    if (!std::isfinite(change.value) || std::abs(change.value - 1.0) < kLeastGain) return;
+  } else {
+    change.value = d;
+    change.deviation = deviation;
+    if (!noise_known_ || std::abs(d) < kLeastSkew_s) return;
+  }
+  candidates_.push_back({change, along * d, along * d / cost});
+}
+
+template <typename Difference>
+void Search::try_swap(ChannelChange change, double cost, const Difference& changed_cost) {
+  double after = 0.0;
+  for (const Line& line : lines_) after += changed_cost(line);
+  if (cost - after > kDeviations * kDeviations)
+    candidates_.push_back({change, cost - after, (cost - after) / cost});
+}
+
+void Search::try_sensors() {
+  using Kind = ChannelChange::Kind;
+  const Index n_u = record_.n_u();
+  const std::complex<double> j(0.0, 1.0);
+  const auto of = [](const Line& line, Index s) {
+    return Eigen::MatrixXcd(line.F.col(s) * line.Y.row(s));
+  };
+  const auto all = [](const Line& line) { return Eigen::MatrixXcd(line.F * line.Y); };
+  try_direction({Kind::gain, true}, total_, 0, n_u, all);
+  try_direction({Kind::skew, true}, total_, 0, n_u, [&](const Line& line) {
+    return Eigen::MatrixXcd(j * line.omega_rad_s * all(line));
+  });
+  for (Index s = 0; s < record_.n_y(); ++s) {
+    try_direction({Kind::gain, true, s}, total_, 0, n_u,
+                  [&](const Line& line) { return of(line, s); });
+    try_direction({Kind::skew, true, s}, total_, 0, n_u, [&](const Line& line) {
+      return Eigen::MatrixXcd(j * line.omega_rad_s * of(line, s));
+    });
+    for (Index t = 0; t < s; ++t)
+      try_swap({Kind::swap, true, t, s}, total_, [&](const Line& line) {
+        const Eigen::MatrixXcd changed =
+            line.E - (line.F.col(s) - line.F.col(t)) * (line.Y.row(t) - line.Y.row(s));
+        return (line.weight.asDiagonal() * changed.cwiseAbs2()).sum();
+      });
+  }
+}
+
+void Search::try_actuators() {
+  using Kind = ChannelChange::Kind;
+  const std::complex<double> j(0.0, 1.0);
+  const Index n_u = record_.n_u();
+  try_direction({Kind::gain, false}, total_, 0, n_u,
+                [](const Line& line) { return Eigen::MatrixXcd(-line.U); });
+  try_direction({Kind::skew, false}, total_, 0, n_u,
+                [&](const Line& line) { return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U); });
+  for (Index a = 0; a < n_u; ++a) {
+    const double cost = row_cost(a);
+    if (!(cost > 0.0)) continue;
+    if (follows(a))
+      try_direction({Kind::gain, false, a}, cost, a, 1,
+                    [&](const Line& line) { return Eigen::MatrixXcd(-line.U.row(a)); });
+    try_direction({Kind::skew, false, a}, cost, a, 1, [&](const Line& line) {
+      return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U.row(a));
+    });
+    for (Index b = 0; b < a; ++b)
+      try_swap({Kind::swap, false, b, a}, cost + row_cost(b), [&](const Line& line) {
+        const Eigen::RowVectorXcd difference = line.U.row(b) - line.U.row(a);
+        return line.weight[a] * (line.E.row(a) + difference).squaredNorm() +
+               line.weight[b] * (line.E.row(b) - difference).squaredNorm();
+      });
+  }
+}
+
+std::optional<Candidate> Search::best() const {
+  const Candidate* most = nullptr;
+  for (const Candidate& candidate : candidates_)
+    if (candidate.share >= kLeastShare &&
+        (most == nullptr || candidate.explained > most->explained))
+      most = &candidate;
+  return most != nullptr ? std::optional<Candidate>(*most) : std::nullopt;
+}
+
+/// A change of a channel that was changed so already: one change by both.
+bool merge(const ChannelChange& change, std::vector<ChannelChange>& changes) {
+  for (ChannelChange& earlier : changes) {
+    if (earlier.kind != change.kind || earlier.of_sensors != change.of_sensors ||
+        earlier.a != change.a || change.kind == ChannelChange::Kind::swap)
+      continue;
+    earlier.value = change.kind == ChannelChange::Kind::gain ? earlier.value * change.value
+                                                             : earlier.value + change.value;
+    earlier.deviation = change.deviation;
+    return true;
+  }
+  return false;
+}
+
+ControllerCheck Search::run() {
+  ControllerCheck check;
+  refresh();
+  for (int i = 0; i < kMostChanges; ++i) {
+    candidates_.clear();
+    try_sensors();
+    try_actuators();
+    const std::optional<Candidate> chosen = best();
+    if (!chosen) break;
+    undo(chosen->change, record_);
+    if (!merge(chosen->change, check.changes)) check.changes.push_back(chosen->change);
+    refresh();
+  }
+  check.misfits = misfits();
+  return check;
+}
+
+bool Search::significant(Index row) const {
+  if (!noise_known_) return true;
+  double evidence = 0.0;
+  for (const Line& line : lines_) {
+    const double mean_square = line.E.row(row).squaredNorm() / static_cast<double>(line.E.cols());
+    if (line.variance[row] > 0.0)
+      evidence -= log_tail_of_f(mean_square / line.variance[row], static_cast<int>(line.E.cols()),
+                                record_.scatter_dof());
+    else if (mean_square > 0.0)
+      evidence += 1e3;
+  }
+  return tail_of_chi_square(evidence, static_cast<Index>(lines_.size())) <
+         kSignificance / static_cast<double>(record_.n_u());
+}
+
+std::vector<ControllerMisfit> Search::misfits() const {
+  std::vector<ControllerMisfit> found;
+  Index driven = 0;
+  for (Index a = 0; a < record_.n_u(); ++a) {
+    double misfit = 0.0;
+    double controlled = 0.0;
+    double moved = 0.0;
+    for (const Line& line : lines_) {
+      misfit += line.E.row(a).squaredNorm();
+      controlled += (line.F.row(a) * line.Y).squaredNorm();
+      moved += line.U.row(a).squaredNorm();
+    }
+    if (controlled > 0.0) ++driven;
+    const double least = std::max(controlled, kRounding * kRounding * moved);
+    const double relative = std::sqrt(misfit / std::max(least, 1e-300));
+    if (relative > kLeastMisfit && significant(a)) found.push_back({a, relative, false});
+  }
+  const bool of_all = 2 * static_cast<Index>(found.size()) > driven && found.size() > 1;
+  for (ControllerMisfit& misfit : found) misfit.of_all = of_all;
+  return found;
+}
+
+}  // namespace
+
+ControllerCheck check_controller(HealthRecord& record, const NominalStage& nominal) {
+  return Search(record, nominal).run();
+}
+
+}  // namespace stageid

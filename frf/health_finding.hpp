@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace stageid {
+
+/// What a finding means for whoever wants to fit.
+enum class Severity : std::uint8_t {
+  fault,     ///< the data are not what they say: do not fit
+  doubt,     ///< usable, but look at it first
+  unchecked  ///< nothing is known: the log does not hold what the check needs
+};
+const char* to_string(Severity severity) noexcept;
+
+/// The kinds of causes, for programs; `what` says it to people.
+enum class Cause : std::uint8_t {
+  dead,
+  saturated,
+  marked,
+  late,
+  swapped,
+  sign,
+  scale,
+  skew,
+  unrecorded,  ///< an actuator moves by more than excitation and controller
+  controller,  ///< the log's controller is not the configuration's
+  rigid_body,  ///< the plant's rigid body is not the configuration's
+  excluded,    ///< an actuator outside the sub-plant moves on the excited lines
+  excitation,  ///< cond(R)
+  inputs,      ///< cond(U)
+  incoherent,
+};
+const char* to_string(Cause cause) noexcept;
+
+/// One line of the table of health: one cause.
+struct Finding {
+  Severity severity = Severity::fault;
+  Cause cause = Cause::dead;
+  std::string channel;  ///< names, "a3 a7"; empty: the whole log
+  std::string what;     ///< what is wrong, or what is not checked
+  std::string figure;   ///< the number that says so
+  std::string remedy;   ///< what to do, or what the check needs
+};
+
+/// The worst severity is a fault.
+bool any_fault(const std::vector<Finding>& findings) noexcept;
+
+}  // namespace stageid

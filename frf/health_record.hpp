@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "frf/channel_scan.hpp"
+#include "frf/plant_frf.hpp"
+
+namespace stageid {
+
+/// Spectra (DFT / samples) of all channels of a log on one line, clean periods of all experiments of
+/// one realization side by side.
+struct LineRecord {
+  Eigen::MatrixXcd R;  ///< n_r x E: every excitation channel
+  Eigen::MatrixXcd Z;  ///< [Y; U], n_y + n_u x columns: one a period, by experiment
+};
+
+/// What the checks of a log's health look at.
+struct HealthRecord {
+  LogInfo info;
+  int realization = 0;             ///< the one whose spectra these are
+  std::vector<int> periods;        ///< clean ones, of each experiment
+  Eigen::VectorXd frequency_hz;    ///< K: excited lines, thinned out to equal ratios
+  std::vector<LineRecord> lines;   ///< K
+  std::vector<Eigen::Index> axes;  ///< excitation channels that are excited, ascending
+  std::vector<ChannelScan> scan;   ///< [sensors; actuators], over all runs that are used
+  RunHealth health;                ///< over all runs that are used
+
+  Eigen::Index n_y() const noexcept { return static_cast<Eigen::Index>(info.sensors.size()); }
+  Eigen::Index n_u() const noexcept { return static_cast<Eigen::Index>(info.actuators.size()); }
+  Eigen::Index experiments() const noexcept { return static_cast<Eigen::Index>(periods.size()); }
+  /// Degrees of freedom of the scatter between periods: sum_e (P_e - 1).
+  int scatter_dof() const noexcept;
+  /// Mean over the periods of every experiment: rows x E.
+  Eigen::MatrixXcd mean(const Eigen::MatrixXcd& columns) const;
+  /// sum_e sum_p (X_pe - X_e)(X_pe - X_e)^H, with scatter_dof() degrees of freedom.
+  Eigen::MatrixXcd scatter(const Eigen::MatrixXcd& columns) const;
+  /// Variance E|dX|^2 of the mean over periods of each row, pooled over the experiments; zeros if there
+  /// is one period only.
+  Eigen::VectorXd variance_of_mean(const Eigen::MatrixXcd& columns) const;
+};
+
+/// Reads every clean period of all runs that FrfOptions choose; spectra are those of the first
+/// realization. Memory: one period a thread, and the spectra on at most `most_lines` lines.
+/// @throws what choose_runs() and LogReader::read() throw; FormatError if a run has no clean period.
+HealthRecord read_health_record(const std::vector<const LogReader*>& logs,
+                                const FrfOptions& options, Eigen::Index most_lines = 200);
+
+}  // namespace stageid

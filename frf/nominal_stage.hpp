@@ -1,0 +1,25 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace stageid {
+
+/// What a configuration says of a stage, against which a log is held.
+struct NominalStage {
+  std::vector<std::string> actuators;
+  std::vector<std::string> sensors;
+  /// -C(e^{j omega T}) from y to u, actuators x sensors.
+  std::function<Eigen::MatrixXcd(double frequency_hz)> controller;
+  /// The rigid body alone through hold, delay and sampler, sensors x actuators.
+  std::function<Eigen::MatrixXcd(double frequency_hz)> rigid_body;
+  double free_from_hz = 0.0;  ///< above it the suspension does not matter
+};
+
+/// Position of each of `names` in `nominal`. @returns empty if one is not there; `missing` names it.
+std::vector<Eigen::Index> positions_in(const std::vector<std::string>& nominal,
+                                       const std::vector<std::string>& names, std::string& missing);
+
+}  // namespace stageid
