@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <numeric>
+#include <set>
 
 #include "frf/excitation_spectrum.hpp"
 #include "frf/run_steps.hpp"
@@ -20,20 +21,24 @@ struct RunPart {
   std::vector<ChannelScan> scan;
 };
 
-/// At most `most` of the lines, in equal ratios: the first and the last, and no line twice.
+/// At most `most` of the lines: half of them in equal ratios, for the rigid body, half in equal steps, for
+/// the flexible modes.
 std::vector<int> thinned(const std::vector<int>& lines, Eigen::Index most) {
   if (static_cast<Eigen::Index>(lines.size()) <= most) return lines;
-  std::vector<int> chosen;
-  const double first = std::log(lines.front());
-  const double step = (std::log(lines.back()) - first) / static_cast<double>(most - 1);
-  for (Eigen::Index i = 0; i < most; ++i) {
-    const double wanted = std::exp(first + step * static_cast<double>(i));
-    const auto at =
-        std::lower_bound(lines.begin(), lines.end(), static_cast<int>(std::lround(wanted)));
-    const int line = at == lines.end() ? lines.back() : *at;
-    if (chosen.empty() || line > chosen.back()) chosen.push_back(line);
+  std::set<int> chosen;
+  const auto half = static_cast<int>(most / 2);
+  const double first = lines.front();
+  const double last = lines.back();
+  for (int i = 0; i < half; ++i) {
+    const double share = static_cast<double>(i) / (half - 1);
+    for (const double wanted :
+         {first * std::pow(last / first, share), first + share * (last - first)}) {
+      const auto at =
+          std::lower_bound(lines.begin(), lines.end(), static_cast<int>(std::lround(wanted)));
+      chosen.insert(at == lines.end() ? lines.back() : *at);
+    }
   }
-  return chosen;
+  return {chosen.begin(), chosen.end()};
 }
 
 Eigen::MatrixXcd period_spectra(const std::vector<int>& lines, RunWorkspace& w) {

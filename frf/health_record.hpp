@@ -21,7 +21,7 @@ struct HealthRecord {
   LogInfo info;
   int realization = 0;             ///< the one whose spectra these are
   std::vector<int> periods;        ///< clean ones, of each experiment
-  Eigen::VectorXd frequency_hz;    ///< K: excited lines, thinned out to equal ratios
+  Eigen::VectorXd frequency_hz;    ///< K: excited lines, thinned out if there are many
   std::vector<LineRecord> lines;   ///< K
   std::vector<Eigen::Index> axes;  ///< excitation channels that are excited, ascending
   std::vector<ChannelScan> scan;   ///< [sensors; actuators], over all runs that are used
@@ -45,6 +45,6 @@ struct HealthRecord {
 /// realization. Memory: one period a thread, and the spectra on at most `most_lines` lines.
 /// @throws what choose_runs() and LogReader::read() throw; FormatError if a run has no clean period.
 HealthRecord read_health_record(const std::vector<const LogReader*>& logs,
-                                const FrfOptions& options, Eigen::Index most_lines = 200);
+                                const FrfOptions& options, Eigen::Index most_lines = 800);
 
 }  // namespace stageid

@@ -8,8 +8,6 @@
 #include <numbers>
 #include <optional>
 
-#include "frf/line_estimate.hpp"
-
 namespace stageid {
 namespace {
 
@@ -25,79 +23,23 @@ constexpr double kBelowGrowth = 0.7;
 constexpr double kDead = 0.05;
 constexpr std::size_t kFewestLines = 8;
 
-/// -omega^2 G on the lines of the band, an entry a row, and the variance of each.
-struct Accelerance {
-  std::vector<double> omega2;
-  std::vector<Eigen::MatrixXcd> value;  // n_y x n_u
-  std::vector<Eigen::MatrixXcd> nominal;
-  std::vector<Eigen::MatrixXd> variance;
-};
-
-/// The lines from free_from_hz on, up to where flexible modes begin.
-Accelerance accelerance(const HealthRecord& record, const NominalStage& nominal,
-                        const std::vector<Index>& outputs, const std::vector<Index>& inputs,
-                        RigidBodyCheck& check) {
-  std::string missing;
-  const auto y = positions_in(nominal.sensors, record.info.sensors.names, missing);
-  const auto u = positions_in(nominal.actuators, record.info.actuators.names, missing);
-  std::vector<Index> rows = outputs;
-  for (const Index a : inputs) rows.push_back(record.n_y() + a);
-  const Eigen::VectorXd periods =
-      Eigen::Map<const Eigen::VectorXi>(record.periods.data(), record.experiments()).cast<double>();
-  Accelerance found;
+/// The lines up to where flexible modes begin.
+std::vector<PlantLine> rigid_lines(const std::vector<PlantLine>& lines) {
   std::vector<double> sizes;
-  for (Index k = 0; k < record.frequency_hz.size(); ++k) {
-    const double frequency_hz = record.frequency_hz[k];
-    if (frequency_hz < nominal.free_from_hz) continue;
-    const LineRecord& at = record.lines[static_cast<std::size_t>(k)];
-    const Eigen::MatrixXcd Z = at.Z(rows, Eigen::all);
-    const LineEstimate estimate = estimate_line(at.R(record.axes, Eigen::all), record.mean(Z),
-                                                static_cast<Index>(outputs.size()));
-    if (estimate.status != LineStatus::good) continue;
-    const double omega = 2.0 * std::numbers::pi * frequency_hz;
-    const double size = omega * omega * estimate.G.norm();
-    sizes.push_back(size);
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const double omega = lines[k].omega_rad_s;
+    sizes.push_back(omega * omega * lines[k].G.norm());
     std::vector<double> sorted = sizes;
-    std::nth_element(sorted.begin(),
-                     sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-    if (sizes.size() >= kFewestLines && size > kGrowth * sorted[sorted.size() / 2]) {
-      while (!found.omega2.empty() && found.omega2.back() > std::pow(kBelowGrowth * omega, 2)) {
-        found.omega2.pop_back();
-        found.value.pop_back();
-        found.nominal.pop_back();
-        found.variance.pop_back();
-      }
-      break;
-    }
-    const Eigen::MatrixXcd full = nominal.rigid_body(frequency_hz);
-    Eigen::MatrixXcd G0(outputs.size(), inputs.size());
-    for (std::size_t i = 0; i < outputs.size(); ++i)
-      for (std::size_t c = 0; c < inputs.size(); ++c)
-        G0(static_cast<Index>(i), static_cast<Index>(c)) =
-            full(y[static_cast<std::size_t>(outputs[i])], u[static_cast<std::size_t>(inputs[c])]);
-    // The delay is common to all: that of the nominal response, whose largest entry is real but for it.
-    Index row = 0;
-    Index column = 0;
-    G0.cwiseAbs().maxCoeff(&row, &column);
-    std::complex<double> turn = G0(row, column) / std::abs(G0(row, column));
-    if (turn.real() > 0.0) turn = -turn;
-    const std::complex<double> scale = omega * omega / turn;
-    found.omega2.push_back(omega * omega);
-    found.value.push_back(scale * estimate.G);
-    found.nominal.push_back(scale * G0);
-    Eigen::MatrixXd variance = Eigen::MatrixXd::Zero(G0.rows(), G0.cols());
-    if (record.scatter_dof() > 0) {
-      const LineNoise noise =
-          line_noise(estimate, record.scatter(Z), record.scatter_dof(), periods);
-      variance = noise.residual.diagonal().real() * noise.input_part.diagonal().real().transpose();
-    }
-    found.variance.push_back(omega * omega * omega * omega * variance);
+    const std::size_t middle = sorted.size() / 2;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(middle),
+                     sorted.end());
+    if (sizes.size() < kFewestLines || sizes.back() <= kGrowth * sorted[middle]) continue;
+    std::vector<PlantLine> band;
+    for (const PlantLine& line : lines)
+      if (line.omega_rad_s < kBelowGrowth * omega) band.push_back(line);
+    return band;
   }
-  if (!found.omega2.empty()) {
-    check.band_hz[0] = std::sqrt(found.omega2.front()) / (2.0 * std::numbers::pi);
-    check.band_hz[1] = std::sqrt(found.omega2.back()) / (2.0 * std::numbers::pi);
-  }
-  return found;
+  return lines;
 }
 
 /// A and A0 with what they are held to.
@@ -107,36 +49,41 @@ struct Gains {
   Eigen::MatrixXd weight;
 };
 
-Gains fit_gains(const Accelerance& data) {
-  const Index n_y = data.value.front().rows();
-  const Index n_u = data.value.front().cols();
-  const auto K = static_cast<Index>(data.omega2.size());
+/// The constant term of entry (i, j): of A, of A0, and the variance of both.
+Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j) {
+  const auto K = static_cast<Index>(lines.size());
+  const double highest = std::pow(lines.back().omega_rad_s, 2);
+  Eigen::MatrixXd X(K, 3);
+  Eigen::MatrixXd rhs(K, 2);
+  for (Index k = 0; k < K; ++k) {
+    const PlantLine& line = lines[static_cast<std::size_t>(k)];
+    const double omega2 = std::pow(line.omega_rad_s, 2);
+    const double x = omega2 / highest;
+    const double row_square = line.G.row(i).squaredNorm() / static_cast<double>(line.G.cols());
+    const double variance = 0.5 * line.variance(i, j) + kModelError * kModelError * row_square;
+    const double w = 1.0 / (omega2 * std::sqrt(std::max(1e-300, variance)));
+    X.row(k) << w, w * x, w * x * x;
+    rhs.row(k) << -w * omega2 * line.G(i, j).real(), -w * omega2 * line.G0(i, j).real();
+  }
+  const Eigen::Matrix3d normal_inverse = (X.transpose() * X).inverse();
+  const Eigen::MatrixXd solution = normal_inverse * X.transpose() * rhs;
+  return {solution(0, 0), solution(0, 1), normal_inverse(0, 0)};
+}
+
+Gains fit_gains(const std::vector<PlantLine>& lines) {
+  const Index n_y = lines.front().G.rows();
+  const Index n_u = lines.front().G.cols();
   Gains gains{Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u)};
+  Eigen::MatrixXd variance(n_y, n_u);
   for (Index i = 0; i < n_y; ++i)
     for (Index j = 0; j < n_u; ++j) {
-      Eigen::MatrixXd X(K, 3);
-      Eigen::MatrixXd rhs(K, 2);
-      for (Index k = 0; k < K; ++k) {
-        const auto at = static_cast<std::size_t>(k);
-        const double x = data.omega2[at] / data.omega2.back();
-        const double row_square = data.value[at].row(i).squaredNorm() / static_cast<double>(n_u);
-        const double w =
-            1.0 / std::sqrt(std::max(1e-300, 0.5 * data.variance[at](i, j) +
-                                                 kModelError * kModelError * row_square));
-        X.row(k) << w, w * x, w * x * x;
-        rhs.row(k) << w * data.value[at](i, j).real(), w * data.nominal[at](i, j).real();
-      }
-      const Eigen::MatrixXd normal_inverse = (X.transpose() * X).inverse();
-      const Eigen::MatrixXd solution = normal_inverse * X.transpose() * rhs;
-      gains.A(i, j) = solution(0, 0);
-      gains.A0(i, j) = solution(0, 1);
-      gains.weight(i, j) = normal_inverse(0, 0);  // the variance, until the tolerance is known
+      const Eigen::Vector3d entry = fit_entry(lines, i, j);
+      gains.A(i, j) = entry[0];
+      gains.A0(i, j) = entry[1];
+      variance(i, j) = entry[2];
     }
-  for (Index i = 0; i < n_y; ++i) {
-    const double row_square = gains.A0.row(i).squaredNorm() / static_cast<double>(n_u);
-    gains.weight.row(i) =
-        (gains.weight.row(i).array() + kTolerance * kTolerance * row_square).inverse();
-  }
+  const Eigen::VectorXd row_square = gains.A0.rowwise().squaredNorm() / static_cast<double>(n_u);
+  gains.weight = (variance.colwise() + kTolerance * kTolerance * row_square).cwiseInverse();
   return gains;
 }
 
@@ -213,18 +160,20 @@ ChannelChange in_log(ChannelChange change, const std::vector<Index>& outputs,
 
 }  // namespace
 
-RigidBodyCheck check_rigid_body(const HealthRecord& record, const NominalStage& nominal,
+RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
                                 const std::vector<Index>& outputs,
                                 const std::vector<Index>& inputs) {
   RigidBodyCheck check;
-  const Accelerance data = accelerance(record, nominal, outputs, inputs, check);
-  if (data.omega2.size() < kFewestLines) {
-    check.unchecked = fmt::format(
-        "{} excited lines between the suspension ({:.3g} Hz) and the flexible modes; {} are needed",
-        data.omega2.size(), nominal.free_from_hz, kFewestLines);
+  const std::vector<PlantLine> lines = rigid_lines(all);
+  if (lines.size() < kFewestLines) {
+    check.unchecked =
+        fmt::format("{} excited lines between suspension and flexible modes; {} are needed",
+                    lines.size(), kFewestLines);
     return check;
   }
-  Gains gains = fit_gains(data);
+  check.band_hz[0] = lines.front().omega_rad_s / (2.0 * std::numbers::pi);
+  check.band_hz[1] = lines.back().omega_rad_s / (2.0 * std::numbers::pi);
+  Gains gains = fit_gains(lines);
   for (Index j = 0; j < gains.A.cols(); ++j) {
     if (gains.A.col(j).norm() > kDead * gains.A0.col(j).norm()) continue;
     check.dead_actuators.push_back(inputs[static_cast<std::size_t>(j)]);

@@ -4,8 +4,7 @@
 #include <vector>
 
 #include "frf/channel_change.hpp"
-#include "frf/health_record.hpp"
-#include "frf/nominal_stage.hpp"
+#include "frf/plant_lines.hpp"
 
 namespace stageid {
 
@@ -29,8 +28,8 @@ struct RigidBodyCheck {
 /// masses and positions are known no better; a gain counts from 30 % on, or if it is negative.
 /// The band ends at 0.7 of the frequency where omega^2 |G| has grown by half over its median.
 ///
-/// @param outputs sensors that are to be looked at, `inputs` actuators that are excited.
-RigidBodyCheck check_rigid_body(const HealthRecord& record, const NominalStage& nominal,
+/// @param outputs, inputs channels of the log that `lines` are of, see plant_lines().
+RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& lines,
                                 const std::vector<Eigen::Index>& outputs,
                                 const std::vector<Eigen::Index>& inputs);
 

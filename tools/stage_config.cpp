@@ -117,8 +117,9 @@ void describe_stage_keys(ConfigVisitor& visitor) {
   describe_stage_file(visitor, file);
 }
 
-StageConfig load_stage_config(const std::filesystem::path& path) {
-  const YamlDocument document = YamlDocument::read(path);
+namespace {
+
+StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& document) {
   StageFile file;
   read_config(document, [&](ConfigVisitor& visitor) { describe_stage_file(visitor, file); });
   StageConfig config;
@@ -139,6 +140,16 @@ StageConfig load_stage_config(const std::filesystem::path& path) {
     throw FormatError(path, "", error.what());
   }
   return config;
+}
+
+}  // namespace
+
+StageConfig load_stage_config(const std::filesystem::path& path) {
+  return stage_config(path, YamlDocument::read(path));
+}
+
+StageConfig parse_stage_config(const std::filesystem::path& name, std::string text) {
+  return stage_config(name, YamlDocument::parse(name, std::move(text)));
 }
 
 std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,

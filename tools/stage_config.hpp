@@ -36,6 +36,9 @@ struct StageConfig {
 /// @throws FileError, FormatError "FILE:LINE:COLUMN: what is wrong; what would be right".
 StageConfig load_stage_config(const std::filesystem::path& file);
 
+/// The same from a text, as a log carries it; `name` only names it in errors. @throws FormatError
+StageConfig parse_stage_config(const std::filesystem::path& name, std::string text);
+
 /// The keys of a stage file. Used by `stageid config schema`.
 void describe_stage_keys(ConfigVisitor& visitor);
 

@@ -99,44 +99,6 @@ double median(Eigen::VectorXd values) {
 
 }  // namespace
 
-std::uint64_t RandomNumbers::next() {  // splitmix64
-  std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ULL);
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-  return z ^ (z >> 31);
-}
-
-double RandomNumbers::uniform(double low, double high) {
-  return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
-}
-
-int RandomNumbers::integer(int low, int high) {
-  return low + static_cast<int>(uniform() * static_cast<double>(high - low + 1));
-}
-
-double RandomNumbers::normal() {
-  const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
-  return radius * std::cos(2.0 * std::numbers::pi * uniform());
-}
-
-std::complex<double> RandomNumbers::circular() {
-  const double radius = std::sqrt(-std::log(1.0 - uniform()));
-  return std::polar(radius, 2.0 * std::numbers::pi * uniform());
-}
-
-double RandomNumbers::chi_square_mean(double dof) {
-  // Sum of dof exponential numbers; above 30 the normal approximation of its cube root (Wilson and
-  // Hilferty) is as good.
-  if (dof <= 30.0) {
-    double sum = 0.0;
-    for (int i = 0; i < static_cast<int>(dof); ++i) sum -= std::log(1.0 - uniform());
-    return sum / dof;
-  }
-  const double spread = 1.0 / (9.0 * dof);
-  const double root = 1.0 - spread + normal() * std::sqrt(spread);
-  return root * root * root;
-}
-
 std::string RandomStage::description() const {
   std::string text = fmt::format(
       "{} modes, {} close pairs, {} peaks missing, noise {:.0f} dB falling as f^-{}, "

@@ -7,23 +7,9 @@
 
 #include "estimation/additive_model.hpp"
 #include "frf/frf_estimate.hpp"
+#include "tests/support/random_numbers.hpp"
 
 namespace stageid::test {
-
-/// Numbers that are the same on every machine.
-class RandomNumbers {
- public:
-  explicit RandomNumbers(std::uint64_t seed) : state_(seed) {}
-  double uniform(double low = 0.0, double high = 1.0);
-  int integer(int low, int high);  ///< both included
-  double normal();
-  std::complex<double> circular();     ///< E|v|^2 = 1, E v^2 = 0
-  double chi_square_mean(double dof);  ///< chi^2 of 2 dof real degrees over its mean
-
- private:
-  std::uint64_t next();
-  std::uint64_t state_;
-};
 
 /// What kind of stages to draw.
 struct RandomStageSpec {
