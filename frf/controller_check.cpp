@@ -54,8 +54,13 @@ class Search {
   template <typename Direction>
   void try_direction(ChannelChange change, double cost, Index first, Index rows,
                      const Direction& direction);
-  template <typename Difference>
-  void try_swap(ChannelChange change, double cost, const Difference& changed_cost);
+  void try_swap(ChannelChange change, double cost, double after);
+  template <typename Term>
+  double sum_over_lines(const Term& term) const {
+    double sum = 0.0;
+    for (const Line& line : lines_) sum += term(line);
+    return sum;
+  }
   void try_sensors();
   void try_actuators();
   std::vector<ControllerMisfit> misfits() const;
@@ -116,9 +121,8 @@ void Search::refresh() {
 }
 
 double Search::row_cost(Index row) const {
-  double cost = 0.0;
-  for (const Line& line : lines_) cost += line.weight[row] * line.E.row(row).squaredNorm();
-  return cost;
+  return sum_over_lines(
+      [row](const Line& line) { return line.weight[row] * line.E.row(row).squaredNorm(); });
 }
 
 /// Is u of this actuator, but for a factor, r - C y? Without this an actuator that moves by itself
@@ -165,10 +169,7 @@ void Search::try_direction(ChannelChange change, double cost, Index first, Index
   candidates_.push_back({change, along * d, along * d / cost});
 }
 
-template <typename Difference>
-void Search::try_swap(ChannelChange change, double cost, const Difference& changed_cost) {
-  double after = 0.0;
-  for (const Line& line : lines_) after += changed_cost(line);
+void Search::try_swap(ChannelChange change, double cost, double after) {
   if (cost - after > kDeviations * kDeviations)
     candidates_.push_back({change, cost - after, (cost - after) / cost});
 }
@@ -192,11 +193,11 @@ void Search::try_sensors() {
       return Eigen::MatrixXcd(j * line.omega_rad_s * of(line, s));
     });
     for (Index t = 0; t < s; ++t)
-      try_swap({Kind::swap, true, t, s}, total_, [&](const Line& line) {
-        const Eigen::MatrixXcd changed =
-            line.E - (line.F.col(s) - line.F.col(t)) * (line.Y.row(t) - line.Y.row(s));
-        return (line.weight.asDiagonal() * changed.cwiseAbs2()).sum();
-      });
+      try_swap({Kind::swap, true, t, s}, total_, sum_over_lines([&](const Line& line) {
+                 const Eigen::MatrixXcd changed =
+                     line.E - (line.F.col(s) - line.F.col(t)) * (line.Y.row(t) - line.Y.row(s));
+                 return (line.weight.asDiagonal() * changed.cwiseAbs2()).sum();
+               }));
   }
 }
 
@@ -217,12 +218,20 @@ void Search::try_actuators() {
     try_direction({Kind::skew, false, a}, cost, a, 1, [&](const Line& line) {
       return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U.row(a));
     });
-    for (Index b = 0; b < a; ++b)
-      try_swap({Kind::swap, false, b, a}, cost + row_cost(b), [&](const Line& line) {
-        const Eigen::RowVectorXcd difference = line.U.row(b) - line.U.row(a);
-        return line.weight[a] * (line.E.row(a) + difference).squaredNorm() +
-               line.weight[b] * (line.E.row(b) - difference).squaredNorm();
-      });
+    for (Index b = 0; b < a; ++b) {
+      const double cost_b = row_cost(b);
+      const auto exchanged = [](Index row, Index with) {
+        return [row, with](const Line& line) {
+          return line.weight[row] *
+                 (line.E.row(row) + line.U.row(with) - line.U.row(row)).squaredNorm();
+        };
+      };
+      const double after_a = sum_over_lines(exchanged(a, b));
+      const double after_b = sum_over_lines(exchanged(b, a));
+      // What one row cannot explain is not the other's: both must come out better.
+      if (after_a > 0.5 * cost || after_b > 0.5 * cost_b) continue;
+      try_swap({Kind::swap, false, b, a}, cost + cost_b, after_a + after_b);
+    }
   }
 }
 
@@ -249,6 +258,16 @@ bool merge(const ChannelChange& change, std::vector<ChannelChange>& changes) {
   return false;
 }
 
+/// Weights follow what is recorded, so that costs before and after a change are not quite the same cost:
+/// an exchange and its undoing could follow each other for ever.
+bool exchanged_before(const ChannelChange& change, const std::vector<ChannelChange>& changes) {
+  return change.kind == ChannelChange::Kind::swap &&
+         std::any_of(changes.begin(), changes.end(), [&](const ChannelChange& earlier) {
+           return earlier.kind == change.kind && earlier.of_sensors == change.of_sensors &&
+                  earlier.a == change.a && earlier.b == change.b;
+         });
+}
+
 ControllerCheck Search::run() {
   ControllerCheck check;
   refresh();
@@ -257,7 +276,7 @@ ControllerCheck Search::run() {
     try_sensors();
     try_actuators();
     const std::optional<Candidate> chosen = best();
-    if (!chosen) break;
+    if (!chosen || exchanged_before(chosen->change, check.changes)) break;
     undo(chosen->change, record_);
     if (!merge(chosen->change, check.changes)) check.changes.push_back(chosen->change);
     refresh();

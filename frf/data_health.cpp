@@ -208,7 +208,8 @@ void Examination::check_responses() {
       continue;
     }
     const double coherence = median_coherence(record_, s);
-    if (expected && coherence < kLeastCoherence)
+    // A dead sensor in the loop disturbs the others.
+    if (expected && spoilt_.empty() && coherence < kLeastCoherence)
       find(Severity::doubt, Cause::incoherent, name(s),
            "little of its motion repeats from period to period",
            fmt::format("median coherence {:.2f}", coherence),
@@ -345,6 +346,7 @@ void Examination::check_stage() {
          fmt::format("{:.0f} % off, {:.3g} ... {:.3g} Hz", 100.0 * check.deviation,
                      check.band_hz[0], check.band_hz[1]),
          "correct mass, inertia or positions in the stage file");
+  if (!check.dead_actuators.empty()) return;  // noise has no phase
   const SkewCheck skew = check_skew(lines, outputs, inputs);
   for (const ChannelChange& change : skew.changes)
     findings_.push_back(to_finding(change, record_.info, false));

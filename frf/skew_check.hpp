@@ -22,9 +22,9 @@ struct SkewCheck {
 ///   Im G_ij = -omega (tau_i + sigma_j) Re G_ij + sum_r (R_r)_ij Im d_r.
 /// The sum is what damping adds; close to a line it comes from the nearest modes, whose R_r are Im G
 /// at their resonances. Projected off these, the equation is least squares for tau and sigma over all
-/// lines, each divided by |G|. Standard deviations by the jackknife over blocks of lines, since what is left
-/// is not noise but damping of far modes, which neighbouring lines share. A channel counts if it is 6
-/// deviations and 3 us off the median of its kind.
+/// lines, each divided by |G| and by its noise where that is above 2 %. Standard deviations by the jackknife over blocks of lines, since what is left
+/// is not noise but damping of far modes, which neighbouring lines share. A channel counts if it is 4.5
+/// deviations (of 19 degrees of freedom: 2.5e-4 a channel) and 5 us off the median of its kind.
 /// @param outputs, inputs channels of the log that `lines` are of, see plant_lines().
 SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Eigen::Index>& outputs,
                      const std::vector<Eigen::Index>& inputs);
