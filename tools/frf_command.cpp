@@ -13,6 +13,7 @@
 #include "tools/exit_code.hpp"
 #include "tools/frf_quality.hpp"
 #include "tools/frf_step.hpp"
+#include "tools/health_step.hpp"
 #include "tools/output_paths.hpp"
 
 namespace stageid {
@@ -32,6 +33,7 @@ double median_relative_std(const FrfEstimate& frf, const Eigen::MatrixXd& varian
 }
 
 nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
+                                const std::vector<std::string>& notes,
                                 const std::filesystem::path& output) {
   nlohmann::ordered_json json = {{"output", output.string()},
                                  {"inputs", frf.inputs.names},
@@ -43,7 +45,7 @@ nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
                                  {"periods", frf.periods},
                                  {"bytes_read", step.bytes},
                                  {"seconds", step.seconds},
-                                 {"notes", step.notes}};
+                                 {"notes", notes}};
   if (frf.noise_variance.size() > 0)
     json["median_relative_noise_std"] = median_relative_std(frf, frf.noise_variance);
   if (frf.total_variance.size() > 0)
@@ -90,6 +92,9 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option(
       "--delay", delay_s_,
       "with --compensate: delay beside the hold's half sample, s; default: the log's");
+  command->add_option("--stage", stage_,
+                      "stage file that the data's health is held against; default: the log's own");
+  command->add_flag("--no-health", no_health_, "do not look at the health of the data");
   command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -114,10 +119,16 @@ void FrfCommand::run() const {
   }
   require_writable(output_);
   FrfStep step = estimate_frf(logs_, options, console_);
+  std::vector<std::string> notes = dropped_lines(step.frf);
+  std::vector<Finding> findings;
+  if (!no_health_) {
+    findings = examine_logs(logs_, options, stage_, console_);
+    step.frf.provenance_json = with_health(step.frf.provenance_json, findings);
+  }
   if (compensate_ != "none") {
     const double delay_s = delay_s_ ? *delay_s_ : declared_delay_s(logs_.front());
     if (!delay_s_)
-      step.notes.push_back(fmt::format("--compensate: delay {} s, as the log declares", delay_s));
+      notes.push_back(fmt::format("--compensate: delay {} s, as the log declares", delay_s));
     step.frf = compensate(
         step.frf, compensate_ == "hold" ? Compensation::hold : Compensation::delay, delay_s);
   }
@@ -130,8 +141,13 @@ void FrfCommand::run() const {
     console_.result(fmt::format("median relative standard deviation by noise: {:.2e}",
                                 median_relative_std(step.frf, step.frf.noise_variance)));
   for (const std::string& line : linearity_lines(step.frf)) console_.message(line);
-  for (const std::string& note : step.notes) console_.message("note: " + note);
-  console_.result(frf_json(step.frf, step, output_));
+  if (!no_health_)
+    for (const std::string& line : health_lines(findings)) console_.result(line);
+  if (any_fault(findings)) console_.exit_code = kNotTrustworthy;
+  for (const std::string& note : notes) console_.message("note: " + note);
+  nlohmann::ordered_json json = frf_json(step.frf, step, notes, output_);
+  if (!no_health_) json["health"] = health_json(findings);
+  console_.result(json);
 }
 
 }  // namespace stageid

@@ -21,6 +21,8 @@ class FrfCommand {
   Console& console_;
   std::vector<std::filesystem::path> logs_;
   std::filesystem::path output_;
+  std::filesystem::path stage_;
+  bool no_health_ = false;
   std::vector<std::string> inputs_;
   std::vector<std::string> outputs_;
   std::vector<int> realizations_;

@@ -8,7 +8,6 @@
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/fingerprint.hpp"
-#include "tools/frf_quality.hpp"
 #include "tools/interrupt.hpp"
 
 namespace stageid {
@@ -49,20 +48,6 @@ std::string complete_provenance(const FrfEstimate& frf, const std::vector<const 
   return provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::vector<std::string> notes_on(const FrfEstimate& frf) {
-  std::vector<std::string> notes;
-  for (std::size_t i = 0; i < frf.excluded_channels.size(); ++i) {
-    const double power = frf.excluded_power[static_cast<Eigen::Index>(i)];
-    if (power > 1e-4)
-      notes.push_back(
-          fmt::format("actuator {} is not part of the response but moved: {:.2g} of the "
-                      "inputs' power; it biases the estimate",
-                      frf.excluded_channels[i], power));
-  }
-  for (std::string& line : dropped_lines(frf)) notes.push_back(std::move(line));
-  return notes;
-}
-
 }  // namespace
 
 std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options) {
@@ -96,7 +81,6 @@ FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, FrfOptions
   step.frf = estimate_plant_frf(logs, options);
   step.seconds = progress.seconds();
   step.frf.provenance_json = complete_provenance(step.frf, logs, options);
-  step.notes = notes_on(step.frf);
   return step;
 }
 

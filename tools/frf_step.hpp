@@ -12,8 +12,7 @@ namespace stageid {
 struct FrfStep {
   FrfEstimate frf;
   double seconds = 0.0;
-  double bytes = 0.0;              ///< of samples that were read
-  std::vector<std::string> notes;  ///< what the reader should know, one line each
+  double bytes = 0.0;  ///< of samples that were read
 };
 
 /// Opens the logs, estimates, shows progress, and completes the provenance: configuration, seeds and

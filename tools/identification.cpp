@@ -17,6 +17,7 @@
 #include "tools/fit_step.hpp"
 #include "tools/frf_quality.hpp"
 #include "tools/frf_step.hpp"
+#include "tools/health_step.hpp"
 #include "tools/measured_stage.hpp"
 #include "tools/model_export.hpp"
 #include "tools/output_paths.hpp"
@@ -72,7 +73,8 @@ int Identification::run() {
   check_model();
   write_outputs();
   print_summary();
-  return exit_code_ != kDone || trustworthy_ ? exit_code_ : static_cast<int>(kNotTrustworthy);
+  const bool trusted = trustworthy_ && !any_fault(health_);
+  return exit_code_ != kDone || trusted ? exit_code_ : static_cast<int>(kNotTrustworthy);
 }
 
 void Identification::finish_step(const char* name, double seconds, std::string note) {
@@ -145,16 +147,30 @@ FrfEstimate Identification::estimate_into(const char* name, const std::vector<in
     }
   }
   FrfStep step = estimate_frf({log}, options, console_);
+  if (realizations == fitted_realizations()) examine(step.frf, options);
   write_frf(path(name), step.frf);
-  notes_.insert(notes_.end(), step.notes.begin(), step.notes.end());
   finish_step("frf", step.seconds,
               fmt::format("{}: {}, {:.0f} MB/s", name, describe(step.frf),
                           step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0));
   return std::move(step.frf);
 }
 
+/// Of the data that are fitted; frf.h5 remembers what was found.
+void Identification::examine(FrfEstimate& frf, const FrfOptions& options) {
+  const SteadyClock::time_point start = SteadyClock::now();
+  const std::vector<Finding> findings = examine_logs({path("run.slog")}, options, {}, console_);
+  frf.provenance_json = with_health(frf.provenance_json, findings);
+  finish_step("health", seconds_since(start),
+              fmt::format("{} findings", health_notes(findings).size()));
+}
+
 void Identification::estimate() {
   frf_ = estimate_into("frf.h5", fitted_realizations());
+  health_ = health_of(frf_->provenance_json);
+  const std::vector<std::string> found = health_notes(health_);
+  notes_.insert(notes_.end(), found.begin(), found.end());
+  const std::vector<std::string> dropped = dropped_lines(*frf_);
+  notes_.insert(notes_.end(), dropped.begin(), dropped.end());
   if (config_.validation_realization >= 0)
     validation_frf_ = estimate_into("frf_validation.h5", {config_.validation_realization});
 }
@@ -229,7 +245,7 @@ Json Identification::summary() const {
                {"configuration", config_.file.filename().string()},
                {"configuration_fingerprint", fingerprint_of(config_.text)},
                {"stage_fingerprint", fingerprint_of(config_.stage.text)},
-               {"trustworthy", trustworthy_ && exit_code_ == kDone},
+               {"trustworthy", trustworthy_ && !any_fault(health_) && exit_code_ == kDone},
                {"fit",
                 {{"status", model_.fit.status},
                  {"weighting", model_.fit.weighting},
@@ -241,6 +257,7 @@ Json Identification::summary() const {
   json["dropped_periods"] = dropped_json(*frf_);
   if (validation_) json["validation"] = validation_json(*validation_);
   if (truth_) json["truth"] = truth_json(*truth_);
+  json["health"] = health_json(health_);
   json["notes"] = notes_;
   json["steps"] = steps;
   return json;

@@ -8,6 +8,7 @@
 
 #include "estimation/fit_additive_model.hpp"
 #include "estimation/validation.hpp"
+#include "frf/health_finding.hpp"
 #include "tools/console.hpp"
 #include "tools/experiment_config.hpp"
 #include "tools/fit_request.hpp"
@@ -40,6 +41,7 @@ class Identification {
   void design();
   int measure_all();
   void estimate();
+  void examine(FrfEstimate& frf, const FrfOptions& options);
   FrfEstimate estimate_into(const char* name, const std::vector<int>& realizations);
   void pick();
   void fit();
@@ -65,6 +67,7 @@ class Identification {
   bool trustworthy_ = true;
   std::vector<Step> steps_;
   std::vector<std::string> notes_;
+  std::vector<Finding> health_;
   std::optional<FrfEstimate> frf_;
   std::optional<FrfEstimate> validation_frf_;
   std::optional<FitSetup> setup_;

@@ -13,6 +13,7 @@
 #include "excitation/file_error.hpp"
 #include "tools/command_line.hpp"
 #include "tools/exit_code.hpp"
+#include "tools/health_step.hpp"
 #include "tools/interrupt.hpp"
 #include "tools/run_metadata.hpp"
 #include "tools/timing_json.hpp"
@@ -22,7 +23,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json health_json(const RunHealth& health) {
+Json counts_json(const RunHealth& health) {
   return {{"cycles", health.cycles},
           {"late", health.late},
           {"missing", health.missing},
@@ -76,7 +77,7 @@ Json info_json(const LogReader& log) {
                             {"samples", run.samples},
                             {"complete", run.complete},
                             {"started_utc", run.started_utc},
-                            {"health", health_json(run.health)},
+                            {"health", counts_json(run.health)},
                             {"timing", timing_json(run.timing)}});
   json["metadata"] = Json::parse(info.metadata_json, nullptr, false);
   return json;
@@ -89,6 +90,9 @@ LogCommand::LogCommand(CLI::App& app, Console& console) : console_(console) {
   log->require_subcommand(1);
   CLI::App* info_command = add_command(*log, "info", "What a log holds, run by run");
   info_command->add_option("file", file_, "log (.slog or .h5)")->required();
+  info_command->add_flag("--health", health_, "read all samples and say what is wrong with them");
+  info_command->add_option(
+      "--stage", stage_, "with --health: the stage file to hold them against; default: the log's");
   info_command->final_callback([this] { info(); });
 
   CLI::App* verify_command = add_command(*log, "verify", "Read every byte and check it");
@@ -129,7 +133,14 @@ void LogCommand::info() const {
                     run.started_utc});
   for (const std::string& line : table_lines(rows)) console_.result(line);
   for (const std::string& line : timing_lines(*log)) console_.result(line);
-  console_.result(info_json(*log));
+  Json json = info_json(*log);
+  if (health_) {
+    const std::vector<Finding> findings = examine_logs({file_}, {}, stage_, console_);
+    for (const std::string& line : health_lines(findings)) console_.result(line);
+    json["health"] = health_json(findings);
+    if (any_fault(findings)) console_.exit_code = kNotTrustworthy;
+  }
+  console_.result(json);
 }
 
 void LogCommand::verify() const {

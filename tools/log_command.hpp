@@ -22,6 +22,8 @@ class LogCommand {
   std::filesystem::path file_;
   std::filesystem::path output_;
   bool complete_only_ = false;
+  bool health_ = false;
+  std::filesystem::path stage_;
 };
 
 }  // namespace stageid

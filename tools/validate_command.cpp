@@ -10,7 +10,9 @@
 #include "excitation/hdf5_file.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
+#include "tools/exit_code.hpp"
 #include "tools/frf_step.hpp"
+#include "tools/health_step.hpp"
 #include "tools/prediction_error.hpp"
 
 namespace stageid {
@@ -89,6 +91,8 @@ ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(con
   command->add_option("data", data_, "frf.h5, or a log (.slog or .h5)")->required();
   command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: the band of the fit")
       ->expected(2);
+  command->add_option("--stage", stage_,
+                      "stage file that the health of a log is held against; default: its own");
   command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -118,6 +122,10 @@ void ValidateCommand::run() const {
                                  {"band_hz", {low_hz, high_hz}},
                                  {"frequency_domain", validation_json(validation)}};
   if (!from_frf) {
+    const std::vector<Finding> findings = examine_logs({data_}, options, stage_, console_);
+    for (const std::string& line : health_lines(findings)) console_.result(line);
+    json["health"] = health_json(findings);
+    if (any_fault(findings)) console_.exit_code = kNotTrustworthy;
     const PredictionError error = prediction_error(model, *open_log(data_), low_hz, high_hz);
     for (const std::string& line : prediction_lines(error)) console_.result(line);
     json["time_domain"] = prediction_json(error);

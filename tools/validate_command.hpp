@@ -22,6 +22,7 @@ class ValidateCommand {
   Console& console_;
   std::filesystem::path model_;
   std::filesystem::path data_;
+  std::filesystem::path stage_;
   std::vector<double> band_hz_;
   int threads_ = 0;
 };

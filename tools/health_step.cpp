@@ -1,0 +1,111 @@
+#include "tools/health_step.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "acquisition/log_reader.hpp"
+#include "tools/interrupt.hpp"
+#include "tools/stage_expectation.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kBytesPerMegabyte = 1e6;
+constexpr Severity kSeverities[] = {Severity::fault, Severity::doubt, Severity::unchecked};
+
+std::string text_of(const Json& object, const char* key) {
+  return object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : "";
+}
+
+/// The cause is for programs that read the table now; notes need severity and texts.
+Finding finding_of(const Json& object) {
+  Finding finding;
+  for (const Severity severity : kSeverities)
+    if (text_of(object, "severity") == to_string(severity)) finding.severity = severity;
+  for (int cause = 0; cause <= static_cast<int>(Cause::incoherent); ++cause)
+    if (text_of(object, "cause") == to_string(static_cast<Cause>(cause)))
+      finding.cause = static_cast<Cause>(cause);
+  finding.channel = text_of(object, "channel");
+  finding.what = text_of(object, "what");
+  finding.figure = text_of(object, "figure");
+  finding.remedy = text_of(object, "remedy");
+  return finding;
+}
+
+}  // namespace
+
+std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
+                                  FrfOptions options, const std::filesystem::path& stage_file,
+                                  const Console& console) {
+  std::vector<std::unique_ptr<LogReader>> readers;
+  std::vector<const LogReader*> logs;
+  for (const std::filesystem::path& file : files) {
+    readers.push_back(open_log(file));
+    logs.push_back(readers.back().get());
+  }
+  const auto nominal = nominal_stage_of(logs.front()->info(), stage_file);
+  Progress progress(console, "health", "MB", 1.0 / kBytesPerMegabyte);
+  options.progress = [&](double done, double total) {
+    throw_if_interrupted();
+    progress.update(done, total);
+  };
+  return check_health(read_health_record(logs, options), nominal);
+}
+
+std::vector<std::string> health_lines(const std::vector<Finding>& findings) {
+  std::vector<std::vector<std::string>> rows = {{"health", "channel", "what", "figure", "remedy"}};
+  bool fine = true;
+  for (const Finding& f : findings) {
+    fine = fine && f.severity == Severity::unchecked;
+    rows.push_back({to_string(f.severity), f.channel, f.what, f.figure, f.remedy});
+  }
+  std::vector<std::string> lines;
+  if (fine) lines.push_back("health of the data: nothing found");
+  if (rows.size() == 1) return lines;
+  for (std::string& line : table_lines(rows)) lines.push_back(std::move(line));
+  return lines;
+}
+
+Json health_json(const std::vector<Finding>& findings) {
+  Json list = Json::array();
+  for (const Finding& f : findings)
+    list.push_back({{"severity", to_string(f.severity)},
+                    {"cause", to_string(f.cause)},
+                    {"channel", f.channel},
+                    {"what", f.what},
+                    {"figure", f.figure},
+                    {"remedy", f.remedy}});
+  return list;
+}
+
+std::vector<std::string> health_notes(const std::vector<Finding>& findings) {
+  std::vector<std::string> notes;
+  for (const Finding& f : findings) {
+    if (f.severity == Severity::unchecked) continue;
+    notes.push_back(fmt::format("{}{}{} ({}); {}", f.channel, f.channel.empty() ? "" : ": ", f.what,
+                                f.figure, f.remedy));
+  }
+  return notes;
+}
+
+std::string with_health(const std::string& provenance_json, const std::vector<Finding>& findings) {
+  Json provenance = Json::parse(provenance_json, nullptr, false);
+  if (!provenance.is_object()) provenance = Json::object();
+  provenance["health"] = health_json(findings);
+  return provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::vector<Finding> health_of(const std::string& provenance_json) {
+  const Json provenance = Json::parse(provenance_json, nullptr, false);
+  std::vector<Finding> findings;
+  if (!provenance.is_object() || !provenance.contains("health") || !provenance["health"].is_array())
+    return findings;
+  for (const Json& object : provenance["health"])
+    if (object.is_object()) findings.push_back(finding_of(object));
+  return findings;
+}
+
+}  // namespace stageid

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "frf/data_health.hpp"
+#include "frf/plant_frf.hpp"
+#include "tools/console.hpp"
+
+namespace stageid {
+
+/// Reads the logs once more and examines them. Controller and rigid body are those of `stage_file`, or of the
+/// stage file that the log carries. Shows progress.
+/// @throws what open_log(), read_health_record() and nominal_stage_of() throw; Interrupted
+std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& logs,
+                                  FrfOptions options, const std::filesystem::path& stage_file,
+                                  const Console& console);
+
+/// The table: one line a finding, in columns; a single line if there is none.
+std::vector<std::string> health_lines(const std::vector<Finding>& findings);
+nlohmann::ordered_json health_json(const std::vector<Finding>& findings);
+
+/// Faults and doubts as sentences, for notes.
+std::vector<std::string> health_notes(const std::vector<Finding>& findings);
+
+/// The provenance of a frequency response with the findings as its "health", and back. What is not
+/// there, or is not as written by us, is none.
+std::string with_health(const std::string& provenance_json, const std::vector<Finding>& findings);
+std::vector<Finding> health_of(const std::string& provenance_json);
+
+}  // namespace stageid
