@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "frf/controller_check.hpp"
+#include "frf/health_measures.hpp"
 #include "frf/rigid_body_check.hpp"
-#include "frf/significance.hpp"
 #include "frf/skew_check.hpp"
 
 namespace stageid {
@@ -54,8 +53,6 @@ class Examination {
   }
   bool found(Cause cause) const;
   std::vector<Index> excited_actuators() const;
-  /// ln p of "the channel does not respond to the excitation", by F tests over the lines.
-  bool responds(Index channel) const;
   bool expected_to_respond(Index sensor, bool& known) const;
   std::string why_no_nominal(bool all_sensors) const;
 
@@ -141,23 +138,6 @@ void Examination::check_samples() {
   }
 }
 
-bool Examination::responds(Index channel) const {
-  if (record_.scatter_dof() == 0) return true;
-  double evidence = 0.0;
-  for (const LineRecord& line : record_.lines) {
-    const Eigen::MatrixXcd row = line.Z.row(channel);
-    const double variance = record_.variance_of_mean(row)[0];
-    const double mean_square =
-        record_.mean(row).squaredNorm() / static_cast<double>(record_.experiments());
-    if (variance > 0.0)
-      evidence -= log_tail_of_f(mean_square / variance, static_cast<int>(record_.experiments()),
-                                record_.scatter_dof());
-    else if (mean_square > 0.0)
-      return true;
-  }
-  return tail_of_chi_square(evidence, static_cast<Index>(record_.lines.size())) < kSignificance;
-}
-
 /// Whether the rigid body moves this sensor when the excited actuators push.
 bool Examination::expected_to_respond(Index sensor, bool& known) const {
   std::string missing;
@@ -177,26 +157,12 @@ bool Examination::expected_to_respond(Index sensor, bool& known) const {
   return here > kResponds * G.cwiseAbs().maxCoeff();
 }
 
-/// Median over the lines of the multiple coherence of one period: what of the power repeats.
-double median_coherence(const HealthRecord& record, Index channel) {
-  std::vector<double> values;
-  for (const LineRecord& line : record.lines) {
-    const Eigen::MatrixXcd row = line.Z.row(channel);
-    const double power = row.squaredNorm();
-    if (power > 0.0) values.push_back(1.0 - record.scatter(row)(0, 0).real() / power);
-  }
-  if (values.empty()) return 1.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 void Examination::check_responses() {
   for (Index s = 0; s < record_.n_y(); ++s) {
     if (spoilt(s)) continue;
     bool known = false;
     const bool expected = expected_to_respond(s, known);
-    if (!responds(s)) {
+    if (!responds(record_, s)) {
       if (known && !expected) continue;
       find(known ? Severity::fault : Severity::doubt, Cause::dead, name(s),
            known ? "dead: noise only, where the rigid body moves it"
@@ -215,14 +181,6 @@ void Examination::check_responses() {
            fmt::format("median coherence {:.2f}", coherence),
            "raise the level, or measure more periods");
   }
-}
-
-double condition(const Eigen::MatrixXcd& M) {
-  const Eigen::VectorXd row_norm = M.rowwise().norm();
-  if (!(row_norm.minCoeff() > 0.0)) return std::numeric_limits<double>::infinity();
-  const Eigen::VectorXd values =
-      Eigen::JacobiSVD<Eigen::MatrixXcd>(row_norm.cwiseInverse().asDiagonal() * M).singularValues();
-  return values[0] / values[values.size() - 1];
 }
 
 void Examination::check_excitation() {
@@ -371,7 +329,7 @@ void Examination::check_excluded() {
     const Index c = record_.n_y() + a;
     if (std::find(excited.begin(), excited.end(), a) != excited.end()) continue;
     const double share = power(a) / inputs;
-    if (share > kExcludedPower && responds(c))
+    if (share > kExcludedPower && responds(record_, c))
       find(Severity::doubt, Cause::excluded, name(c),
            "is not part of the sub-plant but moves on the excited lines: it biases the response",
            fmt::format("{:.2g} of the inputs' power", share), "excite it too, or open its loop");

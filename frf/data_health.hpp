@@ -18,7 +18,8 @@ namespace stageid {
 /// (rigid_body_check.hpp: the wires behind the recording). What cannot be seen from
 /// this log is a finding of severity `unchecked` that names what is needed.
 ///
-/// False alarms: every check's own threshold, at most 1e-3 over all channels of a log together.
+/// Every check states its own rate of false alarms; what matters is measured over random stages by
+/// health_study (docs/benchmarks.md).
 std::vector<Finding> check_health(HealthRecord record, const std::optional<NominalStage>& nominal);
 
 }  // namespace stageid
