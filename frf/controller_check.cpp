@@ -5,7 +5,7 @@
 #include <numbers>
 #include <optional>
 
-#include "frf/significance.hpp"
+#include "frf/tail_probability.hpp"
 
 namespace stageid {
 namespace {
@@ -296,7 +296,7 @@ bool Search::significant(Index row) const {
     else if (mean_square > 0.0)
       evidence += 1e3;
   }
-  return tail_of_chi_square(evidence, static_cast<Index>(lines_.size())) <
+  return tail_of_evidence(evidence, static_cast<Index>(lines_.size())) <
          kSignificance / static_cast<double>(record_.n_u());
 }
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "frf/significance.hpp"
+#include "frf/tail_probability.hpp"
 
 namespace stageid {
 namespace {
@@ -30,7 +30,7 @@ bool responds(const HealthRecord& record, Index channel) {
     else if (mean_square > 0.0)
       return true;
   }
-  return tail_of_chi_square(evidence, static_cast<Index>(record.lines.size())) < kSignificance;
+  return tail_of_evidence(evidence, static_cast<Index>(record.lines.size())) < kSignificance;
 }
 
 double median_coherence(const HealthRecord& record, Index channel) {
