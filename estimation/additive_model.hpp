@@ -47,6 +47,7 @@ struct Submodel {
 
   SubmodelRole role = SubmodelRole::searched;
   bool frequency_held = false;                      ///< a mode whose a_2 stays where it is
+  bool damping_held = false;                        ///< a mode whose a_1 stays where it is
   std::vector<Eigen::MatrixXd> numerator_std = {};  ///< of every entry of numerator; empty: unknown
 
   /// n = 2 with complex poles: 1/(2 pi sqrt(a_2)) and a_1/(2 sqrt(a_2)).

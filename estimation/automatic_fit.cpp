@@ -61,7 +61,9 @@ class AutomaticFit {
     const std::vector<ModeCandidate> modes =
         relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
     say("start: {} modes by pole relocation", modes.size());
-    adopt(fit_additive_model(frf_, start_of(modes), quick_));
+    model = start_of(modes);
+    if (selection_.exactly > kMostGrown) hold_hidden_modes(model);
+    adopt(fit_additive_model(frf_, model, quick_));
   }
 
   /// @param surplus modes to grow by beyond the number that is asked for
@@ -98,6 +100,16 @@ class AutomaticFit {
   }
 
  private:
+  /// Of very many modes that are asked for, the data show some not at all. Free, their poles would
+  /// settle on the largest noise peaks: a lower cost, but further from the truth.
+  void hold_hidden_modes(AdditiveModel& model) {
+    FitOptions still = quick_;
+    still.max_iterations = 0;
+    const int hidden = worth_.hold_hidden(fit_additive_model(frf_, model, still), model);
+    if (hidden > 0)
+      say("{} of them are not above the noise: their poles stay where they were placed", hidden);
+  }
+
   AdditiveModel start() {
     std::vector<ModeCandidate> modes = selection_.modes;
     if (modes.empty() && !selection_.keep_modes) {

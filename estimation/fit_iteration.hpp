@@ -35,8 +35,8 @@ IterationResult iterate(const FitProblem& problem, const WeightMatrices& weights
 inline constexpr double kRoundingDeviations = 0.05;
 
 /// Part of the data's weighted power below which a residual that no step lowers is rounding, not a
-/// fit that got stuck: 1e-12 of the amplitude.
-inline constexpr double kNothingLeft = 1e-24;
+/// fit that got stuck: 1e-10 of the amplitude, what coinciding poles leave of double precision.
+inline constexpr double kNothingLeft = 1e-20;
 
 /// Damping beyond which no step is worth trying.
 inline constexpr double kLargestLevenberg = 1e8;

@@ -46,6 +46,7 @@ std::vector<Eigen::Index> held_frequencies(const AdditiveModel& start) {
   std::vector<Eigen::Index> out;
   Eigen::Index first = 0;
   for (const Submodel& s : start.submodels) {
+    if (s.is_mode() && s.damping_held) out.push_back(first);
     if (s.is_mode() && s.frequency_held) out.push_back(first + 1);
     first += static_cast<Eigen::Index>(s.denominator.size()) - 1;
   }

@@ -4,6 +4,11 @@
 #include <cmath>
 
 namespace stageid {
+namespace {
+
+constexpr double kUpper5Percent = 1.6449;  // of the normal distribution
+
+}  // namespace
 
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
@@ -29,6 +34,21 @@ double ModeWorth::criterion(const FitResult& fit) const {
 
 double ModeWorth::price(const FitResult& fit) const {
   return squares(fit) * -std::expm1(-cost_of_modes(1) / data_);
+}
+
+int ModeWorth::hold_hidden(const FitResult& placed, AdditiveModel& model) const {
+  // Wilson and Hilferty's approximation of the quantile (PNAS 17 (1931) 684).
+  const double n = parameters_of_mode_ - 2.0;
+  const double root = 1.0 - 2.0 / (9.0 * n) + kUpper5Percent * std::sqrt(2.0 / (9.0 * n));
+  const double noise = n * root * root * root * squares(placed) / data_;
+  int hidden = 0;
+  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
+    Submodel& s = model.submodels[i];
+    if (!is_searched_mode(s) || !(placed.removal_cost[i] < noise)) continue;
+    s.frequency_held = s.damping_held = true;
+    ++hidden;
+  }
+  return hidden;
 }
 
 double ModeWorth::deviation_tolerance() const { return std::sqrt(0.01 * cost_of_modes(1)); }

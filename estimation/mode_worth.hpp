@@ -24,6 +24,11 @@ class ModeWorth {
   /// What sum W |E|^2 of `fit` must fall by for one more mode to be worth its parameters.
   double price(const FitResult& fit) const;
 
+  /// Holds the poles of the searched modes of `model` that noise hides: leaving such a mode out of `placed`,
+  /// the fit of its numerators, costs less than the upper 5 % of the chi-square distribution with as many
+  /// degrees of freedom as there are numerators. @returns how many
+  int hold_hidden(const FitResult& placed, AdditiveModel& model) const;
+
   /// Steps shorter than this many standard deviations of the parameters (Newton decrement) lower a cost
   /// by less than a hundredth of what a mode is worth: no decision needs them.
   double deviation_tolerance() const;

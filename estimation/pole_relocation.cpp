@@ -15,12 +15,13 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr int kIterations = 10;
+constexpr int kIterations = 20;
 constexpr int kShares = 8;
 constexpr double kSettled = 1e-3;   // move of every pole in its own half-power widths
 constexpr double kPathShare = 0.5;  // of the start: by the path of log H, the rest by lines
 constexpr double kStartDamping = 0.01;
 constexpr double kLeastDamping = 1e-5;
+constexpr double kLinesWide = 3.0;  // of a pole's half-power width at least, but see narrowest()
 constexpr double kShift = 1e-13;    // makes Gram matrices of unit columns factor
 constexpr double kAccurate = 1e-4;  // relative residual below which one Gram matrix loses too much
 
@@ -193,6 +194,17 @@ class Relocation {
     return corner(gram_factor(A, false)) * first;
   }
 
+  /// The least damping ratio at a frequency, at most that of the start: a sharper pole is placed by the
+  /// noise of one line. Modes may be sharper, and are told so by the fit that follows.
+  double narrowest(double omega_rad_s) const {
+    const Eigen::VectorXd& omega = lines_.omega_rad_s;
+    const Eigen::Index last = omega.size() - 1;
+    const double* above = std::lower_bound(omega.data(), omega.data() + last, omega_rad_s);
+    const Eigen::Index k = std::clamp<Eigen::Index>(above - omega.data(), 1, last);
+    const double spacing = omega[k] - omega[k - 1];
+    return std::clamp(0.5 * kLinesWide * spacing / omega_rad_s, kLeastDamping, kStartDamping);
+  }
+
   /// Takes stable zeros as they are and unstable ones reflected.
   double move(const Eigen::VectorXcd& zeros) {
     const double highest = 10.0 * lines_.omega_rad_s.maxCoeff();
@@ -203,7 +215,7 @@ class Relocation {
       const double size = std::min(std::abs(s), highest);
       if (s.imag() < 0.0) continue;  // the other of the pair
       s *= size / std::abs(s);
-      s = {-std::max(std::abs(s.real()), kLeastDamping * size), s.imag()};
+      s = {-std::max(std::abs(s.real()), narrowest(size) * size), s.imag()};
       if (s.imag() == 0.0)
         found.reals.push_back(to_x(s).real());
       else

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <complex>
 #include <limits>
-#include <numbers>
 
 #include "excitation/line_spectrum.hpp"
+#include "excitation/phase.hpp"
 
 namespace stageid {
 namespace {
@@ -17,14 +17,6 @@ constexpr int kOversampling = 4;
 // iterations reach 1.43 by this climb; fixed fractions of 0.7, 0.8, 0.9 reach 1.64, 1.56, 1.56.
 constexpr double kFirstFraction = 0.7;
 constexpr double kLastFraction = 0.99;
-
-/// Phase in [0, 2 pi).
-double positive_phase_rad(const std::complex<double>& value) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  const double phase = std::arg(value);
-  const double positive = phase < 0.0 ? phase + kTurn : phase;
-  return positive < kTurn ? positive : 0.0;  // a tiny negative phase is rounded up to a full turn
-}
 
 /// Gives every line its amplitude back and keeps the phase; a line that vanished keeps its old one.
 void restore_amplitudes(const Eigen::Ref<const Eigen::VectorXd>& amplitude,

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <complex>
 #include <limits>
-#include <numbers>
 
 #include "excitation/line_spectrum.hpp"
+#include "excitation/phase.hpp"
 #include "excitation/signal_peaks.hpp"
 
 namespace stageid {
@@ -19,13 +19,6 @@ using Eigen::MatrixXcd;
 constexpr double kFirstFraction = 0.7;
 constexpr double kLastFraction = 0.97;
 constexpr double kStep = 1.0;
-
-double positive_phase_rad(const std::complex<double>& value) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  const double phase = std::arg(value);
-  const double positive = phase < 0.0 ? phase + kTurn : phase;
-  return positive < kTurn ? positive : 0.0;  // a tiny negative phase is rounded up to a full turn
-}
 
 class JointCrest {
  public:

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "frf/run_periods.hpp"
 #include "frf/run_steps.hpp"
 #include "frf/transient_model.hpp"
 
@@ -152,18 +153,9 @@ RunSpectra measure_record(const UsedRun& used, const ExcitationSpectrum& excitat
                           RunWorkspace& w, const std::function<void(double bytes)>& read_done) {
   RecordMeasurement measurement(used, excitation, channels, w);
   measurement.add_excitation(excitation_period);
-  const auto period = static_cast<std::uint64_t>(w.dft.length());
-  for (int p = 0; p < used.periods; ++p) {
-    const auto first = static_cast<std::uint64_t>(used.transient_periods + p) * period;
-    used.log->read(used.index, first, period, w.samples);
-    read_done(static_cast<double>(w.samples.actuators.size() + w.samples.sensors.size()) *
-              sizeof(double));
-    if ((w.samples.marked != 0).any()) {
-      measurement.leave_out_marked(p);
-    } else {
-      measurement.take(p);
-    }
-  }
+  for_each_period(
+      used, w, read_done, [&](int p) { measurement.take(p); },
+      [&](int p) { measurement.leave_out_marked(p); });
   return measurement.finish();
 }
 

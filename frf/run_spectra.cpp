@@ -6,6 +6,7 @@
 #include <span>
 
 #include "frf/period_check.hpp"
+#include "frf/run_periods.hpp"
 #include "frf/run_steps.hpp"
 
 namespace stageid {
@@ -139,20 +140,12 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
   RunMeasurement measurement(used, lines, channels, choice, w);
   Fingerprint fingerprint;
   add_matrix(fingerprint, excitation_period);
-  const auto period = static_cast<std::uint64_t>(w.dft.length());
-  for (int p = 0; p < used.periods; ++p) {
-    const auto first = static_cast<std::uint64_t>(used.transient_periods + p) * period;
-    used.log->read(used.index, first, period, w.samples);
-    read_done(static_cast<double>(w.samples.actuators.size() + w.samples.sensors.size()) *
-              sizeof(double));
-    if ((w.samples.marked != 0).any()) {
-      measurement.leave_out_marked(p);
-      continue;
-    }
+  const auto take = [&](int p) {
     add_matrix(fingerprint, w.samples.actuators);
     add_matrix(fingerprint, w.samples.sensors);
     measurement.take(p);
-  }
+  };
+  for_each_period(used, w, read_done, take, [&](int p) { measurement.leave_out_marked(p); });
   RunSpectra run = measurement.finish();
   run.fingerprint = fingerprint.hex();
   return run;

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/fingerprint.hpp"
 #include "tools/interrupt.hpp"
+#include "tools/open_logs.hpp"
 
 namespace stageid {
 namespace {
@@ -65,12 +65,8 @@ std::string request_id_of(const std::string& provenance_json) {
 
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, FrfOptions options,
                      const Console& console) {
-  std::vector<std::unique_ptr<LogReader>> readers;
-  std::vector<const LogReader*> logs;
-  for (const std::filesystem::path& file : files) {
-    readers.push_back(open_log(file));
-    logs.push_back(readers.back().get());
-  }
+  const OpenLogs open(files);
+  const std::vector<const LogReader*>& logs = open.logs();
   FrfStep step;
   Progress progress(console, "frf", "MB", 1.0 / kBytesPerMegabyte);
   options.progress = [&](double done, double total) {

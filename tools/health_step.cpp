@@ -2,10 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "acquisition/log_reader.hpp"
 #include "tools/interrupt.hpp"
+#include "tools/open_logs.hpp"
 #include "tools/stage_expectation.hpp"
 
 namespace stageid {
@@ -40,12 +39,8 @@ Finding finding_of(const Json& object) {
 std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
                                   FrfOptions options, const std::filesystem::path& stage_file,
                                   const Console& console) {
-  std::vector<std::unique_ptr<LogReader>> readers;
-  std::vector<const LogReader*> logs;
-  for (const std::filesystem::path& file : files) {
-    readers.push_back(open_log(file));
-    logs.push_back(readers.back().get());
-  }
+  const OpenLogs open(files);
+  const std::vector<const LogReader*>& logs = open.logs();
   const auto nominal = nominal_stage_of(logs.front()->info(), stage_file);
   Progress progress(console, "health", "MB", 1.0 / kBytesPerMegabyte);
   options.progress = [&](double done, double total) {

@@ -6,6 +6,8 @@
 #include <sys/resource.h>
 
 #include <Eigen/Core>
+#include <fstream>
+#include <string>
 
 #include "estimation/arrow_system.hpp"
 #include "estimation/automatic_fit.hpp"
@@ -185,9 +187,28 @@ void dense_equations(benchmark::State& state) {
 }
 BENCHMARK(dense_equations)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
 
-/// Linear in lines and in channels: ns is the time per line and channel.
+/// A value of /proc/self/status, MB.
+double memory_mb(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with(key + ":")) return 1e-3 * std::stod(line.substr(key.size() + 1));
+  return 0.0;
+}
+
+/// Peak of memory while an iteration runs, beyond what was there before it, MB.
+double memory_of_iteration_mb(const Case& c) {
+  std::ofstream("/proc/self/clear_refs") << 5;  // the peak begins anew
+  const double before = memory_mb("VmRSS");
+  benchmark::DoNotOptimize(iterate_once(c, FitMethod::riv));
+  return memory_mb("VmHWM") - before;
+}
+
+/// Linear in lines and in channels: ns is the time per line and channel; beyond, the memory that an
+/// iteration takes as a part of the data and weights.
 void scale(benchmark::State& state) {
   const Case c = make_case(static_cast<int>(state.range(0)), state.range(1), 2);
+  state.counters["beyond"] =
+      memory_of_iteration_mb(c) / (24e-6 * static_cast<double>(c.problem.G_re.size()));
   const auto begin = std::chrono::steady_clock::now();
   for (auto _ : state) benchmark::DoNotOptimize(iterate_once(c, FitMethod::gn));
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;

@@ -76,6 +76,22 @@ TEST(PoleRelocationShares, DataOfAnUnstablePlantGiveStableModes) {
   for (const ModeCandidate& mode : modes) EXPECT_GT(mode.damping_ratio, 0.0);
 }
 
+// Its width is a tenth of the lines' spacing: where it is, one line tells, and how sharp it is, none.
+TEST(PoleRelocationShares, AModeNarrowerThanTheLinesIsPlacedWider) {
+  DenseProblem problem = test::noisy_stage(HoldModel::none, 0.0);
+  const std::vector<double> a = test::mode_coefficients(900.0, 2.5e-4);
+  problem.model.submodels[2].denominator = {1.0, a[0], a[1]};
+  problem.model.submodels.resize(3);
+  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+  problem.W = problem.G.cwiseAbs2().cwiseInverse();
+  const std::vector<ModeCandidate> modes = relocate(problem, 2);
+  ASSERT_EQ(modes.size(), 2U);
+  const double spacing_hz = problem.frequency_hz[1] - problem.frequency_hz[0];
+  EXPECT_NEAR(modes[1].frequency_hz, 900.0, spacing_hz);
+  EXPECT_NEAR(2.0 * modes[1].damping_ratio * modes[1].frequency_hz, 3.0 * spacing_hz,
+              1e-6 * spacing_hz);
+}
+
 TEST(PoleRelocationShares, NothingAskedForNothingFound) {
   EXPECT_TRUE(relocate(test::noisy_stage(HoldModel::none, 0.0), 0).empty());
 }

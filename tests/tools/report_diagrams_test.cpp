@@ -23,9 +23,11 @@ TEST(ReportDiagrams, KeepPolesToATenthOfAMillihertz) {
 
 TEST(ReportDiagrams, KeepFourDigitsOfATestHoweverSmallItsChance) {
   const double tiny = std::numeric_limits<double>::denorm_min();
-  const json got = nonlinearity_json({.band_hz = Eigen::MatrixXd{{1.0, 2.5}},
-                                      .p_value = Eigen::MatrixXd{{1.23456e-300}, {tiny}, {0.0}},
-                                      .distortion = Eigen::MatrixXd{{0.0123456}, {1.0}, {0.0}}});
+  NonlinearityTest test;
+  test.band_hz = Eigen::MatrixXd{{1.0, 2.5}};
+  test.p_value = Eigen::MatrixXd{{1.23456e-300}, {tiny}, {0.0}};
+  test.distortion = Eigen::MatrixXd{{0.0123456}, {1.0}, {0.0}};
+  const json got = nonlinearity_json(test);
   EXPECT_EQ(got["bands"], json::parse("[[1.0,2.5]]"));
   EXPECT_NEAR(got["p_value"][0][0].get<double>() / 1.235e-300, 1.0, 1e-6);
   EXPECT_EQ(got["p_value"][1][0].get<double>(), tiny);
