@@ -13,7 +13,8 @@
 namespace stageid {
 namespace {
 
-constexpr bool kGlobalsOnly = false;  // numerators are solved again after every step
+constexpr double kNearlyExact = 1e-12;  // of the data's power: normal equations lose what is left
+constexpr bool kGlobalsOnly = false;    // numerators are solved again after every step
 
 /// A candidate with its numerators solved.
 struct Trial {
@@ -154,6 +155,10 @@ class Iteration {
     if (options_.method == FitMethod::riv) {
       const ArrowSystem gauss_newton(problem_, beta_, groups, FitMethod::gn, kGlobalsOnly);
       if (attempt(gauss_newton, 40)) return still_moving();
+    }
+    if (cost_ < kNearlyExact * signal_cost_) {
+      polish_numerators(problem_, evaluate_groups(problem_, beta_, false), beta_.B, cost_);
+      result_.cost.push_back(cost_);
     }
     if (cost_ < kNothingLeft * signal_cost_)
       return end(FitStatus::step_small,

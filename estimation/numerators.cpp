@@ -1,6 +1,7 @@
 #include "estimation/numerators.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <cmath>
 
 #include "estimation/weighted_products.hpp"
@@ -212,6 +213,37 @@ bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& 
     }
   cost = sum / (2.0 * static_cast<double>(problem.size()));
   return std::isfinite(cost);
+}
+
+void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                       Eigen::MatrixXd& B, double& cost) {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(problem.channels());
+  Eigen::MatrixXd polished = B;
+  for (const BasisGroup& group : groups)
+    parallel_tasks(static_cast<int>(group.channels.size()), problem.threads, [&](int member) {
+      const Eigen::Index c = group.channels[static_cast<std::size_t>(member)];
+      const Eigen::Index N = problem.size();
+      const Eigen::VectorXd root = problem.W.row(c).transpose().cwiseSqrt();
+      Eigen::MatrixXd A(2 * N, problem.functions());
+      A << root.asDiagonal() * group.F_re, root.asDiagonal() * group.F_im;
+      Eigen::VectorXd rest(2 * N);
+      rest << root.cwiseProduct(problem.G_re.row(c).transpose()),
+          root.cwiseProduct(problem.G_im.row(c).transpose());
+      const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+      A *= scale.asDiagonal();
+      const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(A);
+      Eigen::VectorXd x = factor.solve(rest);
+      rest -= A * x;
+      const Eigen::VectorXd refinement = factor.solve(rest);
+      x += refinement;
+      rest -= A * refinement;
+      polished.row(c) = scale.cwiseProduct(x).transpose();
+      squares[c] = rest.squaredNorm();
+    });
+  const double polished_cost = squares.sum() / (2.0 * static_cast<double>(problem.size()));
+  if (!(polished_cost < cost)) return;
+  B = std::move(polished);
+  cost = polished_cost;
 }
 
 std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,
