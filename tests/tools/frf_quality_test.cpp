@@ -1,0 +1,57 @@
+// What stageid frf says of linearity and of periods, end to end.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "frf/frf_file.hpp"
+#include "tests/tools/program_fixture.hpp"
+
+namespace stageid::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class FrfQuality : public ProgramTest {};
+
+TEST_F(FrfQuality, TellsWhetherTheStageIsLinear) {
+  make_log();
+  const ProgramResult linear = succeed({"frf", name("run.slog"), "-o", name("f.h5"), "--json"});
+  EXPECT_THAT(linear.err, HasSubstr("nonlinear pairs"));
+  EXPECT_EQ(json::parse(linear.out)["nonlinearity"]["tested"], true);
+  const std::string config =
+      stage("cubic.yaml", "  plate:", "  cubic_stiffness_n_m3: 1.0e+16\n  plate:");
+  succeed({"run", config, "-o", name("cubic.slog")});
+  const ProgramResult cubic = succeed({"frf", name("cubic.slog"), "-o", name("c.h5"), "--json"});
+  const json found = json::parse(cubic.out)["nonlinearity"];
+  EXPECT_EQ(found["nonlinear"], true);
+  EXPECT_GT(found["bands"][0]["distortion"].get<double>(), 0.0);
+  EXPECT_THAT(cubic.err, HasSubstr("the plant is not linear"));
+  EXPECT_LT(read_frf(at("c.h5")).nonlinearity.p_value.minCoeff(),
+            read_frf(at("f.h5")).nonlinearity.p_value.minCoeff());
+}
+
+TEST_F(FrfQuality, SaysWhyItWasNotTested) {
+  make_log();
+  const ProgramResult one =
+      succeed({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "1", "--json"});
+  EXPECT_THAT(one.err, HasSubstr("measure two realizations"));
+  EXPECT_EQ(json::parse(one.out)["nonlinearity"]["tested"], false);
+  const ProgramResult lpm =
+      succeed({"frf", name("run.slog"), "-o", name("f.h5"), "--method", "lpm"});
+  EXPECT_THAT(lpm.err, HasSubstr("estimate with 'periodic'"));
+}
+
+TEST_F(FrfQuality, SmoothsTheCovariance) {
+  make_log();
+  succeed({"frf", name("run.slog"), "-o", name("one.h5")});
+  succeed({"frf", name("run.slog"), "-o", name("nine.h5"), "--smooth-covariance", "9"});
+  EXPECT_EQ(read_frf(at("nine.h5")).noise_dof, 9.0 * read_frf(at("one.h5")).noise_dof);
+  fail({"frf", name("run.slog"), "-o", name("two.h5"), "--smooth-covariance", "2"}, 2,
+       "odd number");
+  fail({"frf", name("run.slog"), "-o", name("two.h5"), "--periods", "some"}, 2, "--periods");
+}
+
+}  // namespace
+}  // namespace stageid::test
