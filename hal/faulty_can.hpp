@@ -27,7 +27,7 @@ struct CanFault {
   double delay_s = 0.0;
 };
 
-/// "lost@100x3", "late@50x1:0.004": KIND@FRAME[xCOUNT][:SECONDS].
+/// "lost@100x3", "late@50x1:0.004": `KIND@FRAME[xCOUNT][:SECONDS]`.
 /// @throws std::invalid_argument naming what is wrong.
 CanFault parse_can_fault(const std::string& text);
 

@@ -26,7 +26,7 @@ struct ModbusFault {
   double value = 0.0;
 };
 
-/// Reads KIND[@REQUEST][xCOUNT][:VALUE]: "late_reply@200:0.4", "exception@50x3:4", "interlock@100".
+/// Reads `KIND[@REQUEST][xCOUNT][:VALUE]`: "late_reply@200:0.4", "exception@50x3:4", "interlock@100".
 /// COUNT is 1 for faults of one reply, otherwise all that follow.
 /// @throws std::invalid_argument that says what is wrong and what would be right.
 ModbusFault parse_modbus_fault(std::string_view text);

@@ -7,9 +7,9 @@ build_packages="g++ cmake ninja-build pkg-config
   libfmt-dev libxxhash-dev libcpp-httplib-dev libmodbus-dev libmatio-dev zlib1g-dev libjs-dygraphs"
 
 # What the tests need beside that: the references in Python, the report in a browser, the format,
-# a kernel that has CAN.
+# the C++ reference, a kernel that has CAN.
 test_packages="libgtest-dev libgmock-dev libbenchmark-dev
-  python3-dev pybind11-dev python3 python3-numpy python3-scipy python3-h5py chromium clang-format git
+  python3-dev pybind11-dev python3 python3-numpy python3-scipy python3-h5py chromium clang-format doxygen git
   mbpoll python3-pymodbus python3-serial-asyncio socat
   user-mode-linux busybox-static iproute2 kmod can-utils"
 
