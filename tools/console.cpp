@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <string_view>
 
 namespace stageid {
 namespace {
@@ -26,6 +28,12 @@ std::size_t width(const std::string& text) {
   return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
   }));
+}
+
+/// A terminal that can erase a line; else progress is plain lines.
+bool redraws_lines() {
+  const char* terminal = std::getenv("TERM");
+  return isatty(STDERR_FILENO) != 0 && terminal != nullptr && std::string_view(terminal) != "dumb";
 }
 
 bool numeric(const std::string& text) {
@@ -56,7 +64,7 @@ Progress::Progress(const Console& console, std::string label, std::string unit, 
       label_(std::move(label)),
       unit_(std::move(unit)),
       scale_(scale),
-      terminal_(isatty(STDERR_FILENO) != 0) {}
+      terminal_(redraws_lines()) {}
 
 Progress::~Progress() {
   if (terminal_ && drawn_) fmt::print(stderr, "\r\x1b[K");

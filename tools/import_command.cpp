@@ -1,6 +1,7 @@
 #include "tools/import_command.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -43,9 +44,11 @@ ArrayList read_arrays(const std::filesystem::path& file) {
     shown += (k == 0 ? "" : ", ") + arrays.arrays[k].name;
   throw FormatError(
       arrays.file, "",
-      fmt::format("does not say what its {} arrays ({}{}) are; write a map with kind: frf or "
-                  "kind: log (docs/exchange.md) and give it with --map",
-                  arrays.arrays.size(), shown, arrays.arrays.size() > kMost ? ", ..." : ""));
+      fmt::format(
+          "does not say what its {} arrays ({}{}) are; write a map with kind: frf or "
+          "kind: log (docs/exchange.md) and give it with --map; 'stageid import {}' lists them",
+          arrays.arrays.size(), shown, arrays.arrays.size() > kMost ? ", ..." : "",
+          arrays.file.string()));
 }
 
 void require_frf_output(const std::filesystem::path& output) {
@@ -89,13 +92,31 @@ ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console
       ->add_option("file", input_,
                    "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone)")
       ->required();
-  command->add_option("-o,--output", output_, "frf.h5, or of a log run.slog or run.h5")->required();
+  command->add_option(
+      "-o,--output", output_,
+      "frf.h5, or of a log run.slog or run.h5; without it the file's arrays are listed, which "
+      "is what a map is written from");
   command->add_option("--map", map_,
                       "YAML file that tells which arrays are what; needed where the file does not");
   command->final_callback([this] { run(); });
 }
 
+void ImportCommand::list() const {
+  if (!map_.empty())
+    throw std::invalid_argument("--map: the file to write is missing; give it with -o");
+  std::vector<std::vector<std::string>> rows = {{"array", "size", "holds"}};
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const NamedArray& array : read_arrays(input_).arrays) {
+    const char* holds = array.is_text() ? "text" : array.is_complex() ? "complex" : "real";
+    rows.push_back({array.name, fmt::format("{}", fmt::join(array.shape, " x ")), holds});
+    json.push_back({{"name", array.name}, {"size", array.shape}, {"holds", holds}});
+  }
+  for (const std::string& line : table_lines(rows)) console_.result(line);
+  console_.result({{"arrays", json}});
+}
+
 void ImportCommand::run() const {
+  if (output_.empty()) return list();
   if (map_.empty()) {
     require_frf_output(output_);
     write_imported(output_, read_foreign_frf(input_, output_), input_);

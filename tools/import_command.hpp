@@ -7,13 +7,15 @@
 
 namespace stageid {
 
-/// stageid import FILE.{unv,uff,mat,csv,h5,npz,sNp} -o frf.h5|run.slog [--map MAP.yaml]
+/// stageid import FILE.{unv,uff,mat,csv,h5,npz,sNp} -o frf.h5|run.slog [--map MAP.yaml]; without -o it lists
+/// what the file holds.
 class ImportCommand {
  public:
   ImportCommand(CLI::App& app, Console& console);
 
  private:
   void run() const;
+  void list() const;
 
   Console& console_;
   std::filesystem::path input_;

@@ -1,6 +1,7 @@
 #include "tools/program.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "excitation/file_error.hpp"
+#include "tools/command_tree.hpp"
 #include "tools/config_command.hpp"
 #include "tools/console.hpp"
 #include "tools/design_command.hpp"
@@ -24,6 +26,7 @@
 #include "tools/interrupt.hpp"
 #include "tools/key_suggestion.hpp"
 #include "tools/log_command.hpp"
+#include "tools/manual_command.hpp"
 #include "tools/modes_command.hpp"
 #include "tools/node_command.hpp"
 #include "tools/report_command.hpp"
@@ -65,14 +68,15 @@ class Program {
         import_(app_, console_),
         report_(app_, console_),
         config_(app_, console_),
-        node_(app_, console_) {
+        node_(app_, console_),
+        manual_(app_, console_) {
     app_.name("stageid");
     app_.set_version_flag("--version", "stageid " STAGEID_VERSION);
     app_.add_flag("--json", console_.json, "the result as one JSON object on stdout");
     const std::vector<std::pair<std::string, Verbosity>> levels = {
         {"quiet", Verbosity::quiet}, {"normal", Verbosity::normal}, {"debug", Verbosity::debug}};
     app_.add_option("--verbosity", console_.verbosity, "quiet | normal | debug")
-        ->transform(CLI::CheckedTransformer(levels).description(""));
+        ->transform(CLI::CheckedTransformer(levels).description("{quiet,normal,debug}"));
     app_.require_subcommand(0, 1);
     app_.footer(kFooter);
   }
@@ -91,9 +95,7 @@ class Program {
 
  private:
   void refuse_unknown_command(int argc, const char* const* argv) const {
-    std::vector<std::string> names;
-    for (const CLI::App* command : app_.get_subcommands([](const CLI::App*) { return true; }))
-      names.push_back(command->get_name());
+    const std::vector<std::string> names = names_of(command_tree(app_).commands);
     int first = 1;
     while (first < argc && argv[first][0] == '-')
       first += std::string_view(argv[first]) == "--verbosity" ? 2 : 1;
@@ -114,13 +116,35 @@ class Program {
       app_.exit(success);
       return false;
     } catch (const CLI::ParseError& error) {
-      std::string command;
-      for (const CLI::App* sub : app_.get_subcommands()) command += " " + sub->get_name();
-      std::string what = error.what();
-      std::replace(what.begin(), what.end(), '\n', ' ');
-      throw std::invalid_argument(fmt::format("{}; see 'stageid{} --help'", what, command));
+      throw std::invalid_argument(explained(error));
     }
     return true;
+  }
+
+  /// What CLI11 says, or the nearest word to one that it does not know; and where help is.
+  std::string explained(const CLI::ParseError& error) {
+    std::string path;
+    const CLI::App* innermost = &app_;
+    while (!innermost->get_subcommands().empty()) {
+      innermost = innermost->get_subcommands().front();
+      path += " " + innermost->get_name();
+    }
+    const CommandTree command = command_tree(*innermost);
+    std::vector<std::string> known = names_of(command.commands);
+    for (const CommandTree& tree : {command, command_tree(app_)})
+      for (const std::string& flag : flags_of(tree)) known.push_back(flag);
+    for (const std::string& unknown : app_.remaining(true)) {
+      const std::string nearest = nearest_word(unknown.substr(0, unknown.find('=')), known);
+      if (!nearest.empty())
+        return fmt::format("'{}' is unknown; did you mean '{}'? See 'stageid{} --help'", unknown,
+                           nearest, path);
+    }
+    if (innermost != &app_ && !command.commands.empty())
+      return fmt::format("a subcommand is missing: one of {}; see 'stageid{} --help'",
+                         fmt::join(names_of(command.commands), ", "), path);
+    std::string what = error.what();
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    return fmt::format("{}; see 'stageid{} --help'", what, path);
   }
 
   Console console_;
@@ -138,6 +162,7 @@ class Program {
   ReportCommand report_;
   ConfigCommand config_;
   NodeCommand node_;
+  ManualCommand manual_;
 };
 
 }  // namespace

@@ -19,7 +19,12 @@ TEST_F(BadRequest, Usage) {
   fail({"frf", "a.slog", "-o", "b.h5", "--method", "guess"}, 2, "--method");
   fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads");
   fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
-  fail({"log"}, 2, "subcommand");
+  fail({"log"}, 2, "a subcommand is missing: one of info, verify, recover, convert; see");
+  fail({"log", "inf", "a.slog"}, 2, "'inf' is unknown; did you mean 'info'?");
+  fail({"frf", "a.slog", "-o", "b.h5", "--methd=lpm"}, 2, "did you mean '--method'?");
+  fail({"frf", "a.slog", "-o", "b.h5", "--jsn"}, 2, "did you mean '--json'? See 'stageid frf");
+  fail({"manual", "-o", config_}, 1, "cannot be made a directory");
+  fail({"import", "x.csv", "--map", "m.yaml"}, 2, "the file to write is missing; give it with -o");
   fail({"run", config_, "-o", name("x.slog"), "--backend", "simulator"}, 2, "--backend");
 }
 

@@ -50,6 +50,12 @@ def uff_function(y, reference, response, x=None, kind=4, double=True, binary=Non
 
 
 class ByThemselves(Case):
+    def test_a_file_without_output_is_listed(self):
+        np.savez(WORK / "x.npz", w=np.arange(4.0), G=G)
+        shown = self.succeed("import", "x.npz").stdout
+        self.assertRegex(shown, r"w +4 +real")
+        self.assertRegex(shown, rf"G +{' x '.join(map(str, G.shape))} +complex")
+
     def test_universal_files_of_others(self):
         for binary, tolerance in ((None, 1e-11), ("<", 0.0), (">", 0.0)):
             with self.subTest(binary):
