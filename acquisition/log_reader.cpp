@@ -28,9 +28,10 @@ std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool dama
   if (magic == kHdf5Magic) return std::make_unique<Hdf5LogReader>(file);
   // With its first block damaged a native log still has others.
   if (!damaged_is_error) return std::make_unique<SlogReader>(file, false);
-  throw FormatError(file, "",
-                    "is neither a native log (.slog) nor an HDF5 file; if it is a damaged native "
-                    "log, use 'stageid log recover'");
+  throw FormatError(
+      file, "",
+      "is neither a native log (.slog) nor an HDF5 file; another program's is read with "
+      "'stageid import', a damaged native log with 'stageid log recover'");
 }
 
 }  // namespace stageid

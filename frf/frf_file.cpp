@@ -148,7 +148,8 @@ void require_format(const Hdf5File& file) {
   if (format != kFormat) {
     throw FormatError(
         file.path(), "/",
-        fmt::format("format is '{}'; a frequency response says '{}'", format, kFormat));
+        fmt::format("format is '{}'; a frequency response says '{}'{}", format, kFormat,
+                    format == "stageid-log" ? ", 'stageid frf' makes one of a log" : ""));
   }
   if (!file.has_attribute("/", "format_version")) return;
   const long long version = file.read_integer_attribute("/", "format_version");

@@ -41,8 +41,8 @@ constexpr const char* kWelcome =
 
   stageid identify configs/experiment/wafer_stage_quick.yaml -o first
       the whole job on a simulated wafer stage, up to a model and first/report.html
-  stageid frf YOUR_LOG.h5 -o frf.h5 && stageid fit frf.h5 -o model.json
-      from a log of your own to a model
+  stageid import YOUR_LOG.csv
+      what a log of another program holds (.mat, .h5, .npz too); docs/guide.md leads from there to a report
   stageid config schema
       everything that may stand in a configuration
 

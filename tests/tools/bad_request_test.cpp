@@ -55,6 +55,21 @@ TEST_F(BadRequest, SubmodelsThatAreNone) {
   fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "n=2,m=3"}, 2, "write at most 2");
 }
 
+TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
+  make_log();
+  fail({"frf", config_, "-o", name("x.h5")}, 2, "another program's is read with 'stageid import'");
+  succeed({"log", "convert", name("run.slog"), "-o", name("run.h5")});
+  fail({"fit", name("run.h5"), "-o", name("m.json")}, 2, "'stageid frf' makes one of a log");
+}
+
+TEST_F(BadRequest, WithoutArgumentsThereAreThreeThingsToTry) {
+  const ProgramResult shown = run({});
+  EXPECT_EQ(shown.exit_code, 0);
+  for (const char* start :
+       {"\n  stageid identify ", "\n  stageid import ", "\n  stageid config schema"})
+    EXPECT_THAT(shown.out, testing::HasSubstr(start));
+}
+
 TEST_F(BadRequest, MissingFiles) {
   fail({"run", name("none.yaml"), "-o", name("x.slog")}, 1, "none.yaml: cannot be read");
   fail({"frf", name("none.slog"), "-o", name("x.h5")}, 1, "none.slog");

@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+"""Ctrl-C at any moment: every command ends by itself or with 130 and one line, an output is there whole or not
+at all, nothing else is left behind, and an interrupted run goes on to the same log.
+
+    interrupt_test.py PROGRAM CONFIGS WORK_DIR
+"""
+
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import unittest
+
+PROGRAM, CONFIGS, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
+SMALL = "configs/experiment/small_stage.yaml"
+# In order: each uses what those before it have written. The bytes of all of these are the same every time.
+COMMANDS = {
+    "excitation.h5": ["design", SMALL],
+    "frf.h5": ["frf", "run.slog", "--realizations", "1,2"],
+    "modes.json": ["modes", "frf.h5"],
+    "model.json": ["fit", "frf.h5", "--band", "120", "800", "--direct-term", "full"],
+    "model.mat": ["export", "model.json"],
+    "table.csv": ["log", "convert", "run.slog"],
+    "back.h5": ["import", "table.csv", "--map", "configs/import/bench_csv.yaml"],
+}
+# From before main() to after most commands are done, in steps that fall everywhere between.
+DELAYS_S = [0.0, 0.003, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12]
+
+
+def run(*words, interrupt_after_s=None):
+    """(exit code, stderr); SIGINT once after so long."""
+    process = subprocess.Popen([PROGRAM, *words], cwd=WORK, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    if interrupt_after_s is not None:
+        try:
+            process.wait(interrupt_after_s)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=120)
+    return process.returncode, error
+
+
+def files():
+    return {path.relative_to(WORK) for path in WORK.rglob("*") if path.is_file()}
+
+
+class InterruptTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        shutil.rmtree(WORK, ignore_errors=True)
+        shutil.copytree(CONFIGS, WORK / "configs")
+        for words in (["run", SMALL, "-o", "run.slog"],
+                      *([*words, "-o", output] for output, words in COMMANDS.items())):
+            code, error = run(*words)
+            assert code == 0, (words, error)
+
+    def check_end(self, code, error):
+        # Before main() nobody is there yet to catch it.
+        self.assertIn(code, (0, 130, -signal.SIGINT), error)
+        if code == 130:
+            last = error.strip().splitlines()[-1]
+            self.assertRegex(last, "^stageid: ")
+
+    def test_an_output_is_whole_or_not_there(self):
+        ends = set()
+        for output, words in COMMANDS.items():
+            whole = (WORK / output).read_bytes()
+            before = files()
+            for delay_s in DELAYS_S:
+                with self.subTest(words[0], delay_s=delay_s):
+                    new = pathlib.Path(f"new{pathlib.Path(output).suffix}")
+                    code, error = run(*words, "-o", str(new), interrupt_after_s=delay_s)
+                    self.check_end(code, error)
+                    ends.add(code)
+                    left = files() - before
+                    self.assertLessEqual(left, {new})
+                    if code == 0:
+                        self.assertEqual(left, {new})
+                    if left:
+                        self.assertTrue((WORK / new).read_bytes() == whole, "another file than without Ctrl-C")
+                        (WORK / new).unlink()
+        self.assertIn(0, ends)
+
+    def test_an_interrupted_run_goes_on(self):
+        codes = []
+        for delay_s in DELAYS_S:
+            with self.subTest(delay_s=delay_s):
+                for path in WORK.glob("cut.*"):
+                    path.unlink()
+                code, error = run("run", SMALL, "-o", "cut.slog", "--pace", "0.1", interrupt_after_s=delay_s)
+                self.check_end(code, error)
+                codes.append(code)
+                if not (WORK / "cut.slog").exists():
+                    continue
+                self.assertEqual(run("log", "verify", "cut.slog")[0], 0)
+                code, error = run("run", SMALL, "-o", "cut.slog", "--resume", "--pace", "0")
+                self.assertEqual(code, 0, error)
+                self.assertEqual(run("frf", "cut.slog", "--realizations", "1,2", "-o", "cut.h5")[0], 0)
+        self.assertIn(130, codes)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
