@@ -57,6 +57,12 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
 }
 
 void RunCommand::run() const {
+  const std::string ending = output_.extension().string();
+  if (ending == ".h5" || ending == ".hdf5" || ending == ".csv")
+    throw std::invalid_argument(fmt::format(
+        "{}: what is measured is written as .slog, which survives a crash; 'stageid log "
+        "convert' makes {} of it",
+        output_.string(), ending));
   const ExperimentConfig config = load_experiment_config(config_);
   const ExperimentPlan plan =
       excitation_.empty() ? make_plan(config) : read_plan_of(config, excitation_);

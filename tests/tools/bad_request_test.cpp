@@ -56,6 +56,7 @@ TEST_F(BadRequest, SubmodelsThatAreNone) {
 }
 
 TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
+  fail({"run", config_, "-o", name("run.h5")}, 2, "'stageid log convert' makes .h5 of it");
   make_log();
   fail({"frf", config_, "-o", name("x.h5")}, 2, "another program's is read with 'stageid import'");
   succeed({"log", "convert", name("run.slog"), "-o", name("run.h5")});
@@ -236,7 +237,8 @@ TEST_F(BadRequest, Outputs) {
       {"report", name("frf.h5")}, {"log", "convert", name("run.slog")}};
   for (std::vector<std::string> command : commands) {
     command.insert(command.end(), {"-o", ""});
-    for (const char* place : {"nowhere/x.h5", "experiment.yaml/x.h5"}) {
+    for (std::string place : {"nowhere/x.h5", "experiment.yaml/x.h5"}) {
+      if (command[0] == "run") place = replaced(place, ".h5", ".slog");
       command.back() = name(place);
       fail(command, 1, place);
     }
