@@ -48,30 +48,28 @@ class LogSum {
 
 class Shares {
  public:
-  Shares(std::span<const Eigen::MatrixXcd> spectra, const Periods& kept, Eigen::Index lines)
-      : spectra_(spectra), kept_(kept), smallest_(spectra.front().rows()) {
+  Shares(std::span<const Eigen::MatrixXcd> spectra, const Periods& kept,
+         const Eigen::VectorXd& frequency_hz)
+      : spectra_(spectra), kept_(kept), leak_(frequency_hz.cwiseInverse()) {
+    smallest_.resize(spectra.front().rows());
     for (Eigen::Index c = 0; c < smallest_.size(); ++c)
-      smallest_[c] = kRounding * spectra.front().row(c).head(lines).cwiseAbs2().maxCoeff();
+      smallest_[c] = kRounding * spectra.front().row(c).head(leak_.size()).cwiseAbs2().maxCoeff();
   }
 
-  BandShares of(Eigen::Index channel, Eigen::Index first, Eigen::Index last) const {
+  BandShares of(Eigen::Index channel, Eigen::Index first, Eigen::Index last) {
     const std::size_t P = kept_.size();
+    deviate(channel, first, last);
+    take_out_leakage(first);
     BandShares band;
     band.share.setZero(static_cast<Eigen::Index>(P));
     std::vector<LogSum> rest(P);
-    Eigen::VectorXd power(static_cast<Eigen::Index>(P));
-    for (Eigen::Index k = first; k < last; ++k) {
-      std::complex<double> mean = 0.0;
-      for (const std::size_t p : kept_) mean += spectra_[p](channel, k);
-      mean /= static_cast<double>(P);
-      for (std::size_t i = 0; i < P; ++i)
-        power[static_cast<Eigen::Index>(i)] = std::norm(spectra_[kept_[i]](channel, k) - mean);
-      const double scatter = power.sum();
+    for (Eigen::Index k = 0; k < deviation_.rows(); ++k) {
+      const double scatter = deviation_.row(k).squaredNorm();
       if (!(scatter > smallest_[channel])) continue;
       ++band.lines;
       const double scale = static_cast<double>(P) / (static_cast<double>(P - 1) * scatter);
       for (std::size_t i = 0; i < P; ++i) {
-        const double r = scale * power[static_cast<Eigen::Index>(i)];
+        const double r = scale * std::norm(deviation_(k, static_cast<Eigen::Index>(i)));
         band.share[static_cast<Eigen::Index>(i)] += r;
         rest[i].add(std::max(kSmallestRest, 1.0 - r));
       }
@@ -83,16 +81,41 @@ class Shares {
   }
 
  private:
+  /// Every period's deviation from the mean, lines x periods.
+  void deviate(Eigen::Index channel, Eigen::Index first, Eigen::Index last) {
+    deviation_.resize(last - first, static_cast<Eigen::Index>(kept_.size()));
+    for (std::size_t i = 0; i < kept_.size(); ++i)
+      deviation_.col(static_cast<Eigen::Index>(i)) =
+          spectra_[kept_[i]].row(channel).segment(first, last - first).transpose();
+    const Eigen::VectorXcd mean = deviation_.rowwise().mean();
+    deviation_.colwise() -= mean;
+  }
+
+  /// Least squares, each line weighed by its own scatter.
+  void take_out_leakage(Eigen::Index first) {
+    const auto leak = leak_.segment(first, deviation_.rows());
+    const Eigen::VectorXd weight =
+        deviation_.rowwise().squaredNorm().cwiseMax(1e-300).cwiseInverse();
+    const Eigen::VectorXd weighed = weight.cwiseProduct(leak);
+    const double size = weighed.dot(leak);
+    if (!(size > 0.0) || !std::isfinite(size)) return;
+    const Eigen::RowVectorXcd part = weighed.transpose() * deviation_ / size;
+    deviation_.noalias() -= leak.cast<std::complex<double>>() * part;
+  }
+
   std::span<const Eigen::MatrixXcd> spectra_;
   const Periods& kept_;
+  Eigen::VectorXd leak_;  // shape of leakage over the lines
   Eigen::VectorXd smallest_;
+  Eigen::MatrixXcd deviation_;
 };
 
 /// The period that stands out most of those kept, as a position in `kept`; none if all belong
 /// together.
 std::optional<PeriodOutlier> worst(std::span<const Eigen::MatrixXcd> spectra, const Periods& kept,
-                                   const std::vector<Eigen::Index>& bands) {
-  const Shares shares(spectra, kept, bands.back());
+                                   const std::vector<Eigen::Index>& bands,
+                                   const Eigen::VectorXd& frequency_hz) {
+  Shares shares(spectra, kept, frequency_hz);
   const auto P = static_cast<double>(kept.size());
   const Eigen::Index channels = spectra.front().rows();
   const double tests = P * static_cast<double>(channels) * static_cast<double>(bands.size() - 1);
@@ -123,7 +146,7 @@ std::vector<PeriodOutlier> find_outliers(std::span<const Eigen::MatrixXcd> perio
   for (std::size_t p = 0; p < kept.size(); ++p) kept[p] = p;
   const std::vector<Eigen::Index> bands = octave_bands(frequency_hz, kFewestLines);
   while (kept.size() >= 3 && 2 * (outliers.size() + 1) < periods.size()) {
-    std::optional<PeriodOutlier> outlier = worst(periods, kept, bands);
+    std::optional<PeriodOutlier> outlier = worst(periods, kept, bands, frequency_hz);
     if (!outlier) break;
     const auto at = kept.begin() + static_cast<std::ptrdiff_t>(outlier->period);
     outlier->period = *at;

@@ -23,7 +23,9 @@ inline constexpr double kDropByChance = 1e-3;
 /// For P periods of stationary Gaussian noise the share of period p in the scatter of a line,
 ///   r = |Z_p - Z|^2 / sum_q |Z_q - Z|^2  P / (P - 1),  Z the mean,  P(r > x) = (1 - x)^(P - 2),
 /// whatever the noise's colour, so that -(P - 2) sum ln(1 - r) over the L lines of a band is a sum of
-/// L unit exponentials. A period is an outlier if in some channel and octave (of at least 8 lines)
+/// L unit exponentials. What drifts from one end of a period to the other leaks into all lines at once,
+/// as 1/(j omega) where it is slow: that much of each period's deviation is taken out of every band
+/// first, lest its one random number counts as L. A period is an outlier if in some channel and octave (of at least 8 lines)
 /// this sum has a probability below kDropByChance over the number of such tests, and the ratio
 ///   (P - 2) sum r / sum (1 - r)  (1 for clean periods)
 /// is above 4: what adds less costs the mean less than a period, and is in its variance. The worst
