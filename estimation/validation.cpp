@@ -68,6 +68,8 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf) {
   if (variance.size() > 0 && variance.minCoeff() > 0.0) {
     const Eigen::ArrayXXd ratio = squared / variance.array();
     out.chi_square_per_dof = ratio.mean();
+    const double nu = frf.noise_variance.size() > 0 ? frf.noise_dof : frf.total_dof;
+    out.expected_chi_square = nu > 1.0 ? nu / (nu - 1.0) : nu > 0.0 ? 0.0 : 1.0;
     out.whitened_above_95 =
         static_cast<double>((ratio > -std::log(0.05)).count()) / static_cast<double>(ratio.size());
     fill_whiteness(E.cwiseQuotient(variance.cwiseSqrt().cast<std::complex<double>>()), out);

@@ -9,8 +9,10 @@ namespace stageid {
 struct Validation {
   double relative_rms_error = 0.0;  ///< sqrt(mean |E|^2/|G|^2)
   double normalized_error = 0.0;    ///< sum |E|^2 over sum |G|^2, square root
-  double chi_square_per_dof =
-      0.0;  ///< mean |E|^2/variance, 1 if the model is within the noise; 0 unknown
+  double chi_square_per_dof = 0.0;  ///< mean |E|^2/variance; 0: unknown
+  /// What that is if the error is noise: nu / (nu - 1), the mean of F(2, 2 nu), for a variance of nu degrees
+  /// of freedom; 1 for an exact one, 0 without a mean.
+  double expected_chi_square = 0.0;
   double whitened_above_95 = 0.0;  ///< share of |e|^2 above the 95 % point of Exp(1); 0.05 is right
   double whiteness =
       0.0;  ///< largest |autocorrelation| of the whitened residual over lines, lags 1..10,

@@ -63,8 +63,11 @@ std::vector<std::string> validation_lines(const Validation& v) {
       "relative error {:.4e} (mean over lines and channels), {:.4e} (of the whole response)",
       v.relative_rms_error, v.normalized_error)};
   if (v.chi_square_per_dof > 0.0) {
-    lines.push_back(fmt::format("chi-square per degree of freedom {:.3f}; 1: within the noise",
-                                v.chi_square_per_dof));
+    const std::string expected = v.expected_chi_square > 0.0
+                                     ? fmt::format("{:.3f}", v.expected_chi_square)
+                                     : "without a mean for variances this uncertain";
+    lines.push_back(fmt::format("chi-square per degree of freedom {:.3f}; of noise alone: {}",
+                                v.chi_square_per_dof, expected));
     lines.push_back(
         fmt::format("residuals above their 95 % point: {:.1f} %; autocorrelation {:.4f}, 99 % "
                     "limit {:.4f}",
@@ -79,6 +82,7 @@ nlohmann::ordered_json validation_json(const Validation& v) {
   return {{"relative_rms_error", v.relative_rms_error},
           {"normalized_error", v.normalized_error},
           {"chi_square_per_dof", v.chi_square_per_dof},
+          {"expected_chi_square", v.expected_chi_square},
           {"whitened_above_95", v.whitened_above_95},
           {"whiteness", v.whiteness},
           {"whiteness_limit", v.whiteness_limit},

@@ -147,6 +147,35 @@ TEST(Validation, TotalVarianceServesWhereNoNoiseVarianceIs) {
   EXPECT_NEAR(validate(model, frf).chi_square_per_dof, 1.0, 0.06);
 }
 
+// A variance that is itself the mean of nu squares: the ratio is F(2, 2 nu).
+TEST(Validation, FewPeriodsRaiseTheChiSquareOfNoiseAlone) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  EXPECT_EQ(validate(model, measured(model, HoldModel::exact)).expected_chi_square, 0.0)
+      << "without variances";
+  for (const int nu : {4, 9}) {
+    FrfEstimate frf = measured(model, HoldModel::exact);
+    add_noise(frf, 7);
+    EXPECT_EQ(validate(model, frf).expected_chi_square, 1.0) << "exact variances";
+    test::RandomNumbers random(static_cast<std::uint64_t>(nu));
+    for (double& variance : frf.noise_variance.reshaped()) {
+      double sum = 0.0;
+      for (int i = 0; i < nu; ++i) sum += std::norm(random.circular());
+      variance *= sum / nu;
+    }
+    frf.noise_dof = nu;
+    const Validation result = validate(model, frf);
+    EXPECT_DOUBLE_EQ(result.expected_chi_square, nu / (nu - 1.0));
+    // F(2, 2 nu) has the variance nu^3 / ((nu - 1)^2 (nu - 2)).
+    const double deviation = std::sqrt(std::pow(nu, 3) / (std::pow(nu - 1, 2) * (nu - 2)));
+    EXPECT_NEAR(result.chi_square_per_dof, result.expected_chi_square,
+                4.5 * deviation / std::sqrt(9000.0));
+  }
+  FrfEstimate one = measured(model, HoldModel::exact);
+  add_noise(one, 7);
+  one.noise_dof = 1.0;
+  EXPECT_EQ(validate(model, one).expected_chi_square, 0.0) << "no mean";
+}
+
 TEST(Validation, ChannelsMustMatchByName) {
   const AdditiveModel model = stage_model(HoldModel::exact);
   FrfEstimate frf = measured(model, HoldModel::exact);
