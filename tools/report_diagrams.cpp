@@ -8,9 +8,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// Of one hundred tests on a linear plant one fails.
-constexpr double kChance = 0.01;
-
 Json significant(double value) {
   if (!std::isfinite(value) || value == 0.0) return std::isfinite(value) ? Json(0.0) : Json();
   const double scale = std::pow(10.0, 3.0 - std::floor(std::log10(std::abs(value))));
@@ -43,7 +40,7 @@ Json nonlinearity_json(const NonlinearityTest& test) {
   return {{"bands", rows_of(test.band_hz)},
           {"p_value", rows_of(test.p_value)},
           {"distortion", rows_of(test.distortion)},
-          {"chance", kChance}};
+          {"chance", kNonlinearBelow}};
 }
 
 Json findings_json(const std::vector<ReportFinding>& findings) {

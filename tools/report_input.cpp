@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -12,6 +13,7 @@
 #include "excitation/hdf5_file.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/fit_step.hpp"
+#include "tools/health_step.hpp"
 #include "tools/model_hdf5.hpp"
 #include "tools/report_comparison.hpp"
 #include "tools/run_metadata.hpp"
@@ -120,26 +122,39 @@ double delay_in(const FrfEstimate& frf, const std::optional<AdditiveModel>& mode
   return delay_s;
 }
 
-/// The test needs independent lines, both variances and their degrees of freedom.
-bool can_test_linearity(const FrfEstimate& frf) {
-  const Json provenance = Json::parse(frf.provenance_json, nullptr, false);
-  const Json options =
-      provenance.is_object() ? provenance.value("options", Json::object()) : Json::object();
-  const bool periodic = options.is_object() && options.value("method", Json()) == "periodic";
-  return periodic && frf.noise_variance.size() > 0 && frf.total_variance.size() > 0 &&
-         frf.total_dof >= 1.0 && frf.noise_dof > 0.0;
+/// A fault of the data is an error of the page, a doubt a warning; what could not be checked is a note.
+ReportMessage::Severity severity_of(const Finding& finding) {
+  switch (finding.severity) {
+    case Severity::fault:
+      return ReportMessage::Severity::error;
+    case Severity::doubt:
+      return ReportMessage::Severity::warning;
+    case Severity::unchecked:
+      return ReportMessage::Severity::note;
+  }
+  return ReportMessage::Severity::note;
 }
 
-void add_diagrams(ReportData& data) {
+/// The verdicts that the file holds stand for all lines that were measured, whatever band was fitted.
+void add_checks(ReportData& data) {
   const FrfEstimate& frf = *data.frf;
-  data.cmif_kind = PeakOptions().kind;
-  data.cmif_curves = cmif(frf, data.cmif_kind);
-  if (can_test_linearity(frf)) data.nonlinearity = nonlinearity_test(frf);
+  if (frf.nonlinearity.band_hz.rows() > 0)
+    data.nonlinearity = frf.nonlinearity;
+  else if (why_linearity_cannot_be_tested(frf).empty())
+    data.nonlinearity = nonlinearity_test(frf);
+  for (const Finding& finding : health_of(frf.provenance_json))
+    data.findings.push_back(
+        {severity_of(finding), finding.channel, finding.what, finding.figure, finding.remedy});
+}
+
+void add_stabilization(ReportData& data) {
+  const FrfEstimate& frf = *data.frf;
   const StabilizationOptions options{.delay_s = delay_in(frf, data.model)};
   if (frf.lines() > 2 * options.most_order) data.stabilization = stabilization(frf, options);
 }
 
-/// What only a summary knows: the truth of a simulated plant, and how long the steps took.
+/// What only a summary knows: the truth of a simulated plant, and how long the steps took. Notes that stand
+/// in the table of findings are not told twice.
 void add_summary(ReportData& data, const std::filesystem::path& file) {
   const Json summary = Json::parse(read_text(file), nullptr, false);
   if (!summary.is_object()) throw FormatError(file, "", "is not JSON; write it anew with identify");
@@ -154,8 +169,10 @@ void add_summary(ReportData& data, const std::filesystem::path& file) {
   for (const Json& step : summary.value("steps", Json::array()))
     data.steps.push_back(
         {step.value("name", ""), step.value("seconds", 0.0), step.value("note", "")});
+  const std::vector<std::string> told =
+      data.frf ? health_notes(health_of(data.frf->provenance_json)) : std::vector<std::string>();
   for (const Json& note : summary.value("notes", Json::array()))
-    if (note.is_string())
+    if (note.is_string() && std::ranges::find(told, note.get<std::string>()) == told.end())
       data.messages.push_back({ReportMessage::Severity::warning, note.get<std::string>()});
 }
 
@@ -199,20 +216,34 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files) {
   return input;
 }
 
-ReportData read_report_data(const ReportInput& input) {
+ReportData read_response_data(const ReportInput& input) {
   ReportData data;
-  data.version = STAGEID_VERSION;
-  data.title = "stageid";
   if (!input.frf.empty()) data.frf = read_frf(input.frf);
   if (!input.validation_frf.empty()) data.validation_frf = read_frf(input.validation_frf);
   if (!input.model.empty()) {
     data.model = read_model(input.model);
-    data.cost = data.model->cost_history;
-    data.decisions = decisions_of(*data.model);
     add_response(data, input);
   }
-  if (data.frf) add_diagrams(data);
+  if (data.frf) {
+    data.cmif_kind = PeakOptions().kind;
+    data.cmif_curves = cmif(*data.frf, data.cmif_kind);
+  }
   if (!input.modes.empty()) data.chosen_modes = read_modes(input.modes);
+  return data;
+}
+
+ReportData read_report_data(const ReportInput& input) {
+  ReportData data = read_response_data(input);
+  data.version = STAGEID_VERSION;
+  data.title = "stageid";
+  if (data.model) {
+    data.cost = data.model->cost_history;
+    data.decisions = decisions_of(*data.model);
+  }
+  if (data.frf) {
+    add_checks(data);
+    add_stabilization(data);
+  }
   if (!input.log.empty()) add_log(data, input.log);
   if (!input.stage.empty()) data.geometry = stage_geometry(input.stage, read_text(input.stage));
   if (!data.geometry.stage.empty()) data.title = data.geometry.stage;

@@ -24,9 +24,14 @@ struct ReportInput {
 /// @throws std::invalid_argument for a file that is none of these, or twice the same kind.
 ReportInput report_input(const std::vector<std::filesystem::path>& files);
 
-/// Reads everything and computes what belongs together: the model's response and error on the lines
-/// of the FRF within the model's band, CMIF curves, validation.
+/// What a page and a picture show of the response: the FRF within the model's band, the model's response and error
+/// on its lines, what was held back, validation, CMIF curves, chosen modes.
 /// @throws FileError, FormatError, std::invalid_argument
+ReportData read_response_data(const ReportInput& input);
+
+/// Reads everything: the response, the verdicts on linearity and the findings on the data's health that the FRF
+/// holds (verdicts are computed where a file has none), poles over orders, log and summary.
+/// @throws as read_response_data()
 ReportData read_report_data(const ReportInput& input);
 
 /// Adds another day or model: a directory of `identify`, or its FRF and model.

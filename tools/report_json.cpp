@@ -11,6 +11,7 @@
 #include "tools/report_encoding.hpp"
 #include "tools/report_modes.hpp"
 #include "tools/report_shapes.hpp"
+#include "tools/report_uncertainty.hpp"
 #include "tools/report_verdict.hpp"
 #include "tools/timing_json.hpp"
 
@@ -50,24 +51,6 @@ const char* to_string(CmifKind kind) {
       return "whitened";
   }
   return "response";
-}
-
-/// Realizations less one below which the scatter between them says little: the standard deviation
-/// of one value would itself be uncertain by half and draw a ragged band.
-constexpr double kLeastTotalDof = 4.0;
-
-/// The variance that the standard deviation of the page stands for: the total one where enough
-/// realizations tell it, else that of the noise.
-struct Uncertainty {
-  const Eigen::MatrixXd* variance = nullptr;
-  const char* kind = "";
-};
-Uncertainty uncertainty(const FrfEstimate& frf) {
-  const bool scarce = frf.total_dof > 0.0 && frf.total_dof < kLeastTotalDof;
-  if (frf.total_variance.size() > 0 && !(scarce && frf.noise_variance.size() > 0))
-    return {&frf.total_variance, "total"};
-  if (frf.noise_variance.size() > 0) return {&frf.noise_variance, "noise"};
-  return {};
 }
 
 /// Blocks and their descriptions, added together so that none is without the other.

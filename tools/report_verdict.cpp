@@ -47,6 +47,19 @@ void judge_modes(const ReportData& data, Reasons& reasons) {
   }
 }
 
+/// @returns whether one of them is an error.
+bool judge_findings(const ReportData& data, Reasons& reasons) {
+  bool error = false;
+  for (const ReportFinding& finding : data.findings) {
+    if (finding.severity == ReportMessage::Severity::note) continue;
+    error = error || finding.severity == ReportMessage::Severity::error;
+    reasons.push_back(fmt::format("{}{}{}{}", finding.channel, finding.channel.empty() ? "" : ": ",
+                                  finding.what,
+                                  finding.figure.empty() ? "" : " (" + finding.figure + ")"));
+  }
+  return error;
+}
+
 void judge_runs(const ReportData& data, Reasons& reasons) {
   std::uint64_t missing = 0;
   std::uint64_t marked = 0;
@@ -85,6 +98,7 @@ Verdict judge(const ReportData& data) {
     error = error || message.severity == ReportMessage::Severity::error;
     verdict.reasons.push_back(message.text);
   }
+  error = judge_findings(data, verdict.reasons) || error;
   judge_runs(data, verdict.reasons);
   if (data.model) {
     judge_fit(data, verdict.reasons);

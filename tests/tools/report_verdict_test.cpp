@@ -13,7 +13,9 @@ using testing::HasSubstr;
 using Level = Verdict::Level;
 
 ReportData sound() {
-  return test::synthetic_report({.outputs = 2, .inputs = 2, .lines = 40, .modes = 4});
+  ReportData data = test::synthetic_report({.outputs = 2, .inputs = 2, .lines = 40, .modes = 4});
+  data.findings.clear();
+  return data;
 }
 
 void expect_doubt(const ReportData& data, const char* why) {
@@ -26,6 +28,19 @@ TEST(Verdict, ASoundResultIsGood) {
   const Verdict verdict = judge(sound());
   EXPECT_EQ(verdict.level, Level::good);
   EXPECT_THAT(verdict.reasons, ElementsAre());
+}
+
+TEST(Verdict, AFaultOfTheDataIsNotTrustedAndADoubtIsDoubted) {
+  using Severity = ReportMessage::Severity;
+  ReportData data = sound();
+  data.findings = {{Severity::note, "", "timing is not checked", "", "two periods"}};
+  EXPECT_EQ(judge(data).level, Level::good);
+  data.findings.push_back({Severity::warning, "", "hum", "12 dB", "look at the shield"});
+  expect_doubt(data, "hum (12 dB)");
+  data.findings.push_back({Severity::error, "a1 a2", "wired crosswise", "", "exchange them"});
+  const Verdict verdict = judge(data);
+  EXPECT_EQ(verdict.level, Level::bad);
+  EXPECT_THAT(verdict.reasons, ElementsAre("hum (12 dB)", "a1 a2: wired crosswise"));
 }
 
 TEST(Verdict, AFitThatDidNotConvergeIsDoubted) {

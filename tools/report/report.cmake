@@ -83,5 +83,6 @@ target_sources(stageid_tools PRIVATE
   report_json.cpp
   report_modes.cpp
   report_shapes.cpp
+  report_uncertainty.cpp
   report_verdict.cpp
   ${report_assets_cpp})

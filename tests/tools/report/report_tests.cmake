@@ -3,6 +3,7 @@ target_sources(tools_tests PRIVATE
   report_comparison_test.cpp
   report_diagrams_test.cpp
   report_encoding_test.cpp
+  report_input_test.cpp
   report_modes_test.cpp
   report_page_test.cpp
   report_shapes_test.cpp

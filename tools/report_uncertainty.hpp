@@ -1,0 +1,17 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "frf/frf_estimate.hpp"
+
+namespace stageid::report {
+
+/// The variance that the standard deviation of page and pictures stands for: the total one where enough
+/// realizations tell it, else that of the noise. A view, valid while `frf` lives.
+struct Uncertainty {
+  const Eigen::MatrixXd* variance = nullptr;  ///< null: none is known
+  const char* kind = "";                      ///< "total", "noise" or ""
+};
+Uncertainty uncertainty(const FrfEstimate& frf);
+
+}  // namespace stageid::report
