@@ -4,7 +4,8 @@
 # To build and run the program.
 build_packages="g++ cmake ninja-build pkg-config
   libeigen3-dev libfftw3-dev libhdf5-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev
-  libfmt-dev libxxhash-dev libcpp-httplib-dev libmodbus-dev libmatio-dev zlib1g-dev libjs-dygraphs"
+  libfmt-dev libxxhash-dev libcpp-httplib-dev libmodbus-dev libmatio-dev zlib1g-dev libjs-dygraphs
+  gnuplot-nox"
 
 # What the tests need beside that: the references in Python, the report in a browser, the format,
 # the C++ reference, a kernel that has CAN.

@@ -29,6 +29,7 @@
 #include "tools/manual_command.hpp"
 #include "tools/modes_command.hpp"
 #include "tools/node_command.hpp"
+#include "tools/plot_command.hpp"
 #include "tools/report_command.hpp"
 #include "tools/run_command.hpp"
 #include "tools/validate_command.hpp"
@@ -67,6 +68,7 @@ class Program {
         export_(app_, console_),
         import_(app_, console_),
         report_(app_, console_),
+        plot_(app_, console_),
         config_(app_, console_),
         node_(app_, console_),
         manual_(app_, console_) {
@@ -160,6 +162,7 @@ class Program {
   ExportCommand export_;
   ImportCommand import_;
   ReportCommand report_;
+  PlotCommand plot_;
   ConfigCommand config_;
   NodeCommand node_;
   ManualCommand manual_;
