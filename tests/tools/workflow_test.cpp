@@ -194,6 +194,12 @@ TEST_F(Workflow, TheDesignForetellsWhatTheRunDoes) {
   }
 }
 
+TEST_F(Workflow, WithoutArgumentsANewcomerIsToldWhatToTry) {
+  const std::string told = succeed({}).out;
+  for (const char* command : {"stageid identify", "stageid frf", "stageid config schema"})
+    EXPECT_THAT(told, HasSubstr(command));
+}
+
 TEST_F(Workflow, AReportComparesWithAnotherDay) {
   make_frf();
   succeed({"fit", name("frf.h5"), "-o", name("model.json"), "--band", "120", "800"});
