@@ -24,7 +24,7 @@ std::int64_t now_ns() {
 
 }  // namespace
 
-LogThread::LogThread(SlogWriter& log, SampleRing& ring, std::vector<RunObserver*> observers)
+LogThread::LogThread(RunWriter& log, SampleRing& ring, std::vector<RunObserver*> observers)
     : log_(log),
       ring_(ring),
       observers_(std::move(observers)),

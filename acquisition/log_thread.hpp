@@ -13,8 +13,8 @@
 
 #include "acquisition/log_info.hpp"
 #include "acquisition/run_observer.hpp"
+#include "acquisition/run_writer.hpp"
 #include "acquisition/sample_ring.hpp"
-#include "acquisition/slog_writer.hpp"
 
 namespace stageid {
 
@@ -26,7 +26,7 @@ namespace stageid {
 /// true. Observers are told of everything behind the log, of a log that has failed too.
 class LogThread {
  public:
-  LogThread(SlogWriter& log, SampleRing& ring, std::vector<RunObserver*> observers = {});
+  LogThread(RunWriter& log, SampleRing& ring, std::vector<RunObserver*> observers = {});
   /// Writes everything that is queued, then ends.
   ~LogThread();
   LogThread(const LogThread&) = delete;
@@ -60,7 +60,7 @@ class LogThread {
   template <typename Action>
   void guarded(Action action) noexcept;
 
-  SlogWriter& log_;
+  RunWriter& log_;
   SampleRing& ring_;
   std::vector<RunObserver*> observers_;
   mutable std::mutex mutex_;  // of the four below

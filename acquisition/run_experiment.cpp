@@ -49,7 +49,7 @@ std::uint64_t mix(std::uint64_t z) noexcept {
 class Experiment {
  public:
   Experiment(const ExperimentPlan& plan, LimitedStage& stage, MotionController& controller,
-             SlogWriter& log, const RunExperimentOptions& options)
+             RunWriter& log, const RunExperimentOptions& options)
       : plan_(plan),
         stage_(stage),
         options_(options),
@@ -355,7 +355,7 @@ std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept {
 }
 
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
-                                MotionController& controller, SlogWriter& log,
+                                MotionController& controller, RunWriter& log,
                                 const RunExperimentOptions& options) {
   if (!same_measurement(log.info(), experiment_log_info(plan, stage.info()))) {
     throw std::invalid_argument(

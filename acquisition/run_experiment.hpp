@@ -8,7 +8,7 @@
 
 #include "acquisition/event_log.hpp"
 #include "acquisition/run_observer.hpp"
-#include "acquisition/slog_writer.hpp"
+#include "acquisition/run_writer.hpp"
 #include "excitation/experiment_plan.hpp"
 #include "hal/limited_stage.hpp"
 #include "hal/motion_controller.hpp"
@@ -85,7 +85,7 @@ std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept;
 /// and not to be had.
 /// @throws std::invalid_argument if plan, stage, controller and log do not fit.
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
-                                MotionController& controller, SlogWriter& log,
+                                MotionController& controller, RunWriter& log,
                                 const RunExperimentOptions& options = {});
 
 }  // namespace stageid

@@ -21,7 +21,7 @@ constexpr std::chrono::milliseconds kPollEvery{20};
 /// Puts downloaded rows into the log as they come.
 class LogSink final : public TraceSink {
  public:
-  LogSink(SlogWriter& log, std::size_t columns) : log_(log), columns_(columns) {}
+  LogSink(RunWriter& log, std::size_t columns) : log_(log), columns_(columns) {}
 
   void rows(std::uint64_t, std::span<const double> values,
             std::span<const Outcome> outcomes) override {
@@ -44,14 +44,14 @@ class LogSink final : public TraceSink {
   RunHealth health;
 
  private:
-  SlogWriter& log_;
+  RunWriter& log_;
   std::size_t columns_;
   std::vector<double> block_;
 };
 
 class ResidentExperiment {
  public:
-  ResidentExperiment(const ExperimentPlan& plan, ResidentStage& stage, SlogWriter& log,
+  ResidentExperiment(const ExperimentPlan& plan, ResidentStage& stage, RunWriter& log,
                      const RunExperimentOptions& options)
       : plan_(plan),
         stage_(stage),
@@ -172,7 +172,7 @@ class ResidentExperiment {
 
   const ExperimentPlan& plan_;
   ResidentStage& stage_;
-  SlogWriter& log_;
+  RunWriter& log_;
   const RunExperimentOptions& options_;
   std::vector<int> actuators_;
   std::vector<RunId> runs_;
@@ -182,7 +182,7 @@ class ResidentExperiment {
 }  // namespace
 
 ExperimentResult run_resident_experiment(const ExperimentPlan& plan, ResidentStage& stage,
-                                         SlogWriter& log, const RunExperimentOptions& options) {
+                                         RunWriter& log, const RunExperimentOptions& options) {
   if (!same_measurement(log.info(), experiment_log_info(plan, stage.info())))
     throw std::invalid_argument(
         "experiment: the log was made for another plan or stage; make it with "

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "acquisition/run_experiment.hpp"
-#include "acquisition/slog_writer.hpp"
+#include "acquisition/run_writer.hpp"
 #include "excitation/experiment_plan.hpp"
 #include "hal/resident_stage.hpp"
 
@@ -15,6 +15,6 @@ namespace stageid {
 /// @throws std::invalid_argument if the log was made for another plan or stage, or a run is longer
 /// than the stage can record.
 ExperimentResult run_resident_experiment(const ExperimentPlan& plan, ResidentStage& stage,
-                                         SlogWriter& log, const RunExperimentOptions& options);
+                                         RunWriter& log, const RunExperimentOptions& options);
 
 }  // namespace stageid

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "acquisition/log_info.hpp"
+#include "acquisition/run_writer.hpp"
 #include "acquisition/slog_format.hpp"
 
 namespace stageid {
@@ -16,7 +17,7 @@ namespace stageid {
 /// is acknowledged once write() has returned for it; it then survives the death of the process, and
 /// that of the machine from the next synchronize() on (called once a second and at the end of every
 /// run).
-class SlogWriter {
+class SlogWriter final : public RunWriter {
  public:
   /// A new log. @throws FileError if `file` exists or cannot be written.
   /// @throws std::invalid_argument from check_log_info().
@@ -29,7 +30,7 @@ class SlogWriter {
   /// @throws FileError if the file is missing, not writable, or being written by another process.
   static SlogWriter resume(const std::filesystem::path& file, const LogInfo& info);
 
-  ~SlogWriter();
+  ~SlogWriter() override;
   SlogWriter(SlogWriter&&) noexcept;
   SlogWriter& operator=(SlogWriter&&) noexcept;
 
@@ -37,15 +38,15 @@ class SlogWriter {
   /// All functions below: @throws FileError if the disk is full or fails; what was acknowledged is
   /// kept, and every later call fails too. @throws std::invalid_argument on wrong sizes, values
   /// that are not finite, or a wrong order of calls.
-  void begin_run(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& excitation);
+  void begin_run(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& excitation) override;
   /// Appends `rows` rows of actuators + sensors + 1 eight-byte words, row-major. One block a call.
-  void write(std::span<const double> rows);
+  void write(std::span<const double> rows) override;
   /// Ends the run; `complete` in `run` says whether it may be used, `health` how it went. Its other
   /// fields are those of begin_run().
-  void end_run(const LogRun& run);
+  void end_run(const LogRun& run) override;
   /// Brings everything acknowledged to the medium (fdatasync).
-  void synchronize();
-  const LogInfo& info() const noexcept;
+  void synchronize() override;
+  const LogInfo& info() const noexcept override;
   std::uint64_t acknowledged_rows() const noexcept;
   std::uint64_t bytes() const noexcept;
   /// Writes the end block with the exit status of the whole experiment and closes.

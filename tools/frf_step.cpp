@@ -63,10 +63,13 @@ std::string request_id_of(const std::string& provenance_json) {
   return json["request_id"].get<std::string>();
 }
 
-FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, FrfOptions options,
+FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
                      const Console& console) {
-  const OpenLogs open(files);
-  const std::vector<const LogReader*>& logs = open.logs();
+  return estimate_frf(OpenLogs(files).logs(), options, console);
+}
+
+FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
+                     const Console& console) {
   FrfStep step;
   Progress progress(console, "frf", "MB", 1.0 / kBytesPerMegabyte);
   options.progress = [&](double done, double total) {

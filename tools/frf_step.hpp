@@ -15,10 +15,13 @@ struct FrfStep {
   double bytes = 0.0;  ///< of samples that were read
 };
 
-/// Opens the logs, estimates, shows progress, and completes the provenance: configuration, seeds and
+/// Estimates, shows progress, and completes the provenance: configuration, seeds and
 /// the request's identity (frf_request_id()). Nothing of it depends on directory, time or threads.
 /// @throws FileError, FormatError, std::invalid_argument, Interrupted
-FrfStep estimate_frf(const std::vector<std::filesystem::path>& logs, FrfOptions options,
+FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
+                     const Console& console);
+/// The same of logs that it opens.
+FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
                      const Console& console);
 
 /// Names what is asked of the estimate: version, options and what the logs say of their experiment.

@@ -8,6 +8,7 @@ namespace stageid {
 namespace {
 
 std::atomic<bool> interrupted = false;
+std::atomic<bool> left_to_host = false;
 static_assert(std::atomic<bool>::is_always_lock_free, "the only kind a signal handler may touch");
 
 extern "C" void on_signal(int signal) {
@@ -16,6 +17,7 @@ extern "C" void on_signal(int signal) {
 }
 
 bool install() {
+  if (left_to_host) return false;
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   std::signal(SIGXFSZ, SIG_IGN);
@@ -31,7 +33,11 @@ const std::atomic<bool>& interrupt_flag() {
   return interrupted;
 }
 
+void leave_signals_to_host() noexcept { left_to_host = true; }
+
 void request_interrupt() noexcept { interrupted = true; }
+
+void forget_interrupt() noexcept { interrupted = false; }
 
 void throw_if_interrupted() {
   if (interrupt_flag()) throw Interrupted();

@@ -25,7 +25,7 @@ class StreamedStage final : public MeasuredStage {
 
   const StageInfo& info() const noexcept override { return stage_.info(); }
 
-  ExperimentResult perform(SlogWriter& log, const RunExperimentOptions& options) override {
+  ExperimentResult perform(RunWriter& log, const RunExperimentOptions& options) override {
     return run_experiment(plan_, stage_, controller_, log, options);
   }
 
@@ -68,7 +68,7 @@ class PlayingStage final : public MeasuredStage {
       : plan_(plan), stage_(std::move(stage)) {}
 
   const StageInfo& info() const noexcept override { return stage_->info(); }
-  ExperimentResult perform(SlogWriter& log, const RunExperimentOptions& options) override {
+  ExperimentResult perform(RunWriter& log, const RunExperimentOptions& options) override {
     return run_resident_experiment(plan_, *stage_, log, options);
   }
   void explain(MeasurementResult& /*result*/) const override {}

@@ -15,7 +15,7 @@ class MeasuredStage {
  public:
   virtual ~MeasuredStage() = default;
   virtual const StageInfo& info() const noexcept = 0;
-  virtual ExperimentResult perform(SlogWriter& log, const RunExperimentOptions& options) = 0;
+  virtual ExperimentResult perform(RunWriter& log, const RunExperimentOptions& options) = 0;
   /// After perform(): what the stage itself knows of the end becomes part of message and exit code.
   virtual void explain(MeasurementResult& result) const = 0;
   /// The first limit that this side of the wires saw.

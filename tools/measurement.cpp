@@ -7,6 +7,7 @@
 
 #include "acquisition/event_recorder.hpp"
 #include "acquisition/log_reader.hpp"
+#include "acquisition/slog_writer.hpp"
 #include "excitation/file_error.hpp"
 #include "hal/real_time.hpp"
 #include "tools/dashboard.hpp"

@@ -6,6 +6,7 @@
 
 #include "acquisition/run_experiment.hpp"
 #include "acquisition/slog_reader.hpp"
+#include "acquisition/slog_writer.hpp"
 #include "tests/support/analytic_stage.hpp"
 #include "tests/support/temporary_directory.hpp"
 

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "acquisition/slog_reader.hpp"
+#include "acquisition/slog_writer.hpp"
 #include "excitation/file_error.hpp"
 #include "tests/acquisition/small_log.hpp"
 #include "tests/support/analytic_stage.hpp"

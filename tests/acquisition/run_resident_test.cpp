@@ -9,6 +9,7 @@
 #include <atomic>
 
 #include "acquisition/slog_reader.hpp"
+#include "acquisition/slog_writer.hpp"
 #include "tests/acquisition/playing_stage.hpp"
 #include "tests/support/temporary_directory.hpp"
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "acquisition/run_experiment.hpp"
+#include "acquisition/slog_writer.hpp"
 #include "hal/simulated_stage.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/wafer_stage.hpp"

@@ -1,0 +1,177 @@
+#!/usr/bin/python3
+"""What the Python package refuses, and how; Ctrl-C. Arguments: experiment.py."""
+
+import os
+import signal
+import threading
+import unittest
+
+from experiment import CONFIG, WORK, measure, run_tests
+
+import h5py
+import numpy as np
+
+import stageid
+
+RATE_HZ = 2000.0
+
+
+def setUpModule():
+    measure()
+
+
+def arrays():
+    return stageid.read_log(WORK / "run.slog").arrays()
+
+
+class Refused(unittest.TestCase):
+    def refuses(self, error, text, function, *words, **options):
+        with self.assertRaisesRegex(error, text) as caught:
+            function(*words, **options)
+        self.assertIsInstance(caught.exception, stageid.StageidError)
+        self.assertNotIn("\n", str(caught.exception))
+
+    def test_kinds_of_errors(self):
+        for kind, python in ((stageid.RequestError, ValueError), (stageid.FormatError, ValueError),
+                             (stageid.FileError, OSError), (stageid.StageError, RuntimeError)):
+            self.assertTrue(issubclass(kind, python) and issubclass(kind, stageid.StageidError))
+
+    def test_files(self):
+        for read in (stageid.read_frf, stageid.read_log, stageid.read_model, stageid.frf, stageid.fit,
+                     stageid.simulate):
+            self.refuses(stageid.FileError, "none", read, WORK / "none.h5")
+        for read in (stageid.read_frf, stageid.read_log, stageid.read_model, stageid.frf, stageid.fit,
+                     stageid.simulate):
+            (WORK / "wrong").write_text("wrong\n")
+            self.refuses(stageid.FormatError, "wrong", read, WORK / "wrong")
+        self.refuses(stageid.FileError, "n.h5", stageid.write_frf, WORK / "no" / "n.h5",
+                     stageid.read_frf(WORK / "frf.h5"))
+        self.refuses(stageid.FileError, "n.json", stageid.read_model(WORK / "model.json").save,
+                     WORK / "no" / "n.json")
+        self.assertFalse((WORK / "no").exists())
+
+    def test_commands(self):
+        self.refuses(stageid.FileError, "none", stageid.call, "frf", WORK / "none.slog", "-o", WORK / "n.h5")
+        self.refuses(stageid.RequestError, "'fit'", stageid.call, "fitt", "frf.h5")
+        self.refuses(stageid.FormatError, "frf.h5", stageid.call, "validate", WORK / "frf.h5", WORK / "frf.h5")
+
+    def test_words(self):
+        frf = stageid.read_frf(WORK / "frf.h5")
+        log = stageid.read_log(WORK / "run.slog")
+        for function, given, option in (
+                (stageid.frf, log, "method"), (stageid.frf, log, "covariance"), (stageid.fit, frf, "hold"),
+                (stageid.fit, frf, "weighting"), (stageid.fit, frf, "delay"),
+                (stageid.fit, frf, "method"), (stageid.fit, frf, "damping"), (stageid.fit, frf, "rigid_body"),
+                (stageid.modes, frf, "kind"), (stageid.cmif, frf, "kind")):
+            with self.subTest(function=function.__name__, option=option):
+                self.refuses(stageid.RequestError, "wurst", function, given, **{option: "wurst"})
+        self.refuses(stageid.RequestError, "modes", stageid.fit, frf, modes=[-5.0])
+        self.refuses(stageid.RequestError, "wurst", frf.compensate, "wurst", 0.0)
+        self.refuses(stageid.RequestError, "wurst", frf.confidence_radius, 0.95, "wurst")
+        self.refuses(stageid.RequestError, "level", frf.confidence_radius, 1.5)
+        self.refuses(stageid.RequestError, "wurst", stageid.multisine, 1000.0, 500, 10.0, 100.0, 1.0, 7,
+                     lines="wurst")
+
+    def test_numbers(self):
+        frf = stageid.read_frf(WORK / "frf.h5")
+        self.refuses(stageid.RequestError, "level", stageid.multisine, 1000.0, 500, 10.0, 100.0, -1.0, 7)
+        self.refuses(stageid.RequestError, "", frf.select, band_hz=(900.0, 950.0))
+        self.refuses(stageid.RequestError, "a9", frf.select, inputs=["a9"])
+        self.refuses(stageid.RequestError, "realization 8", stageid.frf, WORK / "run.slog", realizations=[8])
+        self.refuses(stageid.RequestError, "max-iterations", stageid.fit, frf, max_iterations=0)
+        self.refuses(stageid.RequestError, "", stageid.stabilization, frf, most_order=1000)
+        self.refuses(stageid.RequestError, "", frf.compensate("delay", 0.0).compensate, "delay", 0.0)
+        model = stageid.read_model(WORK / "model.json")
+        self.refuses(stageid.RequestError, "", model.response, [1500.0])
+        self.refuses(stageid.RequestError, "", stageid.validate, model, frf.select(inputs=["a1"]))
+        no_rate = stageid.fit(stageid.Frf(frf.frequency_hz, frf.response), band_hz=(120, 800), modes=1).model
+        self.refuses(stageid.RequestError, "rate", no_rate.sampled_state_space)
+        self.refuses(stageid.RequestError, "", stageid.pair_modes, model, stageid.fit(
+            frf.select(inputs=["a1"]), band_hz=(120, 800), modes=1).model)
+
+    def test_responses_of_arrays(self):
+        f, G = np.arange(1.0, 4.0), np.ones((3, 2, 2), complex)
+        for words, options, text in (
+                ((f, G[0]), {}, "response.*axes"), ((f[::-1], G), {}, "frequency"),
+                ((f[:2], G), {}, ""), ((f, G * np.nan), {}, "finite"),
+                ((f, G), {"noise_variance": -np.ones(G.shape)}, "variance"),
+                ((f, G), {"noise_variance": np.ones((3, 2))}, "noise_variance"),
+                ((f, G), {"inputs": ["one"]}, ""), ((f, G), {"hold": "first"}, "first")):
+            with self.subTest(text=text, **options):
+                self.refuses(stageid.RequestError, text, stageid.Frf, *words, **options)
+        self.assertRaises(TypeError, stageid.Frf, f, "text")
+
+    def test_logs_of_arrays(self):
+        r, u, y = arrays()
+        for given, text in (((r[0], u, y), "excitation.*axes|excitation.*x"), ((r, u[..., 0], y), "actuators"),
+                            ((r[:1], u, y), "excitation"), ((r, u[:, :1], y), "actuators"),
+                            ((r, u[:, :, 1:], y), "actuators"), ((np.full_like(r, np.inf), u, y), "finite")):
+            with self.subTest(text=text):
+                self.refuses(stageid.RequestError, text, stageid.Log, *given, sample_rate_hz=RATE_HZ)
+        for options, text in (({"sensors": ["one"]}, "sensors"), ({"actuator_units": ["N"]}, "actuators"),
+                              ({"marked": np.zeros(3)}, "marked"), ({"actuators": ["a", "a", "b"]}, "a"),
+                              ({"transient_periods": -1}, "transient")):
+            with self.subTest(text=text):
+                self.refuses(stageid.RequestError, text, stageid.Log, r, u, y,
+                             **{"sample_rate_hz": RATE_HZ, **options})
+        self.refuses(stageid.RequestError, "rate", stageid.Log, r, u, y, sample_rate_hz=0.0)
+        self.refuses(stageid.FormatError, "periods", stageid.Log, r, u[:, :, 1:], y[:, :, 1:],
+                     sample_rate_hz=RATE_HZ)
+
+    def test_a_sample_that_is_no_number(self):
+        r, u, y = arrays()
+        y = y.copy()
+        y[1, 2, 1234, 1] = np.nan
+        log = stageid.Log(r, u, y, sample_rate_hz=RATE_HZ, sensors=["left", "right"])
+        self.refuses(stageid.FormatError, "runs/0005.*row 1234 of sensor 'right'", stageid.frf, log)
+
+    def test_runs(self):
+        log = stageid.read_log(WORK / "run.slog")
+        self.assertEqual(log[-1]["experiment"], 2)
+        self.assertRaises(IndexError, lambda: log[9])
+        self.assertRaises(IndexError, lambda: log[-10])
+        self.assertRaises(TypeError, stageid.frf, 5)
+        self.assertRaises(TypeError, stageid.fit, 5)
+        with h5py.File(WORK / "run.h5") as whole, h5py.File(WORK / "gap.h5", "w") as gap:
+            for name in whole:
+                whole.copy(name, gap)
+            gap.attrs.update(whole.attrs)
+            del gap["runs/0004"]
+        self.refuses(stageid.RequestError, "gap.h5.*one by one", stageid.read_log(WORK / "gap.h5").arrays)
+
+    def test_a_stage_that_is_stopped(self):
+        folder = CONFIG.parent
+        stage = (folder.parent / "stage" / "small_stage.yaml").read_text()
+        (WORK / "tight.yaml").write_text(stage.replace("limit_n: 40", "limit_n: 0.5"))
+        (WORK / "stopped.yaml").write_text(CONFIG.read_text().replace("../stage/small_stage.yaml", "tight.yaml"))
+        self.refuses(stageid.StageError, "stopped.yaml: .*limit", stageid.simulate, WORK / "stopped.yaml")
+
+
+class Interrupted(unittest.TestCase):
+    def interrupts(self, function, *words):
+        """The signal comes from another thread of Python: it runs while the call works."""
+        timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        with self.assertRaises(KeyboardInterrupt):
+            function(*words)
+        timer.join()
+        self.assertIs(signal.getsignal(signal.SIGINT), signal.default_int_handler)
+        self.assertEqual(len(stageid.simulate(CONFIG)), 9)  # the next call is not interrupted
+
+    def test_a_simulation(self):
+        self.interrupts(stageid.simulate, CONFIG.parent / "wafer_stage_quick.yaml")
+
+    def test_a_command(self):
+        self.interrupts(stageid.call, "run", CONFIG.parent / "wafer_stage_quick.yaml", "-o", WORK / "cut.slog")
+        self.assertTrue((WORK / "cut.slog").exists())
+
+    def test_estimates(self):
+        rng = np.random.default_rng(1)
+        shape = (1, 8, 4 * 40000, 8)
+        log = stageid.Log(rng.standard_normal((1, 8, 40000, 8)), rng.standard_normal(shape),
+                          rng.standard_normal(shape), sample_rate_hz=1e4)
+        self.interrupts(lambda: [stageid.frf(log, method="lpm") for _ in range(1000)])
+
+
+if __name__ == "__main__":
+    run_tests()

@@ -1,0 +1,35 @@
+"""What the tests of the Python package share: their arguments, and one experiment by the program.
+
+    SCRIPT PROGRAM PACKAGE_DIR CONFIG WORK_DIR
+"""
+
+import pathlib
+import shutil
+import subprocess
+import sys
+import unittest
+
+PROGRAM, PACKAGES, CONFIG, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:5])
+sys.path.insert(0, str(PACKAGES))
+
+
+def program(*words):
+    """Runs a command of the program in WORK; its exit code."""
+    done = subprocess.run([PROGRAM, *map(str, words)], cwd=WORK, capture_output=True, text=True)
+    assert done.returncode in (0, 3), done.stderr
+    return done.returncode
+
+
+def measure():
+    """run.slog, run.h5, frf.h5 and model.json as the program makes them."""
+    shutil.rmtree(WORK, ignore_errors=True)
+    WORK.mkdir(parents=True)
+    program("run", CONFIG, "-o", "run.slog")
+    program("log", "convert", "run.slog", "-o", "run.h5")
+    program("frf", "run.slog", "-o", "frf.h5")
+    program("fit", "frf.h5", "-o", "model.json", "--band", "120", "800")
+
+
+def run_tests():
+    sys.argv = sys.argv[:1] + sys.argv[5:]
+    unittest.main()

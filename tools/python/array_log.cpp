@@ -1,0 +1,168 @@
+#include "tools/python/array_log.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/log_checks.hpp"
+#include "acquisition/row_transpose.hpp"
+
+namespace stageid {
+namespace {
+
+namespace py = pybind11;
+using Reals = ExperimentArrays::Reals;
+
+constexpr py::ssize_t kWord = sizeof(double);
+
+/// True if a sample's channels are neighbours, samples are whole words apart, and reading needs no care
+/// for alignment.
+bool rows_stand_together(const Reals& array) {
+  const bool aligned = reinterpret_cast<std::uintptr_t>(array.data()) % alignof(double) == 0 &&
+                       array.strides(0) % kWord == 0 && array.strides(1) % kWord == 0;
+  return aligned && array.strides(2) >= 0 && array.strides(2) % kWord == 0 &&
+         (array.strides(3) == kWord || array.shape(3) == 1);
+}
+
+Reals with_rows_together(Reals array) {
+  if (rows_stand_together(array)) return array;
+  return py::array_t<double, py::array::c_style | py::array::forcecast>(array);
+}
+
+std::string shape_text(const py::array& array) {
+  std::string text = "[";
+  for (py::ssize_t axis = 0; axis < array.ndim(); ++axis)
+    text += fmt::format("{}{}", axis > 0 ? " x " : "", array.shape(axis));
+  return text + "]";
+}
+
+void require(bool fits, const char* name, const py::array& array, const std::string& right) {
+  if (fits) return;
+  throw std::invalid_argument(
+      fmt::format("{}: has the shape {}; {}", name, shape_text(array), right));
+}
+
+void require_axes(const char* name, const py::array& array, py::ssize_t axes, const char* right) {
+  require(array.ndim() == axes, name, array, right);
+}
+
+}  // namespace
+
+ArrayLog::ArrayLog(std::filesystem::path name, LogInfo info, ExperimentArrays arrays)
+    : name_(std::move(name)), info_(std::move(info)), arrays_(std::move(arrays)) {
+  check_shapes();
+  check_log_info(info_);
+  arrays_.actuators = with_rows_together(std::move(arrays_.actuators));
+  arrays_.sensors = with_rows_together(std::move(arrays_.sensors));
+  locate_runs();
+  check_runs(name_, info_, runs_);
+}
+
+void ArrayLog::check_shapes() const {
+  const ExperimentArrays& a = arrays_;
+  constexpr const char* kAxes = "[realizations x experiments x samples x channels] must stand here";
+  require_axes("excitation", a.excitation, 4, kAxes);
+  require_axes("actuators", a.actuators, 4, kAxes);
+  require_axes("sensors", a.sensors, 4, kAxes);
+  const auto same_runs = [&](const char* name, const py::array& array) {
+    require(array.shape(0) == a.sensors.shape(0) && array.shape(1) == a.sensors.shape(1), name,
+            array,
+            fmt::format("sensors have {} realizations of {} experiments", a.sensors.shape(0),
+                        a.sensors.shape(1)));
+  };
+  same_runs("excitation", a.excitation);
+  same_runs("actuators", a.actuators);
+  const auto same_samples = [&](const char* name, const py::array& array) {
+    require(array.shape(2) == a.sensors.shape(2), name, array,
+            fmt::format("sensors have {} samples", a.sensors.shape(2)));
+  };
+  same_samples("actuators", a.actuators);
+  const auto channels = [](const char* name, const py::array& array, const ChannelList& list) {
+    require(array.shape(3) == static_cast<py::ssize_t>(list.size()), name, array,
+            fmt::format("there are {} channel names", list.size()));
+  };
+  channels("excitation", a.excitation, info_.excitation);
+  channels("actuators", a.actuators, info_.actuators);
+  channels("sensors", a.sensors, info_.sensors);
+  require(a.excitation.shape(2) == info_.period_samples, "excitation", a.excitation,
+          fmt::format("one period of {} samples must stand here", info_.period_samples));
+  if (!a.marked) return;
+  require_axes("marked", *a.marked, 3, "[realizations x experiments x samples] must stand here");
+  same_runs("marked", *a.marked);
+  same_samples("marked", *a.marked);
+}
+
+ArrayLog::Rows ArrayLog::rows_of(const Reals& array, py::ssize_t realization,
+                                 py::ssize_t experiment) {
+  if (array.size() == 0) return {};
+  return {array.data(realization, experiment, 0, 0),
+          static_cast<std::size_t>(array.strides(2) / kWord)};
+}
+
+void ArrayLog::locate_runs() {
+  const ExperimentArrays& a = arrays_;
+  const auto excitation = a.excitation.unchecked<4>();
+  for (py::ssize_t m = 0; m < a.sensors.shape(0); ++m) {
+    for (py::ssize_t e = 0; e < a.sensors.shape(1); ++e) {
+      LogRun run;
+      run.name = fmt::format("{:04}", runs_.size());
+      run.realization = static_cast<int>(m);
+      run.experiment = static_cast<int>(e);
+      run.samples = static_cast<std::uint64_t>(a.sensors.shape(2));
+      run.health.cycles = run.samples;
+      runs_.push_back(std::move(run));
+      actuators_.push_back(rows_of(a.actuators, m, e));
+      sensors_.push_back(rows_of(a.sensors, m, e));
+      Eigen::MatrixXd period(excitation.shape(2), excitation.shape(3));
+      for (Eigen::Index c = 0; c < period.cols(); ++c)
+        for (Eigen::Index n = 0; n < period.rows(); ++n) period(n, c) = excitation(m, e, n, c);
+      if (!period.allFinite())
+        throw std::invalid_argument(fmt::format(
+            "excitation: realization {}, experiment {} is not finite; numbers must stand here", m,
+            e));
+      excitation_.push_back(std::move(period));
+      auto& marked = marked_.emplace_back();
+      marked.setZero(a.sensors.shape(2));
+      if (!a.marked) continue;
+      const auto given = a.marked->unchecked<3>();
+      for (Eigen::Index n = 0; n < marked.size(); ++n) marked[n] = given(m, e, n);
+    }
+  }
+}
+
+Eigen::MatrixXd ArrayLog::excitation(std::size_t run) const {
+  check_run_index(name_, runs_, run);
+  return excitation_[run];
+}
+
+void ArrayLog::read(std::size_t run, std::uint64_t first, std::uint64_t count,
+                    LogSamples& out) const {
+  check_run_index(name_, runs_, run);
+  check_row_range(name_, runs_[run], first, count);
+  resize_samples(info_, count, out);
+  const auto copy = [&](const Rows& rows, Eigen::MatrixXd& columns) {
+    return transpose_rows(rows.first + first * rows.words, rows.words, count,
+                          static_cast<std::size_t>(columns.cols()), columns.data(), count);
+  };
+  const bool actuators_finite = copy(actuators_[run], out.actuators);
+  const bool sensors_finite = copy(sensors_[run], out.sensors);
+  out.marked =
+      marked_[run].segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(count));
+  if (!actuators_finite || !sensors_finite) refuse_not_finite(run, first, out);
+}
+
+void ArrayLog::refuse_not_finite(std::size_t run, std::uint64_t first,
+                                 const LogSamples& samples) const {
+  const Eigen::Index n_u = samples.actuators.cols();
+  for (Eigen::Index n = 0; n < samples.sensors.rows(); ++n)
+    for (Eigen::Index c = 0; c < n_u + samples.sensors.cols(); ++c) {
+      const double value = c < n_u ? samples.actuators(n, c) : samples.sensors(n, c - n_u);
+      if (!std::isfinite(value))
+        throw_not_finite(name_, info_, runs_[run], first + static_cast<std::uint64_t>(n),
+                         static_cast<std::size_t>(c));
+    }
+}
+
+}  // namespace stageid

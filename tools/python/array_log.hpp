@@ -1,0 +1,69 @@
+#pragma once
+
+#include <pybind11/numpy.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "acquisition/log_reader.hpp"
+
+namespace stageid {
+
+/// Samples of a whole experiment, one array a group. M realizations of E experiments (runs) of S
+/// samples each, behind one period of P samples of excitation.
+struct ExperimentArrays {
+  using Reals = pybind11::array_t<double, pybind11::array::forcecast>;
+  using Flags = pybind11::array_t<std::uint8_t, pybind11::array::forcecast>;
+  Reals excitation;             ///< [M x E x P x n_r]
+  Reals actuators;              ///< [M x E x S x n_u]
+  Reals sensors;                ///< [M x E x S x n_y]
+  std::optional<Flags> marked;  ///< [M x E x S], nonzero: do not use
+};
+
+/// A log over arrays of Python, which are not copied where the channels of a sample stand next to
+/// each other (C order, slices of it, views of other records); else once.
+///
+/// Made and destroyed with the interpreter's lock; read() needs none.
+class ArrayLog final : public LogReader {
+ public:
+  /// @param name stands in messages and provenance
+  /// @throws std::invalid_argument where shapes do not fit each other or the channels of `info`
+  /// @throws FormatError from check_runs(): whole periods, more than the transient ones
+  ArrayLog(std::filesystem::path name, LogInfo info, ExperimentArrays arrays);
+
+  const std::filesystem::path& path() const noexcept override { return name_; }
+  const LogInfo& info() const noexcept override { return info_; }
+  const std::vector<LogRun>& runs() const noexcept override { return runs_; }
+  Eigen::MatrixXd excitation(std::size_t run) const override;
+  /// @throws FormatError if a value is not finite
+  void read(std::size_t run, std::uint64_t first, std::uint64_t count,
+            LogSamples& out) const override;
+
+  const ExperimentArrays& arrays() const noexcept { return arrays_; }
+
+ private:
+  struct Rows {
+    const double* first = nullptr;
+    std::size_t words = 0;  ///< from a sample to the next
+  };
+
+  void check_shapes() const;
+  void locate_runs();
+  static Rows rows_of(const ExperimentArrays::Reals& array, pybind11::ssize_t realization,
+                      pybind11::ssize_t experiment);
+  void refuse_not_finite(std::size_t run, std::uint64_t first, const LogSamples& samples) const;
+
+  std::filesystem::path name_;
+  LogInfo info_;
+  ExperimentArrays arrays_;
+  std::vector<LogRun> runs_;
+  std::vector<Rows> actuators_;  // one a run, as the three below
+  std::vector<Rows> sensors_;
+  std::vector<Eigen::Array<std::uint8_t, Eigen::Dynamic, 1>> marked_;
+  std::vector<Eigen::MatrixXd> excitation_;
+};
+
+}  // namespace stageid

@@ -1,0 +1,78 @@
+// What the libraries throw, as Python's own kinds of errors.
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "excitation/file_error.hpp"
+#include "hal/stage.hpp"
+#include "tools/exit_code.hpp"
+#include "tools/python/bindings.hpp"
+
+namespace stageid {
+namespace {
+
+namespace py = pybind11;
+
+// Borrowed from the module, which lives as long as the interpreter.
+PyObject* file_error = nullptr;
+PyObject* format_error = nullptr;
+PyObject* request_error = nullptr;
+PyObject* stage_error = nullptr;
+
+PyObject* new_error(py::module_& module, const char* name, const char* doc, PyObject* base,
+                    PyObject* kind) {
+  const py::tuple bases = kind == nullptr ? py::make_tuple(py::handle(base))
+                                          : py::make_tuple(py::handle(base), py::handle(kind));
+  const auto type = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(
+      (std::string("stageid.") + name).c_str(), doc, bases.ptr(), nullptr));
+  if (!type) throw py::error_already_set();
+  module.attr(name) = type;
+  return type.ptr();
+}
+
+/// Messages quote what stands in files, which need not be UTF-8.
+void raise(PyObject* type, const std::exception& error) {
+  const std::string_view what = error.what();
+  const auto text = py::reinterpret_steal<py::object>(
+      PyUnicode_DecodeUTF8(what.data(), static_cast<Py_ssize_t>(what.size()), "backslashreplace"));
+  if (text) PyErr_SetObject(type, text.ptr());
+}
+
+void translate(std::exception_ptr thrown) {
+  if (!thrown) return;
+  try {
+    std::rethrow_exception(thrown);
+  } catch (const Interrupted&) {
+    PyErr_SetNone(PyExc_KeyboardInterrupt);
+  } catch (const FormatError& error) {
+    raise(format_error, error);
+  } catch (const FileError& error) {
+    raise(file_error, error);
+  } catch (const StageError& error) {
+    raise(stage_error, error);
+  } catch (const std::filesystem::filesystem_error& error) {
+    raise(file_error, error);
+  } catch (const std::invalid_argument& error) {
+    raise(request_error, error);
+  }
+}
+
+}  // namespace
+
+void define_errors(py::module_& module) {
+  PyObject* base = new_error(module, "StageidError", "Everything that stageid itself refuses.",
+                             PyExc_Exception, nullptr);
+  request_error = new_error(module, "RequestError", "The request is wrong (exit code 2).", base,
+                            PyExc_ValueError);
+  format_error = new_error(module, "FormatError", "A file is not what it should be (exit code 2).",
+                           base, PyExc_ValueError);
+  file_error = new_error(module, "FileError", "A file cannot be read or written (exit code 1).",
+                         base, PyExc_OSError);
+  stage_error = new_error(module, "StageError", "The stage or its link failed (exit codes 1, 4).",
+                          base, PyExc_RuntimeError);
+  py::register_local_exception_translator(&translate);
+}
+
+}  // namespace stageid

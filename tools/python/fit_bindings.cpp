@@ -1,0 +1,134 @@
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <array>
+#include <memory>
+#include <utility>
+
+#include "tools/fit_step.hpp"
+#include "tools/python/bindings.hpp"
+#include "tools/python/frf_handle.hpp"
+#include "tools/python/interruptible.hpp"
+#include "tools/python/numpy_arrays.hpp"
+#include "tools/submodel_text.hpp"
+
+namespace stageid {
+namespace {
+
+namespace py = pybind11;
+
+/// A value as the flag of the program takes it: None is silent, a list becomes "f1,f2,...". repr() of a
+/// float gives back the same float.
+std::string flag_text(const py::object& value) {
+  if (value.is_none()) return "";
+  if (py::isinstance<py::str>(value) || py::isinstance<py::int_>(value)) return py::str(value);
+  if (!py::isinstance<py::sequence>(value) && !py::hasattr(value, "tolist"))
+    return py::hasattr(value, "__fspath__") ? py::str(value) : py::str(py::repr(py::float_(value)));
+  std::string text;
+  for (const py::handle& item : value)
+    text += (text.empty() ? "" : ",") +
+            std::string(py::str(py::repr(py::float_(py::reinterpret_borrow<py::object>(item)))));
+  return text;
+}
+
+std::shared_ptr<FrfHandle> frf_of(const py::object& given) {
+  if (py::isinstance<FrfHandle>(given)) return given.cast<std::shared_ptr<FrfHandle>>();
+  try {
+    return std::make_shared<FrfHandle>(read_frf_handle(given.cast<std::filesystem::path>()));
+  } catch (const py::cast_error&) {
+    throw py::type_error("frf: an Frf or the name of a file must stand here");
+  }
+}
+
+FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band_hz,
+              const py::object& modes, const py::object& weighting, const std::string& hold,
+              const py::object& delay, const py::object& rigid_body, const py::object& residue_rank,
+              const std::string& damping, const std::string& direct_term,
+              const std::vector<std::string>& submodels, const std::string& method,
+              int max_iterations, int threads) {
+  FitRequest request;
+  request.band_hz = band_hz;
+  request.modes = flag_text(modes);
+  request.weighting = flag_text(weighting);
+  request.hold = hold;
+  request.delay = flag_text(delay);
+  request.rigid_body = flag_text(rigid_body);
+  request.residue_rank = flag_text(residue_rank);
+  request.damping = damping;
+  request.direct_term = direct_term;
+  for (const std::string& text : submodels) request.submodels.push_back(parse_submodel(text));
+  request.method = method;
+  request.max_iterations = max_iterations;
+  request.threads = threads;
+  const std::shared_ptr<FrfHandle> of = frf_of(given);
+  Console silent;
+  silent.verbosity = Verbosity::quiet;
+  return interruptible([&] {
+    const std::string fingerprint =
+        of->fingerprint.empty() ? fingerprint_of_content(of->frf) : of->fingerprint;
+    return fit_model(make_fit_setup(request, of->frf), of->name, fingerprint, silent).result;
+  });
+}
+
+constexpr const char* kFitDoc =
+    R"(Fits the additive model P(s) = sum of modes and rigid body to a frequency response, as `stageid fit`.
+
+frf               Frf, or the name of a file
+band_hz           (low, high) in Hz; None: all lines
+modes             'auto', 'none', how many, a list of frequencies in Hz, or the name of a modes.json
+weighting         'unit', 'inverse_magnitude', 'relative', 'noise_variance', 'total_variance', 'likelihood',
+                  or the name of an HDF5 file with /weights; None: by the variances of the response
+hold              'none', 'phase', 'sinc', 'exact'; '': by the response
+delay             s, 'estimate' or 'per_channel'; None: by the response
+rigid_body        'none', 'full', a rank, 'suspension' or 'suspension:F1:F2' (Hz); None: full
+residue_rank      of the modes: 'full', or 1
+damping           'proportional' (B_0) or 'general' (B_0 + B_1 s)
+direct_term       'none' or 'full'
+submodels         further ones as --submodel takes them, 'n=4,m=3,f=120:180'
+method            'riv', 'gn' or 'sk'; max_iterations of one fit
+threads           0: all cores; the result does not depend on it
+
+Returns Fit. Not converging is no error: look at trustworthy. Other Python threads run meanwhile; Ctrl-C ends it.
+Raises RequestError, FormatError, FileError.)";
+
+constexpr const char* kVarianceDoc =
+    R"(E|dP|^2 of the model's response on the fitted lines, float64 [N, n_y, n_u]; None without variances.
+
+A read-only view, not copied.)";
+
+}  // namespace
+
+void define_fit(py::module_& module) {
+  py::class_<FitResult, std::shared_ptr<FitResult>>(
+      module, "Fit", "The result of a fit: the model, how it was reached, and whether to trust it.")
+      .def_property_readonly(
+          "model", [](const FitResult& r) { return r.model; }, "Model, a copy")
+      .def_property_readonly(
+          "trustworthy", [](const FitResult& r) { return r.trustworthy(); },
+          "False where the program ends with exit code 3")
+      .def_property_readonly(
+          "status", [](const FitResult& r) { return to_string(r.status); },
+          "'gradient_small', 'step_small', or why it is not to be trusted")
+      .def_readonly("message", &FitResult::message, "One line on how it ended")
+      .def_readonly("cost", &FitResult::cost,
+                    "1/(2N) sum vec(E)^H W vec(E), one an iterate, the start first")
+      .def_readonly("decisions", &FitResult::decisions, "What was chosen and why, one line each")
+      .def_readonly("removal_cost", &FitResult::removal_cost,
+                    "By how much sum W |E|^2 would rise without each submodel")
+      .def_property_readonly(
+          "response_variance",
+          [](const py::object& self) {
+            const auto& r = self.cast<const FitResult&>();
+            return lines_view<double>(r.response_variance, r.model.n_outputs(), self);
+          },
+          kVarianceDoc);
+  module.def("fit", &fit, py::arg("frf"), py::kw_only(), py::arg("band_hz") = py::none(),
+             py::arg("modes") = py::none(), py::arg("weighting") = py::none(), py::arg("hold") = "",
+             py::arg("delay") = py::none(), py::arg("rigid_body") = py::none(),
+             py::arg("residue_rank") = "full", py::arg("damping") = "proportional",
+             py::arg("direct_term") = "none", py::arg("submodels") = std::vector<std::string>{},
+             py::arg("method") = "riv", py::arg("max_iterations") = 100, py::arg("threads") = 0,
+             kFitDoc);
+}
+
+}  // namespace stageid

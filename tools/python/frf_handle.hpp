@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include "frf/frf_estimate.hpp"
+
+namespace stageid {
+
+/// A frequency response of the module, and what the provenance of a fit calls it.
+struct FrfHandle {
+  explicit FrfHandle(FrfEstimate estimate, std::string its_name = "memory",
+                     std::string its_fingerprint = "")
+      : frf(std::move(estimate)),
+        name(std::move(its_name)),
+        fingerprint(std::move(its_fingerprint)) {}
+
+  FrfEstimate frf;
+  std::string name;         ///< of the file it was read from, else "memory"
+  std::string fingerprint;  ///< of that file; empty: not from a file
+};
+
+/// @throws FileError, FormatError
+FrfHandle read_frf_handle(const std::filesystem::path& file);
+
+/// Names the content of a response that is in no file: frequencies, response and variances.
+std::string fingerprint_of_content(const FrfEstimate& frf);
+
+}  // namespace stageid

@@ -1,0 +1,50 @@
+// The Python module: numpy in and out, every number from the functions that the program calls.
+
+#include <string>
+#include <vector>
+
+#include "tools/interrupt.hpp"
+#include "tools/program.hpp"
+#include "tools/python/bindings.hpp"
+#include "tools/python/interruptible.hpp"
+
+namespace stageid {
+namespace {
+
+namespace py = pybind11;
+
+int call(const py::args& arguments) {
+  std::vector<std::string> words = {"stageid"};
+  for (const py::handle& argument : arguments) words.push_back(py::str(argument));
+  std::vector<const char*> pointers;
+  for (const std::string& word : words) pointers.push_back(word.c_str());
+  return interruptible(
+      [&] { return run_program(static_cast<int>(pointers.size()), pointers.data()); });
+}
+
+constexpr const char* kCall =
+    R"(Runs a command of the program in this process: call('fit', 'frf.h5', '-o', 'model.json').
+
+Returns its exit code: 0 done, 3 done but not to be trusted, 4 stopped for safety, 1 the stage ended it.
+Raises RequestError, FormatError, FileError, StageError for all that the program refuses.)";
+
+}  // namespace
+
+PYBIND11_MODULE(_native, module) {
+  leave_signals_to_host();
+  // Users see the package; this is where it is made.
+  module.attr("__name__") = "stageid";
+  module.doc() = "The compiled part of stageid.";
+  module.attr("__version__") = STAGEID_VERSION;
+  define_errors(module);
+  define_excitation(module);
+  define_logs(module);
+  define_frf(module);
+  define_modes(module);
+  define_model(module);
+  define_fit(module);
+  module.def("call", &call, kCall);
+  module.attr("__name__") = "stageid._native";
+}
+
+}  // namespace stageid

@@ -1,0 +1,53 @@
+#include "tools/python/simulate.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "tools/exit_code.hpp"
+#include "tools/interrupt.hpp"
+#include "tools/measured_stage.hpp"
+#include "tools/run_metadata.hpp"
+
+namespace stageid {
+
+RunMemory::RunMemory(LogInfo info, std::size_t runs, std::size_t samples) : info_(std::move(info)) {
+  rows_.reserve(runs * samples * (info_.actuators.size() + info_.sensors.size() + 1));
+}
+
+void RunMemory::begin_run(const LogRun& /*run*/,
+                          const Eigen::Ref<const Eigen::MatrixXd>& excitation) {
+  excitation_.emplace_back(excitation);
+}
+
+void RunMemory::write(std::span<const double> rows) {
+  rows_.insert(rows_.end(), rows.begin(), rows.end());
+}
+
+SimulatedExperiment simulate_experiment(const std::filesystem::path& file) {
+  const ExperimentConfig config = load_experiment_config(file);
+  const ExperimentPlan plan = make_plan(config);
+  MeasurementRequest request;
+  request.pace = 0.0;
+  const std::unique_ptr<MeasuredStage> stage = make_measured_stage(config, plan, request, {});
+
+  SimulatedExperiment out;
+  out.name = file.filename();
+  out.realizations = plan.spec().realizations;
+  out.experiments = plan.experiments();
+  out.samples = static_cast<std::size_t>(plan.samples_per_run());
+  const StageInfo& info = stage->info();
+  out.runs = std::make_unique<RunMemory>(
+      experiment_log_info(plan, info, run_metadata(config, request.backend, info)),
+      plan.runs().size(), out.samples);
+  RunExperimentOptions options;
+  options.interrupt = &interrupt_flag();
+  options.misses_allowed = config.stage.real_time.misses_allowed;
+  const ExperimentResult result = stage->perform(*out.runs, options);
+  if (result.end == ExperimentEnd::interrupted) throw Interrupted();
+  if (result.end != ExperimentEnd::complete)
+    throw StageError(fmt::format("{}: {}", file.string(), result.message));
+  return out;
+}
+
+}  // namespace stageid

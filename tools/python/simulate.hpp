@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "acquisition/run_writer.hpp"
+
+namespace stageid {
+
+/// All runs of an experiment in memory, in one piece.
+class RunMemory final : public RunWriter {
+ public:
+  /// @param runs, samples how many of how many rows are to come
+  RunMemory(LogInfo info, std::size_t runs, std::size_t samples);
+
+  const LogInfo& info() const noexcept override { return info_; }
+  void begin_run(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& excitation) override;
+  void write(std::span<const double> rows) override;
+  void end_run(const LogRun& /*run*/) override {}
+  void synchronize() override {}
+
+  /// Rows of actuators + sensors + status word (slog_format.hpp), run after run.
+  const std::vector<double>& rows() const noexcept { return rows_; }
+  /// One period a run, period_samples x channels.
+  const std::vector<Eigen::MatrixXd>& excitation() const noexcept { return excitation_; }
+
+ private:
+  LogInfo info_;
+  std::vector<double> rows_;
+  std::vector<Eigen::MatrixXd> excitation_;
+};
+
+/// An experiment on the simulated stage, in memory.
+struct SimulatedExperiment {
+  std::filesystem::path name;  ///< of the experiment file
+  int realizations = 0;
+  int experiments = 0;      ///< of each
+  std::size_t samples = 0;  ///< of each run
+  std::unique_ptr<RunMemory> runs;
+};
+
+/// Performs an experiment file on its simulated stage in virtual time: the same samples as
+/// `stageid run CONFIG --backend sim --pace 0`.
+/// @throws FileError, FormatError, std::invalid_argument; Interrupted
+/// @throws StageError if a limit or a fault ended the experiment: tells which
+SimulatedExperiment simulate_experiment(const std::filesystem::path& config);
+
+}  // namespace stageid

@@ -1,0 +1,58 @@
+"""Measures and identifies multivariable motion stages in closed loop; SI units throughout.
+
+The numbers are those of the program `stageid`, to the bit: the same compiled functions give both.
+"""
+
+from stageid._native import (
+    FileError,
+    Fit,
+    FormatError,
+    Frf,
+    Log,
+    Model,
+    RequestError,
+    StageError,
+    StageidError,
+    __version__,
+    call,
+    cmif,
+    fit,
+    frf,
+    modes,
+    multisine,
+    pair_modes,
+    read_frf,
+    read_log,
+    read_model,
+    simulate,
+    stabilization,
+    validate,
+    write_frf,
+)
+
+__all__ = [
+    "FileError",
+    "Fit",
+    "FormatError",
+    "Frf",
+    "Log",
+    "Model",
+    "RequestError",
+    "StageError",
+    "StageidError",
+    "__version__",
+    "call",
+    "cmif",
+    "fit",
+    "frf",
+    "modes",
+    "multisine",
+    "pair_modes",
+    "read_frf",
+    "read_log",
+    "read_model",
+    "simulate",
+    "stabilization",
+    "validate",
+    "write_frf",
+]
