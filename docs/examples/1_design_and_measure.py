@@ -1,0 +1,60 @@
+# %% [markdown]
+# # Design an experiment and measure a simulated stage
+#
+# Run from the root of the repository, as a script or cell by cell.
+
+# %%
+import pathlib
+import tempfile
+
+import numpy as np
+
+import stageid
+
+CONFIG = pathlib.Path("configs/experiment/small_stage.yaml")
+
+# %% [markdown]
+# ## A multisine
+# One period on the odd lines of a band. Random phases, or phases that keep its peak low: with the same
+# rms, the same information at less peak force.
+
+# %%
+settings = dict(sample_rate_hz=2000.0, period_samples=500, low_hz=16.0, high_hz=800.0, rms=1.0, seed=7, lines="odd")
+plain = stageid.multisine(**settings)
+low_crest = stageid.multisine(**settings, crest_iterations=200)
+print(f"crest factor {np.abs(plain).max():.2f} with random phases, {np.abs(low_crest).max():.2f} reduced")
+assert np.abs(low_crest).max() < np.abs(plain).max()
+
+lines = np.flatnonzero(np.abs(np.fft.rfft(plain)) > 1e-9)
+print(f"{lines.size} lines, {lines[0] * 4.0} to {lines[-1] * 4.0} Hz, every second of 4 Hz")
+
+# %% [markdown]
+# ## The experiment file against the limits of the stage
+# What an experiment will do to the stage is computed before it is measured; it is the program's own table.
+
+# %%
+with tempfile.TemporaryDirectory() as folder:
+    assert stageid.call("design", CONFIG, "-o", f"{folder}/excitation.h5") == 0
+
+# %% [markdown]
+# ## The measurement
+# In virtual time and in memory. M realizations of E experiments: arrays [M, E, S, channels]; r is one period.
+
+# %%
+log = stageid.simulate(CONFIG)
+r, u, y = log.arrays()
+print(f"{len(log)} runs: r {r.shape} N, u {u.shape} N, y {y.shape} m")
+for m, e in np.ndindex(*r.shape[:2]):
+    excited = [log.excitation[c] for c in np.flatnonzero(np.ptp(r[m, e], axis=0))]
+    print(f"realization {m}, experiment {e}: {', '.join(excited)} excited, "
+          f"u rms {np.sqrt(np.mean(u[m, e] ** 2)):.2f} N, y peak {1e6 * np.abs(y[m, e]).max():.2f} um")
+
+# %% [markdown]
+# What is periodic repeats; what does not is transient and noise.
+
+# %%
+P = log.period_samples
+periods = y[0, 0].reshape(-1, P, y.shape[3])
+for before, after in zip(periods, periods[1:]):
+    print(f"change from a period to the next: {1e9 * np.sqrt(np.mean((after - before) ** 2)):8.3f} nm rms")
+assert np.std(periods[-1] - periods[-2]) < np.std(periods[1] - periods[0])

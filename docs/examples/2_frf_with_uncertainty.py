@@ -1,0 +1,57 @@
+# %% [markdown]
+# # A frequency response and what is known of its error
+#
+# Run from the root of the repository, as a script or cell by cell.
+
+# %%
+import numpy as np
+
+import stageid
+
+log = stageid.simulate("configs/experiment/small_stage.yaml")
+
+# %% [markdown]
+# ## Estimate
+# In closed loop, from the excitation: G = (mean Y) (mean U)^-1 line by line.
+
+# %%
+frf = stageid.frf(log)
+N, n_y, n_u = frf.response.shape
+print(f"{n_y} x {n_u} on {N} lines, {frf.frequency_hz[0]} to {frf.frequency_hz[-1]} Hz, unit m/N")
+print(f"noise variance with {frf.noise_dof:g} degrees of freedom, total variance with {frf.total_dof:g}")
+
+# %% [markdown]
+# ## Two variances
+# From periods: what repeating the same excitation would give. From realizations: noise, and what a nonlinear stage
+# does to each excitation in another way. This stage is linear: they agree within their scatter.
+
+# %%
+ratio = np.median(frf.total_variance / frf.noise_variance)
+print(f"median of total over noise variance: {ratio:.2f}")
+relative = np.sqrt(frf.noise_variance) / np.abs(frf.response)
+print(f"relative standard deviation: median {np.median(relative):.1e}, largest {relative.max():.1e}")
+
+# %% [markdown]
+# ## Does the region hold what it promises?
+# Two estimates from other realizations differ by noise alone. The difference of two has the sum of their variances;
+# circles of 95 % shall hold 95 % of the differences.
+
+# %%
+first, second = (stageid.frf(log, realizations=[m]) for m in (0, 1))
+difference = np.abs(first.response - second.response) ** 2
+nu = first.noise_dof + second.noise_dof
+variance = first.noise_variance + second.noise_variance
+inside = np.mean(difference < variance * nu * (0.05 ** (-1 / nu) - 1))
+print(f"{100 * inside:.1f} % of {difference.size} differences lie within their circle")
+# Binomial scatter of as many differences, were they independent, is 0.6 %; channels of one output share noise.
+assert 0.91 < inside < 0.99
+
+# %% [markdown]
+# ## Fewer samples
+# The local polynomial method needs no waiting for the transient: whole records, the same response.
+
+# %%
+whole = stageid.frf(log, method="lpm")
+distance = np.abs(whole.response - frf.response) / np.sqrt(whole.noise_variance + frf.noise_variance)
+print(f"lpm from {log.period_samples * 5} samples a run: {np.median(distance):.2f} standard deviations away (median)")
+assert np.median(distance) < 2

@@ -1,0 +1,64 @@
+# %% [markdown]
+# # Identify a modal model and judge it
+#
+# Run from the root of the repository, as a script or cell by cell.
+
+# %%
+import numpy as np
+
+import stageid
+
+log = stageid.simulate("configs/experiment/small_stage.yaml")
+frf = stageid.frf(log, realizations=[0, 1])
+held_back = stageid.frf(log, realizations=[2])
+
+# %% [markdown]
+# ## Candidates
+# Peaks of the mode indicator; a second opinion from poles that stay while the order rises.
+
+# %%
+for mode in stageid.modes(frf.select(band_hz=(120, 800))):
+    print(f"peak at {mode['frequency_hz']:7.2f} Hz, damping {mode['damping_ratio']:.4f}")
+stable = [p for p in stageid.stabilization(frf, most_order=40, delay_s=600e-6) if p["stable_damping"]]
+print(f"{len(stable)} stable poles over 20 orders")
+
+# %% [markdown]
+# ## Fit
+# P(s) = sum of modes, a suspension with known frequencies, and the compliance of what lies above the band; through
+# hold, delay and sampler. Every decision is told.
+
+# %%
+fit = stageid.fit(frf, rigid_body="suspension:0.4:0.5", direct_term="full")
+print(*fit.decisions, sep="\n")
+print(f"{fit.status}, cost {fit.cost[0]:.3g} -> {fit.cost[-1]:.3g}")
+assert fit.trustworthy
+
+for mode in fit.model.modes():
+    if mode["natural_frequency_hz"] > frf.frequency_hz[0]:
+        print(f"{mode['natural_frequency_hz']:9.3f} +- {mode['natural_frequency_std_hz']:.4f} Hz   damping "
+              f"{mode['damping_ratio']:.5f} +- {mode['damping_ratio_std']:.6f}   "
+              f"shape at the sensors {np.round(mode['output_shape'].real, 2)}")
+
+# %% [markdown]
+# ## Judge
+# On a realization that the fit has not seen: chi-square per degree of freedom is 1 where the error is noise.
+
+# %%
+figures = stageid.validate(fit.model, held_back)
+print(f"relative error {figures['relative_rms_error']:.2e}, chi-square {figures['chi_square_per_dof']:.2f}, "
+      f"residuals above their 95 % point {100 * figures['whitened_above_95']:.1f} %")
+
+# Too few modes: the same figures tell.
+poor = stageid.fit(frf, modes=1, rigid_body="suspension:0.4:0.5", direct_term="full").model
+too_few = stageid.validate(poor, held_back)
+print(f"with one mode: relative error {too_few['relative_rms_error']:.2e}, "
+      f"chi-square {too_few['chi_square_per_dof']:.3g}")
+assert too_few["chi_square_per_dof"] > 100 * figures["chi_square_per_dof"]
+
+# %% [markdown]
+# The model knows its own uncertainty: below that of the data, for it has fewer parameters than they have numbers.
+
+# %%
+gain = np.median(np.sqrt(frf.noise_variance / fit.response_variance))
+print(f"standard deviation of the data over that of the model: {gain:.1f} (median)")
+assert gain > 1
