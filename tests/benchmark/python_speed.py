@@ -3,13 +3,14 @@
 
     python_speed.py PROGRAM PACKAGE_DIR CONFIG [REPEATS]
 
-Prints, for each step, the least of REPEATS times (default 3) by the program as a whole process, by the
-program's own account of its work, and by the package; the last column is the package over the process.
-The results must be equal to the bit.
+Prints, for each step, the least of REPEATS times (default 3) of the program as a whole process and of the package,
+by the wall's clock and by the processors': the latter tells more on a machine that others use as well. Ratios
+are the package's over the program's. The results must be equal to the bit.
 """
 
 import json
 import pathlib
+import resource
 import subprocess
 import sys
 import tempfile
@@ -24,32 +25,37 @@ import numpy as np
 import stageid
 
 
-def timed(work):
-    begin = time.perf_counter()
+def used(who):
+    """Seconds by the wall's clock, and of the processors."""
+    usage = resource.getrusage(who)
+    return np.array([time.perf_counter(), usage.ru_utime + usage.ru_stime])
+
+
+def timed(work, who=resource.RUSAGE_SELF):
+    begin = used(who)
     result = work()
-    return time.perf_counter() - begin, result
+    return used(who) - begin, result
 
 
 def program(folder, *words):
-    """Wall time of the process, and what it says itself."""
-    seconds, done = timed(lambda: subprocess.run([PROGRAM, "--json", "--verbosity", "quiet", *words], cwd=folder,
-                                                 capture_output=True, text=True))
+    """Times of the process."""
+    seconds, done = timed(lambda: subprocess.run([PROGRAM, "--verbosity", "quiet", *words], cwd=folder,
+                                                 capture_output=True, text=True), resource.RUSAGE_CHILDREN)
     if done.returncode not in (0, 3):
         sys.exit(done.stderr)
-    return seconds, json.loads(done.stdout)["seconds"]
+    return seconds
 
 
 def compare(step, run_program, run_package):
     """Alternately, so that both see the same machine."""
-    process, own, package = [], [], []
+    process, package, result = [], [], None
     for _ in range(REPEATS):
-        whole, inner = run_program()
+        process.append(run_program())
+        result = None  # its memory is free again
         seconds, result = timed(run_package)
-        process.append(whole)
-        own.append(inner)
         package.append(seconds)
-    print(f"{step:34}{min(process):10.3f}{min(own):10.3f}{min(package):10.3f}"
-          f"{min(package) / min(process):10.3f}", flush=True)
+    process, package = np.min(process, axis=0), np.min(package, axis=0)
+    print(f"{step:28}" + "".join(f"{a:10.3f}{b:10.3f}{b / a:8.3f}" for a, b in zip(process, package)), flush=True)
     return result
 
 
@@ -61,16 +67,16 @@ def main():
             (folder / "run.slog").unlink(missing_ok=True)
             return program(folder, "run", CONFIG, "-o", "run.slog", "--backend", "sim", "--pace", "0")
 
-        print(f"{'':34}{'process':>10}{'its work':>10}{'package':>10}{'ratio':>10}")
+        head = "".join(f"{word:>{width}}" for word, width in (("program", 10), ("package", 10), ("ratio", 8)))
+        print(f"{'':28}{'wall, s':>28}{'processors, s':>28}\n{'':28}{head}{head}")
         log = compare("run | simulate", measure, lambda: stageid.simulate(CONFIG))
         estimate = ("frf", "run.slog", "-o", "frf.h5")
-        from_file = compare("frf of a file, written", lambda: program(folder, *estimate),
+        compare("frf of a file, written", lambda: program(folder, *estimate),
                             lambda: stageid.write_frf(folder / "ours.h5", stageid.frf(folder / "run.slog")))
         frf = compare("frf of a file | of arrays", lambda: program(folder, *estimate),
                       lambda: stageid.frf(log))
         fit = compare("fit", lambda: program(folder, "fit", "frf.h5", "-o", "model.json"),
                       lambda: stageid.fit(folder / "frf.h5"))
-        assert from_file is None
         theirs = stageid.read_frf(folder / "frf.h5")
         assert (folder / "ours.h5").read_bytes() == (folder / "frf.h5").read_bytes()
         assert np.array_equal(frf.response, theirs.response)

@@ -26,6 +26,16 @@ bool rows_stand_together(const Reals& array) {
          (array.strides(3) == kWord || array.shape(3) == 1);
 }
 
+Eigen::MatrixXd period_of(const Reals& excitation, py::ssize_t realization,
+                          py::ssize_t experiment) {
+  const auto in = excitation.unchecked<4>();  // needs no lock: shape and address only
+  Eigen::MatrixXd period(in.shape(2), in.shape(3));
+  for (Eigen::Index n = 0; n < period.rows(); ++n)
+    for (Eigen::Index c = 0; c < period.cols(); ++c)
+      period(n, c) = in(realization, experiment, n, c);
+  return period;
+}
+
 Reals with_rows_together(Reals array) {
   if (rows_stand_together(array)) return array;
   return py::array_t<double, py::array::c_style | py::array::forcecast>(array);
@@ -103,7 +113,6 @@ ArrayLog::Rows ArrayLog::rows_of(const Reals& array, py::ssize_t realization,
 
 void ArrayLog::locate_runs() {
   const ExperimentArrays& a = arrays_;
-  const auto excitation = a.excitation.unchecked<4>();
   for (py::ssize_t m = 0; m < a.sensors.shape(0); ++m) {
     for (py::ssize_t e = 0; e < a.sensors.shape(1); ++e) {
       LogRun run;
@@ -115,14 +124,10 @@ void ArrayLog::locate_runs() {
       runs_.push_back(std::move(run));
       actuators_.push_back(rows_of(a.actuators, m, e));
       sensors_.push_back(rows_of(a.sensors, m, e));
-      Eigen::MatrixXd period(excitation.shape(2), excitation.shape(3));
-      for (Eigen::Index c = 0; c < period.cols(); ++c)
-        for (Eigen::Index n = 0; n < period.rows(); ++n) period(n, c) = excitation(m, e, n, c);
-      if (!period.allFinite())
+      if (!period_of(a.excitation, m, e).allFinite())
         throw std::invalid_argument(fmt::format(
             "excitation: realization {}, experiment {} is not finite; numbers must stand here", m,
             e));
-      excitation_.push_back(std::move(period));
       auto& marked = marked_.emplace_back();
       marked.setZero(a.sensors.shape(2));
       if (!a.marked) continue;
@@ -134,7 +139,7 @@ void ArrayLog::locate_runs() {
 
 Eigen::MatrixXd ArrayLog::excitation(std::size_t run) const {
   check_run_index(name_, runs_, run);
-  return excitation_[run];
+  return period_of(arrays_.excitation, runs_[run].realization, runs_[run].experiment);
 }
 
 void ArrayLog::read(std::size_t run, std::uint64_t first, std::uint64_t count,

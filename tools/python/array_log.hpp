@@ -60,10 +60,9 @@ class ArrayLog final : public LogReader {
   LogInfo info_;
   ExperimentArrays arrays_;
   std::vector<LogRun> runs_;
-  std::vector<Rows> actuators_;  // one a run, as the three below
+  std::vector<Rows> actuators_;  // one a run, as the two below
   std::vector<Rows> sensors_;
   std::vector<Eigen::Array<std::uint8_t, Eigen::Dynamic, 1>> marked_;
-  std::vector<Eigen::MatrixXd> excitation_;
 };
 
 }  // namespace stageid

@@ -91,13 +91,7 @@ ExperimentArrays arrays_of(SimulatedExperiment experiment) {
     marked[n] = unpack_status(std::bit_cast<std::uint64_t>(word)).marked ? 1 : 0;
   }
   const auto P = static_cast<py::ssize_t>(memory->info().period_samples);
-  arrays.excitation = ExperimentArrays::Reals({M, E, P, n_r});
-  auto excitation = arrays.excitation.mutable_unchecked<4>();
-  for (py::ssize_t run = 0; run < M * E; ++run)
-    for (py::ssize_t n = 0; n < P; ++n)
-      for (py::ssize_t c = 0; c < n_r; ++c)
-        excitation(run / E, run % E, n, c) =
-            memory->excitation()[static_cast<std::size_t>(run)](n, c);
+  arrays.excitation = ExperimentArrays::Reals({M, E, P, n_r}, memory->excitation().data(), owner);
   return arrays;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
@@ -24,13 +23,13 @@ class RunMemory final : public RunWriter {
 
   /// Rows of actuators + sensors + status word (slog_format.hpp), run after run.
   const std::vector<double>& rows() const noexcept { return rows_; }
-  /// One period a run, period_samples x channels.
-  const std::vector<Eigen::MatrixXd>& excitation() const noexcept { return excitation_; }
+  /// One period a run, sample by sample, run after run.
+  const std::vector<double>& excitation() const noexcept { return excitation_; }
 
  private:
   LogInfo info_;
   std::vector<double> rows_;
-  std::vector<Eigen::MatrixXd> excitation_;
+  std::vector<double> excitation_;
 };
 
 /// An experiment on the simulated stage, in memory.
