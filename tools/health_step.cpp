@@ -37,10 +37,13 @@ Finding finding_of(const Json& object) {
 }  // namespace
 
 std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
-                                  FrfOptions options, const std::filesystem::path& stage_file,
-                                  const Console& console) {
-  const OpenLogs open(files);
-  const std::vector<const LogReader*>& logs = open.logs();
+                                  const FrfOptions& options,
+                                  const std::filesystem::path& stage_file, const Console& console) {
+  return examine_logs(OpenLogs(files).logs(), options, stage_file, console);
+}
+
+std::vector<Finding> examine_logs(const std::vector<const LogReader*>& logs, FrfOptions options,
+                                  const std::filesystem::path& stage_file, const Console& console) {
   const auto nominal = nominal_stage_of(logs.front()->info(), stage_file);
   Progress progress(console, "health", "MB", 1.0 / kBytesPerMegabyte);
   options.progress = [&](double done, double total) {

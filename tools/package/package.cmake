@@ -1,0 +1,74 @@
+# Debian packages by `cpack`, and a wheel by the target `wheel`: docs/decisions/packages.md.
+#
+# Components: program (stageid), python (python3-stageid), Unspecified is what C++ programs link
+# (libstageid-dev).
+
+set(doc_dir ${CMAKE_INSTALL_DATADIR}/doc)
+install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright
+  DESTINATION ${doc_dir}/stageid COMPONENT program)
+install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright
+  DESTINATION ${doc_dir}/libstageid-dev)
+
+# Debian wants the changelog packed, without a time in it.
+find_program(STAGEID_GZIP gzip REQUIRED)
+set(changelog ${CMAKE_CURRENT_BINARY_DIR}/changelog.gz)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/CHANGELOG.md)
+execute_process(COMMAND ${STAGEID_GZIP} -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md
+  OUTPUT_FILE ${changelog} COMMAND_ERROR_IS_FATAL ANY)
+install(FILES ${changelog} DESTINATION ${doc_dir}/stageid COMPONENT program)
+install(FILES ${changelog} DESTINATION ${doc_dir}/libstageid-dev)
+
+set(components program Unspecified)
+if(STAGEID_BUILD_PYTHON)
+  list(APPEND components python)
+  # Debian's python3 looks here, whatever its minor version.
+  set(package_dir lib/python3/dist-packages/stageid)
+  install(TARGETS stageid_python LIBRARY DESTINATION ${package_dir} COMPONENT python)
+  install(FILES ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.py
+    ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.pyi
+    ${PROJECT_SOURCE_DIR}/tools/python/stageid/py.typed
+    DESTINATION ${package_dir} COMPONENT python)
+  install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright ${changelog}
+    DESTINATION ${doc_dir}/python3-stageid COMPONENT python)
+
+  add_custom_target(wheel
+    COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/wheel.py
+      ${PROJECT_BINARY_DIR}/tools/python/stageid ${PROJECT_VERSION} ${PROJECT_BINARY_DIR}
+      --licence ${CMAKE_CURRENT_LIST_DIR}/copyright --readme ${PROJECT_SOURCE_DIR}/docs/python.md
+      --strip ${CMAKE_STRIP}
+    DEPENDS stageid_python VERBATIM)
+endif()
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_COMPONENTS_ALL ${components})
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_PACKAGE_NAME stageid)
+set(CPACK_PACKAGE_VENDOR stageid)
+set(CPACK_PACKAGE_CONTACT "The stageid engineers <stageid@localhost>")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
+  OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME stageid)
+set(CPACK_COMPONENT_PROGRAM_DESCRIPTION
+  "The program: from an experiment file to a continuous-time modal model with
+standard deviations; excitation, measurement, frequency response, fit, report.")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-stageid)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+  "python3 (>= 3.11), python3 (<< 3.12), python3-numpy")
+set(CPACK_COMPONENT_PYTHON_DESCRIPTION 
+  "The Python package: simulation, frequency responses, modal models and state
+space as functions with numpy arrays in and out.")
+set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_NAME libstageid-dev)
+set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_DEPENDS
+  "libeigen3-dev, libfmt-dev, nlohmann-json3-dev, libfftw3-dev, libhdf5-dev, libmodbus-dev, libxxhash-dev")
+set(CPACK_COMPONENT_UNSPECIFIED_DESCRIPTION 
+  "Static libraries and headers: what find_package(stageid) gives to C++ programs.")
+include(CPack)
