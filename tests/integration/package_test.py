@@ -112,6 +112,7 @@ class Debian(unittest.TestCase):
     def test_the_program_works(self):
         program = self.root / "usr/bin/stageid"
         self.assertIn(VERSION, output(program, "--version"))
+        self.assertTrue((self.root / "usr/share/man/man1/stageid.1").is_file())
         config = self.root / "usr/share/stageid/configs/experiment/small_stage.yaml"
         output(program, "design", config, "-o", WORK / "excitation.h5")
 

@@ -13,6 +13,7 @@
 #include "frf/hold_compensation.hpp"
 #include "tools/flag_values.hpp"
 #include "tools/frf_step.hpp"
+#include "tools/health_step.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/frf_texts.hpp"
@@ -87,7 +88,8 @@ std::vector<std::shared_ptr<LogReader>> logs_of(const py::object& given) {
 FrfHandle frf(const py::object& given, const std::vector<std::string>& inputs,
               const std::vector<std::string>& outputs, const std::vector<int>& realizations,
               std::optional<int> transient_periods, const std::string& method,
-              const std::string& covariance, int threads) {
+              const std::string& covariance, const std::string& periods, int covariance_lines,
+              bool health, const std::optional<std::filesystem::path>& stage, int threads) {
   FrfOptions options;
   options.inputs = inputs;
   options.outputs = outputs;
@@ -95,13 +97,21 @@ FrfHandle frf(const py::object& given, const std::vector<std::string>& inputs,
   options.transient_periods = transient_periods;
   options.method = pick<FrfMethod>("method", method, {"periodic", "lpm"});
   options.covariance = pick<CovarianceKind>("covariance", covariance, {"diagonal", "full"});
+  options.periods = pick<PeriodChoice>("periods", periods, {"consistent", "unmarked"});
+  options.covariance_lines = covariance_lines;
   options.threads = threads;
   const std::vector<std::shared_ptr<LogReader>> kept = logs_of(given);
   std::vector<const LogReader*> logs;
   for (const auto& log : kept) logs.push_back(log.get());
   Console silent;
   silent.verbosity = Verbosity::quiet;
-  return interruptible([&] { return FrfHandle(estimate_frf(logs, options, silent).frf); });
+  return interruptible([&] {
+    FrfEstimate estimate = estimate_frf(logs, options, silent).frf;
+    if (health)
+      estimate.provenance_json = with_health(
+          estimate.provenance_json, examine_logs(logs, options, stage.value_or(""), silent));
+    return FrfHandle(std::move(estimate));
+  });
 }
 
 FrfHandle select(const FrfHandle& of, std::optional<std::array<double, 2>> band_hz,
@@ -120,6 +130,21 @@ FrfHandle compensated(const FrfHandle& of, const std::string& what, double delay
 py::object radius(const FrfHandle& of, double level, const std::string& variance) {
   const auto kind = pick<VarianceKind>("variance", variance, {"noise", "total"});
   return lines_moved<double>(confidence_radius(of.frf, level, kind), of.frf.n_outputs());
+}
+
+py::list health(const FrfEstimate& frf) {
+  py::list list;
+  for (const Finding& finding : health_of(frf.provenance_json)) {
+    py::dict entry;
+    entry["severity"] = to_string(finding.severity);
+    entry["cause"] = to_string(finding.cause);
+    entry["channel"] = finding.channel;
+    entry["what"] = finding.what;
+    entry["figure"] = finding.figure;
+    entry["remedy"] = finding.remedy;
+    list.append(entry);
+  }
+  return list;
 }
 
 /// A read-only array over a matrix of the response.
@@ -174,6 +199,7 @@ void define_properties(Class& c) {
   property(
       "provenance_json", [](const FrfEstimate& f) { return f.provenance_json; },
       "Inputs with their hash, options, versions; JSON");
+  property("health", &health, kHealthDoc);
 }
 
 }  // namespace
@@ -196,7 +222,9 @@ void define_frf(py::module_& module) {
       "frf", &frf, py::arg("logs"), py::kw_only(), py::arg("inputs") = std::vector<std::string>{},
       py::arg("outputs") = std::vector<std::string>{}, py::arg("realizations") = std::vector<int>{},
       py::arg("transient_periods") = py::none(), py::arg("method") = "periodic",
-      py::arg("covariance") = "diagonal", py::arg("threads") = 0, kEstimateDoc);
+      py::arg("covariance") = "diagonal", py::arg("periods") = "consistent",
+      py::arg("covariance_lines") = 1, py::arg("health") = true, py::arg("stage") = py::none(),
+      py::arg("threads") = 0, kEstimateDoc);
   module.def("read_frf", &read_frf_handle, py::arg("file"), kReadFrfDoc);
   module.def(
       "write_frf",

@@ -29,6 +29,10 @@ inline constexpr const char* kNoiseVarianceDoc =
 inline constexpr const char* kTotalVarianceDoc =
     "float64 [N, n_y, n_u], E|dG|^2 by noise and nonlinearity, from realizations; None if unknown";
 
+inline constexpr const char* kHealthDoc =
+    R"(What was found in the data, a list of dicts: severity ('fault', 'doubt', 'unchecked'), cause, channel, what,
+figure, remedy. With a fault the program ends with exit code 3.)";
+
 inline constexpr const char* kSelectDoc =
     R"(The lines of band_hz = (low, high) in Hz and the named inputs and outputs, in the order asked, as a new Frf.
 
@@ -53,6 +57,10 @@ realizations         which, from 0 (the flag of the program counts from 1); empt
 transient_periods    left out, instead of the log's own; None: the log's own ('lpm': none)
 method               'periodic', or 'lpm': whole records, the transient modelled
 covariance           'diagonal' or 'full'
+periods              'consistent': without those that do not belong with the others; or 'unmarked'
+covariance_lines     odd: the noise covariance is smoothed over so many lines
+health               examine the data as well: Frf.health
+stage                stage file that they are held against; None: the one that the log carries
 threads              0: all cores; the result does not depend on it
 
 Returns Frf: the numbers of `stageid frf`. Other Python threads run meanwhile; Ctrl-C ends it.

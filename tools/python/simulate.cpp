@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "tools/config_plan.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/interrupt.hpp"
 #include "tools/measured_stage.hpp"

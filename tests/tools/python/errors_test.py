@@ -59,7 +59,7 @@ class Refused(unittest.TestCase):
         frf = stageid.read_frf(WORK / "frf.h5")
         log = stageid.read_log(WORK / "run.slog")
         for function, given, option in (
-                (stageid.frf, log, "method"), (stageid.frf, log, "covariance"), (stageid.fit, frf, "hold"),
+                (stageid.frf, log, "method"), (stageid.frf, log, "covariance"), (stageid.frf, log, "periods"), (stageid.fit, frf, "hold"),
                 (stageid.fit, frf, "weighting"), (stageid.fit, frf, "delay"),
                 (stageid.fit, frf, "method"), (stageid.fit, frf, "damping"), (stageid.fit, frf, "rigid_body"),
                 (stageid.modes, frf, "kind"), (stageid.cmif, frf, "kind")):
@@ -78,6 +78,8 @@ class Refused(unittest.TestCase):
         self.refuses(stageid.RequestError, "", frf.select, band_hz=(900.0, 950.0))
         self.refuses(stageid.RequestError, "a9", frf.select, inputs=["a9"])
         self.refuses(stageid.RequestError, "realization 8", stageid.frf, WORK / "run.slog", realizations=[8])
+        self.refuses(stageid.RequestError, "covariance_lines|odd", stageid.frf, WORK / "run.slog", covariance_lines=2)
+        self.refuses(stageid.FileError, "no.yaml", stageid.frf, WORK / "run.slog", stage=WORK / "no.yaml")
         self.refuses(stageid.RequestError, "max-iterations", stageid.fit, frf, max_iterations=0)
         self.refuses(stageid.RequestError, "", stageid.stabilization, frf, most_order=1000)
         self.refuses(stageid.RequestError, "", frf.compensate("delay", 0.0).compensate, "delay", 0.0)

@@ -60,6 +60,29 @@ class SameAsTheProgram(unittest.TestCase):
         program("frf", "run.slog", "-o", "lpm.h5", "--method", "lpm")
         self.assert_same_frf(stageid.frf(WORK / "run.slog", method="lpm"), "lpm.h5")
 
+    def test_the_health_of_the_data(self):
+        """Of a log with a sensor's sign turned: found as the program finds it, in memory too."""
+        read = stageid.read_log(WORK / "run.slog")
+        r, u, y = read.arrays()
+        with h5py.File(WORK / "run.h5") as whole, h5py.File(WORK / "turned.h5", "w") as turned:
+            for name in whole:
+                whole.copy(name, turned)
+            turned.attrs.update(whole.attrs)
+            for run in turned["runs"].values():
+                run["sensors"][:, 1] *= -1
+        done = subprocess.run([PROGRAM, "--json", "frf", "turned.h5", "-o", "t.h5"], cwd=WORK, capture_output=True)
+        found = json.loads(done.stdout)["health"]
+        self.assertIn("fault", [f["severity"] for f in found])
+        frf = stageid.frf(WORK / "turned.h5")
+        self.assertEqual(frf.health, found)
+        self.assertEqual(stageid.frf(WORK / "turned.h5", health=False).health, [])
+        program("frf", "run.slog", "-o", "unseen.h5", "--no-health", "--periods", "unmarked", "--smooth-covariance", "3")
+        stageid.write_frf(WORK / "module.h5", stageid.frf(WORK / "run.slog", health=False, periods="unmarked",
+                                                          covariance_lines=3))
+        self.assertEqual((WORK / "module.h5").read_bytes(), (WORK / "unseen.h5").read_bytes())
+        in_memory = stageid.Log(r, u, y, sample_rate_hz=read.sample_rate_hz, transient_periods=2)
+        self.assertNotIn("fault", [f["severity"] for f in stageid.frf(in_memory).health])
+
     def test_a_response_from_arrays(self):
         read = stageid.read_log(WORK / "run.slog")
         r, u, y = read.arrays()

@@ -38,6 +38,14 @@ class StabilizationPole(TypedDict):
     stable_frequency: bool
     stable_damping: bool
 
+class Finding(TypedDict):
+    severity: str
+    cause: str
+    channel: str
+    what: str
+    figure: str
+    remedy: str
+
 class Mode(TypedDict):
     natural_frequency_hz: float
     natural_frequency_std_hz: float | None
@@ -144,6 +152,8 @@ class Frf:
     def delay_s(self) -> float: ...
     @property
     def provenance_json(self) -> str: ...
+    @property
+    def health(self) -> list[Finding]: ...
     def select(
         self,
         *,
@@ -223,6 +233,10 @@ def frf(
     transient_periods: int | None = None,
     method: str = "periodic",
     covariance: str = "diagonal",
+    periods: str = "consistent",
+    covariance_lines: int = 1,
+    health: bool = True,
+    stage: File | None = None,
     threads: int = 0,
 ) -> Frf: ...
 def read_frf(file: File) -> Frf: ...
