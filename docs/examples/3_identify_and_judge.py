@@ -41,11 +41,13 @@ for mode in fit.model.modes():
 
 # %% [markdown]
 # ## Judge
-# On a realization that the fit has not seen: chi-square per degree of freedom is 1 where the error is noise.
+# On a realization that the fit has not seen. Where the error is noise, chi-square per degree of freedom is what
+# variances of so few periods let one expect.
 
 # %%
 figures = stageid.validate(fit.model, held_back)
-print(f"relative error {figures['relative_rms_error']:.2e}, chi-square {figures['chi_square_per_dof']:.2f}, "
+print(f"relative error {figures['relative_rms_error']:.2e}, chi-square {figures['chi_square_per_dof']:.2f} "
+      f"(of noise alone {figures['expected_chi_square']:.2f}), "
       f"residuals above their 95 % point {100 * figures['whitened_above_95']:.1f} %")
 
 # Too few modes: the same figures tell.
