@@ -20,6 +20,7 @@
 
 #include "acquisition/measurement_loop.hpp"
 #include "acquisition/run_experiment.hpp"
+#include "acquisition/slog_writer.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/plant_frf.hpp"
 #include "frf/relative_variance.hpp"
