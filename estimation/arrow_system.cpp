@@ -45,21 +45,23 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
       add_few(group);
       continue;
     }
+    const GroupProducts products(problem, group, columns_, method);
     for (const TileRange& block :
          member_blocks(static_cast<Eigen::Index>(group.channels.size()), problem.size()))
-      if (regular_) add_block(group, block);
+      if (regular_) add_block(group, products, block);
   }
   schur_ += M_;
   schur_e_ += e_;
 }
 
-void ArrowSystem::add_block(const BasisGroup& group, const TileRange& block) {
+void ArrowSystem::add_block(const BasisGroup& group, const GroupProducts& products,
+                            const TileRange& block) {
   const std::vector<Eigen::Index> members(
       group.channels.begin() + block.first_member,
       group.channels.begin() + block.first_member + block.members);
   const Eigen::MatrixXd B = rows_of(beta_.B, members);
   const ComplexColumns Y{Y_re_, Y_im_};
-  const LineSums sums = line_sums(problem_, group, block, B, columns_,
+  const LineSums sums = line_sums(problem_, group, products, block, B, columns_,
                                   method_ == FitMethod::gn ? nullptr : &Y, method_);
   add_denominators(sums);
   Channel passing;

@@ -58,7 +58,7 @@ class ArrowSystem {
   bool regular() const noexcept { return regular_; }
 
  private:
-  void add_block(const BasisGroup& group, const TileRange& block);
+  void add_block(const BasisGroup& group, const GroupProducts& products, const TileRange& block);
   void add_few(const BasisGroup& group);
   void add_denominators(const LineSums& sums);
   void set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,

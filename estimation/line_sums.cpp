@@ -1,39 +1,14 @@
 #include "estimation/line_sums.hpp"
 
 #include <complex>
-#include <map>
 
 namespace stageid {
 namespace {
 
-/// Which products a group's sums need.
-struct Products {
-  Products(const FitProblem& problem, const BasisGroup& group,
-           const std::vector<DerivativeColumn>& columns)
-      : FF(group.fractions, group.fractions.F, group.fractions.F,
-           triangular_pairs(problem.functions())),
-        FD(group.fractions, group.fractions.F, group.fractions.D,
-           all_pairs(problem.functions(), static_cast<Eigen::Index>(columns.size()))),
-        FY(group.fractions, group.fractions.F, group.fractions.Y,
-           all_pairs(problem.functions(), problem.denominators())),
-        DD(group.fractions, group.fractions.D, group.fractions.D,
-           triangular_pairs(static_cast<Eigen::Index>(columns.size()))) {
-    for (const auto& [l, r] : DD.direct()) {
-      const Eigen::Index f = columns[static_cast<std::size_t>(l)].function;
-      const Eigen::Index g = columns[static_cast<std::size_t>(r)].function;
-      functions[{f, g}].push_back({l, r});
-    }
-  }
-
-  PairReduction FF, FD, FY, DD;
-  /// The direct pairs of DD by the functions that they are derivatives of.
-  std::map<std::pair<Eigen::Index, Eigen::Index>, std::vector<ColumnPair>> functions;
-};
-
 /// The sums of one share of channels and lines, tile by tile.
 class Share {
  public:
-  Share(const FitProblem& problem, const BasisGroup& group, const Products& products,
+  Share(const FitProblem& problem, const BasisGroup& group, const GroupProducts& products,
         const Eigen::MatrixXd& B, const std::vector<DerivativeColumn>& columns,
         const ComplexColumns* Y, FitMethod method, const TileRange& range)
       : problem_(problem),
@@ -109,11 +84,10 @@ class Share {
   void add_fractions() {
     const FractionColumns& fractions = group_.fractions;
     if (fractions.pairs() == 0) return;
+    add_fraction_sums(W_, fractions, first_, sums_.S);
+    if (Y_ == nullptr) return;
     const Eigen::VectorXd re = tile(fractions.first.re);
     const Eigen::VectorXd im = tile(fractions.first.im);
-    const Eigen::MatrixXd W = W_ * (re.cwiseAbs2() + im.cwiseAbs2()).asDiagonal();
-    sums_.S.noalias() += W * tile(fractions.base);
-    if (Y_ == nullptr) return;
     const auto base = fractions.base.block(first_, 0, n_, simple_columns());
     const Eigen::MatrixXd V_re = WE_re_ * re.asDiagonal() + WE_im_ * im.asDiagonal();
     const Eigen::MatrixXd V_im = WE_im_ * re.asDiagonal() - WE_re_ * im.asDiagonal();
@@ -197,7 +171,7 @@ class Share {
 
   const FitProblem& problem_;
   const BasisGroup& group_;
-  const Products& products_;
+  const GroupProducts& products_;
   const Eigen::MatrixXd& B_;
   const std::vector<DerivativeColumn>& columns_;
   const ComplexColumns* Y_;
@@ -215,7 +189,7 @@ class Share {
 };
 
 /// What was left to fractions goes where it belongs.
-void expand(const Products& products, const std::vector<DerivativeColumn>& columns,
+void expand(const GroupProducts& products, const std::vector<DerivativeColumn>& columns,
             const Eigen::MatrixXd& B, LineSums& sums) {
   sums.FF = products.FF.expand(sums.S, sums.FF);
   sums.FD = products.FD.expand(sums.S, sums.FD);
@@ -253,6 +227,23 @@ LineSums& LineSums::operator+=(const LineSums& other) {
   return *this;
 }
 
+GroupProducts::GroupProducts(const FitProblem& problem, const BasisGroup& group,
+                             const std::vector<DerivativeColumn>& columns, FitMethod method)
+    : FF(group.fractions, group.fractions.F, group.fractions.F,
+         triangular_pairs(problem.functions())),
+      FD(group.fractions, group.fractions.F, group.fractions.D,
+         all_pairs(problem.functions(), static_cast<Eigen::Index>(columns.size()))),
+      FY(group.fractions, group.fractions.F, group.fractions.Y,
+         all_pairs(problem.functions(), method == FitMethod::gn ? 0 : problem.denominators())),
+      DD(group.fractions, group.fractions.D, group.fractions.D,
+         triangular_pairs(static_cast<Eigen::Index>(columns.size()))) {
+  for (const auto& [l, r] : DD.direct()) {
+    const Eigen::Index f = columns[static_cast<std::size_t>(l)].function;
+    const Eigen::Index g = columns[static_cast<std::size_t>(r)].function;
+    functions[{f, g}].push_back({l, r});
+  }
+}
+
 void equation_error_columns(const FitProblem& problem, const FitParameters& beta,
                             Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
   re.resize(problem.size(), problem.denominators());
@@ -277,10 +268,10 @@ void equation_error_columns(const FitProblem& problem, const FitParameters& beta
   }
 }
 
-LineSums line_sums(const FitProblem& problem, const BasisGroup& group, const TileRange& block,
-                   const Eigen::MatrixXd& B, const std::vector<DerivativeColumn>& columns,
-                   const ComplexColumns* Y, FitMethod method) {
-  const Products products(problem, group, columns);
+LineSums line_sums(const FitProblem& problem, const BasisGroup& group,
+                   const GroupProducts& products, const TileRange& block, const Eigen::MatrixXd& B,
+                   const std::vector<DerivativeColumn>& columns, const ComplexColumns* Y,
+                   FitMethod method) {
   LineSums sums = sum_over_shares<LineSums>(block, problem.threads, [&](const TileRange& share) {
     return Share(problem, group, products, B, columns, Y, method, share).run();
   });

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
+#include <utility>
+#include <vector>
 
 #include "estimation/weighted_products.hpp"
 
@@ -34,11 +37,22 @@ struct LineSums {
 void equation_error_columns(const FitProblem& problem, const FitParameters& beta,
                             Eigen::MatrixXd& re, Eigen::MatrixXd& im);
 
+/// Which products the sums of a group's channels need: the same for all of its blocks.
+struct GroupProducts {
+  GroupProducts(const FitProblem& problem, const BasisGroup& group,
+                const std::vector<DerivativeColumn>& columns, FitMethod method);
+
+  PairReduction FF, FD, FY, DD;  ///< FY: none for gn
+  /// The direct pairs of DD by the functions that they are derivatives of.
+  std::map<std::pair<Eigen::Index, Eigen::Index>, std::vector<ColumnPair>> functions;
+};
+
 /// @param block channels of the group
 /// @param B their numerators, members x n_f
 /// @param Y of equation_error_columns(); nothing for gn
-LineSums line_sums(const FitProblem& problem, const BasisGroup& group, const TileRange& block,
-                   const Eigen::MatrixXd& B, const std::vector<DerivativeColumn>& columns,
-                   const ComplexColumns* Y, FitMethod method);
+LineSums line_sums(const FitProblem& problem, const BasisGroup& group,
+                   const GroupProducts& products, const TileRange& block, const Eigen::MatrixXd& B,
+                   const std::vector<DerivativeColumn>& columns, const ComplexColumns* Y,
+                   FitMethod method);
 
 }  // namespace stageid

@@ -85,10 +85,15 @@ class OwnGrams {
   std::vector<Eigen::MatrixXd> grams_;
 };
 
-GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const TileRange& block) {
+/// The products of all functions of a group: the same for all of its blocks.
+PairReduction function_pairs(const FitProblem& problem, const BasisGroup& group) {
+  return {group.fractions, group.fractions.F, group.fractions.F,
+          triangular_pairs(problem.functions())};
+}
+
+GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
+                   const TileRange& block) {
   const bool few = block.members < kFewChannels;
-  const PairReduction pairs(group.fractions, group.fractions.F, group.fractions.F,
-                            triangular_pairs(problem.functions()));
   const Eigen::Index base = few ? 0 : group.fractions.simple_columns();
   const ComplexColumns F{group.F_re, group.F_im};
   GramSums all = sum_over_shares<GramSums>(block, problem.threads, [&](const TileRange& share) {
@@ -105,11 +110,7 @@ GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const Til
         own.add(group, first, data);
       } else {
         add_pair_sums(data.W, F, F, pairs.direct(), first, sums.FF);
-        const auto size = [&](const Eigen::MatrixXd& x) { return x.col(0).segment(first, n); };
-        const Eigen::MatrixXd W = data.W * (size(group.fractions.first.re).cwiseAbs2() +
-                                            size(group.fractions.first.im).cwiseAbs2())
-                                               .asDiagonal();
-        sums.S.noalias() += W * group.fractions.base.block(first, 0, n, base);
+        add_fraction_sums(data.W, group.fractions, first, sums.S);
       }
       add_weighted_gradient(group, first, data, sums.FG);
     });
@@ -156,9 +157,9 @@ std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, E
 ///
 /// The first solution is refined with the residual itself. What the refinement d lowers the squares by
 /// is FE . d exactly, because they are quadratic; only where that is much of them are they summed anew.
-bool solve_block(const FitProblem& problem, const BasisGroup& group, const TileRange& block,
-                 Eigen::MatrixXd& B, double& squares) {
-  const GramSums gram = gram_sums(problem, group, block);
+bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
+                 const TileRange& block, Eigen::MatrixXd& B, double& squares) {
+  const GramSums gram = gram_sums(problem, group, pairs, block);
   const std::vector<ScaledNormalEquations> factors = normal_equations(gram.FF, problem.functions());
   for (const ScaledNormalEquations& channel : factors)
     if (!channel.ok()) return false;
@@ -202,15 +203,17 @@ bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& 
   B.setZero(problem.channels(), problem.functions());
   double sum = 0.0;
   Eigen::MatrixXd of_block;
-  for (const BasisGroup& group : groups)
+  for (const BasisGroup& group : groups) {
+    const PairReduction pairs = function_pairs(problem, group);
     for (const TileRange& block :
          member_blocks(static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
       double squares = 0.0;
-      if (!solve_block(problem, group, block, of_block, squares)) return false;
+      if (!solve_block(problem, group, pairs, block, of_block, squares)) return false;
       sum += squares;
       for (Eigen::Index r = 0; r < block.members; ++r)
         B.row(group.channels[static_cast<std::size_t>(block.first_member + r)]) = of_block.row(r);
     }
+  }
   cost = sum / (2.0 * static_cast<double>(problem.size()));
   return std::isfinite(cost);
 }
@@ -250,13 +253,15 @@ std::vector<double> removal_costs(const FitProblem& problem, const std::vector<B
                                   const Eigen::MatrixXd& B) {
   const Eigen::Index n_f = problem.functions();
   std::vector<double> costs(problem.shapes.size(), 0.0);
-  for (const BasisGroup& group : groups)
+  for (const BasisGroup& group : groups) {
+    const PairReduction pairs = function_pairs(problem, group);
     for (const TileRange& block :
          member_blocks(static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
       const std::vector<ScaledNormalEquations> factors =
-          normal_equations(gram_sums(problem, group, block).FF, n_f);
+          normal_equations(gram_sums(problem, group, pairs, block).FF, n_f);
       add_removal_costs(problem, factors, group.channels.data() + block.first_member, B, costs);
     }
+  }
   return costs;
 }
 

@@ -78,6 +78,18 @@ double DataTile::squares() const {
   return (W.array() * (E_re.array().square() + E_im.array().square())).sum();
 }
 
+void add_fraction_sums(const Eigen::MatrixXd& W, const FractionColumns& fractions,
+                       Eigen::Index first_line, Eigen::MatrixXd& S) {
+  const auto tile = [&](const Eigen::MatrixXd& x) {
+    return x.block(first_line, 0, W.cols(), x.cols());
+  };
+  const Eigen::MatrixXd weighted =
+      W * (tile(fractions.first.re).cwiseAbs2() + tile(fractions.first.im).cwiseAbs2())
+              .col(0)
+              .asDiagonal();
+  S.noalias() += weighted * fractions.base.block(first_line, 0, W.cols(), S.cols());
+}
+
 void add_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X, const ComplexColumns& Y,
                    const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
                    Eigen::MatrixXd& sums) {

@@ -67,6 +67,11 @@ struct DataTile {
   double squares() const;  ///< sum W |E|^2
 };
 
+/// S(c, b) += sum_k W(c, k) |first(k)|^2 base(k, b) over lines first_line + k, for the first columns of the
+/// base that S has: what PairReduction makes sums of products of.
+void add_fraction_sums(const Eigen::MatrixXd& W, const FractionColumns& fractions,
+                       Eigen::Index first_line, Eigen::MatrixXd& S);
+
 /// sums(p, c) += sum_k W(c, k) Re{ conj(X(k, left_p)) Y(k, right_p) } over lines first_line + k, for pairs
 /// that are multiplied out. The products are functions of frequency alone and shared by all channels, so
 /// that this is one (pairs x lines) (lines x channels) matrix product.

@@ -2,6 +2,12 @@
 
 namespace stageid {
 
+int channel_index(const std::vector<Channel>& channels, const std::string& name) noexcept {
+  for (std::size_t i = 0; i < channels.size(); ++i)
+    if (channels[i].name == name) return static_cast<int>(i);
+  return -1;
+}
+
 const char* to_string(Outcome outcome) noexcept {
   switch (outcome) {
     case Outcome::ok:

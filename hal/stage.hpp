@@ -22,6 +22,9 @@ struct Channel {
   double direction[3] = {0., 0., 1.};   ///< unit vector
 };
 
+/// Index of the channel of that name, -1 if there is none.
+int channel_index(const std::vector<Channel>& channels, const std::string& name) noexcept;
+
 enum class Clock : std::uint8_t { virtual_time, wall };
 
 /// What a back end is and can do; an experiment that does not fit is refused before it starts.

@@ -37,13 +37,12 @@ std::vector<int> channel_numbers(const std::vector<std::string>& names,
     std::iota(numbers.begin(), numbers.end(), 0);
   }
   for (const std::string& name : names) {
-    const auto found = std::find_if(channels.begin(), channels.end(),
-                                    [&](const Channel& channel) { return channel.name == name; });
-    if (found == channels.end())
+    const int index = channel_index(channels, name);
+    if (index < 0)
       throw std::invalid_argument(
           fmt::format("can: bus {}: there is no channel '{}' of that kind; give a name above",
                       interface, name));
-    numbers.push_back(static_cast<int>(found - channels.begin()));
+    numbers.push_back(index);
   }
   return numbers;
 }

@@ -26,10 +26,7 @@ ClosedLoop closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) 
   const auto n_u = static_cast<Eigen::Index>(info.actuators.size());
   Eigen::MatrixXd selection = Eigen::MatrixXd::Zero(n_u, plan.experiments());
   for (std::size_t axis = 0; axis < plan.spec().axes.size(); ++axis) {
-    const int index = channel_index(info.actuators, plan.spec().axes[axis].channel);
-    if (index < 0)
-      throw std::invalid_argument(
-          fmt::format("axes: the stage has no actuator '{}'", plan.spec().axes[axis].channel));
+    const int index = actuator_of_axis(info, plan.spec().axes[axis].channel);
     selection(index, static_cast<Eigen::Index>(axis)) = 1.0;
   }
   const std::vector<PlantMode> modes = wafer_stage_modes(stage);

@@ -25,10 +25,7 @@ std::vector<Index> actuators_of(const ExperimentSpec& experiment, const StageInf
                                 const PlantPrior& prior) {
   std::vector<Index> indices;
   for (const ExcitationAxis& axis : experiment.axes) {
-    const int index = channel_index(stage.actuators, axis.channel);
-    if (index < 0)
-      throw std::invalid_argument(
-          fmt::format("axes: the stage has no actuator '{}'", axis.channel));
+    const int index = actuator_of_axis(stage, axis.channel);
     if (!prior.actuator_known[static_cast<std::size_t>(index)])
       throw std::invalid_argument(fmt::format(
           "prior: does not know the axis '{}'; measure a pilot with all axes", axis.channel));

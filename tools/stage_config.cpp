@@ -106,10 +106,11 @@ const char* to_string(Backend backend) noexcept {
   return kNames[static_cast<std::size_t>(backend)];
 }
 
-int channel_index(const std::vector<Channel>& channels, const std::string& name) {
-  for (std::size_t i = 0; i < channels.size(); ++i)
-    if (channels[i].name == name) return static_cast<int>(i);
-  return -1;
+int actuator_of_axis(const StageInfo& stage, const std::string& axis) {
+  const int index = channel_index(stage.actuators, axis);
+  if (index < 0)
+    throw std::invalid_argument(fmt::format("axes: the stage has no actuator '{}'", axis));
+  return index;
 }
 
 void describe_stage_keys(ConfigVisitor& visitor) {
