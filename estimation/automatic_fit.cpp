@@ -12,6 +12,7 @@
 
 #include "estimation/fit_problem.hpp"
 #include "estimation/mode_worth.hpp"
+#include "estimation/modes_above_noise.hpp"
 #include "estimation/pole_relocation.hpp"
 #include "estimation/residual_modes.hpp"
 
@@ -23,6 +24,7 @@ constexpr std::size_t kCandidates = 4;      // tried before it is believed that 
 constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
 constexpr double kSettledDeviations = 0.1;  // where ways to a number of modes are compared
 constexpr int kMostGrown = 40;              // modes; more are placed at once, and only then grown
+constexpr double kSettledOfMany = 0.02;     // the same for every pole of so many, root mean square
 
 /// Grows and prunes a model; every decision is written down.
 class AutomaticFit {
@@ -62,7 +64,13 @@ class AutomaticFit {
         relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
     say("start: {} modes by pole relocation", modes.size());
     model = start_of(modes);
-    if (selection_.exactly > kMostGrown) hold_hidden_modes(model);
+    if (many()) {
+      FitOptions still = quick_;
+      still.max_iterations = 0;
+      FitResult placed = fit_additive_model(frf_, model, still);
+      if (worth_.at_rounding(placed)) return adopt(std::move(placed));
+      model = modes_above_noise(frf_, structure_, placed, quick_, selection_.exactly, decisions_);
+    }
     adopt(fit_additive_model(frf_, model, quick_));
   }
 
@@ -79,7 +87,7 @@ class AutomaticFit {
       return;
     }
     quick_.max_iterations = options_.max_iterations;
-    quick_.deviation_tolerance = kSettledDeviations;
+    quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
     adopt(fit_additive_model(frf_, best_.model, quick_));
     say("{} modes, by way of {}: cost {:.6g}", count_modes(best_.model), target_,
         best_.model.fit.cost);
@@ -90,7 +98,9 @@ class AutomaticFit {
 
   FitResult finish() {
     sort_modes(best_.model);
-    FitResult result = fit_additive_model(frf_, best_.model, options_);
+    FitOptions last = options_;
+    if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled_of_many());
+    FitResult result = fit_additive_model(frf_, best_.model, last);
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
     result.cost.insert(result.cost.begin(), history_.begin(), history_.end());
@@ -100,14 +110,14 @@ class AutomaticFit {
   }
 
  private:
-  /// Of very many modes that are asked for, the data show some not at all. Free, their poles would
-  /// settle on the largest noise peaks: a lower cost, but further from the truth.
-  void hold_hidden_modes(AdditiveModel& model) {
-    FitOptions still = quick_;
-    still.max_iterations = 0;
-    const int hidden = worth_.hold_hidden(fit_additive_model(frf_, model, still), model);
-    if (hidden > 0)
-      say("{} of them are not above the noise: their poles stay where they were placed", hidden);
+  bool many() const { return selection_.exactly > kMostGrown; }
+
+  /// Newton decrement at which every free pole is off by kSettledOfMany of its standard deviation.
+  double settled_of_many() const {
+    double free = 0.0;
+    for (const Submodel& s : best_.model.submodels)
+      if (is_searched_mode(s) && !s.frequency_held) free += 2.0;
+    return kSettledOfMany * std::sqrt(free);
   }
 
   AdditiveModel start() {
@@ -176,7 +186,7 @@ class AutomaticFit {
   /// Several at once where each is clearly worth it: pruning corrects what was one too many. Where very
   /// many are asked for, whatever they are worth.
   bool add_clear_ones(const std::vector<ResidualMode>& candidates) {
-    const bool demanded = selection_.exactly > kMostGrown;
+    const bool demanded = many();
     std::vector<ResidualMode> clear;
     for (const ResidualMode& candidate : candidates)
       if (demanded || candidate.gain > 4.0 * worth_.price(best_)) clear.push_back(candidate);
@@ -234,29 +244,6 @@ class AutomaticFit {
     return true;
   }
 
-  /// The modes to try to do without: the least worthy first, no two that could stand in for each
-  /// other.
-  std::vector<std::size_t> unworthy(double price_of_one, std::size_t most) const {
-    const std::vector<Submodel>& all = best_.model.submodels;
-    std::vector<std::size_t> order;
-    for (std::size_t i = 0; i < all.size(); ++i)
-      if (is_searched_mode(all[i]) && best_.removal_cost[i] < price_of_one) order.push_back(i);
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return best_.removal_cost[a] < best_.removal_cost[b];
-    });
-    std::vector<std::size_t> out;
-    for (const std::size_t i : order) {
-      const double f = all[i].natural_frequency_hz();
-      const bool stands_in = std::any_of(out.begin(), out.end(), [&](std::size_t o) {
-        const double width = 4.0 * std::max(all[i].damping_ratio(), all[o].damping_ratio()) * f;
-        return std::abs(all[o].natural_frequency_hz() - f) < width;
-      });
-      if (!stands_in && out.size() < most) out.push_back(i);
-    }
-    std::sort(out.begin(), out.end());
-    return out;
-  }
-
   /// Replaces two modes closer than a half-power width by one where the second is not worth its
   /// parameters: on a single resonance two nearly equal modes with large opposite residues fit as
   /// well as one, and none of them can be dropped alone.
@@ -306,7 +293,7 @@ class AutomaticFit {
       const double limit =
           surplus > 0 ? std::numeric_limits<double>::infinity() : 2.0 * worth_.price(best_);
       const std::size_t most = surplus > 0 ? static_cast<std::size_t>((surplus + 1) / 2) : at_once;
-      const std::vector<std::size_t> out = unworthy(limit, most);
+      const std::vector<std::size_t> out = least_worthy(best_, limit, most);
       if (out.empty()) return;
       AdditiveModel model = best_.model;
       for (const std::size_t i : std::views::reverse(out))

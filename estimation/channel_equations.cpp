@@ -1,5 +1,7 @@
 #include "estimation/channel_equations.hpp"
 
+#include <algorithm>
+
 namespace stageid {
 
 void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
@@ -21,6 +23,33 @@ void global_columns(const FitProblem& problem, const FitParameters& beta, const 
   }
 }
 
+namespace {
+
+/// The globals that are no known values, in their order.
+std::vector<Eigen::Index> free_globals(const FitProblem& problem) {
+  std::vector<Eigen::Index> out;
+  for (Eigen::Index i = 0; i < problem.globals(); ++i)
+    if (std::find(problem.held.begin(), problem.held.end(), i) == problem.held.end())
+      out.push_back(i);
+  return out;
+}
+
+/// Equations of numerators and free globals as those of all, zero for the others.
+ChannelEquations scattered(const ChannelEquations& of_free, Eigen::Index functions,
+                           Eigen::Index globals, const std::vector<Eigen::Index>& free) {
+  if (static_cast<Eigen::Index>(free.size()) == globals) return of_free;
+  Eigen::Array<Eigen::Index, Eigen::Dynamic, 1> to(of_free.e.size());
+  for (Eigen::Index i = 0; i < to.size(); ++i)
+    to[i] = i < functions ? i : functions + free[static_cast<std::size_t>(i - functions)];
+  ChannelEquations out{Eigen::MatrixXd::Zero(functions + globals, functions + globals),
+                       Eigen::VectorXd::Zero(functions + globals)};
+  out.M(to, to) = of_free.M;
+  out.e(to) = of_free.e;
+  return out;
+}
+
+}  // namespace
+
 ChannelEquations channel_equations(const FitProblem& problem, const FitParameters& beta,
                                    const BasisGroup& group, Eigen::Index c,
                                    const std::vector<DerivativeColumn>& columns,
@@ -40,37 +69,36 @@ ChannelEquations channel_equations(const FitProblem& problem, const FitParameter
   Eigen::MatrixXd re;
   Eigen::MatrixXd im;
   global_columns(problem, beta, group, c, columns, re, im);
-  Eigen::MatrixXd J(2 * N, n_f + problem.globals());
+  const std::vector<Eigen::Index> free = free_globals(problem);
+  const auto n_free = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd J(2 * N, n_f + n_free);
   J.topLeftCorner(N, n_f) = root.asDiagonal() * group.F_re;
   J.bottomLeftCorner(N, n_f) = root.asDiagonal() * group.F_im;
-  J.topRightCorner(N, problem.globals()) = root.asDiagonal() * re;
-  J.bottomRightCorner(N, problem.globals()) = root.asDiagonal() * im;
+  for (Eigen::Index i = 0; i < n_free; ++i) {
+    J.col(n_f + i).head(N) = root.cwiseProduct(re.col(free[static_cast<std::size_t>(i)]));
+    J.col(n_f + i).tail(N) = root.cwiseProduct(im.col(free[static_cast<std::size_t>(i)]));
+  }
 
-  ChannelEquations out;
-  const auto symmetric = [&](const Eigen::MatrixXd& X) {
+  const auto symmetric = [&](const Eigen::MatrixXd& X) -> ChannelEquations {
     Eigen::MatrixXd lower = Eigen::MatrixXd::Zero(X.cols(), X.cols());
     lower.selfadjointView<Eigen::Lower>().rankUpdate(X.transpose());
-    out.M = lower.selfadjointView<Eigen::Lower>();
-    out.e = X.transpose() * E;
+    return {lower.selfadjointView<Eigen::Lower>(), X.transpose() * E};
   };
-  if (method == FitMethod::gn) {
-    symmetric(J);
-    return out;
-  }
+  const auto full = [&](const ChannelEquations& of_free) {
+    return scattered(of_free, n_f, problem.globals(), free);
+  };
+  if (method == FitMethod::gn) return full(symmetric(J));
   Eigen::MatrixXd Phi = J;
-  for (Eigen::Index p = 0; p < n_a; ++p) {
+  for (Eigen::Index i = 0; i < n_free; ++i) {
+    const Eigen::Index p = free[static_cast<std::size_t>(i)];
+    if (p >= n_a) break;
     const auto y_re = Y->re.col(p);
     const auto y_im = Y->im.col(p);
-    Phi.col(n_f + p).head(N) -= y_re.cwiseProduct(E.head(N)) - y_im.cwiseProduct(E.tail(N));
-    Phi.col(n_f + p).tail(N) -= y_re.cwiseProduct(E.tail(N)) + y_im.cwiseProduct(E.head(N));
+    Phi.col(n_f + i).head(N) -= y_re.cwiseProduct(E.head(N)) - y_im.cwiseProduct(E.tail(N));
+    Phi.col(n_f + i).tail(N) -= y_re.cwiseProduct(E.tail(N)) + y_im.cwiseProduct(E.head(N));
   }
-  if (method == FitMethod::sk) {
-    symmetric(Phi);
-    return out;
-  }
-  out.M = J.transpose() * Phi;
-  out.e = J.transpose() * E;
-  return out;
+  if (method == FitMethod::sk) return full(symmetric(Phi));
+  return full({J.transpose() * Phi, J.transpose() * E});
 }
 
 }  // namespace stageid

@@ -4,12 +4,6 @@
 #include <cmath>
 
 namespace stageid {
-namespace {
-
-constexpr double kUpper5Percent = 1.6449;  // of the normal distribution
-
-}  // namespace
-
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
     : lines_(static_cast<double>(frf.lines())),
@@ -36,23 +30,29 @@ double ModeWorth::price(const FitResult& fit) const {
   return squares(fit) * -std::expm1(-cost_of_modes(1) / data_);
 }
 
-int ModeWorth::hold_hidden(const FitResult& placed, AdditiveModel& model) const {
-  // Wilson and Hilferty's approximation of the quantile (PNAS 17 (1931) 684).
-  const double n = parameters_of_mode_ - 2.0;
-  const double root = 1.0 - 2.0 / (9.0 * n) + kUpper5Percent * std::sqrt(2.0 / (9.0 * n));
-  const double noise = n * root * root * root * squares(placed) / data_;
-  int hidden = 0;
-  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
-    Submodel& s = model.submodels[i];
-    if (!is_searched_mode(s) || !(placed.removal_cost[i] < noise)) continue;
-    s.frequency_held = s.damping_held = true;
-    ++hidden;
-  }
-  return hidden;
-}
-
 double ModeWorth::deviation_tolerance() const { return std::sqrt(0.01 * cost_of_modes(1)); }
 
 bool ModeWorth::at_rounding(const FitResult& fit) const { return squares(fit) <= rounding_; }
+
+std::vector<std::size_t> least_worthy(const FitResult& fit, double price, std::size_t most) {
+  const std::vector<Submodel>& all = fit.model.submodels;
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (is_searched_mode(all[i]) && fit.removal_cost[i] < price) order.push_back(i);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return fit.removal_cost[a] < fit.removal_cost[b];
+  });
+  std::vector<std::size_t> out;
+  for (const std::size_t i : order) {
+    const double f = all[i].natural_frequency_hz();
+    const bool stands_in = std::any_of(out.begin(), out.end(), [&](std::size_t o) {
+      const double width = 4.0 * std::max(all[i].damping_ratio(), all[o].damping_ratio()) * f;
+      return std::abs(all[o].natural_frequency_hz() - f) < width;
+    });
+    if (!stands_in && out.size() < most) out.push_back(i);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
 
 }  // namespace stageid

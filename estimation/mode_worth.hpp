@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "estimation/fit_options.hpp"
 #include "estimation/model_structure.hpp"
 
@@ -24,11 +26,6 @@ class ModeWorth {
   /// What sum W |E|^2 of `fit` must fall by for one more mode to be worth its parameters.
   double price(const FitResult& fit) const;
 
-  /// Holds the poles of the searched modes of `model` that noise hides: leaving such a mode out of `placed`,
-  /// the fit of its numerators, costs less than the upper 5 % of the chi-square distribution with as many
-  /// degrees of freedom as there are numerators. @returns how many
-  int hold_hidden(const FitResult& placed, AdditiveModel& model) const;
-
   /// Steps shorter than this many standard deviations of the parameters (Newton decrement) lower a cost
   /// by less than a hundredth of what a mode is worth: no decision needs them.
   double deviation_tolerance() const;
@@ -45,5 +42,9 @@ class ModeWorth {
   double parameters_of_mode_ = 0.0;
   double rounding_ = 0.0;  ///< of sum W |E|^2
 };
+
+/// The modes to try to do without: those of removal cost below `price`, the least worthy first, no two
+/// that could stand in for each other, at most that many. @returns indices of submodels, rising
+std::vector<std::size_t> least_worthy(const FitResult& fit, double price, std::size_t most);
 
 }  // namespace stageid
