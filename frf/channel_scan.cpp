@@ -6,6 +6,10 @@
 namespace stageid {
 namespace {
 
+// So many samples are looked at as a whole first: hardly any piece holds a new extreme or the same
+// value twice running.
+constexpr Eigen::Index kTogether = 256;
+
 double log_p_of_pile(const Extreme& extreme) noexcept {
   const double n = static_cast<double>(extreme.count + extreme.next_count);
   const double share = static_cast<double>(extreme.count) / n;
@@ -41,14 +45,30 @@ void Extreme::add(const Extreme& other) noexcept {
 }
 
 void ChannelScan::add(const Eigen::Ref<const Eigen::VectorXd>& samples) noexcept {
-  for (const double v : samples) {
-    high_.add(v);
-    low_.add(-v);
-    stretch_ = stretch_ > 0 && v == last_ ? stretch_ + 1 : 1;
-    longest_ = std::max(longest_, stretch_);
-    last_ = v;
-  }
+  for (Eigen::Index first = 0; first < samples.size(); first += kTogether)
+    add_some(samples.segment(first, std::min(kTogether, samples.size() - first)));
   samples_ += static_cast<std::uint64_t>(samples.size());
+}
+
+void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples) noexcept {
+  if (samples.maxCoeff() >= high_.next)
+    for (const double v : samples) high_.add(v);
+  if (-samples.minCoeff() >= low_.next)
+    for (const double v : samples) low_.add(-v);
+  const Eigen::Index rest = samples.size() - 1;
+  const bool repeats = (stretch_ > 0 && samples[0] == last_) ||
+                       (samples.head(rest).array() == samples.tail(rest).array()).any();
+  if (repeats) {
+    for (const double v : samples) {
+      stretch_ = stretch_ > 0 && v == last_ ? stretch_ + 1 : 1;
+      longest_ = std::max(longest_, stretch_);
+      last_ = v;
+    }
+    return;
+  }
+  stretch_ = 1;
+  longest_ = std::max(longest_, stretch_);
+  last_ = samples[rest];
 }
 
 void ChannelScan::add(const ChannelScan& other) noexcept {

@@ -39,6 +39,8 @@ class ChannelScan {
   double log_p_low() const noexcept;
 
  private:
+  void add_some(const Eigen::Ref<const Eigen::VectorXd>& samples) noexcept;
+
   Extreme high_;
   Extreme low_;  // of the negated samples
   std::uint64_t samples_ = 0;

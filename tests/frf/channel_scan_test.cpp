@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 
 #include "tests/support/random_numbers.hpp"
 
@@ -41,6 +43,41 @@ TEST(ChannelScan, SumOfPartsIsTheWhole) {
   EXPECT_EQ(first.high().count, whole.high().count);
   EXPECT_EQ(first.low().count, whole.low().count);
   EXPECT_EQ(first.samples(), whole.samples());
+}
+
+/// The definition, sample by sample.
+std::uint64_t longest_stretch(const Eigen::VectorXd& x) {
+  std::uint64_t longest = 0;
+  std::uint64_t stretch = 0;
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    stretch = i > 0 && x[i] == x[i - 1] ? stretch + 1 : 1;
+    longest = std::max(longest, stretch);
+  }
+  return longest;
+}
+
+TEST(ChannelScan, NothingIsMissedWhereverItStands) {
+  for (Eigen::Index at = 600; at < 624; ++at) {  // around borders between pieces of 256
+    Eigen::VectorXd x = normal_samples(3000, static_cast<std::uint64_t>(at));
+    if (at % 2 == 0) x = (x * 4.0).array().round();  // values come again far apart
+    x.segment(at, 5).setConstant(x.maxCoeff());
+    x.segment(2048 + at, 3).setConstant(x.minCoeff());
+    std::map<double, std::uint64_t> count;
+    for (const double value : x) ++count[value];
+    ChannelScan scan;
+    scan.add(x.head(100));
+    scan.add(x.tail(2900));
+    EXPECT_EQ(scan.longest_constant(), longest_stretch(x)) << at;
+    EXPECT_EQ(scan.high().value, count.rbegin()->first) << at;
+    EXPECT_EQ(scan.high().count, count.rbegin()->second) << at;
+    EXPECT_EQ(scan.high().next, std::next(count.rbegin())->first) << at;
+    EXPECT_EQ(scan.high().next_count, std::next(count.rbegin())->second) << at;
+    EXPECT_EQ(scan.low().value, count.begin()->first) << at;
+    EXPECT_EQ(scan.low().count, count.begin()->second) << at;
+    EXPECT_EQ(scan.low().next, std::next(count.begin())->first) << at;
+    EXPECT_EQ(scan.low().next_count, std::next(count.begin())->second) << at;
+    EXPECT_EQ(scan.samples(), 3000U) << at;
+  }
 }
 
 TEST(ChannelScan, ClippedSamplesPileUpAndOthersDoNot) {
