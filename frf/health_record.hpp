@@ -4,8 +4,9 @@
 #include <optional>
 #include <vector>
 
+#include "acquisition/log_reader.hpp"
 #include "frf/channel_scan.hpp"
-#include "frf/plant_frf.hpp"
+#include "frf/frf_options.hpp"
 
 namespace stageid {
 
@@ -41,10 +42,13 @@ struct HealthRecord {
   Eigen::VectorXd variance_of_mean(const Eigen::MatrixXcd& columns) const;
 };
 
+/// Lines that the checks look at, at most: their rigid body and their modes need no more.
+inline constexpr Eigen::Index kHealthLines = 800;
+
 /// Reads every clean period of all runs that FrfOptions choose; spectra are those of the first
-/// realization. Memory: one period a thread, and the spectra on at most `most_lines` lines.
+/// realization. Memory: one period a thread, and the spectra on at most kHealthLines lines.
 /// @throws what choose_runs() and LogReader::read() throw; FormatError if a run has no clean period.
 HealthRecord read_health_record(const std::vector<const LogReader*>& logs,
-                                const FrfOptions& options, Eigen::Index most_lines = 800);
+                                const FrfOptions& options);
 
 }  // namespace stageid

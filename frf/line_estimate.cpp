@@ -13,7 +13,10 @@ constexpr double kSmallestReciprocalCondition = 1e-6;
 // U may be far from orthogonal where the loop is stiff. Refused is only what rounding decides.
 constexpr double kSmallestReciprocalConditionOfInputs = 1e-13;
 
-double one_norm(const Eigen::MatrixXcd& M) { return M.cwiseAbs().colwise().sum().maxCoeff(); }
+/// Of matrices whose entries are far from overflow: hypot() would take as long as the inverse.
+double one_norm(const Eigen::MatrixXcd& M) {
+  return M.cwiseAbs2().cwiseSqrt().colwise().sum().maxCoeff();
+}
 
 double spectral_norm(const Eigen::MatrixXcd& M) {
   const Eigen::MatrixXcd gram =

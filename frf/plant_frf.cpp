@@ -10,59 +10,29 @@
 #include <utility>
 
 #include "excitation/frequency_grid.hpp"
+#include "frf/byte_counter.hpp"
 #include "frf/channel_choice.hpp"
 #include "frf/covariance_smoothing.hpp"
 #include "frf/detection_average.hpp"
 #include "frf/excitation_spectrum.hpp"
 #include "frf/frf_provenance.hpp"
+#include "frf/health_gathering.hpp"
 #include "frf/plant_average.hpp"
 #include "frf/realization_spectra.hpp"
 #include "frf/record_spectra.hpp"
 #include "frf/run_spectra.hpp"
+#include "frf/run_steps.hpp"
 #include "frf/run_table.hpp"
 #include "frf/worker_pool.hpp"
 
 namespace stageid {
 namespace {
 
-/// One run's excitation: the period as recorded and its spectrum.
-struct RunExcitation {
-  Eigen::MatrixXd period;
-  ExcitationSpectrum spectrum;
-};
-
 /// What the first realization fixes for all: lines and axes.
 struct ExcitedPart {
   std::vector<int> lines;
   std::vector<Eigen::Index> axes;
   bool single_axis = true;  ///< in every run
-};
-
-/// Tells FrfOptions::progress how many bytes are done, from one thread at a time.
-class ByteCounter {
- public:
-  ByteCounter(const FrfOptions& options, const std::vector<RealizationRuns>& realizations)
-      : tell_(options.progress) {
-    for (const RealizationRuns& realization : realizations) {
-      for (const UsedRun& used : realization.runs) {
-        const LogInfo& info = used.log->info();
-        total_ += static_cast<double>(used.periods) * info.period_samples *
-                  static_cast<double>(info.actuators.size() + info.sensors.size()) * sizeof(double);
-      }
-    }
-  }
-  void add(double bytes) {
-    if (!tell_) return;
-    const std::lock_guard lock(mutex_);
-    done_ += bytes;
-    tell_(done_, total_);
-  }
-
- private:
-  const std::function<void(double, double)>& tell_;
-  std::mutex mutex_;
-  double done_ = 0.0;
-  double total_ = 0.0;
 };
 
 /// The estimate in the making: reads realization by realization, threads over the runs of one.
@@ -81,11 +51,13 @@ class PlantEstimation {
     // No more workspaces than there is work for: each holds a period of samples.
     run_workers_ = static_cast<int>(std::min(static_cast<std::size_t>(workers_), most));
     for (int w = 0; w < run_workers_; ++w) {
-      workspaces_.push_back(std::make_unique<RunWorkspace>(info_.period_samples));
+      workspaces_.push_back(std::make_unique<RunWorkspace>(info_.period_samples, pool_));
     }
   }
 
-  FrfEstimate estimate();
+  /// `health`: gathers from the same reading, if there is one.
+  FrfEstimate estimate(HealthGathering* health);
+  const std::vector<RealizationRuns>& realizations() const noexcept { return realizations_; }
 
  private:
   std::vector<RunExcitation> read_excitation(const RealizationRuns& realization);
@@ -93,8 +65,8 @@ class PlantEstimation {
                            const std::vector<RunExcitation>& excitation) const;
   void check_excitation(const RealizationRuns& realization,
                         const std::vector<RunExcitation>& excitation) const;
-  RealizationSpectra measure(const RealizationRuns& realization,
-                             const std::vector<RunExcitation>& excitation);
+  void measure(std::size_t realization, const std::vector<RunExcitation>& excitation,
+               HealthGathering* health, RealizationSpectra& spectra);
   void prepare(const RealizationRuns& realization, const std::vector<RunExcitation>& excitation);
   void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra);
   void include(const RealizationSpectra& spectra, const std::vector<RunExcitation>& excitation);
@@ -106,6 +78,7 @@ class PlantEstimation {
   int workers_;
   int run_workers_ = 1;
   ByteCounter bytes_;
+  MatrixPool pool_;
   std::vector<std::unique_ptr<RunWorkspace>> workspaces_;
   ExcitedPart excited_;
   SpectrumLines lines_;
@@ -122,15 +95,8 @@ class PlantEstimation {
 std::vector<RunExcitation> PlantEstimation::read_excitation(const RealizationRuns& realization) {
   std::vector<RunExcitation> excitation(realization.runs.size());
   for_each_task(run_workers_, realization.runs.size(), [&](int worker, std::size_t e) {
-    const UsedRun& used = realization.runs[e];
-    excitation[e].period = used.log->excitation(used.index);
-    if (excitation[e].period.rows() != info_.period_samples) {
-      throw std::invalid_argument(
-          fmt::format("{}/excitation: {} samples; one period of {} belongs there", used.place(),
-                      excitation[e].period.rows(), info_.period_samples));
-    }
-    excitation[e].spectrum = excitation_spectrum(
-        excitation[e].period, workspaces_[static_cast<std::size_t>(worker)]->dft);
+    excitation[e] = read_run_excitation(realization.runs[e],
+                                        workspaces_[static_cast<std::size_t>(worker)]->dft);
   });
   return excitation;
 }
@@ -182,26 +148,22 @@ void PlantEstimation::check_excitation(const RealizationRuns& realization,
   }
 }
 
-RealizationSpectra PlantEstimation::measure(const RealizationRuns& realization,
-                                            const std::vector<RunExcitation>& excitation) {
-  std::vector<Eigen::MatrixXcd> R;
-  for (const RunExcitation& run : excitation) {
-    R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
-  }
-  RealizationSpectra spectra(realization.realization, std::move(R));
+void PlantEstimation::measure(std::size_t m, const std::vector<RunExcitation>& excitation,
+                              HealthGathering* health, RealizationSpectra& spectra) {
+  const RealizationRuns& realization = realizations_[m];
   std::mutex mutex;
   for_each_task(run_workers_, realization.runs.size(), [&](int worker, std::size_t e) {
     RunWorkspace& workspace = *workspaces_[static_cast<std::size_t>(worker)];
     const auto read_done = [this](double bytes) { bytes_.add(bytes); };
+    HealthPart* part = health != nullptr ? &health->part(m, e) : nullptr;
     RunSpectra run = options_.method == FrfMethod::lpm
-                         ? measure_record(realization.runs[e], excitation[e].spectrum, channels_,
-                                          excitation[e].period, workspace, read_done)
+                         ? measure_record(realization.runs[e], excitation[e], channels_, workspace,
+                                          part, read_done)
                          : measure_run(realization.runs[e], lines_, channels_, excitation[e].period,
-                                       options_.periods, workspace, read_done);
+                                       options_.periods, workspace, part, read_done);
     const std::lock_guard lock(mutex);
     spectra.add(e, std::move(run));
   });
-  return spectra;
 }
 
 void PlantEstimation::note_quality(const RealizationRuns& realization,
@@ -284,8 +246,9 @@ void PlantEstimation::include(const RealizationSpectra& spectra,
   detection_->add(spectra, average_->mean_response(), axis, workers_);
 }
 
-FrfEstimate PlantEstimation::estimate() {
-  for (const RealizationRuns& realization : realizations_) {
+FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
+  for (std::size_t m = 0; m < realizations_.size(); ++m) {
+    const RealizationRuns& realization = realizations_[m];
     const std::vector<RunExcitation> excitation = read_excitation(realization);
     if (!average_) prepare(realization, excitation);
     check_excitation(realization, excitation);
@@ -295,7 +258,16 @@ FrfEstimate PlantEstimation::estimate() {
                       "leave this realization out",
                       excited_.axes.size(), realization.runs.size(), realization.realization));
     }
-    const RealizationSpectra spectra = measure(realization, excitation);
+    if (health != nullptr && m == 0) {
+      std::vector<const ExcitationSpectrum*> all;
+      for (const RunExcitation& run : excitation) all.push_back(&run.spectrum);
+      health->excite(all);
+    }
+    std::vector<Eigen::MatrixXcd> R;
+    for (const RunExcitation& run : excitation)
+      R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
+    RealizationSpectra spectra(realization.realization, std::move(R), pool_);
+    measure(m, excitation, health, spectra);
     note_quality(realization, spectra);
     include(spectra, excitation);
   }
@@ -314,7 +286,15 @@ FrfEstimate PlantEstimation::estimate() {
 FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
                                const FrfOptions& options) {
   PlantEstimation estimation(choose_runs(logs, options), options);
-  return estimation.estimate();
+  return estimation.estimate(nullptr);
+}
+
+FrfAndHealth estimate_plant_frf_and_health(const std::vector<const LogReader*>& logs,
+                                           const FrfOptions& options) {
+  PlantEstimation estimation(choose_runs(logs, options), options);
+  HealthGathering health(estimation.realizations());
+  FrfEstimate frf = estimation.estimate(&health);
+  return {std::move(frf), health.finish()};
 }
 
 }  // namespace stageid

@@ -1,34 +1,13 @@
 #pragma once
 
-#include <functional>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "acquisition/log_reader.hpp"
 #include "frf/frf_estimate.hpp"
+#include "frf/frf_options.hpp"
+#include "frf/health_record.hpp"
 
 namespace stageid {
-
-enum class CovarianceKind : std::uint8_t { diagonal, full };
-enum class PeriodChoice : std::uint8_t {
-  consistent,  ///< periods with a glitch, a bump or a transient in them are left out
-  unmarked     ///< all without a marked sample
-};
-
-struct FrfOptions {
-  std::vector<std::string> inputs{};       ///< actuator names; empty: those that are excited
-  std::vector<std::string> outputs{};      ///< sensor names; empty: all
-  std::optional<int> transient_periods{};  ///< instead of the log's own, or of 0 with lpm
-  FrfMethod method = FrfMethod::periodic;
-  CovarianceKind covariance = CovarianceKind::diagonal;
-  PeriodChoice periods = PeriodChoice::consistent;  ///< lpm: unmarked ones, always
-  int covariance_lines = 1;                         ///< smooth_covariance() over so many lines; odd
-  std::vector<int> realizations{};                  ///< which (0-based); empty: all complete ones
-  int threads = 0;  ///< 0: as many as cores; the result does not depend on it
-  std::function<void(double done, double total)>
-      progress{};  ///< bytes; called from one thread at a time
-};
 
 /// Estimates the plant from closed-loop logs by the indirect method.
 ///
@@ -63,5 +42,15 @@ struct FrfOptions {
 ///         with lpm a single period without empty lines; covariance_lines as smooth_covariance().
 FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
                                const FrfOptions& options = {});
+
+struct FrfAndHealth {
+  FrfEstimate frf;
+  HealthRecord health;  ///< as read_health_record() gives it
+};
+
+/// The estimate and what the checks of the data's health look at, from one reading of the logs.
+/// @throws what estimate_plant_frf() throws
+FrfAndHealth estimate_plant_frf_and_health(const std::vector<const LogReader*>& logs,
+                                           const FrfOptions& options = {});
 
 }  // namespace stageid

@@ -4,11 +4,18 @@
 
 namespace stageid {
 
-RealizationSpectra::RealizationSpectra(int realization, std::vector<Eigen::MatrixXcd> excitation)
-    : realization_(realization),
+RealizationSpectra::RealizationSpectra(int realization, std::vector<Eigen::MatrixXcd> excitation,
+                                       MatrixPool& pool)
+    : pool_(pool),
+      realization_(realization),
       excitation_(std::move(excitation)),
       runs_(excitation_.size()),
       arrived_(excitation_.size(), 0) {}
+
+RealizationSpectra::~RealizationSpectra() {
+  pool_.give_back(std::move(scatter_re_));
+  pool_.give_back(std::move(scatter_im_));
+}
 
 void RealizationSpectra::add(std::size_t experiment, RunSpectra&& spectra) {
   runs_[experiment] = std::move(spectra);
@@ -27,8 +34,8 @@ void RealizationSpectra::fold(RunSpectra& spectra) {
       scatter_im_ += spectra.scatter_im;
     }
   }
-  spectra.scatter_re = Eigen::MatrixXd();
-  spectra.scatter_im = Eigen::MatrixXd();
+  pool_.give_back(std::move(spectra.scatter_re));
+  pool_.give_back(std::move(spectra.scatter_im));
 }
 
 Eigen::MatrixXcd RealizationSpectra::excitation(Eigen::Index k) const {

@@ -10,11 +10,14 @@ namespace stageid {
 
 /// The runs of one realization, gathered. Runs may arrive in any order: they are folded in the
 /// order of the experiments, so that the sums do not depend on which thread was faster, and their
-/// scatters, the largest part, are freed at once.
+/// scatters, the largest part, are used again at once.
 class RealizationSpectra {
  public:
-  /// `excitation`: R of each experiment, excited axes x lines.
-  RealizationSpectra(int realization, std::vector<Eigen::MatrixXcd> excitation);
+  /// `excitation`: R of each experiment, excited axes x lines; `pool`: where scatters came from.
+  RealizationSpectra(int realization, std::vector<Eigen::MatrixXcd> excitation, MatrixPool& pool);
+  ~RealizationSpectra();
+  RealizationSpectra(const RealizationSpectra&) = delete;
+  RealizationSpectra& operator=(const RealizationSpectra&) = delete;
 
   /// One thread at a time.
   void add(std::size_t experiment, RunSpectra&& spectra);
@@ -38,6 +41,7 @@ class RealizationSpectra {
  private:
   void fold(RunSpectra& spectra);
 
+  MatrixPool& pool_;
   int realization_;
   std::vector<Eigen::MatrixXcd> excitation_;
   std::vector<RunSpectra> runs_;

@@ -4,8 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include "frf/health_gathering.hpp"
 #include "frf/run_periods.hpp"
-#include "frf/run_steps.hpp"
 #include "frf/transient_model.hpp"
 
 namespace stageid {
@@ -107,8 +107,10 @@ class RecordMeasurement {
       w_.excluded_sum += segment.samples.rightCols(excluded).middleRows(p * N_, N_);
     if (run_.periods == 0) {
       run_.mean.setZero(part.mean.rows(), part.mean.cols());
-      run_.scatter_re.setZero(part.scatter_re.rows(), part.scatter_re.cols());
-      run_.scatter_im.setZero(part.scatter_im.rows(), part.scatter_im.cols());
+      run_.scatter_re = w_.pool.take(part.scatter_re.rows(), part.scatter_re.cols());
+      run_.scatter_im = w_.pool.take(part.scatter_im.rows(), part.scatter_im.cols());
+      run_.scatter_re.setZero();
+      run_.scatter_im.setZero();
     }
     run_.periods += segment.periods;
     run_.mean += static_cast<double>(segment.periods) * part.mean;
@@ -148,14 +150,20 @@ class RecordMeasurement {
 
 }  // namespace
 
-RunSpectra measure_record(const UsedRun& used, const ExcitationSpectrum& excitation,
-                          const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
-                          RunWorkspace& w, const std::function<void(double bytes)>& read_done) {
-  RecordMeasurement measurement(used, excitation, channels, w);
-  measurement.add_excitation(excitation_period);
-  for_each_period(
-      used, w, read_done, [&](int p) { measurement.take(p); },
-      [&](int p) { measurement.leave_out_marked(p); });
+RunSpectra measure_record(const UsedRun& used, const RunExcitation& excitation,
+                          const ChannelChoice& channels, RunWorkspace& w, HealthPart* health,
+                          const std::function<void(double bytes)>& read_done) {
+  RecordMeasurement measurement(used, excitation.spectrum, channels, w);
+  measurement.add_excitation(excitation.period);
+  const auto take = [&](int p) {
+    measurement.take(p);
+    if (health != nullptr) health->take(w, nullptr);
+  };
+  const auto leave_out = [&](int p) {
+    measurement.leave_out_marked(p);
+    if (health != nullptr) health->leave_out_marked();
+  };
+  for_each_period(used, w, read_done, take, leave_out);
   return measurement.finish();
 }
 

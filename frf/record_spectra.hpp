@@ -1,7 +1,7 @@
 #pragma once
 
-#include "frf/excitation_spectrum.hpp"
 #include "frf/run_spectra.hpp"
+#include "frf/run_steps.hpp"
 
 namespace stageid {
 
@@ -10,11 +10,11 @@ namespace stageid {
 /// waited for. A stretch must not have a gap, so a marked period ends one; the means are weighted by
 /// the stretches' periods. A single period between marked ones is used only if there is nothing else.
 /// Memory: samples and spectra of 16 periods of the chosen channels, however long the run.
+/// `health`, if there is one, gets each period as well.
 /// @throws FormatError if no clean period is left; std::invalid_argument as TransientModel; what
 ///         LogReader::read() throws.
-RunSpectra measure_record(const UsedRun& run, const ExcitationSpectrum& excitation,
-                          const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
-                          RunWorkspace& workspace,
-                          const std::function<void(double bytes)>& read_done);
+RunSpectra measure_record(const UsedRun& run, const RunExcitation& excitation,
+                          const ChannelChoice& channels, RunWorkspace& workspace,
+                          HealthPart* health, const std::function<void(double bytes)>& read_done);
 
 }  // namespace stageid

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <span>
 
+#include "frf/health_gathering.hpp"
 #include "frf/period_check.hpp"
 #include "frf/run_periods.hpp"
 #include "frf/run_steps.hpp"
@@ -12,8 +13,8 @@
 namespace stageid {
 namespace {
 
-/// Periods that are compared with each other, and whose spectra are held for it.
-constexpr int kMostCompared = 16;
+/// Periods that are compared with each other and averaged together, whose spectra are held for it.
+constexpr int kMostTogether = 16;
 
 /// One run in the making.
 class RunMeasurement {
@@ -22,23 +23,24 @@ class RunMeasurement {
                  PeriodChoice choice, RunWorkspace& workspace)
       : used_(used), lines_(lines), channels_(channels), w_(workspace) {
     // Groups of equal size: a last one of one or two periods could not be judged.
-    const int groups = (used.periods + kMostCompared - 1) / kMostCompared;
-    compared_ = choice == PeriodChoice::consistent ? (used.periods + groups - 1) / groups : 1;
+    const int groups = (used.periods + kMostTogether - 1) / kMostTogether;
+    together_ = (used.periods + groups - 1) / groups;
+    compare_ = choice == PeriodChoice::consistent;
     const auto n_lines = static_cast<Eigen::Index>(lines.lines.size());
     const auto n = static_cast<Eigen::Index>(channels.outputs.size() + channels.estimated.size());
-    w_.spectra.resize(static_cast<std::size_t>(compared_));
+    w_.spectra.resize(static_cast<std::size_t>(together_));
     for (Eigen::MatrixXcd& spectrum : w_.spectra) spectrum.resize(n, n_lines);
     w_.deviation_re.resize(n);
     w_.deviation_im.resize(n);
     w_.excluded_sum.setZero(w_.dft.length(), static_cast<Eigen::Index>(channels.excluded.size()));
     run_.mean.setZero(n, n_lines);
     if (used.periods < 2) return;
-    run_.scatter_re.setZero(n * (n + 1) / 2, n_lines);
-    run_.scatter_im.setZero(n * (n + 1) / 2, n_lines);
+    run_.scatter_re = w_.pool.take(n * (n + 1) / 2, n_lines);
+    run_.scatter_im = w_.pool.take(n * (n + 1) / 2, n_lines);
   }
 
-  /// The period in workspace.samples.
-  void take(int period) {
+  /// The period in workspace.samples. @returns its spectra
+  const Eigen::MatrixXcd& take(int period) {
     ++unmarked_;
     Eigen::MatrixXcd& spectra = w_.spectra[waiting_.size()];
     line_spectra(w_.samples.sensors, channels_.outputs, lines_.lines, 0, w_.dft, spectra);
@@ -48,7 +50,8 @@ class RunMeasurement {
     for (std::size_t c = 0; c < channels_.excluded.size(); ++c)
       w_.excluded_sum.col(static_cast<Eigen::Index>(c)) +=
           w_.samples.actuators.col(channels_.excluded[c]);
-    if (static_cast<int>(waiting_.size()) == compared_) include_waiting();
+    if (static_cast<int>(waiting_.size()) == together_) include_waiting();
+    return spectra;
   }
   void leave_out_marked(int period) { run_.dropped.push_back({0, 0, period, "a marked sample"}); }
 
@@ -67,7 +70,7 @@ class RunMeasurement {
  private:
   void include_waiting() {
     std::vector<char> in(waiting_.size(), 1);
-    if (waiting_.size() >= 3) {
+    if (compare_ && waiting_.size() >= 3) {
       const Eigen::VectorXd frequency_hz = excited_frequency_hz();
       for (const PeriodOutlier& outlier :
            find_outliers(std::span(w_.spectra).first(waiting_.size()), frequency_hz)) {
@@ -75,29 +78,45 @@ class RunMeasurement {
         run_.dropped.push_back({0, 0, waiting_[outlier.period], reason(outlier, frequency_hz)});
       }
     }
+    std::vector<const Eigen::MatrixXcd*> periods;
     for (std::size_t i = 0; i < waiting_.size(); ++i)
-      if (in[i] != 0) include(w_.spectra[i]);
+      if (in[i] != 0) periods.push_back(&w_.spectra[i]);
+    for (Eigen::Index k = 0; k < run_.mean.cols(); ++k) include_line(periods, k);
+    run_.periods += static_cast<int>(periods.size());
     waiting_.clear();
   }
 
-  /// One more period into mean and scatter, by Welford's recursion: a difference of two large sums
+  /// More periods into mean and scatter, by Welford's recursion: a difference of two large sums
   /// would lose the noise, which is 1e-6 of the signal, in rounding; and this way the diagonal stays
-  /// >= 0.
-  void include(const Eigen::MatrixXcd& spectra) {
-    ++run_.periods;
-    const double inverse_count = 1.0 / run_.periods;
-    const double weight = 1.0 - inverse_count;
-    for (Eigen::Index k = 0; k < run_.mean.cols(); ++k) {
-      for (Eigen::Index i = 0; i < run_.mean.rows(); ++i) {
-        const std::complex<double> deviation = spectra(i, k) - run_.mean(i, k);
-        run_.mean(i, k) += deviation * inverse_count;
-        w_.deviation_re[i] = deviation.real();
-        w_.deviation_im[i] = deviation.imag();
-      }
-      if (run_.periods < 2) continue;
-      add_outer_product(weight, w_.deviation_re, w_.deviation_im, run_.scatter_re.col(k).data(),
-                        run_.scatter_im.col(k).data());
+  /// >= 0. All periods into one line, whose scatter stays in the cache, then into the next.
+  void include_line(const std::vector<const Eigen::MatrixXcd*>& periods, Eigen::Index k) {
+    const bool scatter = run_.scatter_re.size() > 0;
+    if (scatter && run_.periods == 0) {
+      w_.scatter_re.setZero(run_.scatter_re.rows());
+      w_.scatter_im.setZero(run_.scatter_im.rows());
+    } else if (scatter) {
+      w_.scatter_re = run_.scatter_re.col(k);
+      w_.scatter_im = run_.scatter_im.col(k);
     }
+    const Eigen::Index n = run_.mean.rows();
+    int count = run_.periods;
+    for (const Eigen::MatrixXcd* spectra : periods) {
+      const double inverse_count = 1.0 / ++count;
+      w_.deviation = spectra->col(k) - run_.mean.col(k);
+      // Componentwise, which the compiler makes vectors of; complex numbers it does not.
+      Eigen::Map<Eigen::VectorXd>(reinterpret_cast<double*>(run_.mean.col(k).data()), 2 * n) +=
+          Eigen::Map<const Eigen::VectorXd>(reinterpret_cast<const double*>(w_.deviation.data()),
+                                            2 * n) *
+          inverse_count;
+      if (count < 2) continue;
+      w_.deviation_re = w_.deviation.real();
+      w_.deviation_im = w_.deviation.imag();
+      add_outer_product(1.0 - inverse_count, w_.deviation_re, w_.deviation_im, w_.scatter_re.data(),
+                        w_.scatter_im.data());
+    }
+    if (!scatter) return;
+    run_.scatter_re.col(k) = w_.scatter_re;
+    run_.scatter_im.col(k) = w_.scatter_im;
   }
 
   Eigen::VectorXd excited_frequency_hz() const {
@@ -125,7 +144,8 @@ class RunMeasurement {
   const SpectrumLines& lines_;
   const ChannelChoice& channels_;
   RunWorkspace& w_;
-  int compared_ = 1;
+  int together_ = 1;  // periods that are looked at, and included, together
+  bool compare_ = true;
   int unmarked_ = 0;
   std::vector<int> waiting_;  // periods whose spectra are in the workspace
   RunSpectra run_;
@@ -135,7 +155,7 @@ class RunMeasurement {
 
 RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
                        const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
-                       PeriodChoice choice, RunWorkspace& w,
+                       PeriodChoice choice, RunWorkspace& w, HealthPart* health,
                        const std::function<void(double bytes)>& read_done) {
   RunMeasurement measurement(used, lines, channels, choice, w);
   Fingerprint fingerprint;
@@ -143,9 +163,15 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
   const auto take = [&](int p) {
     add_matrix(fingerprint, w.samples.actuators);
     add_matrix(fingerprint, w.samples.sensors);
-    measurement.take(p);
+    const Eigen::MatrixXcd& spectra = measurement.take(p);
+    const KnownSpectra known{spectra, channels.outputs, channels.estimated, lines};
+    if (health != nullptr) health->take(w, &known);
   };
-  for_each_period(used, w, read_done, take, [&](int p) { measurement.leave_out_marked(p); });
+  const auto leave_out = [&](int p) {
+    measurement.leave_out_marked(p);
+    if (health != nullptr) health->leave_out_marked();
+  };
+  for_each_period(used, w, read_done, take, leave_out);
   RunSpectra run = measurement.finish();
   run.fingerprint = fingerprint.hex();
   return run;

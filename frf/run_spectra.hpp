@@ -7,6 +7,7 @@
 
 #include "excitation/dft.hpp"
 #include "frf/channel_choice.hpp"
+#include "frf/matrix_pool.hpp"
 #include "frf/run_table.hpp"
 
 namespace stageid {
@@ -35,22 +36,28 @@ struct SpectrumLines {
 
 /// What one thread needs again and again: a plan, one period of samples, one period's spectra.
 struct RunWorkspace {
-  explicit RunWorkspace(int period_samples) : dft(period_samples) {}
+  RunWorkspace(int period_samples, MatrixPool& matrices) : dft(period_samples), pool(matrices) {}
   RealDft dft;
+  MatrixPool& pool;  // of all threads: scatters leave the workspace with their run
   LogSamples samples;
   std::vector<Eigen::MatrixXcd> spectra;  // Z_p of some periods, channels x lines
   Eigen::MatrixXd excluded_sum;           // of the periods, samples x excluded actuators
+  Eigen::VectorXcd deviation;             // of one period on one line
   Eigen::VectorXd deviation_re;
   Eigen::VectorXd deviation_im;
+  Eigen::VectorXd scatter_re;  // of one line
+  Eigen::VectorXd scatter_im;
 };
+
+class HealthPart;
 
 /// Reads a run period by period and averages. Periods with a marked sample are left out, and with
 /// PeriodChoice::consistent those that find_outliers() finds among (about) 16 neighbours.
-/// `read_done` is told the bytes read, period by period.
+/// `health`, if there is one, gets each period as well; `read_done` is told the bytes read, period by period.
 /// @throws FormatError if no clean period is left, and what LogReader::read() throws.
 RunSpectra measure_run(const UsedRun& run, const SpectrumLines& lines,
                        const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
-                       PeriodChoice choice, RunWorkspace& workspace,
+                       PeriodChoice choice, RunWorkspace& workspace, HealthPart* health,
                        const std::function<void(double bytes)>& read_done);
 
 }  // namespace stageid

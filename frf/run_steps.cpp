@@ -3,10 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "excitation/file_error.hpp"
 
 namespace stageid {
+
+RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft) {
+  RunExcitation excitation{run.log->excitation(run.index), {}};
+  if (excitation.period.rows() != dft.length()) {
+    throw std::invalid_argument(
+        fmt::format("{}/excitation: {} samples; one period of {} belongs there", run.place(),
+                    excitation.period.rows(), dft.length()));
+  }
+  excitation.spectrum = excitation_spectrum(excitation.period, dft);
+  return excitation;
+}
 
 std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
                                                 Eigen::Index channel, RealDft& dft) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "excitation/fingerprint.hpp"
+#include "frf/excitation_spectrum.hpp"
 #include "frf/run_spectra.hpp"
 
 /// What both ways of measuring a run, period by period and as a whole record, have in common.
@@ -15,6 +16,15 @@ template <typename Matrix>
 void add_matrix(Fingerprint& fingerprint, const Matrix& matrix) {
   fingerprint.add(std::as_bytes(std::span(matrix.data(), static_cast<std::size_t>(matrix.size()))));
 }
+
+/// One run's excitation: the period as recorded and its spectrum.
+struct RunExcitation {
+  Eigen::MatrixXd period;
+  ExcitationSpectrum spectrum;
+};
+
+/// @throws std::invalid_argument if what is recorded is not one period of dft.length() samples
+RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft);
 
 /// Unscaled DFT of one column; valid until the next. @pre samples.rows() == dft.length()
 std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,

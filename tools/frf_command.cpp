@@ -118,13 +118,8 @@ void FrfCommand::run() const {
     options.realizations.push_back(realization - 1);
   }
   require_writable(output_);
-  FrfStep step = estimate_frf(logs_, options, console_);
+  FrfStep step = estimate_frf(logs_, options, {!no_health_, stage_}, console_);
   std::vector<std::string> notes = dropped_lines(step.frf);
-  std::vector<Finding> findings;
-  if (!no_health_) {
-    findings = examine_logs(logs_, options, stage_, console_);
-    step.frf.provenance_json = with_health(step.frf.provenance_json, findings);
-  }
   if (compensate_ != "none") {
     const double delay_s = delay_s_ ? *delay_s_ : declared_delay_s(logs_.front());
     if (!delay_s_)
@@ -142,11 +137,11 @@ void FrfCommand::run() const {
                                 median_relative_std(step.frf, step.frf.noise_variance)));
   for (const std::string& line : linearity_lines(step.frf)) console_.message(line);
   if (!no_health_)
-    for (const std::string& line : health_lines(findings)) console_.result(line);
-  if (any_fault(findings)) console_.exit_code = kNotTrustworthy;
+    for (const std::string& line : health_lines(step.findings)) console_.result(line);
+  if (any_fault(step.findings)) console_.exit_code = kNotTrustworthy;
   for (const std::string& note : notes) console_.message("note: " + note);
   nlohmann::ordered_json json = frf_json(step.frf, step, notes, output_);
-  if (!no_health_) json["health"] = health_json(findings);
+  if (!no_health_) json["health"] = health_json(step.findings);
   console_.result(json);
 }
 

@@ -4,11 +4,16 @@
 #include <fmt/ranges.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/fingerprint.hpp"
+#include "frf/data_health.hpp"
+#include "tools/health_step.hpp"
 #include "tools/interrupt.hpp"
 #include "tools/open_logs.hpp"
+#include "tools/stage_expectation.hpp"
 
 namespace stageid {
 namespace {
@@ -64,22 +69,32 @@ std::string request_id_of(const std::string& provenance_json) {
 }
 
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
-                     const Console& console) {
-  return estimate_frf(OpenLogs(files).logs(), options, console);
+                     const HealthRequest& health, const Console& console) {
+  return estimate_frf(OpenLogs(files).logs(), options, health, console);
 }
 
 FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
-                     const Console& console) {
+                     const HealthRequest& health, const Console& console) {
   FrfStep step;
+  std::optional<NominalStage> nominal;  // before the long work: a stage file may be wrong
+  if (health.wanted) nominal = nominal_stage_of(logs.front()->info(), health.stage_file);
   Progress progress(console, "frf", "MB", 1.0 / kBytesPerMegabyte);
   options.progress = [&](double done, double total) {
     throw_if_interrupted();
     step.bytes = done;
     progress.update(done, total);
   };
-  step.frf = estimate_plant_frf(logs, options);
+  if (health.wanted) {
+    FrfAndHealth both = estimate_plant_frf_and_health(logs, options);
+    step.frf = std::move(both.frf);
+    step.findings = check_health(std::move(both.health), nominal);
+  } else {
+    step.frf = estimate_plant_frf(logs, options);
+  }
   step.seconds = progress.seconds();
   step.frf.provenance_json = complete_provenance(step.frf, logs, options);
+  if (health.wanted)
+    step.frf.provenance_json = with_health(step.frf.provenance_json, step.findings);
   return step;
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "frf/health_finding.hpp"
 #include "frf/plant_frf.hpp"
 #include "tools/console.hpp"
 
@@ -12,17 +13,25 @@ namespace stageid {
 struct FrfStep {
   FrfEstimate frf;
   double seconds = 0.0;
-  double bytes = 0.0;  ///< of samples that were read
+  double bytes = 0.0;             ///< of samples that were read
+  std::vector<Finding> findings;  ///< on the data's health, if it was looked at
 };
 
-/// Estimates, shows progress, and completes the provenance: configuration, seeds and
-/// the request's identity (frf_request_id()). Nothing of it depends on directory, time or threads.
+/// What the health of the data is held against.
+struct HealthRequest {
+  bool wanted = true;
+  std::filesystem::path stage_file;  ///< empty: the one that the log carries
+};
+
+/// Estimates, shows progress, and completes the provenance: configuration, seeds, the request's
+/// identity (frf_request_id()), and the findings on the data's health, which are looked for in the same
+/// reading. Nothing of it depends on directory, time or threads.
 /// @throws FileError, FormatError, std::invalid_argument, Interrupted
 FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
-                     const Console& console);
+                     const HealthRequest& health, const Console& console);
 /// The same of logs that it opens.
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
-                     const Console& console);
+                     const HealthRequest& health, const Console& console);
 
 /// Names what is asked of the estimate: version, options and what the logs say of their experiment.
 /// Two estimates of equal identity from the same samples are equal.

@@ -37,20 +37,16 @@ Finding finding_of(const Json& object) {
 }  // namespace
 
 std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
-                                  const FrfOptions& options,
-                                  const std::filesystem::path& stage_file, const Console& console) {
-  return examine_logs(OpenLogs(files).logs(), options, stage_file, console);
-}
-
-std::vector<Finding> examine_logs(const std::vector<const LogReader*>& logs, FrfOptions options,
-                                  const std::filesystem::path& stage_file, const Console& console) {
-  const auto nominal = nominal_stage_of(logs.front()->info(), stage_file);
+                                  FrfOptions options, const std::filesystem::path& stage_file,
+                                  const Console& console) {
+  const OpenLogs opened(files);
+  const auto nominal = nominal_stage_of(opened.logs().front()->info(), stage_file);
   Progress progress(console, "health", "MB", 1.0 / kBytesPerMegabyte);
   options.progress = [&](double done, double total) {
     throw_if_interrupted();
     progress.update(done, total);
   };
-  return check_health(read_health_record(logs, options), nominal);
+  return check_health(read_health_record(opened.logs(), options), nominal);
 }
 
 std::vector<std::string> health_lines(const std::vector<Finding>& findings) {

@@ -6,20 +6,17 @@
 #include <vector>
 
 #include "frf/data_health.hpp"
-#include "frf/plant_frf.hpp"
+#include "frf/frf_options.hpp"
 #include "tools/console.hpp"
 
 namespace stageid {
 
-/// Reads the logs once more and examines them. Controller and rigid body are those of `stage_file`, or of the
-/// stage file that the log carries. Shows progress.
+/// Reads logs and examines them. Controller and rigid body are those of `stage_file`, or of the stage
+/// file that the log carries. Shows progress.
 /// @throws what open_log(), read_health_record() and nominal_stage_of() throw; Interrupted
-std::vector<Finding> examine_logs(const std::vector<const LogReader*>& logs, FrfOptions options,
-                                  const std::filesystem::path& stage_file, const Console& console);
-/// The same of logs that it opens.
 std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
-                                  const FrfOptions& options,
-                                  const std::filesystem::path& stage_file, const Console& console);
+                                  FrfOptions options, const std::filesystem::path& stage_file,
+                                  const Console& console);
 
 /// The table: one line a finding, in columns; a single line if there is none.
 std::vector<std::string> health_lines(const std::vector<Finding>& findings);

@@ -146,22 +146,14 @@ FrfEstimate Identification::estimate_into(const char* name, const std::vector<in
       return frf;
     }
   }
-  FrfStep step = estimate_frf({log}, options, console_);
-  if (realizations == fitted_realizations()) examine(step.frf, options);
+  // Examined are the data that are fitted; frf.h5 remembers what was found.
+  const bool fitted = realizations == fitted_realizations();
+  FrfStep step = estimate_frf({log}, options, {fitted, {}}, console_);
   write_frf(path(name), step.frf);
   finish_step("frf", step.seconds,
               fmt::format("{}: {}, {:.0f} MB/s", name, describe(step.frf),
                           step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0));
   return std::move(step.frf);
-}
-
-/// Of the data that are fitted; frf.h5 remembers what was found.
-void Identification::examine(FrfEstimate& frf, const FrfOptions& options) {
-  const SteadyClock::time_point start = SteadyClock::now();
-  const std::vector<Finding> findings = examine_logs({path("run.slog")}, options, {}, console_);
-  frf.provenance_json = with_health(frf.provenance_json, findings);
-  finish_step("health", seconds_since(start),
-              fmt::format("{} findings", health_notes(findings).size()));
 }
 
 void Identification::estimate() {

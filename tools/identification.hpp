@@ -41,7 +41,6 @@ class Identification {
   void design();
   int measure_all();
   void estimate();
-  void examine(FrfEstimate& frf, const FrfOptions& options);
   FrfEstimate estimate_into(const char* name, const std::vector<int>& realizations);
   void pick();
   void fit();

@@ -110,8 +110,12 @@ void ValidateCommand::run() const {
   options.inputs = model.inputs.names;
   options.outputs = model.outputs.names;
   options.threads = threads_;
-  FrfEstimate frf = from_frf ? read_frf(data_) : estimate_frf({data_}, options, console_).frf;
-  frf = select_channels(frf, model.inputs.names, model.outputs.names);
+  FrfStep step;
+  if (from_frf)
+    step.frf = read_frf(data_);
+  else
+    step = estimate_frf({data_}, options, {true, stage_}, console_);
+  const FrfEstimate frf = select_channels(step.frf, model.inputs.names, model.outputs.names);
   const bool fitted_band = model.fit.band_hz[1] > 0.0;
   const double low_hz = !band_hz_.empty() ? band_hz_[0]
                         : fitted_band     ? model.fit.band_hz[0]
@@ -126,10 +130,9 @@ void ValidateCommand::run() const {
                                  {"band_hz", {low_hz, high_hz}},
                                  {"frequency_domain", validation_json(validation)}};
   if (!from_frf) {
-    const std::vector<Finding> findings = examine_logs({data_}, options, stage_, console_);
-    for (const std::string& line : health_lines(findings)) console_.result(line);
-    json["health"] = health_json(findings);
-    if (any_fault(findings)) console_.exit_code = kNotTrustworthy;
+    for (const std::string& line : health_lines(step.findings)) console_.result(line);
+    json["health"] = health_json(step.findings);
+    if (any_fault(step.findings)) console_.exit_code = kNotTrustworthy;
     const PredictionError error = prediction_error(model, *open_log(data_), low_hz, high_hz);
     for (const std::string& line : prediction_lines(error)) console_.result(line);
     json["time_domain"] = prediction_json(error);

@@ -106,11 +106,7 @@ FrfHandle frf(const py::object& given, const std::vector<std::string>& inputs,
   Console silent;
   silent.verbosity = Verbosity::quiet;
   return interruptible([&] {
-    FrfEstimate estimate = estimate_frf(logs, options, silent).frf;
-    if (health)
-      estimate.provenance_json = with_health(
-          estimate.provenance_json, examine_logs(logs, options, stage.value_or(""), silent));
-    return FrfHandle(std::move(estimate));
+    return FrfHandle(estimate_frf(logs, options, {health, stage.value_or("")}, silent).frf);
   });
 }
 

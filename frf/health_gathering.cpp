@@ -1,0 +1,166 @@
+#include "frf/health_gathering.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "frf/run_steps.hpp"
+
+namespace stageid {
+namespace {
+
+/// At most `most` of the lines: half of them in equal ratios, for the rigid body, half in equal steps, for
+/// the flexible modes.
+std::vector<int> thinned(const std::vector<int>& lines, Eigen::Index most) {
+  if (static_cast<Eigen::Index>(lines.size()) <= most) return lines;
+  std::set<int> chosen;
+  const auto half = static_cast<int>(most / 2);
+  const double first = lines.front();
+  const double last = lines.back();
+  for (int i = 0; i < half; ++i) {
+    const double share = static_cast<double>(i) / (half - 1);
+    for (const double wanted :
+         {first * std::pow(last / first, share), first + share * (last - first)}) {
+      const auto at =
+          std::lower_bound(lines.begin(), lines.end(), static_cast<int>(std::lround(wanted)));
+      chosen.insert(at == lines.end() ? lines.back() : *at);
+    }
+  }
+  return {chosen.begin(), chosen.end()};
+}
+
+void scan_period(const LogSamples& s, std::vector<ChannelScan>& scan) {
+  for (Eigen::Index c = 0; c < s.sensors.cols(); ++c)
+    scan[static_cast<std::size_t>(c)].add(s.sensors.col(c));
+  for (Eigen::Index c = 0; c < s.actuators.cols(); ++c)
+    scan[static_cast<std::size_t>(s.sensors.cols() + c)].add(s.actuators.col(c));
+}
+
+/// Columns of excited `wanted` lines. @pre they are among the excited ones of `lines`
+std::vector<Eigen::Index> columns_of(const std::vector<int>& wanted, const SpectrumLines& lines) {
+  const auto end = lines.lines.begin() + static_cast<std::ptrdiff_t>(lines.excited);
+  std::vector<Eigen::Index> columns;
+  for (const int line : wanted)
+    columns.push_back(std::lower_bound(lines.lines.begin(), end, line) - lines.lines.begin());
+  return columns;
+}
+
+/// Positions with is_known = 0 of `count` channels from `first` on, counted from there.
+std::vector<Eigen::Index> unknown_channels(const std::vector<char>& is_known, Eigen::Index first,
+                                           Eigen::Index count) {
+  std::vector<Eigen::Index> channels;
+  for (Eigen::Index c = 0; c < count; ++c)
+    if (is_known[static_cast<std::size_t>(first + c)] == 0) channels.push_back(c);
+  return channels;
+}
+
+}  // namespace
+
+void HealthPart::take(RunWorkspace& w, const KnownSpectra* known) {
+  scan_period(w.samples, scan_);
+  if (lines_.empty()) return;
+  const Eigen::Index n_y = w.samples.sensors.cols();
+  Eigen::MatrixXcd Z(n_y + w.samples.actuators.cols(), static_cast<Eigen::Index>(lines_.size()));
+  std::vector<char> is_known(static_cast<std::size_t>(Z.rows()), 0);
+  if (known != nullptr) {
+    std::vector<Eigen::Index> rows = known->sensors;
+    for (const Eigen::Index a : known->actuators) rows.push_back(n_y + a);
+    for (const Eigen::Index row : rows) is_known[static_cast<std::size_t>(row)] = 1;
+    const std::vector<Eigen::Index> columns = columns_of(lines_, known->lines);
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      for (std::size_t i = 0; i < rows.size(); ++i)
+        Z(rows[i], static_cast<Eigen::Index>(k)) =
+            known->values(static_cast<Eigen::Index>(i), columns[k]);
+  }
+  transform_others(w, is_known, Z);
+  periods_.push_back(std::move(Z));
+}
+
+void HealthPart::transform_others(RunWorkspace& w, const std::vector<char>& is_known,
+                                  Eigen::MatrixXcd& Z) const {
+  const Eigen::Index n_y = w.samples.sensors.cols();
+  const std::vector<Eigen::Index> sensors = unknown_channels(is_known, 0, n_y);
+  const std::vector<Eigen::Index> actuators =
+      unknown_channels(is_known, n_y, w.samples.actuators.cols());
+  const auto some = static_cast<Eigen::Index>(sensors.size());
+  Eigen::MatrixXcd others(some + static_cast<Eigen::Index>(actuators.size()), Z.cols());
+  line_spectra(w.samples.sensors, sensors, lines_, 0, w.dft, others);
+  line_spectra(w.samples.actuators, actuators, lines_, some, w.dft, others);
+  for (std::size_t i = 0; i < sensors.size(); ++i)
+    Z.row(sensors[i]) = others.row(static_cast<Eigen::Index>(i));
+  for (std::size_t i = 0; i < actuators.size(); ++i)
+    Z.row(n_y + actuators[i]) = others.row(some + static_cast<Eigen::Index>(i));
+}
+
+void HealthPart::leave_out_marked() {
+  for (ChannelScan& channel : scan_) channel.break_off();
+}
+
+HealthGathering::HealthGathering(const std::vector<RealizationRuns>& realizations,
+                                 Eigen::Index most_lines)
+    : most_lines_(most_lines) {
+  const LogInfo& info = realizations.front().runs.front().log->info();
+  record_.info = info;
+  record_.realization = realizations.front().realization;
+  record_.scan.resize(info.sensors.size() + info.actuators.size());
+  HealthPart empty;
+  empty.scan_.resize(record_.scan.size());
+  for (const RealizationRuns& realization : realizations) {
+    parts_.emplace_back(realization.runs.size(), empty);
+    for (const UsedRun& used : realization.runs) record_.health += used.run().health;
+  }
+}
+
+void HealthGathering::excite(const std::vector<const ExcitationSpectrum*>& spectra) {
+  for (const ExcitationSpectrum* spectrum : spectra)
+    record_.axes.insert(record_.axes.end(), spectrum->channels.begin(), spectrum->channels.end());
+  std::sort(record_.axes.begin(), record_.axes.end());
+  record_.axes.erase(std::unique(record_.axes.begin(), record_.axes.end()), record_.axes.end());
+  lines_ = thinned(spectra.front()->lines, most_lines_);
+  for (HealthPart& part : parts_.front()) part.lines_ = lines_;
+  const auto K = static_cast<Eigen::Index>(lines_.size());
+  record_.frequency_hz.resize(K);
+  record_.lines.resize(lines_.size());
+  for (Eigen::Index k = 0; k < K; ++k) {
+    const int line = lines_[static_cast<std::size_t>(k)];
+    record_.frequency_hz[k] = line * record_.info.sample_rate_hz / record_.info.period_samples;
+    LineRecord& at = record_.lines[static_cast<std::size_t>(k)];
+    at.R.setZero(static_cast<Eigen::Index>(record_.info.excitation.size()),
+                 static_cast<Eigen::Index>(spectra.size()));
+    for (std::size_t e = 0; e < spectra.size(); ++e) {
+      const ExcitationSpectrum& spectrum = *spectra[e];
+      const auto found = std::lower_bound(spectrum.lines.begin(), spectrum.lines.end(), line);
+      if (found != spectrum.lines.end() && *found == line)
+        at.R.col(static_cast<Eigen::Index>(e)) =
+            spectrum.values.col(found - spectrum.lines.begin());
+    }
+  }
+}
+
+HealthPart& HealthGathering::part(std::size_t realization, std::size_t experiment) {
+  return parts_[realization][experiment];
+}
+
+void HealthGathering::add(HealthPart&& part) {
+  for (std::size_t c = 0; c < part.scan_.size(); ++c) record_.scan[c].add(part.scan_[c]);
+  if (part.periods_.empty()) return;
+  record_.periods.push_back(static_cast<int>(part.periods_.size()));
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    Eigen::MatrixXcd& Z = record_.lines[k].Z;
+    const Eigen::Index first = Z.cols();
+    Z.conservativeResize(part.periods_.front().rows(),
+                         first + static_cast<Eigen::Index>(part.periods_.size()));
+    for (std::size_t p = 0; p < part.periods_.size(); ++p)
+      Z.col(first + static_cast<Eigen::Index>(p)) =
+          part.periods_[p].col(static_cast<Eigen::Index>(k));
+  }
+}
+
+HealthRecord HealthGathering::finish() {
+  for (std::vector<HealthPart>& realization : parts_)
+    for (HealthPart& part : realization) add(std::move(part));
+  return std::move(record_);
+}
+
+}  // namespace stageid

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "frf/excitation_spectrum.hpp"
+#include "frf/health_record.hpp"
+#include "frf/run_spectra.hpp"
+#include "frf/run_table.hpp"
+
+namespace stageid {
+
+/// Spectra of one period that its reader has already.
+struct KnownSpectra {
+  const Eigen::MatrixXcd& values;            ///< rows: sensors, then actuators, of these
+  const std::vector<Eigen::Index>& sensors;  ///< positions in the log
+  const std::vector<Eigen::Index>& actuators;
+  const SpectrumLines& lines;  ///< columns
+};
+
+/// What one run gives to a HealthRecord.
+class HealthPart {
+ public:
+  /// The clean period in workspace.samples. Channels that are not known are transformed here.
+  void take(RunWorkspace& workspace, const KnownSpectra* known);
+  void leave_out_marked();
+
+ private:
+  friend class HealthGathering;
+  void transform_others(RunWorkspace& workspace, const std::vector<char>& is_known,
+                        Eigen::MatrixXcd& Z) const;
+
+  std::vector<int> lines_;  // empty: spectra of this run are not wanted
+  std::vector<Eigen::MatrixXcd> periods_;
+  std::vector<ChannelScan> scan_;
+};
+
+/// A HealthRecord in the making, beside whatever else the logs are read for.
+class HealthGathering {
+ public:
+  /// Spectra are those of the first realization, on at most `most_lines` lines.
+  explicit HealthGathering(const std::vector<RealizationRuns>& realizations,
+                           Eigen::Index most_lines = kHealthLines);
+
+  /// The excitation of the runs of the first realization. Before any part is filled.
+  void excite(const std::vector<const ExcitationSpectrum*>& spectra);
+
+  /// Where run `experiment` of realization `realization` (positions) goes; different parts may be
+  /// filled at once.
+  HealthPart& part(std::size_t realization, std::size_t experiment);
+
+  /// After all parts are filled; once.
+  HealthRecord finish();
+
+ private:
+  void add(HealthPart&& part);
+
+  Eigen::Index most_lines_;
+  std::vector<std::vector<HealthPart>> parts_;  // by realization and experiment
+  std::vector<int> lines_;
+  HealthRecord record_;
+};
+
+}  // namespace stageid

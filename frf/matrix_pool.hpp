@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+namespace stageid {
+
+/// Large matrices that are done with, for the next that is needed: fresh memory must be mapped and
+/// cleared by the kernel, which for the scatter of a short run takes longer than filling it. Safe to
+/// use from several threads.
+class MatrixPool {
+ public:
+  /// A matrix with arbitrary contents.
+  Eigen::MatrixXd take(Eigen::Index rows, Eigen::Index cols) {
+    Eigen::MatrixXd matrix;
+    {
+      const std::lock_guard lock(mutex_);
+      if (!free_.empty()) {
+        matrix = std::move(free_.back());
+        free_.pop_back();
+      }
+    }
+    matrix.resize(rows, cols);
+    return matrix;
+  }
+  void give_back(Eigen::MatrixXd&& matrix) {
+    if (matrix.size() == 0) return;
+    const std::lock_guard lock(mutex_);
+    free_.push_back(std::move(matrix));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<Eigen::MatrixXd> free_;
+};
+
+}  // namespace stageid
