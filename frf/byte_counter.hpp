@@ -4,6 +4,7 @@
 #include <mutex>
 #include <vector>
 
+#include "frf/frf_options.hpp"
 #include "frf/run_table.hpp"
 
 namespace stageid {
