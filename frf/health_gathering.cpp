@@ -10,12 +10,12 @@
 namespace stageid {
 namespace {
 
-/// At most `most` of the lines: half of them in equal ratios, for the rigid body, half in equal steps, for
+/// At most kHealthLines of the lines: half of them in equal ratios, for the rigid body, half in equal steps, for
 /// the flexible modes.
-std::vector<int> thinned(const std::vector<int>& lines, Eigen::Index most) {
-  if (static_cast<Eigen::Index>(lines.size()) <= most) return lines;
+std::vector<int> thinned(const std::vector<int>& lines) {
+  if (static_cast<Eigen::Index>(lines.size()) <= kHealthLines) return lines;
   std::set<int> chosen;
-  const auto half = static_cast<int>(most / 2);
+  const auto half = static_cast<int>(kHealthLines / 2);
   const double first = lines.front();
   const double last = lines.back();
   for (int i = 0; i < half; ++i) {
@@ -97,9 +97,7 @@ void HealthPart::leave_out_marked() {
   for (ChannelScan& channel : scan_) channel.break_off();
 }
 
-HealthGathering::HealthGathering(const std::vector<RealizationRuns>& realizations,
-                                 Eigen::Index most_lines)
-    : most_lines_(most_lines) {
+HealthGathering::HealthGathering(const std::vector<RealizationRuns>& realizations) {
   const LogInfo& info = realizations.front().runs.front().log->info();
   record_.info = info;
   record_.realization = realizations.front().realization;
@@ -117,7 +115,7 @@ void HealthGathering::excite(const std::vector<const ExcitationSpectrum*>& spect
     record_.axes.insert(record_.axes.end(), spectrum->channels.begin(), spectrum->channels.end());
   std::sort(record_.axes.begin(), record_.axes.end());
   record_.axes.erase(std::unique(record_.axes.begin(), record_.axes.end()), record_.axes.end());
-  lines_ = thinned(spectra.front()->lines, most_lines_);
+  lines_ = thinned(spectra.front()->lines);
   for (HealthPart& part : parts_.front()) part.lines_ = lines_;
   const auto K = static_cast<Eigen::Index>(lines_.size());
   record_.frequency_hz.resize(K);

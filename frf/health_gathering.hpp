@@ -38,9 +38,8 @@ class HealthPart {
 /// A HealthRecord in the making, beside whatever else the logs are read for.
 class HealthGathering {
  public:
-  /// Spectra are those of the first realization, on at most `most_lines` lines.
-  explicit HealthGathering(const std::vector<RealizationRuns>& realizations,
-                           Eigen::Index most_lines = kHealthLines);
+  /// Spectra are those of the first realization, on at most kHealthLines lines.
+  explicit HealthGathering(const std::vector<RealizationRuns>& realizations);
 
   /// The excitation of the runs of the first realization. Before any part is filled.
   void excite(const std::vector<const ExcitationSpectrum*>& spectra);
@@ -55,7 +54,6 @@ class HealthGathering {
  private:
   void add(HealthPart&& part);
 
-  Eigen::Index most_lines_;
   std::vector<std::vector<HealthPart>> parts_;  // by realization and experiment
   std::vector<int> lines_;
   HealthRecord record_;
