@@ -1,4 +1,5 @@
 """A `stageid node` and a `stageid run` in processes of their own, and what stands between them."""
+import dataclasses
 import os
 import pathlib
 import re
@@ -12,6 +13,22 @@ from pymodbus.client import ModbusTcpClient
 STATUS, STATE, CAUSE, BOOT_ID = 200, 208, 210, 204
 STATES = ['not ready', 'switch on disabled', 'ready', 'switched on', 'operation enabled', 'measuring', 'quick stop',
           'fault reaction', 'fault']
+
+
+@dataclasses.dataclass(frozen=True)
+class Patience:
+    """What is promised of a line. A test of time-outs must know how long the line itself may take."""
+
+    response_s: float
+    worst_reply_s: float
+    watchdog_s: float  # of the node: above a reply that comes late and is asked for again
+    run_s: float  # a run that is still there then has noticed nothing
+
+
+# A pty hands its bytes on in a worker of the kernel, a transaction passes four of them, and on a busy machine one took
+# 0.6 s (eight busy loops on two cores; 1.9 s for a process of nice 8) where a pipe or socket took 0.03 s.
+TCP = Patience(response_s=0.4, worst_reply_s=1.0, watchdog_s=3, run_s=40)
+RTU = Patience(response_s=3.0, worst_reply_s=5.0, watchdog_s=10, run_s=150)
 
 
 class Bench:
@@ -49,14 +66,15 @@ class Bench:
         return ends
 
     def node(self, *options, tcp=True):
-        """A node that is ready, and its port (TCP)."""
+        """A node that is ready, and its port (TCP). Its watchdog is that of the slowest line it serves."""
+        patience = RTU if '--modbus-rtu' in options else TCP
         stage = self.stage('node', backend='sim')
         # A file, not a pipe, which nobody would empty.
         said = self.work / f'node{self.nodes}.txt'
         self.nodes += 1
         with open(said, 'w') as out:
             process = self.start(self.program, 'node', stage, *(['--modbus-tcp', 0] if tcp else []), '--watchdog',
-                                 3, *options, stdout=out, stderr=subprocess.STDOUT)
+                                 patience.watchdog_s, *options, stdout=out, stderr=subprocess.STDOUT)
         process.said = said
         while 'ends it' not in said.read_text():
             if process.poll() is not None:
@@ -68,7 +86,9 @@ class Bench:
     def stage(self, name, backend='modbus', door='tcp: {port: 1502}', supervisor=None, unit=1):
         text = re.sub(r'# What stands.*?(?=actuators:)', '', self.stage_text, flags=re.S)
         text = re.sub(r'modbus:\n(  .*\n)+', '', text)
-        group = f'modbus: {{{door}, unit: {unit}, response_s: 0.4, worst_reply_s: 1.0, device_s: 1e-3}}\n'
+        line = RTU if door.startswith('rtu') else TCP
+        group = (f'modbus: {{{door}, unit: {unit}, response_s: {line.response_s}, '
+                 f'worst_reply_s: {line.worst_reply_s}, device_s: 1e-3}}\n')
         text = text.replace('backend: modbus', f'backend: {backend}') + group
         if supervisor:
             text += (f'supervisor:\n  modbus: {{tcp: {{port: {supervisor}}}}}\n'
