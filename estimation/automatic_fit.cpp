@@ -8,13 +8,14 @@
 #include <optional>
 #include <ranges>
 #include <stdexcept>
-#include <thread>
 
 #include "estimation/fit_problem.hpp"
 #include "estimation/mode_worth.hpp"
 #include "estimation/modes_above_noise.hpp"
 #include "estimation/pole_relocation.hpp"
 #include "estimation/residual_modes.hpp"
+#include "estimation/settled_fit.hpp"
+#include "frf/worker_pool.hpp"
 
 namespace stageid {
 namespace {
@@ -48,9 +49,7 @@ class AutomaticFit {
     quick_.residue_rank = quick_.rigid_body_rank = 0;
     worth_ = ModeWorth(frf, structure, quick_.user_weights);
     quick_.deviation_tolerance = worth_.deviation_tolerance();
-    threads_ = options.threads > 0
-                   ? options.threads
-                   : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    threads_ = worker_count(options.threads);
   }
 
   /// The fit that every search begins with.
@@ -100,7 +99,9 @@ class AutomaticFit {
     sort_modes(best_.model);
     FitOptions last = options_;
     if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled_of_many());
-    FitResult result = fit_additive_model(frf_, best_.model, last);
+    const bool chosen = selection_.exactly == 0 && !selection_.keep_modes;
+    const auto last_fit = chosen ? settled_fit : fit_additive_model;
+    FitResult result = last_fit(frf_, best_.model, last);
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
     result.cost.insert(result.cost.begin(), history_.begin(), history_.end());

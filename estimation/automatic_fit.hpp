@@ -18,7 +18,7 @@ struct ModeSelection {
 
 /// A fit that completes its own start: peaks of the CMIF, then modes at the peaks of the weighted
 /// residual's CMIF while they are worth their parameters, duplicates merged, worthless ones
-/// dropped. Every decision is in FitResult::decisions. FitOptions::progress is called with the iterations of
+/// dropped; last, see settled_fit(). Every decision is in FitResult::decisions. FitOptions::progress is called with the iterations of
 /// all fits on the way.
 /// @throws std::invalid_argument: as fit_additive_model(), and for more modes than the lines carry
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,

@@ -34,11 +34,12 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
       "--rigid-body", request_.rigid_body,
       "none | full | RANK: the term B_0 / s^2 | suspension: a mode below the lines "
       "instead, for a rigid body on weak springs | suspension:F1:F2: at these known "
-      "frequencies, Hz; default: full, with --submodel none");
-  command
-      ->add_option("--direct-term", request_.direct_term,
-                   "none | full: a constant, the compliance of modes above the band")
-      ->capture_default_str();
+      "frequencies, Hz; default: full; none with --submodel or where the outputs are "
+      "accelerations");
+  command->add_option(
+      "--direct-term", request_.direct_term,
+      "none | full: a constant, the compliance of modes above the band; default: none, "
+      "full where the outputs are accelerations");
   command
       ->add_option("--residue-rank", request_.residue_rank,
                    "full | 1: residues phi psi^T of mechanical modes")
@@ -50,10 +51,10 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
                    "one a pair, last the real one of odd n; without it they are searched. n=auto: "
                    "one denominator for all modes that a search finds")
       ->allow_extra_args(false);
-  command
-      ->add_option("--damping", request_.damping,
-                   "proportional | general: numerators B_0, or B_0 + B_1 s")
-      ->capture_default_str();
+  command->add_option(
+      "--damping", request_.damping,
+      "proportional | general: numerators B_0, or B_0 + B_1 s; default: proportional, "
+      "general where the outputs are accelerations");
   command->add_option("--method", request_.method, "riv | gn | sk")->capture_default_str();
   command->add_option("--max-iterations", request_.max_iterations, "of one fit")
       ->capture_default_str();
@@ -76,6 +77,8 @@ void FitCommand::run() const {
   const FitRequest request = checked_request();
   require_writable(output_);
   const FitSetup setup = make_fit_setup(request, read_frf(frf_));
+  for (const std::string& warning : setup.warnings)
+    console_.warning(fmt::format("{}: {}", frf_.string(), warning));
   const FitStep step =
       fit_model(setup, frf_.filename().string(), fingerprint_of_file(frf_), console_);
   const FitResult& result = step.result;

@@ -94,7 +94,8 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   word("weighting", f.weighting,
        {"unit", "inverse_magnitude", "relative", "noise_variance", "total_variance", "likelihood",
         "by_frf"},
-       "of the cost; by_frf: noise variance if known, else total variance, else relative");
+       "of the cost; by_frf: noise variance if known, else total variance, else relative; of one "
+       "realization that is distorted the scatter of its lines");
   word("hold", f.hold, {"none", "phase", "sinc", "exact", "by_frf"},
        "how the model meets sampled data; by_frf: exact unless it was taken out");
 
@@ -133,9 +134,11 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   if (!suspension_hz.empty()) f.rigid_body += fmt::format(":{}", fmt::join(suspension_hz, ":"));
   if (f.rigid_body == "by_submodels") f.rigid_body.clear();
   rank("residue_rank", f.residue_rank, {"full"}, "of a mode: full, or 1 for mechanical modes");
-  word("direct_term", f.direct_term, {"none", "full"},
-       "a constant: the compliance of modes above the band");
-  word("damping", f.damping, {"proportional", "general"}, "numerators B_0, or B_0 + B_1 s");
+  word("direct_term", f.direct_term, {"none", "full", "by_frf"},
+       "a constant: the compliance of modes above the band; by_frf: full where the outputs are "
+       "accelerations, else none");
+  word("damping", f.damping, {"proportional", "general", "by_frf"},
+       "numerators B_0, or B_0 + B_1 s; by_frf: general where the outputs are accelerations");
   word("method", f.method, {"riv", "gn", "sk"}, "of the iteration");
   count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "of one fit");
 }

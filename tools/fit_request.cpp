@@ -11,6 +11,7 @@
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
 #include "frf/hold_compensation.hpp"
+#include "frf/line_scatter.hpp"
 #include "tools/flag_values.hpp"
 #include "tools/key_suggestion.hpp"
 #include "tools/structure_request.hpp"
@@ -19,6 +20,9 @@
 
 namespace stageid {
 namespace {
+
+// The median of a linear plant's is 1 within a few percent, above where modes are narrow for the lines.
+constexpr double kDistorted = 2.0;
 
 const std::vector<std::string> kWeightings = {
     "unit",           "inverse_magnitude", "relative", "noise_variance",
@@ -88,6 +92,7 @@ class FitDefaults {
       parse_weighting();
       return;
     }
+    if (weigh_by_scatter()) return;
     options.weighting = frf.noise_variance.size() > 0   ? Weighting::noise_variance
                         : frf.total_variance.size() > 0 ? Weighting::total_variance
                                                         : Weighting::relative;
@@ -148,6 +153,25 @@ class FitDefaults {
     options.delay_s = *delay_s;
   }
 
+  /// With one realization the variance by the periods lacks what nonlinear distortion adds; weighed by it, the
+  /// distortion would look like modes. @returns true if the lines scatter by more than that variance.
+  bool weigh_by_scatter() {
+    FrfEstimate& frf = setup_.frf;
+    if (frf.noise_variance.size() == 0 || frf.realizations > 1) return false;
+    LineScatter scatter = line_scatter(frf);
+    if (!(scatter.over_noise > kDistorted)) return false;
+    frf.total_variance = std::move(scatter.variance);
+    frf.total_dof = scatter.dof;
+    setup_.options.weighting = Weighting::total_variance;
+    setup_.warnings.push_back(
+        fmt::format("weighting: by the scatter of neighbouring lines, {:.3g} times the variance by "
+                    "the periods (median): the plant looks nonlinear, and with one realization "
+                    "nothing else tells how much; measure several",
+                    scatter.over_noise));
+    note(setup_.warnings.back());
+    return true;
+  }
+
   void parse_weighting() {
     FitOptions& options = setup_.options;
     const std::string& text = request_.weighting;
@@ -191,6 +215,33 @@ class FitDefaults {
   std::optional<double> known_delay_s_;
 };
 
+bool is_acceleration(const std::string& unit) {
+  return unit == "g" || unit.ends_with("/s^2") || unit.ends_with("/s2") || unit.ends_with("/s²") ||
+         unit.ends_with(" s^-2");
+}
+
+/// The parts of the structure that are not asked for, by what the outputs are.
+FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
+                          std::vector<std::string>& notes) {
+  const std::vector<std::string>& units = frf.outputs.units;
+  const bool any_rank = request.residue_rank == "full" || request.residue_rank == "1";
+  const bool accelerations = !units.empty() &&
+                             std::all_of(units.begin(), units.end(), is_acceleration) &&
+                             request.submodels.empty() && any_rank;
+  const bool silent =
+      request.damping.empty() && request.direct_term.empty() && request.rigid_body.empty();
+  const bool chosen = accelerations && silent;
+  if (chosen)
+    notes.push_back(
+        fmt::format("structure: the outputs are accelerations [{}]: numerators B_0 + B_1 s, a "
+                    "direct term, no rigid body",
+                    units.front()));
+  if (request.damping.empty()) request.damping = chosen ? "general" : "proportional";
+  if (request.direct_term.empty()) request.direct_term = chosen ? "full" : "none";
+  if (chosen) request.rigid_body = "none";
+  return request;
+}
+
 std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
   using Json = nlohmann::ordered_json;
   const FitOptions& o = setup.options;
@@ -230,8 +281,9 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
 
 }  // namespace
 
-FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf) {
+FitSetup make_fit_setup(const FitRequest& asked, const FrfEstimate& frf) {
   FitSetup setup;
+  const FitRequest request = with_structure(asked, frf, setup.notes);
   setup.frf =
       request.band_hz ? select_band(frf, (*request.band_hz)[0], (*request.band_hz)[1]) : frf;
   FitDefaults defaults(request, setup);

@@ -15,15 +15,15 @@ namespace stageid {
 /// the FRF, see make_fit_setup().
 struct FitRequest {
   std::optional<std::array<double, 2>> band_hz;
-  std::string modes;                     ///< auto | none | N | f1,f2,... | FILE.json
-  std::string weighting;                 ///< unit | inverse_magnitude | ... | likelihood | FILE.h5
-  std::string hold;                      ///< none | phase | sinc | exact
-  std::string delay;                     ///< SECONDS | estimate | per_channel
-  std::string rigid_body;                ///< none | full | RANK | suspension | suspension:F1:F2
-  std::string residue_rank = "full";     ///< full | 1 (or another rank)
-  std::string damping = "proportional";  ///< proportional | general
-  std::string method = "riv";            ///< riv | gn | sk
-  std::string direct_term = "none";      ///< none | full
+  std::string modes;                  ///< auto | none | N | f1,f2,... | FILE.json
+  std::string weighting;              ///< unit | inverse_magnitude | ... | likelihood | FILE.h5
+  std::string hold;                   ///< none | phase | sinc | exact
+  std::string delay;                  ///< SECONDS | estimate | per_channel
+  std::string rigid_body;             ///< none | full | RANK | suspension | suspension:F1:F2
+  std::string residue_rank = "full";  ///< full | 1 (or another rank)
+  std::string damping;                ///< proportional | general
+  std::string method = "riv";         ///< riv | gn | sk
+  std::string direct_term;            ///< none | full
   std::vector<SubmodelRequest>
       submodels;  ///< further ones; alone where `modes` and `rigid_body` are empty
   int max_iterations = 100;
@@ -36,8 +36,9 @@ struct FitSetup {
   RequestedStructure structure;
   ModeSelection selection;
   FitOptions options;
-  std::vector<std::string> notes;  ///< what was decided by the FRF, one line each
-  std::string request_json;        ///< the request with every default filled in: for provenance
+  std::vector<std::string> notes;     ///< what was decided by the FRF, one line each
+  std::vector<std::string> warnings;  ///< of these, what the user should do something about
+  std::string request_json;           ///< the request with every default filled in: for provenance
 };
 
 /// Fills in the defaults by what the FRF holds:
@@ -45,9 +46,12 @@ struct FitSetup {
 ///   delay, or delay and hold, out   -> put back into the response; hold exact, delay fixed to what
 ///                                      was taken out. With --hold none the response stays as it is
 ///   hold none                       -> no hold, delay 0
+///   all outputs are accelerations   -> damping general, direct term full, no rigid body: s^2 times the
+///                                      receptance of a mode is D + (B_0 + B_1 s) / A
 /// Submodels that are asked for stand alone: then `modes` and `rigid_body` are none unless given, else
 /// auto and full.
-/// And weights: noise variance if there is one, else total variance, else relative.
+/// And weights: noise variance if there is one, else total variance, else relative; with one realization, or an
+/// unknown number, of a plant whose lines scatter far more than either says: that scatter, see line_scatter().
 /// @throws std::invalid_argument naming the flag; FileError, FormatError for files that it names.
 FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf);
 

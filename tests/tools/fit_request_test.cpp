@@ -67,6 +67,57 @@ TEST(FitRequest, WithoutNoiseTheTotalVarianceWeighs) {
   EXPECT_EQ(make_fit_setup({}, frf).options.weighting, Weighting::total_variance);
 }
 
+/// Thirty lines that stand `scatter` off a constant, now on this side, now on that; their variance is 0.25.
+FrfEstimate scattered(double scatter) {
+  FrfEstimate frf = measured();
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(30, 10.0, 39.0);
+  frf.noise_variance = Eigen::MatrixXd::Constant(2, 30, 0.25);
+  frf.response = Eigen::MatrixXcd::NullaryExpr(2, 30, [scatter](Eigen::Index, Eigen::Index line) {
+    return 10.0 + std::polar(scatter, 2.4 * static_cast<double>(line * line));
+  });
+  frf.realizations = 1;
+  return frf;
+}
+
+TEST(FitRequest, OneRealizationOfADistortedPlantIsWeighedByTheScatterOfItsLines) {
+  const FitSetup setup = make_fit_setup({}, scattered(2.0));
+  EXPECT_EQ(setup.options.weighting, Weighting::total_variance);
+  EXPECT_EQ(setup.frf.total_variance.cols(), 30);
+  EXPECT_GT(setup.frf.total_dof, 0.0);
+  EXPECT_THAT(setup.notes, testing::Contains(HasSubstr("scatter of neighbouring lines")));
+  EXPECT_THAT(setup.warnings, testing::ElementsAre(HasSubstr("scatter of neighbouring lines")));
+  FitRequest asked;
+  asked.weighting = "noise_variance";
+  EXPECT_EQ(make_fit_setup(asked, scattered(2.0)).options.weighting, Weighting::noise_variance);
+}
+
+TEST(FitRequest, LinesThatScatterAsTheNoiseSaysOrSeveralRealizationsAreWeighedByTheNoise) {
+  EXPECT_EQ(make_fit_setup({}, scattered(0.5)).options.weighting, Weighting::noise_variance);
+  FrfEstimate several = scattered(2.0);
+  several.realizations = 2;
+  EXPECT_EQ(make_fit_setup({}, several).options.weighting, Weighting::noise_variance);
+}
+
+TEST(FitRequest, AccelerationsGetTheStructureThatTheyHave) {
+  FrfEstimate frf = measured();
+  for (const char* unit : {"m/s^2", "mm/s2", "rad/s²", "g"}) {
+    frf.outputs.units = {unit};
+    const FitSetup setup = make_fit_setup({}, frf);
+    EXPECT_TRUE(setup.structure.common.general_damping) << unit;
+    EXPECT_TRUE(setup.structure.common.direct_term);
+    EXPECT_FALSE(setup.structure.common.rigid_body);
+    EXPECT_THAT(setup.notes.front(), HasSubstr("accelerations"));
+  }
+  FitRequest asked;  // whoever says one of the three is taken at his word
+  asked.damping = "proportional";
+  const ModelStructure own = make_fit_setup(asked, frf).structure.common;
+  EXPECT_FALSE(own.general_damping);
+  EXPECT_FALSE(own.direct_term);
+  EXPECT_TRUE(own.rigid_body);
+  frf.outputs.units = {"kg"};
+  EXPECT_FALSE(make_fit_setup({}, frf).structure.common.general_damping);
+}
+
 TEST(FitRequest, ADelayThatWasTakenOutIsPutBackAndModelled) {
   const FrfEstimate raw = measured();
   const FitSetup setup = make_fit_setup({}, compensate(raw, Compensation::delay, 1.3e-3));
@@ -194,7 +245,8 @@ TEST(FitRequest, EveryWordThatIsNotOneIsRefused) {
   refused(&FitRequest::modes, "-3");
   refused(&FitRequest::modes, "12,-3");
   refused(&FitRequest::rigid_body, "half");
-  refused(&FitRequest::damping, "");
+  refused(&FitRequest::damping, "viscous");
+  refused(&FitRequest::direct_term, "half");
   refused(&FitRequest::method, "lm");
 }
 

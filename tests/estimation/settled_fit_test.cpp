@@ -1,0 +1,86 @@
+// A search may take noise for a mode, and such a mode may keep the last fit from converging.
+
+#include "estimation/settled_fit.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "estimation/fit_additive_model.hpp"
+#include "estimation/model_structure.hpp"
+#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/model_reference.hpp"
+#include "tests/support/random_numbers.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kTrue_hz[] = {120.0, 390.0};
+
+/// One channel with two modes, 2 % noise whose variance is known.
+class SettledFit : public testing::Test {
+ protected:
+  void SetUp() override {
+    test::RandomNumbers random(7);
+    test::DenseProblem problem;
+    problem.model = test::named_model(1, 1);
+    problem.frequency_hz = Eigen::VectorXd::LinSpaced(150, 50.0, 500.0);
+    for (const double f : kTrue_hz) {
+      problem.model.submodels.push_back(
+          test::empty_submodel(problem.model, 0, test::mode_coefficients(f, 0.01), 1));
+      problem.model.submodels.back().numerator[0](0, 0) =
+          problem.model.submodels.back().denominator[2];
+    }
+    problem.G = test::reference_response(problem.model, problem.frequency_hz, HoldModel::none);
+    frf_ = test::frf_of(problem);
+    frf_.noise_variance = 4e-4 * frf_.response.cwiseAbs2();
+    for (Eigen::Index k = 0; k < frf_.lines(); ++k)
+      frf_.response(0, k) += std::sqrt(frf_.noise_variance(0, k)) * random.circular();
+    options_.weighting = Weighting::noise_variance;
+    true_ = problem.model;
+  }
+
+  /// With a mode where there is none, narrower than the lines are apart.
+  AdditiveModel with_a_ghost() const {
+    AdditiveModel model = true_;
+    model.submodels.push_back(
+        test::empty_submodel(true_, 0, test::mode_coefficients(251.2, 1e-4), 1));
+    return model;
+  }
+
+  FrfEstimate frf_;
+  FitOptions options_;
+  AdditiveModel true_;
+};
+
+TEST_F(SettledFit, AModeThatTheDataLeaveOpenIsLeftOut) {
+  options_.max_iterations = 3;  // enough for the two modes, which begin where they are
+  ASSERT_FALSE(fit_additive_model(frf_, with_a_ghost(), options_).trustworthy());
+  const FitResult fit = settled_fit(frf_, with_a_ghost(), options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  ASSERT_EQ(count_modes(fit.model), 2);
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("left out 25"));
+}
+
+TEST_F(SettledFit, AFitThatConvergesIsLeftAlone) {
+  const FitResult fit = settled_fit(frf_, true_, options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_EQ(count_modes(fit.model), 2);
+  EXPECT_TRUE(fit.decisions.empty());
+}
+
+TEST_F(SettledFit, WhereNothingHelpsTheFirstFitIsReturned) {
+  options_.max_iterations = 1;
+  options_.deviation_tolerance = options_.gradient_tolerance = options_.step_tolerance = 0.0;
+  const FitResult fit = settled_fit(frf_, with_a_ghost(), options_);
+  EXPECT_FALSE(fit.trustworthy());
+  EXPECT_EQ(count_modes(fit.model), 3);
+  EXPECT_TRUE(fit.decisions.empty());
+}
+
+}  // namespace
+}  // namespace stageid
