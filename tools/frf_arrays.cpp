@@ -28,12 +28,29 @@ constexpr Dataset kDatasets[] = {{"frequency_hz", 1},
                                  {"input_condition", 1},
                                  {"excluded_channels", 0},
                                  {"excluded_power", 1},
-                                 {"provenance", 0}};
+                                 {"provenance", 0},
+                                 {"detection_frequency_hz", 1},
+                                 {"detection_line", 1},
+                                 {"detection_groups", 0},
+                                 {"detection_runs", 1},
+                                 {"detection_power", 3},
+                                 {"detection_noise", 2},
+                                 {"detection_linear_power", 3},
+                                 {"nonlinearity_band_hz", 2},
+                                 {"nonlinearity_p_value", 3},
+                                 {"nonlinearity_distortion", 3},
+                                 {"nonlinearity_even_p_value", 3},
+                                 {"nonlinearity_even_level", 3},
+                                 {"nonlinearity_odd_p_value", 3},
+                                 {"nonlinearity_odd_level", 3},
+                                 {"dropped_periods", 2},
+                                 {"dropped_reasons", 0}};
 
 constexpr const char* kAttributes[] = {
-    "@format",      "@format_version",   "@sample_rate_hz", "@hold",         "@compensated",
-    "@method",      "@covariance_lines", "@delay_s",        "@realizations", "@periods",
-    "@experiments", "@noise_dof",        "@total_dof",      "inputs@unit",   "outputs@unit"};
+    "@format",       "@format_version", "@sample_rate_hz",   "@hold",
+    "@compensated",  "@method",         "@covariance_lines", "@delay_s",
+    "@realizations", "@periods",        "@experiments",      "@noise_dof",
+    "@total_dof",    "inputs@unit",     "outputs@unit",      "detection_noise@dof"};
 
 /// As MATLAB's variables are called: "@hold" is hold, "inputs@unit" inputs_unit.
 std::string identifier(std::string name) {
@@ -53,10 +70,10 @@ NamedArray with_axes(const ArrayList& list, NamedArray array, const Dataset& dat
                                       : "holds numbers; text must stand here");
   if (dataset.axes <= 1) {
     array.shape = {array.size()};
-  } else if (matlab) {
+  } else if (matlab && dataset.axes == 3) {
     // MATLAB drops trailing axes of length one: there the lines are.
     while (array.shape.size() < dataset.axes) array.shape.push_back(1);
-    if (array.shape.size() == dataset.axes) array = permuted(array, {2, 0, 1});
+    if (array.shape.size() == 3) array = permuted(array, {2, 0, 1});
   }
   return array;
 }

@@ -113,6 +113,37 @@ class RoundTrips(Case):
             if not name.startswith(lost):
                 self.assertEqual(back.get(name), given[name], name)
 
+    def test_what_a_measurement_says_of_itself_comes_back_to_the_bit(self):
+        for lines, groups, bands in ((9, ["a1", "a,2"], 3), (1, ["all"], 1)):
+            g = np.random.default_rng(5)
+            arrays = random_frf() | {
+                "detection_frequency_hz": np.cumsum(g.uniform(0.1, 1.0, lines)),
+                "detection_line": np.arange(3, 3 + lines),
+                "detection_groups": groups,
+                "detection_runs": g.uniform(1, 9, len(groups)),
+                "detection_power": g.uniform(size=(lines, N_Y, len(groups))),
+                "detection_noise": g.uniform(size=(lines, N_Y)),
+                "detection_linear_power": g.uniform(size=(N, N_Y, len(groups))),
+                "nonlinearity_band_hz": np.cumsum(g.uniform(1.0, 2.0, (bands, 2)).ravel()).reshape(bands, 2),
+                "dropped_periods": g.integers(0, 9, (bands, 3)),
+                "dropped_reasons": [f"reason \u00b5{k}" for k in range(bands)],
+            }
+            for name, columns in (("p_value", N_U), ("distortion", N_U), ("even_p_value", len(groups)),
+                                  ("even_level", len(groups)), ("odd_p_value", len(groups)), ("odd_level", len(groups))):
+                arrays[f"nonlinearity_{name}"] = g.uniform(size=(bands, N_Y, columns))
+            write_frf(WORK / "foreign.h5", arrays)
+            with h5py.File(WORK / "foreign.h5", "a") as file:
+                file["detection_noise"].attrs["dof"] = 12.0
+            self.succeed("import", "foreign.h5", "-o", "frf.h5")
+            given = everything(WORK / "frf.h5")
+            self.assertEqual(set(arrays) - set(given), set())
+            self.assertEqual(given["detection_noise@dof"], 12.0)
+            for name, flags in (("a.mat", []), ("b.mat", ["--mat-version", "7.3"]), ("c.npz", [])):
+                with self.subTest(name, lines=lines):
+                    self.succeed("export", "frf.h5", "-o", name, *flags)
+                    self.succeed("import", name, "-o", "back.h5")
+                    self.assertEqual(everything(WORK / "back.h5"), given)
+
     def test_one_line_and_one_channel_keep_their_axes(self):
         for shape in ((1, 2, 3), (5, 1, 1), (1, 1, 1)):
             f = np.arange(1.0, 1.0 + shape[0])
