@@ -26,16 +26,12 @@ void add_values(const std::string& path, const CommandTree& command, Cases& case
 /// @param path the words that lead to the command: "", "log", "log info"
 void add_command_cases(const std::string& path, const CommandTree& command,
                        const CommandTree& program, Cases& cases) {
-  std::vector<std::string> flags = flags_of(command);
+  std::vector<std::string> flags;
+  for (const CommandOption& option : options_taken(command, program))
+    flags.insert(flags.end(), option.flags.begin(), option.flags.end());
   std::vector<std::string> words = names_of(command.commands);
   for (const CommandOption& argument : command.arguments)
     words.insert(words.end(), argument.words.begin(), argument.words.end());
-  if (!path.empty()) {
-    // --json and --verbosity are taken on either side of the command.
-    for (const CommandOption& option : program.options)
-      for (const std::string& flag : option.flags)
-        if (flag != "-h" && flag != "--help" && flag != "--version") flags.push_back(flag);
-  }
   if (!path.empty()) add_values(fmt::format("'{}'", path), command, cases);
   cases.words += fmt::format("    '{}') words='{}' flags='{}' ;;\n", path, fmt::join(words, " "),
                              fmt::join(flags, " "));

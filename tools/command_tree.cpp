@@ -62,6 +62,17 @@ CommandTree command_tree(const CLI::App& app) {
   return tree;
 }
 
+std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program) {
+  std::vector<CommandOption> options = command.options;
+  if (&command == &program) return options;
+  for (const CommandOption& option : program.options)
+    if (std::none_of(option.flags.begin(), option.flags.end(), [](const std::string& flag) {
+          return flag == "--help" || flag == "--version";
+        }))
+      options.push_back(option);
+  return options;
+}
+
 std::vector<std::string> flags_of(const CommandTree& command) {
   std::vector<std::string> flags;
   for (const CommandOption& option : command.options)

@@ -30,6 +30,10 @@ struct CommandTree {
 
 CommandTree command_tree(const CLI::App& app);
 
+/// The options that are taken behind a command: its own, and the program's, --json and --verbosity, which are taken
+/// on either side of it.
+std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program);
+
 /// Every flag of a command's options, "-o", "--output", ...
 std::vector<std::string> flags_of(const CommandTree& command);
 std::vector<std::string> names_of(const std::vector<CommandTree>& commands);

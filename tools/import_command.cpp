@@ -15,6 +15,7 @@
 #include "tools/import_frf.hpp"
 #include "tools/import_log.hpp"
 #include "tools/mat_file.hpp"
+#include "tools/mode_correlation.hpp"
 #include "tools/npz_file.hpp"
 #include "tools/touchstone_reader.hpp"
 #include "tools/uff_frf.hpp"
@@ -22,15 +23,13 @@
 namespace stageid {
 namespace {
 
-bool is_uff(const std::string& ending) { return ending == ".unv" || ending == ".uff"; }
-
 ArrayList read_arrays(const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
   if (ending == ".mat") return read_mat(file);
   if (ending == ".npz") return read_npz(file);
   if (ending == ".csv" || ending == ".txt" || ending == ".dat") return read_csv(file);
   if (ending == ".h5" || ending == ".hdf5") return read_hdf5_arrays(file);
-  if (is_uff(ending)) return arrays_of_uff(file, read_uff(file));
+  if (is_uff_name(file)) return arrays_of_uff(file, read_uff(file));
   throw std::invalid_argument(
       fmt::format("{}: '{}' is not imported; there are .unv, .uff, .mat, .csv, .h5, .npz and .sNp "
                   "(Touchstone)",
@@ -61,7 +60,7 @@ void require_frf_output(const std::filesystem::path& output) {
 FrfEstimate read_foreign_frf(const std::filesystem::path& file,
                              const std::filesystem::path& output) {
   if (is_touchstone(file)) return read_touchstone(file);
-  if (is_uff(file.extension().string())) return frf_of_uff(file, read_uff(file));
+  if (is_uff_name(file)) return frf_of_uff(file, read_uff(file));
   const ArrayList arrays = read_arrays(file);
   if (!holds_frf(arrays)) ask_for_map(arrays);
   return frf_of_arrays(arrays, output);
@@ -92,10 +91,11 @@ ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console
       ->add_option("file", input_,
                    "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone)")
       ->required();
-  command->add_option(
-      "-o,--output", output_,
-      "frf.h5, or of a log run.slog or run.h5; without it the file's arrays are listed, which "
-      "is what a map is written from");
+  command->add_option("-o,--output", output_,
+                      "frf.h5, or of a log run.slog or run.h5, or of the modes of a universal file "
+                      "modes.json for 'fit "
+                      "--modes'; without it the file's arrays are listed, which "
+                      "is what a map is written from");
   command->add_option("--map", map_,
                       "YAML file that tells which arrays are what; needed where the file does not");
   command->final_callback([this] { run(); });
@@ -117,7 +117,9 @@ void ImportCommand::list() const {
 
 void ImportCommand::run() const {
   if (output_.empty()) return list();
-  if (map_.empty()) {
+  if (is_uff_name(input_) && output_.extension() == ".json") {
+    write_modes(output_, candidates_of(input_, read_uff(input_)));
+  } else if (map_.empty()) {
     require_frf_output(output_);
     write_imported(output_, read_foreign_frf(input_, output_), input_);
   } else {

@@ -11,7 +11,7 @@ build_packages="g++ cmake ninja-build pkg-config
 # the C++ reference, a kernel that has CAN, the packages of its own.
 test_packages="libgtest-dev libgmock-dev libbenchmark-dev
   python3-dev pybind11-dev python3-venv dpkg-dev python3 python3-numpy python3-scipy python3-h5py chromium clang-format
-  doxygen groff-base git
+  doxygen groff-base git zsh lintian mypy
   mbpoll python3-pymodbus python3-serial-asyncio socat
   user-mode-linux busybox-static iproute2 kmod can-utils"
 

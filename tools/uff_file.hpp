@@ -89,6 +89,9 @@ enum class UffEncoding : std::uint8_t {
 /// @throws FileError
 void write_uff(const std::filesystem::path& file, const UffContent& content, UffEncoding encoding);
 
+/// Whether the ending is that of a universal file.
+bool is_uff_name(const std::filesystem::path& file);
+
 /// Reads text and binary datasets 58 of either byte order, IEEE 754. Binary abscissas may be of single
 /// precision, as the format has it, or of double precision, as many programs write them.
 /// @throws FileError, FormatError "FILE:LINE: ...".

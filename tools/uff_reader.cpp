@@ -309,6 +309,10 @@ void read_dataset(TextLines& lines, UffContent& content) {
 
 }  // namespace
 
+bool is_uff_name(const std::filesystem::path& file) {
+  return file.extension() == ".unv" || file.extension() == ".uff";
+}
+
 UffContent read_uff(const std::filesystem::path& file) {
   TextLines lines(file);
   UffContent content;

@@ -13,6 +13,7 @@
 #include "tools/exit_code.hpp"
 #include "tools/frf_step.hpp"
 #include "tools/health_step.hpp"
+#include "tools/mode_correlation.hpp"
 #include "tools/prediction_error.hpp"
 
 namespace stageid {
@@ -92,7 +93,11 @@ nlohmann::ordered_json validation_json(const Validation& v) {
 ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "validate", "Try a model on data that it was not fitted to");
   command->add_option("model", model_, "model.json")->required();
-  command->add_option("data", data_, "frf.h5, or a log (.slog or .h5)")->required();
+  command
+      ->add_option(
+          "data", data_,
+          "frf.h5, or a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
+      ->required();
   command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: the band of the fit")
       ->expected(2);
   command->add_option("--stage", stage_,
@@ -105,6 +110,14 @@ ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(con
 
 void ValidateCommand::run() const {
   const AdditiveModel model = read_model(model_);
+  if (is_uff_name(data_)) {
+    const ModeCorrelation correlation = correlate_modes(model, data_, read_uff(data_));
+    for (const std::string& line : correlation_lines(correlation)) console_.result(line);
+    console_.result({{"model", model_.string()},
+                     {"data", data_.string()},
+                     {"modes", correlation_json(correlation)}});
+    return;
+  }
   const bool from_frf = is_frf(data_);
   FrfOptions options;
   options.inputs = model.inputs.names;

@@ -11,7 +11,7 @@
 
 namespace stageid {
 
-/// stageid validate MODEL FRF|LOG
+/// stageid validate MODEL FRF|LOG|MODE_SHAPES
 class ValidateCommand {
  public:
   ValidateCommand(CLI::App& app, Console& console);

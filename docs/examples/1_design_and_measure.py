@@ -4,6 +4,7 @@
 # Run from the root of the repository, as a script or cell by cell.
 
 # %%
+import functools
 import pathlib
 import tempfile
 
@@ -19,9 +20,9 @@ CONFIG = pathlib.Path("configs/experiment/small_stage.yaml")
 # rms, the same information at less peak force.
 
 # %%
-settings = dict(sample_rate_hz=2000.0, period_samples=500, low_hz=16.0, high_hz=800.0, rms=1.0, seed=7, lines="odd")
-plain = stageid.multisine(**settings)
-low_crest = stageid.multisine(**settings, crest_iterations=200)
+draw = functools.partial(stageid.multisine, sample_rate_hz=2000.0, period_samples=500, low_hz=16.0, high_hz=800.0,
+                         rms=1.0, seed=7, lines="odd")
+plain, low_crest = draw(), draw(crest_iterations=200)
 print(f"crest factor {np.abs(plain).max():.2f} with random phases, {np.abs(low_crest).max():.2f} reduced")
 assert np.abs(low_crest).max() < np.abs(plain).max()
 

@@ -26,6 +26,7 @@ print(f"noise variance with {frf.noise_dof:g} degrees of freedom, total variance
 # does to each excitation in another way. This stage is linear: they agree within their scatter.
 
 # %%
+assert frf.total_variance is not None and frf.noise_variance is not None  # there are realizations, and periods
 ratio = np.median(frf.total_variance / frf.noise_variance)
 print(f"median of total over noise variance: {ratio:.2f}")
 relative = np.sqrt(frf.noise_variance) / np.abs(frf.response)
@@ -38,6 +39,7 @@ print(f"relative standard deviation: median {np.median(relative):.1e}, largest {
 
 # %%
 first, second = (stageid.frf(log, realizations=[m]) for m in (0, 1))
+assert first.noise_variance is not None and second.noise_variance is not None
 difference = np.abs(first.response - second.response) ** 2
 nu = first.noise_dof + second.noise_dof
 variance = first.noise_variance + second.noise_variance
@@ -52,6 +54,7 @@ assert 0.91 < inside < 0.99
 
 # %%
 whole = stageid.frf(log, method="lpm")
+assert whole.noise_variance is not None
 distance = np.abs(whole.response - frf.response) / np.sqrt(whole.noise_variance + frf.noise_variance)
 print(f"lpm from {log.period_samples * 5} samples a run: {np.median(distance):.2f} standard deviations away (median)")
 assert np.median(distance) < 2

@@ -17,8 +17,8 @@ held_back = stageid.frf(log, realizations=[2])
 # Peaks of the mode indicator; a second opinion from poles that stay while the order rises.
 
 # %%
-for mode in stageid.modes(frf.select(band_hz=(120, 800))):
-    print(f"peak at {mode['frequency_hz']:7.2f} Hz, damping {mode['damping_ratio']:.4f}")
+for peak in stageid.modes(frf.select(band_hz=(120, 800))):
+    print(f"peak at {peak['frequency_hz']:7.2f} Hz, damping {peak['damping_ratio']:.4f}")
 stable = [p for p in stageid.stabilization(frf, most_order=40, delay_s=600e-6) if p["stable_damping"]]
 print(f"{len(stable)} stable poles over 20 orders")
 
@@ -33,11 +33,11 @@ print(*fit.decisions, sep="\n")
 print(f"{fit.status}, cost {fit.cost[0]:.3g} -> {fit.cost[-1]:.3g}")
 assert fit.trustworthy
 
-for mode in fit.model.modes():
-    if mode["natural_frequency_hz"] > frf.frequency_hz[0]:
-        print(f"{mode['natural_frequency_hz']:9.3f} +- {mode['natural_frequency_std_hz']:.4f} Hz   damping "
-              f"{mode['damping_ratio']:.5f} +- {mode['damping_ratio_std']:.6f}   "
-              f"shape at the sensors {np.round(mode['output_shape'].real, 2)}")
+for found in fit.model.modes():
+    if found["natural_frequency_hz"] > frf.frequency_hz[0]:
+        print(f"{found['natural_frequency_hz']:9.3f} +- {found['natural_frequency_std_hz']:.4f} Hz   damping "
+              f"{found['damping_ratio']:.5f} +- {found['damping_ratio_std']:.6f}   "
+              f"shape at the sensors {np.round(found['output_shape'].real, 2)}")
 
 # %% [markdown]
 # ## Judge
@@ -61,6 +61,7 @@ assert too_few["chi_square_per_dof"] > 100 * figures["chi_square_per_dof"]
 # The model knows its own uncertainty: below that of the data, for it has fewer parameters than they have numbers.
 
 # %%
+assert frf.noise_variance is not None and fit.response_variance is not None
 gain = np.median(np.sqrt(frf.noise_variance / fit.response_variance))
 print(f"standard deviation of the data over that of the model: {gain:.1f} (median)")
 assert gain > 1

@@ -16,7 +16,7 @@ folder = pathlib.Path(tempfile.mkdtemp())
 configs = pathlib.Path("configs")
 
 
-def identify(name, stage):
+def identify(name: str, stage: str) -> stageid.Model:
     """Measures a stage (text of its file) and fits the modes."""
     (folder / f"{name}_stage.yaml").write_text(stage)
     experiment = (configs / "experiment/small_stage.yaml").read_text()
@@ -42,7 +42,9 @@ for pair in stageid.pair_modes(monday, tuesday):
     a, b = before[pair["first"]], after[pair["second"]]
     if a["natural_frequency_hz"] < 16:
         continue
-    std = np.hypot(a["natural_frequency_std_hz"], b["natural_frequency_std_hz"])
+    std_a, std_b = a["natural_frequency_std_hz"], b["natural_frequency_std_hz"]
+    assert std_a is not None and std_b is not None
+    std = np.hypot(std_a, std_b)
     moved = b["natural_frequency_hz"] - a["natural_frequency_hz"]
     changes.append(100 * pair["frequency_difference"])
     print(f"{a['natural_frequency_hz']:8.2f} Hz moved by {moved:6.2f} Hz, {abs(moved) / std:6.1f} standard "

@@ -13,6 +13,11 @@ import unittest
 PROGRAM, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
 # The bash script as completion calls it: the last word is the one that is completed.
 COMPLETE = 'source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _stageid; printf "%s\\n" "${COMPREPLY[@]}"'
+# The same of zsh, with what its completion system would be told instead of the system.
+COMPLETE_ZSH = """_describe() { [[ $1 == -o ]] && shift; print -rl -- ${${(P)2}//(#b)([^\\\\]):*/$match[1]}; }
+compadd() { print -rl -- ${(P)2}; }
+_files() { print -r FILES; }
+setopt extended_glob; script=$1; shift; words=("$@"); CURRENT=$#; source $script"""
 
 
 def help_of(*words):
@@ -50,6 +55,31 @@ class ManualTest(unittest.TestCase):
                               cwd=WORK, capture_output=True, text=True, check=True)
         self.assertEqual(done.stderr, "")
         return done.stdout.split()
+
+    def completed_by_zsh(self, *words):
+        script = WORK / "share/zsh/vendor-completions/_stageid"
+        done = subprocess.run(["zsh", "-fc", COMPLETE_ZSH, "zsh", script, "stageid", *words], cwd=WORK,
+                              capture_output=True, text=True, check=True)
+        self.assertEqual(done.stderr, "")
+        return done.stdout.split("\n")[:-1]
+
+    @unittest.skipUnless(shutil.which("zsh"), "no zsh here")
+    def test_zsh_offers_what_bash_offers(self):
+        for path in every_command():
+            with self.subTest(path):
+                self.assertEqual(self.completed_by_zsh(*path, "-"), self.completed(*path, "-"))
+                self.assertEqual([word for word in self.completed_by_zsh(*path, "") if word != "FILES"],
+                                 self.completed(*path, ""))
+        self.assertEqual(self.completed_by_zsh("frf", "run.slog", "--method", ""), ["periodic", "lpm"])
+        self.assertEqual(self.completed_by_zsh("--verbosity", "debug", "log", ""), self.completed("log", ""))
+        self.assertEqual(self.completed_by_zsh("frf", "run.sl"), ["FILES"])
+
+    @unittest.skipUnless(shutil.which("zsh"), "no zsh here")
+    def test_zsh_finds_its_completion(self):
+        load = "fpath=($1 $fpath); autoload -Uz compinit; compinit -u -d $2; print ${_comps[stageid]}"
+        done = subprocess.run(["zsh", "-fc", load, "zsh", WORK / "share/zsh/vendor-completions", WORK / "dump"],
+                              capture_output=True, text=True)
+        self.assertEqual((done.stdout, done.stderr), ("_stageid\n", ""))
 
     def test_completion_offers_every_command_and_flag(self):
         paths = list(every_command())

@@ -98,7 +98,7 @@ class Debian(unittest.TestCase):
     def test_there_are_three(self):
         self.assertEqual(set(self.packages), {"stageid", "python3-stageid", "libstageid-dev"})
         for package in self.packages:
-            self.assertEqual(self.field(package, "Version"), VERSION)
+            self.assertEqual(self.field(package, "Version"), f"{VERSION}-1")
             self.assertTrue((self.root / "usr/share/doc" / package / "copyright").is_file())
 
     def test_dependencies_are_those_of_the_libraries(self):
@@ -109,10 +109,21 @@ class Debian(unittest.TestCase):
         self.assertIn("python3-numpy", self.field("python3-stageid", "Depends"))
         self.assertIn("libeigen3-dev", self.field("libstageid-dev", "Depends"))
 
+    @unittest.skipUnless(shutil.which("lintian"), "no lintian here")
+    def test_lintian_has_nothing_to_say(self):
+        # The suppressed one is about bugs of Debian's own archive, to which nothing was uploaded.
+        for package in ("stageid", "libstageid-dev"):
+            said = output("lintian", "--allow-root", "--suppress-tags", "initial-upload-closes-no-bugs", self.packages[package])
+            self.assertEqual(said, "", package)
+
+    def test_completions_are_where_the_shells_look(self):
+        for place in ("bash-completion/completions/stageid", "zsh/vendor-completions/_stageid"):
+            self.assertTrue((self.root / "usr/share" / place).is_file(), place)
+
     def test_the_program_works(self):
         program = self.root / "usr/bin/stageid"
         self.assertIn(VERSION, output(program, "--version"))
-        self.assertTrue((self.root / "usr/share/man/man1/stageid.1").is_file())
+        self.assertTrue((self.root / "usr/share/man/man1/stageid.1.gz").is_file())
         config = self.root / "usr/share/stageid/configs/experiment/small_stage.yaml"
         output(program, "design", config, "-o", WORK / "excitation.h5")
 

@@ -4,6 +4,7 @@
 
 #include "tools/bash_completion.hpp"
 #include "tools/manual_pages.hpp"
+#include "tools/zsh_completion.hpp"
 
 namespace stageid {
 namespace {
@@ -64,6 +65,13 @@ TEST_F(Manual, CompletionKnowsTheWordsOfAFlag) {
   const std::string script = bash_completion(command_tree(app_));
   EXPECT_THAT(script, HasSubstr("' cut') path='cut' ;;"));
   EXPECT_THAT(script, HasSubstr("'cut'' --kind') words='red blue' flags='' ;;"));
+}
+
+TEST_F(Manual, ZshGetsDescriptionsAsText) {
+  const std::string script = zsh_completion(command_tree(app_));
+  EXPECT_THAT(script, HasSubstr("' cut') place='cut' ;;"));
+  EXPECT_THAT(script, HasSubstr("'cut'' --kind') values=(red blue) ;;"));
+  EXPECT_THAT(script, HasSubstr("next=('cut:Cuts '\\''it'\\'' at a\\b')"));
 }
 
 }  // namespace

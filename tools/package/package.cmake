@@ -9,14 +9,23 @@ install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright
 install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright
   DESTINATION ${doc_dir}/libstageid-dev)
 
-# Debian wants the changelog packed, without a time in it.
-find_program(STAGEID_GZIP gzip REQUIRED)
-set(changelog ${CMAKE_CURRENT_BINARY_DIR}/changelog.gz)
+# Packed, without a time in the packing: what changed in the program, and that this is its first Debian revision.
+set(STAGEID_PACKAGE_CONTACT "stageid maintainers <stageid@packages.example>" CACHE STRING
+  "Whom the Debian packages name as maintainer: NAME <ADDRESS>")
+set(debian_revision 1)
+string(TIMESTAMP changelog_date "%a, %d %b %Y %H:%M:%S +0000" UTC)  # SOURCE_DATE_EPOCH if that is set
+configure_file(${CMAKE_CURRENT_LIST_DIR}/changelog.Debian.in ${CMAKE_CURRENT_BINARY_DIR}/changelog.Debian @ONLY)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/CHANGELOG.md)
-execute_process(COMMAND ${STAGEID_GZIP} -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md
-  OUTPUT_FILE ${changelog} COMMAND_ERROR_IS_FATAL ANY)
-install(FILES ${changelog} DESTINATION ${doc_dir}/stageid COMPONENT program)
-install(FILES ${changelog} DESTINATION ${doc_dir}/libstageid-dev)
+set(changelogs)
+foreach(file ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${CMAKE_CURRENT_BINARY_DIR}/changelog.Debian)
+  cmake_path(GET file FILENAME name)
+  string(REPLACE "CHANGELOG.md" "changelog" name ${name})
+  set(packed ${CMAKE_CURRENT_BINARY_DIR}/${name}.gz)
+  execute_process(COMMAND ${STAGEID_GZIP} -9nc ${file} OUTPUT_FILE ${packed} COMMAND_ERROR_IS_FATAL ANY)
+  list(APPEND changelogs ${packed})
+endforeach()
+install(FILES ${changelogs} DESTINATION ${doc_dir}/stageid COMPONENT program)
+install(FILES ${changelogs} DESTINATION ${doc_dir}/libstageid-dev)
 
 set(components program Unspecified)
 if(STAGEID_BUILD_PYTHON)
@@ -28,7 +37,7 @@ if(STAGEID_BUILD_PYTHON)
     ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.pyi
     ${PROJECT_SOURCE_DIR}/tools/python/stageid/py.typed
     DESTINATION ${package_dir} COMPONENT python)
-  install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright ${changelog}
+  install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright ${changelogs}
     DESTINATION ${doc_dir}/python3-stageid COMPONENT python)
 
   add_custom_target(wheel
@@ -44,10 +53,11 @@ set(CPACK_COMPONENTS_ALL ${components})
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_PACKAGE_NAME stageid)
 set(CPACK_PACKAGE_VENDOR stageid)
-set(CPACK_PACKAGE_CONTACT "The stageid engineers <stageid@localhost>")
+set(CPACK_PACKAGE_CONTACT "${STAGEID_PACKAGE_CONTACT}")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_RELEASE ${debian_revision})
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)

@@ -300,6 +300,58 @@ class Models(Case):
         with h5py.File(WORK / "m.h5") as a, h5py.File(WORK / "back.h5") as b:
             np.testing.assert_allclose(b["response"][()], a["response"][()], rtol=1e-12)
 
+    def test_mode_shapes_of_others_are_paired_with_the_models(self):
+        """Normal modes and a complex eigenvalue, nodes in no order, one that the model does not know."""
+        self.write_shapes("fe.unv", [(2, [0.0], {7: (-3.1, 0, 0), 3: (9, 9, 9), 12: (0, 0, 1.0)}),
+                                     (2, [51.0, 1.0, 0.0], {7: (-3.1, 0, 0), 3: (9, 9, 9), 12: (0, 0, 1.0)}),
+                                     (3, [-1.0, 2 * np.pi * 80.0, 0.0, 1.0],
+                                      {7: (1.0, 0, 0), 3: (0, 0, 0), 12: (0, 0, 1.0)})])
+        (WORK / "model.json").write_text(json.dumps(MODEL | {"outputs": ["12+Z", "7-X"]}))
+        found = json.loads(self.succeed("validate", "model.json", "fe.unv", "--json").stdout)["modes"]
+        (pair,) = found["pairs"]
+        own, other = np.array([1.0, 3.0]), np.array([1.0, 3.1])
+        self.assertAlmostEqual(pair["mac"], (own @ other) ** 2 / (own @ own) / (other @ other), places=12)
+        self.assertAlmostEqual(pair["frequency_hz"], 1 / np.sqrt(1e-5) / (2 * np.pi), places=9)
+        self.assertEqual((pair["other_frequency_hz"], pair["other_damping_ratio"]), (51.0, 0.0))
+        eigenvalue = np.hypot(1.0, 2 * np.pi * 80.0)
+        self.assertEqual(len(found["other_alone_hz"]), 2)
+        self.assertAlmostEqual(found["other_alone_hz"][1], eigenvalue / (2 * np.pi), places=3)
+        self.assertIn("MAC over 2 outputs: 12+Z, 7-X", self.succeed("validate", "model.json", "fe.unv").stdout)
+
+        self.succeed("import", "fe.unv", "-o", "modes.json")
+        modes = json.loads((WORK / "modes.json").read_text())["modes"]
+        self.assertEqual([modes[0]["frequency_hz"], modes[0]["damping_ratio"]], [51.0, 1e-4])
+        self.assertAlmostEqual(modes[1]["damping_ratio"], 1.0 / eigenvalue, places=6)
+        self.assertEqual(len(modes), 2, "a rigid body is no place to start from")
+
+    def test_mode_shapes_that_do_not_fit_are_refused(self):
+        self.write_shapes("fe.unv", [(2, [51.0, 1.0, 0.0], {5: (1.0, 0, 0)})])
+        self.refuse("have no value for any output (z1, z'2)", "validate", "model.json", "fe.unv")
+        self.write_shapes("rigid.unv", [(2, [0.0, 1.0, 0.0], {5: (1.0, 0, 0)})])
+        self.refuse("none of its modes has a frequency above zero", "import", "rigid.unv", "-o", "modes.json")
+        self.succeed("export", self.frf(), "-o", "response.unv")
+        self.refuse("holds no mode shapes (dataset 55)", "validate", "model.json", "response.unv")
+        self.refuse("holds no mode shapes (dataset 55)", "import", "response.unv", "-o", "modes.json")
+
+    @staticmethod
+    def write_shapes(name, modes):
+        """Datasets 55 to the letter of the format: analysis 2 (normal mode) or 3 (complex eigenvalue), three values a node."""
+        def numbers(values):
+            return "".join(f"{value:13.5E}" for value in values) + "\n"
+
+        text = ""
+        for number, (analysis, reals, nodes) in enumerate(modes, 1):
+            reals = (list(reals) + [1.0, 0.0, 0.0])[:3] + [0.0] if analysis == 2 else reals
+            kind = 5 if analysis == 3 else 2
+            text += "    -1\n    55\n" + "NONE\n" * 5
+            text += f"{1:10d}{analysis:10d}{2:10d}{8:10d}{kind:10d}{3:10d}\n"
+            text += f"{2:10d}{len(reals):10d}{0:10d}{number:10d}\n" + numbers(reals)
+            for node, values in nodes.items():
+                parts = [part for value in values for part in ((value, 0.0) if kind == 5 else (value,))]
+                text += f"{node:10d}\n" + numbers(parts)
+            text += "    -1\n"
+        (WORK / name).write_text(text)
+
 
 if __name__ == "__main__":
     sys.argv = sys.argv[:1] + sys.argv[3:]

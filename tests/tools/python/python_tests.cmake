@@ -17,3 +17,15 @@ foreach(example IN LISTS examples)
   set_tests_properties(tools.example_${name} PROPERTIES LABELS "tools;python" TIMEOUT 300
     ENVIRONMENT PYTHONPATH=${PROJECT_BINARY_DIR}/tools/python)
 endforeach()
+
+# Types of the stub, and that the examples keep to them.
+find_program(STAGEID_MYPY mypy PATHS /usr/bin NO_DEFAULT_PATH)
+if(STAGEID_MYPY)
+  list(TRANSFORM examples PREPEND ${PROJECT_SOURCE_DIR}/ OUTPUT_VARIABLE example_files)
+  add_test(NAME tools.python_types
+    COMMAND ${STAGEID_MYPY} --config-file ${CMAKE_CURRENT_LIST_DIR}/mypy.ini
+      --python-executable /usr/bin/python3 --cache-dir ${CMAKE_CURRENT_BINARY_DIR}/mypy_cache
+      ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.pyi ${example_files})
+  set_tests_properties(tools.python_types PROPERTIES LABELS "tools;python" TIMEOUT 300
+    ENVIRONMENT MYPYPATH=${PROJECT_SOURCE_DIR}/tools/python)
+endif()
