@@ -80,10 +80,10 @@ weighting         'unit', 'inverse_magnitude', 'relative', 'noise_variance', 'to
                   or the name of an HDF5 file with /weights; None: by the variances of the response
 hold              'none', 'phase', 'sinc', 'exact'; '': by the response
 delay             s, 'estimate' or 'per_channel'; None: by the response
-rigid_body        'none', 'full', a rank, 'suspension' or 'suspension:F1:F2' (Hz); None: full
+rigid_body        'none', 'full', a rank, 'suspension' or 'suspension:F1:F2' (Hz); None: by the unit of the outputs, full
 residue_rank      of the modes: 'full', or 1
-damping           'proportional' (B_0) or 'general' (B_0 + B_1 s)
-direct_term       'none' or 'full'
+damping           'proportional' (B_0) or 'general' (B_0 + B_1 s); '': by the unit of the outputs
+direct_term       'none' or 'full'; '': by the unit of the outputs
 submodels         further ones as --submodel takes them, 'n=4,m=3,f=120:180'
 method            'riv', 'gn' or 'sk'; max_iterations of one fit
 threads           0: all cores; the result does not depend on it
@@ -125,10 +125,9 @@ void define_fit(py::module_& module) {
   module.def("fit", &fit, py::arg("frf"), py::kw_only(), py::arg("band_hz") = py::none(),
              py::arg("modes") = py::none(), py::arg("weighting") = py::none(), py::arg("hold") = "",
              py::arg("delay") = py::none(), py::arg("rigid_body") = py::none(),
-             py::arg("residue_rank") = "full", py::arg("damping") = "proportional",
-             py::arg("direct_term") = "none", py::arg("submodels") = std::vector<std::string>{},
-             py::arg("method") = "riv", py::arg("max_iterations") = 100, py::arg("threads") = 0,
-             kFitDoc);
+             py::arg("residue_rank") = "full", py::arg("damping") = "", py::arg("direct_term") = "",
+             py::arg("submodels") = std::vector<std::string>{}, py::arg("method") = "riv",
+             py::arg("max_iterations") = 100, py::arg("threads") = 0, kFitDoc);
 }
 
 }  // namespace stageid
