@@ -1,5 +1,7 @@
 #include "frf/skew_check.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -10,54 +12,59 @@ namespace {
 using Index = Eigen::Index;
 
 constexpr int kBlocks = 20;
-constexpr int kIterations = 4;
+constexpr int kIterations = 6;
 constexpr std::size_t kFewestLines = 100;
-constexpr std::size_t kMostModes = 8;
-constexpr double kDeviations = 4.5;
-constexpr double kDampingLeft = 0.02;  // of |G|, far from the resonances
+constexpr double kDeviations = 8.0;
+constexpr double kNear = 0.3;  // ln of the ratio of two frequencies that see the same modes
+constexpr double kLeastDirection = 0.1;  // Im G beside the directions taken already, of |G|
+constexpr double kNoiseAllowed = 0.02;   // of |G|: above it a line's weight falls
 constexpr double kLeastSkew_s = 5e-6;
-constexpr double kUselessDeviation_s = 3e-6;
-
-/// Lines on which omega^2 |G| has a maximum.
-std::vector<std::size_t> resonances(const std::vector<PlantLine>& lines) {
-  std::vector<std::size_t> found;
-  const auto size = [&](std::size_t k) {
-    return std::pow(lines[k].omega_rad_s, 2) * lines[k].G.norm();
-  };
-  for (std::size_t k = 1; k + 1 < lines.size(); ++k)
-    if (size(k) > size(k - 1) && size(k) >= size(k + 1)) found.push_back(k);
-  return found;
-}
+constexpr double kWantedSkew_s = 10e-6;
 
 double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
 }
 
-/// Normal equations of one block of lines.
+/// Normal equations M x = v, and the square of their right-hand side.
 struct Normal {
   Eigen::MatrixXd M;
   Eigen::VectorXd v;
+  double square = 0.0;
+
+  explicit Normal(Index n) : M(Eigen::MatrixXd::Zero(n, n)), v(Eigen::VectorXd::Zero(n)) {}
+  void add(const Normal& other, double weight) {
+    M += weight * other.M;
+    v += weight * other.v;
+    square += weight * other.square;
+  }
+  Eigen::VectorXd solution() const { return M.completeOrthogonalDecomposition().solve(v); }
+  double residual(const Eigen::VectorXd& x) const {
+    return std::max(0.0, square - 2.0 * x.dot(v) + x.dot(M * x));
+  }
 };
 
 class SkewFit {
  public:
   explicit SkewFit(const std::vector<PlantLine>& lines)
-      : lines_(lines), n_y_(lines.front().G.rows()), n_u_(lines.front().G.cols()) {
-    const std::size_t most = std::min(kMostModes, static_cast<std::size_t>(n_y_ * n_u_ / 4));
-    for (const std::size_t k : resonances(lines)) peaks_.push_back(k);
-    modes_ = std::min(most, peaks_.size());
-  }
+      : lines_(lines),
+        n_y_(lines.front().G.rows()),
+        n_u_(lines.front().G.cols()),
+        trust_(Eigen::VectorXd::Ones(static_cast<Index>(lines.size()))),
+        blocks_(kBlocks, Normal(n_y_ + n_u_)),
+        skew_(Eigen::VectorXd::Zero(n_y_ + n_u_)) {}
 
   /// Skews [tau; sigma] in s, each against the median of its kind.
   Eigen::VectorXd solve();
   Eigen::VectorXd deviations() const;
 
  private:
-  void accumulate(const Eigen::VectorXd& skew);
-  Eigen::MatrixXd damping_directions(std::size_t line, const Eigen::VectorXd& skew) const;
-  Eigen::MatrixXcd turned(std::size_t line, const Eigen::VectorXd& skew) const;
+  void iterate();
+  Eigen::MatrixXcd turned(const PlantLine& line) const;
+  Eigen::MatrixXd damping_directions(const Eigen::MatrixXd& imaginary, Index block) const;
+  Normal normal_of(std::size_t line, const Eigen::MatrixXcd& G, const Eigen::MatrixXd& Q) const;
+  Index first_of(Index block) const { return block * static_cast<Index>(lines_.size()) / kBlocks; }
   /// Each kind against its median: what all sensors or all actuators share is the plant's delay, and
   /// what damping adds to all of them alike.
   Eigen::VectorXd relative(Eigen::VectorXd skew) const {
@@ -65,94 +72,111 @@ class SkewFit {
     skew.tail(n_u_).array() -= median({skew.data() + n_y_, skew.data() + n_y_ + n_u_});
     return skew;
   }
-  static Eigen::VectorXd solution(const Normal& normal) {
-    return normal.M.completeOrthogonalDecomposition().solve(normal.v);
-  }
 
   const std::vector<PlantLine>& lines_;
   Index n_y_;
   Index n_u_;
-  std::vector<std::size_t> peaks_;
-  std::size_t modes_ = 0;
+  Eigen::VectorXd trust_;  // of each line
   std::vector<Normal> blocks_;
   Eigen::VectorXd skew_;
 };
 
-/// G with the skews found so far undone.
-Eigen::MatrixXcd SkewFit::turned(std::size_t k, const Eigen::VectorXd& skew) const {
+/// G with the skews found so far undone, divided by its size; by more where that is noise.
+Eigen::MatrixXcd SkewFit::turned(const PlantLine& line) const {
   const auto phases = [&](const Eigen::VectorXd& delays_s) {
     Eigen::VectorXcd turn(delays_s.size());
     for (Index i = 0; i < turn.size(); ++i)
-      turn[i] = std::polar(1.0, lines_[k].omega_rad_s * delays_s[i]);
+      turn[i] = std::polar(1.0, line.omega_rad_s * delays_s[i]);
     return turn;
   };
-  return phases(skew.head(n_y_)).asDiagonal() * lines_[k].G * phases(skew.tail(n_u_)).asDiagonal();
+  const double size =
+      std::sqrt(line.G.squaredNorm() + line.variance.sum() / (kNoiseAllowed * kNoiseAllowed));
+  return phases(skew_.head(n_y_)).asDiagonal() * (line.G / size) *
+         phases(skew_.tail(n_u_)).asDiagonal();
 }
 
-/// Orthonormal basis of Im vec G at the resonances that are nearest to the line.
-Eigen::MatrixXd SkewFit::damping_directions(std::size_t k, const Eigen::VectorXd& skew) const {
-  std::vector<std::size_t> nearest = peaks_;
-  const auto distance = [&](std::size_t p) {
-    return std::abs(std::log(lines_[p].omega_rad_s / lines_[k].omega_rad_s));
+/// Orthonormal basis of what damping adds near a block: pivoted QR takes the line with the largest
+/// Im vec G first, a resonance, then the one with the largest part beside it, and so on. A line counts
+/// the less the farther it is from the block, and half of the entries are left to tell the skews.
+Eigen::MatrixXd SkewFit::damping_directions(const Eigen::MatrixXd& imaginary, Index block) const {
+  const auto log_omega = [&](Index k) {
+    return std::log(lines_[static_cast<std::size_t>(k)].omega_rad_s);
   };
-  std::sort(nearest.begin(), nearest.end(),
-            [&](auto a, auto b) { return distance(a) < distance(b); });
-  Eigen::MatrixXd directions(n_y_ * n_u_, static_cast<Index>(modes_));
-  for (std::size_t m = 0; m < modes_; ++m)
-    directions.col(static_cast<Index>(m)) = turned(nearest[m], skew).imag().reshaped().normalized();
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(directions);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(directions.rows(), qr.rank());
+  double middle = 0.0;
+  const Index first = first_of(block);
+  const Index last = first_of(block + 1);
+  for (Index k = first; k < last; ++k) middle += log_omega(k) / static_cast<double>(last - first);
+  Eigen::MatrixXd near = imaginary;
+  for (Index k = 0; k < near.cols(); ++k) {
+    const double distance = (log_omega(k) - middle) / kNear;
+    near.col(k) /= 1.0 + distance * distance;
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(near);
+  Index rank = 0;
+  while (rank < imaginary.rows() / 2 && std::abs(qr.matrixQR()(rank, rank)) > kLeastDirection)
+    ++rank;
+  return qr.householderQ() * Eigen::MatrixXd::Identity(imaginary.rows(), rank);
 }
 
-void SkewFit::accumulate(const Eigen::VectorXd& skew) {
-  const Index n = n_y_ + n_u_;
-  blocks_.assign(kBlocks, {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)});
-  for (std::size_t k = 0; k < lines_.size(); ++k) {
-    Eigen::MatrixXcd G = turned(k, skew);
-    // Equal weight a line, but where noise is more than what damping leaves.
-    const double noise = lines_[k].variance.sum() / G.squaredNorm();
-    G /= G.norm() * std::sqrt(1.0 + noise / (kDampingLeft * kDampingLeft));
-    const double omega = lines_[k].omega_rad_s;
-    Eigen::MatrixXd X = Eigen::MatrixXd::Zero(n_y_ * n_u_, n);
-    for (Index j = 0; j < n_u_; ++j)
-      for (Index i = 0; i < n_y_; ++i)
-        X(i + n_y_ * j, i) = X(i + n_y_ * j, n_y_ + j) = -omega * G(i, j).real();
-    Eigen::VectorXd rest = G.imag().reshaped();
-    const Eigen::MatrixXd Q = damping_directions(k, skew);
-    X -= Q * (Q.transpose() * X);
-    rest -= Q * (Q.transpose() * rest);
-    Normal& block = blocks_[k * kBlocks / lines_.size()];
-    block.M += X.transpose() * X;
-    block.v += X.transpose() * rest;
+/// @param Q what is projected off
+Normal SkewFit::normal_of(std::size_t k, const Eigen::MatrixXcd& G,
+                          const Eigen::MatrixXd& Q) const {
+  Eigen::MatrixXd X = Eigen::MatrixXd::Zero(n_y_ * n_u_, n_y_ + n_u_);
+  for (Index j = 0; j < n_u_; ++j)
+    for (Index i = 0; i < n_y_; ++i)
+      X(i + n_y_ * j, i) = X(i + n_y_ * j, n_y_ + j) = -lines_[k].omega_rad_s * G(i, j).real();
+  Eigen::VectorXd rest = G.imag().reshaped();
+  X -= Q * (Q.transpose() * X);
+  rest -= Q * (Q.transpose() * rest);
+  Normal normal(n_y_ + n_u_);
+  normal.M = X.transpose() * X;
+  normal.v = X.transpose() * rest;
+  normal.square = rest.squaredNorm();
+  return normal;
+}
+
+void SkewFit::iterate() {
+  const auto K = static_cast<Index>(lines_.size());
+  std::vector<Eigen::MatrixXcd> G;
+  Eigen::MatrixXd imaginary(n_y_ * n_u_, K);
+  for (const PlantLine& line : lines_) {
+    imaginary.col(static_cast<Index>(G.size())) = turned(line).imag().reshaped();
+    G.push_back(turned(line));
   }
+  std::vector<Normal> normals;
+  Normal sum(n_y_ + n_u_);
+  for (Index b = 0; b < kBlocks; ++b) {
+    const Eigen::MatrixXd Q = damping_directions(imaginary, b);
+    Normal& block = blocks_[static_cast<std::size_t>(b)] = Normal(n_y_ + n_u_);
+    for (Index k = first_of(b); k < first_of(b + 1); ++k) {
+      const auto line = static_cast<std::size_t>(k);
+      normals.push_back(normal_of(line, G[line], Q));
+      block.add(normals.back(), trust_[k]);
+    }
+    sum.add(block, 1.0);
+  }
+  const Eigen::VectorXd step = sum.solution();
+  skew_ += step;
+  std::vector<double> residuals;
+  for (const Normal& normal : normals) residuals.push_back(normal.residual(step));
+  const double middle = std::max(1e-300, median(residuals));
+  for (Index k = 0; k < K; ++k)
+    trust_[k] = 1.0 / (1.0 + residuals[static_cast<std::size_t>(k)] / middle);
 }
 
 Eigen::VectorXd SkewFit::solve() {
-  Eigen::VectorXd skew = Eigen::VectorXd::Zero(n_y_ + n_u_);
-  for (int i = 0; i < kIterations; ++i) {
-    accumulate(skew);
-    Normal sum = blocks_.front();
-    for (std::size_t b = 1; b < blocks_.size(); ++b) {
-      sum.M += blocks_[b].M;
-      sum.v += blocks_[b].v;
-    }
-    skew += solution(sum);
-  }
-  skew_ = skew;
-  return relative(skew);
+  for (int i = 0; i < kIterations; ++i) iterate();
+  return relative(skew_);
 }
 
 /// @pre solve() was called.
 Eigen::VectorXd SkewFit::deviations() const {
   Eigen::MatrixXd left_out(n_y_ + n_u_, kBlocks);
   for (std::size_t out = 0; out < blocks_.size(); ++out) {
-    Normal sum{Eigen::MatrixXd::Zero(n_y_ + n_u_, n_y_ + n_u_), Eigen::VectorXd::Zero(n_y_ + n_u_)};
-    for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      if (b == out) continue;
-      sum.M += blocks_[b].M;
-      sum.v += blocks_[b].v;
-    }
-    left_out.col(static_cast<Index>(out)) = relative(skew_ + solution(sum));
+    Normal sum(n_y_ + n_u_);
+    for (std::size_t b = 0; b < blocks_.size(); ++b)
+      if (b != out) sum.add(blocks_[b], 1.0);
+    left_out.col(static_cast<Index>(out)) = relative(skew_ + sum.solution());
   }
   const Eigen::VectorXd mean = left_out.rowwise().mean();
   const Eigen::VectorXd squares = (left_out.colwise() - mean).rowwise().squaredNorm();
@@ -186,8 +210,9 @@ SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Inde
   };
   look(true, outputs, 0);
   look(false, inputs, n_y);
-  if (check.changes.empty() && check.largest_deviation_s > kUselessDeviation_s)
-    check.unchecked = "more power or lighter damping: 4.5 deviations are more than 13 us";
+  if (check.changes.empty() && kDeviations * check.largest_deviation_s > kWantedSkew_s)
+    check.unchecked = fmt::format("more power or lighter damping: {:.0f} deviations are {:.3g} us",
+                                  kDeviations, 1e6 * kDeviations * check.largest_deviation_s);
   return check;
 }
 

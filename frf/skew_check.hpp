@@ -20,11 +20,18 @@ struct SkewCheck {
 /// With real mode shapes G e^{j omega tau0} = sum_r R_r d_r(j omega), R_r real: away from the resonances it
 /// is real. A channel that is late turns its row or column by -omega tau:
 ///   Im G_ij = -omega (tau_i + sigma_j) Re G_ij + sum_r (R_r)_ij Im d_r.
-/// The sum is what damping adds; close to a line it comes from the nearest modes, whose R_r are Im G
-/// at their resonances. Projected off these, the equation is least squares for tau and sigma over all
-/// lines, each divided by |G| and by its noise where that is above 2 %. Standard deviations by the jackknife over blocks of lines, since what is left
-/// is not noise but damping of far modes, which neighbouring lines share. A channel counts if it is 4.5
-/// deviations (of 19 degrees of freedom: 2.5e-4 a channel) and 5 us off the median of its kind.
+/// The sum is what damping adds: on all lines of a band it lies in the span of the R_r of the modes near
+/// it, found as the lines of the largest Im vec G (pivoted QR). Projected off these, the equation is
+/// least squares for tau and sigma over all lines, each divided by |G| and by its noise where that is above
+/// 2 %, and by what the equation leaves of it where that is above the median (a Cauchy weight): it holds
+/// badly on resonances whose peaks are cut by noise. The skews are undone and the step repeated: the Re and
+/// Im of a late channel are not yet those of the equation. Standard deviations by the
+/// jackknife over blocks of lines, since what is left is not noise but damping of far modes, which
+/// neighbouring lines share. A channel counts if it is 8 deviations and 5 us off the median of its kind: mode
+/// shapes that are not quite real, with phases of 2 degrees, make errors of 2 us whose deviations come out
+/// at half of that.
+///
+/// What all sensors, or all actuators, share is the plant's delay and cannot be seen.
 /// @param outputs, inputs channels of the log that `lines` are of, see plant_lines().
 SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Eigen::Index>& outputs,
                      const std::vector<Eigen::Index>& inputs);
