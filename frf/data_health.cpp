@@ -16,6 +16,7 @@ namespace {
 using Index = Eigen::Index;
 
 constexpr double kSignificance = 1e-4;    // of a check, over all channels
+constexpr double kSuspicion = 0.05;       // of clipping, where u = r - C y fails
 constexpr double kStuckShare = 0.02;      // of a run's samples that show one value
 constexpr double kResponds = 1e-3;        // of the largest nominal response
 constexpr double kExcludedPower = 1e-4;   // of the inputs' power
@@ -52,6 +53,8 @@ class Examination {
     return std::find(spoilt_.begin(), spoilt_.end(), channel) != spoilt_.end();
   }
   bool found(Cause cause) const;
+  void find_clipped(Index channel, double log_p);
+  bool find_suspected(Index first, Index count);
   std::vector<Index> excited_actuators() const;
   bool expected_to_respond(Index sensor, bool& known) const;
   std::string why_no_nominal(bool all_sensors) const;
@@ -122,20 +125,41 @@ void Examination::check_samples() {
       spoilt_.push_back(c);
       continue;
     }
-    const bool high = scan.log_p_high() < limit;
-    const bool low = scan.log_p_low() < limit;
-    if (!high && !low) continue;
-    const std::string& unit = (sensor ? record_.info.sensors : record_.info.actuators)
-                                  .units[static_cast<std::size_t>(sensor ? c : c - record_.n_y())];
-    find(Severity::fault, Cause::saturated, name(c),
-         "clipped: samples pile up at the end of its range",
-         fmt::format("{} samples at {:.4g} {}",
-                     (high ? scan.high().count : 0) + (low ? scan.low().count : 0),
-                     high ? scan.high().value : scan.low().value, unit),
-         sensor ? "lower the level, or widen the sensor's range"
-                : "lower the level, or raise the actuator's limit");
-    spoilt_.push_back(c);
+    if (std::min(scan.log_p_high(), scan.log_p_low()) < limit) find_clipped(c, limit);
   }
+}
+
+/// @param log_p from where on an end of the range tells of clipping
+void Examination::find_clipped(Index c, double log_p) {
+  const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
+  const bool sensor = c < record_.n_y();
+  const bool high = scan.log_p_high() <= log_p;
+  const bool low = scan.log_p_low() <= log_p;
+  const std::string& unit = (sensor ? record_.info.sensors : record_.info.actuators)
+                                .units[static_cast<std::size_t>(sensor ? c : c - record_.n_y())];
+  find(Severity::fault, Cause::saturated, name(c),
+       "clipped: samples pile up at the end of its range",
+       fmt::format("{} samples at {:.4g} {}",
+                   (high ? scan.high().count : 0) + (low ? scan.low().count : 0),
+                   high ? scan.high().value : scan.low().value, unit),
+       sensor ? "lower the level, or widen the sensor's range"
+              : "lower the level, or raise the actuator's limit");
+  spoilt_.push_back(c);
+}
+
+/// Where u = r - C y fails, a few samples that pile up are enough to say why: the channel most clipped
+/// of `count` from `first` on.
+bool Examination::find_suspected(Index first, Index count) {
+  const auto log_p = [this](Index c) {
+    const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
+    return scan.log_p_high() + scan.log_p_low();
+  };
+  Index most = first;
+  for (Index c = first; c < first + count; ++c)
+    if (log_p(c) < log_p(most)) most = c;
+  if (log_p(most) > std::log(kSuspicion)) return false;
+  find_clipped(most, 0.5 * std::log(kSuspicion));
+  return true;
 }
 
 /// Whether the rigid body moves this sensor when the excited actuators push.
@@ -249,6 +273,7 @@ void Examination::check_recording() {
   for (const ChannelChange& change : check.changes)
     findings_.push_back(to_finding(change, record_.info, true));
   if (!check.misfits.empty() && check.misfits.front().of_all) {
+    if (find_suspected(0, record_.n_y())) return;
     find(Severity::doubt, Cause::controller, "",
          "the loop was closed by another controller than the configuration's",
          fmt::format("u - r + C y is {:.2g} of C y", check.misfits.front().relative),
@@ -256,6 +281,7 @@ void Examination::check_recording() {
     return;
   }
   for (const ControllerMisfit& misfit : check.misfits) {
+    if (find_suspected(record_.n_y() + misfit.actuator, 1)) continue;
     const std::vector<Index> excited = excited_actuators();
     const bool is_input =
         std::find(excited.begin(), excited.end(), misfit.actuator) != excited.end();
@@ -288,6 +314,11 @@ void Examination::check_stage() {
   }
   for (const Index a : inputs)
     if (spoilt(record_.n_y() + a)) return;
+  if (found(Cause::excluded)) {
+    find(Severity::unchecked, Cause::rigid_body, "", what, "",
+         "needs every actuator that moves excited: Y U^-1 is not the plant without");
+    return;
+  }
   const std::vector<PlantLine> lines = plant_lines(record_, *nominal_, outputs, inputs);
   const RigidBodyCheck check = check_rigid_body(lines, outputs, inputs);
   if (!check.unchecked.empty()) {
@@ -342,8 +373,8 @@ std::vector<Finding> Examination::examine() {
   check_responses();
   check_excitation();
   check_recording();
-  check_stage();
   check_excluded();
+  check_stage();
   check_inputs();
   std::stable_sort(findings_.begin(), findings_.end(),
                    [](const Finding& a, const Finding& b) { return a.severity < b.severity; });

@@ -23,9 +23,9 @@ struct SkewCheck {
 /// The sum is what damping adds: on all lines of a band it lies in the span of the R_r of the modes near
 /// it, found as the lines of the largest Im vec G (pivoted QR). Projected off these, the equation is
 /// least squares for tau and sigma over all lines, each divided by |G| and by its noise where that is above
-/// 2 %, and by what the equation leaves of it where that is above the median (a Cauchy weight): it holds
-/// badly on resonances whose peaks are cut by noise. The skews are undone and the step repeated: the Re and
-/// Im of a late channel are not yet those of the equation. Standard deviations by the
+/// 2 %, and by what the equation leaves of it where that is above the median (a Cauchy weight): close to a
+/// resonance that the span does not hold, the equation says nothing of skews. The skews are undone and the
+/// step repeated, since the equation is their first order. Standard deviations by the
 /// jackknife over blocks of lines, since what is left is not noise but damping of far modes, which
 /// neighbouring lines share. A channel counts if it is 8 deviations and 5 us off the median of its kind: mode
 /// shapes that are not quite real, with phases of 2 degrees, make errors of 2 us whose deviations come out

@@ -65,6 +65,38 @@ TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
   EXPECT_EQ(unchecked, 2);  // recording, and stage
 }
 
+/// A limit that three samples of every period reach: 20 samples and more would tell by themselves, so few
+/// do because u = r - C y fails.
+TEST(DataHealth, AFewClippedSamplesAreNotTakenForAnExcitationThatWasNotRecorded) {
+  test::FaultyLogRequest request = request_of(40);
+  request.seed = 1040;
+  constexpr int kActuator = 7;
+  const MemoryLog log = test::simulate_faulty_log(
+      request, {test::PlantedFault::Kind::saturation, false, kActuator, 0, 7.3});
+  const HealthRecord record = read_health_record({&log}, {});
+  const ChannelScan& scan = record.scan[static_cast<std::size_t>(record.n_y() + kActuator)];
+  EXPECT_LE(scan.high().count, 10U);
+  EXPECT_LE(scan.low().count, 10U);
+  const auto findings = check_health(record, nominal_stage(request.configured));
+  ASSERT_EQ(health_notes(findings).size(), 1U) << told(findings);
+  EXPECT_EQ(findings.front().cause, Cause::saturated) << told(findings);
+  EXPECT_EQ(findings.front().channel, "z8");
+}
+
+/// The loop moves the other ten: Y U^-1 of three is not the plant, and says nothing of the wiring.
+TEST(DataHealth, ActuatorsThatMoveUnexcitedAreNoFaultOfTheWiring) {
+  test::FaultyLogRequest request = request_of(5);
+  request.axes = 3;
+  const MemoryLog log = test::simulate_faulty_log(request, {});
+  const auto nominal = std::optional(nominal_stage(request.configured));
+  const auto findings = check_health(read_health_record({&log}, {}), nominal);
+  EXPECT_FALSE(any_fault(findings)) << told(findings);
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings.front().cause, Cause::excluded) << told(findings);
+  EXPECT_EQ(findings.back().cause, Cause::rigid_body);
+  EXPECT_EQ(findings.back().severity, Severity::unchecked);
+}
+
 TEST(DataHealth, FindingsSurviveTheProvenance) {
   const std::vector<Finding> findings = {
       {Severity::fault, Cause::swapped, "a1 a2", "wired crosswise", "exchanged", "exchange them"},
