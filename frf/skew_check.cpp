@@ -140,8 +140,8 @@ void SkewFit::iterate() {
   std::vector<Eigen::MatrixXcd> G;
   Eigen::MatrixXd imaginary(n_y_ * n_u_, K);
   for (const PlantLine& line : lines_) {
-    imaginary.col(static_cast<Index>(G.size())) = turned(line).imag().reshaped();
     G.push_back(turned(line));
+    imaginary.col(static_cast<Index>(G.size()) - 1) = G.back().imag().reshaped();
   }
   std::vector<Normal> normals;
   Normal sum(n_y_ + n_u_);

@@ -65,8 +65,8 @@ TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
   EXPECT_EQ(unchecked, 2);  // recording, and stage
 }
 
-/// A limit that three samples of every period reach: 20 samples and more would tell by themselves, so few
-/// do because u = r - C y fails.
+/// A limit that three samples of every period reach: 25 at one end would tell by themselves, so few do
+/// because u = r - C y fails.
 TEST(DataHealth, AFewClippedSamplesAreNotTakenForAnExcitationThatWasNotRecorded) {
   test::FaultyLogRequest request = request_of(40);
   request.seed = 1040;
