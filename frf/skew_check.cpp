@@ -89,8 +89,8 @@ Eigen::MatrixXcd SkewFit::turned(const PlantLine& line) const {
       turn[i] = std::polar(1.0, line.omega_rad_s * delays_s[i]);
     return turn;
   };
-  const double size =
-      std::sqrt(line.G.squaredNorm() + line.variance.sum() / (kNoiseAllowed * kNoiseAllowed));
+  const double size = std::sqrt(std::max(
+      1e-300, line.G.squaredNorm() + line.variance.sum() / (kNoiseAllowed * kNoiseAllowed)));
   return phases(skew_.head(n_y_)).asDiagonal() * (line.G / size) *
          phases(skew_.tail(n_u_)).asDiagonal();
 }

@@ -27,6 +27,7 @@ struct Judgement {
   bool named =
       false;       ///< the cause at the channel, with its number; or nothing if nothing is planted
   int others = 0;  ///< faults and doubts beside it
+  double error = 0.0;  ///< of its number: of a factor, relative; of a skew, us
 };
 
 inline std::string channel_text(const PlantedFault& fault, const LogInfo& info) {
@@ -119,12 +120,15 @@ inline Judgement judge(const NamedFault& planted, const std::vector<Finding>& fi
     if (finding.severity == Severity::unchecked) continue;
     bool right = !planted.none && finding.cause == planted.cause &&
                  finding.channel == planted.expected_channel;
-    // Numbers: a factor to 10 %, a skew to 1 us in the recording and to 3 us behind it.
-    if (right && finding.cause == Cause::scale)
-      right = std::abs(figure_number(finding.figure) / planted.fault.value - 1.0) < 0.1;
-    if (right && finding.cause == Cause::skew)
-      right = std::abs(figure_number(finding.figure) - 1e6 * planted.fault.value) <
-              (planted.in_recording ? 1.0 : 3.0);
+    // Numbers: a factor to 10 %, a skew to 1 us.
+    if (right && finding.cause == Cause::scale) {
+      judgement.error = figure_number(finding.figure) / planted.fault.value - 1.0;
+      right = std::abs(judgement.error) < 0.1;
+    }
+    if (right && finding.cause == Cause::skew) {
+      judgement.error = figure_number(finding.figure) - 1e6 * planted.fault.value;
+      right = std::abs(judgement.error) < 1.0;
+    }
     if (right)
       judgement.named = true;
     else
