@@ -22,7 +22,8 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-void check_axis(const FrequencyGrid& grid, const ExcitationAxis& axis, std::size_t number) {
+void check_axis(const FrequencyGrid& grid, const ExperimentSpec& spec, std::size_t number) {
+  const ExcitationAxis& axis = spec.axes[number];
   const std::string place = fmt::format("experiment: axes[{}]", number);
   if (axis.channel.empty()) throw std::invalid_argument(place + ".channel: a name is needed");
   if (!(axis.level > 0.0) || !std::isfinite(axis.level)) {
@@ -36,6 +37,8 @@ void check_axis(const FrequencyGrid& grid, const ExcitationAxis& axis, std::size
                     axis.channel, axis.shape.size(), grid.size()));
   }
   for (Index k = 0; k < grid.size(); ++k) {
+    if (!has_line(spec.scheme, static_cast<Index>(number), static_cast<Index>(spec.axes.size()), k))
+      continue;
     // A line that one axis does not excite has no FRF: it must not be in the grid.
     if (!(axis.shape[k] > 0.0) || !std::isfinite(axis.shape[k])) {
       throw std::invalid_argument(fmt::format(
@@ -57,9 +60,16 @@ void check(const FrequencyGrid& grid, const ExperimentSpec& spec) {
   at_least("transient_periods", spec.transient_periods, 0);
   at_least("crest_iterations", spec.crest_iterations, 0);
   if (spec.axes.empty()) throw std::invalid_argument("experiment: axes: at least one is needed");
+  if (spec.scheme == ExcitationScheme::zippered &&
+      grid.size() < static_cast<Index>(spec.axes.size())) {
+    throw std::invalid_argument(
+        fmt::format("experiment: scheme zippered shares {} lines among {} axes; each needs some: "
+                    "lengthen the period or widen the band",
+                    grid.size(), spec.axes.size()));
+  }
   std::set<std::string> channels;
   for (std::size_t p = 0; p < spec.axes.size(); ++p) {
-    check_axis(grid, spec.axes[p], p);
+    check_axis(grid, spec, p);
     if (!channels.insert(spec.axes[p].channel).second) {
       throw std::invalid_argument(fmt::format("experiment: axes[{}].channel: '{}' is excited twice",
                                               p, spec.axes[p].channel));
@@ -69,6 +79,7 @@ void check(const FrequencyGrid& grid, const ExperimentSpec& spec) {
 
 /// T, axes x experiments: T T^H = n I for the orthogonal schemes, I for single_axis.
 MatrixXcd mixing_matrix(ExcitationScheme scheme, int n) {
+  if (scheme == ExcitationScheme::zippered) return MatrixXcd::Ones(n, 1);
   if (scheme == ExcitationScheme::single_axis) return MatrixXcd::Identity(n, n);
   if (scheme == ExcitationScheme::orthogonal_hadamard) {
     try {
@@ -91,10 +102,19 @@ MatrixXcd mixing_matrix(ExcitationScheme scheme, int n) {
   return T;
 }
 
+/// Of rms 1, on the lines that the axis has.
+Eigen::VectorXd axis_amplitude(const FrequencyGrid& grid, const ExperimentSpec& spec, int axis) {
+  Eigen::VectorXd shape = spec.axes[static_cast<std::size_t>(axis)].shape;
+  if (spec.scheme != ExcitationScheme::zippered) return unit_rms_amplitude(grid, shape);
+  if (shape.size() == 0) shape.setOnes(grid.size());
+  for (Index k = 0; k < grid.size(); ++k)
+    if (!has_line(spec.scheme, axis, static_cast<Index>(spec.axes.size()), k)) shape[k] = 0.0;
+  return unit_rms_amplitude(grid, shape);
+}
+
 Eigen::VectorXd draw_phase_rad(const FrequencyGrid& grid, const ExperimentSpec& spec,
                                int realization, int axis) {
-  const Eigen::VectorXd& shape = spec.axes[static_cast<std::size_t>(axis)].shape;
-  return multisine_phase_rad(grid, unit_rms_amplitude(grid, shape),
+  return multisine_phase_rad(grid, axis_amplitude(grid, spec, axis),
                              stream_seed(spec.seed, static_cast<std::uint64_t>(realization),
                                          static_cast<std::uint64_t>(axis)),
                              spec.crest_iterations);
@@ -122,7 +142,7 @@ ExperimentPlan::ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec,
                                std::vector<MatrixXd> phase_rad)
     : grid_(std::move(grid)), spec_(std::move(spec)), reduced_phase_rad_(std::move(phase_rad)) {
   check(grid_, spec_);
-  mixing_ = mixing_matrix(spec_.scheme, experiments());
+  mixing_ = mixing_matrix(spec_.scheme, axes());
   if (spec_.crest_iterations > 0 && reduced_phase_rad_.empty()) {
     reduced_phase_rad_ = reduced_phases(grid_, spec_);
   }
@@ -166,8 +186,8 @@ void ExperimentPlan::check_run(RunId run) const {
 MatrixXd ExperimentPlan::phase_rad(int realization) const {
   check_run({realization, 0});
   if (!reduced_phase_rad_.empty()) return reduced_phase_rad_[static_cast<std::size_t>(realization)];
-  MatrixXd phase_rad(experiments(), grid_.size());
-  for (int p = 0; p < experiments(); ++p) {
+  MatrixXd phase_rad(axes(), grid_.size());
+  for (int p = 0; p < axes(); ++p) {
     phase_rad.row(p) = draw_phase_rad(grid_, spec_, realization, p).transpose();
   }
   return phase_rad;
@@ -176,8 +196,8 @@ MatrixXd ExperimentPlan::phase_rad(int realization) const {
 MatrixXcd ExperimentPlan::spectrum(RunId run) const {
   check_run(run);
   const MatrixXd phases = phase_rad(run.realization);
-  MatrixXcd spectrum = MatrixXcd::Zero(experiments(), grid_.size());
-  for (int p = 0; p < experiments(); ++p) {
+  MatrixXcd spectrum = MatrixXcd::Zero(axes(), grid_.size());
+  for (int p = 0; p < axes(); ++p) {
     if (!excites(p, run.experiment)) continue;
     spectrum.row(p) = line_coefficients(mixing_(p, run.experiment), amplitude_.row(p).transpose(),
                                         phases.row(p).transpose())
@@ -189,8 +209,8 @@ MatrixXcd ExperimentPlan::spectrum(RunId run) const {
 MatrixXd ExperimentPlan::excitation(RunId run) const {
   const MatrixXcd lines = spectrum(run);
   LineSpectrum synthesis(grid_);
-  MatrixXd samples = MatrixXd::Zero(grid_.samples_per_period(), experiments());
-  for (int p = 0; p < experiments(); ++p) {
+  MatrixXd samples = MatrixXd::Zero(grid_.samples_per_period(), axes());
+  for (int p = 0; p < axes(); ++p) {
     if (excites(p, run.experiment)) samples.col(p) = synthesis.samples(lines.row(p).transpose());
   }
   return samples;
@@ -200,15 +220,14 @@ MatrixXd ExperimentPlan::excitation(RunId run) const {
 /// stage that is not quite linear depends on the amplitudes, so they must not change between
 /// realizations.
 void ExperimentPlan::set_amplitude() {
-  amplitude_.resize(experiments(), grid_.size());
-  Eigen::VectorXd level(experiments());
-  for (int p = 0; p < experiments(); ++p) {
-    const ExcitationAxis& axis = spec_.axes[static_cast<std::size_t>(p)];
-    amplitude_.row(p) = unit_rms_amplitude(grid_, axis.shape).transpose();
-    level[p] = axis.level;
+  amplitude_.resize(axes(), grid_.size());
+  Eigen::VectorXd level(axes());
+  for (int p = 0; p < axes(); ++p) {
+    amplitude_.row(p) = axis_amplitude(grid_, spec_, p).transpose();
+    level[p] = spec_.axes[static_cast<std::size_t>(p)].level;
   }
   if (spec_.scaling == AmplitudeScaling::peak) {
-    Eigen::VectorXd peak = Eigen::VectorXd::Zero(experiments());
+    Eigen::VectorXd peak = Eigen::VectorXd::Zero(axes());
     for (const RunId run : runs()) {
       peak = peak.cwiseMax(excitation(run).cwiseAbs().colwise().maxCoeff().transpose());
     }

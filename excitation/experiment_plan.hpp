@@ -15,7 +15,8 @@ namespace stageid {
 enum class ExcitationScheme : std::uint8_t {
   single_axis,     ///< experiment e excites axis e alone
   orthogonal_dft,  ///< all axes at once, axis p in experiment e times exp(2 pi j p e / n); any n
-  orthogonal_hadamard  ///< the same with a Hadamard matrix: n = 1, 2, 4, 8, 12, 16, 20 ...
+  orthogonal_hadamard,  ///< the same with a Hadamard matrix: n = 1, 2, 4, 8, 12, 16, 20 ...
+  zippered  ///< one experiment: axis p has the p-th, (p + n)-th, (p + 2n)-th ... line for itself
 };
 
 /// One excited channel of the stage.
@@ -28,7 +29,7 @@ struct ExcitationAxis {
 struct ExperimentSpec {
   ExcitationScheme scheme = ExcitationScheme::single_axis;
   AmplitudeScaling scaling = AmplitudeScaling::rms;
-  std::vector<ExcitationAxis> axes;  ///< one experiment per axis and realization
+  std::vector<ExcitationAxis> axes;  ///< one experiment per axis and realization (zippered: one)
   int realizations = 2;
   int periods = 2;            ///< measured periods of every run
   int transient_periods = 1;  ///< periods before them that are recorded and not used
@@ -43,12 +44,18 @@ struct RunId {
   friend auto operator<=>(const RunId&, const RunId&) = default;
 };
 
+/// Whether axis p of n has line k (a position in the grid) for its own or shares it.
+constexpr bool has_line(ExcitationScheme scheme, Eigen::Index p, Eigen::Index n, Eigen::Index k) {
+  return scheme != ExcitationScheme::zippered || k % n == p;
+}
+
 /// The whole experiment: every run's multisines follow from it, on every machine the same.
 ///
 /// Axis p of realization m is a multisine with line coefficients A_p(l) / 2 exp(j phi_mp(l)); its
 /// amplitudes A_p are the same in all runs, its phases phi_mp come from a stream of their own and
 /// are new in every realization. In experiment e it plays times T(p, e), see ExcitationScheme: per
-/// line R R^H = n D_A^2 / 4 over the n experiments for the orthogonal schemes. With
+/// line R R^H = n D_A^2 / 4 over the n experiments for the orthogonal schemes. Zippered axes have
+/// A_p(l) = 0 on the lines of the others. With
 /// AmplitudeScaling::rms, `level` is the rms of the axis in every run that excites it; with peak,
 /// its largest absolute sample in all runs together.
 class ExperimentPlan {
@@ -64,7 +71,10 @@ class ExperimentPlan {
 
   const FrequencyGrid& grid() const noexcept { return grid_; }
   const ExperimentSpec& spec() const noexcept { return spec_; }
-  int experiments() const noexcept { return static_cast<int>(spec_.axes.size()); }
+  int axes() const noexcept { return static_cast<int>(spec_.axes.size()); }
+  int experiments() const noexcept {
+    return spec_.scheme == ExcitationScheme::zippered ? 1 : axes();
+  }
   std::vector<RunId> runs() const;  ///< in the order of measuring: realization by realization
   /// runs() without those of `done`, for an experiment that is resumed.
   std::vector<RunId> runs_without(const std::vector<RunId>& done) const;
@@ -81,7 +91,7 @@ class ExperimentPlan {
 
   /// A_p(l_k), axes x lines, unit of the channel.
   const Eigen::MatrixXd& amplitude() const noexcept { return amplitude_; }
-  /// T, axes x experiments; the identity for single_axis.
+  /// T, axes x experiments; the identity for single_axis, ones for zippered.
   const Eigen::MatrixXcd& mixing() const noexcept { return mixing_; }
   /// phi_mp(l_k) of a realization, axes x lines, in [0, 2 pi).
   Eigen::MatrixXd phase_rad(int realization) const;

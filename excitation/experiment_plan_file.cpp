@@ -1,8 +1,8 @@
 // excitation.h5, an HDF5 file from which any program can play the experiment:
 //
 //   /   attributes: format = "stageid-excitation", format_version = 1, sample_rate_hz,
-//       period_samples, scheme = "single_axis" | "orthogonal_dft" | "orthogonal_hadamard",
-//       scaling = "rms" | "peak", realizations, periods, transient_periods, crest_iterations,
+//       period_samples, scheme = "single_axis" | "orthogonal_dft" | "orthogonal_hadamard" |
+//       "zippered", scaling = "rms" | "peak", realizations, periods, transient_periods, crest_iterations,
 //       seed (text, decimal: an unsigned 64-bit number fits no signed integer and no double)
 //   /lines         [L] int64    excited lines of the DFT of one period
 //   /frequency_hz  [L]          their frequencies, for reading convenience
@@ -10,7 +10,8 @@
 //   /level         [n]          rms or peak of each axis (see scaling), unit of the channel
 //   /shape         [n x L]      optional: relative amplitudes as asked for; a row of zeros is flat
 //   /amplitude     [n x L]      A: amplitude of each line of each axis, unit of the channel
-//   /mixing        [n x n] complex   T: factor of axis (row) in experiment (column)
+//   /mixing        [n x E] complex   T: factor of axis (row) in experiment (column); E = n,
+//                                    zippered: 1
 //   /realizations/0000, 0001, ...
 //     phase_rad    [n x L]           phi
 //     spectrum     [n x L] complex   X = A / 2 exp(j phi)
@@ -52,7 +53,8 @@ struct SchemeName {
 };
 constexpr SchemeName kSchemes[] = {{ExcitationScheme::single_axis, "single_axis"},
                                    {ExcitationScheme::orthogonal_dft, "orthogonal_dft"},
-                                   {ExcitationScheme::orthogonal_hadamard, "orthogonal_hadamard"}};
+                                   {ExcitationScheme::orthogonal_hadamard, "orthogonal_hadamard"},
+                                   {ExcitationScheme::zippered, "zippered"}};
 
 std::string realization_group(int realization) {
   return fmt::format("/realizations/{:04}", realization);
@@ -102,7 +104,7 @@ void write_axes(Hdf5File& file, const ExperimentPlan& plan) {
 
   std::vector<std::string> channels;
   std::vector<double> levels;
-  MatrixXd shape = MatrixXd::Zero(plan.experiments(), grid.size());
+  MatrixXd shape = MatrixXd::Zero(plan.axes(), grid.size());
   for (const ExcitationAxis& axis : plan.spec().axes) {
     const auto row = static_cast<Index>(channels.size());
     if (axis.shape.size() > 0) shape.row(row) = axis.shape.transpose();
@@ -208,7 +210,7 @@ ExcitationScheme PlanReader::scheme() const {
     if (name == entry.name) return entry.scheme;
   }
   fail("/", "attribute 'scheme' is '" + name +
-                "'; it must be single_axis, orthogonal_dft or orthogonal_hadamard");
+                "'; it must be single_axis, orthogonal_dft, orthogonal_hadamard or zippered");
 }
 
 std::uint64_t PlanReader::seed() const {
@@ -287,10 +289,10 @@ void PlanReader::check_agrees(const ExperimentPlan& plan) const {
            "it was altered or is damaged: design the experiment anew");
     }
   };
-  const Index axes = plan.experiments();
+  const Index axes = plan.axes();
   const Index lines = plan.grid().size();
   check(reals("/amplitude", axes, lines), plan.amplitude(), "/amplitude");
-  check(complex("/mixing", axes, axes), plan.mixing(), "/mixing");
+  check(complex("/mixing", axes, plan.experiments()), plan.mixing(), "/mixing");
   for (int m = 0; m < plan.spec().realizations; ++m) {
     const std::string group = realization_group(m);
     const MatrixXd phase_rad = plan.phase_rad(m);

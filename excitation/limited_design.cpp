@@ -66,6 +66,7 @@ class Designer {
  public:
   Designer(const FrequencyGrid& grid, const LimitedDesignSpec& spec)
       : grid_(grid), spec_(spec), plan_(flat_plan(grid, spec)), groups_(groups_of(plan_)) {
+    cost_ = (plan_.amplitude().array() > 0.0).select(spec.cost, 0.0);
     const Eigen::VectorXd frequency_hz = grid.frequency_hz();
     for (const BoundedSignal& s : spec.signals) {
       gain_.emplace_back(s.transfer.cwiseAbs2() / 2.0);
@@ -139,7 +140,7 @@ class Designer {
       Eigen::VectorXd cost(size * lines);
       for (Index i = 0; i < size; ++i) {
         const Index p = group[static_cast<std::size_t>(i)];
-        cost.segment(i * lines, lines) = spec_.cost.row(p).transpose();
+        cost.segment(i * lines, lines) = cost_.row(p).transpose();
         for (std::size_t s = 0; s < spec_.signals.size(); ++s)
           bounds.block(static_cast<Index>(s), i * lines, 1, lines) =
               gain_[s].row(p) / allowed(s, static_cast<Index>(g));
@@ -149,6 +150,7 @@ class Designer {
         amplitude_.row(group[static_cast<std::size_t>(i)]) =
             power.segment(i * lines, lines).cwiseSqrt().transpose();
     }
+    amplitude_ = (plan_.amplitude().array() > 0.0).select(amplitude_, 0.0).eval();
   }
 
   MatrixXd reduced(const MatrixXd& phase_rad) const {
@@ -226,7 +228,8 @@ class Designer {
       experiment.axes[p].shape = A;
       experiment.axes[p].level = A.norm() / std::sqrt(2.0);
     }
-    const double cost = (spec_.cost.array() / amplitude_.array().square()).sum();
+    const double cost =
+        (cost_.array() > 0.0).select(cost_.array() / amplitude_.array().square(), 0.0).sum();
     return {ExperimentPlan(grid_, std::move(experiment), phases), std::move(largest), cost};
   }
 
@@ -236,6 +239,7 @@ class Designer {
   std::vector<std::vector<Index>> groups_;
   std::vector<MatrixXd> gain_;  // a signal's mean square over that of one line of one axis
   MatrixXd crest_;              // signals x groups
+  MatrixXd cost_;               // spec_.cost on the lines that an axis has
   MatrixXd amplitude_;
 };
 

@@ -11,8 +11,9 @@ namespace stageid {
 
 /// What to design. Any values may stand here; they are checked by design_within_limits().
 struct LimitedDesignSpec {
-  ExperimentSpec experiment;           ///< levels and shapes are designed; crest_iterations >= 1
-  Eigen::MatrixXd cost;                ///< c, axes x lines: variance wanted small is sum c / A^2
+  ExperimentSpec experiment;  ///< levels and shapes are designed; crest_iterations >= 1
+  Eigen::MatrixXd cost;       ///< c, axes x lines: variance wanted small is sum c / A^2 over the
+                              ///< lines that each axis has
   std::vector<BoundedSignal> signals;  ///< what must stay inside
   double safety = 0.9;                 ///< largest predicted use of any limit
 };

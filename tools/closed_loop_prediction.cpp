@@ -24,7 +24,7 @@ struct ClosedLoop {
 ClosedLoop closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) {
   const StageInfo& info = stage.info;
   const auto n_u = static_cast<Eigen::Index>(info.actuators.size());
-  Eigen::MatrixXd selection = Eigen::MatrixXd::Zero(n_u, plan.experiments());
+  Eigen::MatrixXd selection = Eigen::MatrixXd::Zero(n_u, plan.axes());
   for (std::size_t axis = 0; axis < plan.spec().axes.size(); ++axis) {
     const int index = actuator_of_axis(info, plan.spec().axes[axis].channel);
     selection(index, static_cast<Eigen::Index>(axis)) = 1.0;

@@ -199,9 +199,14 @@ BoundedLoop bounded_loop(const FrequencyGrid& grid, const ExperimentSpec& experi
 }
 
 double relative_variance(const ExperimentPlan& plan, const MatrixXd& cost) {
-  const bool single = plan.spec().scheme == ExcitationScheme::single_axis;
-  const double together = single ? 1.0 : static_cast<double>(plan.spec().axes.size());
-  return 4.0 / together * (cost.array() / plan.amplitude().array().square()).colwise().sum().mean();
+  const ExcitationScheme scheme = plan.spec().scheme;
+  const auto n = static_cast<double>(plan.axes());
+  // Zippered: each axis has every n-th line, once.
+  const double factor = scheme == ExcitationScheme::single_axis ? 1.0
+                        : scheme == ExcitationScheme::zippered  ? n
+                                                                : 1.0 / n;
+  const Eigen::ArrayXXd power = plan.amplitude().array().square();
+  return 4.0 * factor * (power > 0.0).select(cost.array() / power, 0.0).colwise().sum().mean();
 }
 
 }  // namespace stageid

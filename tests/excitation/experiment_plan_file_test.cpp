@@ -41,6 +41,19 @@ ExperimentSpec spec(int crest_iterations = 0) {
   return spec;
 }
 
+TEST(ExperimentPlanFile, GivesAZipperedPlanBack) {
+  const TemporaryDirectory directory;
+  ExperimentSpec zippered = spec(15);
+  zippered.scheme = ExcitationScheme::zippered;
+  const ExperimentPlan plan(grid(), zippered);
+  write_experiment_plan(directory / "plan.h5", plan);
+  const ExperimentPlan back = read_experiment_plan(directory / "plan.h5");
+  EXPECT_EQ(back.spec().scheme, ExcitationScheme::zippered);
+  EXPECT_EQ(back.experiments(), 1);
+  ASSERT_EQ(back.mixing(), (Eigen::MatrixXcd::Ones(2, 1)));
+  for (const RunId run : plan.runs()) EXPECT_EQ(back.excitation(run), plan.excitation(run));
+}
+
 std::string content(const fs::path& file) {
   std::ostringstream text;
   text << std::ifstream(file, std::ios::binary).rdbuf();

@@ -204,6 +204,51 @@ TEST(ExperimentPlan, CrestReductionLowersEveryRunAndKeepsOrthogonality) {
   }
 }
 
+TEST(ExperimentPlan, ZipperedAxesShareARunAndNoLine) {
+  ExperimentSpec spec = spec_of(3, ExcitationScheme::zippered);
+  spec.periods = 4;
+  spec.axes[1].shape = Eigen::VectorXd::LinSpaced(small_grid().size(), 1.0, 5.0);
+  const ExperimentPlan plan(small_grid(), spec);
+  EXPECT_EQ(plan.experiments(), 1);
+  EXPECT_EQ(plan.axes(), 3);
+  EXPECT_EQ(plan.runs(), (std::vector<RunId>{{0, 0}, {1, 0}, {2, 0}}));
+  EXPECT_DOUBLE_EQ(plan.duration_s(), 3.0 * 1.0);  // realizations x (1 + 4) periods of 0.2 s
+  RealDft dft(200);
+  for (const RunId run : plan.runs()) {
+    const Eigen::MatrixXd excitation = plan.excitation(run);
+    EXPECT_LT((rms_of_columns(excitation) - Eigen::Vector3d(1.0, 1.5, 2.0)).cwiseAbs().maxCoeff(),
+              32.0 * kEps);
+    for (int p = 0; p < 3; ++p) {
+      std::copy(excitation.col(p).data(), excitation.col(p).data() + 200, dft.input().begin());
+      const auto spectrum = dft.forward();
+      for (std::size_t k = 0; k < plan.grid().lines().size(); ++k) {
+        const double amplitude =
+            std::abs(spectrum[static_cast<std::size_t>(plan.grid().lines()[k])]) / 100.0;
+        const double wanted = plan.amplitude()(p, static_cast<Eigen::Index>(k));
+        EXPECT_EQ(wanted > 0.0, k % 3 == static_cast<std::size_t>(p)) << k;
+        EXPECT_NEAR(amplitude, wanted, 64.0 * kEps) << k;
+      }
+    }
+  }
+  // The shape holds on the lines that the axis has.
+  EXPECT_NEAR(plan.amplitude()(1, 4) / plan.amplitude()(1, 1),
+              spec.axes[1].shape[4] / spec.axes[1].shape[1], 8.0 * kEps);
+}
+
+TEST(ExperimentPlan, ZipperedPeaksAreThoseAskedForAndCrestIsReduced) {
+  ExperimentSpec spec = spec_of(3, ExcitationScheme::zippered);
+  spec.scaling = AmplitudeScaling::peak;
+  spec.crest_iterations = 50;
+  const ExperimentPlan plan(small_grid(), spec);
+  Eigen::Vector3d peak = Eigen::Vector3d::Zero();
+  for (const RunId run : plan.runs()) {
+    const Eigen::MatrixXd excitation = plan.excitation(run);
+    peak = peak.cwiseMax(excitation.cwiseAbs().colwise().maxCoeff().transpose());
+    for (int p = 0; p < 3; ++p) EXPECT_LT(crest_factor(excitation.col(p)), 2.0);
+  }
+  EXPECT_LT((peak - Eigen::Vector3d(1.0, 1.5, 2.0)).cwiseAbs().maxCoeff(), 32.0 * kEps);
+}
+
 TEST(ExperimentPlan, RunsFollowTheSeedAlone) {
   ExperimentSpec spec = spec_of(2, ExcitationScheme::orthogonal_dft);
   const Eigen::MatrixXd first = ExperimentPlan(small_grid(), spec).excitation({1, 1});
@@ -247,6 +292,8 @@ TEST(ExperimentPlan, NamesTheFieldThatIsWrong) {
       },
       "at line 3");
   expect_refused([](auto& s) { s.scheme = ExcitationScheme::orthogonal_hadamard; }, "2 and 4");
+  expect_refused([](auto& s) { s = spec_of(100, ExcitationScheme::zippered); },
+                 "shares 30 lines among 100 axes");
 }
 
 TEST(ExperimentPlan, LeavesOutWhatIsDone) {
