@@ -55,6 +55,13 @@ void fill_deviations(const ParameterCovariance& covariance, AdditiveModel& model
   }
 }
 
+/// The covariance takes the lines for independent: of so many of them only one is.
+void raise(ParameterCovariance& covariance, double correlated_lines) {
+  covariance.globals *= correlated_lines;
+  covariance.numerator_variance *= correlated_lines;
+  covariance.response_variance *= correlated_lines;
+}
+
 void use_covariance(const ParameterCovariance& covariance, bool likelihood, FitResult& result) {
   if (covariance.response_variance.size() == 0) return;
   if (!covariance.globals.allFinite() || !covariance.numerator_variance.allFinite() ||
@@ -287,6 +294,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   if (options.uncertainty) {
     if (!low_rank && result.status != FitStatus::singular)
       covariance = free_covariance(frf, options, problem, matrices, beta, iteration);
+    raise(covariance, frf.correlated_lines);
     use_covariance(covariance, weighs_by_variance(options.weighting), result);
     judge(problem, beta, iteration.E, covariance.globals, iteration.frozen, result);
   }

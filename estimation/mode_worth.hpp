@@ -38,7 +38,7 @@ class ModeWorth {
   double cost_of_modes(int modes) const;
 
   double lines_ = 0.0;
-  double data_ = 0.0;  ///< real numbers
+  double data_ = 0.0;  ///< real numbers, as many as are independent
   double parameters_of_mode_ = 0.0;
   double rounding_ = 0.0;  ///< of sum W |E|^2
 };

@@ -21,6 +21,8 @@ void require_smoothable(const FrfEstimate& frf, int lines) {
     refuse("the noise covariance is unknown; measure two periods");
   if (frf.method == FrfMethod::lpm)
     refuse("method 'lpm' takes it from neighbouring bins already; estimate with 'periodic'");
+  if (frf.correlated_lines != 1.0)
+    refuse("zippered lines take it from their neighbours already; leave the smoothing out");
   if (frf.covariance_lines != 1)
     refuse(fmt::format("it is the mean of {} lines already; start from the logs",
                        frf.covariance_lines));

@@ -15,7 +15,7 @@ namespace stageid {
 /// Source: facts 8 (weights must not depend on the same noise per line); DFT lines of stationary
 /// noise are independent: Brillinger, Time Series (2001), theorem 4.4.1.
 /// @throws std::invalid_argument unless `lines` is odd, positive and no more than there are; if C_E or
-///         S are unknown; if C_E is smooth already (lpm, or smoothed).
+///         S are unknown; if C_E is smooth already (lpm, zippered, or smoothed).
 FrfEstimate smooth_covariance(const FrfEstimate& frf, int lines);
 
 }  // namespace stageid

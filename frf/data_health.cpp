@@ -208,7 +208,7 @@ void Examination::check_responses() {
 }
 
 void Examination::check_excitation() {
-  if (record_.axes.empty()) return;
+  if (record_.axes.empty() || record_.zippered) return;  // orthogonal: they share no line
   double worst = 0.0;
   Index at = 0;
   for (Index k = 0; k < record_.frequency_hz.size(); ++k) {
@@ -227,7 +227,7 @@ void Examination::check_excitation() {
 /// After the recording's channels are put right.
 void Examination::check_inputs() {
   const std::vector<Index> excited = excited_actuators();
-  if (excited.empty()) return;
+  if (excited.empty() || record_.zippered) return;
   std::vector<Index> rows;
   for (const Index a : excited) rows.push_back(record_.n_y() + a);
   std::vector<double> conditions;
@@ -317,6 +317,11 @@ void Examination::check_stage() {
   if (found(Cause::excluded)) {
     find(Severity::unchecked, Cause::rigid_body, "", what, "",
          "needs every actuator that moves excited: Y U^-1 is not the plant without");
+    return;
+  }
+  if (record_.zippered) {
+    find(Severity::unchecked, Cause::rigid_body, "", what, "",
+         "needs all axes on one line: a scheme other than zippered");
     return;
   }
   const std::vector<PlantLine> lines = plant_lines(record_, *nominal_, outputs, inputs);

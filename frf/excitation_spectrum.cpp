@@ -35,6 +35,10 @@ Eigen::VectorXcd channel_spectrum(const Eigen::VectorXd& samples, RealDft& dft) 
 
 }  // namespace
 
+bool ExcitationSpectrum::one_channel_a_line() const {
+  return std::all_of(only.begin(), only.end(), [](Eigen::Index c) { return c >= 0; });
+}
+
 ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& dft) {
   const Eigen::Index last = (period.rows() + 1) / 2 - 1;  // below Nyquist
   Eigen::MatrixXcd spectra(dft.half_size(), period.cols());
@@ -46,7 +50,9 @@ ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& d
   }
 
   ExcitationSpectrum result;
-  std::vector<char> excited(static_cast<std::size_t>(last) + 1, 0);
+  constexpr Eigen::Index kNone = -2;
+  constexpr Eigen::Index kSeveral = -1;
+  std::vector<Eigen::Index> only(static_cast<std::size_t>(last) + 1, kNone);
   for (Eigen::Index c = 0; c < period.cols(); ++c) {
     if (!(largest[c] > kSmallestChannel * largest.maxCoeff())) continue;
     const double rounding =
@@ -57,13 +63,16 @@ ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& d
     bool any = false;
     for (Eigen::Index l = 1; l <= last; ++l) {
       if (std::norm(spectra(l, c)) <= threshold * threshold) continue;
-      excited[static_cast<std::size_t>(l)] = 1;
+      Eigen::Index& channel = only[static_cast<std::size_t>(l)];
+      channel = channel == kNone ? c : kSeveral;
       any = true;
     }
     if (any) result.channels.push_back(c);
   }
   for (int l = 1; l <= last; ++l) {
-    if (excited[static_cast<std::size_t>(l)] != 0) result.lines.push_back(l);
+    if (only[static_cast<std::size_t>(l)] == kNone) continue;
+    result.lines.push_back(l);
+    result.only.push_back(only[static_cast<std::size_t>(l)]);
   }
   result.values.setZero(period.cols(), static_cast<Eigen::Index>(result.lines.size()));
   for (const Eigen::Index c : result.channels) {

@@ -12,6 +12,10 @@ struct ExcitationSpectrum {
   std::vector<int> lines;              ///< excited in some channel, ascending, never DC or Nyquist
   std::vector<Eigen::Index> channels;  ///< excited on some line, ascending
   Eigen::MatrixXcd values;             ///< R, excitation channels x lines: DFT / samples
+  std::vector<Eigen::Index> only;      ///< of each line: its only channel; -1: it has several
+
+  /// Every channel that is excited has lines of its own.
+  bool one_channel_a_line() const;
 
   friend bool operator==(const ExcitationSpectrum&, const ExcitationSpectrum&) = default;
 };

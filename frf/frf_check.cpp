@@ -99,6 +99,8 @@ void check_scalars(const FrfEstimate& frf) {
     refuse("sample_rate_hz", "not a finite number >= 0; 0 means unknown");
   }
   if (!std::isfinite(frf.delay_s)) refuse("delay_s", "not finite");
+  if (!std::isfinite(frf.correlated_lines) || frf.correlated_lines < 1.0)
+    refuse("correlated_lines", "not a finite number >= 1");
   for (const double dof : {frf.noise_dof, frf.total_dof}) {
     if (!std::isfinite(dof) || dof < 0.0)
       refuse("noise_dof, total_dof", "not a finite number >= 0");
@@ -170,6 +172,10 @@ void check(const FrfEstimate& frf) {
   check_optional("covariance", frf.covariance, n_channels * n_channels, frf.lines());
   if (frf.input_condition.size() != 0) {
     check_optional("input_condition", Eigen::MatrixXd(frf.input_condition.transpose()), 1,
+                   frf.lines());
+  }
+  if (frf.interpolation_misfit.size() != 0) {
+    check_optional("interpolation_misfit", Eigen::MatrixXd(frf.interpolation_misfit.transpose()), 1,
                    frf.lines());
   }
   check_detection(frf);

@@ -113,6 +113,8 @@ FrfEstimate select_band(const FrfEstimate& frf, double low_hz, double high_hz) {
   band.covariance = columns(frf.covariance);
   band.detection.linear_power = columns(frf.detection.linear_power);
   if (frf.input_condition.size() != 0) band.input_condition = frf.input_condition(kept);
+  if (frf.interpolation_misfit.size() != 0)
+    band.interpolation_misfit = frf.interpolation_misfit(kept);
   return band;
 }
 

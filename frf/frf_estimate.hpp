@@ -66,7 +66,13 @@ struct FrfEstimate {
   Eigen::MatrixXcd input_factor;
   Eigen::MatrixXcd covariance;  ///< (n_c n_c) x N on request, n_c = n_y n_u: Cov(vec G); else empty
   int covariance_lines = 1;     ///< C_E is the mean over so many lines: smooth_covariance()
-  DetectionLines detection;     ///< empty if unknown
+  /// Errors of the response on neighbouring lines are correlated: all N lines tell a smooth model as
+  /// much as N / correlated_lines independent ones (zippered experiments; else 1).
+  double correlated_lines = 1.0;
+  /// N, zippered: residual of the local models over what noise would leave; about 1 where the
+  /// interpolation holds and the plant is linear. Empty if unknown.
+  Eigen::VectorXd interpolation_misfit;
+  DetectionLines detection;       ///< empty if unknown
   NonlinearityTest nonlinearity;  ///< empty unless there are two periods and two realizations
   std::vector<DroppedPeriod> dropped_periods;
   std::vector<std::string> excluded_channels;  ///< actuators outside the sub-plant

@@ -65,6 +65,8 @@ void write_attributes(Hdf5File& file, const FrfEstimate& frf) {
   file.write_attribute("/", "experiments", static_cast<long long>(frf.experiments));
   file.write_attribute("/", "noise_dof", frf.noise_dof);
   file.write_attribute("/", "total_dof", frf.total_dof);
+  if (frf.correlated_lines != 1.0)
+    file.write_attribute("/", "correlated_lines", frf.correlated_lines);
 }
 
 /// Of the total variance if it is known: what another measurement would show.
@@ -108,6 +110,9 @@ void write_optional(Hdf5File& file, const FrfEstimate& frf) {
   }
   if (frf.input_condition.size() != 0) {
     file.write_reals("/input_condition", {N}, frf.input_condition.data());
+  }
+  if (frf.interpolation_misfit.size() != 0) {
+    file.write_reals("/interpolation_misfit", {N}, frf.interpolation_misfit.data());
   }
   if (!frf.excluded_channels.empty()) {
     file.write_texts("/excluded_channels", frf.excluded_channels);
@@ -236,6 +241,8 @@ void read_optional(const Hdf5File& file, FrfEstimate& frf) {
                                              static_cast<Eigen::Index>(values.size()));
   };
   if (file.exists("/input_condition")) frf.input_condition = read_vector("/input_condition", N);
+  if (file.exists("/interpolation_misfit"))
+    frf.interpolation_misfit = read_vector("/interpolation_misfit", N);
   if (file.exists("/excluded_channels")) {
     frf.excluded_channels = file.read_texts("/excluded_channels");
     frf.excluded_power = read_vector("/excluded_power", frf.excluded_channels.size());
@@ -291,6 +298,7 @@ FrfEstimate read_frf(const std::filesystem::path& path) {
   frf.experiments = integer_or_zero(file, "experiments");
   frf.noise_dof = real_or(file, "noise_dof", 0.0);
   frf.total_dof = real_or(file, "total_dof", 0.0);
+  frf.correlated_lines = real_or(file, "correlated_lines", 1.0);
 
   frf.inputs = read_channels(file, "/inputs");
   frf.outputs = read_channels(file, "/outputs");

@@ -31,6 +31,7 @@ enum class Cause : std::uint8_t {
   excitation,  ///< cond(R)
   inputs,      ///< cond(U)
   incoherent,
+  interpolation,  ///< zippered lines: a local model leaves more than noise
 };
 const char* to_string(Cause cause) noexcept;
 

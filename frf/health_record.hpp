@@ -25,6 +25,7 @@ struct HealthRecord {
   Eigen::VectorXd frequency_hz;    ///< K: excited lines, thinned out if there are many
   std::vector<LineRecord> lines;   ///< K
   std::vector<Eigen::Index> axes;  ///< excitation channels that are excited, ascending
+  bool zippered = false;           ///< one experiment excites them all, each on lines of its own
   std::vector<ChannelScan> scan;   ///< [sensors; actuators], over all runs that are used
   RunHealth health;                ///< over all runs that are used
 

@@ -1,9 +1,12 @@
 #include "frf/local_fit.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -16,20 +19,75 @@ constexpr double kChanceOfAPole = 0.05;  // that noise alone is taken for one
 // which it does not do much more is not worth the iteration.
 constexpr double kWorthIterating = 0.9;
 
-/// Least squares of Z on the rows of K, by QR of K^H.
-struct Projection {
-  Eigen::MatrixXcd Q;  // B x p
-  Eigen::VectorXcd y;  // Theta k0 = (Z Q) y
-
-  Projection(const Eigen::MatrixXcd& K, const Eigen::VectorXcd& k0) {
-    const Eigen::HouseholderQR<Eigen::MatrixXcd> qr(K.adjoint());
-    Q = qr.householderQ() * Eigen::MatrixXcd::Identity(K.cols(), K.rows());
-    y = qr.matrixQR().topRows(K.rows()).triangularView<Eigen::Upper>().adjoint().solve(k0);
+/// Least squares of Z on the rows of K, group by group, by QR of K^H.
+class Projection {
+ public:
+  Projection(const Eigen::MatrixXcd& K, const Eigen::VectorXcd& k0,
+             const std::vector<Eigen::Index>& groups) {
+    Eigen::Index first = 0;
+    for (const Eigen::Index bins : groups) {
+      const Eigen::HouseholderQR<Eigen::MatrixXcd> qr(K.middleCols(first, bins).adjoint());
+      Group group{first, qr.householderQ() * Eigen::MatrixXcd::Identity(bins, K.rows()), {}};
+      // Theta k0 = (Z Q) R^-H k0.
+      group.weight =
+          group.Q *
+          qr.matrixQR().topRows(K.rows()).triangularView<Eigen::Upper>().adjoint().solve(k0);
+      groups_.push_back(std::move(group));
+      first += bins;
+    }
   }
-  Eigen::MatrixXcd fitted(const Eigen::MatrixXcd& Z) const { return (Z * Q) * Q.adjoint(); }
+  Eigen::MatrixXcd fitted(const Eigen::MatrixXcd& Z) const {
+    Eigen::MatrixXcd fitted(Z.rows(), Z.cols());
+    for (const Group& g : groups_)
+      fitted.middleCols(g.first, g.Q.rows()) =
+          (Z.middleCols(g.first, g.Q.rows()) * g.Q) * g.Q.adjoint();
+    return fitted;
+  }
   Eigen::MatrixXcd residual(const Eigen::MatrixXcd& Z) const { return Z - fitted(Z); }
-  Eigen::VectorXcd value(const Eigen::MatrixXcd& Z) const { return (Z * Q) * y; }
+  Eigen::MatrixXcd value(const Eigen::MatrixXcd& Z) const {
+    Eigen::MatrixXcd value(Z.rows(), static_cast<Eigen::Index>(groups_.size()));
+    for (std::size_t g = 0; g < groups_.size(); ++g)
+      value.col(static_cast<Eigen::Index>(g)) =
+          Z.middleCols(groups_[g].first, groups_[g].Q.rows()) * groups_[g].weight;
+    return value;
+  }
+  Eigen::VectorXcd weight(std::size_t group) const { return groups_[group].weight; }
+
+ private:
+  struct Group {
+    Eigen::Index first;
+    Eigen::MatrixXcd Q;  // bins x p
+    Eigen::VectorXcd weight;
+  };
+  std::vector<Group> groups_;
 };
+
+/// Ratio of the residual powers with and without `gained` more poles, `poles` in all, that noise alone
+/// falls below with a chance of 0.05. For one pole P(ratio < x) = x^q with q degrees of freedom left,
+/// of all channels with noise of their own together: D is common to them.
+double significant_ratio(const LocalProblem& problem, int poles, int gained) {
+  const auto groups = static_cast<Eigen::Index>(problem.groups.size());
+  const double left = static_cast<double>(problem.tested_noise) *
+                          static_cast<double>(problem.r.size() - problem.K.rows() * groups) -
+                      static_cast<double>(poles);
+  return std::pow(kChanceOfAPole, static_cast<double>(gained) / left);
+}
+
+/// Whether all poles, zeros of 1 + d_1 r + ... are as wide as the problem asks.
+bool wide_enough(const LocalProblem& problem, const Eigen::VectorXcd& d) {
+  if (!(problem.narrowest_pole > 0.0)) return true;
+  const Eigen::Index n = d.size();
+  const Eigen::Index bins = problem.groups.front();
+  const double distance = (problem.r.head(bins).maxCoeff() - problem.r.head(bins).minCoeff()) /
+                          static_cast<double>(bins - 1);
+  // The zeros are the inverses of the eigenvalues of this matrix: r^-n + d_1 r^-(n-1) + ... + d_n = 0.
+  Eigen::MatrixXcd companion = Eigen::MatrixXcd::Zero(n, n);
+  companion.row(0) = -d.transpose();
+  for (Eigen::Index i = 1; i < n; ++i) companion(i, i - 1) = 1.0;
+  for (const std::complex<double> inverse : companion.eigenvalues())
+    if (std::abs((1.0 / inverse).imag()) < problem.narrowest_pole * distance) return false;
+  return true;
+}
 
 /// sum_c w_c a_c b_c^H.
 std::complex<double> product(const Eigen::VectorXd& weight, const Eigen::MatrixXcd& a,
@@ -43,25 +101,29 @@ class Fitting {
   explicit Fitting(const LocalProblem& problem) : p_(problem) {
     polynomial_ = fit(Eigen::VectorXcd());
     // Units differ, and so does the noise: every channel counts by its own.
-    weight_ = polynomial_.residual.rowwise().squaredNorm();
+    weight_ = polynomial_.residual.topRows(p_.pole_channels).rowwise().squaredNorm();
     weight_ = (weight_.array() > 0.0).select(weight_.cwiseInverse(), 0.0);
   }
 
   const LocalFit& polynomial() const { return polynomial_; }
   double cost(const LocalFit& fit) const {
-    return weight_.dot(fit.residual.rowwise().squaredNorm());
+    return weight_.dot(fit.residual.topRows(p_.pole_channels).rowwise().squaredNorm());
   }
 
   /// The fit with `poles` poles; the polynomial one if the first step shows no sign of a pole, or
   /// the iteration breaks down.
   LocalFit with_poles(int poles) const {
+    // Or half of the way to what is significant.
+    const double worth =
+        std::max(kWorthIterating, 0.5 * (1.0 + significant_ratio(p_, poles, poles)));
     Eigen::VectorXcd d = Eigen::VectorXcd::Zero(poles);
     for (int i = 0; i < kIterations; ++i) {
       double linear_cost = 0.0;
       d = next_denominator(d, linear_cost);
       if (!d.allFinite()) return polynomial_;
-      if (i == 0 && linear_cost > kWorthIterating * cost(polynomial_)) return polynomial_;
+      if (i == 0 && linear_cost > worth * cost(polynomial_)) return polynomial_;
     }
+    if (!wide_enough(p_, d)) return polynomial_;
     LocalFit rational = fit(d);
     return rational.residual.allFinite() ? rational : polynomial_;
   }
@@ -86,8 +148,8 @@ class Fitting {
   /// Least squares in d and Theta of (D Z - Theta K) / D_previous.
   Eigen::VectorXcd next_denominator(const Eigen::VectorXcd& previous, double& linear_cost) const {
     const Eigen::ArrayXcd D = denominator(previous);
-    const Projection projection(over(p_.K, D), p_.k0);
-    const Eigen::MatrixXcd Z = over(p_.Z, D);
+    const Projection projection(over(p_.K, D), p_.k0, p_.groups);
+    const Eigen::MatrixXcd Z = over(p_.Z.topRows(p_.pole_channels), D);
     const Eigen::MatrixXcd e = projection.residual(Z);
     std::vector<Eigen::MatrixXcd> x;
     for (Eigen::Index i = 0; i < previous.size(); ++i) {
@@ -109,15 +171,24 @@ class Fitting {
 
   LocalFit fit(const Eigen::VectorXcd& d) const {
     const Eigen::ArrayXcd D = denominator(d);
-    const Projection projection(over(p_.K, D), p_.k0);
+    const Projection projection(over(p_.K, D), p_.k0, p_.groups);
+    const auto groups = static_cast<Eigen::Index>(p_.groups.size());
     LocalFit result;
     result.poles = static_cast<int>(d.size());
     result.value = projection.value(p_.Z);
     const Eigen::MatrixXcd fitted = projection.fitted(p_.Z);
     result.residual = p_.Z - fitted;
-    result.leverage = projection.y.squaredNorm();
+    result.weight.resize(p_.r.size());
+    result.leverage.resize(groups);
+    Eigen::Index first = 0;
+    for (Eigen::Index g = 0; g < groups; ++g) {
+      const Eigen::VectorXcd weight = projection.weight(static_cast<std::size_t>(g));
+      result.weight.segment(first, weight.size()) = weight;
+      result.leverage[g] = weight.squaredNorm();
+      first += weight.size();
+    }
     // One D for all channels takes a degree of freedom from them together.
-    result.dof = static_cast<double>(p_.r.size() - p_.K.rows()) -
+    result.dof = static_cast<double>(p_.r.size() - p_.K.rows() * groups) -
                  static_cast<double>(d.size()) / static_cast<double>(p_.independent_noise);
     if (d.size() > 0) result.pole_spread = pole_spread(projection, fitted, D, d.size(), result);
     return result;
@@ -128,14 +199,15 @@ class Fitting {
   Eigen::MatrixXcd pole_spread(const Projection& projection, const Eigen::MatrixXcd& fitted,
                                const Eigen::ArrayXcd& D, Eigen::Index poles,
                                const LocalFit& fit) const {
-    const Eigen::VectorXd variance = fit.residual.rowwise().squaredNorm() / fit.dof;
+    const Eigen::VectorXd variance =
+        fit.residual.topRows(p_.pole_channels).rowwise().squaredNorm() / fit.dof;
     const Eigen::VectorXd weight = (variance.array() > 0.0).select(variance.cwiseInverse(), 0.0);
-    Eigen::MatrixXcd g(p_.Z.rows(), poles);
+    Eigen::MatrixXcd g(fit.value.size(), poles);
     std::vector<Eigen::MatrixXcd> x;
     for (Eigen::Index i = 0; i < poles; ++i) {
       const Eigen::MatrixXcd slope = over(times_power(fitted, i + 1), D);
-      g.col(i) = projection.value(slope);
-      x.push_back(projection.residual(slope));
+      g.col(i) = projection.value(slope).reshaped();
+      x.push_back(projection.residual(slope.topRows(p_.pole_channels)));
     }
     Eigen::MatrixXcd information(poles, poles);
     for (Eigen::Index i = 0; i < poles; ++i) {
@@ -144,8 +216,11 @@ class Fitting {
             product(weight, x[static_cast<std::size_t>(j)], x[static_cast<std::size_t>(i)]);
       }
     }
-    information *= static_cast<double>(p_.independent_noise) / static_cast<double>(p_.Z.rows());
+    information *=
+        static_cast<double>(p_.independent_noise) / static_cast<double>(p_.pole_channels);
     const Eigen::LLT<Eigen::MatrixXcd> factor(information);
+    if (factor.info() != Eigen::Success)  // poles that the data do not determine: no candidate
+      return Eigen::MatrixXcd::Constant(g.rows(), poles, std::numeric_limits<double>::quiet_NaN());
     return factor.matrixL().solve(g.adjoint()).adjoint();
   }
 
@@ -163,11 +238,8 @@ LocalFit fit_locally(const LocalProblem& problem, int most_poles) {
   for (int poles = 1; poles <= most_poles; ++poles) {
     LocalFit candidate = fitting.with_poles(poles);
     if (candidate.poles != poles || !candidate.pole_spread.allFinite()) continue;
-    // Residual powers of nested complex fits: P(ratio < x) = x^q with q degrees of freedom left.
-    const double left = static_cast<double>(problem.r.size() - problem.K.rows() - poles);
-    const double gained = poles - best.poles;
     const double smaller = fitting.cost(candidate);
-    if (!(smaller < cost * std::pow(kChanceOfAPole, gained / left))) continue;
+    if (!(smaller < cost * significant_ratio(problem, poles, poles - best.poles))) continue;
     best = std::move(candidate);
     cost = smaller;
   }

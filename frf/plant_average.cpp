@@ -52,10 +52,20 @@ PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
   input_sum_.setZero(inputs * inputs, N);
   if (covariance == CovarianceKind::full) covariance_sum_.setZero(n_c * n_c, N);
   condition_.setZero(N);
+  scarcity_sum_.setZero(N);
+  share_sum_.setZero(N);
+  misfit_sum_.setZero(N);
 }
 
-void PlantAverage::add(const RealizationSpectra& spectra, int workers) {
+void PlantAverage::add(const RealizationSpectra& spectra, int workers,
+                       const ZipperedFit* zippered) {
   ++realizations_;
+  if (zippered != nullptr) {
+    zippered_axes_ = zippered->lines().axes;
+    for_each_line(workers, frequency_hz_.size(),
+                  [&](Eigen::Index k) { add_zippered(spectra, *zippered, k); });
+    return;
+  }
   noise_known_ = noise_known_ && spectra.scatter_dof() > 0;
   noise_dof_ += spectra.scatter_dof();
   Eigen::VectorXd periods(spectra.experiments());
@@ -69,6 +79,24 @@ void PlantAverage::add(const RealizationSpectra& spectra, int workers) {
 void PlantAverage::add_line(const RealizationSpectra& spectra, const Eigen::VectorXd& periods,
                             Eigen::Index k) {
   const LineEstimate line = estimate_line(spectra.excitation(k), spectra.response(k), outputs_);
+  add_response(spectra, line, k);
+  if (noise_known_) {
+    add_noise(line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods), k);
+  }
+}
+
+void PlantAverage::add_zippered(const RealizationSpectra& spectra, const ZipperedFit& fit,
+                                Eigen::Index k) {
+  const ZipperedEstimate at = fit.estimate(spectra, k);
+  add_response(spectra, at.line, k);
+  add_noise(at.noise, k);
+  scarcity_sum_[k] += 1.0 / at.noise_dof;
+  share_sum_[k] += at.variance_share;
+  misfit_sum_[k] += at.misfit;
+}
+
+void PlantAverage::add_response(const RealizationSpectra& spectra, const LineEstimate& line,
+                                Eigen::Index k) {
   if (line.status != LineStatus::good) {
     refuse(line.status, spectra.realization(), lines_[static_cast<std::size_t>(k)],
            frequency_hz_[k]);
@@ -81,9 +109,6 @@ void PlantAverage::add_line(const RealizationSpectra& spectra, const Eigen::Vect
     const std::complex<double> deviation = line.G.data()[c] - G_mean_(c, k);
     G_mean_(c, k) += deviation / static_cast<double>(realizations_);
     G_scatter_(c, k) += (1.0 - 1.0 / realizations_) * std::norm(deviation);
-  }
-  if (noise_known_) {
-    add_noise(line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods), k);
   }
 }
 
@@ -130,11 +155,21 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
     return;
   }
   frf.noise_dof = noise_dof_;
+  if (zippered_axes_ > 0) finish_zippered(frf);
   frf.noise_variance = noise_sum_ / (M * M);
   frf.residual_covariance_re = residual_sum_.real() / M;
   frf.residual_covariance_im = residual_sum_.imag() / M;
   frf.input_factor = input_sum_ / (M * M);
   if (covariance_kind_ == CovarianceKind::full) frf.covariance = covariance_sum_ / (M * M);
+}
+
+/// Degrees of freedom differ a little from line to line: their harmonic mean, as the mean of
+/// 1 / variance has it.
+void PlantAverage::finish_zippered(FrfEstimate& frf) const {
+  const double M = realizations_;
+  frf.noise_dof = M * M / scarcity_sum_.mean();
+  frf.correlated_lines = static_cast<double>(zippered_axes_) * M / share_sum_.mean();
+  if (misfit_sum_.minCoeff() > 0.0) frf.interpolation_misfit = misfit_sum_ / M;
 }
 
 void PlantAverage::finish_line(FrfEstimate& frf, Eigen::Index k) const {

@@ -6,6 +6,7 @@
 #include "frf/line_estimate.hpp"
 #include "frf/plant_frf.hpp"
 #include "frf/realization_spectra.hpp"
+#include "frf/zippered_fit.hpp"
 
 namespace stageid {
 
@@ -19,9 +20,10 @@ class PlantAverage {
   PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines, Eigen::Index outputs,
                Eigen::Index inputs, CovarianceKind covariance);
 
-  /// Lines are shared among `workers` threads; each line is worked on by one.
+  /// Lines are shared among `workers` threads; each line is worked on by one. `zippered`: the model
+  /// between the lines of each axis, if they are not excited on all; the same in all calls.
   /// @throws std::invalid_argument "singular ..." naming realization, line and frequency.
-  void add(const RealizationSpectra& spectra, int workers);
+  void add(const RealizationSpectra& spectra, int workers, const ZipperedFit* zippered = nullptr);
 
   /// Mean of the realizations' own estimates so far, vec(G) x lines.
   const Eigen::MatrixXcd& mean_response() const noexcept { return G_mean_; }
@@ -32,6 +34,9 @@ class PlantAverage {
 
  private:
   void add_line(const RealizationSpectra& spectra, const Eigen::VectorXd& periods, Eigen::Index k);
+  void add_zippered(const RealizationSpectra& spectra, const ZipperedFit& fit, Eigen::Index k);
+  void add_response(const RealizationSpectra& spectra, const LineEstimate& line, Eigen::Index k);
+  void finish_zippered(FrfEstimate& frf) const;
   void add_noise(const LineNoise& noise, Eigen::Index k);
   void finish_line(FrfEstimate& frf, Eigen::Index k) const;
   bool noise_known() const noexcept { return realizations_ > 0 && noise_known_; }
@@ -53,6 +58,10 @@ class PlantAverage {
   Eigen::MatrixXcd input_sum_;       // vec(A_m) over the mean of 1 / P_e
   Eigen::MatrixXcd covariance_sum_;  // vec(Cov(vec G)), on request
   Eigen::VectorXd condition_;
+  Eigen::Index zippered_axes_ = 0;
+  Eigen::VectorXd scarcity_sum_;  // of 1 / degrees of freedom
+  Eigen::VectorXd share_sum_;     // of the variance shares
+  Eigen::VectorXd misfit_sum_;
 };
 
 }  // namespace stageid

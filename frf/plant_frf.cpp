@@ -24,6 +24,7 @@
 #include "frf/run_steps.hpp"
 #include "frf/run_table.hpp"
 #include "frf/worker_pool.hpp"
+#include "frf/zippered_fit.hpp"
 
 namespace stageid {
 namespace {
@@ -32,7 +33,8 @@ namespace {
 struct ExcitedPart {
   std::vector<int> lines;
   std::vector<Eigen::Index> axes;
-  bool single_axis = true;  ///< in every run
+  bool single_axis = true;           ///< in every run
+  std::vector<Eigen::Index> only{};  ///< zippered: the channel of each line; else empty
 };
 
 /// The estimate in the making: reads realization by realization, threads over the runs of one.
@@ -83,6 +85,7 @@ class PlantEstimation {
   ExcitedPart excited_;
   SpectrumLines lines_;
   ChannelChoice channels_;
+  std::unique_ptr<ZipperedFit> zippered_;  // if one experiment is a whole realization
   std::unique_ptr<PlantAverage> average_;
   std::unique_ptr<DetectionAverage> detection_;
   std::unique_ptr<FrfProvenance> provenance_;
@@ -116,6 +119,9 @@ ExcitedPart PlantEstimation::excited_part(const RealizationRuns& realization,
   }
   std::sort(part.axes.begin(), part.axes.end());
   part.axes.erase(std::unique(part.axes.begin(), part.axes.end()), part.axes.end());
+  const ExcitationSpectrum& only = excitation.front().spectrum;
+  if (excitation.size() == 1 && part.axes.size() > 1 && only.one_channel_a_line())
+    part.only = only.only;
   return part;
 }
 
@@ -136,6 +142,13 @@ void PlantEstimation::check_excitation(const RealizationRuns& realization,
           place, spectrum.lines.size(), excited_.lines.size(),
           realizations_.front().runs.front().place(), differing.front(),
           differing.front() * resolution_hz));
+    }
+    if (!excited_.only.empty() && spectrum.only != excited_.only) {
+      throw std::invalid_argument(
+          fmt::format("{}: the axes have other lines than in {}; all realizations of a zippered "
+                      "experiment must "
+                      "give an axis the same lines",
+                      place, realizations_.front().runs.front().place()));
     }
     for (const Eigen::Index axis : spectrum.channels) {
       if (std::binary_search(excited_.axes.begin(), excited_.axes.end(), axis)) continue;
@@ -213,7 +226,9 @@ FrfEstimate PlantEstimation::describe() const {
 void PlantEstimation::prepare(const RealizationRuns& realization,
                               const std::vector<RunExcitation>& excitation) {
   excited_ = excited_part(realization, excitation);
-  channels_ = choose_channels(info_, excited_.axes, realization.runs.size(),
+  const bool zippered = !excited_.only.empty();
+  channels_ = choose_channels(info_, excited_.axes,
+                              zippered ? excited_.axes.size() : realization.runs.size(),
                               realization.realization, options_);
   const FrequencyGrid grid(info_.sample_rate_hz, info_.period_samples, excited_.lines);
   const auto outputs = static_cast<Eigen::Index>(channels_.outputs.size());
@@ -223,19 +238,27 @@ void PlantEstimation::prepare(const RealizationRuns& realization,
   provenance_ = std::make_unique<FrfProvenance>(info_, options_, channels_);
   excluded_power_.setZero(static_cast<Eigen::Index>(channels_.excluded.size()));
   lines_ = {excited_.lines, excited_.lines.size()};
-  if (options_.method == FrfMethod::lpm) return;
-  const std::vector<int> detection = detection_lines(excited_.lines);
-  lines_.lines.insert(lines_.lines.end(), detection.begin(), detection.end());
   std::vector<std::string> axes;
   for (const Eigen::Index axis : excited_.axes)
     axes.push_back(info_.excitation.names[static_cast<std::size_t>(axis)]);
+  if (zippered) {
+    ZipperedLines lines{excited_.lines, {}, static_cast<Eigen::Index>(axes.size())};
+    for (const Eigen::Index channel : excited_.only)
+      lines.axis.push_back(std::lower_bound(excited_.axes.begin(), excited_.axes.end(), channel) -
+                           excited_.axes.begin());
+    require_enough_lines(lines, axes, realization.runs.front().place() + "/excitation");
+    zippered_ = std::make_unique<ZipperedFit>(std::move(lines), outputs);
+  }
+  if (options_.method == FrfMethod::lpm) return;
+  const std::vector<int> detection = detection_lines(excited_.lines);
+  lines_.lines.insert(lines_.lines.end(), detection.begin(), detection.end());
   detection_ =
       std::make_unique<DetectionAverage>(excited_.lines, axes, excited_.single_axis, outputs);
 }
 
 void PlantEstimation::include(const RealizationSpectra& spectra,
                               const std::vector<RunExcitation>& excitation) {
-  average_->add(spectra, workers_);
+  average_->add(spectra, workers_, zippered_.get());
   if (!detection_) return;
   std::vector<std::size_t> axis;
   for (const RunExcitation& run : excitation) {
@@ -252,7 +275,7 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
     const std::vector<RunExcitation> excitation = read_excitation(realization);
     if (!average_) prepare(realization, excitation);
     check_excitation(realization, excitation);
-    if (realization.runs.size() < excited_.axes.size()) {
+    if (!zippered_ && realization.runs.size() < excited_.axes.size()) {
       throw std::invalid_argument(
           fmt::format("{} excited axes but only {} experiments in realization {}; "
                       "leave this realization out",
@@ -274,6 +297,10 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   FrfEstimate frf = describe();
   average_->finish(frf, workers_);
   if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);
+  // Beyond them some axis would have to be extrapolated.
+  if (zippered_)
+    frf = select_band(frf, frf.frequency_hz[zippered_->lines().first()],
+                      frf.frequency_hz[zippered_->lines().last()]);
   if (why_linearity_cannot_be_tested(frf).empty()) frf.nonlinearity = nonlinearity_test(frf);
   frf.provenance_json = provenance_->json();
   if (options_.covariance_lines != 1) frf = smooth_covariance(frf, options_.covariance_lines);

@@ -28,6 +28,13 @@ namespace stageid {
 /// their variances are correlated over some 12 bins. Stretches end at marked periods and after 16
 /// periods at most: record_spectra.hpp. Memory: 16 periods a thread.
 ///
+/// If one experiment excites several axes, each on lines of its own (zippered), it is a whole
+/// realization: the responses to each axis are modelled between its lines, see zippered_fit.hpp, after
+/// either method. The result has the lines between the axes' first and last ones; errors of
+/// neighbouring lines are correlated (FrfEstimate::correlated_lines), interpolation_misfit shows where
+/// the interpolation cannot be trusted. The noise is that between periods pooled with what the local
+/// models leave, distortions and interpolation errors among it; with one period that alone.
+///
 /// Incomplete runs are passed over; of several complete runs of one (realization, experiment) the
 /// last counts. Periods with a marked sample are dropped, and (periodic, three periods or more)
 /// those whose scatter shows that they do not belong with the others: period_check.hpp. With two
@@ -39,7 +46,8 @@ namespace stageid {
 /// Source: method.md section 3; Pintelon and Schoukens, System Identification (2012).
 /// @throws std::invalid_argument / FormatError: fewer experiments than inputs, singular excitation
 ///         (names line and frequency), a period that does not divide the record, channels unknown;
-///         with lpm a single period without empty lines; covariance_lines as smooth_covariance().
+///         with lpm a single period without empty lines; zippered lines that are too few, or not the
+///         same in all realizations; covariance_lines as smooth_covariance().
 FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
                                const FrfOptions& options = {});
 

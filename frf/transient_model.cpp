@@ -83,7 +83,9 @@ void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
   LocalProblem problem;
   problem.Z = Z(Eigen::all, bins);
   problem.r.resize(window_);
+  problem.groups = {window_};
   problem.independent_noise = outputs_;
+  problem.pole_channels = Z.rows();
   problem.K.resize(kOrder + 1, window_);
   for (Eigen::Index i = 0; i < window_; ++i) {
     const double r = static_cast<double>(bins[static_cast<std::size_t>(i)] - bin) / reach;
@@ -93,9 +95,9 @@ void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
   problem.k0 = Eigen::VectorXcd::Unit(kOrder + 1, 0);
 
   const LocalFit fit = fit_locally(problem, kMostPoles);
-  run.mean.col(k) = Z.col(bin) - fit.value;
+  run.mean.col(k) = Z.col(bin) - fit.value.col(0);
   // The line's own noise and that of T, as of one period: the scatter is of single periods.
-  add_scatter(periods_ * (1.0 + fit.leverage) * dof_ / fit.dof, fit.residual, k, run);
+  add_scatter(periods_ * (1.0 + fit.leverage[0]) * dof_ / fit.dof, fit.residual, k, run);
   if (fit.poles > 0) add_scatter(periods_ * static_cast<double>(dof_), fit.pole_spread, k, run);
 }
 

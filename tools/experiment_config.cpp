@@ -8,6 +8,7 @@
 
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
+#include "frf/zippered_lines.hpp"
 #include "tools/config_plan.hpp"
 #include "tools/config_reader.hpp"
 #include "tools/key_suggestion.hpp"
@@ -94,8 +95,9 @@ void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
 
 void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
   v.texts("axes", f.axes, {1, 64}, kRequired, "actuators that are excited, by name");
-  choose(v, "scheme", f.spec.scheme, {"single_axis", "orthogonal_dft", "orthogonal_hadamard"},
-         kOptional, "how the axes share the experiments");
+  choose(v, "scheme", f.spec.scheme,
+         {"single_axis", "orthogonal_dft", "orthogonal_hadamard", "zippered"}, kOptional,
+         "how the axes share the experiments");
   v.group(
       "level", [&](ConfigVisitor& level) { describe_level(level, f); }, kRequired,
       "size of the excitation");
@@ -239,6 +241,19 @@ std::vector<ExcitationAxis> excitation_axes(const ExperimentFile& file, const Fr
   return axes;
 }
 
+/// Refused before it is measured: what frf could not make anything of.
+void require_zippered_lines(const ExperimentSpec& spec, const FrequencyGrid& grid) {
+  const auto n = static_cast<Eigen::Index>(spec.axes.size());
+  if (spec.scheme != ExcitationScheme::zippered || n < 2) return;
+  ZipperedLines lines{grid.lines(), {}, n};
+  for (Eigen::Index k = 0; k < grid.size(); ++k)
+    for (Eigen::Index p = 0; p < n; ++p)
+      if (has_line(spec.scheme, p, n, k)) lines.axis.push_back(p);
+  std::vector<std::string> names;
+  for (const ExcitationAxis& axis : spec.axes) names.push_back(axis.channel);
+  require_enough_lines(lines, names, "experiment");
+}
+
 /// What is measured follows from these numbers and the stage; not from how the data are used later.
 std::string measurement_id(const ExperimentFile& f, const StageConfig& stage) {
   const ExperimentSpec& s = f.spec;
@@ -282,6 +297,7 @@ void complete(ExperimentConfig& config, ExperimentFile& file, const YamlDocument
     config.experiment = file.spec;
     config.limits = file.limits;
     outline_plan(config);
+    require_zippered_lines(file.spec, grid);
   } catch (const std::invalid_argument& error) {
     checker.fail("band_hz", error.what());
   }

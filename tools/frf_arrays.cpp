@@ -26,6 +26,7 @@ constexpr Dataset kDatasets[] = {{"frequency_hz", 1},
                                  {"residual_covariance", 3},
                                  {"input_factor", 3},
                                  {"input_condition", 1},
+                                 {"interpolation_misfit", 1},
                                  {"excluded_channels", 0},
                                  {"excluded_power", 1},
                                  {"provenance", 0},
@@ -46,11 +47,23 @@ constexpr Dataset kDatasets[] = {{"frequency_hz", 1},
                                  {"dropped_periods", 2},
                                  {"dropped_reasons", 0}};
 
-constexpr const char* kAttributes[] = {
-    "@format",       "@format_version", "@sample_rate_hz",   "@hold",
-    "@compensated",  "@method",         "@covariance_lines", "@delay_s",
-    "@realizations", "@periods",        "@experiments",      "@noise_dof",
-    "@total_dof",    "inputs@unit",     "outputs@unit",      "detection_noise@dof"};
+constexpr const char* kAttributes[] = {"@format",
+                                       "@format_version",
+                                       "@sample_rate_hz",
+                                       "@hold",
+                                       "@compensated",
+                                       "@method",
+                                       "@covariance_lines",
+                                       "@delay_s",
+                                       "@realizations",
+                                       "@periods",
+                                       "@experiments",
+                                       "@noise_dof",
+                                       "@total_dof",
+                                       "@correlated_lines",
+                                       "inputs@unit",
+                                       "outputs@unit",
+                                       "detection_noise@dof"};
 
 /// As MATLAB's variables are called: "@hold" is hold, "inputs@unit" inputs_unit.
 std::string identifier(std::string name) {

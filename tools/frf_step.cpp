@@ -93,8 +93,7 @@ FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions optio
   }
   step.seconds = progress.seconds();
   step.frf.provenance_json = complete_provenance(step.frf, logs, options);
-  if (health.wanted)
-    step.frf.provenance_json = with_health(step.frf.provenance_json, step.findings);
+  if (health.wanted) step.findings = keep_health(step.frf, std::move(step.findings));
   return step;
 }
 

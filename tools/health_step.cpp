@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "acquisition/log_reader.hpp"
+#include "frf/interpolation_check.hpp"
 #include "tools/interrupt.hpp"
 #include "tools/open_logs.hpp"
 #include "tools/stage_expectation.hpp"
@@ -24,7 +28,7 @@ Finding finding_of(const Json& object) {
   Finding finding;
   for (const Severity severity : kSeverities)
     if (text_of(object, "severity") == to_string(severity)) finding.severity = severity;
-  for (int cause = 0; cause <= static_cast<int>(Cause::incoherent); ++cause)
+  for (int cause = 0; cause <= static_cast<int>(Cause::interpolation); ++cause)
     if (text_of(object, "cause") == to_string(static_cast<Cause>(cause)))
       finding.cause = static_cast<Cause>(cause);
   finding.channel = text_of(object, "channel");
@@ -85,11 +89,15 @@ std::vector<std::string> health_notes(const std::vector<Finding>& findings) {
   return notes;
 }
 
-std::string with_health(const std::string& provenance_json, const std::vector<Finding>& findings) {
-  Json provenance = Json::parse(provenance_json, nullptr, false);
+std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings) {
+  for (Finding& finding : check_interpolation(frf)) findings.push_back(std::move(finding));
+  std::stable_sort(findings.begin(), findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.severity < b.severity; });
+  Json provenance = Json::parse(frf.provenance_json, nullptr, false);
   if (!provenance.is_object()) provenance = Json::object();
   provenance["health"] = health_json(findings);
-  return provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+  frf.provenance_json = provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return findings;
 }
 
 std::vector<Finding> health_of(const std::string& provenance_json) {

@@ -25,9 +25,10 @@ nlohmann::ordered_json health_json(const std::vector<Finding>& findings);
 /// Faults and doubts as sentences, for notes.
 std::vector<std::string> health_notes(const std::vector<Finding>& findings);
 
-/// The provenance of a frequency response with the findings as its "health", and back. What is not
-/// there, or is not as written by us, is none.
-std::string with_health(const std::string& provenance_json, const std::vector<Finding>& findings);
+/// Adds what the response itself shows (check_interpolation()) to the findings about its logs and keeps
+/// all of them as "health" in its provenance; returns them, faults first.
+std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings);
+/// What keep_health() kept. What is not there, or is not as written by us, is none.
 std::vector<Finding> health_of(const std::string& provenance_json);
 
 }  // namespace stageid

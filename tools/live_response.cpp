@@ -9,6 +9,7 @@
 #include <set>
 
 #include "acquisition/log_reader.hpp"
+#include "frf/zippered_lines.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/report_json.hpp"
 
@@ -37,7 +38,7 @@ int complete_realizations(const LogReader& log) {
   std::map<int, std::set<int>> experiments;
   for (const LogRun& run : log.runs())
     if (run.complete) experiments[run.realization].insert(run.experiment);
-  const std::size_t needed = log.info().excitation.size();
+  const std::size_t needed = is_zippered(log) ? 1 : log.info().excitation.size();
   int complete = 0;
   for (const auto& [realization, done] : experiments) complete += done.size() >= needed ? 1 : 0;
   return complete;

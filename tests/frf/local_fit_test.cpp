@@ -22,7 +22,9 @@ LocalProblem problem_with(const std::vector<std::complex<double>>& poles) {
   p.K.resize(3, kBins);
   p.K << Eigen::RowVectorXcd::Ones(kBins), p.r.transpose(), p.r.transpose().cwiseAbs2();
   p.k0 = Eigen::VectorXcd::Unit(3, 0);
+  p.groups = {kBins};
   p.independent_noise = kChannels;
+  p.pole_channels = kChannels;
   p.Z.resize(kChannels, kBins);
   for (Eigen::Index c = 0; c < kChannels; ++c) {
     const std::complex<double> shape(1.0, 0.4 * static_cast<double>(c));
@@ -41,7 +43,7 @@ void add_noise(LocalProblem& p, double std, ComplexNoise& random) {
 TEST(LocalFit, APolynomialIsFoundExactly) {
   const LocalFit fit = fit_locally(problem_with({}), 0);
   for (Eigen::Index c = 0; c < kChannels; ++c) {
-    EXPECT_NEAR(std::abs(fit.value[c] - std::complex<double>(1.0, 0.4 * static_cast<double>(c))),
+    EXPECT_NEAR(std::abs(fit.value(c, 0) - std::complex<double>(1.0, 0.4 * static_cast<double>(c))),
                 0.0, 1e-13);
   }
   EXPECT_EQ(fit.dof, 9.0);
@@ -60,8 +62,8 @@ TEST(LocalFit, PolesNarrowerThanTheBinsAreFound) {
       const std::complex<double> truth =
           -n * std::complex<double>(1.0, 0.4 * static_cast<double>(c));
       // A polynomial through the same bins is wrong by more than a tenth.
-      EXPECT_LT(std::abs(fit.value[c] - truth), 1e-8);
-      EXPECT_GT(std::abs(polynomial.value[c] - truth), 0.1);
+      EXPECT_LT(std::abs(fit.value(c, 0) - truth), 1e-8);
+      EXPECT_GT(std::abs(polynomial.value(c, 0) - truth), 0.1);
     }
   }
 }
@@ -71,7 +73,7 @@ TEST(LocalFit, StatedCovarianceIsTheScatterOverTrials) {
   for (const bool resonant : {false, true}) {
     using Poles = std::vector<std::complex<double>>;
     const LocalProblem clean = problem_with(resonant ? Poles{{0.1, 0.15}} : Poles{});
-    const Eigen::VectorXcd truth = fit_locally(clean, resonant ? 1 : 0).value;
+    const Eigen::MatrixXcd truth = fit_locally(clean, resonant ? 1 : 0).value;
     ComplexNoise random(7);
     double scatter = 0.0;
     double stated = 0.0;
@@ -83,7 +85,7 @@ TEST(LocalFit, StatedCovarianceIsTheScatterOverTrials) {
       const double variance = fit.residual.squaredNorm() / fit.dof;
       noise += variance / kTrials;
       scatter += (fit.value - truth).squaredNorm() / kTrials;
-      stated += (fit.leverage * variance + fit.pole_spread.squaredNorm()) / kTrials;
+      stated += (fit.leverage[0] * variance + fit.pole_spread.squaredNorm()) / kTrials;
     }
     // 4 x 9 degrees of freedom a trial: 0.3 %; 4 values a trial: 0.8 %. Five of them, and 1 % for
     // the first-order treatment of a pole at this signal-to-noise ratio of 100.

@@ -26,14 +26,14 @@ struct ClosedLoop {
   Transfer controller;  ///< n_u x n_y
 };
 
-enum class AxisScheme : std::uint8_t { single_axis, orthogonal, random };
+enum class AxisScheme : std::uint8_t { single_axis, orthogonal, random, zippered };
 
 struct LoopExperiment {
   double sample_rate_hz = 1000.0;
   int period_samples = 250;
   std::vector<int> lines = {1, 3, 5, 7, 9, 13, 21, 35, 51, 75};
   int axes = 3;         ///< excited ones: the first actuators
-  int experiments = 0;  ///< 0: as many as axes
+  int experiments = 0;  ///< 0: as many as axes; zippered: one, whatever stands here
   int realizations = 1;
   int periods = 2;
   int transient_periods = 1;  ///< these carry a ramp on top of the periodic part
@@ -92,10 +92,13 @@ inline double omega_of(const LoopExperiment& experiment, Eigen::Index k) {
          experiment.sample_rate_hz / experiment.period_samples;
 }
 
-/// R of one realization: for each experiment, n_u x lines; amplitude 1 a line.
+/// R of one realization: for each experiment, n_u x lines; amplitude 1 a line, zippered lines as much
+/// larger as they are fewer.
 inline std::vector<Eigen::MatrixXcd> excitation_spectra(const LoopExperiment& x, Eigen::Index n_u,
                                                         ComplexNoise& random) {
-  const int experiments = x.experiments > 0 ? x.experiments : x.axes;
+  const int experiments = x.scheme == AxisScheme::zippered ? 1
+                          : x.experiments > 0              ? x.experiments
+                                                           : x.axes;
   const auto N = static_cast<Eigen::Index>(x.lines.size());
   std::vector<Eigen::MatrixXcd> R(static_cast<std::size_t>(experiments),
                                   Eigen::MatrixXcd::Zero(n_u, N));
@@ -113,6 +116,9 @@ inline std::vector<Eigen::MatrixXcd> excitation_spectra(const LoopExperiment& x,
             break;
           case AxisScheme::random:
             r = random.phase();
+            break;
+          case AxisScheme::zippered:
+            if (k % x.axes == axis) r = std::sqrt(static_cast<double>(x.axes)) * phase;
             break;
         }
       }

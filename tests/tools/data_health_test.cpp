@@ -101,7 +101,10 @@ TEST(DataHealth, FindingsSurviveTheProvenance) {
   const std::vector<Finding> findings = {
       {Severity::fault, Cause::swapped, "a1 a2", "wired crosswise", "exchanged", "exchange them"},
       {Severity::unchecked, Cause::skew, "", "timing", "", "needs two periods"}};
-  const std::vector<Finding> back = health_of(with_health("{\"version\": 1}", findings));
+  FrfEstimate frf;
+  frf.provenance_json = "{\"version\": 1}";
+  EXPECT_EQ(keep_health(frf, findings).size(), 2U);
+  const std::vector<Finding> back = health_of(frf.provenance_json);
   ASSERT_EQ(back.size(), 2U);
   EXPECT_EQ(health_json(back), health_json(findings));
   EXPECT_TRUE(any_fault(back));

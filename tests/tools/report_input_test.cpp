@@ -41,7 +41,7 @@ class ReportInputTest : public testing::Test {
 
 TEST_F(ReportInputTest, FindingsComeFromTheProvenanceOfTheResponse) {
   FrfEstimate frf = response();
-  frf.provenance_json = with_health("{}", kFindings);
+  keep_health(frf, kFindings);
   const ReportData data = read_back(frf);
   ASSERT_EQ(data.findings.size(), 3u);
   EXPECT_EQ(data.findings[0].severity, MessageSeverity::note);
@@ -62,7 +62,7 @@ TEST_F(ReportInputTest, AProvenanceThatIsNotOursHasNoFindings) {
 
 TEST_F(ReportInputTest, NotesOfTheSummaryThatAreFindingsAreNotToldTwice) {
   FrfEstimate frf = response();
-  frf.provenance_json = with_health("{}", kFindings);
+  keep_health(frf, kFindings);
   std::vector<std::string> notes = health_notes(kFindings);
   ASSERT_EQ(notes.size(), 2u);
   notes.push_back("something else");

@@ -193,6 +193,9 @@ void define_properties(Class& c) {
       "total_dof", [](const FrfEstimate& f) { return f.total_dof; },
       "Complex degrees of freedom of total_variance");
   property(
+      "correlated_lines", [](const FrfEstimate& f) { return f.correlated_lines; },
+      "Zippered experiments: of so many lines one is independent; else 1");
+  property(
       "provenance_json", [](const FrfEstimate& f) { return f.provenance_json; },
       "Inputs with their hash, options, versions; JSON");
   property("health", &health, kHealthDoc);
