@@ -20,7 +20,8 @@ LocalFit fit_around(const FrfEstimate& frf, Eigen::Index k) {
   LocalProblem problem;
   problem.Z = frf.response.middleCols(first, kWindow);
   problem.r = (away / away.abs().maxCoeff()).matrix();
-  problem.independent_noise = frf.response.rows();
+  problem.groups = {kWindow};
+  problem.independent_noise = problem.pole_channels = frf.response.rows();
   problem.K.resize(kOrder + 1, kWindow);
   for (Eigen::Index i = 0; i <= kOrder; ++i)
     problem.K.row(i) = problem.r.array()

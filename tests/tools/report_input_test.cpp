@@ -44,10 +44,10 @@ TEST_F(ReportInputTest, FindingsComeFromTheProvenanceOfTheResponse) {
   keep_health(frf, kFindings);
   const ReportData data = read_back(frf);
   ASSERT_EQ(data.findings.size(), 3u);
-  EXPECT_EQ(data.findings[0].severity, MessageSeverity::note);
-  EXPECT_EQ(data.findings[1].severity, MessageSeverity::error);
-  EXPECT_EQ(data.findings[2].severity, MessageSeverity::warning);
-  const ReportFinding& fault = data.findings[1];
+  EXPECT_EQ(data.findings[0].severity, MessageSeverity::error);
+  EXPECT_EQ(data.findings[1].severity, MessageSeverity::warning);
+  EXPECT_EQ(data.findings[2].severity, MessageSeverity::note);
+  const ReportFinding& fault = data.findings[0];
   EXPECT_THAT((std::vector{fault.channel, fault.what, fault.figure, fault.remedy}),
               ElementsAre("a1 a2", "wired crosswise", "0.99", "exchange them"));
 }
