@@ -125,7 +125,8 @@ Normal SkewFit::normal_of(std::size_t k, const Eigen::MatrixXcd& G,
   for (Index j = 0; j < n_u_; ++j)
     for (Index i = 0; i < n_y_; ++i)
       X(i + n_y_ * j, i) = X(i + n_y_ * j, n_y_ + j) = -lines_[k].omega_rad_s * G(i, j).real();
-  Eigen::VectorXd rest = G.imag().reshaped();
+  const Eigen::MatrixXd imaginary = G.imag();
+  Eigen::VectorXd rest = imaginary.reshaped();
   X -= Q * (Q.transpose() * X);
   rest -= Q * (Q.transpose() * rest);
   Normal normal(n_y_ + n_u_);
@@ -141,7 +142,8 @@ void SkewFit::iterate() {
   Eigen::MatrixXd imaginary(n_y_ * n_u_, K);
   for (const PlantLine& line : lines_) {
     G.push_back(turned(line));
-    imaginary.col(static_cast<Index>(G.size()) - 1) = G.back().imag().reshaped();
+    const Eigen::MatrixXd of_line = G.back().imag();
+    imaginary.col(static_cast<Index>(G.size()) - 1) = of_line.reshaped();
   }
   std::vector<Normal> normals;
   Normal sum(n_y_ + n_u_);
