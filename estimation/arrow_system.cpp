@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "estimation/channel_equations.hpp"
@@ -28,9 +29,19 @@ void hold_unknowns(const std::vector<Eigen::Index>& frozen, Eigen::MatrixXd& M) 
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
                          const std::vector<BasisGroup>& groups, FitMethod method,
                          bool keep_channels)
+    : ArrowSystem(problem, beta, groups, method, {0, problem.channels()}, keep_channels) {}
+
+ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
+                         const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part)
+    : ArrowSystem(problem, beta, groups, method, part, true) {}
+
+ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
+                         const std::vector<BasisGroup>& groups, FitMethod method,
+                         ChannelRange range, bool keep_channels)
     : problem_(problem),
       beta_(beta),
       method_(method),
+      range_(range),
       keep_channels_(keep_channels),
       columns_(derivative_columns(problem)) {
   const Eigen::Index globals = problem.globals();
@@ -38,16 +49,20 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
   e_.setZero(globals);
   schur_.setZero(globals, globals);
   schur_e_.setZero(globals);
-  if (keep_channels) channels_.resize(static_cast<std::size_t>(problem.channels()));
+  if (keep_channels) channels_.resize(static_cast<std::size_t>(range.count));
   if (method != FitMethod::gn) equation_error_columns(problem, beta, Y_re_, Y_im_);
   for (const BasisGroup& group : groups) {
+    const Eigen::Index* all = group.channels.data();
+    const Eigen::Index* all_end = all + group.channels.size();
+    const Eigen::Index* begin = std::lower_bound(all, all_end, range.first);  // they are sorted
+    const Eigen::Index* end = std::lower_bound(begin, all_end, range.first + range.count);
+    if (begin == end) continue;
     if (static_cast<Eigen::Index>(group.channels.size()) < kFewChannels) {
-      add_few(group);
+      add_few(group, begin, end);
       continue;
     }
     const GroupProducts products(problem, group, columns_, method);
-    for (const TileRange& block :
-         member_blocks(static_cast<Eigen::Index>(group.channels.size()), problem.size()))
+    for (const TileRange& block : member_blocks(begin - all, end - begin, problem.size()))
       if (regular_) add_block(group, products, block);
   }
   schur_ += M_;
@@ -67,27 +82,31 @@ void ArrowSystem::add_block(const BasisGroup& group, const GroupProducts& produc
   Channel passing;
   for (Eigen::Index r = 0; r < block.members && regular_; ++r) {
     const Eigen::Index index = members[static_cast<std::size_t>(r)];
-    Channel& channel = keep_channels_ ? channels_[static_cast<std::size_t>(index)] : passing;
+    Channel& channel = keep_channels_ ? kept(index) : passing;
     set_channel(sums, B, r, channel);
     if (problem_.delays() > 0) add_delays(sums, B, r, index, channel);
     eliminate(channel);
   }
 }
 
-void ArrowSystem::add_few(const BasisGroup& group) {
+ArrowSystem::Channel& ArrowSystem::kept(Eigen::Index c) {
+  return channels_[static_cast<std::size_t>(c - range_.first)];
+}
+
+void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
+                          const Eigen::Index* end) {
   const ComplexColumns Y{Y_re_, Y_im_};
-  std::vector<ChannelEquations> own(group.channels.size());
+  std::vector<ChannelEquations> own(static_cast<std::size_t>(end - begin));
   parallel_tasks(static_cast<int>(own.size()), problem_.threads, [&](int r) {
     const auto at = static_cast<std::size_t>(r);
-    own[at] = channel_equations(problem_, beta_, group, group.channels[at], columns_,
+    own[at] = channel_equations(problem_, beta_, group, begin[r], columns_,
                                 method_ == FitMethod::gn ? nullptr : &Y, method_);
   });
   const Eigen::Index n_f = problem_.functions();
   const Eigen::Index globals = problem_.globals();
   Channel passing;
   for (std::size_t r = 0; r < own.size() && regular_; ++r) {
-    Channel& channel =
-        keep_channels_ ? channels_[static_cast<std::size_t>(group.channels[r])] : passing;
+    Channel& channel = keep_channels_ ? kept(begin[r]) : passing;
     const auto& [M, e] = own[r];
     channel.bb = M.topLeftCorner(n_f, n_f);
     channel.ab = M.bottomLeftCorner(globals, n_f);

@@ -7,6 +7,12 @@
 
 namespace stageid {
 
+/// Some channels in a row.
+struct ChannelRange {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+
 /// The equations of one step, M d_beta = e, in the order beta = (globals, numerators of channel 1,
 /// 2, ...) where globals are the denominator coefficients of all submodels and then the delays.
 ///
@@ -25,6 +31,11 @@ class ArrowSystem {
   ///        of channels, and channels() is empty.
   ArrowSystem(const FitProblem& problem, const FitParameters& beta,
               const std::vector<BasisGroup>& groups, FitMethod method, bool keep_channels = true);
+
+  /// What these channels alone contribute, all of them kept: M, e and the Schur complement are sums
+  /// over parts.
+  ArrowSystem(const FitProblem& problem, const FitParameters& beta,
+              const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part);
 
   struct Step {
     Eigen::VectorXd globals;
@@ -51,6 +62,10 @@ class ArrowSystem {
     Eigen::VectorXd x;   ///< bb^-1 e
   };
   const std::vector<Channel>& channels() const noexcept { return channels_; }
+  /// @pre it is kept
+  const Channel& channel(Eigen::Index c) const {
+    return channels_[static_cast<std::size_t>(c - range_.first)];
+  }
   const Eigen::MatrixXd& M_globals() const noexcept { return M_; }
   const Eigen::VectorXd& e_globals() const noexcept { return e_; }
   const Eigen::MatrixXd& schur() const noexcept { return schur_; }
@@ -58,8 +73,12 @@ class ArrowSystem {
   bool regular() const noexcept { return regular_; }
 
  private:
+  ArrowSystem(const FitProblem& problem, const FitParameters& beta,
+              const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange range,
+              bool keep_channels);
+  Channel& kept(Eigen::Index c);
   void add_block(const BasisGroup& group, const GroupProducts& products, const TileRange& block);
-  void add_few(const BasisGroup& group);
+  void add_few(const BasisGroup& group, const Eigen::Index* begin, const Eigen::Index* end);
   void add_denominators(const LineSums& sums);
   void set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
                    Channel& channel) const;
@@ -72,6 +91,7 @@ class ArrowSystem {
   const FitProblem& problem_;
   const FitParameters& beta_;
   FitMethod method_;
+  ChannelRange range_;
   bool keep_channels_;
   std::vector<DerivativeColumn> columns_;
   Eigen::MatrixXd Y_re_;  // equation_error_columns()

@@ -10,8 +10,9 @@
 #include <stdexcept>
 
 #include "estimation/fit_problem.hpp"
+#include "estimation/hidden_modes.hpp"
 #include "estimation/mode_worth.hpp"
-#include "estimation/modes_above_noise.hpp"
+#include "estimation/overlapping_modes.hpp"
 #include "estimation/pole_relocation.hpp"
 #include "estimation/residual_modes.hpp"
 #include "estimation/settled_fit.hpp"
@@ -25,6 +26,7 @@ constexpr std::size_t kCandidates = 4;      // tried before it is believed that 
 constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
 constexpr double kSettledDeviations = 0.1;  // where ways to a number of modes are compared
 constexpr int kMostGrown = 40;              // modes; more are placed at once, and only then grown
+constexpr int kIterationsOfMany = 6;        // with free poles: those that noise hides never settle
 constexpr double kSettledOfMany = 0.02;     // the same for every pole of so many, root mean square
 
 /// Grows and prunes a model; every decision is written down.
@@ -68,7 +70,7 @@ class AutomaticFit {
       still.max_iterations = 0;
       FitResult placed = fit_additive_model(frf_, model, still);
       if (worth_.at_rounding(placed)) return adopt(std::move(placed));
-      model = modes_above_noise(frf_, structure_, placed, quick_, selection_.exactly, decisions_);
+      return hold_hidden(placed.model);
     }
     adopt(fit_additive_model(frf_, model, quick_));
   }
@@ -95,11 +97,16 @@ class AutomaticFit {
   double cost() const { return best_.model.fit.cost; }
   bool at_rounding() const { return worth_.at_rounding(best_); }
 
+  /// What a search weighs with; the last fit makes its own.
+  void release_weights() { quick_.user_weights = {}; }
+
   FitResult finish() {
+    release_weights();
     sort_modes(best_.model);
     FitOptions last = options_;
     if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled_of_many());
     const bool chosen = selection_.exactly == 0 && !selection_.keep_modes;
+    last.shrink_hidden = many();
     const auto last_fit = chosen ? settled_fit : fit_additive_model;
     FitResult result = last_fit(frf_, best_.model, last);
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
@@ -119,6 +126,17 @@ class AutomaticFit {
     for (const Submodel& s : best_.model.submodels)
       if (is_searched_mode(s) && !s.frequency_held) free += 2.0;
     return kSettledOfMany * std::sqrt(free);
+  }
+
+  /// Fits `model` with all poles free, and holds those that noise hides where they have come to.
+  void hold_hidden(const AdditiveModel& model) {
+    FitOptions while_free = quick_;
+    while_free.max_iterations = std::min(kIterationsOfMany, options_.max_iterations);
+    FitResult fit = fit_additive_model(frf_, model, while_free);
+    const int hidden = hold_hidden_modes(fit, frf_.response.rows(), frf_.lines(), fit.model);
+    say("{} of them stand out of the noise; the poles of the other {} are held after {} iterations",
+        count_modes(fit.model) - hidden, hidden, fit.cost.size() - 1);
+    adopt(std::move(fit));
   }
 
   AdditiveModel start() {
@@ -249,23 +267,8 @@ class AutomaticFit {
   /// parameters: on a single resonance two nearly equal modes with large opposite residues fit as
   /// well as one, and none of them can be dropped alone.
   void merge() {
-    struct Pair {
-      std::size_t i, j;
-      double distance;
-    };
-    std::vector<Pair> pairs;
     const std::vector<Submodel>& all = best_.model.submodels;
-    for (std::size_t i = 0; i < all.size(); ++i)
-      for (std::size_t j = i + 1; j < all.size(); ++j) {
-        if (!is_searched_mode(all[i]) || !is_searched_mode(all[j])) continue;
-        const double f = all[i].natural_frequency_hz();
-        const double width = 2.0 * f * std::max(all[i].damping_ratio(), all[j].damping_ratio());
-        const double distance = std::abs(all[j].natural_frequency_hz() - f) / width;
-        if (distance < 1.0) pairs.push_back({i, j, distance});
-      }
-    std::stable_sort(pairs.begin(), pairs.end(),
-                     [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
-    for (const auto& [i, j, distance] : pairs) {
+    for (const auto& [i, j] : overlapping_modes(best_.model)) {
       AdditiveModel model = best_.model;
       Submodel& one = model.submodels[i];
       const double f = std::sqrt(one.natural_frequency_hz() * all[j].natural_frequency_hz());
@@ -371,17 +374,21 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
     if (!best || attempt.cost() < best->cost()) best.emplace(std::move(attempt));
     return best->at_rounding();
   };
+  const auto finish = [&] {
+    begun.release_weights();
+    return best->finish();
+  };
   const bool placed = selection.exactly > 0 && selection.modes.empty() && !selection.keep_modes;
   const bool too_many_to_grow = placed && selection.exactly > kMostGrown;
   if (!too_many_to_grow || options.delay != DelayModel::fixed) begun.begin();
   if (placed) {
     AutomaticFit relocated = begun;
     relocated.begin_relocated();
-    if (go(std::move(relocated), 0) || too_many_to_grow) return best->finish();
+    if (go(std::move(relocated), 0) || too_many_to_grow) return finish();
   }
   for (const int surplus : surpluses(selection, most))
     if (go(begun, surplus)) break;
-  return best->finish();
+  return finish();
 }
 
 }  // namespace stageid

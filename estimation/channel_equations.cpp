@@ -5,18 +5,23 @@
 namespace stageid {
 
 void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
-                    Eigen::Index c, const std::vector<DerivativeColumn>& columns,
+                    Eigen::Index c, const std::vector<DerivativeColumn>& columns, LineRange lines,
                     Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
-  re.setZero(problem.size(), problem.globals());
-  im.setZero(problem.size(), problem.globals());
+  const auto on_lines = [lines](const auto& matrix) {
+    return matrix.middleRows(lines.first, lines.count);
+  };
+  re.setZero(lines.count, problem.globals());
+  im.setZero(lines.count, problem.globals());
   for (std::size_t d = 0; d < columns.size(); ++d) {
     const auto column = static_cast<Eigen::Index>(d);
-    re.col(columns[d].parameter) += beta.B(c, columns[d].function) * group.D_re.col(column);
-    im.col(columns[d].parameter) += beta.B(c, columns[d].function) * group.D_im.col(column);
+    re.col(columns[d].parameter) +=
+        beta.B(c, columns[d].function) * on_lines(group.D_re).col(column);
+    im.col(columns[d].parameter) +=
+        beta.B(c, columns[d].function) * on_lines(group.D_im).col(column);
   }
   if (problem.delay == DelayModel::fixed) return;
-  const Eigen::VectorXd t_re = group.T_re * beta.B.row(c).transpose();
-  const Eigen::VectorXd t_im = group.T_im * beta.B.row(c).transpose();
+  const Eigen::VectorXd t_re = on_lines(group.T_re) * beta.B.row(c).transpose();
+  const Eigen::VectorXd t_im = on_lines(group.T_im) * beta.B.row(c).transpose();
   for (const Eigen::Index t : delay_parameters(problem, c)) {
     re.col(t) = t_re;
     im.col(t) = t_im;
@@ -57,18 +62,18 @@ ChannelEquations channel_equations(const FitProblem& problem, const FitParameter
   const Eigen::Index N = problem.size();
   const Eigen::Index n_f = problem.functions();
   const Eigen::Index n_a = problem.denominators();
-  const Eigen::VectorXd root = problem.W.row(c).transpose().cwiseSqrt();
+  const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
   const Eigen::VectorXd E_re =
-      problem.G_re.row(c).transpose() - group.F_re * beta.B.row(c).transpose();
+      problem.G->row(c).real().transpose() - group.F_re * beta.B.row(c).transpose();
   const Eigen::VectorXd E_im =
-      problem.G_im.row(c).transpose() - group.F_im * beta.B.row(c).transpose();
+      problem.G->row(c).imag().transpose() - group.F_im * beta.B.row(c).transpose();
   Eigen::VectorXd E(2 * N);
   E << root.cwiseProduct(E_re), root.cwiseProduct(E_im);
 
   // Real and imaginary parts below each other, weighted: J of the instrument, Phi of the regressor.
   Eigen::MatrixXd re;
   Eigen::MatrixXd im;
-  global_columns(problem, beta, group, c, columns, re, im);
+  global_columns(problem, beta, group, c, columns, {0, N}, re, im);
   const std::vector<Eigen::Index> free = free_globals(problem);
   const auto n_free = static_cast<Eigen::Index>(free.size());
   Eigen::MatrixXd J(2 * N, n_f + n_free);

@@ -7,9 +7,15 @@
 
 namespace stageid {
 
-/// Columns d vec(P)_c / d globals on every line for one channel, N x globals each.
+/// Some lines in a row.
+struct LineRange {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+
+/// Columns d vec(P)_c / d globals on some lines for one channel, lines x globals each.
 void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
-                    Eigen::Index c, const std::vector<DerivativeColumn>& columns,
+                    Eigen::Index c, const std::vector<DerivativeColumn>& columns, LineRange lines,
                     Eigen::MatrixXd& re, Eigen::MatrixXd& im);
 
 /// One channel's share of M d_beta = e (arrow_system.hpp), order (functions, globals).

@@ -10,6 +10,7 @@
 #include "estimation/mode_worth.hpp"
 #include "estimation/parameter_covariance.hpp"
 #include "estimation/poles.hpp"
+#include "estimation/residual.hpp"
 
 namespace stageid {
 namespace {
@@ -54,9 +55,10 @@ std::string too_uncertain(const FitProblem& problem, const FitParameters& beta,
   return {};
 }
 
-/// What the size of the response of submodel `i` says against it. Noise alone would let a submodel lower
+/// What the size of the response of submodel `i` says against it, by itself or as far as the others cannot stand in
+/// for it. Noise alone would let a submodel lower
 /// sum W |E|^2 by half of its variance for each parameter, by more where it searches its place.
-std::string too_small(const FitProblem& problem, const FitParameters& beta, const Residual& E,
+std::string too_small(const FitProblem& problem, const FitParameters& beta, double cost,
                       double removal_cost, std::size_t i) {
   FitProblem alone = problem;
   FitParameters own = beta;
@@ -65,15 +67,11 @@ std::string too_small(const FitProblem& problem, const FitParameters& beta, cons
   Eigen::Index first = 0;
   for (std::size_t o = 0; o < i; ++o) first += problem.shapes[o].functions();
   own.B = beta.B.middleCols(first, problem.shapes[i].functions());
-  const Eigen::MatrixXd data = problem.G_re.cwiseAbs2() + problem.G_im.cwiseAbs2();
-  alone.G_re.setZero();
-  alone.G_im.setZero();
-  const Residual P = residual(alone, evaluate_groups(alone, own, false), own.B);
-  const double signal = problem.W.cwiseProduct(data).sum();
-  if (2.0 * static_cast<double>(problem.size()) * P.cost < kRoundingPower * signal)
+  const WeightedPower power = weighted_power(alone, evaluate_groups(alone, own, false), own.B);
+  if (std::min(power.model, removal_cost) < kRoundingPower * power.data)
     return "its response is rounding";
   const Eigen::Index parameters = own.B.size() + own.a[0].size();
-  const double noise = residual_per_degree(problem, E, problem.parameters());
+  const double noise = residual_per_degree(problem, cost, problem.parameters());
   if (removal_cost < noise * static_cast<double>(parameters))
     return "its response is within the noise";
   return {};
@@ -99,7 +97,7 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
   Eigen::VectorXd direction;
   for (const BasisGroup& group : groups)
     for (const Eigen::Index c : group.channels) {
-      const Eigen::VectorXd w = problem.W.row(c).transpose();
+      const Eigen::VectorXd w = problem.weights(c);
       const Eigen::MatrixXd M = group.F_re.transpose() * w.asDiagonal() * group.F_re +
                                 group.F_im.transpose() * w.asDiagonal() * group.F_im;
       const Eigen::VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
@@ -122,9 +120,8 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
   return fmt::format("the data do not determine the numerators of {}", fmt::join(names, " and "));
 }
 
-std::string undetermined_poles(const FitProblem& problem, const FitParameters& beta,
-                               const Residual& E, const ArrowSystem& gn,
-                               const std::vector<double>& removal_cost,
+std::string undetermined_poles(const FitProblem& problem, const FitParameters& beta, double cost,
+                               const ArrowSystem& gn, const std::vector<double>& removal_cost,
                                const Eigen::MatrixXd& covariance,
                                const std::vector<Eigen::Index>& frozen,
                                const std::vector<std::size_t>& held) {
@@ -140,7 +137,7 @@ std::string undetermined_poles(const FitProblem& problem, const FitParameters& b
       else if (!(shares.segment(first, n).minCoeff() > kSmallestShare))
         reason = "a change of its denominator is imitated by the rest of the model";
       else
-        reason = too_small(problem, beta, E, removal_cost[i], i);
+        reason = too_small(problem, beta, cost, removal_cost[i], i);
       if (reason.empty() && covariance.size() > 0)
         reason = too_uncertain(problem, beta, covariance, i, first);
       if (!reason.empty())

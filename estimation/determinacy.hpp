@@ -19,13 +19,12 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
 /// stands at a bound; a change of the denominator is imitated by the rest of the model to rounding;
 /// a natural frequency's standard deviation is half of it, or a damping ratio's is all of it; or
 /// its whole response is rounding (-160 dB of the data's weighted power) or within the noise.
-/// @param removal_cost what sum W |E|^2 would rise by without a submodel
+/// @param cost of the fit   @param removal_cost what sum W |E|^2 would rise by without a submodel
 /// @param gn the Gauss-Newton equations at `beta`   @param covariance of the globals, may be empty
 /// @param frozen globals that were no unknowns   @param held submodels with a pole at a bound
 /// @returns a reason that names the submodel, or nothing
-std::string undetermined_poles(const FitProblem& problem, const FitParameters& beta,
-                               const Residual& E, const ArrowSystem& gn,
-                               const std::vector<double>& removal_cost,
+std::string undetermined_poles(const FitProblem& problem, const FitParameters& beta, double cost,
+                               const ArrowSystem& gn, const std::vector<double>& removal_cost,
                                const Eigen::MatrixXd& covariance,
                                const std::vector<Eigen::Index>& frozen,
                                const std::vector<std::size_t>& held);

@@ -10,21 +10,18 @@
 #include "estimation/determinacy.hpp"
 #include "estimation/fit_iteration.hpp"
 #include "estimation/fit_start.hpp"
+#include "estimation/hidden_modes.hpp"
 #include "estimation/low_rank_iteration.hpp"
+#include "estimation/model_structure.hpp"
 #include "estimation/numerators.hpp"
 #include "estimation/parameter_covariance.hpp"
 #include "estimation/pole_bounds.hpp"
 #include "estimation/poles.hpp"
+#include "estimation/residual.hpp"
 #include "estimation/weight_matrices.hpp"
 
 namespace stageid {
 namespace {
-
-/// True if the weights claim to be the inverse of the noise's covariance.
-bool weighs_by_variance(Weighting weighting) {
-  return weighting == Weighting::noise_variance || weighting == Weighting::total_variance ||
-         weighting == Weighting::likelihood;
-}
 
 /// Delta method, facts.md section 10:  df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
 void fill_deviations(const ParameterCovariance& covariance, AdditiveModel& model) {
@@ -62,8 +59,8 @@ void raise(ParameterCovariance& covariance, double correlated_lines) {
   covariance.response_variance *= correlated_lines;
 }
 
-void use_covariance(const ParameterCovariance& covariance, bool likelihood, FitResult& result) {
-  if (covariance.response_variance.size() == 0) return;
+void use_covariance(ParameterCovariance& covariance, bool likelihood, FitResult& result) {
+  if (covariance.numerator_variance.size() == 0) return;
   if (!covariance.globals.allFinite() || !covariance.numerator_variance.allFinite() ||
       !covariance.response_variance.allFinite()) {
     result.decisions.emplace_back(
@@ -72,31 +69,12 @@ void use_covariance(const ParameterCovariance& covariance, bool likelihood, FitR
     return;
   }
   fill_deviations(covariance, result.model);
-  result.response_variance = covariance.response_variance;
+  result.response_variance = std::move(covariance.response_variance);
   if (likelihood && covariance.residual_scale > 1.0)
     result.decisions.push_back(
         fmt::format("the residual is {:.3g} times what the variances predict: the model does not "
                     "explain the data; standard deviations are raised by {:.3g}",
                     covariance.residual_scale, std::sqrt(covariance.residual_scale)));
-}
-
-/// What is known of the noise under diagonal weights. The given variance is taken as it is: the
-/// covariance is linear in it, and smoothing would only lower its peaks. Nonlinear distortion moves
-/// an estimate from realization to realization as noise does: the total variance counts where there
-/// is one.
-DataNoise data_noise(const FrfEstimate& frf, const FitOptions& options) {
-  const Eigen::MatrixXd& known =
-      frf.total_variance.size() > 0 ? frf.total_variance : frf.noise_variance;
-  DataNoise noise;
-  if (weighs_by_variance(options.weighting)) {
-    noise.knowledge = VarianceKnowledge::weights;
-    noise.variance = weighed_variance(frf, options.weighting);
-  } else if (known.size() > 0 && known.minCoeff() > 0.0) {
-    noise.knowledge = VarianceKnowledge::given;
-    noise.variance = known;
-  }
-  if (noise.knowledge != VarianceKnowledge::none) noise.correlation = output_correlation(frf);
-  return noise;
 }
 
 /// With free numerators.
@@ -105,26 +83,26 @@ ParameterCovariance free_covariance(const FrfEstimate& frf, const FitOptions& op
                                     const std::optional<WeightMatrices>& matrices,
                                     const FitParameters& beta, const IterationResult& iteration) {
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
-  const Residual& E = iteration.E;
   if (!matrices)
-    return parameter_covariance(problem, beta, groups, E,
-                                ArrowSystem(problem, beta, groups, FitMethod::gn),
-                                data_noise(frf, options), iteration.frozen);
+    return parameter_covariance(problem, beta, groups, iteration.end_cost,
+                                data_noise(frf, options.weighting), iteration.frozen,
+                                options.response_variance);
   return joint_covariance(
-      problem, beta, groups, E, JointEquations(problem, *matrices, beta, groups, E),
+      problem, beta, groups, iteration.end_cost,
+      JointEquations(problem, *matrices, beta, groups, residual(problem, groups, beta.B)),
       weighs_by_variance(options.weighting) ? VarianceKnowledge::weights : VarianceKnowledge::none,
-      matrices->scatter_factor(), iteration.frozen);
+      matrices->scatter_factor(), iteration.frozen, options.response_variance);
 }
 
 /// What giving up the free residues cost, and whether noise alone would have.
 std::string rank_decision(const FitProblem& problem, const IterationResult& free,
                           const LowRankResult& constrained, bool likelihood) {
-  std::string text = fmt::format("residues of the given ranks: cost {:.6g} -> {:.6g}", free.E.cost,
-                                 constrained.iteration.E.cost);
+  std::string text = fmt::format("residues of the given ranks: cost {:.6g} -> {:.6g}",
+                                 free.end_cost, constrained.iteration.end_cost);
   if (!likelihood) return text;
   // Twice the rise of sum W |E|^2 is chi-square distributed where the ranks are right.
   const double rise =
-      4.0 * static_cast<double>(problem.size()) * (constrained.iteration.E.cost - free.E.cost);
+      4.0 * static_cast<double>(problem.size()) * (constrained.iteration.end_cost - free.end_cost);
   const auto given_up = static_cast<double>(problem.parameters() - constrained.parameters);
   const double sigmas = (rise - given_up) / std::sqrt(2.0 * std::max(given_up, 1.0));
   return text + fmt::format(", chi-square {:.4g} for {:.0f} parameters given up: {}", rise,
@@ -132,19 +110,6 @@ std::string rank_decision(const FitProblem& problem, const IterationResult& free
                             sigmas < 3.0 ? "what noise explains"
                                          : "more than noise explains, the ranks are too low or the "
                                            "variances too small");
-}
-
-double relative_rms_error(const FrfEstimate& frf, const Residual& E) {
-  double sum = 0.0;
-  Eigen::Index count = 0;
-  for (Eigen::Index k = 0; k < E.re.cols(); ++k)
-    for (Eigen::Index c = 0; c < E.re.rows(); ++c) {
-      const double power = std::norm(frf.response(c, k));
-      if (!(power > 0.0)) continue;
-      sum += (E.re(c, k) * E.re(c, k) + E.im(c, k) * E.im(c, k)) / power;
-      ++count;
-    }
-  return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
 }
 
 void fill_model(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
@@ -157,17 +122,18 @@ void fill_model(const FrfEstimate& frf, const FitOptions& options, const FitProb
   for (std::size_t i = 0; i < beta.a.size(); ++i)
     if (Submodel& s = result.model.submodels[i]; !s.is_mode())
       s.poles = pole_estimates(beta.a[i], Eigen::MatrixXd());
-  result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
+  if (result.removal_cost.empty())
+    result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
 }
 
 void fill_record(const FrfEstimate& frf, const FitOptions& options,
-                 const IterationResult& iteration, FitResult& result) {
+                 const IterationResult& iteration, double relative_rms, FitResult& result) {
   FitRecord& record = result.model.fit;
-  record.cost = iteration.E.cost;
+  record.cost = iteration.end_cost;
   record.weighting = to_string(options.weighting);
   record.iterations = iteration.iterations;
   record.status = to_string(result.status);
-  record.relative_rms_error = relative_rms_error(frf, iteration.E);
+  record.relative_rms_error = relative_rms;
   record.band_hz[0] = frf.frequency_hz[0];
   record.band_hz[1] = frf.frequency_hz[frf.lines() - 1];
   result.model.cost_history = result.cost;
@@ -178,7 +144,8 @@ ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& op
                                     const FitProblem& problem, FitParameters& beta,
                                     IterationResult& iteration, FitResult& result) {
   const bool likelihood = weighs_by_variance(options.weighting);
-  LowRankResult constrained = iterate_low_rank(problem, beta, options, data_noise(frf, options));
+  LowRankResult constrained =
+      iterate_low_rank(problem, beta, options, data_noise(frf, options.weighting));
   result.decisions.push_back(rank_decision(problem, iteration, constrained, likelihood));
   constrained.iteration.cost.insert(constrained.iteration.cost.begin(), iteration.cost.begin(),
                                     iteration.cost.end());
@@ -187,6 +154,27 @@ ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& op
   for (std::size_t i = 0; i < constrained.ranks.size(); ++i)
     if (constrained.ranks[i] > 0) result.model.submodels[i].residue_rank = constrained.ranks[i];
   return std::move(constrained.covariance);
+}
+
+/// Residues of modes whose poles are held because noise hides them.
+void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResult& iteration,
+                   FitResult& result) {
+  std::vector<std::size_t> hidden;
+  for (std::size_t i = 0; i < result.model.submodels.size(); ++i)
+    if (const Submodel& s = result.model.submodels[i]; is_searched_mode(s) && s.frequency_held)
+      hidden.push_back(i);
+  if (hidden.empty()) return;
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, false);
+  double cost = iteration.end_cost;
+  result.removal_cost =
+      removal_costs(problem, groups, beta.B);  // of what solves the convex problem
+  shrink_hidden_modes(problem, groups, hidden, result.removal_cost, beta.B, cost);
+  result.decisions.push_back(
+      fmt::format("residues of the {} modes that noise hides, shrunk as James and Stein do: cost "
+                  "{:.6g} -> {:.6g}",
+                  hidden.size(), iteration.end_cost, cost));
+  iteration.end_cost = cost;
+  iteration.cost.push_back(cost);
 }
 
 /// What an earlier fit knew about the start is not known about this one.
@@ -201,21 +189,22 @@ void forget_results(AdditiveModel& model) {
 }
 
 /// Where the start has no finite response there is nothing to return but itself, without numerators.
-void keep_finite(const FitProblem& problem, const FitParameters& start, FitParameters& beta,
-                 IterationResult& iteration) {
-  bool finite = beta.B.allFinite() && iteration.E.re.allFinite() && iteration.E.im.allFinite() &&
-                iteration.E.re.size() > 0;
+/// @returns relative error of what is returned
+double keep_finite(const FitProblem& problem, const FitParameters& start, FitParameters& beta,
+                   IterationResult& iteration) {
+  bool finite = beta.B.allFinite() && !iteration.cost.empty();
   for (const Eigen::VectorXd& a : beta.a) finite = finite && a.allFinite();
-  if (finite) return;
+  if (finite) {
+    const ResidualSize E = residual_size(problem, evaluate_groups(problem, beta, false), beta.B);
+    if (E.finite) return E.relative_rms;
+  }
   beta = start;
   beta.B.setZero();
-  iteration.E = Residual{problem.G_re, problem.G_im, 0.0};
-  iteration.E.cost =
-      (problem.W.array() * (problem.G_re.array().square() + problem.G_im.array().square())).sum() /
-      (2.0 * static_cast<double>(problem.size()));
+  iteration.end_cost = signal_cost(problem);
   iteration.status = FitStatus::singular;
-  iteration.cost.assign(1, iteration.E.cost);
+  iteration.cost.assign(1, iteration.end_cost);
   if (iteration.message.empty()) iteration.message = "the start has no finite response";
+  return residual_size(problem, {}, {}).relative_rms;
 }
 
 std::vector<std::size_t> held_submodels(const FitProblem& problem, const FitParameters& beta,
@@ -235,7 +224,7 @@ std::vector<std::size_t> held_submodels(const FitProblem& problem, const FitPara
 
 /// A fit that has converged is undetermined where the data leave a submodel open that was asked for;
 /// one that has not says so as well.
-void judge(const FitProblem& problem, const FitParameters& beta, const Residual& E,
+void judge(const FitProblem& problem, const FitParameters& beta, double cost,
            const Eigen::MatrixXd& covariance, const std::vector<Eigen::Index>& frozen,
            FitResult& result) {
   const bool asked_for = std::any_of(
@@ -247,8 +236,8 @@ void judge(const FitProblem& problem, const FitParameters& beta, const Residual&
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
   std::string reason = undetermined_numerators(problem, beta, groups);
   if (reason.empty() && !singular) {
-    const ArrowSystem gn(problem, beta, groups, FitMethod::gn);
-    reason = undetermined_poles(problem, beta, E, gn, result.removal_cost, covariance, frozen,
+    const ArrowSystem gn(problem, beta, groups, FitMethod::gn, false);
+    reason = undetermined_poles(problem, beta, cost, gn, result.removal_cost, covariance, frozen,
                                 result.held);
   }
   if (reason.empty()) return;
@@ -262,12 +251,19 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
                              const FitOptions& options) {
   check_start(frf, start, options);
   const std::optional<WeightMatrices> matrices = make_weight_matrices(frf, options);
-  const FitProblem problem = make_problem(
-      frf, start, options, matrices ? matrices->marginal() : make_weights(frf, options));
+  const bool searched = options.delay != DelayModel::fixed && options.delay_s == 0.0 &&
+                        start.input_delay_s.size() == 0;
+  // The search weighs by itself; all that it asks is which of a user's weights are zero.
+  const bool later = searched && !matrices && options.weighting != Weighting::user;
+  SharedMatrix<Eigen::MatrixXd> W;
+  if (matrices)
+    W = SharedMatrix<Eigen::MatrixXd>::kept(matrices->marginal());
+  else if (!later)
+    W = make_weights(frf, options);
+  FitProblem problem = make_problem(frf, start, options, std::move(W));
   FitParameters beta = make_parameters(problem, start, options);
-  if (options.delay != DelayModel::fixed && options.delay_s == 0.0 &&
-      start.input_delay_s.size() == 0)
-    search_delay(problem, beta);
+  if (searched) search_delay(problem, beta);
+  if (later) problem.W = make_weights(frf, options);
 
   const FitParameters begun = beta;
   FitResult result;
@@ -285,7 +281,9 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   if (low_rank && iteration.status != FitStatus::singular)
     covariance = constrain_ranks(frf, options, problem, beta, iteration, result);
-  keep_finite(problem, begun, beta, iteration);
+  if (options.shrink_hidden && iteration.status != FitStatus::singular)
+    shrink_hidden(problem, beta, iteration, result);
+  const double relative_rms = keep_finite(problem, begun, beta, iteration);
   result.status = iteration.status;
   result.message = iteration.message;
   result.cost = iteration.cost;
@@ -296,9 +294,9 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
       covariance = free_covariance(frf, options, problem, matrices, beta, iteration);
     raise(covariance, frf.correlated_lines);
     use_covariance(covariance, weighs_by_variance(options.weighting), result);
-    judge(problem, beta, iteration.E, covariance.globals, iteration.frozen, result);
+    judge(problem, beta, iteration.end_cost, covariance.globals, iteration.frozen, result);
   }
-  fill_record(frf, options, iteration, result);
+  fill_record(frf, options, iteration, relative_rms, result);
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "estimation/arrow_system.hpp"
 #include "estimation/numerators.hpp"
@@ -63,19 +64,17 @@ double scaled_gradient(const FitProblem& problem, const ArrowSystem& system,
 class Iteration {
  public:
   Iteration(const FitProblem& problem, FitParameters& beta, const FitOptions& options)
-      : problem_(problem), beta_(beta), options_(options), bounds_(problem, beta) {
-    signal_cost_ =
-        (problem.W.array() * (problem.G_re.array().square() + problem.G_im.array().square()))
-            .sum() /
-        (2.0 * static_cast<double>(problem.size()));
-  }
+      : problem_(problem),
+        beta_(beta),
+        options_(options),
+        bounds_(problem, beta),
+        signal_cost_(signal_cost(problem)) {}
 
   IterationResult run() {
     if (begin()) {
       while (go_on()) {
       }
-      result_.E = residual(problem_, evaluate_groups(problem_, beta_, false), beta_.B);
-      result_.E.cost = cost_;
+      result_.end_cost = cost_;
     }
     result_.frozen = frozen_;
     return std::move(result_);
@@ -234,9 +233,9 @@ class Iteration {
   FitParameters& beta_;
   const FitOptions& options_;
   PoleBounds bounds_;
+  double signal_cost_;
   std::vector<Eigen::Index> frozen_;  // modes at their bounds
   IterationResult result_;
-  double signal_cost_ = 0.0;
   double cost_ = 0.0;  // at beta_
   double levenberg_ = 0.0;
   double gradient_ = 1.0;
@@ -247,6 +246,11 @@ class Iteration {
 
 }  // namespace
 
+double signal_cost(const FitProblem& problem) {
+  return (problem.W->array() * problem.G->array().abs2()).sum() /
+         (2.0 * static_cast<double>(problem.size()));
+}
+
 IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options) {
   return Iteration(problem, beta, options).run();
 }
@@ -255,11 +259,11 @@ void search_delay(const FitProblem& problem, FitParameters& beta) {
   // The poles are not right yet, and under weights that follow the noise one sharp mode that is off
   // by a part of its width would outweigh the phase of everything else. Relative errors do not.
   FitProblem relative = problem;
-  const Eigen::ArrayXXd power = problem.G_re.array().square() + problem.G_im.array().square();
+  const auto power = problem.G->array().abs2();
   const Eigen::ArrayXd floor = 1e-6 * power.rowwise().mean() + 1e-300;
-  relative.W = (problem.W.array() > 0.0 && power > 0.0)
-                   .select((power.colwise() + floor).inverse(), 0.0)
-                   .matrix();
+  Eigen::MatrixXd weights = (power > 0.0).select((power.colwise() + floor).inverse(), 0.0).matrix();
+  if (problem.W->size() > 0) weights.array() *= (problem.W->array() > 0.0).cast<double>();
+  relative.W = std::move(weights);
   const double highest = problem.lines.omega_rad_s.maxCoeff();
   const double step =
       0.5 / highest;  // rad at the highest line: well inside the basin of the best delay

@@ -13,7 +13,7 @@ struct IterationResult {
   std::string message;
   std::vector<double> cost;  ///< the start (numerators solved) first
   int iterations = 0;
-  Residual E;                        ///< at the returned parameters
+  double end_cost = 0.0;             ///< at the returned parameters
   std::vector<Eigen::Index> frozen;  ///< globals that ended at a bound: no longer unknowns
 };
 
@@ -37,6 +37,9 @@ inline constexpr double kRoundingDeviations = 0.05;
 /// Part of the data's weighted power below which a residual that no step lowers is rounding, not a
 /// fit that got stuck: 1e-10 of the amplitude, what coinciding poles leave of double precision.
 inline constexpr double kNothingLeft = 1e-20;
+
+/// sum W |G|^2 / (2N): what the cost is without a model.
+double signal_cost(const FitProblem& problem);
 
 /// Damping beyond which no step is worth trying.
 inline constexpr double kLargestLevenberg = 1e8;

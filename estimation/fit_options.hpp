@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimation/additive_model.hpp"
+#include "estimation/shared_matrix.hpp"
 
 namespace stageid {
 
@@ -34,7 +35,7 @@ enum class DelayModel : std::uint8_t { fixed, estimate, per_channel };
 /// What to fit and how. Checked once by fit_additive_model().
 struct FitOptions {
   Weighting weighting = Weighting::relative;
-  Eigen::MatrixXd user_weights;  ///< (n_y n_u) x N: the diagonals of W_k
+  SharedMatrix<Eigen::MatrixXd> user_weights;  ///< (n_y n_u) x N: the diagonals of W_k
   /// (n_c n_c) x N, n_c = n_y n_u: column k = vec(W_k), Hermitian; used instead unless empty
   Eigen::MatrixXcd user_weight_matrices;
   HoldModel hold = HoldModel::none;
@@ -48,8 +49,10 @@ struct FitOptions {
   double step_tolerance = 1e-10;     ///< largest relative change of a pole, and of the cost
   /// Largest distance of a parameter from the stationary point, in standard deviations (Newton decrement).
   double deviation_tolerance = 1e-4;
-  bool uncertainty = true;  ///< also standard deviations and the variance of the response
-  int threads = 0;          ///< 0: all cores; the result does not depend on it
+  bool shrink_hidden = false;     ///< searched modes with held poles: shrink_hidden_modes()
+  bool uncertainty = true;        ///< also standard deviations and the variance of the response
+  bool response_variance = true;  ///< false: of those only the standard deviations
+  int threads = 0;                ///< 0: all cores; the result does not depend on it
   std::function<void(int iteration, double cost)> progress;
 };
 
@@ -74,7 +77,7 @@ struct FitResult {
   /// By how much sum W |E|^2 (W diagonal, or the best diagonal) would rise without a submodel, the others re-solved; one entry each.
   std::vector<double> removal_cost;
   std::vector<std::size_t> held;  ///< submodels with a pole at a bound, or held by request
-  /// (n_y n_u) x N: of P, from the parameter covariance; may be empty.
+  /// (n_y n_u) x N: of P, from the parameter covariance; empty if it is not known or not asked for.
   Eigen::MatrixXd response_variance;
   bool trustworthy() const noexcept {
     return status == FitStatus::gradient_small || status == FitStatus::step_small;

@@ -6,6 +6,16 @@
 
 namespace stageid {
 
+Eigen::ArrayXd LineVariance::channel(Eigen::Index c) const {
+  return matrix->row(c).transpose().array() / divisor;
+}
+
+Eigen::VectorXd FitProblem::weights(Eigen::Index channel) const {
+  Eigen::VectorXd w = W->row(channel).transpose();
+  if (middle) w = w.cwiseProduct(w).array() * middle->channel(channel);
+  return w;
+}
+
 Eigen::Index FitProblem::functions() const noexcept {
   Eigen::Index n = 0;
   for (const SubmodelShape& shape : shapes) n += shape.functions();
@@ -127,26 +137,6 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
     }
   });
   return groups;
-}
-
-Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                  const Eigen::MatrixXd& B) {
-  Residual E{problem.G_re, problem.G_im, 0.0};
-  for (const BasisGroup& group : groups) {
-    const bool all = group.channels.size() == static_cast<std::size_t>(problem.channels());
-    if (all) {
-      E.re.noalias() -= B * group.F_re.transpose();
-      E.im.noalias() -= B * group.F_im.transpose();
-    } else {
-      for (const Eigen::Index c : group.channels) {
-        E.re.row(c) -= (group.F_re * B.row(c).transpose()).transpose();
-        E.im.row(c) -= (group.F_im * B.row(c).transpose()).transpose();
-      }
-    }
-  }
-  const double sum = (problem.W.array() * (E.re.array().square() + E.im.array().square())).sum();
-  E.cost = sum / (2.0 * static_cast<double>(problem.size()));
-  return E;
 }
 
 void parallel_tasks(int count, int threads, const std::function<void(int)>& task) {

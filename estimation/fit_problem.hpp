@@ -1,11 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "estimation/basis.hpp"
 #include "estimation/fit_options.hpp"
 #include "estimation/fraction_columns.hpp"
+#include "estimation/shared_matrix.hpp"
 #include "frf/frf_estimate.hpp"
 
 namespace stageid {
@@ -16,25 +18,35 @@ namespace stageid {
 //   B(c, j)   the numerator coefficients of channel c
 //   D(k, .)   derivatives of F to the denominator coefficients
 
-/// Data of a fit, channels as rows: real arithmetic throughout, since parameters are real.
+/// A variance of the data whose lines are divided by a number each, without a copy of it.
+struct LineVariance {
+  SharedMatrix<Eigen::MatrixXd> matrix;  ///< n_c x N
+  Eigen::ArrayXd divisor;                ///< N
+
+  Eigen::ArrayXd channel(Eigen::Index c) const;  ///< N
+};
+
+/// Data of a fit, channels as rows, one copy of them however many problems they belong to. Parts and
+/// products are made tile by tile, in real arithmetic, since parameters are real.
 struct FitProblem {
   ModelLines lines;
   Eigen::Index n_outputs = 0;
   Eigen::Index n_inputs = 0;
-  Eigen::MatrixXd G_re;  ///< n_c x N
-  Eigen::MatrixXd G_im;
-  Eigen::MatrixXd W;  ///< n_c x N
+  SharedMatrix<Eigen::MatrixXcd> G;    ///< n_c x N
+  SharedMatrix<Eigen::MatrixXd> W;     ///< n_c x N; see weights()
+  std::optional<LineVariance> middle;  ///< v: the weights are W v W instead of W
   std::vector<SubmodelShape> shapes;
   std::vector<SubmodelRole> roles;  ///< one a submodel; empty: all searched
   std::vector<Eigen::Index> held;   ///< globals that are known and stay
   DelayModel delay = DelayModel::fixed;
   int threads = 1;
 
-  Eigen::Index channels() const noexcept { return G_re.rows(); }
-  Eigen::Index size() const noexcept { return G_re.cols(); }
-  Eigen::Index functions() const noexcept;     ///< n_f
-  Eigen::Index denominators() const noexcept;  ///< number of denominator coefficients
-  Eigen::Index delays() const noexcept;        ///< number of free delays: 0, 1 or n_y + n_u - 1
+  Eigen::Index channels() const noexcept { return G->rows(); }
+  Eigen::Index size() const noexcept { return G->cols(); }
+  Eigen::VectorXd weights(Eigen::Index channel) const;  ///< N
+  Eigen::Index functions() const noexcept;              ///< n_f
+  Eigen::Index denominators() const noexcept;           ///< number of denominator coefficients
+  Eigen::Index delays() const noexcept;  ///< number of free delays: 0, 1 or n_y + n_u - 1
   Eigen::Index globals() const noexcept { return denominators() + delays(); }
   Eigen::Index parameters() const noexcept { return globals() + channels() * functions(); }
 };
@@ -81,24 +93,15 @@ FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
                                         bool with_derivatives);
 
-/// E = G - P and what follows from it.
-struct Residual {
-  Eigen::MatrixXd re;  ///< n_c x N
-  Eigen::MatrixXd im;
-  double cost = 0.0;  ///< 1/(2N) sum vec(E)^H W vec(E)
-};
-Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                  const Eigen::MatrixXd& B);
-
 /// The diagonal weights of a fit; for weight matrices their best diagonal. Variances from few degrees of freedom are smoothed over neighbouring
 /// lines, so that a weight does not depend on the very noise that it weighs (facts.md section 8).
 /// @throws std::invalid_argument if what the weighting needs is missing, zero or not finite.
-Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options);
+SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOptions& options);
 
 /// The variance v, n_c x N, for which W v W is E{W C W} on the average, W = make_weights() of a
-/// variance that is itself an estimate: weight and variance come from the same sample. Empty where
-/// variances do not weigh, or are exact (their degrees of freedom unknown).
-Eigen::MatrixXd weighed_variance(const FrfEstimate& frf, Weighting weighting);
+/// variance that is itself an estimate: weight and variance come from the same sample. None where
+/// variances do not weigh, or are exact (their degrees of freedom unknown). `frf` must outlive it.
+std::optional<LineVariance> weighed_variance(const FrfEstimate& frf, Weighting weighting);
 
 /// Runs task(0) .. task(count - 1) on up to `threads` threads. Which thread runs a task does not
 /// matter to the result.

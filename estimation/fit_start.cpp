@@ -80,14 +80,13 @@ void check_start(const FrfEstimate& frf, const AdditiveModel& start, const FitOp
 }
 
 FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
-                        const FitOptions& options, Eigen::MatrixXd W) {
+                        const FitOptions& options, SharedMatrix<Eigen::MatrixXd> W) {
   FitProblem problem;
   problem.lines = {frf.omega_rad_s(), frf.sample_rate_hz > 0.0 ? 1.0 / frf.sample_rate_hz : 0.0,
                    options.hold};
   problem.n_outputs = frf.n_outputs();
   problem.n_inputs = frf.n_inputs();
-  problem.G_re = frf.response.real();
-  problem.G_im = frf.response.imag();
+  problem.G = SharedMatrix<Eigen::MatrixXcd>::kept(frf.response);
   problem.W = std::move(W);
   for (const Submodel& s : start.submodels)
     problem.shapes.push_back({s.integrators, static_cast<int>(s.denominator.size()) - 1,

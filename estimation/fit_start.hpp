@@ -9,9 +9,10 @@ namespace stageid {
 void check_start(const FrfEstimate& frf, const AdditiveModel& start, const FitOptions& options);
 
 /// The data and the submodels' shapes, roles and held frequencies, with diagonal weights W, n_c x N.
+/// `frf` must outlive the problem, which refers to its response.
 /// @throws std::invalid_argument: more parameters than data
 FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
-                        const FitOptions& options, Eigen::MatrixXd W);
+                        const FitOptions& options, SharedMatrix<Eigen::MatrixXd> W);
 
 /// The start's values; delays from it where they are to be estimated and it has them.
 FitParameters make_parameters(const FitProblem& problem, const AdditiveModel& start,

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "estimation/arrow_system.hpp"
+#include "estimation/residual.hpp"
 #include "estimation/weight_matrices.hpp"
 
 namespace stageid {

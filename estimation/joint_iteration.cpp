@@ -25,15 +25,15 @@ class JointIteration {
         beta_(beta),
         options_(options),
         bounds_(problem, beta) {
-    const Residual G{problem.G_re, problem.G_im, 0.0};
-    signal_cost_ = weighted_cost(problem, weights, G);
+    signal_cost_ = weighted_cost(problem, weights, residual(problem, {}, {}));
   }
 
   IterationResult run() {
-    result_.E = residual_at(beta_);
-    result_.cost.push_back(result_.E.cost);
+    E_ = residual_at(beta_);
+    result_.cost.push_back(E_.cost);
     while (iterate_once()) {
     }
+    result_.end_cost = E_.cost;
     result_.frozen = frozen_;
     return std::move(result_);
   }
@@ -54,7 +54,7 @@ class JointIteration {
   /// @returns false at the end; `result_` then says why.
   bool iterate_once() {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const JointEquations equations(problem_, weights_, beta_, groups, result_.E);
+    const JointEquations equations(problem_, weights_, beta_, groups, E_);
     if (!equations.regular())
       return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
     const Eigen::VectorXd step = free_step(equations);
@@ -65,7 +65,7 @@ class JointIteration {
                              "first-order condition",
                              result_.iterations, deviations_));
     if (descend(equations, step)) return true;
-    if (result_.E.cost < kNothingLeft * signal_cost_)
+    if (E_.cost < kNothingLeft * signal_cost_)
       return end(FitStatus::step_small,
                  "the residual has reached rounding: no step lowers the cost any further");
     if (deviations_ < kRoundingDeviations)
@@ -90,10 +90,10 @@ class JointIteration {
   /// By the Newton decrement, over all parameters: the step's length in standard deviations of the
   /// noise that the residual shows, and as a part of that residual.
   bool at_optimum(double decrement) {
-    const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.E.cost;
+    const double squares = 2.0 * static_cast<double>(problem_.size()) * E_.cost;
     const double gradient = std::sqrt(std::max(decrement, 0.0) / std::max(squares, 1e-300));
     deviations_ = gradient * std::sqrt(static_cast<double>(problem_.size() * problem_.channels()));
-    if (result_.E.cost < 1e-28 * signal_cost_) {
+    if (E_.cost < 1e-28 * signal_cost_) {
       end(FitStatus::gradient_small, "the residual has reached rounding");
       return true;
     }
@@ -126,12 +126,12 @@ class JointIteration {
     trial.B += step.tail(step.size() - globals).reshaped(trial.B.rows(), trial.B.cols());
     if (!bounds_.stabilize(beta_, trial)) return false;
     Residual E = residual_at(trial);
-    if (!(E.cost < result_.E.cost)) return false;
+    if (!(E.cost < E_.cost)) return false;
     beta_ = std::move(trial);
-    result_.E = std::move(E);
-    result_.cost.push_back(result_.E.cost);
+    E_ = std::move(E);
+    result_.cost.push_back(E_.cost);
     ++result_.iterations;
-    if (options_.progress) options_.progress(result_.iterations, result_.E.cost);
+    if (options_.progress) options_.progress(result_.iterations, E_.cost);
     return true;
   }
 
@@ -141,6 +141,7 @@ class JointIteration {
   const FitOptions& options_;
   PoleBounds bounds_;
   std::vector<Eigen::Index> frozen_;
+  Residual E_;  // at beta_
   IterationResult result_;
   double signal_cost_ = 0.0;
   double deviations_ = 0.0;

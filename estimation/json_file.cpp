@@ -44,8 +44,10 @@ long long JsonNode::integer(long long lowest, long long highest) const {
   if (!value_.is_number_integer()) fail("must be a whole number");
   const auto number = value_.get<long long>();
   if (number < lowest || number > highest)
-    fail("must be a whole number from " + std::to_string(lowest) + " to " +
-         std::to_string(highest));
+    fail("is " + std::to_string(number) + " and must be " +
+         (lowest == highest ? std::to_string(lowest)
+                            : "a whole number from " + std::to_string(lowest) + " to " +
+                                  std::to_string(highest)));
   return number;
 }
 

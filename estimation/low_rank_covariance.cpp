@@ -21,20 +21,21 @@ std::vector<Eigen::Index> parameters_of(const FitProblem& problem, const FitPara
   return own;
 }
 
-/// Columns d vec(P)_c / d own parameters, N x own each.
+/// Columns d vec(P)_c / d own parameters on some lines, lines x own each.
 void free_columns(const FitProblem& problem, const FitParameters& beta,
                   const ResidueFactors& factors, const BasisGroup& group, Eigen::Index c,
-                  const std::vector<Eigen::Index>& own, Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
-  global_columns(problem, beta, group, c, derivative_columns(problem), re, im);
+                  const std::vector<Eigen::Index>& own, LineRange lines, Eigen::MatrixXd& re,
+                  Eigen::MatrixXd& im) {
+  global_columns(problem, beta, group, c, derivative_columns(problem), lines, re, im);
   const auto n = static_cast<Eigen::Index>(own.size());
-  re.conservativeResizeLike(Eigen::MatrixXd::Zero(problem.size(), n));
-  im.conservativeResizeLike(Eigen::MatrixXd::Zero(problem.size(), n));
+  re.conservativeResizeLike(Eigen::MatrixXd::Zero(lines.count, n));
+  im.conservativeResizeLike(Eigen::MatrixXd::Zero(lines.count, n));
   std::vector<ResidueFactors::Entry> entries;
   factors.channel_entries(beta, c, entries);
   for (const auto& [function, parameter, value] : entries) {
     const auto at = std::lower_bound(own.begin(), own.end(), parameter) - own.begin();
-    re.col(at) += value * group.F_re.col(function);
-    im.col(at) += value * group.F_im.col(function);
+    re.col(at) += value * group.F_re.col(function).segment(lines.first, lines.count);
+    im.col(at) += value * group.F_im.col(function).segment(lines.first, lines.count);
   }
 }
 
@@ -50,19 +51,18 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
   parallel_tasks(static_cast<int>(problem.n_inputs), problem.threads, [&](int u) {
     const auto input = static_cast<std::size_t>(u);
     own[input] = parameters_of(problem, beta, factors, n_y * u, n_y);
-    OutputColumns X;
-    X.re.resize(static_cast<std::size_t>(n_y));
-    X.im.resize(static_cast<std::size_t>(n_y));
-    for (Eigen::Index y = 0; y < n_y; ++y) {
+    Eigen::ArrayXXd scale(problem.size(), n_y);
+    for (Eigen::Index y = 0; y < n_y; ++y) scale.col(y) = noise_scale(problem, noise, n_y * u + y);
+    const auto of_output = [&](Eigen::Index y, LineRange lines, Eigen::MatrixXd& re,
+                               Eigen::MatrixXd& im) {
       const Eigen::Index c = y + n_y * u;
-      const auto at = static_cast<std::size_t>(y);
       free_columns(problem, beta, factors, *group_of[static_cast<std::size_t>(c)], c, own[input],
-                   X.re[at], X.im[at]);
-      const Eigen::ArrayXd scale = noise_scale(problem, noise, c);
-      X.re[at].array().colwise() *= scale;
-      X.im[at].array().colwise() *= scale;
-    }
-    parts[input] = correlated_gram(X, correlated(noise.correlation, X));
+                   lines, re, im);
+      re.array().colwise() *= scale.col(y).segment(lines.first, lines.count);
+      im.array().colwise() *= scale.col(y).segment(lines.first, lines.count);
+    };
+    parts[input] = correlated_gram(problem, noise.correlation,
+                                   static_cast<Eigen::Index>(own[input].size()), of_output);
   });
   for (std::size_t u = 0; u < parts.size(); ++u) K(own[u], own[u]) += parts[u];
   return K;
@@ -85,37 +85,39 @@ Eigen::VectorXd numerator_variances(const FitProblem& problem, const FitParamete
 }  // namespace
 
 ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitParameters& beta,
-                                        const Residual& E, const ResidueFactors& factors,
+                                        double cost, const ResidueFactors& factors,
                                         const DataNoise& noise,
-                                        const std::vector<Eigen::Index>& frozen) {
+                                        const std::vector<Eigen::Index>& frozen,
+                                        bool with_response) {
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
   const ArrowSystem gn(problem, beta, groups, FitMethod::gn);
   const Eigen::MatrixXd N = factors.reduced_matrix(beta, gn);
   Eigen::MatrixXd K = N;
-  if (noise.correlation.size() > 0) {
+  if (noise.correlation.known()) {
     K = correlated_middle(problem, beta, groups, factors, noise);
-  } else if (noise.variance.size() > 0) {
+  } else if (noise.variance) {
     const FitProblem weighed = middle_problem(problem, noise);
     K = factors.reduced_matrix(beta, ArrowSystem(weighed, beta, groups, FitMethod::gn));
   }
   ParameterCovariance out;
-  out.residual_scale = covariance_scale(problem, E, factors.size(), noise);
+  out.residual_scale = covariance_scale(problem, cost, factors.size(), noise);
   const Eigen::MatrixXd inverse = free_inverse(N, frozen);
   const Eigen::MatrixXd C = 0.5 * out.residual_scale * inverse * K * inverse.transpose();
   if (!C.allFinite()) return {};
 
   out.globals = C.topLeftCorner(problem.globals(), problem.globals());
   out.numerator_variance.resize(problem.channels(), problem.functions());
-  out.response_variance.resize(problem.channels(), problem.size());
+  if (with_response) out.response_variance.resize(problem.channels(), problem.size());
   for (const BasisGroup& group : groups)
     parallel_tasks(static_cast<int>(group.channels.size()), problem.threads, [&](int r) {
       const Eigen::Index c = group.channels[static_cast<std::size_t>(r)];
       const std::vector<Eigen::Index> own = parameters_of(problem, beta, factors, c, 1);
+      out.numerator_variance.row(c) = numerator_variances(problem, beta, factors, c, C).transpose();
+      if (!with_response) return;
       Eigen::MatrixXd re;
       Eigen::MatrixXd im;
-      free_columns(problem, beta, factors, group, c, own, re, im);
+      free_columns(problem, beta, factors, group, c, own, {0, problem.size()}, re, im);
       out.response_variance.row(c) = quadratic(re, im, C(own, own), re, im).transpose();
-      out.numerator_variance.row(c) = numerator_variances(problem, beta, factors, c, C).transpose();
     });
   return out;
 }

@@ -11,8 +11,9 @@ namespace stageid {
 /// The rank ties outputs and inputs of a mode together; their noise counts as correlated between the
 /// outputs of one input where noise.correlation says so. Empty where N is singular.
 ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitParameters& beta,
-                                        const Residual& E, const ResidueFactors& factors,
+                                        double cost, const ResidueFactors& factors,
                                         const DataNoise& noise,
-                                        const std::vector<Eigen::Index>& frozen);
+                                        const std::vector<Eigen::Index>& frozen,
+                                        bool with_response);
 
 }  // namespace stageid

@@ -8,6 +8,7 @@
 
 #include "estimation/low_rank_covariance.hpp"
 #include "estimation/pole_bounds.hpp"
+#include "estimation/residual.hpp"
 
 namespace stageid {
 namespace {
@@ -24,7 +25,7 @@ class LowRankIteration {
   LowRankResult run(const DataNoise& noise) {
     LowRankResult out;
     project();
-    result_.cost.push_back(result_.E.cost);
+    result_.cost.push_back(result_.end_cost);
     while (iterate_once() && result_.iterations < options_.max_iterations) {
     }
     if (result_.message.empty())
@@ -32,7 +33,8 @@ class LowRankIteration {
           fmt::format("residues of given rank: stopped after {} iterations, scaled gradient {:.2g}",
                       result_.iterations, gradient_));
     if (options_.uncertainty && result_.status != FitStatus::singular)
-      out.covariance = low_rank_covariance(problem_, beta_, result_.E, factors_, noise, frozen_);
+      out.covariance = low_rank_covariance(problem_, beta_, result_.end_cost, factors_, noise,
+                                           frozen_, options_.response_variance);
     result_.frozen = frozen_;
     out.parameters = factors_.size();
     out.ranks = factors_.ranks();
@@ -56,7 +58,7 @@ class LowRankIteration {
     weight /= weight.maxCoeff();
     factors_.project(beta_, weight);
     factors_.write_numerators(beta_);
-    result_.E = residual(problem_, groups, beta_.B);
+    result_.end_cost = residual_cost(problem_, groups, beta_.B);
   }
 
   Eigen::VectorXd solve(double damping) const {
@@ -83,7 +85,7 @@ class LowRankIteration {
     g_ = factors_.reduced_gradient(beta_, system);
     if (!N_.allFinite()) return end(FitStatus::singular, "the residue factors are not determined");
     frozen_ = bounds_.leaning(beta_, g_.head(problem_.globals()));
-    const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.E.cost;
+    const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.end_cost;
     gradient_ = 0.0;
     for (Eigen::Index i = 0; i < g_.size(); ++i)
       if (std::find(frozen_.begin(), frozen_.end(), i) == frozen_.end())
@@ -117,14 +119,14 @@ class LowRankIteration {
       ResidueFactors factors = factors_;
       factors.step(step);
       factors.write_numerators(trial);
-      Residual E = residual(problem_, evaluate_groups(problem_, trial, false), trial.B);
-      if (!(E.cost < result_.E.cost)) continue;
+      const double cost = residual_cost(problem_, evaluate_groups(problem_, trial, false), trial.B);
+      if (!(cost < result_.end_cost)) continue;
       beta_ = std::move(trial);
       factors_ = std::move(factors);
-      result_.E = std::move(E);
-      result_.cost.push_back(result_.E.cost);
+      result_.end_cost = cost;
+      result_.cost.push_back(cost);
       ++result_.iterations;
-      if (options_.progress) options_.progress(result_.iterations, result_.E.cost);
+      if (options_.progress) options_.progress(result_.iterations, cost);
       levenberg_ = levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0;
       return true;
     }

@@ -179,19 +179,35 @@ bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairR
   return true;
 }
 
-void add_removal_costs(const FitProblem& problem, const std::vector<ScaledNormalEquations>& factors,
-                       const Eigen::Index* channels, const Eigen::MatrixXd& B,
-                       std::vector<double>& costs) {
+/// Calls visit(i, C_i^-1) for every submodel of a channel with the normal equations M: C_i is its block of
+/// M^-1.
+template <typename Visit>
+void visit_submodels(const FitProblem& problem, const Eigen::MatrixXd& M, Visit visit) {
   const Eigen::Index n_f = problem.functions();
-  for (std::size_t c = 0; c < factors.size(); ++c) {
-    if (!factors[c].ok()) continue;
-    const Eigen::MatrixXd inverse = factors[c].solve(Eigen::MatrixXd::Identity(n_f, n_f));
-    Eigen::Index f = 0;
-    for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
-      const Eigen::Index n = problem.shapes[i].functions();
-      const Eigen::VectorXd b = B.row(channels[c]).segment(f, n).transpose();
-      costs[i] += b.dot(Eigen::MatrixXd(inverse.block(f, f, n, n)).llt().solve(b));
-      f += n;
+  const ScaledNormalEquations factor(M);
+  if (!factor.ok()) return;
+  const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(n_f, n_f));
+  Eigen::Index f = 0;
+  for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
+    const Eigen::Index n = problem.shapes[i].functions();
+    const Eigen::MatrixXd C = inverse.block(f, f, n, n);
+    visit(i, f, Eigen::MatrixXd(C.llt().solve(Eigen::MatrixXd::Identity(n, n))));
+    f += n;
+  }
+}
+
+/// Calls visit(c, M) for every channel with its normal equations, members of a block on all threads.
+template <typename Visit>
+void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
+  for (const BasisGroup& group : groups) {
+    const PairReduction pairs = function_pairs(problem, group);
+    for (const TileRange& block :
+         member_blocks(0, static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
+      const Eigen::MatrixXd FF = gram_sums(problem, group, pairs, block).FF;
+      parallel_tasks(static_cast<int>(FF.cols()), problem.threads, [&](int r) {
+        visit(group.channels[static_cast<std::size_t>(block.first_member + r)],
+              from_triangle(FF.col(r), problem.functions()));
+      });
     }
   }
 }
@@ -206,7 +222,7 @@ bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& 
   for (const BasisGroup& group : groups) {
     const PairReduction pairs = function_pairs(problem, group);
     for (const TileRange& block :
-         member_blocks(static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
+         member_blocks(0, static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
       double squares = 0.0;
       if (!solve_block(problem, group, pairs, block, of_block, squares)) return false;
       sum += squares;
@@ -226,12 +242,12 @@ void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>&
     parallel_tasks(static_cast<int>(group.channels.size()), problem.threads, [&](int member) {
       const Eigen::Index c = group.channels[static_cast<std::size_t>(member)];
       const Eigen::Index N = problem.size();
-      const Eigen::VectorXd root = problem.W.row(c).transpose().cwiseSqrt();
+      const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
       Eigen::MatrixXd A(2 * N, problem.functions());
       A << root.asDiagonal() * group.F_re, root.asDiagonal() * group.F_im;
       Eigen::VectorXd rest(2 * N);
-      rest << root.cwiseProduct(problem.G_re.row(c).transpose()),
-          root.cwiseProduct(problem.G_im.row(c).transpose());
+      rest << root.cwiseProduct(problem.G->row(c).real().transpose()),
+          root.cwiseProduct(problem.G->row(c).imag().transpose());
       const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
       A *= scale.asDiagonal();
       const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(A);
@@ -251,18 +267,35 @@ void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>&
 
 std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                                   const Eigen::MatrixXd& B) {
-  const Eigen::Index n_f = problem.functions();
-  std::vector<double> costs(problem.shapes.size(), 0.0);
-  for (const BasisGroup& group : groups) {
-    const PairReduction pairs = function_pairs(problem, group);
-    for (const TileRange& block :
-         member_blocks(static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
-      const std::vector<ScaledNormalEquations> factors =
-          normal_equations(gram_sums(problem, group, pairs, block).FF, n_f);
-      add_removal_costs(problem, factors, group.channels.data() + block.first_member, B, costs);
-    }
-  }
-  return costs;
+  Eigen::MatrixXd costs =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(problem.shapes.size()), problem.channels());
+  visit_channels(problem, groups, [&](Eigen::Index c, const Eigen::MatrixXd& M) {
+    visit_submodels(problem, M, [&](std::size_t i, Eigen::Index f, const Eigen::MatrixXd& inverse) {
+      const Eigen::VectorXd b = B.row(c).segment(f, inverse.cols()).transpose();
+      costs(static_cast<Eigen::Index>(i), c) = b.dot(inverse * b);
+    });
+  });
+  std::vector<double> out(problem.shapes.size(), 0.0);
+  for (Eigen::Index c = 0; c < costs.cols(); ++c)
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] += costs(static_cast<Eigen::Index>(i), c);
+  return out;
+}
+
+double shrink_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                         const std::vector<double>& share, Eigen::MatrixXd& B) {
+  Eigen::VectorXd rise = Eigen::VectorXd::Zero(problem.channels());
+  visit_channels(problem, groups, [&](Eigen::Index c, const Eigen::MatrixXd& M) {
+    Eigen::MatrixXd penalty = Eigen::MatrixXd::Zero(M.rows(), M.cols());
+    visit_submodels(problem, M, [&](std::size_t i, Eigen::Index f, const Eigen::MatrixXd& inverse) {
+      penalty.block(f, f, inverse.rows(), inverse.cols()) = share[i] / (1.0 - share[i]) * inverse;
+    });
+    const ScaledNormalEquations penalized(M + penalty);
+    if (!penalized.ok()) return;
+    const Eigen::VectorXd change = penalized.solve(-penalty * B.row(c).transpose());
+    rise[c] = change.dot(M * change);
+    B.row(c) += change.transpose();
+  });
+  return rise.sum();
 }
 
 }  // namespace stageid

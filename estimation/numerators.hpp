@@ -23,4 +23,11 @@ void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>&
 std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                                   const Eigen::MatrixXd& B);
 
+/// Numerators of least sum W |E|^2 + sum_i s_i / (1 - s_i) b_i' C_i^-1 b_i: by itself submodel i would keep
+/// 1 - s_i of its numerators b_i. C_i is the block of the inverse normal equations.
+/// @param share s, 0 <= s < 1; one entry a submodel  @pre `B` solves the convex problem
+/// @returns what sum W |E|^2 rises by
+double shrink_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                         const std::vector<double>& share, Eigen::MatrixXd& B);
+
 }  // namespace stageid

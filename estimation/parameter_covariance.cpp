@@ -6,84 +6,96 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <optional>
 
 #include "estimation/weighted_products.hpp"
 
 namespace stageid {
 namespace {
 
-/// Above this, a residual cannot be the noise alone.
-constexpr double kClearlyTooLarge = 1.5;
 // Of conjugate gradients; with their residual, variances have its square.
 constexpr double kColumnTolerance = 1e-2;
 
-/// K = sum Re{J^H W C W J} with the numerators' part of the globals' columns taken away: J_a - F Z.
-struct Middle {
-  Eigen::MatrixXd globals;
-  std::vector<Eigen::MatrixXd> cross;  ///< globals x n_f, one a channel
-  std::vector<Eigen::MatrixXd> own;    ///< n_f x n_f, one a channel
-};
-
-/// The part of those columns that the channel's numerators cannot follow: J_a - F Z, with Z the
+/// The part of the globals' columns that the channel's numerators cannot follow: J_a - F Z, with Z the
 /// channel's rows of M_bb^-1 M_ba.
 void projected_columns(const FitProblem& problem, const FitParameters& beta,
                        const BasisGroup& group, const Eigen::MatrixXd& Z, Eigen::Index c,
-                       const std::vector<DerivativeColumn>& columns, Eigen::MatrixXd& re,
-                       Eigen::MatrixXd& im) {
-  global_columns(problem, beta, group, c, columns, re, im);
-  re -= group.F_re * Z;
-  im -= group.F_im * Z;
+                       const std::vector<DerivativeColumn>& columns, LineRange lines,
+                       Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+  global_columns(problem, beta, group, c, columns, lines, re, im);
+  re -= group.F_re.middleRows(lines.first, lines.count) * Z;
+  im -= group.F_im.middleRows(lines.first, lines.count) * Z;
 }
 
-/// The channels' noise uncorrelated: `K` are the equations with the weights W C W.
-Middle diagonal_middle(const ArrowSystem& gn, const ArrowSystem& K) {
-  Middle out;
-  out.globals = K.M_globals();
-  for (std::size_t c = 0; c < gn.channels().size(); ++c) {
-    const Eigen::MatrixXd& Z = gn.channels()[c].Z;
-    const ArrowSystem::Channel& k = K.channels()[c];
-    out.globals -= Z.transpose() * k.ba + k.ab * Z;
-    out.globals += Z.transpose() * k.bb * Z;
-    out.cross.emplace_back(k.ab - Z.transpose() * k.bb);
-    out.own.push_back(k.bb);
+/// Channels whose equations are kept at a time: whole inputs where their outputs are correlated.
+std::vector<ChannelRange> channel_parts(const FitProblem& problem, const DataNoise& noise) {
+  const Eigen::Index together = noise.correlation.known() ? problem.n_outputs : 1;
+  const Eigen::Index most = std::max<Eigen::Index>(1, kMostMembers / together) * together;
+  std::vector<ChannelRange> parts;
+  for (Eigen::Index c = 0; c < problem.channels(); c += most)
+    parts.push_back({c, std::min(most, problem.channels() - c)});
+  return parts;
+}
+
+/// The equations of some channels, M and K = sum Re{J^H W C W J}, the channels' noise uncorrelated.
+struct PartEquations {
+  ArrowSystem gn;
+  std::optional<ArrowSystem> weighed;  ///< with the weights W C W; nothing: K = M
+  const ArrowSystem& middle() const { return weighed ? *weighed : gn; }
+};
+
+/// K for the globals with the numerators' part of their columns taken away, J_a - F Z.
+Eigen::MatrixXd projected_middle(const PartEquations& part, ChannelRange range) {
+  Eigen::MatrixXd K = part.middle().M_globals();
+  for (Eigen::Index c = range.first; c < range.first + range.count; ++c) {
+    const Eigen::MatrixXd& Z = part.gn.channel(c).Z;
+    const ArrowSystem::Channel& k = part.middle().channel(c);
+    K -= Z.transpose() * k.ba + k.ab * Z;
+    K += Z.transpose() * k.bb * Z;
   }
-  return out;
+  return K;
 }
 
-/// Globals and cross terms again, the outputs of one input correlated.
-void correlate_outputs(const FitProblem& problem, const FitParameters& beta,
-                       const std::vector<BasisGroup>& groups, const ArrowSystem& gn,
-                       const DataNoise& noise, Middle& middle) {
+/// The same, the outputs of one input correlated. @param cross of every channel with its numerators,
+/// globals x n_f each: those of the part are filled
+Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
+                                  const std::vector<const BasisGroup*>& group_of,
+                                  const PartEquations& part, ChannelRange range,
+                                  const DataNoise& noise, std::vector<Eigen::MatrixXd>& cross) {
   const Eigen::Index n_y = problem.n_outputs;
   const auto columns = derivative_columns(problem);
-  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
-  std::vector<Eigen::MatrixXd> parts(static_cast<std::size_t>(problem.n_inputs));
-  parallel_tasks(static_cast<int>(problem.n_inputs), problem.threads, [&](int u) {
-    OutputColumns X;
-    X.re.resize(static_cast<std::size_t>(n_y));
-    X.im.resize(static_cast<std::size_t>(n_y));
-    for (Eigen::Index y = 0; y < n_y; ++y) {
-      const auto c = static_cast<std::size_t>(y + n_y * u);
-      const auto at = static_cast<std::size_t>(y);
-      projected_columns(problem, beta, *group_of[c], gn.channels()[c].Z, y + n_y * u, columns,
-                        X.re[at], X.im[at]);
-      const Eigen::ArrayXd scale = noise_scale(problem, noise, y + n_y * u);
-      X.re[at].array().colwise() *= scale;
-      X.im[at].array().colwise() *= scale;
-    }
-    const OutputColumns Y = correlated(noise.correlation, X);
-    parts[static_cast<std::size_t>(u)] = correlated_gram(X, Y);
-    for (Eigen::Index y = 0; y < n_y; ++y) {
-      const auto c = static_cast<std::size_t>(y + n_y * u);
-      const auto at = static_cast<std::size_t>(y);
-      const Eigen::ArrayXd scale = noise_scale(problem, noise, y + n_y * u);
-      const Eigen::MatrixXd F_re = group_of[c]->F_re.array().colwise() * scale;
-      const Eigen::MatrixXd F_im = group_of[c]->F_im.array().colwise() * scale;
-      middle.cross[c] = Y.re[at].transpose() * F_re + Y.im[at].transpose() * F_im;
-    }
+  std::vector<Eigen::MatrixXd> inputs(static_cast<std::size_t>(range.count / n_y));
+  parallel_tasks(static_cast<int>(inputs.size()), problem.threads, [&](int u) {
+    const Eigen::Index first = range.first + n_y * u;
+    Eigen::ArrayXXd scale(problem.size(), n_y);
+    for (Eigen::Index y = 0; y < n_y; ++y) scale.col(y) = noise_scale(problem, noise, first + y);
+    const auto of_output = [&](Eigen::Index y, LineRange lines, Eigen::MatrixXd& re,
+                               Eigen::MatrixXd& im) {
+      const Eigen::Index c = first + y;
+      projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)], part.gn.channel(c).Z,
+                        c, columns, lines, re, im);
+      re.array().colwise() *= scale.col(y).segment(lines.first, lines.count);
+      im.array().colwise() *= scale.col(y).segment(lines.first, lines.count);
+    };
+    for (Eigen::Index y = 0; y < n_y; ++y)
+      cross[static_cast<std::size_t>(first + y)].setZero(problem.globals(), problem.functions());
+    const auto add_cross = [&](LineRange lines, const OutputColumns& Y) {
+      for (Eigen::Index y = 0; y < n_y; ++y) {
+        const auto c = static_cast<std::size_t>(first + y);
+        const auto at = static_cast<std::size_t>(y);
+        const auto weight = scale.col(y).segment(lines.first, lines.count);
+        const auto F_re = group_of[c]->F_re.middleRows(lines.first, lines.count).array();
+        const auto F_im = group_of[c]->F_im.middleRows(lines.first, lines.count).array();
+        cross[c] += Y.re[at].transpose() * (F_re.colwise() * weight).matrix() +
+                    Y.im[at].transpose() * (F_im.colwise() * weight).matrix();
+      }
+    };
+    inputs[static_cast<std::size_t>(u)] =
+        correlated_gram(problem, noise.correlation, problem.globals(), of_output, add_cross);
   });
-  middle.globals.setZero();
-  for (const Eigen::MatrixXd& part : parts) middle.globals += part;
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(problem.globals(), problem.globals());
+  for (const Eigen::MatrixXd& input : inputs) K += input;
+  return K;
 }
 
 /// What is known of one channel's numerators: Cov(nu_c) and Cov(a, nu_c), and Z.
@@ -96,47 +108,40 @@ struct ChannelCovariance {
 /// The variances of the channel's numerators and response; out.globals stands.
 void fill_channel(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
                   Eigen::Index c, const ChannelCovariance& channel, ParameterCovariance& out) {
+  const Eigen::MatrixXd& Z = channel.Z;
   Eigen::VectorXd numerators = channel.own.diagonal();
-  Eigen::VectorXd total = quadratic(group.F_re, group.F_im, channel.own, group.F_re, group.F_im);
-  if (problem.globals() > 0) {
-    const Eigen::MatrixXd& Z = channel.Z;
+  if (problem.globals() > 0)
     numerators +=
         (Z * out.globals).cwiseProduct(Z).rowwise().sum() - 2.0 * (Z * channel.cross).diagonal();
+  out.numerator_variance.row(c) = numerators.transpose();
+  if (out.response_variance.size() == 0) return;
+  Eigen::VectorXd total = quadratic(group.F_re, group.F_im, channel.own, group.F_re, group.F_im);
+  if (problem.globals() > 0) {
     Eigen::MatrixXd J_re;
     Eigen::MatrixXd J_im;
-    projected_columns(problem, beta, group, Z, c, derivative_columns(problem), J_re, J_im);
+    projected_columns(problem, beta, group, Z, c, derivative_columns(problem), {0, problem.size()},
+                      J_re, J_im);
     total += quadratic(J_re, J_im, out.globals, J_re, J_im);
     total += 2.0 * quadratic(J_re, J_im, channel.cross, group.F_re, group.F_im);
   }
-  out.numerator_variance.row(c) = numerators.transpose();
   out.response_variance.row(c) = total.transpose();
 }
 
-/// Calls task(group, channel) for all channels; the result is empty unless all return true.
-void fill_channels(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                   ParameterCovariance& out,
-                   const std::function<bool(const BasisGroup&, Eigen::Index)>& task) {
+void resize(const FitProblem& problem, bool with_response, ParameterCovariance& out) {
   out.numerator_variance.setZero(problem.channels(), problem.functions());
-  out.response_variance.setZero(problem.channels(), problem.size());
+  if (with_response) out.response_variance.setZero(problem.channels(), problem.size());
+}
+
+/// Calls task(channel) for some channels. @returns whether all return true
+bool fill_channels(ChannelRange range, int threads, const std::function<bool(Eigen::Index)>& task) {
   std::atomic<bool> determined = true;
-  for (const BasisGroup& group : groups)
-    parallel_tasks(static_cast<int>(group.channels.size()), problem.threads, [&](int r) {
-      if (!task(group, group.channels[static_cast<std::size_t>(r)])) determined = false;
-    });
-  if (!determined) out = {};
+  parallel_tasks(static_cast<int>(range.count), threads, [&](int r) {
+    if (!task(range.first + r)) determined = false;
+  });
+  return determined;
 }
 
 }  // namespace
-
-double residual_per_degree(const FitProblem& problem, const Residual& E, Eigen::Index parameters) {
-  const double data = static_cast<double>(problem.size() * problem.channels());
-  return 2.0 * static_cast<double>(problem.size()) * E.cost /
-         std::max(data - 0.5 * static_cast<double>(parameters), 1.0);
-}
-
-double residual_scale(double per_degree, bool likelihood) {
-  return likelihood && per_degree < kClearlyTooLarge ? 1.0 : per_degree;
-}
 
 Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen) {
   if (S.size() == 0) return S;
@@ -170,68 +175,71 @@ std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
   return out;
 }
 
-Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c) {
-  const Eigen::ArrayXd W = problem.W.row(c).transpose().array();
-  if (noise.variance.size() == 0) return W.sqrt();
-  return W * noise.variance.row(c).transpose().array().sqrt();
-}
-
-FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise) {
-  FitProblem middle = problem;
-  middle.W = problem.W.cwiseProduct(problem.W).cwiseProduct(noise.variance);
-  return middle;
-}
-
-double covariance_scale(const FitProblem& problem, const Residual& E, Eigen::Index parameters,
-                        const DataNoise& noise) {
-  if (noise.knowledge == VarianceKnowledge::given) return 1.0;
-  return residual_scale(residual_per_degree(problem, E, parameters),
-                        noise.knowledge == VarianceKnowledge::weights);
-}
-
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
-                                         const std::vector<BasisGroup>& groups, const Residual& E,
-                                         const ArrowSystem& gn, const DataNoise& noise,
-                                         const std::vector<Eigen::Index>& frozen) {
+                                         const std::vector<BasisGroup>& groups, double cost,
+                                         const DataNoise& noise,
+                                         const std::vector<Eigen::Index>& frozen,
+                                         bool with_response) {
   ParameterCovariance out;
-  if (!gn.regular()) return out;
-  out.residual_scale = covariance_scale(problem, E, problem.parameters(), noise);
+  out.residual_scale = covariance_scale(problem, cost, problem.parameters(), noise);
   const double half = 0.5 * out.residual_scale;
+  const bool correlate = problem.globals() > 0 && noise.correlation.known();
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
+  const std::vector<ChannelRange> parts = channel_parts(problem, noise);
+  std::optional<FitProblem> weighed;
+  if (noise.variance) weighed = middle_problem(problem, noise);
+  std::optional<PartEquations> equations;
+  const auto make_equations = [&](ChannelRange part) {
+    equations.emplace(
+        PartEquations{ArrowSystem(problem, beta, groups, FitMethod::gn, part), std::nullopt});
+    if (weighed) equations->weighed.emplace(*weighed, beta, groups, FitMethod::gn, part);
+  };
 
-  Middle middle;
-  if (noise.variance.size() > 0) {
-    const FitProblem weighed = middle_problem(problem, noise);
-    middle = diagonal_middle(gn, ArrowSystem(weighed, beta, groups, FitMethod::gn));
-  } else {
-    middle = diagonal_middle(gn, gn);
+  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(problem.globals(), problem.globals());
+  Eigen::MatrixXd K = S;
+  std::vector<Eigen::MatrixXd> cross(correlate ? static_cast<std::size_t>(problem.channels())
+                                               : std::size_t{0});
+  for (const ChannelRange part : parts) {
+    make_equations(part);
+    if (!equations->gn.regular()) return {};
+    S += equations->gn.schur();
+    K += correlate ? correlated_middle(problem, beta, group_of, *equations, part, noise, cross)
+                   : projected_middle(*equations, part);
   }
-  if (problem.globals() > 0 && noise.correlation.size() > 0)
-    correlate_outputs(problem, beta, groups, gn, noise, middle);
-  const Eigen::MatrixXd inverse = free_inverse(gn.schur(), frozen);
-  if (problem.globals() > 0) out.globals = half * inverse * middle.globals * inverse.transpose();
+  const Eigen::MatrixXd inverse = free_inverse(S, frozen);
+  if (problem.globals() > 0) out.globals = half * inverse * K * inverse.transpose();
 
+  // The equations of a part are made once more: kept, all of them would outgrow the data.
+  resize(problem, with_response, out);
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
-  fill_channels(problem, groups, out, [&](const BasisGroup& group, Eigen::Index c) {
-    const auto at = static_cast<std::size_t>(c);
-    Eigen::MatrixXd bb_inverse;
-    if (!solve_scaled(gn.channels()[at].bb, unit, bb_inverse)) return false;
-    fill_channel(problem, beta, group, c,
-                 {half * bb_inverse * middle.own[at] * bb_inverse,
-                  half * inverse * middle.cross[at] * bb_inverse, gn.channels()[at].Z},
-                 out);
-    return true;
-  });
+  for (const ChannelRange part : parts) {
+    if (parts.size() > 1) make_equations(part);
+    const bool determined = fill_channels(part, problem.threads, [&](Eigen::Index c) {
+      const ArrowSystem::Channel& gn = equations->gn.channel(c);
+      const ArrowSystem::Channel& k = equations->middle().channel(c);
+      Eigen::MatrixXd bb_inverse;
+      if (!solve_scaled(gn.bb, unit, bb_inverse)) return false;
+      const auto at = static_cast<std::size_t>(c);
+      const Eigen::MatrixXd& k_ab =
+          correlate ? cross[at] : Eigen::MatrixXd(k.ab - gn.Z.transpose() * k.bb);
+      fill_channel(
+          problem, beta, *group_of[at], c,
+          {half * bb_inverse * k.bb * bb_inverse, half * inverse * k_ab * bb_inverse, gn.Z}, out);
+      return true;
+    });
+    if (!determined) return {};
+  }
   return out;
 }
 
 ParameterCovariance joint_covariance(const FitProblem& problem, const FitParameters& beta,
-                                     const std::vector<BasisGroup>& groups, const Residual& E,
+                                     const std::vector<BasisGroup>& groups, double cost,
                                      const JointEquations& equations, VarianceKnowledge knowledge,
-                                     double scatter_factor,
-                                     const std::vector<Eigen::Index>& frozen) {
+                                     double scatter_factor, const std::vector<Eigen::Index>& frozen,
+                                     bool with_response) {
   ParameterCovariance out;
   if (!equations.regular()) return out;
-  out.residual_scale = residual_scale(residual_per_degree(problem, E, problem.parameters()),
+  out.residual_scale = residual_scale(residual_per_degree(problem, cost, problem.parameters()),
                                       knowledge == VarianceKnowledge::weights);
   const double half = 0.5 * scatter_factor * out.residual_scale;
 
@@ -254,15 +262,20 @@ ParameterCovariance joint_covariance(const FitProblem& problem, const FitParamet
 
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
   const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(globals, problem.functions());
-  fill_channels(problem, groups, out, [&](const BasisGroup& group, Eigen::Index c) {
-    const auto& arrow = equations.preconditioner().channels()[static_cast<std::size_t>(c)];
-    Eigen::MatrixXd own;
-    if (!solve_scaled(arrow.bb, unit, own)) return false;
-    const Eigen::MatrixXd Z_c =
-        Z(Eigen::seqN(c, problem.functions(), problem.channels()), Eigen::all);
-    fill_channel(problem, beta, group, c, {half * own, none, Z_c}, out);
-    return true;
-  });
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
+  resize(problem, with_response, out);
+  const bool determined =
+      fill_channels({0, problem.channels()}, problem.threads, [&](Eigen::Index c) {
+        const ArrowSystem::Channel& arrow = equations.preconditioner().channel(c);
+        Eigen::MatrixXd own;
+        if (!solve_scaled(arrow.bb, unit, own)) return false;
+        const Eigen::MatrixXd Z_c =
+            Z(Eigen::seqN(c, problem.functions(), problem.channels()), Eigen::all);
+        fill_channel(problem, beta, *group_of[static_cast<std::size_t>(c)], c,
+                     {half * own, none, Z_c}, out);
+        return true;
+      });
+  if (!determined) return {};
   return out;
 }
 

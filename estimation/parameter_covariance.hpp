@@ -5,7 +5,7 @@
 
 #include "estimation/arrow_system.hpp"
 #include "estimation/channel_equations.hpp"
-#include "estimation/correlated_outputs.hpp"
+#include "estimation/data_noise.hpp"
 #include "estimation/joint_equations.hpp"
 
 namespace stageid {
@@ -13,23 +13,8 @@ namespace stageid {
 struct ParameterCovariance {
   Eigen::MatrixXd globals;             ///< of denominator coefficients and delays
   Eigen::MatrixXd numerator_variance;  ///< of B, n_c x n_f
-  Eigen::MatrixXd response_variance;   ///< E|dP|^2, n_c x N
+  Eigen::MatrixXd response_variance;   ///< E|dP|^2, n_c x N; empty if not asked for
   double residual_scale = 1.0;  ///< what variances were multiplied with (unknown or too small)
-};
-
-/// What is known about the data's variance.
-enum class VarianceKnowledge : std::uint8_t {
-  weights,  ///< W is its inverse, exactly or as far as it was estimated: maximum likelihood
-  given,    ///< another variance than the weights': sandwich form
-  none      ///< proportional to 1/W, scaled by the residual
-};
-
-/// The noise of the data as far as it is known.
-struct DataNoise {
-  VarianceKnowledge knowledge = VarianceKnowledge::none;
-  Eigen::MatrixXd variance;  ///< n_c x N; empty: 1/W, up to a scale with `none`
-  Eigen::MatrixXcd
-      correlation;  ///< (n_y n_y) x N: of the outputs for one input; empty: uncorrelated
 };
 
 /// First-order covariance of the estimate. With M = sum Re{J^H W J} and K = sum Re{J^H W C W J},
@@ -41,12 +26,16 @@ struct DataNoise {
 /// that, the covariance does not. Noise of different inputs counts as uncorrelated.
 /// Where W is the inverse variance but the residual is clearly larger than it predicts, the covariance is
 /// raised by that ratio (`residual_scale`). Empty where numerators are not determined.
-/// @param gn the Gauss-Newton system at the estimate
+/// The equations are made in parts of channels, once for the globals and once for the rest: memory is
+/// that of a part.
+/// @param groups evaluated with derivatives at the estimate   @param cost there
 /// @param frozen globals that are not unknowns (a mode at its bound): known exactly here
+/// @param with_response false: no response_variance, which is as large as the data's
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
-                                         const std::vector<BasisGroup>& groups, const Residual& E,
-                                         const ArrowSystem& gn, const DataNoise& noise,
-                                         const std::vector<Eigen::Index>& frozen = {});
+                                         const std::vector<BasisGroup>& groups, double cost,
+                                         const DataNoise& noise,
+                                         const std::vector<Eigen::Index>& frozen,
+                                         bool with_response);
 
 /// The same for weight matrices that are the noise's inverse covariance (`knowledge` weights, then
 /// multiplied by WeightMatrices::scatter_factor()) or proportional to it (none):
@@ -60,30 +49,12 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
 /// too narrow; the exact one would take a solution for every numerator. The same holds for the
 /// numerators' variances.
 ParameterCovariance joint_covariance(const FitProblem& problem, const FitParameters& beta,
-                                     const std::vector<BasisGroup>& groups, const Residual& E,
+                                     const std::vector<BasisGroup>& groups, double cost,
                                      const JointEquations& equations, VarianceKnowledge knowledge,
-                                     double scatter_factor,
-                                     const std::vector<Eigen::Index>& frozen = {});
+                                     double scatter_factor, const std::vector<Eigen::Index>& frozen,
+                                     bool with_response);
 
 // Parts of it that fits of another structure use too.
-
-/// sum W |E|^2 per complex degree of freedom: 1 where W is the inverse variance and the model right.
-double residual_per_degree(const FitProblem& problem, const Residual& E, Eigen::Index parameters);
-
-/// What variances are multiplied with: 1 where the weights are inverse variances (`likelihood`) and the
-/// residual is not clearly larger than they predict, else the residual per degree of freedom.
-double residual_scale(double per_degree, bool likelihood);
-
-/// That scale for what is known of the noise: 1 where the variance is given apart from the weights.
-double covariance_scale(const FitProblem& problem, const Residual& E, Eigen::Index parameters,
-                        const DataNoise& noise);
-
-/// The problem whose Gauss-Newton matrix is K for uncorrelated noise: weights W C W.
-/// @pre noise.variance is known
-FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise);
-
-/// W C^1/2 of one channel on every line, for correlated().
-Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c);
 
 /// A channel's group, one entry a channel.
 std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,

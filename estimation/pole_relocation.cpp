@@ -1,14 +1,14 @@
 #include "estimation/pole_relocation.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <optional>
 
-#include "estimation/fit_problem.hpp"
 #include "estimation/pole_set.hpp"
+#include "estimation/sigma_equations.hpp"
 
 namespace stageid {
 namespace {
@@ -16,64 +16,36 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr int kIterations = 20;
-constexpr int kShares = 8;
 constexpr double kSettled = 1e-3;   // move of every pole in its own half-power widths
 constexpr double kPathShare = 0.5;  // of the start: by the path of log H, the rest by lines
 constexpr double kStartDamping = 0.01;
 constexpr double kLeastDamping = 1e-5;
 constexpr double kLinesWide = 3.0;  // of a pole's half-power width at least, but see narrowest()
-constexpr double kShift = 1e-13;    // makes Gram matrices of unit columns factor
-constexpr double kAccurate = 1e-4;  // relative residual below which one Gram matrix loses too much
+constexpr double kExact = 2e-11;    // relative residual that only rounding leaves
+constexpr double kAccurate = 1e-4;  // relative residual below which sums lose too much
 
 Eigen::VectorXcd complex(const SplitMatrix& column) {
   return column.re.cast<Complex>() + Complex(0.0, 1.0) * column.im.cast<Complex>();
-}
-
-/// R of A = Q R by the Cholesky factor of its Gram matrix; A becomes Q. Columns that depend on others to
-/// within 1e-7 are not orthonormal then: a second call, on Q, mends that (Yamamoto et al., ETNA 44
-/// (2015) 306).
-Eigen::MatrixXd gram_factor(Eigen::MatrixXd& A, bool orthogonalize) {
-  const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
-  A *= scale.asDiagonal();
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(A.cols(), A.cols());
-  gram.selfadjointView<Eigen::Upper>().rankUpdate(A.transpose());
-  gram.diagonal().array() += kShift;
-  const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> factor(gram);
-  const Eigen::MatrixXd R = factor.matrixU();
-  if (orthogonalize) factor.matrixU().solveInPlace<Eigen::OnTheRight>(A);
-  return R * scale.cwiseInverse().asDiagonal();
-}
-
-/// The triangle R of [R; further] = Q R.
-void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
-  Eigen::MatrixXd both(R.rows() + further.rows(), R.cols());
-  both << R, further;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(std::move(both));
-  R = qr.matrixQR().topRows(R.cols()).triangularView<Eigen::Upper>();
 }
 
 class Relocation {
  public:
   Relocation(const FrfEstimate& frf, const AdditiveModel& model, const Eigen::MatrixXd& weights,
              int threads)
-      : weights_(weights),
-        threads_(threads),
-        exact_(model.hold == HoldModel::exact),
+      : exact_(model.hold == HoldModel::exact),
         lines_{frf.omega_rad_s(), frf.sample_rate_hz > 0.0 ? 1.0 / frf.sample_rate_hz : 0.0,
                model.hold} {
     const LineOperator through(lines_, model.mean_delay_s());
-    x_ = complex(through.x());
+    const Eigen::VectorXcd x = complex(through.x());
     // Delay and hold out of the data: the rest is rational in x.
     const Eigen::VectorXcd factor = complex(through.first());
-    H_ = frf.response * factor.cwiseInverse().asDiagonal();
-    size_ = factor.cwiseAbs();
     signal_ = (weights.array() * frf.response.cwiseAbs2().array()).sum();
     for (const Submodel& s : model.submodels) {
       integrators_ = std::max(integrators_, s.integrators);
       constant_ = constant_ || (s.integrators == 0 && s.denominator.size() == 1);
     }
     constant_ = constant_ || exact_;  // a held input leaves one
-    own_ = beside();
+    equations_.emplace(x, exact_, frf.response, factor, weights, beside(x), threads);
   }
 
   std::vector<ModeCandidate> run(std::size_t modes) {
@@ -87,13 +59,14 @@ class Relocation {
   /// Poles where the response turns: as much of the path of log H, all channels together, between any two
   /// of them, and as many lines, half and half.
   void spread(std::size_t modes) {
+    const Eigen::MatrixXcd& H = equations_->H();
     const Eigen::VectorXd& omega = lines_.omega_rad_s;
     const Eigen::Index last = omega.size() - 1;
     Eigen::VectorXd path = Eigen::VectorXd::Zero(omega.size());
     for (Eigen::Index k = 1; k <= last; ++k) {
       double step = 0.0;
-      for (Eigen::Index c = 0; c < H_.rows(); ++c) {
-        const double turn = std::abs(std::log(H_(c, k) / H_(c, k - 1)));
+      for (Eigen::Index c = 0; c < H.rows(); ++c) {
+        const double turn = std::abs(std::log(H(c, k) / H(c, k - 1)));
         if (std::isfinite(turn)) step += turn;
       }
       path[k] = path[k - 1] + step;
@@ -119,11 +92,11 @@ class Relocation {
   Complex to_s(Complex x) const { return exact_ ? std::log(x) / lines_.sample_period_s : x; }
 
   /// What the numerators have beside the poles.
-  SplitMatrix beside() const {
+  SplitMatrix beside(const Eigen::VectorXcd& x) const {
     const Eigen::Index count = integrators_ + (constant_ ? 1 : 0);
-    SplitMatrix out{Eigen::MatrixXd(x_.size(), count), Eigen::MatrixXd(x_.size(), count)};
+    SplitMatrix out{Eigen::MatrixXd(x.size(), count), Eigen::MatrixXd(x.size(), count)};
     for (int l = 1; l <= integrators_; ++l) {
-      const Eigen::ArrayXcd inverse = (x_.array() - (exact_ ? 1.0 : 0.0)).inverse();
+      const Eigen::ArrayXcd inverse = (x.array() - (exact_ ? 1.0 : 0.0)).inverse();
       const Eigen::ArrayXcd column = l == 1 ? inverse : Eigen::ArrayXcd(inverse.square());
       out.re.col(l - 1) = column.real();
       out.im.col(l - 1) = column.imag();
@@ -135,22 +108,13 @@ class Relocation {
 
   /// One iteration. @returns the largest move of a pole, in half-power widths.
   double relocate() {
-    const SplitMatrix phi = partial_fractions(poles_, x_);
-    const Eigen::Index n = phi.cols();
-
-    // What the channels say of sigma's coefficients (c, d): a triangle for each of a fixed number of shares,
-    // so that the result does not depend on the threads.
-    std::vector<Eigen::MatrixXd> shares(kShares, Eigen::MatrixXd::Zero(n + 1, n + 1));
-    parallel_tasks(kShares, threads_, [&](int share) {
-      for (Eigen::Index c = share; c < H_.rows(); c += kShares)
-        append(shares[static_cast<std::size_t>(share)], eliminated(c, phi));
-    });
-    Eigen::MatrixXd R = shares[0];
-    for (std::size_t share = 1; share < kShares; ++share) append(R, shares[share]);
+    Eigen::MatrixXd R = equations_->triangle(poles_, accurate_);
+    const Eigen::Index n = poles_.size();
+    if (R.col(n).squaredNorm() < kExact * kExact * signal_) return 0.0;
 
     // Relaxed: the mean of Re sigma over the lines is 1, so that sigma cannot vanish.
     Eigen::VectorXd mean(n + 1);
-    mean << phi.re.colwise().mean().transpose(), 1.0;
+    mean << partial_fractions(poles_, equations_->x()).re.colwise().mean().transpose(), 1.0;
     const Eigen::VectorXd scale = R.colwise().norm().cwiseMax(1e-300).cwiseInverse();
     R *= scale.asDiagonal();
     for (Eigen::Index i = 0; i <= n; ++i)
@@ -164,34 +128,6 @@ class Relocation {
     if (!sigma.allFinite() || d == 0.0) return 0.0;
     accurate_ = squares < kAccurate * kAccurate * signal_;
     return move(zeros_of_sum(poles_, sigma.head(n) / d));
-  }
-
-  /// The lower right corner of R, n+1 x n+1, in  sqrt(w) [phi, own | -H phi, -H] = Q R: what remains of
-  /// the channel's equations once its numerators are eliminated.
-  Eigen::MatrixXd eliminated(Eigen::Index c, const SplitMatrix& phi) const {
-    const Eigen::Index N = x_.size();
-    const Eigen::Index n = phi.cols();
-    const Eigen::Index numerators = n + own_.cols();
-    const Eigen::ArrayXd w = weights_.row(c).transpose().cwiseSqrt().array() * size_.array();
-    const Eigen::ArrayXcd H = H_.row(c).transpose().array();
-    const Eigen::ArrayXd h_re = -w * H.real();
-    const Eigen::ArrayXd h_im = -w * H.imag();
-    Eigen::MatrixXd A(2 * N, numerators + n + 1);
-    A.topLeftCorner(N, n) = phi.re.array().colwise() * w;
-    A.bottomLeftCorner(N, n) = phi.im.array().colwise() * w;
-    A.block(0, n, N, own_.cols()) = own_.re.array().colwise() * w;
-    A.block(N, n, N, own_.cols()) = own_.im.array().colwise() * w;
-    A.block(0, numerators, N, n) =
-        phi.re.array().colwise() * h_re - phi.im.array().colwise() * h_im;
-    A.block(N, numerators, N, n) =
-        phi.re.array().colwise() * h_im + phi.im.array().colwise() * h_re;
-    A.rightCols(1) << h_re.matrix(), h_im.matrix();
-    const auto corner = [&](const Eigen::MatrixXd& R) {
-      return Eigen::MatrixXd(R.bottomRightCorner(n + 1, n + 1).triangularView<Eigen::Upper>());
-    };
-    const Eigen::MatrixXd first = corner(gram_factor(A, accurate_));
-    if (!accurate_) return first;
-    return corner(gram_factor(A, false)) * first;
   }
 
   /// The least damping ratio at a frequency, at most that of the start: a sharper pole is placed by the
@@ -256,18 +192,13 @@ class Relocation {
     return modes;
   }
 
-  const Eigen::MatrixXd& weights_;
-  int threads_;
   bool exact_;
   ModelLines lines_;
   int integrators_ = 0;
   bool constant_ = false;
   bool accurate_ = false;
-  Eigen::VectorXcd x_;
-  Eigen::MatrixXcd H_;    // n_c x N
-  Eigen::VectorXd size_;  // |G| / |H| on every line
-  double signal_ = 0.0;   // sum w |G|^2
-  SplitMatrix own_;
+  double signal_ = 0.0;  // sum w |G|^2
+  std::optional<SigmaEquations> equations_;
   PoleSet poles_;  // x
 };
 

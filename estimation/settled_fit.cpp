@@ -45,6 +45,7 @@ bool may_converge(const FitResult& fit) {
 FitResult settled_fit(const FrfEstimate& frf, const AdditiveModel& start,
                       const FitOptions& options) {
   FitResult first = fit_additive_model(frf, start, options);
+  if (!may_converge(first)) return first;
   FitResult fit = first;
   std::vector<std::string> left_out;
   while (may_converge(fit) && count_modes(fit.model) > 1) {

@@ -1,12 +1,12 @@
 #include "estimation/weighted_products.hpp"
 
 #include <algorithm>
+#include <complex>
 
 namespace stageid {
 namespace {
 
 constexpr Eigen::Index kBlockPairs = 192;
-constexpr Eigen::Index kMostMembers = 256;
 constexpr Eigen::Index kShares = 8;  // of a block, if the lines make as many tiles
 
 }  // namespace
@@ -33,10 +33,10 @@ std::vector<ColumnPair> all_pairs(Eigen::Index left, Eigen::Index right) {
   return pairs;
 }
 
-std::vector<TileRange> member_blocks(Eigen::Index members, Eigen::Index lines) {
+std::vector<TileRange> member_blocks(Eigen::Index first, Eigen::Index members, Eigen::Index lines) {
   std::vector<TileRange> blocks;
   for (Eigen::Index m = 0; m < members; m += kMostMembers)
-    blocks.push_back({m, std::min(kMostMembers, members - m), 0, lines});
+    blocks.push_back({first + m, std::min(kMostMembers, members - m), 0, lines});
   return blocks;
 }
 
@@ -54,21 +54,36 @@ void DataTile::load(const FitProblem& problem, const BasisGroup& group, const Ti
                     const Eigen::MatrixXd& B, Eigen::Index first_line, Eigen::Index lines) {
   const Eigen::Index* channels = group.channels.data() + range.first_member;
   const bool in_order = channels[range.members - 1] - channels[0] == range.members - 1;  // sorted
-  const auto gather = [&](const Eigen::MatrixXd& source, Eigen::MatrixXd& out) {
-    out.resize(range.members, lines);
-    if (in_order) {
-      out = source.block(channels[0], first_line, range.members, lines);
-      return;
-    }
-    for (Eigen::Index k = 0; k < lines; ++k) {
-      const double* column = source.data() + source.rows() * (first_line + k);
-      double* to = out.data() + range.members * k;
-      for (Eigen::Index r = 0; r < range.members; ++r) to[r] = column[channels[r]];
-    }
+  /// Calls take(to, from): a channel's place in the tile and in the column of a line.
+  const auto gather = [&](const auto& take) {
+    if (in_order)
+      for (Eigen::Index r = 0; r < range.members; ++r) take(r, channels[0] + r);
+    else
+      for (Eigen::Index r = 0; r < range.members; ++r) take(r, channels[r]);
   };
-  gather(problem.W, W);
-  gather(problem.G_re, E_re);
-  gather(problem.G_im, E_im);
+  W.resize(range.members, lines);
+  E_re.resize(range.members, lines);
+  E_im.resize(range.members, lines);
+  for (Eigen::Index k = 0; k < lines; ++k) {
+    const double* weights = problem.W->data() + problem.channels() * (first_line + k);
+    double* w = W.data() + range.members * k;
+    gather([&](Eigen::Index to, Eigen::Index from) { w[to] = weights[from]; });
+    if (problem.middle) {
+      const LineVariance& v = *problem.middle;
+      const double* variance = v.matrix->data() + problem.channels() * (first_line + k);
+      const double divisor = v.divisor[first_line + k];
+      gather([&](Eigen::Index to, Eigen::Index from) {
+        w[to] = w[to] * w[to] * (variance[from] / divisor);
+      });
+    }
+    const std::complex<double>* data = problem.G->data() + problem.channels() * (first_line + k);
+    double* re = E_re.data() + range.members * k;
+    double* im = E_im.data() + range.members * k;
+    gather([&](Eigen::Index to, Eigen::Index from) {
+      re[to] = data[from].real();
+      im[to] = data[from].imag();
+    });
+  }
   if (B.size() == 0) return;
   E_re.noalias() -= B * group.F_re.middleRows(first_line, lines).transpose();
   E_im.noalias() -= B * group.F_im.middleRows(first_line, lines).transpose();

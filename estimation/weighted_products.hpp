@@ -31,8 +31,10 @@ struct TileRange {
   Eigen::Index lines;
 };
 
-/// The channels of a group in blocks, each with all lines: memory for sums is that of a block.
-std::vector<TileRange> member_blocks(Eigen::Index members, Eigen::Index lines);
+constexpr Eigen::Index kMostMembers = 256;  // of a block
+
+/// Channels of a group in blocks, each with all lines: memory for sums is that of a block.
+std::vector<TileRange> member_blocks(Eigen::Index first, Eigen::Index members, Eigen::Index lines);
 
 /// A block's lines in shares for the threads. Shares depend on sizes alone, never on the number of
 /// threads: what is summed in each of them, and in which order, is always the same.

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "estimation/fit_problem.hpp"
 #include "estimation/weight_matrices.hpp"
@@ -16,6 +17,7 @@ constexpr double kWantedDof = 25.0;
 // Degrees of freedom of a smoothed variance below which the scatter of its inverse is not finite or
 // nearly so: only where the lines are fewer than a handful.
 constexpr double kLeastTogether = 4.0;
+constexpr Eigen::Index kChannels = 256;  // smoothed at a time
 
 std::string channel_name(const FrfEstimate& frf, Eigen::Index c, Eigen::Index k) {
   return frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())] + " <- " +
@@ -60,15 +62,21 @@ Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, doub
   const double nu = std::max(dof, 1.0);
   if (half == 0 && power > 0.0) return variance;
   if (half == 0) return variance.cwiseInverse() * ((nu - 1.0) / nu);
-  const Eigen::MatrixXd logarithm = variance.array().log().matrix();
   const Eigen::Index N = variance.cols();
+  Eigen::VectorXd bias(N);
+  for (Eigen::Index k = 0; k < N; ++k)
+    bias[k] = std::log(expected_power(power, static_cast<double>(window_lines(k, half, N)), nu));
   Eigen::MatrixXd out(variance.rows(), N);
-  for (Eigen::Index k = 0; k < N; ++k) {
-    const Eigen::Index first = std::max<Eigen::Index>(0, k - half);
-    const Eigen::Index count = window_lines(k, half, N);
-    const double bias = std::log(expected_power(power, static_cast<double>(count), nu));
-    out.col(k) =
-        (power * logarithm.middleCols(first, count).rowwise().mean().array() - bias).exp().matrix();
+  for (Eigen::Index c = 0; c < variance.rows(); c += kChannels) {
+    const Eigen::Index rows = std::min(kChannels, variance.rows() - c);
+    Eigen::MatrixXd logarithm = variance.middleRows(c, rows);
+    logarithm = logarithm.array().log().matrix();
+    for (Eigen::Index k = 0; k < N; ++k) {
+      const auto window =
+          logarithm.middleCols(std::max<Eigen::Index>(0, k - half), window_lines(k, half, N));
+      out.col(k).segment(c, rows) =
+          (power * window.rowwise().mean().array() - bias[k]).exp().matrix();
+    }
   }
   return out;
 }
@@ -123,17 +131,20 @@ Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
 // With g the geometric mean of n sample variances of nu degrees of freedom (Gamma distributed) and W
 // proportional to 1/g, v one of the n:  E{W^2 v} / (E{W^2} E{v}) = E{v^(1-2/n)} / E{v^(-2/n)} E{v}
 //   = 1 - 2 / (n nu).
-Eigen::MatrixXd weighed_variance(const FrfEstimate& frf, Weighting weighting) {
+std::optional<LineVariance> weighed_variance(const FrfEstimate& frf, Weighting weighting) {
   const bool noise = weighting == Weighting::noise_variance;
   const double dof = noise ? frf.noise_dof : frf.total_dof;
-  if ((!noise && weighting != Weighting::total_variance) || !(dof > 0.0)) return {};
-  Eigen::MatrixXd out = noise ? frf.noise_variance : frf.total_variance;
+  if ((!noise && weighting != Weighting::total_variance) || !(dof > 0.0)) return std::nullopt;
   const Eigen::Index half = window_reach(dof);
-  for (Eigen::Index k = 0; k < out.cols(); ++k) {
-    const double together = dof * static_cast<double>(window_lines(k, half, out.cols()));
-    out.col(k) /= 1.0 - 2.0 / std::max(together, kLeastTogether);
+  const Eigen::Index N = frf.lines();
+  Eigen::ArrayXd divisor(N);
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const double together = dof * static_cast<double>(window_lines(k, half, N));
+    divisor[k] = 1.0 - 2.0 / std::max(together, kLeastTogether);
   }
-  return out;
+  return LineVariance{
+      SharedMatrix<Eigen::MatrixXd>::kept(noise ? frf.noise_variance : frf.total_variance),
+      std::move(divisor)};
 }
 
 SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {
@@ -165,11 +176,11 @@ SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {
   return out;
 }
 
-Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options) {
+SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOptions& options) {
   if (const auto matrices = make_weight_matrices(frf, options)) return matrices->marginal();
   switch (options.weighting) {
     case Weighting::unit:
-      return Eigen::MatrixXd::Ones(frf.response.rows(), frf.response.cols());
+      return Eigen::MatrixXd(Eigen::MatrixXd::Ones(frf.response.rows(), frf.response.cols()));
     case Weighting::inverse_magnitude:
       return inverse_magnitude(frf, 1.0);
     case Weighting::relative:
@@ -189,7 +200,7 @@ Eigen::MatrixXd make_weights(const FrfEstimate& frf, const FitOptions& options) 
   if (!W.allFinite() || W.minCoeff() < 0.0 || !(W.maxCoeff() > 0.0))
     throw std::invalid_argument(
         "user weights: every weight must be finite and not negative, and one positive");
-  return W;
+  return options.user_weights;
 }
 
 }  // namespace stageid

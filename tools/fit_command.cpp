@@ -75,8 +75,9 @@ FitRequest FitCommand::checked_request() const {
 
 void FitCommand::run() const {
   const FitRequest request = checked_request();
-  require_writable(output_);
-  const FitSetup setup = make_fit_setup(request, read_frf(frf_));
+  require_writable(output_, {frf_});
+  FitSetup setup = make_fit_setup(request, read_frf(frf_));
+  setup.options.response_variance = false;  // no file holds it
   for (const std::string& warning : setup.warnings)
     console_.warning(fmt::format("{}: {}", frf_.string(), warning));
   const FitStep step =

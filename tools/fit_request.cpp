@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
@@ -44,7 +45,7 @@ class FitDefaults {
                         (only_delay && request_.hold != "none");
     if (frf.compensated == Compensation::none || !(frf.sample_rate_hz > 0.0) || !wanted) return;
     known_delay_s_ = frf.delay_s;
-    frf = as_measured(frf);
+    frf = as_measured(std::move(frf));
     note(fmt::format(
         "hold and delay: {} s was taken out of the response; it is put back and modelled",
         *known_delay_s_));
@@ -128,6 +129,11 @@ class FitDefaults {
         return;
       }
       if (!number && text.find_first_not_of("0123456789.eE+-") != std::string::npos) {
+        if (!std::filesystem::exists(text))
+          throw FileError(fmt::format(
+              "--modes: '{}': there is no such file; write auto, none, a number of modes, "
+              "frequencies in Hz 'f1,f2,...', or the name of a file",
+              text));
         selection.modes = read_modes(text);
         for (const ModeCandidate& mode : selection.modes)
           require_below_nyquist("--modes", setup_, mode.frequency_hz);
@@ -158,7 +164,7 @@ class FitDefaults {
   bool weigh_by_scatter() {
     FrfEstimate& frf = setup_.frf;
     if (frf.noise_variance.size() == 0 || frf.realizations > 1) return false;
-    LineScatter scatter = line_scatter(frf);
+    LineScatter scatter = line_scatter(frf, request_.threads);
     if (!(scatter.over_noise > kDistorted)) return false;
     frf.total_variance = std::move(scatter.variance);
     frf.total_dof = scatter.dof;
@@ -272,7 +278,7 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
       const auto* bytes = reinterpret_cast<const std::byte*>(matrix.data());
       fingerprint.add({bytes, static_cast<std::size_t>(matrix.size()) * sizeof(*matrix.data())});
     };
-    add(o.user_weights);
+    add(*o.user_weights);
     add(o.user_weight_matrices);
     json["weights_fingerprint"] = fingerprint.hex();
   }
@@ -281,11 +287,11 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
 
 }  // namespace
 
-FitSetup make_fit_setup(const FitRequest& asked, const FrfEstimate& frf) {
+FitSetup make_fit_setup(const FitRequest& asked, FrfEstimate frf) {
   FitSetup setup;
   const FitRequest request = with_structure(asked, frf, setup.notes);
-  setup.frf =
-      request.band_hz ? select_band(frf, (*request.band_hz)[0], (*request.band_hz)[1]) : frf;
+  if (request.band_hz) frf = select_band(frf, (*request.band_hz)[0], (*request.band_hz)[1]);
+  setup.frf = std::move(frf);
   FitDefaults defaults(request, setup);
   defaults.restore_as_measured();
   defaults.choose_hold();

@@ -53,7 +53,8 @@ struct FitSetup {
 /// And weights: noise variance if there is one, else total variance, else relative; with one realization, or an
 /// unknown number, of a plant whose lines scatter far more than either says: that scatter, see line_scatter().
 /// @throws std::invalid_argument naming the flag; FileError, FormatError for files that it names.
-FitSetup make_fit_setup(const FitRequest& request, const FrfEstimate& frf);
+/// `frf` is moved where it can be: nothing else holds as much memory.
+FitSetup make_fit_setup(const FitRequest& request, FrfEstimate frf);
 
 /// Keys of the section `fit` (fit_keys.cpp).
 void describe_fit_keys(ConfigVisitor& visitor, FitRequest& request);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "estimation/weight_matrices.hpp"
 #include "excitation/file_error.hpp"
@@ -65,7 +66,9 @@ void read_matrices(const Hdf5File& file, const FrfEstimate& frf, Eigen::MatrixXc
 void read_weights(const std::filesystem::path& path, const FrfEstimate& frf, FitOptions& options) {
   const Hdf5File file = Hdf5File::open(path);
   if (!file.exists(kMatrices)) {
-    read_diagonals(file, frf, options.user_weights);
+    Eigen::MatrixXd weights;
+    read_diagonals(file, frf, weights);
+    options.user_weights = std::move(weights);
     return;
   }
   if (file.exists(kDiagonals))

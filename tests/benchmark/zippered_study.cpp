@@ -2,6 +2,7 @@
 //
 //   zippered_study variance [seeds = 30] [outputs = 4] [inputs = 13]
 //   zippered_study resonance [seeds = 200]
+//   zippered_study plants [plants = 12] [seeds = 20] [outputs = 2] [inputs = 2] [noise = 0.1]
 //   zippered_study time [seeds = 10]
 //
 // variance: stated over empirical variance, and the squared mean error over the variance of that mean
@@ -10,10 +11,13 @@
 // resonance: a mode of half-power width w in distances of an axis' own lines, 2 x 2, around its
 //   resonance: bias over stated standard deviation, and the fraction of experiments in which the check
 //   of the interpolation speaks up.
+// plants: the same two variances on random plants, over all of them and on the worst and best one, and the
+//   noise that is stated (C_E) over the true one; lpm adds the noise of its transient model.
 // time: the error of one zippered period against the orthogonal scheme in the same measuring time, on
 //   resonances and between them.
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -38,6 +42,7 @@ using stageid::test::Trials;
 
 constexpr double kSampleRateHz = 200.0;
 constexpr double kNoise = 0.1;
+constexpr double kLineDistanceHz = 0.5;  // of an axis
 
 /// One period in which each axis has lines 0.5 Hz apart, odd ones.
 LoopExperiment zippered(int axes) {
@@ -70,6 +75,56 @@ void study_variance(int seeds, int outputs, int inputs) {
   x.periods = 3;
   print("two periods after one passed over",
         stageid::test::repeat(plant, x, kNoise, {.transient_periods = 1}, seeds));
+}
+
+/// Three to six modes anywhere in the band, 2 to 12 distances of an axis' lines wide; stable in the loop.
+SampledPlant random_plant(int outputs, int inputs, std::uint64_t seed) {
+  stageid::test::ComplexNoise random(seed);
+  for (;;) {
+    std::vector<stageid::test::PlantMode> modes(3 +
+                                                static_cast<std::size_t>(4.0 * random.uniform()));
+    for (stageid::test::PlantMode& mode : modes) {
+      const double width_hz = kLineDistanceHz * 2.0 * std::pow(6.0, random.uniform());
+      mode = {9.0 + 31.0 * random.uniform(), 1.0 / (std::numbers::pi * width_hz)};
+    }
+    const SampledPlant plant =
+        stageid::test::sampled_plant(outputs, inputs, modes, kSampleRateHz, 0.1);
+    const Eigen::MatrixXd closed = plant.A - plant.B * plant.K * plant.C;
+    if (closed.eigenvalues().cwiseAbs().maxCoeff() < 0.995) return plant;
+  }
+}
+
+void study_plants(int plants, int seeds, int outputs, int inputs, double noise) {
+  struct Record {
+    const char* what;
+    int periods;
+    FrfOptions options;
+  };
+  fmt::print("{} x {}, {} plants, noise {}\n", outputs, inputs, plants, noise);
+  for (const Record& record :
+       {Record{"one period from rest, lpm", 1, {.method = FrfMethod::lpm}},
+        Record{"one period after one passed over", 2, {.transient_periods = 1}},
+        Record{"two periods after one passed over", 3, {.transient_periods = 1}}}) {
+    LoopExperiment x = zippered(inputs);
+    x.periods = record.periods;
+    double over = 0.0, bias = 0.0, noise_ratio = 0.0;
+    double least = 1e9, most = 0.0;
+    for (int p = 1; p <= plants; ++p) {
+      const Trials trials =
+          stageid::test::repeat(random_plant(outputs, inputs, 1000 + static_cast<std::uint64_t>(p)),
+                                x, noise, record.options, seeds);
+      over += trials.over_stated / plants;
+      bias += (trials.bias - 1.0) / seeds / plants;
+      least = std::min(least, 1.0 / trials.over_stated);
+      most = std::max(most, 1.0 / trials.over_stated);
+      const int used = record.periods - record.options.transient_periods.value_or(0);
+      noise_ratio += trials.residual / (noise * noise / x.period_samples / used) / plants;
+    }
+    fmt::print(
+        "  {:34} stated / empirical variance {:.3f} ({:.3f} ... {:.3f}), of which bias {:.3f}; "
+        "noise stated / true {:.3f}\n",
+        record.what, 1.0 / over, least, most, bias, noise_ratio);
+  }
 }
 
 /// Around the middle of three modes, as wide as `width` distances of an axis' lines (0.5 Hz).
@@ -183,6 +238,9 @@ int main(int argc, char** argv) {
   };
   if (what == "variance") study_variance(number(2, 30), number(3, 4), number(4, 13));
   if (what == "resonance") study_resonance(number(2, 200));
+  if (what == "plants")
+    study_plants(number(2, 12), number(3, 20), number(4, 2), number(5, 2),
+                 argc > 6 ? std::atof(argv[6]) : kNoise);
   if (what == "time") study_time(number(2, 10));
   return 0;
 }

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "estimation/arrow_system.hpp"
+#include "estimation/residual.hpp"
 #include "tests/estimation/disturbed_problem.hpp"
 
 namespace stageid {

@@ -7,6 +7,7 @@
 #include "estimation/arrow_system.hpp"
 #include "estimation/channel_equations.hpp"
 #include "estimation/numerators.hpp"
+#include "estimation/residual.hpp"
 #include "tests/estimation/disturbed_problem.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
@@ -167,7 +168,7 @@ TEST(WeightedProducts, SharesCoverEveryLineOfEveryChannelOnce) {
                                        {257, 257},
                                        {1000, 5000}}) {
     Eigen::MatrixXi seen = Eigen::MatrixXi::Zero(members, lines);
-    for (const TileRange& block : member_blocks(members, lines))
+    for (const TileRange& block : member_blocks(0, members, lines))
       for (const TileRange& share : line_shares(block))
         for_each_tile(share, [&, rows = share](Eigen::Index first, Eigen::Index n) {
           seen.block(rows.first_member, first, rows.members, n).array() += 1;

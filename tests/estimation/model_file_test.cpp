@@ -274,7 +274,7 @@ TEST_F(ModelFile, MissingKeys) {
 
 TEST_F(ModelFile, AnotherVersion) {
   expect_format_error([](Json& root) { root["format_version"] = 2; }, "/format_version",
-                      "whole number");
+                      "is 2 and must be 1");
   expect_format_error([](Json& root) { root["format_version"] = "1"; }, "/format_version",
                       "whole number");
 }

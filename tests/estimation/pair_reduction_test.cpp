@@ -123,7 +123,7 @@ class ReductionTest : public testing::Test {
     EXPECT_GE(pairs.size() - reduction.direct().size(), least_reduced);
     EXPECT_GT(reduction.direct().size(), 0U);
 
-    const Eigen::MatrixXd& W = c.fit.W;
+    const Eigen::MatrixXd& W = *c.fit.W;
     const Eigen::VectorXd size =
         fractions.first.re.col(0).cwiseAbs2() + fractions.first.im.col(0).cwiseAbs2();
     Eigen::MatrixXd direct =
@@ -179,8 +179,8 @@ TEST_F(ReductionTest, WithComplexWeightsToo) {
     EXPECT_GE(pairs.size() - reduction.direct().size(), 20U);
     const ComplexColumns F{c.group.F_re, c.group.F_im};
     const ComplexColumns Y{c.Y_re, c.Y_im};
-    const Eigen::MatrixXd& V_re = c.fit.G_re;
-    const Eigen::MatrixXd& V_im = c.fit.G_im;
+    const Eigen::MatrixXd V_re = c.fit.G->real();
+    const Eigen::MatrixXd V_im = c.fit.G->imag();
     const auto sums_of = [&](const std::vector<ColumnPair>& some) {
       Eigen::MatrixXd sums =
           Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(some.size()), V_re.rows());

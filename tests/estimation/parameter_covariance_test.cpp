@@ -168,7 +168,7 @@ TEST(Covariance, OfEstimatedVariancesCountsTheScatterOfTheWeights) {
   const FitResult fit = fit_additive_model(frf, problem.model, options);
   ASSERT_TRUE(fit.trustworthy()) << fit.message;
   expect_dense_uncertainty(problem, fit, make_weights(frf, options),
-                           weighed_variance(frf, Weighting::noise_variance));
+                           test::values(weighed_variance(frf, Weighting::noise_variance)));
 }
 
 TEST(Covariance, WithoutVariancesIsScaledByTheResidual) {

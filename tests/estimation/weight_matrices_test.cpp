@@ -71,7 +71,7 @@ TEST(WeightMatrices, OfAUserAreTakenAsTheyAre) {
   EXPECT_EQ(weights->marginal().col(4), difference.cwiseAbs());
   const Eigen::MatrixXcd C = noise.covariance(200);
   EXPECT_NEAR(weights->marginal()(5, 200) * C(5, 5).real(), 1.0, 1e-10);
-  EXPECT_EQ(make_weights(frf, options), weights->marginal());
+  EXPECT_EQ(*make_weights(frf, options), weights->marginal());
 }
 
 TEST(WeightMatrices, AreNoneWithDiagonalWeights) {

@@ -4,11 +4,7 @@
 #include <cstddef>
 #include <cstdlib>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
-#define STAGEID_MALLOC_IS_OURS 0
-#else
-#define STAGEID_MALLOC_IS_OURS 1
-#endif
+#include "tests/support/own_malloc.hpp"
 
 namespace {
 
@@ -18,13 +14,7 @@ thread_local std::uint64_t allocations = 0;
 
 #if STAGEID_MALLOC_IS_OURS
 
-// glibc's own names for what is replaced here.
 extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* old, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-
 void* malloc(std::size_t size) noexcept {
   ++allocations;
   return __libc_malloc(size);

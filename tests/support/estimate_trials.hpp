@@ -13,6 +13,7 @@ struct Trials {
   double error = 0.0;        ///< rms over seeds and lines of |G - truth| / |truth|
   double over_stated = 0.0;  ///< mean over entries of (empirical / reported variance)
   double bias = 0.0;         ///< mean over entries of |mean error|^2 over its variance
+  double residual = 0.0;     ///< mean over seeds, lines and outputs of C_E's diagonal
 };
 
 inline Trials repeat(const SampledPlant& plant, LoopExperiment x, double noise_std,
@@ -37,6 +38,9 @@ inline Trials repeat(const SampledPlant& plant, LoopExperiment x, double noise_s
     sum += deviation;
     squares += deviation.cwiseAbs2();
     stated += frf.noise_variance;
+    for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
+      trials.residual += frf.residual_covariance_re.row(i * (frf.n_outputs() + 1)).mean() /
+                         static_cast<double>(seeds * frf.n_outputs());
   }
   trials.error = std::sqrt(trials.error / (seeds * static_cast<double>(sum.cols())));
   trials.over_stated = (squares.array() / stated.array()).mean();

@@ -10,6 +10,7 @@
 #include "estimation/automatic_fit.hpp"
 #include "estimation/fit_start.hpp"
 #include "estimation/numerators.hpp"
+#include "estimation/residual.hpp"
 
 namespace stageid::test {
 namespace {

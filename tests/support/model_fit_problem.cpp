@@ -34,13 +34,19 @@ FitProblem fit_problem(const DenseProblem& problem, DelayModel delay) {
                problem.hold};
   out.n_outputs = problem.model.n_outputs();
   out.n_inputs = problem.model.n_inputs();
-  out.G_re = problem.G.real();
-  out.G_im = problem.G.imag();
+  out.G = problem.G;
   out.W = problem.W;
   for (const Submodel& s : problem.model.submodels)
     out.shapes.push_back({s.integrators, static_cast<int>(s.denominator.size()) - 1,
                           static_cast<int>(s.numerator.size()) - 1});
   out.delay = delay;
+  return out;
+}
+
+Eigen::MatrixXd values(const std::optional<LineVariance>& variance) {
+  Eigen::MatrixXd out(variance->matrix->rows(), variance->matrix->cols());
+  for (Eigen::Index c = 0; c < out.rows(); ++c)
+    out.row(c) = variance->channel(c).matrix().transpose();
   return out;
 }
 

@@ -16,6 +16,9 @@ Submodel empty_submodel(const AdditiveModel& model, int integrators, std::vector
 
 /// A dense problem as the library's equations take it.
 FitProblem fit_problem(const DenseProblem& problem, DelayModel delay);
+
+/// All of a variance that there is, n_c x N.
+Eigen::MatrixXd values(const std::optional<LineVariance>& variance);
 FitParameters fit_parameters(const DenseProblem& problem);
 
 /// The FRF of a dense problem, without variances.

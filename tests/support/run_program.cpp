@@ -46,6 +46,26 @@ void redirect(const char* file, int flags, int descriptor) {
   ::_exit(127);
 }
 
+/// Until `file` is there, or the child has ended. @returns whether it is there
+bool wait_for_file(const std::filesystem::path& file, pid_t child) {
+  while (!std::filesystem::exists(file)) {
+    siginfo_t ended{};
+    // WNOWAIT: the status is left for waitpid().
+    if (::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 ||
+        ended.si_pid == child)
+      return std::filesystem::exists(file);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+void interrupt(pid_t child, const ProgramOptions& options) {
+  if (!options.interrupt_after_file.empty() && !wait_for_file(options.interrupt_after_file, child))
+    return;
+  std::this_thread::sleep_for(std::chrono::duration<double>(options.interrupt_after_s));
+  ::kill(child, SIGINT);
+}
+
 }  // namespace
 
 ProgramResult run_program(const std::filesystem::path& program,
@@ -64,10 +84,7 @@ ProgramResult run_program(const std::filesystem::path& program,
   const pid_t child = ::fork();
   if (child < 0) throw std::runtime_error("fork failed");
   if (child == 0) become(name, argv, out, err, options);
-  if (options.interrupt_after_s >= 0.0) {
-    std::this_thread::sleep_for(std::chrono::duration<double>(options.interrupt_after_s));
-    ::kill(child, SIGINT);
-  }
+  if (options.interrupt_after_s >= 0.0) interrupt(child, options);
   int status = 0;
   ::waitpid(child, &status, 0);
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -218,8 +218,8 @@ TEST(FitRequest, WeightsComeFromAFileInTheOrderOfTheResponse) {
   request.weighting = path.string();
   const FitSetup setup = make_fit_setup(request, measured());
   EXPECT_EQ(setup.options.weighting, Weighting::user);
-  EXPECT_EQ(setup.options.user_weights(1, 0), 1.0);  // channel y <- b on the first line
-  EXPECT_EQ(setup.options.user_weights(0, 3), 6.0);
+  EXPECT_EQ((*setup.options.user_weights)(1, 0), 1.0);  // channel y <- b on the first line
+  EXPECT_EQ((*setup.options.user_weights)(0, 3), 6.0);
   request.band_hz = {15.0, 45.0};
   EXPECT_THROW(make_fit_setup(request, measured()), FormatError);
   values[3] = -1.0;

@@ -51,8 +51,8 @@ TEST_F(WeightFile, DiagonalsAreRowsOfOutputs) {
   file.write_reals("/weights", {4, 2, 3}, values.data());
   file.close();
   read_weights(path_, frf_, options_);
-  EXPECT_EQ(options_.user_weights(1 + 2 * 2, 3), 23.0);
-  EXPECT_EQ(options_.user_weights(0 + 2 * 1, 0), 1.0);
+  EXPECT_EQ((*options_.user_weights)(1 + 2 * 2, 3), 23.0);
+  EXPECT_EQ((*options_.user_weights)(0 + 2 * 1, 0), 1.0);
   EXPECT_EQ(options_.user_weight_matrices.size(), 0);
 }
 

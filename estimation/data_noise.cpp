@@ -1,0 +1,63 @@
+#include "estimation/data_noise.hpp"
+
+#include <algorithm>
+
+namespace stageid {
+namespace {
+
+/// Above this, a residual cannot be the noise alone.
+constexpr double kClearlyTooLarge = 1.5;
+
+}  // namespace
+
+DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
+  const Eigen::MatrixXd& known =
+      frf.total_variance.size() > 0 ? frf.total_variance : frf.noise_variance;
+  DataNoise noise;
+  if (weighs_by_variance(weighting)) {
+    noise.knowledge = VarianceKnowledge::weights;
+    noise.variance = weighed_variance(frf, weighting);
+  } else if (known.size() > 0 && known.minCoeff() > 0.0) {
+    noise.knowledge = VarianceKnowledge::given;
+    noise.variance =
+        LineVariance{SharedMatrix<Eigen::MatrixXd>::kept(known), Eigen::ArrayXd::Ones(frf.lines())};
+  }
+  if (noise.knowledge != VarianceKnowledge::none) noise.correlation = OutputCorrelation(frf);
+  return noise;
+}
+
+bool weighs_by_variance(Weighting weighting) noexcept {
+  return weighting == Weighting::noise_variance || weighting == Weighting::total_variance ||
+         weighting == Weighting::likelihood;
+}
+
+double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters) {
+  const double data = static_cast<double>(problem.size() * problem.channels());
+  return 2.0 * static_cast<double>(problem.size()) * cost /
+         std::max(data - 0.5 * static_cast<double>(parameters), 1.0);
+}
+
+double residual_scale(double per_degree, bool likelihood) {
+  return likelihood && per_degree < kClearlyTooLarge ? 1.0 : per_degree;
+}
+
+Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c) {
+  const Eigen::ArrayXd W = problem.weights(c).array();
+  if (!noise.variance) return W.sqrt();
+  return W * noise.variance->channel(c).sqrt();
+}
+
+FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise) {
+  FitProblem middle = problem;
+  middle.middle = noise.variance;
+  return middle;
+}
+
+double covariance_scale(const FitProblem& problem, double cost, Eigen::Index parameters,
+                        const DataNoise& noise) {
+  if (noise.knowledge == VarianceKnowledge::given) return 1.0;
+  return residual_scale(residual_per_degree(problem, cost, parameters),
+                        noise.knowledge == VarianceKnowledge::weights);
+}
+
+}  // namespace stageid

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <utility>
+
+namespace stageid {
+
+/// A matrix that many read and nobody changes any more: a copy of the handle is no copy of the data.
+template <typename Matrix>
+class SharedMatrix {
+ public:
+  SharedMatrix() : SharedMatrix(Matrix()) {}
+  SharedMatrix(Matrix matrix)  // NOLINT(google-explicit-constructor): it stands for the matrix
+      : matrix_(std::make_shared<const Matrix>(std::move(matrix))) {}
+
+  /// Of a matrix that somebody else keeps, at least as long as this handle and its copies.
+  static SharedMatrix kept(const Matrix& matrix) {
+    SharedMatrix out;
+    out.matrix_ = std::shared_ptr<const Matrix>(std::shared_ptr<const Matrix>(), &matrix);
+    return out;
+  }
+  static SharedMatrix kept(Matrix&& matrix) = delete;  // it would not last
+
+  const Matrix& operator*() const noexcept { return *matrix_; }
+  const Matrix* operator->() const noexcept { return matrix_.get(); }
+  operator const Matrix&() const noexcept { return *matrix_; }  // NOLINT: as above
+
+ private:
+  std::shared_ptr<const Matrix> matrix_;
+};
+
+}  // namespace stageid

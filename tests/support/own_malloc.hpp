@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstddef>
+
+// For test executables that bring their own malloc: whether they may (sanitizers bring theirs), and what it calls.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
+#define STAGEID_MALLOC_IS_OURS 0
+#else
+#define STAGEID_MALLOC_IS_OURS 1
+
+// glibc's own names for what is replaced.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* old, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+void __libc_free(void* memory);
+}
+#endif
