@@ -4,33 +4,22 @@
 
 #include <algorithm>
 #include <complex>
-#include <mutex>
 #include <new>
 #include <stdexcept>
 
+#include "excitation/fft_planner.hpp"
+
 namespace stageid {
-namespace {
-
-/// FFTW's planner has global state and must be entered by one thread at a time; executing need not.
-std::mutex& planner_lock() {
-  static std::mutex lock;
-  return lock;
-}
-
-}  // namespace
 
 struct RealDft::Plan {
   explicit Plan(int n)
       : length(n),
         real(fftw_alloc_real(static_cast<std::size_t>(n))),
         half(fftw_alloc_complex(static_cast<std::size_t>(n) / 2 + 1)) {
-    // FFTW_ESTIMATE, never FFTW_MEASURE: the latter picks among algorithms by timing them, so the
-    // rounding of the result, and with it the bytes of our files, would change from run to run. It
-    // also takes 1.1 s for 40 000 points, to save 16 of 79 us a transform.
-    const std::lock_guard guard(planner_lock());
+    const std::lock_guard guard(fft_planner().lock);
     if (real != nullptr && half != nullptr) {
-      forward = fftw_plan_dft_r2c_1d(n, real, half, FFTW_ESTIMATE);
-      inverse = fftw_plan_dft_c2r_1d(n, half, real, FFTW_ESTIMATE);
+      forward = fftw_plan_dft_r2c_1d(n, real, half, fft_planner().flags);
+      inverse = fftw_plan_dft_c2r_1d(n, half, real, fft_planner().flags);
     }
     if (forward == nullptr || inverse == nullptr) {
       release();
@@ -38,7 +27,7 @@ struct RealDft::Plan {
     }
   }
   ~Plan() {
-    const std::lock_guard guard(planner_lock());
+    const std::lock_guard guard(fft_planner().lock);
     release();
   }
   Plan(const Plan&) = delete;

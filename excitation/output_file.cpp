@@ -16,8 +16,10 @@
 namespace stageid {
 namespace {
 
-[[noreturn]] void fail(const std::filesystem::path& file, const std::string& what, int error) {
-  throw FileError(fmt::format("{}: {}: {}", file.string(), what, std::strerror(error)));
+[[noreturn]] void fail(const std::filesystem::path& file, const std::string& what, int error,
+                       const std::string& remedy = "") {
+  throw FileError(fmt::format("{}: {}: {}{}{}", file.string(), what, std::strerror(error),
+                              remedy.empty() ? "" : "; ", remedy));
 }
 
 /// A file descriptor that closes itself; write errors surface at fsync(), so close() is not
@@ -100,7 +102,9 @@ OutputFile::OutputFile(const std::filesystem::path& target)
   constexpr mode_t kMode = 0666;  // less the user's umask
   const Descriptor descriptor(
       ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
-  if (!descriptor) fail(target_, "cannot create a file in this directory", errno);
+  if (!descriptor)
+    fail(target_, "cannot create a file in this directory", errno,
+         errno == ENOENT ? "make it first" : "check its rights");
 }
 
 OutputFile::~OutputFile() {

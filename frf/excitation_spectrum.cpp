@@ -35,8 +35,9 @@ Eigen::VectorXcd channel_spectrum(const Eigen::VectorXd& samples, RealDft& dft) 
 
 }  // namespace
 
-bool ExcitationSpectrum::one_channel_a_line() const {
-  return std::all_of(only.begin(), only.end(), [](Eigen::Index c) { return c >= 0; });
+bool ExcitationSpectrum::is_zippered() const {
+  return channels.size() > 1 &&
+         std::all_of(only.begin(), only.end(), [](Eigen::Index c) { return c >= 0; });
 }
 
 ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& dft) {

@@ -14,8 +14,8 @@ struct ExcitationSpectrum {
   Eigen::MatrixXcd values;             ///< R, excitation channels x lines: DFT / samples
   std::vector<Eigen::Index> only;      ///< of each line: its only channel; -1: it has several
 
-  /// Every channel that is excited has lines of its own.
-  bool one_channel_a_line() const;
+  /// Several channels are excited, each on lines of its own.
+  bool is_zippered() const;
 
   friend bool operator==(const ExcitationSpectrum&, const ExcitationSpectrum&) = default;
 };

@@ -89,6 +89,10 @@ FrfEstimate select_band(const FrfEstimate& frf, double low_hz, double high_hz) {
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     if (frf.frequency_hz[k] >= low_hz && frf.frequency_hz[k] <= high_hz) kept.push_back(k);
   }
+  if (low_hz > high_hz)
+    throw std::invalid_argument(
+        fmt::format("band {} to {} Hz: ends below its beginning; write the lower frequency first",
+                    low_hz, high_hz));
   if (kept.empty()) {
     const std::string range = frf.lines() == 0
                                   ? std::string("no lines")

@@ -115,8 +115,7 @@ void HealthGathering::excite(const std::vector<const ExcitationSpectrum*>& spect
     record_.axes.insert(record_.axes.end(), spectrum->channels.begin(), spectrum->channels.end());
   std::sort(record_.axes.begin(), record_.axes.end());
   record_.axes.erase(std::unique(record_.axes.begin(), record_.axes.end()), record_.axes.end());
-  record_.zippered =
-      spectra.size() == 1 && record_.axes.size() > 1 && spectra.front()->one_channel_a_line();
+  record_.zippered = spectra.size() == 1 && spectra.front()->is_zippered();
   lines_ = thinned(spectra.front()->lines);
   for (HealthPart& part : parts_.front()) part.lines_ = lines_;
   const auto K = static_cast<Eigen::Index>(lines_.size());

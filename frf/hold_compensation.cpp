@@ -67,19 +67,18 @@ FrfEstimate compensate(const FrfEstimate& frf, Compensation kind, double delay_s
   return result;
 }
 
-FrfEstimate as_measured(const FrfEstimate& frf) {
+FrfEstimate as_measured(FrfEstimate frf) {
   if (frf.compensated == Compensation::none)
     throw std::invalid_argument("the response was not compensated: it is as measured already");
   if (!(frf.sample_rate_hz > 0.0) || !std::isfinite(frf.sample_rate_hz))
     throw std::invalid_argument(
         "the sample rate is unknown: what the compensation took out cannot be put back");
   const double T = 1.0 / frf.sample_rate_hz;
-  FrfEstimate result = frf;
-  multiply(result, [&](double omega) { return taken_out(frf.compensated, frf.delay_s, T, omega); });
-  result.hold = Hold::zoh;
-  result.compensated = Compensation::none;
-  result.delay_s = 0.0;
-  return result;
+  multiply(frf, [&](double omega) { return taken_out(frf.compensated, frf.delay_s, T, omega); });
+  frf.hold = Hold::zoh;
+  frf.compensated = Compensation::none;
+  frf.delay_s = 0.0;
+  return frf;
 }
 
 }  // namespace stageid

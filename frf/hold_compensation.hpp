@@ -14,6 +14,6 @@ FrfEstimate compensate(const FrfEstimate& frf, Compensation kind, double delay_s
 /// The response as it was measured: puts back what compensate() took out, so that a model can go
 /// through hold, delay and sampler exactly instead of meeting data in which the aliasing was left.
 /// @throws std::invalid_argument if nothing was taken out or the sample rate is unknown.
-FrfEstimate as_measured(const FrfEstimate& frf);
+FrfEstimate as_measured(FrfEstimate frf);
 
 }  // namespace stageid

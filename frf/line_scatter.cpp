@@ -1,9 +1,13 @@
 #include "frf/line_scatter.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <numeric>
 #include <vector>
 
 #include "frf/local_fit.hpp"
+#include "frf/worker_pool.hpp"
 
 namespace stageid {
 namespace {
@@ -33,27 +37,46 @@ LocalFit fit_around(const FrfEstimate& frf, Eigen::Index k) {
   return fit_locally(problem, kMostPoles);
 }
 
+/// Calls use(a / b) wherever b > 0.
+template <typename Use>
+void for_each_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const Use& use) {
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (b.data()[i] > 0.0) use(a.data()[i] / b.data()[i]);
+}
+
+/// Numbers that are not negative are ordered as their bits are: exponent and four bits of the fraction.
+std::size_t bin_of(double ratio) { return std::bit_cast<std::uint64_t>(ratio) >> 48; }
+
+/// The upper median of numbers that are not negative. They are as many as the data: first counted in
+/// bins, and only those of the middle bin are stored.
 double median_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   if (a.size() == 0 || b.size() != a.size()) return 0.0;
+  std::vector<std::size_t> counts(std::size_t{1} << 16);
+  for_each_ratio(a, b, [&](double ratio) { ++counts[bin_of(ratio)]; });
+  std::size_t rank = std::accumulate(counts.begin(), counts.end(), std::size_t{0}) / 2;
+  std::size_t bin = 0;
+  while (bin < counts.size() && rank >= counts[bin]) rank -= counts[bin++];
+  if (bin == counts.size()) return 0.0;
   std::vector<double> ratios;
-  for (Eigen::Index i = 0; i < a.size(); ++i)
-    if (b.data()[i] > 0.0) ratios.push_back(a.data()[i] / b.data()[i]);
-  if (ratios.empty()) return 0.0;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  ratios.reserve(counts[bin]);
+  for_each_ratio(a, b, [&](double ratio) {
+    if (bin_of(ratio) == bin) ratios.push_back(ratio);
+  });
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(rank);
   std::nth_element(ratios.begin(), middle, ratios.end());
   return *middle;
 }
 
 }  // namespace
 
-LineScatter line_scatter(const FrfEstimate& frf) {
+LineScatter line_scatter(const FrfEstimate& frf, int threads) {
   LineScatter scatter;
   if (frf.lines() < kWindow) return scatter;
   scatter.variance.resize(frf.response.rows(), frf.lines());
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+  for_each_line(worker_count(threads), frf.lines(), [&](Eigen::Index k) {
     const LocalFit fit = fit_around(frf, k);
     scatter.variance.col(k) = fit.residual.rowwise().squaredNorm() / fit.dof;
-  }
+  });
   scatter.dof = static_cast<double>(kDof);
   scatter.over_noise = median_ratio(scatter.variance, frf.noise_variance);
   return scatter;

@@ -23,7 +23,8 @@ struct LineScatter {
 /// from line to line, about a response that is smooth; with one realization the lines are all there is to ask.
 /// Where modes are narrower than the lines are apart the variance comes out too large.
 /// Source: Pintelon and Schoukens, System Identification (2012), chapters 4 and 7.
+/// @param threads 0: all cores; the result does not depend on it
 /// @returns empty matrices if there are too few lines
-LineScatter line_scatter(const FrfEstimate& frf);
+LineScatter line_scatter(const FrfEstimate& frf, int threads = 0);
 
 }  // namespace stageid

@@ -13,8 +13,7 @@
 namespace stageid {
 namespace {
 
-constexpr int kIterations = 8;           // of Sanathanan and Koerner; they settle in four or five
-constexpr double kChanceOfAPole = 0.05;  // that noise alone is taken for one
+constexpr int kIterations = 8;  // of Sanathanan and Koerner; they settle in four or five
 // Without a pole the first, linear step lowers the cost by one degree of freedom of many: a line on
 // which it does not do much more is not worth the iteration.
 constexpr double kWorthIterating = 0.9;
@@ -52,6 +51,9 @@ class Projection {
     return value;
   }
   Eigen::VectorXcd weight(std::size_t group) const { return groups_[group].weight; }
+  Eigen::VectorXd freedom(std::size_t group) const {
+    return 1.0 - groups_[group].Q.rowwise().squaredNorm().array();
+  }
 
  private:
   struct Group {
@@ -62,15 +64,20 @@ class Projection {
   std::vector<Group> groups_;
 };
 
+/// What `poles` poles leave, of all channels with noise of their own together.
+double degrees_of_freedom(const LocalProblem& problem, int poles) {
+  const auto groups = static_cast<Eigen::Index>(problem.groups.size());
+  return static_cast<double>(problem.tested_noise) *
+             static_cast<double>(problem.r.size() - problem.K.rows() * groups) -
+         static_cast<double>(poles);
+}
+
 /// Ratio of the residual powers with and without `gained` more poles, `poles` in all, that noise alone
-/// falls below with a chance of 0.05. For one pole P(ratio < x) = x^q with q degrees of freedom left,
+/// falls below with the chance asked for. For one pole P(ratio < x) = x^q with q degrees of freedom left,
 /// of all channels with noise of their own together: D is common to them.
 double significant_ratio(const LocalProblem& problem, int poles, int gained) {
-  const auto groups = static_cast<Eigen::Index>(problem.groups.size());
-  const double left = static_cast<double>(problem.tested_noise) *
-                          static_cast<double>(problem.r.size() - problem.K.rows() * groups) -
-                      static_cast<double>(poles);
-  return std::pow(kChanceOfAPole, static_cast<double>(gained) / left);
+  return std::pow(problem.chance_of_a_pole,
+                  static_cast<double>(gained) / degrees_of_freedom(problem, poles));
 }
 
 /// Whether all poles, zeros of 1 + d_1 r + ... are as wide as the problem asks.
@@ -179,11 +186,14 @@ class Fitting {
     const Eigen::MatrixXcd fitted = projection.fitted(p_.Z);
     result.residual = p_.Z - fitted;
     result.weight.resize(p_.r.size());
+    result.freedom.resize(p_.r.size());
     result.leverage.resize(groups);
     Eigen::Index first = 0;
     for (Eigen::Index g = 0; g < groups; ++g) {
       const Eigen::VectorXcd weight = projection.weight(static_cast<std::size_t>(g));
       result.weight.segment(first, weight.size()) = weight;
+      result.freedom.segment(first, weight.size()) =
+          projection.freedom(static_cast<std::size_t>(g));
       result.leverage[g] = weight.squaredNorm();
       first += weight.size();
     }
@@ -229,6 +239,20 @@ class Fitting {
   Eigen::VectorXd weight_;
 };
 
+/// ln of the probability of each fit but for a constant: residual power^-(degrees of freedom), and the
+/// odds against a pole for which chance has to make up.
+Eigen::ArrayXd log_probability(const LocalProblem& problem, const Fitting& fitting,
+                               const std::vector<LocalFit>& fits) {
+  Eigen::ArrayXd log_p(static_cast<Eigen::Index>(fits.size()));
+  for (Eigen::Index n = 0; n < log_p.size(); ++n) {
+    const LocalFit& fit = fits[static_cast<std::size_t>(n)];
+    const double cost = std::max(fitting.cost(fit), std::numeric_limits<double>::min());
+    log_p[n] = fit.poles * std::log(problem.chance_of_a_pole) -
+               degrees_of_freedom(problem, fit.poles) * std::log(cost);
+  }
+  return log_p;
+}
+
 }  // namespace
 
 LocalFit fit_locally(const LocalProblem& problem, int most_poles) {
@@ -244,6 +268,50 @@ LocalFit fit_locally(const LocalProblem& problem, int most_poles) {
     cost = smaller;
   }
   return best;
+}
+
+LocalFit average_locally(const LocalProblem& problem, int most_poles) {
+  const Fitting fitting(problem);
+  std::vector<LocalFit> fits = {fitting.polynomial()};
+  Eigen::Index columns = 0;
+  for (int poles = 1; poles <= most_poles; ++poles) {
+    LocalFit fit = fitting.with_poles(poles);
+    if (fit.poles != poles || !fit.pole_spread.allFinite()) continue;
+    columns += poles;
+    fits.push_back(std::move(fit));
+  }
+  if (fits.size() == 1) return std::move(fits.front());
+  const Eigen::ArrayXd log_p = log_probability(problem, fitting, fits);
+  const Eigen::ArrayXd likely = (log_p - log_p.maxCoeff()).exp();
+  const Eigen::ArrayXd share = likely / likely.sum();
+
+  const Eigen::Index B = problem.r.size();
+  const Eigen::Index channels = problem.Z.rows();
+  LocalFit mean;
+  mean.value.setZero(channels, static_cast<Eigen::Index>(problem.groups.size()));
+  mean.weight.setZero(B);
+  mean.leverage.setZero(mean.value.cols());
+  mean.residual.resize(channels, B * share.size());
+  for (Eigen::Index n = 0; n < share.size(); ++n) {
+    const LocalFit& fit = fits[static_cast<std::size_t>(n)];
+    mean.value += share[n] * fit.value;
+    mean.weight += share[n] * fit.weight;
+    mean.leverage += share[n] * fit.leverage;
+    mean.dof += share[n] * fit.dof;
+    mean.residual.middleCols(B * n, B) = std::sqrt(share[n]) * fit.residual;
+    mean.poles = fit.poles;
+  }
+  mean.pole_spread.resize(mean.value.size(), columns + share.size());
+  Eigen::Index column = 0;
+  for (Eigen::Index n = 0; n < share.size(); ++n) {
+    const LocalFit& fit = fits[static_cast<std::size_t>(n)];
+    const double root = std::sqrt(share[n]);
+    mean.pole_spread.col(column++) = root * (fit.value - mean.value).reshaped();
+    if (fit.poles == 0) continue;
+    mean.pole_spread.middleCols(column, fit.poles) = root * fit.pole_spread;
+    column += fit.poles;
+  }
+  return mean;
 }
 
 }  // namespace stageid

@@ -17,9 +17,11 @@ namespace stageid {
 /// SYSID 2012 (local rational models).
 struct LocalFit {
   Eigen::MatrixXcd value;     ///< channels x groups: Theta k0, the function on the line (D(0) = 1)
-  Eigen::MatrixXcd residual;  ///< channels x B
+  Eigen::MatrixXcd residual;  ///< channels x B (average_locally(): for each fit)
   Eigen::VectorXcd weight;    ///< B: value of a group = sum over its bins of weight Z, for given D
-  Eigen::VectorXd leverage;   ///< of each group: the sum of its |weight|^2
+  Eigen::VectorXd
+      freedom;  ///< B: power of a bin's residual over that of its noise; 1 - fit's share
+  Eigen::VectorXd leverage;  ///< of each group: the sum of its |weight|^2
   /// (channels groups) x n, vec(value) from the factor of Cov(d): what not knowing D adds.
   ///   Cov(vec value) = diag(leverage) kron C_V + pole_spread pole_spread^H
   Eigen::MatrixXcd pole_spread;
@@ -39,14 +41,24 @@ struct LocalProblem {
   Eigen::Index pole_channels;
   /// Channels whose noise the test of a pole counts: 1 is strict, independent_noise sharp.
   Eigen::Index tested_noise = 1;
+  double chance_of_a_pole = 0.05;  ///< that noise alone is taken for one, on a line
   /// Poles nearer to the axis of r than so many distances of a group's bins are not taken: they would
   /// describe the noise of a single bin. Half of the half-power width. 0: any.
   double narrowest_pole = 0.0;
 };
 
 /// Fits with 0, 1, ... `most_poles` poles and keeps a pole only if it lowers the sum of squared
-/// residuals further than noise alone does on one of twenty lines.
+/// residuals further than noise alone does with a chance of chance_of_a_pole.
 /// @pre B > p groups + most_poles; K of each group has full rank p.
 LocalFit fit_locally(const LocalProblem& problem, int most_poles);
+
+/// The mean of the fits with 0, 1, ... `most_poles` poles, each as probable as its residual says, a pole
+/// being unlikely by as much as fit_locally() asks of it. Choosing one of them would leave out of the
+/// covariance that another could have been chosen; here the fits' distances from their mean are columns
+/// of pole_spread. residual holds every fit's, times the root of its share: channels x B fits.
+/// poles: the most of any fit.
+/// Source: Buckland, Burnham and Augustin, Biometrics 53 (1997); Hoeting et al., Stat. Sci. 14 (1999).
+/// @pre as fit_locally()
+LocalFit average_locally(const LocalProblem& problem, int most_poles);
 
 }  // namespace stageid

@@ -119,9 +119,8 @@ ExcitedPart PlantEstimation::excited_part(const RealizationRuns& realization,
   }
   std::sort(part.axes.begin(), part.axes.end());
   part.axes.erase(std::unique(part.axes.begin(), part.axes.end()), part.axes.end());
-  const ExcitationSpectrum& only = excitation.front().spectrum;
-  if (excitation.size() == 1 && part.axes.size() > 1 && only.one_channel_a_line())
-    part.only = only.only;
+  const ExcitationSpectrum& first = excitation.front().spectrum;
+  if (excitation.size() == 1 && first.is_zippered()) part.only = first.only;
   return part;
 }
 

@@ -25,7 +25,7 @@ namespace stageid {
 /// With FrfMethod::lpm Z is the steady state of the whole record, the transient removed by a local
 /// polynomial or rational model (transient_model.hpp), and C_E comes from what that leaves beside
 /// the lines: 9 degrees of freedom a stretch, from one period on. Neighbouring lines share bins, so
-/// their variances are correlated over some 12 bins. Stretches end at marked periods and after 16
+/// their variances are correlated over some 16 bins. Stretches end at marked periods and after 16
 /// periods at most: record_spectra.hpp. Memory: 16 periods a thread.
 ///
 /// If one experiment excites several axes, each on lines of its own (zippered), it is a whole

@@ -12,7 +12,7 @@ namespace stageid {
 namespace {
 
 /// Periods that are transformed together. More would cost memory and gain nothing: the noise of the
-/// mean is the same, and a window of 12 bins is narrow enough.
+/// mean is the same, and a window of 16 bins is narrow enough.
 constexpr int kLongest = 16;
 
 /// Clean periods in a row: samples of the chosen channels, outputs, estimated, excluded.
@@ -111,6 +111,8 @@ class RecordMeasurement {
       run_.scatter_im = w_.pool.take(part.scatter_im.rows(), part.scatter_im.cols());
       run_.scatter_re.setZero();
       run_.scatter_im.setZero();
+      run_.scatter_window = part.scatter_window;  // stretches are nearly equally long
+      run_.scatter_first = std::move(part.scatter_first);
     }
     run_.periods += segment.periods;
     run_.mean += static_cast<double>(segment.periods) * part.mean;

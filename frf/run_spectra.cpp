@@ -177,4 +177,13 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
   return run;
 }
 
+double common_scatter(const RunSpectra& run, Eigen::Index k, Eigen::Index l) {
+  if (k == l || run.scatter_window == 0) return k == l ? 1.0 : 0.0;
+  const Eigen::Index apart = std::abs(run.scatter_first[static_cast<std::size_t>(k)] -
+                                      run.scatter_first[static_cast<std::size_t>(l)]);
+  const double x =
+      std::max(0.0, 1.0 - static_cast<double>(apart) / static_cast<double>(run.scatter_window));
+  return x * (2.0 + x) / 3.0;
+}
+
 }  // namespace stageid

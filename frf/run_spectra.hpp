@@ -20,13 +20,22 @@ struct RunSpectra {
   /// 2 + j; empty without degrees of freedom.
   Eigen::MatrixXd scatter_re;
   Eigen::MatrixXd scatter_im;
-  int scatter_dof = 0;             ///< scatter / scatter_dof / periods estimates Cov(mean)
+  int scatter_dof = 0;  ///< scatter / scatter_dof / periods estimates Cov(mean)
+  /// Where the scatter of each line is made of `scatter_window` bins which others use as well: the
+  /// first of them, counted among those that are used. 0 and empty: no line shares with another.
+  Eigen::Index scatter_window = 0;
+  std::vector<Eigen::Index> scatter_first{};
   int periods = 0;                 ///< clean ones
   Eigen::VectorXd excluded_power;  ///< sum over the lines of |U|^2 of the excluded actuators
   std::string fingerprint;         ///< of the excitation and of every sample that is not marked
   /// By period; which realization and experiment this is, others know.
   std::vector<DroppedPeriod> dropped;
 };
+
+/// How much two lines' scatters have in common: the squared correlation of their mean squares; 1 for
+/// k = l. Of two windows with m of n bins in common, the local polynomials being taken off, it is near
+/// x (2 + x) / 3, x = m / n.
+double common_scatter(const RunSpectra& run, Eigen::Index k, Eigen::Index l);
 
 /// The lines that spectra are wanted on: the excited ones, ascending, then others.
 struct SpectrumLines {

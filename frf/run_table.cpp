@@ -1,6 +1,7 @@
 #include "frf/run_table.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -95,11 +96,18 @@ std::set<int> begun_experiments(const std::vector<const LogReader*>& logs) {
 }
 
 void check_realizations_asked_for(const RunsByRealization& table, const FrfOptions& options,
-                                  const std::string& log) {
+                                  const std::vector<const LogReader*>& logs) {
+  std::set<int> complete;
+  for (const LogReader* reader : logs)
+    for (const LogRun& run : reader->runs())
+      if (run.complete) complete.insert(run.realization);
+  const std::string log = logs.front()->path().string();
   for (const int realization : options.realizations) {
     if (!table.contains(realization)) {
-      throw std::invalid_argument(
-          fmt::format("{}: realization {} has no complete run; leave it out", log, realization));
+      throw std::invalid_argument(fmt::format(
+          "{}: realization {} has no complete run; counted from 0, those that have one are {} "
+          "(--realizations counts from 1)",
+          log, realization, fmt::join(complete, ", ")));
     }
   }
 }
@@ -147,7 +155,7 @@ std::vector<RealizationRuns> choose_runs(const std::vector<const LogReader*>& lo
   }
   const RunsByRealization table = complete_runs(logs, options);
   const std::string first = logs.front()->path().string();
-  check_realizations_asked_for(table, options, first);
+  check_realizations_asked_for(table, options, logs);
   if (table.empty()) {
     throw std::invalid_argument(
         fmt::format("{}: no complete run; measure at least one realization to its end", first));

@@ -1,5 +1,5 @@
 // Symbols: l a line, b = P l its bin, r = (bin - b) / half of the window's width; regressors of T are
-// 1, r, r^2.
+// 1, r, ..., r^5.
 #include "frf/transient_model.hpp"
 
 #include <fmt/format.h>
@@ -14,11 +14,16 @@
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kOrder = 2;
-constexpr int kMostPoles = 2;  // two modes close to each other
+// With one period the window has 30 lines: order 2 and two poles left a remainder of the transient that
+// was 1.5 times the noise, and thousands of times next to a mode (docs/theory.md, section 4).
+constexpr Eigen::Index kOrder = 5;
+constexpr int kMostPoles = 4;
+// A pole in vain takes more of the residual than its degree of freedom, having been chosen for it.
+constexpr double kChanceOfAPole = 0.005;
 // Degrees of freedom left by the polynomials. More give a better noise estimate for a run, fewer a
-// narrower window, on which the polynomials hold.
-constexpr Eigen::Index kDof = 9;
+// narrower window, on which the polynomials hold. An even number of bins: as many below as above.
+constexpr Eigen::Index kResidualDof = 10;
+constexpr int kDof = 9;  // and of the scatter, whose bins have unequal weights: 9.5 to 9.7
 
 /// Adds weight e e^H, packed as in RunSpectra, for each column e.
 void add_scatter(double weight, const Eigen::MatrixXcd& columns, Eigen::Index k, RunSpectra& run) {
@@ -57,8 +62,8 @@ TransientModel::TransientModel(int period_samples, int periods,
   for (Eigen::Index b = 0; b < bins_; ++b) {
     if (taken[static_cast<std::size_t>(b)] == 0) usable_.push_back(b);
   }
-  window_ = kOrder + 1 + kDof;
-  dof_ = static_cast<int>(kDof);
+  window_ = kOrder + 1 + kResidualDof;
+  dof_ = kDof;
   if (static_cast<Eigen::Index>(usable_.size()) < window_) {
     throw std::invalid_argument(fmt::format(
         "{}: method 'lpm' needs {} bins beside the lines, this record of {} period{} has {}; "
@@ -85,20 +90,31 @@ void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
   problem.r.resize(window_);
   problem.groups = {window_};
   problem.independent_noise = outputs_;
-  problem.pole_channels = Z.rows();
+  problem.pole_channels = outputs_;  // the inputs repeat their noise
+  problem.tested_noise = outputs_;
+  problem.chance_of_a_pole = kChanceOfAPole;
   problem.K.resize(kOrder + 1, window_);
   for (Eigen::Index i = 0; i < window_; ++i) {
     const double r = static_cast<double>(bins[static_cast<std::size_t>(i)] - bin) / reach;
     problem.r[i] = r;
-    problem.K.col(i) << 1.0, r, r * r;
+    for (Eigen::Index q = 0; q <= kOrder; ++q)
+      problem.K(q, i) = std::pow(r, static_cast<double>(q));
   }
   problem.k0 = Eigen::VectorXcd::Unit(kOrder + 1, 0);
 
   const LocalFit fit = fit_locally(problem, kMostPoles);
+  run.scatter_first[static_cast<std::size_t>(k)] =
+      std::lower_bound(usable_.begin(), usable_.end(), bins.front()) - usable_.begin();
   run.mean.col(k) = Z.col(bin) - fit.value.col(0);
-  // The line's own noise and that of T, as of one period: the scatter is of single periods.
-  add_scatter(periods_ * (1.0 + fit.leverage[0]) * dof_ / fit.dof, fit.residual, k, run);
-  if (fit.poles > 0) add_scatter(periods_ * static_cast<double>(dof_), fit.pole_spread, k, run);
+  // As of one period, for the scatter is of single periods: the line's own noise, as the mean of the
+  // bins' has it, and that of T, the sum of |weight|^2 times the bin's own, for the loop colours the
+  // noise from bin to bin. A white one comes to 1 + leverage times what fit.dof is said to give.
+  const double periods = periods_ * static_cast<double>(dof_);
+  const double shared = static_cast<double>(kResidualDof) / fit.dof;  // by poles
+  const Eigen::ArrayXd weight =
+      1.0 / fit.dof + shared * fit.weight.array().abs2() / fit.freedom.array();
+  add_scatter(periods, fit.residual * weight.sqrt().matrix().asDiagonal(), k, run);
+  if (fit.poles > 0) add_scatter(periods, fit.pole_spread, k, run);
 }
 
 void TransientModel::separate(const Eigen::MatrixXcd& Z, RunSpectra& run) const {
@@ -108,6 +124,8 @@ void TransientModel::separate(const Eigen::MatrixXcd& Z, RunSpectra& run) const 
   run.scatter_re.setZero(n * (n + 1) / 2, lines);
   run.scatter_im.setZero(n * (n + 1) / 2, lines);
   run.scatter_dof = dof_;
+  run.scatter_window = window_;
+  run.scatter_first.resize(excitation_.lines.size());
   for (Eigen::Index k = 0; k < lines; ++k) separate_line(Z, k, run);
 }
 

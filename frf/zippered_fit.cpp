@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "frf/local_fit.hpp"
+#include "frf/tail_probability.hpp"
 
 namespace stageid {
 namespace {
@@ -17,6 +18,8 @@ using Eigen::MatrixXcd;
 // a lower one what lies outside the window could not be added to the poles.
 constexpr int kMostPoles = 3;
 constexpr double kNarrowestPole = 0.2;
+// That noise alone leaves so much that the residual is not pooled with the noise but taken for itself.
+constexpr double kMisfitByChance = 0.01;
 
 MatrixXcd open_loop_residual(const MatrixXcd& G) {  // [I, -G]
   MatrixXcd factor(G.rows(), G.rows() + G.cols());
@@ -95,7 +98,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
   problem.tested_noise = outputs_;
   problem.narrowest_pole = kNarrowestPole;
 
-  const LocalFit fit = fit_locally(problem, kMostPoles);
+  const LocalFit fit = average_locally(problem, kMostPoles);
   ZipperedEstimate result;
   result.line = estimate_line(MatrixXcd::Identity(axes, axes), fit.value, outputs_);
   if (result.line.status != LineStatus::good) return result;
@@ -109,21 +112,33 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
   const Eigen::VectorXd effective = periods * fit.leverage.cwiseInverse();
   if (from_periods) {
     MatrixXcd scatter = MatrixXcd::Zero(problem.Z.rows(), problem.Z.rows());
-    double sum_of_squares = 0.0;
+    Eigen::VectorXd share = fit.weight.cwiseAbs2();
+    for (Index p = 0; p < axes; ++p) {
+      auto own = share.segment(p * bins_, bins_);
+      own /= own.sum() * static_cast<double>(axes);
+    }
+    double in_common = 0.0;
     for (Index i = 0; i < B; ++i) {
-      const double share =
-          std::norm(fit.weight[i]) / fit.leverage[i / bins_] / static_cast<double>(axes);
-      scatter += share * spectra.scatter(window[static_cast<std::size_t>(i)]);
-      sum_of_squares += share * share;
+      const Index line = window[static_cast<std::size_t>(i)];
+      scatter += share[i] * spectra.scatter(line);
+      for (Index j = 0; j < B; ++j)
+        in_common += share[i] * share[j] *
+                     common_scatter(spectra.run(0), line, window[static_cast<std::size_t>(j)]);
     }
     result.noise = line_noise(result.line, scatter, spectra.scatter_dof(), effective);
-    const double dof = spectra.scatter_dof() / sum_of_squares;
+    const double dof = spectra.scatter_dof() / in_common;
     const Eigen::VectorXd noise = result.noise.residual.diagonal().real() / periods;
     if (noise.minCoeff() > 0.0) result.misfit = left_variance.cwiseQuotient(noise).mean();
-    // The residual is of the same noise, and holds what the model cannot follow.
-    result.noise_dof = dof + fit.dof;
-    result.noise.residual =
-        (dof * result.noise.residual + periods * left * left.adjoint()) / result.noise_dof;
+    if (result.misfit > 1.0 && log_tail_of_f(result.misfit, static_cast<int>(std::ceil(fit.dof)),
+                                             dof) < std::log(kMisfitByChance)) {
+      // More than noise: what the model cannot follow, of which the value has its part.
+      result.noise.residual *= result.misfit;
+      result.noise_dof = fit.dof;
+    } else {
+      result.noise_dof = dof + fit.dof;
+      result.noise.residual =
+          (dof * result.noise.residual + periods * left * left.adjoint()) / result.noise_dof;
+    }
   } else {
     // Not an integer where a pole took its share: divided before.
     const MatrixXcd scatter = fit.residual * fit.residual.adjoint() / fit.dof;
@@ -131,7 +146,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
     result.noise_dof = fit.dof;
   }
   result.noise.mean_of_periods = 1.0 / periods;
-  if (fit.poles > 0)
+  if (fit.pole_spread.cols() > 0)
     result.noise.input_part +=
         pole_part(result.line, fit.pole_spread, result.noise.residual.diagonal().real());
   return result;

@@ -25,12 +25,12 @@ struct ZipperedEstimate {
 /// On a line k of axis p the loop gives Z(k) = H_p(k) R_p(k) + V(k), one column H_p of Z R^-1. All
 /// columns are modelled around line l, on the zippered_window() nearest lines of each axis,
 ///   Z(k) = R_p(k) (theta_p0 + theta_p1 r + theta_p2 r^2 + theta_p3 r^3) / D(r) + V(k),
-/// r = (k - l) / reach, with one D of up to three poles for all axes (LocalFit: the poles are the
-/// loop's), and G = Y U^-1 of [theta_10 theta_20
-/// ...]. Each column is a weighted sum of spectra on other lines, so
+/// r = (k - l) / reach, with one D of up to three poles for all axes (average_locally(): the mean over
+/// the number of poles), and G = Y U^-1 of [theta_10 theta_20 ...]. Each column is a weighted sum of spectra on other lines, so
 ///   Cov(vec G) = sum_p |w_p|^2 (q_p q_p^H) kron C_E / P + (what not knowing D adds),
 /// q_p row p of U^-1. C_E is the mean of the lines', weighted as they enter, pooled with what the local
-/// model leaves, which holds what it cannot follow; with one period it is that alone.
+/// model leaves; where that is more than noise leaves on one of a hundred lines, C_E is raised to it, as
+/// it holds what the model cannot follow. With one period it is the residual alone.
 /// Source: Pintelon and Schoukens, System Identification (2012), sections 2.7.2 and 7.2.
 class ZipperedFit {
  public:

@@ -21,8 +21,7 @@ bool is_zippered(const LogReader& log) {
   RealDft dft(log.info().period_samples);
   const Eigen::MatrixXd period = log.excitation(0);
   if (period.rows() != dft.length()) return false;
-  const ExcitationSpectrum spectrum = excitation_spectrum(period, dft);
-  return spectrum.channels.size() > 1 && spectrum.one_channel_a_line();
+  return excitation_spectrum(period, dft).is_zippered();
 }
 
 std::vector<Eigen::Index> ZipperedLines::of(Eigen::Index wanted) const {

@@ -7,12 +7,12 @@
 #include <stdexcept>
 
 #include "acquisition/log_reader.hpp"
+#include "excitation/fft_wisdom.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/hold_compensation.hpp"
 #include "tools/command_line.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/frf_quality.hpp"
-#include "tools/frf_step.hpp"
 #include "tools/health_step.hpp"
 #include "tools/output_paths.hpp"
 
@@ -95,10 +95,23 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("--stage", stage_,
                       "stage file that the data's health is held against; default: the log's own");
   command->add_flag("--no-health", no_health_, "do not look at the health of the data");
+  command
+      ->add_option("--fft-wisdom", fft_wisdom_,
+                   "keep FFT plans found by timing in FILE, and use those it holds")
+      ->type_name("FILE");
   command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->final_callback([this] { run(); });
+}
+
+FrfStep FrfCommand::estimate(const FrfOptions& options) const {
+  const HealthRequest health{!no_health_, stage_};
+  if (fft_wisdom_.empty()) return estimate_frf(logs_, options, health, console_);
+  FftWisdom wisdom(fft_wisdom_);
+  FrfStep step = estimate_frf(logs_, options, health, console_);
+  note_fft_plans(step.frf, wisdom.save());
+  return step;
 }
 
 void FrfCommand::run() const {
@@ -117,8 +130,8 @@ void FrfCommand::run() const {
           fmt::format("--realizations: {}; they are counted from 1", realization));
     options.realizations.push_back(realization - 1);
   }
-  require_writable(output_);
-  FrfStep step = estimate_frf(logs_, options, {!no_health_, stage_}, console_);
+  require_writable(output_, logs_);
+  FrfStep step = estimate(options);
   std::vector<std::string> notes = dropped_lines(step.frf);
   if (compensate_ != "none") {
     const double delay_s = delay_s_ ? *delay_s_ : declared_delay_s(logs_.front());

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tools/console.hpp"
+#include "tools/frf_step.hpp"
 
 namespace stageid {
 
@@ -17,11 +18,13 @@ class FrfCommand {
 
  private:
   void run() const;
+  FrfStep estimate(const FrfOptions& options) const;
 
   Console& console_;
   std::vector<std::filesystem::path> logs_;
   std::filesystem::path output_;
   std::filesystem::path stage_;
+  std::filesystem::path fft_wisdom_;
   bool no_health_ = false;
   std::vector<std::string> inputs_;
   std::vector<std::string> outputs_;

@@ -49,16 +49,33 @@ Json detected_json(const DetectedDistortion& found, Eigen::Index band) {
   return {{"p_value", verdict.p_value}, {"level", found.level(verdict.at, band)}};
 }
 
-/// Whether any verdict stands out more than the least probable of so many does by chance.
-bool anything_nonlinear(const NonlinearityTest& test) {
-  double smallest = test.p_value.minCoeff();
-  auto tests = static_cast<double>(test.p_value.size());
+/// The least probable of all verdicts, and how many there are.
+struct Extreme {
+  double p_value = 1.0;
+  double tests = 0.0;
+  /// More than the least probable of so many is by chance.
+  bool stands_out() const { return p_value * tests < kNonlinearBelow; }
+};
+
+Extreme extreme(const NonlinearityTest& test) {
+  Extreme out{test.p_value.minCoeff(), static_cast<double>(test.p_value.size())};
   for (const DetectedDistortion* kind : {&test.even, &test.odd}) {
     if (kind->p_value.size() == 0) continue;
-    smallest = std::min(smallest, kind->p_value.minCoeff());
-    tests += static_cast<double>(kind->p_value.size());
+    out.p_value = std::min(out.p_value, kind->p_value.minCoeff());
+    out.tests += static_cast<double>(kind->p_value.size());
   }
-  return smallest * tests < kNonlinearBelow;
+  return out;
+}
+
+std::string conclusion(const NonlinearityTest& test) {
+  const Extreme most = extreme(test);
+  const std::string chance =
+      fmt::format("a linear plant shows {:.1f} of {} pairs and bands as nonlinear by chance",
+                  kNonlinearBelow * static_cast<double>(test.p_value.size()), test.p_value.size());
+  if (!most.stands_out()) return "no sign that the plant is not linear: " + chance;
+  return fmt::format(
+      "the plant is not linear: {}, but none as improbable as p = {:.0e}, which is here", chance,
+      std::max(most.p_value, 1e-300));
 }
 
 std::string why_not_tested(const FrfEstimate& frf) {
@@ -83,10 +100,7 @@ std::vector<std::string> linearity_lines(const FrfEstimate& frf) {
                     detected(test.even, b), detected(test.odd, b)});
   }
   std::vector<std::string> lines = table_lines(rows);
-  lines.push_back(fmt::format(
-      "{}; a linear plant shows {:.1f} nonlinear pairs by chance",
-      anything_nonlinear(test) ? "the plant is not linear" : "no sign that the plant is not linear",
-      kNonlinearBelow * static_cast<double>(test.p_value.size())));
+  lines.push_back(conclusion(test));
   return lines;
 }
 
@@ -108,7 +122,7 @@ Json linearity_json(const FrfEstimate& frf) {
          {"odd", detected_json(test.odd, b)}});
   }
   return {{"tested", true},
-          {"nonlinear", anything_nonlinear(test)},
+          {"nonlinear", extreme(test).stands_out()},
           {"false_alarm_rate", kNonlinearBelow},
           {"bands", bands}};
 }

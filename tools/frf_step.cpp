@@ -55,6 +55,12 @@ std::string complete_provenance(const FrfEstimate& frf, const std::vector<const 
 
 }  // namespace
 
+void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint) {
+  Json provenance = Json::parse(frf.provenance_json);
+  provenance["fft_plans"] = fingerprint;
+  frf.provenance_json = provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options) {
   Json request = {{"version", STAGEID_VERSION}, {"options", options_json(options)}};
   for (const LogReader* log : logs) request["experiments"].push_back(lasting_metadata(*log));

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <memory>
+#include <utility>
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/file_error.hpp"
@@ -198,7 +199,7 @@ void Identification::fit() {
   }
   FitStep step = fit_model(*setup_, "frf.h5", fingerprint, console_);
   model_ = step.result.model;
-  model_variance_ = step.result.response_variance;
+  model_variance_ = std::move(step.result.response_variance);
   trustworthy_ = step.result.trustworthy();
   if (!trustworthy_) notes_.push_back("the fit did not converge: " + step.result.message);
   write_model(path("model.json"), model_);

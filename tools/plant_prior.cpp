@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "estimation/additive_model.hpp"
 #include "estimation/validation.hpp"
@@ -58,7 +59,7 @@ FrfEstimate prior_of_model(const std::filesystem::path& file, const StageInfo& s
 FrfEstimate prior_of_frf(const std::filesystem::path& file, const StageInfo& stage,
                          const Eigen::VectorXd& frequency_hz) {
   FrfEstimate frf = read_frf(file);
-  if (frf.compensated != Compensation::none) frf = as_measured(frf);
+  if (frf.compensated != Compensation::none) frf = as_measured(std::move(frf));
   if (frf.hold != Hold::zoh || frf.sample_rate_hz != stage.sample_rate_hz)
     throw FormatError(
         file, "",

@@ -98,12 +98,16 @@ TEST(LocalFit, StatedCovarianceIsTheScatterOverTrials) {
 TEST(LocalFit, NoiseIsSeldomTakenForAPole) {
   ComplexNoise random(3);
   int poles = 0;
+  int poles_of_a_strict_test = 0;
   for (int i = 0; i < 2000; ++i) {
     LocalProblem p = problem_with({});
     add_noise(p, 1.0, random);
     poles += fit_locally(p, 1).poles;
+    p.chance_of_a_pole = 0.005;
+    poles_of_a_strict_test += fit_locally(p, 1).poles;
   }
-  EXPECT_LE(poles, 130);  // 5 % of 2000, and three standard deviations
+  EXPECT_LE(poles, 130);                  // 5 % of 2000, and three standard deviations
+  EXPECT_LE(poles_of_a_strict_test, 19);  // 0.5 %
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ TEST(PlantFrfErrors, TooShortForALocalModel) {
   const MemoryLog log = small_log({.period_samples = 16, .lines = {1, 3, 5}, .periods = 1});
   EXPECT_THAT(
       message_of<std::invalid_argument>({&log}, {.transient_periods = 1, .method = FrfMethod::lpm}),
-      AllOf(HasSubstr("needs 12 bins"), HasSubstr("of 1 period has 4")));
+      AllOf(HasSubstr("needs 16 bins"), HasSubstr("of 1 period has 4")));
 }
 
 TEST(PlantFrfErrors, UnknownChannels) {

@@ -27,7 +27,9 @@ TEST_F(FrfQuality, TellsWhetherTheStageIsLinear) {
   const json found = json::parse(cubic.out)["nonlinearity"];
   EXPECT_EQ(found["nonlinear"], true);
   EXPECT_GT(found["bands"][0]["distortion"].get<double>(), 0.0);
-  EXPECT_THAT(cubic.err, HasSubstr("the plant is not linear"));
+  EXPECT_THAT(cubic.err, HasSubstr("the plant is not linear: a linear plant shows "));
+  EXPECT_THAT(cubic.err, HasSubstr("but none as improbable as p = "));
+  EXPECT_THAT(linear.err, HasSubstr("no sign that the plant is not linear: a linear plant shows "));
   EXPECT_LT(read_frf(at("c.h5")).nonlinearity.p_value.minCoeff(),
             read_frf(at("f.h5")).nonlinearity.p_value.minCoeff());
 }
