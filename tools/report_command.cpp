@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "tools/command_line.hpp"
 #include "tools/output_paths.hpp"
@@ -24,7 +25,15 @@ ReportCommand::ReportCommand(CLI::App& app, Console& console) : console_(console
 }
 
 void ReportCommand::run() const {
-  require_writable(output_);
+  std::vector<std::filesystem::path> read = inputs_;
+  read.insert(read.end(), compare_.begin(), compare_.end());
+  require_writable(output_, read);
+  const std::string ending = output_.extension().string();
+  if (ending != ".html" && ending != ".htm")
+    throw std::invalid_argument(fmt::format(
+        "{}: the report is a page; write a name that ends in .html, and print it from a browser "
+        "for paper",
+        output_.string()));
   ReportData data = read_report_data(report_input(inputs_));
   if (!compare_.empty()) add_comparison(data, compare_);
   write_report(output_, data);

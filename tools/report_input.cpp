@@ -38,6 +38,8 @@ std::string kind_of(const std::filesystem::path& file) {
   if (ending == ".yaml" || ending == ".yml") return "stageid-stage";
   if (ending == ".json") {
     const Json json = Json::parse(read_text(file), nullptr, false);
+    if (json.is_discarded())
+      throw FormatError(file, "", "is not JSON, or cut short; copy it again or write it anew");
     if (json.is_object() && json.contains("format") && json["format"].is_string())
       return json["format"];
     return "";
@@ -204,7 +206,15 @@ void add_log(ReportData& data, const std::filesystem::path& file) {
 
 ReportInput report_input(const std::vector<std::filesystem::path>& files) {
   ReportInput input;
-  for (const std::filesystem::path& file : files) {
+  for (auto at = files.begin(); at != files.end(); ++at) {
+    const std::filesystem::path& file = *at;
+    std::error_code none;
+    const auto same = [&](const auto& other) {
+      return std::filesystem::equivalent(file, other, none);
+    };
+    if (std::any_of(files.begin(), at, same))
+      throw std::invalid_argument(
+          fmt::format("{}: is given twice; what was held back is another file", file.string()));
     if (!std::filesystem::exists(file))
       throw FileError(fmt::format("{}: does not exist; check the path", file.string()));
     if (std::filesystem::is_directory(file)) {

@@ -53,6 +53,12 @@ const char* to_string(CmifKind kind) {
   return "response";
 }
 
+/// An array that is in the page already, as the page decodes it.
+struct Based {
+  const char* id = "";
+  const Eigen::MatrixXcd* values = nullptr;
+};
+
 /// Blocks and their descriptions, added together so that none is without the other.
 class Arrays {
  public:
@@ -60,6 +66,17 @@ class Arrays {
     more["type"] = type;
     description_[id] = std::move(more);
     blocks_.push_back({id, std::move(text)});
+  }
+  /// Expected from the decoded numbers of `base` (none: 0), extrapolated by `order`. @returns the decoded
+  Eigen::MatrixXcd add_float32(const std::string& id, const Eigen::MatrixXcd& values, int order,
+                               const Based& base = {}) {
+    return add_complex(id, "c64", encode_complex_float32(values, {base.values, order}), order,
+                       base);
+  }
+  Eigen::MatrixXcd add_block16(const std::string& id, const Eigen::MatrixXcd& values, int order,
+                               const Based& base = {}) {
+    return add_complex(id, "c40", encode_complex_block16(values, {base.values, order}), order,
+                       base);
   }
   /// Square roots of variances. Each by std::sqrt: Eigen's own is an approximation on some
   /// machines, and a page must not depend on the machine.
@@ -74,14 +91,48 @@ class Arrays {
   std::vector<Block>& blocks() { return blocks_; }
 
  private:
+  Eigen::MatrixXcd add_complex(const std::string& id, const char* type, ComplexCode code, int order,
+                               const Based& base) {
+    Json more = {{"order", order}};
+    if (base.values != nullptr) more["base"] = base.id;
+    add(id, type, std::move(code.text), std::move(more));
+    return std::move(code.decoded);
+  }
+
   Json description_ = Json::object();
   std::vector<Block> blocks_;
 };
 
+/// The model travels as the residual: small errors of small numbers stay small in both.
+void add_measured(const ReportData& data, Arrays& arrays) {
+  const FrfEstimate& frf = *data.frf;
+  Eigen::MatrixXcd residual;
+  Based from_residual;
+  if (data.model_response.size() > 0) {
+    residual = arrays.add_block16("residual", frf.response - data.model_response, 0);
+    from_residual = {"residual", &residual};
+  }
+  // Measured less residual is the model, and that is smooth; noise is not, and twice differenced it grows.
+  const int order = from_residual.values != nullptr ? 2 : 1;
+  const Eigen::MatrixXcd response =
+      arrays.add_float32("response", frf.response, order, from_residual);
+  if (!data.comparison) return;
+  Eigen::MatrixXcd other_model;
+  Based like = {"response", &response};
+  if (data.comparison->model_response.size() > 0) {
+    other_model = arrays.add_block16("other_model", data.comparison->model_response, 2);
+    like = {"other_model", &other_model};
+  }
+  if (data.comparison->response.size() > 0)
+    arrays.add_block16("other_response", data.comparison->response, 0, like);
+}
+
 void add_response(const ReportData& data, Arrays& arrays) {
   const FrfEstimate& frf = *data.frf;
   arrays.add("frequency", "f64", encode_float64(frf.frequency_hz));
-  arrays.add("response", "c64", encode_complex_float32(frf.response));
+  add_measured(data, arrays);
+  if (frf.interpolation_misfit.size() > 0)
+    arrays.add("interpolation_misfit", "f32", encode_float32(frf.interpolation_misfit.transpose()));
   const Eigen::MatrixXd* const variance = uncertainty(frf).variance;
   if (variance != nullptr) arrays.add_deviation("deviation", *variance);
   if (data.cmif_curves.size() > 0) {
@@ -90,14 +141,7 @@ void add_response(const ReportData& data, Arrays& arrays) {
     if (variance != nullptr)
       arrays.add_log_bytes("cmif_deviation", cmif_deviation(frf, data.cmif_kind, *variance));
   }
-  if (data.comparison && data.comparison->response.size() > 0)
-    arrays.add("other_response", "c40", encode_complex_block16(data.comparison->response));
-  if (data.comparison && data.comparison->model_response.size() > 0)
-    arrays.add("other_model", "c40", encode_complex_block16(data.comparison->model_response));
   if (data.model_response.size() == 0) return;
-  // The model travels as the residual: small errors of small numbers stay small in both.
-  const Eigen::MatrixXcd residual = frf.response - data.model_response;
-  arrays.add("residual", "c40", encode_complex_block16(residual));
   if (data.model_variance.size() > 0) arrays.add_deviation("model_deviation", data.model_variance);
   if (data.validation_frf)
     arrays.add_log_bytes("validation_residual",
@@ -115,6 +159,7 @@ Json frf_json(const FrfEstimate& frf) {
   return {{"inputs", channels(frf.inputs)},
           {"outputs", channels(frf.outputs)},
           {"lines", frf.lines()},
+          {"band_hz", {frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1]}},
           {"realizations", frf.realizations},
           {"periods", frf.periods},
           {"experiments", frf.experiments},
@@ -124,6 +169,7 @@ Json frf_json(const FrfEstimate& frf) {
           {"delay_s", frf.delay_s},
           {"deviation", uncertainty(frf).kind},
           {"noise_dof", frf.noise_dof},
+          {"correlated_lines", frf.correlated_lines},
           {"total_dof", frf.total_dof},
           {"worst_condition",
            frf.input_condition.size() > 0 ? Json(frf.input_condition.maxCoeff()) : Json()},

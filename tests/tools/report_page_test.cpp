@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "excitation/file_error.hpp"
-#include "tests/tools/report/base64_reader.hpp"
+#include "tests/tools/report/packed_reader.hpp"
 #include "tests/tools/report/synthetic_report.hpp"
 #include "tools/report.hpp"
 
@@ -54,15 +54,19 @@ std::string refusal(Change change) {
 TEST(Report, HoldsTheResponseAsFloat32ChannelAfterChannel) {
   const ReportData data = small();
   const std::string page = report_page(data);
-  const auto numbers = test::numbers_from_base64<float>(element(page, "data-response"));
-  ASSERT_EQ(numbers.size(), 2u * 6u * 50u);
+  const json arrays = content(page)["arrays"];
+  EXPECT_EQ(arrays["response"]["base"], "residual");
+  const auto residual = test::unpacked_block16(element(page, "data-residual"));
+  const auto numbers =
+      test::unpacked_float32(element(page, "data-response"), arrays["response"]["order"], residual);
+  ASSERT_EQ(numbers.size(), 6u * 50u);
   std::size_t at = 0;
   for (Eigen::Index channel = 0; channel < 6; ++channel)
     for (Eigen::Index k = 0; k < 50; ++k) {
-      EXPECT_EQ(numbers[at++], static_cast<float>(data.frf->response(channel, k).real()));
-      EXPECT_EQ(numbers[at++], static_cast<float>(data.frf->response(channel, k).imag()));
+      EXPECT_EQ(numbers[at].real(), static_cast<float>(data.frf->response(channel, k).real()));
+      EXPECT_EQ(numbers[at++].imag(), static_cast<float>(data.frf->response(channel, k).imag()));
     }
-  const auto frequency = test::numbers_from_base64<double>(element(page, "data-frequency"));
+  const auto frequency = test::packed_numbers<double>(element(page, "data-frequency"));
   EXPECT_EQ(frequency,
             std::vector<double>(data.frf->frequency_hz.begin(), data.frf->frequency_hz.end()));
 }
@@ -203,8 +207,37 @@ TEST(Report, NeedsNothingOutsideTheFile) {
 
 TEST(Report, IsTheSameBytesEveryTime) { EXPECT_EQ(report_page(small()), report_page(small())); }
 
-TEST(Report, StaysBelowFiveMegabytesAtFullSize) {
-  EXPECT_LT(report_page(test::synthetic_report()).size(), 5'000'000u);
+/// The numbers of an array of a page, after packing: parts of complex ones count by themselves.
+std::size_t numbers_in(const std::string& page, const std::string& id, std::size_t bytes_each) {
+  return test::unpacked(element(page, "data-" + id)).size() / bytes_each;
+}
+
+TEST(Report, StaysBelowFourMegabytesAtFullSizeAndWithAnotherDayBelowFive) {
+  ReportData data = test::synthetic_report({.variance_dof = 7});
+  const std::string single = report_page(data);
+  test::add_other_day(data);
+  const std::string both = report_page(data);
+  // Every number is there, and no array is left out because it is another's.
+  constexpr std::size_t elements = 4 * 13 * 4000;
+  for (const std::string& page : {single, both}) {
+    EXPECT_EQ(numbers_in(page, "response", 8), elements);
+    EXPECT_EQ(numbers_in(page, "residual", 5), elements);
+    for (const char* id : {"deviation", "model_deviation", "validation_residual"})
+      EXPECT_EQ(numbers_in(page, id, 1), elements) << id;
+  }
+  EXPECT_EQ(numbers_in(both, "other_response", 5), elements);
+  EXPECT_EQ(numbers_in(both, "other_model", 5), elements);
+  EXPECT_LT(single.size(), 4'000'000u);
+  EXPECT_LT(both.size(), 4'800'000u);
+  // The noise is its own: 16 bits of each part of the residual cannot become less.
+  EXPECT_GT(element(single, "data-residual").size(), elements * 4 * 9 / 10 * 4 / 3);
+  EXPECT_GT(element(both, "data-other_response").size(), elements * 2);
+}
+
+TEST(Report, StaysBelowFiveMegabytesWhereNothingIsButNoise) {
+  ReportData data = test::synthetic_report({.relative_noise = 3.0, .variance_dof = 7});
+  test::add_other_day(data);
+  EXPECT_LT(report_page(data).size(), 5'000'000u);
 }
 
 TEST(Report, RefusesShapesThatDoNotAgree) {

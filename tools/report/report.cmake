@@ -37,6 +37,7 @@ set(report_js
   compare
   stabilization
   nonlinearity
+  interpolation
   health
   selftest
   main)
@@ -82,6 +83,7 @@ target_sources(stageid_tools PRIVATE
   report_encoding.cpp
   report_json.cpp
   report_modes.cpp
+  report_packing.cpp
   report_shapes.cpp
   report_uncertainty.cpp
   report_verdict.cpp

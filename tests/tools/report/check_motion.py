@@ -8,22 +8,14 @@ Prints frames a second, time of the first paint and size. Exit code 77 (skipped)
 STAGEID_REQUIRE_BROWSER is not set.
 """
 
-import argparse
-import os
-import pathlib
 import subprocess
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "dashboard"))
+from page_checks import expect, run  # the first: it knows where the browser is
+
 from browser import Browser, find_browser
 
-failures = []
 SHAPES = "window.stageidReport.shapes"
-
-
-def expect(condition, message):
-    if not condition:
-        failures.append(message)
 
 
 def open_page(page, still=False):
@@ -83,23 +75,12 @@ def check_keyboard(page):
     browser.close()
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sample", required=True, help="program that writes the page")
-    parser.add_argument("--work", required=True, type=pathlib.Path)
-    options = parser.parse_args()
-    if find_browser() is None:
-        print("no Chromium found; install it with: apt-get install --no-install-recommends chromium")
-        return 1 if os.environ.get("STAGEID_REQUIRE_BROWSER") else 77
-    work = options.work.resolve()
-    subprocess.run([options.sample, work, "full"], check=True)
+def checks(sample, work):
+    subprocess.run([sample, work, "full"], check=True)
     check_motion(work / "report.html")
     check_stillness(work / "report.html")
     check_keyboard(work / "report.html")
-    for failure in failures:
-        print("FAILED:", failure)
-    return 1 if failures else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run(__doc__, checks))

@@ -1,5 +1,5 @@
 // Writes report.html of a synthetic stage and expected.json, what a browser must find in it.
-//   report_sample DIRECTORY [full|small|compared|bare|hostile]
+//   report_sample DIRECTORY [full|full_compared|small|compared|bare|hostile]
 
 #include <fmt/format.h>
 
@@ -115,25 +115,6 @@ Json expected_shapes(const AdditiveModel& model) {
   return out;
 }
 
-constexpr double kShift = 4e-4;
-
-/// Another day: every frequency higher by kShift, the first mode gone, the response 2 % smaller.
-void add_other_day(ReportData& data) {
-  ReportComparison other;
-  other.title = "Tuesday";
-  other.model = data.model;
-  std::vector<Submodel>& submodels = other.model->submodels;
-  submodels.erase(std::ranges::find_if(submodels, &Submodel::is_mode));
-  for (Submodel& submodel : submodels)
-    if (submodel.is_mode()) {
-      submodel.denominator[1] /= 1.0 + kShift;
-      submodel.denominator[2] /= (1.0 + kShift) * (1.0 + kShift);
-    }
-  other.response = 0.98 * data.frf->response;
-  other.model_response = 0.98 * data.model_response;
-  data.comparison = other;
-}
-
 Json expected_comparison(const ReportData& data) {
   Json pairs = Json::array();
   int own = 0;
@@ -141,14 +122,18 @@ Json expected_comparison(const ReportData& data) {
     if (!submodel.is_mode()) continue;
     const double f = submodel.natural_frequency_hz();
     if (own > 0)
-      pairs.push_back({{"own", own},
-                       {"other", own - 1},
-                       {"frequency_difference", kShift},
-                       {"frequency_deviation",
-                        kShift * f / (std::sqrt(2.0) * *submodel.natural_frequency_std_hz)}});
+      pairs.push_back(
+          {{"own", own},
+           {"other", own - 1},
+           {"frequency_difference", test::kOtherDayShift},
+           {"frequency_deviation",
+            test::kOtherDayShift * f / (std::sqrt(2.0) * *submodel.natural_frequency_std_hz)}});
     ++own;
   }
-  return {{"pairs", pairs}, {"other", extremes(data.comparison->response)}};
+  return {{"pairs", pairs},
+          {"other", extremes(data.comparison->response)},
+          {"otherModel", extremes(data.comparison->model_response)},
+          {"change", extremes(data.comparison->response - data.frf->response)}};
 }
 
 Json expected(const ReportData& data) {
@@ -179,6 +164,16 @@ Json expected(const ReportData& data) {
   out["nyquist"] = expected_nyquist(data);
   out["arrays"]["frequency"] = summary_of(Eigen::MatrixXd(frf.frequency_hz.transpose()), false);
   out["arrays"]["response"] = summary_of(frf.response, true);
+  if (frf.interpolation_misfit.size() > 0) {
+    Eigen::Index worst = 0;
+    frf.interpolation_misfit.maxCoeff(&worst);
+    out["arrays"]["interpolation_misfit"] =
+        summary_of(Eigen::MatrixXd(frf.interpolation_misfit.transpose()), true);
+    out["correlated"] = {
+        {"independent", std::lround(static_cast<double>(frf.lines()) / frf.correlated_lines)},
+        {"largest", frf.interpolation_misfit[worst]},
+        {"at_hz", frf.frequency_hz[worst]}};
+  }
   if (data.model_response.size() > 0) {
     out["arrays"]["residual"] =
         summary_of(Eigen::MatrixXcd(frf.response - data.model_response), false);
@@ -190,6 +185,13 @@ Json expected(const ReportData& data) {
   return out;
 }
 
+/// As of a zippered experiment: correlated lines, and a resonance too narrow for them.
+void make_zippered(FrfEstimate& frf) {
+  frf.correlated_lines = 6.5;
+  frf.interpolation_misfit = Eigen::VectorXd::LinSpaced(frf.lines(), 0.8, 1.2);
+  frf.interpolation_misfit[frf.lines() / 3] = 74.5;
+}
+
 /// Every text that comes from outside tries to become an element.
 void make_hostile(ReportData& data) {
   const std::string attack = "</script><img src=x onerror=\"console.error('injected')\">&amp;<!--";
@@ -197,7 +199,7 @@ void make_hostile(ReportData& data) {
   data.frf->inputs.names[0] = attack;
   data.frf->inputs.units[0] = attack;
   data.frf->outputs.names[0] = "z\xff\xc0 {{content}} " + attack;
-  add_other_day(data);
+  test::add_other_day(data);
   data.comparison->title = attack;
   for (ReportFinding& finding : data.findings)
     finding.channel = finding.what = finding.figure = finding.remedy = attack;
@@ -220,7 +222,11 @@ void make_hostile(ReportData& data) {
 }
 
 ReportData sample(const std::string& kind) {
-  if (kind == "full") return test::synthetic_report();
+  if (kind == "full" || kind == "full_compared") {
+    ReportData data = test::synthetic_report({.variance_dof = 7});
+    if (kind == "full_compared") test::add_other_day(data);
+    return data;
+  }
   if (kind == "bare") {  // a measurement of a response, no variances, no model
     ReportData data = test::synthetic_report({.outputs = 1, .inputs = 2, .lines = 60, .modes = 2});
     ReportData bare;
@@ -231,8 +237,11 @@ ReportData sample(const std::string& kind) {
     return bare;
   }
   ReportData data = test::synthetic_report({.outputs = 2, .inputs = 3, .lines = 300, .modes = 5});
-  if (kind == "small") data.geometry = {};  // shapes as bars
-  if (kind == "compared") add_other_day(data);
+  if (kind == "small") {
+    data.geometry = {};  // shapes as bars
+    make_zippered(*data.frf);
+  }
+  if (kind == "compared") test::add_other_day(data);
   if (kind == "hostile") make_hostile(data);
   return data;
 }
@@ -242,7 +251,8 @@ ReportData sample(const std::string& kind) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::cerr << "usage: report_sample DIRECTORY [full|small|compared|bare|hostile]\n";
+    std::cerr
+        << "usage: report_sample DIRECTORY [full|full_compared|small|compared|bare|hostile]\n";
     return 2;
   }
   const std::filesystem::path directory = argv[1];

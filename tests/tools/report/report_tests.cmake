@@ -5,19 +5,24 @@ target_sources(tools_tests PRIVATE
   report_encoding_test.cpp
   report_input_test.cpp
   report_modes_test.cpp
+  report_packing_test.cpp
   report_page_test.cpp
   report_shapes_test.cpp
   report_verdict_test.cpp
+  report/synthetic_other_day.cpp
   report/synthetic_report.cpp)
-target_link_libraries(tools_tests PRIVATE fmt::fmt nlohmann_json::nlohmann_json)
+target_link_libraries(tools_tests PRIVATE fmt::fmt nlohmann_json::nlohmann_json ZLIB::ZLIB)
 
-add_executable(report_sample report/report_sample.cpp report/synthetic_report.cpp)
+add_executable(report_sample
+  report/report_sample.cpp
+  report/synthetic_other_day.cpp
+  report/synthetic_report.cpp)
 target_link_libraries(report_sample PRIVATE stageid::tools fmt::fmt nlohmann_json::nlohmann_json
   stageid::warnings)
 
 find_package(Python3 3.9 COMPONENTS Interpreter)
 if(Python3_Interpreter_FOUND)
-  foreach(kind full small compared bare hostile)
+  foreach(kind full full_compared small compared bare hostile)
     add_test(NAME report_in_browser.${kind}
       COMMAND Python3::Interpreter ${CMAKE_CURRENT_LIST_DIR}/check_report.py
         --sample $<TARGET_FILE:report_sample> --work ${CMAKE_CURRENT_BINARY_DIR}/report_in_browser
@@ -26,8 +31,10 @@ if(Python3_Interpreter_FOUND)
     set_tests_properties(report_in_browser.${kind} PROPERTIES
       SKIP_RETURN_CODE 77 LABELS "tools;browser" TIMEOUT 1800)
   endforeach()
-  add_test(NAME report_in_motion
-    COMMAND Python3::Interpreter ${CMAKE_CURRENT_LIST_DIR}/check_motion.py
-      --sample $<TARGET_FILE:report_sample> --work ${CMAKE_CURRENT_BINARY_DIR}/report_in_motion)
-  set_tests_properties(report_in_motion PROPERTIES SKIP_RETURN_CODE 77 LABELS "tools;browser" TIMEOUT 600)
+  foreach(what motion print)
+    add_test(NAME report_in_${what}
+      COMMAND Python3::Interpreter ${CMAKE_CURRENT_LIST_DIR}/check_${what}.py
+        --sample $<TARGET_FILE:report_sample> --work ${CMAKE_CURRENT_BINARY_DIR}/report_in_${what})
+    set_tests_properties(report_in_${what} PROPERTIES SKIP_RETURN_CODE 77 LABELS "tools;browser" TIMEOUT 600)
+  endforeach()
 endif()

@@ -7,31 +7,14 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
-#include <random>
+
+#include "tests/tools/report/synthetic_random.hpp"
 
 namespace stageid::test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr double delay_s = 1.63e-4;
-
-/// Uniform and normal numbers that do not depend on the standard library's distributions.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1.0p-53; }
-  double normal() {
-    return std::sqrt(-2.0 * std::log(1.0 - uniform())) * std::cos(2.0 * pi * uniform());
-  }
-  /// E|z|^2 = 1.
-  std::complex<double> circular() {
-    const double re = normal();
-    return std::complex<double>(re, normal()) / std::sqrt(2.0);
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 ChannelList named(const char* prefix, Eigen::Index count, const char* unit) {
   ChannelList list;
@@ -141,13 +124,13 @@ Eigen::MatrixXd noise_variance(const Eigen::MatrixXcd& response, const Eigen::Ve
   return variance;
 }
 
-Eigen::MatrixXcd with_noise(const Eigen::MatrixXcd& response, const Eigen::MatrixXd& variance,
-                            Random& random) {
-  Eigen::MatrixXcd out = response;
-  for (Eigen::Index k = 0; k < out.cols(); ++k)
-    for (Eigen::Index c = 0; c < out.rows(); ++c)
-      out(c, k) += std::sqrt(variance(c, k)) * random.circular();
-  return out;
+/// What an estimate from `dof` degrees of freedom makes of it: chi-square of that many, over them.
+Eigen::MatrixXd estimated(const Eigen::MatrixXd& variance, int dof, Random& random) {
+  return variance.unaryExpr([&](double exact) {
+    double sum = 0.0;
+    for (int i = 0; i < dof; ++i) sum += std::pow(random.normal(), 2);
+    return dof > 0 ? exact * sum / dof : exact;
+  });
 }
 
 void add_measurement(ReportData& data, const SyntheticSize& size, Random& random) {
@@ -157,7 +140,9 @@ void add_measurement(ReportData& data, const SyntheticSize& size, Random& random
   frf.inputs = data.model->inputs;
   frf.outputs = data.model->outputs;
   data.model_response = modal_sum(*data.model, frf.frequency_hz);
-  frf.total_variance = noise_variance(data.model_response, frf.frequency_hz, size.relative_noise);
+  const Eigen::MatrixXd variance =
+      noise_variance(data.model_response, frf.frequency_hz, size.relative_noise);
+  frf.total_variance = estimated(variance, size.variance_dof, random);
   frf.noise_variance = 0.9 * frf.total_variance;
   frf.sample_rate_hz = 10000.0;
   frf.hold = Hold::zoh;
@@ -171,9 +156,9 @@ void add_measurement(ReportData& data, const SyntheticSize& size, Random& random
   frf.excluded_power = Eigen::VectorXd{{2e-4, 1e-4}};
   frf.provenance_json = R"({"log": "run.slog", "xxh3": "5f1d2c0a99b1e3d4"})";
   data.validation_frf = frf;
-  frf.response = with_noise(data.model_response, frf.total_variance, random);
-  data.validation_frf->response = with_noise(data.model_response, frf.total_variance, random);
-  data.model_variance = 0.01 * frf.total_variance;
+  frf.response = with_noise(data.model_response, variance, random);
+  data.validation_frf->response = with_noise(data.model_response, variance, random);
+  data.model_variance = 0.01 * variance;
   data.frf = std::move(frf);
 }
 

@@ -13,11 +13,19 @@ struct SyntheticSize {
   Eigen::Index lines = 4000;
   int modes = 17;
   double relative_noise = 3e-3;
+  int variance_dof = 0;  ///< variances are estimates of so many degrees of freedom; 0: exact
 };
 
 /// A complete report of a stage with rigid body, modes (two pairs of them close) and delay;
 /// measured data are its exact response and circular noise of the variance stated. Modal sums are
 /// evaluated here, without the code under test. The same seed gives the same data.
 ReportData synthetic_report(const SyntheticSize& size = {}, std::uint64_t seed = 1);
+
+/// Share by which add_other_day() moves every natural frequency.
+constexpr double kOtherDayShift = 4e-4;
+
+/// Another day beside it: every natural frequency higher by kOtherDayShift, the first mode gone, the
+/// response 2 % smaller and with noise of its own.
+void add_other_day(ReportData& data, std::uint64_t seed = 2);
 
 }  // namespace stageid::test

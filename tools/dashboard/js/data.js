@@ -5,19 +5,19 @@ const link = { search: location.search, edition: 0, loading: false };
 
 // The response as the report page holds it; empty until the first realization is complete.
 let content = { frf: null, arrays: {}, candidates: [], modes: [] };
-let blocks = {};
+let blocks = {};  // by name, unpacked
 let decoded = {};
 
 function array(id) {
   const about = content.arrays[id];
   if (!about) return null;
-  if (!decoded[id]) decoded[id] = decoders[about.type](bytesOf(blocks[id]), about);
+  if (!decoded[id]) decoded[id] = decoders[about.type](blocks[id], about, about.base && array(about.base));
   return decoded[id];
 }
 
-function setResponse(fresh) {
+async function setResponse(fresh) {
+  blocks = await unpackAll(fresh.blocks);
   content = fresh.content;
-  blocks = fresh.blocks;
   decoded = {};
   curvesOfChannel.clear();
   matrix.columns = null;

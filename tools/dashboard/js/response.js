@@ -3,9 +3,8 @@
 function fetchResponse(edition) {
   if (edition <= link.edition || link.loading) return Promise.resolve();
   link.loading = true;
-  return fetch('response.json' + link.search).then((answer) => answer.json()).then((fresh) => {
+  return fetch('response.json' + link.search).then((answer) => answer.json()).then(setResponse).then(() => {
     link.edition = edition;
-    setResponse(fresh);
     showResponse();
   }).finally(() => { link.loading = false; });
 }

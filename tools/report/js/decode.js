@@ -1,4 +1,4 @@
-// Encoded numbers: tools/report_encoding.hpp is the writer.
+// Packed numbers: tools/report_packing.hpp and report_encoding.hpp are the writers.
 
 function bytesOf(base64) {
   const text = atob(base64);
@@ -7,18 +7,95 @@ function bytesOf(base64) {
   return bytes;
 }
 
-// m 2^(e-15) of pairs of int16 m and one int8 e: (re, im) interleaved.
-function fromBlock16(bytes) {
-  const count = bytes.length / 5;
-  const mantissa = new Int16Array(bytes.buffer, 0, 2 * count);
-  const exponent = new Int8Array(bytes.buffer, 4 * count, count);
-  const out = new Float64Array(2 * count);
-  const scales = Float64Array.from({ length: 256 }, (_, i) => Math.pow(2, i - 128 - 15));
-  for (let i = 0; i < count; ++i) {
-    const scale = scales[exponent[i] + 128];
-    out[2 * i] = mantissa[2 * i] * scale;
-    out[2 * i + 1] = mantissa[2 * i + 1] * scale;
+// The browser's own inflate. No Blob and no Response: nothing leaves this script's turn of the event loop, so that
+// in Chromium the page is whole before it counts as loaded, and may be printed.
+async function unpack(base64) {
+  const inflate = new DecompressionStream('deflate');
+  const writer = inflate.writable.getWriter();
+  const written = writer.write(bytesOf(base64)).then(() => writer.close());
+  const reader = inflate.readable.getReader();
+  const pieces = [];
+  for (let piece = await reader.read(); !piece.done; piece = await reader.read()) pieces.push(piece.value);
+  await written;
+  const bytes = new Uint8Array(pieces.reduce((size, piece) => size + piece.length, 0));
+  let at = 0;
+  for (const piece of pieces) {
+    bytes.set(piece, at);
+    at += piece.length;
   }
+  return bytes;
+}
+
+// Blocks by name, packed -> unpacked.
+async function unpackAll(blocks) {
+  if (typeof DecompressionStream === 'undefined')
+    throw new Error('This browser is too old for the plots: it cannot unpack their numbers. Open the page with Chrome or Edge 80, Firefox 113, Safari 16.4 or later.');
+  const names = Object.keys(blocks);
+  const unpacked = await Promise.all(names.map((name) => unpack(blocks[name])));
+  return Object.fromEntries(names.map((name, i) => [name, unpacked[i]]));
+}
+
+// Bytes of numbers from planes: all lowest bytes, then the next, ...
+function interleaved(planes, width) {
+  const count = planes.length / width;
+  const bytes = new Uint8Array(planes.length);
+  for (let plane = 0; plane < width; ++plane) {
+    for (let i = 0; i < count; ++i) bytes[i * width + plane] = planes[plane * count + i];
+  }
+  return bytes.buffer;
+}
+
+// Pairs (re, im), each from what is expected of it: value(guess, i) gives number i. Rounds as class Extrapolation does.
+function expectedPairs(out, about, base, value) {
+  const twice = about.order === 2 ? 2 : about.order;
+  const once = about.order === 2 ? 1 : 0;
+  const last = [0, 0], before = [0, 0];
+  for (let i = 0; i < out.length; ++i) {
+    const part = i & 1;
+    const known = base ? base[i] : 0;
+    out[i] = value(known + (twice * last[part] - once * before[part]), i);
+    before[part] = last[part];
+    last[part] = out[i] - known;
+  }
+  return out;
+}
+
+function signFirst(word) {
+  return (word >>> 1) ^ -(word & 1);
+}
+
+const largestFloat = 3.4028234663852886e38;
+
+// Words: the place in the order of all float32 less that of the expected number.
+function fromComplexFloat32(bytes, about, base) {
+  const words = new Uint32Array(interleaved(bytes, 4));
+  const number = new Float32Array(1);
+  const bits = new Uint32Array(number.buffer);
+  return expectedPairs(new Float32Array(words.length), about, base, (guess, i) => {
+    number[0] = Math.max(-largestFloat, Math.min(largestFloat, guess + 0));  // -0 is expected as 0
+    const place = (bits[0] >>> 31 ? ~bits[0] : bits[0] | 0x80000000) + signFirst(words[i]);
+    bits[0] = place >>> 0 >= 0x80000000 ? place & 0x7fffffff : ~place;
+    return number[0];
+  });
+}
+
+// m 2^(e-15): int16 m less the expected one modulo 2^16, then int8 e less the one before.
+function fromBlock16(bytes, about, base) {
+  const count = bytes.length / 5;
+  const words = new Uint16Array(interleaved(bytes.subarray(0, 4 * count), 2));
+  const exponents = runningSum(bytes.subarray(4 * count));
+  const scales = Float64Array.from({ length: 256 }, (_, e) => Math.pow(2, (e << 24 >> 24) - 15));
+  return expectedPairs(new Float64Array(2 * count), about, base, (guess, i) => {
+    const scale = scales[exponents[i >> 1]];
+    const expected = Math.max(-32767, Math.min(32767, Math.floor(guess / scale + 0.5)));
+    return ((expected + signFirst(words[i])) << 16 >> 16) * scale;
+  });
+}
+
+// Modulo 256.
+function runningSum(bytes) {
+  const out = new Uint8Array(bytes.length);
+  for (let i = 0, sum = 0; i < out.length; ++i) out[i] = sum += bytes[i];
   return out;
 }
 
@@ -34,11 +111,11 @@ function fromLogBytes(codes, low, step) {
 }
 
 const decoders = {
-  f64: (bytes) => new Float64Array(bytes.buffer),
-  f32: (bytes) => new Float32Array(bytes.buffer),
-  c64: (bytes) => new Float32Array(bytes.buffer),
+  f64: (bytes) => new Float64Array(interleaved(bytes, 8)),
+  f32: (bytes) => new Float32Array(interleaved(bytes, 4)),
+  c64: fromComplexFloat32,
   c40: fromBlock16,
-  log8: (bytes, about) => fromLogBytes(bytes, about.low, about.step),
+  log8: (bytes, about) => fromLogBytes(runningSum(bytes), about.low, about.step),
 };
 
 function difference(a, b) {

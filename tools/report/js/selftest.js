@@ -24,6 +24,7 @@ async function selfTest(startedMs) {
   findings.rows = Object.fromEntries(Array.from(document.querySelectorAll('section'), (s) => [s.id, s.querySelectorAll('tbody tr').length]));
   if (content.frf) Object.assign(findings, { zoom: zoomCheck(), use: useCheck(), nyquist: nyquistCheck(), drag: dragCheck(), table: tableCheck() });
   findings.diagrams = diagramCheck();
+  findings.correlated = Array.from(document.querySelectorAll('#interpolation p, .correlated, #provenance dd'), (node) => node.textContent).join(' | ');
   if (content.comparison) findings.comparison = { ...content.comparison, rows: document.querySelectorAll('#comparison .compared > div:first-child tbody tr').length };
   if (content.shapes) findings.shapes = shapesCheck();
   findings.saved = await savedCheck();

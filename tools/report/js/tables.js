@@ -18,8 +18,7 @@ function buildHead() {
   }
   if (frf) {
     figures.push(['lines', count(frf.lines)], ['sensors \u00d7 actuators', frf.outputs.length + ' \u00d7 ' + frf.inputs.length]);
-    const f = array('frequency');
-    figures.push(['band', hertz(f[0]) + ' \u2013 ' + hertz(f[f.length - 1])]);
+    figures.push(['band', frf.band_hz.map(hertz).join(' \u2013 ')]);
   }
   for (const figure of content.figures) figures.push([figure.label, figure.value]);
   head.append(figureList(figures));
@@ -64,6 +63,7 @@ function buildModes() {
   const uncertain = content.modes.some((mode) => isNumber(mode.frequency_std_hz));
   const body = section('modes', 'Modes', 'Modes', known
     ? 'Identified modes beside the true ones of the simulated plant. Deviations are in standard deviations.' : null);
+  if (uncertain && isZippered()) body.append(element('p', { class: 'lead correlated' }, correlationText() + ' The standard deviations count that.'));
   const rows = content.modes.map((mode, i) => ({ ...mode, place: i + 1, rowClass: isNumber(mode.frequency_hz) ? null : 'absent' }));
   const sigmas = (value) => (isNumber(value) ? (value < 0 ? '\u2212' : '+') + Math.abs(value).toFixed(1) : '\u2013');
   const deviation = (key) => (row) => element('span', { class: Math.abs(row[key]) > 3 ? 'far' : null }, sigmas(row[key]));
@@ -183,6 +183,7 @@ function buildProvenance() {
       ['compensated', frf.compensated + (frf.compensated === 'none' ? '' : ', ' + duration(frf.delay_s))],
       ['standard deviation from', frf.deviation ? frf.deviation + ' variance' : 'unknown'],
       ['degrees of freedom', frf.deviation ? number(frf.deviation === 'total' ? frf.total_dof : frf.noise_dof) : null],
+      ['lines as good as independent', isZippered() ? count(Math.round(frf.lines / frf.correlated_lines)) + ' of ' + count(frf.lines) : null],
       ['worst condition of the inputs', isNumber(frf.worst_condition) ? number(frf.worst_condition) : null],
     ]));
     if (frf.excluded.length) body.append(element('p', null, 'Actuators outside the identified part, with their power over that of the inputs: ' +

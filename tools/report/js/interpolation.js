@@ -1,0 +1,54 @@
+// Zippered experiments: each axis has lines of its own, and a local model between them. What that model leaves, and
+// what lines are worth whose errors are correlated by it.
+
+const interpolation = { graph: null };
+
+function isZippered() {
+  return Boolean(content.frf) && content.frf.correlated_lines > 1;
+}
+
+// What the reader of a deviation has to know; null for other experiments.
+function correlationText() {
+  if (!isZippered()) return null;
+  const { lines, correlated_lines: each } = content.frf;
+  return 'Zippered experiment: between the lines of each axis its response is a local model, so errors of neighbouring lines are correlated. ' +
+    'The ' + count(lines) + ' lines tell a smooth model as much as ' + count(Math.round(lines / each)) + ' independent ones (correlated_lines: ' + number(each) + ').';
+}
+
+function buildInterpolation() {
+  const body = section('interpolation', 'Interpolation', 'Between the lines of each axis', correlationText());
+  if (!content.arrays.interpolation_misfit) {
+    body.append(element('p', null, 'Whether the local models hold was not checked: the noise is taken from what they leave, as no second period tells it.'));
+    return;
+  }
+  body.append(element('div', { class: 'plot-head' }, element('p', null, misfitText()), saveButtons('interpolation', () => ({
+    title: 'What the local models leave, over noise', panels: [graphPanel(interpolation.graph, 'Misfit over frequency in Hz')],
+  }))), element('div', { class: 'plot', id: 'interpolation-plot', role: 'img', 'aria-label': misfitText(), tabindex: '0', onkeydown: bandKey }),
+    element('p', { class: 'axis-title' }, 'Frequency [Hz]'));
+  afterFirstPaint(drawInterpolation);
+  onColours(() => interpolation.graph && interpolation.graph.updateOptions({ ...plotColours(), series: misfitSeries() }));
+  followBand(() => showBandIn(interpolation.graph));
+}
+
+function misfitText() {
+  const misfit = array('interpolation_misfit');
+  const f = array('frequency');
+  const most = misfit.reduce((best, v, k) => (v > misfit[best] ? k : best), 0);
+  const sorted = Array.from(misfit).sort((a, b) => a - b);
+  return 'What the local models leave, over what noise would: about 1 where they hold, more where a resonance is too narrow for the distance of the lines ' +
+    'or the plant is not linear; there the response is off by more than its deviation tells. Median ' + number(sorted[sorted.length >> 1]) +
+    ', largest ' + number(misfit[most]) + ' at ' + hertz(f[most]) + '.';
+}
+
+function drawInterpolation() {
+  const misfit = array('interpolation_misfit');
+  interpolation.graph = new Dygraph(document.getElementById('interpolation-plot'), Array.from(array('frequency'), (hz, k) => [hz, misfit[k]]), {
+    ...plotBasics, ...plotColours(), labels: ['f', 'misfit'], logscale: true, series: misfitSeries(),
+    axes: { x: frequencyAxis, y: magnitudeAxis }, ...tiedToBand(),
+  });
+  plots.add(interpolation.graph);
+}
+
+function misfitSeries() {
+  return { misfit: { color: palette().curves[0] } };
+}
