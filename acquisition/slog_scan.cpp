@@ -146,7 +146,7 @@ SlogSource::SlogSource(std::filesystem::path file) : path_(std::move(file)) {
   file_ = FileDescriptor(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
   if (file_.get() < 0 || ::fstat(file_.get(), &status) != 0) {
-    throw FileError(fmt::format("{}: cannot be opened: {}", path_.string(),
+    throw FileError(fmt::format("{}: cannot be opened: {}; check the path", path_.string(),
                                 std::error_code(errno, std::generic_category()).message()));
   }
   if (!S_ISREG(status.st_mode)) {

@@ -115,7 +115,7 @@ DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console
 
 void DesignCommand::run() const {
   const ExperimentConfig config = load_experiment_config(config_);
-  require_writable(output_);
+  require_writable(output_, {config_});
   if (config.limits) {
     design_within(config);
     return;

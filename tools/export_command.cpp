@@ -14,6 +14,7 @@
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
 #include "tools/model_export.hpp"
+#include "tools/output_paths.hpp"
 
 namespace stageid {
 namespace {
@@ -76,6 +77,7 @@ MatVersion ExportCommand::mat_version() const {
 
 void ExportCommand::export_from_model() const {
   require_export_format(output_);
+  require_no_input(output_, {input_, frf_});
   const AdditiveModel model = read_model(input_);
   ExportedResponse exported;
   exported.frequency_hz = default_lines(model);
@@ -98,6 +100,7 @@ void ExportCommand::export_from_frf() const {
     throw std::invalid_argument(
         fmt::format("{}: is HDF5 and no model; --frf and --driving-point go with a model.json",
                     input_.string()));
+  require_no_input(output_, {input_});
   const FrfEstimate frf = read_frf(input_);
   try {
     require_frf_export_format(output_);

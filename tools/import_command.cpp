@@ -17,6 +17,7 @@
 #include "tools/mat_file.hpp"
 #include "tools/mode_correlation.hpp"
 #include "tools/npz_file.hpp"
+#include "tools/output_paths.hpp"
 #include "tools/touchstone_reader.hpp"
 #include "tools/uff_frf.hpp"
 
@@ -117,6 +118,7 @@ void ImportCommand::list() const {
 
 void ImportCommand::run() const {
   if (output_.empty()) return list();
+  require_no_input(output_, {input_, map_});
   if (is_uff_name(input_) && output_.extension() == ".json") {
     write_modes(output_, candidates_of(input_, read_uff(input_)));
   } else if (map_.empty()) {

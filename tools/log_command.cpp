@@ -15,6 +15,7 @@
 #include "tools/exit_code.hpp"
 #include "tools/health_step.hpp"
 #include "tools/interrupt.hpp"
+#include "tools/output_paths.hpp"
 #include "tools/run_metadata.hpp"
 #include "tools/timing_json.hpp"
 
@@ -199,6 +200,7 @@ void LogCommand::recover() const {
 }
 
 void LogCommand::convert() const {
+  require_no_input(output_, {file_});
   if (output_.extension() == ".mat")
     throw std::invalid_argument(fmt::format(
         "{}: MAT files are not in this version; there are .h5 and .csv", output_.string()));

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <stdexcept>
 #include <system_error>
 
 #include "excitation/file_error.hpp"
@@ -9,7 +10,21 @@
 
 namespace stageid {
 
-void require_writable(const std::filesystem::path& file) { const OutputFile probe(file); }
+void require_no_input(const std::filesystem::path& file,
+                      const std::vector<std::filesystem::path>& inputs) {
+  for (const std::filesystem::path& input : inputs) {
+    std::error_code none;  // one of them is not there: they are not the same
+    if (std::filesystem::equivalent(file, input, none))
+      throw std::invalid_argument(fmt::format(
+          "{}: is an input, which the result would replace; give -o another name", file.string()));
+  }
+}
+
+void require_writable(const std::filesystem::path& file,
+                      const std::vector<std::filesystem::path>& inputs) {
+  require_no_input(file, inputs);
+  const OutputFile probe(file);
+}
 
 void require_directory(const std::filesystem::path& directory) {
   std::error_code error;

@@ -1,12 +1,19 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 namespace stageid {
 
-/// Before long work: that a file can be written there. Nothing is left behind.
-/// @throws FileError naming the file and the reason.
-void require_writable(const std::filesystem::path& file);
+/// That a result does not replace what it is made of, under whatever name or link.
+/// @throws std::invalid_argument naming the file
+void require_no_input(const std::filesystem::path& file,
+                      const std::vector<std::filesystem::path>& inputs);
+
+/// Before long work: that a file can be written there, and is none of the inputs. Nothing is left behind.
+/// @throws FileError naming the file and the reason; std::invalid_argument
+void require_writable(const std::filesystem::path& file,
+                      const std::vector<std::filesystem::path>& inputs);
 
 /// Makes the directory if it is not there. @throws FileError
 void require_directory(const std::filesystem::path& directory);

@@ -100,7 +100,7 @@ void PlotCommand::run() const {
   if (std::ranges::find(kFigures, figure_) == kFigures.end())
     refuse_word("figure", figure_, kFigures);
   static_cast<void>(picture_format(output_));
-  require_writable(output_);
+  require_writable(output_, inputs_);
   const ReportInput input = report_input(inputs_);
   if (input.frf.empty())
     throw std::invalid_argument(

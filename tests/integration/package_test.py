@@ -112,7 +112,7 @@ class Debian(unittest.TestCase):
     @unittest.skipUnless(shutil.which("lintian"), "no lintian here")
     def test_lintian_has_nothing_to_say(self):
         # The suppressed one is about bugs of Debian's own archive, to which nothing was uploaded.
-        for package in ("stageid", "libstageid-dev"):
+        for package in ("stageid", "python3-stageid", "libstageid-dev"):
             said = output("lintian", "--allow-root", "--suppress-tags", "initial-upload-closes-no-bugs", self.packages[package])
             self.assertEqual(said, "", package)
 

@@ -268,6 +268,52 @@ TEST_F(BadRequest, AFullDiskLeavesNothingBehind) {
   EXPECT_TRUE(std::filesystem::exists(at("full.slog")));
 }
 
+TEST_F(BadRequest, AResultThatWouldReplaceWhatItIsMadeOf) {
+  make_log();
+  make_frf();
+  const auto refused = [&](const std::vector<std::string>& words) {
+    fail(words, 2, "is an input, which the result would replace; give -o another name");
+  };
+  const std::string log = name("run.slog");
+  const std::string frf = name("frf.h5");
+  refused({"frf", log, "-o", log});
+  refused({"fit", frf, "-o", frf});
+  refused({"modes", frf, "-o", frf});
+  refused({"design", config_, "-o", config_});
+  succeed({"log", "convert", log, "-o", name("log.h5")});
+  refused({"log", "convert", name("log.h5"), "-o", name("log.h5")});
+  succeed({"export", frf, "-o", name("f.uff")});
+  // Another name of the same file.
+  const auto link = [&](const char* to, const char* from) {
+    std::filesystem::create_symlink(to, at(from));
+    return name(from);
+  };
+  refused({"frf", log, "-o", link("run.slog", "link.h5")});
+  refused({"import", name("f.uff"), "-o", link("f.uff", "again.h5")});
+  refused({"export", frf, "-o", link("frf.h5", "export.mat")});
+  refused({"report", frf, "-o", link("frf.h5", "page.html")});
+  refused({"report", log, "-o", link("frf.h5", "other.html"), "--compare", frf});
+  refused({"plot", "cmif", frf, "-o", link("frf.h5", "plot.svg")});
+}
+
+TEST_F(BadRequest, Reports) {
+  make_frf();
+  const std::string frf = name("frf.h5");
+  fail({"report", frf, "-o", name("r.pdf")}, 2,
+       "r.pdf: the report is a page; write a name that ends in .html");
+  fail({"report", frf, frf, "-o", name("r.html")}, 2, "frf.h5: is given twice");
+  write_bytes(at("cut.json"), "{\"format\": \"stageid-mo");
+  fail({"report", frf, name("cut.json"), "-o", name("r.html")}, 2,
+       "cut.json: is not JSON, or cut short");
+  write_bytes(at("new.json"), "{\"format\": \"stageid-model\", \"format_version\": 9}");
+  fail({"report", frf, name("new.json"), "-o", name("r.html")}, 2,
+       "format_version: is 9 and must be 1");
+  fail({"report", frf, "-o", name("nowhere/r.html")}, 1,
+       "No such file or directory; make it first");
+  fail({"report", frf, "-o", name("r.html"), "--compare", name("none")}, 1,
+       "none: does not exist; check the path");
+}
+
 TEST_F(BadRequest, Fits) {
   make_frf();
   const auto wrong = [&](std::vector<std::string> flags, const std::string& text) {
@@ -276,13 +322,15 @@ TEST_F(BadRequest, Fits) {
   };
   wrong({"--band", "900", "950"},
         "no line lies in it; the frequency response has lines from 16 to 800 Hz");
-  wrong({"--band", "500", "100"}, "no line lies in it");
+  wrong({"--band", "500", "100"}, "write the lower frequency first");
   wrong({"--rigid-body", "half"}, "--rigid-body: 'half'; write none, full or a rank");
   wrong({"--residue-rank", "0"}, "--residue-rank: '0'; write full or a rank");
   wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with --damping general");
   wrong({"--modes", "500"}, "--modes: 500; 197 lines carry no more than 65;");
   wrong({"--modes", "0"}, "--modes");
   wrong({"--modes", "12,x"}, "--modes");
+  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--modes", "many"}, 1,
+       "--modes: 'many': there is no such file; write auto");
   wrong({"--modes", "100,5000"}, "--modes: 5000 Hz is not below half the sample rate, 1000 Hz");
   wrong({"--weighting", "relativ"}, "did you mean 'relative'?");
   wrong({"--hold", "exakt"}, "did you mean 'exact'?");
@@ -296,7 +344,9 @@ TEST_F(BadRequest, Fits) {
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--inputs", "a9"}, 2, "a9");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--outputs", "s9"}, 2, "s9");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "0"}, 2, "counted from 1");
-  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "9"}, 2, "no complete run");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "9"}, 2,
+       "realization 8 has no complete run; counted from 0, those that have one are 0, 1, 2 "
+       "(--realizations counts from 1)");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--transient-periods", "9"}, 2,
        "5 periods were recorded and 9 are transient");
 }

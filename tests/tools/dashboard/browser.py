@@ -87,7 +87,8 @@ class Browser:
     def evaluate(self, script):
         answer = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in answer:
-            raise RuntimeError(f"{script}: {answer['exceptionDetails']}")
+            details = answer["exceptionDetails"]
+            raise RuntimeError(f"{script}: {details.get('exception', {}).get('description', details)}")
         return answer["result"].get("value")
 
     def wait_for(self, script, seconds=60):

@@ -76,10 +76,21 @@ RESPONSE = """(() => { const d = window.stageidDashboard; const f = d.content().
   plots: Array.from(document.querySelectorAll('.plot'), (p) => p.id) }; })()"""
 
 
-def check_numbers(program, log, seen):
-    """What the page draws is what `stageid frf` estimates from the finished log."""
+class Spoilt(Exception):
+    """A machine that was late in every period of a run: the remedy is to measure again."""
+
+
+def estimate(program, log):
     file = log.with_name("frf.h5")
-    subprocess.run([program, "frf", log, "-o", file], check=True, capture_output=True)
+    done = subprocess.run([program, "frf", log, "-o", file], capture_output=True, text=True, check=False)
+    if done.returncode == 2 and "has a marked sample; measure this run again" in done.stderr:
+        raise Spoilt(done.stderr)
+    expect(done.returncode in (0, 3), f"frf: exit code {done.returncode}: {done.stderr}")
+    return file
+
+
+def check_numbers(file, seen):
+    """What the page draws is what `stageid frf` estimates from the finished log."""
     with h5py.File(file) as frf:
         G = frf["response"][()]
         G = G["r"] + 1j * G["i"] if G.dtype.names else G
@@ -109,8 +120,9 @@ def check_numbers(program, log, seen):
     expect(set(seen["plots"]) >= {"entry-magnitude", "entry-phase", "cmif-plot"}, f"plots {seen['plots']}")
 
 
-def watch_one(program, configs, work):
-    log, running, browser = start(program, configs, work, "whole", realizations=3)
+def watch_one(program, configs, work, name):
+    # Periods enough that some are clean where a busy machine marks many.
+    log, running, browser = start(program, configs, work, name, realizations=3, periods=20)
     try:
         expect(browser.wait_for("window.stageidDashboard.state && window.stageidDashboard.state.state === 'running'"), "no state came")
         expect(browser.wait_for("window.stageidDashboard.edition() >= 1"), "no response came")
@@ -121,9 +133,10 @@ def watch_one(program, configs, work):
         code, out = running.wait()
         expect(code in (0, 3), f"exit code {code}: {out}")
         expect(browser.evaluate("window.stageidDashboard.state.exit_code") == code, "the page knows another exit code")
+        file = estimate(program, log)
         seen = browser.evaluate(RESPONSE)
         check_widths(browser, work, "ended")
-        check_numbers(program, log, seen)
+        check_numbers(file, seen)
         expect(browser.problems == [], f"the browser complains: {browser.problems}")
         expect(browser.evaluate("window.stageidDashboard.errors") == [], "errors on the page")
     finally:
@@ -161,7 +174,15 @@ def main():
         return 1 if os.environ.get("STAGEID_REQUIRE_BROWSER") else 77
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
-    watch_one(program, configs, work)
+    for attempt in range(1, 4):
+        try:
+            watch_one(program, configs, work, f"whole_{attempt}")
+            break
+        except Spoilt as late:
+            print(f"attempt {attempt}: {late}")
+            if attempt == 3:
+                raise
+            failures.clear()
     stop_one(program, configs, work)
     for failure in failures:
         print("FAILED:", failure)
