@@ -32,6 +32,13 @@ struct DroppedPeriod {
   friend bool operator==(const DroppedPeriod&, const DroppedPeriod&) = default;
 };
 
+/// A realization that was left out as a whole.
+struct LeftOutRealization {
+  int realization = 0;  ///< counted from 0
+  std::string reason;
+  friend bool operator==(const LeftOutRealization&, const LeftOutRealization&) = default;
+};
+
 /// A frequency response with its uncertainty: what frf.h5 holds.
 ///
 /// Storage is the paper's vec: column k of a channel matrix is vec(G(j omega_k)), channel
@@ -75,6 +82,7 @@ struct FrfEstimate {
   DetectionLines detection;       ///< empty if unknown
   NonlinearityTest nonlinearity;  ///< empty unless there are two periods and two realizations
   std::vector<DroppedPeriod> dropped_periods;
+  std::vector<LeftOutRealization> left_out_realizations;
   std::vector<std::string> excluded_channels;  ///< actuators outside the sub-plant
   Eigen::VectorXd excluded_power;              ///< their excited-line power over that of the inputs
   std::string provenance_json = "{}";          ///< inputs (hash), configuration, version, seeds

@@ -8,7 +8,7 @@
 namespace stageid {
 namespace {
 
-constexpr hsize_t kMostDropped = 100'000'000;
+constexpr double kLargestCount = 1e8;
 
 Eigen::VectorXd read_vector(const Hdf5File& file, const std::string& dataset) {
   const std::vector<hsize_t> shape = file.shape(dataset);
@@ -111,6 +111,16 @@ void read_nonlinearity(const Hdf5File& file, FrfEstimate& frf) {
   test.odd.level = read_if_there(file, "/nonlinearity_odd_level", bands, n_y, n_g);
 }
 
+/// @throws FormatError if a number is negative or beyond what anybody measures
+std::vector<double> read_counts(const Hdf5File& file, const std::string& dataset) {
+  std::vector<double> counts = file.read_reals(dataset);
+  for (const double count : counts) {
+    if (!(count >= 0.0 && count <= kLargestCount))
+      throw FormatError(file.path(), dataset, fmt::format("{} is not a count", count));
+  }
+  return counts;
+}
+
 void write_dropped(Hdf5File& file, const std::vector<DroppedPeriod>& dropped) {
   if (dropped.empty()) return;
   std::vector<long long> where;
@@ -127,16 +137,32 @@ void read_dropped(const Hdf5File& file, std::vector<DroppedPeriod>& dropped) {
   if (!file.exists("/dropped_periods")) return;
   const std::vector<std::string> reasons = file.read_texts("/dropped_reasons");
   require_shape(file, "/dropped_periods", {reasons.size(), 3});
-  const std::vector<double> where = file.read_reals("/dropped_periods");
-  for (std::size_t i = 0; i < where.size(); ++i) {
-    if (!(where[i] >= 0.0 && where[i] <= static_cast<double>(kMostDropped)))
-      throw FormatError(file.path(), "/dropped_periods",
-                        fmt::format("{} is not a count", where[i]));
-  }
+  const std::vector<double> where = read_counts(file, "/dropped_periods");
   for (std::size_t i = 0; i < reasons.size(); ++i) {
     const auto number = [&](std::size_t column) { return static_cast<int>(where[3 * i + column]); };
     dropped.push_back({number(0), number(1), number(2), reasons[i]});
   }
+}
+
+void write_left_out(Hdf5File& file, const std::vector<LeftOutRealization>& left_out) {
+  if (left_out.empty()) return;
+  std::vector<long long> which;
+  std::vector<std::string> reasons;
+  for (const LeftOutRealization& one : left_out) {
+    which.push_back(one.realization);
+    reasons.push_back(one.reason);
+  }
+  file.write_integers("/left_out_realizations", {which.size()}, which.data());
+  file.write_texts("/left_out_reasons", reasons);
+}
+
+void read_left_out(const Hdf5File& file, std::vector<LeftOutRealization>& left_out) {
+  if (!file.exists("/left_out_realizations")) return;
+  const std::vector<std::string> reasons = file.read_texts("/left_out_reasons");
+  require_shape(file, "/left_out_realizations", {reasons.size()});
+  const std::vector<double> which = read_counts(file, "/left_out_realizations");
+  for (std::size_t i = 0; i < reasons.size(); ++i)
+    left_out.push_back({static_cast<int>(which[i]), reasons[i]});
 }
 
 }  // namespace
@@ -145,12 +171,14 @@ void write_quality(Hdf5File& file, const FrfEstimate& frf) {
   write_detection(file, frf.detection, frf.n_outputs());
   write_nonlinearity(file, frf.nonlinearity, frf.n_outputs());
   write_dropped(file, frf.dropped_periods);
+  write_left_out(file, frf.left_out_realizations);
 }
 
 void read_quality(const Hdf5File& file, FrfEstimate& frf) {
   read_detection(file, frf);
   read_nonlinearity(file, frf);
   read_dropped(file, frf.dropped_periods);
+  read_left_out(file, frf.left_out_realizations);
 }
 
 }  // namespace stageid

@@ -100,24 +100,40 @@ void HealthPart::leave_out_marked() {
 HealthGathering::HealthGathering(const std::vector<RealizationRuns>& realizations) {
   const LogInfo& info = realizations.front().runs.front().log->info();
   record_.info = info;
-  record_.realization = realizations.front().realization;
   record_.scan.resize(info.sensors.size() + info.actuators.size());
   HealthPart empty;
   empty.scan_.resize(record_.scan.size());
   for (const RealizationRuns& realization : realizations) {
     parts_.emplace_back(realization.runs.size(), empty);
+    realization_.push_back(realization.realization);
     for (const UsedRun& used : realization.runs) record_.health += used.run().health;
   }
 }
 
-void HealthGathering::excite(const std::vector<const ExcitationSpectrum*>& spectra) {
+std::size_t HealthGathering::first_without_spectra() const {
+  const auto missing = [](const HealthPart& part) { return part.periods_.empty(); };
+  return static_cast<std::size_t>(std::find_if(excited_->begin(), excited_->end(), missing) -
+                                  excited_->begin());
+}
+
+bool HealthGathering::complete() const {
+  return excited_ != nullptr && first_without_spectra() == excited_->size();
+}
+
+void HealthGathering::excite(std::size_t realization,
+                             const std::vector<const ExcitationSpectrum*>& spectra) {
+  if (excited_ != nullptr)
+    for (HealthPart& part : *excited_) part.periods_.clear();
+  excited_ = &parts_[realization];
+  record_.realization = realization_[realization];
+  record_.axes.clear();
   for (const ExcitationSpectrum* spectrum : spectra)
     record_.axes.insert(record_.axes.end(), spectrum->channels.begin(), spectrum->channels.end());
   std::sort(record_.axes.begin(), record_.axes.end());
   record_.axes.erase(std::unique(record_.axes.begin(), record_.axes.end()), record_.axes.end());
   record_.zippered = spectra.size() == 1 && spectra.front()->is_zippered();
   lines_ = thinned(spectra.front()->lines);
-  for (HealthPart& part : parts_.front()) part.lines_ = lines_;
+  for (HealthPart& part : *excited_) part.lines_ = lines_;
   const auto K = static_cast<Eigen::Index>(lines_.size());
   record_.frequency_hz.resize(K);
   record_.lines.resize(lines_.size());

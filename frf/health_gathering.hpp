@@ -38,23 +38,33 @@ class HealthPart {
 /// A HealthRecord in the making, beside whatever else the logs are read for.
 class HealthGathering {
  public:
-  /// Spectra are those of the first realization, on at most kHealthLines lines.
+  /// Spectra are those of the first complete realization, on at most kHealthLines lines.
   explicit HealthGathering(const std::vector<RealizationRuns>& realizations);
 
-  /// The excitation of the runs of the first realization. Before any part is filled.
-  void excite(const std::vector<const ExcitationSpectrum*>& spectra);
+  /// Position of a run without a clean period in the realization that was excited last; beyond the
+  /// last one if there is none.
+  std::size_t first_without_spectra() const;
+
+  /// Whether each run of the realization that was excited last gave spectra.
+  bool complete() const;
+
+  /// The excitation of the runs of a realization whose spectra are wanted, the earlier ones having
+  /// lacked a run. Before a part of it is filled. @pre !complete()
+  void excite(std::size_t realization, const std::vector<const ExcitationSpectrum*>& spectra);
 
   /// Where run `experiment` of realization `realization` (positions) goes; different parts may be
   /// filled at once.
   HealthPart& part(std::size_t realization, std::size_t experiment);
 
-  /// After all parts are filled; once.
+  /// After all parts are filled; once. @pre complete()
   HealthRecord finish();
 
  private:
   void add(HealthPart&& part);
 
   std::vector<std::vector<HealthPart>> parts_;  // by realization and experiment
+  std::vector<int> realization_;                // their numbers
+  std::vector<HealthPart>* excited_ = nullptr;  // parts whose spectra are wanted
   std::vector<int> lines_;
   HealthRecord record_;
 };

@@ -22,21 +22,28 @@ class RecordReading {
       : realizations_(choose_runs(logs, options)),
         bytes_(options, realizations_),
         gathering_(realizations_) {
-    for (std::size_t m = 0; m < realizations_.size(); ++m)
-      for (std::size_t e = 0; e < realizations_[m].runs.size(); ++e)
-        runs_.push_back({&realizations_[m].runs[e], &gathering_.part(m, e)});
-    const int period = runs_.front().used->log->info().period_samples;
-    workers_ = static_cast<int>(
-        std::min(static_cast<std::size_t>(worker_count(options.threads)), runs_.size()));
+    std::size_t runs = 0;
+    for (const RealizationRuns& realization : realizations_) runs += realization.runs.size();
+    const int period = realizations_.front().runs.front().log->info().period_samples;
+    workers_ =
+        static_cast<int>(std::min(static_cast<std::size_t>(worker_count(options.threads)), runs));
     for (int w = 0; w < workers_; ++w)
       workspaces_.push_back(std::make_unique<RunWorkspace>(period, pool_));
   }
 
   HealthRecord read() {
-    read_excitation();
-    for_each_task(workers_, runs_.size(), [&](int worker, std::size_t i) {
-      read_run(runs_[i], *workspaces_[static_cast<std::size_t>(worker)]);
-    });
+    const UsedRun* marked = nullptr;
+    std::size_t m = 0;
+    while (!gathering_.complete()) {
+      if (m == realizations_.size()) refuse_marked_runs(*marked);
+      const std::vector<UsedRun>& runs = realizations_[m].runs;
+      read_excitation(m);
+      read_runs(m, m + 1);
+      const std::size_t e = gathering_.first_without_spectra();
+      if (marked == nullptr && e < runs.size()) marked = &runs[e];
+      ++m;
+    }
+    read_runs(m, realizations_.size());
     return gathering_.finish();
   }
 
@@ -46,8 +53,19 @@ class RecordReading {
     HealthPart* part;
   };
 
-  void read_excitation() {
-    const std::vector<UsedRun>& runs = realizations_.front().runs;
+  /// The runs of realizations first ... last - 1, all at once.
+  void read_runs(std::size_t first, std::size_t last) {
+    std::vector<Run> runs;
+    for (std::size_t m = first; m < last; ++m)
+      for (std::size_t e = 0; e < realizations_[m].runs.size(); ++e)
+        runs.push_back({&realizations_[m].runs[e], &gathering_.part(m, e)});
+    for_each_task(workers_, runs.size(), [&](int worker, std::size_t i) {
+      read_run(runs[i], *workspaces_[static_cast<std::size_t>(worker)]);
+    });
+  }
+
+  void read_excitation(std::size_t realization) {
+    const std::vector<UsedRun>& runs = realizations_[realization].runs;
     std::vector<ExcitationSpectrum> spectra(runs.size());
     for_each_task(workers_, runs.size(), [&](int worker, std::size_t e) {
       spectra[e] =
@@ -55,25 +73,18 @@ class RecordReading {
     });
     std::vector<const ExcitationSpectrum*> all;
     for (const ExcitationSpectrum& spectrum : spectra) all.push_back(&spectrum);
-    gathering_.excite(all);
+    gathering_.excite(realization, all);
   }
 
   void read_run(const Run& run, RunWorkspace& w) {
-    bool clean = false;
-    const auto take = [&](int) {
-      clean = true;
-      run.part->take(w, nullptr);
-    };
     for_each_period(
-        *run.used, w, [this](double bytes) { bytes_.add(bytes); }, take,
-        [&](int) { run.part->leave_out_marked(); });
-    if (!clean) refuse_marked_run(*run.used);
+        *run.used, w, [this](double bytes) { bytes_.add(bytes); },
+        [&](int) { run.part->take(w, nullptr); }, [&](int) { run.part->leave_out_marked(); });
   }
 
   std::vector<RealizationRuns> realizations_;
   ByteCounter bytes_;
   HealthGathering gathering_;
-  std::vector<Run> runs_;
   int workers_ = 1;
   MatrixPool pool_;
   std::vector<std::unique_ptr<RunWorkspace>> workspaces_;

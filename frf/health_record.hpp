@@ -47,8 +47,9 @@ struct HealthRecord {
 inline constexpr Eigen::Index kHealthLines = 800;
 
 /// Reads every clean period of all runs that FrfOptions choose; spectra are those of the first
-/// realization. Memory: one period a thread, and the spectra on at most kHealthLines lines.
-/// @throws what choose_runs() and LogReader::read() throw; FormatError if a run has no clean period.
+/// realization whose runs all have one. Memory: one period a thread, and the spectra on at most
+/// kHealthLines lines.
+/// @throws what choose_runs() and LogReader::read() throw; FormatError if there is no such realization.
 HealthRecord read_health_record(const std::vector<const LogReader*>& logs,
                                 const FrfOptions& options);
 

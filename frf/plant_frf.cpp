@@ -70,6 +70,8 @@ class PlantEstimation {
   void measure(std::size_t realization, const std::vector<RunExcitation>& excitation,
                HealthGathering* health, RealizationSpectra& spectra);
   void prepare(const RealizationRuns& realization, const std::vector<RunExcitation>& excitation);
+  void note_dropped(const RealizationRuns& realization, const RealizationSpectra& spectra);
+  bool leave_out(const RealizationRuns& realization, const RealizationSpectra& spectra);
   void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra);
   void include(const RealizationSpectra& spectra, const std::vector<RunExcitation>& excitation);
   FrfEstimate describe() const;
@@ -90,6 +92,8 @@ class PlantEstimation {
   std::unique_ptr<DetectionAverage> detection_;
   std::unique_ptr<FrfProvenance> provenance_;
   std::vector<DroppedPeriod> dropped_;
+  std::vector<LeftOutRealization> left_out_;
+  const UsedRun* first_marked_ = nullptr;  // of those without a clean period
   int fewest_periods_ = std::numeric_limits<int>::max();
   double input_power_ = 0.0;
   Eigen::VectorXd excluded_power_;
@@ -178,6 +182,31 @@ void PlantEstimation::measure(std::size_t m, const std::vector<RunExcitation>& e
   });
 }
 
+void PlantEstimation::note_dropped(const RealizationRuns& realization,
+                                   const RealizationSpectra& spectra) {
+  for (std::size_t e = 0; e < realization.runs.size(); ++e) {
+    for (DroppedPeriod dropped : spectra.run(e).dropped) {
+      dropped.realization = realization.realization;
+      dropped.experiment = realization.runs[e].run().experiment;
+      dropped_.push_back(std::move(dropped));
+    }
+  }
+}
+
+/// Whether a run without a clean period makes the realization useless, and if so, notes it.
+bool PlantEstimation::leave_out(const RealizationRuns& realization,
+                                const RealizationSpectra& spectra) {
+  for (std::size_t e = 0; e < realization.runs.size(); ++e) {
+    if (spectra.run(e).periods > 0) continue;
+    left_out_.push_back({realization.realization,
+                         fmt::format("{}: {}", realization.runs[e].place(),
+                                     no_clean_period(realization.runs[e]))});
+    if (first_marked_ == nullptr) first_marked_ = &realization.runs[e];
+    return true;
+  }
+  return false;
+}
+
 void PlantEstimation::note_quality(const RealizationRuns& realization,
                                    const RealizationSpectra& spectra) {
   const auto inputs = static_cast<Eigen::Index>(channels_.estimated.size());
@@ -185,11 +214,6 @@ void PlantEstimation::note_quality(const RealizationRuns& realization,
     const RunSpectra& run = spectra.run(e);
     provenance_->add(realization.runs[e], run.fingerprint);
     fewest_periods_ = std::min(fewest_periods_, run.periods);
-    for (DroppedPeriod dropped : run.dropped) {
-      dropped.realization = realization.realization;
-      dropped.experiment = realization.runs[e].run().experiment;
-      dropped_.push_back(std::move(dropped));
-    }
     for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(excited_.lines.size()); ++k) {
       for (Eigen::Index i = run.mean.rows() - inputs; i < run.mean.rows(); ++i) {
         input_power_ += std::norm(run.mean(i, k));
@@ -217,6 +241,7 @@ FrfEstimate PlantEstimation::describe() const {
   frf.hold = Hold::zoh;
   frf.method = options_.method;
   frf.dropped_periods = dropped_;
+  frf.left_out_realizations = left_out_;
   frf.periods = fewest_periods_;
   frf.experiments = static_cast<int>(realizations_.front().runs.size());
   return frf;
@@ -280,19 +305,22 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
                       "leave this realization out",
                       excited_.axes.size(), realization.runs.size(), realization.realization));
     }
-    if (health != nullptr && m == 0) {
+    if (health != nullptr && !health->complete()) {
       std::vector<const ExcitationSpectrum*> all;
       for (const RunExcitation& run : excitation) all.push_back(&run.spectrum);
-      health->excite(all);
+      health->excite(m, all);
     }
     std::vector<Eigen::MatrixXcd> R;
     for (const RunExcitation& run : excitation)
       R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
     RealizationSpectra spectra(realization.realization, std::move(R), pool_);
     measure(m, excitation, health, spectra);
+    note_dropped(realization, spectra);
+    if (leave_out(realization, spectra)) continue;
     note_quality(realization, spectra);
     include(spectra, excitation);
   }
+  if (left_out_.size() == realizations_.size()) refuse_marked_runs(*first_marked_);
   FrfEstimate frf = describe();
   average_->finish(frf, workers_);
   if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);

@@ -37,15 +37,18 @@ namespace stageid {
 ///
 /// Incomplete runs are passed over; of several complete runs of one (realization, experiment) the
 /// last counts. Periods with a marked sample are dropped, and (periodic, three periods or more)
-/// those whose scatter shows that they do not belong with the others: period_check.hpp. With two
-/// periods and two realizations the plant's linearity is tested, see nonlinearity_test(). Inputs asked for that are only some of the
-/// excited actuators are columns of the whole estimate: the others move too.
+/// those whose scatter shows that they do not belong with the others: period_check.hpp. A realization
+/// with a run that has no clean period is left out (FrfEstimate::left_out_realizations). With two
+/// periods and two realizations the plant's linearity is tested, see nonlinearity_test(). Inputs asked
+/// for that are only some of the excited actuators are columns of the whole estimate: the others move
+/// too.
 ///
 /// Memory (periodic): one period of samples and 16 of spectra a thread, and the spectra of one
 /// realization.
 /// Source: method.md section 3; Pintelon and Schoukens, System Identification (2012).
 /// @throws std::invalid_argument / FormatError: fewer experiments than inputs, singular excitation
-///         (names line and frequency), a period that does not divide the record, channels unknown;
+///         (names line and frequency), a period that does not divide the record, no realization
+///         whose runs all have a clean period, channels unknown;
 ///         with lpm a single period without empty lines; zippered lines that are too few, or not the
 ///         same in all realizations; covariance_lines as smooth_covariance().
 FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,

@@ -59,18 +59,18 @@ class RecordMeasurement {
 
   void leave_out_marked(int period) {
     close_segment();
-    run_.dropped.push_back({0, 0, period, "a marked sample"});
+    run_.drop(period, "a marked sample");
   }
 
   RunSpectra finish() {
     close_segment();
     if (run_.periods == 0 && alone_) include(*std::exchange(alone_, std::nullopt));
-    if (run_.periods == 0) refuse_marked_run(used_);
+    std::sort(run_.dropped.begin(), run_.dropped.end(),
+              [](const auto& a, const auto& b) { return a.period < b.period; });
+    if (run_.periods == 0) return std::move(run_);
     run_.mean /= static_cast<double>(run_.periods);
     run_.excluded_power = excluded_power(excitation_.lines, run_.periods, w_);
     run_.fingerprint = fingerprint_.hex();
-    std::sort(run_.dropped.begin(), run_.dropped.end(),
-              [](const auto& a, const auto& b) { return a.period < b.period; });
     return std::move(run_);
   }
 
@@ -92,7 +92,7 @@ class RecordMeasurement {
   }
 
   void drop_alone(const Segment& segment) {
-    run_.dropped.push_back({0, 0, segment.first, "between marked periods, too short for a record"});
+    run_.drop(segment.first, "between marked periods, too short for a record");
   }
 
   void include(const Segment& segment) {

@@ -53,17 +53,17 @@ class RunMeasurement {
     if (static_cast<int>(waiting_.size()) == together_) include_waiting();
     return spectra;
   }
-  void leave_out_marked(int period) { run_.dropped.push_back({0, 0, period, "a marked sample"}); }
+  void leave_out_marked(int period) { run_.drop(period, "a marked sample"); }
 
   RunSpectra finish() {
     include_waiting();
-    if (run_.periods == 0) refuse_marked_run(used_);
+    std::sort(run_.dropped.begin(), run_.dropped.end(),
+              [](const auto& a, const auto& b) { return a.period < b.period; });
+    if (run_.periods == 0) return std::move(run_);
     run_.scatter_dof = run_.periods - 1;
     const std::vector<int> excited(
         lines_.lines.begin(), lines_.lines.begin() + static_cast<std::ptrdiff_t>(lines_.excited));
     run_.excluded_power = excluded_power(excited, unmarked_, w_);
-    std::sort(run_.dropped.begin(), run_.dropped.end(),
-              [](const auto& a, const auto& b) { return a.period < b.period; });
     return std::move(run_);
   }
 
@@ -75,7 +75,7 @@ class RunMeasurement {
       for (const PeriodOutlier& outlier :
            find_outliers(std::span(w_.spectra).first(waiting_.size()), frequency_hz)) {
         in[outlier.period] = 0;
-        run_.dropped.push_back({0, 0, waiting_[outlier.period], reason(outlier, frequency_hz)});
+        run_.drop(waiting_[outlier.period], reason(outlier, frequency_hz));
       }
     }
     std::vector<const Eigen::MatrixXcd*> periods;
@@ -175,6 +175,12 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
   RunSpectra run = measurement.finish();
   run.fingerprint = fingerprint.hex();
   return run;
+}
+
+void RunSpectra::drop(int period, std::string reason) {
+  DroppedPeriod& one = dropped.emplace_back();
+  one.period = period;
+  one.reason = std::move(reason);
 }
 
 double common_scatter(const RunSpectra& run, Eigen::Index k, Eigen::Index l) {

@@ -30,6 +30,7 @@ struct RunSpectra {
   std::string fingerprint;         ///< of the excitation and of every sample that is not marked
   /// By period; which realization and experiment this is, others know.
   std::vector<DroppedPeriod> dropped;
+  void drop(int period, std::string reason);
 };
 
 /// How much two lines' scatters have in common: the squared correlation of their mean squares; 1 for
@@ -63,7 +64,8 @@ class HealthPart;
 /// Reads a run period by period and averages. Periods with a marked sample are left out, and with
 /// PeriodChoice::consistent those that find_outliers() finds among (about) 16 neighbours.
 /// `health`, if there is one, gets each period as well; `read_done` is told the bytes read, period by period.
-/// @throws FormatError if no clean period is left, and what LogReader::read() throws.
+/// @returns zero periods, and nothing else but which were dropped, if none is clean
+/// @throws what LogReader::read() throws.
 RunSpectra measure_run(const UsedRun& run, const SpectrumLines& lines,
                        const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
                        PeriodChoice choice, RunWorkspace& workspace, HealthPart* health,

@@ -73,11 +73,13 @@ Eigen::VectorXd excluded_power(const std::vector<int>& lines, int periods, RunWo
   return power;
 }
 
-void refuse_marked_run(const UsedRun& run) {
+std::string no_clean_period(const UsedRun& run) {
+  return fmt::format("each of its {} periods after the transient has a marked sample", run.periods);
+}
+
+void refuse_marked_runs(const UsedRun& run) {
   throw FormatError(run.log->path(), fmt::format("/runs/{}", run.run().name),
-                    fmt::format("each of its {} periods after the transient has a marked sample; "
-                                "measure this run again",
-                                run.periods));
+                    no_clean_period(run) + ", and no realization is without such a run; measure again");
 }
 
 }  // namespace stageid

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <complex>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "excitation/fingerprint.hpp"
@@ -46,7 +47,12 @@ void add_outer_product(double weight, const Eigen::VectorXd& re, const Eigen::Ve
 /// workspace: one transform a run, not one a period.
 Eigen::VectorXd excluded_power(const std::vector<int>& lines, int periods, RunWorkspace& workspace);
 
-/// @throws FormatError always: no period of the run is clean.
-[[noreturn]] void refuse_marked_run(const UsedRun& run);
+/// Why a run that gave no period is of no use: each is marked.
+std::string no_clean_period(const UsedRun& run);
+
+/// @throws FormatError always: each realization has a run without a clean period, the first of them
+///         `run`.
+[[noreturn]] void refuse_marked_runs(const UsedRun& run);
+
 
 }  // namespace stageid

@@ -45,7 +45,9 @@ constexpr Dataset kDatasets[] = {{"frequency_hz", 1},
                                  {"nonlinearity_odd_p_value", 3},
                                  {"nonlinearity_odd_level", 3},
                                  {"dropped_periods", 2},
-                                 {"dropped_reasons", 0}};
+                                 {"dropped_reasons", 0},
+                                 {"left_out_realizations", 1},
+                                 {"left_out_reasons", 0}};
 
 constexpr const char* kAttributes[] = {"@format",
                                        "@format_version",

@@ -52,6 +52,7 @@ nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
     json["median_relative_total_std"] = median_relative_std(frf, frf.total_variance);
   json["nonlinearity"] = linearity_json(frf);
   json["dropped_periods"] = dropped_json(frf);
+  json["left_out_realizations"] = left_out_json(frf);
   return json;
 }
 

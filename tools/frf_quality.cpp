@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "frf/nonlinearity.hpp"
 #include "tools/console.hpp"
@@ -129,17 +130,32 @@ Json linearity_json(const FrfEstimate& frf) {
 
 std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
   std::vector<std::string> lines;
+  std::set<int> left_out;
+  for (const LeftOutRealization& one : frf.left_out_realizations) {
+    left_out.insert(one.realization);
+    lines.push_back(fmt::format("realization {} left out, the others are used: {}", one.realization + 1, one.reason));
+  }
+  std::size_t told = 0;
+  std::size_t more = 0;
   for (const DroppedPeriod& period : frf.dropped_periods) {
-    if (lines.size() == kMostLines) {
-      lines.push_back(fmt::format("... and {} more periods, see /dropped_periods",
-                                  frf.dropped_periods.size() - kMostLines));
-      break;
+    if (left_out.contains(period.realization)) continue;
+    if (++told > kMostLines) {
+      ++more;
+      continue;
     }
     lines.push_back(fmt::format("realization {}, experiment {}: period {} left out: {}",
                                 period.realization + 1, period.experiment + 1, period.period + 1,
                                 period.reason));
   }
+  if (more > 0) lines.push_back(fmt::format("... and {} more periods, see /dropped_periods", more));
   return lines;
+}
+
+Json left_out_json(const FrfEstimate& frf) {
+  Json list = Json::array();
+  for (const LeftOutRealization& one : frf.left_out_realizations)
+    list.push_back({{"realization", one.realization + 1}, {"reason", one.reason}});
+  return list;
 }
 
 Json dropped_json(const FrfEstimate& frf) {

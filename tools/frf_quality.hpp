@@ -20,8 +20,12 @@ std::vector<std::string> linearity_lines(const FrfEstimate& frf);
 /// probable, or null without such lines.
 nlohmann::ordered_json linearity_json(const FrfEstimate& frf);
 
-/// Which periods were left out and why, one line each; of very many the first ones.
+/// Which realizations and which periods of the others were left out and why, one line each; of very
+/// many periods the first ones.
 std::vector<std::string> dropped_lines(const FrfEstimate& frf);
+
+/// [{"realization": 1, "reason": ...}, ...], counted from 1.
+nlohmann::ordered_json left_out_json(const FrfEstimate& frf);
 
 /// [{"realization": 1, "experiment": 1, "period": 3, "reason": ...}, ...], counted from 1.
 nlohmann::ordered_json dropped_json(const FrfEstimate& frf);

@@ -40,6 +40,7 @@ FrfEstimate with_quality() {
   frf.nonlinearity.even = {numbered(6, 2, 20.0), numbered(6, 2, 40.0)};
   frf.nonlinearity.odd = {numbered(6, 2, 30.0), numbered(6, 2, 50.0)};
   frf.dropped_periods = {{0, 1, 4, "a marked sample"}, {2, 0, 7, "12 times the scatter"}};
+  frf.left_out_realizations = {{3, "run.slog:/runs/0007: each of its 4 periods"}};
   return frf;
 }
 
@@ -67,6 +68,7 @@ TEST_F(FrfQualityFile, EverythingComesBack) {
   EXPECT_EQ(back.nonlinearity.even.p_value, frf.nonlinearity.even.p_value);
   EXPECT_EQ(back.nonlinearity.odd.level, frf.nonlinearity.odd.level);
   EXPECT_EQ(back.dropped_periods, frf.dropped_periods);
+  EXPECT_EQ(back.left_out_realizations, frf.left_out_realizations);
 }
 
 // What docs/formats.md says, element by element.
@@ -111,7 +113,7 @@ std::string message_of(const std::filesystem::path& file) {
 
 TEST_F(FrfQualityFile, SpoiltDatasetsAreNamed) {
   for (const char* dataset : {"/detection_line", "/detection_power", "/detection_noise",
-                              "/detection_runs", "/detection_linear_power", "/dropped_periods",
+                              "/detection_runs", "/detection_linear_power", "/dropped_periods", "/left_out_realizations",
                               "/nonlinearity_p_value", "/nonlinearity_even_level"}) {
     write_frf(file_, with_quality());
     test::Hdf5Surgery(file_).reshape(dataset, {7});
