@@ -49,7 +49,7 @@ std::uint64_t load_word(const std::byte* bytes) noexcept {
 /// A linear map on 32-bit CRC registers: column i is the image of bit i.
 using RegisterMap = std::array<std::uint32_t, 32>;
 
-constexpr std::uint32_t apply(const RegisterMap& map, std::uint32_t value) {
+constexpr std::uint32_t map_bits(const RegisterMap& map, std::uint32_t value) {
   std::uint32_t image = 0;
   for (std::size_t bit = 0; bit < 32; ++bit) {
     if (((value >> bit) & 1U) != 0) image ^= map[bit];
@@ -69,12 +69,12 @@ constexpr ShiftTables make_shift_tables(std::size_t length) {
   }
   for (; length > 1; length /= 2) {
     RegisterMap square{};
-    for (std::size_t bit = 0; bit < 32; ++bit) square[bit] = apply(map, map[bit]);
+    for (std::size_t bit = 0; bit < 32; ++bit) square[bit] = map_bits(map, map[bit]);
     map = square;
   }
   ShiftTables tables{};
   for (std::size_t k = 0; k < 4; ++k) {
-    for (std::uint32_t b = 0; b < 256; ++b) tables[k][b] = apply(map, b << (8 * k));
+    for (std::uint32_t b = 0; b < 256; ++b) tables[k][b] = map_bits(map, b << (8 * k));
   }
   return tables;
 }
