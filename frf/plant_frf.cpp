@@ -198,9 +198,9 @@ bool PlantEstimation::leave_out(const RealizationRuns& realization,
                                 const RealizationSpectra& spectra) {
   for (std::size_t e = 0; e < realization.runs.size(); ++e) {
     if (spectra.run(e).periods > 0) continue;
-    left_out_.push_back({realization.realization,
-                         fmt::format("{}: {}", realization.runs[e].place(),
-                                     no_clean_period(realization.runs[e]))});
+    left_out_.push_back(
+        {realization.realization,
+         fmt::format("{}: {}", realization.runs[e].place(), no_clean_period(realization.runs[e]))});
     if (first_marked_ == nullptr) first_marked_ = &realization.runs[e];
     return true;
   }

@@ -78,8 +78,9 @@ std::string no_clean_period(const UsedRun& run) {
 }
 
 void refuse_marked_runs(const UsedRun& run) {
-  throw FormatError(run.log->path(), fmt::format("/runs/{}", run.run().name),
-                    no_clean_period(run) + ", and no realization is without such a run; measure again");
+  throw FormatError(
+      run.log->path(), fmt::format("/runs/{}", run.run().name),
+      no_clean_period(run) + ", and no realization is without such a run; measure again");
 }
 
 }  // namespace stageid

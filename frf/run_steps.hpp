@@ -54,5 +54,4 @@ std::string no_clean_period(const UsedRun& run);
 ///         `run`.
 [[noreturn]] void refuse_marked_runs(const UsedRun& run);
 
-
 }  // namespace stageid

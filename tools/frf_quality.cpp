@@ -133,7 +133,8 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
   std::set<int> left_out;
   for (const LeftOutRealization& one : frf.left_out_realizations) {
     left_out.insert(one.realization);
-    lines.push_back(fmt::format("realization {} left out, the others are used: {}", one.realization + 1, one.reason));
+    lines.push_back(fmt::format("realization {} left out, the others are used: {}",
+                                one.realization + 1, one.reason));
   }
   std::size_t told = 0;
   std::size_t more = 0;
