@@ -28,34 +28,30 @@ void hold_unknowns(const std::vector<Eigen::Index>& frozen, Eigen::MatrixXd& M) 
 
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
                          const std::vector<BasisGroup>& groups, FitMethod method,
-                         bool keep_channels)
-    : ArrowSystem(problem, beta, groups, method, {0, problem.channels()}, keep_channels) {}
+                         ChannelEquationsUse use)
+    : ArrowSystem(problem, beta, groups, method, {0, problem.channels()}, use) {}
 
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-                         const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part)
-    : ArrowSystem(problem, beta, groups, method, part, true) {}
-
-ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-                         const std::vector<BasisGroup>& groups, FitMethod method,
-                         ChannelRange range, bool keep_channels)
+                         const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part,
+                         ChannelEquationsUse use)
     : problem_(problem),
       beta_(beta),
       method_(method),
-      range_(range),
-      keep_channels_(keep_channels),
+      range_(part),
+      use_(use),
       columns_(derivative_columns(problem)) {
   const Eigen::Index globals = problem.globals();
   M_.setZero(globals, globals);
   e_.setZero(globals);
   schur_.setZero(globals, globals);
   schur_e_.setZero(globals);
-  if (keep_channels) channels_.resize(static_cast<std::size_t>(range.count));
+  if (keeps()) channels_.resize(static_cast<std::size_t>(part.count));
   if (method != FitMethod::gn) equation_error_columns(problem, beta, Y_re_, Y_im_);
   for (const BasisGroup& group : groups) {
     const Eigen::Index* all = group.channels.data();
     const Eigen::Index* all_end = all + group.channels.size();
-    const Eigen::Index* begin = std::lower_bound(all, all_end, range.first);  // they are sorted
-    const Eigen::Index* end = std::lower_bound(begin, all_end, range.first + range.count);
+    const Eigen::Index* begin = std::lower_bound(all, all_end, part.first);  // they are sorted
+    const Eigen::Index* end = std::lower_bound(begin, all_end, part.first + part.count);
     if (begin == end) continue;
     if (static_cast<Eigen::Index>(group.channels.size()) < kFewChannels) {
       add_few(group, begin, end);
@@ -82,7 +78,7 @@ void ArrowSystem::add_block(const BasisGroup& group, const GroupProducts& produc
   Channel passing;
   for (Eigen::Index r = 0; r < block.members && regular_; ++r) {
     const Eigen::Index index = members[static_cast<std::size_t>(r)];
-    Channel& channel = keep_channels_ ? kept(index) : passing;
+    Channel& channel = keeps() ? kept(index) : passing;
     set_channel(sums, B, r, channel);
     if (problem_.delays() > 0) add_delays(sums, B, r, index, channel);
     eliminate(channel);
@@ -106,7 +102,7 @@ void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
   const Eigen::Index globals = problem_.globals();
   Channel passing;
   for (std::size_t r = 0; r < own.size() && regular_; ++r) {
-    Channel& channel = keep_channels_ ? kept(begin[r]) : passing;
+    Channel& channel = keeps() ? kept(begin[r]) : passing;
     const auto& [M, e] = own[r];
     channel.bb = M.topLeftCorner(n_f, n_f);
     channel.ab = M.bottomLeftCorner(globals, n_f);
@@ -176,6 +172,7 @@ void ArrowSystem::add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eig
 }
 
 void ArrowSystem::eliminate(Channel& channel) {
+  if (use_ == ChannelEquationsUse::only_kept) return;
   Eigen::MatrixXd rhs(channel.ba.rows(), channel.ba.cols() + 1);
   rhs << channel.ba, channel.e;
   Eigen::MatrixXd solution;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "estimation/line_sums.hpp"
@@ -11,6 +12,13 @@ namespace stageid {
 struct ChannelRange {
   Eigen::Index first = 0;
   Eigen::Index count = 0;
+};
+
+/// What becomes of the channels' own equations.
+enum class ChannelEquationsUse : std::uint8_t {
+  eliminated,  ///< and forgotten: memory is that of a block of channels; for solve_globals()
+  kept,        ///< eliminated and kept
+  only_kept    ///< M as it is, which may be singular; without Z, x and the Schur complement
 };
 
 /// The equations of one step, M d_beta = e, in the order beta = (globals, numerators of channel 1,
@@ -27,15 +35,14 @@ struct ChannelRange {
 class ArrowSystem {
  public:
   /// @pre `groups` were evaluated with derivatives at `beta`.
-  /// @param keep_channels false where only solve_globals() is asked for: memory is then that of a block
-  ///        of channels, and channels() is empty.
   ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-              const std::vector<BasisGroup>& groups, FitMethod method, bool keep_channels = true);
+              const std::vector<BasisGroup>& groups, FitMethod method,
+              ChannelEquationsUse use = ChannelEquationsUse::kept);
 
-  /// What these channels alone contribute, all of them kept: M, e and the Schur complement are sums
-  /// over parts.
+  /// What these channels alone contribute: M, e and the Schur complement are sums over parts.
   ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-              const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part);
+              const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part,
+              ChannelEquationsUse use = ChannelEquationsUse::kept);
 
   struct Step {
     Eigen::VectorXd globals;
@@ -58,7 +65,7 @@ class ArrowSystem {
     Eigen::MatrixXd ba;  ///< n_f x globals
     Eigen::MatrixXd bb;  ///< n_f x n_f
     Eigen::VectorXd e;   ///< n_f
-    Eigen::MatrixXd Z;   ///< bb^-1 ba, n_f x globals
+    Eigen::MatrixXd Z;   ///< bb^-1 ba, n_f x globals; if eliminated
     Eigen::VectorXd x;   ///< bb^-1 e
   };
   const std::vector<Channel>& channels() const noexcept { return channels_; }
@@ -70,12 +77,12 @@ class ArrowSystem {
   const Eigen::VectorXd& e_globals() const noexcept { return e_; }
   const Eigen::MatrixXd& schur() const noexcept { return schur_; }
   const Eigen::VectorXd& schur_gradient() const noexcept { return schur_e_; }
+  /// Whether all channels could be eliminated; if not, those behind the first that could not are not
+  /// there.
   bool regular() const noexcept { return regular_; }
 
  private:
-  ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-              const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange range,
-              bool keep_channels);
+  bool keeps() const noexcept { return use_ != ChannelEquationsUse::eliminated; }
   Channel& kept(Eigen::Index c);
   void add_block(const BasisGroup& group, const GroupProducts& products, const TileRange& block);
   void add_few(const BasisGroup& group, const Eigen::Index* begin, const Eigen::Index* end);
@@ -92,7 +99,7 @@ class ArrowSystem {
   const FitParameters& beta_;
   FitMethod method_;
   ChannelRange range_;
-  bool keep_channels_;
+  ChannelEquationsUse use_;
   std::vector<DerivativeColumn> columns_;
   Eigen::MatrixXd Y_re_;  // equation_error_columns()
   Eigen::MatrixXd Y_im_;

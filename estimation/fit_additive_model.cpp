@@ -236,7 +236,7 @@ void judge(const FitProblem& problem, const FitParameters& beta, double cost,
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
   std::string reason = undetermined_numerators(problem, beta, groups);
   if (reason.empty() && !singular) {
-    const ArrowSystem gn(problem, beta, groups, FitMethod::gn, false);
+    const ArrowSystem gn(problem, beta, groups, FitMethod::gn, ChannelEquationsUse::eliminated);
     reason = undetermined_poles(problem, beta, cost, gn, result.removal_cost, covariance, frozen,
                                 result.held);
   }

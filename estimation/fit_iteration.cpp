@@ -15,7 +15,8 @@ namespace stageid {
 namespace {
 
 constexpr double kNearlyExact = 1e-12;  // of the data's power: normal equations lose what is left
-constexpr bool kGlobalsOnly = false;    // numerators are solved again after every step
+// Numerators are solved again after every step.
+constexpr ChannelEquationsUse kGlobalsOnly = ChannelEquationsUse::eliminated;
 
 /// A candidate with its numerators solved.
 struct Trial {

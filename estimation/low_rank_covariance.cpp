@@ -90,14 +90,16 @@ ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitPara
                                         const std::vector<Eigen::Index>& frozen,
                                         bool with_response) {
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
-  const ArrowSystem gn(problem, beta, groups, FitMethod::gn);
-  const Eigen::MatrixXd N = factors.reduced_matrix(beta, gn);
+  const auto reduced = [&](const FitProblem& one) {
+    return factors.reduced_matrix(
+        beta, ArrowSystem(one, beta, groups, FitMethod::gn, ChannelEquationsUse::only_kept));
+  };
+  const Eigen::MatrixXd N = reduced(problem);
   Eigen::MatrixXd K = N;
   if (noise.correlation.known()) {
     K = correlated_middle(problem, beta, groups, factors, noise);
   } else if (noise.variance) {
-    const FitProblem weighed = middle_problem(problem, noise);
-    K = factors.reduced_matrix(beta, ArrowSystem(weighed, beta, groups, FitMethod::gn));
+    K = reduced(middle_problem(problem, noise));
   }
   ParameterCovariance out;
   out.residual_scale = covariance_scale(problem, cost, factors.size(), noise);

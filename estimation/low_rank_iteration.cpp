@@ -46,7 +46,8 @@ class LowRankIteration {
   /// The unconstrained numerators, each weighted by its inverse variance.
   void project() {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, FitMethod::gn);
+    const ArrowSystem system(problem_, beta_, groups, FitMethod::gn,
+                             ChannelEquationsUse::only_kept);
     Eigen::MatrixXd weight(problem_.channels(), problem_.functions());
     const Eigen::MatrixXd unit =
         Eigen::MatrixXd::Identity(problem_.functions(), problem_.functions());
@@ -80,7 +81,8 @@ class LowRankIteration {
   /// @returns whether to go on.
   bool iterate_once() {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, FitMethod::gn);
+    const ArrowSystem system(problem_, beta_, groups, FitMethod::gn,
+                             ChannelEquationsUse::only_kept);
     N_ = factors_.reduced_matrix(beta_, system);
     g_ = factors_.reduced_gradient(beta_, system);
     if (!N_.allFinite()) return end(FitStatus::singular, "the residue factors are not determined");

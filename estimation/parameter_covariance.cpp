@@ -192,7 +192,9 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   const auto make_equations = [&](ChannelRange part) {
     equations.emplace(
         PartEquations{ArrowSystem(problem, beta, groups, FitMethod::gn, part), std::nullopt});
-    if (weighed) equations->weighed.emplace(*weighed, beta, groups, FitMethod::gn, part);
+    if (weighed)
+      equations->weighed.emplace(*weighed, beta, groups, FitMethod::gn, part,
+                                 ChannelEquationsUse::only_kept);
   };
 
   Eigen::MatrixXd S = Eigen::MatrixXd::Zero(problem.globals(), problem.globals());

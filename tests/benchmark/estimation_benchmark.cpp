@@ -79,7 +79,7 @@ Case make_case(int times, Eigen::Index every, int threads) {
 /// What an iteration of iterate() does: equations, step, numerators at the new poles.
 double iterate_once(const Case& c, FitMethod method) {
   const std::vector<BasisGroup> groups = evaluate_groups(c.problem, c.beta, true);
-  const ArrowSystem system(c.problem, c.beta, groups, method, false);
+  const ArrowSystem system(c.problem, c.beta, groups, method, ChannelEquationsUse::eliminated);
   FitParameters next = stepped(c.problem, c.beta, system.solve_globals(1e-6));
   double cost = 0.0;
   solve_numerators(c.problem, evaluate_groups(c.problem, next, false), next.B, cost);

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "estimation/arrow_system.hpp"
 #include "estimation/channel_equations.hpp"
 #include "estimation/numerators.hpp"
@@ -45,7 +47,7 @@ TEST(LineSums, SharedSumsOfManyChannelsAreTheChannelsOwn) {
       ASSERT_EQ(groups.size(), 1U);
       ASSERT_GE(fit.channels(), kFewChannels);
       const ArrowSystem system(fit, beta, groups, method);
-      const ArrowSystem passing(fit, beta, groups, method, false);
+      const ArrowSystem passing(fit, beta, groups, method, ChannelEquationsUse::eliminated);
       EXPECT_EQ(system.schur(), passing.schur());
 
       const auto columns = derivative_columns(fit);
@@ -74,6 +76,30 @@ TEST(LineSums, SharedSumsOfManyChannelsAreTheChannelsOwn) {
       expect_same(system.M_globals(), M);
       expect_same(system.e_globals(), e);
     }
+}
+
+// One that cannot be eliminated keeps nobody from the equations of the others: modal forms and
+// covariances of other weights need no more.
+TEST(LineSums, ChannelsThatAreOnlyKeptAreAllThere) {
+  DenseProblem problem = wide_problem(HoldModel::exact);
+  constexpr Eigen::Index kSpoilt = 3;
+  problem.W(kSpoilt, 7) = std::numeric_limits<double>::infinity();
+  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
+  const FitParameters beta = test::fit_parameters(problem);
+  const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
+  ASSERT_FALSE(ArrowSystem(fit, beta, groups, FitMethod::gn).regular());
+  const ArrowSystem kept(fit, beta, groups, FitMethod::gn, ChannelEquationsUse::only_kept);
+  EXPECT_TRUE(kept.regular());
+  const auto columns = derivative_columns(fit);
+  for (Eigen::Index c = 0; c < fit.channels(); ++c) {
+    if (c == kSpoilt) continue;
+    const ChannelEquations own =
+        channel_equations(fit, beta, groups[0], c, columns, nullptr, FitMethod::gn);
+    const Eigen::MatrixXd bb = own.M.topLeftCorner(fit.functions(), fit.functions());
+    const Eigen::MatrixXd ab = own.M.bottomLeftCorner(fit.globals(), fit.functions());
+    EXPECT_LT((kept.channel(c).bb - bb).norm(), 1e-10 * bb.norm());
+    EXPECT_LT((kept.channel(c).ab - ab).norm(), 1e-10 * ab.norm());
+  }
 }
 
 TEST(LineSums, NumeratorsOfManyChannelsAreThoseOfEachAlone) {

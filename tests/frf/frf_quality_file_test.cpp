@@ -112,9 +112,10 @@ std::string message_of(const std::filesystem::path& file) {
 }
 
 TEST_F(FrfQualityFile, SpoiltDatasetsAreNamed) {
-  for (const char* dataset : {"/detection_line", "/detection_power", "/detection_noise",
-                              "/detection_runs", "/detection_linear_power", "/dropped_periods", "/left_out_realizations",
-                              "/nonlinearity_p_value", "/nonlinearity_even_level"}) {
+  for (const char* dataset :
+       {"/detection_line", "/detection_power", "/detection_noise", "/detection_runs",
+        "/detection_linear_power", "/dropped_periods", "/left_out_realizations",
+        "/nonlinearity_p_value", "/nonlinearity_even_level"}) {
     write_frf(file_, with_quality());
     test::Hdf5Surgery(file_).reshape(dataset, {7});
     EXPECT_THAT(message_of(file_), HasSubstr(dataset)) << dataset;

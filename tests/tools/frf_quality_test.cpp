@@ -6,11 +6,14 @@
 
 #include "frf/frf_file.hpp"
 #include "tests/tools/program_fixture.hpp"
+#include "tools/frf_quality.hpp"
 
 namespace stageid::test {
 namespace {
 
 using nlohmann::json;
+using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 class FrfQuality : public ProgramTest {};
@@ -53,6 +56,23 @@ TEST_F(FrfQuality, SmoothsTheCovariance) {
   fail({"frf", name("run.slog"), "-o", name("two.h5"), "--smooth-covariance", "2"}, 2,
        "odd number");
   fail({"frf", name("run.slog"), "-o", name("two.h5"), "--periods", "some"}, 2, "--periods");
+}
+
+TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {
+  FrfEstimate frf;
+  frf.left_out_realizations = {{1, "run.slog:/runs/0003: no clean period"}};
+  frf.dropped_periods = {{0, 2, 4, "a glitch"}};
+  for (int period = 0; period < 30; ++period)
+    frf.dropped_periods.push_back({1, 0, period, "marked"});
+  EXPECT_THAT(
+      dropped_lines(frf),
+      ElementsAre(
+          "realization 2 left out, the others are used: run.slog:/runs/0003: no clean period",
+          "realization 1, experiment 3: period 5 left out: a glitch"));
+  EXPECT_EQ(left_out_json(frf),
+            json({{{"realization", 2}, {"reason", "run.slog:/runs/0003: no clean period"}}}));
+  frf.left_out_realizations.clear();
+  EXPECT_THAT(dropped_lines(frf), Contains("... and 21 more periods, see /dropped_periods"));
 }
 
 }  // namespace
