@@ -6,6 +6,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "frf/order_statistic.hpp"
+
 namespace stageid {
 namespace {
 
@@ -107,9 +109,7 @@ double scatter_db(const Eigen::RowVectorXd& curve_db, Eigen::Index line) {
   std::vector<double> bends;
   for (Eigen::Index i = first; i <= last; ++i)
     bends.push_back(std::abs(curve_db[i - 1] - 2.0 * curve_db[i] + curve_db[i + 1]));
-  const auto median = bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2);
-  std::nth_element(bends.begin(), median, bends.end());
-  return *median / (0.6745 * std::sqrt(6.0));  // of normal numbers
+  return order_statistic(bends, 0.5) / (0.6745 * std::sqrt(6.0));  // of normal numbers
 }
 
 /// Lower quartile of the lines beside a peak up to where the curve rises above it again: a base that
@@ -120,9 +120,7 @@ double base_db(const Eigen::RowVectorXd& curve_db, Eigen::Index peak, Eigen::Ind
        k >= 0 && k < curve_db.size() && curve_db[k] <= curve_db[peak]; k += direction)
     values.push_back(curve_db[k]);
   if (values.empty()) return curve_db[peak];
-  const auto quartile = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 4);
-  std::nth_element(values.begin(), quartile, values.end());
-  return *quartile;
+  return order_statistic(values, 0.25);
 }
 
 /// Whether a local maximum stands above its surroundings by more than noise makes maxima stand.

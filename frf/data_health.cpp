@@ -7,6 +7,7 @@
 
 #include "frf/controller_check.hpp"
 #include "frf/health_measures.hpp"
+#include "frf/order_statistic.hpp"
 #include "frf/rigid_body_check.hpp"
 #include "frf/skew_check.hpp"
 
@@ -237,11 +238,10 @@ void Examination::check_inputs() {
       conditions.push_back(
           condition(record_.mean(record_.lines[static_cast<std::size_t>(k)].Z(rows, Eigen::all))));
   if (conditions.empty()) return;
-  const auto middle = conditions.begin() + static_cast<std::ptrdiff_t>(conditions.size() / 2);
-  std::nth_element(conditions.begin(), middle, conditions.end());
-  if (*middle > kWorstInputs)
+  const double median = order_statistic(conditions, 0.5);
+  if (median > kWorstInputs)
     find(Severity::doubt, Cause::inputs, "", "the loop makes the inputs almost alike",
-         fmt::format("median cond(U) {:.3g} above {:.4g} Hz", *middle, 0.5 * last_hz),
+         fmt::format("median cond(U) {:.3g} above {:.4g} Hz", median, 0.5 * last_hz),
          "more power on the weak directions; shape the excitation by the sensitivity");
 }
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "frf/order_statistic.hpp"
 #include "frf/tail_probability.hpp"
 
 namespace stageid {
@@ -41,9 +42,7 @@ double median_coherence(const HealthRecord& record, Index channel) {
     if (power > 0.0) values.push_back(1.0 - record.scatter(row)(0, 0).real() / power);
   }
   if (values.empty()) return 1.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return order_statistic(values, 0.5);
 }
 
 double condition(const Eigen::MatrixXcd& M) {

@@ -8,6 +8,8 @@
 #include <numbers>
 #include <optional>
 
+#include "frf/order_statistic.hpp"
+
 namespace stageid {
 namespace {
 
@@ -30,10 +32,8 @@ std::vector<PlantLine> rigid_lines(const std::vector<PlantLine>& lines) {
     const double omega = lines[k].omega_rad_s;
     sizes.push_back(omega * omega * lines[k].G.norm());
     std::vector<double> sorted = sizes;
-    const std::size_t middle = sorted.size() / 2;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(middle),
-                     sorted.end());
-    if (sizes.size() < kFewestLines || sizes.back() <= kGrowth * sorted[middle]) continue;
+    if (sizes.size() < kFewestLines || sizes.back() <= kGrowth * order_statistic(sorted, 0.5))
+      continue;
     std::vector<PlantLine> band;
     for (const PlantLine& line : lines)
       if (line.omega_rad_s < kBelowGrowth * omega) band.push_back(line);

@@ -10,6 +10,7 @@
 #include "excitation/fft_wisdom.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/hold_compensation.hpp"
+#include "frf/order_statistic.hpp"
 #include "tools/command_line.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/frf_quality.hpp"
@@ -27,9 +28,7 @@ double declared_delay_s(const std::filesystem::path& log) {
 
 double median_relative_std(const FrfEstimate& frf, const Eigen::MatrixXd& variance) {
   Eigen::ArrayXXd ratio = (variance.array() / frf.response.cwiseAbs2().array()).sqrt();
-  auto* middle = ratio.data() + ratio.size() / 2;
-  std::nth_element(ratio.data(), middle, ratio.data() + ratio.size());
-  return *middle;
+  return order_statistic({ratio.data(), static_cast<std::size_t>(ratio.size())}, 0.5);
 }
 
 nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,

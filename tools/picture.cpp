@@ -8,6 +8,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "frf/order_statistic.hpp"
 #include "tools/unicode.hpp"
 
 namespace stageid {
@@ -104,9 +105,7 @@ std::pair<double, double> magnitude_range(const Eigen::Ref<const Eigen::MatrixXd
     if (value > 0.0 && std::isfinite(value)) positive.push_back(value);
   if (positive.empty()) return {1.0, 10.0};
   const double high = *std::ranges::max_element(positive);
-  const auto low = positive.begin() + static_cast<std::ptrdiff_t>(positive.size() / 500);
-  std::ranges::nth_element(positive, low);
-  return {*low, high};
+  return {order_statistic(positive, 0.002), high};
 }
 
 std::string panel_edges(const Picture& picture, double left_in, double right_in, double bottom_in,
