@@ -87,9 +87,11 @@ class AutomaticFit {
       if (grow()) reduce();
       return;
     }
-    quick_.max_iterations = options_.max_iterations;
-    quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
-    adopt(fit_additive_model(frf_, best_.model, quick_));
+    if (!at_rounding()) {  // else the last fit says it all
+      quick_.max_iterations = options_.max_iterations;
+      quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
+      adopt(fit_additive_model(frf_, best_.model, quick_));
+    }
     say("{} modes, by way of {}: cost {:.6g}", count_modes(best_.model), target_,
         best_.model.fit.cost);
   }

@@ -15,6 +15,11 @@ namespace stageid {
 namespace {
 
 constexpr double kNearlyExact = 1e-12;  // of the data's power: normal equations lose what is left
+// Of the cost: a step that gains less there is the last one.
+constexpr double kGainAtRounding = 0.5;
+constexpr int kTriesAtRounding = 3;
+constexpr int kTriesOfRiv = 3;  // before the Gauss-Newton step is taken
+constexpr int kTries = 40;
 // Numerators are solved again after every step.
 constexpr ChannelEquationsUse kGlobalsOnly = ChannelEquationsUse::eliminated;
 
@@ -145,22 +150,37 @@ class Iteration {
     return false;
   }
 
+  bool nearly_exact() const { return cost_ < kNearlyExact * signal_cost_; }
+  bool at_rounding() const { return cost_ < kNothingLeft * signal_cost_; }
+
   bool descent_step() {
+    // Without a residual the refined-IV equations are those of Gauss-Newton, at twice the price.
+    const FitMethod method = nearly_exact() ? FitMethod::gn : options_.method;
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, options_.method, kGlobalsOnly);
+    const ArrowSystem system(problem_, beta_, groups, method, kGlobalsOnly);
     if (!system.regular())
       return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
     if (at_optimum(system)) return false;
-    if (attempt(system, options_.method == FitMethod::riv ? 3 : 40)) return still_moving();
-    if (options_.method == FitMethod::riv) {
-      const ArrowSystem gauss_newton(problem_, beta_, groups, FitMethod::gn, kGlobalsOnly);
-      if (attempt(gauss_newton, 40)) return still_moving();
+    const double before = cost_;
+    const int tries = at_rounding() ? kTriesAtRounding : kTries;
+    if (attempt(system, method == FitMethod::riv ? kTriesOfRiv : tries)) {
+      if (at_rounding() && cost_ > kGainAtRounding * before) return end_of_descent();
+      return still_moving();
     }
-    if (cost_ < kNearlyExact * signal_cost_) {
+    if (method == FitMethod::riv) {
+      const ArrowSystem gauss_newton(problem_, beta_, groups, FitMethod::gn, kGlobalsOnly);
+      if (attempt(gauss_newton, tries)) return still_moving();
+    }
+    return end_of_descent();
+  }
+
+  /// Where no step lowers the cost, or none by a part of it that is worth one more.
+  bool end_of_descent() {
+    if (nearly_exact()) {
       polish_numerators(problem_, evaluate_groups(problem_, beta_, false), beta_.B, cost_);
       result_.cost.push_back(cost_);
     }
-    if (cost_ < kNothingLeft * signal_cost_)
+    if (at_rounding())
       return end(FitStatus::step_small,
                  "the residual has reached rounding: no step lowers the cost any further");
     if (deviations_ < kRoundingDeviations)
