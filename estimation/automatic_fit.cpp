@@ -271,13 +271,7 @@ class AutomaticFit {
   void merge() {
     const std::vector<Submodel>& all = best_.model.submodels;
     for (const auto& [i, j] : overlapping_modes(best_.model)) {
-      AdditiveModel model = best_.model;
-      Submodel& one = model.submodels[i];
-      const double f = std::sqrt(one.natural_frequency_hz() * all[j].natural_frequency_hz());
-      const double damping = std::sqrt(one.damping_ratio() * all[j].damping_ratio());
-      one = mode_submodel(frf_, structure_, {f, damping, 1});
-      model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(j));
-      FitResult merged = fit_additive_model(frf_, model, quick_);
+      FitResult merged = fit_additive_model(frf_, with_one_of(best_.model, i, j), quick_);
       if (!(worth_.criterion(merged) < worth_.criterion(best_))) continue;
       say("merged {:.6g} and {:.6g} Hz: cost {:.6g} -> {:.6g}", all[i].natural_frequency_hz(),
           all[j].natural_frequency_hz(), best_.model.fit.cost, merged.model.fit.cost);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,12 +11,14 @@
 
 #include "estimation/fit_additive_model.hpp"
 #include "estimation/model_structure.hpp"
+#include "estimation/overlapping_modes.hpp"
 
 namespace stageid {
 namespace {
 
 // A mode that is known better than this does not keep a fit from converging.
 constexpr double kLeastDoubt = 1.0;
+constexpr double kUndoubtedWidths = 0.1;
 
 struct OpenMode {
   std::size_t submodel = 0;
@@ -36,6 +39,52 @@ std::optional<OpenMode> most_open(const AdditiveModel& model) {
   return open;
 }
 
+/// Standard deviation of the frequency; where there is none, a part of the half-power width.
+double doubt_hz(const Submodel& s) {
+  const double width_hz = 2.0 * s.damping_ratio() * s.natural_frequency_hz();
+  return s.natural_frequency_std_hz.value_or(kUndoubtedWidths * width_hz);
+}
+
+/// Two modes that have run into one: nearer to each other than either of them is known. Their limit is a double pole,
+/// with residues that grow without end and cancel; nothing determines the parameters there.
+std::optional<std::pair<std::size_t, std::size_t>> coalesced(const AdditiveModel& model) {
+  for (const auto& [i, j] : overlapping_modes(model)) {
+    const Submodel& one = model.submodels[i];
+    const Submodel& other = model.submodels[j];
+    const double apart_hz = std::abs(one.natural_frequency_hz() - other.natural_frequency_hz());
+    if (apart_hz < std::min(doubt_hz(one), doubt_hz(other))) return std::pair(i, j);
+  }
+  return std::nullopt;
+}
+
+struct Simpler {
+  AdditiveModel model;
+  std::string reason;
+};
+
+/// The model with one mode less: of two that have run into one, else without the most open one.
+std::optional<Simpler> simpler(const AdditiveModel& model) {
+  if (const auto pair = coalesced(model)) {
+    const auto [i, j] = *pair;
+    return Simpler{with_one_of(model, i, j),
+                   fmt::format("made one mode of {:.6g} and {:.6g} Hz, which ran into each other; "
+                               "the data do not tell them apart and they kept the fit from "
+                               "converging",
+                               model.submodels[i].natural_frequency_hz(),
+                               model.submodels[j].natural_frequency_hz())};
+  }
+  const std::optional<OpenMode> open = most_open(model);
+  if (!open) return std::nullopt;
+  Simpler out{model, {}};
+  const auto place = out.model.submodels.begin() + static_cast<std::ptrdiff_t>(open->submodel);
+  out.reason = fmt::format(
+      "left out {:.6g} Hz, which the data do not determine (standard deviation {:.2g} "
+      "times its size) and which kept the fit from converging",
+      place->natural_frequency_hz(), open->doubt);
+  out.model.submodels.erase(place);
+  return out;
+}
+
 bool may_converge(const FitResult& fit) {
   return fit.status == FitStatus::iteration_limit || fit.status == FitStatus::cost_stalled;
 }
@@ -49,18 +98,12 @@ FitResult settled_fit(const FrfEstimate& frf, const AdditiveModel& start,
   FitResult fit = first;
   std::vector<std::string> left_out;
   while (may_converge(fit) && count_modes(fit.model) > 1) {
-    const std::optional<OpenMode> open = most_open(fit.model);
-    if (!open) break;
-    AdditiveModel fewer = fit.model;
-    const auto place = fewer.submodels.begin() + static_cast<std::ptrdiff_t>(open->submodel);
-    const double frequency_hz = place->natural_frequency_hz();
-    fewer.submodels.erase(place);
+    const std::optional<Simpler> fewer = simpler(fit.model);
+    if (!fewer) break;
     const double cost = fit.model.fit.cost;
-    fit = fit_additive_model(frf, fewer, options);
-    left_out.push_back(fmt::format(
-        "left out {:.6g} Hz, which the data do not determine (standard deviation {:.2g} times "
-        "its size) and which kept the fit from converging: cost {:.6g} -> {:.6g}",
-        frequency_hz, open->doubt, cost, fit.model.fit.cost));
+    fit = fit_additive_model(frf, fewer->model, options);
+    left_out.push_back(
+        fmt::format("{}: cost {:.6g} -> {:.6g}", fewer->reason, cost, fit.model.fit.cost));
   }
   if (!fit.trustworthy()) return first;
   fit.decisions.insert(fit.decisions.begin(), left_out.begin(), left_out.end());

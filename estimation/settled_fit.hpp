@@ -6,10 +6,11 @@
 namespace stageid {
 
 /// The last fit of a search that chose the modes itself. Where the iteration does not converge, searched
-/// modes that the data leave open are left out, one after the other, until it does: first the one whose
-/// standard deviation is largest in units of itself, be it of the damping ratio or of the frequency in
+/// modes are given up, one after the other, until it does. First one of two that have run into each other: they
+/// overlap, and are less apart than the deviation of either frequency. Then the one that the data leave most open,
+/// whose standard deviation is largest in units of itself, be it of the damping ratio or of the frequency in
 /// half-power widths. If none of these fits converges the first one is returned, as it is.
-/// @returns with a line in FitResult::decisions for each mode left out
+/// @returns with a line in FitResult::decisions for each mode given up
 /// @throws std::invalid_argument: as fit_additive_model()
 FitResult settled_fit(const FrfEstimate& frf, const AdditiveModel& start,
                       const FitOptions& options);

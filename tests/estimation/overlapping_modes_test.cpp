@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid {
@@ -27,6 +29,15 @@ TEST(OverlappingModes, WhatWasAskedForIsLeftAlone) {
   AdditiveModel model = with_modes({{1000.0, 0.01}, {1001.0, 0.01}});
   model.submodels[1].role = SubmodelRole::given;
   EXPECT_TRUE(overlapping_modes(model).empty());
+}
+
+TEST(OverlappingModes, OneOfTwoIsTheirGeometricMean) {
+  const AdditiveModel two = with_modes({{1000.0, 0.01}, {1020.0, 0.04}, {1500.0, 0.01}});
+  const AdditiveModel one = with_one_of(two, 1, 2);
+  ASSERT_EQ(one.submodels.size(), two.submodels.size() - 1);
+  EXPECT_NEAR(one.submodels[1].natural_frequency_hz(), std::sqrt(1000.0 * 1020.0), 1e-9);
+  EXPECT_NEAR(one.submodels[1].damping_ratio(), 0.02, 1e-12);
+  EXPECT_NEAR(one.submodels[2].natural_frequency_hz(), 1500.0, 1e-9);
 }
 
 }  // namespace

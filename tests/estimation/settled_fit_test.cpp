@@ -5,6 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <complex>
+#include <numbers>
+
 #include "estimation/fit_additive_model.hpp"
 #include "estimation/model_structure.hpp"
 #include "tests/support/model_fit_problem.hpp"
@@ -64,6 +67,28 @@ TEST_F(SettledFit, AModeThatTheDataLeaveOpenIsLeftOut) {
     EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
   ASSERT_FALSE(fit.decisions.empty());
   EXPECT_THAT(fit.decisions.front(), HasSubstr("left out 25"));
+}
+
+// The data have a double pole: nothing that two modes with numerators B_0 reach, though the nearer they come the better
+// they fit.
+TEST_F(SettledFit, TwoModesThatRunIntoEachOtherBecomeOne) {
+  const std::vector<double> a = test::mode_coefficients(250.0, 0.02);
+  AdditiveModel twice = true_;
+  twice.submodels.push_back(test::empty_submodel(true_, 0, a, 1));
+  twice.submodels.push_back(test::empty_submodel(true_, 0, a, 1));
+  const std::complex<double> j(0.0, 1.0);
+  for (Eigen::Index k = 0; k < frf_.lines(); ++k) {
+    const std::complex<double> s = j * 2.0 * std::numbers::pi * frf_.frequency_hz[k];
+    const std::complex<double> A = 1.0 + a[0] * s + a[1] * s * s;
+    frf_.response(0, k) += a[1] * (0.1 / A + 1e-3 / (A * A));
+  }
+  twice.submodels[2].denominator = {1.0, 1.02 * a[0], a[1]};
+  ASSERT_FALSE(fit_additive_model(frf_, twice, options_).trustworthy());
+  const FitResult fit = settled_fit(frf_, twice, options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_EQ(count_modes(fit.model), 3);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("made one mode of"));
 }
 
 TEST_F(SettledFit, AFitThatConvergesIsLeftAlone) {
