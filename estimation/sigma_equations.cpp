@@ -23,21 +23,6 @@ Eigen::VectorXd inverse_root(const Eigen::VectorXd& diagonal) {
   return diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
 }
 
-/// R of A = Q R by the Cholesky factor of its Gram matrix; A becomes Q. Columns that depend on others to
-/// within 1e-7 are not orthonormal then: a second call, on Q, mends that (Yamamoto et al., ETNA 44
-/// (2015) 306).
-Eigen::MatrixXd gram_factor(Eigen::MatrixXd& A, bool orthogonalize) {
-  const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
-  A *= scale.asDiagonal();
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(A.cols(), A.cols());
-  gram.selfadjointView<Eigen::Upper>().rankUpdate(A.transpose());
-  gram.diagonal().array() += kShift;
-  const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> factor(gram);
-  const Eigen::MatrixXd R = factor.matrixU();
-  if (orthogonalize) factor.matrixU().solveInPlace<Eigen::OnTheRight>(A);
-  return R * scale.cwiseInverse().asDiagonal();
-}
-
 /// The triangle R of [R; further] = Q R.
 void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
   Eigen::MatrixXd both(R.rows() + further.rows(), R.cols());
@@ -65,11 +50,9 @@ Eigen::MatrixXd factor_of_channel(const Eigen::VectorXd& weights, const Eigen::V
   A.block(0, numerators, N, n) = phi.re.array().colwise() * h_re - phi.im.array().colwise() * h_im;
   A.block(N, numerators, N, n) = phi.re.array().colwise() * h_im + phi.im.array().colwise() * h_re;
   A.rightCols(1) << h_re.matrix(), h_im.matrix();
-  const auto corner = [&](const Eigen::MatrixXd& R) {
-    return Eigen::MatrixXd(R.bottomRightCorner(n + 1, n + 1).triangularView<Eigen::Upper>());
-  };
-  const Eigen::MatrixXd first = corner(gram_factor(A, true));
-  return corner(gram_factor(A, false)) * first;
+  const Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(A);
+  return Eigen::MatrixXd(
+      A.block(numerators, numerators, n + 1, n + 1).triangularView<Eigen::Upper>());
 }
 
 /// sum_k Re{conj(X) v}, one a column of X
