@@ -200,6 +200,7 @@ class Fitting {
     // One D for all channels takes a degree of freedom from them together.
     result.dof = static_cast<double>(p_.r.size() - p_.K.rows() * groups) -
                  static_cast<double>(d.size()) / static_cast<double>(p_.independent_noise);
+    result.variance_dof = result.dof;
     if (d.size() > 0) result.pole_spread = pole_spread(projection, fitted, D, d.size(), result);
     return result;
   }
@@ -238,6 +239,26 @@ class Fitting {
   LocalFit polynomial_;
   Eigen::VectorXd weight_;
 };
+
+/// Of the mean of the fits' variances, each as sure as its degrees of freedom: what they differ by adds.
+double variance_dof(const LocalProblem& problem, const std::vector<LocalFit>& fits,
+                    const Eigen::ArrayXd& share) {
+  Eigen::ArrayXXd variance(problem.pole_channels, share.size());
+  for (Eigen::Index n = 0; n < share.size(); ++n) {
+    const LocalFit& fit = fits[static_cast<std::size_t>(n)];
+    variance.col(n) = fit.residual.topRows(problem.pole_channels).rowwise().squaredNorm() / fit.dof;
+  }
+  const Eigen::ArrayXd mean = variance.matrix() * share.matrix();
+  if (!(mean.minCoeff() > 0.0)) return fits.front().dof;
+  double scarcity = 0.0;
+  for (Eigen::Index n = 0; n < share.size(); ++n) {
+    const Eigen::ArrayXd ratio = variance.col(n) / mean;
+    scarcity +=
+        share[n] *
+        (ratio.square() / fits[static_cast<std::size_t>(n)].dof + (ratio - 1.0).square()).mean();
+  }
+  return 1.0 / scarcity;
+}
 
 /// ln of the probability of each fit but for a constant: residual power^-(degrees of freedom), and the
 /// odds against a pole for which chance has to make up.
@@ -301,6 +322,7 @@ LocalFit average_locally(const LocalProblem& problem, int most_poles) {
     mean.residual.middleCols(B * n, B) = std::sqrt(share[n]) * fit.residual;
     mean.poles = fit.poles;
   }
+  mean.variance_dof = variance_dof(problem, fits, share);
   mean.pole_spread.resize(mean.value.size(), columns + share.size());
   Eigen::Index column = 0;
   for (Eigen::Index n = 0; n < share.size(); ++n) {

@@ -26,7 +26,9 @@ struct LocalFit {
   ///   Cov(vec value) = diag(leverage) kron C_V + pole_spread pole_spread^H
   Eigen::MatrixXcd pole_spread;
   int poles = 0;     ///< n
-  double dof = 0.0;  ///< of residual residual^H / dof, an unbiased C_V
+  double dof = 0.0;  ///< residual residual^H / dof is an unbiased C_V
+  /// What that is worth as an estimate: dof, or fewer where the number of poles is not sure.
+  double variance_dof = 0.0;
 };
 
 /// What there is to fit. Sizes: B bins, p regressors of each group.

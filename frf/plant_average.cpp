@@ -52,7 +52,7 @@ PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
   input_sum_.setZero(inputs * inputs, N);
   if (covariance == CovarianceKind::full) covariance_sum_.setZero(n_c * n_c, N);
   condition_.setZero(N);
-  scarcity_sum_.setZero(N);
+  dof_sum_.setZero(N);
   share_sum_.setZero(N);
   misfit_sum_.setZero(N);
 }
@@ -67,7 +67,6 @@ void PlantAverage::add(const RealizationSpectra& spectra, int workers,
     return;
   }
   noise_known_ = noise_known_ && spectra.scatter_dof() > 0;
-  noise_dof_ += spectra.scatter_dof();
   Eigen::VectorXd periods(spectra.experiments());
   for (Eigen::Index e = 0; e < periods.size(); ++e) {
     periods[e] = spectra.periods(static_cast<std::size_t>(e));
@@ -80,6 +79,7 @@ void PlantAverage::add_line(const RealizationSpectra& spectra, const Eigen::Vect
                             Eigen::Index k) {
   const LineEstimate line = estimate_line(spectra.excitation(k), spectra.response(k), outputs_);
   add_response(spectra, line, k);
+  dof_sum_[k] += spectra.scatter_dof(k);
   if (noise_known_) {
     add_noise(line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods), k);
   }
@@ -90,7 +90,7 @@ void PlantAverage::add_zippered(const RealizationSpectra& spectra, const Zippere
   const ZipperedEstimate at = fit.estimate(spectra, k);
   add_response(spectra, at.line, k);
   add_noise(at.noise, k);
-  scarcity_sum_[k] += 1.0 / at.noise_dof;
+  dof_sum_[k] += 1.0 / at.noise_dof;
   share_sum_[k] += at.variance_share;
   misfit_sum_[k] += at.misfit;
 }
@@ -154,7 +154,9 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
     }
     return;
   }
-  frf.noise_dof = noise_dof_;
+  // Where they differ from line to line: their harmonic mean, as the mean of 1 / variance has it.
+  frf.noise_dof = dof_sum_.maxCoeff() > dof_sum_.minCoeff() ? 1.0 / dof_sum_.cwiseInverse().mean()
+                                                            : dof_sum_[0];
   if (zippered_axes_ > 0) finish_zippered(frf);
   frf.noise_variance = noise_sum_ / (M * M);
   frf.residual_covariance_re = residual_sum_.real() / M;
@@ -163,11 +165,9 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
   if (covariance_kind_ == CovarianceKind::full) frf.covariance = covariance_sum_ / (M * M);
 }
 
-/// Degrees of freedom differ a little from line to line: their harmonic mean, as the mean of
-/// 1 / variance has it.
 void PlantAverage::finish_zippered(FrfEstimate& frf) const {
   const double M = realizations_;
-  frf.noise_dof = M * M / scarcity_sum_.mean();
+  frf.noise_dof = M * M / dof_sum_.mean();
   frf.correlated_lines = static_cast<double>(zippered_axes_) * M / share_sum_.mean();
   if (misfit_sum_.minCoeff() > 0.0) frf.interpolation_misfit = misfit_sum_ / M;
 }

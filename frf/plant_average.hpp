@@ -49,7 +49,6 @@ class PlantAverage {
 
   int realizations_ = 0;
   bool noise_known_ = true;
-  double noise_dof_ = 0.0;
   Eigen::MatrixXcd Z_sum_;           // vec(Z_m) x lines
   Eigen::MatrixXcd G_mean_;          // vec(G) x lines, of the realizations' own estimates
   Eigen::MatrixXd G_scatter_;        // sum |G^[m] - mean|^2
@@ -59,8 +58,8 @@ class PlantAverage {
   Eigen::MatrixXcd covariance_sum_;  // vec(Cov(vec G)), on request
   Eigen::VectorXd condition_;
   Eigen::Index zippered_axes_ = 0;
-  Eigen::VectorXd scarcity_sum_;  // of 1 / degrees of freedom
-  Eigen::VectorXd share_sum_;     // of the variance shares
+  Eigen::VectorXd dof_sum_;    // of the noise; zippered: of 1 / degrees of freedom
+  Eigen::VectorXd share_sum_;  // of the variance shares
   Eigen::VectorXd misfit_sum_;
 };
 

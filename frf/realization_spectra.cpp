@@ -54,6 +54,12 @@ Eigen::MatrixXcd RealizationSpectra::response(Eigen::Index k) const {
   return Z;
 }
 
+double RealizationSpectra::scatter_dof(Eigen::Index k) const {
+  double dof = 0.0;
+  for (const RunSpectra& run : runs_) dof += run.dof(k);
+  return dof;
+}
+
 Eigen::MatrixXcd RealizationSpectra::scatter(Eigen::Index k) const {
   const Eigen::Index n = runs_.front().mean.rows();
   Eigen::MatrixXcd full(n, n);

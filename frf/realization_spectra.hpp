@@ -33,7 +33,9 @@ class RealizationSpectra {
   const RunSpectra& run(std::size_t experiment) const { return runs_[experiment]; }
 
   /// Degrees of freedom of scatter(): sum_e (P_e - 1), or those of the transient models.
+  /// The scatter is scaled for so many, whatever a line has of them.
   int scatter_dof() const noexcept { return scatter_dof_; }
+  double scatter_dof(Eigen::Index k) const;  ///< that line k has
   /// sum_e sum_p (Z_pe - Z_e)(Z_pe - Z_e)^H at line k, or what the transient models leave in its
   /// place; full Hermitian matrix.
   Eigen::MatrixXcd scatter(Eigen::Index k) const;

@@ -111,6 +111,7 @@ class RecordMeasurement {
       run_.scatter_im = w_.pool.take(part.scatter_im.rows(), part.scatter_im.cols());
       run_.scatter_re.setZero();
       run_.scatter_im.setZero();
+      run_.line_dof.setZero(part.mean.cols());
       run_.scatter_window = part.scatter_window;  // stretches are nearly equally long
       run_.scatter_first = std::move(part.scatter_first);
     }
@@ -119,6 +120,7 @@ class RecordMeasurement {
     run_.scatter_re += part.scatter_re;  // of single periods, however many there are
     run_.scatter_im += part.scatter_im;
     run_.scatter_dof += part.scatter_dof;
+    run_.line_dof += part.line_dof;
   }
 
   /// DFT / samples of the first `rows` samples, outputs and estimated x bins.

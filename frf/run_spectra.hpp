@@ -21,6 +21,8 @@ struct RunSpectra {
   Eigen::MatrixXd scatter_re;
   Eigen::MatrixXd scatter_im;
   int scatter_dof = 0;  ///< scatter / scatter_dof / periods estimates Cov(mean)
+  /// Degrees of freedom that the scatter of each line has where they differ (poles take some); else empty.
+  Eigen::VectorXd line_dof{};
   /// Where the scatter of each line is made of `scatter_window` bins which others use as well: the
   /// first of them, counted among those that are used. 0 and empty: no line shares with another.
   Eigen::Index scatter_window = 0;
@@ -31,6 +33,7 @@ struct RunSpectra {
   /// By period; which realization and experiment this is, others know.
   std::vector<DroppedPeriod> dropped;
   void drop(int period, std::string reason);
+  double dof(Eigen::Index k) const { return line_dof.size() > 0 ? line_dof[k] : scatter_dof; }
 };
 
 /// How much two lines' scatters have in common: the squared correlation of their mean squares; 1 for

@@ -63,7 +63,6 @@ TransientModel::TransientModel(int period_samples, int periods,
     if (taken[static_cast<std::size_t>(b)] == 0) usable_.push_back(b);
   }
   window_ = kOrder + 1 + kResidualDof;
-  dof_ = kDof;
   if (static_cast<Eigen::Index>(usable_.size()) < window_) {
     throw std::invalid_argument(fmt::format(
         "{}: method 'lpm' needs {} bins beside the lines, this record of {} period{} has {}; "
@@ -106,10 +105,11 @@ void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
   run.scatter_first[static_cast<std::size_t>(k)] =
       std::lower_bound(usable_.begin(), usable_.end(), bins.front()) - usable_.begin();
   run.mean.col(k) = Z.col(bin) - fit.value.col(0);
+  run.line_dof[k] = static_cast<double>(kDof) * fit.dof / static_cast<double>(kResidualDof);
   // As of one period, for the scatter is of single periods: the line's own noise, as the mean of the
   // bins' has it, and that of T, the sum of |weight|^2 times the bin's own, for the loop colours the
   // noise from bin to bin. A white one comes to 1 + leverage times what fit.dof is said to give.
-  const double periods = periods_ * static_cast<double>(dof_);
+  const double periods = periods_ * static_cast<double>(kDof);
   const double shared = static_cast<double>(kResidualDof) / fit.dof;  // by poles
   const Eigen::ArrayXd weight =
       1.0 / fit.dof + shared * fit.weight.array().abs2() / fit.freedom.array();
@@ -123,7 +123,8 @@ void TransientModel::separate(const Eigen::MatrixXcd& Z, RunSpectra& run) const 
   run.mean.resize(n, lines);
   run.scatter_re.setZero(n * (n + 1) / 2, lines);
   run.scatter_im.setZero(n * (n + 1) / 2, lines);
-  run.scatter_dof = dof_;
+  run.scatter_dof = kDof;
+  run.line_dof.resize(lines);
   run.scatter_window = window_;
   run.scatter_first.resize(excitation_.lines.size());
   for (Eigen::Index k = 0; k < lines; ++k) separate_line(Z, k, run);

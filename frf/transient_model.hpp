@@ -28,13 +28,10 @@ class TransientModel {
   Eigen::Index bins() const noexcept { return bins_; }  ///< DC ... below Nyquist
 
   /// Fills mean with the steady state, on the lines of the excitation, and the scatter such that
-  /// scatter / scatter_dof / periods estimates Cov(mean). Lines that needed poles have up to two
-  /// degrees of freedom fewer over the rank of the noise.
+  /// scatter / scatter_dof / periods estimates Cov(mean). Lines that needed poles have fewer
+  /// degrees of freedom, one a pole over the rank of the noise: line_dof.
   /// Z: DFT / samples, channels x bins().
   void separate(const Eigen::MatrixXcd& Z, RunSpectra& run) const;
-
-  /// sum of squares has so many degrees of freedom a run and line.
-  int dof() const noexcept { return dof_; }
 
  private:
   void separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k, RunSpectra& run) const;
@@ -46,7 +43,6 @@ class TransientModel {
   Eigen::Index outputs_;
   std::vector<Eigen::Index> usable_;  ///< bins fitted on, ascending
   Eigen::Index window_ = 0;
-  int dof_ = 0;
 };
 
 }  // namespace stageid

@@ -117,33 +117,36 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
       auto own = share.segment(p * bins_, bins_);
       own /= own.sum() * static_cast<double>(axes);
     }
-    double in_common = 0.0;
+    double scarcity = 0.0;  // 1 / degrees of freedom
     for (Index i = 0; i < B; ++i) {
       const Index line = window[static_cast<std::size_t>(i)];
       scatter += share[i] * spectra.scatter(line);
-      for (Index j = 0; j < B; ++j)
-        in_common += share[i] * share[j] *
-                     common_scatter(spectra.run(0), line, window[static_cast<std::size_t>(j)]);
+      for (Index j = 0; j < B; ++j) {
+        const Index other = window[static_cast<std::size_t>(j)];
+        scarcity += share[i] * share[j] * common_scatter(spectra.run(0), line, other) /
+                    std::sqrt(spectra.scatter_dof(line) * spectra.scatter_dof(other));
+      }
     }
     result.noise = line_noise(result.line, scatter, spectra.scatter_dof(), effective);
-    const double dof = spectra.scatter_dof() / in_common;
+    const double dof = 1.0 / scarcity;
     const Eigen::VectorXd noise = result.noise.residual.diagonal().real() / periods;
     if (noise.minCoeff() > 0.0) result.misfit = left_variance.cwiseQuotient(noise).mean();
     if (result.misfit > 1.0 && log_tail_of_f(result.misfit, static_cast<int>(std::ceil(fit.dof)),
                                              dof) < std::log(kMisfitByChance)) {
       // More than noise: what the model cannot follow, of which the value has its part.
       result.noise.residual *= result.misfit;
-      result.noise_dof = fit.dof;
+      result.noise_dof = fit.variance_dof;
     } else {
-      result.noise_dof = dof + fit.dof;
-      result.noise.residual =
-          (dof * result.noise.residual + periods * left * left.adjoint()) / result.noise_dof;
+      result.noise_dof = dof + fit.variance_dof;
+      const double share_of_left = fit.variance_dof / (result.noise_dof * fit.dof);
+      result.noise.residual = dof / result.noise_dof * result.noise.residual +
+                              periods * share_of_left * left * left.adjoint();
     }
   } else {
     // Not an integer where a pole took its share: divided before.
     const MatrixXcd scatter = fit.residual * fit.residual.adjoint() / fit.dof;
     result.noise = line_noise(result.line, scatter, 1, effective);
-    result.noise_dof = fit.dof;
+    result.noise_dof = fit.variance_dof;
   }
   result.noise.mean_of_periods = 1.0 / periods;
   if (fit.pole_spread.cols() > 0)

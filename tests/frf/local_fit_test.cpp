@@ -110,5 +110,48 @@ TEST(LocalFit, NoiseIsSeldomTakenForAPole) {
   EXPECT_LE(poles_of_a_strict_test, 19);  // 0.5 %
 }
 
+/// Noise alone, seen by zippered lines of two axes: two groups, interleaved, a cubic each.
+LocalProblem two_groups(Eigen::Index channels, ComplexNoise& random) {
+  constexpr Eigen::Index kOfAGroup = 7;
+  LocalProblem p;
+  p.r.resize(2 * kOfAGroup);
+  p.K.resize(4, 2 * kOfAGroup);
+  for (Eigen::Index i = 0; i < p.r.size(); ++i) {
+    p.r[i] = static_cast<double>(2 * (i % kOfAGroup) + i / kOfAGroup) / 6.5 - 1.0;
+    for (Eigen::Index q = 0; q < 4; ++q) p.K(q, i) = std::pow(p.r[i], static_cast<double>(q));
+  }
+  p.k0 = Eigen::VectorXcd::Unit(4, 0);
+  p.groups = {kOfAGroup, kOfAGroup};
+  p.independent_noise = p.pole_channels = p.tested_noise = channels;
+  p.narrowest_pole = 0.2;
+  p.Z.resize(channels, p.r.size());
+  for (Eigen::Index i = 0; i < p.r.size(); ++i) p.Z.col(i) = random.gaussian(channels);
+  return p;
+}
+
+// var(variance) / mean^2 = 1 / nu for one with nu complex degrees of freedom.
+TEST(LocalFit, VariancesOfAMeanOverPolesScatterAsTheirDegreesOfFreedomSay) {
+  constexpr int kTrials = 3000;
+  for (const Eigen::Index channels : {1, 2, 4}) {
+    ComplexNoise random(11);
+    double sum = 0.0;
+    double squares = 0.0;
+    double scarcity = 0.0;
+    for (int i = 0; i < kTrials; ++i) {
+      const LocalFit fit = average_locally(two_groups(channels, random), 3);
+      const Eigen::ArrayXd variance = fit.residual.rowwise().squaredNorm().array() / fit.dof;
+      sum += variance.mean() / kTrials;
+      squares += variance.square().mean() / kTrials;
+      scarcity += 1.0 / fit.variance_dof / kTrials;
+    }
+    const double found = sum * sum / (squares - sum * sum);
+    // Poles were chosen for what they take: 7 % of the noise of one output.
+    EXPECT_NEAR(sum, 1.0, 0.09) << channels;
+    // sqrt(2 / 3000) = 2.6 % for one channel. Its fits have 5.6 degrees of freedom on average, where 4.2
+    // are found.
+    EXPECT_NEAR(found * scarcity, 1.0, 0.2) << channels;
+  }
+}
+
 }  // namespace
 }  // namespace stageid

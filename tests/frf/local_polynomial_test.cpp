@@ -51,7 +51,9 @@ TEST(LocalPolynomial, WithoutNoiseTheTransientIsRemoved) {
   EXPECT_LT(removed, 1e-5);
   EXPECT_GT(left, 0.05);  // what a transient that is used costs
   EXPECT_EQ(lpm.periods, 4);
-  EXPECT_EQ(lpm.noise_dof, 18.0);
+  // Two runs; where poles were needed, up to four, they took half a degree of freedom of ten each.
+  EXPECT_LT(lpm.noise_dof, 18.0);
+  EXPECT_GE(lpm.noise_dof, 0.8 * 18.0);
 }
 
 // At equal time: four periods from the start against three after one that is passed over.
@@ -118,7 +120,8 @@ TEST(LocalPolynomial, StretchesBesideAMarkedPeriodAreBothUsed) {
   }
   const FrfEstimate marked = estimate_plant_frf({&log}, {.method = FrfMethod::lpm});
   EXPECT_EQ(marked.periods, 5);
-  EXPECT_EQ(marked.noise_dof, 2 * 2 * 9.0);
+  EXPECT_LE(marked.noise_dof, 2 * 2 * 9.0);
+  EXPECT_GT(marked.noise_dof, 0.95 * 2 * 2 * 9.0);  // poles are needed on few lines
   ASSERT_EQ(marked.dropped_periods.size(), 2u);
   EXPECT_EQ(marked.dropped_periods[0].period, 2);
   // 284 entries of lines that share some 6: standard deviation 15 %.

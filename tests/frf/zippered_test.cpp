@@ -128,10 +128,8 @@ TEST_P(ZipperedDof, IsThatOfTheScatterOverSeeds) {
   const Eigen::ArrayXXd mean = sum / kSeeds;
   const Eigen::ArrayXXd scatter = (squares / kSeeds - mean.square()) * kSeeds / (kSeeds - 1.0);
   const double found = 1.0 / (scatter / mean.square()).mean();
-  // 246 entries, about 30 of them independent, of 60 seeds: sqrt(2 / (30 * 60)) = 3.3 %. A single period
-  // from rest states 18 where there are 15: where the transient needs poles it has fewer than it counts.
-  const bool single = GetParam().options.method == FrfMethod::lpm && GetParam().periods == 1;
-  EXPECT_NEAR(found / dof, 1.0, single ? 0.25 : 0.15) << found << ' ' << dof;
+  // 246 entries, about 30 of them independent, of 60 seeds: sqrt(2 / (30 * 60)) = 3.3 %.
+  EXPECT_NEAR(found / dof, 1.0, 0.15) << found << ' ' << dof;
 }
 INSTANTIATE_TEST_SUITE_P(
     Records, ZipperedDof,
