@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "tools/text_lines.hpp"
+#include "tools/unicode.hpp"
 
 namespace stageid {
 namespace {
@@ -51,7 +52,7 @@ bool all_numbers(const std::vector<std::string>& fields, char separator) {
 std::vector<std::string> names_of(const TextLines& lines, const std::vector<std::string>& fields) {
   std::vector<std::string> names;
   for (const std::string& field : fields) {
-    names.emplace_back(trimmed(field));
+    names.push_back(utf8_of_text(trimmed(field)));
     if (!names.back().empty() && std::count(names.begin(), names.end(), names.back()) > 1)
       lines.fail(
           fmt::format("two columns are called '{}'; give each a name of its own", names.back()));

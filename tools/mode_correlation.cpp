@@ -54,6 +54,20 @@ std::optional<std::complex<double>> value_at(const UffMode& mode, const Place& p
   return place.sign * mode.values.at(first + (scalar ? 0 : axis));
 }
 
+/// An output without a direction is the one in which its node moves, if there is but one.
+Place with_direction(Place place, const std::vector<UffMode>& modes) {
+  if (place.direction != 0) return place;
+  for (int direction = 1; direction <= 6; ++direction) {
+    const bool moves = std::any_of(modes.begin(), modes.end(), [&](const UffMode& mode) {
+      return mode.values_per_node > 1 &&
+             value_at(mode, {place.node, direction, 1.0}).value_or(0.0) != 0.0;
+    });
+    if (moves && place.direction != 0) return {place.node, 0, place.sign};
+    if (moves) place.direction = direction;
+  }
+  return place;
+}
+
 /// Frequency and damping; the shape is filled in by whoever knows the outputs.
 ModeShape mode_of(const UffMode& mode) {
   ModeShape shape;
@@ -86,7 +100,7 @@ ModeCorrelation correlate_modes(const AdditiveModel& model, const std::filesyste
   std::vector<Place> places;
   std::vector<Eigen::Index> rows;
   for (std::size_t i = 0; i < model.outputs.size(); ++i) {
-    const Place place = place_of(model.outputs.names[i], i);
+    const Place place = with_direction(place_of(model.outputs.names[i], i), content.modes);
     if (!std::all_of(content.modes.begin(), content.modes.end(),
                      [&](const UffMode& mode) { return value_at(mode, place).has_value(); }))
       continue;

@@ -11,10 +11,16 @@
 #include "excitation/file_error.hpp"
 
 namespace stageid {
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // before UTF-8, from Windows
+
+}  // namespace
 
 TextLines::TextLines(const std::filesystem::path& file) : file_(file) {
   std::ifstream stream(file, std::ios::binary);
   if (stream) text_.assign(std::istreambuf_iterator<char>(stream), {});
+  if (text_.starts_with(kByteOrderMark)) at_ = kByteOrderMark.size();
   if (!stream || std::filesystem::is_directory(file))
     throw FileError(fmt::format("{}: cannot be read; name a file that is there", file.string()));
 }
@@ -27,7 +33,7 @@ std::string_view TextLines::next() {
   ++line_;
   const std::size_t end = std::min(text_.find('\n', at_), text_.size());
   std::string_view line = std::string_view(text_).substr(at_, end - at_);
-  at_ = end + 1;
+  at_ = std::min(end + 1, text_.size());  // the last line may have no end
   if (line.ends_with('\r')) line.remove_suffix(1);
   return line;
 }

@@ -16,7 +16,8 @@ namespace stageid {
 
 /// Where a function was measured: records 6 of dataset 58.
 struct UffPoint {
-  std::string entity = "NONE";  ///< at most 10 characters
+  std::string entity =
+      "NONE";  ///< at most 10 characters, ASCII: others would shift the fields behind
   long long node = 0;
   int direction = 0;  ///< 0 scalar; 1, 2, 3 +X, +Y, +Z; 4, 5, 6 rotations; negative: the other way
 };
@@ -27,6 +28,7 @@ struct UffAxis {
       0;  ///< 8 displacement, 11 velocity, 12 acceleration, 13 excitation force, 17 time, 18 frequency
   std::array<int, 3> exponents = {0, 0, 0};  ///< of length, force, temperature; for types 0 and 1
   std::string unit = "NONE";                 ///< at most 20 characters
+  std::string label = "NONE";                ///< at most 20 characters
 };
 
 /// Dataset 58: values over time or frequency.
@@ -44,7 +46,7 @@ struct UffFunction {
   std::size_t line = 0;                        ///< of the file, 1-based: for errors
 };
 
-/// Dataset 55, analysis type 2 (normal mode) or 3 (complex eigenvalue).
+/// Dataset 55, analysis type 2 (normal mode), 3 or 7 (complex eigenvalue).
 struct UffMode {
   std::array<std::string, 5> id = {"NONE", "NONE", "NONE", "NONE", "NONE"};
   int number = 0;
@@ -80,7 +82,7 @@ struct UffContent {
 
 enum class UffEncoding : std::uint8_t {
   text,   ///< 13 digits, as the format prescribes (E20.12); abscissas 6 unless evenly spaced
-  binary  ///< 58b: ordinates exact; abscissas single precision unless evenly spaced
+  binary  ///< 58b: exact; uneven abscissas of double precision, as the readers in use take them
 };
 
 /// Writes datasets 151, 164, 58 and 55 whole or not at all; the same content gives the same bytes, dates
@@ -93,7 +95,8 @@ void write_uff(const std::filesystem::path& file, const UffContent& content, Uff
 bool is_uff_name(const std::filesystem::path& file);
 
 /// Reads text and binary datasets 58 of either byte order, IEEE 754. Binary abscissas may be of single
-/// precision, as the format has it, or of double precision, as many programs write them.
+/// precision, as the format has it, or of double precision, as many programs write them. Texts that are
+/// not UTF-8 are read as Latin-1.
 /// @throws FileError, FormatError "FILE:LINE: ...".
 UffContent read_uff(const std::filesystem::path& file);
 

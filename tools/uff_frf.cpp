@@ -10,6 +10,7 @@
 
 #include "excitation/file_error.hpp"
 #include "tools/text_lines.hpp"
+#include "tools/unicode.hpp"
 
 namespace stageid {
 namespace {
@@ -43,14 +44,22 @@ std::string name_line(const char* head, const std::string& name) {
   return head + name;
 }
 
+/// The whole name stands in an id line.
+std::string entity_of(const std::string& name) {
+  std::string entity;
+  for (const char32_t point : code_points_of(name))
+    entity += point >= 0x20 && point <= 0x7E ? static_cast<char>(point) : '_';
+  return entity.substr(0, 10);
+}
+
 UffFunction channel_function(const FrfEstimate& frf, Eigen::Index i, Eigen::Index j) {
   const auto output = static_cast<std::size_t>(i), input = static_cast<std::size_t>(j);
   UffFunction f;
   f.id[3] = name_line(kOutput, frf.outputs.names[output]);
   f.id[4] = name_line(kInput, frf.inputs.names[input]);
-  f.response = {frf.outputs.names[output].substr(0, 10), i + 1,
+  f.response = {entity_of(frf.outputs.names[output]), i + 1,
                 uff_direction(frf.outputs.names[output])};
-  f.reference = {frf.inputs.names[input].substr(0, 10), kFirstInputNode + j,
+  f.reference = {entity_of(frf.inputs.names[input]), kFirstInputNode + j,
                  uff_direction(frf.inputs.names[input])};
   f.abscissa_axis = {18, {0, 0, 0}, "Hz"};
   f.ordinate_axis = axis_of(frf.outputs.units[output]);
@@ -113,6 +122,19 @@ std::string name_of(const UffFunction& f, const UffPoint& point, std::size_t id_
 std::string output_name(const UffFunction& f) { return name_of(f, f.response, 3, kOutput); }
 std::string input_name(const UffFunction& f) { return name_of(f, f.reference, 4, kInput); }
 
+bool has_input(const UffFunction& f) {
+  return f.type == 4 || (f.type != 1 && (f.reference.node != 0 || f.reference.entity != "NONE"));
+}
+
+/// Of a function that has no input: many programs number no node and name the channel in the label of
+/// the ordinate or in the first id line.
+std::string channel_name(const UffFunction& f) {
+  if (f.response.node != 0 || f.response.entity != "NONE") return output_name(f);
+  for (const std::string* text : {&f.ordinate_axis.label, &f.id[0]})
+    if (!text->empty() && *text != "NONE") return *text;
+  return output_name(f);
+}
+
 /// File units in one SI unit, for a quantity of this axis; none: nobody knows.
 std::optional<double> factor_of(const UffAxis& axis, int direction, const UffUnits& units) {
   if (units.length == 1.0 && units.force == 1.0) return 1.0;
@@ -154,6 +176,29 @@ Eigen::Index place_in(ChannelList& channels, const std::string& name, const std:
   channels.names.push_back(name);
   channels.units.push_back(unit);
   return static_cast<Eigen::Index>(channels.size()) - 1;
+}
+
+/// What stands in a file that has no frequency response, and what can be done with it.
+std::string other_content(const UffContent& content) {
+  static const std::map<int, const char*> kNames = {
+      {1, "time response"}, {2, "auto spectrum"},          {3, "cross spectrum"},
+      {6, "coherence"},     {9, "power spectral density"}, {12, "spectrum"}};
+  std::map<std::string, int> counts;
+  bool time = false;
+  for (const UffFunction& f : content.functions) {
+    const auto name = kNames.find(f.type);
+    ++counts[name != kNames.end() ? name->second : fmt::format("function of type {}", f.type)];
+    time = time || f.type == 1;
+  }
+  if (!content.modes.empty()) counts["mode shape"] = static_cast<int>(content.modes.size());
+  std::string text;
+  for (const auto& [name, count] : counts)
+    text += fmt::format("{}{} x {}", text.empty() ? " but " : ", ", count, name);
+  if (time) text += "; take time responses with a map (--map, 'kind: log', docs/exchange.md)";
+  if (!content.modes.empty())
+    text += "; take the modes with '-o modes.json', or compare them with 'validate MODEL FILE'";
+  if (!time && content.modes.empty()) text += "; export frequency responses from the other program";
+  return text;
 }
 
 [[noreturn]] void fail(const std::filesystem::path& file, const UffFunction& f,
@@ -268,9 +313,9 @@ FrfEstimate frf_of_uff(const std::filesystem::path& file, const UffContent& cont
   read_settings(content.description, frf);
   const auto table = table_of(file, content, frf, "");
   if (table.empty())
-    throw FormatError(file, "",
-                      "holds no frequency response (dataset 58, function type 4); for time "
-                      "responses write a map with 'kind: log'");
+    throw FormatError(
+        file, "",
+        "holds no frequency response (dataset 58, function type 4)" + other_content(content));
   const UffFunction& first = *table.begin()->second;
   const std::vector<double> frequency = frequencies_of(content, first);
   const auto lines = static_cast<Eigen::Index>(frequency.size());
@@ -288,9 +333,12 @@ FrfEstimate frf_of_uff(const std::filesystem::path& file, const UffContent& cont
 
 ArrayList arrays_of_uff(const std::filesystem::path& file, const UffContent& content) {
   ArrayList list{file, {}};
+  std::map<std::string, int> seen;  // several measurements of one channel
   for (const UffFunction& f : content.functions) {
-    const std::string name =
-        f.type == 1 ? output_name(f) : fmt::format("{}<-{}", output_name(f), input_name(f));
+    const std::string channel =
+        has_input(f) ? fmt::format("{}<-{}", output_name(f), input_name(f)) : channel_name(f);
+    const int before = seen[channel]++;
+    const std::string name = before == 0 ? channel : fmt::format("{} ({})", channel, before + 1);
     NamedArray array{name, {f.ordinate.size()}, f.ordinate};
     if (!f.complex) {
       std::vector<double> real;

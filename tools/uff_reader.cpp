@@ -8,6 +8,7 @@
 #include "excitation/file_error.hpp"
 #include "tools/text_lines.hpp"
 #include "tools/uff_file.hpp"
+#include "tools/unicode.hpp"
 
 namespace stageid {
 namespace {
@@ -19,7 +20,7 @@ class Record {
  public:
   Record(const TextLines& lines, std::string_view line) : lines_(lines), line_(line) {}
 
-  std::string text(std::size_t width) { return std::string(trimmed(take(width))); }
+  std::string text(std::size_t width) { return utf8_of_text(trimmed(take(width))); }
   long long integer(std::size_t width) {
     const std::string_view field = trimmed(take(width));
     if (field.empty()) return 0;
@@ -73,9 +74,10 @@ UffAxis read_axis(TextLines& lines) {
   UffAxis axis;
   axis.type = static_cast<int>(record.integer(10));
   for (int& exponent : axis.exponents) exponent = static_cast<int>(record.integer(5));
-  record.text(21);  // label
-  axis.unit = record.text(21);
-  if (axis.unit.empty()) axis.unit = "NONE";
+  for (std::string* text : {&axis.label, &axis.unit}) {
+    *text = record.text(21);
+    if (text->empty()) *text = "NONE";
+  }
   return axis;
 }
 
@@ -183,7 +185,7 @@ void distribute(const std::vector<double>& values, const DataForm& form, UffFunc
 UffFunction read_function(TextLines& lines, const std::optional<BinaryForm>& binary) {
   UffFunction f;
   f.line = lines.line_number();
-  for (std::string& id : f.id) id = trimmed(lines.next());
+  for (std::string& id : f.id) id = utf8_of_text(trimmed(lines.next()));
   Record record(lines, lines.next());
   f.type = static_cast<int>(record.integer(5));
   record.text(25);  // function id, version, load case
@@ -215,14 +217,15 @@ std::vector<double> read_short_values(TextLines& lines, std::size_t count) {
 /// Modes only; other data at nodes are passed over.
 std::optional<UffMode> read_mode(TextLines& lines) {
   UffMode mode;
-  for (std::string& id : mode.id) id = trimmed(lines.next());
+  for (std::string& id : mode.id) id = utf8_of_text(trimmed(lines.next()));
   Record record(lines, lines.next());
   record.integer(10);  // model type
   const long long analysis = record.integer(10);
   record.text(20);
   mode.complex = record.integer(10) == 5;
   const long long per_node = record.integer(10);
-  if ((analysis != 2 && analysis != 3) || per_node < 1 || per_node > 9) return std::nullopt;
+  if ((analysis != 2 && analysis != 3 && analysis != 7) || per_node < 1 || per_node > 9)
+    return std::nullopt;
   mode.values_per_node = static_cast<std::size_t>(per_node);
   Record numbers(lines, lines.next());
   const long long n_integers = numbers.integer(10), n_reals = numbers.integer(10);
@@ -264,9 +267,8 @@ UffUnits read_units(TextLines& lines) {
 }
 
 void read_header(TextLines& lines, UffContent& content) {
-  content.model_name = trimmed(lines.next());
-  content.description = trimmed(lines.next());
-  content.program = trimmed(lines.next());
+  for (std::string* text : {&content.model_name, &content.description, &content.program})
+    *text = utf8_of_text(trimmed(lines.next()));
 }
 
 /// The form of the data if the dataset line says "58b".

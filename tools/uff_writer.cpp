@@ -50,8 +50,8 @@ std::string axis_line(const UffAxis& axis) {
   if (axis.unit.size() > 20)
     throw std::invalid_argument(
         fmt::format("unit '{}' is longer than the 20 characters of a universal file", axis.unit));
-  return fmt::format("{:>10}{:>5}{:>5}{:>5} {:<20} {:<20}\n", axis.type, axis.exponents[0],
-                     axis.exponents[1], axis.exponents[2], "NONE",
+  return fmt::format("{:>10}{:>5}{:>5}{:>5} {:<20.20} {:<20}\n", axis.type, axis.exponents[0],
+                     axis.exponents[1], axis.exponents[2], axis.label,
                      axis.unit.empty() ? "NONE" : axis.unit);
 }
 
@@ -106,17 +106,18 @@ std::string text_values(const UffFunction& f, bool even) {
   return text;
 }
 
-template <typename Number>
-void append_bytes(std::string& bytes, Number value) {
-  char raw[sizeof(Number)];
-  std::memcpy(raw, &value, sizeof(Number));
-  bytes.append(raw, sizeof(Number));
+void append_bytes(std::string& bytes, double value) {
+  char raw[sizeof(value)];
+  std::memcpy(raw, &value, sizeof(value));
+  bytes.append(raw, sizeof(value));
 }
 
+/// The format has abscissas of single precision. pyuff and MATLAB's readuff, which most people read with,
+/// take all numbers for the precision of the ordinate and fail at such files.
 std::string binary_values(const UffFunction& f, bool even) {
   std::string bytes;
   for (std::size_t k = 0; k < f.abscissa.size(); ++k) {
-    if (!even) append_bytes(bytes, static_cast<float>(f.abscissa[k]));
+    if (!even) append_bytes(bytes, f.abscissa[k]);
     append_bytes(bytes, f.ordinate[k].real());
     if (f.complex) append_bytes(bytes, f.ordinate[k].imag());
   }

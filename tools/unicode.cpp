@@ -87,4 +87,11 @@ std::string utf8_of(std::u16string_view units) {
   return text;
 }
 
+std::string utf8_of_text(std::string_view text) {
+  if (utf8_of(code_points_of(text)) == text) return std::string(text);
+  std::string latin_1;
+  for (const char c : text) append(latin_1, static_cast<unsigned char>(c));
+  return latin_1;
+}
+
 }  // namespace stageid

@@ -211,9 +211,16 @@ class ReadByOthers(Case):
                 i, j = k % N_Y, k // N_Y
                 np.testing.assert_array_equal(function["x"], given["frequency_hz"])
                 np.testing.assert_allclose(function["y"], given["response"][:, i, j], rtol=tolerance)
-                self.assertEqual(function["response"][1:], [str(i + 1), "3" if i == 0 else "1"])
+                self.assertEqual(function["response"], [["z1", "1", "3"], ["x_2", "2", "1"]][i])
                 self.assertEqual(function["reference"][1], str(1001 + j))
-                self.assertEqual(function["axes"][0][0], "18")
+                self.assertEqual((function["axes"][0][0], function["axes"][0][-1]), ("18", "Hz"))
+                self.assertEqual((function["axes"][1][-1], function["axes"][2][-1]), (("m", "rad")[i], "N"))
+
+    def test_uneven_binary_abscissas_are_exact(self):
+        self.succeed("export", self.frf(), "-o", "a.uff")
+        for function in uff_reader.read(WORK / "a.uff"):
+            if function.get("type") == 4:
+                np.testing.assert_array_equal(function["x"], FREQUENCY_HZ)
 
 
 MODEL = {
@@ -302,11 +309,22 @@ class Models(Case):
         with h5py.File(WORK / "m.h5") as a, h5py.File(WORK / "back.h5") as b:
             np.testing.assert_allclose(b["response"][()], a["response"][()], rtol=1e-12)
 
+    def test_shapes_of_outputs_without_a_direction_stand_in_x(self):
+        (WORK / "model.json").write_text(json.dumps(MODEL | {"outputs": ["s1", "z2"]}))
+        self.succeed("export", "model.json", "-o", "m.unv")
+        mode = next(d for d in uff_reader.read(WORK / "m.unv") if d["dataset"] == 55)
+        s1, z2 = mode["values"]
+        self.assertEqual((s1[1:], z2[:2]), ([0, 0], [0, 0]))
+        np.testing.assert_allclose(z2[2] / s1[0], 3.0, rtol=1e-5)  # rows of the numerator of MODEL
+        found = json.loads(self.succeed("validate", "model.json", "m.unv", "--json").stdout)["modes"]
+        self.assertEqual(found["outputs"], ["s1", "z2"])
+        self.assertAlmostEqual(found["pairs"][0]["mac"], 1.0, places=9)
+
     def test_mode_shapes_of_others_are_paired_with_the_models(self):
         """Normal modes and a complex eigenvalue, nodes in no order, one that the model does not know."""
         self.write_shapes("fe.unv", [(2, [0.0], {7: (-3.1, 0, 0), 3: (9, 9, 9), 12: (0, 0, 1.0)}),
                                      (2, [51.0, 1.0, 0.0], {7: (-3.1, 0, 0), 3: (9, 9, 9), 12: (0, 0, 1.0)}),
-                                     (3, [-1.0, 2 * np.pi * 80.0, 0.0, 1.0],
+                                     (7, [-1.0, 2 * np.pi * 80.0, 0.0, 1.0],
                                       {7: (1.0, 0, 0), 3: (0, 0, 0), 12: (0, 0, 1.0)})])
         (WORK / "model.json").write_text(json.dumps(MODEL | {"outputs": ["12+Z", "7-X"]}))
         found = json.loads(self.succeed("validate", "model.json", "fe.unv", "--json").stdout)["modes"]
@@ -337,7 +355,7 @@ class Models(Case):
 
     @staticmethod
     def write_shapes(name, modes):
-        """Datasets 55 to the letter of the format: analysis 2 (normal mode) or 3 (complex eigenvalue), three values a node."""
+        """Datasets 55 to the letter of the format: analysis 2 (normal mode), 3 or 7 (complex eigenvalue), three values a node."""
         def numbers(values):
             return "".join(f"{value:13.5E}" for value in values) + "\n"
 

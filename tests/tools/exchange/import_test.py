@@ -4,6 +4,7 @@
     import_test.py PROGRAM WORK_DIR
 """
 
+import json
 import sys
 import unittest
 
@@ -70,6 +71,30 @@ class ByThemselves(Case):
                     self.assertEqual(list(h5["outputs"].asstr()), ["1+Z", "2+Z"])
                     self.assertEqual(list(h5["inputs"].asstr()), ["101-Z", "102-Z", "103-Z"])
                     self.assertEqual(h5["outputs"].attrs["unit"], "m/s^2")
+
+    def test_universal_files_of_programs_that_number_no_node(self):
+        """Latin-1, channels named by the label of the ordinate or the first line, several without any name."""
+        def channel(title, label, unit="m/s\u00b2"):
+            head = uff_function(np.sin(np.arange(8.0)), (0, 0), (0, 0), np.arange(8.0), kind=1)
+            head = head.replace(b"NONE", title.ljust(4).encode("latin-1"), 1)
+            lines = head.split(b"\n")
+            lines[10] = f"{1:10}{0:5}{0:5}{0:5} {label:20} {unit:20}".encode("latin-1")
+            return b"\n".join(lines)
+
+        (WORK / "x.uff").write_bytes(channel("NONE", "z\u00b5") + channel("1x : m", "NONE")
+                                     + channel("NONE", "NONE") + channel("NONE", "NONE"))
+        listed = json.loads(self.succeed("import", "x.uff", "--json").stdout)["arrays"]
+        self.assertEqual([array["name"] for array in listed[::2]], ["z\u00b5", "1x : m", "0", "0 (2)"])
+        self.refuse("4 x time response; take time responses with a map", "import", "x.uff", "-o", "n.h5")
+        (WORK / "x.uff").write_bytes(uff_function(abs(G[:, 0, 0]), (0, 0), (0, 0), kind=9))
+        self.refuse("1 x power spectral density; export frequency responses", "import", "x.uff", "-o", "n.h5")
+
+    def test_tables_of_windows_programs(self):
+        """A byte order mark before the names of the columns, and letters of Latin-1."""
+        for head in (b"\xef\xbb\xbft,z\xc2\xb5\r\n", b"t,z\xb5\r\n"):
+            (WORK / "x.csv").write_bytes(head + b"1,2\r\n3,4\r\n")
+            listed = json.loads(self.succeed("import", "x.csv", "--json").stdout)["arrays"]
+            self.assertEqual([array["name"] for array in listed], ["t", "z\u00b5"])
 
     def test_units_of_a_universal_file_become_si(self):
         units = (f"    -1\n   164\n{5:10}{'mm (milli newton)':20}{2:10}\n"

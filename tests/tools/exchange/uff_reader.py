@@ -63,7 +63,8 @@ def read_function(data, at, line, head, out):
     if out["binary"]:
         order, floating, lines, size = [int(x) for x in fields(head[7:], [6, 6, 12, 12])]
         assert (order, floating, lines) == (1, 2, 11)
-        code = "<" + ("" if even else "f") + BINARY_CODES[kind]
+        # Abscissas of double precision, as most readers take them; the format has "f".
+        code = "<" + ("" if even else "d") + BINARY_CODES[kind]
         assert struct.calcsize(code) * count == size
         table = np.array(list(struct.iter_unpack(code, data[here:here + size])))
         out["end"] = here + size
