@@ -4,7 +4,8 @@ const cost = { graph: null };
 
 function buildCost() {
   const body = section('cost', 'Cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines; it may never rise.');
-  body.append(saveButtons('cost', () => ({ title: 'Cost over the iterations', panels: [graphPanel(cost.graph)] })),
+  body.append(element('div', { class: 'plot-head' }, element('p', { class: 'plot-title' }, 'Cost'),
+    saveButtons('cost', () => ({ title: 'Cost over the iterations', panels: [graphPanel(cost.graph)] }))),
     element('div', { class: 'plot', id: 'cost-plot', role: 'img', 'aria-labelledby': 'cost-title' }),
     element('p', { class: 'axis-title' }, 'Iteration'));
   afterFirstPaint(drawCost);

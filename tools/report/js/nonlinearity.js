@@ -4,9 +4,9 @@ const distortion = { figure: null, text: null };
 
 function buildNonlinearity() {
   const { bands, chance } = content.nonlinearity;
-  const body = section('nonlinearity', 'Nonlinearity', 'Nonlinear distortions', 'Each cell is one actuator (column) to one sensor (row), each bar one octave from low to high; ' +
-    'the height is the distortion of one realization over |G| on a logarithmic scale from 0.01 % to 100 %. ' +
-    'Coloured: more than noise (p < ' + chance + ' of the F test); grey: within the noise.');
+  const body = section('nonlinearity', 'Nonlinearity', 'Nonlinear distortions', 'Each cell is one sensor over one actuator, as the edges name them, each bar one octave from low to high; ' +
+    'the height is the distortion of one realization over |G| on a logarithmic scale from 0.01\u00a0% to 100\u00a0%. ' +
+    'Coloured: more than noise (p\u00a0<\u00a0' + chance + ' of the F test); grey: within the noise.');
   distortion.text = element('output', { class: 'values' });
   distortion.figure = canvasFigure('nonlinearity-plot', distortionSummary(), drawNonlinearity, 'tall');
   distortion.figure.node.addEventListener('pointermove', tellDistortion);
@@ -46,10 +46,13 @@ function distortionTable(bands) {
   ], rows);
 }
 
+// Sensors are rows; where the names of many actuators do not fit beside each other, columns.
 function distortionFrame(width, height) {
   const { inputs, outputs } = content.frf;
   const area = { x: 64, y: 22, w: width - 70, h: height - 28 };
-  return { area, cell: [area.w / inputs.length, area.h / outputs.length] };
+  const turned = inputs.length > outputs.length && area.w / inputs.length < 36;
+  const [columns, rows] = turned ? [outputs, inputs] : [inputs, outputs];
+  return { area, turned, columns, rows, cell: [area.w / columns.length, area.h / rows.length] };
 }
 
 // 0 at 0.01 %, 1 at 100 %.
@@ -58,16 +61,21 @@ function distortionHeight(level) {
 }
 
 function drawNonlinearity(context, width, height) {
-  const { inputs, outputs } = content.frf;
-  const { area, cell: [w, h] } = distortionFrame(width, height);
+  const { outputs } = content.frf;
+  const { area, turned, columns, rows, cell: [w, h] } = distortionFrame(width, height);
   const bands = content.nonlinearity.bands.length;
+  const place = (channel) => {
+    const [input, output] = [Math.floor(channel / outputs.length), channel % outputs.length];
+    return turned ? [output, input] : [input, output];
+  };
   const colours = palette();
-  outputs.forEach((output, o) => drawName(context, output.name.slice(0, 8), 'right', area.x - 8, area.y + (o + 0.5) * h));
-  inputs.forEach((input, i) => drawName(context, input.name.slice(0, Math.max(2, Math.floor(w / 6.5))), 'center', area.x + (i + 0.5) * w, area.y / 2));
+  rows.forEach((row, r) => drawName(context, row.name.slice(0, 8), 'right', area.x - 8, area.y + (r + 0.5) * h));
+  columns.forEach((column, c) => drawName(context, column.name.slice(0, Math.max(2, Math.floor(w / 6.5))), 'center', area.x + (c + 0.5) * w, area.y / 2));
   context.lineWidth = 1;
   for (const test of distortionTests()) {
-    const left = area.x + Math.floor(test.channel / outputs.length) * w + 2;
-    const bottom = area.y + (test.channel % outputs.length + 1) * h - 3;
+    const [column, row] = place(test.channel);
+    const left = area.x + column * w + 2;
+    const bottom = area.y + (row + 1) * h - 3;
     const tall = (h - 8) * distortionHeight(test.level);
     const wide = (w - 5) / bands;
     context.fillStyle = isDistorted(test) ? colours.marker : colours.frame;
@@ -75,21 +83,23 @@ function drawNonlinearity(context, width, height) {
   }
   context.strokeStyle = colours.grid;
   for (let c = 0; c < channelCount(); ++c) {
-    context.strokeRect(area.x + Math.floor(c / outputs.length) * w + 0.5, area.y + (c % outputs.length) * h + 0.5, w - 2, h - 2);
+    const [column, row] = place(c);
+    context.strokeRect(area.x + column * w + 0.5, area.y + row * h + 0.5, w - 2, h - 2);
   }
 }
 
 function tellDistortion(event) {
   const { node } = distortion.figure;
-  const { area, cell: [w, h] } = distortionFrame(node.clientWidth, node.clientHeight);
-  const input = Math.floor((event.offsetX - area.x) / w);
-  const output = Math.floor((event.offsetY - area.y) / h);
+  const { area, turned, cell: [w, h] } = distortionFrame(node.clientWidth, node.clientHeight);
+  const column = Math.floor((event.offsetX - area.x) / w);
+  const row = Math.floor((event.offsetY - area.y) / h);
+  const [input, output] = turned ? [row, column] : [column, row];
   const { bands, p_value: p, distortion: level } = content.nonlinearity;
   if (!content.frf.inputs[input] || !content.frf.outputs[output]) {
     distortion.text.textContent = '';
     return;
   }
-  const place = Math.min(bands.length - 1, Math.max(0, Math.floor((event.offsetX - area.x - input * w - 2) / ((w - 5) / bands.length))));
+  const place = Math.min(bands.length - 1, Math.max(0, Math.floor((event.offsetX - area.x - column * w - 2) / ((w - 5) / bands.length))));
   const channel = channelIndex(output, input);
   distortion.text.textContent = channelName(channel) + ', ' + bandName(bands[place]) + ': ' + percent(level[channel][place]) + ', p = ' + number(p[channel][place], 2);
 }

@@ -54,7 +54,7 @@ function showShape(index) {
   shapes.index = index;
   document.getElementById('shape-mode').value = index;
   shapes.scene = makeScene(mode);
-  const mass = isNumber(mode.modal_mass) ? '; modal mass ' + number(mode.modal_mass, 4) : '';
+  const mass = isNumber(mode.modal_mass) ? '; modal mass ' + number(mode.modal_mass, 4) + ' (shapes of norm one)' : '';
   shapes.text.textContent = 'Mode ' + (index + 1) + ': ' + fixed(mode.frequency_hz) + ' Hz, \u03b6 ' + hundred(mode.damping_ratio) + ' %' + mass +
     (mode.not_rank_one > 0.01 ? '; second singular value ' + percent(mode.not_rank_one) + ' of the first' : '');
   shapes.figure.node.setAttribute('aria-label', shapes.text.textContent + '. The table below holds its numbers.');

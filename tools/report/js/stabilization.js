@@ -7,14 +7,14 @@ const poleKinds = ['new', 'stable frequency', 'stable frequency and damping'];
 function buildStabilization() {
   const poles = content.stabilization;
   const body = section('stabilization', 'Stabilization', 'Stabilization diagram',
-    'Poles of a common-denominator fit of rising order, independent of the model. A pole is stable if it stands within 1 % in frequency, ' +
-    'and 5 % in damping, of one of the order before. Behind them the first curve of the CMIF and the identified modes.');
+    'Poles of a common-denominator fit of rising order, independent of the model. A pole is stable if it stands within 1\u00a0% in frequency, ' +
+    'and 5\u00a0% in damping, of one of the order before. Behind them the first curve of the CMIF and the identified modes.');
   const legend = element('div', { class: 'legend' }, ...poleKinds.map((kind, i) => element('span', { class: 'pole-mark kind-' + i }, kind)),
     saveButtons('stabilization diagram', savedStabilization));
   stability.figure = canvasFigure('stabilization-plot', stabilizationSummary(), drawStabilization, 'tall');
   stability.figure.node.addEventListener('keydown', bandKey);
   followBand(stability.figure.redraw);
-  body.append(legend, bandBar(), stability.figure.node, element('p', { class: 'axis-title' }, 'Frequency [Hz]'), folded('Stable poles of the largest order', '', stableTable()));
+  body.append(legend, bandBar(), element('p', { class: 'plot-title' }, 'Order of the fit'), stability.figure.node, element('p', { class: 'axis-title' }, 'Frequency [Hz]'), folded('Stable poles of the largest order', '', stableTable()));
 }
 
 function lastOrder() {

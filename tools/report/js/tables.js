@@ -130,7 +130,7 @@ function delayText(delays) {
 function fitFacts() {
   const model = content.model;
   return facts([
-    ['status', model.status], ['weighting', model.weighting && model.weighting.replace(/_/g, ' ')],
+    ['status', model.status && model.status.replace(/_/g, ' ')], ['weighting', model.weighting && model.weighting.replace(/_/g, ' ')],
     ['cost', number(model.cost, 5)], ['iterations', count(model.iterations)], ['hold in the model', model.hold],
     ['delay at the inputs', delayText(model.delay_s.inputs)], ['delay at the outputs', delayText(model.delay_s.outputs)],
     ['band fitted', model.band_hz[1] > 0 ? hertz(model.band_hz[0]) + ' \u2013 ' + hertz(model.band_hz[1]) : null],
