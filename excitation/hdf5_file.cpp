@@ -7,6 +7,8 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
+#include <string_view>
 
 #include "excitation/file_error.hpp"
 #include "excitation/hdf5_heap_check.hpp"
@@ -36,6 +38,20 @@ void check_can_be_opened(const std::filesystem::path& file) {
   if (!regular) throw FileError(file.string() + ": is not a file; give the name of an HDF5 file");
 }
 
+/// What stands where an HDF5 file belongs, and what to give instead.
+std::string other_kind(const std::filesystem::path& file) {
+  char head[5] = {};
+  std::ifstream(file, std::ios::binary).read(head, sizeof(head));
+  const std::string_view begin(head, sizeof(head));
+  if (begin == "\x89SLOG")
+    return "is a native log, not an HDF5 file; 'stageid frf' makes a frequency response of it, "
+           "'stageid "
+           "log convert' an HDF5 log";
+  if (begin.starts_with('{'))
+    return "is JSON, as models and modes are, not an HDF5 file; give a frequency response or a log";
+  return "is not an HDF5 file, or its beginning is damaged; give an HDF5 file";
+}
+
 }  // namespace
 
 /// The datasets read or appended to last. A dataset that is opened anew for every block of rows
@@ -63,8 +79,7 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
   check_can_be_opened(file);
   if (H5Fis_hdf5(file.c_str()) <= 0) {
     H5Eclear2(H5E_DEFAULT);
-    throw FormatError(file, "",
-                      "is not an HDF5 file, or its beginning is damaged; give an HDF5 file");
+    throw FormatError(file, "", other_kind(file));
   }
   hdf5::check_global_heaps(file);
   Hdf5Handle handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);

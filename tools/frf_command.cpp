@@ -131,6 +131,7 @@ void FrfCommand::run() const {
     options.realizations.push_back(realization - 1);
   }
   require_writable(output_, logs_);
+  require_ending(output_, "a frequency response", {".h5", ".hdf5"});
   FrfStep step = estimate(options);
   std::vector<std::string> notes = dropped_lines(step.frf);
   if (compensate_ != "none") {

@@ -27,7 +27,10 @@ ModesCommand::ModesCommand(CLI::App& app, Console& console) : console_(console) 
 }
 
 void ModesCommand::run() const {
-  if (!output_.empty()) require_writable(output_, {frf_});
+  if (!output_.empty()) {
+    require_writable(output_, {frf_});
+    require_ending(output_, "a list of modes", {".json"});
+  }
   FrfEstimate frf = read_frf(frf_);
   if (!band_hz_.empty()) frf = select_band(frf, band_hz_[0], band_hz_[1]);
   PeakOptions options;

@@ -1,7 +1,9 @@
 #include "tools/output_paths.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <system_error>
 
@@ -24,6 +26,13 @@ void require_writable(const std::filesystem::path& file,
                       const std::vector<std::filesystem::path>& inputs) {
   require_no_input(file, inputs);
   const OutputFile probe(file);
+}
+
+void require_ending(const std::filesystem::path& file, const char* what,
+                    const std::vector<std::string>& endings) {
+  if (std::find(endings.begin(), endings.end(), file.extension().string()) != endings.end()) return;
+  throw std::invalid_argument(fmt::format("{}: {} is written as {}; give -o such a name",
+                                          file.string(), what, fmt::join(endings, ", ")));
 }
 
 void require_directory(const std::filesystem::path& directory) {

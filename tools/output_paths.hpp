@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace stageid {
@@ -14,6 +15,11 @@ void require_no_input(const std::filesystem::path& file,
 /// @throws FileError naming the file and the reason; std::invalid_argument
 void require_writable(const std::filesystem::path& file,
                       const std::vector<std::filesystem::path>& inputs);
+
+/// That the name ends as files of this kind do: readers go by the ending.
+/// @throws std::invalid_argument "FILE: WHAT is written as ENDING, ..."
+void require_ending(const std::filesystem::path& file, const char* what,
+                    const std::vector<std::string>& endings);
 
 /// Makes the directory if it is not there. @throws FileError
 void require_directory(const std::filesystem::path& directory);

@@ -216,6 +216,21 @@ class WithAMap(Case):
 
 
 class Damaged(Case):
+    def test_files_of_another_kind_are_named(self):
+        (WORK / "run.slog").write_bytes(b"\x89SLOG\r\n\x1a" + bytes(100))
+        self.refuse("is a native log, not an HDF5 file; 'stageid frf'", "fit", "run.slog", "-o", "n.json")
+        (WORK / "model.json").write_text("{}")
+        self.refuse("is JSON, as models and modes are", "fit", "model.json", "-o", "n.json")
+        (WORK / "run.txt").write_text("words")
+        self.refuse("is not an HDF5 file", "fit", "run.txt", "-o", "n.json")
+
+    def test_names_that_do_not_end_as_their_kind(self):
+        frf = self.frf()
+        self.refuse("n.h5: a model is written as .json", "fit", frf, "-o", "n.h5")
+        self.refuse("n.h5: a list of modes is written as .json", "modes", frf, "-o", "n.h5")
+        self.refuse("n.json: a frequency response is written as .h5, .hdf5", "frf", "run.slog", "-o", "n.json")
+        self.assertFalse((WORK / "n.h5").exists() or (WORK / "n.json").exists())
+
     def test_every_file_cut_short_is_one_line(self):
         frf = self.frf()
         for ending in ("mat", "npz", "unv", "uff"):
