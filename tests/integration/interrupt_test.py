@@ -84,21 +84,27 @@ class InterruptTest(unittest.TestCase):
                         (WORK / new).unlink()
         self.assertIn(0, ends)
 
+    def cut_and_resume(self, delay_s):
+        for path in WORK.glob("cut.*"):
+            path.unlink()
+        code, error = run("run", SMALL, "-o", "cut.slog", "--pace", "0.1", interrupt_after_s=delay_s)
+        self.check_end(code, error)
+        if (WORK / "cut.slog").exists():
+            self.assertEqual(run("log", "verify", "cut.slog")[0], 0)
+            resumed, error = run("run", SMALL, "-o", "cut.slog", "--resume", "--pace", "0")
+            self.assertEqual(resumed, 0, error)
+            self.assertEqual(run("frf", "cut.slog", "--realizations", "1,2", "-o", "cut.h5")[0], 0)
+        return code
+
     def test_an_interrupted_run_goes_on(self):
         codes = []
-        for delay_s in DELAYS_S:
+        delays_s = list(DELAYS_S)
+        for delay_s in delays_s:
             with self.subTest(delay_s=delay_s):
-                for path in WORK.glob("cut.*"):
-                    path.unlink()
-                code, error = run("run", SMALL, "-o", "cut.slog", "--pace", "0.1", interrupt_after_s=delay_s)
-                self.check_end(code, error)
-                codes.append(code)
-                if not (WORK / "cut.slog").exists():
-                    continue
-                self.assertEqual(run("log", "verify", "cut.slog")[0], 0)
-                code, error = run("run", SMALL, "-o", "cut.slog", "--resume", "--pace", "0")
-                self.assertEqual(code, 0, error)
-                self.assertEqual(run("frf", "cut.slog", "--realizations", "1,2", "-o", "cut.h5")[0], 0)
+                codes.append(self.cut_and_resume(delay_s))
+            # On a busy machine main() begins later than the last of them.
+            if delay_s == delays_s[-1] < 60.0 and set(codes) == {-signal.SIGINT}:
+                delays_s.append(2.0 * delay_s)
         self.assertIn(130, codes)
 
 
