@@ -124,12 +124,16 @@ Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
   };
   const SplitMatrix thin_phi = thinned(phi);
   const SplitMatrix thin_own = thinned(own_);
+  const Eigen::VectorXd thin_power = power_(lines);
   std::vector<Eigen::MatrixXd> shares(kShares, Eigen::MatrixXd::Zero(n + 1, n + 1));
   parallel_tasks(kShares, threads_, [&](int share) {
-    for (Eigen::Index c = share; c < H_.rows(); c += kShares)
+    for (Eigen::Index c = share; c < H_.rows(); c += kShares) {
+      const Eigen::RowVectorXd weight = weights_(c, lines);
+      const Eigen::RowVectorXcd response = H_(c, lines);
       append(shares[static_cast<std::size_t>(share)],
-             factor_of_channel(weights_(c, lines).transpose().cwiseProduct(power_(lines)),
-                               H_(c, lines).transpose(), thin_phi, thin_own));
+             factor_of_channel(weight.transpose().cwiseProduct(thin_power), response.transpose(),
+                               thin_phi, thin_own));
+    }
   });
   Eigen::MatrixXd R = shares[0];
   for (std::size_t share = 1; share < kShares; ++share) append(R, shares[share]);
