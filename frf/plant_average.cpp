@@ -53,6 +53,7 @@ PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
   if (covariance == CovarianceKind::full) covariance_sum_.setZero(n_c * n_c, N);
   condition_.setZero(N);
   dof_sum_.setZero(N);
+  scarcity_sum_.setZero(N);
   share_sum_.setZero(N);
   misfit_sum_.setZero(N);
 }
@@ -90,7 +91,7 @@ void PlantAverage::add_zippered(const RealizationSpectra& spectra, const Zippere
   const ZipperedEstimate at = fit.estimate(spectra, k);
   add_response(spectra, at.line, k);
   add_noise(at.noise, k);
-  dof_sum_[k] += 1.0 / at.noise_dof;
+  scarcity_sum_[k] += 1.0 / at.noise_dof;
   share_sum_[k] += at.variance_share;
   misfit_sum_[k] += at.misfit;
 }
@@ -167,7 +168,7 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
 
 void PlantAverage::finish_zippered(FrfEstimate& frf) const {
   const double M = realizations_;
-  frf.noise_dof = M * M / dof_sum_.mean();
+  frf.noise_dof = M * M / scarcity_sum_.mean();
   frf.correlated_lines = static_cast<double>(zippered_axes_) * M / share_sum_.mean();
   if (misfit_sum_.minCoeff() > 0.0) frf.interpolation_misfit = misfit_sum_ / M;
 }

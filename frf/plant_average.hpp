@@ -58,8 +58,9 @@ class PlantAverage {
   Eigen::MatrixXcd covariance_sum_;  // vec(Cov(vec G)), on request
   Eigen::VectorXd condition_;
   Eigen::Index zippered_axes_ = 0;
-  Eigen::VectorXd dof_sum_;    // of the noise; zippered: of 1 / degrees of freedom
-  Eigen::VectorXd share_sum_;  // of the variance shares
+  Eigen::VectorXd dof_sum_;       // of the noise's degrees of freedom
+  Eigen::VectorXd scarcity_sum_;  // zippered: of 1 / degrees of freedom
+  Eigen::VectorXd share_sum_;     // of the variance shares
   Eigen::VectorXd misfit_sum_;
 };
 
