@@ -250,7 +250,7 @@ void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>&
           root.cwiseProduct(problem.G->row(c).imag().transpose());
       const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
       A *= scale.asDiagonal();
-      const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(A);
+      const Eigen::HouseholderQR<Eigen::MatrixXd> factor(A);
       Eigen::VectorXd x = factor.solve(rest);
       rest -= A * x;
       const Eigen::VectorXd refinement = factor.solve(rest);

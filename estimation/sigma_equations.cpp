@@ -31,6 +31,19 @@ void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
   R = qr.matrixQR().topRows(R.cols()).triangularView<Eigen::Upper>();
 }
 
+/// The triangle of all of them below each other, two by two.
+Eigen::MatrixXd combined(std::vector<Eigen::MatrixXd> triangles, int threads) {
+  while (triangles.size() > 1) {
+    const std::size_t pairs = triangles.size() / 2;
+    parallel_tasks(static_cast<int>(pairs), threads, [&](int pair) {
+      const auto p = static_cast<std::size_t>(pair);
+      append(triangles[p], triangles[triangles.size() - 1 - p]);
+    });
+    triangles.resize(triangles.size() - pairs);
+  }
+  return std::move(triangles.front());
+}
+
 /// The lower right corner of R, n+1 x n+1, in  sqrt(w) [phi, own | -H phi, -H] = Q R: what remains of
 /// the channel's equations once its numerators are eliminated.
 Eigen::MatrixXd factor_of_channel(const Eigen::VectorXd& weights, const Eigen::VectorXcd& response,
@@ -115,8 +128,7 @@ Eigen::MatrixXd SigmaEquations::triangle(const PoleSet& poles, bool accurate) co
 /// A triangle for each of a fixed number of shares of the channels. Data that call for this are next to exact: a few
 /// times as many lines as unknowns say all.
 Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
-  const Eigen::Index n = phi.cols();
-  const Eigen::Index unknowns = 2 * n + own_.cols() + 1;
+  const Eigen::Index unknowns = 2 * phi.cols() + own_.cols() + 1;
   const Eigen::Index stride = std::max<Eigen::Index>(1, 2 * x_.size() / (kTimesOver * unknowns));
   const auto lines = Eigen::seq(0, x_.size() - 1, stride);
   const auto thinned = [&](const SplitMatrix& all) {
@@ -125,19 +137,20 @@ Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
   const SplitMatrix thin_phi = thinned(phi);
   const SplitMatrix thin_own = thinned(own_);
   const Eigen::VectorXd thin_power = power_(lines);
-  std::vector<Eigen::MatrixXd> shares(kShares, Eigen::MatrixXd::Zero(n + 1, n + 1));
-  parallel_tasks(kShares, threads_, [&](int share) {
-    for (Eigen::Index c = share; c < H_.rows(); c += kShares) {
-      const Eigen::RowVectorXd weight = weights_(c, lines);
-      const Eigen::RowVectorXcd response = H_(c, lines);
-      append(shares[static_cast<std::size_t>(share)],
-             factor_of_channel(weight.transpose().cwiseProduct(thin_power), response.transpose(),
-                               thin_phi, thin_own));
-    }
+  const auto triangle_of = [&](Eigen::Index c) {
+    const Eigen::RowVectorXd weight = weights_(c, lines);
+    const Eigen::RowVectorXcd response = H_(c, lines);
+    return factor_of_channel(weight.transpose().cwiseProduct(thin_power), response.transpose(),
+                             thin_phi, thin_own);
+  };
+  std::vector<Eigen::MatrixXd> shares(
+      static_cast<std::size_t>(std::min<Eigen::Index>(kShares, H_.rows())));
+  parallel_tasks(static_cast<int>(shares.size()), threads_, [&](int share) {
+    Eigen::MatrixXd& R = shares[static_cast<std::size_t>(share)];
+    R = triangle_of(share);
+    for (Eigen::Index c = share + kShares; c < H_.rows(); c += kShares) append(R, triangle_of(c));
   });
-  Eigen::MatrixXd R = shares[0];
-  for (std::size_t share = 1; share < kShares; ++share) append(R, shares[share]);
-  return R * std::sqrt(static_cast<double>(stride));
+  return combined(std::move(shares), threads_) * std::sqrt(static_cast<double>(stride));
 }
 
 /// From products of fractions. @returns nothing if too few digits are left
