@@ -6,8 +6,15 @@
 #include <cmath>
 
 #include "estimation/channel_equations.hpp"
+#include "estimation/parallel_tasks.hpp"
 
 namespace stageid {
+namespace {
+
+constexpr Eigen::Index kAtOnce = 16;  // channels that are eliminated together
+
+}  // namespace
+
 bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x) {
   const Eigen::VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd scaled = scale.asDiagonal() * M * scale.asDiagonal();
@@ -53,7 +60,7 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
     const Eigen::Index* begin = std::lower_bound(all, all_end, part.first);  // they are sorted
     const Eigen::Index* end = std::lower_bound(begin, all_end, part.first + part.count);
     if (begin == end) continue;
-    if (static_cast<Eigen::Index>(group.channels.size()) < kFewChannels) {
+    if (group.few) {
       add_few(group, begin, end);
       continue;
     }
@@ -75,14 +82,28 @@ void ArrowSystem::add_block(const BasisGroup& group, const GroupProducts& produc
   const LineSums sums = line_sums(problem_, group, products, block, B, columns_,
                                   method_ == FitMethod::gn ? nullptr : &Y, method_);
   add_denominators(sums);
-  Channel passing;
-  for (Eigen::Index r = 0; r < block.members && regular_; ++r) {
-    const Eigen::Index index = members[static_cast<std::size_t>(r)];
-    Channel& channel = keeps() ? kept(index) : passing;
-    set_channel(sums, B, r, channel);
-    if (problem_.delays() > 0) add_delays(sums, B, r, index, channel);
-    eliminate(channel);
+  std::vector<Channel> passing;
+  for (Eigen::Index first = 0; first < block.members && regular_; first += kAtOnce) {
+    const Eigen::Index count = std::min(kAtOnce, block.members - first);
+    const std::vector<Channel*> channels = places(members.data() + first, count, passing);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      Channel& channel = *channels[static_cast<std::size_t>(i)];
+      set_channel(sums, B, first + i, channel);
+      if (problem_.delays() > 0)
+        add_delays(sums, B, first + i, members[static_cast<std::size_t>(first + i)], channel);
+    }
+    eliminate(channels);
   }
+}
+
+std::vector<ArrowSystem::Channel*> ArrowSystem::places(const Eigen::Index* channels,
+                                                       Eigen::Index count,
+                                                       std::vector<Channel>& passing) {
+  if (!keeps()) passing.resize(static_cast<std::size_t>(count));
+  std::vector<Channel*> out;
+  for (Eigen::Index i = 0; i < count; ++i)
+    out.push_back(keeps() ? &kept(channels[i]) : &passing[static_cast<std::size_t>(i)]);
+  return out;
 }
 
 ArrowSystem::Channel& ArrowSystem::kept(Eigen::Index c) {
@@ -100,9 +121,10 @@ void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
   });
   const Eigen::Index n_f = problem_.functions();
   const Eigen::Index globals = problem_.globals();
-  Channel passing;
-  for (std::size_t r = 0; r < own.size() && regular_; ++r) {
-    Channel& channel = keeps() ? kept(begin[r]) : passing;
+  std::vector<Channel> passing;
+  const std::vector<Channel*> channels = places(begin, end - begin, passing);
+  for (std::size_t r = 0; r < own.size(); ++r) {
+    Channel& channel = *channels[r];
     const auto& [M, e] = own[r];
     channel.bb = M.topLeftCorner(n_f, n_f);
     channel.ab = M.bottomLeftCorner(globals, n_f);
@@ -110,8 +132,8 @@ void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
     channel.e = e.head(n_f);
     M_ += M.bottomRightCorner(globals, globals);
     e_ += e.tail(globals);
-    eliminate(channel);
   }
+  eliminate(channels);
 }
 
 void ArrowSystem::add_denominators(const LineSums& sums) {
@@ -171,19 +193,27 @@ void ArrowSystem::add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eig
   }
 }
 
-void ArrowSystem::eliminate(Channel& channel) {
+void ArrowSystem::eliminate(const std::vector<Channel*>& channels) {
   if (use_ == ChannelEquationsUse::only_kept) return;
-  Eigen::MatrixXd rhs(channel.ba.rows(), channel.ba.cols() + 1);
-  rhs << channel.ba, channel.e;
-  Eigen::MatrixXd solution;
-  if (!solve_scaled(channel.bb, rhs, solution)) {
-    regular_ = false;
-    return;
+  std::vector<char> solved(channels.size());
+  const int threads = problem_.functions() < kManyFunctions ? 1 : problem_.threads;
+  parallel_tasks(static_cast<int>(channels.size()), threads, [&](int i) {
+    Channel& channel = *channels[static_cast<std::size_t>(i)];
+    Eigen::MatrixXd rhs(channel.ba.rows(), channel.ba.cols() + 1);
+    rhs << channel.ba, channel.e;
+    Eigen::MatrixXd solution;
+    if (!solve_scaled(channel.bb, rhs, solution)) return;
+    solved[static_cast<std::size_t>(i)] = 1;
+    channel.Z = solution.leftCols(channel.ba.cols());
+    channel.x = solution.rightCols(1);
+  });
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    regular_ = regular_ && solved[i] != 0;
+    if (!regular_) return;
+    const Channel& channel = *channels[i];
+    schur_.noalias() -= channel.ab * channel.Z;
+    schur_e_.noalias() -= channel.ab * channel.x;
   }
-  channel.Z = solution.leftCols(channel.ba.cols());
-  channel.x = solution.rightCols(1);
-  schur_.noalias() -= channel.ab * channel.Z;
-  schur_e_.noalias() -= channel.ab * channel.x;
 }
 
 Eigen::VectorXd ArrowSystem::solve_globals(double damping,

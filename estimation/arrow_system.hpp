@@ -84,6 +84,9 @@ class ArrowSystem {
  private:
   bool keeps() const noexcept { return use_ != ChannelEquationsUse::eliminated; }
   Channel& kept(Eigen::Index c);
+  /// Where these channels' equations go: to stay, or into `passing`.
+  std::vector<Channel*> places(const Eigen::Index* channels, Eigen::Index count,
+                               std::vector<Channel>& passing);
   void add_block(const BasisGroup& group, const GroupProducts& products, const TileRange& block);
   void add_few(const BasisGroup& group, const Eigen::Index* begin, const Eigen::Index* end);
   void add_denominators(const LineSums& sums);
@@ -91,7 +94,7 @@ class ArrowSystem {
                    Channel& channel) const;
   void add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
                   Eigen::Index index, Channel& channel);
-  void eliminate(Channel& channel);
+  void eliminate(const std::vector<Channel*>& channels);  ///< in their order
   Eigen::VectorXd solve_schur(const Eigen::VectorXd& right_side, double damping,
                               const std::vector<Eigen::Index>& frozen) const;
 

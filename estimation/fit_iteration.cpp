@@ -89,12 +89,23 @@ class Iteration {
  private:
   bool begin() {
     bounds_.stabilize(beta_, beta_);
-    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, false);
-    if (!solve_numerators(problem_, groups, beta_.B, cost_))
+    const auto solve = [&] {
+      return solve_numerators(problem_, evaluate_groups(problem_, beta_, false), beta_.B, cost_);
+    };
+    bool solved = solve();
+    if ((!solved || nearly_exact()) && all_digits()) solved = solve();
+    if (!solved)
       return end(FitStatus::singular,
                  "the start's numerators are not determined: two modes coincide or the data do not "
                  "excite them");
     result_.cost.push_back(cost_);
+    return true;
+  }
+
+  /// From now on products are multiplied out. @returns false if they were
+  bool all_digits() {
+    if (problem_.multiplied_out || !sums_fractions_of_few(problem_)) return false;
+    problem_.multiplied_out = true;
     return true;
   }
 
@@ -156,10 +167,12 @@ class Iteration {
   bool descent_step() {
     // Without a residual the refined-IV equations are those of Gauss-Newton, at twice the price.
     const FitMethod method = nearly_exact() ? FitMethod::gn : options_.method;
+    if (nearly_exact()) all_digits();
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, method, kGlobalsOnly);
     if (!system.regular())
-      return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+      return all_digits() ||
+             end(FitStatus::singular, "the numerators are not determined: two modes coincide");
     if (at_optimum(system)) return false;
     const double before = cost_;
     const int tries = at_rounding() ? kTriesAtRounding : kTries;
@@ -171,7 +184,7 @@ class Iteration {
       const ArrowSystem gauss_newton(problem_, beta_, groups, FitMethod::gn, kGlobalsOnly);
       if (attempt(gauss_newton, tries)) return still_moving();
     }
-    return end_of_descent();
+    return all_digits() || end_of_descent();
   }
 
   /// Where no step lowers the cost, or none by a part of it that is worth one more.
@@ -250,7 +263,7 @@ class Iteration {
     return end(status, std::move(message));
   }
 
-  const FitProblem& problem_;
+  FitProblem problem_;
   FitParameters& beta_;
   const FitOptions& options_;
   PoleBounds bounds_;

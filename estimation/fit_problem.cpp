@@ -1,8 +1,10 @@
 #include "estimation/fit_problem.hpp"
 
-#include <atomic>
+#include <algorithm>
 #include <map>
-#include <thread>
+#include <utility>
+
+#include "estimation/parallel_tasks.hpp"
 
 namespace stageid {
 
@@ -40,13 +42,27 @@ Eigen::Index FitProblem::delays() const noexcept {
   return 0;
 }
 
+namespace {
+
+bool is_held(const FitProblem& problem, Eigen::Index parameter) {
+  return std::find(problem.held.begin(), problem.held.end(), parameter) != problem.held.end();
+}
+
+bool is_few(const FitProblem& problem, std::size_t channels) {
+  return static_cast<Eigen::Index>(channels) < kFewChannels &&
+         (problem.multiplied_out || problem.functions() < kManyFunctions);
+}
+
+}  // namespace
+
 std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem) {
   std::vector<DerivativeColumn> columns;
   Eigen::Index function = 0;
   Eigen::Index parameter = 0;
   for (const SubmodelShape& shape : problem.shapes) {
     for (int m = 0; m < shape.functions(); ++m)
-      for (int q = 0; q < shape.order; ++q) columns.push_back({function + m, parameter + q});
+      for (int q = 0; q < shape.order; ++q)
+        if (!is_held(problem, parameter + q)) columns.push_back({function + m, parameter + q});
     function += shape.functions();
     parameter += shape.order;
   }
@@ -80,6 +96,81 @@ FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
   return out;
 }
 
+bool sums_fractions_of_few(const FitProblem& problem) {
+  return problem.functions() >= kManyFunctions &&
+         (problem.channels() < kFewChannels || problem.delay == DelayModel::per_channel);
+}
+
+namespace {
+
+constexpr std::size_t kSubmodelsATask = 32;
+
+/// Where a submodel's columns begin.
+struct SubmodelPlace {
+  Eigen::Index function = 0;
+  Eigen::Index parameter = 0;
+  Eigen::Index derivative = 0;  // see DerivativeColumn
+};
+
+std::vector<SubmodelPlace> submodel_places(const FitProblem& problem) {
+  std::vector<SubmodelPlace> out;
+  SubmodelPlace next;
+  for (const SubmodelShape& shape : problem.shapes) {
+    out.push_back(next);
+    next.function += shape.functions();
+    for (int q = 0; q < shape.order; ++q, ++next.parameter)
+      if (!is_held(problem, next.parameter)) next.derivative += shape.functions();
+  }
+  return out;
+}
+
+void resize(const FitProblem& problem, WantedBasis wanted, BasisGroup& group) {
+  const auto set = [&](Eigen::Index columns, Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+    re.resize(problem.size(), columns);
+    im.resize(problem.size(), columns);
+  };
+  set(problem.functions(), group.F_re, group.F_im);
+  const auto derivatives = static_cast<Eigen::Index>(derivative_columns(problem).size());
+  if (wanted.gradient) set(derivatives, group.D_re, group.D_im);
+  if (wanted.delay) set(problem.functions(), group.T_re, group.T_im);
+}
+
+void evaluate_fractions(const FitProblem& problem, const LineOperator& through,
+                        const FitParameters& beta, bool derivatives, FractionColumns& out) {
+  out = fraction_columns(through, problem.lines.omega_rad_s.maxCoeff(), problem.shapes, beta.a,
+                         derivatives);
+  if (!derivatives) return;
+  const std::vector<FractionColumn> all = std::exchange(out.D, {});
+  std::size_t column = 0;
+  Eigen::Index parameter = 0;
+  for (const SubmodelShape& shape : problem.shapes) {
+    for (int m = 0; m < shape.functions(); ++m)
+      for (int q = 0; q < shape.order; ++q, ++column)
+        if (!is_held(problem, parameter + q)) out.D.push_back(all[column]);
+    parameter += shape.order;
+  }
+}
+
+void evaluate_submodel(const FitProblem& problem, const LineOperator& through,
+                       const FitParameters& beta, std::size_t i, const SubmodelPlace& place,
+                       WantedBasis wanted, SubmodelBasis& basis, BasisGroup& group) {
+  evaluate_basis(through, problem.shapes[i], beta.a[i], wanted, basis);
+  const Eigen::Index functions = basis.value.cols();
+  group.F_re.middleCols(place.function, functions) = basis.value.re;
+  group.F_im.middleCols(place.function, functions) = basis.value.im;
+  Eigen::Index d = place.derivative;
+  for (Eigen::Index c = 0; c < basis.gradient.cols(); ++c) {
+    if (is_held(problem, place.parameter + c % problem.shapes[i].order)) continue;
+    group.D_re.col(d) = basis.gradient.re.col(c);
+    group.D_im.col(d++) = basis.gradient.im.col(c);
+  }
+  if (!wanted.delay) return;
+  group.T_re.middleCols(place.function, functions) = basis.delay.re;
+  group.T_im.middleCols(place.function, functions) = basis.delay.im;
+}
+
+}  // namespace
+
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
                                         bool with_derivatives) {
   std::map<double, std::vector<Eigen::Index>> members;
@@ -96,61 +187,27 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
     groups.push_back(std::move(group));
   }
 
-  const Eigen::Index N = problem.size();
-  const auto n_d = static_cast<Eigen::Index>(derivative_columns(problem).size());
+  const WantedBasis wanted{with_derivatives, with_derivatives && problem.delays() > 0};
+  const std::vector<SubmodelPlace> places = submodel_places(problem);
+  std::vector<std::optional<LineOperator>> through(groups.size());
   parallel_tasks(static_cast<int>(groups.size()), problem.threads, [&](int g) {
-    BasisGroup& group = groups[static_cast<std::size_t>(g)];
-    const LineOperator through(problem.lines, group.delay_s);
-    if (static_cast<Eigen::Index>(group.channels.size()) >= kFewChannels)
-      group.fractions = fraction_columns(through, problem.lines.omega_rad_s.maxCoeff(),
-                                         problem.shapes, beta.a, with_derivatives);
-    const WantedBasis wanted{with_derivatives, with_derivatives && problem.delays() > 0};
-    group.F_re.resize(N, problem.functions());
-    group.F_im.resize(N, problem.functions());
-    if (wanted.gradient) {
-      group.D_re.resize(N, n_d);
-      group.D_im.resize(N, n_d);
-    }
-    if (wanted.delay) {
-      group.T_re.resize(N, problem.functions());
-      group.T_im.resize(N, problem.functions());
-    }
+    const auto at = static_cast<std::size_t>(g);
+    BasisGroup& group = groups[at];
+    through[at].emplace(problem.lines, group.delay_s);
+    group.few = is_few(problem, group.channels.size());
+    resize(problem, wanted, group);
+    if (!group.few)
+      evaluate_fractions(problem, *through[at], beta, with_derivatives, group.fractions);
+  });
+  const std::size_t parts = (places.size() + kSubmodelsATask - 1) / kSubmodelsATask;
+  parallel_tasks(static_cast<int>(groups.size() * parts), problem.threads, [&](int task) {
+    const std::size_t g = static_cast<std::size_t>(task) / parts;
+    const std::size_t first = static_cast<std::size_t>(task) % parts * kSubmodelsATask;
     SubmodelBasis basis;
-    Eigen::Index f = 0;
-    Eigen::Index d = 0;
-    for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
-      evaluate_basis(through, problem.shapes[i], beta.a[i], wanted, basis);
-      const Eigen::Index functions = basis.value.cols();
-      group.F_re.middleCols(f, functions) = basis.value.re;
-      group.F_im.middleCols(f, functions) = basis.value.im;
-      const Eigen::Index gradients = basis.gradient.cols();
-      if (gradients > 0) {
-        group.D_re.middleCols(d, gradients) = basis.gradient.re;
-        group.D_im.middleCols(d, gradients) = basis.gradient.im;
-      }
-      if (wanted.delay) {
-        group.T_re.middleCols(f, functions) = basis.delay.re;
-        group.T_im.middleCols(f, functions) = basis.delay.im;
-      }
-      f += functions;
-      d += gradients;
-    }
+    for (std::size_t i = first; i < std::min(places.size(), first + kSubmodelsATask); ++i)
+      evaluate_submodel(problem, *through[g], beta, i, places[i], wanted, basis, groups[g]);
   });
   return groups;
-}
-
-void parallel_tasks(int count, int threads, const std::function<void(int)>& task) {
-  if (threads <= 1 || count <= 1) {
-    for (int i = 0; i < count; ++i) task(i);
-    return;
-  }
-  std::atomic<int> next{0};
-  const auto work = [&] {
-    for (int i = next++; i < count; i = next++) task(i);
-  };
-  std::vector<std::jthread> helpers;
-  for (int t = 1; t < std::min(threads, count); ++t) helpers.emplace_back(work);
-  work();
 }
 
 }  // namespace stageid

@@ -39,6 +39,7 @@ struct FitProblem {
   std::vector<SubmodelRole> roles;  ///< one a submodel; empty: all searched
   std::vector<Eigen::Index> held;   ///< globals that are known and stay
   DelayModel delay = DelayModel::fixed;
+  bool multiplied_out = false;  ///< no sums of fractions for few channels: all digits, more time
   int threads = 1;
 
   Eigen::Index channels() const noexcept { return G->rows(); }
@@ -59,8 +60,9 @@ struct FitParameters {
   Eigen::MatrixXd B;               ///< n_c x n_f
 };
 
-/// Groups of fewer channels: what channels share costs more than it saves.
+/// Groups of fewer channels: what channels share costs more than it saves, unless functions are many.
 constexpr Eigen::Index kFewChannels = 16;
+constexpr Eigen::Index kManyFunctions = 64;
 
 /// Channels that share one delay, and the functions that they see.
 struct BasisGroup {
@@ -72,10 +74,11 @@ struct BasisGroup {
   Eigen::MatrixXd D_im;
   Eigen::MatrixXd T_re;  ///< N x n_f: derivative to the delay; empty unless delays are free
   Eigen::MatrixXd T_im;
-  FractionColumns fractions;  ///< of groups of kFewChannels and more
+  bool few = false;           ///< every channel's products are multiplied out by themselves
+  FractionColumns fractions;  ///< unless few
 };
 
-/// What column of D belongs to what: dF_function / da_parameter.
+/// What column of D belongs to what: dF_function / da_parameter, for the parameters that are not held.
 struct DerivativeColumn {
   Eigen::Index function;
   Eigen::Index parameter;
@@ -88,6 +91,9 @@ std::vector<Eigen::Index> delay_parameters(const FitProblem& problem, Eigen::Ind
 /// `beta` after a step of the globals; numerators stay.
 FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
                       const Eigen::Ref<const Eigen::VectorXd>& step);
+
+/// Whether some channels are few but their functions many, so that multiplied_out makes a difference.
+bool sums_fractions_of_few(const FitProblem& problem);
 
 /// Evaluates the functions of every group of channels at the parameters.
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
@@ -102,9 +108,5 @@ SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOpti
 /// variance that is itself an estimate: weight and variance come from the same sample. None where
 /// variances do not weigh, or are exact (their degrees of freedom unknown). `frf` must outlive it.
 std::optional<LineVariance> weighed_variance(const FrfEstimate& frf, Weighting weighting);
-
-/// Runs task(0) .. task(count - 1) on up to `threads` threads. Which thread runs a task does not
-/// matter to the result.
-void parallel_tasks(int count, int threads, const std::function<void(int)>& task);
 
 }  // namespace stageid

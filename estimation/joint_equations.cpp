@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "estimation/parallel_tasks.hpp"
 #include "estimation/weighted_products.hpp"
 
 namespace stageid {

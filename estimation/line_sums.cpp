@@ -190,18 +190,17 @@ class Share {
 
 /// What was left to fractions goes where it belongs.
 void expand(const GroupProducts& products, const std::vector<DerivativeColumn>& columns,
-            const Eigen::MatrixXd& B, LineSums& sums) {
-  sums.FF = products.FF.expand(sums.S, sums.FF);
-  sums.FD = products.FD.expand(sums.S, sums.FD);
-  if (sums.FY.cols() > 0) sums.FY = products.FY.expand(sums.S_re, sums.S_im, sums.FY);
-  const std::vector<ColumnPair>& pairs = products.DD.pairs();
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
-    if (!products.DD.is_reduced(p)) continue;
-    const auto [l, r] = pairs[p];
+            const Eigen::MatrixXd& B, int threads, LineSums& sums) {
+  sums.FF = products.FF.expand(sums.S, sums.FF, threads);
+  sums.FD = products.FD.expand(sums.S, sums.FD, threads);
+  if (sums.FY.cols() > 0) sums.FY = products.FY.expand(sums.S_re, sums.S_im, sums.FY, threads);
+  products.DD.for_each_pair(threads, [&](std::size_t p) {
+    if (!products.DD.is_reduced(p)) return;
+    const auto [l, r] = products.DD.pairs()[p];
     const auto left = B.col(columns[static_cast<std::size_t>(l)].function);
     const auto right = B.col(columns[static_cast<std::size_t>(r)].function);
-    sums.DD(l, r) += products.DD.sum(p, sums.S).dot(left.cwiseProduct(right));
-  }
+    sums.DD(l, r) += products.DD.weighted_sum(p, sums.S, left.cwiseProduct(right));
+  });
 }
 
 }  // namespace
@@ -275,7 +274,7 @@ LineSums line_sums(const FitProblem& problem, const BasisGroup& group,
   LineSums sums = sum_over_shares<LineSums>(block, problem.threads, [&](const TileRange& share) {
     return Share(problem, group, products, B, columns, Y, method, share).run();
   });
-  expand(products, columns, B, sums);
+  expand(products, columns, B, problem.threads, sums);
   return sums;
 }
 

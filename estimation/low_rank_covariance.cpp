@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "estimation/parallel_tasks.hpp"
+
 namespace stageid {
 namespace {
 

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <cmath>
 
+#include "estimation/parallel_tasks.hpp"
 #include "estimation/weighted_products.hpp"
 
 namespace stageid {
@@ -93,7 +94,7 @@ PairReduction function_pairs(const FitProblem& problem, const BasisGroup& group)
 
 GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
                    const TileRange& block) {
-  const bool few = block.members < kFewChannels;
+  const bool few = group.few;
   const Eigen::Index base = few ? 0 : group.fractions.simple_columns();
   const ComplexColumns F{group.F_re, group.F_im};
   GramSums all = sum_over_shares<GramSums>(block, problem.threads, [&](const TileRange& share) {
@@ -117,7 +118,7 @@ GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const Pai
     if (few) own.pack(sums.FF);
     return sums;
   });
-  if (!few) all.FF = pairs.expand(all.S, all.FF);
+  if (!few) all.FF = pairs.expand(all.S, all.FF, problem.threads);
   return all;
 }
 

@@ -57,119 +57,142 @@ void add_sampled(Complex l, Complex m, const std::array<Complex, 2>& of_left,
 /// The order of the fractions in a column.
 int order(const FractionColumn& column) { return column.squared == 0.0 ? 1 : 2; }
 
-/// How many times larger than the product the terms of its sum become, at the highest line.
-double loss(const FractionColumns& columns, const FractionColumn& left,
-            const FractionColumn& right) {
-  const Complex l = columns.lambda[static_cast<std::size_t>(left.pair)];
-  const Complex r = columns.lambda[static_cast<std::size_t>(right.pair)];
-  const double nearest = std::min(std::abs(l + r), std::abs(l + std::conj(r)));
-  const auto beyond = [&](double rad_s) { return std::max(1.0, columns.highest_rad_s / rad_s); };
-  return beyond(std::abs(l)) * beyond(std::abs(r)) *
-         std::pow(beyond(nearest), order(left) + order(right) - 1);
-}
+/// Up to which order(left) + order(right) products of the fractions of two pairs of poles are made sums: how many
+/// times larger than the product its terms become at the highest line grows with it.
+class LargestOrders {
+ public:
+  explicit LargestOrders(const FractionColumns& columns)
+      : orders_(columns.pairs(), columns.pairs()) {
+    const double highest = columns.highest_rad_s * columns.highest_rad_s;
+    const auto beyond = [&](Complex rad_s) { return std::max(1.0, highest / std::norm(rad_s)); };
+    for (Eigen::Index i = 0; i < orders_.rows(); ++i)
+      for (Eigen::Index j = 0; j <= i; ++j) {
+        const Complex l = columns.lambda[static_cast<std::size_t>(i)];
+        const Complex r = columns.lambda[static_cast<std::size_t>(j)];
+        const double nearest = std::max(beyond(l + r), beyond(l + std::conj(r)));
+        double squared_loss = beyond(l) * beyond(r);
+        int order = 1;
+        for (; order < 4 && squared_loss * nearest <= kLargestLoss * kLargestLoss; ++order)
+          squared_loss *= nearest;
+        orders_(i, j) = orders_(j, i) = order;
+      }
+  }
+
+  bool allow(const FractionColumn& left, const FractionColumn& right) const {
+    return order(left) + order(right) <= orders_(left.pair, right.pair);
+  }
+
+ private:
+  Eigen::MatrixXi orders_;
+};
 
 }  // namespace
+
+/// A pair's product in columns of the base.
+struct PairReduction::Terms {
+  struct Term {
+    Eigen::Index column;
+    Complex factor;
+  };
+  std::array<Term, 17> all;  // a constant; q and p of both pairs of poles, and their squares
+  std::size_t count = 0;
+
+  void add(Eigen::Index column, Complex factor) { all[count++] = {column, factor}; }
+  const Term* begin() const { return all.data(); }
+  const Term* end() const { return all.data() + count; }
+};
 
 PairReduction::PairReduction(const FractionColumns& columns,
                              const std::vector<FractionColumn>& left,
                              const std::vector<FractionColumn>& right,
                              std::vector<ColumnPair> pairs)
-    : pairs_(std::move(pairs)) {
-  const Eigen::Index squares = columns.simple_columns() - 1;
-  begin_.reserve(pairs_.size() + 1);
-  begin_.push_back(0);
-  for (const ColumnPair& pair : pairs_) {
-    const FractionColumn* X = nullptr;
-    const FractionColumn* Y = nullptr;
+    : columns_(&columns), left_(&left), right_(&right), pairs_(std::move(pairs)) {
+  place_.assign(pairs_.size(), -1);
+  const LargestOrders orders(columns);
+  for (std::size_t p = 0; p < pairs_.size(); ++p) {
     if (columns.pairs() > 0) {
-      X = &left[static_cast<std::size_t>(pair.left)];
-      Y = &right[static_cast<std::size_t>(pair.right)];
+      const FractionColumn& X = left[static_cast<std::size_t>(pairs_[p].left)];
+      const FractionColumn& Y = right[static_cast<std::size_t>(pairs_[p].right)];
+      if (X.pair >= 0 && Y.pair >= 0 && orders.allow(X, Y)) continue;
     }
-    if (X == nullptr || X->pair < 0 || Y->pair < 0 || loss(columns, *X, *Y) > kLargestLoss) {
-      direct_.push_back(pair);
-      begin_.push_back(terms_.size());
-      continue;
-    }
-    // Times q: Re and Im of the base; times conj(q): the latter's sign is the other.
-    const auto add = [&](Eigen::Index column, Complex factor, double sign) {
-      terms_.push_back({column, factor});
-      terms_.push_back({column + 1, Complex(0.0, sign) * factor});
-    };
-    double one = X->constant * Y->constant;
-    std::array<std::array<Complex, 2>, 2> of_X = {};  // [which of the pair][order]
-    std::array<std::array<Complex, 2>, 2> of_Y = {};
-    for (std::size_t i = 0; i < 2; ++i) {
-      const auto taken = [&](Complex c, bool conjugate) { return conjugate ? std::conj(c) : c; };
-      // conj(X): its coefficients are conjugated too.
-      const std::array<Complex, 2> x = {taken(X->simple, i == 0), taken(X->squared, i == 0)};
-      const Complex m = taken(columns.place[static_cast<std::size_t>(X->pair)], i == 0);
-      for (std::size_t o = 0; o < 2; ++o) of_X[i][o] += Y->constant * x[o];
-      for (std::size_t j = 0; j < 2; ++j) {
-        const std::array<Complex, 2> y = {taken(Y->simple, j == 1), taken(Y->squared, j == 1)};
-        const Complex l = taken(columns.place[static_cast<std::size_t>(Y->pair)], j == 1);
-        if (i == 0)
-          for (std::size_t o = 0; o < 2; ++o) of_Y[j][o] += X->constant * y[o];
-        Product product;
-        if (columns.exact)
-          add_sampled(l, m, x, y, product);
-        else
-          add_continuous(l, m, x, y, product);
-        one += product.one.real();
-        for (std::size_t o = 0; o < 2; ++o) {
-          of_X[i][o] += product.left[o];
-          of_Y[j][o] += product.right[o];
-        }
-      }
-    }
-    terms_.push_back({0, one});
-    for (Eigen::Index o = 0; o < 2; ++o)
-      for (Eigen::Index i = 0; i < 2; ++i) {
-        const auto at = [&](const auto& c) {
-          return c[static_cast<std::size_t>(i)][static_cast<std::size_t>(o)];
-        };
-        const Eigen::Index offset = 1 + 2 * i + o * squares;
-        if (o == 0 || X->squared != 0.0) add(offset + 4 * X->pair, at(of_X), -1.0);
-        if (o == 0 || Y->squared != 0.0) add(offset + 4 * Y->pair, at(of_Y), 1.0);
-      }
-    begin_.push_back(terms_.size());
+    place_[p] = static_cast<Eigen::Index>(direct_.size());
+    direct_.push_back(pairs_[p]);
   }
 }
 
-Eigen::VectorXd PairReduction::sum(std::size_t pair, const Eigen::MatrixXd& S) const {
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(S.rows());
-  for (std::size_t t = begin_[pair]; t < begin_[pair + 1]; ++t)
-    out += terms_[t].factor.real() * S.col(terms_[t].column);
+PairReduction::Terms PairReduction::terms(std::size_t pair) const {
+  const FractionColumn& X = (*left_)[static_cast<std::size_t>(pairs_[pair].left)];
+  const FractionColumn& Y = (*right_)[static_cast<std::size_t>(pairs_[pair].right)];
+  // conj(X): its coefficients are conjugated too.
+  const std::array<Complex, 2> x = {std::conj(X.simple), std::conj(X.squared)};
+  const std::array<Complex, 2> y = {Y.simple, Y.squared};
+  const std::array<Complex, 2> y_conj = {std::conj(Y.simple), std::conj(Y.squared)};
+  const Complex m = std::conj(columns_->place[static_cast<std::size_t>(X.pair)]);
+  const Complex l = columns_->place[static_cast<std::size_t>(Y.pair)];
+  // Of the four products of a pole of X and one of Y, two are the conjugates of these.
+  Product with_l;
+  Product with_conj;
+  const auto add = columns_->exact ? add_sampled : add_continuous;
+  add(l, m, x, y, with_l);
+  add(std::conj(l), m, x, y_conj, with_conj);
+
+  Terms out;
+  out.add(0, X.constant * Y.constant + 2.0 * (with_l.one + with_conj.one).real());
+  const Eigen::Index squares = columns_->simple_columns() - 1;
+  // Times q: Re and Im of the base; times conj(q): the latter's sign is the other.
+  const auto add_pair = [&](Eigen::Index column, Complex factor, double sign) {
+    out.add(column, factor);
+    out.add(column + 1, Complex(0.0, sign) * factor);
+    out.add(column + 2, std::conj(factor));
+    out.add(column + 3, Complex(0.0, sign) * std::conj(factor));
+  };
+  for (std::size_t o = 0; o < 2; ++o) {
+    const Eigen::Index first = 1 + static_cast<Eigen::Index>(o) * squares;
+    if (o == 0 || X.squared != 0.0)
+      add_pair(first + 4 * X.pair, Y.constant * x[o] + with_l.left[o] + with_conj.left[o], -1.0);
+    if (o == 0 || Y.squared != 0.0)
+      add_pair(first + 4 * Y.pair,
+               X.constant * y[o] + with_l.right[o] + std::conj(with_conj.right[o]), 1.0);
+  }
+  return out;
+}
+
+double PairReduction::weighted_sum(std::size_t pair, const Eigen::MatrixXd& S,
+                                   const Eigen::Ref<const Eigen::VectorXd>& factor) const {
+  double out = 0.0;
+  for (const Terms::Term& term : terms(pair))
+    out += term.factor.real() * S.col(term.column).dot(factor);
   return out;
 }
 
 template <typename Row>
-Eigen::MatrixXd PairReduction::expand_rows(const Eigen::MatrixXd& direct, Eigen::Index members,
+Eigen::MatrixXd PairReduction::expand_rows(const Eigen::MatrixXd& direct, int threads,
                                            Row&& row) const {
-  Eigen::MatrixXd out(members, static_cast<Eigen::Index>(pairs_.size()));
-  Eigen::Index next = 0;
-  for (std::size_t p = 0; p < pairs_.size(); ++p) {
-    const auto column = static_cast<Eigen::Index>(p);
+  Eigen::MatrixXd out(direct.cols(), static_cast<Eigen::Index>(pairs_.size()));
+  for_each_pair(threads, [&](std::size_t p) {
+    auto to = out.col(static_cast<Eigen::Index>(p));
     if (is_reduced(p))
-      out.col(column) = row(p);
+      row(p, to);
     else
-      out.col(column) = direct.row(next++).transpose();
-  }
+      to = direct.row(place_[p]).transpose();
+  });
   return out.transpose();
 }
 
-Eigen::MatrixXd PairReduction::expand(const Eigen::MatrixXd& S,
-                                      const Eigen::MatrixXd& direct) const {
-  return expand_rows(direct, direct.cols(), [&](std::size_t p) { return sum(p, S); });
+Eigen::MatrixXd PairReduction::expand(const Eigen::MatrixXd& S, const Eigen::MatrixXd& direct,
+                                      int threads) const {
+  return expand_rows(direct, threads, [&](std::size_t p, auto out) {
+    out.setZero();
+    for (const auto& [column, factor] : terms(p)) out += factor.real() * S.col(column);
+  });
 }
 
 Eigen::MatrixXd PairReduction::expand(const Eigen::MatrixXd& S_re, const Eigen::MatrixXd& S_im,
-                                      const Eigen::MatrixXd& direct) const {
-  return expand_rows(direct, direct.cols(), [&](std::size_t p) {
-    Eigen::VectorXd out = Eigen::VectorXd::Zero(S_re.rows());
-    for (std::size_t t = begin_[p]; t < begin_[p + 1]; ++t)
-      out += terms_[t].factor.real() * S_re.col(terms_[t].column) -
-             terms_[t].factor.imag() * S_im.col(terms_[t].column);
-    return out;
+                                      const Eigen::MatrixXd& direct, int threads) const {
+  return expand_rows(direct, threads, [&](std::size_t p, auto out) {
+    out.setZero();
+    for (const auto& [column, factor] : terms(p))
+      out += factor.real() * S_re.col(column) - factor.imag() * S_im.col(column);
   });
 }
 

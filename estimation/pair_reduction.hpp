@@ -1,10 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <complex>
+#include <algorithm>
 #include <vector>
 
 #include "estimation/fraction_columns.hpp"
+#include "estimation/parallel_tasks.hpp"
 
 namespace stageid {
 
@@ -25,37 +26,54 @@ struct ColumnPair {
 /// cancel; such pairs, and columns that are no fractions, remain to be multiplied out.
 class PairReduction {
  public:
-  /// @param left, right columns of `columns` that the pairs index
+  /// @param left, right columns of `columns` that the pairs index; all three must outlive this
   PairReduction(const FractionColumns& columns, const std::vector<FractionColumn>& left,
                 const std::vector<FractionColumn>& right, std::vector<ColumnPair> pairs);
 
   const std::vector<ColumnPair>& pairs() const noexcept { return pairs_; }
-  bool is_reduced(std::size_t pair) const noexcept { return begin_[pair] != begin_[pair + 1]; }
+  bool is_reduced(std::size_t pair) const noexcept { return place_[pair] < 0; }
   /// Those to multiply out, in their order.
   const std::vector<ColumnPair>& direct() const noexcept { return direct_; }
 
-  /// One pair's sums, a value a channel. @param S members x base columns: sum_k V(c, k) |first|^2 base(k)
-  Eigen::VectorXd sum(std::size_t pair, const Eigen::MatrixXd& S) const;
-
-  /// All pairs' sums, pairs x members. @param direct the direct pairs' sums, likewise
-  Eigen::MatrixXd expand(const Eigen::MatrixXd& S, const Eigen::MatrixXd& direct) const;
+  /// All pairs' sums, pairs x members.
+  /// @param S members x base columns: sum_k V(c, k) |first|^2 base(k)
+  /// @param direct the direct pairs' sums, pairs x members
+  Eigen::MatrixXd expand(const Eigen::MatrixXd& S, const Eigen::MatrixXd& direct,
+                         int threads) const;
   /// The same for complex V, sum_k Re{conj(X) Y V}; S is sum_k V conj(first) base(k) for columns Y
   /// without `first`.
   Eigen::MatrixXd expand(const Eigen::MatrixXd& S_re, const Eigen::MatrixXd& S_im,
-                         const Eigen::MatrixXd& direct) const;
+                         const Eigen::MatrixXd& direct, int threads) const;
+
+  /// Of a reduced pair, the sum over the channels of `factor` times its sums.
+  double weighted_sum(std::size_t pair, const Eigen::MatrixXd& S,
+                      const Eigen::Ref<const Eigen::VectorXd>& factor) const;
+
+  /// Calls task(pair) for all pairs on up to `threads` threads.
+  template <typename Task>
+  void for_each_pair(int threads, Task&& task) const;
 
  private:
-  struct Term {
-    Eigen::Index column;  // of the base
-    std::complex<double> factor;
-  };
+  struct Terms;
+  Terms terms(std::size_t pair) const;
   template <typename Row>
-  Eigen::MatrixXd expand_rows(const Eigen::MatrixXd& direct, Eigen::Index members, Row&& row) const;
+  Eigen::MatrixXd expand_rows(const Eigen::MatrixXd& direct, int threads, Row&& row) const;
 
+  const FractionColumns* columns_;
+  const std::vector<FractionColumn>* left_;
+  const std::vector<FractionColumn>* right_;
   std::vector<ColumnPair> pairs_;
   std::vector<ColumnPair> direct_;
-  std::vector<std::size_t> begin_;  // of a pair's terms; none: direct
-  std::vector<Term> terms_;
+  std::vector<Eigen::Index> place_;  // of a pair in direct_; -1: reduced
 };
+
+template <typename Task>
+void PairReduction::for_each_pair(int threads, Task&& task) const {
+  constexpr std::size_t kAtOnce = 4096;
+  parallel_tasks(static_cast<int>((pairs_.size() + kAtOnce - 1) / kAtOnce), threads, [&](int part) {
+    const std::size_t first = static_cast<std::size_t>(part) * kAtOnce;
+    for (std::size_t p = first; p < std::min(pairs_.size(), first + kAtOnce); ++p) task(p);
+  });
+}
 
 }  // namespace stageid

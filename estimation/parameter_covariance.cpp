@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 
+#include "estimation/parallel_tasks.hpp"
 #include "estimation/weighted_products.hpp"
 
 namespace stageid {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/parallel_tasks.hpp"
+
 namespace stageid {
 namespace {
 

@@ -7,6 +7,7 @@
 
 #include "estimation/basis.hpp"
 #include "estimation/fit_problem.hpp"
+#include "estimation/parallel_tasks.hpp"
 
 namespace stageid {
 namespace {

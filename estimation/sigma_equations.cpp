@@ -9,6 +9,7 @@
 
 #include "estimation/fit_problem.hpp"
 #include "estimation/fraction_gram.hpp"
+#include "estimation/parallel_tasks.hpp"
 
 namespace stageid {
 namespace {

@@ -6,6 +6,7 @@
 #include <new>
 #include <stdexcept>
 
+#include "estimation/freed_memory.hpp"
 #include "excitation/file_error.hpp"
 #include "hal/stage.hpp"
 #include "tools/exit_code.hpp"
@@ -21,6 +22,7 @@ int report(const std::exception& error, int exit_code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  stageid::keep_freed_memory();
   try {
     return stageid::run_program(argc, argv);
   } catch (const stageid::Interrupted& error) {

@@ -10,6 +10,7 @@
 #include "estimation/arrow_system.hpp"
 #include "estimation/automatic_fit.hpp"
 #include "estimation/channel_equations.hpp"
+#include "estimation/freed_memory.hpp"
 #include "estimation/numerators.hpp"
 #include "tests/support/random_stage.hpp"
 
@@ -274,4 +275,8 @@ BENCHMARK(large_fit)
 
 }  // namespace
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  stageid::keep_freed_memory();
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+}

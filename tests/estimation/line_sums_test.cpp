@@ -113,7 +113,10 @@ TEST(LineSums, NumeratorsOfManyChannelsAreThoseOfEachAlone) {
   EXPECT_NEAR(cost, residual(fit, groups, together).cost, 1e-12 * cost);
   const std::vector<Eigen::Index> all = groups[0].channels;
   groups.assign(all.size(), groups[0]);
-  for (std::size_t c = 0; c < all.size(); ++c) groups[c].channels = {all[c]};
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    groups[c].channels = {all[c]};
+    groups[c].few = true;
+  }
   Eigen::MatrixXd alone;
   double cost_alone = 0.0;
   ASSERT_TRUE(solve_numerators(fit, groups, alone, cost_alone));

@@ -129,7 +129,8 @@ class ReductionTest : public testing::Test {
     Eigen::MatrixXd direct =
         Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(reduction.direct().size()), W.rows());
     add_pair_sums(W, left_columns, right_columns, reduction.direct(), 0, direct);
-    const Eigen::MatrixXd sums = reduction.expand(W * size.asDiagonal() * fractions.base, direct);
+    const Eigen::MatrixXd sums =
+        reduction.expand(W * size.asDiagonal() * fractions.base, direct, 2);
     Eigen::MatrixXd wanted =
         Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pairs.size()), W.rows());
     add_pair_sums(W, left_columns, right_columns, pairs, 0, wanted);
@@ -193,8 +194,9 @@ TEST_F(ReductionTest, WithComplexWeightsToo) {
     const Eigen::MatrixXd S_re = (V_re * re + V_im * im) * base;
     const Eigen::MatrixXd S_im = (V_im * re - V_re * im) * base;
     const Eigen::MatrixXd size = V_re.cwiseAbs2() + V_im.cwiseAbs2();
-    expect_close(pairs, sums_of(pairs), reduction.expand(S_re, S_im, sums_of(reduction.direct())),
-                 size.cwiseSqrt(), F, Y);
+    expect_close(pairs, sums_of(pairs),
+                 reduction.expand(S_re, S_im, sums_of(reduction.direct()), 2), size.cwiseSqrt(), F,
+                 Y);
   }
 }
 
