@@ -17,6 +17,7 @@ constexpr double kSemidefinite = -1e-10;  // rounding of the smallest eigenvalue
 constexpr double kSmallestPivot = 1e-12;  // of a correlation matrix
 
 [[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument(what); }
+[[noreturn]] void refuse_indefinite(const std::string& what) { throw IndefiniteWeights(what); }
 
 std::string line_name(const FrfEstimate& frf, Eigen::Index k) {
   return fmt::format("line {} ({} Hz)", k, frf.frequency_hz[k]);
@@ -46,8 +47,9 @@ Eigen::MatrixXcd inverse_or_refuse(const FrfEstimate& frf, const Eigen::MatrixXc
   Eigen::MatrixXcd inverse;
   if (is_hermitian(M)) inverse = definite_inverse(M);
   if (inverse.size() == 0)
-    refuse(fmt::format("weighting likelihood: {} of {} is not Hermitian and positive definite; {}",
-                       name, line_name(frf, k), remedy));
+    refuse_indefinite(
+        fmt::format("weighting likelihood: {} of {} is not Hermitian and positive definite; {}",
+                    name, line_name(frf, k), remedy));
   return inverse;
 }
 
@@ -65,7 +67,7 @@ void require_factors(const FrfEstimate& frf) {
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
     for (Eigen::Index y = 0; y < n_y; ++y)
       if (!(frf.residual_covariance_re(y * (n_y + 1), k) > 0.0))
-        refuse(
+        refuse_indefinite(
             fmt::format("weighting likelihood: residual_covariance of {} on {} is not positive; "
                         "leave the output out",
                         frf.outputs.names[static_cast<std::size_t>(y)], line_name(frf, k)));
@@ -145,7 +147,7 @@ WeightMatrices WeightMatrices::user(const FrfEstimate& frf, const Eigen::MatrixX
                       line_name(frf, k)));
     const Eigen::MatrixXcd inverse = definite_inverse(W_k);
     if (inverse.size() == 0 && !is_semidefinite(W_k))
-      refuse(
+      refuse_indefinite(
           fmt::format("weight matrix of {}: not positive semidefinite; the cost would have no "
                       "minimum",
                       line_name(frf, k)));

@@ -2,11 +2,19 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <stdexcept>
 
 #include "estimation/fit_options.hpp"
 #include "frf/frf_estimate.hpp"
 
 namespace stageid {
+
+/// Weights that are not positive definite, so that the cost has no minimum: the data (or whoever weighs
+/// them) are at fault, not the request. The program then ends with exit code 3 and writes nothing.
+class IndefiniteWeights : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
 
 /// Hermitian weights W_k, n_c x n_c on every line, of the cost 1/(2N) sum vec(E)^H W_k vec(E), kept
 /// as they came: whole, or as the two factors of a likelihood,
@@ -17,13 +25,14 @@ class WeightMatrices {
   /// From residual_covariance and input_factor. C_E is smoothed over neighbouring lines until it has
   /// enough degrees of freedom nu for an inverse, and the inverse of a complex Wishart matrix is
   /// corrected: E{C_hat^-1} = nu / (nu - n_y) C^-1.
-  /// @throws std::invalid_argument if one of them is missing or not positive definite (naming the
-  /// line), or the whole band has too few degrees of freedom.
+  /// @throws std::invalid_argument if one of them is missing or the whole band has too few degrees of
+  /// freedom; IndefiniteWeights (naming the line) if one is not positive definite.
   static WeightMatrices likelihood(const FrfEstimate& frf);
 
   /// The user's own: (n_c n_c) x N, column k = vec(W_k).
   /// @throws std::invalid_argument if they do not belong to the response, are too large for memory,
-  /// or (naming the line) not finite, not Hermitian or not positive semidefinite.
+  /// or (naming the line) not finite or not Hermitian; IndefiniteWeights (naming the line) if not
+  /// positive semidefinite.
   static WeightMatrices user(const FrfEstimate& frf, const Eigen::MatrixXcd& W);
 
   /// Column j of `tile` (n_c x lines) becomes W_k times it, k = first + j.

@@ -197,9 +197,10 @@ SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOpti
   if (W.rows() != frf.response.rows() || W.cols() != frf.response.cols())
     throw std::invalid_argument(
         "user weights: the shape differs from that of the response in the band");
-  if (!W.allFinite() || W.minCoeff() < 0.0 || !(W.maxCoeff() > 0.0))
-    throw std::invalid_argument(
-        "user weights: every weight must be finite and not negative, and one positive");
+  if (W.allFinite() && W.minCoeff() < 0.0)
+    throw IndefiniteWeights("user weights: one is negative; the cost would have no minimum");
+  if (!W.allFinite() || !(W.maxCoeff() > 0.0))
+    throw std::invalid_argument("user weights: every weight must be finite, and one positive");
   return options.user_weights;
 }
 

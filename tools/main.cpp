@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "estimation/freed_memory.hpp"
+#include "estimation/weight_matrices.hpp"
 #include "excitation/file_error.hpp"
 #include "hal/stage.hpp"
 #include "tools/exit_code.hpp"
@@ -35,6 +36,8 @@ int main(int argc, char** argv) {
     return report(error, stageid::kWorldFailed);
   } catch (const std::filesystem::filesystem_error& error) {
     return report(error, stageid::kWorldFailed);
+  } catch (const stageid::IndefiniteWeights& error) {
+    return report(error, stageid::kNotTrustworthy);
   } catch (const std::invalid_argument& error) {
     return report(error, stageid::kRequestWrong);
   } catch (const std::bad_alloc&) {

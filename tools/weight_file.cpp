@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "estimation/weight_matrices.hpp"
@@ -25,6 +26,10 @@ void require_shape(const Hdf5File& file, const char* dataset, const std::vector<
                                 fmt::join(shape, " x "), fmt::join(wanted, " x ")));
 }
 
+IndefiniteWeights indefinite(const Hdf5File& file, const char* dataset, const std::string& what) {
+  return IndefiniteWeights(fmt::format("{}: {}: {}", file.path().string(), dataset, what));
+}
+
 void read_diagonals(const Hdf5File& file, const FrfEstimate& frf, Eigen::MatrixXd& weights) {
   require_shape(file, kDiagonals,
                 {static_cast<hsize_t>(frf.lines()), static_cast<hsize_t>(frf.n_outputs()),
@@ -35,9 +40,12 @@ void read_diagonals(const Hdf5File& file, const FrfEstimate& frf, Eigen::MatrixX
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
     for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
       for (Eigen::Index j = 0; j < frf.n_inputs(); ++j, ++at) {
-        if (!std::isfinite(values[at]) || values[at] < 0.0)
+        if (!std::isfinite(values[at]))
           throw FormatError(file.path(), kDiagonals,
-                            fmt::format("line {}: {}; weights are 0 or more", k, values[at]));
+                            fmt::format("line {}: {}; weights are finite", k, values[at]));
+        if (values[at] < 0.0)
+          throw indefinite(file, kDiagonals,
+                           fmt::format("line {}: {}; weights are 0 or more", k, values[at]));
         weights(i + frf.n_outputs() * j, k) = values[at];
       }
 }
@@ -56,6 +64,8 @@ void read_matrices(const Hdf5File& file, const FrfEstimate& frf, Eigen::MatrixXc
       matrices.col(k) =
           Eigen::Map<const Eigen::VectorXcd>(values.data() + k * n_c * n_c, n_c * n_c).conjugate();
     (void)WeightMatrices::user(frf, matrices);
+  } catch (const IndefiniteWeights& error) {
+    throw indefinite(file, kMatrices, error.what());
   } catch (const std::invalid_argument& error) {
     throw FormatError(file.path(), kMatrices, error.what());
   }

@@ -9,8 +9,9 @@ namespace stageid {
 
 /// Reads the weights of docs/formats.md, on the lines of the band, into `options`:
 /// /weights [N x n_y x n_u], or /weight_matrices [N x n_c x n_c] complex.
-/// @throws FileError, FormatError: shape, a weight that is negative, a matrix that is not Hermitian and
-///         positive semidefinite, both datasets or none; too large for memory, before it is read.
+/// @throws FileError; FormatError: shape, not finite, a matrix that is not Hermitian, both datasets or
+///         none, too large for memory, before it is read; IndefiniteWeights: a weight that is negative, a
+///         matrix that is not positive semidefinite.
 void read_weights(const std::filesystem::path& file, const FrfEstimate& frf, FitOptions& options);
 
 }  // namespace stageid

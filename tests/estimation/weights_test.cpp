@@ -180,11 +180,13 @@ TEST_F(WeightRefusal, UsersWeightsOfAnotherShapeOrThatAreNone) {
   expect_refused("shape");
   options_.user_weights = Eigen::MatrixXd(Eigen::MatrixXd::Ones(3, 4));
   expect_refused("shape");
-  for (const double wrong : {-1.0, std::nan(""), HUGE_VAL}) {
+  for (const auto& [wrong, reason] :
+       {std::pair{-1.0, "negative"}, std::pair{std::nan(""), "finite"},
+        std::pair{HUGE_VAL, "finite"}}) {
     Eigen::MatrixXd weights = Eigen::MatrixXd::Ones(4, 3);
     weights(0, 0) = wrong;
     options_.user_weights = weights;
-    expect_refused("finite and not negative");
+    expect_refused(reason);
   }
   options_.user_weights = Eigen::MatrixXd(Eigen::MatrixXd::Zero(4, 3));
   expect_refused("one positive");

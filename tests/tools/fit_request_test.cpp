@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "estimation/cmif.hpp"
+#include "estimation/weight_matrices.hpp"
 #include "excitation/file_error.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "frf/hold_compensation.hpp"
@@ -229,7 +230,7 @@ TEST(FitRequest, WeightsComeFromAFileInTheOrderOfTheResponse) {
     file.close();
   }
   request.band_hz.reset();
-  EXPECT_THROW(make_fit_setup(request, measured()), FormatError);
+  EXPECT_THROW(make_fit_setup(request, measured()), IndefiniteWeights);
 }
 
 TEST(FitRequest, EveryWordThatIsNotOneIsRefused) {

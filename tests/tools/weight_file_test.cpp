@@ -7,6 +7,7 @@
 
 #include <complex>
 
+#include "estimation/weight_matrices.hpp"
 #include "excitation/file_error.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "tests/support/numbered_frf.hpp"
@@ -33,9 +34,10 @@ class WeightFile : public testing::Test {
     values[36 + 6 * 4 + 1] = Complex(0.5, -0.25);
     return values;
   }
+  template <typename Error = FormatError>
   void expect_refused(const std::string& part) {
     EXPECT_THAT([this] { read_weights(path_, frf_, options_); },
-                testing::ThrowsMessage<FormatError>(
+                testing::ThrowsMessage<Error>(
                     testing::AllOf(testing::HasSubstr("weights.h5"), testing::HasSubstr(part))));
   }
   FrfEstimate frf_ = test::numbered_frf();
@@ -72,7 +74,7 @@ TEST_F(WeightFile, RefusesMatricesNamingTheLine) {
   values = matrices();
   values[2 * 36] = -2.0;
   write_matrices(values);
-  expect_refused("line 2 (3 Hz): not positive semidefinite");
+  expect_refused<IndefiniteWeights>("line 2 (3 Hz): not positive semidefinite");
 }
 
 TEST_F(WeightFile, RefusesAnotherShapeAndBothKindsAtOnce) {
@@ -93,7 +95,7 @@ TEST_F(WeightFile, RefusesNegativeWeights) {
   Hdf5File file = Hdf5File::create(path_);
   file.write_reals("/weights", {4, 2, 3}, values.data());
   file.close();
-  expect_refused("line 2: -1; weights are 0 or more");
+  expect_refused<IndefiniteWeights>("line 2: -1; weights are 0 or more");
 }
 
 }  // namespace
