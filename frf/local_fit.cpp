@@ -103,13 +103,34 @@ std::complex<double> product(const Eigen::VectorXd& weight, const Eigen::MatrixX
   return weight.cast<std::complex<double>>().dot(sums);
 }
 
+/// Normal equations of the next d_1, ..., d_n: normal d = right; the cost of d is cost - right^H d.
+struct DenominatorStep {
+  Eigen::MatrixXcd normal;
+  Eigen::VectorXcd right;
+  double cost = 0.0;  // of d = 0
+
+  /// Of the first `poles` coefficients; `linear_cost`: what they leave of it.
+  Eigen::VectorXcd solution(Eigen::Index poles, double& linear_cost) const {
+    const Eigen::VectorXcd d =
+        normal.topLeftCorner(poles, poles).fullPivLu().solve(right.head(poles));
+    linear_cost = cost - right.head(poles).dot(d).real();
+    return d;
+  }
+};
+
 class Fitting {
  public:
-  explicit Fitting(const LocalProblem& problem) : p_(problem) {
-    polynomial_ = fit(Eigen::VectorXcd());
+  Fitting(const LocalProblem& problem, int most_poles)
+      : p_(problem), powers_(problem.r.size(), most_poles + 1) {
+    powers_.col(0).setOnes();
+    for (Eigen::Index i = 1; i <= most_poles; ++i)
+      powers_.col(i) = powers_.col(i - 1) * p_.r.array();
+    const Projection projection(p_.K, p_.k0, p_.groups);
+    polynomial_ = fit(Eigen::VectorXcd(), projection);
     // Units differ, and so does the noise: every channel counts by its own.
     weight_ = polynomial_.residual.topRows(p_.pole_channels).rowwise().squaredNorm();
     weight_ = (weight_.array() > 0.0).select(weight_.cwiseInverse(), 0.0);
+    first_step_ = denominator_step(p_.Z.topRows(p_.pole_channels), projection, most_poles);
   }
 
   const LocalFit& polynomial() const { return polynomial_; }
@@ -123,24 +144,20 @@ class Fitting {
     // Or half of the way to what is significant.
     const double worth =
         std::max(kWorthIterating, 0.5 * (1.0 + significant_ratio(p_, poles, poles)));
-    Eigen::VectorXcd d = Eigen::VectorXcd::Zero(poles);
-    for (int i = 0; i < kIterations; ++i) {
-      double linear_cost = 0.0;
-      d = next_denominator(d, linear_cost);
-      if (!d.allFinite()) return polynomial_;
-      if (i == 0 && linear_cost > worth * cost(polynomial_)) return polynomial_;
-    }
-    if (!wide_enough(p_, d)) return polynomial_;
-    LocalFit rational = fit(d);
+    // D = 1 at first, whatever the number of poles.
+    double linear_cost = 0.0;
+    Eigen::VectorXcd d = first_step_.solution(poles, linear_cost);
+    if (linear_cost > worth * first_step_.cost) return polynomial_;
+    for (int i = 1; i < kIterations && d.allFinite(); ++i) d = next_denominator(d);
+    if (!d.allFinite() || !wide_enough(p_, d)) return polynomial_;
+    LocalFit rational = fit(d, Projection(over(p_.K, denominator(d)), p_.k0, p_.groups));
     return rational.residual.allFinite() ? rational : polynomial_;
   }
 
  private:
   Eigen::ArrayXcd denominator(const Eigen::VectorXcd& d) const {
     Eigen::ArrayXcd D = Eigen::ArrayXcd::Ones(p_.r.size());
-    for (Eigen::Index i = 0; i < d.size(); ++i) {
-      D += d[i] * p_.r.array().pow(static_cast<double>(i + 1));
-    }
+    for (Eigen::Index i = 0; i < d.size(); ++i) D += d[i] * powers_.col(i + 1);
     return D;
   }
 
@@ -149,36 +166,39 @@ class Fitting {
   }
 
   Eigen::MatrixXcd times_power(const Eigen::MatrixXcd& rows, Eigen::Index power) const {
-    return rows * p_.r.array().pow(static_cast<double>(power)).matrix().asDiagonal();
+    return rows * powers_.col(power).matrix().asDiagonal();
   }
 
-  /// Least squares in d and Theta of (D Z - Theta K) / D_previous.
-  Eigen::VectorXcd next_denominator(const Eigen::VectorXcd& previous, double& linear_cost) const {
-    const Eigen::ArrayXcd D = denominator(previous);
-    const Projection projection(over(p_.K, D), p_.k0, p_.groups);
-    const Eigen::MatrixXcd Z = over(p_.Z.topRows(p_.pole_channels), D);
+  /// Least squares in d and Theta of (D Z - Theta K) / D_previous, D_previous in Z and `projection`.
+  DenominatorStep denominator_step(const Eigen::MatrixXcd& Z, const Projection& projection,
+                                   Eigen::Index poles) const {
     const Eigen::MatrixXcd e = projection.residual(Z);
     std::vector<Eigen::MatrixXcd> x;
-    for (Eigen::Index i = 0; i < previous.size(); ++i) {
+    for (Eigen::Index i = 0; i < poles; ++i)
       x.push_back(projection.residual(times_power(Z, i + 1)));
-    }
-    Eigen::MatrixXcd normal(previous.size(), previous.size());
-    Eigen::VectorXcd right(previous.size());
-    for (Eigen::Index i = 0; i < previous.size(); ++i) {
-      const auto xi = static_cast<std::size_t>(i);
-      right[i] = -product(weight_, e, x[xi]);
-      for (Eigen::Index j = 0; j < previous.size(); ++j) {
-        normal(i, j) = product(weight_, x[static_cast<std::size_t>(j)], x[xi]);
+    DenominatorStep step{Eigen::MatrixXcd(poles, poles), Eigen::VectorXcd(poles),
+                         product(weight_, e, e).real()};
+    for (Eigen::Index i = 0; i < poles; ++i) {
+      const auto& x_i = x[static_cast<std::size_t>(i)];
+      step.right[i] = -product(weight_, e, x_i);
+      step.normal(i, i) = product(weight_, x_i, x_i).real();
+      for (Eigen::Index j = 0; j < i; ++j) {
+        step.normal(i, j) = product(weight_, x[static_cast<std::size_t>(j)], x_i);
+        step.normal(j, i) = std::conj(step.normal(i, j));
       }
     }
-    const Eigen::VectorXcd d = normal.fullPivLu().solve(right);
-    linear_cost = product(weight_, e, e).real() - right.dot(d).real();
-    return d;
+    return step;
   }
 
-  LocalFit fit(const Eigen::VectorXcd& d) const {
-    const Eigen::ArrayXcd D = denominator(d);
+  Eigen::VectorXcd next_denominator(const Eigen::VectorXcd& previous) const {
+    const Eigen::ArrayXcd D = denominator(previous);
     const Projection projection(over(p_.K, D), p_.k0, p_.groups);
+    double linear_cost = 0.0;
+    return denominator_step(over(p_.Z.topRows(p_.pole_channels), D), projection, previous.size())
+        .solution(previous.size(), linear_cost);
+  }
+
+  LocalFit fit(const Eigen::VectorXcd& d, const Projection& projection) const {
     const auto groups = static_cast<Eigen::Index>(p_.groups.size());
     LocalFit result;
     result.poles = static_cast<int>(d.size());
@@ -201,7 +221,8 @@ class Fitting {
     result.dof = static_cast<double>(p_.r.size() - p_.K.rows() * groups) -
                  static_cast<double>(d.size()) / static_cast<double>(p_.independent_noise);
     result.variance_dof = result.dof;
-    if (d.size() > 0) result.pole_spread = pole_spread(projection, fitted, D, d.size(), result);
+    if (d.size() > 0)
+      result.pole_spread = pole_spread(projection, fitted, denominator(d), d.size(), result);
     return result;
   }
 
@@ -236,8 +257,10 @@ class Fitting {
   }
 
   const LocalProblem& p_;
+  Eigen::ArrayXXd powers_;  // B x (most poles + 1): 1, r, r^2, ...
   LocalFit polynomial_;
   Eigen::VectorXd weight_;
+  DenominatorStep first_step_;
 };
 
 /// Of the mean of the fits' variances, each as sure as its degrees of freedom: what they differ by adds.
@@ -277,7 +300,7 @@ Eigen::ArrayXd log_probability(const LocalProblem& problem, const Fitting& fitti
 }  // namespace
 
 LocalFit fit_locally(const LocalProblem& problem, int most_poles) {
-  const Fitting fitting(problem);
+  const Fitting fitting(problem, most_poles);
   LocalFit best = fitting.polynomial();
   double cost = fitting.cost(best);
   for (int poles = 1; poles <= most_poles; ++poles) {
@@ -292,7 +315,7 @@ LocalFit fit_locally(const LocalProblem& problem, int most_poles) {
 }
 
 LocalFit average_locally(const LocalProblem& problem, int most_poles) {
-  const Fitting fitting(problem);
+  const Fitting fitting(problem, most_poles);
   std::vector<LocalFit> fits = {fitting.polynomial()};
   Eigen::Index columns = 0;
   for (int poles = 1; poles <= most_poles; ++poles) {
