@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "frf/local_fit.hpp"
+#include "frf/order_statistic.hpp"
 #include "frf/worker_pool.hpp"
 
 namespace stageid {
@@ -62,9 +63,7 @@ double median_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   for_each_ratio(a, b, [&](double ratio) {
     if (bin_of(ratio) == bin) ratios.push_back(ratio);
   });
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(rank);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+  return value_of_rank(ratios, rank);
 }
 
 }  // namespace

@@ -65,8 +65,6 @@ class RecordMeasurement {
   RunSpectra finish() {
     close_segment();
     if (run_.periods == 0 && alone_) include(*std::exchange(alone_, std::nullopt));
-    std::sort(run_.dropped.begin(), run_.dropped.end(),
-              [](const auto& a, const auto& b) { return a.period < b.period; });
     if (run_.periods == 0) return std::move(run_);
     run_.mean /= static_cast<double>(run_.periods);
     run_.excluded_power = excluded_power(excitation_.lines, run_.periods, w_);

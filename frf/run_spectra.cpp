@@ -57,8 +57,6 @@ class RunMeasurement {
 
   RunSpectra finish() {
     include_waiting();
-    std::sort(run_.dropped.begin(), run_.dropped.end(),
-              [](const auto& a, const auto& b) { return a.period < b.period; });
     if (run_.periods == 0) return std::move(run_);
     run_.scatter_dof = run_.periods - 1;
     const std::vector<int> excited(
@@ -178,7 +176,10 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
 }
 
 void RunSpectra::drop(int period, std::string reason) {
-  DroppedPeriod& one = dropped.emplace_back();
+  const auto at =
+      std::upper_bound(dropped.begin(), dropped.end(), period,
+                       [](int p, const DroppedPeriod& other) { return p < other.period; });
+  DroppedPeriod& one = *dropped.emplace(at);
   one.period = period;
   one.reason = std::move(reason);
 }

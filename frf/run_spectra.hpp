@@ -30,7 +30,7 @@ struct RunSpectra {
   int periods = 0;                 ///< clean ones
   Eigen::VectorXd excluded_power;  ///< sum over the lines of |U|^2 of the excluded actuators
   std::string fingerprint;         ///< of the excitation and of every sample that is not marked
-  /// By period; which realization and experiment this is, others know.
+  /// In the order of the periods; which realization and experiment this is, others know.
   std::vector<DroppedPeriod> dropped;
   void drop(int period, std::string reason);
   double dof(Eigen::Index k) const { return line_dof.size() > 0 ? line_dof[k] : scatter_dof; }

@@ -5,6 +5,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <vector>
+
+#include "frf/order_statistic.hpp"
 
 namespace stageid {
 namespace {
@@ -20,12 +24,6 @@ constexpr double kLeastDirection = 0.1;  // Im G beside the directions taken alr
 constexpr double kNoiseAllowed = 0.02;   // of |G|: above it a line's weight falls
 constexpr double kLeastSkew_s = 5e-6;
 constexpr double kWantedSkew_s = 10e-6;
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
-}
 
 /// Normal equations M x = v, and the square of their right-hand side.
 struct Normal {
@@ -68,8 +66,10 @@ class SkewFit {
   /// Each kind against its median: what all sensors or all actuators share is the plant's delay, and
   /// what damping adds to all of them alike.
   Eigen::VectorXd relative(Eigen::VectorXd skew) const {
-    skew.head(n_y_).array() -= median({skew.data(), skew.data() + n_y_});
-    skew.tail(n_u_).array() -= median({skew.data() + n_y_, skew.data() + n_y_ + n_u_});
+    std::vector<double> values(skew.begin(), skew.end());
+    const std::span all(values);
+    skew.head(n_y_).array() -= median(all.first(static_cast<std::size_t>(n_y_)));
+    skew.tail(n_u_).array() -= median(all.last(static_cast<std::size_t>(n_u_)));
     return skew;
   }
 
@@ -159,9 +159,10 @@ void SkewFit::iterate() {
   }
   const Eigen::VectorXd step = sum.solution();
   skew_ += step;
-  std::vector<double> residuals;
+  std::vector<double> residuals;  // by line
   for (const Normal& normal : normals) residuals.push_back(normal.residual(step));
-  const double middle = std::max(1e-300, median(residuals));
+  std::vector<double> sorted = residuals;
+  const double middle = std::max(1e-300, median(sorted));
   for (Index k = 0; k < K; ++k)
     trust_[k] = 1.0 / (1.0 + residuals[static_cast<std::size_t>(k)] / middle);
 }

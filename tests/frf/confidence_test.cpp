@@ -9,6 +9,7 @@
 
 #include "frf/plant_frf.hpp"
 #include "tests/support/closed_loop.hpp"
+#include "tests/support/error_message.hpp"
 
 namespace stageid {
 namespace {
@@ -44,12 +45,7 @@ TEST(ConfidenceRadius, ManyDegreesOfFreedomAreAKnownVariance) {
 }
 
 std::string message_of(const FrfEstimate& frf, double level, VarianceKind kind) {
-  try {
-    confidence_radius(frf, level, kind);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  return test::error_message<std::invalid_argument>([&] { confidence_radius(frf, level, kind); });
 }
 
 TEST(ConfidenceRadius, RefusesWhatItCannotKnow) {

@@ -8,6 +8,7 @@
 #include "frf/confidence.hpp"
 #include "frf/plant_frf.hpp"
 #include "tests/support/closed_loop.hpp"
+#include "tests/support/error_message.hpp"
 #include "tests/support/numbered_frf.hpp"
 
 namespace stageid {
@@ -38,12 +39,7 @@ TEST(CovarianceSmoothing, IsTheMeanOfNeighboursAndTheWindowStaysInside) {
 }
 
 std::string message_of(const FrfEstimate& frf, int lines) {
-  try {
-    smooth_covariance(frf, lines);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  return test::error_message<std::invalid_argument>([&] { smooth_covariance(frf, lines); });
 }
 
 TEST(CovarianceSmoothing, RefusesWhatCannotBeSmoothed) {

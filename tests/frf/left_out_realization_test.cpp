@@ -1,12 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <string>
-
 #include "excitation/file_error.hpp"
 #include "frf/health_record.hpp"
 #include "frf/plant_frf.hpp"
 #include "tests/support/closed_loop.hpp"
+#include "tests/support/error_message.hpp"
 
 namespace stageid {
 namespace {
@@ -89,22 +88,12 @@ TEST(LeftOutRealization, HealthLooksAtTheNextOne) {
   }
 }
 
-template <typename Call>
-std::string format_error_of(const Call& call) {
-  try {
-    call();
-  } catch (const FormatError& error) {
-    return error.what();
-  }
-  return "no FormatError";
-}
-
 TEST(LeftOutRealization, OneAtLeastIsNeeded) {
   const MemoryLog log = log_with_marked_runs({1, 2, 4, 5});
   const auto wanted =
       AllOf(HasSubstr("/runs/0001"), HasSubstr("no realization is without such a run"));
-  EXPECT_THAT(format_error_of([&] { estimate_plant_frf({&log}, {}); }), wanted);
-  EXPECT_THAT(format_error_of([&] { read_health_record({&log}, {}); }), wanted);
+  EXPECT_THAT(test::error_message<FormatError>([&] { estimate_plant_frf({&log}, {}); }), wanted);
+  EXPECT_THAT(test::error_message<FormatError>([&] { read_health_record({&log}, {}); }), wanted);
 }
 
 }  // namespace

@@ -23,6 +23,9 @@ TEST(OrderStatistic, IsWhereSortingPutsIt) {
     }
   std::vector<double> four{4.0, 1.0, 3.0, 2.0};
   EXPECT_EQ(order_statistic(four, 0.5), 3.0);  // the upper median
+  EXPECT_EQ(median(four), 2.5);
+  std::vector<double> three{4.0, 1.0, 2.0};
+  EXPECT_EQ(median(three), 2.0);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include "excitation/file_error.hpp"
 #include "frf/plant_frf.hpp"
 #include "tests/support/closed_loop.hpp"
+#include "tests/support/error_message.hpp"
 
 namespace stageid {
 namespace {
@@ -15,14 +16,7 @@ using testing::HasSubstr;
 
 template <typename Error>
 std::string message_of(const std::vector<const LogReader*>& logs, const FrfOptions& options = {}) {
-  try {
-    estimate_plant_frf(logs, options);
-  } catch (const Error& error) {
-    return error.what();
-  } catch (const std::exception& error) {
-    return std::string("another kind of error: ") + error.what();
-  }
-  return "no error";
+  return test::error_message<Error>([&] { estimate_plant_frf(logs, options); });
 }
 
 MemoryLog small_log(const LoopExperiment& x = {}) {
