@@ -30,6 +30,15 @@ std::vector<int> detection_lines(const std::vector<int>& excited) {
   return lines;
 }
 
+Eigen::VectorXcd interpolated_response(const std::vector<int>& excited, int line,
+                                       const Eigen::MatrixXcd& G) {
+  const std::size_t above = at_or_above(excited, line);
+  const int low = excited[above - 1];
+  const double t = static_cast<double>(line - low) / (excited[above] - low);
+  const auto k = static_cast<Eigen::Index>(above);
+  return (1.0 - t) * G.col(k - 1) + t * G.col(k);
+}
+
 DetectionAverage::DetectionAverage(const std::vector<int>& lines,
                                    const std::vector<std::string>& axes, bool single_axis,
                                    Eigen::Index outputs)
@@ -70,10 +79,12 @@ void DetectionAverage::add_line(const RealizationSpectra& spectra, const Eigen::
                                 const std::vector<Eigen::Index>& groups, Eigen::Index d) {
   const auto column = static_cast<Eigen::Index>(excited_.size()) + d;
   const Eigen::MatrixXcd Z = spectra.response(column);
-  const Eigen::MatrixXcd response = response_on(detection_[static_cast<std::size_t>(d)], G);
+  const Eigen::VectorXcd between =
+      interpolated_response(excited_, detection_[static_cast<std::size_t>(d)], G);
   Eigen::MatrixXcd residual_of_Z(outputs_, Z.rows());  // [I, -G]
   residual_of_Z.leftCols(outputs_).setIdentity();
-  residual_of_Z.rightCols(response.cols()) = -response;
+  residual_of_Z.rightCols(Z.rows() - outputs_) =
+      -Eigen::Map<const Eigen::MatrixXcd>(between.data(), outputs_, Z.rows() - outputs_);
   const Eigen::MatrixXcd E = residual_of_Z * Z;
   for (Eigen::Index e = 0; e < E.cols(); ++e) {
     const auto run = static_cast<std::size_t>(e);
@@ -88,15 +99,6 @@ void DetectionAverage::add_line(const RealizationSpectra& spectra, const Eigen::
                        .real()
                        .max(0.0)
                        .matrix();
-}
-
-Eigen::MatrixXcd DetectionAverage::response_on(int line, const Eigen::MatrixXcd& G) const {
-  const std::size_t above = at_or_above(excited_, line);
-  const int low = excited_[above - 1];
-  const double t = static_cast<double>(line - low) / (excited_[above] - low);
-  const auto k = static_cast<Eigen::Index>(above);
-  const Eigen::VectorXcd between = (1.0 - t) * G.col(k - 1) + t * G.col(k);
-  return Eigen::Map<const Eigen::MatrixXcd>(between.data(), outputs_, between.size() / outputs_);
 }
 
 DetectionLines DetectionAverage::finish(double resolution_hz) const {

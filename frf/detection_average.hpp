@@ -14,6 +14,11 @@ namespace stageid {
 /// would have thousands.
 std::vector<int> detection_lines(const std::vector<int>& excited);
 
+/// vec(G) on `line`, linear between the two lines of `excited` around it; `G`: a column each of them.
+/// @pre excited.front() < line < excited.back()
+Eigen::VectorXcd interpolated_response(const std::vector<int>& excited, int line,
+                                       const Eigen::MatrixXcd& G);
+
 /// Gathers DetectionLines over realizations, one after the other. Spectra hold the excited lines
 /// first, then the detection lines.
 class DetectionAverage {
@@ -35,7 +40,6 @@ class DetectionAverage {
  private:
   void add_line(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G,
                 const std::vector<Eigen::Index>& groups, Eigen::Index d);
-  Eigen::MatrixXcd response_on(int line, const Eigen::MatrixXcd& G) const;
 
   std::vector<int> excited_;
   std::vector<int> detection_;

@@ -136,6 +136,9 @@ void check_nonlinearity(const FrfEstimate& frf) {
   check_optional("nonlinearity_p_value", test.p_value, n_c, bands);
   check_shape("nonlinearity_distortion", test.distortion, n_c, bands);
   check_optional("nonlinearity_distortion", test.distortion, n_c, bands);
+  if (test.settled_p_value.size() > 0 &&
+      (test.settled_p_value.size() != bands || !test.settled_p_value.allFinite()))
+    refuse("nonlinearity_settled_p_value", "a probability a band belongs there");
   const Eigen::Index rows =
       frf.n_outputs() * static_cast<Eigen::Index>(frf.detection.groups.size());
   for (const DetectedDistortion* kind : {&test.even, &test.odd}) {

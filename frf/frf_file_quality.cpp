@@ -82,6 +82,9 @@ void write_nonlinearity(Hdf5File& file, const NonlinearityTest& test, Eigen::Ind
                    Eigen::MatrixXd(test.band_hz.transpose()).data());
   write_columns(file, "/nonlinearity_p_value", test.p_value, n_y);
   write_columns(file, "/nonlinearity_distortion", test.distortion, n_y);
+  if (test.settled_p_value.size() > 0)
+    file.write_reals("/nonlinearity_settled_p_value", {size_of(test.settled_p_value.size())},
+                     test.settled_p_value.data());
   write_columns(file, "/nonlinearity_even_p_value", test.even.p_value, n_y);
   write_columns(file, "/nonlinearity_even_level", test.even.level, n_y);
   write_columns(file, "/nonlinearity_odd_p_value", test.odd.p_value, n_y);
@@ -104,6 +107,10 @@ void read_nonlinearity(const Hdf5File& file, FrfEstimate& frf) {
   const auto n_g = static_cast<Eigen::Index>(frf.detection.groups.size());
   test.p_value = read_if_there(file, "/nonlinearity_p_value", bands, n_y, n_u);
   test.distortion = read_if_there(file, "/nonlinearity_distortion", bands, n_y, n_u);
+  if (file.exists("/nonlinearity_settled_p_value")) {
+    require_shape(file, "/nonlinearity_settled_p_value", {size_of(bands)});
+    test.settled_p_value = read_vector(file, "/nonlinearity_settled_p_value");
+  }
   if (n_g == 0) return;
   test.even.p_value = read_if_there(file, "/nonlinearity_even_p_value", bands, n_y, n_g);
   test.even.level = read_if_there(file, "/nonlinearity_even_level", bands, n_y, n_g);
@@ -121,48 +128,40 @@ std::vector<double> read_counts(const Hdf5File& file, const std::string& dataset
   return counts;
 }
 
-void write_dropped(Hdf5File& file, const std::vector<DroppedPeriod>& dropped) {
-  if (dropped.empty()) return;
-  std::vector<long long> where;
+/// What was left out, and why: a row of counts and a text each.
+struct LeftOut {
+  std::vector<std::vector<int>> where;
   std::vector<std::string> reasons;
-  for (const DroppedPeriod& period : dropped) {
-    where.insert(where.end(), {period.realization, period.experiment, period.period});
-    reasons.push_back(period.reason);
-  }
-  file.write_integers("/dropped_periods", {dropped.size(), 3}, where.data());
-  file.write_texts("/dropped_reasons", reasons);
+};
+
+void write_left_out(Hdf5File& file, const LeftOut& left_out, const std::string& places,
+                    const std::string& reasons) {
+  if (left_out.reasons.empty()) return;
+  std::vector<long long> rows;
+  for (const std::vector<int>& row : left_out.where)
+    rows.insert(rows.end(), row.begin(), row.end());
+  std::vector<hsize_t> shape = {left_out.where.size()};
+  if (const std::size_t columns = left_out.where.front().size(); columns > 1)
+    shape.push_back(columns);
+  file.write_integers(places, shape, rows.data());
+  file.write_texts(reasons, left_out.reasons);
 }
 
-void read_dropped(const Hdf5File& file, std::vector<DroppedPeriod>& dropped) {
-  if (!file.exists("/dropped_periods")) return;
-  const std::vector<std::string> reasons = file.read_texts("/dropped_reasons");
-  require_shape(file, "/dropped_periods", {reasons.size(), 3});
-  const std::vector<double> where = read_counts(file, "/dropped_periods");
-  for (std::size_t i = 0; i < reasons.size(); ++i) {
-    const auto number = [&](std::size_t column) { return static_cast<int>(where[3 * i + column]); };
-    dropped.push_back({number(0), number(1), number(2), reasons[i]});
+/// Empty if it is not there.
+LeftOut read_left_out(const Hdf5File& file, const std::string& places, const std::string& reasons,
+                      std::size_t columns) {
+  LeftOut left_out;
+  if (!file.exists(places)) return left_out;
+  left_out.reasons = file.read_texts(reasons);
+  std::vector<hsize_t> shape = {left_out.reasons.size()};
+  if (columns > 1) shape.push_back(columns);
+  require_shape(file, places, shape);
+  const std::vector<double> counts = read_counts(file, places);
+  for (std::size_t i = 0; i < left_out.reasons.size(); ++i) {
+    const auto row = counts.begin() + static_cast<std::ptrdiff_t>(columns * i);
+    left_out.where.emplace_back(row, row + static_cast<std::ptrdiff_t>(columns));
   }
-}
-
-void write_left_out(Hdf5File& file, const std::vector<LeftOutRealization>& left_out) {
-  if (left_out.empty()) return;
-  std::vector<long long> which;
-  std::vector<std::string> reasons;
-  for (const LeftOutRealization& one : left_out) {
-    which.push_back(one.realization);
-    reasons.push_back(one.reason);
-  }
-  file.write_integers("/left_out_realizations", {which.size()}, which.data());
-  file.write_texts("/left_out_reasons", reasons);
-}
-
-void read_left_out(const Hdf5File& file, std::vector<LeftOutRealization>& left_out) {
-  if (!file.exists("/left_out_realizations")) return;
-  const std::vector<std::string> reasons = file.read_texts("/left_out_reasons");
-  require_shape(file, "/left_out_realizations", {reasons.size()});
-  const std::vector<double> which = read_counts(file, "/left_out_realizations");
-  for (std::size_t i = 0; i < reasons.size(); ++i)
-    left_out.push_back({static_cast<int>(which[i]), reasons[i]});
+  return left_out;
 }
 
 }  // namespace
@@ -170,15 +169,32 @@ void read_left_out(const Hdf5File& file, std::vector<LeftOutRealization>& left_o
 void write_quality(Hdf5File& file, const FrfEstimate& frf) {
   write_detection(file, frf.detection, frf.n_outputs());
   write_nonlinearity(file, frf.nonlinearity, frf.n_outputs());
-  write_dropped(file, frf.dropped_periods);
-  write_left_out(file, frf.left_out_realizations);
+  LeftOut periods;
+  for (const DroppedPeriod& one : frf.dropped_periods) {
+    periods.where.push_back({one.realization, one.experiment, one.period});
+    periods.reasons.push_back(one.reason);
+  }
+  write_left_out(file, periods, "/dropped_periods", "/dropped_reasons");
+  LeftOut realizations;
+  for (const LeftOutRealization& one : frf.left_out_realizations) {
+    realizations.where.push_back({one.realization});
+    realizations.reasons.push_back(one.reason);
+  }
+  write_left_out(file, realizations, "/left_out_realizations", "/left_out_reasons");
 }
 
 void read_quality(const Hdf5File& file, FrfEstimate& frf) {
   read_detection(file, frf);
   read_nonlinearity(file, frf);
-  read_dropped(file, frf.dropped_periods);
-  read_left_out(file, frf.left_out_realizations);
+  const LeftOut periods = read_left_out(file, "/dropped_periods", "/dropped_reasons", 3);
+  for (std::size_t i = 0; i < periods.reasons.size(); ++i) {
+    const std::vector<int>& at = periods.where[i];
+    frf.dropped_periods.push_back({at[0], at[1], at[2], periods.reasons[i]});
+  }
+  const LeftOut realizations =
+      read_left_out(file, "/left_out_realizations", "/left_out_reasons", 1);
+  for (std::size_t i = 0; i < realizations.reasons.size(); ++i)
+    frf.left_out_realizations.push_back({realizations.where[i][0], realizations.reasons[i]});
 }
 
 }  // namespace stageid

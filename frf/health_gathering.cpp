@@ -120,19 +120,19 @@ bool HealthGathering::complete() const {
   return excited_ != nullptr && first_without_spectra() == excited_->size();
 }
 
-void HealthGathering::excite(std::size_t realization,
-                             const std::vector<const ExcitationSpectrum*>& spectra) {
+void HealthGathering::excite(std::size_t realization, const std::vector<RunExcitation>& runs) {
   if (excited_ != nullptr)
     for (HealthPart& part : *excited_) part.periods_.clear();
   excited_ = &parts_[realization];
   record_.realization = realization_[realization];
   record_.axes.clear();
-  for (const ExcitationSpectrum* spectrum : spectra)
-    record_.axes.insert(record_.axes.end(), spectrum->channels.begin(), spectrum->channels.end());
+  for (const RunExcitation& run : runs)
+    record_.axes.insert(record_.axes.end(), run.spectrum.channels.begin(),
+                        run.spectrum.channels.end());
   std::sort(record_.axes.begin(), record_.axes.end());
   record_.axes.erase(std::unique(record_.axes.begin(), record_.axes.end()), record_.axes.end());
-  record_.zippered = spectra.size() == 1 && spectra.front()->is_zippered();
-  lines_ = thinned(spectra.front()->lines);
+  record_.zippered = runs.size() == 1 && runs.front().spectrum.is_zippered();
+  lines_ = thinned(runs.front().spectrum.lines);
   for (HealthPart& part : *excited_) part.lines_ = lines_;
   const auto K = static_cast<Eigen::Index>(lines_.size());
   record_.frequency_hz.resize(K);
@@ -142,9 +142,9 @@ void HealthGathering::excite(std::size_t realization,
     record_.frequency_hz[k] = line * record_.info.sample_rate_hz / record_.info.period_samples;
     LineRecord& at = record_.lines[static_cast<std::size_t>(k)];
     at.R.setZero(static_cast<Eigen::Index>(record_.info.excitation.size()),
-                 static_cast<Eigen::Index>(spectra.size()));
-    for (std::size_t e = 0; e < spectra.size(); ++e) {
-      const ExcitationSpectrum& spectrum = *spectra[e];
+                 static_cast<Eigen::Index>(runs.size()));
+    for (std::size_t e = 0; e < runs.size(); ++e) {
+      const ExcitationSpectrum& spectrum = runs[e].spectrum;
       const auto found = std::lower_bound(spectrum.lines.begin(), spectrum.lines.end(), line);
       if (found != spectrum.lines.end() && *found == line)
         at.R.col(static_cast<Eigen::Index>(e)) =

@@ -3,9 +3,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "frf/excitation_spectrum.hpp"
 #include "frf/health_record.hpp"
 #include "frf/run_spectra.hpp"
+#include "frf/run_steps.hpp"
 #include "frf/run_table.hpp"
 
 namespace stageid {
@@ -50,7 +50,7 @@ class HealthGathering {
 
   /// The excitation of the runs of a realization whose spectra are wanted, the earlier ones having
   /// lacked a run. Before a part of it is filled. @pre !complete()
-  void excite(std::size_t realization, const std::vector<const ExcitationSpectrum*>& spectra);
+  void excite(std::size_t realization, const std::vector<RunExcitation>& runs);
 
   /// Where run `experiment` of realization `realization` (positions) goes; different parts may be
   /// filled at once.

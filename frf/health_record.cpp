@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "frf/byte_counter.hpp"
-#include "frf/excitation_spectrum.hpp"
 #include "frf/health_gathering.hpp"
 #include "frf/run_periods.hpp"
 #include "frf/run_steps.hpp"
@@ -66,14 +65,13 @@ class RecordReading {
 
   void read_excitation(std::size_t realization) {
     const std::vector<UsedRun>& runs = realizations_[realization].runs;
-    std::vector<ExcitationSpectrum> spectra(runs.size());
+    std::vector<RunExcitation> excitation(runs.size());
     for_each_task(workers_, runs.size(), [&](int worker, std::size_t e) {
-      spectra[e] =
-          read_run_excitation(runs[e], workspaces_[static_cast<std::size_t>(worker)]->dft).spectrum;
+      excitation[e] =
+          read_run_excitation(runs[e], workspaces_[static_cast<std::size_t>(worker)]->dft);
+      excitation[e].period.resize(0, 0);  // samples of all runs would be much memory
     });
-    std::vector<const ExcitationSpectrum*> all;
-    for (const ExcitationSpectrum& spectrum : spectra) all.push_back(&spectrum);
-    gathering_.excite(realization, all);
+    gathering_.excite(realization, excitation);
   }
 
   void read_run(const Run& run, RunWorkspace& w) {

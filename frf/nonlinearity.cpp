@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <vector>
 
@@ -26,17 +27,16 @@ double evidence(double power, double noise, double linear, int power_dof, double
 }
 
 /// From the scatter of the realizations: column b of p_value and distortion.
-void test_scatter(const FrfEstimate& frf, Eigen::Index first, Eigen::Index K, Eigen::Index b,
-                  NonlinearityTest& test) {
+void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, Eigen::Index first,
+                  Eigen::Index K, Eigen::Index b, NonlinearityTest& test) {
   const int a = static_cast<int>(frf.total_dof);
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
     double sum = 0.0;
     double excess = 0.0;
     for (Eigen::Index k = first; k < first + K; ++k) {
-      const double total = frf.total_variance(c, k);
-      const double noise = frf.noise_variance(c, k);
-      sum += evidence(total, noise, std::norm(frf.response(c, k)), a, frf.noise_dof);
-      excess += std::max(0.0, total - noise);
+      sum += evidence(scatter.total(c, k), scatter.noise(c, k), std::norm(frf.response(c, k)), a,
+                      frf.noise_dof);
+      excess += std::max(0.0, frf.total_variance(c, k) - frf.noise_variance(c, k));
     }
     test.p_value(c, b) = tail_of_evidence(sum, K);
     test.distortion(c, b) =
@@ -77,7 +77,48 @@ void test_detection(const DetectionLines& detection, const std::vector<Eigen::In
   }
 }
 
+/// One-sided: a standard normal variable is above z.
+double tail_of_normal(double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); }
+
+/// The smallest tail of any output on the lines [low_hz, high_hz].
+double least_tail(const LineAlignment& alignment, double low_hz, double high_hz) {
+  double least = 1.0;
+  for (Eigen::Index i = 0; i < alignment.cosine.rows(); ++i) {
+    double cosine = 0.0;
+    double pairs = 0.0;
+    for (Eigen::Index l = 0; l < alignment.frequency_hz.size(); ++l) {
+      if (alignment.frequency_hz[l] < low_hz || alignment.frequency_hz[l] > high_hz) continue;
+      cosine += alignment.cosine(i, l);
+      pairs += alignment.pairs(i, l);
+    }
+    if (pairs >= kFewestLines)
+      least = std::min(least, tail_of_normal(cosine / std::sqrt(0.5 * pairs)));
+  }
+  return least;
+}
+
+/// Into settled_p_value, with what follows for the verdicts. @pre band_hz and the p-values are known
+void test_settling(const LineAlignment& alignment, NonlinearityTest& test) {
+  if (alignment.frequency_hz.size() == 0) return;
+  const Eigen::Index bands = test.band_hz.rows();
+  const double tests = 2.0 * static_cast<double>(alignment.cosine.rows());
+  const double everywhere = least_tail(alignment, test.band_hz(0, 0), test.band_hz(bands - 1, 1));
+  test.settled_p_value.resize(bands);
+  for (Eigen::Index b = 0; b < bands; ++b) {
+    const double band = least_tail(alignment, test.band_hz(b, 0), test.band_hz(b, 1));
+    test.settled_p_value[b] = std::min(1.0, tests * std::min(band, everywhere));
+    if (test.settled(b)) continue;
+    test.p_value.col(b).setOnes();
+    for (DetectedDistortion* kind : {&test.even, &test.odd})
+      if (kind->p_value.size() > 0) kind->p_value.col(b).setOnes();
+  }
+}
+
 }  // namespace
+
+bool NonlinearityTest::settled(Eigen::Index b) const {
+  return settled_p_value.size() == 0 || settled_p_value[b] >= kUnsettledBelow;
+}
 
 std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
   if (frf.method != FrfMethod::periodic)
@@ -99,7 +140,7 @@ std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
   return "";
 }
 
-NonlinearityTest nonlinearity_test(const FrfEstimate& frf) {
+NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEvidence& evidence) {
   if (const std::string why = why_linearity_cannot_be_tested(frf); !why.empty())
     throw std::invalid_argument(why);
   const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kFewestLines);
@@ -109,6 +150,10 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf) {
   test.band_hz.resize(bands, 2);
   test.p_value.resize(n_c, bands);
   test.distortion.resize(n_c, bands);
+  const RealizationScatter scatter =
+      evidence.scatter.total.size() > 0
+          ? evidence.scatter
+          : RealizationScatter{frf.total_variance, frf.noise_variance};
   const DetectionLines& detection = frf.detection;
   if (detection.line.size() > 0) {
     test.even.p_value.resize(detection.power.rows(), bands);
@@ -119,7 +164,7 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf) {
     const Eigen::Index first = limits[static_cast<std::size_t>(b)];
     const Eigen::Index next = limits[static_cast<std::size_t>(b) + 1];
     test.band_hz.row(b) << frf.frequency_hz[first], frf.frequency_hz[next - 1];
-    test_scatter(frf, first, next - first, b, test);
+    test_scatter(frf, scatter, first, next - first, b, test);
     if (detection.line.size() == 0) continue;
     const Eigen::VectorXd linear_power =
         detection.linear_power.middleCols(first, next - first).rowwise().mean();
@@ -128,6 +173,7 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf) {
     test_detection(detection, lines_of(detection, 0, low_hz, high_hz), linear_power, b, test.even);
     test_detection(detection, lines_of(detection, 1, low_hz, high_hz), linear_power, b, test.odd);
   }
+  test_settling(evidence.alignment, test);
   return test;
 }
 

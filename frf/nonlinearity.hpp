@@ -25,6 +25,29 @@ struct DetectionLines {
   Eigen::MatrixXd linear_power;  ///< (n_y n_g) x N: |Y|^2 on the excited lines
 };
 
+/// The variances of nonlinearity_test() for the mean that counts each realization by its own noise: of
+/// one whose noise is a hundred times another's (level, phases, controller) they keep F's distribution.
+struct RealizationScatter {
+  Eigen::MatrixXd total;  ///< (n_y n_u) x N, from the scatter of the realizations; empty if unknown
+  Eigen::MatrixXd noise;  ///< (n_y n_u) x N, from the periods
+};
+
+/// Whether what a run leaves, E = Y - G U, turns from one line to the next. Noise and stochastic
+/// nonlinear contributions do, by a random angle; what a record has at one end and not at the other, a
+/// transient or a drift, is smooth over the lines. E is taken on detection lines and, from the second
+/// realization on, on excited lines with the G of the realizations before.
+struct LineAlignment {
+  Eigen::VectorXd frequency_hz;  ///< L: excited and detection lines; empty if unknown
+  Eigen::MatrixXd cosine;  ///< n_y x L: of the angle from the line before, summed over the runs
+  Eigen::MatrixXd pairs;   ///< n_y x L: how many that are
+};
+
+/// What the records tell of linearity beyond the estimate and its variances.
+struct LinearityEvidence {
+  RealizationScatter scatter;
+  LineAlignment alignment;
+};
+
 /// Distortions of one kind, seen on detection lines: even-order ones on even lines, odd-order ones
 /// on odd lines. Rows are output + n_y * group.
 struct DetectedDistortion {
@@ -39,10 +62,18 @@ struct NonlinearityTest {
   Eigen::MatrixXd distortion;  ///< (n_y n_u) x bands, relative to |G|: see nonlinearity_test()
   DetectedDistortion even;     ///< empty without detection lines
   DetectedDistortion odd;
+  /// bands: chance of lines that are so much alike in settled records; empty: unknown. Below
+  /// kUnsettledBelow linearity cannot be told in this band, and every p-value there is 1.
+  Eigen::VectorXd settled_p_value;
+
+  /// Whether linearity can be told in band b.
+  bool settled(Eigen::Index b) const;
 };
 
 /// A p-value below this is called nonlinear: one of a hundred verdicts on a linear plant.
 inline constexpr double kNonlinearBelow = 0.01;
+/// A settled_p_value below this is called not settled: one of a hundred bands of settled records.
+inline constexpr double kUnsettledBelow = 0.01;
 
 /// Noise against stochastic nonlinear contributions.
 ///
@@ -59,9 +90,17 @@ inline constexpr double kNonlinearBelow = 0.01;
 /// group, whatever G was interpolated; a wrong G blurs the level only, by its relative error times
 /// the loop's T. level^2 = mean_k max(0, power - noise) / mean linear_power over the band.
 ///
-/// Source: Pintelon and Schoukens, System Identification (2012), sections 4.3 and 7.3.
+/// Both take lines for independent, and what a run has in excess of the others for distortion: neither
+/// holds in records with a transient or a drift. There the cosine of the angle between neighbouring lines
+/// of E has not the mean 0, so that over the n pairs of a band
+///   z = sum cos / sqrt(n / 2)
+/// is not standard normal. settled_p_value is the least upper tail of z over the outputs, of the band
+/// and of all bands together, times the number of these tests.
+/// `evidence`: of the records, if they are there; else the variances are those of the estimate.
+/// Source: Pintelon and Schoukens, System Identification (2012), sections 4.3 and 7.3; Mardia and Jupp,
+/// Directional Statistics (2000), section 6.3 (tests of uniformity).
 /// @throws std::invalid_argument with the text of why_linearity_cannot_be_tested().
-NonlinearityTest nonlinearity_test(const FrfEstimate& frf);
+NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEvidence& evidence = {});
 
 /// Empty, or what is missing: two periods, two realizations with total_dof = M - 1, the periodic
 /// method (with lpm neighbouring lines share bins), noise that was not smoothed over lines (they

@@ -41,7 +41,8 @@ PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
       lines_(std::move(lines)),
       outputs_(outputs),
       inputs_(inputs),
-      covariance_kind_(covariance) {
+      covariance_kind_(covariance),
+      scatter_(outputs, inputs, frequency_hz_.size()) {
   const Eigen::Index N = frequency_hz_.size();
   const Eigen::Index n_c = outputs * inputs;
   Z_sum_.setZero((outputs + inputs) * inputs, N);
@@ -82,7 +83,9 @@ void PlantAverage::add_line(const RealizationSpectra& spectra, const Eigen::Vect
   add_response(spectra, line, k);
   dof_sum_[k] += spectra.scatter_dof(k);
   if (noise_known_) {
-    add_noise(line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods), k);
+    const LineNoise noise = line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods);
+    add_noise(noise, k);
+    scatter_.add(line, noise, spectra.scatter_dof(k), k);
   }
 }
 
@@ -164,6 +167,11 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
   frf.residual_covariance_im = residual_sum_.imag() / M;
   frf.input_factor = input_sum_ / (M * M);
   if (covariance_kind_ == CovarianceKind::full) frf.covariance = covariance_sum_ / (M * M);
+}
+
+RealizationScatter PlantAverage::scatter() const {
+  if (realizations_ < 2 || !noise_known() || zippered_axes_ > 0) return {};
+  return scatter_.finish(realizations_);
 }
 
 void PlantAverage::finish_zippered(FrfEstimate& frf) const {

@@ -5,6 +5,7 @@
 #include "frf/frf_estimate.hpp"
 #include "frf/line_estimate.hpp"
 #include "frf/plant_frf.hpp"
+#include "frf/realization_scatter.hpp"
 #include "frf/realization_spectra.hpp"
 #include "frf/zippered_fit.hpp"
 
@@ -32,6 +33,9 @@ class PlantAverage {
   /// @throws std::invalid_argument if a full covariance is wanted and no noise could be seen.
   void finish(FrfEstimate& frf, int workers) const;
 
+  /// For nonlinearity_test(); empty if it needs more realizations, periods or independent lines.
+  RealizationScatter scatter() const;
+
  private:
   void add_line(const RealizationSpectra& spectra, const Eigen::VectorXd& periods, Eigen::Index k);
   void add_zippered(const RealizationSpectra& spectra, const ZipperedFit& fit, Eigen::Index k);
@@ -57,6 +61,7 @@ class PlantAverage {
   Eigen::MatrixXcd input_sum_;       // vec(A_m) over the mean of 1 / P_e
   Eigen::MatrixXcd covariance_sum_;  // vec(Cov(vec G)), on request
   Eigen::VectorXd condition_;
+  ScatterAverage scatter_;
   Eigen::Index zippered_axes_ = 0;
   Eigen::VectorXd dof_sum_;       // of the noise's degrees of freedom
   Eigen::VectorXd scarcity_sum_;  // zippered: of 1 / degrees of freedom

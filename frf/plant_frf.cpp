@@ -17,6 +17,7 @@
 #include "frf/excitation_spectrum.hpp"
 #include "frf/frf_provenance.hpp"
 #include "frf/health_gathering.hpp"
+#include "frf/line_alignment.hpp"
 #include "frf/plant_average.hpp"
 #include "frf/realization_spectra.hpp"
 #include "frf/record_spectra.hpp"
@@ -90,6 +91,7 @@ class PlantEstimation {
   std::unique_ptr<ZipperedFit> zippered_;  // if one experiment is a whole realization
   std::unique_ptr<PlantAverage> average_;
   std::unique_ptr<DetectionAverage> detection_;
+  std::unique_ptr<AlignmentAverage> alignment_;
   std::unique_ptr<FrfProvenance> provenance_;
   std::vector<DroppedPeriod> dropped_;
   std::vector<LeftOutRealization> left_out_;
@@ -278,11 +280,18 @@ void PlantEstimation::prepare(const RealizationRuns& realization,
   lines_.lines.insert(lines_.lines.end(), detection.begin(), detection.end());
   detection_ =
       std::make_unique<DetectionAverage>(excited_.lines, axes, excited_.single_axis, outputs);
+  alignment_ = std::make_unique<AlignmentAverage>(excited_.lines, detection, outputs);
 }
 
 void PlantEstimation::include(const RealizationSpectra& spectra,
                               const std::vector<RunExcitation>& excitation) {
-  average_->add(spectra, workers_, zippered_.get());
+  if (!detection_ || zippered_) {
+    average_->add(spectra, workers_, zippered_.get());
+  } else {
+    const Eigen::MatrixXcd G_before = average_->mean_response();
+    average_->add(spectra, workers_);
+    alignment_->add(spectra, G_before, average_->mean_response(), workers_);
+  }
   if (!detection_) return;
   std::vector<std::size_t> axis;
   for (const RunExcitation& run : excitation) {
@@ -305,11 +314,7 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
                       "leave this realization out",
                       excited_.axes.size(), realization.runs.size(), realization.realization));
     }
-    if (health != nullptr && !health->complete()) {
-      std::vector<const ExcitationSpectrum*> all;
-      for (const RunExcitation& run : excitation) all.push_back(&run.spectrum);
-      health->excite(m, all);
-    }
+    if (health != nullptr && !health->complete()) health->excite(m, excitation);
     std::vector<Eigen::MatrixXcd> R;
     for (const RunExcitation& run : excitation)
       R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
@@ -328,7 +333,10 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   if (zippered_)
     frf = select_band(frf, frf.frequency_hz[zippered_->lines().first()],
                       frf.frequency_hz[zippered_->lines().last()]);
-  if (why_linearity_cannot_be_tested(frf).empty()) frf.nonlinearity = nonlinearity_test(frf);
+  if (why_linearity_cannot_be_tested(frf).empty())
+    frf.nonlinearity = nonlinearity_test(
+        frf,
+        {average_->scatter(), alignment_->finish(info_.sample_rate_hz / info_.period_samples)});
   frf.provenance_json = provenance_->json();
   if (options_.covariance_lines != 1) frf = smooth_covariance(frf, options_.covariance_lines);
   if (channels_.inputs == frf.inputs.names) return frf;

@@ -68,11 +68,27 @@ Extreme extreme(const NonlinearityTest& test) {
   return out;
 }
 
+std::size_t unsettled_bands(const NonlinearityTest& test) {
+  std::size_t count = 0;
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) count += test.settled(b) ? 0 : 1;
+  return count;
+}
+
+std::string unsettled_line(const NonlinearityTest& test) {
+  return fmt::format(
+      "in {} of {} bands linearity cannot be told: the records hold a transient or a drift; pass "
+      "over "
+      "more periods (--transient-periods) or model it (--method lpm)",
+      unsettled_bands(test), test.band_hz.rows());
+}
+
 std::string conclusion(const NonlinearityTest& test) {
   const Extreme most = extreme(test);
+  const std::size_t tests = static_cast<std::size_t>(test.p_value.size()) -
+                            unsettled_bands(test) * static_cast<std::size_t>(test.p_value.rows());
   const std::string chance =
       fmt::format("a linear plant shows {:.1f} of {} pairs and bands as nonlinear by chance",
-                  kNonlinearBelow * static_cast<double>(test.p_value.size()), test.p_value.size());
+                  kNonlinearBelow * static_cast<double>(tests), tests);
   if (!most.stands_out()) return "no sign that the plant is not linear: " + chance;
   return fmt::format(
       "the plant is not linear: {}, but none as improbable as p = {:.0e}, which is here", chance,
@@ -94,14 +110,21 @@ std::vector<std::string> linearity_lines(const FrfEstimate& frf) {
   for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
     const Verdict verdict = least(test.p_value, b);
     const auto count = (test.p_value.col(b).array() < kNonlinearBelow).count();
-    rows.push_back({fmt::format("{:.4g} ... {:.4g}", test.band_hz(b, 0), test.band_hz(b, 1)),
-                    fmt::format("{} of {}", count, test.p_value.rows()),
+    const std::string band =
+        fmt::format("{:.4g} ... {:.4g}", test.band_hz(b, 0), test.band_hz(b, 1));
+    if (!test.settled(b)) {
+      rows.push_back({band, "not settled", "-", "-", "-", "-"});
+      continue;
+    }
+    rows.push_back({band, fmt::format("{} of {}", count, test.p_value.rows()),
                     count > 0 ? pair_name(frf, verdict.at) : "-",
                     count > 0 ? decibels(test.distortion(verdict.at, b)) : "-",
                     detected(test.even, b), detected(test.odd, b)});
   }
   std::vector<std::string> lines = table_lines(rows);
-  lines.push_back(conclusion(test));
+  const std::size_t unsettled = unsettled_bands(test);
+  if (unsettled > 0) lines.push_back(unsettled_line(test));
+  if (unsettled < static_cast<std::size_t>(test.band_hz.rows())) lines.push_back(conclusion(test));
   return lines;
 }
 
@@ -113,6 +136,7 @@ Json linearity_json(const FrfEstimate& frf) {
     const Verdict verdict = least(test.p_value, b);
     bands.push_back(
         {{"band_hz", {test.band_hz(b, 0), test.band_hz(b, 1)}},
+         {"settled", test.settled(b)},
          {"tests", test.p_value.rows()},
          {"nonlinear", (test.p_value.col(b).array() < kNonlinearBelow).count()},
          {"output", frf.outputs.names[static_cast<std::size_t>(verdict.at % frf.n_outputs())]},

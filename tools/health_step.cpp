@@ -7,6 +7,7 @@
 
 #include "acquisition/log_reader.hpp"
 #include "frf/interpolation_check.hpp"
+#include "frf/settling_check.hpp"
 #include "tools/interrupt.hpp"
 #include "tools/open_logs.hpp"
 #include "tools/stage_expectation.hpp"
@@ -28,7 +29,7 @@ Finding finding_of(const Json& object) {
   Finding finding;
   for (const Severity severity : kSeverities)
     if (text_of(object, "severity") == to_string(severity)) finding.severity = severity;
-  for (int cause = 0; cause <= static_cast<int>(Cause::interpolation); ++cause)
+  for (int cause = 0; cause <= static_cast<int>(Cause::unsettled); ++cause)
     if (text_of(object, "cause") == to_string(static_cast<Cause>(cause)))
       finding.cause = static_cast<Cause>(cause);
   finding.channel = text_of(object, "channel");
@@ -91,6 +92,7 @@ std::vector<std::string> health_notes(const std::vector<Finding>& findings) {
 
 std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings) {
   for (Finding& finding : check_interpolation(frf)) findings.push_back(std::move(finding));
+  for (Finding& finding : check_settling(frf)) findings.push_back(std::move(finding));
   std::stable_sort(findings.begin(), findings.end(),
                    [](const Finding& a, const Finding& b) { return a.severity < b.severity; });
   Json provenance = Json::parse(frf.provenance_json, nullptr, false);

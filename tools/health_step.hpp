@@ -25,7 +25,7 @@ nlohmann::ordered_json health_json(const std::vector<Finding>& findings);
 /// Faults and doubts as sentences, for notes.
 std::vector<std::string> health_notes(const std::vector<Finding>& findings);
 
-/// Adds what the response itself shows (check_interpolation()) to the findings about its logs and keeps
+/// Adds what the response itself shows (check_interpolation(), check_settling()) to the findings about its logs and keeps
 /// all of them as "health" in its provenance; returns them, faults first.
 std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings);
 /// What keep_health() kept. What is not there, or is not as written by us, is none.

@@ -8,6 +8,7 @@
 #include "excitation/file_error.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "frf/frf_file.hpp"
+#include "tests/support/error_message.hpp"
 #include "tests/support/hdf5_surgery.hpp"
 #include "tests/support/numbered_frf.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -37,6 +38,7 @@ FrfEstimate with_quality() {
   frf.nonlinearity.band_hz = numbered(2, 2, 1.0);
   frf.nonlinearity.p_value = numbered(6, 2, 0.5);
   frf.nonlinearity.distortion = numbered(6, 2, 0.25);
+  frf.nonlinearity.settled_p_value = numbered(2, 1, 0.125);
   frf.nonlinearity.even = {numbered(6, 2, 20.0), numbered(6, 2, 40.0)};
   frf.nonlinearity.odd = {numbered(6, 2, 30.0), numbered(6, 2, 50.0)};
   frf.dropped_periods = {{0, 1, 4, "a marked sample"}, {2, 0, 7, "12 times the scatter"}};
@@ -65,6 +67,7 @@ TEST_F(FrfQualityFile, EverythingComesBack) {
   EXPECT_EQ(back.nonlinearity.band_hz, frf.nonlinearity.band_hz);
   EXPECT_EQ(back.nonlinearity.p_value, frf.nonlinearity.p_value);
   EXPECT_EQ(back.nonlinearity.distortion, frf.nonlinearity.distortion);
+  EXPECT_EQ(back.nonlinearity.settled_p_value, frf.nonlinearity.settled_p_value);
   EXPECT_EQ(back.nonlinearity.even.p_value, frf.nonlinearity.even.p_value);
   EXPECT_EQ(back.nonlinearity.odd.level, frf.nonlinearity.odd.level);
   EXPECT_EQ(back.dropped_periods, frf.dropped_periods);
@@ -103,19 +106,14 @@ TEST_F(FrfQualityFile, MethodAndSmoothingComeBack) {
 }
 
 std::string message_of(const std::filesystem::path& file) {
-  try {
-    read_frf(file);
-  } catch (const FormatError& error) {
-    return error.what();
-  }
-  return "no error";
+  return test::error_message<FormatError>([&] { read_frf(file); });
 }
 
 TEST_F(FrfQualityFile, SpoiltDatasetsAreNamed) {
   for (const char* dataset :
        {"/detection_line", "/detection_power", "/detection_noise", "/detection_runs",
         "/detection_linear_power", "/dropped_periods", "/left_out_realizations",
-        "/nonlinearity_p_value", "/nonlinearity_even_level"}) {
+        "/nonlinearity_p_value", "/nonlinearity_settled_p_value", "/nonlinearity_even_level"}) {
     write_frf(file_, with_quality());
     test::Hdf5Surgery(file_).reshape(dataset, {7});
     EXPECT_THAT(message_of(file_), HasSubstr(dataset)) << dataset;

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "frf/plant_frf.hpp"
+#include "tests/support/error_message.hpp"
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
@@ -55,12 +56,7 @@ TEST(Nonlinearity, BandsAreOctavesOfEnoughLines) {
 }
 
 std::string message_of(const FrfEstimate& frf) {
-  try {
-    nonlinearity_test(frf);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  return test::error_message<std::invalid_argument>([&] { nonlinearity_test(frf); });
 }
 
 TEST(Nonlinearity, RefusesWithoutBothVariances) {

@@ -7,6 +7,7 @@
 #include "frf/frf_file.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tools/frf_quality.hpp"
+#include "tools/health_step.hpp"
 
 namespace stageid::test {
 namespace {
@@ -35,6 +36,24 @@ TEST_F(FrfQuality, TellsWhetherTheStageIsLinear) {
   EXPECT_THAT(linear.err, HasSubstr("no sign that the plant is not linear: a linear plant shows "));
   EXPECT_LT(read_frf(at("c.h5")).nonlinearity.p_value.minCoeff(),
             read_frf(at("f.h5")).nonlinearity.p_value.minCoeff());
+}
+
+TEST_F(FrfQuality, SaysWhereTheRecordsAreNotSettled) {
+  make_log();
+  succeed({"frf", name("run.slog"), "-o", name("f.h5")});
+  FrfEstimate frf = read_frf(at("f.h5"));
+  const Eigen::Index bands = frf.nonlinearity.band_hz.rows();
+  frf.nonlinearity.settled_p_value = Eigen::VectorXd::Ones(bands);
+  frf.nonlinearity.settled_p_value[0] = 1e-5;
+  EXPECT_THAT(linearity_lines(frf), Contains(HasSubstr("not settled")));
+  EXPECT_THAT(linearity_lines(frf), Contains(HasSubstr("linearity cannot be told")));
+  EXPECT_EQ(linearity_json(frf)["bands"][0]["settled"], false);
+  const std::vector<Finding> found = keep_health(frf, {});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].cause, Cause::unsettled);
+  EXPECT_EQ(health_of(frf.provenance_json).front().cause, Cause::unsettled);
+  frf.nonlinearity.settled_p_value.setConstant(1e-5);
+  EXPECT_THAT(linearity_lines(frf), testing::Not(Contains(HasSubstr("not linear"))));
 }
 
 TEST_F(FrfQuality, SaysWhyItWasNotTested) {

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "frf/frf_estimate.hpp"
+#include "frf/health_finding.hpp"
+
+namespace stageid {
+
+/// Where the records are not settled (NonlinearityTest::settled_p_value): a transient that is left after
+/// the periods passed over, or a drift. It adds to the response what no variance holds, and would pass
+/// for distortions of the plant. One finding at most, naming the bands.
+std::vector<Finding> check_settling(const FrfEstimate& frf);
+
+}  // namespace stageid
