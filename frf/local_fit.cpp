@@ -13,7 +13,8 @@
 namespace stageid {
 namespace {
 
-constexpr int kIterations = 8;  // of Sanathanan and Koerner; they settle in four or five
+constexpr int kIterations = 8;      // of Sanathanan and Koerner; they settle in four or five
+constexpr double kSettled = 1e-10;  // a step of D so small, relative to D, is the last
 // Without a pole the first, linear step lowers the cost by one degree of freedom of many: a line on
 // which it does not do much more is not worth the iteration.
 constexpr double kWorthIterating = 0.9;
@@ -148,7 +149,10 @@ class Fitting {
     double linear_cost = 0.0;
     Eigen::VectorXcd d = first_step_.solution(poles, linear_cost);
     if (linear_cost > worth * first_step_.cost) return polynomial_;
-    for (int i = 1; i < kIterations && d.allFinite(); ++i) d = next_denominator(d);
+    for (int i = 1; i < kIterations && d.allFinite(); ++i) {
+      const Eigen::VectorXcd before = std::exchange(d, next_denominator(d));
+      if ((d - before).norm() <= kSettled * d.norm()) break;
+    }
     if (!d.allFinite() || !wide_enough(p_, d)) return polynomial_;
     LocalFit rational = fit(d, Projection(over(p_.K, denominator(d)), p_.k0, p_.groups));
     return rational.residual.allFinite() ? rational : polynomial_;
