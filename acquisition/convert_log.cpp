@@ -16,6 +16,7 @@
 #include "excitation/file_error.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "excitation/output_file.hpp"
+#include "excitation/system_reason.hpp"
 
 namespace stageid {
 
@@ -185,8 +186,8 @@ class CsvFile {
     text_.clear();
   }
   [[noreturn]] void fail() const {
-    throw FileError(fmt::format("{}: cannot be written: {}", path_.string(),
-                                std::error_code(errno, std::generic_category()).message()));
+    throw FileError(
+        fmt::format("{}: cannot be written: {}", shown_name(path_).string(), system_reason(errno)));
   }
   std::filesystem::path path_;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;

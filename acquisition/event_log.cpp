@@ -10,6 +10,7 @@
 
 #include "acquisition/utc_time.hpp"
 #include "excitation/file_error.hpp"
+#include "excitation/system_reason.hpp"
 
 namespace stageid {
 
@@ -31,8 +32,7 @@ std::string line_of(std::string_view event, const std::vector<EventField>& field
 EventLog::EventLog(const std::filesystem::path& file)
     : path_(file), file_(std::fopen(file.c_str(), "ae")) {
   if (!file_)
-    throw FileError(fmt::format("{}: cannot be written: {}; make the directory writable",
-                                file.string(), std::strerror(errno)));
+    throw FileError(fmt::format("{}: cannot be written: {}", file.string(), system_reason(errno)));
 }
 
 void EventLog::write(std::string_view event, const std::vector<EventField>& fields) noexcept {

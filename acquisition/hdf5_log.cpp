@@ -9,7 +9,9 @@
 
 #include "acquisition/log_checks.hpp"
 #include "acquisition/row_transpose.hpp"
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
+#include "excitation/file_kind.hpp"
 
 namespace stageid {
 
@@ -37,9 +39,10 @@ ChannelList read_channel_list(const Hdf5File& file, const std::string& dataset) 
   }
   if (channels.units.size() == 1) channels.units.assign(channels.size(), channels.units.front());
   if (channels.units.size() != channels.size()) {
-    throw FormatError(file.path(), dataset,
-                      fmt::format("has {} channels and {} units; give one unit, or one a channel",
-                                  channels.size(), channels.units.size()));
+    throw FormatError(
+        file.path(), dataset,
+        fmt::format("has {} and {}; give one unit, or one a channel",
+                    counted(channels.size(), "channel"), counted(channels.units.size(), "unit")));
   }
   return channels;
 }
@@ -49,9 +52,9 @@ std::vector<double> read_column_values(const Hdf5File& file, const std::string& 
                                        const std::string& name, std::size_t size) {
   std::vector<double> values = file.read_reals_attribute(dataset, name);
   if (values.size() != 1 && values.size() != size) {
-    throw FormatError(
-        file.path(), dataset,
-        fmt::format("attribute {} has {} values; it must have 1 or {}", name, values.size(), size));
+    throw FormatError(file.path(), dataset,
+                      fmt::format("attribute {} has {}; it must have 1 or {}", name,
+                                  counted(values.size(), "value"), size));
   }
   if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) {
     throw FormatError(file.path(), dataset, fmt::format("attribute {} is not finite", name));
@@ -72,8 +75,11 @@ Hdf5LogReader::Hdf5LogReader(const std::filesystem::path& file) : path_(file) {
   file_ = Hdf5File::open(file);
   const std::string format = file_->read_text_attribute("/", "format");
   if (format != "stageid-log") {
-    throw FormatError(path_, "/",
-                      fmt::format("attribute format is '{}'; a log has 'stageid-log'", format));
+    const std::string other = other_hdf5_kind(format, "a log");
+    throw FormatError(
+        path_, "/",
+        !other.empty() ? other
+                       : fmt::format("attribute format is '{}'; a log has 'stageid-log'", format));
   }
   const long long version = file_->read_integer_attribute("/", "format_version");
   if (version != 1) {
@@ -177,9 +183,9 @@ void Hdf5LogReader::check_excitation_length(const LogRun& run, const Dataset& ex
     return;
   }
   throw FormatError(path_, excitation.name,
-                    fmt::format("has {} rows; it must have one period ({}) or as many as the run "
+                    fmt::format("has {}; it must have one period ({}) or as many as the run "
                                 "({})",
-                                excitation.rows, period, run.samples));
+                                counted(excitation.rows, "row"), period, run.samples));
 }
 
 void Hdf5LogReader::read_columns(const Dataset& dataset, std::uint64_t first,

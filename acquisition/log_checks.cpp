@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 
 namespace stageid {
@@ -19,10 +20,11 @@ void check_runs(const std::filesystem::path& file, const LogInfo& info,
     if (!run.complete) continue;
     const std::string place = "/runs/" + run.name;
     if (run.samples % period != 0 || run.samples / period <= transient) {
-      throw FormatError(file, place,
-                        fmt::format("has {} samples, which are not {} transient periods and one or "
-                                    "more further periods of {} samples each",
-                                    run.samples, transient, period));
+      throw FormatError(
+          file, place,
+          fmt::format("has {}; {} and one or more further periods of {} each are wanted",
+                      counted(run.samples, "sample"), counted(transient, "transient period"),
+                      counted(period, "sample")));
     }
     if (run.realization < 0 || run.experiment < 0) {
       throw FormatError(file, place,

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "excitation/counted.hpp"
+
 namespace stageid {
 
 namespace {
@@ -14,8 +16,9 @@ constexpr std::uint64_t kLargestPeriodBytes = std::uint64_t{1} << 30;
 
 void check_channels(const ChannelList& channels, const char* group) {
   if (channels.units.size() != channels.names.size()) {
-    throw std::invalid_argument(fmt::format("log: {} has {} names and {} units; one unit a name",
-                                            group, channels.names.size(), channels.units.size()));
+    throw std::invalid_argument(fmt::format("log: {} has {} and {}; one unit a name", group,
+                                            counted(channels.names.size(), "name"),
+                                            counted(channels.units.size(), "unit")));
   }
   std::vector<std::string> sorted = channels.names;
   std::sort(sorted.begin(), sorted.end());

@@ -6,6 +6,7 @@
 #include "acquisition/hdf5_log.hpp"
 #include "acquisition/slog_reader.hpp"
 #include "excitation/file_error.hpp"
+#include "excitation/file_kind.hpp"
 
 namespace stageid {
 
@@ -28,6 +29,8 @@ std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool dama
   if (magic == kHdf5Magic) return std::make_unique<Hdf5LogReader>(file);
   // With its first block damaged a native log still has others.
   if (!damaged_is_error) return std::make_unique<SlogReader>(file, false);
+  if (const std::string other = other_kind(file, "a log"); !other.empty())
+    throw FormatError(file, "", other);
   throw FormatError(
       file, "",
       "is neither a native log (.slog) nor an HDF5 file; another program's is read with "

@@ -20,6 +20,7 @@
 #include "acquisition/measurement_loop.hpp"
 #include "acquisition/shared_progress.hpp"
 #include "acquisition/utc_time.hpp"
+#include "excitation/counted.hpp"
 
 namespace stageid {
 
@@ -164,8 +165,8 @@ class Experiment {
       break;
     }
     if (result_.end == ExperimentEnd::complete) {
-      result_.message = fmt::format("{}{}{} runs measured", enough, enough.empty() ? "" : "; ",
-                                    result_.runs_done);
+      result_.message = fmt::format("{}{}{} measured", enough, enough.empty() ? "" : "; ",
+                                    counted(result_.runs_done, "run"));
     }
   }
 

@@ -12,6 +12,7 @@
 #include "acquisition/excited_actuators.hpp"
 #include "acquisition/slog_format.hpp"
 #include "acquisition/utc_time.hpp"
+#include "excitation/counted.hpp"
 
 namespace stageid {
 namespace {
@@ -76,8 +77,8 @@ class ResidentExperiment {
     }
     stage_.stop();
     if (result_.end == ExperimentEnd::complete)
-      result_.message = fmt::format("{}{}{} runs measured", enough, enough.empty() ? "" : "; ",
-                                    result_.runs_done);
+      result_.message = fmt::format("{}{}{} measured", enough, enough.empty() ? "" : "; ",
+                                    counted(result_.runs_done, "run"));
     if (result_.end == ExperimentEnd::interrupted)
       result_.message = "interrupted; what was measured is kept";
     return std::move(result_);

@@ -16,15 +16,16 @@
 #include <utility>
 
 #include "acquisition/crc32c.hpp"
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
+#include "excitation/output_file.hpp"
+#include "excitation/system_reason.hpp"
 
 namespace stageid {
 
 namespace {
 
 constexpr std::array<std::byte, kSlogAlignment> kZeros{};
-
-std::string reason(int error) { return std::error_code(error, std::generic_category()).message(); }
 
 void lock(const FileDescriptor& file, const std::filesystem::path& path) {
   if (::flock(file.get(), LOCK_EX | LOCK_NB) == 0) return;
@@ -72,7 +73,8 @@ SlogAppender SlogAppender::create(const std::filesystem::path& file) {
     throw FileError(
         error == EEXIST
             ? fmt::format("{}: exists already; give another name, or --resume it", file.string())
-            : fmt::format("{}: cannot be created: {}", file.string(), reason(error)));
+            : fmt::format("{}: cannot be created: {}", shown_name(file).string(),
+                          system_reason(error)));
   }
   lock(descriptor, file);
   synchronize_directory(file);
@@ -83,7 +85,7 @@ SlogAppender SlogAppender::open_existing(const std::filesystem::path& file) {
   FileDescriptor descriptor(::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
   if (descriptor.get() < 0) {
     throw FileError(
-        fmt::format("{}: cannot be opened for writing: {}", file.string(), reason(errno)));
+        fmt::format("{}: cannot be opened for writing: {}", file.string(), system_reason(errno)));
   }
   lock(descriptor, file);
   return {file, std::move(descriptor), 0};
@@ -93,7 +95,7 @@ void SlogAppender::continue_at(std::uint64_t bytes, std::uint32_t log_id,
                                std::uint64_t next_sequence) {
   if (::ftruncate(file_.get(), static_cast<off_t>(bytes)) != 0) {
     throw FileError(fmt::format("{}: cannot be cut to its intact {} bytes: {}", path_.string(),
-                                bytes, reason(errno)));
+                                bytes, system_reason(errno)));
   }
   bytes_ = written_back_ = bytes;
   log_id_ = log_id;
@@ -161,12 +163,10 @@ void SlogAppender::fail(int error) {
   error_ = error;
   // A partial block would be taken for damage by every reader.
   const bool cut = is_open() && ::ftruncate(file_.get(), static_cast<off_t>(bytes_)) == 0;
-  throw FileError(
-      fmt::format("{}: cannot be written: {}; the {} blocks ({} bytes) written before are kept{}; "
-                  "free some space, then "
-                  "continue with --resume",
-                  path_.string(), reason(error), next_sequence_, bytes_,
-                  cut ? "" : ", behind them may stand a part of one more"));
+  throw FileError(fmt::format(
+      "{}: cannot be written: {}; {} ({} bytes) written before {} kept{}",
+      shown_name(path_).string(), system_reason(error), counted(next_sequence_, "block"), bytes_,
+      next_sequence_ == 1 ? "is" : "are", cut ? "" : ", behind them may stand a part of one more"));
 }
 
 void SlogAppender::synchronize() {
@@ -176,7 +176,7 @@ void SlogAppender::synchronize() {
   throw FileError(
       fmt::format("{}: cannot be brought to the disk: {}; what was written since the "
                   "last synchronization may be lost",
-                  path_.string(), reason(error)));
+                  path_.string(), system_reason(error)));
 }
 
 void SlogAppender::close() {

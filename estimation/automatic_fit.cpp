@@ -16,6 +16,7 @@
 #include "estimation/pole_relocation.hpp"
 #include "estimation/residual_modes.hpp"
 #include "estimation/settled_fit.hpp"
+#include "excitation/counted.hpp"
 #include "frf/worker_pool.hpp"
 
 namespace stageid {
@@ -63,7 +64,7 @@ class AutomaticFit {
     const auto wanted = static_cast<std::size_t>(selection_.exactly);
     const std::vector<ModeCandidate> modes =
         relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
-    say("start: {} modes by pole relocation", modes.size());
+    say("start: {} by pole relocation", counted(modes.size(), "mode"));
     model = start_of(modes);
     if (many()) {
       FitOptions still = quick_;
@@ -92,7 +93,7 @@ class AutomaticFit {
       quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
       adopt(fit_additive_model(frf_, best_.model, quick_));
     }
-    say("{} modes, by way of {}: cost {:.6g}", count_modes(best_.model), target_,
+    say("{}, by way of {}: cost {:.6g}", counted(count_modes(best_.model), "mode"), target_,
         best_.model.fit.cost);
   }
 
@@ -147,9 +148,9 @@ class AutomaticFit {
       modes = without_given(pick_modes(frf_), structure_);
       const std::size_t most = static_cast<std::size_t>(affordable_modes());
       if (modes.size() > most) modes.resize(most);
-      say("start: {} peaks of the CMIF", modes.size());
+      say("start: {} of the CMIF", counted(modes.size(), "peak"));
     } else {
-      say("start: {} modes given", modes.size());
+      say("start: {} given", counted(modes.size(), "mode"));
     }
     AdditiveModel model = start_of(modes);
     if (model.submodels.empty())

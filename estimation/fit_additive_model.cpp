@@ -19,6 +19,7 @@
 #include "estimation/poles.hpp"
 #include "estimation/residual.hpp"
 #include "estimation/weight_matrices.hpp"
+#include "excitation/counted.hpp"
 
 namespace stageid {
 namespace {
@@ -170,9 +171,9 @@ void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResu
       removal_costs(problem, groups, beta.B);  // of what solves the convex problem
   shrink_hidden_modes(problem, groups, hidden, result.removal_cost, beta.B, cost);
   result.decisions.push_back(
-      fmt::format("residues of the {} modes that noise hides, shrunk as James and Stein do: cost "
+      fmt::format("residues of {} that noise hides, shrunk as James and Stein do: cost "
                   "{:.6g} -> {:.6g}",
-                  hidden.size(), iteration.end_cost, cost));
+                  counted(hidden.size(), "mode"), iteration.end_cost, cost));
   iteration.end_cost = cost;
   iteration.cost.push_back(cost);
 }

@@ -8,6 +8,8 @@
 #include <thread>
 #include <utility>
 
+#include "excitation/counted.hpp"
+
 namespace stageid {
 namespace {
 
@@ -100,9 +102,9 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
   require(
       2 * problem.size() >= per_channel && 2 * problem.size() * problem.channels() >=
                                                problem.globals() + per_channel * problem.channels(),
-      fmt::format("fit: {} lines of {} channels cannot carry {} parameters; choose fewer modes or "
+      fmt::format("fit: {} of {} cannot carry {} parameters; choose fewer modes or "
                   "a wider band",
-                  problem.size(), problem.channels(),
+                  counted(problem.size(), "line"), counted(problem.channels(), "channel"),
                   problem.globals() + per_channel * problem.channels()));
   return problem;
 }

@@ -5,6 +5,9 @@
 #include <fstream>
 #include <sstream>
 
+#include "excitation/file_kind.hpp"
+#include "excitation/system_reason.hpp"
+
 namespace stageid {
 
 JsonNode JsonNode::member(const std::string& key) const {
@@ -70,11 +73,17 @@ std::vector<std::string> JsonNode::texts() const {
 
 JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file_(std::move(file)) {
   std::ifstream stream(file_, std::ios::binary);
-  if (!stream) throw FileError(file_.string() + ": cannot be read: " + std::strerror(errno));
+  if (!stream) throw FileError(file_.string() + ": cannot be read: " + system_reason(errno));
+  if (std::filesystem::is_directory(file_))
+    throw FileError(file_.string() + ": is a directory; give a JSON file");
   std::stringstream text;
   text << stream.rdbuf();
   if (text.str().empty())
     throw FormatError(file_, "", "is empty; a JSON file of format " + format + " is wanted");
+  const std::string wanted =
+      format == "stageid-model" ? "a model (.json)" : "a " + format + " file (.json)";
+  const std::string other = other_kind(file_, wanted);
+  if (!other.empty() && !text.str().starts_with('{')) throw FormatError(file_, "", other);
   try {
     value_ = nlohmann::ordered_json::parse(text.str());
   } catch (const nlohmann::ordered_json::out_of_range& error) {
@@ -88,13 +97,16 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
     const std::string what = error.what();
     const std::size_t start = what.find("at line");
     throw FormatError(file_, "",
-                      "is not JSON: " + (start == std::string::npos ? what : what.substr(start)));
+                      "is not JSON: " + (start == std::string::npos ? what : what.substr(start)) +
+                          "; give " + wanted);
   }
   const JsonNode node = root();
   if (!value_.is_object() || !node.has("format") || !value_["format"].is_string() ||
-      value_["format"] != format)
+      value_["format"] != format) {
+    if (node.has("format") && !other.empty()) throw FormatError(file_, "", other);
     throw FormatError(file_, "",
                       "is not a " + format + " file; its \"format\" must be \"" + format + "\"");
+  }
 }
 
 }  // namespace stageid

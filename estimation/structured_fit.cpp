@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "excitation/counted.hpp"
+
 namespace stageid {
 namespace {
 
@@ -97,9 +99,9 @@ class PoleSearch {
     for (const Submodel& s : found_.model.submodels)
       if (is_searched_mode(s)) out.push_back(&s);
     if (static_cast<int>(out.size()) < pairs)
-      throw std::invalid_argument(fmt::format(
-          "fit: the submodels need {} pairs of poles and {} were found; give their frequencies",
-          pairs, out.size()));
+      throw std::invalid_argument(
+          fmt::format("fit: the submodels need {} of poles, {} found; give their frequencies",
+                      counted(pairs, "pair"), out.size()));
     if (pairs == 0 && static_cast<int>(2 * out.size()) > kLargestOrder)
       throw std::invalid_argument(
           fmt::format("fit: n=auto finds {} modes and one denominator carries {}; take a narrower "

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "estimation/poles.hpp"
+#include "excitation/counted.hpp"
 
 namespace stageid {
 namespace {
@@ -21,8 +22,8 @@ std::string fault_of_start(const SubmodelRequest& request) {
   if (request.order_by_search && !(f.empty() && zeta.empty()))
     return "with n=auto the poles are searched; leave frequencies and damping ratios out";
   if (!f.empty() && f.size() != poles)
-    return fmt::format("n={} starts from {} frequenc{}{}; {} given", request.shape.order, poles,
-                       poles == 1 ? "y" : "ies",
+    return fmt::format("n={} starts from {}{}; {} given", request.shape.order,
+                       counted(poles, "frequency", "frequencies"),
                        request.has_real_pole() && pairs > 0 ? ", the last of the real pole" : "",
                        f.size());
   if (!std::all_of(f.begin(), f.end(), [](double x) { return std::isfinite(x) && x > 0.0; }))

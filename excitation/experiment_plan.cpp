@@ -9,6 +9,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "excitation/counted.hpp"
 #include "excitation/hadamard.hpp"
 #include "excitation/line_spectrum.hpp"
 #include "excitation/multisine_lines.hpp"
@@ -176,10 +177,10 @@ double ExperimentPlan::duration_s() const noexcept {
 void ExperimentPlan::check_run(RunId run) const {
   if (run.realization < 0 || run.realization >= spec_.realizations || run.experiment < 0 ||
       run.experiment >= experiments()) {
-    throw std::invalid_argument(fmt::format(
-        "experiment: there is no realization {}, experiment {}; there are {} realizations "
-        "of {} experiments",
-        run.realization, run.experiment, spec_.realizations, experiments()));
+    throw std::invalid_argument(
+        fmt::format("experiment: there is no realization {}, experiment {}; there are {} of {}",
+                    run.realization, run.experiment, counted(spec_.realizations, "realization"),
+                    counted(experiments(), "experiment")));
   }
 }
 

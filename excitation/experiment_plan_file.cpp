@@ -31,6 +31,7 @@
 
 #include "excitation/experiment_plan.hpp"
 #include "excitation/file_error.hpp"
+#include "excitation/file_kind.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "excitation/multisine_lines.hpp"
 #include "excitation/output_file.hpp"
@@ -181,7 +182,10 @@ void PlanReader::check_format() const {
   const bool named = file_.has_attribute("/", "format");
   const std::string format = named ? file_.read_text_attribute("/", "format") : "";
   if (format != kFormat) {
-    fail("/", fmt::format("attribute 'format' is '{}'; it must be '{}'", format, kFormat));
+    const std::string other = other_hdf5_kind(format, "a designed excitation");
+    fail("/", other.empty()
+                  ? fmt::format("attribute 'format' is '{}'; it must be '{}'", format, kFormat)
+                  : other);
   }
   const long long version = file_.read_integer_attribute("/", "format_version");
   if (version != kVersion) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "excitation/file_error.hpp"
+#include "excitation/system_reason.hpp"
 
 namespace stageid {
 
@@ -58,7 +59,7 @@ std::string fingerprint_of_file(const std::filesystem::path& file) {
     void operator()(std::FILE* stream) const noexcept { std::fclose(stream); }
   };
   const auto fail = [&file](int error) {
-    throw FileError(file.string() + ": cannot be read: " + std::strerror(error));
+    throw FileError(file.string() + ": cannot be read: " + system_reason(error));
   };
   const std::unique_ptr<std::FILE, Close> stream(std::fopen(file.c_str(), "rb"));
   if (!stream) fail(errno);

@@ -11,8 +11,11 @@
 #include <string_view>
 
 #include "excitation/file_error.hpp"
+#include "excitation/file_kind.hpp"
 #include "excitation/hdf5_heap_check.hpp"
 #include "excitation/hdf5_support.hpp"
+#include "excitation/output_file.hpp"
+#include "excitation/system_reason.hpp"
 
 namespace stageid {
 namespace {
@@ -30,7 +33,7 @@ void prepare_library() {
 void check_can_be_opened(const std::filesystem::path& file) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) {
-    throw FileError(file.string() + ": cannot be read: " + std::strerror(errno));
+    throw FileError(file.string() + ": cannot be read: " + system_reason(errno));
   }
   struct stat status {};
   const bool regular = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
@@ -38,18 +41,10 @@ void check_can_be_opened(const std::filesystem::path& file) {
   if (!regular) throw FileError(file.string() + ": is not a file; give the name of an HDF5 file");
 }
 
-/// What stands where an HDF5 file belongs, and what to give instead.
-std::string other_kind(const std::filesystem::path& file) {
-  char head[5] = {};
+bool begins_as_hdf5(const std::filesystem::path& file) {
+  char head[4] = {};
   std::ifstream(file, std::ios::binary).read(head, sizeof(head));
-  const std::string_view begin(head, sizeof(head));
-  if (begin == "\x89SLOG")
-    return "is a native log, not an HDF5 file; 'stageid frf' makes a frequency response of it, "
-           "'stageid "
-           "log convert' an HDF5 log";
-  if (begin.starts_with('{'))
-    return "is JSON, as models and modes are, not an HDF5 file; give a frequency response or a log";
-  return "is not an HDF5 file, or its beginning is damaged; give an HDF5 file";
+  return std::string_view(head, sizeof(head)) == "\x89HDF";
 }
 
 }  // namespace
@@ -79,7 +74,12 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
   check_can_be_opened(file);
   if (H5Fis_hdf5(file.c_str()) <= 0) {
     H5Eclear2(H5E_DEFAULT);
-    throw FormatError(file, "", other_kind(file));
+    // other_kind() would open what begins as an HDF5 file, to ask for its format.
+    const std::string other = begins_as_hdf5(file) ? "" : other_kind(file, "an HDF5 file");
+    throw FormatError(file, "",
+                      !other.empty()
+                          ? other
+                          : "is not an HDF5 file, or its beginning is damaged; give an HDF5 file");
   }
   hdf5::check_global_heaps(file);
   Hdf5Handle handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
@@ -93,7 +93,7 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
 
 Hdf5File Hdf5File::create(const std::filesystem::path& file,
                           const std::filesystem::path& shown_as) {
-  const std::filesystem::path& named = shown_as.empty() ? file : shown_as;
+  const std::filesystem::path named = shown_name(shown_as.empty() ? file : shown_as);
   prepare_library();
   const Hdf5Handle properties = hdf5::property_list(H5P_FILE_CREATE);
   H5Pset_obj_track_times(properties.get(), false);
@@ -104,7 +104,7 @@ Hdf5File Hdf5File::create(const std::filesystem::path& file,
   Hdf5Handle handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), access.get()),
                     H5Fclose);
   if (!handle) {
-    throw FileError(named.string() + ": cannot be created: " + hdf5::take_reason());
+    throw FileError(named.string() + ": cannot be created: " + with_remedy(hdf5::take_reason()));
   }
   return {named, std::move(handle)};
 }
@@ -113,7 +113,7 @@ void Hdf5File::close() {
   if (!file_) return;
   open_datasets_ = std::make_unique<OpenDatasets>();
   const bool flushed = H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0;
-  const std::string reason = flushed ? "" : hdf5::take_reason();
+  const std::string reason = flushed ? "" : with_remedy(hdf5::take_reason());
   file_.reset();
   if (!flushed) throw FileError(path_.string() + ": cannot be written: " + reason);
 }

@@ -8,18 +8,21 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <regex>
 #include <string>
 #include <system_error>
 
 #include "excitation/file_error.hpp"
+#include "excitation/system_reason.hpp"
 
 namespace stageid {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& what, int error,
                        const std::string& remedy = "") {
-  throw FileError(fmt::format("{}: {}: {}{}{}", file.string(), what, std::strerror(error),
-                              remedy.empty() ? "" : "; ", remedy));
+  throw FileError(fmt::format(
+      "{}: {}: {}", shown_name(file).string(), what,
+      remedy.empty() ? system_reason(error) : fmt::format("{}; {}", std::strerror(error), remedy)));
 }
 
 /// A file descriptor that closes itself; write errors surface at fsync(), so close() is not
@@ -97,6 +100,13 @@ void write_all(int descriptor, std::string_view text, const std::filesystem::pat
 
 }  // namespace
 
+std::filesystem::path shown_name(const std::filesystem::path& file) {
+  static const std::regex temporary(R"(\.(.+)\.\d+\.\d+\.tmp(\.[a-z0-9]+)?)");
+  std::string name = file.filename().string();
+  for (std::smatch match; std::regex_match(name, match, temporary);) name = std::string(match[1]);
+  return file.has_parent_path() ? file.parent_path() / name : std::filesystem::path(name);
+}
+
 OutputFile::OutputFile(const std::filesystem::path& target)
     : target_(resolve_target(target)), temporary_(temporary_beside(target_)) {
   constexpr mode_t kMode = 0666;  // less the user's umask
@@ -104,7 +114,7 @@ OutputFile::OutputFile(const std::filesystem::path& target)
       ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
   if (!descriptor)
     fail(target_, "cannot create a file in this directory", errno,
-         errno == ENOENT ? "make it first" : "check its rights");
+         errno == ENOENT ? "make it first" : "");
 }
 
 OutputFile::~OutputFile() {

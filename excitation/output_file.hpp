@@ -5,6 +5,10 @@
 
 namespace stageid {
 
+/// The name of an output for messages: a temporary file is called by the one that it becomes, also where
+/// that is a temporary file itself.
+std::filesystem::path shown_name(const std::filesystem::path& file);
+
 /// An output that exists whole or not at all: write to path(), then commit() renames it onto the
 /// target (after fsync). Destroyed without commit(), it removes the temporary file.
 class OutputFile {

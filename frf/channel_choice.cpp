@@ -6,6 +6,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "excitation/counted.hpp"
+
 namespace stageid {
 namespace {
 
@@ -62,27 +64,29 @@ void check_counts(const LogInfo& info, const Indices& excited, std::size_t input
   const std::string axes = fmt::format("{}", fmt::join(names_of(info.excitation, excited), ", "));
   if (inputs > experiments) {
     throw std::invalid_argument(
-        fmt::format("{} inputs but only {} experiments in realization {}; measure one experiment "
-                    "for each input, or "
-                    "select at most {} inputs",
-                    inputs, experiments, realization, experiments));
+        fmt::format("{} but only {} in realization {} (counted from 1); measure one experiment "
+                    "for each input, or select at most {}",
+                    counted(inputs, "input"), counted(experiments, "experiment"), realization + 1,
+                    counted(experiments, "input")));
   }
   if (inputs > excited.size()) {
     throw std::invalid_argument(fmt::format(
-        "{} inputs but only {} excited axes ({}); excite one axis for each input, or select {} "
-        "inputs",
-        inputs, excited.size(), axes, excited.size()));
+        "{} but only {} ({}); excite one axis for each input, or select {}",
+        counted(inputs, "input"), counted(excited.size(), "excited axis", "excited axes"), axes,
+        counted(excited.size(), "input")));
   }
   if (inputs < excited.size()) {
     throw std::invalid_argument(
-        fmt::format("{} inputs but {} excited axes ({}): what the others do would be taken for the "
+        fmt::format("{} but {} excited axes ({}): what the others do would be taken for the "
                     "selected inputs' work; select {} inputs",
-                    inputs, excited.size(), axes, excited.size()));
+                    counted(inputs, "input"), excited.size(), axes, excited.size()));
   }
   if (experiments < excited.size()) {
     throw std::invalid_argument(
-        fmt::format("{} excited axes but only {} experiments in realization {}", excited.size(),
-                    experiments, realization));
+        fmt::format("{} but only {} in realization {} (counted from 1); leave it out, or measure "
+                    "one experiment for each axis",
+                    counted(excited.size(), "excited axis", "excited axes"),
+                    counted(experiments, "experiment"), realization + 1));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "excitation/counted.hpp"
 #include "frf/controller_check.hpp"
 #include "frf/health_measures.hpp"
 #include "frf/order_statistic.hpp"
@@ -140,8 +141,8 @@ void Examination::find_clipped(Index c, double log_p) {
                                 .units[static_cast<std::size_t>(sensor ? c : c - record_.n_y())];
   find(Severity::fault, Cause::saturated, name(c),
        "clipped: samples pile up at the end of its range",
-       fmt::format("{} samples at {:.4g} {}",
-                   (high ? scan.high().count : 0) + (low ? scan.low().count : 0),
+       fmt::format("{} at {:.4g} {}",
+                   counted((high ? scan.high().count : 0) + (low ? scan.low().count : 0), "sample"),
                    high ? scan.high().value : scan.low().value, unit),
        sensor ? "lower the level, or widen the sensor's range"
               : "lower the level, or raise the actuator's limit");

@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "excitation/counted.hpp"
 #include "frf/frf_estimate.hpp"
 
 namespace stageid {
@@ -18,8 +19,9 @@ namespace {
 void check_names(const char* place, const ChannelList& channels) {
   if (channels.names.empty()) refuse(place, "no channel; name at least one");
   if (channels.units.size() != channels.names.size()) {
-    refuse(place, fmt::format("{} units for {} channels; give one a channel", channels.units.size(),
-                              channels.names.size()));
+    refuse(place,
+           fmt::format("{} for {}; give one a channel", counted(channels.units.size(), "unit"),
+                       counted(channels.names.size(), "channel")));
   }
   std::set<std::string> seen;
   for (const std::string& name : channels.names) {

@@ -8,6 +8,7 @@
 #include <complex>
 
 #include "excitation/file_error.hpp"
+#include "excitation/file_kind.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "excitation/output_file.hpp"
 #include "frf/confidence.hpp"
@@ -151,10 +152,11 @@ void require_format(const Hdf5File& file) {
   }
   const std::string format = file.read_text_attribute("/", "format");
   if (format != kFormat) {
-    throw FormatError(
-        file.path(), "/",
-        fmt::format("format is '{}'; a frequency response says '{}'{}", format, kFormat,
-                    format == "stageid-log" ? ", 'stageid frf' makes one of a log" : ""));
+    const std::string other = other_hdf5_kind(format, "a frequency response");
+    throw FormatError(file.path(), "/",
+                      !other.empty() ? other
+                                     : fmt::format("format is '{}'; a frequency response says '{}'",
+                                                   format, kFormat));
   }
   if (!file.has_attribute("/", "format_version")) return;
   const long long version = file.read_integer_attribute("/", "format_version");

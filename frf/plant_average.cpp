@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "excitation/counted.hpp"
 #include "frf/worker_pool.hpp"
 
 namespace stageid {
@@ -18,8 +19,8 @@ Eigen::Map<Eigen::MatrixXcd> unvec(Eigen::MatrixXcd& columns, Eigen::Index k, Ei
 }
 
 [[noreturn]] void refuse(LineStatus status, int realization, int line, double frequency_hz) {
-  const std::string where =
-      fmt::format("realization {}, line {} ({} Hz)", realization, line, frequency_hz);
+  const std::string where = fmt::format("realization {} (counted from 1), line {} ({} Hz)",
+                                        realization + 1, line, frequency_hz);
   if (status == LineStatus::singular_excitation) {
     throw std::invalid_argument(
         fmt::format("singular excitation in {}: the axes are not excited independently of each "

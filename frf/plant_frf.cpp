@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "excitation/counted.hpp"
 #include "excitation/frequency_grid.hpp"
 #include "frf/byte_counter.hpp"
 #include "frf/channel_choice.hpp"
@@ -157,11 +158,12 @@ void PlantEstimation::check_excitation(const RealizationRuns& realization,
     }
     for (const Eigen::Index axis : spectrum.channels) {
       if (std::binary_search(excited_.axes.begin(), excited_.axes.end(), axis)) continue;
-      throw std::invalid_argument(fmt::format(
-          "{}: channel {} is excited here and never in realization {}; all realizations must "
-          "excite the same axes",
-          place, info_.excitation.names[static_cast<std::size_t>(axis)],
-          realizations_.front().realization));
+      throw std::invalid_argument(
+          fmt::format("{}: channel {} is excited here and never in realization {} (counted from "
+                      "1); all realizations must "
+                      "excite the same axes",
+                      place, info_.excitation.names[static_cast<std::size_t>(axis)],
+                      realizations_.front().realization + 1));
     }
   }
 }
@@ -309,10 +311,10 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
     if (!average_) prepare(realization, excitation);
     check_excitation(realization, excitation);
     if (!zippered_ && realization.runs.size() < excited_.axes.size()) {
-      throw std::invalid_argument(
-          fmt::format("{} excited axes but only {} experiments in realization {}; "
-                      "leave this realization out",
-                      excited_.axes.size(), realization.runs.size(), realization.realization));
+      throw std::invalid_argument(fmt::format(
+          "{} but only {} in realization {} (counted from 1); leave this realization out",
+          counted(excited_.axes.size(), "excited axis", "excited axes"),
+          counted(realization.runs.size(), "experiment"), realization.realization + 1));
     }
     if (health != nullptr && !health->complete()) health->excite(m, excitation);
     std::vector<Eigen::MatrixXcd> R;

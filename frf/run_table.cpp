@@ -9,6 +9,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 
 namespace stageid {
@@ -52,19 +53,17 @@ UsedRun measured_part(const LogReader& log, std::size_t index, const FrfOptions&
   const auto period = static_cast<std::uint64_t>(info.period_samples);
   const std::uint64_t samples = used.run().samples;
   if (samples == 0 || samples % period != 0) {
-    throw FormatError(
-        log.path(), place,
-        fmt::format("{} samples are not a whole number of periods of {} samples; correct "
-                    "period_samples or cut the record",
-                    samples, period));
+    throw FormatError(log.path(), place,
+                      fmt::format("{} are not a whole number of periods of {}; correct "
+                                  "period_samples or cut the record",
+                                  counted(samples, "sample"), counted(period, "sample")));
   }
   used.periods = static_cast<int>(samples / period) - used.transient_periods;
   if (used.periods < 1) {
-    throw FormatError(
-        log.path(), place,
-        fmt::format("{} periods were recorded and {} are transient: none is left; measure "
-                    "longer or give fewer transient periods",
-                    samples / period, used.transient_periods));
+    throw FormatError(log.path(), place,
+                      fmt::format("{} recorded, {} transient: none is left; measure "
+                                  "longer or give fewer transient periods",
+                                  counted(samples / period, "period"), used.transient_periods));
   }
   return used;
 }
@@ -100,14 +99,13 @@ void check_realizations_asked_for(const RunsByRealization& table, const FrfOptio
   std::set<int> complete;
   for (const LogReader* reader : logs)
     for (const LogRun& run : reader->runs())
-      if (run.complete) complete.insert(run.realization);
+      if (run.complete) complete.insert(run.realization + 1);
   const std::string log = logs.front()->path().string();
   for (const int realization : options.realizations) {
     if (!table.contains(realization)) {
       throw std::invalid_argument(fmt::format(
-          "{}: realization {} has no complete run; counted from 0, those that have one are {} "
-          "(--realizations counts from 1)",
-          log, realization, fmt::join(complete, ", ")));
+          "{}: realization {} has no complete run; counted from 1, those that have one are {}", log,
+          realization + 1, fmt::join(complete, ", ")));
     }
   }
 }
@@ -124,9 +122,9 @@ std::size_t needed_experiments(const RunsByRealization& table, std::size_t begun
   const std::size_t most = best->second.size();
   if (most < begun && options.inputs.empty()) {
     throw std::invalid_argument(fmt::format(
-        "{}: no realization is complete, realization {} has {} of {} experiments; resume "
+        "{}: no realization is complete, realization {} (counted from 1) has {} of {}; resume "
         "the experiment, or name the inputs",
-        log, best->first, most, begun));
+        log, best->first + 1, most, counted(begun, "experiment")));
   }
   return most;
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "excitation/counted.hpp"
 #include "frf/local_fit.hpp"
 #include "frf/run_steps.hpp"
 
@@ -64,10 +65,10 @@ TransientModel::TransientModel(int period_samples, int periods,
   }
   window_ = kOrder + 1 + kResidualDof;
   if (static_cast<Eigen::Index>(usable_.size()) < window_) {
-    throw std::invalid_argument(fmt::format(
-        "{}: method 'lpm' needs {} bins beside the lines, this record of {} period{} has {}; "
-        "measure more periods",
-        place, window_, periods, periods == 1 ? "" : "s", usable_.size()));
+    throw std::invalid_argument(
+        fmt::format("{}: method 'lpm' needs {} bins beside the lines, this record of {} has {}; "
+                    "measure more periods",
+                    place, window_, counted(periods, "period"), usable_.size()));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 #include "excitation/output_file.hpp"
 #include "hal/can_dbc.hpp"
@@ -81,15 +82,16 @@ void ConfigCommand::check() const {
   for (const std::filesystem::path& file : files_) {
     if (format_of(file) == "stageid-stage") {
       const StageConfig stage = load_stage_config(file);
-      console_.result(fmt::format("{}: stage '{}', {} actuators, {} sensors, {} Hz", file.string(),
-                                  stage.spec.info.name, stage.spec.info.actuators.size(),
-                                  stage.spec.info.sensors.size(), stage.spec.info.sample_rate_hz));
+      console_.result(fmt::format(
+          "{}: stage '{}', {}, {}, {} Hz", file.string(), stage.spec.info.name,
+          counted(stage.spec.info.actuators.size(), "actuator"),
+          counted(stage.spec.info.sensors.size(), "sensor"), stage.spec.info.sample_rate_hz));
     } else {
       const ExperimentConfig experiment = load_experiment_config(file);
       const ExperimentPlan plan = outline_plan(experiment);
-      console_.result(fmt::format("{}: {} runs, {:.1f} min, {} lines", file.string(),
-                                  plan.runs().size(), plan.duration_s() / 60.0,
-                                  plan.grid().size()));
+      console_.result(fmt::format("{}: {}, {:.1f} min, {}", file.string(),
+                                  counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
+                                  counted(plan.grid().size(), "line")));
     }
     json.push_back({{"file", file.string()}, {"valid", true}});
   }

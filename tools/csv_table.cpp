@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "excitation/file_error.hpp"
 #include "tools/text_lines.hpp"
 #include "tools/unicode.hpp"
 
@@ -98,6 +99,11 @@ ArrayList read_csv(const std::filesystem::path& file) {
     }
     append_row(lines, fields, separator, row++, columns);
   }
+  if (row == 0)
+    throw FormatError(file, "",
+                      columns.empty()
+                          ? "holds no table; the file is empty, or cut short"
+                          : "holds names of columns and no row of numbers; the file is cut short");
   ArrayList list{file, {}};
   for (std::size_t c = 0; c < columns.size(); ++c)
     if (!names[c].empty())

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 #include "tools/command_line.hpp"
 #include "tools/config_plan.hpp"
@@ -62,11 +63,11 @@ std::vector<std::string> design_table(const ExperimentConfig& config, const Expe
   const auto [least, most] =
       std::minmax_element(prediction.crest_factor.begin(), prediction.crest_factor.end());
   lines.push_back(fmt::format(
-      "{} runs of {} + {} periods of {} s, {:.1f} min in all; log {:.1f} MB", plan.runs().size(),
-      plan.spec().transient_periods, plan.spec().periods, plan.grid().period_s(),
+      "{} of {} + {} of {} s, {:.1f} min in all; log {:.1f} MB", counted(plan.runs().size(), "run"),
+      plan.spec().transient_periods, counted(plan.spec().periods, "period"), plan.grid().period_s(),
       plan.duration_s() / 60.0, expected_log_bytes(plan, stage.info) / 1e6));
-  lines.push_back(fmt::format("{} lines, {} ... {} Hz; crest factors {:.2f} ... {:.2f}",
-                              plan.grid().size(), frequency_hz[0],
+  lines.push_back(fmt::format("{}, {} ... {} Hz; crest factors {:.2f} ... {:.2f}",
+                              counted(plan.grid().size(), "line"), frequency_hz[0],
                               frequency_hz[frequency_hz.size() - 1], *least, *most));
   for (const LinkLoad& link : link_loads(config.stage)) lines.push_back(to_string(link));
   std::vector<std::vector<std::string>> rows = {
@@ -140,9 +141,9 @@ void DesignCommand::design_within(const ExperimentConfig& config) const {
   const LimitedPlan limited = make_limited_plan(config);
   const ExperimentPlan& plan = limited.design.plan;
   write_experiment_plan(output_, plan);
-  console_.result(fmt::format("{} runs, {:.1f} min in all; {} lines; prior {}", plan.runs().size(),
-                              plan.duration_s() / 60.0, plan.grid().size(),
-                              config.limits->prior.string()));
+  console_.result(fmt::format("{}, {:.1f} min in all; {}; prior {}",
+                              counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
+                              counted(plan.grid().size(), "line"), config.limits->prior.string()));
   for (const LinkLoad& link : link_loads(config.stage)) console_.result(to_string(link));
   for (const std::string& line : limited_table(limited, accuracy_)) console_.result(line);
   console_.result(fmt::format("wrote {}", output_.string()));

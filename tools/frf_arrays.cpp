@@ -97,7 +97,7 @@ NamedArray with_axes(const ArrayList& list, NamedArray array, const Dataset& dat
 }  // namespace
 
 ArrayList arrays_of_frf(const FrfEstimate& frf, const std::filesystem::path& beside) {
-  const OutputFile scratch(beside.string() + ".h5");
+  const OutputFile scratch(beside);
   write_frf(scratch.path(), frf);
   return read_hdf5_arrays(scratch.path());
 }
@@ -116,7 +116,7 @@ FrfEstimate frf_of_arrays(const ArrayList& list, const std::filesystem::path& be
       if (copy.size() != 1) copy.shape = {copy.size()};
       ours.arrays.push_back(std::move(copy));
     }
-  const OutputFile scratch(beside.string() + ".h5");
+  const OutputFile scratch(beside);
   const std::string scratch_name = scratch.path().string();
   try {
     write_hdf5_arrays(scratch.path(), ours);

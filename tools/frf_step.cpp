@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "acquisition/log_reader.hpp"
+#include "excitation/counted.hpp"
 #include "excitation/fingerprint.hpp"
 #include "frf/data_health.hpp"
 #include "tools/health_step.hpp"
@@ -104,10 +105,10 @@ FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions optio
 }
 
 std::string describe(const FrfEstimate& frf) {
-  return fmt::format("{} x {} on {} lines, {} ... {} Hz, {} realization{} x {} period{}",
-                     frf.n_outputs(), frf.n_inputs(), frf.lines(), frf.frequency_hz[0],
-                     frf.frequency_hz[frf.lines() - 1], frf.realizations,
-                     frf.realizations == 1 ? "" : "s", frf.periods, frf.periods == 1 ? "" : "s");
+  return fmt::format("{} x {} on {}, {} ... {} Hz, {} x {}", frf.n_outputs(), frf.n_inputs(),
+                     counted(frf.lines(), "line"), frf.frequency_hz[0],
+                     frf.frequency_hz[frf.lines() - 1], counted(frf.realizations, "realization"),
+                     counted(frf.periods, "period"));
 }
 
 }  // namespace stageid

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "acquisition/log_reader.hpp"
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
 #include "excitation/output_file.hpp"
@@ -98,8 +99,8 @@ void Identification::design() {
   write_experiment_plan(path("excitation.h5"), plan_);
   for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
   finish_step("design", seconds_since(start),
-              fmt::format("{} runs, {:.1f} min of stage time, {} lines", plan_.runs().size(),
-                          plan_.duration_s() / 60.0, plan_.grid().size()));
+              fmt::format("{}, {:.1f} min of stage time, {}", counted(plan_.runs().size(), "run"),
+                          plan_.duration_s() / 60.0, counted(plan_.grid().size(), "line")));
 }
 
 int Identification::measure_all() {
@@ -122,8 +123,8 @@ int Identification::measure_all() {
                           static_cast<double>(result.log_bytes) / 1e6));
   if (exit_code_ != kDone && exit_code_ != kNotTrustworthy)
     console_.warning(fmt::format(
-        "{}: {}; {} of {} runs are kept, continue with --resume", request.log.string(),
-        result.message, result.runs_before + result.experiment.runs_done, result.runs_total));
+        "{}; {} of {} runs are kept, continue with --resume", named(request.log, result.message),
+        result.runs_before + result.experiment.runs_done, result.runs_total));
   return exit_code_;
 }
 
@@ -203,9 +204,10 @@ void Identification::fit() {
   trustworthy_ = step.result.trustworthy();
   if (!trustworthy_) notes_.push_back("the fit did not converge: " + step.result.message);
   write_model(path("model.json"), model_);
-  finish_step("fit", step.seconds,
-              fmt::format("{} submodels, relative error {:.3g}, {}", model_.submodels.size(),
-                          model_.fit.relative_rms_error, cost_line(step.result.cost)));
+  finish_step(
+      "fit", step.seconds,
+      fmt::format("{}, relative error {:.3g}, {}", counted(model_.submodels.size(), "submodel"),
+                  model_.fit.relative_rms_error, cost_line(step.result.cost)));
 }
 
 void Identification::check_model() {

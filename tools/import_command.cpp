@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "excitation/file_error.hpp"
+#include "excitation/file_kind.hpp"
 #include "excitation/fingerprint.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
@@ -31,6 +32,9 @@ ArrayList read_arrays(const std::filesystem::path& file) {
   if (ending == ".csv" || ending == ".txt" || ending == ".dat") return read_csv(file);
   if (ending == ".h5" || ending == ".hdf5") return read_hdf5_arrays(file);
   if (is_uff_name(file)) return arrays_of_uff(file, read_uff(file));
+  require_readable(file);
+  if (const std::string other = other_kind(file, "a file of another program"); !other.empty())
+    throw FormatError(file, "", other);
   throw std::invalid_argument(
       fmt::format("{}: '{}' is not imported; there are .unv, .uff, .mat, .csv, .h5, .npz and .sNp "
                   "(Touchstone)",

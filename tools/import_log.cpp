@@ -8,6 +8,7 @@
 
 #include "acquisition/convert_log.hpp"
 #include "acquisition/slog_writer.hpp"
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 #include "excitation/output_file.hpp"
 
@@ -46,13 +47,13 @@ void name_channels(const ImportMap& map, const char* key, const ImportMap::Signa
   const auto count = static_cast<std::size_t>(out.samples.cols());
   if (!group.names.empty()) out.channels.names = group.names;
   if (out.channels.names.size() != count)
-    fail(map, fmt::format("{}: {} names for {} channels; give names: [...]", key,
-                          out.channels.names.size(), count));
+    fail(map, fmt::format("{}: {} for {}; give names: [...]", key,
+                          counted(out.channels.names.size(), "name"), counted(count, "channel")));
   out.channels.units = units_of(map, key, group.unit, count);
   if (group.scale.empty()) return;
   if (group.scale.size() != count)
-    fail(map, fmt::format("{}: {} scales for {} channels; give one a channel", key,
-                          group.scale.size(), count));
+    fail(map, fmt::format("{}: {} for {}; give one a channel", key,
+                          counted(group.scale.size(), "scale"), counted(count, "channel")));
   for (std::size_t c = 0; c < count; ++c)
     out.samples.col(static_cast<Eigen::Index>(c)) *= group.scale[c];
 }
@@ -92,10 +93,10 @@ Rows rows_of(const ArrayList& arrays, const ImportMap& map, const ImportMap::Run
   if (rows.count == 0) rows.count = samples - rows.first;
   const Eigen::Index least = (static_cast<Eigen::Index>(map.transient_periods) + 1) * period;
   if (rows.count < least || rows.count % period != 0)
-    fail(map, fmt::format(
-                  "runs: {} rows are not {} transient periods and more of period_samples = {}, all "
-                  "whole; give first_row and rows of a run",
-                  rows.count, map.transient_periods, period));
+    fail(map, fmt::format("runs: {} are not {} and more of period_samples = {}, all "
+                          "whole; give first_row and rows of a run",
+                          counted(rows.count, "row"),
+                          counted(map.transient_periods, "transient period"), period));
   return rows;
 }
 
@@ -188,7 +189,7 @@ void import_log(const ArrayList& arrays, const ImportMap& map,
                           actuators.samples.rows(), sensors.samples.rows()));
   const std::vector<ImportMap::Run> runs =
       map.runs.empty() ? std::vector<ImportMap::Run>(1) : map.runs;
-  OutputFile scratch(ending == ".slog" ? output : std::filesystem::path(output.string() + ".slog"));
+  OutputFile scratch(output);
   std::filesystem::remove(scratch.path());  // a log is never written over
   SlogWriter writer =
       SlogWriter::create(scratch.path(), info_of(map, excitation, actuators, sensors));

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 #include "tools/config_reader.hpp"
 
@@ -112,8 +113,8 @@ std::vector<std::string> units_of(const ImportMap& map, const char* key, const s
   if (units.size() == 1) units.resize(count, units.front());
   if (units.size() != count)
     throw FormatError(map.file, "",
-                      fmt::format("{}: {} units for {} channels; give one, or one a channel", key,
-                                  units.size(), count));
+                      fmt::format("{}: {} for {}; give one, or one a channel", key,
+                                  counted(units.size(), "unit"), counted(count, "channel")));
   return units;
 }
 

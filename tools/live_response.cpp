@@ -9,6 +9,7 @@
 #include <set>
 
 #include "acquisition/log_reader.hpp"
+#include "excitation/counted.hpp"
 #include "frf/zippered_lines.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/report_json.hpp"
@@ -118,8 +119,8 @@ void LiveResponse::update() {
   const FrfEstimate frf = estimate_plant_frf({log.get()}, options_);
   response_.publish(page_json(frf));
   realizations_ = complete;
-  set_status(fmt::format("from {} realization{} of {} periods", frf.realizations,
-                         frf.realizations == 1 ? "" : "s", frf.periods));
+  set_status(fmt::format("from {} of {}", counted(frf.realizations, "realization"),
+                         counted(frf.periods, "period")));
 }
 
 }  // namespace stageid

@@ -10,6 +10,7 @@
 #include "acquisition/convert_log.hpp"
 #include "acquisition/log_reader.hpp"
 #include "acquisition/slog_recover.hpp"
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 #include "tools/command_line.hpp"
 #include "tools/exit_code.hpp"
@@ -49,8 +50,9 @@ std::vector<std::string> timing_lines(const LogReader& log) {
     return fmt::format("{} median < {}, 99 % < {}, 99.9 % < {}, all < {}", what, of(0.5), of(0.99),
                        of(0.999), of(1.0));
   };
-  return {line("execution ", timing.execution), line("lateness  ", timing.lateness),
-          fmt::format("skipped    {} periods of {:.4g} us", timing.skipped, 1e6 * period_s)};
+  return {
+      line("execution ", timing.execution), line("lateness  ", timing.lateness),
+      fmt::format("skipped    {} of {:.4g} us", counted(timing.skipped, "period"), 1e6 * period_s)};
 }
 
 Json damage_json(const std::vector<LogDamage>& damage) {
@@ -61,7 +63,8 @@ Json damage_json(const std::vector<LogDamage>& damage) {
 }
 
 std::string damage_line(const LogDamage& damage) {
-  return fmt::format("damaged at byte {}, {} bytes: {}", damage.offset, damage.bytes, damage.what);
+  return fmt::format("damaged at byte {}, {}: {}", damage.offset, counted(damage.bytes, "byte"),
+                     damage.what);
 }
 
 Json info_json(const LogReader& log) {
@@ -117,10 +120,10 @@ LogCommand::LogCommand(CLI::App& app, Console& console) : console_(console) {
 void LogCommand::info() const {
   const std::unique_ptr<LogReader> log = open_log(file_);
   const LogInfo& info = log->info();
-  console_.result(fmt::format("{}: {} Hz, period {} samples ({} s), {} transient period{}",
-                              file_.string(), info.sample_rate_hz, info.period_samples,
-                              info.period_samples / info.sample_rate_hz, info.transient_periods,
-                              info.transient_periods == 1 ? "" : "s"));
+  console_.result(fmt::format("{}: {} Hz, period {} ({} s), {}", file_.string(),
+                              info.sample_rate_hz, counted(info.period_samples, "sample"),
+                              info.period_samples / info.sample_rate_hz,
+                              counted(info.transient_periods, "transient period")));
   console_.result(fmt::format("excitation {}", fmt::join(info.excitation.names, " ")));
   console_.result(fmt::format("actuators  {}", fmt::join(info.actuators.names, " ")));
   console_.result(fmt::format("sensors    {}", fmt::join(info.sensors.names, " ")));
@@ -147,10 +150,11 @@ void LogCommand::info() const {
 void LogCommand::verify() const {
   const VerifyReport report = verify_log(file_);
   throw_if_interrupted();
-  console_.result(
-      fmt::format("{}: {:.1f} MB, {} blocks, {} rows ({} marked), {} of {} runs complete",
-                  file_.string(), static_cast<double>(report.bytes) / 1e6, report.blocks,
-                  report.rows, report.marked_rows, report.complete_runs, report.runs));
+  console_.result(fmt::format("{}: {:.1f} MB, {}, {} ({} marked), {} of {} complete",
+                              file_.string(), static_cast<double>(report.bytes) / 1e6,
+                              counted(report.blocks, "block"), counted(report.rows, "row"),
+                              report.marked_rows, report.complete_runs,
+                              counted(report.runs, "run")));
   for (const LogDamage& damage : report.damage) console_.result(damage_line(damage));
   if (report.closed && !report.exit_message.empty())
     console_.result(fmt::format("ended with {}: {}", report.exit_code, report.exit_message));
@@ -169,7 +173,7 @@ void LogCommand::verify() const {
     return;
   }
   const std::string what = !report.damage.empty()
-                               ? fmt::format("damaged at {} place(s)", report.damage.size())
+                               ? "damaged at " + counted(report.damage.size(), "place")
                                : "was not closed: the experiment was cut off";
   throw FormatError(file_, "",
                     fmt::format("{}; save the rest with 'stageid log recover {} -o NEW.slog', "
@@ -183,11 +187,11 @@ void LogCommand::recover() const {
         fmt::format("{}: exists already; give the name of a new log", output_.string()));
   const RecoverReport report = recover_log(file_, output_);
   for (const LogDamage& damage : report.damage) console_.result(damage_line(damage));
-  console_.result(
-      fmt::format("{}: {} blocks, {} rows, {} of {} runs complete; lost: {} blocks, {} rows, "
-                  "{} bytes",
-                  output_.string(), report.blocks_kept, report.rows_kept, report.complete_runs,
-                  report.runs, report.blocks_lost, report.rows_lost, report.bytes_lost));
+  console_.result(fmt::format(
+      "{}: {}, {}, {} of {} complete; lost: {}, {}, {}", output_.string(),
+      counted(report.blocks_kept, "block"), counted(report.rows_kept, "row"), report.complete_runs,
+      counted(report.runs, "run"), counted(report.blocks_lost, "block"),
+      counted(report.rows_lost, "row"), counted(report.bytes_lost, "byte")));
   console_.result({{"output", output_.string()},
                    {"blocks_kept", report.blocks_kept},
                    {"blocks_lost", report.blocks_lost},

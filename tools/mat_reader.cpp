@@ -10,6 +10,7 @@
 
 #include "excitation/file_error.hpp"
 #include "tools/mat_file.hpp"
+#include "tools/output_paths.hpp"
 #include "tools/unicode.hpp"
 
 namespace stageid {
@@ -203,14 +204,25 @@ void require_whole(const std::filesystem::path& path, std::uintmax_t file_bytes)
                       "ends before its variables do; the file was cut short or is damaged");
 }
 
+/// Octave's `save` writes a format of its own unless told not to, whatever the name.
+std::string no_matlab_file(const std::filesystem::path& path) {
+  char head[20] = {};
+  std::ifstream(path, std::ios::binary).read(head, sizeof(head));
+  const std::string_view begin(head, sizeof(head));
+  if (begin.starts_with("# Created by Octave") || begin.starts_with("Octave-1-"))
+    return "is in Octave's own format; write it in Octave with 'save -v7 FILE VARIABLES'";
+  if (begin.starts_with("\x89HDF"))
+    return "is HDF5, not of MATLAB; write it in Octave with 'save -v7 FILE VARIABLES', or name it "
+           ".h5";
+  return "is no MATLAB file, or a damaged one; a .mat file must stand here";
+}
+
 }  // namespace
 
 ArrayList read_mat(const std::filesystem::path& path) {
-  if (!std::ifstream(path, std::ios::binary))
-    throw FileError(fmt::format("{}: cannot be opened; name a file that is there", path.string()));
+  require_readable(path);
   const MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), &Mat_Close);
-  if (!file)
-    throw FormatError(path, "", "is no MATLAB file, or a damaged one; a .mat file must stand here");
+  if (!file) throw FormatError(path, "", no_matlab_file(path));
   const std::uintmax_t bytes = std::filesystem::file_size(path);
   require_whole(path, bytes);
   ArrayList list{path, {}};

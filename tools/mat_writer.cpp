@@ -10,6 +10,7 @@
 
 #include "excitation/file_error.hpp"
 #include "excitation/output_file.hpp"
+#include "excitation/system_reason.hpp"
 #include "tools/mat_file.hpp"
 #include "tools/unicode.hpp"
 
@@ -149,8 +150,7 @@ void write_mat(const std::filesystem::path& path, const ArrayList& list, MatVers
   if (version == MatVersion::v5) require_room(list);
   OutputFile output(path);
   const auto fail = [&] {
-    throw FileError(fmt::format("{}: cannot be written: {}", path.string(),
-                                std::error_code(errno, std::generic_category()).message()));
+    throw FileError(fmt::format("{}: cannot be written: {}", path.string(), system_reason(errno)));
   };
   // The default header tells the time; ours is the same for the same content.
   const std::string header =

@@ -8,6 +8,7 @@
 #include "acquisition/event_recorder.hpp"
 #include "acquisition/log_reader.hpp"
 #include "acquisition/slog_writer.hpp"
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 #include "hal/real_time.hpp"
 #include "tools/dashboard.hpp"
@@ -60,9 +61,9 @@ void conclude(const MeasuredStage& stage, MeasurementResult& result) {
   result.message = result.experiment.message;
   result.exit_code = exit_code_of(result.experiment);
   if (result.exit_code == kNotTrustworthy)
-    result.message =
-        fmt::format("{} samples are marked or missing",
-                    result.experiment.health.marked + result.experiment.health.missing);
+    result.message = fmt::format(
+        "marked or missing: {}",
+        counted(result.experiment.health.marked + result.experiment.health.missing, "sample"));
   stage.explain(result);
 }
 

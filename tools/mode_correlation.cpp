@@ -9,6 +9,7 @@
 #include <optional>
 #include <regex>
 
+#include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 #include "tools/console.hpp"
 #include "tools/uff_frf.hpp"
@@ -168,8 +169,7 @@ std::vector<std::string> correlation_lines(const ModeCorrelation& correlation) {
   };
   left("model", alone(correlation.own, correlation.pairs, &ModePair::first));
   left("file", alone(correlation.other, correlation.pairs, &ModePair::second));
-  lines.push_back(fmt::format("MAC over {} output{}: {}", correlation.outputs.size(),
-                              correlation.outputs.size() == 1 ? "" : "s",
+  lines.push_back(fmt::format("MAC over {}: {}", counted(correlation.outputs.size(), "output"),
                               fmt::join(correlation.outputs, ", ")));
   return lines;
 }

@@ -47,7 +47,7 @@ UffEncoding encoding_of(const std::filesystem::path& file) {
 ArrayList arrays_of_model(const std::filesystem::path& beside, const AdditiveModel& model,
                           const ExportedResponse& response,
                           const std::optional<DrivingPoint>& driving_point) {
-  const OutputFile scratch(beside.string() + ".h5");
+  const OutputFile scratch(beside);
   write_model_hdf5(scratch.path(), model, response, driving_point);
   return read_hdf5_arrays(scratch.path());
 }

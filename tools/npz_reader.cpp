@@ -10,6 +10,7 @@
 
 #include "excitation/file_error.hpp"
 #include "tools/npz_file.hpp"
+#include "tools/output_paths.hpp"
 #include "tools/unicode.hpp"
 
 // Sources: as tools/npz_writer.cpp. What is read here comes from outside: every offset is checked.
@@ -246,9 +247,8 @@ NamedArray array_of(const std::filesystem::path& file, std::string name, std::st
 }  // namespace
 
 ArrayList read_npz(const std::filesystem::path& file) {
+  require_readable(file);
   std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file))
-    throw FileError(fmt::format("{}: cannot be read; name a file that is there", file.string()));
   const std::string content(std::istreambuf_iterator<char>(stream), {});
   ArrayList list{file, {}};
   for (const Member& member : directory_of(file, content)) {

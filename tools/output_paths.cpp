@@ -4,11 +4,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <fstream>
 #include <stdexcept>
 #include <system_error>
 
 #include "excitation/file_error.hpp"
 #include "excitation/output_file.hpp"
+#include "excitation/system_reason.hpp"
 
 namespace stageid {
 
@@ -26,6 +29,18 @@ void require_writable(const std::filesystem::path& file,
                       const std::vector<std::filesystem::path>& inputs) {
   require_no_input(file, inputs);
   const OutputFile probe(file);
+}
+
+std::string named(const std::filesystem::path& file, const std::string& message) {
+  const std::string place = file.string() + ": ";
+  return message.starts_with(place) ? message : place + message;
+}
+
+void require_readable(const std::filesystem::path& file) {
+  errno = 0;
+  if (!std::ifstream(file, std::ios::binary) || std::filesystem::is_directory(file))
+    throw FileError(fmt::format("{}: cannot be read: {}", file.string(),
+                                system_reason(errno != 0 ? errno : EISDIR)));
 }
 
 void require_ending(const std::filesystem::path& file, const char* what,

@@ -16,6 +16,12 @@ void require_no_input(const std::filesystem::path& file,
 void require_writable(const std::filesystem::path& file,
                       const std::vector<std::filesystem::path>& inputs);
 
+/// "FILE: MESSAGE"; errors of the file name it already
+std::string named(const std::filesystem::path& file, const std::string& message);
+
+/// @throws FileError why the file cannot be read, a directory included
+void require_readable(const std::filesystem::path& file);
+
 /// That the name ends as files of this kind do: readers go by the ending.
 /// @throws std::invalid_argument "FILE: WHAT is written as ENDING, ..."
 void require_ending(const std::filesystem::path& file, const char* what,

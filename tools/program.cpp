@@ -21,6 +21,7 @@
 #include "tools/export_command.hpp"
 #include "tools/fit_command.hpp"
 #include "tools/frf_command.hpp"
+#include "tools/help_command.hpp"
 #include "tools/identify_command.hpp"
 #include "tools/import_command.hpp"
 #include "tools/interrupt.hpp"
@@ -47,7 +48,7 @@ constexpr const char* kWelcome =
   stageid config schema
       everything that may stand in a configuration
 
-stageid --help lists the commands, stageid COMMAND --help their options.)";
+stageid help lists the commands, stageid help COMMAND their options.)";
 
 constexpr const char* kFooter =
     R"(Exit codes: 0 done; 1 the world failed (file, link, interlock); 2 the request is wrong; 3 done but
@@ -71,7 +72,8 @@ class Program {
         plot_(app_, console_),
         config_(app_, console_),
         node_(app_, console_),
-        manual_(app_, console_) {
+        manual_(app_, console_),
+        help_(app_) {
     app_.name("stageid");
     app_.set_version_flag("--version", "stageid " STAGEID_VERSION);
     app_.add_flag("--json", console_.json, "the result as one JSON object on stdout");
@@ -146,6 +148,7 @@ class Program {
                          fmt::join(names_of(command.commands), ", "), path);
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');
+    if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) what += "; write a number";
     return fmt::format("{}; see 'stageid{} --help'", what, path);
   }
 
@@ -166,6 +169,7 @@ class Program {
   ConfigCommand config_;
   NodeCommand node_;
   ManualCommand manual_;
+  HelpCommand help_;
 };
 
 }  // namespace

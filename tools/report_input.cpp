@@ -10,11 +10,13 @@
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/file_error.hpp"
+#include "excitation/file_kind.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/fit_step.hpp"
 #include "tools/health_step.hpp"
 #include "tools/model_hdf5.hpp"
+#include "tools/output_paths.hpp"
 #include "tools/report_comparison.hpp"
 #include "tools/run_metadata.hpp"
 
@@ -43,6 +45,14 @@ std::string kind_of(const std::filesystem::path& file) {
     if (json.is_object() && json.contains("format") && json["format"].is_string())
       return json["format"];
     return "";
+  }
+  if (ending != ".h5" && ending != ".hdf5") {
+    require_readable(file);
+    const std::string other = other_kind(file, "a file that the report shows");
+    throw FormatError(file, "",
+                      !other.empty()
+                          ? other
+                          : "is nothing that the report shows; give .slog, .h5, .json or .yaml");
   }
   const Hdf5File hdf5 = Hdf5File::open(file);
   if (!hdf5.has_attribute("/", "format")) return hdf5.exists("/response") ? "stageid-frf" : "";

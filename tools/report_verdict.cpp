@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "excitation/counted.hpp"
 #include "tools/report_modes.hpp"
 
 namespace stageid {
@@ -69,9 +70,10 @@ void judge_runs(const ReportData& data, Reasons& reasons) {
     marked += run.health.marked;
     incomplete += run.complete ? 0 : 1;
   }
-  if (missing > 0) reasons.push_back(fmt::format("{} cycles are missing", missing));
-  if (marked > 0) reasons.push_back(fmt::format("{} cycles are marked as not to be used", marked));
-  if (incomplete > 0) reasons.push_back(fmt::format("{} runs are incomplete", incomplete));
+  if (missing > 0) reasons.push_back(counted(missing, "cycle is", "cycles are") + " missing");
+  if (marked > 0)
+    reasons.push_back(counted(marked, "cycle is", "cycles are") + " marked as not to be used");
+  if (incomplete > 0) reasons.push_back(counted(incomplete, "run is", "runs are") + " incomplete");
 }
 
 }  // namespace

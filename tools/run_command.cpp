@@ -7,10 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "excitation/counted.hpp"
 #include "tools/command_line.hpp"
 #include "tools/config_plan.hpp"
 #include "tools/experiment_config.hpp"
 #include "tools/measurement.hpp"
+#include "tools/output_paths.hpp"
 
 namespace stageid {
 namespace {
@@ -63,6 +65,7 @@ void RunCommand::run() const {
         "{}: what is measured is written as .slog, which survives a crash; 'stageid log "
         "convert' makes {} of it",
         output_.string(), ending));
+  require_ending(output_, "a log", {".slog"});
   const ExperimentConfig config = load_experiment_config(config_);
   const ExperimentPlan plan =
       excitation_.empty() ? make_plan(config) : read_plan_of(config, excitation_);
@@ -83,13 +86,13 @@ void RunCommand::run() const {
   const double stage_s = static_cast<double>(health.cycles) / plan.grid().sample_rate_hz();
   const int complete = result.runs_before + result.experiment.runs_done;
   console_.result(fmt::format(
-      "{}: {} of {} runs complete{}", output_.string(), complete, result.runs_total,
+      "{}: {} of {} complete{}", output_.string(), complete, counted(result.runs_total, "run"),
       result.runs_before > 0 ? fmt::format(" ({} of them before)", result.runs_before) : ""));
   console_.result(
-      fmt::format("{} cycles, {} late, {} missing, {} marked; {:.1f} s of stage time in "
+      fmt::format("{}, {} late, {} missing, {} marked; {:.1f} s of stage time in "
                   "{:.1f} s, {:.1f} MB",
-                  health.cycles, health.late, health.missing, health.marked, stage_s,
-                  result.seconds, static_cast<double>(result.log_bytes) / 1e6));
+                  counted(health.cycles, "cycle"), health.late, health.missing, health.marked,
+                  stage_s, result.seconds, static_cast<double>(result.log_bytes) / 1e6));
   if (result.variance) console_.result(result.message);
   nlohmann::ordered_json json = {{"log", output_.string()},
                                  {"exit_code", result.exit_code},
@@ -106,7 +109,7 @@ void RunCommand::run() const {
   if (result.variance) json["relative_variance"] = *result.variance;
   console_.result(json);
   if (result.exit_code != 0)
-    console_.warning(fmt::format("{}: {}{}", output_.string(), result.message,
+    console_.warning(fmt::format("{}{}", named(output_, result.message),
                                  complete < result.runs_total ? "; continue with --resume" : ""));
 }
 

@@ -16,6 +16,8 @@
 #include <utility>
 
 #include "excitation/file_error.hpp"
+#include "excitation/file_kind.hpp"
+#include "excitation/system_reason.hpp"
 
 namespace stageid {
 namespace {
@@ -222,13 +224,15 @@ YamlDocument YamlDocument::read(const std::filesystem::path& file) {
     throw FileError(fmt::format("{}: is a directory; give a YAML file", file.string()));
   std::ifstream stream(file, std::ios::binary);
   if (!stream)
-    throw FileError(
-        fmt::format("{}: cannot be read: {}; check the path", file.string(), std::strerror(errno)));
+    throw FileError(fmt::format("{}: cannot be read: {}", file.string(), system_reason(errno)));
   std::string text(kLongestFile + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(stream.gcount()));
   if (stream.bad())
     throw FileError(fmt::format("{}: cannot be read; check the disk", file.string()));
+  if (text.starts_with('{') || text.find('\0') != std::string::npos)
+    if (const std::string other = other_kind(file, "a YAML file"); !other.empty())
+      throw FormatError(file, "", other);
   return parse(file, std::move(text));
 }
 

@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "excitation/file_error.hpp"
+#include "tools/output_paths.hpp"
 
 namespace stageid {
 namespace {
@@ -18,11 +19,10 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // before UTF-8, fr
 }  // namespace
 
 TextLines::TextLines(const std::filesystem::path& file) : file_(file) {
+  require_readable(file);
   std::ifstream stream(file, std::ios::binary);
   if (stream) text_.assign(std::istreambuf_iterator<char>(stream), {});
   if (text_.starts_with(kByteOrderMark)) at_ = kByteOrderMark.size();
-  if (!stream || std::filesystem::is_directory(file))
-    throw FileError(fmt::format("{}: cannot be read; name a file that is there", file.string()));
 }
 
 std::string_view TextLines::next() {

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "acquisition/log_reader.hpp"
+#include "excitation/counted.hpp"
 #include "frf/relative_variance.hpp"
 #include "tools/live_response.hpp"
 
@@ -35,8 +36,8 @@ std::string UntilVariance::enough() {
   });
   worker.join();
   if (!reached_ || *reached_ > wanted_) return "";
-  return fmt::format("mean relative variance {:.3g} after {} realization{}, {:.3g} was wanted",
-                     *reached_, realizations_, realizations_ == 1 ? "" : "s", wanted_);
+  return fmt::format("mean relative variance {:.3g} after {}, {:.3g} was wanted", *reached_,
+                     counted(realizations_, "realization"), wanted_);
 }
 
 void UntilVariance::look() {

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "acquisition/log_reader.hpp"
+#include "excitation/counted.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
@@ -50,9 +51,9 @@ std::vector<std::string> prediction_lines(const PredictionError& error) {
                     fmt::format("{:.3e}", error.error_rms[k] / error.signal_rms[k])});
   }
   std::vector<std::string> lines = {
-      fmt::format("prediction of the samples from the actuators, {} runs, {} "
+      fmt::format("prediction of the samples from the actuators, {}, {} "
                   "... {} Hz:",
-                  error.runs, error.band_hz[0], error.band_hz[1])};
+                  counted(error.runs, "run"), error.band_hz[0], error.band_hz[1])};
   for (std::string& line : table_lines(rows)) lines.push_back(std::move(line));
   return lines;
 }

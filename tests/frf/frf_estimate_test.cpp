@@ -166,7 +166,7 @@ INSTANTIATE_TEST_SUITE_P(
               "frequency_hz: no line"},
         Fault{"no_input", [](FrfEstimate& f) { f.inputs = {}; }, "inputs: no channel"},
         Fault{"units", [](FrfEstimate& f) { f.outputs.units.pop_back(); },
-              "outputs: 1 units for 2 channels"},
+              "outputs: 1 unit for 2 channels"},
         Fault{"same_name", [](FrfEstimate& f) { f.inputs.names[2] = "a1"; },
               "inputs: 'a1' stands there twice"},
         Fault{"rate", [](FrfEstimate& f) { f.sample_rate_hz = -1.0; }, "sample_rate_hz"},

@@ -213,7 +213,7 @@ const Damage kDamages[] = {
     {"NoFormat", [](Hdf5File&) {}, "attribute format is missing"},
     {"OtherFormat",
      [](Hdf5File& f) { f.write_attribute("/", "format", std::string("stageid-log")); },
-     "format is 'stageid-log'"},
+     "is a log in HDF5, not a frequency response;"},
     {"LaterVersion",
      [](Hdf5File& f) {
        f.write_attribute("/", "format", std::string("stageid-frf"));
@@ -287,7 +287,7 @@ const Damage kDamages[] = {
        f.write_attribute("/inputs", "unit", std::vector<std::string>{"N", "m"});
        f.write_complex("/response", {2, 1, 1}, kTwo);
      },
-     ":/inputs: 2 units for 1 channels"},
+     ":/inputs: 2 units for 1 channel"},
     {"RealResponse",
      [](Hdf5File& f) {
        f.write_attribute("/", "format", std::string("stageid-frf"));

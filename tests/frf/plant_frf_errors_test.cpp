@@ -55,24 +55,24 @@ TEST(PlantFrfErrors, NoRealizationIsComplete) {
   MemoryLog log = small_log({.realizations = 2});
   log.log_runs[2].complete = false;
   log.log_runs[4].complete = false;
-  EXPECT_THAT(
-      message_of<std::invalid_argument>({&log}),
-      AllOf(HasSubstr("realization 0 has 2 of 3 experiments"), HasSubstr("name the inputs")));
+  EXPECT_THAT(message_of<std::invalid_argument>({&log}),
+              AllOf(HasSubstr("realization 1 (counted from 1) has 2 of 3 experiments"),
+                    HasSubstr("name the inputs")));
   EXPECT_EQ(
       message_of<std::invalid_argument>({&log}, {.inputs = {"a1", "a2"}, .realizations = {0}}),
       "no error");
   EXPECT_THAT(message_of<std::invalid_argument>(
                   {&log}, {.inputs = {"a1", "a2", "a3"}, .realizations = {0}}),
-              HasSubstr("3 inputs but only 2 experiments in realization 0"));
+              HasSubstr("3 inputs but only 2 experiments in realization 1 (counted from 1)"));
 }
 
 TEST(PlantFrfErrors, MoreInputsThanExperiments) {
   MemoryLog log = small_log({.axes = 2});
   log.log_info.excitation = test::channels("d", 3, "N");
-  EXPECT_THAT(
-      message_of<std::invalid_argument>({&log}),
-      HasSubstr("3 inputs but only 2 experiments in realization 0; measure one experiment for each "
-                "input, or select at most 2 inputs"));
+  EXPECT_THAT(message_of<std::invalid_argument>({&log}),
+              HasSubstr("3 inputs but only 2 experiments in realization 1 (counted from 1); "
+                        "measure one experiment for each "
+                        "input, or select at most 2 inputs"));
 }
 
 TEST(PlantFrfErrors, MoreInputsThanExcitedAxes) {
@@ -102,9 +102,10 @@ TEST(PlantFrfErrors, AnIncompleteRealizationAskedFor) {
   MemoryLog log = small_log({.realizations = 2});
   log.log_runs[5].complete = false;
   EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.realizations = {0, 1}}),
-              HasSubstr("3 excited axes but only 2 experiments in realization 1"));
-  EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.realizations = {0, 7}}),
-              HasSubstr("realization 7 has no complete run"));
+              HasSubstr("3 excited axes but only 2 experiments in realization 2 (counted from 1)"));
+  EXPECT_THAT(
+      message_of<std::invalid_argument>({&log}, {.realizations = {0, 7}}),
+      HasSubstr("realization 8 has no complete run; counted from 1, those that have one are 1, 2"));
 }
 
 TEST(PlantFrfErrors, NothingComplete) {
@@ -124,7 +125,7 @@ TEST(PlantFrfErrors, APeriodThatDoesNotDivideTheRecord) {
 TEST(PlantFrfErrors, NoPeriodLeft) {
   const MemoryLog log = small_log();
   EXPECT_THAT(message_of<FormatError>({&log}, {.transient_periods = 3}),
-              HasSubstr("3 periods were recorded and 3 are transient: none is left"));
+              HasSubstr("3 periods recorded, 3 transient: none is left"));
   EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.transient_periods = -1}),
               HasSubstr("must not be negative"));
 }
@@ -161,16 +162,17 @@ TEST(PlantFrfErrors, SingularExcitationNamesLineAndFrequency) {
     third[9] = spectrum(1)[9];
     log.excitation_periods[2].col(c) = dft.inverse(third);
   }
-  EXPECT_THAT(message_of<std::invalid_argument>({&log}),
-              AllOf(HasSubstr("singular excitation in realization 0, line 9 (36 Hz)"),
-                    HasSubstr("orthogonal")));
+  EXPECT_THAT(
+      message_of<std::invalid_argument>({&log}),
+      AllOf(HasSubstr("singular excitation in realization 1 (counted from 1), line 9 (36 Hz)"),
+            HasSubstr("orthogonal")));
 }
 
 TEST(PlantFrfErrors, InputsThatMoveTogether) {
   MemoryLog log = small_log();
   for (LogSamples& record : log.records) record.actuators.col(2) = record.actuators.col(1);
   EXPECT_THAT(message_of<std::invalid_argument>({&log}),
-              HasSubstr("singular inputs in realization 0, line 1 (4 Hz)"));
+              HasSubstr("singular inputs in realization 1 (counted from 1), line 1 (4 Hz)"));
 }
 
 TEST(PlantFrfErrors, NothingExcited) {

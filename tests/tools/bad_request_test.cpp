@@ -77,9 +77,27 @@ TEST_F(BadRequest, SubmodelsThatAreNone) {
 TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
   fail({"run", config_, "-o", name("run.h5")}, 2, "'stageid log convert' makes .h5 of it");
   make_log();
-  fail({"frf", config_, "-o", name("x.h5")}, 2, "another program's is read with 'stageid import'");
+  fail({"frf", config_, "-o", name("x.h5")}, 2,
+       "is an experiment file, not a log; 'stageid identify'");
   succeed({"log", "convert", name("run.slog"), "-o", name("run.h5")});
-  fail({"fit", name("run.h5"), "-o", name("m.json")}, 2, "'stageid frf' makes one of a log");
+  fail({"fit", name("run.h5"), "-o", name("m.json")}, 2,
+       "is a log in HDF5, not a frequency response; 'stageid frf', 'validate'");
+  const std::string log = name("run.slog");
+  fail({"export", log, "-o", name("m.mat")}, 2, "run.slog: is a native log, not a model (.json);");
+  fail({"validate", log, name("frf.h5")}, 2, "run.slog: is a native log, not a model (.json);");
+  fail({"run", log, "-o", name("x.slog")}, 2, "run.slog: is a native log, not a YAML file;");
+  fail({"export", config_, "-o", name("m.mat")}, 2, "is an experiment file, not a model (.json);");
+  std::filesystem::create_directory(at("folder.json"));
+  fail({"export", name("folder.json"), "-o", name("m.mat")}, 1, "is a directory; give a JSON file");
+}
+
+TEST_F(BadRequest, HelpIsThatOfTheCommand) {
+  EXPECT_EQ(run({"help"}).out, run({"--help"}).out);
+  EXPECT_EQ(run({"help", "frf"}).out, run({"frf", "--help"}).out);
+  EXPECT_EQ(run({"help", "log", "info"}).out, run({"log", "info", "--help"}).out);
+  fail({"help", "frff"}, 2, "help: 'frff' is no command; did you mean 'frf'?");
+  fail({"help", "log", "inf"}, 2, "help: 'inf' is no command of log; did you mean 'info'?");
+  fail({"help", "frf", "x"}, 2, "help: 'x' is no command of frf; write 'stageid help frf'");
 }
 
 TEST_F(BadRequest, WithoutArgumentsThereAreThreeThingsToTry) {
@@ -97,6 +115,18 @@ TEST_F(BadRequest, MissingFiles) {
   fail({"validate", name("none.json"), name("none.h5")}, 1, "none.json");
   fail({"report", name("none"), "-o", name("r.html")}, 1, "does not exist");
   fail({"log", "info", name("none.slog")}, 1, "none.slog");
+  fail({"import", name("none.csv")}, 1, "none.csv: cannot be read: No such file or directory;");
+  fail({"import", name(".")}, 1, "cannot be read: Is a directory; give the name of a file");
+}
+
+TEST_F(BadRequest, WhatIsNoTableAndNoReport) {
+  write_bytes(at("empty.csv"), "");
+  fail({"import", name("empty.csv")}, 2, "empty.csv: holds no table;");
+  write_bytes(at("head.csv"), "u,y\n");
+  fail({"import", name("head.csv")}, 2, "head.csv: holds names of columns and no row of numbers;");
+  fail({"report", name("head.csv"), "-o", name("r.html")}, 2, "is nothing that the report shows");
+  fail({"import", config_}, 2, "is an experiment file, not a file of another program;");
+  fail({"run", config_, "-o", name("x.txt")}, 2, "x.txt: a log is written as .slog;");
 }
 
 TEST_F(BadRequest, Configurations) {
@@ -279,11 +309,15 @@ TEST_F(BadRequest, AFullDiskLeavesNothingBehind) {
   fail({"export", name("model.json"), "-o", name("m.h5")}, 1, "m.h5", full);
   fail({"export", name("model.json"), "-o", name("m.csv")}, 1, "m.csv", full);
   fail({"report", name("frf.h5"), "-o", name("r.html")}, 1, "r.html", full);
+  fail({"export", name("model.json"), "-o", name("m.mat")}, 1, "m.mat: cannot be written", full);
   fail({"log", "convert", name("run.slog"), "-o", name("l.h5")}, 1, "l.h5", full);
+  fail({"log", "convert", name("run.slog"), "-o", name("l.csv")}, 1, "l.csv: cannot be wr", full);
   // What was recorded before the disk was full stays.
   full.largest_file_bytes = 200000;
   const ProgramResult run_full = run({"run", config_, "-o", name("full.slog")}, full);
   EXPECT_EQ(run_full.exit_code, 1);
+  const std::string place = name("full.slog") + ": cannot be written: File too large; raise";
+  EXPECT_THAT(run_full.err, testing::HasSubstr("stageid: " + place));  // the file is named once
   EXPECT_TRUE(std::filesystem::exists(at("full.slog")));
 }
 
@@ -364,10 +398,9 @@ TEST_F(BadRequest, Fits) {
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--outputs", "s9"}, 2, "s9");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "0"}, 2, "counted from 1");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "9"}, 2,
-       "realization 8 has no complete run; counted from 0, those that have one are 0, 1, 2 "
-       "(--realizations counts from 1)");
+       "realization 9 has no complete run; counted from 1, those that have one are 1, 2, 3");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--transient-periods", "9"}, 2,
-       "5 periods were recorded and 9 are transient");
+       "5 periods recorded, 9 transient");
 }
 
 }  // namespace

@@ -121,7 +121,7 @@ TEST_F(DamagedData, ThreeExperimentsOfRankTwoAreSingular) {
   config_ = experiment("all_axes.yaml", "lines: all", "lines: all\n  scheme: orthogonal_dft");
   make_hdf5_log();
   fail({"frf", spoilt("whole.h5", repeat_first_experiment), "-o", name("f.h5")}, 2,
-       "singular excitation in realization 0, line 4 (16 Hz)");
+       "singular excitation in realization 1 (counted from 1), line 4 (16 Hz)");
 }
 
 TEST_F(DamagedData, Hdf5FilesCutOrFlipped) {

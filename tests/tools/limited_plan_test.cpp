@@ -102,7 +102,8 @@ TEST_F(LimitedPlanTest, RequestsThatAreWrong) {
        "the scheme is not that of");
   fail({"run", variant("seed: 7", "seed: 8"), "--excitation", name("e.h5"), "-o", name("x.slog")},
        2, "the seed is not that of");
-  fail({"run", limits_, "--excitation", prior(), "-o", name("x.slog")}, 2, "stageid-excitation");
+  fail({"run", limits_, "--excitation", prior(), "-o", name("x.slog")}, 2,
+       "is a frequency response, not a designed excitation;");
 }
 
 TEST_F(LimitedPlanTest, APriorOfAnotherStageIsRefused) {

@@ -8,6 +8,7 @@
 
 #include "acquisition/log_checks.hpp"
 #include "acquisition/row_transpose.hpp"
+#include "excitation/counted.hpp"
 
 namespace stageid {
 namespace {
@@ -79,19 +80,19 @@ void ArrayLog::check_shapes() const {
   const auto same_runs = [&](const char* name, const py::array& array) {
     require(array.shape(0) == a.sensors.shape(0) && array.shape(1) == a.sensors.shape(1), name,
             array,
-            fmt::format("sensors have {} realizations of {} experiments", a.sensors.shape(0),
-                        a.sensors.shape(1)));
+            fmt::format("sensors have {} of {}", counted(a.sensors.shape(0), "realization"),
+                        counted(a.sensors.shape(1), "experiment")));
   };
   same_runs("excitation", a.excitation);
   same_runs("actuators", a.actuators);
   const auto same_samples = [&](const char* name, const py::array& array) {
     require(array.shape(2) == a.sensors.shape(2), name, array,
-            fmt::format("sensors have {} samples", a.sensors.shape(2)));
+            fmt::format("sensors have {}", counted(a.sensors.shape(2), "sample")));
   };
   same_samples("actuators", a.actuators);
   const auto channels = [](const char* name, const py::array& array, const ChannelList& list) {
     require(array.shape(3) == static_cast<py::ssize_t>(list.size()), name, array,
-            fmt::format("there are {} channel names", list.size()));
+            fmt::format("names: {}", counted(list.size(), "channel")));
   };
   channels("excitation", a.excitation, info_.excitation);
   channels("actuators", a.actuators, info_.actuators);

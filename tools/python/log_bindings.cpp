@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "acquisition/slog_format.hpp"
+#include "excitation/counted.hpp"
 #include "tools/python/array_log.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/interruptible.hpp"
@@ -32,8 +33,9 @@ ChannelList channels(const char* group, py::ssize_t count, const char* prefix, c
       list.names.push_back(fmt::format("{}{}", prefix, c + 1));
   list.units = units ? *units : std::vector<std::string>(list.size());
   if (list.units.size() != list.size())
-    throw std::invalid_argument(fmt::format("{}: {} units for {} channels; give one a channel",
-                                            group, list.units.size(), list.size()));
+    throw std::invalid_argument(fmt::format("{}: {} for {}; give one a channel", group,
+                                            counted(list.units.size(), "unit"),
+                                            counted(list.size(), "channel")));
   return list;
 }
 
@@ -140,10 +142,10 @@ std::vector<std::size_t> full_experiment(const LogReader& log, py::ssize_t& M, p
                        return log.runs()[i].samples == log.runs()[order.front()].samples;
                      });
   if (!equal)
-    throw std::invalid_argument(fmt::format(
-        "{}: its complete runs are not {} realizations of {} experiments of one length; "
-        "take them one by one, log[i]",
-        log.path().string(), M, E));
+    throw std::invalid_argument(
+        fmt::format("{}: its complete runs are not {} of {} of one length; "
+                    "take them one by one, log[i]",
+                    log.path().string(), counted(M, "realization"), counted(E, "experiment")));
   return order;
 }
 

@@ -220,7 +220,7 @@ class Damaged(Case):
         (WORK / "run.slog").write_bytes(b"\x89SLOG\r\n\x1a" + bytes(100))
         self.refuse("is a native log, not an HDF5 file; 'stageid frf'", "fit", "run.slog", "-o", "n.json")
         (WORK / "model.json").write_text("{}")
-        self.refuse("is JSON, as models and modes are", "fit", "model.json", "-o", "n.json")
+        self.refuse("is JSON, not an HDF5 file", "fit", "model.json", "-o", "n.json")
         (WORK / "run.txt").write_text("words")
         self.refuse("is not an HDF5 file", "fit", "run.txt", "-o", "n.json")
 

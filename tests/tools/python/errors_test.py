@@ -77,7 +77,7 @@ class Refused(unittest.TestCase):
         self.refuses(stageid.RequestError, "level", stageid.multisine, 1000.0, 500, 10.0, 100.0, -1.0, 7)
         self.refuses(stageid.RequestError, "", frf.select, band_hz=(900.0, 950.0))
         self.refuses(stageid.RequestError, "a9", frf.select, inputs=["a9"])
-        self.refuses(stageid.RequestError, "realization 8", stageid.frf, WORK / "run.slog", realizations=[8])
+        self.refuses(stageid.RequestError, "realization 9 has no complete run; counted from 1", stageid.frf, WORK / "run.slog", realizations=[8])
         self.refuses(stageid.RequestError, "covariance_lines|odd", stageid.frf, WORK / "run.slog", covariance_lines=2)
         self.refuses(stageid.FileError, "no.yaml", stageid.frf, WORK / "run.slog", stage=WORK / "no.yaml")
         self.refuses(stageid.RequestError, "max-iterations", stageid.fit, frf, max_iterations=0)
