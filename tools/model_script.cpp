@@ -65,7 +65,7 @@ class Syntax {
     if (python_) return fmt::format("{} = {}\n", name, value);
     std::string field = name;
     for (char& c : field) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return fmt::format("model.{} = {};\n", name.size() == 1 ? name : field, value);
+    return fmt::format("model.{} = {};\n", name.size() <= 2 ? name : field, value);
   }
 
  private:
@@ -219,7 +219,7 @@ end
 function P = held_response(model, f)
 if strcmp(model.hold, 'exact')
   a = 2i * pi * f(:).' / model.sample_rate_hz;
-  P = state_space_response(exp(a), model.ad, model.bd, model.cd, model.dd, ...
+  P = state_space_response(exp(a), model.Ad, model.Bd, model.Cd, model.Dd, ...
     exp(-model.input_delay_samples * a), exp(-model.output_delay_samples * a));
   return
 end
