@@ -30,13 +30,14 @@ function comparedFigures() {
 
 function signedPercent(value) {
   if (!isNumber(value)) return '\u2013';
+  if (Math.abs(value) < 1e-9) return percent(0);  // rounding of two equal numbers
   return (value < 0 ? '\u2212' : value > 0 ? '+' : '') + percent(Math.abs(value), 3);
 }
 
 function pairColumns() {
   const { own, modes, title } = content.comparison;
   const sigma = (key) => [(row) => Math.abs(row[key]), (row) => element('span', { class: Math.abs(row[key]) > 3 ? 'far' : null },
-    isNumber(row[key]) ? (row[key] < 0 ? '\u2212' : '+') + Math.abs(row[key]).toFixed(1) : '\u2013')];
+    deviations(row[key]))];
   return [
     ['#', (row) => row.own, (row) => (row.own + 1) + ' \u2013 ' + (row.other + 1)],
     ['f\u2080 [Hz]', (row) => own[row.own].frequency_hz, (row) => fixed(own[row.own].frequency_hz)],

@@ -3,7 +3,8 @@
 const cost = { graph: null };
 
 function buildCost() {
-  const body = section('cost', 'Cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines; it may never rise.');
+  const body = section('cost', 'Cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines. It never rises while one set of modes is fitted; ' +
+    'it may where the automatic fit takes another set.');
   body.append(element('div', { class: 'plot-head' }, element('p', { class: 'plot-title' }, 'Cost'),
     saveButtons('cost', () => ({ title: 'Cost over the iterations', panels: [graphPanel(cost.graph)] }))),
     element('div', { class: 'plot', id: 'cost-plot', role: 'img', 'aria-labelledby': 'cost-title' }),

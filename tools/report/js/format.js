@@ -41,6 +41,13 @@ function percent(value, digits = 2) {
   return (Math.abs(text) < 1e-3 && text !== 0 ? number(text, digits) : String(text)) + '\u00a0%';
 }
 
+// In standard deviations, with sign: "+1.3".
+function deviations(value) {
+  if (!isNumber(value)) return '\u2013';
+  const text = Math.abs(value).toFixed(1);
+  return (text === '0.0' ? '' : value < 0 ? '\u2212' : '+') + text;
+}
+
 function hertz(value) {
   if (!isNumber(value)) return '\u2013';
   return value >= 1000 ? number(value / 1000, 4).replace(/\.?0+$/, '') + '\u00a0kHz'

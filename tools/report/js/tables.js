@@ -65,8 +65,7 @@ function buildModes() {
     ? 'Identified modes beside the true ones of the simulated plant. Deviations are in standard deviations.' : null);
   if (uncertain && isZippered()) body.append(element('p', { class: 'lead correlated' }, correlationText() + ' The standard deviations count that.'));
   const rows = content.modes.map((mode, i) => ({ ...mode, place: i + 1, rowClass: isNumber(mode.frequency_hz) ? null : 'absent' }));
-  const sigmas = (value) => (isNumber(value) ? (value < 0 ? '\u2212' : '+') + Math.abs(value).toFixed(1) : '\u2013');
-  const deviation = (key) => (row) => element('span', { class: Math.abs(row[key]) > 3 ? 'far' : null }, sigmas(row[key]));
+  const deviation = (key) => (row) => element('span', { class: Math.abs(row[key]) > 3 ? 'far' : null }, deviations(row[key]));
   const columns = [
     ['#', (row) => row.place, shapeCell],
     ['f\u2080 [Hz]', (row) => row.frequency_hz, frequencyCell],

@@ -8,7 +8,7 @@ const palettes = {
     curves: ['#0072b2', '#d55e00', '#3d9970', '#b0569b', '#b58900', '#5b6b7b'],
   },
   dark: {
-    measured: '#3c86b8', model: '#ffc078', residual: '#54d3a0', deviation: '#8c96a3', validation: '#e39ad0', other: '#e6c04a', otherModel: '#b79cf0', change: '#9fb0c2',
+    measured: '#3c86b8', model: '#ffc078', residual: '#54d3a0', deviation: '#8c96a3', validation: '#e39ad0', other: '#6fe0ee', otherModel: '#b79cf0', change: '#9fb0c2',
     grid: '#2a323c', frame: '#4b5663', text: '#aab4c0', ink: '#e4e9ef', below: '#5ab4e8', above: '#ff9a4d', marker: '#ff9a4d', background: '#171c22',
     curves: ['#5ab4e8', '#ff9a4d', '#54d3a0', '#e39ad0', '#e6c04a', '#9fb0c2'],
   },
