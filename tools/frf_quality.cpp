@@ -100,6 +100,15 @@ std::string why_not_tested(const FrfEstimate& frf) {
   return why.empty() ? "nonlinearity test: the file holds none; estimate again from the logs" : why;
 }
 
+/// Every experiment begins with a period that is unlike the others, and none has another such period.
+bool transient_lasts(const FrfEstimate& frf) {
+  const std::size_t experiments =
+      static_cast<std::size_t>(frf.realizations) * static_cast<std::size_t>(frf.experiments);
+  return experiments > 0 && frf.dropped_periods.size() == experiments &&
+         std::all_of(frf.dropped_periods.begin(), frf.dropped_periods.end(),
+                     [](const DroppedPeriod& period) { return period.period == 0; });
+}
+
 }  // namespace
 
 std::vector<std::string> linearity_lines(const FrfEstimate& frf) {
@@ -173,6 +182,12 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
                                 period.reason));
   }
   if (more > 0) lines.push_back(fmt::format("... and {} more periods, see /dropped_periods", more));
+  if (transient_lasts(frf))
+    lines.emplace_back(
+        "the first measured period of every experiment was left out: the transient was not over, "
+        "and "
+        "what is left of it looks like distortion; give --transient-periods one more, or --method "
+        "lpm");
   return lines;
 }
 

@@ -96,5 +96,20 @@ TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {
   EXPECT_THAT(dropped_lines(frf), Contains("... and 21 more periods, see /dropped_periods"));
 }
 
+TEST(DroppedLines, SayThatTheTransientLasts) {
+  const auto told =
+      testing::StartsWith("the first measured period of every experiment was left out");
+  FrfEstimate frf;
+  frf.realizations = 2;
+  frf.experiments = 2;
+  EXPECT_THAT(dropped_lines(frf), testing::IsEmpty());
+  frf.dropped_periods = {{0, 0, 0, "unlike"}, {0, 1, 0, "unlike"}, {1, 0, 0, "unlike"}};
+  EXPECT_THAT(dropped_lines(frf), testing::Not(Contains(told)));
+  frf.dropped_periods.push_back({1, 1, 1, "a glitch"});
+  EXPECT_THAT(dropped_lines(frf), testing::Not(Contains(told)));
+  frf.dropped_periods.back().period = 0;
+  EXPECT_THAT(dropped_lines(frf), Contains(told));
+}
+
 }  // namespace
 }  // namespace stageid::test

@@ -25,7 +25,7 @@ function showSupervisor(state) {
 
 function buildEvents() {
   side.events = element('tbody');
-  section('events', 'Events', 'Events', 'The newest last. All of them stand in the event log beside the log.').append(
+  section('events', 'Events', 'Events', 'The newest first. All of them stand in the event log beside the log.').append(
     element('div', { class: 'table-scroll' }, element('table', { class: 'events' }, side.events)));
 }
 
@@ -33,7 +33,7 @@ function showEvents(state) {
   const key = JSON.stringify(state.events[state.events.length - 1] || null) + state.events.length;
   if (side.key === key) return;
   side.key = key;
-  side.events.replaceChildren(...state.events.filter(Boolean).map((event) => element('tr', null,
+  side.events.replaceChildren(...state.events.filter(Boolean).reverse().map((event) => element('tr', null,
     element('td', null, String(event.time_utc).slice(11, 23)), element('td', null, String(event.event).replace(/_/g, ' ')),
     element('td', { class: 'quiet' }, eventText(event)))));
 }

@@ -1,20 +1,20 @@
 // Logarithmic axes for dygraphs, whose own ticks crowd on a narrow plot.
 
-// Ticks of a logarithmic axis: labels at decades, at 1-2-5 when zoomed in, linear when within a decade.
+// Ticks of a logarithmic axis: labels at decades, at 1-3 or 1-2-5 where there is room, linear when within a decade.
 function logTicks(min, max, pixels, label, spacing) {
   const decades = Math.log10(max / min);
   if (!(decades > 0)) return [];
   const room = Math.max(2, Math.floor(pixels / spacing));
   if (decades < 0.9) return linearTicks(min, max, room, label);
   const every = Math.max(1, Math.ceil(decades / room));
-  const fine = decades * 3 <= room;
+  const labelled = decades * 3 <= room ? [2, 5] : decades * 2 <= room ? [3] : [];
   const ticks = [];
   for (let d = Math.floor(Math.log10(min)); d <= Math.ceil(Math.log10(max)); ++d) {
     for (let m = 1; m < 10; ++m) {
       const v = m * Math.pow(10, d);
       if (v < min * (1 - 1e-9) || v > max * (1 + 1e-9)) continue;
       if (m === 1) ticks.push({ v, label: d % every === 0 ? label(v) : '' });
-      else if (fine && (m === 2 || m === 5)) ticks.push({ v, label: label(v) });
+      else if (labelled.includes(m)) ticks.push({ v, label: label(v) });
       else if (pixels / decades > 60) ticks.push({ v, label: '' });
     }
   }
