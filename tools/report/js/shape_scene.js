@@ -44,12 +44,12 @@ function drawStage(context, width, height) {
     context.globalAlpha = 1;
     drawChannel(context, point.kind, now.x, now.y);
     context.font = font(11);
-    // A sensor and an actuator at one place: names to opposite corners.
+    // A sensor and an actuator at one place: names to either side.
     const sensor = point.kind === 'outputs';
     context.textAlign = sensor ? 'right' : 'left';
     context.textBaseline = 'middle';
     context.fillStyle = colours.ink;
-    context.fillText(point.name.slice(0, 12), now.x + (sensor ? -7 : 7), now.y + (sensor ? 8 : -7));
+    context.fillText(point.name.slice(0, 12), now.x + (sensor ? -7 : 7), now.y - 7);
   }
 }
 
