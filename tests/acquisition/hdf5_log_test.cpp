@@ -212,7 +212,7 @@ TEST_F(Hdf5Log, RefusesWhatIsMissing) {
 }
 
 TEST_F(Hdf5Log, RefusesAttributesThatMakeNoSense) {
-  expect_refused({.format = "stageid-frf"}, "/", "stageid-frf");
+  expect_refused({.format = "stageid-frf"}, "/", "is a frequency response, not a log;");
   expect_refused({.version = 2}, "/", "version 2");
   expect_refused({.sample_rate_hz = 0.0}, "/", "sample_rate_hz");
   expect_refused({.sample_rate_hz = std::nan("")}, "/", "sample_rate_hz");
