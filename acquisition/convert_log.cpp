@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
@@ -12,7 +13,10 @@
 #include <system_error>
 
 #include "acquisition/hdf5_log.hpp"
+#include "acquisition/slog_format.hpp"
 #include "acquisition/slog_index.hpp"
+#include "acquisition/slog_reader.hpp"
+#include "acquisition/slog_writer.hpp"
 #include "excitation/file_error.hpp"
 #include "excitation/hdf5_file.hpp"
 #include "excitation/output_file.hpp"
@@ -252,19 +256,60 @@ void convert_to_csv(const LogReader& reader, const std::filesystem::path& to,
   csv.close();
 }
 
+// native -------------------------------------------------------------------------------------
+
+void convert_run_to_slog(const LogReader& reader, std::size_t run, SlogWriter& writer,
+                         Progress& progress) {
+  const LogRun& which = reader.runs()[run];
+  writer.begin_run(which, reader.excitation(run));
+  LogSamples samples;
+  for (std::uint64_t first = 0; first < which.samples; first += kPieceRows) {
+    const std::uint64_t count = std::min(kPieceRows, which.samples - first);
+    reader.read(run, first, count, samples);
+    const Eigen::Index n_u = samples.actuators.cols();
+    const Eigen::Index n_y = samples.sensors.cols();
+    RowMajor words(static_cast<Eigen::Index>(count), n_u + n_y + 1);
+    words.leftCols(n_u) = samples.actuators;
+    words.middleCols(n_u, n_y) = samples.sensors;
+    for (Eigen::Index r = 0; r < words.rows(); ++r)
+      words(r, n_u + n_y) = std::bit_cast<double>(pack_status({.marked = samples.marked[r] != 0}));
+    writer.write({words.data(), static_cast<std::size_t>(words.size())});
+    progress.add(count);
+  }
+  writer.end_run(which);
+}
+
+void convert_to_slog(const LogReader& reader, const std::filesystem::path& temporary,
+                     const ConvertOptions& options) {
+  Progress progress(reader, options);
+  std::filesystem::remove(temporary);  // a log is never written over
+  SlogWriter writer = SlogWriter::create(temporary, reader.info());
+  for (std::size_t run = 0; run < reader.runs().size(); ++run)
+    if (progress.wanted(reader.runs()[run])) convert_run_to_slog(reader, run, writer, progress);
+  writer.close(0, "converted");
+}
+
 }  // namespace
 
 void convert_log(const LogReader& reader, const std::filesystem::path& to,
                  const ConvertOptions& options) {
   const std::string extension = to.extension().string();
   const bool hdf5 = extension == ".h5" || extension == ".hdf5";
-  if (!hdf5 && extension != ".csv") {
-    throw std::invalid_argument(
-        fmt::format("{}: unknown extension; give .h5 or .hdf5 (HDF5) or .csv (text)", to.string()));
+  const bool native = extension == ".slog";
+  if (!hdf5 && !native && extension != ".csv") {
+    throw std::invalid_argument(fmt::format(
+        "{}: unknown extension; give .h5 or .hdf5 (HDF5), .csv (text), .mat (MATLAB) or .slog",
+        to.string()));
   }
+  if (native && dynamic_cast<const SlogReader*>(&reader) != nullptr)
+    throw std::invalid_argument(fmt::format(
+        "{}: is a native log already; 'stageid log recover' makes a new one of what is intact",
+        reader.path().string()));
   OutputFile output(to);
   if (hdf5) {
     convert_to_hdf5(reader, output.path(), to, options);
+  } else if (native) {
+    convert_to_slog(reader, output.path(), options);
   } else {
     convert_to_csv(reader, output.path(), options);
   }

@@ -15,7 +15,8 @@ struct ConvertOptions {
 };
 
 /// Writes a log of either format to `to`, by its extension: .h5 or .hdf5 (the layout of
-/// Hdf5LogReader, excitation one period, metadata and health as attributes) or .csv.
+/// Hdf5LogReader, excitation one period, metadata and health as attributes), .csv, or of an HDF5 log
+/// .slog, whose rows know no lateness.
 ///
 /// CSV: one line a sample over all runs: run, realization, experiment, time_s (from the start of
 /// the run), marked, then excitation, actuators and sensors, each column headed "name [unit]".

@@ -13,6 +13,7 @@
 
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
+#include "tools/mat_option.hpp"
 #include "tools/model_export.hpp"
 #include "tools/output_paths.hpp"
 
@@ -65,14 +66,8 @@ ExportCommand::ExportCommand(CLI::App& app, Console& console) : console_(console
           "--driving-point", driving_point_,
           "OUTPUT INPUT, at one place in one direction; .h5, .mat, .npz: each mode's mass there")
       ->expected(2);
-  command->add_option("--mat-version", mat_version_, "of a .mat file: 5 or 7.3 (HDF5)")
-      ->check(CLI::IsMember({"5", "7.3"}))
-      ->capture_default_str();
+  add_mat_version(*command, mat_version_);
   command->final_callback([this] { run(); });
-}
-
-MatVersion ExportCommand::mat_version() const {
-  return mat_version_ == "5" ? MatVersion::v5 : MatVersion::v73;
 }
 
 void ExportCommand::export_from_model() const {
@@ -92,7 +87,7 @@ void ExportCommand::export_from_model() const {
   if (!driving_point_.empty())
     driving_point = {place_of(driving_point_[0], model.outputs, "output"),
                      place_of(driving_point_[1], model.inputs, "input")};
-  export_model(output_, model, exported, driving_point, mat_version());
+  export_model(output_, model, exported, driving_point, mat_version_);
 }
 
 void ExportCommand::export_from_frf() const {
@@ -108,7 +103,7 @@ void ExportCommand::export_from_frf() const {
     throw std::invalid_argument(
         fmt::format("{}: holds a frequency response; {}", input_.string(), error.what()));
   }
-  export_frf(output_, frf, mat_version());
+  export_frf(output_, frf, mat_version_);
 }
 
 void ExportCommand::run() const {

@@ -19,14 +19,13 @@ class ExportCommand {
   void run() const;
   void export_from_model() const;
   void export_from_frf() const;
-  MatVersion mat_version() const;
 
   Console& console_;
   std::filesystem::path input_;
   std::filesystem::path output_;
   std::filesystem::path frf_;
   std::vector<std::string> driving_point_;
-  std::string mat_version_ = "5";
+  MatVersion mat_version_ = MatVersion::v5;
 };
 
 }  // namespace stageid

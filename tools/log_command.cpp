@@ -16,6 +16,8 @@
 #include "tools/exit_code.hpp"
 #include "tools/health_step.hpp"
 #include "tools/interrupt.hpp"
+#include "tools/mat_log.hpp"
+#include "tools/mat_option.hpp"
 #include "tools/output_paths.hpp"
 #include "tools/run_metadata.hpp"
 #include "tools/timing_json.hpp"
@@ -109,11 +111,14 @@ LogCommand::LogCommand(CLI::App& app, Console& console) : console_(console) {
   recover_command->final_callback([this] { recover(); });
 
   CLI::App* convert_command =
-      add_command(*log, "convert", "Native log to HDF5 or CSV, HDF5 to CSV");
+      add_command(*log, "convert", "Log to HDF5, CSV or MATLAB, HDF5 to native");
   convert_command->add_option("file", file_, "log (.slog or .h5)")->required();
-  convert_command->add_option("-o,--output", output_, "file to write (.h5 or .csv)")->required();
+  convert_command
+      ->add_option("-o,--output", output_, "file to write (.h5, .csv, .mat; of an HDF5 log .slog)")
+      ->required();
   convert_command->add_flag("--complete-only", complete_only_,
                             "leave out runs that were broken off");
+  add_mat_version(*convert_command, mat_version_);
   convert_command->final_callback([this] { convert(); });
 }
 
@@ -205,9 +210,6 @@ void LogCommand::recover() const {
 
 void LogCommand::convert() const {
   require_no_input(output_, {file_});
-  if (output_.extension() == ".mat")
-    throw std::invalid_argument(fmt::format(
-        "{}: MAT files are not in this version; there are .h5 and .csv", output_.string()));
   const std::unique_ptr<LogReader> log = open_log(file_);
   Progress progress(console_, "convert", "rows");
   ConvertOptions options;
@@ -216,7 +218,10 @@ void LogCommand::convert() const {
     throw_if_interrupted();
     progress.update(static_cast<double>(done), static_cast<double>(total));
   };
-  convert_log(*log, output_, options);
+  if (output_.extension() == ".mat")
+    write_mat_log(*log, output_, mat_version_, options);
+  else
+    convert_log(*log, output_, options);
   console_.result(fmt::format("wrote {}, {:.1f} MB", output_.string(),
                               static_cast<double>(std::filesystem::file_size(output_)) / 1e6));
   console_.result({{"output", output_.string()}, {"bytes", std::filesystem::file_size(output_)}});

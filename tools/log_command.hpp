@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "tools/console.hpp"
+#include "tools/mat_file.hpp"
 
 namespace stageid {
 
@@ -22,6 +23,7 @@ class LogCommand {
   std::filesystem::path file_;
   std::filesystem::path output_;
   bool complete_only_ = false;
+  MatVersion mat_version_ = MatVersion::v5;
   bool health_ = false;
   std::filesystem::path stage_;
 };

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 
 #include "tools/named_array.hpp"
 
@@ -12,7 +13,8 @@ enum class MatVersion : std::uint8_t {
   v73  ///< HDF5 inside
 };
 
-/// Writes a MATLAB file, whole or not at all: same content, same bytes (v5).
+/// Writes a MATLAB file, whole or not at all: same content, same bytes (v5). Lists of arrays are written
+/// as they come, and need not be kept.
 ///
 /// "modes/damping_ratio" becomes field damping_ratio of struct modes, "inputs@unit" a variable
 /// inputs_unit, "@format" a variable format; a name that begins with a digit gets an x in front. Lists
@@ -20,6 +22,24 @@ enum class MatVersion : std::uint8_t {
 /// axes, N x a x b, are a x b x N, as MATLAB counts pages: what idfrd(response, frequency, ...) wants.
 /// @throws FileError
 /// @throws std::invalid_argument if an array is too large for v5; v7.3 is the remedy.
+class MatWriter {
+ public:
+  MatWriter(const std::filesystem::path& file, MatVersion version);
+  ~MatWriter();
+  MatWriter(const MatWriter&) = delete;
+  MatWriter& operator=(const MatWriter&) = delete;
+
+  /// Structs are whole: all of their fields are in one list.
+  void add(const ArrayList& list);
+  /// The file appears. Without it none does.
+  void close();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// All at once.
 void write_mat(const std::filesystem::path& file, const ArrayList& list,
                MatVersion version = MatVersion::v5);
 

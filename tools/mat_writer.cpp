@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <map>
 #include <memory>
 #include <stdexcept>
+#include <string>
 #include <system_error>
 
 #include "excitation/file_error.hpp"
@@ -135,35 +137,65 @@ std::vector<Variable> variables_of(const ArrayList& list) {
   return variables;
 }
 
+/// A variable is an array or a struct with all that it holds.
 void require_room(const ArrayList& list) {
   constexpr std::size_t kMostBytes = std::size_t{1} << 31;
-  for (const NamedArray& array : list.arrays)
-    if (!array.is_text() && array.size() * (array.is_complex() ? 16 : 8) >= kMostBytes)
+  std::map<std::string, std::size_t> bytes;
+  for (const NamedArray& array : list.arrays) {
+    if (array.is_text()) continue;
+    std::size_t& sum = bytes[path_of(array.name).front()];
+    sum += array.size() * (array.is_complex() ? 16 : 8);
+    if (sum >= kMostBytes)
       throw std::invalid_argument(fmt::format(
           "{}: '{}' has 2 GiB or more; MATLAB v5 files hold less a variable, write v7.3",
-          list.file.string(), array.name));
+          list.file.string(), path_of(array.name).front()));
+  }
 }
 
 }  // namespace
 
-void write_mat(const std::filesystem::path& path, const ArrayList& list, MatVersion version) {
-  if (version == MatVersion::v5) require_room(list);
-  OutputFile output(path);
-  const auto fail = [&] {
+struct MatWriter::State {
+  State(const std::filesystem::path& to, MatVersion wanted)
+      : path(to), version(wanted), output(to) {}
+
+  [[noreturn]] void fail() const {
     throw FileError(fmt::format("{}: cannot be written: {}", path.string(), system_reason(errno)));
-  };
+  }
+
+  std::filesystem::path path;
+  MatVersion version;
+  OutputFile output;
+  MatFile file{nullptr, &Mat_Close};
+};
+
+MatWriter::MatWriter(const std::filesystem::path& file, MatVersion version)
+    : state_(std::make_unique<State>(file, version)) {
+  const bool v5 = version == MatVersion::v5;
   // The default header tells the time; ours is the same for the same content.
   const std::string header =
-      fmt::format("MATLAB {} MAT-file, written by stageid {}",
-                  version == MatVersion::v5 ? "5.0" : "7.3", STAGEID_VERSION);
-  MatFile file(Mat_CreateVer(output.path().c_str(), header.c_str(),
-                             version == MatVersion::v5 ? MAT_FT_MAT5 : MAT_FT_MAT73),
-               &Mat_Close);
-  if (!file) fail();
+      fmt::format("MATLAB {} MAT-file, written by stageid {}", v5 ? "5.0" : "7.3", STAGEID_VERSION);
+  state_->file.reset(Mat_CreateVer(state_->output.path().c_str(), header.c_str(),
+                                   v5 ? MAT_FT_MAT5 : MAT_FT_MAT73));
+  if (!state_->file) state_->fail();
+}
+
+MatWriter::~MatWriter() = default;
+
+void MatWriter::add(const ArrayList& list) {
+  if (state_->version == MatVersion::v5) require_room(list);
   for (const Variable& variable : variables_of(list))
-    if (Mat_VarWrite(file.get(), variable.get(), MAT_COMPRESSION_NONE) != 0) fail();
-  if (Mat_Close(file.release()) != 0) fail();
-  output.commit();
+    if (Mat_VarWrite(state_->file.get(), variable.get(), MAT_COMPRESSION_NONE) != 0) state_->fail();
+}
+
+void MatWriter::close() {
+  if (Mat_Close(state_->file.release()) != 0) state_->fail();
+  state_->output.commit();
+}
+
+void write_mat(const std::filesystem::path& file, const ArrayList& list, MatVersion version) {
+  MatWriter writer(file, version);
+  writer.add(list);
+  writer.close();
 }
 
 }  // namespace stageid

@@ -215,6 +215,71 @@ class WithAMap(Case):
             np.testing.assert_array_equal(h5["runs/0000/actuators"][()], u[100:])
 
 
+class Logs(Case):
+    """What `log convert` writes of a log, against the arrays that the log was made of."""
+
+    def setUp(self):
+        super().setUp()
+        g = np.random.default_rng(6)
+        self.r, self.u, self.y = g.normal(size=(50, 1)), g.normal(size=(2, 150, 1)), g.normal(size=(2, 150, 2))
+        self.marked = (np.arange(150) == 77).astype("u1")
+        with h5py.File(WORK / "log.h5", "w") as f:
+            f.attrs["format"], f.attrs["format_version"] = "stageid-log", 1
+            f.attrs["sample_rate_hz"], f.attrs["period_samples"], f.attrs["transient_periods"] = 100.0, 50, 1
+            for name, names in (("excitation", ["r"]), ("actuators", ["a"]), ("sensors", ["z1", "\u00b52"])):
+                f[f"channels/{name}"] = names
+                f[f"channels/{name}"].attrs["unit"] = "m" if name == "sensors" else "N"
+            for m in range(2):
+                run = f.create_group(f"runs/{m:04}")
+                run.attrs["realization"], run.attrs["experiment"], run.attrs["complete"] = m, 0, 1 - m
+                run["excitation"], run["actuators"], run["sensors"] = self.r, self.u[m], self.y[m]
+                run["marked"] = self.marked
+
+    def test_matlab_holds_every_run_to_the_bit(self):
+        self.succeed("log", "convert", "log.h5", "-o", "log.mat")
+        read = scipy.io.loadmat(WORK / "log.mat", squeeze_me=True, struct_as_record=False,
+                                uint16_codec="utf-16-le")
+        self.assertEqual((read["sample_rate_hz"], read["period_samples"], read["transient_periods"]), (100, 50, 1))
+        self.assertEqual(list(read["channels"].sensors), ["z1", "\u00b52"])
+        self.assertEqual(list(read["channels"].sensors_unit), ["m", "m"])
+        for m in range(2):
+            run = read[f"run{m:04}"]
+            self.assertEqual((run.realization, run.experiment, run.complete), (m, 0, 1 - m))
+            np.testing.assert_array_equal(run.excitation, self.r[:, 0])
+            np.testing.assert_array_equal(run.actuators, self.u[m, :, 0])
+            np.testing.assert_array_equal(run.sensors, self.y[m])
+            np.testing.assert_array_equal(run.marked, self.marked)
+        self.succeed("log", "convert", "log.h5", "-o", "part.mat", "--complete-only", "--mat-version", "7.3")
+        with h5py.File(WORK / "part.mat") as f:
+            np.testing.assert_array_equal(f["run0000/sensors"][()].T, self.y[0])
+            self.assertNotIn("run0001", f)
+
+    def test_matlab_comes_back_through_a_map(self):
+        self.succeed("log", "convert", "log.h5", "-o", "log.mat")
+        write_map("kind: log\nsample_rate_hz: 100\nperiod_samples: 50\ntransient_periods: 1\n"
+                  "excitation: {arrays: [run0000/excitation], names: [r], unit: N}\n"
+                  "actuators: {arrays: [run0000/actuators], names: [a], unit: N}\n"
+                  "sensors: {arrays: [run0000/sensors], names: [z1, z2], unit: m}\n")
+        self.succeed("import", "log.mat", "-o", "back.h5", "--map", "map.yaml")
+        with h5py.File(WORK / "back.h5") as f:
+            np.testing.assert_array_equal(f["runs/0000/sensors"][()], self.y[0])
+            np.testing.assert_array_equal(f["runs/0000/actuators"][()], self.u[0])
+
+    def test_native_and_back_to_the_bit(self):
+        self.succeed("log", "convert", "log.h5", "-o", "log.slog")
+        self.succeed("log", "verify", "log.slog")
+        self.refuse("is a native log already", "log", "convert", "log.slog", "-o", "twice.slog")
+        self.succeed("log", "convert", "log.slog", "-o", "again.h5")
+        with h5py.File(WORK / "again.h5") as f:
+            for m in range(2):
+                run = f[f"runs/{m:04}"]
+                self.assertEqual((run.attrs["realization"], run.attrs["complete"]), (m, 1 - m))
+                np.testing.assert_array_equal(run["excitation"][()], self.r)
+                np.testing.assert_array_equal(run["actuators"][()], self.u[m])
+                np.testing.assert_array_equal(run["sensors"][()], self.y[m])
+                np.testing.assert_array_equal(run["marked"][()], self.marked)
+
+
 class Damaged(Case):
     def test_files_of_another_kind_are_named(self):
         (WORK / "run.slog").write_bytes(b"\x89SLOG\r\n\x1a" + bytes(100))
