@@ -4,9 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "estimation/additive_model.hpp"
-#include "excitation/hdf5_file.hpp"
-#include "frf/frf_file.hpp"
-#include "tests/support/numbered_frf.hpp"
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid::test {
@@ -36,22 +33,6 @@ TEST_F(BadRequest, WhatIsNotInThisVersionSaysSo) {
   fail({"run", config_, "-o", name("x.slog"), "--dashboard", "http://a"}, 2, "--dashboard");
   fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
   fail({"export", "model.json", "-o", name("m.step")}, 2, ".json, .h5, .hdf5, .csv, .mat");
-}
-
-TEST_F(BadRequest, WeightsWithoutAMinimumAreNotToBeTrusted) {
-  const FrfEstimate frf = numbered_frf();
-  write_frf(name("frf.h5"), frf);
-  std::vector<double> weights(static_cast<std::size_t>(frf.response.size()), 1.0);
-  weights[5] = -1.0;
-  Hdf5File file = Hdf5File::create(name("w.h5"));
-  file.write_reals("/weights",
-                   {static_cast<hsize_t>(frf.lines()), static_cast<hsize_t>(frf.n_outputs()),
-                    static_cast<hsize_t>(frf.n_inputs())},
-                   weights.data());
-  file.close();
-  fail({"fit", name("frf.h5"), "-o", name("model.json"), "--weighting", name("w.h5")}, 3,
-       "-1; weights are 0 or more");
-  EXPECT_FALSE(std::filesystem::exists(name("model.json")));
 }
 
 TEST_F(BadRequest, WhatAModelHasNot) {

@@ -10,8 +10,10 @@
 #include "estimation/weight_matrices.hpp"
 #include "excitation/file_error.hpp"
 #include "excitation/hdf5_file.hpp"
+#include "frf/frf_file.hpp"
 #include "tests/support/numbered_frf.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/tools/program_fixture.hpp"
 
 namespace stageid {
 namespace {
@@ -96,6 +98,24 @@ TEST_F(WeightFile, RefusesNegativeWeights) {
   file.write_reals("/weights", {4, 2, 3}, values.data());
   file.close();
   expect_refused<IndefiniteWeights>("line 2: -1; weights are 0 or more");
+}
+
+class WeightsOfTheProgram : public test::ProgramTest {};
+
+TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
+  const FrfEstimate frf = test::numbered_frf();
+  write_frf(name("frf.h5"), frf);
+  std::vector<double> weights(static_cast<std::size_t>(frf.response.size()), 1.0);
+  weights[5] = -1.0;
+  Hdf5File file = Hdf5File::create(name("w.h5"));
+  file.write_reals("/weights",
+                   {static_cast<hsize_t>(frf.lines()), static_cast<hsize_t>(frf.n_outputs()),
+                    static_cast<hsize_t>(frf.n_inputs())},
+                   weights.data());
+  file.close();
+  fail({"fit", name("frf.h5"), "-o", name("model.json"), "--weighting", name("w.h5")}, 3,
+       "-1; weights are 0 or more");
+  EXPECT_FALSE(std::filesystem::exists(name("model.json")));
 }
 
 }  // namespace
