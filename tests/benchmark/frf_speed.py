@@ -4,7 +4,8 @@
     frf_speed.py PROGRAM CONFIG [REALIZATIONS PERIODS [REPEATS]]
 
 Simulates the experiment of CONFIG with so many realizations and periods (default 3 and 3) and estimates its
-response, alternately with reading the file in pieces of 1 MiB, all from the page cache. Prints the least of REPEATS
+response, alternately with reading the file in pieces of 1 MiB, from the page cache and, the cache told to forget
+the file, from the disk. Prints the least of REPEATS
 times (default 5) by the wall's clock and by the processors': the latter tells more on a machine that others
 use as well. Rates are of the file as it stands, which `frf` reads but for the transient periods. The folder of
 temporary files (TMPDIR) must hold the log. The result must be the same for any number of threads.
@@ -54,6 +55,15 @@ def read_plainly(log):
     return time.perf_counter() - begin, sum(os.times()[:2]) - used, 1.0
 
 
+def from_disk(log, run):
+    """After every page of the file has left the page cache."""
+    file = os.open(log, os.O_RDONLY)
+    os.fsync(file)
+    os.posix_fadvise(file, 0, 0, os.POSIX_FADV_DONTNEED)
+    os.close(file)
+    return run()
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -66,6 +76,8 @@ def main():
             "frf": lambda: child("frf", log, "-o", folder / "all.h5"),
             "frf --no-health": lambda: child("frf", log, "-o", folder / "fast.h5", "--no-health"),
             "frf --threads 1": lambda: child("frf", log, "-o", folder / "one.h5", "--threads", "1"),
+            "disk, read plainly": lambda: from_disk(log, lambda: read_plainly(log)),
+            "disk, frf": lambda: from_disk(log, lambda: child("frf", log, "-o", folder / "disk.h5")),
         }
         times = {way: [] for way in ways}
         for _ in range(REPEATS):  # alternately, so that all see the same machine
@@ -73,11 +85,11 @@ def main():
                 times[way].append(run())
         assert (folder / "all.h5").read_bytes() == (folder / "one.h5").read_bytes()
         print(f"{size:.2f} GB: {REALIZATIONS} realizations, {PERIODS} periods, load {os.getloadavg()[0]:.1f}")
-        print(f"{'':18}{'wall, s':>10}{'GB/s':>8}{'processors, s':>15}{'GB a processor second':>24}{'peak, MB':>10}")
+        print(f"{'':20}{'wall, s':>10}{'GB/s':>8}{'processors, s':>15}{'GB a processor second':>24}{'peak, MB':>10}")
         for way, seconds in times.items():
             wall, used, _ = (min(column) for column in zip(*seconds))
             memory = max(peak for _, _, peak in seconds)
-            print(f"{way:18}{wall:10.2f}{size / wall:8.2f}{used:15.2f}{size / used:24.2f}{memory:10.0f}", flush=True)
+            print(f"{way:20}{wall:10.2f}{size / wall:8.2f}{used:15.2f}{size / used:24.2f}{memory:10.0f}", flush=True)
 
 
 if __name__ == "__main__":
