@@ -60,10 +60,13 @@ int exit_code_of(const ExperimentResult& result) {
 void conclude(const MeasuredStage& stage, MeasurementResult& result) {
   result.message = result.experiment.message;
   result.exit_code = exit_code_of(result.experiment);
+  const RunHealth& health = result.experiment.health;
   if (result.exit_code == kNotTrustworthy)
     result.message = fmt::format(
-        "marked or missing: {}",
-        counted(result.experiment.health.marked + result.experiment.health.missing, "sample"));
+        "{} missing, {} marked as not to be used: 'stageid log info' counts them by run, "
+        "'stageid frf' leaves out the periods they stand in",
+        counted(health.missing, "cycle is", "cycles are"),
+        counted(health.marked, "sample is", "samples are"));
   stage.explain(result);
 }
 
