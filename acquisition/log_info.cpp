@@ -43,8 +43,7 @@ void check_log_info(const LogInfo& info) {
       static_cast<std::uint64_t>(info.period_samples) * sizeof(double) * info.excitation.size();
   if (period_bytes > kLargestPeriodBytes) {
     throw std::invalid_argument(fmt::format(
-        "log: period_samples is {}: one period of the excitation would take {} bytes; {} "
-        "at most",
+        "log: period_samples is {}: one period of the excitation would take {} bytes; {} at most",
         info.period_samples, period_bytes, kLargestPeriodBytes));
   }
   if (info.transient_periods < 0) {

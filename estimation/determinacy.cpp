@@ -48,8 +48,7 @@ std::string too_uncertain(const FitProblem& problem, const FitParameters& beta,
     const double damping_std = pole.damping_ratio_std.value_or(0.0);
     if (!(damping_std < kLargestDampingDeviation * pole.damping_ratio))
       return fmt::format(
-          "the damping ratio {:.2g} of its pole at {:.4g} Hz has a standard "
-          "deviation of {:.2g}",
+          "the damping ratio {:.2g} of its pole at {:.4g} Hz has a standard deviation of {:.2g}",
           pole.damping_ratio, f, damping_std);
   }
   return {};

@@ -68,8 +68,7 @@ std::string fault_of(const std::vector<SubmodelRequest>& requests, bool rigid_bo
                            (rigid_body ? 1 : 0);
   if (integrating > 1)
     return fmt::format(
-        "{} terms with integrators (l > 0{}), which the data cannot tell apart; "
-        "keep one",
+        "{} terms with integrators (l > 0{}), which the data cannot tell apart; keep one",
         integrating, rigid_body ? ", the rigid body is one" : "");
   const auto biproper =
       count([](const SubmodelRequest& r) { return r.biproper(); }) + (direct_term ? 1 : 0);

@@ -126,8 +126,7 @@ std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
            "'periodic'";
   if (frf.correlated_lines != 1.0)
     return "nonlinearity test: neighbouring lines of a zippered experiment share their data; "
-           "measure "
-           "with 'orthogonal_dft' or 'single_axis'";
+           "measure with 'orthogonal_dft' or 'single_axis'";
   if (frf.covariance_lines > 1)
     return "nonlinearity test: neighbouring lines share their smoothed noise; estimate without "
            "smoothing";

@@ -24,8 +24,7 @@ Eigen::Map<Eigen::MatrixXcd> unvec(Eigen::MatrixXcd& columns, Eigen::Index k, Ei
   if (status == LineStatus::singular_excitation) {
     throw std::invalid_argument(
         fmt::format("singular excitation in {}: the axes are not excited independently of each "
-                    "other; excite one axis an "
-                    "experiment, or all with orthogonal phases",
+                    "other; excite one axis an experiment, or all with orthogonal phases",
                     where));
   }
   throw std::invalid_argument(fmt::format(
@@ -154,8 +153,7 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
     if (covariance_kind_ == CovarianceKind::full) {
       throw std::invalid_argument(
           "covariance: the full covariance comes from the scatter over periods, and there is only "
-          "one clean "
-          "period; measure two, or ask for the diagonal");
+          "one clean period; measure two, or ask for the diagonal");
     }
     return;
   }

@@ -152,16 +152,14 @@ void PlantEstimation::check_excitation(const RealizationRuns& realization,
     if (!excited_.only.empty() && spectrum.only != excited_.only) {
       throw std::invalid_argument(
           fmt::format("{}: the axes have other lines than in {}; all realizations of a zippered "
-                      "experiment must "
-                      "give an axis the same lines",
+                      "experiment must give an axis the same lines",
                       place, realizations_.front().runs.front().place()));
     }
     for (const Eigen::Index axis : spectrum.channels) {
       if (std::binary_search(excited_.axes.begin(), excited_.axes.end(), axis)) continue;
       throw std::invalid_argument(
           fmt::format("{}: channel {} is excited here and never in realization {} (counted from "
-                      "1); all realizations must "
-                      "excite the same axes",
+                      "1); all realizations must excite the same axes",
                       place, info_.excitation.names[static_cast<std::size_t>(axis)],
                       realizations_.front().realization + 1));
     }

@@ -21,8 +21,7 @@ std::vector<Finding> check_settling(const FrfEstimate& frf) {
   finding.figure = figure;
   finding.remedy =
       "pass over more periods (--transient-periods), or model it (--method lpm); linearity cannot "
-      "be "
-      "told there";
+      "be told there";
   return {finding};
 }
 

@@ -239,8 +239,7 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
   trace_.resize(rows * row_bytes());
   if (!read(CanMemory::trace, trace_, trace_chunks_))
     throw StageError(fmt::format(
-        "can: {}: the download stopped after {} of {} chunks; call it again when the bus "
-        "is well",
+        "can: {}: the download stopped after {} of {} chunks; call it again when the bus is well",
         transport_->name(0), trace_chunks_, chunks_of(trace_.size())));
   const std::size_t columns = info_.actuators.size() + info_.sensors.size();
   std::vector<double> values;

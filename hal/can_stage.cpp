@@ -247,8 +247,7 @@ std::string CanStage::trouble() const {
                          transport_->name(bus), transport_->health(bus).send_refused);
   if (!complete())
     return fmt::format(
-        "the node did not answer sample {} in time ({} damaged, {} old, {} foreign "
-        "frames so far)",
+        "the node did not answer sample {} in time ({} damaged, {} old, {} foreign frames so far)",
         expected_, counts_.damaged, counts_.old, counts_.foreign);
   return "";
 }

@@ -259,8 +259,7 @@ std::string measurement_id(const ExperimentFile& f, const StageConfig& stage) {
   const ExperimentSpec& s = f.spec;
   std::string text = fmt::format(
       "scheme {} scaling {} lines {} group {} period {} transient {} periods {} realizations {} "
-      "crest "
-      "{} seed {} band {} {}",
+      "crest {} seed {} band {} {}",
       static_cast<int>(s.scheme), static_cast<int>(s.scaling), static_cast<int>(f.lines.selection),
       f.lines.group_size, f.period_s, s.transient_periods, s.periods, s.realizations,
       s.crest_iterations, s.seed, f.lines.low_hz, f.lines.high_hz);

@@ -77,8 +77,7 @@ std::size_t unsettled_bands(const NonlinearityTest& test) {
 std::string unsettled_line(const NonlinearityTest& test) {
   return fmt::format(
       "in {} of {} bands linearity cannot be told: the records hold a transient or a drift; pass "
-      "over "
-      "more periods (--transient-periods) or model it (--method lpm)",
+      "over more periods (--transient-periods) or model it (--method lpm)",
       unsettled_bands(test), test.band_hz.rows());
 }
 
@@ -185,9 +184,8 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
   if (transient_lasts(frf))
     lines.emplace_back(
         "the first measured period of every experiment was left out: the transient was not over, "
-        "and "
-        "what is left of it looks like distortion; give --transient-periods one more, or --method "
-        "lpm");
+        "and what is left of it looks like distortion; give --transient-periods one more, or "
+        "--method lpm");
   return lines;
 }
 

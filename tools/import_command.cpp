@@ -98,9 +98,8 @@ ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console
       ->required();
   command->add_option("-o,--output", output_,
                       "frf.h5, or of a log run.slog or run.h5, or of the modes of a universal file "
-                      "modes.json for 'fit "
-                      "--modes'; without it the file's arrays are listed, which "
-                      "is what a map is written from");
+                      "modes.json for 'fit --modes'; without it the file's arrays are listed, "
+                      "which is what a map is written from");
   command->add_option("--map", map_,
                       "YAML file that tells which arrays are what; needed where the file does not");
   command->final_callback([this] { run(); });

@@ -26,8 +26,7 @@ std::string model_csv(const AdditiveModel& model) {
   std::string text = fmt::format(
       "# stageid-model 1, written by stageid {}; hold {}, sample rate {} Hz\n"
       "# P(s) = sum over submodels of coefficient s^power_of_s / (s^integrators A(s)), SI units, s "
-      "in "
-      "rad/s\n"
+      "in rad/s\n"
       "# A(s) = 1 + 2 zeta s/omega + s^2/omega^2, or 1 where natural_frequency_hz is empty\n"
       "submodel,integrators,natural_frequency_hz,natural_frequency_std_hz,damping_ratio,"
       "damping_ratio_std,power_of_s,output,input,coefficient\n",

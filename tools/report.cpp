@@ -36,8 +36,7 @@ void check_data(const ReportData& data) {
         data.validation_frf || other)
       throw std::invalid_argument(
           "report: model_response, cmif_curves, validation_frf, nonlinearity and the responses of "
-          "a comparison "
-          "need the frf whose lines they are on");
+          "a comparison need the frf whose lines they are on");
     return;
   }
   const FrfEstimate& frf = *data.frf;

@@ -52,8 +52,7 @@ int main(int argc, char** argv) {
     const Trials lpm = stageid::test::repeat(plant, experiment(periods), kNoise,
                                              {.method = FrfMethod::lpm}, seeds);
     fmt::print(
-        "{:2} periods: empirical / stated variance {:.3f}, squared bias / its variance "
-        "{:.3f}\n",
+        "{:2} periods: empirical / stated variance {:.3f}, squared bias / its variance {:.3f}\n",
         periods, lpm.over_stated, lpm.bias);
   }
   return 0;

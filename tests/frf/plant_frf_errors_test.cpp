@@ -71,8 +71,7 @@ TEST(PlantFrfErrors, MoreInputsThanExperiments) {
   log.log_info.excitation = test::channels("d", 3, "N");
   EXPECT_THAT(message_of<std::invalid_argument>({&log}),
               HasSubstr("3 inputs but only 2 experiments in realization 1 (counted from 1); "
-                        "measure one experiment for each "
-                        "input, or select at most 2 inputs"));
+                        "measure one experiment for each input, or select at most 2 inputs"));
 }
 
 TEST(PlantFrfErrors, MoreInputsThanExcitedAxes) {

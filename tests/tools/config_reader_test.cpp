@@ -122,14 +122,12 @@ INSTANTIATE_TEST_SUITE_P(
               "f.yaml:1:11: period_s: 1e999 is not finite; write a number in s"},
         Wrong{"period_s: 4 s\n",
               "f.yaml:1:11: period_s: '4 s' stands here; write the number alone, in s (the unit "
-              "stands "
-              "in the key)"},
+              "stands in the key)"},
         Wrong{"period_s: '4'\n",
               "f.yaml:1:11: period_s: '4' stands here; write a number in s, without quotes"},
         Wrong{"period_s: 0x10\n",
               "f.yaml:1:11: period_s: '0x10' stands here; write the number alone, in s (the unit "
-              "stands "
-              "in the key)"},
+              "stands in the key)"},
         Wrong{"period_s: --1\n", "f.yaml:1:11: period_s: '--1' stands here; write a number in s"},
         Wrong{"period_s:\n", "f.yaml:1:10: period_s: nothing stands here; write a number in s"},
         Wrong{"period_s: # later\nseed: 1\n",
@@ -150,8 +148,7 @@ INSTANTIATE_TEST_SUITE_P(
               "f.yaml:2:7: kind: 'od' stands here; write one of odd, even (did you mean 'odd'?)"},
         Wrong{"period_s: 1\ndelay_s: never\n",
               "f.yaml:2:10: delay_s: 'never' stands here; write 'auto' or a number (any finite "
-              "number in "
-              "s)"},
+              "number in s)"},
         Wrong{"period_s: 1\nlevel: 3\n",
               "f.yaml:2:8: level is '3'; write a map, 'key: value' lines"},
         Wrong{"period_s: 1\nlevel: {rms_n: 30}\n", "f.yaml:2:16: rms_n: too large; lower it"},
