@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
@@ -13,7 +12,6 @@
 #include <system_error>
 
 #include "acquisition/hdf5_log.hpp"
-#include "acquisition/slog_format.hpp"
 #include "acquisition/slog_index.hpp"
 #include "acquisition/slog_reader.hpp"
 #include "acquisition/slog_writer.hpp"
@@ -24,33 +22,26 @@
 
 namespace stageid {
 
+ConvertProgress::ConvertProgress(const LogReader& reader, const ConvertOptions& options)
+    : options_(options) {
+  for (const LogRun& run : reader.runs())
+    if (wanted(run)) total_ += run.samples;
+}
+
+bool ConvertProgress::wanted(const LogRun& run) const noexcept {
+  return run.complete || (options_.incomplete_runs && run.samples > 0);
+}
+
+void ConvertProgress::add(std::uint64_t rows) {
+  done_ += rows;
+  if (options_.progress) options_.progress(done_, total_);
+}
+
 namespace {
 
 constexpr std::uint64_t kPieceRows = 8192;
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-/// Counts rows over all runs for the progress.
-class Progress {
- public:
-  Progress(const LogReader& reader, const ConvertOptions& options) : options_(options) {
-    for (const LogRun& run : reader.runs()) {
-      if (wanted(run)) total_ += run.samples;
-    }
-  }
-  bool wanted(const LogRun& run) const {
-    return run.complete || (options_.incomplete_runs && run.samples > 0);
-  }
-  void add(std::uint64_t rows) {
-    done_ += rows;
-    if (options_.progress) options_.progress(done_, total_);
-  }
-
- private:
-  const ConvertOptions& options_;
-  std::uint64_t done_ = 0;
-  std::uint64_t total_ = 0;
-};
 
 // HDF5 ---------------------------------------------------------------------------------------
 
@@ -89,7 +80,7 @@ void write_run_attributes(Hdf5File& file, const std::string& group, const LogRun
 
 /// Rows of one run, as they come from the reader, appended to growing datasets.
 void copy_rows_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& file,
-                       const std::string& group, Progress& progress) {
+                       const std::string& group, ConvertProgress& progress) {
   LogSamples samples;
   RowMajor rows;
   const std::uint64_t total = reader.runs()[run].samples;
@@ -109,7 +100,7 @@ void copy_rows_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& file,
 }
 
 void convert_run_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& file,
-                         Progress& progress) {
+                         ConvertProgress& progress) {
   const LogInfo& info = reader.info();
   const std::string group = "/runs/" + slog_run_name(run);
   const RowMajor excitation = reader.excitation(run);
@@ -130,7 +121,7 @@ void convert_run_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& fil
 
 void convert_to_hdf5(const LogReader& reader, const std::filesystem::path& temporary,
                      const std::filesystem::path& to, const ConvertOptions& options) {
-  Progress progress(reader, options);
+  ConvertProgress progress(reader, options);
   std::unique_lock lock(hdf5_mutex());
   Hdf5File file = Hdf5File::create(temporary, to);
   write_hdf5_head(file, reader.info());
@@ -221,7 +212,7 @@ void write_cells(CsvFile& csv, const Row& row) {
 }
 
 void convert_run_to_csv(const LogReader& reader, std::size_t run, CsvFile& csv,
-                        Progress& progress) {
+                        ConvertProgress& progress) {
   const LogInfo& info = reader.info();
   const LogRun& which = reader.runs()[run];
   const RowMajor excitation = reader.excitation(run);
@@ -247,7 +238,7 @@ void convert_run_to_csv(const LogReader& reader, std::size_t run, CsvFile& csv,
 
 void convert_to_csv(const LogReader& reader, const std::filesystem::path& to,
                     const ConvertOptions& options) {
-  Progress progress(reader, options);
+  ConvertProgress progress(reader, options);
   CsvFile csv(to);
   write_csv_head(csv, reader.info());
   for (std::size_t run = 0; run < reader.runs().size(); ++run) {
@@ -259,21 +250,14 @@ void convert_to_csv(const LogReader& reader, const std::filesystem::path& to,
 // native -------------------------------------------------------------------------------------
 
 void convert_run_to_slog(const LogReader& reader, std::size_t run, SlogWriter& writer,
-                         Progress& progress) {
+                         ConvertProgress& progress) {
   const LogRun& which = reader.runs()[run];
   writer.begin_run(which, reader.excitation(run));
   LogSamples samples;
   for (std::uint64_t first = 0; first < which.samples; first += kPieceRows) {
     const std::uint64_t count = std::min(kPieceRows, which.samples - first);
     reader.read(run, first, count, samples);
-    const Eigen::Index n_u = samples.actuators.cols();
-    const Eigen::Index n_y = samples.sensors.cols();
-    RowMajor words(static_cast<Eigen::Index>(count), n_u + n_y + 1);
-    words.leftCols(n_u) = samples.actuators;
-    words.middleCols(n_u, n_y) = samples.sensors;
-    for (Eigen::Index r = 0; r < words.rows(); ++r)
-      words(r, n_u + n_y) = std::bit_cast<double>(pack_status({.marked = samples.marked[r] != 0}));
-    writer.write({words.data(), static_cast<std::size_t>(words.size())});
+    write_samples(writer, samples);
     progress.add(count);
   }
   writer.end_run(which);
@@ -281,7 +265,7 @@ void convert_run_to_slog(const LogReader& reader, std::size_t run, SlogWriter& w
 
 void convert_to_slog(const LogReader& reader, const std::filesystem::path& temporary,
                      const ConvertOptions& options) {
-  Progress progress(reader, options);
+  ConvertProgress progress(reader, options);
   std::filesystem::remove(temporary);  // a log is never written over
   SlogWriter writer = SlogWriter::create(temporary, reader.info());
   for (std::size_t run = 0; run < reader.runs().size(); ++run)

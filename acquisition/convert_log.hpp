@@ -14,6 +14,20 @@ struct ConvertOptions {
   std::function<void(std::uint64_t, std::uint64_t)> progress = {};
 };
 
+/// Which runs a conversion takes, and how far it is. `reader` and `options` stay until it is done.
+class ConvertProgress {
+ public:
+  ConvertProgress(const LogReader& reader, const ConvertOptions& options);
+  bool wanted(const LogRun& run) const noexcept;
+  /// Tells the caller that `rows` more rows of the wanted runs are done.
+  void add(std::uint64_t rows);
+
+ private:
+  const ConvertOptions& options_;
+  std::uint64_t done_ = 0;
+  std::uint64_t total_ = 0;
+};
+
 /// Writes a log of either format to `to`, by its extension: .h5 or .hdf5 (the layout of
 /// Hdf5LogReader, excitation one period, metadata and health as attributes), .csv, or of an HDF5 log
 /// .slog, whose rows know no lateness.

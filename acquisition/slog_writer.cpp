@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <optional>
 #include <stdexcept>
@@ -196,6 +197,20 @@ void SlogWriter::close(int exit_code, const char* message) {
   state.open_run.reset();  // a run without its end is incomplete
   state.appender.append(state.header(SlogBlockType::end), to_json(SlogEnd{exit_code, message}));
   state.appender.close();
+}
+
+void write_samples(SlogWriter& writer, const LogSamples& samples) {
+  const Eigen::Index n_u = samples.actuators.cols();
+  const Eigen::Index n_y = samples.sensors.cols();
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> words(
+      samples.actuators.rows(), n_u + n_y + 1);
+  words.leftCols(n_u) = samples.actuators;
+  words.middleCols(n_u, n_y) = samples.sensors;
+  for (Eigen::Index r = 0; r < words.rows(); ++r) {
+    const bool marked = samples.marked.size() > 0 && samples.marked[r] != 0;
+    words(r, n_u + n_y) = std::bit_cast<double>(pack_status({.marked = marked}));
+  }
+  writer.write({words.data(), static_cast<std::size_t>(words.size())});
 }
 
 }  // namespace stageid

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "acquisition/log_info.hpp"
+#include "acquisition/log_reader.hpp"
 #include "acquisition/run_writer.hpp"
 #include "acquisition/slog_format.hpp"
 
@@ -57,5 +58,9 @@ class SlogWriter final : public RunWriter {
   explicit SlogWriter(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
+
+/// Appends samples of a run that was measured before, as one block: cycles of which nothing is known
+/// but whether they are marked. No marks: none is.
+void write_samples(SlogWriter& writer, const LogSamples& samples);
 
 }  // namespace stageid

@@ -34,8 +34,7 @@ namespace {
 std::vector<Eigen::Index> free_globals(const FitProblem& problem) {
   std::vector<Eigen::Index> out;
   for (Eigen::Index i = 0; i < problem.globals(); ++i)
-    if (std::find(problem.held.begin(), problem.held.end(), i) == problem.held.end())
-      out.push_back(i);
+    if (!problem.is_held(i)) out.push_back(i);
   return out;
 }
 

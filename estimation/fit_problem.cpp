@@ -42,11 +42,11 @@ Eigen::Index FitProblem::delays() const noexcept {
   return 0;
 }
 
-namespace {
-
-bool is_held(const FitProblem& problem, Eigen::Index parameter) {
-  return std::find(problem.held.begin(), problem.held.end(), parameter) != problem.held.end();
+bool FitProblem::is_held(Eigen::Index global) const noexcept {
+  return std::find(held.begin(), held.end(), global) != held.end();
 }
+
+namespace {
 
 bool is_few(const FitProblem& problem, std::size_t channels) {
   return static_cast<Eigen::Index>(channels) < kFewChannels &&
@@ -62,7 +62,7 @@ std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem) {
   for (const SubmodelShape& shape : problem.shapes) {
     for (int m = 0; m < shape.functions(); ++m)
       for (int q = 0; q < shape.order; ++q)
-        if (!is_held(problem, parameter + q)) columns.push_back({function + m, parameter + q});
+        if (!problem.is_held(parameter + q)) columns.push_back({function + m, parameter + q});
     function += shape.functions();
     parameter += shape.order;
   }
@@ -119,7 +119,7 @@ std::vector<SubmodelPlace> submodel_places(const FitProblem& problem) {
     out.push_back(next);
     next.function += shape.functions();
     for (int q = 0; q < shape.order; ++q, ++next.parameter)
-      if (!is_held(problem, next.parameter)) next.derivative += shape.functions();
+      if (!problem.is_held(next.parameter)) next.derivative += shape.functions();
   }
   return out;
 }
@@ -146,7 +146,7 @@ void evaluate_fractions(const FitProblem& problem, const LineOperator& through,
   for (const SubmodelShape& shape : problem.shapes) {
     for (int m = 0; m < shape.functions(); ++m)
       for (int q = 0; q < shape.order; ++q, ++column)
-        if (!is_held(problem, parameter + q)) out.D.push_back(all[column]);
+        if (!problem.is_held(parameter + q)) out.D.push_back(all[column]);
     parameter += shape.order;
   }
 }
@@ -160,7 +160,7 @@ void evaluate_submodel(const FitProblem& problem, const LineOperator& through,
   group.F_im.middleCols(place.function, functions) = basis.value.im;
   Eigen::Index d = place.derivative;
   for (Eigen::Index c = 0; c < basis.gradient.cols(); ++c) {
-    if (is_held(problem, place.parameter + c % problem.shapes[i].order)) continue;
+    if (problem.is_held(place.parameter + c % problem.shapes[i].order)) continue;
     group.D_re.col(d) = basis.gradient.re.col(c);
     group.D_im.col(d++) = basis.gradient.im.col(c);
   }

@@ -48,6 +48,7 @@ struct FitProblem {
   Eigen::Index functions() const noexcept;              ///< n_f
   Eigen::Index denominators() const noexcept;           ///< number of denominator coefficients
   Eigen::Index delays() const noexcept;  ///< number of free delays: 0, 1 or n_y + n_u - 1
+  bool is_held(Eigen::Index global) const noexcept;
   Eigen::Index globals() const noexcept { return denominators() + delays(); }
   Eigen::Index parameters() const noexcept { return globals() + channels() * functions(); }
 };

@@ -82,8 +82,11 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
     throw FormatError(file_, "", "is empty; a JSON file of format " + format + " is wanted");
   const std::string wanted =
       format == "stageid-model" ? "a model (.json)" : "a " + format + " file (.json)";
-  const std::string other = other_kind(file_, wanted);
-  if (!other.empty() && !text.str().starts_with('{')) throw FormatError(file_, "", other);
+  const auto refuse_other_kind = [&] {
+    const std::string other = other_kind(file_, wanted);
+    if (!other.empty()) throw FormatError(file_, "", other);
+  };
+  if (!text.str().starts_with('{')) refuse_other_kind();
   try {
     value_ = nlohmann::ordered_json::parse(text.str());
   } catch (const nlohmann::ordered_json::out_of_range& error) {
@@ -103,7 +106,7 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
   const JsonNode node = root();
   if (!value_.is_object() || !node.has("format") || !value_["format"].is_string() ||
       value_["format"] != format) {
-    if (node.has("format") && !other.empty()) throw FormatError(file_, "", other);
+    if (node.has("format")) refuse_other_kind();
     throw FormatError(file_, "",
                       "is not a " + format + " file; its \"format\" must be \"" + format + "\"");
   }

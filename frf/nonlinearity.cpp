@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <vector>
 
@@ -78,8 +77,6 @@ void test_detection(const DetectionLines& detection, const std::vector<Eigen::In
 }
 
 /// One-sided: a standard normal variable is above z.
-double tail_of_normal(double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); }
-
 /// The smallest tail of any output on the lines [low_hz, high_hz].
 double least_tail(const LineAlignment& alignment, double low_hz, double high_hz) {
   double least = 1.0;

@@ -280,19 +280,16 @@ void PlantEstimation::prepare(const RealizationRuns& realization,
   lines_.lines.insert(lines_.lines.end(), detection.begin(), detection.end());
   detection_ =
       std::make_unique<DetectionAverage>(excited_.lines, axes, excited_.single_axis, outputs);
-  alignment_ = std::make_unique<AlignmentAverage>(excited_.lines, detection, outputs);
+  if (!zippered)
+    alignment_ = std::make_unique<AlignmentAverage>(excited_.lines, detection, outputs);
 }
 
 void PlantEstimation::include(const RealizationSpectra& spectra,
                               const std::vector<RunExcitation>& excitation) {
-  if (!detection_ || zippered_) {
-    average_->add(spectra, workers_, zippered_.get());
-  } else {
-    const Eigen::MatrixXcd G_before = average_->mean_response();
-    average_->add(spectra, workers_);
-    alignment_->add(spectra, G_before, average_->mean_response(), workers_);
-  }
+  const Eigen::MatrixXcd G_before = average_->mean_response();
+  average_->add(spectra, workers_, zippered_.get());
   if (!detection_) return;
+  if (alignment_) alignment_->add(spectra, G_before, average_->mean_response(), workers_);
   std::vector<std::size_t> axis;
   for (const RunExcitation& run : excitation) {
     const auto at =
@@ -333,7 +330,7 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   if (zippered_)
     frf = select_band(frf, frf.frequency_hz[zippered_->lines().first()],
                       frf.frequency_hz[zippered_->lines().last()]);
-  if (why_linearity_cannot_be_tested(frf).empty())
+  if (alignment_ && why_linearity_cannot_be_tested(frf).empty())
     frf.nonlinearity = nonlinearity_test(
         frf,
         {average_->scatter(), alignment_->finish(info_.sample_rate_hz / info_.period_samples)});

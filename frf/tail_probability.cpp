@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace stageid {
 namespace {
@@ -37,5 +38,7 @@ double tail_of_evidence(double h, Eigen::Index K) {
   }
   return std::min(1.0, sum);
 }
+
+double tail_of_normal(double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); }
 
 }  // namespace stageid

@@ -12,4 +12,7 @@ double log_tail_of_f(double x, int a, double b);
 /// chi-square variable with 2 K degrees of freedom. 1 if K is 0.
 double tail_of_evidence(double h, Eigen::Index K);
 
+/// P(Z > z) of a standard normal variable.
+double tail_of_normal(double z);
+
 }  // namespace stageid

@@ -158,13 +158,11 @@ void write_run(SlogWriter& writer, const ImportMap::Run& from, const Rows& rows,
   run.experiment = static_cast<int>(from.experiment);
   run.health.cycles = static_cast<std::uint64_t>(rows.count);
   writer.begin_run(run, period);
-  const Eigen::Index n_u = actuators.samples.cols(), n_y = sensors.samples.cols();
   for (Eigen::Index at = 0; at < rows.count; at += kPieceRows) {
     const Eigen::Index count = std::min(kPieceRows, rows.count - at);
-    RowMajor words = RowMajor::Zero(count, n_u + n_y + 1);  // the status word of a good cycle is 0
-    words.leftCols(n_u) = actuators.samples.middleRows(rows.first + at, count);
-    words.middleCols(n_u, n_y) = sensors.samples.middleRows(rows.first + at, count);
-    writer.write({words.data(), static_cast<std::size_t>(words.size())});
+    write_samples(writer, {actuators.samples.middleRows(rows.first + at, count),
+                           sensors.samples.middleRows(rows.first + at, count),
+                           {}});
   }
   run.samples = static_cast<std::uint64_t>(rows.count);
   writer.end_run(run);

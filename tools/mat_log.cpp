@@ -65,20 +65,13 @@ ArrayList run_arrays(const LogReader& log, std::size_t run, const std::filesyste
 
 void write_mat_log(const LogReader& log, const std::filesystem::path& to, MatVersion version,
                    const ConvertOptions& options) {
-  const auto wanted = [&](const LogRun& run) {
-    return run.complete || (options.incomplete_runs && run.samples > 0);
-  };
-  std::uint64_t total = 0;
-  for (const LogRun& run : log.runs())
-    if (wanted(run)) total += run.samples;
-  std::uint64_t done = 0;
+  ConvertProgress progress(log, options);
   MatWriter writer(to, version);
   writer.add(head(log.info(), to));
   for (std::size_t run = 0; run < log.runs().size(); ++run) {
-    if (!wanted(log.runs()[run])) continue;
+    if (!progress.wanted(log.runs()[run])) continue;
     writer.add(run_arrays(log, run, to));
-    done += log.runs()[run].samples;
-    if (options.progress) options.progress(done, total);
+    progress.add(log.runs()[run].samples);
   }
   writer.close();
 }

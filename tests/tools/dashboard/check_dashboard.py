@@ -142,7 +142,8 @@ def watch_one(program, configs, work):
 
 
 def stop_one(program, configs, work):
-    log, running, browser = start(program, configs, work, "stopped", 1, realizations=40)
+    # One run of minutes: the stop falls into it and not between two.
+    log, running, browser = start(program, configs, work, "stopped", 1, periods=1000)
     try:
         expect(browser.wait_for("!!document.querySelector('#abort:enabled')"), "no button")
         browser.evaluate("document.getElementById('abort').focus()")
