@@ -1,5 +1,8 @@
 #pragma once
 
+#include <filesystem>
+#include <string>
+
 #include "tools/named_array.hpp"
 
 namespace stageid {
@@ -10,5 +13,8 @@ namespace stageid {
 /// is not all numbers names the columns; else they are 1, 2, ... A column may end before the others.
 /// @throws FileError, FormatError "FILE:LINE: ..."
 ArrayList read_csv(const std::filesystem::path& file);
+
+/// A field of a table that commas separate, in quotes if it must be.
+std::string csv_field(const std::string& text);
 
 }  // namespace stageid

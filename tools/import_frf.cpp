@@ -142,6 +142,8 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
   frf.inputs.names = map.inputs.empty() ? appearing(map, &ImportMap::Channel::input) : map.inputs;
   frf.response =
       Eigen::MatrixXcd::Constant(frf.n_outputs() * frf.n_inputs(), frf.lines(), std::nan(""));
+  if (!map.channels.front().noise_variance.empty()) frf.noise_variance = frf.response.real();
+  if (!map.channels.front().total_variance.empty()) frf.total_variance = frf.response.real();
   const auto place = [&](const std::vector<std::string>& names, const std::string& name) {
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
@@ -152,12 +154,20 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
     const std::string& real = channel.real.empty() ? channel.response : channel.real;
     const Complex values = channel.magnitude.empty() ? complex_of(arrays, real, channel.imaginary)
                                                      : polar_of(arrays, channel);
-    if (static_cast<Eigen::Index>(values.size()) != frf.lines())
-      fail(map, fmt::format("channels: {} <- {} has {} values; there are {} frequencies",
-                            channel.output, channel.input, values.size(), frf.lines()));
-    frf.response.row(place(frf.outputs.names, channel.output) +
-                     frf.n_outputs() * place(frf.inputs.names, channel.input)) =
-        Eigen::Map<const Eigen::RowVectorXcd>(values.data(), frf.lines());
+    const Eigen::Index row = place(frf.outputs.names, channel.output) +
+                             frf.n_outputs() * place(frf.inputs.names, channel.input);
+    const auto put = [&](const auto& column, auto& matrix) {
+      if (static_cast<Eigen::Index>(column.size()) != frf.lines())
+        fail(map, fmt::format("channels: {} <- {} has {} values; there are {} frequencies",
+                              channel.output, channel.input, column.size(), frf.lines()));
+      for (Eigen::Index k = 0; k < frf.lines(); ++k)
+        matrix(row, k) = column[static_cast<std::size_t>(k)];
+    };
+    put(values, frf.response);
+    if (frf.noise_variance.size() > 0)
+      put(real_values(arrays, arrays.at(channel.noise_variance)), frf.noise_variance);
+    if (frf.total_variance.size() > 0)
+      put(real_values(arrays, arrays.at(channel.total_variance)), frf.total_variance);
   }
   if (map.channels.size() != frf.outputs.size() * frf.inputs.size())
     fail(map, fmt::format("channels: {} of {} outputs and {} inputs; give every pair once",

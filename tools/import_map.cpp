@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
 #include <sstream>
 
@@ -22,6 +23,8 @@ void describe_channel(ConfigVisitor& v, ImportMap::Channel& channel) {
   v.text("imaginary", channel.imaginary, kOptional, "and array of imaginary parts");
   v.text("magnitude", channel.magnitude, kOptional, "or array of magnitudes");
   v.text("phase_deg", channel.phase_deg, kOptional, "and array of phases in degrees");
+  v.text("noise_variance", channel.noise_variance, kOptional, "array, in every channel or in none");
+  v.text("total_variance", channel.total_variance, kOptional, "array, in every channel or in none");
   const int forms = static_cast<int>(!channel.response.empty()) +
                     static_cast<int>(!channel.real.empty()) +
                     static_cast<int>(!channel.magnitude.empty());
@@ -101,6 +104,12 @@ void require_keys(ConfigVisitor& v, const ImportMap& map) {
   v.require(!map.frequency.empty(), "kind", "a frequency response needs frequency; add it");
   v.require(map.response.empty() != map.channels.empty(), "kind",
             "a frequency response needs either response or channels; add one of them");
+  for (const auto name : {&ImportMap::Channel::noise_variance, &ImportMap::Channel::total_variance})
+    v.require(std::all_of(map.channels.begin(), map.channels.end(),
+                          [&](const ImportMap::Channel& channel) {
+                            return (channel.*name).empty() == (map.channels.front().*name).empty();
+                          }),
+              "channels", "a variance stands in every channel or in none; add or remove it");
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ struct ImportMap {
   struct Channel {
     std::string output, input;
     std::string response, real, imaginary, magnitude, phase_deg;
+    std::string noise_variance, total_variance;  ///< of all channels or of none
   };
   /// A group of channels of a log: arrays of samples, or of samples x channels.
   struct Signals {

@@ -5,16 +5,10 @@
 #include <optional>
 #include <stdexcept>
 
+#include "tools/csv_table.hpp"
+
 namespace stageid {
 namespace {
-
-/// A field of a CSV file, quoted if it must be.
-std::string field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
 
 std::string number_or_nothing(const std::optional<double>& value) {
   return value ? fmt::format("{}", *value) : "";
@@ -48,8 +42,8 @@ std::string model_csv(const AdditiveModel& model) {
       for (Eigen::Index i = 0; i < model.n_outputs(); ++i)
         for (Eigen::Index j = 0; j < model.n_inputs(); ++j)
           text += fmt::format("{},{},{},{},{}\n", head, power,
-                              field(model.outputs.names[static_cast<std::size_t>(i)]),
-                              field(model.inputs.names[static_cast<std::size_t>(j)]),
+                              csv_field(model.outputs.names[static_cast<std::size_t>(i)]),
+                              csv_field(model.inputs.names[static_cast<std::size_t>(j)]),
                               s.numerator[power](i, j));
   }
   return text;

@@ -10,6 +10,7 @@
 
 #include "excitation/output_file.hpp"
 #include "tools/frf_arrays.hpp"
+#include "tools/frf_csv.hpp"
 #include "tools/model_csv.hpp"
 #include "tools/model_script.hpp"
 #include "tools/npz_file.hpp"
@@ -21,7 +22,7 @@ namespace {
 
 const std::vector<std::string> kModelEndings = {".json", ".h5",  ".hdf5", ".csv", ".mat",
                                                 ".npz",  ".unv", ".uff",  ".py",  ".m"};
-const std::vector<std::string> kFrfEndings = {".mat", ".npz", ".unv", ".uff"};
+const std::vector<std::string> kFrfEndings = {".mat", ".npz", ".csv", ".unv", ".uff"};
 
 void require_ending(const std::filesystem::path& file, const std::vector<std::string>& endings,
                     const char* what) {
@@ -106,6 +107,8 @@ void export_frf(const std::filesystem::path& file, const FrfEstimate& frf, MatVe
   require_frf_export_format(file);
   if (file.extension() == ".unv" || file.extension() == ".uff")
     write_uff(file, uff_of_frf(frf), encoding_of(file));
+  else if (file.extension() == ".csv")
+    write_text_file(file, frf_csv(frf));
   else
     write_arrays(file, arrays_of_frf(frf, file), mat_version);
 }

@@ -3,7 +3,7 @@
 // Exported models and frequency responses, by the ending of the file; docs/exchange.md.
 //
 //   .json        the model                        .h5, .hdf5   tools/model_hdf5.hpp
-//   .csv         one line a coefficient           .npz, .mat   the content of .h5 for numpy and MATLAB
+//   .csv         model_csv.hpp, frf_csv.hpp       .npz, .mat   the content of .h5 for numpy and MATLAB
 //   .unv, .uff   tools/uff_frf.hpp, text and binary: response and modes
 //   .py, .m      tools/model_script.hpp
 
@@ -25,7 +25,7 @@ void export_model(const std::filesystem::path& file, const AdditiveModel& model,
                   const std::optional<DrivingPoint>& driving_point = {},
                   MatVersion mat_version = MatVersion::v5);
 
-/// .mat, .npz, .unv, .uff. @throws as export_model().
+/// .mat, .npz, .csv, .unv, .uff. @throws as export_model().
 void export_frf(const std::filesystem::path& file, const FrfEstimate& frf,
                 MatVersion mat_version = MatVersion::v5);
 

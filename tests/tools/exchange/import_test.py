@@ -4,6 +4,7 @@
     import_test.py PROGRAM WORK_DIR
 """
 
+import csv
 import json
 import sys
 import unittest
@@ -180,6 +181,37 @@ class WithAMap(Case):
         self.refuse("x.csv:1: two columns", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
         (WORK / "x.csv").write_text(text + "1;2;nonsense;4;5;\n")
         self.refuse("'nonsense' stands in column 3", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_a_frequency_response_written_as_a_table(self):
+        frf = self.frf()
+        self.succeed("export", frf, "-o", "f.csv")
+        with open(WORK / "f.csv", encoding="utf-8") as file:
+            head, *rows = csv.reader(line for line in file if not line.startswith("#"))
+        columns = dict(zip(head, np.array(rows, dtype=float).T))
+        with h5py.File(frf) as f:
+            response, noise, total = (f[name][:] for name in ("response", "noise_variance", "total_variance"))
+            names = [list(f[side].asstr()) for side in ("outputs", "inputs")]
+            units = [np.broadcast_to(f[side].attrs["unit"], f[side].shape) for side in ("outputs", "inputs")]
+        np.testing.assert_array_equal(columns["frequency_hz"], FREQUENCY_HZ)
+        channels = []
+        for i, output in enumerate(names[0]):
+            for j, given in enumerate(names[1]):
+                unit = f"{units[0][i]}/{units[1][j]}"
+                called = {part: f"{part} {output}/{given} [{unit}]" for part in ("real", "imaginary")}
+                called |= {part: f"{part} {output}/{given} [({unit})^2]" for part in ("noise_variance", "total_variance")}
+                for part, values in (("real", response.real), ("imaginary", response.imag),
+                                     ("noise_variance", noise), ("total_variance", total)):  # fmt: skip
+                    np.testing.assert_array_equal(columns[called[part]], values[:, i, j])
+                channels.append({"output": output, "input": given} | called)
+        self.assertEqual(len(head), 1 + 4 * len(channels))
+        write_map(f"kind: frf\nfrequency: frequency_hz\nchannels: {json.dumps(channels)}\n")
+        self.succeed("import", "f.csv", "-o", "back.h5", "--map", "map.yaml")
+        with h5py.File(WORK / "back.h5") as f:
+            for name, values in (("response", response), ("noise_variance", noise), ("total_variance", total)):
+                np.testing.assert_array_equal(f[name][:], values)
+        del channels[2]["noise_variance"]
+        write_map(f"kind: frf\nfrequency: frequency_hz\nchannels: {json.dumps(channels)}\n")
+        self.refuse("in every channel or in none", "import", "f.csv", "-o", "n.h5", "--map", "map.yaml")
 
     def test_a_log(self):
         g = np.random.default_rng(4)
