@@ -37,7 +37,10 @@ Json stabilization_json(const std::vector<StabilizationPole>& poles) {
 }
 
 Json nonlinearity_json(const NonlinearityTest& test) {
+  Json settled = Json::array();
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) settled.push_back(test.settled(b));
   return {{"bands", rows_of(test.band_hz)},
+          {"settled", std::move(settled)},
           {"p_value", rows_of(test.p_value)},
           {"distortion", rows_of(test.distortion)},
           {"chance", kNonlinearBelow}};

@@ -33,6 +33,9 @@ TEST(ReportDiagrams, KeepFourDigitsOfATestHoweverSmallItsChance) {
   EXPECT_EQ(got["p_value"][1][0].get<double>(), tiny);
   EXPECT_EQ(got["p_value"][2][0].get<double>(), 0.0);
   EXPECT_NEAR(got["distortion"][0][0].get<double>(), 0.01235, 1e-12);
+  EXPECT_EQ(got["settled"], json::parse("[true]"));
+  test.settled_p_value = Eigen::VectorXd::Constant(1, 1e-3);
+  EXPECT_EQ(nonlinearity_json(test)["settled"], json::parse("[false]"));
 }
 
 TEST(ReportDiagrams, TellTheGravestFindingFirst) {

@@ -3,10 +3,11 @@
 const distortion = { figure: null, text: null };
 
 function buildNonlinearity() {
-  const { bands, chance } = content.nonlinearity;
+  const { bands, chance, settled } = content.nonlinearity;
   const body = section('nonlinearity', 'Nonlinearity', 'Nonlinear distortions', 'Each cell is one sensor over one actuator, as the edges name them, each bar one octave from low to high; ' +
     'the height is the distortion of one realization over |G| on a logarithmic scale from 0.01\u00a0% to 100\u00a0%. ' +
-    'Coloured: more than noise (p\u00a0<\u00a0' + chance + ' of the F test); grey: within the noise.');
+    'Coloured: more than noise (p\u00a0<\u00a0' + chance + ' of the F test); grey: within the noise' +
+    (settled.every(Boolean) ? '.' : '; outlined: not to be told, the records hold a transient or a drift there.'));
   distortion.text = element('output', { class: 'values' });
   distortion.figure = canvasFigure('nonlinearity-plot', distortionSummary(), drawNonlinearity, 'tall');
   distortion.figure.node.addEventListener('pointermove', tellDistortion);
@@ -16,10 +17,15 @@ function buildNonlinearity() {
     folded('Bands and pairs that are more than noise, as a table', '', distortionTable(bands)));
 }
 
-// [{channel, band, p, level}] of everything tested.
+// [{channel, band, p, level, settled}] of every pair and band.
+function distortionBars() {
+  const { p_value: p, distortion: level, settled } = content.nonlinearity;
+  return p.flatMap((row, channel) => row.map((value, i) => ({ channel, band: i, p: value, level: level[channel][i], settled: settled[i] })));
+}
+
+// Of everything that could be tested.
 function distortionTests() {
-  const { p_value: p, distortion: level } = content.nonlinearity;
-  return p.flatMap((row, channel) => row.map((value, i) => ({ channel, band: i, p: value, level: level[channel][i] })));
+  return distortionBars().filter((bar) => bar.settled);
 }
 
 function isDistorted(test) {
@@ -30,7 +36,13 @@ function distortionSummary() {
   const tests = distortionTests();
   const found = tests.filter(isDistorted).length;
   return count(found) + ' of ' + count(tests.length) + ' pairs and bands scatter more than noise does; a linear plant would show about ' +
-    number(content.nonlinearity.chance * tests.length, 2);
+    number(content.nonlinearity.chance * tests.length, 2) + unsettledSummary();
+}
+
+function unsettledSummary() {
+  const { bands, settled } = content.nonlinearity;
+  const open = settled.filter((whether) => !whether).length;
+  return open ? '; in ' + count(open) + ' of ' + count(bands.length) + ' bands the records are not settled' : '';
 }
 
 function bandName([low, high]) {
@@ -72,12 +84,17 @@ function drawNonlinearity(context, width, height) {
   rows.forEach((row, r) => drawName(context, row.name.slice(0, 8), 'right', area.x - 8, area.y + (r + 0.5) * h));
   columns.forEach((column, c) => drawName(context, column.name.slice(0, Math.max(2, Math.floor(w / 6.5))), 'center', area.x + (c + 0.5) * w, area.y / 2));
   context.lineWidth = 1;
-  for (const test of distortionTests()) {
+  context.strokeStyle = colours.text;
+  for (const test of distortionBars()) {
     const [column, row] = place(test.channel);
     const left = area.x + column * w + 2;
     const bottom = area.y + (row + 1) * h - 3;
     const tall = (h - 8) * distortionHeight(test.level);
     const wide = (w - 5) / bands;
+    if (!test.settled) {
+      context.strokeRect(left + test.band * wide + 0.5, bottom - tall + 0.5, Math.max(1, wide - 2), tall - 1);
+      continue;
+    }
     context.fillStyle = isDistorted(test) ? colours.marker : colours.frame;
     context.fillRect(left + test.band * wide, bottom - tall, Math.max(1, wide - 1), tall);
   }
@@ -94,16 +111,16 @@ function tellDistortion(event) {
   const column = Math.floor((event.offsetX - area.x) / w);
   const row = Math.floor((event.offsetY - area.y) / h);
   const [input, output] = turned ? [row, column] : [column, row];
-  const { bands, p_value: p, distortion: level } = content.nonlinearity;
+  const { bands, p_value: p, distortion: level, settled } = content.nonlinearity;
   if (!content.frf.inputs[input] || !content.frf.outputs[output]) {
     distortion.text.textContent = '';
     return;
   }
   const place = Math.min(bands.length - 1, Math.max(0, Math.floor((event.offsetX - area.x - column * w - 2) / ((w - 5) / bands.length))));
   const channel = channelIndex(output, input);
-  distortion.text.textContent = channelName(channel) + ', ' + bandName(bands[place]) + ': ' + percent(level[channel][place]) + ', p = ' + number(p[channel][place], 2);
+  distortion.text.textContent = channelName(channel) + ', ' + bandName(bands[place]) + ': ' + percent(level[channel][place]) + (settled[place] ? ', p = ' + number(p[channel][place], 2) : ', not settled');
 }
 
 function savedNonlinearity() {
-  return { title: 'Nonlinear distortions, 0.01 % to 100 % of |G|', legend: [['more than noise', palette().marker], ['within the noise', palette().frame]], panels: [canvasPanel(distortion.figure)] };
+  return { title: 'Nonlinear distortions, 0.01 % to 100 % of |G|', legend: [['more than noise', palette().marker], ['within the noise', palette().frame], ...(content.nonlinearity.settled.every(Boolean) ? [] : [['not settled', palette().text]])], panels: [canvasPanel(distortion.figure)] };
 }

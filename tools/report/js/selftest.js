@@ -162,7 +162,8 @@ function diagramCheck() {
   const severity = document.querySelector('.findings .severity');
   return {
     stabilization: { poles: content.stabilization || [], drawn: symbols('stabilization diagram', palette().curves[0]) },
-    distorted: symbols('nonlinear distortions', palette().marker), findings: document.querySelectorAll('.findings tbody tr').length,
+    distorted: symbols('nonlinear distortions', palette().marker), distortion_text: content.nonlinearity ? distortionSummary() : '',
+    findings: document.querySelectorAll('.findings tbody tr').length,
     first_finding: severity && severity.textContent,
   };
 }
