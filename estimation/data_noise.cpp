@@ -22,7 +22,7 @@ DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
     noise.variance =
         LineVariance{SharedMatrix<Eigen::MatrixXd>::kept(known), Eigen::ArrayXd::Ones(frf.lines())};
   }
-  if (noise.knowledge != VarianceKnowledge::none) noise.correlation = OutputCorrelation(frf);
+  if (noise.knowledge != VarianceKnowledge::none) noise.correlation = NoiseCorrelation(frf);
   return noise;
 }
 

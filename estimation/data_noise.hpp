@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "estimation/correlated_outputs.hpp"
+#include "estimation/noise_correlation.hpp"
 
 namespace stageid {
 
@@ -18,7 +18,7 @@ enum class VarianceKnowledge : std::uint8_t {
 struct DataNoise {
   VarianceKnowledge knowledge = VarianceKnowledge::none;
   std::optional<LineVariance> variance;  ///< nothing: 1/W, up to a scale with `none`
-  OutputCorrelation correlation;         ///< of the outputs for one input
+  NoiseCorrelation correlation;          ///< of channels on a line
 };
 
 /// What is known of the noise under diagonal weights. The given variance is taken as it is: the
@@ -45,7 +45,7 @@ double covariance_scale(const FitProblem& problem, double cost, Eigen::Index par
 /// @pre noise.variance is known
 FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise);
 
-/// W C^1/2 of one channel on every line, for correlated().
+/// W C^1/2 of one channel on every line, for correlated_gram().
 Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c);
 
 }  // namespace stageid

@@ -41,33 +41,28 @@ void free_columns(const FitProblem& problem, const FitParameters& beta,
   }
 }
 
-/// T^T K T, the outputs of one input correlated.
+/// T^T K T, the channels correlated.
 Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
                                   const std::vector<BasisGroup>& groups,
                                   const ResidueFactors& factors, const DataNoise& noise) {
   const Eigen::Index n_y = problem.n_outputs;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
-  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(factors.size(), factors.size());
-  std::vector<Eigen::MatrixXd> parts(static_cast<std::size_t>(problem.n_inputs));
-  std::vector<std::vector<Eigen::Index>> own(parts.size());
-  parallel_tasks(static_cast<int>(problem.n_inputs), problem.threads, [&](int u) {
-    const auto input = static_cast<std::size_t>(u);
-    own[input] = parameters_of(problem, beta, factors, n_y * u, n_y);
-    Eigen::ArrayXXd scale(problem.size(), n_y);
-    for (Eigen::Index y = 0; y < n_y; ++y) scale.col(y) = noise_scale(problem, noise, n_y * u + y);
-    const auto of_output = [&](Eigen::Index y, LineRange lines, Eigen::MatrixXd& re,
-                               Eigen::MatrixXd& im) {
-      const Eigen::Index c = y + n_y * u;
-      free_columns(problem, beta, factors, *group_of[static_cast<std::size_t>(c)], c, own[input],
-                   lines, re, im);
-      re.array().colwise() *= scale.col(y).segment(lines.first, lines.count);
-      im.array().colwise() *= scale.col(y).segment(lines.first, lines.count);
-    };
-    parts[input] = correlated_gram(problem, noise.correlation,
-                                   static_cast<Eigen::Index>(own[input].size()), of_output);
-  });
-  for (std::size_t u = 0; u < parts.size(); ++u) K(own[u], own[u]) += parts[u];
-  return K;
+  Eigen::ArrayXXd scale(problem.size(), problem.channels());
+  for (Eigen::Index c = 0; c < problem.channels(); ++c)
+    scale.col(c) = noise_scale(problem, noise, c);
+  CorrelatedColumns inputs;
+  for (Eigen::Index u = 0; u < problem.n_inputs; ++u)
+    inputs.parameters.push_back(parameters_of(problem, beta, factors, n_y * u, n_y));
+  inputs.columns = [&](Eigen::Index u, Eigen::Index y, LineRange lines, Eigen::MatrixXd& re,
+                       Eigen::MatrixXd& im) {
+    const Eigen::Index c = y + n_y * u;
+    free_columns(problem, beta, factors, *group_of[static_cast<std::size_t>(c)], c,
+                 inputs.parameters[static_cast<std::size_t>(u)], lines, re, im);
+    const auto weight = scale.col(c).segment(lines.first, lines.count);
+    re.array().colwise() *= weight;
+    im.array().colwise() *= weight;
+  };
+  return correlated_gram(problem, noise.correlation, factors.size(), inputs);
 }
 
 /// Variances of one channel's numerators: rows of T over its functions.

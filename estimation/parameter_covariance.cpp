@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <numeric>
 #include <optional>
 
 #include "estimation/parallel_tasks.hpp"
@@ -28,9 +29,17 @@ void projected_columns(const FitProblem& problem, const FitParameters& beta,
   im -= group.F_im.middleRows(lines.first, lines.count) * Z;
 }
 
-/// Channels whose equations are kept at a time: whole inputs where their outputs are correlated.
+std::vector<Eigen::Index> all_globals(const FitProblem& problem) {
+  std::vector<Eigen::Index> out(static_cast<std::size_t>(problem.globals()));
+  std::iota(out.begin(), out.end(), Eigen::Index{0});
+  return out;
+}
+
+/// Channels whose equations are kept at a time: all that are correlated with each other.
 std::vector<ChannelRange> channel_parts(const FitProblem& problem, const DataNoise& noise) {
-  const Eigen::Index together = noise.correlation.known() ? problem.n_outputs : 1;
+  const Eigen::Index together = noise.correlation.between_inputs() ? problem.channels()
+                                : noise.correlation.known()        ? problem.n_outputs
+                                                                   : 1;
   const Eigen::Index most = std::max<Eigen::Index>(1, kMostMembers / together) * together;
   std::vector<ChannelRange> parts;
   for (Eigen::Index c = 0; c < problem.channels(); c += most)
@@ -57,46 +66,44 @@ Eigen::MatrixXd projected_middle(const PartEquations& part, ChannelRange range) 
   return K;
 }
 
-/// The same, the outputs of one input correlated. @param cross of every channel with its numerators,
-/// globals x n_f each: those of the part are filled
+/// The same, the channels correlated. @param cross of every channel with its numerators, globals x n_f
+/// each: those of the part are filled
 Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
                                   const std::vector<const BasisGroup*>& group_of,
                                   const PartEquations& part, ChannelRange range,
                                   const DataNoise& noise, std::vector<Eigen::MatrixXd>& cross) {
   const Eigen::Index n_y = problem.n_outputs;
   const auto columns = derivative_columns(problem);
-  std::vector<Eigen::MatrixXd> inputs(static_cast<std::size_t>(range.count / n_y));
-  parallel_tasks(static_cast<int>(inputs.size()), problem.threads, [&](int u) {
-    const Eigen::Index first = range.first + n_y * u;
-    Eigen::ArrayXXd scale(problem.size(), n_y);
-    for (Eigen::Index y = 0; y < n_y; ++y) scale.col(y) = noise_scale(problem, noise, first + y);
-    const auto of_output = [&](Eigen::Index y, LineRange lines, Eigen::MatrixXd& re,
-                               Eigen::MatrixXd& im) {
-      const Eigen::Index c = first + y;
-      projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)], part.gn.channel(c).Z,
-                        c, columns, lines, re, im);
-      re.array().colwise() *= scale.col(y).segment(lines.first, lines.count);
-      im.array().colwise() *= scale.col(y).segment(lines.first, lines.count);
-    };
-    for (Eigen::Index y = 0; y < n_y; ++y)
-      cross[static_cast<std::size_t>(first + y)].setZero(problem.globals(), problem.functions());
-    const auto add_cross = [&](LineRange lines, const OutputColumns& Y) {
-      for (Eigen::Index y = 0; y < n_y; ++y) {
-        const auto c = static_cast<std::size_t>(first + y);
-        const auto at = static_cast<std::size_t>(y);
-        const auto weight = scale.col(y).segment(lines.first, lines.count);
-        const auto F_re = group_of[c]->F_re.middleRows(lines.first, lines.count).array();
-        const auto F_im = group_of[c]->F_im.middleRows(lines.first, lines.count).array();
-        cross[c] += Y.re[at].transpose() * (F_re.colwise() * weight).matrix() +
-                    Y.im[at].transpose() * (F_im.colwise() * weight).matrix();
-      }
-    };
-    inputs[static_cast<std::size_t>(u)] =
-        correlated_gram(problem, noise.correlation, problem.globals(), of_output, add_cross);
-  });
-  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(problem.globals(), problem.globals());
-  for (const Eigen::MatrixXd& input : inputs) K += input;
-  return K;
+  Eigen::ArrayXXd scale(problem.size(), range.count);
+  for (Eigen::Index r = 0; r < range.count; ++r) {
+    scale.col(r) = noise_scale(problem, noise, range.first + r);
+    cross[static_cast<std::size_t>(range.first + r)].setZero(problem.globals(),
+                                                             problem.functions());
+  }
+  CorrelatedColumns inputs;
+  inputs.first_input = range.first / n_y;
+  inputs.parameters.assign(static_cast<std::size_t>(range.count / n_y), all_globals(problem));
+  inputs.columns = [&](Eigen::Index u, Eigen::Index y, LineRange lines, Eigen::MatrixXd& re,
+                       Eigen::MatrixXd& im) {
+    const Eigen::Index c = range.first + n_y * u + y;
+    projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)], part.gn.channel(c).Z,
+                      c, columns, lines, re, im);
+    const auto weight = scale.col(n_y * u + y).segment(lines.first, lines.count);
+    re.array().colwise() *= weight;
+    im.array().colwise() *= weight;
+  };
+  inputs.use = [&](Eigen::Index u, LineRange lines, const OutputColumns& Z) {
+    for (Eigen::Index y = 0; y < n_y; ++y) {
+      const auto c = static_cast<std::size_t>(range.first + n_y * u + y);
+      const auto at = static_cast<std::size_t>(y);
+      const auto weight = scale.col(n_y * u + y).segment(lines.first, lines.count);
+      const auto F_re = group_of[c]->F_re.middleRows(lines.first, lines.count).array();
+      const auto F_im = group_of[c]->F_im.middleRows(lines.first, lines.count).array();
+      cross[c] += Z.re[at].transpose() * (F_re.colwise() * weight).matrix() +
+                  Z.im[at].transpose() * (F_im.colwise() * weight).matrix();
+    }
+  };
+  return correlated_gram(problem, noise.correlation, problem.globals(), inputs);
 }
 
 /// What is known of one channel's numerators: Cov(nu_c) and Cov(a, nu_c), and Z.

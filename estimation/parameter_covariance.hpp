@@ -22,8 +22,8 @@ struct ParameterCovariance {
 /// (facts.md section 10), restricted to what is wanted by the arrow structure: with Z the channel's rows
 /// of M_bb^-1 M_ba and nu what its numerators would be for given globals a,
 ///   b_c = nu_c - Z a,   dP_c = (J_a - F Z) a + F nu_c.
-/// The outputs' noise is correlated wherever a disturbance force causes it; diagonal weights ignore
-/// that, the covariance does not. Noise of different inputs counts as uncorrelated.
+/// The outputs' noise is correlated wherever a disturbance force causes it, that of inputs wherever the
+/// controller answers; diagonal weights ignore that, the covariance does not (noise_correlation.hpp).
 /// Where W is the inverse variance but the residual is clearly larger than it predicts, the covariance is
 /// raised by that ratio (`residual_scale`). Empty where numerators are not determined.
 /// The equations are made in parts of channels, once for the globals and once for the rest: memory is

@@ -1,5 +1,5 @@
-// What fits with residues of given rank say about their uncertainty, against what happens when a
-// measurement whose outputs are disturbed together is repeated.
+// What fits with diagonal weights, residues of given rank or free, say about their uncertainty, against
+// what happens when a measurement whose channels are disturbed together is repeated.
 
 #include <gtest/gtest.h>
 
@@ -17,8 +17,8 @@ constexpr int kRuns = 150;
 constexpr double kLowest = 0.62;
 constexpr double kHighest = 1.52;
 
-/// The 2 x 3 stage with modes of rank one, and one disturbance on both outputs. Experiments are
-/// independent: S is diagonal.
+/// The 2 x 3 stage with modes of rank one, one disturbance on both outputs, and inputs that repeat what
+/// the controller makes of it.
 struct RankOneStage {
   test::DenseProblem problem = test::noisy_stage(HoldModel::exact, 0.0);
   test::CorrelatedNoise noise;
@@ -33,7 +33,6 @@ struct RankOneStage {
     }
     problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
     noise = test::correlated_noise(problem, 0.01, 0.9);
-    for (Eigen::MatrixXcd& S : noise.S) S = Eigen::MatrixXcd(S.diagonal().asDiagonal());
   }
 };
 
@@ -60,11 +59,11 @@ struct Repeated {
   double response_ratio_error = 0.0;  ///< standard error of it
 };
 
-Repeated repeat(Weighting weighting) {
+Repeated repeat(Weighting weighting, int residue_rank = 1) {
   const RankOneStage stage;
   FitOptions options = test::options_with(weighting);
   options.threads = 1;
-  options.residue_rank = 1;
+  options.residue_rank = residue_rank;
   Repeated out;
   Eigen::MatrixXd values;
   Eigen::ArrayXd response_ratio(kRuns);
@@ -103,12 +102,22 @@ void expect_honest(const Repeated& repeated) {
   EXPECT_NEAR(repeated.response_ratio, 1.0, 4.0 * repeated.response_ratio_error);
 }
 
-TEST(LowRankCovarianceMonteCarlo, CountsTheCorrelationOfTheOutputs) {
-  const Repeated repeated = repeat(Weighting::noise_variance);
-  expect_honest(repeated);
+void expect_the_correlation_to_matter(const Repeated& repeated) {
   const Eigen::ArrayXd ratio = (repeated.scatter / repeated.without).head(6);
   EXPECT_TRUE(ratio.minCoeff() < kLowest || ratio.maxCoeff() > kHighest)
       << "a correlation that changes nothing tests nothing";
+}
+
+TEST(LowRankCovarianceMonteCarlo, CountsTheCorrelationOfOutputsAndInputs) {
+  const Repeated repeated = repeat(Weighting::noise_variance);
+  expect_honest(repeated);
+  expect_the_correlation_to_matter(repeated);
+}
+
+TEST(CovarianceMonteCarlo, FreeResiduesCountTheCorrelationOfOutputsAndInputs) {
+  const Repeated repeated = repeat(Weighting::noise_variance, 0);
+  expect_honest(repeated);
+  expect_the_correlation_to_matter(repeated);
 }
 
 // Outputs of different noise, which unit weights do not know and the variances say. (Relative weights
