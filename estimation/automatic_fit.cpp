@@ -107,6 +107,7 @@ class AutomaticFit {
     release_weights();
     sort_modes(best_.model);
     FitOptions last = options_;
+    last.judge_modes = selection_.keep_modes;
     if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled_of_many());
     const bool chosen = selection_.exactly == 0 && !selection_.keep_modes;
     last.shrink_hidden = many();

@@ -23,10 +23,12 @@ constexpr double kShareOfDirection = 0.1;     // from which a submodel is named
 constexpr double kLargestFrequencyDeviation = 0.5;
 constexpr double kLargestDampingDeviation = 1.0;
 
-bool is_judged(const FitProblem& problem, std::size_t i) {
+/// @param first coefficient of submodel `i` among the globals
+bool is_judged(const FitProblem& problem, std::size_t i, Eigen::Index first, bool judge_modes) {
   const int order = problem.shapes[i].order;
   const SubmodelRole role = problem.roles.empty() ? SubmodelRole::searched : problem.roles[i];
   if (order == 0 || role == SubmodelRole::suspension) return false;
+  if (judge_modes && !problem.is_held(first)) return true;
   return order != 2 || problem.shapes[i].integrators > 0 || role == SubmodelRole::given;
 }
 
@@ -123,13 +125,13 @@ std::string undetermined_poles(const FitProblem& problem, const FitParameters& b
                                const ArrowSystem& gn, const std::vector<double>& removal_cost,
                                const Eigen::MatrixXd& covariance,
                                const std::vector<Eigen::Index>& frozen,
-                               const std::vector<std::size_t>& held) {
+                               const std::vector<std::size_t>& held, bool judge_modes) {
   if (problem.globals() == 0) return {};
   const Eigen::VectorXd shares = own_shares(gn, frozen);
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
     const Eigen::Index n = problem.shapes[i].order;
-    if (is_judged(problem, i)) {
+    if (is_judged(problem, i, first, judge_modes)) {
       std::string reason;
       if (std::find(held.begin(), held.end(), i) != held.end())
         reason = "a pole stands at a bound, where the lines do not see it";

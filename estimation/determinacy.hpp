@@ -15,8 +15,8 @@ std::string submodel_name(const FitProblem& problem, const FitParameters& beta, 
 std::string undetermined_numerators(const FitProblem& problem, const FitParameters& beta,
                                     const std::vector<BasisGroup>& groups);
 
-/// Whose poles the data do not determine, among submodels that were asked for or are no modes: a pole
-/// stands at a bound; a change of the denominator is imitated by the rest of the model to rounding;
+/// Whose poles the data do not determine, among submodels that were asked for or are no modes, and searched
+/// modes with `judge_modes` (but those held where they are): a pole stands at a bound; a change of the denominator is imitated by the rest of the model to rounding;
 /// a natural frequency's standard deviation is half of it, or a damping ratio's is all of it; or
 /// its whole response is rounding (-160 dB of the data's weighted power) or within the noise.
 /// @param cost of the fit   @param removal_cost what sum W |E|^2 would rise by without a submodel
@@ -27,6 +27,6 @@ std::string undetermined_poles(const FitProblem& problem, const FitParameters& b
                                const ArrowSystem& gn, const std::vector<double>& removal_cost,
                                const Eigen::MatrixXd& covariance,
                                const std::vector<Eigen::Index>& frozen,
-                               const std::vector<std::size_t>& held);
+                               const std::vector<std::size_t>& held, bool judge_modes);
 
 }  // namespace stageid

@@ -227,11 +227,13 @@ std::vector<std::size_t> held_submodels(const FitProblem& problem, const FitPara
 /// one that has not says so as well.
 void judge(const FitProblem& problem, const FitParameters& beta, double cost,
            const Eigen::MatrixXd& covariance, const std::vector<Eigen::Index>& frozen,
-           FitResult& result) {
-  const bool asked_for = std::any_of(
-      result.model.submodels.begin(), result.model.submodels.end(), [](const Submodel& s) {
-        return s.role == SubmodelRole::given || (s.denominator.size() > 1 && !s.is_mode());
-      });
+           bool judge_modes, FitResult& result) {
+  const bool asked_for =
+      judge_modes || std::any_of(result.model.submodels.begin(), result.model.submodels.end(),
+                                 [](const Submodel& s) {
+                                   return s.role == SubmodelRole::given ||
+                                          (s.denominator.size() > 1 && !s.is_mode());
+                                 });
   const bool singular = result.status == FitStatus::singular;
   if (!asked_for && !singular) return;
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
@@ -239,7 +241,7 @@ void judge(const FitProblem& problem, const FitParameters& beta, double cost,
   if (reason.empty() && !singular) {
     const ArrowSystem gn(problem, beta, groups, FitMethod::gn, ChannelEquationsUse::eliminated);
     reason = undetermined_poles(problem, beta, cost, gn, result.removal_cost, covariance, frozen,
-                                result.held);
+                                result.held, judge_modes);
   }
   if (reason.empty()) return;
   result.message = result.trustworthy() ? reason : result.message + "; " + reason;
@@ -295,7 +297,8 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
       covariance = free_covariance(frf, options, problem, matrices, beta, iteration);
     raise(covariance, frf.correlated_lines);
     use_covariance(covariance, weighs_by_variance(options.weighting), result);
-    judge(problem, beta, iteration.end_cost, covariance.globals, iteration.frozen, result);
+    judge(problem, beta, iteration.end_cost, covariance.globals, iteration.frozen,
+          options.judge_modes, result);
   }
   fill_record(frf, options, iteration, relative_rms, result);
   return result;

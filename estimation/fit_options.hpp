@@ -50,6 +50,7 @@ struct FitOptions {
   /// Largest distance of a parameter from the stationary point, in standard deviations (Newton decrement).
   double deviation_tolerance = 1e-4;
   bool shrink_hidden = false;     ///< searched modes with held poles: shrink_hidden_modes()
+  bool judge_modes = false;       ///< modes were asked for one by one: undetermined if one is
   bool uncertainty = true;        ///< also standard deviations and the variance of the response
   bool response_variance = true;  ///< false: of those only the standard deviations
   int threads = 0;                ///< 0: all cores; the result does not depend on it

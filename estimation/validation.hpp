@@ -13,7 +13,8 @@ struct Validation {
   /// What that is if the error is noise: nu / (nu - 1), the mean of F(2, 2 nu), for a variance of nu degrees
   /// of freedom; 1 for an exact one, 0 without a mean.
   double expected_chi_square = 0.0;
-  double whitened_above_95 = 0.0;  ///< share of |e|^2 above the 95 % point of Exp(1); 0.05 is right
+  double whitened_above_95 =
+      0.0;  ///< share of |e|^2 above the 95 % point of noise alone; 0.05 is right
   double whiteness =
       0.0;  ///< largest |autocorrelation| of the whitened residual over lines, lags 1..10,
   double whiteness_limit = 0.0;   ///<   and its 99 % limit

@@ -225,6 +225,7 @@ Json validation_json(const Validation& validation) {
   return {{"relative_rms_error", validation.relative_rms_error},
           {"normalized_error", validation.normalized_error},
           {"chi_square_per_dof", validation.chi_square_per_dof},
+          {"expected_chi_square", validation.expected_chi_square},
           {"doubtful_chi_square", doubtful_chi_square},
           {"whitened_above_95", validation.whitened_above_95},
           {"whiteness", validation.whiteness},

@@ -69,6 +69,25 @@ TEST(Validation, ATrueModelIsWithinTheNoise) {
   EXPECT_LE(too_coloured, 4);
 }
 
+// Variances from few degrees of freedom: |e|^2 over them is F(2, 2 nu).
+TEST(Validation, CountsWhatVariancesFromFewDegreesOfFreedomExceed) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  add_noise(frf, 71);
+  test::RandomNumbers random(72);
+  constexpr int kDof = 4;
+  for (double& variance : frf.noise_variance.reshaped()) {
+    double sum = 0.0;
+    for (int i = 0; i < kDof; ++i) sum += std::norm(random.circular());
+    variance *= sum / kDof;
+  }
+  frf.noise_dof = kDof;
+  const Validation result = validate(model, frf);
+  EXPECT_NEAR(result.whitened_above_95, 0.05, 4.5 * std::sqrt(0.05 * 0.95 / 9000.0));
+  frf.noise_dof = 0.0;  // taken for exact
+  EXPECT_GT(validate(model, frf).whitened_above_95, 0.09);
+}
+
 // The limit is 99 %, not 99.9999 %: of many white residuals some are above it.
 TEST(Validation, TheWhitenessLimitIsTheOneItSays) {
   AdditiveModel model = test::named_model(1, 1);

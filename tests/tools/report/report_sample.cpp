@@ -68,7 +68,7 @@ Json extremes(const Eigen::MatrixXcd& values) {
 }
 
 /// First and last element in the complex plane: points, model, radius of the 95 % circle
-/// (|dG|^2 of a circular complex Gaussian exceeds -ln(0.05) sigma^2 in 5 % of all cases).
+/// (|dG|^2 over a variance of nu complex degrees of freedom is F(2, 2 nu), exponential without end).
 Json expected_nyquist(const ReportData& data) {
   Json out = Json::array();
   for (const Eigen::Index c : {Eigen::Index{0}, data.frf->response.rows() - 1}) {
@@ -76,8 +76,9 @@ Json expected_nyquist(const ReportData& data) {
     if (data.model_response.size() > 0)
       element["model"] = summary_of(Eigen::MatrixXcd(data.model_response.row(c)), false);
     if (data.frf->total_variance.size() > 0) {
-      const Eigen::MatrixXd radius =
-          std::sqrt(-std::log(0.05)) * data.frf->total_variance.row(c).cwiseSqrt();
+      const double nu = data.frf->total_dof;
+      const double point = nu > 0.0 ? nu * (std::pow(0.05, -1.0 / nu) - 1.0) : -std::log(0.05);
+      const Eigen::MatrixXd radius = std::sqrt(point) * data.frf->total_variance.row(c).cwiseSqrt();
       element["radius"] = summary_of(radius, false);
     }
     out.push_back(element);
