@@ -14,6 +14,7 @@ namespace {
 using Index = Eigen::Index;
 
 constexpr double kSignificance = 1e-4;
+constexpr double kRounding = 1e-24;  // of a line's power: what double precision leaves of no noise
 
 }  // namespace
 
@@ -25,7 +26,7 @@ bool responds(const HealthRecord& record, Index channel) {
     const double variance = record.variance_of_mean(row)[0];
     const double mean_square =
         record.mean(row).squaredNorm() / static_cast<double>(record.experiments());
-    if (variance > 0.0)
+    if (variance > kRounding * mean_square)
       evidence -= log_tail_of_f(mean_square / variance, static_cast<int>(record.experiments()),
                                 record.scatter_dof());
     else if (mean_square > 0.0)

@@ -18,7 +18,7 @@ namespace {
 class RecordReading {
  public:
   RecordReading(const std::vector<const LogReader*>& logs, const FrfOptions& options)
-      : realizations_(choose_runs(logs, options)),
+      : realizations_(choose_runs(logs, options).realizations),
         bytes_(options, realizations_),
         gathering_(realizations_) {
     std::size_t runs = 0;

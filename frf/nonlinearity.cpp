@@ -38,8 +38,9 @@ void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, Eig
       excess += std::max(0.0, frf.total_variance(c, k) - frf.noise_variance(c, k));
     }
     test.p_value(c, b) = tail_of_evidence(sum, K);
-    test.distortion(c, b) =
-        std::sqrt((a + 1) * excess / frf.response.row(c).segment(first, K).squaredNorm());
+    const double linear = frf.response.row(c).segment(first, K).squaredNorm();
+    // An output that shows one value throughout has no response, and nothing that is distorted.
+    test.distortion(c, b) = linear > 0.0 ? std::sqrt((a + 1) * excess / linear) : 0.0;
   }
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -13,6 +14,7 @@
 #include "excitation/frequency_grid.hpp"
 #include "frf/byte_counter.hpp"
 #include "frf/channel_choice.hpp"
+#include "frf/constant_input.hpp"
 #include "frf/covariance_smoothing.hpp"
 #include "frf/detection_average.hpp"
 #include "frf/excitation_spectrum.hpp"
@@ -42,8 +44,9 @@ struct ExcitedPart {
 /// The estimate in the making: reads realization by realization, threads over the runs of one.
 class PlantEstimation {
  public:
-  PlantEstimation(std::vector<RealizationRuns> realizations, const FrfOptions& options)
-      : realizations_(std::move(realizations)),
+  PlantEstimation(ChosenRuns chosen, const FrfOptions& options)
+      : realizations_(std::move(chosen.realizations)),
+        incomplete_(std::move(chosen.incomplete)),
         options_(options),
         info_(realizations_.front().runs.front().log->info()),
         workers_(worker_count(options.threads)),
@@ -79,6 +82,7 @@ class PlantEstimation {
   FrfEstimate describe() const;
 
   std::vector<RealizationRuns> realizations_;
+  std::vector<LeftOutRealization> incomplete_;
   const FrfOptions& options_;
   const LogInfo& info_;
   int workers_;
@@ -243,7 +247,9 @@ FrfEstimate PlantEstimation::describe() const {
   frf.hold = Hold::zoh;
   frf.method = options_.method;
   frf.dropped_periods = dropped_;
-  frf.left_out_realizations = left_out_;
+  std::merge(incomplete_.begin(), incomplete_.end(), left_out_.begin(), left_out_.end(),
+             std::back_inserter(frf.left_out_realizations),
+             [](const auto& a, const auto& b) { return a.realization < b.realization; });
   frf.periods = fewest_periods_;
   frf.experiments = static_cast<int>(realizations_.front().runs.size());
   return frf;
@@ -319,6 +325,7 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
     measure(m, excitation, health, spectra);
     note_dropped(realization, spectra);
     if (leave_out(realization, spectra)) continue;
+    refuse_constant_inputs(realization, spectra, channels_);
     note_quality(realization, spectra);
     include(spectra, excitation);
   }

@@ -6,6 +6,7 @@
 
 #include "frf/health_gathering.hpp"
 #include "frf/run_periods.hpp"
+#include "frf/run_steps.hpp"
 #include "frf/transient_model.hpp"
 
 namespace stageid {
@@ -128,7 +129,7 @@ class RecordMeasurement {
     Eigen::MatrixXcd Z(n_, bins);
     const double scale = 1.0 / static_cast<double>(rows);
     for (Eigen::Index c = 0; c < n_; ++c) {
-      std::copy(samples.col(c).data(), samples.col(c).data() + rows, dft.input().begin());
+      fill_for_lines(samples.col(c).head(rows), dft);
       const auto transformed = dft.forward();
       for (Eigen::Index b = 0; b < bins; ++b)
         Z(c, b) = scale * transformed[static_cast<std::size_t>(b)];

@@ -22,9 +22,16 @@ RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft) {
 
 std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
                                                 Eigen::Index channel, RealDft& dft) {
-  std::copy(samples.col(channel).data(), samples.col(channel).data() + samples.rows(),
-            dft.input().begin());
+  fill_for_lines(samples.col(channel), dft);
   return dft.forward();
+}
+
+void fill_for_lines(const Eigen::Ref<const Eigen::VectorXd>& samples, RealDft& dft) {
+  const auto input = dft.input();
+  if (samples.size() > 0 && (samples.array() == samples[0]).all())
+    std::fill_n(input.begin(), samples.size(), 0.0);
+  else
+    std::copy_n(samples.data(), samples.size(), input.begin());
 }
 
 // Spectra lie line by line. One channel's lines are so far apart that every value would cost a cache

@@ -27,9 +27,13 @@ struct RunExcitation {
 /// @throws std::invalid_argument if what is recorded is not one period of dft.length() samples
 RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft);
 
-/// Unscaled DFT of one column; valid until the next. @pre samples.rows() == dft.length()
+/// Unscaled DFT of one column, on lines above zero; valid until the next. @pre samples.rows() == dft.length()
 std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
                                                 Eigen::Index channel, RealDft& dft);
+
+/// Samples into dft.input(), for lines above zero: of a channel that shows one value throughout these
+/// are zeros, where rounding would leave a response of its own. @pre as many as dft.length()
+void fill_for_lines(const Eigen::Ref<const Eigen::VectorXd>& samples, RealDft& dft);
 
 /// DFT / samples of one period of the chosen channels, on `lines`, into the rows of `spectra` from
 /// `first_row` on.

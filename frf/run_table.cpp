@@ -94,6 +94,23 @@ std::set<int> begun_experiments(const std::vector<const LogReader*>& logs) {
   return begun;
 }
 
+std::set<int> begun_realizations(const std::vector<const LogReader*>& logs) {
+  std::set<int> begun;
+  for (const LogReader* log : logs) {
+    for (const LogRun& run : log->runs()) begun.insert(run.realization);
+  }
+  return begun;
+}
+
+std::string why_incomplete(const RunsByExperiment& runs, const std::set<int>& begun,
+                           const std::string& log) {
+  std::vector<int> missing;
+  for (const int experiment : begun)
+    if (!runs.contains(experiment)) missing.push_back(experiment + 1);
+  return fmt::format("{}: no complete run of experiment {} (counted from 1)", log,
+                     fmt::join(missing, ", "));
+}
+
 void check_realizations_asked_for(const RunsByRealization& table, const FrfOptions& options,
                                   const std::vector<const LogReader*>& logs) {
   std::set<int> complete;
@@ -140,8 +157,7 @@ std::string UsedRun::place() const {
   return fmt::format("{}:/runs/{}", log->path().string(), run().name);
 }
 
-std::vector<RealizationRuns> choose_runs(const std::vector<const LogReader*>& logs,
-                                         const FrfOptions& options) {
+ChosenRuns choose_runs(const std::vector<const LogReader*>& logs, const FrfOptions& options) {
   if (logs.empty())
     throw std::invalid_argument("estimate_plant_frf: no log given; give at least one");
   if (options.transient_periods.value_or(0) < 0) {
@@ -158,15 +174,22 @@ std::vector<RealizationRuns> choose_runs(const std::vector<const LogReader*>& lo
     throw std::invalid_argument(
         fmt::format("{}: no complete run; measure at least one realization to its end", first));
   }
-  const std::size_t needed =
-      needed_experiments(table, begun_experiments(logs).size(), options, first);
+  const std::set<int> begun = begun_experiments(logs);
+  const std::size_t needed = needed_experiments(table, begun.size(), options, first);
 
-  std::vector<RealizationRuns> chosen;
+  ChosenRuns chosen;
   for (const auto& [realization, runs] : table) {
     if (options.realizations.empty() && runs.size() < needed) continue;
     RealizationRuns entry{realization, {}};
     for (const auto& [experiment, used] : runs) entry.runs.push_back(used);
-    chosen.push_back(std::move(entry));
+    chosen.realizations.push_back(std::move(entry));
+  }
+  if (!options.realizations.empty()) return chosen;
+  for (const int realization : begun_realizations(logs)) {
+    const auto at = table.find(realization);
+    const RunsByExperiment runs = at == table.end() ? RunsByExperiment{} : at->second;
+    if (runs.size() < needed)
+      chosen.incomplete.push_back({realization, why_incomplete(runs, begun, first)});
   }
   return chosen;
 }

@@ -29,15 +29,20 @@ struct RealizationRuns {
   std::vector<UsedRun> runs;
 };
 
+/// What is estimated from, and what is not though it was begun.
+struct ChosenRuns {
+  std::vector<RealizationRuns> realizations;
+  std::vector<LeftOutRealization> incomplete;  ///< and which experiment is missing; ascending
+};
+
 /// Chooses the runs: complete ones, of several of one (realization, experiment) the last, of the
 /// realizations asked for; without a wish, of those that lack no experiment which was begun
-/// anywhere. Ordered by realization and experiment, whatever their order in the logs.
+/// anywhere; the others are told as incomplete. Ordered by realization and experiment, whatever their order in the logs.
 ///
 /// @throws std::invalid_argument if the logs disagree in rate, period or channels, a realization
 /// asked
 ///         for is not there, or nothing complete is; FormatError if a run is not a whole number of
 ///         periods or has none after the transient.
-std::vector<RealizationRuns> choose_runs(const std::vector<const LogReader*>& logs,
-                                         const FrfOptions& options);
+ChosenRuns choose_runs(const std::vector<const LogReader*>& logs, const FrfOptions& options);
 
 }  // namespace stageid

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace stageid {
@@ -14,7 +15,10 @@ constexpr double kRescaleAbove = 1e200;
 // With w = b / (b + a x) that is the incomplete beta function
 //   I_w(b, a) = w^b sum_{j < a} Gamma(b + j) / (Gamma(b) j!) (1 - w)^j.
 double log_tail_of_f(double x, int a, double b) {
-  const double rest = a * x / (b + a * x);  // 1 - w
+  // By the odds (1 - w) / w: of noise-free data w is below what 1 - w can tell from one. Noise that is
+  // next to nothing must leave a number.
+  const double odds = std::min(a * x / b, std::numeric_limits<double>::max());
+  const double rest = odds < 1.0 ? odds / (1.0 + odds) : 1.0 / (1.0 + 1.0 / odds);  // 1 - w
   double term = 1.0;
   double sum = 1.0;
   double log_scale = 0.0;
@@ -26,11 +30,12 @@ double log_tail_of_f(double x, int a, double b) {
     term /= sum;
     sum = 1.0;
   }
-  return std::min(0.0, b * std::log1p(-rest) + std::log(sum) + log_scale);
+  return std::min(0.0, std::log(sum) - b * std::log1p(odds) + log_scale);
 }
 
 double tail_of_evidence(double h, Eigen::Index K) {
   if (!(h > 0.0) || K == 0) return 1.0;
+  if (std::isinf(h)) return 0.0;
   double sum = 0.0;
   for (Eigen::Index j = 0; j < K; ++j) {
     const double n = static_cast<double>(j);

@@ -66,6 +66,29 @@ TEST(LeftOutRealization, ItsDroppedPeriodsAreTold) {
   }
 }
 
+TEST(LeftOutRealization, AMissingOrIncompleteRunIsTold) {
+  MemoryLog log = log_with_marked_runs({});
+  log.log_runs[1].complete = false;
+  log.log_runs[4].complete = false;
+  log.log_runs[5].complete = false;
+  const FrfEstimate frf = estimate_plant_frf({&log}, {});
+  EXPECT_EQ(frf.realizations, 1);
+  ASSERT_EQ(frf.left_out_realizations.size(), 2U);
+  EXPECT_EQ(frf.left_out_realizations[0].realization, 0);
+  EXPECT_EQ(frf.left_out_realizations[0].reason,
+            "memory.slog: no complete run of experiment 2 (counted from 1)");
+  EXPECT_EQ(frf.left_out_realizations[1].realization, 2);
+  EXPECT_THAT(frf.left_out_realizations[1].reason, HasSubstr("experiment 1, 2 "));
+  EXPECT_EQ(estimate_plant_frf({&log}, {.realizations = {1}}).left_out_realizations.size(), 0U);
+  // Not in the log at all, beside one whose record is spoilt; ascending.
+  MemoryLog both = log_with_marked_runs({1});
+  both.log_runs.pop_back();
+  const FrfEstimate other = estimate_plant_frf({&both}, {});
+  ASSERT_EQ(other.left_out_realizations.size(), 2U);
+  EXPECT_THAT(other.left_out_realizations[0].reason, HasSubstr("marked sample"));
+  EXPECT_THAT(other.left_out_realizations[1].reason, HasSubstr("no complete run of experiment 2"));
+}
+
 // The checks of the data's health look at the first realization that has all its runs.
 TEST(LeftOutRealization, HealthLooksAtTheNextOne) {
   const MemoryLog log = log_with_marked_runs({1});

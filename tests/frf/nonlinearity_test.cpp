@@ -110,5 +110,27 @@ TEST(Nonlinearity, ACubicTermAtMinus60DecibelIsFound) {
   EXPECT_LT(found.distortion.maxCoeff(), 0.1);
 }
 
+// Without noise F passes 1e16 where the distortion is largest: that says most, not nothing.
+TEST(Nonlinearity, WithoutNoiseEveryBandThatIsDistortedIsNonlinear) {
+  const test::SampledPlant plant =
+      test::sampled_plant(2, 2, {{12.3, 0.1}, {37.0, 0.1}}, 200.0, 0.5);
+  LoopExperiment x{.sample_rate_hz = 200.0, .period_samples = 400, .axes = 2};
+  x.lines = test::line_range(11, 161, 2);
+  x.realizations = 3;
+  x.periods = 3;
+  x.transient_periods = 6;
+  const MemoryLog linear = test::simulate_sampled_log(plant, x, 0.0);
+  const NonlinearityTest none = estimate_plant_frf({&linear}).nonlinearity;
+  EXPECT_GT(none.p_value.minCoeff(), kNonlinearBelow);
+  EXPECT_GE(none.settled_p_value.minCoeff(), kUnsettledBelow);
+  for (const double cubic : {1e-6, 1e-4, 1e-2}) {
+    const MemoryLog log = test::simulate_sampled_log(plant, x, 0.0, cubic);
+    const NonlinearityTest test = estimate_plant_frf({&log}).nonlinearity;
+    EXPECT_LT(test.p_value.maxCoeff(), kNonlinearBelow) << cubic;
+    EXPECT_GE(test.p_value.minCoeff(), 0.0) << cubic;
+    EXPECT_TRUE(test.p_value.allFinite()) << cubic;
+  }
+}
+
 }  // namespace
 }  // namespace stageid

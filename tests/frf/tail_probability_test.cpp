@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 namespace stageid {
 namespace {
@@ -30,6 +31,21 @@ TEST(TailProbability, AgreesWithClosedForms) {
   // F(4, 4): P(F > x) = I_w(2, 2) with w = 1 / (1 + x), and I_w(2, 2) = w^2 (3 - 2 w).
   const double w = 1.0 / (1.0 + 1.7);
   EXPECT_NEAR(log_tail_of_f(1.7, 2, 2.0), std::log(w * w * (3.0 - 2.0 * w)), 1e-14);
+}
+
+// Noise-free data: F beyond what 1 - w tells from one, and beyond the largest double.
+TEST(TailProbability, StaysANumberHoweverCleanTheDataAre) {
+  EXPECT_NEAR(log_tail_of_f(1e20, 1, 7.0), -7.0 * std::log1p(1e20 / 7.0), 1e-10);
+  EXPECT_NEAR(log_tail_of_f(1e20, 2, 2.0), std::log(3.0) - 2.0 * std::log1p(1e20), 1e-10);
+  EXPECT_NEAR(log_tail_of_f(1e-20, 1, 7.0), -1e-20, 1e-34);
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const double x : {1e300, 1e308, infinity}) {
+    EXPECT_TRUE(std::isfinite(log_tail_of_f(x, 3, 2.0))) << x;
+    EXPECT_LT(log_tail_of_f(x, 3, 2.0), -1000.0) << x;
+  }
+  EXPECT_EQ(log_tail_of_f(0.0, 3, 2.0), 0.0);
+  EXPECT_EQ(tail_of_evidence(infinity, 5), 0.0);
+  EXPECT_EQ(tail_of_evidence(1e300, 5), 0.0);
 }
 
 }  // namespace
