@@ -9,6 +9,7 @@
 #include "frf/controller_check.hpp"
 #include "frf/health_measures.hpp"
 #include "frf/order_statistic.hpp"
+#include "frf/repetition_check.hpp"
 #include "frf/rigid_body_check.hpp"
 #include "frf/skew_check.hpp"
 
@@ -374,14 +375,17 @@ void Examination::check_excluded() {
 }
 
 std::vector<Finding> Examination::examine() {
+  findings_ = check_repetition(record_);
   check_cycles();
   check_samples();
-  check_responses();
-  check_excitation();
-  check_recording();
-  check_excluded();
-  check_stage();
-  check_inputs();
+  if (!found(Cause::aperiodic)) {  // else no spectrum is what it seems
+    check_responses();
+    check_excitation();
+    check_recording();
+    check_excluded();
+    check_stage();
+    check_inputs();
+  }
   std::stable_sort(findings_.begin(), findings_.end(),
                    [](const Finding& a, const Finding& b) { return a.severity < b.severity; });
   return std::move(findings_);

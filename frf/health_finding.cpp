@@ -14,7 +14,7 @@ const char* to_string(Cause cause) noexcept {
   constexpr std::array kNames = {
       "dead",       "saturated", "marked",     "late",          "swapped",    "sign",
       "scale",      "skew",      "unrecorded", "controller",    "rigid_body", "excluded",
-      "excitation", "inputs",    "incoherent", "interpolation", "unsettled"};
+      "excitation", "inputs",    "incoherent", "interpolation", "aperiodic",  "unsettled"};
   return kNames[static_cast<std::size_t>(cause)];
 }
 

@@ -32,6 +32,7 @@ enum class Cause : std::uint8_t {
   inputs,      ///< cond(U)
   incoherent,
   interpolation,  ///< zippered lines: a local model leaves more than noise
+  aperiodic,      ///< the inputs do not repeat with the period
   unsettled,      ///< a transient or a drift: linearity cannot be told
 };
 const char* to_string(Cause cause) noexcept;
