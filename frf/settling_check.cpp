@@ -6,22 +6,25 @@ namespace stageid {
 
 std::vector<Finding> check_settling(const FrfEstimate& frf) {
   const NonlinearityTest& test = frf.nonlinearity;
+  if (test.settled_p_value.size() == 0) return {};
+  // Of ten settled bands one in ten logs has one below the limit of a band (Bonferroni).
+  const auto bands = static_cast<double>(test.settled_p_value.size());
+  if (bands * test.settled_p_value.minCoeff() >= kUnsettledBelow) return {};
   std::string figure;
   for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
     if (test.settled(b)) continue;
     figure += fmt::format("{}{:.4g} ... {:.4g} Hz: p = {:.0e}", figure.empty() ? "" : ", ",
                           test.band_hz(b, 0), test.band_hz(b, 1), test.settled_p_value[b]);
   }
-  if (figure.empty()) return {};
   Finding finding;
   finding.severity = Severity::doubt;
   finding.cause = Cause::unsettled;
   finding.what =
-      "the records are not settled: a transient or a drift, which is smooth over the lines";
+      "the records are not settled: a transient, a drift or slow noise, smooth over the lines";
   finding.figure = figure;
   finding.remedy =
-      "pass over more periods (--transient-periods), or model it (--method lpm); linearity cannot "
-      "be told there";
+      "a transient: pass over more periods (--transient-periods); a drift or slow noise: longer "
+      "periods, or --method lpm; linearity cannot be told there";
   return {finding};
 }
 

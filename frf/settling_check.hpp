@@ -9,7 +9,8 @@ namespace stageid {
 
 /// Where the records are not settled (NonlinearityTest::settled_p_value): a transient that is left after
 /// the periods passed over, or a drift. It adds to the response what no variance holds, and would pass
-/// for distortions of the plant. One finding at most, naming the bands.
+/// for distortions of the plant. One finding at most, naming the bands; by chance in one of a hundred logs
+/// (kUnsettledBelow) at most, however many bands there are.
 std::vector<Finding> check_settling(const FrfEstimate& frf);
 
 }  // namespace stageid

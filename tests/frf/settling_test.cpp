@@ -100,6 +100,26 @@ TEST(Settling, ATransientIsNotCalledNonlinear) {
   }
 }
 
+// Ten bands, each judged at one in a hundred, would find something in one of ten settled logs.
+TEST(Settling, TheFindingIsRarerThanTheBands) {
+  FrfEstimate frf;
+  NonlinearityTest& test = frf.nonlinearity;
+  test.band_hz.resize(10, 2);
+  test.band_hz << Eigen::VectorXd::LinSpaced(10, 1.0, 10.0),
+      Eigen::VectorXd::LinSpaced(10, 1.5, 10.5);
+  EXPECT_TRUE(check_settling(frf).empty());
+  test.settled_p_value = Eigen::VectorXd::Ones(10);
+  test.settled_p_value[3] = 0.005;
+  EXPECT_FALSE(test.settled(3));
+  EXPECT_TRUE(check_settling(frf).empty());
+  test.settled_p_value[7] = 0.0005;
+  const std::vector<Finding> found = check_settling(frf);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NE(found[0].figure.find("4 ... 4.5 Hz"), std::string::npos) << found[0].figure;
+  EXPECT_NE(found[0].figure.find("8 ... 8.5 Hz"), std::string::npos) << found[0].figure;
+  EXPECT_NE(found[0].remedy.find("longer periods"), std::string::npos) << found[0].remedy;
+}
+
 // Distortions have random phases: they are not taken for a drift.
 TEST(Settling, ADistortedPlantIsSettled) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
