@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <vector>
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/fft_wisdom.hpp"
@@ -26,9 +29,13 @@ double declared_delay_s(const std::filesystem::path& log) {
   return json.is_object() ? json.value("transport_delay_s", 0.0) : 0.0;
 }
 
+/// Of the responses that there are: an output that shows one value throughout has none.
 double median_relative_std(const FrfEstimate& frf, const Eigen::MatrixXd& variance) {
-  Eigen::ArrayXXd ratio = (variance.array() / frf.response.cwiseAbs2().array()).sqrt();
-  return order_statistic({ratio.data(), static_cast<std::size_t>(ratio.size())}, 0.5);
+  std::vector<double> ratio;
+  for (Eigen::Index i = 0; i < variance.size(); ++i)
+    if (const double power = std::norm(frf.response.data()[i]); power > 0.0)
+      ratio.push_back(std::sqrt(variance.data()[i] / power));
+  return ratio.empty() ? std::numeric_limits<double>::infinity() : order_statistic(ratio, 0.5);
 }
 
 nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
@@ -72,10 +79,11 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
       ->check(CLI::IsMember({"periodic", "lpm"}))
       ->capture_default_str();
   command
-      ->add_option("--periods", periods_,
-                   "consistent (glitches, bumps and transients left out) | unmarked (all)")
-      ->check(CLI::IsMember({"consistent", "unmarked"}))
-      ->capture_default_str();
+      ->add_option(
+          "--periods", periods_,
+          "consistent (glitches, bumps and transients left out) | unmarked (all); default: "
+          "consistent, with lpm unmarked")
+      ->check(CLI::IsMember({"consistent", "unmarked"}));
   command
       ->add_option("--smooth-covariance", covariance_lines_,
                    "of the noise: mean over LINES (odd) neighbouring lines, with their degrees "
@@ -114,6 +122,17 @@ FrfStep FrfCommand::estimate(const FrfOptions& options) const {
   return step;
 }
 
+PeriodChoice FrfCommand::period_choice() const {
+  if (method_ != "lpm")
+    return periods_ == "unmarked" ? PeriodChoice::unmarked : PeriodChoice::consistent;
+  if (periods_ == "consistent")
+    throw std::invalid_argument(
+        "--periods consistent: with --method lpm the first periods hold the transient that is "
+        "modelled, and are unlike the others by right; mark glitches in the log, or use "
+        "--method periodic");
+  return PeriodChoice::unmarked;
+}
+
 void FrfCommand::run() const {
   FrfOptions options;
   options.inputs = inputs_;
@@ -121,7 +140,7 @@ void FrfCommand::run() const {
   options.transient_periods = transient_periods_;
   options.method = method_ == "lpm" ? FrfMethod::lpm : FrfMethod::periodic;
   options.covariance = covariance_ == "full" ? CovarianceKind::full : CovarianceKind::diagonal;
-  options.periods = periods_ == "unmarked" ? PeriodChoice::unmarked : PeriodChoice::consistent;
+  options.periods = period_choice();
   options.covariance_lines = covariance_lines_;
   options.threads = threads_;
   for (const int realization : realizations_) {

@@ -1,10 +1,12 @@
 // What stageid frf says of linearity and of periods, end to end.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
 #include "frf/frf_file.hpp"
+#include "tests/support/hdf5_surgery.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tools/frf_quality.hpp"
 #include "tools/health_step.hpp"
@@ -69,6 +71,35 @@ TEST_F(FrfQuality, SaysWhyItWasNotTested) {
   EXPECT_THAT(lpm.err, HasSubstr("estimate with 'periodic'"));
 }
 
+/// `signal` of the first runs is zero, on all its channels.
+void silence(const std::filesystem::path& file, const std::string& signal, hsize_t channels,
+             int runs) {
+  constexpr hsize_t kSamples = 2500;
+  Hdf5Surgery log(file);
+  for (int run = 0; run < runs; ++run)
+    log.reshape(fmt::format("/runs/{:04}/{}", run, signal), {kSamples, channels});
+}
+
+TEST_F(FrfQuality, ChannelsWithoutASignalAreNamed) {
+  make_log();
+  succeed({"log", "convert", name("run.slog"), "-o", name("sensors.h5")});
+  succeed({"log", "convert", name("run.slog"), "-o", name("actuators.h5")});
+  Hdf5Surgery(at("sensors.h5")).remove("/runs/0008");
+  silence(at("sensors.h5"), "sensors", 2, 8);
+  const ProgramResult dead = run({"frf", name("sensors.h5"), "-o", name("f.h5"), "--json"});
+  EXPECT_EQ(dead.exit_code, 3) << dead.err;
+  const json told = json::parse(dead.out);
+  EXPECT_EQ(told["health"][0]["cause"], "dead");
+  EXPECT_EQ(told["health"][0]["channel"], "s1");
+  // The last realization lacks an experiment.
+  EXPECT_EQ(told["left_out_realizations"][0]["realization"], 3);
+  EXPECT_THAT(dead.err, HasSubstr("no complete run of experiment 3"));
+  EXPECT_EQ(read_frf(at("f.h5")).left_out_realizations.size(), 1u);
+  EXPECT_EQ(read_frf(at("f.h5")).nonlinearity.distortion.maxCoeff(), 0.0);
+  silence(at("actuators.h5"), "actuators", 3, 9);
+  fail({"frf", name("actuators.h5"), "-o", name("g.h5")}, 2, "channel a1 shows one value");
+}
+
 TEST_F(FrfQuality, SmoothsTheCovariance) {
   make_log();
   succeed({"frf", name("run.slog"), "-o", name("one.h5")});
@@ -77,6 +108,9 @@ TEST_F(FrfQuality, SmoothsTheCovariance) {
   fail({"frf", name("run.slog"), "-o", name("two.h5"), "--smooth-covariance", "2"}, 2,
        "odd number");
   fail({"frf", name("run.slog"), "-o", name("two.h5"), "--periods", "some"}, 2, "--periods");
+  const std::vector<std::string> lpm = {
+      "frf", name("run.slog"), "-o", name("two.h5"), "--method", "lpm", "--periods", "consistent"};
+  fail(lpm, 2, "mark glitches in the log");
 }
 
 TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {
