@@ -58,7 +58,7 @@ bool inside(const FrfEstimate& frf, double hz) {
   return hz >= frf.frequency_hz[0] && hz <= frf.frequency_hz[frf.lines() - 1];
 }
 
-/// Frequencies of the chosen modes and their curve's value there.
+/// Frequencies of the candidates and their curve's value there.
 std::array<Eigen::VectorXd, 2> rings(const ReportData& data) {
   std::vector<double> at_hz;
   std::vector<double> value;
@@ -119,7 +119,7 @@ Picture cmif_picture(const ReportData& data) {
         {"modes.txt", table_text({{"frequency_hz", ring_hz}, {"value", ring_value}})});
     drawn += fmt::format(", \\\n     'modes.txt' using 1:2 with points {}", kRing);
     marks.push_back(
-        {fmt::format("points {}", kRing), fmt::format("selected modes ({})", ring_hz.size()), 19});
+        {fmt::format("points {}", kRing), fmt::format("candidates ({})", ring_hz.size()), 15});
   }
   picture.script =
       fmt::format("set multiplot\nunset key\n{}", kFrame) +

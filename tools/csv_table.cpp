@@ -12,10 +12,26 @@
 namespace stageid {
 namespace {
 
+/// What stands between fields: within quotes these belong to a name.
 char separator_of(std::string_view line) {
+  std::string outside;
+  bool quoted = false;
+  for (const char c : line) {
+    if (c == '"') quoted = !quoted;
+    if (!quoted) outside += c;
+  }
   for (const char c : {'\t', ';', ','})
-    if (line.find(c) != std::string_view::npos) return c;
+    if (outside.find(c) != std::string::npos) return c;
   return ' ';
+}
+
+/// A field as messages quote it: a line of prose in one of them is not wanted whole.
+std::string shortened(const std::string& field) {
+  constexpr std::size_t kMost = 40;
+  if (field.size() <= kMost) return field;
+  std::size_t end = kMost - 3;
+  while (end > 0 && (static_cast<unsigned char>(field[end]) & 0xC0U) == 0x80U) --end;
+  return field.substr(0, end) + "...";
 }
 
 std::vector<std::string> split(const TextLines& lines, std::string_view line, char separator) {
@@ -69,8 +85,8 @@ void append_row(const TextLines& lines, const std::vector<std::string>& fields, 
     if (trimmed(fields[c]).empty()) continue;
     const std::optional<double> value = number_of(fields[c], separator);
     if (!value)
-      lines.fail(
-          fmt::format("'{}' stands in column {} where a finite number belongs", fields[c], c + 1));
+      lines.fail(fmt::format("'{}' stands in column {} where a finite number belongs",
+                             shortened(fields[c]), c + 1));
     if (columns[c].size() != row)
       lines.fail(fmt::format("column {} goes on after an empty field; fill or remove it", c + 1));
     columns[c].push_back(*value);

@@ -51,6 +51,20 @@ void describe_run(ConfigVisitor& v, ImportMap::Run& run) {
   v.integer("rows", run.rows, 0, kMost, kOptional, "0: to the end");
 }
 
+/// That the run just read is none of those before it: they would be one run of two contents.
+void require_another_run(ConfigVisitor& v, const std::vector<ImportMap::Run>& runs) {
+  const ImportMap::Run& last = runs.back();
+  const auto same = std::find_if(runs.begin(), runs.end(), [&](const ImportMap::Run& run) {
+    return run.realization == last.realization && run.experiment == last.experiment;
+  });
+  const auto place = same - runs.begin();
+  const bool another = place + 1 == static_cast<std::ptrdiff_t>(runs.size());
+  v.require(another, "experiment",
+            fmt::format("entries {} and {} of runs are both realization: {}, experiment: {}; give "
+                        "each run its own",
+                        place + 1, runs.size(), last.realization, last.experiment));
+}
+
 void describe_frf(ConfigVisitor& v, ImportMap& map) {
   v.text("frequency", map.frequency, kOptional, "array of frequencies");
   choose(v, "frequency_unit", map.frequency_unit, {"Hz", "rad/s"}, kOptional, "of the frequencies");
@@ -86,8 +100,12 @@ void describe_log(ConfigVisitor& v, ImportMap& map) {
   choose(v, "excitation_period", map.excitation_period, {"repeats", "mean"}, kOptional,
          "mean: the excitation was measured, take the mean of its periods behind the transient");
   v.items(
-      "runs", [&map](ConfigVisitor& item) { describe_run(item, map.runs.emplace_back()); }, {1},
-      kOptional, "one run of all rows if left out");
+      "runs",
+      [&map](ConfigVisitor& item) {
+        describe_run(item, map.runs.emplace_back());
+        require_another_run(item, map.runs);
+      },
+      {1}, kOptional, "one run of all rows if left out");
 }
 
 void require_keys(ConfigVisitor& v, const ImportMap& map) {

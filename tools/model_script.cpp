@@ -162,7 +162,11 @@ def response(frequency_hz):
 
 
 def main():
-    import matplotlib.pyplot as plt
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError:
+        raise SystemExit(f"{__file__}: the plot needs matplotlib; install python3-matplotlib, "
+                         "or import this file and call its response") from None
 
     low, high = BAND_HZ if BAND_HZ[1] > BAND_HZ[0] > 0 else (1.0, 1000.0)
     f = np.geomspace(low, high, 2000)

@@ -153,6 +153,7 @@ TEST_F(Plot, TheModeIndicatorHasItsCurvesAndAMarkForEveryMode) {
   const auto marks = table_of(picture, "modes.txt");
   EXPECT_EQ(marks.at("frequency_hz"),
             (std::vector{file.frequency_hz[10] + 1e-3, file.frequency_hz[20] - 1e-3}));
+  EXPECT_THAT(picture.script, HasSubstr("candidates (2)"));
   EXPECT_EQ(marks.at("value"), (std::vector{curves.at("curve_1")[10], curves.at("curve_2")[20]}));
 }
 

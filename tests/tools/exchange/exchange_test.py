@@ -6,6 +6,7 @@ universal files of its own; what they write is imported; every malformed file is
 """
 
 import json
+import os
 import pathlib
 import shutil
 import subprocess
@@ -88,6 +89,7 @@ class Case(unittest.TestCase):
         self.assertTrue(result.stderr.startswith("stageid: "), result.stderr)
         self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
         self.assertEqual(sorted(WORK.iterdir()), before, "a file was left")
+        return result.stderr
 
     def frf(self, arrays=None):
         """The program's own writing of a foreign frf.h5."""
@@ -281,6 +283,15 @@ class Models(Case):
             np.testing.assert_allclose(space["response"](h5["frequency_hz"][()]), h5["response"][()],
                                        rtol=3e-10)
         self.assertEqual(space["OUTPUTS"], ["z1", "z'2"])
+
+    def test_the_python_script_says_what_its_plot_needs(self):
+        self.succeed("export", "model.json", "-o", "m.py")
+        (WORK / "without").mkdir(exist_ok=True)
+        (WORK / "without/matplotlib.py").write_text("raise ImportError\n")
+        done = subprocess.run([sys.executable, "m.py"], cwd=WORK, capture_output=True, text=True,
+                              env={**os.environ, "PYTHONPATH": str(WORK / "without")})
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
+        self.assertRegex(done.stderr, r"^\S*m\.py: the plot needs matplotlib; install python3-matplotlib, or ")
 
     def test_universal_files_hold_response_and_modes(self):
         self.succeed("export", "model.json", "-o", "m.unv")

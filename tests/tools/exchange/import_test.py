@@ -181,6 +181,23 @@ class WithAMap(Case):
         self.refuse("x.csv:1: two columns", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
         (WORK / "x.csv").write_text(text + "1;2;nonsense;4;5;\n")
         self.refuse("'nonsense' stands in column 3", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
+        (WORK / "x.csv").write_text(text + "1;2;" + "nonsense" * 9 + ";4;5;\n")
+        self.refuse("'" + ("nonsense" * 9)[:37] + "...' stands in column 3",
+                    "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_names_that_hold_what_stands_between_fields(self):
+        names = ["f", "a;b", "c\td", 'say "x;y", z']
+        with open(WORK / "x.csv", "w", encoding="utf-8", newline="") as file:
+            csv.writer(file, quoting=csv.QUOTE_NONNUMERIC).writerows([names, [1, 2.5, 3, 4], [2, 3.5, 4, 5]])
+        listed = json.loads(self.succeed("import", "x.csv", "--json").stdout)["arrays"]
+        self.assertEqual([array["name"] for array in listed], names)
+        frf = self.frf()
+        with h5py.File(WORK / frf, "r+") as f:
+            f["outputs"][0] = "x;y"
+        self.succeed("export", frf, "-o", "f.csv")
+        listed = json.loads(self.succeed("import", "f.csv", "--json").stdout)["arrays"]
+        self.assertEqual(len(listed), 1 + 4 * 6)
+        self.assertTrue(any("x;y" in array["name"] for array in listed))
 
     def test_a_frequency_response_written_as_a_table(self):
         frf = self.frf()
@@ -240,6 +257,12 @@ class WithAMap(Case):
         scipy.io.savemat(WORK / "x.mat", {"r": r + 1e-3 * g.normal(size=r.shape), "u": u, "y": y})
         write_map(text)
         self.refuse("excitation_period: mean", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+        for second in ("{first_row: 100}", "{realization: 0, experiment: 0}"):
+            write_map(text + f"excitation_period: mean\nruns: [{{first_row: 0, rows: 100}}, {{experiment: 1}}, {second}]\n")
+            error = self.refuse("entries 1 and 3 of runs are both realization: 0, experiment: 0",
+                                "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+            self.assertFalse((WORK / "n.slog").exists())
+            self.assertRegex(error, r"map.yaml:9:\d+: ")
         write_map(text + "excitation_period: mean\nruns: [{experiment: 2, first_row: 100, rows: 100}]\n")
         self.succeed("import", "x.mat", "-o", "run.h5", "--map", "map.yaml")
         with h5py.File(WORK / "run.h5") as h5:
