@@ -121,7 +121,7 @@ class MapReader final : public ConfigVisitor {
     } else if (node->kind == YamlNode::Kind::scalar && rule.any_text && !node->text.empty()) {
       value.word = node->text;
     } else {
-      wrong(key, *node, describe_forms(rule));
+      wrong(key, *node, describe_forms(rule) + nearest_of(*node, rule.words));
     }
   }
   void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,
@@ -250,11 +250,14 @@ class MapReader final : public ConfigVisitor {
   }
   [[noreturn]] void wrong_word(const char* key, const YamlNode& node,
                                const std::vector<std::string>& names) const {
-    const std::string nearest =
-        node.kind == YamlNode::Kind::scalar ? nearest_word(node.text, names) : "";
     wrong(key, node,
-          fmt::format("{}{}", names.size() > 1 ? "one of " : "", fmt::join(names, ", ")) +
-              (nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
+          fmt::format("{}{}{}", names.size() > 1 ? "one of " : "", fmt::join(names, ", "),
+                      nearest_of(node, names)));
+  }
+  static std::string nearest_of(const YamlNode& node, const std::vector<std::string>& words) {
+    const std::string nearest =
+        node.kind == YamlNode::Kind::scalar ? nearest_word(node.text, words) : "";
+    return nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest);
   }
 
   const YamlDocument& document_;

@@ -75,7 +75,7 @@ FitRequest FitCommand::checked_request() const {
 void FitCommand::run() const {
   const FitRequest request = checked_request();
   require_writable(output_, {frf_});
-  require_ending(output_, "a model", {".json"});
+  require_model_ending(output_);
   FitSetup setup = make_fit_setup(request, read_frf(frf_));
   setup.options.response_variance = false;  // no file holds it
   for (const std::string& warning : setup.warnings)

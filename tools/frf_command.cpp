@@ -149,8 +149,12 @@ void FrfCommand::run() const {
           fmt::format("--realizations: {}; they are counted from 1", realization));
     options.realizations.push_back(realization - 1);
   }
+  if (delay_s_ && compensate_ == "none")
+    throw std::invalid_argument(
+        "--delay: nothing is taken out without --compensate; add --compensate delay or hold, or "
+        "leave --delay out");
   require_writable(output_, logs_);
-  require_ending(output_, "a frequency response", {".h5", ".hdf5"});
+  require_frf_ending(output_);
   FrfStep step = estimate(options);
   std::vector<std::string> notes = dropped_lines(step.frf);
   if (compensate_ != "none") {

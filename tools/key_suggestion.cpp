@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <string_view>
 
 namespace stageid {
@@ -38,12 +39,23 @@ std::string_view stem(std::string_view key) {
   return key;
 }
 
+/// Letters in upper case that are lower case otherwise, or the reverse, are no other word.
+bool equal_but_for_case(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
+    return std::tolower(x) == std::tolower(y);
+  });
+}
+
 }  // namespace
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& allowed) {
   std::string best;
   std::size_t least = std::max<std::size_t>(1, std::min<std::size_t>(3, word.size() / 3)) + 1;
   if (word.size() > 64) return best;
+  const auto same = std::find_if(allowed.begin(), allowed.end(), [&](const std::string& candidate) {
+    return equal_but_for_case(word, candidate);
+  });
+  if (same != allowed.end()) return *same;
   for (const std::string& candidate : allowed) {
     const std::size_t distance = edit_distance(word, candidate);
     if (distance < least) {

@@ -9,7 +9,8 @@ namespace stageid {
 /// list of keys that are allowed.
 std::string suggest_key(const std::string& unknown, const std::vector<std::string>& allowed);
 
-/// The nearest of `allowed` by edit distance (a swap of neighbours counts one); empty if none is near.
+/// The nearest of `allowed`: equal but for case, or by edit distance (a swap of neighbours counts one); empty
+/// if none is near.
 std::string nearest_word(const std::string& word, const std::vector<std::string>& allowed);
 
 }  // namespace stageid

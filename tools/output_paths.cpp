@@ -46,8 +46,16 @@ void require_readable(const std::filesystem::path& file) {
 void require_ending(const std::filesystem::path& file, const char* what,
                     const std::vector<std::string>& endings) {
   if (std::find(endings.begin(), endings.end(), file.extension().string()) != endings.end()) return;
-  throw std::invalid_argument(fmt::format("{}: {} is written as {}; give -o such a name",
+  throw std::invalid_argument(fmt::format("{}: {} is written as {}; give it such a name",
                                           file.string(), what, fmt::join(endings, ", ")));
+}
+
+void require_model_ending(const std::filesystem::path& file) {
+  require_ending(file, "a model", {".json"});
+}
+
+void require_frf_ending(const std::filesystem::path& file) {
+  require_ending(file, "a frequency response", {".h5", ".hdf5"});
 }
 
 void require_directory(const std::filesystem::path& directory) {

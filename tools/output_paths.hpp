@@ -27,6 +27,10 @@ void require_readable(const std::filesystem::path& file);
 void require_ending(const std::filesystem::path& file, const char* what,
                     const std::vector<std::string>& endings);
 
+/// require_ending() of what `fit` writes, and of what `frf` writes.
+void require_model_ending(const std::filesystem::path& file);
+void require_frf_ending(const std::filesystem::path& file);
+
 /// Makes the directory if it is not there. @throws FileError
 void require_directory(const std::filesystem::path& directory);
 

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "tools/flag_values.hpp"
+#include "tools/key_suggestion.hpp"
 #include "tools/submodel_text.hpp"
 
 namespace stageid {
@@ -77,6 +78,10 @@ void choose_rigid_body(const FitRequest& request, FitSetup& setup) {
     return;
   }
   setup.structure.common.rigid_body = true;
+  const std::string word = text.substr(0, text.find(':'));
+  const std::string nearest = nearest_word(word, {"none", "full", std::string(kSuspension)});
+  if (!to_number(text) && word != "full" && !nearest.empty())
+    refuse("--rigid-body", text, fmt::format("{} (did you mean '{}'?)", kRigidBodies, nearest));
   if (text != "full") setup.options.rigid_body_rank = rank("--rigid-body", text, kRigidBodies);
 }
 

@@ -161,6 +161,8 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(KeySuggestion, FindsSwapsLossesAndUnits) {
   EXPECT_EQ(nearest_word("preiods", {"period_s", "periods"}), "periods");
   EXPECT_EQ(nearest_word("modes", {"weighting", "hold"}), "");
+  EXPECT_EQ(nearest_word("A1", {"b1", "a1"}), "a1");
+  EXPECT_EQ(nearest_word("FORCE_X", {"force_y", "force_x"}), "force_x");
   EXPECT_EQ(nearest_word("", {"hold"}), "");
   EXPECT_THAT(suggest_key("delay_ms", {"delay_s", "decay"}), HasSubstr("write 'delay_s'"));
 }

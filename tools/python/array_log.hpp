@@ -9,14 +9,15 @@
 #include <vector>
 
 #include "acquisition/log_reader.hpp"
+#include "tools/python/real_arrays.hpp"
 
 namespace stageid {
 
 /// Samples of a whole experiment, one array a group. M realizations of E experiments (runs) of S
 /// samples each, behind one period of P samples of excitation.
 struct ExperimentArrays {
-  using Reals = pybind11::array_t<double, pybind11::array::forcecast>;
-  using Flags = pybind11::array_t<std::uint8_t, pybind11::array::forcecast>;
+  using Reals = RealArray;
+  using Flags = FlagArray;
   Reals excitation;             ///< [M x E x P x n_r]
   Reals actuators;              ///< [M x E x S x n_u]
   Reals sensors;                ///< [M x E x S x n_y]

@@ -4,6 +4,7 @@
 #include "excitation/multisine.hpp"
 #include "tools/flag_values.hpp"
 #include "tools/python/bindings.hpp"
+#include "tools/python/real_arrays.hpp"
 
 namespace stageid {
 namespace {
@@ -12,7 +13,7 @@ namespace py = pybind11;
 
 Eigen::VectorXd multisine(double sample_rate_hz, int period_samples, double low_hz, double high_hz,
                           double rms, std::uint64_t seed, const std::string& lines,
-                          const std::optional<Eigen::VectorXd>& shape, int crest_iterations) {
+                          const py::object& shape, int crest_iterations) {
   const LineSpec band{
       .low_hz = low_hz,
       .high_hz = high_hz,
@@ -22,7 +23,7 @@ Eigen::VectorXd multisine(double sample_rate_hz, int period_samples, double low_
   spec.level = rms;
   spec.seed = seed;
   spec.crest_iterations = crest_iterations;
-  if (shape) spec.shape = *shape;
+  if (!shape.is_none()) spec.shape = real_vector(shape, "shape");
   return random_phase_multisine(FrequencyGrid::band(sample_rate_hz, period_samples, band), spec)
       .samples;
 }

@@ -18,11 +18,12 @@ namespace {
 namespace py = pybind11;
 
 /// A value as the flag of the program takes it: None is silent, a list becomes "f1,f2,...". repr() of a
-/// float gives back the same float.
+/// float gives back the same float. Arrays of numpy are lists, its scalars numbers.
 std::string flag_text(const py::object& value) {
   if (value.is_none()) return "";
   if (py::isinstance<py::str>(value) || py::isinstance<py::int_>(value)) return py::str(value);
-  if (!py::isinstance<py::sequence>(value) && !py::hasattr(value, "tolist"))
+  if (py::hasattr(value, "tolist")) return flag_text(value.attr("tolist")());
+  if (!py::isinstance<py::sequence>(value))
     return py::hasattr(value, "__fspath__") ? py::str(value) : py::str(py::repr(py::float_(value)));
   std::string text;
   for (const py::handle& item : value)

@@ -11,14 +11,17 @@
 #include "frf/confidence.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/hold_compensation.hpp"
+#include "tools/channel_names.hpp"
 #include "tools/flag_values.hpp"
 #include "tools/frf_step.hpp"
 #include "tools/health_step.hpp"
+#include "tools/output_paths.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/frf_texts.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/python/numpy_arrays.hpp"
+#include "tools/python/real_arrays.hpp"
 
 namespace stageid {
 
@@ -27,7 +30,6 @@ namespace py = pybind11;
 namespace {
 
 using Names = std::optional<std::vector<std::string>>;
-using Reals = py::array_t<double, py::array::forcecast>;
 using Complexes = py::array_t<std::complex<double>, py::array::forcecast>;
 
 const std::vector<std::string> kHolds = {"none", "zoh"};
@@ -44,19 +46,24 @@ ChannelList channels(Eigen::Index count, const char* prefix, const Names& names,
   return list;
 }
 
-FrfHandle frf_of_arrays(const Eigen::VectorXd& frequency_hz, const Complexes& response,
-                        const std::optional<Reals>& noise_variance,
-                        const std::optional<Reals>& total_variance, double noise_dof,
-                        double total_dof, const Names& inputs, const Names& outputs,
-                        const Names& input_units, const Names& output_units, double sample_rate_hz,
-                        const std::string& hold) {
+/// None: not known.
+Eigen::MatrixXd variance_of(const py::object& given, const char* name) {
+  if (given.is_none()) return {};
+  return columns_of<double>(real_array(given, name), name);
+}
+
+FrfHandle frf_of_arrays(const py::object& frequency_hz, const Complexes& response,
+                        const py::object& noise_variance, const py::object& total_variance,
+                        double noise_dof, double total_dof, const Names& inputs,
+                        const Names& outputs, const Names& input_units, const Names& output_units,
+                        double sample_rate_hz, const std::string& hold) {
   FrfEstimate frf;
-  frf.frequency_hz = frequency_hz;
+  frf.frequency_hz = real_vector(frequency_hz, "frequency_hz");
   frf.response = columns_of<std::complex<double>>(response, "response");
   frf.outputs = channels(response.shape(1), "y", outputs, output_units);
   frf.inputs = channels(response.shape(2), "u", inputs, input_units);
-  if (noise_variance) frf.noise_variance = columns_of<double>(*noise_variance, "noise_variance");
-  if (total_variance) frf.total_variance = columns_of<double>(*total_variance, "total_variance");
+  frf.noise_variance = variance_of(noise_variance, "noise_variance");
+  frf.total_variance = variance_of(total_variance, "total_variance");
   frf.noise_dof = noise_dof;
   frf.total_dof = total_dof;
   frf.sample_rate_hz = sample_rate_hz;
@@ -113,6 +120,8 @@ FrfHandle frf(const py::object& given, const std::vector<std::string>& inputs,
 FrfHandle select(const FrfHandle& of, std::optional<std::array<double, 2>> band_hz,
                  const Names& inputs, const Names& outputs) {
   FrfEstimate frf = band_hz ? select_band(of.frf, (*band_hz)[0], (*band_hz)[1]) : of.frf;
+  if (inputs) require_known("inputs", "input", *inputs, frf.inputs);
+  if (outputs) require_known("outputs", "output", *outputs, frf.outputs);
   if (inputs || outputs)
     frf = select_channels(frf, inputs.value_or(frf.inputs.names),
                           outputs.value_or(frf.outputs.names));
@@ -227,7 +236,10 @@ void define_frf(py::module_& module) {
   module.def("read_frf", &read_frf_handle, py::arg("file"), kReadFrfDoc);
   module.def(
       "write_frf",
-      [](const std::filesystem::path& file, const FrfHandle& h) { write_frf(file, h.frf); },
+      [](const std::filesystem::path& file, const FrfHandle& h) {
+        require_frf_ending(file);
+        write_frf(file, h.frf);
+      },
       py::arg("file"), py::arg("frf"), kWriteFrfDoc);
 }
 

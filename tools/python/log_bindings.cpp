@@ -14,6 +14,7 @@
 #include "tools/python/bindings.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/python/log_texts.hpp"
+#include "tools/python/real_arrays.hpp"
 #include "tools/python/simulate.hpp"
 
 namespace stageid {
@@ -39,27 +40,36 @@ ChannelList channels(const char* group, py::ssize_t count, const char* prefix, c
   return list;
 }
 
-std::shared_ptr<LogReader> log_of_arrays(ExperimentArrays::Reals r, ExperimentArrays::Reals u,
-                                         ExperimentArrays::Reals y, double sample_rate_hz,
+/// The arguments r, u, y and marked (None: nothing is marked) of a log.
+ExperimentArrays given_arrays(const py::object& r, const py::object& u, const py::object& y,
+                              const py::object& marked) {
+  ExperimentArrays arrays{real_array(r, "r"), real_array(u, "u"), real_array(y, "y"), {}};
+  if (!marked.is_none()) arrays.marked = flag_array(marked, "marked");
+  return arrays;
+}
+
+std::shared_ptr<LogReader> log_of_arrays(const py::object& r, const py::object& u,
+                                         const py::object& y, double sample_rate_hz,
                                          int transient_periods, const Names& excitation,
                                          const Names& actuators, const Names& sensors,
                                          const Names& actuator_units, const Names& sensor_units,
-                                         std::optional<ExperimentArrays::Flags> marked) {
+                                         const py::object& marked) {
+  ExperimentArrays arrays = given_arrays(r, u, y, marked);
   const auto last_axis = [](const py::array& array) {
     return array.ndim() == 4 ? array.shape(3) : 0;
   };
   LogInfo info;
   info.sample_rate_hz = sample_rate_hz;
-  info.period_samples = r.ndim() == 4 ? static_cast<int>(r.shape(2)) : 0;
+  const RealArray& period = arrays.excitation;
+  info.period_samples = period.ndim() == 4 ? static_cast<int>(period.shape(2)) : 0;
   info.transient_periods = transient_periods;
-  info.actuators = channels("actuators", last_axis(u), "u", actuators, actuator_units);
-  info.sensors = channels("sensors", last_axis(y), "y", sensors, sensor_units);
-  const bool at_actuators = !excitation && last_axis(r) == last_axis(u);
-  info.excitation =
-      at_actuators ? info.actuators : channels("excitation", last_axis(r), "r", excitation, {});
-  return std::make_shared<ArrayLog>(
-      "arrays", std::move(info),
-      ExperimentArrays{std::move(r), std::move(u), std::move(y), std::move(marked)});
+  info.actuators =
+      channels("actuators", last_axis(arrays.actuators), "u", actuators, actuator_units);
+  info.sensors = channels("sensors", last_axis(arrays.sensors), "y", sensors, sensor_units);
+  const bool at_actuators = !excitation && last_axis(period) == last_axis(arrays.actuators);
+  info.excitation = at_actuators ? info.actuators
+                                 : channels("excitation", last_axis(period), "r", excitation, {});
+  return std::make_shared<ArrayLog>("arrays", std::move(info), std::move(arrays));
 }
 
 /// Bytes from an element of each axis of a C-ordered array [M x E x S x words] to the next.

@@ -4,14 +4,17 @@
 
 #include <array>
 #include <memory>
+#include <stdexcept>
 
 #include "estimation/modal_assurance.hpp"
 #include "estimation/modal_form.hpp"
 #include "estimation/sampled_state_space.hpp"
 #include "estimation/validation.hpp"
+#include "tools/output_paths.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/numpy_arrays.hpp"
+#include "tools/python/real_arrays.hpp"
 
 namespace stageid {
 namespace {
@@ -64,8 +67,14 @@ py::dict fit_of(const AdditiveModel& model) {
   return out;
 }
 
-py::object response_of(const AdditiveModel& model,
-                       const Eigen::Ref<const Eigen::VectorXd>& frequency_hz) {
+py::object response_of(const AdditiveModel& model, const py::object& given) {
+  const Eigen::VectorXd frequency_hz = real_vector(given, "frequency_hz");
+  if (!frequency_hz.allFinite())
+    throw std::invalid_argument(
+        "frequency_hz: holds what is not finite; numbers in Hz must stand here");
+  if (frequency_hz.size() == 0)
+    return py::array_t<std::complex<double>>(
+        {Eigen::Index{0}, model.n_outputs(), model.n_inputs()});
   return lines_moved<std::complex<double>>(response(model, frequency_hz, model.hold),
                                            model.n_outputs());
 }
@@ -119,8 +128,8 @@ py::list pairs_of(const AdditiveModel& first, const AdditiveModel& second) {
 constexpr const char* kResponseDoc =
     R"(P(j omega) through the model's hold and delays, complex128 [N, n_y, n_u], unit of output over input.
 
-frequency_hz [N] in Hz; read where it is if it is contiguous float64. The result is not copied.
-Raises RequestError where a frequency is not below Nyquist.)";
+frequency_hz [N] in Hz, or one number (N = 1). The result is not copied.
+Raises RequestError where a frequency is not finite, or above Nyquist behind a hold.)";
 
 constexpr const char* kModesDoc =
     R"(A list of dicts: natural_frequency_hz and damping_ratio with natural_frequency_std_hz (Hz) and
@@ -176,8 +185,14 @@ void define_model(py::module_& module) {
            "Continuous A [n, n], B [n, n_u], C [n_y, n], D [n_y, n_u] without delays, rad/s.")
       .def("sampled_state_space", &sampled, kSampledDoc)
       .def(
-          "save", [](const Model& m, const std::filesystem::path& file) { write_model(file, m); },
-          py::arg("file"), "Writes model.json, whole or not at all. Raises FileError.");
+          "save",
+          [](const Model& m, const std::filesystem::path& file) {
+            require_model_ending(file);
+            write_model(file, m);
+          },
+          py::arg("file"),
+          "Writes model.json, whole or not at all. Raises FileError, RequestError for another "
+          "ending.");
   module.def("read_model", &read_model, py::arg("file"),
              "model.json as Model. Raises FileError, FormatError.");
   module.def("validate", &validate_on, py::arg("model"), py::arg("frf"), py::kw_only(),

@@ -50,6 +50,12 @@ class Refused(unittest.TestCase):
                      WORK / "no" / "n.json")
         self.assertFalse((WORK / "no").exists())
 
+    def test_endings(self):
+        for name, written in (("x.h5", stageid.read_model(WORK / "model.json").save),
+                              ("w.csv", lambda file: stageid.write_frf(file, stageid.read_frf(WORK / "frf.h5")))):
+            self.refuses(stageid.RequestError, f"{name}: a .* is written as", written, WORK / name)
+            self.assertFalse((WORK / name).exists())
+
     def test_commands(self):
         self.refuses(stageid.FileError, "none", stageid.call, "frf", WORK / "none.slog", "-o", WORK / "n.h5")
         self.refuses(stageid.RequestError, "'fit'", stageid.call, "fitt", "frf.h5")
@@ -76,7 +82,9 @@ class Refused(unittest.TestCase):
         frf = stageid.read_frf(WORK / "frf.h5")
         self.refuses(stageid.RequestError, "level", stageid.multisine, 1000.0, 500, 10.0, 100.0, -1.0, 7)
         self.refuses(stageid.RequestError, "", frf.select, band_hz=(900.0, 950.0))
-        self.refuses(stageid.RequestError, "a9", frf.select, inputs=["a9"])
+        self.refuses(stageid.RequestError, "inputs: unknown input 'A1'; did you mean 'a1'", frf.select, inputs=["A1"])
+        self.refuses(stageid.RequestError, "outputs: unknown output 'velocity'; there are", frf.select,
+                     outputs=["velocity"])
         self.refuses(stageid.RequestError, "realization 9 has no complete run; counted from 1", stageid.frf, WORK / "run.slog", realizations=[8])
         self.refuses(stageid.RequestError, "covariance_lines|odd", stageid.frf, WORK / "run.slog", covariance_lines=2)
         self.refuses(stageid.FileError, "no.yaml", stageid.frf, WORK / "run.slog", stage=WORK / "no.yaml")
@@ -85,6 +93,8 @@ class Refused(unittest.TestCase):
         self.refuses(stageid.RequestError, "", frf.compensate("delay", 0.0).compensate, "delay", 0.0)
         model = stageid.read_model(WORK / "model.json")
         self.refuses(stageid.RequestError, "", model.response, [1500.0])
+        self.refuses(stageid.RequestError, "frequency_hz: .*finite", model.response, [100.0, np.nan])
+        self.refuses(stageid.RequestError, "frequency_hz: .*axes", model.response, [[100.0, 200.0]])
         self.refuses(stageid.RequestError, "", stageid.validate, model, frf.select(inputs=["a1"]))
         no_rate = stageid.fit(stageid.Frf(frf.frequency_hz, frf.response), band_hz=(120, 800), modes=1).model
         self.refuses(stageid.RequestError, "rate", no_rate.sampled_state_space)
@@ -102,6 +112,22 @@ class Refused(unittest.TestCase):
             with self.subTest(text=text, **options):
                 self.refuses(stageid.RequestError, text, stageid.Frf, *words, **options)
         self.assertRaises(TypeError, stageid.Frf, f, "text")
+        self.assertRaises(TypeError, stageid.Frf, "text", G)
+
+    def test_complex_numbers_where_real_ones_belong(self):
+        f, G = np.arange(1.0, 4.0), np.ones((3, 2, 2), complex)
+        for name in ("noise_variance", "total_variance"):
+            self.refuses(stageid.RequestError, f"{name}: .*complex", stageid.Frf, f, G, **{name: G})
+        self.refuses(stageid.RequestError, "frequency_hz: .*complex", stageid.Frf, f + 1j, G)
+        self.refuses(stageid.RequestError, "frequency_hz: .*complex",
+                     stageid.read_model(WORK / "model.json").response, [100.0 + 1j])
+        self.refuses(stageid.RequestError, "shape: .*complex", stageid.multisine, 1000.0, 500, 10.0, 100.0, 1.0, 7,
+                     shape=np.ones(46, complex))
+        given = dict(zip("ruy", arrays()))
+        for name in given:
+            self.refuses(stageid.RequestError, f"{name}: .*complex", stageid.Log,
+                         **{**given, name: given[name] + 0j}, sample_rate_hz=RATE_HZ)
+            self.assertRaises(TypeError, stageid.Log, **{**given, name: "text"}, sample_rate_hz=RATE_HZ)
 
     def test_logs_of_arrays(self):
         r, u, y = arrays()

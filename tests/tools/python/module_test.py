@@ -109,6 +109,15 @@ class SameAsTheProgram(unittest.TestCase):
         expected = stageid.frf(stageid.Log(r, u[:, :, kept], y[:, :, kept], **settings))
         np.testing.assert_array_equal(without.response, expected.response)
 
+    def test_any_number_but_zero_marks_a_sample(self):
+        r, u, y = stageid.read_log(WORK / "run.slog").arrays()
+        marked = np.zeros(u.shape[:3])
+        marked[:, :, 7] = 1
+        for flags in (marked != 0, 256 * marked.astype(int), 0.5 * marked, -marked, np.nan * marked == 0, marked.tolist()):
+            log = stageid.Log(r, u, y, marked=flags, sample_rate_hz=2000.0)
+            expected = np.asarray(flags) != 0
+            np.testing.assert_array_equal(log[0]["marked"] != 0, expected[0, 0])
+
     def test_a_fit_of_a_file(self):
         fit = stageid.fit(WORK / "frf.h5", band_hz=BAND)
         fit.model.save(WORK / "module.json")
@@ -126,6 +135,17 @@ class SameAsTheProgram(unittest.TestCase):
         fit.model.save(WORK / "module.json")
         self.assertEqual((WORK / "module.json").read_bytes(), (WORK / "options.json").read_bytes())
         self.assertEqual(fit.trustworthy, code == 0)
+
+    def test_numbers_of_numpy_are_numbers(self):
+        def cost(**options):
+            return stageid.fit(WORK / "frf.h5", band_hz=BAND, **options).cost
+
+        for name, plain, numbers in (("modes", 4, (np.int64(4), np.array(4))), ("rigid_body", 2, (np.int64(2),)),
+                                     ("residue_rank", 1, (np.int32(1),)),
+                                     ("delay", float(np.float32(6e-4)), (np.float32(6e-4), np.float64(np.float32(6e-4))))):
+            for number in numbers:
+                with self.subTest(name, number=repr(number)):
+                    self.assertEqual(cost(**{name: number}), cost(**{name: plain}))
 
     def test_a_fit_without_any_file(self):
         program_model = stageid.read_model(WORK / "model.json")
@@ -172,6 +192,17 @@ class Values(unittest.TestCase):
                                           h5["modes/modal_mass"][()])
         model.save(WORK / "saved.json")
         self.assertEqual(stageid.read_model(WORK / "saved.json").outputs, model.outputs)
+
+    def test_a_model_at_one_frequency_and_at_none(self):
+        model = stageid.read_model(WORK / "model.json")
+        n_y, n_u = len(model.outputs), len(model.inputs)
+        for none in ([], np.empty(0)):
+            response = model.response(none)
+            self.assertEqual((response.shape, response.dtype), ((0, n_y, n_u), np.complex128))
+        for one in (200.0, 200, np.float32(200.0)):
+            np.testing.assert_array_equal(model.response(one), model.response([200.0]))
+        np.testing.assert_array_equal(model.response(np.arange(100.0, 200.0)[::2]),
+                                      model.response(np.arange(100.0, 200.0, 2.0)))
 
     def test_a_model_is_paired_with_itself(self):
         model = stageid.read_model(WORK / "model.json")
