@@ -113,6 +113,11 @@ void warn_of_real_time(const RealTimeOptions& options, const Console& console) {
     console.warning("realtime: " + missing);
 }
 
+void warn_of_until(const ExperimentPlan& plan, const FrfOptions& options, const Console& console) {
+  if (const std::string why = never_enough(plan.spec(), options); !why.empty())
+    console.warning("--until: " + why);
+}
+
 void tell_begin(EventLog& events, const ExperimentConfig& config, const StageInfo& stage,
                 const MeasurementResult& result) {
   constexpr std::array kPolicies = {"off", "try", "require"};
@@ -189,6 +194,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   options.real_time = config.stage.real_time.options;
   options.misses_allowed = config.stage.real_time.misses_allowed;
   if (info.clock == Clock::wall) warn_of_real_time(options.real_time, console);
+  if (request.until) warn_of_until(plan, config.frf, console);
   const std::unique_ptr<SupervisedPlant> plant = supervise(config, request, options);
   std::optional<EventLog> events;  // outlives the dashboard, whose watchers write to it
   const std::unique_ptr<Dashboard> dashboard =

@@ -40,6 +40,14 @@ std::string UntilVariance::enough() {
                      counted(realizations_, "realization"), wanted_);
 }
 
+std::string never_enough(const ExperimentSpec& plan, const FrfOptions& options) {
+  if (plan.realizations > 1) return "";
+  const bool no_noise = plan.periods < 2 && options.method == FrfMethod::periodic;
+  return fmt::format("{}, so the experiment runs to its end; plan realizations: 2 or more",
+                     no_noise ? "one period of one realization tells no variance"
+                              : "looked at is every realization, and the plan has one");
+}
+
 void UntilVariance::look() {
   reached_.reset();
   failure_.clear();

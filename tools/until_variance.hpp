@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "excitation/experiment_plan.hpp"
 #include "frf/plant_frf.hpp"
 
 namespace stageid {
@@ -33,5 +34,8 @@ class UntilVariance {
   int realizations_ = 0;
   std::string failure_;
 };
+
+/// Why a plan cannot end before its time by UntilVariance, and the remedy; empty if it can.
+std::string never_enough(const ExperimentSpec& plan, const FrfOptions& options);
 
 }  // namespace stageid

@@ -14,7 +14,9 @@
 namespace stageid::test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 using Json = nlohmann::json;
 
 class LimitedPlanTest : public ProgramTest {
@@ -81,6 +83,25 @@ TEST_F(LimitedPlanTest, RunEndsWhenTheVarianceIsReachedAndGoesOnWithResume) {
   succeed({"frf", log, "-o", name("a.h5")});
   succeed({"frf", name("whole.slog"), "-o", name("b.h5")});
   EXPECT_EQ(read_frf(at("a.h5")).response, read_frf(at("b.h5")).response);
+}
+
+TEST_F(LimitedPlanTest, UntilWarnsOfAPlanThatCannotEndEarly) {
+  const auto warning = [&](const std::string& from, const std::string& to) {
+    const std::string short_plan =
+        replaced(read_bytes(config_), "validation:\n  realization: 3", "");
+    write_bytes(at("short.yaml"), replaced(short_plan, from, to));
+    return run({"run", name("short.yaml"), "-o", name("short.slog"), "--until", "1e-12", "--pace",
+                "0"})
+        .err;
+  };
+  const std::string plan = "  periods: 3\n  realizations: 3";
+  EXPECT_THAT(warning(plan, "  periods: 1\n  realizations: 1"),
+              AllOf(HasSubstr("--until: one period of one realization tells no variance"),
+                    HasSubstr("plan realizations: 2 or more")));
+  std::filesystem::remove(at("short.slog"));
+  EXPECT_THAT(warning(plan, "  periods: 3\n  realizations: 1"), HasSubstr("the plan has one"));
+  std::filesystem::remove(at("short.slog"));
+  EXPECT_THAT(warning(plan, "  periods: 1\n  realizations: 2"), Not(HasSubstr("--until")));
 }
 
 TEST_F(LimitedPlanTest, RequestsThatAreWrong) {
