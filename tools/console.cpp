@@ -8,6 +8,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "tools/interrupt.hpp"
 
 namespace stageid {
 namespace {
@@ -40,24 +44,42 @@ bool numeric(const std::string& text) {
   return !text.empty() && (text[0] == '-' || text[0] == '+' || (text[0] >= '0' && text[0] <= '9'));
 }
 
+/// To stderr. A terminal that has closed takes nothing, which is no reason to break off the work.
+template <typename... Values>
+void tell(fmt::format_string<Values...> format, Values&&... values) {
+  static_cast<void>(
+      std::fputs(fmt::format(format, std::forward<Values>(values)...).c_str(), stderr));
+}
+
+/// To stdout. What cannot be written is an error, but for a terminal that has closed: that is an interrupt,
+/// whose exit code stands.
+template <typename... Values>
+void print_result(fmt::format_string<Values...> format, Values&&... values) {
+  try {
+    fmt::print(stdout, format, std::forward<Values>(values)...);
+  } catch (const std::system_error&) {
+    if (!interrupt_flag()) throw;
+  }
+}
+
 }  // namespace
 
 void Console::result(const std::string& line) const {
-  if (!json) fmt::print(stdout, "{}\n", line);
+  if (!json) print_result("{}\n", line);
 }
 void Console::result(const nlohmann::ordered_json& object) const {
   // Names from foreign files may hold anything: what is not UTF-8 is replaced, not thrown at.
   if (json)
-    fmt::print(stdout, "{}\n",
-               object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    print_result("{}\n",
+                 object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 void Console::message(const std::string& line) const {
-  if (verbosity >= Verbosity::normal) fmt::print(stderr, "{}\n", line);
+  if (verbosity >= Verbosity::normal) tell("{}\n", line);
 }
 void Console::detail(const std::string& line) const {
-  if (verbosity >= Verbosity::debug) fmt::print(stderr, "{}\n", line);
+  if (verbosity >= Verbosity::debug) tell("{}\n", line);
 }
-void Console::warning(const std::string& line) const { fmt::print(stderr, "stageid: {}\n", line); }
+void Console::warning(const std::string& line) const { tell("stageid: {}\n", line); }
 
 Progress::Progress(const Console& console, std::string label, std::string unit, double scale)
     : console_(console),
@@ -67,7 +89,7 @@ Progress::Progress(const Console& console, std::string label, std::string unit, 
       terminal_(redraws_lines()) {}
 
 Progress::~Progress() {
-  if (terminal_ && drawn_) fmt::print(stderr, "\r\x1b[K");
+  if (terminal_ && drawn_) tell("\r\x1b[K");
 }
 
 double Progress::seconds() const {
@@ -89,8 +111,8 @@ void Progress::draw(double done, double total, const std::string& note) {
   const double rate = elapsed > 0.0 ? done * scale_ / elapsed : 0.0;
   const std::string tail = note.empty() ? "" : "  " + note;
   if (!(total > 0.0)) {
-    fmt::print(stderr, "{}{}: {:.0f} s  {:.0f} {}{}{}", terminal_ ? "\r" : "", label_, elapsed,
-               done * scale_, unit_, tail, terminal_ ? "\x1b[K" : "\n");
+    tell("{}{}: {:.0f} s  {:.0f} {}{}{}", terminal_ ? "\r" : "", label_, elapsed, done * scale_,
+         unit_, tail, terminal_ ? "\x1b[K" : "\n");
     std::fflush(stderr);
     drawn_ = true;
     return;
@@ -98,13 +120,12 @@ void Progress::draw(double done, double total, const std::string& note) {
   const std::string numbers = fmt::format("{:3.0f} %  {:.4g} {}/s  {} left{}", 100.0 * share, rate,
                                           unit_, duration(left), tail);
   if (!terminal_) {
-    fmt::print(stderr, "{}: {}\n", label_, numbers);
+    tell("{}: {}\n", label_, numbers);
     return;
   }
   constexpr int kWidth = 24;
   const int full = static_cast<int>(std::lround(share * kWidth));
-  fmt::print(stderr, "\r{} [{:#<{}}{:.<{}}] {}\x1b[K", label_, "", full, "", kWidth - full,
-             numbers);
+  tell("\r{} [{:#<{}}{:.<{}}] {}\x1b[K", label_, "", full, "", kWidth - full, numbers);
   std::fflush(stderr);
   drawn_ = true;
 }

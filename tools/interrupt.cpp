@@ -16,10 +16,16 @@ extern "C" void on_signal(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
+/// Of a terminal or connection that closed. Who ignores it, as nohup does, wants the work to go on.
+void end_at_hangup() {
+  if (std::signal(SIGHUP, on_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+}
+
 bool install() {
   if (left_to_host) return false;
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  end_at_hangup();
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
   return true;

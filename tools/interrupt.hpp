@@ -4,7 +4,8 @@
 
 namespace stageid {
 
-/// From now on SIGINT and SIGTERM set this instead of ending the program. The second signal ends it.
+/// From now on SIGINT, SIGTERM and SIGHUP (unless it is ignored) set this instead of ending the program. The
+/// second signal of a kind ends it.
 /// Also ignores SIGXFSZ and SIGPIPE, so that a full disk and a closed pipe are errors of the write.
 const std::atomic<bool>& interrupt_flag();
 

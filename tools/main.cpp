@@ -16,7 +16,8 @@
 namespace {
 
 int report(const std::exception& error, int exit_code) {
-  fmt::print(stderr, "stageid: {}\n", error.what());
+  // A terminal that has closed takes nothing: the exit code still tells.
+  static_cast<void>(std::fputs(fmt::format("stageid: {}\n", error.what()).c_str(), stderr));
   return exit_code;
 }
 

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -111,6 +112,20 @@ class Program {
                                                 : fmt::format("did you mean '{}'?", nearest)));
   }
 
+  /// Behind CLI11's "FLAG: WORD not in {A,B}": which of them is near.
+  static std::string nearest_choice(const std::string& what) {
+    constexpr std::string_view kMiddle = " not in {";
+    const std::size_t middle = what.find(kMiddle);
+    const std::size_t word = what.find(": ");
+    if (middle == std::string::npos || word >= middle) return "";
+    std::istringstream list(what.substr(middle + kMiddle.size()));
+    std::vector<std::string> names;
+    for (std::string name; std::getline(list, name, ',');)
+      names.push_back(name.substr(0, name.find('}')));
+    const std::string nearest = nearest_word(what.substr(word + 2, middle - word - 2), names);
+    return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
+  }
+
   /// CLI11 speaks its own exceptions, for help too; translated here, at its border.
   /// @returns false if only help or the version was asked for.
   bool parse(int argc, const char* const* argv) {
@@ -148,6 +163,7 @@ class Program {
                          fmt::join(names_of(command.commands), ", "), path);
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');
+    what += nearest_choice(what);
     if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) what += "; write a number";
     return fmt::format("{}; see 'stageid{} --help'", what, path);
   }
@@ -179,7 +195,9 @@ int run_program(int argc, const char* const* argv) {
   Program program;
   const int exit_code = program.run(argc, argv);
   // A full disk or a closed pipe behind stdout must not end in silence.
-  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+  // A terminal that has closed is an interrupt, whose exit code stands.
+  const bool lost = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
+  if (lost && !interrupt_flag())
     throw FileError(fmt::format("stdout: cannot be written: {}", std::strerror(errno)));
   return exit_code;
 }

@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
-"""Ctrl-C at any moment: every command ends by itself or with 130 and one line, an output is there whole or not
+"""Ctrl-C at any moment, a closed terminal: every command ends by itself or with 130 and one line, an output is there whole or not
 at all, nothing else is left behind, and an interrupted run goes on to the same log.
 
     interrupt_test.py PROGRAM CONFIGS WORK_DIR
 """
 
+import os
 import pathlib
+import pty
 import shutil
 import signal
 import subprocess
 import sys
+import time
 import unittest
 
 PROGRAM, CONFIGS, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
@@ -28,14 +31,15 @@ COMMANDS = {
 DELAYS_S = [0.0, 0.003, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12]
 
 
-def run(*words, interrupt_after_s=None):
-    """(exit code, stderr); SIGINT once after so long."""
-    process = subprocess.Popen([PROGRAM, *words], cwd=WORK, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def run(*words, interrupt_after_s=None, by=signal.SIGINT, start=None):
+    """(exit code, stderr); the signal once after so long. `start` is called in the process before the program."""
+    process = subprocess.Popen([PROGRAM, *words], cwd=WORK, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                               preexec_fn=start)
     if interrupt_after_s is not None:
         try:
             process.wait(interrupt_after_s)
         except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(by)
     _, error = process.communicate(timeout=120)
     return process.returncode, error
 
@@ -106,6 +110,43 @@ class InterruptTest(unittest.TestCase):
             if delay_s == delays_s[-1] < 60.0 and set(codes) == {-signal.SIGINT}:
                 delays_s.append(2.0 * delay_s)
         self.assertIn(130, codes)
+
+    def test_a_closed_terminal_ends_a_run_as_ctrl_c_does(self):
+        code = None
+        for delay_s in (0.3, 0.6, 1.2, 2.4, 4.8):  # on a busy machine main() begins late
+            for path in WORK.glob("hung.*"):
+                path.unlink()
+            code, error = run("run", SMALL, "-o", "hung.slog", "--pace", "1", interrupt_after_s=delay_s,
+                              by=signal.SIGHUP)
+            if code != -signal.SIGHUP and (WORK / "hung.slog").exists():
+                break
+        self.assertEqual(code, 130, error)
+        self.assertEqual(run("log", "verify", "hung.slog")[0], 0)
+        resumed, error = run("run", SMALL, "-o", "hung.slog", "--resume", "--pace", "0")
+        self.assertEqual(resumed, 0, error)
+
+    def test_a_run_ends_so_when_nobody_takes_its_messages_any_more(self):
+        process, terminal = pty.fork()
+        if process == 0:
+            os.chdir(WORK)
+            os.execv(PROGRAM, [str(PROGRAM), "run", SMALL, "-o", "alone.slog", "--pace", "0.1"])
+        self.wait_for_samples(WORK / "alone.slog")
+        os.close(terminal)
+        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), 130)
+        self.assertEqual(run("log", "verify", "alone.slog")[0], 0)
+
+    def wait_for_samples(self, log):
+        for _ in range(600):
+            if log.exists() and log.stat().st_size > 10000:
+                return
+            time.sleep(0.1)
+        self.fail(f"{log}: no samples came")
+
+    def test_a_run_of_nohup_goes_on(self):
+        code, error = run("run", SMALL, "-o", "nohup.slog", "--pace", "4", interrupt_after_s=1.0, by=signal.SIGHUP,
+                          start=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+        self.assertIn(code, (0, 3), error)  # 3: late cycles of a busy machine
+        self.assertNotIn("interrupted", error)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,9 @@ TEST_F(BadRequest, Usage) {
   fail({"frf"}, 2, "required");
   fail({"frf", "a.slog", "-o", "b.h5", "--no-such-flag"}, 2, "--no-such-flag");
   fail({"frf", "a.slog", "-o", "b.h5", "--method", "guess"}, 2, "--method");
+  fail({"frf", "a.slog", "-o", "b.h5", "--method", "lmp"}, 2, "; did you mean 'lpm'?");
+  fail({"frf", "a.slog", "-o", "b.h5", "--delay", "1e-3"}, 2, "add --compensate delay or hold");
+  fail({"config", "schema", "stge"}, 2, "; did you mean 'stage'?");
   fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads");
   fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
   fail({"log"}, 2, "a subcommand is missing: one of info, verify, recover, convert; see");
@@ -348,6 +351,17 @@ TEST_F(BadRequest, Reports) {
        "none: does not exist; check the path");
 }
 
+TEST_F(BadRequest, NamesThatAreNearOnes) {
+  make_log();
+  fail({"frf", name("run.slog"), "-o", name("x.h5"), "--inputs", "a1,A2,a3"}, 2,
+       "inputs: unknown actuator 'A2'; did you mean 'a2'? There are a1, a2, a3");
+  fail({"frf", name("run.slog"), "-o", name("x.h5"), "--outputs", "velocity"}, 2,
+       "outputs: unknown sensor 'velocity'; there are ");
+  fail(
+      {"config", "check", experiment("e.yaml", "rigid_body: suspension", "rigid_body: suspention")},
+      2, "(did you mean 'suspension'?)");
+}
+
 TEST_F(BadRequest, Fits) {
   make_frf();
   const auto wrong = [&](std::vector<std::string> flags, const std::string& text) {
@@ -358,6 +372,7 @@ TEST_F(BadRequest, Fits) {
         "no line lies in it; the frequency response has lines from 16 to 800 Hz");
   wrong({"--band", "500", "100"}, "write the lower frequency first");
   wrong({"--rigid-body", "half"}, "--rigid-body: 'half'; write none, full or a rank");
+  wrong({"--rigid-body", "suspention"}, "or suspension:F1:F2 (Hz) (did you mean 'suspension'?)");
   wrong({"--residue-rank", "0"}, "--residue-rank: '0'; write full or a rank");
   wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with --damping general");
   wrong({"--modes", "500"}, "--modes: 500; 197 lines carry no more than 65;");
