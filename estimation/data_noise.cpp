@@ -41,10 +41,13 @@ double residual_scale(double per_degree, bool likelihood) {
   return likelihood && per_degree < kClearlyTooLarge ? 1.0 : per_degree;
 }
 
-Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c) {
-  const Eigen::ArrayXd W = problem.weights(c).array();
+Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
+                           LineRange lines) {
+  const Eigen::ArrayXd W = problem.W->row(c).segment(lines.first, lines.count).transpose();
   if (!noise.variance) return W.sqrt();
-  return W * noise.variance->channel(c).sqrt();
+  const auto variance = noise.variance->matrix->row(c).segment(lines.first, lines.count);
+  const auto divisor = noise.variance->divisor.segment(lines.first, lines.count);
+  return W * (variance.transpose().array() / divisor).sqrt();
 }
 
 FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise) {

@@ -47,9 +47,6 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
                                   const ResidueFactors& factors, const DataNoise& noise) {
   const Eigen::Index n_y = problem.n_outputs;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
-  Eigen::ArrayXXd scale(problem.size(), problem.channels());
-  for (Eigen::Index c = 0; c < problem.channels(); ++c)
-    scale.col(c) = noise_scale(problem, noise, c);
   CorrelatedColumns inputs;
   for (Eigen::Index u = 0; u < problem.n_inputs; ++u)
     inputs.parameters.push_back(parameters_of(problem, beta, factors, n_y * u, n_y));
@@ -58,7 +55,7 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
     const Eigen::Index c = y + n_y * u;
     free_columns(problem, beta, factors, *group_of[static_cast<std::size_t>(c)], c,
                  inputs.parameters[static_cast<std::size_t>(u)], lines, re, im);
-    const auto weight = scale.col(c).segment(lines.first, lines.count);
+    const Eigen::ArrayXd weight = noise_scale(problem, noise, c, lines);
     re.array().colwise() *= weight;
     im.array().colwise() *= weight;
   };

@@ -10,7 +10,7 @@
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kTileEntries = 1 << 20;  // of the columns of all channels
+constexpr Eigen::Index kTileEntries = 1 << 17;  // of the columns of all channels
 
 /// R(y, z) of a covariance whose (y, z) stands in row y + n z of re + i im.
 void normalized(const Eigen::MatrixXd& re, const Eigen::MatrixXd& im, Eigen::Index n,

@@ -74,12 +74,8 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
                                   const DataNoise& noise, std::vector<Eigen::MatrixXd>& cross) {
   const Eigen::Index n_y = problem.n_outputs;
   const auto columns = derivative_columns(problem);
-  Eigen::ArrayXXd scale(problem.size(), range.count);
-  for (Eigen::Index r = 0; r < range.count; ++r) {
-    scale.col(r) = noise_scale(problem, noise, range.first + r);
-    cross[static_cast<std::size_t>(range.first + r)].setZero(problem.globals(),
-                                                             problem.functions());
-  }
+  for (Eigen::Index c = range.first; c < range.first + range.count; ++c)
+    cross[static_cast<std::size_t>(c)].setZero(problem.globals(), problem.functions());
   CorrelatedColumns inputs;
   inputs.first_input = range.first / n_y;
   inputs.parameters.assign(static_cast<std::size_t>(range.count / n_y), all_globals(problem));
@@ -88,7 +84,7 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
     const Eigen::Index c = range.first + n_y * u + y;
     projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)], part.gn.channel(c).Z,
                       c, columns, lines, re, im);
-    const auto weight = scale.col(n_y * u + y).segment(lines.first, lines.count);
+    const Eigen::ArrayXd weight = noise_scale(problem, noise, c, lines);
     re.array().colwise() *= weight;
     im.array().colwise() *= weight;
   };
@@ -96,7 +92,8 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
     for (Eigen::Index y = 0; y < n_y; ++y) {
       const auto c = static_cast<std::size_t>(range.first + n_y * u + y);
       const auto at = static_cast<std::size_t>(y);
-      const auto weight = scale.col(n_y * u + y).segment(lines.first, lines.count);
+      const Eigen::ArrayXd weight =
+          noise_scale(problem, noise, static_cast<Eigen::Index>(c), lines);
       const auto F_re = group_of[c]->F_re.middleRows(lines.first, lines.count).array();
       const auto F_im = group_of[c]->F_im.middleRows(lines.first, lines.count).array();
       cross[c] += Z.re[at].transpose() * (F_re.colwise() * weight).matrix() +
