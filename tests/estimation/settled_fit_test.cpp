@@ -80,7 +80,7 @@ TEST_F(SettledFit, TwoModesThatRunIntoEachOtherBecomeOne) {
   for (Eigen::Index k = 0; k < frf_.lines(); ++k) {
     const std::complex<double> s = j * 2.0 * std::numbers::pi * frf_.frequency_hz[k];
     const std::complex<double> A = 1.0 + a[0] * s + a[1] * s * s;
-    frf_.response(0, k) += a[1] * (0.1 / A + 1e-3 / (A * A));
+    frf_.response(0, k) += a[1] * (0.1 / A + 8e-4 / (A * A));
   }
   twice.submodels[2].denominator = {1.0, 1.02 * a[0], a[1]};
   ASSERT_FALSE(fit_additive_model(frf_, twice, options_).trustworthy());
