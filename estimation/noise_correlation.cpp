@@ -12,18 +12,18 @@ namespace {
 
 constexpr Eigen::Index kTileEntries = 1 << 17;  // of the columns of all channels
 
-/// R(y, z) of a covariance whose (y, z) stands in row y + n z of re + i im.
-void normalized(const Eigen::MatrixXd& re, const Eigen::MatrixXd& im, Eigen::Index n,
-                Eigen::Index y, Eigen::Index z, LineRange lines, Eigen::ArrayXd& R_re,
-                Eigen::ArrayXd& R_im) {
-  R_re.resize(lines.count);
-  R_im.resize(lines.count);
+/// C(a, b) / sqrt(C(a, a) C(b, b)) on some lines, 0 where that is none. @param C (a, b, line) -> complex
+template <typename Covariance>
+void correlation_of(const Covariance& C, Eigen::Index a, Eigen::Index b, LineRange lines,
+                    Eigen::ArrayXd& re, Eigen::ArrayXd& im) {
+  re.resize(lines.count);
+  im.resize(lines.count);
   for (Eigen::Index i = 0; i < lines.count; ++i) {
     const Eigen::Index k = lines.first + i;
-    const double power = re(y * (n + 1), k) * re(z * (n + 1), k);
-    const double scale = power > 0.0 ? 1.0 / std::sqrt(power) : 0.0;
-    R_re[i] = scale * re(y + n * z, k);
-    R_im[i] = scale * im(y + n * z, k);
+    const double power = C(a, a, k).real() * C(b, b, k).real();
+    const std::complex<double> rho = power > 0.0 ? C(a, b, k) / std::sqrt(power) : 0.0;
+    re[i] = rho.real();
+    im[i] = rho.imag();
   }
 }
 
@@ -135,6 +135,10 @@ NoiseCorrelation::NoiseCorrelation(const FrfEstimate& frf)
 }
 
 OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, LineRange lines) const {
+  const auto C = [this](Eigen::Index y, Eigen::Index z, Eigen::Index k) {
+    const Eigen::Index at = y + n_y_ * z;
+    return std::complex<double>((*re_)(at, k), (*im_)(at, k));
+  };
   OutputColumns Y = X;  // the diagonal of R is one
   Eigen::ArrayXd re;
   Eigen::ArrayXd im;
@@ -143,7 +147,7 @@ OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, LineRange lin
       if (z == y) continue;
       const auto to = static_cast<std::size_t>(y);
       const auto from = static_cast<std::size_t>(z);
-      normalized(*re_, *im_, n_y_, y, z, lines, re, im);
+      correlation_of(C, y, z, lines, re, im);
       for (Eigen::Index p = 0; p < X.re[from].cols(); ++p)
         add_scaled(re, im, X.re[from], X.im[from], p, Y.re[to], Y.im[to], p);
     }
@@ -153,16 +157,12 @@ OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, LineRange lin
 void NoiseCorrelation::add_input(Eigen::Index u, Eigen::Index v, const OutputColumns& Y,
                                  const std::vector<Eigen::Index>& at, LineRange lines,
                                  OutputColumns& Z) const {
-  Eigen::ArrayXd re(lines.count);
-  Eigen::ArrayXd im(lines.count);
-  for (Eigen::Index i = 0; i < lines.count; ++i) {
-    const auto S = S_->col(lines.first + i);
-    const double power = S[u * (n_u_ + 1)].real() * S[v * (n_u_ + 1)].real();
-    const std::complex<double> rho =
-        power > 0.0 ? S[u + n_u_ * v] / std::sqrt(power) : std::complex<double>();
-    re[i] = u == v ? 1.0 : rho.real();
-    im[i] = u == v ? 0.0 : rho.imag();
-  }
+  Eigen::ArrayXd re = Eigen::ArrayXd::Ones(lines.count);  // the diagonal of S is one
+  Eigen::ArrayXd im = Eigen::ArrayXd::Zero(lines.count);
+  const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
+    return (*S_)(a + n_u_ * b, k);
+  };
+  if (u != v) correlation_of(C, u, v, lines, re, im);
   for (std::size_t y = 0; y < Y.re.size(); ++y)
     for (std::size_t p = 0; p < at.size(); ++p)
       add_scaled(re, im, Y.re[y], Y.im[y], static_cast<Eigen::Index>(p), Z.re[y], Z.im[y], at[p]);

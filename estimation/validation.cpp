@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "frf/confidence.hpp"
+
 namespace stageid {
 
 Eigen::MatrixXcd response_like(const AdditiveModel& model, const FrfEstimate& frf) {
@@ -47,12 +49,6 @@ void fill_whiteness(const Eigen::MatrixXcd& white, Validation& out) {
   out.whiteness_limit = std::sqrt(-std::log(1.0 - std::pow(0.99, 0.1)) / count);
 }
 
-/// What |e|^2 over its variance exceeds with the given chance: Exp(1), or F(2, 2 nu) where the variance was
-/// estimated with nu complex degrees of freedom; 0: it is exact.
-double upper_point(double chance, double nu) {
-  return nu > 0.0 ? nu * std::expm1(-std::log(chance) / nu) : -std::log(chance);
-}
-
 }  // namespace
 
 Validation validate(const AdditiveModel& model, const FrfEstimate& frf) {
@@ -76,8 +72,9 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf) {
     out.chi_square_per_dof = ratio.mean();
     const double nu = frf.noise_variance.size() > 0 ? frf.noise_dof : frf.total_dof;
     out.expected_chi_square = nu > 1.0 ? nu / (nu - 1.0) : nu > 0.0 ? 0.0 : 1.0;
-    out.whitened_above_95 = static_cast<double>((ratio > upper_point(0.05, nu)).count()) /
-                            static_cast<double>(ratio.size());
+    out.whitened_above_95 =
+        static_cast<double>((ratio > squared_error_quantile(0.95, nu)).count()) /
+        static_cast<double>(ratio.size());
     fill_whiteness(E.cwiseQuotient(variance.cwiseSqrt().cast<std::complex<double>>()), out);
   }
   return out;

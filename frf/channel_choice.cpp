@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "excitation/counted.hpp"
+#include "frf/channel_positions.hpp"
 
 namespace stageid {
 namespace {
@@ -21,24 +22,6 @@ Indices all_of(const ChannelList& channels) {
   Indices indices(channels.size());
   for (std::size_t i = 0; i < channels.size(); ++i) indices[i] = static_cast<Eigen::Index>(i);
   return indices;
-}
-
-Indices positions(const ChannelList& channels, const std::vector<std::string>& wanted,
-                  const char* option, const char* kind) {
-  Indices found;
-  for (const std::string& name : wanted) {
-    const auto at = std::find(channels.names.begin(), channels.names.end(), name);
-    if (at == channels.names.end()) {
-      throw std::invalid_argument(fmt::format("{}: unknown {} '{}'; there are {}", option, kind,
-                                              name, fmt::join(channels.names, ", ")));
-    }
-    found.push_back(at - channels.names.begin());
-  }
-  if (std::set<Eigen::Index>(found.begin(), found.end()).size() != found.size()) {
-    throw std::invalid_argument(
-        fmt::format("{}: a channel is named twice; name each once", option));
-  }
-  return found;
 }
 
 std::vector<std::string> names_of(const ChannelList& channels, const Indices& at) {
@@ -97,8 +80,8 @@ ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Inde
   ChannelChoice choice;
   choice.outputs = options.outputs.empty()
                        ? all_of(info.sensors)
-                       : positions(info.sensors, options.outputs, "outputs", "sensor");
-  const Indices asked = positions(info.actuators, options.inputs, "inputs", "actuator");
+                       : channel_positions(info.sensors, options.outputs, "outputs", "sensor");
+  const Indices asked = channel_positions(info.actuators, options.inputs, "inputs", "actuator");
   const Indices by_excitation = excited_actuators(info, excited);
   const bool part_of_the_excited =
       asked.size() < excited.size() && by_excitation.size() == excited.size() &&

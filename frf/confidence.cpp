@@ -7,6 +7,12 @@
 
 namespace stageid {
 
+double squared_error_quantile(double level, double dof) {
+  const double known = -std::log1p(-level);
+  // expm1: many degrees of freedom leave little of the difference.
+  return dof > 0.0 ? dof * std::expm1(known / dof) : known;
+}
+
 Eigen::MatrixXd confidence_radius(const FrfEstimate& frf, double level, VarianceKind kind) {
   if (!(level > 0.0 && level < 1.0)) {
     throw std::invalid_argument(
@@ -22,9 +28,7 @@ Eigen::MatrixXd confidence_radius(const FrfEstimate& frf, double level, Variance
               : "confidence radius: the noise variance or its noise_dof is unknown; measure two "
                 "periods");
   }
-  // expm1: many degrees of freedom leave little of the difference.
-  const double quantile = dof * std::expm1(-std::log1p(-level) / dof);
-  return (quantile * variance).cwiseSqrt();
+  return (squared_error_quantile(level, dof) * variance).cwiseSqrt();
 }
 
 }  // namespace stageid

@@ -12,6 +12,11 @@ enum class VarianceKind : std::uint8_t {
   total   ///< noise and stochastic nonlinear contributions
 };
 
+/// What |dG|^2 over its variance stays below with the probability `level`: F_{2, 2 nu; level} where the
+/// variance was estimated with nu = `dof` complex degrees of freedom; that of a known variance,
+/// -ln(1 - level), with dof 0.
+double squared_error_quantile(double level, double dof);
+
 /// Radii of circles that hold the true response with the probability `level`, (n_y n_u) x N.
 ///
 ///   P(|dG| <= radius) = level,  radius^2 = variance F_{2, 2 nu; level},

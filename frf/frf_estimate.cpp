@@ -8,32 +8,19 @@
 #include <set>
 #include <stdexcept>
 
+#include "frf/channel_positions.hpp"
+
 namespace stageid {
 namespace {
 
 using Indices = std::vector<Eigen::Index>;
 
-/// Where each of `wanted` stands in `channels`.
 Indices positions(const ChannelList& channels, const std::vector<std::string>& wanted,
-                  const char* kind) {
-  if (wanted.empty()) {
+                  const char* option, const char* kind) {
+  if (wanted.empty())
     throw std::invalid_argument(
         fmt::format("select_channels: no {} asked for; name at least one", kind));
-  }
-  Indices found;
-  for (const std::string& name : wanted) {
-    const auto at = std::find(channels.names.begin(), channels.names.end(), name);
-    if (at == channels.names.end()) {
-      throw std::invalid_argument(fmt::format("select_channels: unknown {} '{}'; there are {}",
-                                              kind, name, fmt::join(channels.names, ", ")));
-    }
-    found.push_back(at - channels.names.begin());
-  }
-  if (std::set<Eigen::Index>(found.begin(), found.end()).size() != found.size()) {
-    throw std::invalid_argument(
-        fmt::format("select_channels: an {} is named twice; name each once", kind));
-  }
-  return found;
+  return channel_positions(channels, wanted, option, kind);
 }
 
 ChannelList pick(const ChannelList& channels, const Indices& at) {
@@ -124,8 +111,8 @@ FrfEstimate select_band(const FrfEstimate& frf, double low_hz, double high_hz) {
 
 FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,
                             const std::vector<std::string>& outputs) {
-  const Indices input_at = positions(frf.inputs, inputs, "input");
-  const Indices output_at = positions(frf.outputs, outputs, "output");
+  const Indices input_at = positions(frf.inputs, inputs, "inputs", "input");
+  const Indices output_at = positions(frf.outputs, outputs, "outputs", "output");
   Indices entries;
   for (const Eigen::Index j : input_at) {
     for (const Eigen::Index i : output_at) entries.push_back(i + frf.n_outputs() * j);

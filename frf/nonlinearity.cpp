@@ -77,8 +77,7 @@ void test_detection(const DetectionLines& detection, const std::vector<Eigen::In
   }
 }
 
-/// One-sided: a standard normal variable is above z.
-/// The smallest tail of any output on the lines [low_hz, high_hz].
+/// The smallest upper tail of any output on the lines [low_hz, high_hz].
 double least_tail(const LineAlignment& alignment, double low_hz, double high_hz) {
   double least = 1.0;
   for (Eigen::Index i = 0; i < alignment.cosine.rows(); ++i) {

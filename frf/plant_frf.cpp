@@ -292,7 +292,7 @@ void PlantEstimation::prepare(const RealizationRuns& realization,
 
 void PlantEstimation::include(const RealizationSpectra& spectra,
                               const std::vector<RunExcitation>& excitation) {
-  const Eigen::MatrixXcd G_before = average_->mean_response();
+  const Eigen::MatrixXcd G_before = alignment_ ? average_->mean_response() : Eigen::MatrixXcd();
   average_->add(spectra, workers_, zippered_.get());
   if (!detection_) return;
   if (alignment_) alignment_->add(spectra, G_before, average_->mean_response(), workers_);

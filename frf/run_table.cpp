@@ -85,27 +85,19 @@ RunsByRealization complete_runs(const std::vector<const LogReader*>& logs,
   return table;
 }
 
-/// Every experiment that was at least begun in some realization.
-std::set<int> begun_experiments(const std::vector<const LogReader*>& logs) {
-  std::set<int> begun;
+/// Every experiment, or realization, that was at least begun.
+std::set<int> begun(const std::vector<const LogReader*>& logs, int LogRun::*which) {
+  std::set<int> found;
   for (const LogReader* log : logs) {
-    for (const LogRun& run : log->runs()) begun.insert(run.experiment);
+    for (const LogRun& run : log->runs()) found.insert(run.*which);
   }
-  return begun;
+  return found;
 }
 
-std::set<int> begun_realizations(const std::vector<const LogReader*>& logs) {
-  std::set<int> begun;
-  for (const LogReader* log : logs) {
-    for (const LogRun& run : log->runs()) begun.insert(run.realization);
-  }
-  return begun;
-}
-
-std::string why_incomplete(const RunsByExperiment& runs, const std::set<int>& begun,
+std::string why_incomplete(const RunsByExperiment& runs, const std::set<int>& experiments,
                            const std::string& log) {
   std::vector<int> missing;
-  for (const int experiment : begun)
+  for (const int experiment : experiments)
     if (!runs.contains(experiment)) missing.push_back(experiment + 1);
   return fmt::format("{}: no complete run of experiment {} (counted from 1)", log,
                      fmt::join(missing, ", "));
@@ -174,8 +166,8 @@ ChosenRuns choose_runs(const std::vector<const LogReader*>& logs, const FrfOptio
     throw std::invalid_argument(
         fmt::format("{}: no complete run; measure at least one realization to its end", first));
   }
-  const std::set<int> begun = begun_experiments(logs);
-  const std::size_t needed = needed_experiments(table, begun.size(), options, first);
+  const std::set<int> experiments = begun(logs, &LogRun::experiment);
+  const std::size_t needed = needed_experiments(table, experiments.size(), options, first);
 
   ChosenRuns chosen;
   for (const auto& [realization, runs] : table) {
@@ -185,11 +177,11 @@ ChosenRuns choose_runs(const std::vector<const LogReader*>& logs, const FrfOptio
     chosen.realizations.push_back(std::move(entry));
   }
   if (!options.realizations.empty()) return chosen;
-  for (const int realization : begun_realizations(logs)) {
+  for (const int realization : begun(logs, &LogRun::realization)) {
     const auto at = table.find(realization);
     const RunsByExperiment runs = at == table.end() ? RunsByExperiment{} : at->second;
     if (runs.size() < needed)
-      chosen.incomplete.push_back({realization, why_incomplete(runs, begun, first)});
+      chosen.incomplete.push_back({realization, why_incomplete(runs, experiments, first)});
   }
   return chosen;
 }

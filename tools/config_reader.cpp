@@ -8,7 +8,7 @@
 #include <cmath>
 #include <optional>
 
-#include "tools/key_suggestion.hpp"
+#include "excitation/key_suggestion.hpp"
 #include "tools/number_range.hpp"
 
 namespace stageid {

@@ -8,10 +8,10 @@
 
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
+#include "excitation/key_suggestion.hpp"
 #include "frf/zippered_lines.hpp"
 #include "tools/config_plan.hpp"
 #include "tools/config_reader.hpp"
-#include "tools/key_suggestion.hpp"
 #include "tools/strict_yaml.hpp"
 
 namespace stageid {

@@ -56,8 +56,7 @@ ExportCommand::ExportCommand(CLI::App& app, Console& console) : console_(console
   command
       ->add_option("-o,--output", output_,
                    "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); of a "
-                   "model also "
-                   ".json, .py, .m")
+                   "model also .json, .py, .m")
       ->required();
   command->add_option("--frf", frf_,
                       "of a model: the response on the lines of this FRF within the fit's band");

@@ -11,10 +11,10 @@
 
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
+#include "excitation/key_suggestion.hpp"
 #include "frf/hold_compensation.hpp"
 #include "frf/line_scatter.hpp"
 #include "tools/flag_values.hpp"
-#include "tools/key_suggestion.hpp"
 #include "tools/structure_request.hpp"
 #include "tools/submodel_text.hpp"
 #include "tools/weight_file.hpp"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "tools/key_suggestion.hpp"
+#include "excitation/key_suggestion.hpp"
 
 namespace stageid {
 

@@ -76,9 +76,8 @@ std::size_t unsettled_bands(const NonlinearityTest& test) {
 
 std::string unsettled_line(const NonlinearityTest& test) {
   return fmt::format(
-      "in {} of {} bands linearity cannot be told: the records hold a transient (pass over "
-      "more periods: --transient-periods), or a drift or slow noise (longer periods, or --method "
-      "lpm)",
+      "in {} of {} bands linearity cannot be told: the records hold a transient (pass over more "
+      "periods: --transient-periods), or a drift or slow noise (longer periods, or --method lpm)",
       unsettled_bands(test), test.band_hz.rows());
 }
 

@@ -11,7 +11,6 @@
 #include "excitation/counted.hpp"
 #include "excitation/fingerprint.hpp"
 #include "frf/data_health.hpp"
-#include "tools/channel_names.hpp"
 #include "tools/health_step.hpp"
 #include "tools/interrupt.hpp"
 #include "tools/open_logs.hpp"
@@ -83,8 +82,6 @@ FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfO
 
 FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
                      const HealthRequest& health, const Console& console) {
-  require_known("inputs", "actuator", options.inputs, logs.front()->info().actuators);
-  require_known("outputs", "sensor", options.outputs, logs.front()->info().sensors);
   FrfStep step;
   std::optional<NominalStage> nominal;  // before the long work: a stage file may be wrong
   if (health.wanted) nominal = nominal_stage_of(logs.front()->info(), health.stage_file);

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "excitation/key_suggestion.hpp"
 #include "tools/command_line.hpp"
 #include "tools/command_tree.hpp"
-#include "tools/key_suggestion.hpp"
 
 namespace stageid {
 

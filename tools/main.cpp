@@ -1,6 +1,3 @@
-#include <fmt/format.h>
-
-#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <new>
@@ -10,14 +7,14 @@
 #include "estimation/weight_matrices.hpp"
 #include "excitation/file_error.hpp"
 #include "hal/stage.hpp"
+#include "tools/console.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/program.hpp"
 
 namespace {
 
 int report(const std::exception& error, int exit_code) {
-  // A terminal that has closed takes nothing: the exit code still tells.
-  static_cast<void>(std::fputs(fmt::format("stageid: {}\n", error.what()).c_str(), stderr));
+  stageid::Console().warning(error.what());
   return exit_code;
 }
 

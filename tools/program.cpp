@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "excitation/file_error.hpp"
+#include "excitation/key_suggestion.hpp"
 #include "tools/command_tree.hpp"
 #include "tools/config_command.hpp"
 #include "tools/console.hpp"
@@ -26,7 +27,6 @@
 #include "tools/identify_command.hpp"
 #include "tools/import_command.hpp"
 #include "tools/interrupt.hpp"
-#include "tools/key_suggestion.hpp"
 #include "tools/log_command.hpp"
 #include "tools/manual_command.hpp"
 #include "tools/modes_command.hpp"

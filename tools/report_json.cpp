@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimation/cmif_deviation.hpp"
+#include "frf/confidence.hpp"
 #include "tools/page_template.hpp"
 #include "tools/report_comparison.hpp"
 #include "tools/report_diagrams.hpp"
@@ -168,6 +169,7 @@ Json frf_json(const FrfEstimate& frf) {
           {"compensated", to_string(frf.compensated)},
           {"delay_s", frf.delay_s},
           {"deviation", uncertainty(frf).kind},
+          {"band_factor", std::sqrt(squared_error_quantile(0.95, uncertainty(frf).dof))},
           {"noise_dof", frf.noise_dof},
           {"correlated_lines", frf.correlated_lines},
           {"total_dof", frf.total_dof},

@@ -12,8 +12,8 @@ constexpr double kLeastTotalDof = 4.0;
 Uncertainty uncertainty(const FrfEstimate& frf) {
   const bool scarce = frf.total_dof > 0.0 && frf.total_dof < kLeastTotalDof;
   if (frf.total_variance.size() > 0 && !(scarce && frf.noise_variance.size() > 0))
-    return {&frf.total_variance, "total"};
-  if (frf.noise_variance.size() > 0) return {&frf.noise_variance, "noise"};
+    return {&frf.total_variance, "total", frf.total_dof};
+  if (frf.noise_variance.size() > 0) return {&frf.noise_variance, "noise", frf.noise_dof};
   return {};
 }
 

@@ -11,6 +11,7 @@ namespace stageid::report {
 struct Uncertainty {
   const Eigen::MatrixXd* variance = nullptr;  ///< null: none is known
   const char* kind = "";                      ///< "total", "noise" or ""
+  double dof = 0.0;                           ///< of it; 0: not known
 };
 Uncertainty uncertainty(const FrfEstimate& frf);
 

@@ -7,8 +7,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "excitation/key_suggestion.hpp"
 #include "tools/flag_values.hpp"
-#include "tools/key_suggestion.hpp"
 #include "tools/submodel_text.hpp"
 
 namespace stageid {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "tools/key_suggestion.hpp"
+#include "excitation/key_suggestion.hpp"
 
 namespace stageid {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdint>
 
 #include "excitation/file_error.hpp"
+#include "excitation/key_suggestion.hpp"
 #include "tools/config_schema.hpp"
-#include "tools/key_suggestion.hpp"
 
 namespace stageid {
 namespace {

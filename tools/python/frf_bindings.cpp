@@ -11,7 +11,6 @@
 #include "frf/confidence.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/hold_compensation.hpp"
-#include "tools/channel_names.hpp"
 #include "tools/flag_values.hpp"
 #include "tools/frf_step.hpp"
 #include "tools/health_step.hpp"
@@ -120,8 +119,6 @@ FrfHandle frf(const py::object& given, const std::vector<std::string>& inputs,
 FrfHandle select(const FrfHandle& of, std::optional<std::array<double, 2>> band_hz,
                  const Names& inputs, const Names& outputs) {
   FrfEstimate frf = band_hz ? select_band(of.frf, (*band_hz)[0], (*band_hz)[1]) : of.frf;
-  if (inputs) require_known("inputs", "input", *inputs, frf.inputs);
-  if (outputs) require_known("outputs", "output", *outputs, frf.outputs);
   if (inputs || outputs)
     frf = select_channels(frf, inputs.value_or(frf.inputs.names),
                           outputs.value_or(frf.outputs.names));

@@ -2,14 +2,6 @@
 
 const entry = { magnitude: null, phase: null, channel: 0, hidden: new Set(['validation']), order: [] };
 
-// |dG| of a circular complex Gaussian exceeds so many of its deviations in 5 % of all cases: |dG|^2 is exponential,
-// and F(2, 2 nu) where the variance was estimated with nu degrees of freedom.
-function bandFactor() {
-  const { deviation, noise_dof, total_dof } = content.frf;
-  const nu = deviation === 'total' ? total_dof : noise_dof;
-  return Math.sqrt(nu > 0 ? nu * Math.expm1(-Math.log(0.05) / nu) : -Math.log(0.05));
-}
-
 const traceNames = {
   measured: 'measured', model: 'model', residual: 'residual', validation: 'residual, held-back data', deviation: 'standard deviation',
 };
@@ -84,7 +76,7 @@ function zoomEntry(low, high) {
 function bar(value, deviation, floor) {
   const v = Math.max(value, floor);
   if (!deviation) return [v, v, v];
-  return [Math.max(value - bandFactor() * deviation, floor), v, value + bandFactor() * deviation];
+  return [Math.max(value - content.frf.band_factor * deviation, floor), v, value + content.frf.band_factor * deviation];
 }
 
 // Rows of dygraphs' own format, with the names of the columns.
@@ -143,7 +135,7 @@ function calmestCut(phases) {
 
 function phaseBar(phase, magnitude, deviation, cut) {
   if (!deviation) return [phase, phase, phase];
-  const ratio = bandFactor() * deviation / magnitude;
+  const ratio = content.frf.band_factor * deviation / magnitude;
   const half = ratio >= 1 ? 180 : Math.asin(ratio) * 180 / Math.PI;
   return [Math.max(cut, phase - half), phase, Math.min(cut + 360, phase + half)];
 }

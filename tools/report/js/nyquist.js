@@ -46,7 +46,7 @@ function nyquistData(channel, low, high) {
   for (let k = first; k <= last; ++k) {
     const place = 2 * (channel * lines + k);
     const s = scale ? scale[k] : 1;
-    points.push({ k, re: s * response[place], im: s * response[place + 1], radius: deviation ? s * bandFactor() * deviation[k] : 0 });
+    points.push({ k, re: s * response[place], im: s * response[place + 1], radius: deviation ? s * content.frf.band_factor * deviation[k] : 0 });
     if (residual) model.push({ re: s * (response[place] - residual[place]), im: s * (response[place + 1] - residual[place + 1]) });
     if (otherOne) other.push({ re: s * otherOne[place], im: s * otherOne[place + 1] });
   }

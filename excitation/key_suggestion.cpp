@@ -1,4 +1,4 @@
-#include "tools/key_suggestion.hpp"
+#include "excitation/key_suggestion.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
