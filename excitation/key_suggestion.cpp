@@ -46,6 +46,15 @@ bool equal_but_for_case(std::string_view a, std::string_view b) {
   });
 }
 
+/// The one word of which three letters or more are the beginning: "conv" for "convert".
+std::string whole_word(const std::string& beginning, const std::vector<std::string>& allowed) {
+  const auto begins = [&](const std::string& candidate) {
+    return candidate.compare(0, beginning.size(), beginning) == 0;
+  };
+  if (beginning.size() < 3 || std::count_if(allowed.begin(), allowed.end(), begins) != 1) return "";
+  return *std::find_if(allowed.begin(), allowed.end(), begins);
+}
+
 }  // namespace
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& allowed) {
@@ -56,6 +65,7 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
     return equal_but_for_case(word, candidate);
   });
   if (same != allowed.end()) return *same;
+  if (const std::string whole = whole_word(word, allowed); !whole.empty()) return whole;
   for (const std::string& candidate : allowed) {
     const std::size_t distance = edit_distance(word, candidate);
     if (distance < least) {

@@ -22,9 +22,7 @@ std::vector<Finding> check_settling(const FrfEstimate& frf) {
   finding.what =
       "the records are not settled: a transient, a drift or slow noise, smooth over the lines";
   finding.figure = figure;
-  finding.remedy =
-      "a transient: pass over more periods (--transient-periods); a drift or slow noise: longer "
-      "periods, or --method lpm; linearity cannot be told there";
+  finding.remedy = fmt::format("{}; linearity cannot be told there", kUnsettledRemedy);
   return {finding};
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "frf/nonlinearity.hpp"
+#include "frf/settling_check.hpp"
 #include "tools/console.hpp"
 
 namespace stageid {
@@ -76,9 +77,8 @@ std::size_t unsettled_bands(const NonlinearityTest& test) {
 
 std::string unsettled_line(const NonlinearityTest& test) {
   return fmt::format(
-      "in {} of {} bands linearity cannot be told: the records hold a transient (pass over more "
-      "periods: --transient-periods), or a drift or slow noise (longer periods, or --method lpm)",
-      unsettled_bands(test), test.band_hz.rows());
+      "in {} of {} bands linearity cannot be told, for the records are not settled there: {}",
+      unsettled_bands(test), test.band_hz.rows(), kUnsettledRemedy);
 }
 
 std::string conclusion(const NonlinearityTest& test) {

@@ -152,14 +152,18 @@ class Program {
     std::vector<std::string> known = names_of(command.commands);
     for (const CommandTree& tree : {command, command_tree(app_)})
       for (const std::string& flag : flags_of(tree)) known.push_back(flag);
-    for (const std::string& unknown : app_.remaining(true)) {
+    const std::vector<std::string> left_over = app_.remaining(true);
+    for (const std::string& unknown : left_over) {
       const std::string nearest = nearest_word(unknown.substr(0, unknown.find('=')), known);
       if (!nearest.empty())
         return fmt::format("'{}' is unknown; did you mean '{}'? See 'stageid{} --help'", unknown,
                            nearest, path);
     }
     if (innermost != &app_ && !command.commands.empty())
-      return fmt::format("a subcommand is missing: one of {}; see 'stageid{} --help'",
+      return fmt::format("{}: one of {}; see 'stageid{} --help'",
+                         left_over.empty()
+                             ? "a subcommand is missing"
+                             : fmt::format("'{}' is no subcommand", left_over.front()),
                          fmt::join(names_of(command.commands), ", "), path);
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');

@@ -23,6 +23,8 @@ TEST_F(BadRequest, Usage) {
   fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
   fail({"log"}, 2, "a subcommand is missing: one of info, verify, recover, convert; see");
   fail({"log", "inf", "a.slog"}, 2, "'inf' is unknown; did you mean 'info'?");
+  fail({"log", "conv", "a.slog"}, 2, "'conv' is unknown; did you mean 'convert'?");
+  fail({"log", "a.slog"}, 2, "'a.slog' is no subcommand: one of info, verify, recover, convert");
   fail({"frf", "a.slog", "-o", "b.h5", "--methd=lpm"}, 2, "did you mean '--method'?");
   fail({"frf", "a.slog", "-o", "b.h5", "--jsn"}, 2, "did you mean '--json'? See 'stageid frf");
   fail({"manual", "-o", config_}, 1, "cannot be made a directory");

@@ -164,6 +164,8 @@ TEST(KeySuggestion, FindsSwapsLossesAndUnits) {
   EXPECT_EQ(nearest_word("A1", {"b1", "a1"}), "a1");
   EXPECT_EQ(nearest_word("FORCE_X", {"force_y", "force_x"}), "force_x");
   EXPECT_EQ(nearest_word("", {"hold"}), "");
+  EXPECT_EQ(nearest_word("conv", {"convert", "info"}), "convert");
+  EXPECT_EQ(nearest_word("conv", {"convert", "convolve"}), "");
   EXPECT_THAT(suggest_key("delay_ms", {"delay_s", "decay"}), HasSubstr("write 'delay_s'"));
 }
 

@@ -77,6 +77,8 @@ void ArrayLog::check_shapes() const {
   require_axes("excitation", a.excitation, 4, kAxes);
   require_axes("actuators", a.actuators, 4, kAxes);
   require_axes("sensors", a.sensors, 4, kAxes);
+  require(a.sensors.shape(0) > 0 && a.sensors.shape(1) > 0, "sensors", a.sensors,
+          "a log has one realization and one experiment at least");
   const auto same_runs = [&](const char* name, const py::array& array) {
     require(array.shape(0) == a.sensors.shape(0) && array.shape(1) == a.sensors.shape(1), name,
             array,
@@ -92,7 +94,7 @@ void ArrayLog::check_shapes() const {
   same_samples("actuators", a.actuators);
   const auto channels = [](const char* name, const py::array& array, const ChannelList& list) {
     require(array.shape(3) == static_cast<py::ssize_t>(list.size()), name, array,
-            fmt::format("names: {}", counted(list.size(), "channel")));
+            fmt::format("{} stand for its last axis", counted(list.size(), "name")));
   };
   channels("excitation", a.excitation, info_.excitation);
   channels("actuators", a.actuators, info_.actuators);

@@ -133,10 +133,11 @@ class Refused(unittest.TestCase):
         r, u, y = arrays()
         for given, text in (((r[0], u, y), "excitation.*axes|excitation.*x"), ((r, u[..., 0], y), "actuators"),
                             ((r[:1], u, y), "excitation"), ((r, u[:, :1], y), "actuators"),
-                            ((r, u[:, :, 1:], y), "actuators"), ((np.full_like(r, np.inf), u, y), "finite")):
+                            ((r, u[:, :, 1:], y), "actuators"), ((np.full_like(r, np.inf), u, y), "finite"),
+                            ((r[:0], u[:0], y[:0]), "one realization")):
             with self.subTest(text=text):
                 self.refuses(stageid.RequestError, text, stageid.Log, *given, sample_rate_hz=RATE_HZ)
-        for options, text in (({"sensors": ["one"]}, "sensors"), ({"actuator_units": ["N"]}, "actuators"),
+        for options, text in (({"sensors": ["one"]}, "sensors: .*1 name"), ({"actuator_units": ["N"]}, "actuators"),
                               ({"marked": np.zeros(3)}, "marked"), ({"actuators": ["a", "a", "b"]}, "a"),
                               ({"transient_periods": -1}, "transient")):
             with self.subTest(text=text):
