@@ -14,8 +14,8 @@
 #include "estimation/mode_worth.hpp"
 #include "estimation/overlapping_modes.hpp"
 #include "estimation/pole_relocation.hpp"
+#include "estimation/ranked_fit.hpp"
 #include "estimation/residual_modes.hpp"
-#include "estimation/settled_fit.hpp"
 #include "excitation/counted.hpp"
 #include "frf/worker_pool.hpp"
 
@@ -109,10 +109,12 @@ class AutomaticFit {
     FitOptions last = options_;
     last.judge_modes = selection_.keep_modes;
     if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled_of_many());
-    const bool chosen = selection_.exactly == 0 && !selection_.keep_modes;
     last.shrink_hidden = many();
-    const auto last_fit = chosen ? settled_fit : fit_additive_model;
-    FitResult result = last_fit(frf_, best_.model, last);
+    FitResult result = many() ? fit_additive_model(frf_, best_.model, last)
+                              : ranked_fit(frf_, best_.model, last, mode_number());
+    if (const std::string ranks = describe(result.residue_ranks); !ranks.empty())
+      result.decisions.push_back(ranks);
+    sort_modes(result);
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
     result.cost.insert(result.cost.begin(), history_.begin(), history_.end());
@@ -122,6 +124,11 @@ class AutomaticFit {
   }
 
  private:
+  ModeNumber mode_number() const {
+    if (selection_.keep_modes) return ModeNumber::given;
+    return selection_.exactly > 0 ? ModeNumber::asked : ModeNumber::chosen;
+  }
+
   bool many() const { return selection_.exactly > kMostGrown; }
 
   /// Newton decrement at which every free pole is off by kSettledOfMany of its standard deviation.

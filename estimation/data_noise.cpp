@@ -26,6 +26,10 @@ DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
   return noise;
 }
 
+double independent_numbers(const FrfEstimate& frf) {
+  return 2.0 * static_cast<double>(frf.response.size()) / frf.correlated_lines;
+}
+
 bool weighs_by_variance(Weighting weighting) noexcept {
   return weighting == Weighting::noise_variance || weighting == Weighting::total_variance ||
          weighting == Weighting::likelihood;

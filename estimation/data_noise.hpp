@@ -27,6 +27,9 @@ struct DataNoise {
 /// is one. `frf` must outlive the result.
 DataNoise data_noise(const FrfEstimate& frf, Weighting weighting);
 
+/// Real numbers of the response, as many as are independent.
+double independent_numbers(const FrfEstimate& frf);
+
 /// True if the weights claim to be the inverse of the noise's covariance.
 bool weighs_by_variance(Weighting weighting) noexcept;
 

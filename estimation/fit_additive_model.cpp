@@ -17,6 +17,7 @@
 #include "estimation/parameter_covariance.hpp"
 #include "estimation/pole_bounds.hpp"
 #include "estimation/poles.hpp"
+#include "estimation/ranked_fit.hpp"
 #include "estimation/residual.hpp"
 #include "estimation/weight_matrices.hpp"
 #include "excitation/counted.hpp"
@@ -95,30 +96,14 @@ ParameterCovariance free_covariance(const FrfEstimate& frf, const FitOptions& op
       matrices->scatter_factor(), iteration.frozen, options.response_variance);
 }
 
-/// What giving up the free residues cost, and whether noise alone would have.
-std::string rank_decision(const FitProblem& problem, const IterationResult& free,
-                          const LowRankResult& constrained, bool likelihood) {
-  std::string text = fmt::format("residues of the given ranks: cost {:.6g} -> {:.6g}",
-                                 free.end_cost, constrained.iteration.end_cost);
-  if (!likelihood) return text;
-  // Twice the rise of sum W |E|^2 is chi-square distributed where the ranks are right.
-  const double rise =
-      4.0 * static_cast<double>(problem.size()) * (constrained.iteration.end_cost - free.end_cost);
-  const auto given_up = static_cast<double>(problem.parameters() - constrained.parameters);
-  const double sigmas = (rise - given_up) / std::sqrt(2.0 * std::max(given_up, 1.0));
-  return text + fmt::format(", chi-square {:.4g} for {:.0f} parameters given up: {}", rise,
-                            given_up,
-                            sigmas < 3.0 ? "what noise explains"
-                                         : "more than noise explains, the ranks are too low or the "
-                                           "variances too small");
-}
-
 void fill_model(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
                 const FitParameters& beta, FitResult& result) {
   result.model.inputs = frf.inputs;
   result.model.outputs = frf.outputs;
   result.model.sample_rate_hz = frf.sample_rate_hz;
   result.model.hold = options.hold;
+  result.model.fit.band_hz[0] = frf.frequency_hz[0];
+  result.model.fit.band_hz[1] = frf.frequency_hz[frf.lines() - 1];
   fill_submodels(problem, beta, result.model);
   for (std::size_t i = 0; i < beta.a.size(); ++i)
     if (Submodel& s = result.model.submodels[i]; !s.is_mode())
@@ -127,16 +112,14 @@ void fill_model(const FrfEstimate& frf, const FitOptions& options, const FitProb
     result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
 }
 
-void fill_record(const FrfEstimate& frf, const FitOptions& options,
-                 const IterationResult& iteration, double relative_rms, FitResult& result) {
+void fill_record(const FitOptions& options, const IterationResult& iteration, double relative_rms,
+                 FitResult& result) {
   FitRecord& record = result.model.fit;
   record.cost = iteration.end_cost;
   record.weighting = to_string(options.weighting);
   record.iterations = iteration.iterations;
   record.status = to_string(result.status);
   record.relative_rms_error = relative_rms;
-  record.band_hz[0] = frf.frequency_hz[0];
-  record.band_hz[1] = frf.frequency_hz[frf.lines() - 1];
   result.model.cost_history = result.cost;
 }
 
@@ -147,7 +130,12 @@ ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& op
   const bool likelihood = weighs_by_variance(options.weighting);
   LowRankResult constrained =
       iterate_low_rank(problem, beta, options, data_noise(frf, options.weighting));
-  result.decisions.push_back(rank_decision(problem, iteration, constrained, likelihood));
+  if (options.mode_ranks.empty())
+    result.decisions.push_back(rank_decision(iteration.end_cost, constrained.iteration.end_cost,
+                                             2.0 * static_cast<double>(problem.size()),
+                                             problem.parameters() - constrained.parameters,
+                                             likelihood));
+  result.parameters = constrained.parameters;
   constrained.iteration.cost.insert(constrained.iteration.cost.begin(), iteration.cost.begin(),
                                     iteration.cost.end());
   constrained.iteration.iterations += iteration.iterations;
@@ -272,7 +260,8 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   FitResult result;
   result.model = start;
   forget_results(result.model);
-  IterationResult iteration = iterate(problem, beta, options);
+  IterationResult iteration;
+  if (options.mode_ranks.empty()) iteration = iterate(problem, beta, options);
   if (matrices && iteration.status != FitStatus::singular) {
     result.decisions.push_back(
         fmt::format("weight matrices: started from their best diagonal, {} "
@@ -281,6 +270,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
     iteration = iterate(problem, *matrices, beta, options);
   }
   ParameterCovariance covariance;
+  result.parameters = problem.parameters();
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   if (low_rank && iteration.status != FitStatus::singular)
     covariance = constrain_ranks(frf, options, problem, beta, iteration, result);
@@ -297,11 +287,27 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
       covariance = free_covariance(frf, options, problem, matrices, beta, iteration);
     raise(covariance, frf.correlated_lines);
     use_covariance(covariance, weighs_by_variance(options.weighting), result);
+    if (!low_rank)
+      result.residue_ranks = residue_rank_tests(result.model, independent_numbers(frf));
     judge(problem, beta, iteration.end_cost, covariance.globals, iteration.frozen,
           options.judge_modes, result);
   }
-  fill_record(frf, options, iteration, relative_rms, result);
+  fill_record(options, iteration, relative_rms, result);
   return result;
+}
+
+void sort_modes(FitResult& fit) {
+  const std::vector<std::size_t> order = mode_order(fit.model);
+  std::vector<double> removal;
+  std::vector<std::size_t> held;
+  for (std::size_t to = 0; to < order.size(); ++to) {
+    removal.push_back(fit.removal_cost[order[to]]);
+    if (std::find(fit.held.begin(), fit.held.end(), order[to]) != fit.held.end())
+      held.push_back(to);
+  }
+  fit.removal_cost = std::move(removal);
+  fit.held = std::move(held);
+  sort_modes(fit.model);
 }
 
 }  // namespace stageid

@@ -17,4 +17,7 @@ namespace stageid {
 FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
                              const FitOptions& options = {});
 
+/// Searched modes by frequency, behind the other submodels, with what is known of each.
+void sort_modes(FitResult& fit);
+
 }  // namespace stageid

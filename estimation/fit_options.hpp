@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimation/additive_model.hpp"
+#include "estimation/residue_rank_test.hpp"
 #include "estimation/shared_matrix.hpp"
 
 namespace stageid {
@@ -44,6 +45,9 @@ struct FitOptions {
   FitMethod method = FitMethod::riv;
   int residue_rank = 0;     ///< of every mode; 0: free
   int rigid_body_rank = 0;  ///< of the submodel with integrators; 0: free
+  /// Of modes one by one, an entry a submodel, 0: residue_rank. The fit then begins at the start's residues, without
+  /// a fit of free ones, which modes at one place do not have.
+  std::vector<int> mode_ranks = {};
   int max_iterations = 100;
   double gradient_tolerance = 1e-9;  ///< scaled: max_i |e_i| / sqrt(M_ii 2N cost)
   double step_tolerance = 1e-10;     ///< largest relative change of a pole, and of the cost
@@ -73,8 +77,12 @@ struct FitResult {
       model;  ///< the iterate of least cost, with standard deviations where variances are known
   FitStatus status = FitStatus::iteration_limit;
   std::string message = "fit_additive_model was not called";
+  Eigen::Index parameters = 0;         ///< free ones
   std::vector<double> cost;            ///< one entry an iterate, the start first
   std::vector<std::string> decisions;  ///< what an automatic fit chose, and why, in order
+  std::vector<std::string> findings;   ///< of these, what the user should do something about
+  std::vector<ResidueRankTest>
+      residue_ranks;  ///< where residues were free and deviations asked for
   /// By how much sum W |E|^2 (W diagonal, or the best diagonal) would rise without a submodel, the others re-solved; one entry each.
   std::vector<double> removal_cost;
   std::vector<std::size_t> held;  ///< submodels with a pole at a bound, or held by request

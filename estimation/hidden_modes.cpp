@@ -6,6 +6,7 @@
 #include "estimation/data_noise.hpp"
 #include "estimation/model_structure.hpp"
 #include "estimation/numerators.hpp"
+#include "frf/tail_probability.hpp"
 
 namespace stageid {
 namespace {
@@ -13,13 +14,6 @@ namespace {
 constexpr double kPart =
     0.5;  // of the best share: three quarters of the gain, a quarter of the cost
 constexpr double kLargestShare = 0.99;  // of a mode that is taken away
-
-/// P(chi-square with n degrees of freedom > x), by the cube root of Wilson and Hilferty (PNAS 17 (1931)
-/// 684).
-double chi_square_tail(double x, double n) {
-  const double variance = 2.0 / (9.0 * n);
-  return 0.5 * std::erfc((std::cbrt(x / n) - 1.0 + variance) / std::sqrt(2.0 * variance));
-}
 
 }  // namespace
 
@@ -32,7 +26,7 @@ int hold_hidden_modes(const FitResult& fit, Eigen::Index channels, Eigen::Index 
     if (!is_searched_mode(s)) continue;
     const auto numbers =
         static_cast<double>(s.numerator.size() * static_cast<std::size_t>(channels));
-    const double by_noise = chi_square_tail(fit.removal_cost[i] / noise, numbers);
+    const double by_noise = tail_of_chi_square(fit.removal_cost[i] / noise, numbers);
     if (by_noise * static_cast<double>(lines) < 1.0) continue;
     s.frequency_held = s.damping_held = true;
     ++hidden;

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/data_noise.hpp"
+
 namespace stageid {
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
     : lines_(static_cast<double>(frf.lines())),
-      data_(2.0 * static_cast<double>(frf.response.size()) / frf.correlated_lines),
+      data_(independent_numbers(frf)),
       parameters_of_mode_(2.0 + (structure.general_damping ? 2.0 : 1.0) *
                                     static_cast<double>(frf.response.rows())),
       rounding_(kRoundingPower * (weights.array() * frf.response.cwiseAbs2().array()).sum()) {}

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <numbers>
+#include <numeric>
+#include <utility>
 
 #include "estimation/basis.hpp"
 
@@ -55,13 +57,23 @@ int count_modes(const AdditiveModel& model) {
       std::count_if(model.submodels.begin(), model.submodels.end(), is_searched_mode));
 }
 
+std::vector<std::size_t> mode_order(const AdditiveModel& model) {
+  std::vector<std::size_t> order(model.submodels.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) {
+    const Submodel& a = model.submodels[i];
+    const Submodel& b = model.submodels[j];
+    const bool mode = is_searched_mode(a);
+    if (mode != is_searched_mode(b)) return !mode;
+    return mode && a.natural_frequency_hz() < b.natural_frequency_hz();
+  });
+  return order;
+}
+
 void sort_modes(AdditiveModel& model) {
-  std::stable_sort(model.submodels.begin(), model.submodels.end(),
-                   [](const Submodel& a, const Submodel& b) {
-                     const bool mode = is_searched_mode(a);
-                     if (mode != is_searched_mode(b)) return !mode;
-                     return mode && a.natural_frequency_hz() < b.natural_frequency_hz();
-                   });
+  std::vector<Submodel> sorted;
+  for (const std::size_t i : mode_order(model)) sorted.push_back(std::move(model.submodels[i]));
+  model.submodels = std::move(sorted);
 }
 
 Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure) {

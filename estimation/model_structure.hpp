@@ -33,6 +33,9 @@ bool is_searched_mode(const Submodel& submodel) noexcept;
 /// Of them.
 int count_modes(const AdditiveModel& model);
 
+/// The places of the submodels in the order of sort_modes().
+std::vector<std::size_t> mode_order(const AdditiveModel& model);
+
 /// Searched modes by frequency, behind the other submodels.
 void sort_modes(AdditiveModel& model);
 

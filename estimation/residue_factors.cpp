@@ -5,13 +5,16 @@
 namespace stageid {
 namespace {
 
-int rank_of(const FitProblem& problem, const SubmodelShape& shape, const Eigen::VectorXd& a,
+int rank_of(const FitProblem& problem, std::size_t i, const Eigen::VectorXd& a,
             const FitOptions& options) {
+  const SubmodelShape& shape = problem.shapes[i];
   if (shape.integrators > 0) return options.rigid_body_rank;
   if (shape.order != 2 || !(a[1] > 0.0)) return 0;
   const double omega = 1.0 / std::sqrt(a[1]);
   const Eigen::VectorXd& lines = problem.lines.omega_rad_s;
-  return omega > lines.minCoeff() && omega < lines.maxCoeff() ? options.residue_rank : 0;
+  if (!(omega > lines.minCoeff() && omega < lines.maxCoeff())) return 0;
+  const int own = options.mode_ranks.empty() ? 0 : options.mode_ranks[i];
+  return own > 0 ? own : options.residue_rank;
 }
 
 }  // namespace
@@ -24,7 +27,7 @@ ResidueFactors::ResidueFactors(const FitProblem& problem, const FitParameters& b
   size_ = globals_;
   for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
     const SubmodelShape& shape = problem.shapes[i];
-    ranks_.push_back(rank_of(problem, shape, beta.a[i], options));
+    ranks_.push_back(rank_of(problem, i, beta.a[i], options));
     parts_.push_back({ResidueForm(shape, ranks_.back(), n_outputs_, n_inputs_), shape.functions(),
                       function, denominator, size_});
     function += shape.functions();

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "estimation/ranked_fit.hpp"
 #include "excitation/counted.hpp"
 
 namespace stageid {
@@ -178,7 +179,8 @@ class PoleSearch {
 
 /// Continues from `result`, the way there kept.
 void refit(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
-  FitResult next = fit_additive_model(frf, result.model, options);
+  FitResult next = ranked_fit(frf, result.model, options, ModeNumber::given);
+  sort_modes(next);
   next.decisions.insert(next.decisions.begin(), result.decisions.begin(), result.decisions.end());
   next.cost.insert(next.cost.begin(), result.cost.begin(), result.cost.end());
   next.model.cost_history = next.cost;

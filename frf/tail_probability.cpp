@@ -44,6 +44,11 @@ double tail_of_evidence(double h, Eigen::Index K) {
   return std::min(1.0, sum);
 }
 
+double tail_of_chi_square(double x, double n) {
+  const double variance = 2.0 / (9.0 * n);
+  return tail_of_normal((std::cbrt(x / n) - 1.0 + variance) / std::sqrt(variance));
+}
+
 double tail_of_normal(double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); }
 
 }  // namespace stageid

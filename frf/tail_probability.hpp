@@ -12,6 +12,9 @@ double log_tail_of_f(double x, int a, double b);
 /// chi-square variable with 2 K degrees of freedom. 1 if K is 0.
 double tail_of_evidence(double h, Eigen::Index K);
 
+/// P(chi-square with n degrees of freedom > x), by the cube root of Wilson and Hilferty (PNAS 17 (1931) 684).
+double tail_of_chi_square(double x, double n);
+
 /// P(Z > z) of a standard normal variable.
 double tail_of_normal(double z);
 

@@ -99,8 +99,11 @@ void FitCommand::run() const {
                    {"relative_rms_error", result.model.fit.relative_rms_error},
                    {"cost", result.cost},
                    {"decisions", result.decisions},
+                   {"findings", result.findings},
                    {"modes", modes_json(result.model)},
                    {"seconds", step.seconds}});
+  for (const std::string& finding : result.findings)
+    console_.warning(fmt::format("{}: {}", output_.string(), finding));
   if (!result.trustworthy())
     console_.warning(fmt::format(
         "{}: {}{}; the model is written, do not trust it before you know why", output_.string(),

@@ -22,6 +22,13 @@ TEST(TailProbability, OfEvidenceIsThatOfScipy) {
   EXPECT_EQ(tail_of_evidence(3.0, 0), 1.0);
 }
 
+// scipy.stats.chi2.sf(x, n), to the accuracy of Wilson and Hilferty.
+TEST(TailProbability, OfChiSquareIsThatOfScipy) {
+  EXPECT_NEAR(tail_of_chi_square(4.0, 4.0), 0.40600584970983794, 2e-3);
+  EXPECT_NEAR(tail_of_chi_square(52.0, 36.0), 0.04110463210330187, 1e-4);
+  EXPECT_NEAR(std::log(tail_of_chi_square(38.0, 4.0)), -16.00426772644601, 0.3);
+}
+
 TEST(TailProbability, AgreesWithClosedForms) {
   // F(2, 2 b): P(F > x) = (1 + x / b)^-b. Chi-square with two degrees of freedom: exp(-h).
   EXPECT_NEAR(log_tail_of_f(2.5, 1, 7.0), -7.0 * std::log1p(2.5 / 7.0), 1e-14);
