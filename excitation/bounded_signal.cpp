@@ -6,6 +6,14 @@
 
 namespace stageid {
 
+Eigen::VectorXd below_band_hz(const FrequencyGrid& grid) {
+  const Eigen::Index halves = 2 * static_cast<Eigen::Index>(grid.lines().front()) - 1;
+  Eigen::VectorXd frequency_hz(halves);
+  for (Eigen::Index i = 0; i < halves; ++i)
+    frequency_hz[i] = 0.5 * static_cast<double>(i + 1) * grid.resolution_hz();
+  return frequency_hz;
+}
+
 std::complex<double> kind_factor(SignalKind kind, double frequency_hz, double sample_rate_hz) {
   const double omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
   switch (kind) {

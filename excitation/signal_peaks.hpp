@@ -12,7 +12,7 @@ namespace stageid {
 /// The largest that a signal becomes in some runs.
 struct SignalPeak {
   double steady = 0.0;     ///< bound on |x(t)| over all t, in steady state
-  double from_rest = 0.0;  ///< largest |x[n]| of the first period, begun at rest
+  double from_rest = 0.0;  ///< largest |x[n]| of the first period, begun at rest, with its margin
   double rms = 0.0;        ///< over the window of the signal's limit, steady state
   double peak() const { return steady > from_rest ? steady : from_rest; }
   void include(const SignalPeak& other);
@@ -25,8 +25,8 @@ struct SignalPeak {
 /// polynomial stays above M cos(l t)). m is 8 l or more, so that the bound is at most 8 % high, in
 /// effect less than 1 %, as the largest of some thousand maxima hardly ever lies between the samples.
 ///
-/// From rest: x = h * (r 1(t >= 0)), h from the transfer, interpolated linearly between the lines and held
-/// constant beyond them, over two periods with r in the first: what has not died out after a period
+/// From rest: x = h * (r 1(t >= 0)), h from the transfer, interpolated between the lines, below
+/// them as the signal tells, held constant above them, over two periods with r in the first: what has not died out after a period
 /// wraps round.
 class SignalPredictor {
  public:

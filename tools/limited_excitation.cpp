@@ -21,6 +21,10 @@ using Eigen::MatrixXd;
 // of the excitation.
 constexpr double kDeviations = 6.0;
 
+// Of the first period from rest: the noise of a pilot, and that of the run beyond what a steady state's
+// bound between the samples covers.
+constexpr double kRestMargin = 0.02;
+
 std::vector<Index> actuators_of(const ExperimentSpec& experiment, const StageInfo& stage,
                                 const PlantPrior& prior) {
   std::vector<Index> indices;
@@ -68,24 +72,38 @@ class LoopTransfers {
     const MotionController controller(stage.controller);
     for (Index k = 0; k < grid.size(); ++k)
       add_line(k, controller.response(grid.frequency_hz()[k]));
+    if (prior.below_band.empty()) return;
+    const Eigen::VectorXd below_hz = below_band_hz(grid);
+    below_u.assign(stage.info.actuators.size(), MatrixXcd(n, below_hz.size()));
+    below_y.assign(stage.info.sensors.size(), MatrixXcd(n, below_hz.size()));
+    for (Index b = 0; b < below_hz.size(); ++b)
+      add_transfers(b, prior.below_band[static_cast<std::size_t>(b)],
+                    controller.response(below_hz[b]), below_u, below_y);
   }
 
-  std::vector<MatrixXcd> to_u, to_y;  ///< a channel: axes x lines
+  std::vector<MatrixXcd> to_u, to_y;        ///< a channel: axes x lines
+  std::vector<MatrixXcd> below_u, below_y;  ///< axes x below_band_hz(), or nothing
   MatrixXd cost;
   Eigen::VectorXd u_noise, slew_noise, y_noise, velocity_noise;  ///< mean squares
 
  private:
-  void add_line(Index k, const MatrixXcd& K) {
-    const MatrixXcd& G = prior_.response[static_cast<std::size_t>(k)];
+  /// @returns S on the excited axes
+  MatrixXcd add_transfers(Index column, const MatrixXcd& G, const MatrixXcd& K,
+                          std::vector<MatrixXcd>& u, std::vector<MatrixXcd>& y) const {
     const MatrixXcd S_all =
         (MatrixXcd::Identity(K.rows(), K.rows()) - K * G).partialPivLu().inverse();
     const MatrixXcd S = S_all(Eigen::all, axes_);
     const MatrixXcd Y = G * S;
     for (Index i = 0; i < S.rows(); ++i)
-      to_u[static_cast<std::size_t>(i)].col(k) = S.row(i).transpose();
+      u[static_cast<std::size_t>(i)].col(column) = S.row(i).transpose();
     for (Index i = 0; i < Y.rows(); ++i)
-      to_y[static_cast<std::size_t>(i)].col(k) = Y.row(i).transpose();
+      y[static_cast<std::size_t>(i)].col(column) = Y.row(i).transpose();
+    return S;
+  }
 
+  void add_line(Index k, const MatrixXcd& K) {
+    const MatrixXcd& G = prior_.response[static_cast<std::size_t>(k)];
+    const MatrixXcd S = add_transfers(k, G, K, to_u, to_y);
     const MatrixXcd inverse = MatrixXcd(S(axes_, Eigen::all)).partialPivLu().inverse();
     double relative = 0.0;
     for (const Index i : outputs_) {
@@ -147,6 +165,7 @@ void add_actuator(BoundedLoop& loop, const LoopTransfers& transfers, const Wafer
   BoundedSignal u;
   u.name = channel.name;
   u.transfer = transfers.to_u[i];
+  if (!transfers.below_u.empty()) u.below_band = transfers.below_u[i];
   BoundedSignal slew = u;
   u.peak_limit = limit_of(stage.limits.actuator_n, i);
   u.rms_limit = limit_of(stage.limits.thermal_rms_n, i);
@@ -165,6 +184,7 @@ void add_sensor(BoundedLoop& loop, const LoopTransfers& transfers, const WaferSt
   BoundedSignal y;
   y.name = channel.name;
   y.transfer = transfers.to_y[i];
+  if (!transfers.below_y.empty()) y.below_band = transfers.below_y[i];
   BoundedSignal velocity = y;
   y.peak_limit = limit_of(stage.limits.position_window_m, i);
   y.reserve = reserve_of(transfers.y_noise, i);
@@ -187,6 +207,8 @@ BoundedLoop bounded_loop(const FrequencyGrid& grid, const ExperimentSpec& experi
   BoundedLoop loop;
   loop.cost = transfers.cost;
   loop.noise_known = prior.noise_density.size() > 0;
+  loop.extrapolated_below_hz = prior.extrapolated_below_hz;
+  loop.extrapolation_misfit = prior.extrapolation_misfit;
   for (std::size_t i = 0; i < stage.info.actuators.size(); ++i)
     add_actuator(loop, transfers, stage, i);
   for (std::size_t i = 0; i < stage.info.sensors.size(); ++i) {
@@ -195,6 +217,8 @@ BoundedLoop bounded_loop(const FrequencyGrid& grid, const ExperimentSpec& experi
     else if (stage.limits.position_window_m.size() > 0)
       loop.unknown.push_back(stage.info.sensors[i].name);
   }
+  for (BoundedSignal& signal : loop.signals)
+    signal.rest_margin = kRestMargin + prior.extrapolation_misfit;
   return loop;
 }
 

@@ -21,13 +21,16 @@ struct BoundedLoop {
   /// Of no absolute meaning where the prior does not know the noise.
   Eigen::MatrixXd cost;
   bool noise_known = false;
+  double extrapolated_below_hz = 0.0;  ///< of the prior
+  double extrapolation_misfit = 0.0;   ///< of the prior
 };
 
 /// Builds it from the prior and the controller:
 ///   u = S r, S = (I - K G)^-1 on the excited actuators, y = G u;
 ///   Var(G_ij) = C_ii sum_p |(S^-1)_jp|^2 4 / (n P M A_p^2),
 /// and of the noise v in y: (I - G K)^-1 v and K (I - G K)^-1 v, six standard deviations of which are the
-/// signals' reserve, above the band with the highest line's density.
+/// signals' reserve, above the band with the highest line's density. The peak from rest gets a margin of 2 %,
+/// and of what the prior's extrapolation below its lines leaves of them.
 /// @param outputs   sensors of the response that is wanted; empty: all that the prior knows
 /// @param velocity_m_s  limit of every sensor's velocity; empty: none
 /// @throws std::invalid_argument naming an axis that the stage or the prior lacks, or an unknown output.

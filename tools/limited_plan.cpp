@@ -15,6 +15,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr double kDoubtfulMisfit = 0.05;
+
 const char* quantity(SignalKind kind) {
   constexpr const char* kNames[] = {"value", "slew", "velocity"};
   return kNames[static_cast<std::size_t>(kind)];
@@ -39,8 +41,8 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config) {
         request.prior.string(), config.file.string()));
   const ExperimentPlan outline = outline_plan(config);
   const WaferStageSpec& stage = config.stage.spec;
-  const PlantPrior prior =
-      read_plant_prior(request.prior, stage.info, outline.grid().frequency_hz());
+  const PlantPrior prior = read_plant_prior(
+      request.prior, stage.info, outline.grid().frequency_hz(), below_band_hz(outline.grid()));
   Eigen::VectorXd velocity_m_s;
   if (request.velocity_m_s > 0.0)
     velocity_m_s.setConstant(static_cast<Eigen::Index>(stage.info.sensors.size()),
@@ -89,6 +91,11 @@ std::vector<std::string> limited_table(const LimitedPlan& limited, double accura
   if (!limited.loop.unknown.empty())
     lines.push_back(fmt::format("not predicted, as the prior does not show them: {}",
                                 fmt::join(limited.loop.unknown, ", ")));
+  if (limited.loop.extrapolation_misfit > kDoubtfulMisfit)
+    lines.push_back(fmt::format(
+        "from rest in doubt: below {:.4g} Hz the prior shows nothing, and its lowest lines are no "
+        "rigid body (misfit {:.0f} %); measure a pilot from a lower frequency on",
+        limited.loop.extrapolated_below_hz, 100.0 * limited.loop.extrapolation_misfit));
   if (!limited.loop.noise_known) {
     lines.push_back("the prior does not tell the noise: no accuracy can be foretold");
     return lines;
@@ -116,6 +123,9 @@ Json limited_json(const LimitedPlan& limited, double accuracy) {
     if (std::isfinite(signal.rms_limit)) entry["rms_limit"] = signal.rms_limit;
     json["signals"].push_back(std::move(entry));
   }
+  if (limited.loop.extrapolated_below_hz > 0.0)
+    json["extrapolated"] = {{"below_hz", limited.loop.extrapolated_below_hz},
+                            {"misfit", limited.loop.extrapolation_misfit}};
   if (!limited.loop.noise_known) return json;
   json["relative_variance"] = final_variance(limited);
   if (accuracy > 0.0) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "estimation/additive_model.hpp"
@@ -13,6 +14,7 @@
 #include "excitation/file_error.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/hold_compensation.hpp"
+#include "tools/low_frequency_plant.hpp"
 #include "tools/stage_config.hpp"
 
 namespace stageid {
@@ -128,9 +130,13 @@ Eigen::MatrixXd noise_density(const FrfEstimate& frf) {
 }  // namespace
 
 PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& stage,
-                            const Eigen::VectorXd& frequency_hz) {
-  const FrfEstimate frf = file.extension() == ".json" ? prior_of_model(file, stage, frequency_hz)
-                                                      : prior_of_frf(file, stage, frequency_hz);
+                            const Eigen::VectorXd& frequency_hz,
+                            const Eigen::VectorXd& below_band_hz) {
+  const bool of_model = file.extension() == ".json";
+  Eigen::VectorXd asked_hz(below_band_hz.size() + frequency_hz.size());
+  asked_hz << below_band_hz, frequency_hz;
+  const FrfEstimate frf =
+      of_model ? prior_of_model(file, stage, asked_hz) : prior_of_frf(file, stage, frequency_hz);
   const std::vector<Index> sensors = places(file, frf.outputs, stage.sensors, "sensor");
   const std::vector<Index> actuators = places(file, frf.inputs, stage.actuators, "actuator");
   PlantPrior prior;
@@ -140,19 +146,32 @@ PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& 
   for (const Index j : actuators) prior.actuator_known[static_cast<std::size_t>(j)] = true;
   const auto n_y = static_cast<Index>(stage.sensors.size());
   const auto n_u = static_cast<Index>(stage.actuators.size());
-  const Eigen::MatrixXd density = noise_density(frf);
-  if (density.size() > 0) prior.noise_density.setZero(n_y, frequency_hz.size());
-  for (Index k = 0; k < frequency_hz.size(); ++k) {
-    const Between at = between(frf.frequency_hz, frequency_hz[k]);
-    const Eigen::VectorXcd G = interpolated(frf.response, at);
+
+  std::optional<LowFrequencyPlant> low;
+  if (asked_hz[0] < frf.frequency_hz[0]) {
+    low.emplace(frf, stage, sensors, actuators);
+    prior.extrapolated_below_hz = frf.frequency_hz[0];
+    prior.extrapolation_misfit = low->misfit();
+  }
+  const auto response = [&](double f_hz) {
+    const Eigen::VectorXcd G = f_hz < frf.frequency_hz[0]
+                                   ? low->response(f_hz)
+                                   : interpolated(frf.response, between(frf.frequency_hz, f_hz));
     Eigen::MatrixXcd whole = Eigen::MatrixXcd::Zero(n_y, n_u);
     for (Index j = 0; j < frf.n_inputs(); ++j)
       for (Index i = 0; i < frf.n_outputs(); ++i)
         whole(sensors[static_cast<std::size_t>(i)], actuators[static_cast<std::size_t>(j)]) =
             G[i + frf.n_outputs() * j];
-    prior.response.push_back(std::move(whole));
-    if (density.size() == 0) continue;
-    const Eigen::VectorXd noise = interpolated(density, at);
+    return whole;
+  };
+  for (const double f_hz : below_band_hz) prior.below_band.push_back(response(f_hz));
+  for (const double f_hz : frequency_hz) prior.response.push_back(response(f_hz));
+
+  const Eigen::MatrixXd density = noise_density(frf);
+  if (density.size() == 0) return prior;
+  prior.noise_density.setZero(n_y, frequency_hz.size());
+  for (Index k = 0; k < frequency_hz.size(); ++k) {
+    const Eigen::VectorXd noise = interpolated(density, between(frf.frequency_hz, frequency_hz[k]));
     for (Index i = 0; i < frf.n_outputs(); ++i)
       prior.noise_density(sensors[static_cast<std::size_t>(i)], k) = noise[i];
   }

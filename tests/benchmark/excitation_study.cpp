@@ -195,9 +195,10 @@ bool design_within(const Study& study) {
   spec.experiment = study.spec(ExcitationScheme::orthogonal_dft, 1.0, 5);
   spec.experiment.realizations = study.realizations;
   spec.experiment.crest_iterations = study.iterations;
-  const BoundedLoop loop = bounded_loop(
-      grid, spec.experiment, study.stage,
-      read_plant_prior(directory / "pilot.h5", study.stage.info, grid.frequency_hz()), {}, {});
+  const BoundedLoop loop = bounded_loop(grid, spec.experiment, study.stage,
+                                        read_plant_prior(directory / "pilot.h5", study.stage.info,
+                                                         grid.frequency_hz(), below_band_hz(grid)),
+                                        {}, {});
   spec.cost = loop.cost;
   spec.signals = loop.signals;
   const auto start = Clock::now();

@@ -113,6 +113,65 @@ TEST(SignalPeaks, TheFirstPeriodFromRestIsThatOfASimulation) {
   }
 }
 
+/// x[n] = a x[n-1] + b x[n-2] + r[n], poles 0.98 exp(+-j 2 pi 10 Hz / fs): its transfer is
+/// 1 / (1 - a z^-1 - b z^-2).
+struct Swinging {
+  const double a = 2.0 * 0.98 * std::cos(2.0 * std::numbers::pi * 10.0 / kRate_hz);
+  const double b = -0.98 * 0.98;
+
+  std::complex<double> transfer(double f_hz) const {
+    const auto z = std::polar(1.0, -2.0 * std::numbers::pi * f_hz / kRate_hz);
+    return 1.0 / (1.0 - a * z - b * z * z);
+  }
+  /// Largest of the first period from rest.
+  double largest(const Eigen::VectorXd& r) const {
+    double largest = 0.0;
+    double x[2] = {0.0, 0.0};
+    for (const double sample : r) {
+      const double now = a * x[0] + b * x[1] + sample;
+      x[1] = x[0];
+      x[0] = now;
+      largest = std::max(largest, std::abs(now));
+    }
+    return largest;
+  }
+};
+
+// A loop that swings at 10 Hz, which a band from 50 Hz on does not show: started at rest it moves up to
+// three times as far as the band foretells, and the transfer below the band tells how far.
+TEST(SignalPeaks, BelowTheBandTheFirstPeriodFromRestIsThatOfASimulationToo) {
+  const FrequencyGrid grid =
+      FrequencyGrid::band(kRate_hz, kPeriod, {.low_hz = 50.0, .high_hz = 200.0});
+  ExperimentSpec spec = plan_of(grid).spec();
+  spec.realizations = 4;
+  const ExperimentPlan plan(grid, spec);
+  const Swinging loop;
+  BoundedSignal blind;
+  blind.transfer.resize(2, grid.size());
+  for (Index k = 0; k < grid.size(); ++k)
+    blind.transfer.col(k).setConstant(loop.transfer(grid.frequency_hz()[k]));
+  BoundedSignal seeing = blind;
+  const Eigen::VectorXd below_hz = below_band_hz(grid);
+  ASSERT_EQ(below_hz.size(), 2 * grid.lines().front() - 1);
+  seeing.below_band.resize(2, below_hz.size());
+  for (Index i = 0; i < below_hz.size(); ++i) {
+    EXPECT_DOUBLE_EQ(below_hz[i], 0.5 * static_cast<double>(i + 1) * grid.resolution_hz());
+    seeing.below_band.col(i).setConstant(loop.transfer(below_hz[i]));
+  }
+  BoundedSignal careful = seeing;
+  careful.rest_margin = 0.1;
+  SignalPredictor predictor(grid);
+  double least = 1.0;
+  for (const RunId run : plan.runs()) {
+    const double value = loop.largest(plan.excitation(run).rowwise().sum());
+    const auto peaks = predictor.predict({blind, seeing, careful}, plan.spectrum(run));
+    least = std::min(least, peaks[0].peak() / value);
+    EXPECT_NEAR(peaks[1].from_rest, value, 0.01 * value);
+    EXPECT_DOUBLE_EQ(peaks[2].from_rest, 1.1 * peaks[1].from_rest);
+  }
+  EXPECT_LT(least, 0.6);
+}
+
 // Of a sine the window's mean square ripples: m = A^2/2 (1 + |1 / (1 + j 2 omega tau)|).
 TEST(SignalPeaks, TheWindowedRmsOfASineIsTheKnownOne) {
   constexpr int kSamples = 20000;

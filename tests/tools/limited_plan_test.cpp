@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "acquisition/log_reader.hpp"
 #include "excitation/file_error.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/relative_variance.hpp"
@@ -58,6 +59,90 @@ TEST_F(LimitedPlanTest, WhatIsForetoldFromThePilotHolds) {
   // The pilot of 1.5 s knows the noise of a line from some 20 lines, and its own noise is in |G|.
   EXPECT_GT(reached, variance / 1.6);
   EXPECT_LT(reached, variance * 1.6);
+}
+
+/// Largest |y| of all runs of a log.
+Eigen::VectorXd largest_position(const std::filesystem::path& file) {
+  const auto log = open_log(file);
+  Eigen::VectorXd largest =
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(log->info().sensors.names.size()));
+  LogSamples samples;
+  for (std::size_t run = 0; run < log->runs().size(); ++run) {
+    log->read(run, 0, log->runs()[run].samples, samples);
+    largest = largest.cwiseMax(samples.sensors.cwiseAbs().colwise().maxCoeff().transpose());
+  }
+  return largest;
+}
+
+// A position window binds in the first period, where what lies below the band swings: the loop at 20 Hz,
+// of which a band from 50 Hz on shows nothing, and a pilot from 50 Hz on no more.
+TEST_F(LimitedPlanTest, PositionsFromRestAreForetoldBelowTheBandToo) {
+  const std::string stage = read_bytes(at("small_stage.yaml"));
+  for (const char* pilot_band : {"[4, 800]", "[52, 800]"}) {
+    const std::string pilot = read_bytes(at("small_stage_pilot.yaml"));
+    write_bytes(at("small_stage_pilot.yaml"), replaced(pilot, "[4, 800]", pilot_band));
+    make_pilot();
+    write_bytes(at("small_stage_pilot.yaml"), pilot);
+    write_bytes(at("small_stage.yaml"), replaced(stage, "window_m: 1e-3", "window_m: 3e-6"));
+    const std::string narrow = variant("[16, 800]", "[52, 800]");
+    const Json design = Json::parse(succeed({"design", narrow, "-o", name("e.h5"), "--json"}).out);
+    succeed(
+        {"run", narrow, "--excitation", name("e.h5"), "-o", name("r.slog")});  // nothing was hit
+    const Eigen::VectorXd reached = largest_position(at("r.slog"));
+    double most = 0.0;
+    for (const Json& signal : design["signals"]) {
+      if (signal["of"] != "value" || signal["unit"] != "m") continue;
+      const double foretold = signal["peak_from_rest"];
+      EXPECT_GT(foretold, signal["peak"].get<double>());
+      const double y = reached[signal["name"] == "s1" ? 0 : 1];
+      EXPECT_LT(y, foretold + signal["reserve"].get<double>());
+      EXPECT_GT(y, 0.9 * foretold);
+      most = std::max(most, signal["used"].get<double>());
+    }
+    EXPECT_NEAR(most, 0.9, 1e-6);
+    EXPECT_EQ(design.contains("extrapolated"), true);
+    for (const char* file : {"pilot.slog", "r.slog"}) std::filesystem::remove(at(file));
+    write_bytes(at("small_stage.yaml"), stage);
+  }
+}
+
+// Against the exact sampled plant of the stage, far below the lines that are known.
+TEST_F(LimitedPlanTest, BelowItsLinesAPriorIsARigidBodyWithCompliance) {
+  const WaferStageSpec stage = load_stage_config(at("small_stage.yaml")).spec;
+  const auto exact = [&](double f_hz) {
+    return sampled_response(wafer_stage_modes(stage), stage.delay_s, stage.info.sample_rate_hz,
+                            f_hz);
+  };
+  FrfEstimate frf;
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(60, 50.0, 286.0);  // over the modes from 170 Hz on
+  frf.inputs = {{"a1", "a2", "a3"}, {"N", "N", "N"}};
+  frf.outputs = {{"s1", "s2"}, {"m", "m"}};
+  frf.response.resize(6, frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k)
+    frf.response.col(k) = exact(frf.frequency_hz[k]).reshaped();
+  frf.sample_rate_hz = stage.info.sample_rate_hz;
+  frf.hold = Hold::zoh;
+  write_frf(at("prior.h5"), frf);
+  const Eigen::VectorXd below{{5.0, 20.0, 40.0}};
+  const Eigen::VectorXd lines{{60.0, 100.0}};
+  const PlantPrior prior = read_plant_prior(at("prior.h5"), stage.info, lines, below);
+  EXPECT_EQ(prior.extrapolated_below_hz, 50.0);
+  EXPECT_LT(prior.extrapolation_misfit, 0.02);
+  for (Eigen::Index b = 0; b < below.size(); ++b) {
+    const Eigen::MatrixXcd G = exact(below[b]);
+    EXPECT_LT((prior.below_band[static_cast<std::size_t>(b)] - G).norm(), 0.03 * G.norm());
+  }
+  const PlantPrior all = read_plant_prior(at("prior.h5"), stage.info, lines);
+  EXPECT_EQ(all.extrapolated_below_hz, 0.0);
+  EXPECT_TRUE(all.below_band.empty());
+
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(60, 150.0, 209.0);  // nothing of the rigid body
+  for (Eigen::Index k = 0; k < frf.lines(); ++k)
+    frf.response.col(k) = exact(frf.frequency_hz[k]).reshaped();
+  write_frf(at("prior.h5"), frf);
+  const PlantPrior doubtful =
+      read_plant_prior(at("prior.h5"), stage.info, Eigen::VectorXd{{160.0, 180.0}}, below);
+  EXPECT_GT(doubtful.extrapolation_misfit, 0.05);
 }
 
 TEST_F(LimitedPlanTest, RunEndsWhenTheVarianceIsReachedAndGoesOnWithResume) {
