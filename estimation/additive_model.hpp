@@ -33,6 +33,13 @@ struct PoleEstimate {
   std::optional<double> damping_ratio_std = {};
 };
 
+/// Standard deviations of what mode_shapes() tells of a mode, to first order.
+struct ModeShapeDeviation {
+  Eigen::VectorXcd output_shape;  ///< of the real parts, and of the imaginary parts
+  Eigen::VectorXcd input_shape;
+  double modal_mass = 0.0;
+};
+
 /// P_i(s) = (B_0 + B_1 s + ...) / (s^integrators (1 + a_1 s + ...)), s in rad/s.
 struct Submodel {
   int integrators = 0;
@@ -42,6 +49,7 @@ struct Submodel {
   // Filled by a fit, where they apply.
   std::optional<double> natural_frequency_std_hz;
   std::optional<double> damping_ratio_std;
+  std::optional<ModeShapeDeviation> shape_std = {};
   std::optional<int> residue_rank = {};  ///< that the numerators were held at; none: free
   std::vector<PoleEstimate> poles = {};  ///< of a submodel with poles that is no mode, rising
 

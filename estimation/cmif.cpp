@@ -6,7 +6,9 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "frf/dc_line.hpp"
 #include "frf/order_statistic.hpp"
+#include "frf/worker_pool.hpp"
 
 namespace stageid {
 namespace {
@@ -29,23 +31,17 @@ Eigen::MatrixXcd weighted_response(const FrfEstimate& frf, CmifKind kind, Eigen:
   return G;
 }
 
-struct Decomposition {
-  Eigen::MatrixXd curves;                 ///< squared singular values, curves x N
-  std::vector<Eigen::MatrixXcd> vectors;  ///< left singular vectors a line
-};
+/// Not taller than wide.
+Eigen::MatrixXcd wide_response(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
+  Eigen::MatrixXcd G = weighted_response(frf, kind, k);
+  if (G.rows() > G.cols()) G.transposeInPlace();
+  return G;
+}
 
-Decomposition decompose(const FrfEstimate& frf, CmifKind kind, bool with_vectors) {
-  Decomposition out;
-  const Eigen::Index curves = std::min(frf.n_outputs(), frf.n_inputs());
-  out.curves.resize(curves, frf.lines());
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    Eigen::MatrixXcd G = weighted_response(frf, kind, k);
-    if (G.rows() > G.cols()) G.transposeInPlace();
-    const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(G, with_vectors ? Eigen::ComputeThinU : 0);
-    out.curves.col(k) = svd.singularValues().head(curves).cwiseAbs2();
-    if (with_vectors) out.vectors.push_back(svd.matrixU());
-  }
-  return out;
+/// Left singular vectors of a line: of all lines they would be as large as the response.
+Eigen::MatrixXcd shapes(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
+  return Eigen::BDCSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k), Eigen::ComputeThinU)
+      .matrixU();
 }
 
 /// How far a peak stands above the higher of the two valleys around it, in dB of power.
@@ -86,14 +82,16 @@ double half_power_damping(const Eigen::VectorXd& f,
 
 /// A peak of a lower curve that only mirrors a crossing: the curve above dips there and the shapes
 /// swap.
-bool is_crossing(const Decomposition& d, Eigen::Index curve, Eigen::Index k) {
-  if (curve == 0 || k == 0 || k + 1 >= d.curves.cols()) return false;
+bool is_crossing(const FrfEstimate& frf, CmifKind kind, const Eigen::MatrixXd& curves,
+                 Eigen::Index curve, Eigen::Index k) {
+  if (curve == 0 || k == 0 || k + 1 >= curves.cols()) return false;
   const double gap_db =
-      10.0 * std::log10(d.curves(curve - 1, k) / std::max(d.curves(curve, k), 1e-300));
+      10.0 * std::log10(curves(curve - 1, k) / std::max(curves(curve, k), 1e-300));
   if (gap_db > 3.0) return false;
+  const Eigen::MatrixXcd before = shapes(frf, kind, k - 1);
+  const Eigen::MatrixXcd after = shapes(frf, kind, k + 1);
   const auto mac = [&](Eigen::Index i, Eigen::Index j) {
-    return std::norm(d.vectors[static_cast<std::size_t>(k - 1)].col(i).dot(
-        d.vectors[static_cast<std::size_t>(k + 1)].col(j)));
+    return std::norm(before.col(i).dot(after.col(j)));
   };
   return mac(curve, curve - 1) > 0.5 && mac(curve - 1, curve) > 0.5;
 }
@@ -132,24 +130,32 @@ bool above_scatter(const Eigen::RowVectorXd& curve_db, Eigen::Index peak) {
 }  // namespace
 
 Eigen::MatrixXd cmif(const FrfEstimate& frf, CmifKind kind) {
-  return decompose(frf, kind, false).curves;
+  Eigen::MatrixXd curves(std::min(frf.n_outputs(), frf.n_inputs()), frf.lines());
+  for_each_line(worker_count(0), frf.lines(), [&](Eigen::Index k) {
+    curves.col(k) = Eigen::BDCSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k))
+                        .singularValues()
+                        .head(curves.rows())
+                        .cwiseAbs2();
+  });
+  return curves;
 }
 
 std::vector<ModeCandidate> pick_modes(const FrfEstimate& frf, const PeakOptions& options) {
-  const Decomposition d = decompose(frf, options.kind, true);
+  if (has_dc_line(frf)) return pick_modes(without_dc_line(frf), options);
+  const Eigen::MatrixXd curves = cmif(frf, options.kind);
   struct Peak {
     ModeCandidate mode;
     double prominence;
   };
   std::vector<Peak> peaks;
-  for (Eigen::Index c = 0; c < d.curves.rows(); ++c) {
-    const Eigen::RowVectorXd curve = d.curves.row(c);
+  for (Eigen::Index c = 0; c < curves.rows(); ++c) {
+    const Eigen::RowVectorXd curve = curves.row(c);
     const Eigen::RowVectorXd curve_db = 10.0 * curve.array().max(1e-300).log10();
     for (Eigen::Index k = 1; k + 1 < curve.size(); ++k) {
       if (!(curve[k] > curve[k - 1] && curve[k] >= curve[k + 1])) continue;
       const double prominence = prominence_db(curve, k);
       if (prominence < options.minimum_prominence_db || !above_scatter(curve_db, k) ||
-          is_crossing(d, c, k))
+          is_crossing(frf, options.kind, curves, c, k))
         continue;
       peaks.push_back({{frf.frequency_hz[k], half_power_damping(frf.frequency_hz, curve, k),
                         static_cast<int>(c) + 1},

@@ -34,7 +34,7 @@ struct PeakOptions {
 };
 
 /// Peaks of the CMIF curves that are modes: prominent, not the crossing of two curves, damping from
-/// the half-power width. By frequency.
+/// the half-power width. By frequency. A line at 0 Hz is left out.
 std::vector<ModeCandidate> pick_modes(const FrfEstimate& frf, const PeakOptions& options = {});
 
 /// modes.json as in docs/formats.md. @throws FileError, FormatError

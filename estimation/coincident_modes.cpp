@@ -117,19 +117,13 @@ std::optional<TiedModel> with_parted(const FrfEstimate& frf, const TiedModel& ti
 }
 
 void split_tied(const std::vector<int>& ranks, FitResult& fit) {
-  std::vector<Submodel> submodels;
-  std::vector<double> removal;
-  std::vector<std::size_t> held;
+  std::vector<std::size_t> sources;
+  std::vector<Submodel> parts;
   for (std::size_t i = 0; i < ranks.size(); ++i) {
-    const bool is_held = std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end();
-    const auto keep = [&](Submodel s) {
-      if (is_held) held.push_back(submodels.size());
-      submodels.push_back(std::move(s));
-      removal.push_back(fit.removal_cost[i]);
-    };
     const Submodel& whole = fit.model.submodels[i];
     if (ranks[i] < 2) {
-      keep(whole);
+      sources.push_back(i);
+      parts.push_back(whole);
       continue;
     }
     const Eigen::JacobiSVD<Eigen::MatrixXd> svd(whole.numerator[0],
@@ -141,12 +135,12 @@ void split_tied(const std::vector<int>& ranks, FitResult& fit) {
           svd.singularValues()[k] * svd.matrixU().col(k) * svd.matrixV().col(k).transpose();
       part.numerator_std.clear();
       part.residue_rank = 1;
-      keep(std::move(part));
+      sources.push_back(i);
+      parts.push_back(std::move(part));
     }
   }
-  fit.model.submodels = std::move(submodels);
-  fit.removal_cost = std::move(removal);
-  fit.held = std::move(held);
+  rearrange(sources, fit);
+  fit.model.submodels = std::move(parts);
 }
 
 }  // namespace stageid

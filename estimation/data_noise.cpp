@@ -35,10 +35,18 @@ bool weighs_by_variance(Weighting weighting) noexcept {
          weighting == Weighting::likelihood;
 }
 
+bool has_no_weight(const FitProblem& problem, Eigen::Index channel) {
+  return !(problem.W->row(channel).maxCoeff() > 0.0);
+}
+
 double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters) {
-  const double data = static_cast<double>(problem.size() * problem.channels());
+  Eigen::Index weighted = 0;
+  for (Eigen::Index c = 0; c < problem.channels(); ++c)
+    weighted += has_no_weight(problem, c) ? 0 : 1;
+  const Eigen::Index without = (problem.channels() - weighted) * problem.functions();
+  const double data = static_cast<double>(problem.size() * weighted);
   return 2.0 * static_cast<double>(problem.size()) * cost /
-         std::max(data - 0.5 * static_cast<double>(parameters), 1.0);
+         std::max(data - 0.5 * static_cast<double>(parameters - without), 1.0);
 }
 
 double residual_scale(double per_degree, bool likelihood) {

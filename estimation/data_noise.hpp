@@ -33,6 +33,9 @@ double independent_numbers(const FrfEstimate& frf);
 /// True if the weights claim to be the inverse of the noise's covariance.
 bool weighs_by_variance(Weighting weighting) noexcept;
 
+/// Whether a channel's weight is zero on all lines: the data say nothing of it.
+bool has_no_weight(const FitProblem& problem, Eigen::Index channel);
+
 /// sum W |E|^2 per complex degree of freedom: 1 where W is the inverse variance and the model right.
 double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters);
 

@@ -49,8 +49,9 @@ void fill_deviations(const ParameterCovariance& covariance, AdditiveModel& model
     first += order;
     for (const Eigen::MatrixXd& B : s.numerator)
       s.numerator_std.emplace_back(
-          covariance.numerator_variance.col(f++).cwiseMax(0.0).cwiseSqrt().reshaped(B.rows(),
-                                                                                    B.cols()));
+          covariance.numerator_variance.col(f++)
+              .unaryExpr([](double v) { return v < 0.0 ? 0.0 : std::sqrt(v); })
+              .reshaped(B.rows(), B.cols()));
   }
 }
 
@@ -61,10 +62,21 @@ void raise(ParameterCovariance& covariance, double correlated_lines) {
   covariance.response_variance *= correlated_lines;
 }
 
-void use_covariance(ParameterCovariance& covariance, bool likelihood, FitResult& result) {
+/// What belongs to a channel without weight is not known, and does not touch the rest.
+bool weighted_are_finite(const FitProblem& problem, const ParameterCovariance& covariance) {
+  for (Eigen::Index c = 0; c < problem.channels(); ++c) {
+    const bool finite = covariance.numerator_variance.row(c).allFinite() &&
+                        (covariance.response_variance.size() == 0 ||
+                         covariance.response_variance.row(c).allFinite());
+    if (!finite && !has_no_weight(problem, c)) return false;
+  }
+  return true;
+}
+
+void use_covariance(const FitProblem& problem, ParameterCovariance& covariance, bool likelihood,
+                    FitResult& result) {
   if (covariance.numerator_variance.size() == 0) return;
-  if (!covariance.globals.allFinite() || !covariance.numerator_variance.allFinite() ||
-      !covariance.response_variance.allFinite()) {
+  if (!covariance.globals.allFinite() || !weighted_are_finite(problem, covariance)) {
     result.decisions.emplace_back(
         "no standard deviations: the covariance of the parameters is not finite; some of them are "
         "not in the data");
@@ -88,7 +100,7 @@ ParameterCovariance free_covariance(const FrfEstimate& frf, const FitOptions& op
   if (!matrices)
     return parameter_covariance(problem, beta, groups, iteration.end_cost,
                                 data_noise(frf, options.weighting), iteration.frozen,
-                                options.response_variance);
+                                {options.response_variance, false});
   return joint_covariance(
       problem, beta, groups, iteration.end_cost,
       JointEquations(problem, *matrices, beta, groups, residual(problem, groups, beta.B)),
@@ -171,6 +183,7 @@ void forget_results(AdditiveModel& model) {
   for (Submodel& s : model.submodels) {
     s.natural_frequency_std_hz.reset();
     s.damping_ratio_std.reset();
+    s.shape_std.reset();
     s.numerator_std.clear();
     s.residue_rank.reset();
     s.poles.clear();
@@ -281,12 +294,13 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   result.message = iteration.message;
   result.cost = iteration.cost;
   result.held = held_submodels(problem, beta, iteration.frozen);
+  result.frozen = iteration.frozen;
   fill_model(frf, options, problem, beta, result);
   if (options.uncertainty) {
     if (!low_rank && result.status != FitStatus::singular)
       covariance = free_covariance(frf, options, problem, matrices, beta, iteration);
     raise(covariance, frf.correlated_lines);
-    use_covariance(covariance, weighs_by_variance(options.weighting), result);
+    use_covariance(problem, covariance, weighs_by_variance(options.weighting), result);
     if (!low_rank)
       result.residue_ranks = residue_rank_tests(result.model, independent_numbers(frf));
     judge(problem, beta, iteration.end_cost, covariance.globals, iteration.frozen,
@@ -296,18 +310,31 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   return result;
 }
 
-void sort_modes(FitResult& fit) {
-  const std::vector<std::size_t> order = mode_order(fit.model);
+void rearrange(const std::vector<std::size_t>& sources, FitResult& fit) {
+  std::vector<Eigen::Index> first = {0};  // coefficient of every submodel
+  for (const Submodel& s : fit.model.submodels)
+    first.push_back(first.back() + static_cast<Eigen::Index>(s.denominator.size()) - 1);
+  AdditiveModel model = fit.model;
+  model.submodels.clear();
   std::vector<double> removal;
   std::vector<std::size_t> held;
-  for (std::size_t to = 0; to < order.size(); ++to) {
-    removal.push_back(fit.removal_cost[order[to]]);
-    if (std::find(fit.held.begin(), fit.held.end(), order[to]) != fit.held.end())
-      held.push_back(to);
+  std::vector<Eigen::Index> frozen;
+  Eigen::Index next = 0;
+  for (const std::size_t i : sources) {
+    if (std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end())
+      held.push_back(model.submodels.size());
+    for (const Eigen::Index p : fit.frozen)
+      if (p >= first[i] && p < first[i + 1]) frozen.push_back(next + p - first[i]);
+    next += first[i + 1] - first[i];
+    model.submodels.push_back(fit.model.submodels[i]);
+    removal.push_back(fit.removal_cost[i]);
   }
+  fit.model = std::move(model);
   fit.removal_cost = std::move(removal);
   fit.held = std::move(held);
-  sort_modes(fit.model);
+  fit.frozen = std::move(frozen);
 }
+
+void sort_modes(FitResult& fit) { rearrange(mode_order(fit.model), fit); }
 
 }  // namespace stageid

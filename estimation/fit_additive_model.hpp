@@ -17,6 +17,9 @@ namespace stageid {
 FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
                              const FitOptions& options = {});
 
+/// Submodel sources[k] in place k, with all that is told of it; one may stand in several places.
+void rearrange(const std::vector<std::size_t>& sources, FitResult& fit);
+
 /// Searched modes by frequency, behind the other submodels, with what is known of each.
 void sort_modes(FitResult& fit);
 

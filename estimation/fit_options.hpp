@@ -57,6 +57,7 @@ struct FitOptions {
   bool judge_modes = false;       ///< modes were asked for one by one: undetermined if one is
   bool uncertainty = true;        ///< also standard deviations and the variance of the response
   bool response_variance = true;  ///< false: of those only the standard deviations
+  bool covariance = false;        ///< also FitResult::covariance
   int threads = 0;                ///< 0: all cores; the result does not depend on it
   std::function<void(int iteration, double cost)> progress;
 };
@@ -70,6 +71,15 @@ enum class FitStatus : std::uint8_t {
   undetermined  ///< converged, but the data do not determine a submodel that was asked for
 };
 const char* to_string(FitStatus status) noexcept;
+
+/// All that is known of a fit's parameters and response, see dense_covariances(). Parameters: denominator
+/// coefficients in the order of the submodels, free delays, vec B (channels x functions).
+struct FitCovariance {
+  Eigen::MatrixXd sandwich;           ///< of the estimate: what standard deviations are taken from
+  Eigen::MatrixXd likelihood;         ///< [2 sum Re{J^H W J}]^-1
+  Eigen::MatrixXd response_variance;  ///< (n_y n_u) x N: E|dP|^2
+  Eigen::MatrixXd response_radius;    ///< that |dP| stays below with probability 0.95
+};
 
 /// A fit that did not converge is a result, not an error: look at `status`.
 struct FitResult {
@@ -85,9 +95,12 @@ struct FitResult {
       residue_ranks;  ///< where residues were free and deviations asked for
   /// By how much sum W |E|^2 (W diagonal, or the best diagonal) would rise without a submodel, the others re-solved; one entry each.
   std::vector<double> removal_cost;
-  std::vector<std::size_t> held;  ///< submodels with a pole at a bound, or held by request
+  std::vector<std::size_t> held;     ///< submodels with a pole at a bound, or held by request
+  std::vector<Eigen::Index> frozen;  ///< denominator coefficients that stood at a bound at the end
   /// (n_y n_u) x N: of P, from the parameter covariance; empty if it is not known or not asked for.
   Eigen::MatrixXd response_variance;
+  FitCovariance
+      covariance;  ///< empty unless asked for; where it cannot be told, a decision says why
   bool trustworthy() const noexcept {
     return status == FitStatus::gradient_small || status == FitStatus::step_small;
   }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "excitation/counted.hpp"
+#include "frf/dc_line.hpp"
 
 namespace stageid {
 namespace {
@@ -63,6 +64,7 @@ void check_start(const FrfEstimate& frf, const AdditiveModel& start, const FitOp
           "fit: the start has no submodel; give at least one mode or the rigid body");
   require(options.max_iterations >= 0, "fit: max_iterations must not be negative");
   require(std::isfinite(options.delay_s), "fit: the delay must be finite");
+  require(!has_dc_line(frf), "fit: a line lies at 0 Hz; leave it out (without_dc_line)");
   if (options.hold != HoldModel::none)
     require(frf.sample_rate_hz > 0.0,
             fmt::format("fit: hold {} needs the sample rate, and the FRF has none; use hold none",

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <sstream>
 
 #include "excitation/file_kind.hpp"
@@ -62,6 +63,13 @@ std::string JsonNode::text() const {
 std::vector<double> JsonNode::numbers() const {
   std::vector<double> out;
   for (const JsonNode& node : elements()) out.push_back(node.number());
+  return out;
+}
+
+std::vector<double> JsonNode::numbers_or_null() const {
+  std::vector<double> out;
+  for (const JsonNode& node : elements())
+    out.push_back(node.raw().is_null() ? std::numeric_limits<double>::quiet_NaN() : node.number());
   return out;
 }
 

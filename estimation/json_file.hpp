@@ -26,6 +26,7 @@ class JsonNode {
   long long integer(long long lowest, long long highest) const;
   std::string text() const;
   std::vector<double> numbers() const;
+  std::vector<double> numbers_or_null() const;  ///< null: NaN
   std::vector<std::string> texts() const;
   const nlohmann::ordered_json& raw() const noexcept { return value_; }
   [[noreturn]] void fail(const std::string& what) const { throw FormatError(file_, place_, what); }

@@ -78,12 +78,10 @@ Eigen::VectorXd numerator_variances(const FitProblem& problem, const FitParamete
 
 }  // namespace
 
-ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitParameters& beta,
-                                        double cost, const ResidueFactors& factors,
-                                        const DataNoise& noise,
-                                        const std::vector<Eigen::Index>& frozen,
-                                        bool with_response) {
-  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
+LowRankParameters low_rank_parameters(const FitProblem& problem, const FitParameters& beta,
+                                      const std::vector<BasisGroup>& groups, double cost,
+                                      const ResidueFactors& factors, const DataNoise& noise,
+                                      const std::vector<Eigen::Index>& frozen) {
   const auto reduced = [&](const FitProblem& one) {
     return factors.reduced_matrix(
         beta, ArrowSystem(one, beta, groups, FitMethod::gn, ChannelEquationsUse::only_kept));
@@ -95,11 +93,27 @@ ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitPara
   } else if (noise.variance) {
     K = reduced(middle_problem(problem, noise));
   }
-  ParameterCovariance out;
+  LowRankParameters out;
   out.residual_scale = covariance_scale(problem, cost, factors.size(), noise);
   const Eigen::MatrixXd inverse = free_inverse(N, frozen);
-  const Eigen::MatrixXd C = 0.5 * out.residual_scale * inverse * K * inverse.transpose();
-  if (!C.allFinite()) return {};
+  out.sandwich = 0.5 * out.residual_scale * inverse * K * inverse.transpose();
+  out.likelihood = 0.5 * out.residual_scale * inverse;
+  if (!out.sandwich.allFinite()) return {};
+  return out;
+}
+
+ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitParameters& beta,
+                                        double cost, const ResidueFactors& factors,
+                                        const DataNoise& noise,
+                                        const std::vector<Eigen::Index>& frozen,
+                                        bool with_response) {
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
+  const LowRankParameters free =
+      low_rank_parameters(problem, beta, groups, cost, factors, noise, frozen);
+  const Eigen::MatrixXd& C = free.sandwich;
+  if (C.size() == 0) return {};
+  ParameterCovariance out;
+  out.residual_scale = free.residual_scale;
 
   out.globals = C.topLeftCorner(problem.globals(), problem.globals());
   out.numerator_variance.resize(problem.channels(), problem.functions());

@@ -12,9 +12,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// The pole with positive imaginary part, or the slower of two real ones.
-Complex pole_of_mode(const Submodel& submodel) {
-  const std::vector<Complex> poles = pole_representatives(submodel);
+}  // namespace
+
+Complex described_pole(const Submodel& mode) {
+  const std::vector<Complex> poles = pole_representatives(mode);
   return poles.size() == 2 && std::abs(poles[1]) < std::abs(poles[0]) ? poles[1] : poles[0];
 }
 
@@ -24,7 +25,7 @@ ModeShape mode_shape(const Submodel& submodel, std::size_t index) {
   mode.natural_frequency_hz = submodel.natural_frequency_hz();
   mode.damping_ratio = submodel.damping_ratio();
   const auto shapes = singular_shapes(
-      Eigen::MatrixXcd(numerator_at(submodel, pole_of_mode(submodel)) / submodel.denominator[2]));
+      Eigen::MatrixXcd(numerator_at(submodel, described_pole(submodel)) / submodel.denominator[2]));
   const Eigen::VectorXd& values = shapes.singular_value;
   const double seen = values[0] > 0.0 ? 1.0 : 0.0;  // no residue, no shape
   mode.output_shape = seen * shapes.output.col(0);
@@ -33,8 +34,6 @@ ModeShape mode_shape(const Submodel& submodel, std::size_t index) {
   mode.not_rank_one = values.size() > 1 && values[0] > 0.0 ? values[1] / values[0] : 0.0;
   return mode;
 }
-
-}  // namespace
 
 std::vector<ModeShape> mode_shapes(const AdditiveModel& model) {
   std::vector<ModeShape> out;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <complex>
 #include <vector>
 
 #include "estimation/additive_model.hpp"
@@ -29,6 +30,11 @@ struct ModeShape {
   double modal_mass = 0.0;        ///< infinite, and the shapes zero, if the numerators are
   double not_rank_one = 0.0;      ///< second singular value over the first
 };
+
+/// A mode of a model. @param index what it is called there  @pre submodel.is_mode()
+ModeShape mode_shape(const Submodel& submodel, std::size_t index);
+/// The pole that a mode is described at: with positive imaginary part, or the slower of two real ones.
+std::complex<double> described_pole(const Submodel& mode);
 
 /// The modes of a model, in its order. Source: method.md section 5; D. J. Ewins, Modal Testing, 2nd ed.
 /// (2000), section 2.8, for the shapes of general viscous damping.

@@ -1,9 +1,11 @@
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimation/additive_model.hpp"
 #include "estimation/json_file.hpp"
+#include "estimation/modal_form.hpp"
 #include "excitation/output_file.hpp"
 
 namespace stageid {
@@ -21,6 +23,31 @@ Json matrix_to_json(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
+/// Real parts under the name itself, imaginary ones apart where the mode has them.
+void add_shape(const std::string& name, const Eigen::VectorXcd& shape,
+               const Eigen::VectorXcd& deviation, bool complex, Json& out) {
+  const auto add = [&](const std::string& key, const Eigen::VectorXd& values) {
+    out[key] = std::vector<double>(values.begin(), values.end());
+  };
+  add(name, shape.real());
+  add(name + "_std", deviation.real());
+  if (!complex) return;
+  add(name + "_imaginary", shape.imag());
+  add(name + "_imaginary_std", deviation.imag());
+}
+
+/// Shapes and mass follow from the numerators: they stand here for their standard deviations.
+void add_shapes(const Submodel& s, Json& out) {
+  if (!s.is_mode() || !s.shape_std) return;
+  const ModeShape mode = mode_shape(s, 0);
+  const bool complex = s.numerator.size() > 1;
+  out["modal_mass"] = mode.modal_mass;
+  out["modal_mass_std"] = s.shape_std->modal_mass;
+  add_shape("output_shape", mode.output_shape, s.shape_std->output_shape, complex, out);
+  add_shape("input_shape", mode.input_shape, s.shape_std->input_shape, complex, out);
+}
+
+/// What is not known stands as null, which is how NaN is written.
 Json submodel_to_json(const Submodel& s) {
   Json out;
   out["integrators"] = s.integrators;
@@ -34,6 +61,7 @@ Json submodel_to_json(const Submodel& s) {
     out["damping_ratio"] = s.damping_ratio();
     if (s.natural_frequency_std_hz) out["natural_frequency_std_hz"] = *s.natural_frequency_std_hz;
     if (s.damping_ratio_std) out["damping_ratio_std"] = *s.damping_ratio_std;
+    add_shapes(s, out);
   }
   for (const PoleEstimate& pole : s.poles) {
     Json item;
@@ -53,12 +81,13 @@ std::vector<double> to_list(const Eigen::VectorXd& values, Eigen::Index size) {
   return {values.begin(), values.end()};
 }
 
-Eigen::MatrixXd matrix_from_json(const JsonNode& node, std::size_t rows, std::size_t columns) {
+Eigen::MatrixXd matrix_from_json(const JsonNode& node, std::size_t rows, std::size_t columns,
+                                 bool or_null = false) {
   Eigen::MatrixXd out(rows, columns);
   const std::vector<JsonNode> lines = node.elements();
   if (lines.size() != rows) node.fail("must have " + std::to_string(rows) + " rows, one an output");
   for (std::size_t y = 0; y < rows; ++y) {
-    const std::vector<double> values = lines[y].numbers();
+    const std::vector<double> values = or_null ? lines[y].numbers_or_null() : lines[y].numbers();
     if (values.size() != columns)
       lines[y].fail("must have " + std::to_string(columns) + " numbers, one an input");
     for (std::size_t u = 0; u < columns; ++u)
@@ -85,11 +114,37 @@ std::vector<Eigen::MatrixXd> deviations_from_json(const JsonNode& node,
   std::vector<Eigen::MatrixXd> out;
   for (const JsonNode& matrix : list.elements()) {
     out.push_back(matrix_from_json(matrix, static_cast<std::size_t>(numerator[0].rows()),
-                                   static_cast<std::size_t>(numerator[0].cols())));
-    if (out.back().minCoeff() < 0.0) matrix.fail("must not hold a negative standard deviation");
+                                   static_cast<std::size_t>(numerator[0].cols()), true));
+    if ((out.back().array() < 0.0).any())
+      matrix.fail("must not hold a negative standard deviation");
   }
   if (out.size() != numerator.size()) list.fail("must have as many matrices as numerator");
   return out;
+}
+
+Eigen::VectorXcd shape_deviation_from_json(const JsonNode& node, const std::string& name,
+                                           Eigen::Index size) {
+  Eigen::VectorXcd out = Eigen::VectorXcd::Zero(size);
+  const auto read = [&](const std::string& key) {
+    const std::vector<double> values = node.member(key).numbers();
+    if (static_cast<Eigen::Index>(values.size()) != size)
+      node.member(key).fail("must have " + std::to_string(size) + " numbers, one a channel");
+    if (*std::min_element(values.begin(), values.end()) < 0.0)
+      node.member(key).fail("must not hold a negative standard deviation");
+    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(values.data(), size));
+  };
+  out.real() = read(name + "_std");
+  if (node.has(name + "_imaginary_std")) out.imag() = read(name + "_imaginary_std");
+  return out;
+}
+
+/// Of the shapes themselves nothing is read: the numerators tell them.
+std::optional<ModeShapeDeviation> shape_deviations_from_json(
+    const JsonNode& node, const std::vector<Eigen::MatrixXd>& numerator) {
+  if (!node.has("modal_mass_std")) return std::nullopt;
+  return ModeShapeDeviation{shape_deviation_from_json(node, "output_shape", numerator[0].rows()),
+                            shape_deviation_from_json(node, "input_shape", numerator[0].cols()),
+                            node.member("modal_mass_std").number()};
 }
 
 Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::size_t n_inputs) {
@@ -114,6 +169,7 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
     for (const JsonNode& pole : node.member("poles").elements())
       s.poles.push_back(pole_from_json(pole));
   if (node.has("numerator_std")) s.numerator_std = deviations_from_json(node, s.numerator);
+  s.shape_std = shape_deviations_from_json(node, s.numerator);
   if (node.has("residue_rank"))
     s.residue_rank = static_cast<int>(node.member("residue_rank").integer(1, 1'000'000));
   return s;

@@ -168,6 +168,31 @@ void NoiseCorrelation::add_input(Eigen::Index u, Eigen::Index v, const OutputCol
       add_scaled(re, im, Y.re[y], Y.im[y], static_cast<Eigen::Index>(p), Z.re[y], Z.im[y], at[p]);
 }
 
+bool NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, LineRange lines,
+                                   Eigen::ArrayXd& re, Eigen::ArrayXd& im) const {
+  const auto of_outputs = [this](Eigen::Index y, Eigen::Index z, Eigen::Index k) {
+    const Eigen::Index at = y + n_y_ * z;
+    return std::complex<double>((*re_)(at, k), (*im_)(at, k));
+  };
+  const auto of_inputs = [this](Eigen::Index u, Eigen::Index v, Eigen::Index k) {
+    return (*S_)(u + n_u_ * v, k);
+  };
+  const Eigen::Index u = c / n_y_;
+  const Eigen::Index v = d / n_y_;
+  if (u != v && !between_inputs()) return false;
+  re.setOnes(lines.count);
+  im.setZero(lines.count);
+  if (c % n_y_ != d % n_y_) correlation_of(of_outputs, c % n_y_, d % n_y_, lines, re, im);
+  if (u == v) return true;
+  Eigen::ArrayXd s_re;
+  Eigen::ArrayXd s_im;
+  correlation_of(of_inputs, u, v, lines, s_re, s_im);
+  const Eigen::ArrayXd product = re * s_re - im * s_im;
+  im = (re * s_im + im * s_re).eval();
+  re = product;
+  return true;
+}
+
 Eigen::MatrixXd correlated_gram(const FitProblem& problem, const NoiseCorrelation& correlation,
                                 Eigen::Index n, const CorrelatedColumns& inputs) {
   GramOfTiles gram(problem, correlation, n, inputs);

@@ -34,6 +34,9 @@ class NoiseCorrelation {
   /// Z += S(u, v) Y, the n columns of Y in the places `at` of Z. @pre between_inputs()
   void add_input(Eigen::Index u, Eigen::Index v, const OutputColumns& Y,
                  const std::vector<Eigen::Index>& at, LineRange lines, OutputColumns& Z) const;
+  /// (S kron R)(c, d) of two channels on some lines. @returns false: it is zero. @pre known()
+  bool of_channels(Eigen::Index c, Eigen::Index d, LineRange lines, Eigen::ArrayXd& re,
+                   Eigen::ArrayXd& im) const;
 
  private:
   Eigen::Index n_y_ = 0;

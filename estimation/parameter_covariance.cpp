@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numeric>
 #include <optional>
 
@@ -103,13 +104,6 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
   return correlated_gram(problem, noise.correlation, problem.globals(), inputs);
 }
 
-/// What is known of one channel's numerators: Cov(nu_c) and Cov(a, nu_c), and Z.
-struct ChannelCovariance {
-  Eigen::MatrixXd own;
-  Eigen::MatrixXd cross;
-  Eigen::MatrixXd Z;
-};
-
 /// The variances of the channel's numerators and response; out.globals stands.
 void fill_channel(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
                   Eigen::Index c, const ChannelCovariance& channel, ParameterCovariance& out) {
@@ -130,6 +124,18 @@ void fill_channel(const FitProblem& problem, const FitParameters& beta, const Ba
     total += 2.0 * quadratic(J_re, J_im, channel.cross, group.F_re, group.F_im);
   }
   out.response_variance.row(c) = total.transpose();
+}
+
+void leave_unknown(const FitProblem& problem, Eigen::Index c, ParameterCovariance& out) {
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  out.numerator_variance.row(c).setConstant(unknown);
+  if (out.response_variance.size() > 0) out.response_variance.row(c).setConstant(unknown);
+  if (out.channels.empty()) return;
+  const Eigen::Index n_f = problem.functions();
+  const Eigen::Index globals = problem.globals();
+  out.channels[static_cast<std::size_t>(c)] = {
+      Eigen::MatrixXd::Constant(n_f, n_f, unknown), Eigen::MatrixXd::Zero(globals, n_f),
+      Eigen::MatrixXd::Zero(n_f, globals), Eigen::MatrixXd::Constant(n_f, n_f, unknown)};
 }
 
 void resize(const FitProblem& problem, bool with_response, ParameterCovariance& out) {
@@ -184,7 +190,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
                                          const std::vector<BasisGroup>& groups, double cost,
                                          const DataNoise& noise,
                                          const std::vector<Eigen::Index>& frozen,
-                                         bool with_response) {
+                                         WantedCovariance wanted) {
   ParameterCovariance out;
   out.residual_scale = covariance_scale(problem, cost, problem.parameters(), noise);
   const double half = 0.5 * out.residual_scale;
@@ -217,21 +223,30 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   if (problem.globals() > 0) out.globals = half * inverse * K * inverse.transpose();
 
   // The equations of a part are made once more: kept, all of them would outgrow the data.
-  resize(problem, with_response, out);
+  resize(problem, wanted.response, out);
+  if (wanted.channels) {
+    out.globals_inverse = inverse;
+    out.channels.resize(static_cast<std::size_t>(problem.channels()));
+  }
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
   for (const ChannelRange part : parts) {
     if (parts.size() > 1) make_equations(part);
     const bool determined = fill_channels(part, problem.threads, [&](Eigen::Index c) {
       const ArrowSystem::Channel& gn = equations->gn.channel(c);
       const ArrowSystem::Channel& k = equations->middle().channel(c);
+      if (has_no_weight(problem, c)) {
+        leave_unknown(problem, c, out);
+        return true;
+      }
       Eigen::MatrixXd bb_inverse;
       if (!solve_scaled(gn.bb, unit, bb_inverse)) return false;
       const auto at = static_cast<std::size_t>(c);
       const Eigen::MatrixXd& k_ab =
           correlate ? cross[at] : Eigen::MatrixXd(k.ab - gn.Z.transpose() * k.bb);
-      fill_channel(
-          problem, beta, *group_of[at], c,
-          {half * bb_inverse * k.bb * bb_inverse, half * inverse * k_ab * bb_inverse, gn.Z}, out);
+      ChannelCovariance channel = {half * bb_inverse * k.bb * bb_inverse,
+                                   half * inverse * k_ab * bb_inverse, gn.Z, bb_inverse};
+      fill_channel(problem, beta, *group_of[at], c, channel, out);
+      if (wanted.channels) out.channels[at] = std::move(channel);
       return true;
     });
     if (!determined) return {};
@@ -274,12 +289,16 @@ ParameterCovariance joint_covariance(const FitProblem& problem, const FitParamet
   const bool determined =
       fill_channels({0, problem.channels()}, problem.threads, [&](Eigen::Index c) {
         const ArrowSystem::Channel& arrow = equations.preconditioner().channel(c);
+        if (has_no_weight(problem, c)) {
+          leave_unknown(problem, c, out);
+          return true;
+        }
         Eigen::MatrixXd own;
         if (!solve_scaled(arrow.bb, unit, own)) return false;
         const Eigen::MatrixXd Z_c =
             Z(Eigen::seqN(c, problem.functions(), problem.channels()), Eigen::all);
         fill_channel(problem, beta, *group_of[static_cast<std::size_t>(c)], c,
-                     {half * own, none, Z_c}, out);
+                     {half * own, none, Z_c, own}, out);
         return true;
       });
   if (!determined) return {};

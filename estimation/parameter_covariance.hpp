@@ -10,11 +10,28 @@
 
 namespace stageid {
 
+/// What is known of one channel's numerators b_c = nu_c - Z a: of their own part nu, and how it goes with
+/// the globals a.
+struct ChannelCovariance {
+  Eigen::MatrixXd own;                ///< Cov(nu_c)
+  Eigen::MatrixXd cross;              ///< Cov(a, nu_c)
+  Eigen::MatrixXd Z;                  ///< the channel's rows of M_bb^-1 M_ba
+  Eigen::MatrixXd equations_inverse;  ///< the channel's block of M_bb^-1
+};
+
 struct ParameterCovariance {
   Eigen::MatrixXd globals;             ///< of denominator coefficients and delays
   Eigen::MatrixXd numerator_variance;  ///< of B, n_c x n_f
   Eigen::MatrixXd response_variance;   ///< E|dP|^2, n_c x N; empty if not asked for
-  double residual_scale = 1.0;  ///< what variances were multiplied with (unknown or too small)
+  double residual_scale = 1.0;      ///< what variances were multiplied with (unknown or too small)
+  Eigen::MatrixXd globals_inverse;  ///< (M^-1)_aa
+  std::vector<ChannelCovariance> channels;  ///< if they are wanted
+};
+
+/// What of a ParameterCovariance beside the deviations is wanted.
+struct WantedCovariance {
+  bool response = false;  ///< as large as the data
+  bool channels = false;  ///< so that numerators of different channels can be put together
 };
 
 /// First-order covariance of the estimate. With M = sum Re{J^H W J} and K = sum Re{J^H W C W J},
@@ -25,17 +42,17 @@ struct ParameterCovariance {
 /// The outputs' noise is correlated wherever a disturbance force causes it, that of inputs wherever the
 /// controller answers; diagonal weights ignore that, the covariance does not (noise_correlation.hpp).
 /// Where W is the inverse variance but the residual is clearly larger than it predicts, the covariance is
-/// raised by that ratio (`residual_scale`). Empty where numerators are not determined.
+/// raised by that ratio (`residual_scale`). Empty where numerators are not determined; what belongs to a
+/// channel without weight is NaN.
 /// The equations are made in parts of channels, once for the globals and once for the rest: memory is
 /// that of a part.
 /// @param groups evaluated with derivatives at the estimate   @param cost there
 /// @param frozen globals that are not unknowns (a mode at its bound): known exactly here
-/// @param with_response false: no response_variance, which is as large as the data's
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
                                          const std::vector<BasisGroup>& groups, double cost,
                                          const DataNoise& noise,
                                          const std::vector<Eigen::Index>& frozen,
-                                         bool with_response);
+                                         WantedCovariance wanted);
 
 /// The same for weight matrices that are the noise's inverse covariance (`knowledge` weights, then
 /// multiplied by WeightMatrices::scatter_factor()) or proportional to it (none):

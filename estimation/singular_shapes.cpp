@@ -12,10 +12,9 @@ double conjugate(double value) { return value; }
 
 template <typename Shape>
 auto leading_component(const Shape& shape) {
-  constexpr double kLeading = 0.9;
   const double largest = shape.cwiseAbs().maxCoeff();
   Eigen::Index i = 0;
-  while (std::abs(shape[i]) < kLeading * largest) ++i;
+  while (std::abs(shape[i]) < kLeadingComponent * largest) ++i;
   return shape[i];
 }
 

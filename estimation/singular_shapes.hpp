@@ -5,6 +5,9 @@
 
 namespace stageid {
 
+/// The leading component of a shape is the first with at least so much of the largest magnitude.
+constexpr double kLeadingComponent = 0.9;
+
 /// A matrix (n_y x n_u) as a sum of products of an output shape and an input shape,
 ///   M = sum_r singular_value_r  output_r  input_r^T     (transposed, not conjugated),
 /// columns of norm one, the largest singular value first. Of each pair of columns the output shape is

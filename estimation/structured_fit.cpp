@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "estimation/dense_covariance.hpp"
+#include "estimation/mode_deviation.hpp"
 #include "estimation/ranked_fit.hpp"
 #include "excitation/counted.hpp"
 
@@ -251,6 +253,8 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   FitResult result = automatic_fit(frf, complete, selection, options);
   settle_suspension(frf, options, result);
   result.decisions.insert(result.decisions.begin(), decisions.begin(), decisions.end());
+  if (options.uncertainty) fill_shape_deviations(frf, options, result);
+  if (options.covariance) fill_covariance(frf, options, result);
   return result;
 }
 

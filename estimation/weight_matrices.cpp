@@ -161,6 +161,23 @@ WeightMatrices WeightMatrices::user(const FrfEstimate& frf, const Eigen::MatrixX
   return out;
 }
 
+void WeightMatrices::between(Eigen::Index c, Eigen::Index d, Eigen::Index first, Eigen::Index lines,
+                             Eigen::ArrayXd& re, Eigen::ArrayXd& im) const {
+  const Eigen::Index n_c = marginal_.rows();
+  Eigen::ArrayXcd W(lines);
+  if (whole_.size() > 0) {
+    W = whole_.row(c + n_c * d).segment(first, lines).transpose();
+  } else {
+    const Eigen::Index n_y = n_outputs_;
+    const Eigen::Index n_u = n_c / n_y;
+    // (S^-1)(u, v), which stands transposed, times C_E^-1(y, z).
+    W = inputs_.row(d / n_y + n_u * (c / n_y)).segment(first, lines).transpose().array() *
+        outputs_.row(c % n_y + n_y * (d % n_y)).segment(first, lines).transpose().array();
+  }
+  re = W.real();
+  im = W.imag();
+}
+
 void WeightMatrices::apply(Eigen::Index first, Eigen::MatrixXcd& tile) const {
   if (whole_.size() > 0) {
     const Eigen::Index n_c = tile.rows();

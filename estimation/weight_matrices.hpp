@@ -38,6 +38,10 @@ class WeightMatrices {
   /// Column j of `tile` (n_c x lines) becomes W_k times it, k = first + j.
   void apply(Eigen::Index first, Eigen::MatrixXcd& tile) const;
 
+  /// W_k(c, d) of two channels on some lines.
+  void between(Eigen::Index c, Eigen::Index d, Eigen::Index first, Eigen::Index lines,
+               Eigen::ArrayXd& re, Eigen::ArrayXd& im) const;
+
   /// The best diagonal in their place, n_c x N: 1 / (W_k^-1)_cc, one over the variance of the
   /// channel itself where W_k = Cov(vec G)^-1; W_cc where a user's W_k is singular.
   const Eigen::MatrixXd& marginal() const noexcept { return marginal_; }

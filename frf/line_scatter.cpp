@@ -18,6 +18,11 @@ constexpr int kMostPoles = 2;  // two modes close to each other
 constexpr Eigen::Index kDof = 9;
 constexpr Eigen::Index kWindow = kOrder + 1 + kDof;
 
+// Medians. Of errors that do not depend on the lines the first is 1; of a response that the quadratic part cannot
+// follow it is 2^6.
+constexpr double kMostByDistance = 3.0;
+constexpr double kMostOfResponse = 0.04;
+
 LocalFit fit_around(const FrfEstimate& frf, Eigen::Index k) {
   const Eigen::Index first = std::clamp<Eigen::Index>(k - kWindow / 2, 0, frf.lines() - kWindow);
   const Eigen::ArrayXd away =
@@ -79,6 +84,19 @@ LineScatter line_scatter(const FrfEstimate& frf, int threads) {
   scatter.dof = static_cast<double>(kDof);
   scatter.over_noise = median_ratio(scatter.variance, frf.noise_variance);
   return scatter;
+}
+
+bool lines_are_coarse(const FrfEstimate& frf, const LineScatter& scatter, int threads) {
+  if (frf.lines() < 2 * kWindow) return true;
+  if (median_ratio(scatter.variance, frf.response.cwiseAbs2()) > kMostOfResponse) return true;
+  const auto others = Eigen::seq(0, frf.lines() - 1, 2);
+  FrfEstimate half;
+  half.inputs = frf.inputs;
+  half.outputs = frf.outputs;
+  half.frequency_hz = frf.frequency_hz(others);
+  half.response = frf.response(Eigen::all, others);
+  return median_ratio(line_scatter(half, threads).variance, scatter.variance(Eigen::all, others)) >
+         kMostByDistance;
 }
 
 }  // namespace stageid

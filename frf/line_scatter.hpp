@@ -27,4 +27,9 @@ struct LineScatter {
 /// @returns empty matrices if there are too few lines
 LineScatter line_scatter(const FrfEstimate& frf, int threads = 0);
 
+/// Whether the lines are too coarse for it, so that the response itself looks like scatter: they are fewer than
+/// twice twelve, every other line scatters clearly more (noise and distortion do not care how far the lines are
+/// apart, what a local function cannot follow does), or half of all scatter by more than a fifth of the response.
+bool lines_are_coarse(const FrfEstimate& frf, const LineScatter& scatter, int threads = 0);
+
 }  // namespace stageid

@@ -8,6 +8,7 @@
 #include "excitation/fingerprint.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
+#include "tools/covariance_file.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/fit_step.hpp"
 #include "tools/output_paths.hpp"
@@ -19,6 +20,10 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "fit", "Fit the additive model to an FRF");
   command->add_option("frf", frf_, "frf.h5")->required();
   command->add_option("-o,--output", output_, "model.json to write")->required();
+  command->add_option("--covariance", covariance_,
+                      "FILE.h5 to write: covariance of all parameters (sandwich and maximum "
+                      "likelihood) with their names and units, and the response of the model with "
+                      "its variance and 95 % radius");
   command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: all lines")->expected(2);
   command->add_option("--modes", request_.modes,
                       "auto | none | how many | frequencies f1,f2,... in Hz | modes.json; default: "
@@ -72,18 +77,28 @@ FitRequest FitCommand::checked_request() const {
   return request;
 }
 
+void FitCommand::require_covariance_file() const {
+  if (covariance_.empty()) return;
+  require_ending(covariance_, "a covariance", {".h5"});
+  require_writable(covariance_, {frf_, output_});
+}
+
 void FitCommand::run() const {
   const FitRequest request = checked_request();
   require_writable(output_, {frf_});
   require_model_ending(output_);
+  require_covariance_file();
   FitSetup setup = make_fit_setup(request, read_frf(frf_));
-  setup.options.response_variance = false;  // no file holds it
+  setup.options.response_variance = false;  // that of the covariance is exact for all weights
+  setup.options.covariance = !covariance_.empty();
   for (const std::string& warning : setup.warnings)
     console_.warning(fmt::format("{}: {}", frf_.string(), warning));
   const FitStep step =
       fit_model(setup, frf_.filename().string(), fingerprint_of_file(frf_), console_);
   const FitResult& result = step.result;
   write_model(output_, result.model);
+  const bool told = result.covariance.sandwich.size() > 0;
+  if (told) write_covariance(covariance_, result, setup.frf.frequency_hz);
 
   for (const std::string& line : result.decisions) console_.result(line);
   console_.result(cost_line(result.cost));
@@ -91,7 +106,8 @@ void FitCommand::run() const {
   console_.result(fmt::format("{}: relative error {:.4g}, {} ({})", output_.string(),
                               result.model.fit.relative_rms_error, to_string(result.status),
                               result.message));
-  console_.exit_code = result.trustworthy() ? kDone : kNotTrustworthy;
+  const bool whole = told || covariance_.empty();
+  console_.exit_code = result.trustworthy() && whole ? kDone : kNotTrustworthy;
   console_.result({{"output", output_.string()},
                    {"status", to_string(result.status)},
                    {"message", result.message},
@@ -104,6 +120,9 @@ void FitCommand::run() const {
                    {"seconds", step.seconds}});
   for (const std::string& finding : result.findings)
     console_.warning(fmt::format("{}: {}", output_.string(), finding));
+  if (!whole)
+    console_.warning(fmt::format("{}: not written: {}", covariance_.string(),
+                                 result.decisions.empty() ? "" : result.decisions.back()));
   if (!result.trustworthy())
     console_.warning(fmt::format(
         "{}: {}{}; the model is written, do not trust it before you know why", output_.string(),

@@ -19,10 +19,12 @@ class FitCommand {
  private:
   void run() const;
   FitRequest checked_request() const;
+  void require_covariance_file() const;
 
   Console& console_;
   std::filesystem::path frf_;
   std::filesystem::path output_;
+  std::filesystem::path covariance_;  ///< empty: not asked for
   FitRequest request_;
   std::vector<double> band_hz_;
   std::vector<std::string> submodels_;

@@ -12,6 +12,7 @@
 #include "excitation/file_error.hpp"
 #include "excitation/fingerprint.hpp"
 #include "excitation/key_suggestion.hpp"
+#include "frf/dc_line.hpp"
 #include "frf/hold_compensation.hpp"
 #include "frf/line_scatter.hpp"
 #include "tools/flag_values.hpp"
@@ -31,10 +32,27 @@ const std::vector<std::string> kWeightings = {
 const std::vector<std::string> kHolds = {"none", "phase", "sinc", "exact"};
 const std::vector<std::string> kMethods = {"riv", "gn", "sk"};
 
+/// What is said of channels whose weight is zero on all lines; empty: there is none.
+std::string channels_without_weight(const FrfEstimate& frf, const FitOptions& options) {
+  const Eigen::MatrixXd& W = options.user_weights;
+  std::vector<std::string> names;
+  for (Eigen::Index c = 0; c < W.rows(); ++c)
+    if (W.row(c).maxCoeff() == 0.0)
+      names.push_back(fmt::format("({}, {})",
+                                  frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())],
+                                  frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]));
+  if (names.empty()) return {};
+  return fmt::format(
+      "weighting: {} (output, input) {} no weight: free numerators there are not determined, and "
+      "stand as 0 with a standard deviation of null",
+      fmt::join(names, ", "), names.size() == 1 ? "has" : "have");
+}
+
 /// Sums up what the FRF decides where the request is silent.
 class FitDefaults {
  public:
-  FitDefaults(const FitRequest& request, FitSetup& setup) : request_(request), setup_(setup) {}
+  FitDefaults(const FitRequest& request, FitSetup& setup, WholeLines whole)
+      : request_(request), setup_(setup), whole_(whole) {}
 
   /// What was taken out is put back and given to the model, which goes through hold, delay and
   /// sampler exactly; the data keep the aliasing, and no compensation can divide it out.
@@ -166,6 +184,14 @@ class FitDefaults {
     if (frf.noise_variance.size() == 0 || frf.realizations > 1) return false;
     LineScatter scatter = line_scatter(frf, request_.threads);
     if (!(scatter.over_noise > kDistorted)) return false;
+    if (lines_are_coarse(frf, scatter, request_.threads)) {
+      setup_.warnings.push_back(
+          "weighting: by the variance by the periods; the lines scatter by more, but they are too "
+          "coarse to tell distortion from response; lines twice as fine, or several realizations, "
+          "would");
+      note(setup_.warnings.back());
+      return false;
+    }
     frf.total_variance = std::move(scatter.variance);
     frf.total_dof = scatter.dof;
     setup_.options.weighting = Weighting::total_variance;
@@ -196,7 +222,11 @@ class FitDefaults {
                          nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
     }
     options.weighting = Weighting::user;
-    read_weights(text, setup_.frf, options);
+    read_weights(text, setup_.frf, options, whole_);
+    const std::string missing = channels_without_weight(setup_.frf, options);
+    if (missing.empty()) return;
+    setup_.warnings.push_back(missing);
+    note(missing);
   }
 
   void parse_frequencies(const std::string& text) {
@@ -218,6 +248,7 @@ class FitDefaults {
 
   const FitRequest& request_;
   FitSetup& setup_;
+  WholeLines whole_;
   std::optional<double> known_delay_s_;
 };
 
@@ -290,9 +321,16 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
 FitSetup make_fit_setup(const FitRequest& asked, FrfEstimate frf) {
   FitSetup setup;
   const FitRequest request = with_structure(asked, frf, setup.notes);
+  const Eigen::VectorXd whole_hz = frf.frequency_hz;
   if (request.band_hz) frf = select_band(frf, (*request.band_hz)[0], (*request.band_hz)[1]);
+  if (has_dc_line(frf)) {
+    setup.warnings.emplace_back(kDcLineLeftOut);
+    setup.notes.emplace_back(kDcLineLeftOut);
+    frf = without_dc_line(std::move(frf));
+  }
   setup.frf = std::move(frf);
-  FitDefaults defaults(request, setup);
+  const auto before = (whole_hz.array() < setup.frf.frequency_hz[0]).count();
+  FitDefaults defaults(request, setup, {before, whole_hz.size()});
   defaults.restore_as_measured();
   defaults.choose_hold();
   defaults.choose_delay();

@@ -51,7 +51,8 @@ struct FitSetup {
 /// Submodels that are asked for stand alone: then `modes` and `rigid_body` are none unless given, else
 /// auto and full.
 /// And weights: noise variance if there is one, else total variance, else relative; with one realization, or an
-/// unknown number, of a plant whose lines scatter far more than either says: that scatter, see line_scatter().
+/// unknown number, of a plant whose lines scatter far more than either says: that scatter, see line_scatter(), unless
+/// lines_are_coarse().
 /// @throws std::invalid_argument naming the flag; FileError, FormatError for files that it names.
 /// `frf` is moved where it can be: nothing else holds as much memory.
 FitSetup make_fit_setup(const FitRequest& request, FrfEstimate frf);

@@ -8,25 +8,13 @@
 
 #include "excitation/hdf5_file.hpp"
 #include "excitation/output_file.hpp"
+#include "tools/channel_order.hpp"
 #include "tools/modal_hdf5.hpp"
 
 namespace stageid {
 namespace {
 
 hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
-
-/// [N x n_y x n_u] in C order from columns that are vec of an n_y x n_u matrix.
-template <typename Scalar>
-std::vector<Scalar> c_order(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& columns,
-                            Eigen::Index n_y) {
-  std::vector<Scalar> data;
-  data.reserve(static_cast<std::size_t>(columns.size()));
-  const Eigen::Index n_u = columns.rows() / n_y;
-  for (Eigen::Index k = 0; k < columns.cols(); ++k)
-    for (Eigen::Index i = 0; i < n_y; ++i)
-      for (Eigen::Index j = 0; j < n_u; ++j) data.push_back(columns(i + n_y * j, k));
-  return data;
-}
 
 void write_submodels(Hdf5File& file, const AdditiveModel& model) {
   file.create_group("/submodels");

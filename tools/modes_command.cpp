@@ -4,8 +4,10 @@
 
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "estimation/cmif.hpp"
+#include "frf/dc_line.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
 #include "tools/output_paths.hpp"
@@ -33,6 +35,10 @@ void ModesCommand::run() const {
   }
   FrfEstimate frf = read_frf(frf_);
   if (!band_hz_.empty()) frf = select_band(frf, band_hz_[0], band_hz_[1]);
+  if (has_dc_line(frf)) {
+    console_.warning(fmt::format("{}: {}", frf_.string(), kDcLineLeftOut));
+    frf = without_dc_line(std::move(frf));
+  }
   PeakOptions options;
   if (kind_ == "response") options.kind = CmifKind::response;
   if (kind_ == "whitened") options.kind = CmifKind::whitened;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "tools/covariance_file.hpp"
 #include "tools/fit_step.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
@@ -46,7 +47,7 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
               const py::object& delay, const py::object& rigid_body, const py::object& residue_rank,
               const std::string& damping, const std::string& direct_term,
               const std::vector<std::string>& submodels, const std::string& method,
-              int max_iterations, int threads) {
+              int max_iterations, int threads, bool covariance) {
   FitRequest request;
   request.band_hz = band_hz;
   request.modes = flag_text(modes);
@@ -67,7 +68,9 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
   return interruptible([&] {
     const std::string fingerprint =
         of->fingerprint.empty() ? fingerprint_of_content(of->frf) : of->fingerprint;
-    return fit_model(make_fit_setup(request, of->frf), of->name, fingerprint, silent).result;
+    FitSetup setup = make_fit_setup(request, of->frf);
+    setup.options.covariance = covariance;
+    return fit_model(setup, of->name, fingerprint, silent).result;
   });
 }
 
@@ -88,9 +91,32 @@ direct_term       'none' or 'full'; '': by the unit of the outputs
 submodels         further ones as --submodel takes them, 'n=4,m=3,f=120:180'
 method            'riv', 'gn' or 'sk'; max_iterations of one fit
 threads           0: all cores; the result does not depend on it
+covariance        True: also Fit.covariance, at most 4000 parameters
 
 Returns Fit. Not converging is no error: look at trustworthy. Other Python threads run meanwhile; Ctrl-C ends it.
 Raises RequestError, FormatError, FileError.)";
+
+py::object covariance_of(const py::object& self) {
+  const auto& r = self.cast<const FitResult&>();
+  if (r.covariance.sandwich.size() == 0) return py::none();
+  const ParameterNames parameters = parameter_names(r);
+  const Eigen::Index n_y = r.model.n_outputs();
+  py::dict out;
+  out["name"] = parameters.names;
+  out["unit"] = parameters.units;
+  out["value"] = Eigen::Map<const Eigen::VectorXd>(
+      parameters.values.data(), static_cast<Eigen::Index>(parameters.values.size()));
+  out["sandwich"] = r.covariance.sandwich;
+  out["likelihood"] = r.covariance.likelihood;
+  out["response_variance"] = lines_view<double>(r.covariance.response_variance, n_y, self);
+  out["confidence_radius"] = lines_view<double>(r.covariance.response_radius, n_y, self);
+  return out;
+}
+
+constexpr const char* kCovarianceDoc =
+    R"(A dict: name, unit and value of all p parameters; sandwich and likelihood, their covariance [p, p];
+response_variance and confidence_radius (95 %) of the model on the fitted lines, float64 [N, n_y, n_u]. What
+stageid fit --covariance writes. None unless asked for by fit(..., covariance=True).)";
 
 constexpr const char* kVarianceDoc =
     R"(E|dP|^2 of the model's response on the fitted lines, float64 [N, n_y, n_u]; None without variances.
@@ -122,13 +148,15 @@ void define_fit(py::module_& module) {
             const auto& r = self.cast<const FitResult&>();
             return lines_view<double>(r.response_variance, r.model.n_outputs(), self);
           },
-          kVarianceDoc);
+          kVarianceDoc)
+      .def_property_readonly("covariance", &covariance_of, kCovarianceDoc);
   module.def("fit", &fit, py::arg("frf"), py::kw_only(), py::arg("band_hz") = py::none(),
              py::arg("modes") = py::none(), py::arg("weighting") = py::none(), py::arg("hold") = "",
              py::arg("delay") = py::none(), py::arg("rigid_body") = py::none(),
              py::arg("residue_rank") = "full", py::arg("damping") = "", py::arg("direct_term") = "",
              py::arg("submodels") = std::vector<std::string>{}, py::arg("method") = "riv",
-             py::arg("max_iterations") = 100, py::arg("threads") = 0, kFitDoc);
+             py::arg("max_iterations") = 100, py::arg("threads") = 0, py::arg("covariance") = false,
+             kFitDoc);
 }
 
 }  // namespace stageid

@@ -37,6 +37,10 @@ py::list modes_of(const AdditiveModel& model) {
     mode["modal_mass"] = shape.modal_mass;
     mode["output_shape"] = shape.output_shape;
     mode["input_shape"] = shape.input_shape;
+    const std::optional<ModeShapeDeviation>& deviation = submodel.shape_std;
+    mode["modal_mass_std"] = deviation ? py::object(py::float_(deviation->modal_mass)) : py::none();
+    mode["output_shape_std"] = deviation ? py::cast(deviation->output_shape) : py::none();
+    mode["input_shape_std"] = deviation ? py::cast(deviation->input_shape) : py::none();
     modes.append(mode);
   }
   return modes;
@@ -133,7 +137,8 @@ Raises RequestError where a frequency is not finite, or above Nyquist behind a h
 
 constexpr const char* kModesDoc =
     R"(A list of dicts: natural_frequency_hz and damping_ratio with natural_frequency_std_hz (Hz) and
-damping_ratio_std (None if unknown), modal_mass (kg for N and m), output_shape [n_y], input_shape [n_u].)";
+damping_ratio_std (None if unknown), modal_mass (kg for N and m), output_shape [n_y], input_shape [n_u], and
+modal_mass_std, output_shape_std, input_shape_std: of the real parts, and of the imaginary parts; None if unknown.)";
 
 constexpr const char* kSubmodelsDoc =
     R"(A list of dicts: integrators, denominator [1, a_1, ...], numerator [B_0, B_1, ...] of [n_y, n_u] each, and

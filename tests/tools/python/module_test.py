@@ -156,6 +156,27 @@ class SameAsTheProgram(unittest.TestCase):
             self.assertEqual(ours["denominator"], theirs["denominator"])
             np.testing.assert_array_equal(ours["numerator"], theirs["numerator"])
 
+    def test_the_covariance_is_what_the_program_writes(self):
+        program("fit", "frf.h5", "-o", "with.json", "--band", *BAND, "--covariance", "covariance.h5")
+        self.assertIsNone(stageid.fit(WORK / "frf.h5", band_hz=BAND).covariance)
+        fit = stageid.fit(WORK / "frf.h5", band_hz=BAND, covariance=True)
+        with h5py.File(WORK / "covariance.h5") as file:
+            self.assertEqual([n.decode() for n in file["parameters/name"]], fit.covariance["name"])
+            for ours, theirs in (("value", "parameters/value"), ("sandwich", "covariance/sandwich"),
+                                 ("likelihood", "covariance/likelihood"),
+                                 ("response_variance", "response_variance"),
+                                 ("confidence_radius", "confidence_radius")):
+                np.testing.assert_array_equal(fit.covariance[ours], file[theirs][:])
+        deviation = np.sqrt(np.diag(fit.covariance["sandwich"]))
+        by_name = dict(zip(fit.covariance["name"], deviation))
+        for i, submodel in enumerate(fit.model.submodels):
+            std = submodel["numerator_std"][0]
+            for y, u in np.ndindex(std.shape):
+                self.assertAlmostEqual(by_name[f"submodels[{i}].numerator[0][{y}][{u}]"] / std[y, u], 1.0, 6)
+        for mode in fit.model.modes():
+            self.assertTrue(0 < mode["modal_mass_std"] < mode["modal_mass"])
+            self.assertEqual(mode["input_shape_std"].shape, mode["input_shape"].shape)
+
     def test_candidate_modes(self):
         program("modes", "frf.h5", "-o", "modes.json", "--band", *BAND)
         found = stageid.modes(stageid.read_frf(WORK / "frf.h5").select(band_hz=BAND))

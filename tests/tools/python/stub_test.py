@@ -12,7 +12,7 @@ import stageid
 
 # Kinds of results and of arguments: in the stub only.
 TYPES_ONLY = {"File", "Reals", "Complexes", "Run", "CandidateMode", "StabilizationPole", "Mode", "Submodel",
-              "ModePair", "Finding"}
+              "ModePair", "Covariance", "Finding"}
 SPECIAL = {"__init__", "__len__", "__iter__", "__getitem__"}
 
 

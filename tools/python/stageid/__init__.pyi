@@ -54,6 +54,18 @@ class Mode(TypedDict):
     modal_mass: float
     output_shape: Complexes
     input_shape: Complexes
+    modal_mass_std: float | None
+    output_shape_std: Complexes | None
+    input_shape_std: Complexes | None
+
+class Covariance(TypedDict):
+    name: list[str]
+    unit: list[str]
+    value: Reals
+    sandwich: Reals
+    likelihood: Reals
+    response_variance: Reals
+    confidence_radius: Reals
 
 class Submodel(TypedDict):
     integrators: int
@@ -210,6 +222,8 @@ class Fit:
     def removal_cost(self) -> list[float]: ...
     @property
     def response_variance(self) -> Reals | None: ...
+    @property
+    def covariance(self) -> Covariance | None: ...
 
 def call(*args: object) -> int: ...
 def multisine(
@@ -264,6 +278,7 @@ def fit(
     method: str = "riv",
     max_iterations: int = 100,
     threads: int = 0,
+    covariance: bool = False,
 ) -> Fit: ...
 def read_model(file: File) -> Model: ...
 def validate(model: Model, frf: Frf, *, band_hz: Sequence[float] | None = None) -> dict[str, Any]: ...

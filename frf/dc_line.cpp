@@ -1,0 +1,18 @@
+#include "frf/dc_line.hpp"
+
+#include <stdexcept>
+
+namespace stageid {
+
+bool has_dc_line(const FrfEstimate& frf) { return frf.lines() > 0 && frf.frequency_hz[0] == 0.0; }
+
+FrfEstimate without_dc_line(FrfEstimate frf) {
+  if (!has_dc_line(frf)) return frf;
+  if (frf.lines() == 1)
+    throw std::invalid_argument(
+        "the only line lies at 0 Hz, where no fit and no search for modes looks; take a wider "
+        "--band");
+  return select_band(frf, frf.frequency_hz[1], frf.frequency_hz[frf.lines() - 1]);
+}
+
+}  // namespace stageid
