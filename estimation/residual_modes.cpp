@@ -17,6 +17,7 @@ constexpr double kBelowBand = 0.5;  // candidates reach beyond the band's ends b
 constexpr double kAboveBand = 1.8;
 constexpr double kLeastOwnShare = 0.02;
 constexpr Eigen::Index kBlock = 64;
+constexpr Eigen::Index kChannels = 256;  // whose residual is held at a time
 
 /// Frequencies a fraction of the half-power width apart, not finer than the lines.
 std::vector<ModeCandidate> candidate_grid(const FrfEstimate& frf, const AdditiveModel& model) {
@@ -90,52 +91,106 @@ Eigen::MatrixXd own_functions(const FrfEstimate& frf, const AdditiveModel& model
   return qr.householderQ() * Eigen::MatrixXd::Identity(2 * N, columns.cols());
 }
 
+/// Root of the mean over channels; those of very different size count alike.
+Eigen::VectorXd mean_root_weight(const Eigen::MatrixXd& weights) {
+  const Eigen::VectorXd channel_scale = weights.rowwise().mean().cwiseInverse();
+  Eigen::VectorXd out(weights.cols());
+  for (Eigen::Index k = 0; k < out.size(); ++k)
+    out[k] = std::sqrt(weights.col(k).cwiseProduct(channel_scale).mean());
+  return out;
+}
+
+/// Inputs in a row, with all outputs.
+struct InputRange {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+
+/// As many at a time as have some hundred channels: what is made of the data must not be as large as they are.
+std::vector<InputRange> input_ranges(const FrfEstimate& frf) {
+  const Eigen::Index most = std::max<Eigen::Index>(1, kChannels / frf.n_outputs());
+  std::vector<InputRange> out;
+  for (Eigen::Index u = 0; u < frf.n_inputs(); u += most)
+    out.push_back({u, std::min(most, frf.n_inputs() - u)});
+  return out;
+}
+
+AdditiveModel of_inputs(const AdditiveModel& model, const InputRange& inputs) {
+  if (inputs.count == model.n_inputs()) return model;
+  AdditiveModel out = model;
+  const auto first = model.inputs.names.begin() + inputs.first;
+  out.inputs.names.assign(first, first + inputs.count);
+  out.inputs.units.assign(out.inputs.names.size(), {});
+  if (model.input_delay_s.size() > 0)
+    out.input_delay_s = model.input_delay_s.segment(inputs.first, inputs.count);
+  for (Submodel& s : out.submodels)
+    for (Eigen::MatrixXd& B : s.numerator)
+      B = Eigen::MatrixXd(B.middleCols(inputs.first, inputs.count));
+  return out;
+}
+
+/// W E, real parts and then imaginary parts of all lines.
+Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& model,
+                                  const Eigen::MatrixXd& weights, const InputRange& inputs) {
+  const Eigen::Index N = frf.lines();
+  const Eigen::Index first = inputs.first * frf.n_outputs();
+  const Eigen::Index rows = inputs.count * frf.n_outputs();
+  const Eigen::MatrixXcd E = frf.response.middleRows(first, rows) -
+                             response(of_inputs(model, inputs), frf.frequency_hz, model.hold);
+  Eigen::MatrixXd WE(rows, 2 * N);
+  WE << weights.middleRows(first, rows).cwiseProduct(E.real()),
+      weights.middleRows(first, rows).cwiseProduct(E.imag());
+  return WE;
+}
+
 }  // namespace
 
 std::vector<ResidualMode> residual_modes(const FrfEstimate& frf, const AdditiveModel& model,
                                          const Eigen::MatrixXd& weights, std::size_t most,
                                          int threads) {
-  const Eigen::MatrixXcd E = frf.response - response(model, frf.frequency_hz, model.hold);
   const Eigen::Index N = frf.lines();
-  Eigen::MatrixXd WE(weights.rows(), 2 * N);
-  WE << weights.cwiseProduct(E.real()), weights.cwiseProduct(E.imag());
-  // Channels of very different size count alike in the mean.
-  const Eigen::VectorXd channel_scale = weights.rowwise().mean().cwiseInverse();
-  const Eigen::VectorXd root_weight =
-      (channel_scale.asDiagonal() * weights).colwise().mean().cwiseSqrt().transpose();
+  const Eigen::VectorXd root_weight = mean_root_weight(weights);
   const Eigen::VectorXcd factor = delay_factor(frf, model);
   const Eigen::MatrixXd own = own_functions(frf, model, factor, root_weight);
 
   const std::vector<ModeCandidate> grid = candidate_grid(frf, model);
-  std::vector<ResidualMode> scored(grid.size());
+  Eigen::VectorXd raw = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(grid.size()));
+  Eigen::VectorXd share = Eigen::VectorXd::Ones(raw.size());
   const auto blocks = static_cast<int>((grid.size() + kBlock - 1) / kBlock);
-  parallel_tasks(blocks, threads, [&](int block) {
-    const auto first = static_cast<Eigen::Index>(block) * kBlock;
-    const Eigen::Index count =
-        std::min<Eigen::Index>(kBlock, static_cast<Eigen::Index>(grid.size()) - first);
-    Eigen::MatrixXd phi(2 * N, count);
-    Eigen::MatrixXd power(N, count);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Eigen::VectorXcd x =
-          candidate_function(frf.frequency_hz, factor, grid[static_cast<std::size_t>(first + i)]);
-      phi.col(i) << x.real(), x.imag();
-      power.col(i) = x.cwiseAbs2();
-    }
-    const Eigen::MatrixXd correlation = WE * phi;
-    const Eigen::MatrixXd norm = weights * power;
-    phi.topRows(N).array().colwise() *= root_weight.array();
-    phi.bottomRows(N).array().colwise() *= root_weight.array();
-    const Eigen::VectorXd total = phi.colwise().squaredNorm().transpose();
-    const Eigen::VectorXd imitated = (own.transpose() * phi).colwise().squaredNorm().transpose();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const double raw =
-          (correlation.col(i).array().square() / norm.col(i).array().max(1e-300)).sum();
-      const double share =
-          own.cols() > 0 ? std::max(1.0 - imitated[i] / total[i], kLeastOwnShare) : 1.0;
-      scored[static_cast<std::size_t>(first + i)] = {grid[static_cast<std::size_t>(first + i)],
-                                                     raw / share};
-    }
-  });
+  for (const InputRange& inputs : input_ranges(frf)) {
+    const Eigen::MatrixXd WE = weighted_residual(frf, model, weights, inputs);
+    const auto W = weights.middleRows(inputs.first * frf.n_outputs(), WE.rows());
+    parallel_tasks(blocks, threads, [&](int block) {
+      const auto first = static_cast<Eigen::Index>(block) * kBlock;
+      const Eigen::Index count = std::min<Eigen::Index>(kBlock, raw.size() - first);
+      Eigen::MatrixXd phi(2 * N, count);
+      Eigen::MatrixXd power(N, count);
+      for (Eigen::Index i = 0; i < count; ++i) {
+        const Eigen::VectorXcd x =
+            candidate_function(frf.frequency_hz, factor, grid[static_cast<std::size_t>(first + i)]);
+        phi.col(i) << x.real(), x.imag();
+        power.col(i) = x.cwiseAbs2();
+      }
+      const Eigen::MatrixXd correlation = WE * phi;
+      const Eigen::MatrixXd norm = W * power;
+      raw.segment(first, count) += (correlation.array().square() / norm.array().max(1e-300))
+                                       .colwise()
+                                       .sum()
+                                       .matrix()
+                                       .transpose();
+      if (inputs.first > 0 || own.cols() == 0) return;
+      phi.topRows(N).array().colwise() *= root_weight.array();
+      phi.bottomRows(N).array().colwise() *= root_weight.array();
+      const Eigen::ArrayXd total = phi.colwise().squaredNorm().transpose();
+      const Eigen::ArrayXd imitated = (own.transpose() * phi).colwise().squaredNorm().transpose();
+      share.segment(first, count) = (1.0 - imitated / total).max(kLeastOwnShare);
+    });
+  }
+  std::vector<ResidualMode> scored(grid.size());
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    scored[i] = {grid[i], raw[at] / share[at]};
+  }
   std::stable_sort(scored.begin(), scored.end(),
                    [](const ResidualMode& a, const ResidualMode& b) { return a.gain > b.gain; });
   std::vector<ResidualMode> best;

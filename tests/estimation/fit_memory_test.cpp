@@ -109,5 +109,11 @@ TEST_F(FitMemory, HoldsForTheWholeWayFromGivenModes) {
   expect_little_beside(1.0, [&] { return structured_fit(frf_, structure, selection, options_); });
 }
 
+TEST_F(FitMemory, HoldsForTheWholeWayFromNothingWithTheDelayEstimated) {
+  options_.delay = DelayModel::estimate;
+  options_.delay_s = 0.0;
+  expect_little_beside(1.0, [&] { return structured_fit(frf_, {}, {}, options_); });
+}
+
 }  // namespace
 }  // namespace stageid
