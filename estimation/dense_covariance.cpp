@@ -246,10 +246,9 @@ std::vector<DenseCovariance> dense_covariances(const FrfEstimate& frf, const Fit
                                      : low_rank
                                          ? of_given_ranks(frf, fit, result, options, sets)
                                          : of_free_numerators(frf, fit, result, options, sets);
-  for (DenseCovariance& one : out) {
-    one.sandwich *= frf.correlated_lines;
-    one.likelihood *= frf.correlated_lines;
-  }
+  for (DenseCovariance& one : out)
+    for (Eigen::MatrixXd* matrix : {&one.sandwich, &one.likelihood})  // symmetric to the last bit
+      *matrix = (0.5 * frf.correlated_lines * (*matrix + matrix->transpose())).eval();
   return out;
 }
 

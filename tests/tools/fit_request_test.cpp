@@ -221,8 +221,12 @@ TEST(FitRequest, WeightsComeFromAFileInTheOrderOfTheResponse) {
   EXPECT_EQ(setup.options.weighting, Weighting::user);
   EXPECT_EQ((*setup.options.user_weights)(1, 0), 1.0);  // channel y <- b on the first line
   EXPECT_EQ((*setup.options.user_weights)(0, 3), 6.0);
-  request.band_hz = {15.0, 45.0};
-  EXPECT_THROW(make_fit_setup(request, measured()), FormatError);
+  request.band_hz = {15.0, 35.0};  // of the whole response: those of the band are taken
+  const FitSetup band = make_fit_setup(request, measured());
+  ASSERT_EQ((*band.options.user_weights).cols(), 2);
+  EXPECT_EQ((*band.options.user_weights)(0, 0), 2.0);
+  EXPECT_EQ((*band.options.user_weights)(1, 1), 5.0);
+  EXPECT_THROW(make_fit_setup(request, select_band(measured(), 15.0, 45.0)), FormatError);
   values[3] = -1.0;
   {
     Hdf5File file = Hdf5File::create(path);

@@ -1,3 +1,4 @@
+#include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
@@ -104,8 +105,8 @@ py::object covariance_of(const py::object& self) {
   py::dict out;
   out["name"] = parameters.names;
   out["unit"] = parameters.units;
-  out["value"] = Eigen::Map<const Eigen::VectorXd>(
-      parameters.values.data(), static_cast<Eigen::Index>(parameters.values.size()));
+  out["value"] = Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(
+      parameters.values.data(), static_cast<Eigen::Index>(parameters.values.size())));
   out["sandwich"] = r.covariance.sandwich;
   out["likelihood"] = r.covariance.likelihood;
   out["response_variance"] = lines_view<double>(r.covariance.response_variance, n_y, self);
