@@ -10,12 +10,14 @@
 #include <stdexcept>
 
 #include "estimation/fit_problem.hpp"
+#include "estimation/growth_watch.hpp"
 #include "estimation/hidden_modes.hpp"
 #include "estimation/mode_worth.hpp"
 #include "estimation/overlapping_modes.hpp"
 #include "estimation/pole_relocation.hpp"
 #include "estimation/ranked_fit.hpp"
 #include "estimation/residual_modes.hpp"
+#include "estimation/search_start.hpp"
 #include "excitation/counted.hpp"
 #include "frf/worker_pool.hpp"
 
@@ -114,6 +116,7 @@ class AutomaticFit {
                               : ranked_fit(frf_, best_.model, last, mode_number());
     if (const std::string ranks = describe(result.residue_ranks); !ranks.empty())
       result.decisions.push_back(ranks);
+    tell_why_the_search_ended(result);
     sort_modes(result);
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
@@ -127,6 +130,15 @@ class AutomaticFit {
   ModeNumber mode_number() const {
     if (selection_.keep_modes) return ModeNumber::given;
     return selection_.exactly > 0 ? ModeNumber::asked : ModeNumber::chosen;
+  }
+
+  void tell_why_the_search_ended(FitResult& result) const {
+    if (!watch_.ended()) return;
+    result.findings.push_back(watch_.finding());
+    if (!watch_.by_delay() || !result.trustworthy()) return;
+    result.status = FitStatus::unexplained;
+    result.message = watch_.finding();
+    result.model.fit.status = to_string(result.status);
   }
 
   bool many() const { return selection_.exactly > kMostGrown; }
@@ -162,31 +174,12 @@ class AutomaticFit {
     }
     AdditiveModel model = start_of(modes);
     if (model.submodels.empty())
-      model.submodels.push_back(mode_submodel(frf_, structure_, strongest_peak()));
+      model.submodels.push_back(mode_submodel(frf_, structure_, strongest_peak(frf_)));
     return model;
   }
 
-  /// Hold and delays as far as they are known, and these modes.
   AdditiveModel start_of(const std::vector<ModeCandidate>& modes) const {
-    AdditiveModel model;
-    model.hold = options_.hold;
-    if (!best_.model.submodels.empty()) {
-      model.input_delay_s = best_.model.input_delay_s;
-      model.output_delay_s = best_.model.output_delay_s;
-    } else if (options_.delay == DelayModel::fixed) {
-      model.input_delay_s.setConstant(frf_.n_inputs(), options_.delay_s);
-      model.output_delay_s.setZero(frf_.n_outputs());
-    }
-    model.submodels = fixed_submodels(frf_, structure_);
-    for (const ModeCandidate& mode : modes)
-      model.submodels.push_back(mode_submodel(frf_, structure_, mode));
-    return model;
-  }
-
-  ModeCandidate strongest_peak() const {
-    Eigen::Index k = 0;
-    cmif(frf_, CmifKind::accelerance).row(0).maxCoeff(&k);
-    return {frf_.frequency_hz[k], 0.01, 1};
+    return search_start(frf_, structure_, options_, best_.model, modes);
   }
 
   int affordable_modes() const {
@@ -196,7 +189,7 @@ class AutomaticFit {
   bool wanted_more() const {
     const int modes = count_modes(best_.model);
     if (selection_.exactly > 0) return modes < target_;
-    return modes < affordable_modes() && !worth_.at_rounding(best_);
+    return modes < affordable_modes() && !worth_.at_rounding(best_) && !watch_.ended();
   }
 
   /// Adds modes while they are worth it. @returns true if any was added.
@@ -207,8 +200,14 @@ class AutomaticFit {
           std::max(kCandidates, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
       const std::vector<ResidualMode> candidates =
           residual_modes(frf_, best_.model, quick_.user_weights, most, threads_);
+      FitResult before = best_;
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
+      if (selection_.exactly > 0) continue;
+      const std::size_t added = best_.model.submodels.size() - before.model.submodels.size();
+      if (!watch_.ends(frf_, quick_, before, best_, added)) continue;
+      best_ = watch_.model();
+      say("{}", watch_.finding());
     }
     return grown;
   }
@@ -344,6 +343,7 @@ class AutomaticFit {
   ModeWorth worth_;
   int target_;  ///< modes to grow to where their number is given
   int threads_ = 1;
+  GrowthWatch watch_;
   FitResult best_;
   std::vector<std::string> decisions_;
   std::vector<double> history_;

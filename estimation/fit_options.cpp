@@ -48,6 +48,8 @@ const char* to_string(FitStatus status) noexcept {
       return "singular";
     case FitStatus::undetermined:
       return "undetermined";
+    case FitStatus::unexplained:
+      return "unexplained";
   }
   return "singular";
 }

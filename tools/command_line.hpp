@@ -12,4 +12,20 @@ inline CLI::App* add_command(CLI::App& app, const std::string& name, const std::
   return command;
 }
 
+/// Refuses numbers below zero, or not above it, in words: CLI11 prints the largest double as what is allowed.
+inline CLI::Validator number_check(bool zero_is_one, const char* name) {
+  const auto check = [zero_is_one](const std::string& text) -> std::string {
+    double value = 0.0;
+    if (CLI::detail::lexical_cast(text, value) && (zero_is_one ? value >= 0.0 : value > 0.0))
+      return {};
+    return "'" + text + "' is not " + (zero_is_one ? "0 or more" : "above 0");
+  };
+  return {check, name, ""};
+}
+
+/// For options that take 0 or more.
+inline const CLI::Validator kNotNegative = number_check(true, "NONNEGATIVE");
+/// For options that take more than 0.
+inline const CLI::Validator kPositive = number_check(false, "POSITIVE");
+
 }  // namespace stageid

@@ -109,7 +109,7 @@ DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console
       ->add_option("--accuracy", accuracy_,
                    "with level.limits: mean relative variance that is wanted, e.g. 1e-6 for 0.1 %; "
                    "prints how many minutes reach it")
-      ->check(CLI::PositiveNumber);
+      ->check(kPositive);
   command->add_flag("--force", force_, "write even if a limit would be exceeded");
   command->final_callback([this] { run(); });
 }

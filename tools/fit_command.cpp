@@ -65,7 +65,7 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("--seed", seed_, "accepted; nothing in a fit is random");
   command
       ->add_option("--threads", request_.threads, "0: all cores; the result does not depend on it")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNotNegative)
       ->capture_default_str();
   command->final_callback([this] { run(); });
 }
@@ -119,14 +119,17 @@ void FitCommand::run() const {
                    {"modes", modes_json(result.model)},
                    {"seconds", step.seconds}});
   for (const std::string& finding : result.findings)
-    console_.warning(fmt::format("{}: {}", output_.string(), finding));
+    if (finding != result.message)
+      console_.warning(fmt::format("{}: {}", output_.string(), finding));
   if (!whole)
     console_.warning(fmt::format("{}: not written: {}", covariance_.string(),
                                  result.decisions.empty() ? "" : result.decisions.back()));
   if (!result.trustworthy())
     console_.warning(fmt::format(
         "{}: {}{}; the model is written, do not trust it before you know why", output_.string(),
-        result.status == FitStatus::undetermined ? "" : "the fit did not converge: ",
+        result.status == FitStatus::undetermined || result.status == FitStatus::unexplained
+            ? ""
+            : "the fit did not converge: ",
         result.message));
 }
 

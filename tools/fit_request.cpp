@@ -175,6 +175,14 @@ class FitDefaults {
     if (!delay_s) refuse("--delay", request_.delay, "a number in s, estimate or per_channel");
     options.delay = DelayModel::fixed;
     options.delay_s = *delay_s;
+    const Eigen::VectorXd& f = setup_.frf.frequency_hz;
+    if (f.size() < 2) return;
+    const double spacing_hz = (f.tail(f.size() - 1) - f.head(f.size() - 1)).minCoeff();
+    if (!(std::abs(*delay_s) * 2.0 * spacing_hz <= 1.0))
+      refuse("--delay", request_.delay,
+             fmt::format("at most {:.4g} s in size: lines {:.4g} Hz apart do not tell a longer one "
+                         "from a shorter one (1/(2 df))",
+                         0.5 / spacing_hz, spacing_hz));
   }
 
   /// With one realization the variance by the periods lacks what nonlinear distortion adds; weighed by it, the

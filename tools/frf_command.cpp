@@ -89,7 +89,7 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
                    "of the noise: mean over LINES (odd) neighbouring lines, with their degrees "
                    "of freedom")
       ->type_name("LINES")
-      ->check(CLI::PositiveNumber)
+      ->check(kPositive)
       ->capture_default_str();
   command->add_option("--covariance", covariance_, "diagonal | full")
       ->check(CLI::IsMember({"diagonal", "full"}))
@@ -108,7 +108,7 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
                    "keep FFT plans found by timing in FILE, and use those it holds")
       ->type_name("FILE");
   command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNotNegative)
       ->capture_default_str();
   command->final_callback([this] { run(); });
 }

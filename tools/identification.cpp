@@ -202,7 +202,7 @@ void Identification::fit() {
   model_ = step.result.model;
   model_variance_ = std::move(step.result.response_variance);
   trustworthy_ = step.result.trustworthy();
-  if (!trustworthy_) notes_.push_back("the fit did not converge: " + step.result.message);
+  if (!trustworthy_) notes_.push_back("the fit is not to be trusted: " + step.result.message);
   notes_.insert(notes_.end(), step.result.findings.begin(), step.result.findings.end());
   write_model(path("model.json"), model_);
   finish_step(

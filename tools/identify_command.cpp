@@ -17,7 +17,7 @@ IdentifyCommand::IdentifyCommand(CLI::App& app, Console& console) : console_(con
   command->add_flag("--resume", resume_, "continue an interrupted one; what is up to date stays");
   command->add_flag("--force", force_, "measure even if a limit would be exceeded");
   command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNotNegative)
       ->capture_default_str();
   command->final_callback([this] { run(); });
 }

@@ -23,7 +23,7 @@ ModesCommand::ModesCommand(CLI::App& app, Console& console) : console_(console) 
       ->check(CLI::IsMember({"response", "accelerance", "whitened"}))
       ->capture_default_str();
   command->add_option("--prominence", prominence_db_, "of a peak, dB")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNotNegative)
       ->capture_default_str();
   command->final_callback([this] { run(); });
 }

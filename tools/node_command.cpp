@@ -96,7 +96,7 @@ NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
   command
       ->add_option("--pace", pace_,
                    "of resident experiments; 0: as fast as possible, 1: wall clock")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNotNegative)
       ->capture_default_str();
   command
       ->add_option("--hold", hold_s_,

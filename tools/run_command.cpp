@@ -39,7 +39,7 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
                    "backend replay: largest difference of a command from the recorded one, N")
       ->capture_default_str();
   command->add_option("--pace", pace_, "0: as fast as possible; 1: wall clock; default: stage file")
-      ->check(CLI::NonNegativeNumber);
+      ->check(kNotNegative);
   command->add_option("--excitation", excitation_,
                       "excitation.h5 of 'stageid design': play it instead of designing again");
   command
@@ -47,7 +47,7 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
           "--until", until_,
           "VARIANCE: end as soon as the mean relative variance of the response is as small, "
           "e.g. 1e-6 for 0.1 %; asked after every realization")
-      ->check(CLI::PositiveNumber);
+      ->check(kPositive);
   command->add_flag("--resume", resume_,
                     "continue an interrupted log: complete runs are not repeated");
   command->add_option("--dashboard", dashboard_,

@@ -104,7 +104,7 @@ ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(con
   command->add_option("--stage", stage_,
                       "stage file that the health of a log is held against; default: its own");
   command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNotNegative)
       ->capture_default_str();
   command->final_callback([this] { run(); });
 }

@@ -18,6 +18,8 @@ namespace {
 constexpr const char* kDiagonals = "/weights";
 constexpr const char* kMatrices = "/weight_matrices";
 
+constexpr double kLeastPower = 1e-100;
+
 /// @param wanted of the lines in the band  @returns the band's first line in the dataset
 std::size_t first_line(const Hdf5File& file, const char* dataset,
                        const std::vector<hsize_t>& wanted, WholeLines whole) {
@@ -56,6 +58,18 @@ void read_diagonals(const Hdf5File& file, const FrfEstimate& frf, WholeLines who
                            fmt::format("line {}: {}; weights are 0 or more", k, values[at]));
         weights(i + frf.n_outputs() * j, k) = values[at];
       }
+  if (!(weights.maxCoeff() > 0.0))
+    throw FormatError(
+        file.path(), kDiagonals,
+        "every weight is 0, so that nothing is fitted; one at least must be positive");
+  // Of numbers beyond, squares leave the range of doubles.
+  const double power = (weights.array() * frf.response.cwiseAbs2().array()).sum();
+  if (power > 0.0 && !(power > kLeastPower && power < 1.0 / kLeastPower))
+    throw FormatError(
+        file.path(), kDiagonals,
+        fmt::format("the weighted power of the response, sum W |G|^2, is {:.1e}; only "
+                    "the ratios of weights matter: scale them until it is about 1",
+                    power));
 }
 
 void read_matrices(const Hdf5File& file, const FrfEstimate& frf, WholeLines whole,

@@ -185,6 +185,43 @@ TEST_F(SmallStage, WithoutRigidBodyThereIsNone) {
   EXPECT_EQ(fit.model.submodels.size(), 3U);
 }
 
+// A search that goes on for what is no mode ------------------------------------------------------
+
+TEST_F(SmallStage, ADelayThatIsDeniedEndsTheSearchAndIsNamed) {
+  constexpr double kDelay_s = 1e-4;
+  for (Eigen::Index k = 0; k < frf_.lines(); ++k)
+    frf_.response.col(k) *= std::polar(1.0, -kDelay_s * frf_.omega_rad_s()[k]);
+  for (const double denied_s : {0.0, -2e-4}) {
+    FitOptions options;
+    options.delay_s = denied_s;
+    const FitResult fit = automatic_fit(frf_, {}, {}, options);
+    EXPECT_FALSE(fit.trustworthy());
+    EXPECT_THAT(fit.findings,
+                testing::ElementsAre(testing::AllOf(
+                    testing::ContainsRegex("a delay of (9\\.99|0\\.0001).* s instead of"),
+                    testing::HasSubstr("take --delay estimate"))));
+    EXPECT_LE(frequencies(fit.model).size(), 6U);
+    if (denied_s != 0.0) continue;  // such a fit need not converge
+    EXPECT_EQ(fit.status, FitStatus::unexplained) << fit.message;
+    EXPECT_EQ(fit.model.fit.status, "unexplained");
+  }
+  FitOptions options;
+  options.delay = DelayModel::estimate;
+  const FitResult fit = automatic_fit(frf_, {}, {}, options);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.findings.empty());
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+}
+
+// A ripple as a cable or a filter leaves it: no mode, and every mode that follows it lowers the cost.
+TEST_F(SmallStage, ModesThatOnlyModelColourEndTheSearchAndAreLeftOut) {
+  for (Eigen::Index k = 0; k < frf_.lines(); ++k)
+    frf_.response.col(k) *= 1.0 + 0.1 * std::sin(frf_.frequency_hz[k] / 25.0);
+  const FitResult fit = automatic_fit(frf_, {}, {}, {});
+  EXPECT_THAT(fit.findings, testing::ElementsAre(testing::HasSubstr("colour of the residual")));
+  EXPECT_LE(frequencies(fit.model).size(), 12U);
+}
+
 TEST_F(SmallStage, TheNumberOfThreadsDoesNotChangeABit) {
   FitOptions options;
   options.threads = 1;

@@ -19,7 +19,7 @@ TEST_F(BadRequest, Usage) {
   fail({"frf", "a.slog", "-o", "b.h5", "--method", "lmp"}, 2, "; did you mean 'lpm'?");
   fail({"frf", "a.slog", "-o", "b.h5", "--delay", "1e-3"}, 2, "add --compensate delay or hold");
   fail({"config", "schema", "stge"}, 2, "; did you mean 'stage'?");
-  fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads");
+  fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads: '-1' is not 0 or more");
   fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
   fail({"log"}, 2, "a subcommand is missing: one of info, verify, recover, convert; see");
   fail({"log", "inf", "a.slog"}, 2, "'inf' is unknown; did you mean 'info'?");

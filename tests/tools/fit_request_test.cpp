@@ -119,6 +119,20 @@ TEST(FitRequest, AccelerationsGetTheStructureThatTheyHave) {
   EXPECT_FALSE(make_fit_setup({}, frf).structure.common.general_damping);
 }
 
+TEST(FitRequest, RefusesADelayThatTheLinesCannotTellFromItsAlias) {
+  FitRequest request;
+  for (const char* delay : {"0.05", "-0.05"}) {  // 1/(2 df) of lines 10 Hz apart
+    request.delay = delay;
+    EXPECT_NO_THROW((void)make_fit_setup(request, measured())) << delay;
+  }
+  for (const char* delay : {"0.051", "-0.051", "1e9"}) {
+    request.delay = delay;
+    EXPECT_THAT([&] { (void)make_fit_setup(request, measured()); },
+                testing::ThrowsMessage<std::invalid_argument>(testing::AllOf(
+                    HasSubstr("--delay"), HasSubstr("at most 0.05 s"), HasSubstr("10 Hz apart"))));
+  }
+}
+
 TEST(FitRequest, ADelayThatWasTakenOutIsPutBackAndModelled) {
   const FrfEstimate raw = measured();
   const FitSetup setup = make_fit_setup({}, compensate(raw, Compensation::delay, 1.3e-3));

@@ -100,6 +100,18 @@ TEST_F(WeightFile, RefusesNegativeWeights) {
   expect_refused<IndefiniteWeights>("line 2: -1; weights are 0 or more");
 }
 
+TEST_F(WeightFile, RefusesWeightsThatAreAllZeroOrBeyondTheRangeOfSquares) {
+  for (const auto& [weight, part] : {std::pair{0.0, "every weight is 0"},
+                                     {1e-200, "only the ratios of weights matter"},
+                                     {1e200, "only the ratios of weights matter"}}) {
+    const std::vector<double> values(4 * 6, weight);
+    Hdf5File file = Hdf5File::create(path_);
+    file.write_reals("/weights", {4, 2, 3}, values.data());
+    file.close();
+    expect_refused(part);
+  }
+}
+
 class WeightsOfTheProgram : public test::ProgramTest {};
 
 TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {

@@ -1,0 +1,92 @@
+#include "estimation/growth_watch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "estimation/data_noise.hpp"
+#include "estimation/fit_additive_model.hpp"
+#include "estimation/model_structure.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kBroad = 0.1;  // a damping ratio: such a mode is no peak
+constexpr int kMostColoured = 4;
+
+bool overlaps_another(const AdditiveModel& model, std::size_t i) {
+  const Submodel& one = model.submodels[i];
+  const double f = one.natural_frequency_hz();
+  for (std::size_t o = 0; o < model.submodels.size(); ++o) {
+    const Submodel& other = model.submodels[o];
+    if (o == i || !is_searched_mode(other)) continue;
+    const double width = 2.0 * f * std::max(one.damping_ratio(), other.damping_ratio());
+    if (std::abs(other.natural_frequency_hz() - f) < width) return true;
+  }
+  return false;
+}
+
+bool is_coloured(const AdditiveModel& model, std::size_t i) {
+  const Submodel& s = model.submodels[i];
+  const double f = s.natural_frequency_hz();
+  return f < model.fit.band_hz[0] || f > model.fit.band_hz[1] || s.damping_ratio() > kBroad ||
+         overlaps_another(model, i);
+}
+
+bool is_power_of_two(int n) { return (n & (n - 1)) == 0; }
+
+}  // namespace
+
+bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const FitResult& before,
+                       const FitResult& now, std::size_t added) {
+  if (rounds_ == 0) first_ = before;
+  ++rounds_;
+  bool coloured = true;
+  for (std::size_t i = now.model.submodels.size() - added; i < now.model.submodels.size(); ++i)
+    coloured = coloured && is_coloured(now.model, i);
+  if (!coloured) coloured_in_a_row_ = 0;
+  if (coloured && coloured_in_a_row_++ == 0) back_to_ = before;
+  // Every second, fourth, eighth round: what it costs stays a small part of the search.
+  if (rounds_ > 1 && is_power_of_two(rounds_) && a_delay_explains_more(frf, options, now))
+    return true;
+  if (coloured_in_a_row_ < kMostColoured) return false;
+  finding_ = fmt::format(
+      "the search for modes ended: the last {} that it added only model the colour of the "
+      "residual, "
+      "cost {:.6g} -> {:.6g}, and are left out; the variances may be too small, or the data hold "
+      "what modes do not describe (--damping general, --direct-term full, a delay)",
+      coloured_in_a_row_, back_to_.model.fit.cost, now.model.fit.cost);
+  return true;
+}
+
+bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions& searched,
+                                        const FitResult& now) {
+  if (searched.delay != DelayModel::fixed) return false;
+  FitOptions options = searched;
+  options.delay = DelayModel::estimate;
+  options.delay_s = 0.0;  // searched: a wrong one is no start
+  AdditiveModel start = first_.model;
+  start.input_delay_s.resize(0);
+  start.output_delay_s.resize(0);
+  const FitResult trial = fit_additive_model(frf, start, options);
+  if (trial.status == FitStatus::singular) return false;
+  const double data = independent_numbers(frf);
+  const auto criterion = [&](const FitResult& fit) {
+    return data * std::log(std::max(fit.model.fit.cost, 1e-300)) +
+           static_cast<double>(fit.parameters) * std::log(data);
+  };
+  if (!(criterion(trial) < criterion(now))) return false;
+  by_delay_ = true;
+  back_to_ = std::move(first_);
+  finding_ = fmt::format(
+      "the search for modes ended: a delay of {:.4g} s instead of {:.4g} s explains more (cost "
+      "{:.6g}) than the {} modes that it added (cost {:.6g}), which are left out; take --delay "
+      "estimate",
+      trial.model.mean_delay_s(), searched.delay_s, trial.model.fit.cost,
+      count_modes(now.model) - count_modes(back_to_.model), now.model.fit.cost);
+  return true;
+}
+
+}  // namespace stageid
