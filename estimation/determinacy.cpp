@@ -11,6 +11,7 @@
 #include "estimation/parameter_covariance.hpp"
 #include "estimation/poles.hpp"
 #include "estimation/residual.hpp"
+#include "estimation/undetermined_modes.hpp"
 
 namespace stageid {
 namespace {
@@ -20,8 +21,6 @@ namespace {
 constexpr double kSmallestDirection = 1e-12;  // of the numerators
 constexpr double kSmallestShare = 3e-14;      // of the denominators
 constexpr double kShareOfDirection = 0.1;     // from which a submodel is named
-constexpr double kLargestFrequencyDeviation = 0.5;
-constexpr double kLargestDampingDeviation = 1.0;
 
 /// @param first coefficient of submodel `i` among the globals
 bool is_judged(const FitProblem& problem, std::size_t i, Eigen::Index first, bool judge_modes) {
@@ -45,10 +44,10 @@ std::string too_uncertain(const FitProblem& problem, const FitParameters& beta,
   for (const PoleEstimate& pole : pole_estimates(beta.a[i], covariance.block(first, first, n, n))) {
     const double f = pole.natural_frequency_hz;
     const double std_hz = pole.natural_frequency_std_hz.value_or(0.0);
-    if (!(std_hz < kLargestFrequencyDeviation * f))
+    if (!(std_hz < kOpenFrequency * f))
       return fmt::format("its pole at {:.4g} Hz has a standard deviation of {:.2g} Hz", f, std_hz);
     const double damping_std = pole.damping_ratio_std.value_or(0.0);
-    if (!(damping_std < kLargestDampingDeviation * pole.damping_ratio))
+    if (!(damping_std < kOpenDamping * pole.damping_ratio))
       return fmt::format(
           "the damping ratio {:.2g} of its pole at {:.4g} Hz has a standard deviation of {:.2g}",
           pole.damping_ratio, f, damping_std);

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "estimation/data_noise.hpp"
 #include "estimation/fit_additive_model.hpp"
+#include "estimation/mode_worth.hpp"
 #include "estimation/model_structure.hpp"
 
 namespace stageid {
@@ -72,12 +72,7 @@ bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions
   start.output_delay_s.resize(0);
   const FitResult trial = fit_additive_model(frf, start, options);
   if (trial.status == FitStatus::singular) return false;
-  const double data = independent_numbers(frf);
-  const auto criterion = [&](const FitResult& fit) {
-    return data * std::log(std::max(fit.model.fit.cost, 1e-300)) +
-           static_cast<double>(fit.parameters) * std::log(data);
-  };
-  if (!(criterion(trial) < criterion(now))) return false;
+  if (!(information_criterion(frf, trial) < information_criterion(frf, now))) return false;
   by_delay_ = true;
   back_to_ = std::move(first_);
   finding_ = fmt::format(

@@ -6,6 +6,13 @@
 #include "estimation/data_noise.hpp"
 
 namespace stageid {
+
+double information_criterion(const FrfEstimate& frf, const FitResult& fit) {
+  const double data = independent_numbers(frf);
+  return data * std::log(std::max(fit.model.fit.cost, 1e-300)) +
+         static_cast<double>(fit.parameters) * std::log(data);
+}
+
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
     : lines_(static_cast<double>(frf.lines())),

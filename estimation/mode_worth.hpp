@@ -10,6 +10,10 @@ namespace stageid {
 /// Of the weighted power of the data (-160 dB): less is rounding, no more precise measurement exists.
 inline constexpr double kRoundingPower = 1e-16;
 
+/// BIC of a fit with the scale of the variances unknown, in units of 2 ln(likelihood); the smaller the better. For
+/// models whose parameters differ; where modes are searched on the lines, their places cost too: ModeWorth.
+double information_criterion(const FrfEstimate& frf, const FitResult& fit);
+
 /// Whether a mode is worth its parameters: an extended Bayesian information criterion (Chen and Chen,
 /// Biometrika 95 (2008) 759) with the scale of the variances unknown. Where the variances are right it
 /// decides like the one with known variance; where the model cannot be right, it does not chase errors.

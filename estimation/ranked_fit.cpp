@@ -13,6 +13,7 @@
 #include "estimation/model_structure.hpp"
 #include "estimation/overlapping_modes.hpp"
 #include "estimation/settled_fit.hpp"
+#include "estimation/undetermined_modes.hpp"
 #include "excitation/counted.hpp"
 
 namespace stageid {
@@ -77,12 +78,7 @@ class RankedFit {
                [](const Submodel& s) { return is_searched_mode(s) && s.numerator.size() > 1; });
   }
 
-  /// BIC, with the scale of the variances unknown as in ModeWorth.
-  double criterion(const FitResult& fit) const {
-    const double squares =
-        2.0 * static_cast<double>(frf_.lines()) * std::max(fit.model.fit.cost, 1e-300);
-    return data_ * std::log(squares) + static_cast<double>(fit.parameters) * std::log(data_);
-  }
+  double criterion(const FitResult& fit) const { return information_criterion(frf_, fit); }
 
   /// Adopts a fit that is better, or nearly as good (BIC) and converged where the present one has not.
   bool adopt(const TiedModel& tied, FitResult&& trial) {
@@ -270,9 +266,13 @@ class RankedFit {
 
 FitResult ranked_fit(const FrfEstimate& frf, const AdditiveModel& start, const FitOptions& options,
                      ModeNumber number) {
-  if (options.residue_rank > 0) return RankedFit(frf, options, number).run(start);
-  return number == ModeNumber::chosen ? settled_fit(frf, start, options)
-                                      : fit_additive_model(frf, start, options);
+  FitResult fit = options.residue_rank > 0       ? RankedFit(frf, options, number).run(start)
+                  : number == ModeNumber::chosen ? settled_fit(frf, start, options)
+                                                 : fit_additive_model(frf, start, options);
+  // Of modes that are given one by one the status tells.
+  if (number != ModeNumber::given && fit.status != FitStatus::singular)
+    find_undetermined_modes(fit);
+  return fit;
 }
 
 std::string rank_decision(double free_cost, double cost, double cost_to_squares,

@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "estimation/fit_additive_model.hpp"
+#include "estimation/mode_worth.hpp"
 #include "estimation/model_structure.hpp"
 #include "estimation/overlapping_modes.hpp"
+#include "estimation/undetermined_modes.hpp"
 
 namespace stageid {
 namespace {
@@ -92,24 +94,58 @@ bool may_converge(const FitResult& fit) {
   return fit.status == FitStatus::iteration_limit || fit.status == FitStatus::cost_stalled;
 }
 
-}  // namespace
+/// Leaves out modes that the data do not determine, one by one, where they are not worth their parameters.
+void leave_out_undetermined(const FrfEstimate& frf, const FitOptions& options, FitResult& fit,
+                            std::vector<std::string>& left_out) {
+  const auto without = [&](std::size_t i) {
+    AdditiveModel fewer = fit.model;
+    fewer.submodels.erase(fewer.submodels.begin() + static_cast<std::ptrdiff_t>(i));
+    FitResult trial = fit_additive_model(frf, fewer, options);
+    if (!trial.trustworthy() ||
+        !(information_criterion(frf, trial) < information_criterion(frf, fit)))
+      return false;
+    left_out.push_back(fmt::format(
+        "left out {:.6g} Hz (damping {:.3g}), which the data do not determine and which is not "
+        "worth its parameters: cost {:.6g} -> {:.6g}",
+        fit.model.submodels[i].natural_frequency_hz(), fit.model.submodels[i].damping_ratio(),
+        fit.model.fit.cost, trial.model.fit.cost));
+    fit = std::move(trial);
+    return true;
+  };
+  while (count_modes(fit.model) > 1) {
+    const std::vector<std::size_t> open = undetermined_modes(fit);
+    if (std::none_of(open.begin(), open.end(), without)) return;
+  }
+}
 
-FitResult settled_fit(const FrfEstimate& frf, const AdditiveModel& start,
-                      const FitOptions& options) {
+/// Gives up modes until a fit converges; the first one if none does.
+FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
+                        const FitOptions& options, std::vector<std::string>& left_out) {
   FitResult first = fit_additive_model(frf, start, options);
   if (!may_converge(first)) return first;
   FitResult fit = first;
-  std::vector<std::string> left_out;
+  std::vector<std::string> given_up;
   while (may_converge(fit) && count_modes(fit.model) > 1) {
     const std::optional<Simpler> fewer = simpler(fit.model);
     if (!fewer) break;
     const double cost = fit.model.fit.cost;
     fit = fit_additive_model(frf, fewer->model, options);
     if (!(fit.model.fit.cost < kDearest * first.model.fit.cost)) return first;
-    left_out.push_back(
+    given_up.push_back(
         fmt::format("{}: cost {:.6g} -> {:.6g}", fewer->reason, cost, fit.model.fit.cost));
   }
   if (!fit.trustworthy()) return first;
+  left_out = std::move(given_up);
+  return fit;
+}
+
+}  // namespace
+
+FitResult settled_fit(const FrfEstimate& frf, const AdditiveModel& start,
+                      const FitOptions& options) {
+  std::vector<std::string> left_out;
+  FitResult fit = converged_fit(frf, start, options, left_out);
+  if (fit.trustworthy()) leave_out_undetermined(frf, options, fit, left_out);
   fit.decisions.insert(fit.decisions.begin(), left_out.begin(), left_out.end());
   return fit;
 }

@@ -10,6 +10,7 @@
 
 #include "estimation/fit_additive_model.hpp"
 #include "estimation/model_structure.hpp"
+#include "estimation/undetermined_modes.hpp"
 #include "tests/support/model_fit_problem.hpp"
 #include "tests/support/model_reference.hpp"
 #include "tests/support/random_numbers.hpp"
@@ -89,6 +90,38 @@ TEST_F(SettledFit, TwoModesThatRunIntoEachOtherBecomeOne) {
   EXPECT_EQ(count_modes(fit.model), 3);
   ASSERT_FALSE(fit.decisions.empty());
   EXPECT_THAT(fit.decisions.front(), HasSubstr("made one mode of"));
+}
+
+// A mode so broad that its damping ratio ends at the bound converges; it is worth nothing.
+TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
+  AdditiveModel broad = true_;
+  broad.submodels.push_back(test::empty_submodel(true_, 0, test::mode_coefficients(250.0, 0.9), 1));
+  const FitResult kept = fit_additive_model(frf_, broad, options_);
+  ASSERT_TRUE(kept.trustworthy()) << kept.message;
+  ASSERT_EQ(undetermined_modes(kept), std::vector<std::size_t>{2}) << "no mode to leave out";
+  const FitResult fit = settled_fit(frf_, broad, options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_EQ(count_modes(fit.model), 2);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("which the data do not determine"));
+}
+
+// Where a number of modes is asked for they stay, and are told.
+TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFinding) {
+  FitResult fit = fit_additive_model(frf_, true_, options_);
+  find_undetermined_modes(fit);
+  EXPECT_TRUE(fit.findings.empty());
+  fit.held = {1};
+  fit.model.submodels[0].damping_ratio_std = 2.0 * fit.model.submodels[0].damping_ratio();
+  find_undetermined_modes(fit);
+  ASSERT_EQ(fit.findings.size(), 1U);
+  EXPECT_THAT(fit.findings[0], HasSubstr(", its deviation as large), 390.0"));
+  EXPECT_THAT(fit.findings[0], HasSubstr("at its bound"));
+  fit.findings.clear();
+  fit.model.fit.band_hz[1] = 300.0;  // beside the lines a mode stands for what is there
+  fit.model.submodels[0].damping_ratio_std = 1e-4;
+  find_undetermined_modes(fit);
+  EXPECT_TRUE(fit.findings.empty());
 }
 
 TEST_F(SettledFit, AFitThatConvergesIsLeftAlone) {
