@@ -23,6 +23,8 @@ void require_smoothable(const FrfEstimate& frf, int lines) {
     refuse("method 'lpm' takes it from neighbouring bins already; estimate with 'periodic'");
   if (frf.correlated_lines != 1.0)
     refuse("zippered lines take it from their neighbours already; leave the smoothing out");
+  if (frf.experiment_noise_ratio != 1.0)
+    refuse("the noise differs between the experiments, so that no single C_E is common to them");
   if (frf.covariance_lines != 1)
     refuse(fmt::format("it is the mean of {} lines already; start from the logs",
                        frf.covariance_lines));

@@ -101,6 +101,8 @@ void check_scalars(const FrfEstimate& frf) {
     refuse("sample_rate_hz", "not a finite number >= 0; 0 means unknown");
   }
   if (!std::isfinite(frf.delay_s)) refuse("delay_s", "not finite");
+  if (!std::isfinite(frf.experiment_noise_ratio) || frf.experiment_noise_ratio < 1.0)
+    refuse("experiment_noise_ratio", "not a finite number >= 1");
   if (!std::isfinite(frf.correlated_lines) || frf.correlated_lines < 1.0)
     refuse("correlated_lines", "not a finite number >= 1");
   for (const double dof : {frf.noise_dof, frf.total_dof}) {

@@ -71,6 +71,10 @@ struct FrfEstimate {
   /// (n_u n_u) x N: S, Hermitian, with Cov(vec G) = S kron C_E for the mean over realizations; with one
   /// realization S = [(U U^H)^-1]^T. Empty if unknown.
   Eigen::MatrixXcd input_factor;
+  /// Largest over smallest noise power of two experiments of a realization whose noise is not that of the
+  /// others, see experiment_noise.hpp: their covariances were not pooled, and S kron C_E is the nearest to them
+  /// only. 1: the experiments agree.
+  double experiment_noise_ratio = 1.0;
   Eigen::MatrixXcd covariance;  ///< (n_c n_c) x N on request, n_c = n_y n_u: Cov(vec G); else empty
   int covariance_lines = 1;     ///< C_E is the mean over so many lines: smooth_covariance()
   /// Errors of the response on neighbouring lines are correlated: all N lines tell a smooth model as

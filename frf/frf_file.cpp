@@ -68,6 +68,8 @@ void write_attributes(Hdf5File& file, const FrfEstimate& frf) {
   file.write_attribute("/", "total_dof", frf.total_dof);
   if (frf.correlated_lines != 1.0)
     file.write_attribute("/", "correlated_lines", frf.correlated_lines);
+  if (frf.experiment_noise_ratio != 1.0)
+    file.write_attribute("/", "experiment_noise_ratio", frf.experiment_noise_ratio);
 }
 
 /// Of the total variance if it is known: what another measurement would show.
@@ -301,6 +303,7 @@ FrfEstimate read_frf(const std::filesystem::path& path) {
   frf.noise_dof = real_or(file, "noise_dof", 0.0);
   frf.total_dof = real_or(file, "total_dof", 0.0);
   frf.correlated_lines = real_or(file, "correlated_lines", 1.0);
+  frf.experiment_noise_ratio = real_or(file, "experiment_noise_ratio", 1.0);
 
   frf.inputs = read_channels(file, "/inputs");
   frf.outputs = read_channels(file, "/outputs");

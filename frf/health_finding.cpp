@@ -11,10 +11,11 @@ const char* to_string(Severity severity) noexcept {
 }
 
 const char* to_string(Cause cause) noexcept {
-  constexpr std::array kNames = {
-      "dead",       "saturated", "marked",     "late",          "swapped",    "sign",
-      "scale",      "skew",      "unrecorded", "controller",    "rigid_body", "excluded",
-      "excitation", "inputs",    "incoherent", "interpolation", "aperiodic",  "unsettled"};
+  constexpr std::array kNames = {"dead",       "saturated",  "marked",      "late",
+                                 "swapped",    "sign",       "scale",       "skew",
+                                 "unrecorded", "controller", "rigid_body",  "excluded",
+                                 "excitation", "inputs",     "incoherent",  "interpolation",
+                                 "aperiodic",  "unsettled",  "uneven_noise"};
   return kNames[static_cast<std::size_t>(cause)];
 }
 

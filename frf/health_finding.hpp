@@ -34,6 +34,7 @@ enum class Cause : std::uint8_t {
   interpolation,  ///< zippered lines: a local model leaves more than noise
   aperiodic,      ///< the inputs do not repeat with the period
   unsettled,      ///< a transient or a drift: linearity cannot be told
+  uneven_noise,   ///< the noise of one experiment is not that of another
 };
 const char* to_string(Cause cause) noexcept;
 

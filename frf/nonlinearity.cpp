@@ -34,7 +34,7 @@ void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, Eig
     double excess = 0.0;
     for (Eigen::Index k = first; k < first + K; ++k) {
       sum += evidence(scatter.total(c, k), scatter.noise(c, k), std::norm(frf.response(c, k)), a,
-                      frf.noise_dof);
+                      scatter.noise_dof);
       excess += std::max(0.0, frf.total_variance(c, k) - frf.noise_variance(c, k));
     }
     test.p_value(c, b) = tail_of_evidence(sum, K);
@@ -149,7 +149,7 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
   const RealizationScatter scatter =
       evidence.scatter.total.size() > 0
           ? evidence.scatter
-          : RealizationScatter{frf.total_variance, frf.noise_variance};
+          : RealizationScatter{frf.total_variance, frf.noise_variance, frf.noise_dof};
   const DetectionLines& detection = frf.detection;
   if (detection.line.size() > 0) {
     test.even.p_value.resize(detection.power.rows(), bands);
@@ -169,6 +169,9 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
     test_detection(detection, lines_of(detection, 0, low_hz, high_hz), linear_power, b, test.even);
     test_detection(detection, lines_of(detection, 1, low_hz, high_hz), linear_power, b, test.odd);
   }
+  // The noise of detection lines is pooled over the experiments, their power is that of some.
+  if (frf.experiment_noise_ratio > 1.0)
+    for (DetectedDistortion* kind : {&test.even, &test.odd}) kind->p_value.setOnes();
   test_settling(evidence.alignment, test);
   return test;
 }

@@ -30,6 +30,7 @@ struct DetectionLines {
 struct RealizationScatter {
   Eigen::MatrixXd total;  ///< (n_y n_u) x N, from the scatter of the realizations; empty if unknown
   Eigen::MatrixXd noise;  ///< (n_y n_u) x N, from the periods
+  double noise_dof = 0.0;  ///< of `noise`
 };
 
 /// Whether what a run leaves, E = Y - G U, turns from one line to the next. Noise and stochastic

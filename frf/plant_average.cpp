@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "excitation/counted.hpp"
+#include "frf/experiment_noise.hpp"
 #include "frf/worker_pool.hpp"
 
 namespace stageid {
@@ -16,6 +17,16 @@ namespace {
 /// Column k of columns that are vec of a matrix with `rows` rows.
 Eigen::Map<Eigen::MatrixXcd> unvec(Eigen::MatrixXcd& columns, Eigen::Index k, Eigen::Index rows) {
   return {columns.col(k).data(), rows, columns.rows() / rows};
+}
+
+/// Lines whose scatters tell as much as one: of the middle, all alike.
+double lines_that_share(const RealizationSpectra& spectra) {
+  const RunSpectra& run = spectra.run(0);
+  if (run.scatter_window == 0) return 1.0;
+  const auto N = static_cast<Eigen::Index>(run.scatter_first.size());
+  double sum = 0.0;
+  for (Eigen::Index l = 0; l < N; ++l) sum += common_scatter(run, N / 2, l);
+  return sum;
 }
 
 [[noreturn]] void refuse(LineStatus status, int realization, int line, double frequency_hz) {
@@ -49,6 +60,7 @@ PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
   G_mean_.setZero(n_c, N);
   G_scatter_.setZero(n_c, N);
   noise_sum_.setZero(n_c, N);
+  scarce_sum_.setZero(n_c, N);
   residual_sum_.setZero(outputs * outputs, N);
   input_sum_.setZero(inputs * inputs, N);
   if (covariance == CovarianceKind::full) covariance_sum_.setZero(n_c * n_c, N);
@@ -73,19 +85,39 @@ void PlantAverage::add(const RealizationSpectra& spectra, int workers,
   for (Eigen::Index e = 0; e < periods.size(); ++e) {
     periods[e] = spectra.periods(static_cast<std::size_t>(e));
   }
-  for_each_line(workers, frequency_hz_.size(),
-                [&](Eigen::Index k) { add_line(spectra, periods, k); });
+  std::vector<LineEstimate> lines(static_cast<std::size_t>(frequency_hz_.size()));
+  for_each_line(workers, frequency_hz_.size(), [&](Eigen::Index k) {
+    LineEstimate& line = lines[static_cast<std::size_t>(k)];
+    line = estimate_line(spectra.excitation(k), spectra.response(k), outputs_);
+    add_response(spectra, line, k);
+    dof_sum_[k] += spectra.scatter_dof(k);
+  });
+  if (!noise_known_) return;
+  const ExperimentNoise experiments(spectra, lines, lines_that_share(spectra), workers);
+  experiment_noise_ratio_ = std::max(experiment_noise_ratio_, experiments.ratio());
+  for_each_line(workers, frequency_hz_.size(), [&](Eigen::Index k) {
+    add_noise(spectra, lines[static_cast<std::size_t>(k)], experiments, periods, k);
+  });
 }
 
-void PlantAverage::add_line(const RealizationSpectra& spectra, const Eigen::VectorXd& periods,
-                            Eigen::Index k) {
-  const LineEstimate line = estimate_line(spectra.excitation(k), spectra.response(k), outputs_);
-  add_response(spectra, line, k);
-  dof_sum_[k] += spectra.scatter_dof(k);
-  if (noise_known_) {
-    const LineNoise noise = line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods);
-    add_noise(noise, k);
-    scatter_.add(line, noise, spectra.scatter_dof(k), k);
+void PlantAverage::add_noise(const RealizationSpectra& spectra, const LineEstimate& line,
+                             const ExperimentNoise& experiments, const Eigen::VectorXd& periods,
+                             Eigen::Index k) {
+  const double dof = spectra.scatter_dof(k);
+  const LineNoise noise =
+      experiments.differs(k) ? experiments.scaled(line, periods, k)
+                             : line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods);
+  add_common(noise, k);
+  scatter_.add(line, noise, dof, k);
+  if (!experiments.differs(k)) {
+    add_product(noise.input_part, noise.residual, dof, k);
+    return;
+  }
+  const std::vector<Eigen::MatrixXcd> C = experiments.covariances(line, k);
+  for (Eigen::Index e = 0; e < periods.size(); ++e) {
+    const Eigen::VectorXcd q = line.Q.row(e).transpose();
+    add_product(q * q.adjoint() / periods[e], C[static_cast<std::size_t>(e)],
+                spectra.run(static_cast<std::size_t>(e)).dof(k), k);
   }
 }
 
@@ -93,7 +125,8 @@ void PlantAverage::add_zippered(const RealizationSpectra& spectra, const Zippere
                                 Eigen::Index k) {
   const ZipperedEstimate at = fit.estimate(spectra, k);
   add_response(spectra, at.line, k);
-  add_noise(at.noise, k);
+  add_common(at.noise, k);
+  add_product(at.noise.input_part, at.noise.residual, at.noise_dof, k);
   scarcity_sum_[k] += 1.0 / at.noise_dof;
   share_sum_[k] += at.variance_share;
   misfit_sum_[k] += at.misfit;
@@ -116,23 +149,28 @@ void PlantAverage::add_response(const RealizationSpectra& spectra, const LineEst
   }
 }
 
-void PlantAverage::add_noise(const LineNoise& noise, Eigen::Index k) {
+void PlantAverage::add_common(const LineNoise& noise, Eigen::Index k) {
   unvec(residual_sum_, k, outputs_) += noise.mean_of_periods * noise.residual;
   // Hermitian in rounding too.
   unvec(input_sum_, k, inputs_) +=
       (0.5 / noise.mean_of_periods) * (noise.input_part + noise.input_part.adjoint());
+}
+
+/// Noise whose covariance is A kron C, C of `dof` degrees of freedom.
+void PlantAverage::add_product(const Eigen::MatrixXcd& A, const Eigen::MatrixXcd& C, double dof,
+                               Eigen::Index k) {
   for (Eigen::Index j = 0; j < inputs_; ++j) {
     for (Eigen::Index i = 0; i < outputs_; ++i) {
-      noise_sum_(i + outputs_ * j, k) +=
-          noise.input_part(j, j).real() * noise.residual(i, i).real();
+      const double variance = A(j, j).real() * C(i, i).real();
+      noise_sum_(i + outputs_ * j, k) += variance;
+      scarce_sum_(i + outputs_ * j, k) += variance * variance / (dof + 1.0);
     }
   }
   if (covariance_kind_ != CovarianceKind::full) return;
   Eigen::Map<Eigen::MatrixXcd> covariance = unvec(covariance_sum_, k, outputs_ * inputs_);
   for (Eigen::Index j = 0; j < inputs_; ++j) {
     for (Eigen::Index i = 0; i < inputs_; ++i) {
-      covariance.block(i * outputs_, j * outputs_, outputs_, outputs_) +=
-          noise.input_part(i, j) * noise.residual;
+      covariance.block(i * outputs_, j * outputs_, outputs_, outputs_) += A(i, j) * C;
     }
   }
 }
@@ -157,15 +195,23 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
     }
     return;
   }
-  // Where they differ from line to line: their harmonic mean, as the mean of 1 / variance has it.
-  frf.noise_dof = dof_sum_.maxCoeff() > dof_sum_.minCoeff() ? 1.0 / dof_sum_.cwiseInverse().mean()
-                                                            : dof_sum_[0];
+  frf.noise_dof = harmonic_mean(dof_sum_);
   if (zippered_axes_ > 0) finish_zippered(frf);
+  if (experiment_noise_ratio_ > 1.0) frf.noise_dof = effective_dof();
+  frf.experiment_noise_ratio = experiment_noise_ratio_;
   frf.noise_variance = noise_sum_ / (M * M);
   frf.residual_covariance_re = residual_sum_.real() / M;
   frf.residual_covariance_im = residual_sum_.imag() / M;
   frf.input_factor = input_sum_ / (M * M);
   if (covariance_kind_ == CovarianceKind::full) frf.covariance = covariance_sum_ / (M * M);
+}
+
+/// Welch and Satterthwaite: of a sum of variances a_e with nu_e degrees of freedom, (sum a)^2 / sum a^2 / nu. With
+/// estimates for a, sum a^2 / (nu + 1) / (sum a)^2 has the mean 1 / (nu + 1); its mean over lines and entries.
+double PlantAverage::effective_dof() const {
+  const Eigen::ArrayXXd scarcity = scarce_sum_.array() / noise_sum_.array().square();
+  const Eigen::ArrayXXd known = scarcity.isFinite().select(scarcity, 0.0);
+  return static_cast<double>(scarcity.isFinite().count()) / known.sum() - 1.0;
 }
 
 RealizationScatter PlantAverage::scatter() const {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include "frf/experiment_noise.hpp"
 #include "frf/frf_estimate.hpp"
 #include "frf/line_estimate.hpp"
 #include "frf/plant_frf.hpp"
@@ -16,6 +17,9 @@ namespace stageid {
 ///   noise: C_n = sum_m C_n^[m] / M^2, each realization with its own U and G (memory stays
 ///   bounded); with one C_E common to all, that is S kron C_E with S = sum_m A_m / (M^2 mean 1/P_e),
 ///   C_E being the mean of the realizations' and of the mean of periods; total: sum_m |G^[m] - mean G|^2 / (M (M - 1)).
+/// Experiments of one realization whose noise differs (ExperimentNoise) are not pooled:
+/// C_n^[m] = sum_e q_e q_e^H / P_e kron C_Ee then, with the degrees of freedom of Welch and Satterthwaite, and S and C_E are
+/// those that come nearest to it.
 class PlantAverage {
  public:
   PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines, Eigen::Index outputs,
@@ -37,11 +41,16 @@ class PlantAverage {
   RealizationScatter scatter() const;
 
  private:
-  void add_line(const RealizationSpectra& spectra, const Eigen::VectorXd& periods, Eigen::Index k);
+  void add_noise(const RealizationSpectra& spectra, const LineEstimate& line,
+                 const ExperimentNoise& experiments, const Eigen::VectorXd& periods,
+                 Eigen::Index k);
   void add_zippered(const RealizationSpectra& spectra, const ZipperedFit& fit, Eigen::Index k);
   void add_response(const RealizationSpectra& spectra, const LineEstimate& line, Eigen::Index k);
   void finish_zippered(FrfEstimate& frf) const;
-  void add_noise(const LineNoise& noise, Eigen::Index k);
+  void add_common(const LineNoise& noise, Eigen::Index k);
+  void add_product(const Eigen::MatrixXcd& A, const Eigen::MatrixXcd& C, double dof,
+                   Eigen::Index k);
+  double effective_dof() const;
   void finish_line(FrfEstimate& frf, Eigen::Index k) const;
   bool noise_known() const noexcept { return realizations_ > 0 && noise_known_; }
 
@@ -53,10 +62,12 @@ class PlantAverage {
 
   int realizations_ = 0;
   bool noise_known_ = true;
-  Eigen::MatrixXcd Z_sum_;           // vec(Z_m) x lines
-  Eigen::MatrixXcd G_mean_;          // vec(G) x lines, of the realizations' own estimates
-  Eigen::MatrixXd G_scatter_;        // sum |G^[m] - mean|^2
-  Eigen::MatrixXd noise_sum_;        // sum of the realizations' noise variances
+  Eigen::MatrixXcd Z_sum_;      // vec(Z_m) x lines
+  Eigen::MatrixXcd G_mean_;     // vec(G) x lines, of the realizations' own estimates
+  Eigen::MatrixXd G_scatter_;   // sum |G^[m] - mean|^2
+  Eigen::MatrixXd noise_sum_;   // sum of the realizations' noise variances
+  Eigen::MatrixXd scarce_sum_;  // sum of a^2 / (nu + 1) of the variances a that are its terms
+  double experiment_noise_ratio_ = 1.0;
   Eigen::MatrixXcd residual_sum_;    // vec(C_E) of the mean of periods
   Eigen::MatrixXcd input_sum_;       // vec(A_m) over the mean of 1 / P_e
   Eigen::MatrixXcd covariance_sum_;  // vec(Cov(vec G)), on request

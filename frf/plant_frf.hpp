@@ -20,7 +20,9 @@ namespace stageid {
 ///
 /// The noise of Y - G U is that of the open loop, whatever was excited, so its covariance C_E is
 /// pooled over the experiments of a realization: Cov(vec G) = sum_e (q_e q_e^H) kron C_E / P_e with
-/// q_e the e-th row of U^-1, and M E (P-1) degrees of freedom (each dropped period takes one).
+/// q_e the e-th row of U^-1, and M E (P-1) degrees of freedom (each dropped period takes one). Where the
+/// experiments' noise is found to differ, each has its own C_E and the degrees of freedom are those of Welch and
+/// Satterthwaite: experiment_noise.hpp.
 ///
 /// With FrfMethod::lpm Z is the steady state of the whole record, the transient removed by a local
 /// polynomial or rational model (transient_model.hpp), and C_E comes from what that leaves beside
@@ -43,8 +45,8 @@ namespace stageid {
 /// for that are only some of the excited actuators are columns of the whole estimate: the others move
 /// too.
 ///
-/// Memory (periodic): one period of samples and 16 of spectra a thread, and the spectra of one
-/// realization.
+/// Memory (periodic): one period of samples and 16 of spectra a thread, and the spectra and scatters of one
+/// realization, (n_y + n_u)^2 numbers a line and experiment.
 /// Source: method.md section 3; Pintelon and Schoukens, System Identification (2012).
 /// @throws std::invalid_argument / FormatError: fewer experiments than inputs, singular excitation
 ///         (names line and frequency), a period that does not divide the record, no realization

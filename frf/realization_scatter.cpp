@@ -2,10 +2,14 @@
 
 namespace stageid {
 
+double harmonic_mean(const Eigen::VectorXd& dof) {
+  return dof.maxCoeff() > dof.minCoeff() ? 1.0 / dof.cwiseInverse().mean() : dof[0];
+}
+
 ScatterAverage::ScatterAverage(Eigen::Index outputs, Eigen::Index inputs, Eigen::Index lines) {
   mean_.setZero(outputs * inputs, lines);
   scatter_.setZero(outputs * inputs, lines);
-  weight_.setZero(inputs, lines);
+  weight_.setZero(outputs * inputs, lines);
   residual_.setZero(outputs, lines);
   dof_.setZero(lines);
 }
@@ -16,16 +20,13 @@ void ScatterAverage::add(const LineEstimate& line, const LineNoise& noise, doubl
   residual_.col(k) += dof * noise.residual.diagonal().real();
   dof_[k] += dof;
   // West's recursion: Welford's with weights.
-  for (Eigen::Index j = 0; j < weight_.rows(); ++j) {
-    const double weight = 1.0 / noise.input_part(j, j).real();
-    weight_(j, k) += weight;
-    const double share = weight / weight_(j, k);
-    for (Eigen::Index i = 0; i < outputs; ++i) {
-      const Eigen::Index c = i + outputs * j;
-      const std::complex<double> deviation = line.G(i, j) - mean_(c, k);
-      mean_(c, k) += share * deviation;
-      scatter_(c, k) += weight * (1.0 - share) * std::norm(deviation);
-    }
+  for (Eigen::Index c = 0; c < weight_.rows(); ++c) {
+    const double weight = 1.0 / noise.gain(c % outputs, c / outputs);
+    weight_(c, k) += weight;
+    const double share = weight / weight_(c, k);
+    const std::complex<double> deviation = line.G.data()[c] - mean_(c, k);
+    mean_(c, k) += share * deviation;
+    scatter_(c, k) += weight * (1.0 - share) * std::norm(deviation);
   }
 }
 
@@ -33,14 +34,9 @@ RealizationScatter ScatterAverage::finish(int realizations) const {
   const Eigen::Index outputs = residual_.rows();
   const Eigen::MatrixXd residual = residual_ * dof_.cwiseInverse().asDiagonal();
   RealizationScatter found;
-  found.total = scatter_ / (realizations - 1.0);
-  found.noise.resize(scatter_.rows(), scatter_.cols());
-  for (Eigen::Index j = 0; j < weight_.rows(); ++j) {
-    const auto weight = weight_.row(j).array();
-    auto total = found.total.middleRows(outputs * j, outputs).array();
-    total.rowwise() /= weight;
-    found.noise.middleRows(outputs * j, outputs) = (residual.array().rowwise() / weight).matrix();
-  }
+  found.total = scatter_.cwiseQuotient(weight_) / (realizations - 1.0);
+  found.noise = residual.replicate(weight_.rows() / outputs, 1).cwiseQuotient(weight_);
+  found.noise_dof = harmonic_mean(dof_);
   return found;
 }
 

@@ -7,8 +7,11 @@
 
 namespace stageid {
 
-/// Gathers RealizationScatter, realization by realization. With q_m = [A_m]_jj, what realization m makes
-/// of the noise C_E for input j (line_estimate.hpp), and w_m = 1 / q_m, W = sum_m w_m,
+/// Of degrees of freedom that differ from line to line: as the mean of 1 / variance has it.
+double harmonic_mean(const Eigen::VectorXd& dof);
+
+/// Gathers RealizationScatter, realization by realization. With q_m = LineNoise::gain, what realization m makes
+/// of the noise C_E for an entry of G (line_estimate.hpp), and w_m = 1 / q_m, W = sum_m w_m,
 ///   total = sum_m w_m |G^[m] - G_w|^2 / ((M - 1) W),  G_w = sum_m w_m G^[m] / W,
 ///   noise = C_E / W,  C_E pooled over the realizations by their degrees of freedom.
 /// On a linear plant w_m |G^[m] - G|^2 has the variance C_E for every m, so that their ratio has the
@@ -28,7 +31,7 @@ class ScatterAverage {
  private:
   Eigen::MatrixXcd mean_;     // (n_y n_u) x N: G_w
   Eigen::MatrixXd scatter_;   // (n_y n_u) x N: sum w |G - G_w|^2
-  Eigen::MatrixXd weight_;    // n_u x N: W
+  Eigen::MatrixXd weight_;    // (n_y n_u) x N: W
   Eigen::MatrixXd residual_;  // n_y x N: sum of dof C_E
   Eigen::VectorXd dof_;       // N
 };

@@ -9,33 +9,17 @@ RealizationSpectra::RealizationSpectra(int realization, std::vector<Eigen::Matri
     : pool_(pool),
       realization_(realization),
       excitation_(std::move(excitation)),
-      runs_(excitation_.size()),
-      arrived_(excitation_.size(), 0) {}
+      runs_(excitation_.size()) {}
 
 RealizationSpectra::~RealizationSpectra() {
-  pool_.give_back(std::move(scatter_re_));
-  pool_.give_back(std::move(scatter_im_));
+  for (RunSpectra& run : runs_) {
+    pool_.give_back(std::move(run.scatter_re));
+    pool_.give_back(std::move(run.scatter_im));
+  }
 }
 
 void RealizationSpectra::add(std::size_t experiment, RunSpectra&& spectra) {
   runs_[experiment] = std::move(spectra);
-  arrived_[experiment] = 1;
-  while (folded_ < runs_.size() && arrived_[folded_] != 0) fold(runs_[folded_++]);
-}
-
-void RealizationSpectra::fold(RunSpectra& spectra) {
-  if (spectra.scatter_dof > 0) {
-    scatter_dof_ += spectra.scatter_dof;
-    if (scatter_re_.size() == 0) {
-      scatter_re_ = std::move(spectra.scatter_re);
-      scatter_im_ = std::move(spectra.scatter_im);
-    } else {
-      scatter_re_ += spectra.scatter_re;
-      scatter_im_ += spectra.scatter_im;
-    }
-  }
-  pool_.give_back(std::move(spectra.scatter_re));
-  pool_.give_back(std::move(spectra.scatter_im));
 }
 
 Eigen::MatrixXcd RealizationSpectra::excitation(Eigen::Index k) const {
@@ -54,6 +38,12 @@ Eigen::MatrixXcd RealizationSpectra::response(Eigen::Index k) const {
   return Z;
 }
 
+int RealizationSpectra::scatter_dof() const {
+  int dof = 0;
+  for (const RunSpectra& run : runs_) dof += run.scatter_dof;
+  return dof;
+}
+
 double RealizationSpectra::scatter_dof(Eigen::Index k) const {
   double dof = 0.0;
   for (const RunSpectra& run : runs_) dof += run.dof(k);
@@ -62,11 +52,20 @@ double RealizationSpectra::scatter_dof(Eigen::Index k) const {
 
 Eigen::MatrixXcd RealizationSpectra::scatter(Eigen::Index k) const {
   const Eigen::Index n = runs_.front().mean.rows();
+  Eigen::MatrixXcd sum = Eigen::MatrixXcd::Zero(n, n);
+  for (std::size_t e = 0; e < runs_.size(); ++e)
+    if (runs_[e].scatter_dof > 0) sum += scatter(e, k);
+  return sum;
+}
+
+Eigen::MatrixXcd RealizationSpectra::scatter(std::size_t experiment, Eigen::Index k) const {
+  const RunSpectra& run = runs_[experiment];
+  const Eigen::Index n = run.mean.rows();
   Eigen::MatrixXcd full(n, n);
   Eigen::Index entry = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = 0; j <= i; ++j, ++entry) {
-      full(i, j) = {scatter_re_(entry, k), scatter_im_(entry, k)};
+      full(i, j) = {run.scatter_re(entry, k), run.scatter_im(entry, k)};
       full(j, i) = std::conj(full(i, j));
     }
   }

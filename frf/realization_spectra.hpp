@@ -8,9 +8,8 @@
 
 namespace stageid {
 
-/// The runs of one realization, gathered. Runs may arrive in any order: they are folded in the
-/// order of the experiments, so that the sums do not depend on which thread was faster, and their
-/// scatters, the largest part, are used again at once.
+/// The runs of one realization, gathered. Runs may arrive in any order. Their scatters, the largest part, are kept
+/// apart, as the noise of one experiment may not be that of another, and are used again by the next realization.
 class RealizationSpectra {
  public:
   /// `excitation`: R of each experiment, excited axes x lines; `pool`: where scatters came from.
@@ -34,24 +33,18 @@ class RealizationSpectra {
 
   /// Degrees of freedom of scatter(): sum_e (P_e - 1), or those of the transient models.
   /// The scatter is scaled for so many, whatever a line has of them.
-  int scatter_dof() const noexcept { return scatter_dof_; }
+  int scatter_dof() const;
   double scatter_dof(Eigen::Index k) const;  ///< that line k has
   /// sum_e sum_p (Z_pe - Z_e)(Z_pe - Z_e)^H at line k, or what the transient models leave in its
   /// place; full Hermitian matrix.
   Eigen::MatrixXcd scatter(Eigen::Index k) const;
+  Eigen::MatrixXcd scatter(std::size_t experiment, Eigen::Index k) const;  ///< of one experiment
 
  private:
-  void fold(RunSpectra& spectra);
-
   MatrixPool& pool_;
   int realization_;
   std::vector<Eigen::MatrixXcd> excitation_;
   std::vector<RunSpectra> runs_;
-  std::vector<char> arrived_;
-  std::size_t folded_ = 0;
-  Eigen::MatrixXd scatter_re_;
-  Eigen::MatrixXd scatter_im_;
-  int scatter_dof_ = 0;
 };
 
 }  // namespace stageid

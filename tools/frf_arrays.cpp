@@ -64,6 +64,7 @@ constexpr const char* kAttributes[] = {"@format",
                                        "@noise_dof",
                                        "@total_dof",
                                        "@correlated_lines",
+                                       "@experiment_noise_ratio",
                                        "inputs@unit",
                                        "outputs@unit",
                                        "detection_noise@dof"};

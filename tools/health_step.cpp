@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "acquisition/log_reader.hpp"
+#include "frf/experiment_noise_check.hpp"
 #include "frf/interpolation_check.hpp"
 #include "frf/settling_check.hpp"
 #include "tools/interrupt.hpp"
@@ -92,6 +93,7 @@ std::vector<std::string> health_notes(const std::vector<Finding>& findings) {
 
 std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings) {
   for (Finding& finding : check_interpolation(frf)) findings.push_back(std::move(finding));
+  for (Finding& finding : check_experiment_noise(frf)) findings.push_back(std::move(finding));
   for (Finding& finding : check_settling(frf)) findings.push_back(std::move(finding));
   std::stable_sort(findings.begin(), findings.end(),
                    [](const Finding& a, const Finding& b) { return a.severity < b.severity; });

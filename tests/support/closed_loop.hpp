@@ -41,6 +41,7 @@ struct LoopExperiment {
   std::uint64_t seed = 1;
   Eigen::MatrixXcd
       noise_factor{};  ///< n_y x n_y, v = factor * w, E w w^H = I a line and period; empty: none
+  std::vector<double> noise_scale{};  ///< of v, an experiment; empty: 1
 };
 
 /// Circular complex Gaussian, E|w|^2 = 1, and phases; the same numbers with every standard library.
@@ -129,7 +130,8 @@ inline std::vector<Eigen::MatrixXcd> excitation_spectra(const LoopExperiment& x,
 
 /// Samples of one run; column k of R is the excitation on line k.
 inline LogSamples simulate_run(const ClosedLoop& loop, const LoopExperiment& x,
-                               const Eigen::MatrixXcd& R, ComplexNoise& random, RealDft& dft) {
+                               const Eigen::MatrixXcd& R, ComplexNoise& random, RealDft& dft,
+                               double noise_scale = 1.0) {
   const Eigen::Index n_u = R.rows();
   const Eigen::Index n_y = loop.plant(1.0).rows();
   const Eigen::Index n = x.period_samples;
@@ -146,7 +148,7 @@ inline LogSamples simulate_run(const ClosedLoop& loop, const LoopExperiment& x,
       const Eigen::MatrixXcd G = loop.plant(omega);
       const Eigen::MatrixXcd C = loop.controller(omega);
       Eigen::VectorXcd v = Eigen::VectorXcd::Zero(n_y);
-      if (x.noise_factor.size() != 0) v = x.noise_factor * random.gaussian(n_y);
+      if (x.noise_factor.size() != 0) v = noise_scale * x.noise_factor * random.gaussian(n_y);
       const Eigen::MatrixXcd loop_gain = Eigen::MatrixXcd::Identity(n_u, n_u) + C * G;
       U.col(k) = loop_gain.partialPivLu().solve(R.col(k) - C * v);
       Y.col(k) = G * U.col(k) + v;
@@ -178,8 +180,9 @@ inline MemoryLog simulate_log(const ClosedLoop& loop, const LoopExperiment& x) {
   for (int m = 0; m < x.realizations; ++m) {
     const std::vector<Eigen::MatrixXcd> R = excitation_spectra(x, n_u, random);
     for (std::size_t e = 0; e < R.size(); ++e) {
-      log.append(m, static_cast<int>(e), synthesize(R[e], x.lines, dft),
-                 simulate_run(loop, x, R[e], random, dft));
+      log.append(
+          m, static_cast<int>(e), synthesize(R[e], x.lines, dft),
+          simulate_run(loop, x, R[e], random, dft, x.noise_scale.empty() ? 1.0 : x.noise_scale[e]));
     }
   }
   return log;
