@@ -11,34 +11,6 @@ namespace {
 
 class BadRequest : public ProgramTest {};
 
-TEST_F(BadRequest, Usage) {
-  fail({"frff"}, 2, "unknown command 'frff'; did you mean 'frf'?");
-  fail({"--json"}, 2, "no command");
-  fail({"frf"}, 2, "required");
-  fail({"frf", "a.slog", "-o", "b.h5", "--no-such-flag"}, 2, "--no-such-flag");
-  fail({"frf", "a.slog", "-o", "b.h5", "--method", "lmp"}, 2, "; did you mean 'lpm'?");
-  fail({"frf", "a.slog", "-o", "b.h5", "--delay", "1e-3"}, 2, "add --compensate delay or hold");
-  fail({"config", "schema", "stge"}, 2, "; did you mean 'stage'?");
-  fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads: '-1' is not 0 or more");
-  fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
-  fail({"log"}, 2, "a subcommand is missing: one of info, verify, recover, convert; see");
-  fail({"log", "inf", "a.slog"}, 2, "'inf' is unknown; did you mean 'info'?");
-  fail({"log", "conv", "a.slog"}, 2, "'conv' is unknown; did you mean 'convert'?");
-  fail({"log", "a.slog"}, 2, "'a.slog' is no subcommand: one of info, verify, recover, convert");
-  fail({"frf", "a.slog", "-o", "b.h5", "--methd=lpm"}, 2, "did you mean '--method'?");
-  fail({"frf", "a.slog", "-o", "b.h5", "--jsn"}, 2, "did you mean '--json'? See 'stageid frf");
-  fail({"manual", "-o", config_}, 1, "cannot be made a directory");
-  fail({"import", "x.csv", "--map", "m.yaml"}, 2, "the file to write is missing; give it with -o");
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "simulator"}, 2, "--backend");
-}
-
-TEST_F(BadRequest, WhatIsNotInThisVersionSaysSo) {
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "can"}, 2, "has no group 'can'");
-  fail({"run", config_, "-o", name("x.slog"), "--dashboard", "http://a"}, 2, "--dashboard");
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
-  fail({"export", "model.json", "-o", name("m.step")}, 2, ".json, .h5, .hdf5, .csv, .mat");
-}
-
 TEST_F(BadRequest, WhatAModelHasNot) {
   AdditiveModel model;
   model.inputs = {{"a1"}, {"N"}};
@@ -74,23 +46,6 @@ TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
   fail({"export", config_, "-o", name("m.mat")}, 2, "is an experiment file, not a model (.json);");
   std::filesystem::create_directory(at("folder.json"));
   fail({"export", name("folder.json"), "-o", name("m.mat")}, 1, "is a directory; give a JSON file");
-}
-
-TEST_F(BadRequest, HelpIsThatOfTheCommand) {
-  EXPECT_EQ(run({"help"}).out, run({"--help"}).out);
-  EXPECT_EQ(run({"help", "frf"}).out, run({"frf", "--help"}).out);
-  EXPECT_EQ(run({"help", "log", "info"}).out, run({"log", "info", "--help"}).out);
-  fail({"help", "frff"}, 2, "help: 'frff' is no command; did you mean 'frf'?");
-  fail({"help", "log", "inf"}, 2, "help: 'inf' is no command of log; did you mean 'info'?");
-  fail({"help", "frf", "x"}, 2, "help: 'x' is no command of frf; write 'stageid help frf'");
-}
-
-TEST_F(BadRequest, WithoutArgumentsThereAreThreeThingsToTry) {
-  const ProgramResult shown = run({});
-  EXPECT_EQ(shown.exit_code, 0);
-  for (const char* start :
-       {"\n  stageid identify ", "\n  stageid import ", "\n  stageid config schema"})
-    EXPECT_THAT(shown.out, testing::HasSubstr(start));
 }
 
 TEST_F(BadRequest, MissingFiles) {

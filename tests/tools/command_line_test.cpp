@@ -1,0 +1,58 @@
+// What is asked of the program: unknown commands and flags, help.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/tools/program_fixture.hpp"
+
+namespace stageid::test {
+namespace {
+
+class CommandLine : public ProgramTest {};
+
+TEST_F(CommandLine, Usage) {
+  fail({"frff"}, 2, "unknown command 'frff'; did you mean 'frf'?");
+  fail({"--json"}, 2, "no command");
+  fail({"frf"}, 2, "required");
+  fail({"frf", "a.slog", "-o", "b.h5", "--no-such-flag"}, 2, "--no-such-flag");
+  fail({"frf", "a.slog", "-o", "b.h5", "--method", "lmp"}, 2, "; did you mean 'lpm'?");
+  fail({"frf", "a.slog", "-o", "b.h5", "--delay", "1e-3"}, 2, "add --compensate delay or hold");
+  fail({"config", "schema", "stge"}, 2, "; did you mean 'stage'?");
+  fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads: '-1' is not 0 or more");
+  fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
+  fail({"log"}, 2, "a subcommand is missing: one of info, verify, recover, convert; see");
+  fail({"log", "inf", "a.slog"}, 2, "'inf' is unknown; did you mean 'info'?");
+  fail({"log", "conv", "a.slog"}, 2, "'conv' is unknown; did you mean 'convert'?");
+  fail({"log", "a.slog"}, 2, "'a.slog' is no subcommand: one of info, verify, recover, convert");
+  fail({"frf", "a.slog", "-o", "b.h5", "--methd=lpm"}, 2, "did you mean '--method'?");
+  fail({"frf", "a.slog", "-o", "b.h5", "--jsn"}, 2, "did you mean '--json'? See 'stageid frf");
+  fail({"manual", "-o", config_}, 1, "cannot be made a directory");
+  fail({"import", "x.csv", "--map", "m.yaml"}, 2, "the file to write is missing; give it with -o");
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "simulator"}, 2, "--backend");
+}
+
+TEST_F(CommandLine, WhatIsNotInThisVersionSaysSo) {
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "can"}, 2, "has no group 'can'");
+  fail({"run", config_, "-o", name("x.slog"), "--dashboard", "http://a"}, 2, "--dashboard");
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
+  fail({"export", "model.json", "-o", name("m.step")}, 2, ".json, .h5, .hdf5, .csv, .mat");
+}
+
+TEST_F(CommandLine, HelpIsThatOfTheCommand) {
+  EXPECT_EQ(run({"help"}).out, run({"--help"}).out);
+  EXPECT_EQ(run({"help", "frf"}).out, run({"frf", "--help"}).out);
+  EXPECT_EQ(run({"help", "log", "info"}).out, run({"log", "info", "--help"}).out);
+  fail({"help", "frff"}, 2, "help: 'frff' is no command; did you mean 'frf'?");
+  fail({"help", "log", "inf"}, 2, "help: 'inf' is no command of log; did you mean 'info'?");
+  fail({"help", "frf", "x"}, 2, "help: 'x' is no command of frf; write 'stageid help frf'");
+}
+
+TEST_F(CommandLine, WithoutArgumentsThereAreThreeThingsToTry) {
+  const ProgramResult shown = run({});
+  EXPECT_EQ(shown.exit_code, 0);
+  for (const char* start :
+       {"\n  stageid identify ", "\n  stageid import ", "\n  stageid config schema"})
+    EXPECT_THAT(shown.out, testing::HasSubstr(start));
+}
+
+}  // namespace
+}  // namespace stageid::test
