@@ -38,12 +38,6 @@ double variance_of_log_power(double x) {
   return sum + (1.0 + 0.5 / x + y * (1.0 / 6.0 - y * (1.0 / 30.0 - y / 42.0))) / x;
 }
 
-/// P(chi-square with `dof` degrees of freedom > x), after Wilson and Hilferty.
-double tail_of_chi_square(double x, double dof) {
-  const double variance = 2.0 / (9.0 * dof);
-  return tail_of_normal((std::cbrt(x / dof) - 1.0 + variance) / std::sqrt(variance));
-}
-
 }  // namespace
 
 ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
