@@ -195,6 +195,7 @@ class AutomaticFit {
   /// Adds modes while they are worth it. @returns true if any was added.
   bool grow() {
     bool grown = false;
+    watch_.cut();
     while (wanted_more()) {
       const std::size_t most =
           std::max(kCandidates, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);

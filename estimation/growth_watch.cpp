@@ -14,14 +14,16 @@ namespace stageid {
 namespace {
 
 constexpr double kBroad = 0.1;  // a damping ratio: such a mode is no peak
-constexpr int kMostColoured = 4;
+// In a row: a measured aircraft, which is nonlinear, comes to five before it converges.
+constexpr int kMostColoured = 6;
 
+/// A broad mode is no resonance that a narrow one within its width could be part of.
 bool overlaps_another(const AdditiveModel& model, std::size_t i) {
   const Submodel& one = model.submodels[i];
   const double f = one.natural_frequency_hz();
   for (std::size_t o = 0; o < model.submodels.size(); ++o) {
     const Submodel& other = model.submodels[o];
-    if (o == i || !is_searched_mode(other)) continue;
+    if (o == i || !is_searched_mode(other) || other.damping_ratio() > kBroad) continue;
     const double width = 2.0 * f * std::max(one.damping_ratio(), other.damping_ratio());
     if (std::abs(other.natural_frequency_hz() - f) < width) return true;
   }

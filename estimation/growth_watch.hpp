@@ -13,7 +13,7 @@ namespace stageid {
 ///
 /// Two signs are watched. A delay, where none is estimated: one more parameter for the model without the modes that
 /// were added is worth more (BIC) than all of them. And colour of the residual: rounds in a row that added nothing but
-/// modes beside the lines, broader than resonances are, or within the half-power width of another mode. Real close
+/// modes beside the lines, broader than resonances are, or within the half-power width of another that is not. Real close
 /// modes look like that too, but not so many in a row.
 class GrowthWatch {
  public:
@@ -22,6 +22,9 @@ class GrowthWatch {
   /// @returns true if the search is to end, with model()
   bool ends(const FrfEstimate& frf, const FitOptions& options, const FitResult& before,
             const FitResult& now, std::size_t added);
+
+  /// A search that goes on after it was cut back: rounds before no longer stand in a row with those to come.
+  void cut() noexcept { coloured_in_a_row_ = 0; }
 
   bool ended() const noexcept { return !finding_.empty(); }
   bool by_delay() const noexcept { return by_delay_; }

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "estimation/growth_watch.hpp"
 #include "tests/support/model_blind_fit.hpp"
 #include "tests/support/model_fit_problem.hpp"
 #include "tests/support/model_reference.hpp"
@@ -213,13 +214,40 @@ TEST_F(SmallStage, ADelayThatIsDeniedEndsTheSearchAndIsNamed) {
   EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
 }
 
-// A ripple as a cable or a filter leaves it: no mode, and every mode that follows it lowers the cost.
-TEST_F(SmallStage, ModesThatOnlyModelColourEndTheSearchAndAreLeftOut) {
-  for (Eigen::Index k = 0; k < frf_.lines(); ++k)
-    frf_.response.col(k) *= 1.0 + 0.1 * std::sin(frf_.frequency_hz[k] / 25.0);
-  const FitResult fit = automatic_fit(frf_, {}, {}, {});
-  EXPECT_THAT(fit.findings, testing::ElementsAre(testing::HasSubstr("colour of the residual")));
-  EXPECT_LE(frequencies(fit.model).size(), 12U);
+/// Feeds a watch with rounds that add one mode each. @returns whether the last one ended the search
+bool ends_after(GrowthWatch& watch, const FrfEstimate& frf, FitResult& fit,
+                const std::vector<std::pair<double, double>>& modes) {
+  FitOptions options;
+  options.delay = DelayModel::estimate;  // no other is tried
+  bool ended = false;
+  for (const auto& [frequency_hz, damping] : modes) {
+    const FitResult before = fit;
+    fit.model.submodels.push_back(mode_submodel(frf, {}, {frequency_hz, damping, 1}));
+    ended = watch.ends(frf, options, before, fit, 1);
+  }
+  return ended;
+}
+
+TEST_F(SmallStage, RoundsInARowThatOnlyModelColourEndTheSearch) {
+  FitResult fit;
+  fit.model.fit.band_hz[0] = 10.0;
+  fit.model.fit.band_hz[1] = 1000.0;
+  GrowthWatch watch;
+  // Broad, beside the lines on either side, on another; a resonance of its own begins the count anew.
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{120.0, 0.01}, {300.0, 0.3}, {5.0, 0.01}}));
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{1100.0, 0.02}, {120.5, 0.01}, {500.0, 0.2}}));
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{300.0, 0.01}}));
+  EXPECT_FALSE(watch.ended());
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{300.2, 0.01}, {5.0, 0.01}, {119.9, 0.01}}));
+  watch.cut();
+  const std::size_t kept = fit.model.submodels.size();
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{400.0, 0.3}, {5.0, 0.02}, {600.0, 0.4}}));
+  EXPECT_TRUE(ends_after(watch, frf_, fit, {{700.0, 0.3}, {2000.0, 0.02}, {800.0, 0.2}}));
+  EXPECT_TRUE(watch.ended());
+  EXPECT_FALSE(watch.by_delay());
+  EXPECT_EQ(watch.model().model.submodels.size(), kept);
+  EXPECT_THAT(watch.finding(),
+              testing::HasSubstr("the last 6 that it added only model the colour"));
 }
 
 TEST_F(SmallStage, TheNumberOfThreadsDoesNotChangeABit) {
