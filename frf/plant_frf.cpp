@@ -179,8 +179,8 @@ void PlantEstimation::measure(std::size_t m, const std::vector<RunExcitation>& e
     const auto read_done = [this](double bytes) { bytes_.add(bytes); };
     HealthPart* part = health != nullptr ? &health->part(m, e) : nullptr;
     RunSpectra run = options_.method == FrfMethod::lpm
-                         ? measure_record(realization.runs[e], excitation[e], channels_, workspace,
-                                          part, read_done)
+                         ? measure_record(realization.runs[e], excitation[e], channels_,
+                                          options_.periods, workspace, part, read_done)
                          : measure_run(realization.runs[e], lines_, channels_, excitation[e].period,
                                        options_.periods, workspace, part, read_done);
     const std::lock_guard lock(mutex);

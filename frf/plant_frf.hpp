@@ -39,7 +39,8 @@ namespace stageid {
 ///
 /// Incomplete runs are passed over; of several complete runs of one (realization, experiment) the
 /// last counts. Periods with a marked sample are dropped, and (periodic, three periods or more)
-/// those whose scatter shows that they do not belong with the others: period_check.hpp. A realization
+/// those whose scatter shows that they do not belong with the others: period_check.hpp; with lpm those with
+/// a glitch: glitch_check.hpp. A realization
 /// with a run that has no clean period is left out (FrfEstimate::left_out_realizations). With two
 /// periods and two realizations the plant's linearity is tested, see nonlinearity_test(). Inputs asked
 /// for that are only some of the excited actuators are columns of the whole estimate: the others move

@@ -1,9 +1,12 @@
 #include "frf/record_spectra.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <optional>
 #include <utility>
 
+#include "frf/glitch_check.hpp"
 #include "frf/health_gathering.hpp"
 #include "frf/run_periods.hpp"
 #include "frf/run_steps.hpp"
@@ -27,10 +30,11 @@ struct Segment {
 class RecordMeasurement {
  public:
   RecordMeasurement(const UsedRun& used, const ExcitationSpectrum& excitation,
-                    const ChannelChoice& channels, RunWorkspace& workspace)
+                    const ChannelChoice& channels, PeriodChoice choice, RunWorkspace& workspace)
       : used_(used),
         excitation_(excitation),
         channels_(channels),
+        choice_(choice),
         w_(workspace),
         N_(workspace.dft.length()),
         outputs_(static_cast<Eigen::Index>(channels.outputs.size())),
@@ -76,18 +80,53 @@ class RecordMeasurement {
  private:
   /// A period on its own is worse off (the noise must be seen on lines that are left empty): it is
   /// used if there is nothing else.
-  void close_segment() {
-    if (segment_.periods == 1 && used_.periods > 1) {
+  void settle(const Segment& segment) {
+    if (segment.periods == 1 && used_.periods > 1) {
       if (run_.periods == 0 && !alone_) {
-        alone_ = segment_;
+        alone_ = segment;
       } else {
-        drop_alone(segment_);
+        drop_alone(segment);
       }
-    } else if (segment_.periods > 0) {
-      include(segment_);
+    } else if (segment.periods > 0) {
+      include(segment);
       if (alone_) drop_alone(*std::exchange(alone_, std::nullopt));
     }
+  }
+
+  /// What lies between the periods with a glitch, if there are any.
+  void close_segment() {
+    std::vector<Glitch> glitches;
+    if (choice_ == PeriodChoice::consistent)
+      glitches = find_glitches(segment_.samples, n_, N_, segment_.periods);
+    if (glitches.empty()) {
+      settle(segment_);
+    } else {
+      int begin = 0;
+      const int end = segment_.periods;
+      for (const Glitch& glitch : glitches) {
+        settle(part(begin, glitch.period));
+        run_.drop(segment_.first + glitch.period,
+                  fmt::format("a glitch: {} is off by {:.3g} times the noise about it",
+                              channel_name(glitch.channel), glitch.ratio));
+        begin = glitch.period + 1;
+      }
+      settle(part(begin, end));
+    }
     segment_.periods = 0;
+  }
+
+  Segment part(int begin, int end) const {
+    return {segment_.samples.middleRows(begin * N_, (end - begin) * N_), segment_.first + begin,
+            end - begin};
+  }
+
+  const std::string& channel_name(Eigen::Index channel) const {
+    const LogInfo& info = used_.log->info();
+    return channel < outputs_
+               ? info.sensors.names[static_cast<std::size_t>(
+                     channels_.outputs[static_cast<std::size_t>(channel)])]
+               : info.actuators.names[static_cast<std::size_t>(
+                     channels_.estimated[static_cast<std::size_t>(channel - outputs_)])];
   }
 
   void drop_alone(const Segment& segment) {
@@ -140,6 +179,7 @@ class RecordMeasurement {
   const UsedRun& used_;
   const ExcitationSpectrum& excitation_;
   const ChannelChoice& channels_;
+  PeriodChoice choice_;
   RunWorkspace& w_;
   Eigen::Index N_;
   Eigen::Index outputs_;
@@ -154,9 +194,9 @@ class RecordMeasurement {
 }  // namespace
 
 RunSpectra measure_record(const UsedRun& used, const RunExcitation& excitation,
-                          const ChannelChoice& channels, RunWorkspace& w, HealthPart* health,
-                          const std::function<void(double bytes)>& read_done) {
-  RecordMeasurement measurement(used, excitation.spectrum, channels, w);
+                          const ChannelChoice& channels, PeriodChoice choice, RunWorkspace& w,
+                          HealthPart* health, const std::function<void(double bytes)>& read_done) {
+  RecordMeasurement measurement(used, excitation.spectrum, channels, choice, w);
   measurement.add_excitation(excitation.period);
   const auto take = [&](int p) {
     measurement.take(p);

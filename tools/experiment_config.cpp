@@ -124,7 +124,8 @@ void describe_frf(ConfigVisitor& v, FrfOptions& f) {
   choose(v, "covariance", f.covariance, {"diagonal", "full"}, kOptional, "of the response");
   choose(v, "method", f.method, {"periodic", "lpm"}, kOptional, "of the estimate");
   choose(v, "periods", f.periods, {"consistent", "unmarked"}, kOptional,
-         "consistent: periods with a glitch, a bump or a transient are left out");
+         "consistent: periods with a glitch, a bump or a transient are left out; lpm: "
+         "with a glitch");
   count(v, "smooth_covariance", f.covariance_lines, 1, 9999, kOptional,
         "lines (odd) over which the noise covariance is averaged");
   v.require(f.covariance_lines % 2 == 1, "smooth_covariance",

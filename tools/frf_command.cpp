@@ -81,9 +81,9 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
   command
       ->add_option(
           "--periods", periods_,
-          "consistent (glitches, bumps and transients left out) | unmarked (all); default: "
-          "consistent, with lpm unmarked")
-      ->check(CLI::IsMember({"consistent", "unmarked"}));
+          "consistent (glitches, bumps and transients left out; lpm: glitches) | unmarked (all)")
+      ->check(CLI::IsMember({"consistent", "unmarked"}))
+      ->capture_default_str();
   command
       ->add_option("--smooth-covariance", covariance_lines_,
                    "of the noise: mean over LINES (odd) neighbouring lines, with their degrees "
@@ -122,17 +122,6 @@ FrfStep FrfCommand::estimate(const FrfOptions& options) const {
   return step;
 }
 
-PeriodChoice FrfCommand::period_choice() const {
-  if (method_ != "lpm")
-    return periods_ == "unmarked" ? PeriodChoice::unmarked : PeriodChoice::consistent;
-  if (periods_ == "consistent")
-    throw std::invalid_argument(
-        "--periods consistent: with --method lpm the first periods hold the transient that is "
-        "modelled, and are unlike the others by right; mark glitches in the log, or use "
-        "--method periodic");
-  return PeriodChoice::unmarked;
-}
-
 void FrfCommand::run() const {
   FrfOptions options;
   options.inputs = inputs_;
@@ -140,7 +129,7 @@ void FrfCommand::run() const {
   options.transient_periods = transient_periods_;
   options.method = method_ == "lpm" ? FrfMethod::lpm : FrfMethod::periodic;
   options.covariance = covariance_ == "full" ? CovarianceKind::full : CovarianceKind::diagonal;
-  options.periods = period_choice();
+  options.periods = periods_ == "unmarked" ? PeriodChoice::unmarked : PeriodChoice::consistent;
   options.covariance_lines = covariance_lines_;
   options.threads = threads_;
   for (const int realization : realizations_) {

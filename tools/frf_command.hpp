@@ -18,7 +18,6 @@ class FrfCommand {
 
  private:
   void run() const;
-  PeriodChoice period_choice() const;
   FrfStep estimate(const FrfOptions& options) const;
 
   Console& console_;
@@ -33,7 +32,7 @@ class FrfCommand {
   std::optional<int> transient_periods_;
   std::optional<double> delay_s_;
   std::string method_ = "periodic";
-  std::string periods_;  // empty: by the method
+  std::string periods_ = "consistent";
   int covariance_lines_ = 1;
   std::string covariance_ = "diagonal";
   std::string compensate_ = "none";

@@ -66,6 +66,45 @@ TEST(LocalPolynomial, IsAsAccurateAsPassingOverAPeriod) {
   EXPECT_LT(lpm.error, 1.02 * periodic.error);
 }
 
+/// One sample of one sensor off by so many standard deviations of the noise, in a period of the first run.
+MemoryLog with_glitch(double deviations, int period, int periods, std::uint64_t seed) {
+  LoopExperiment x = slow_experiment(periods);
+  x.seed = seed;
+  MemoryLog log = test::simulate_sampled_log(slow_stage(), x, kNoise);
+  log.records[0].sensors(period * x.period_samples + 431, 1) += deviations * kNoise;
+  return log;
+}
+
+// As much as leaving the period out by hand; which of two periods it is in nobody can tell.
+TEST(LocalPolynomial, LeavesPeriodsWithAGlitchOut) {
+  const FrfOptions lpm{.method = FrfMethod::lpm};
+  FrfOptions unmarked = lpm;
+  unmarked.periods = PeriodChoice::unmarked;
+  for (const int period : {0, 1, 2, 4}) {
+    MemoryLog log = with_glitch(500.0, period, 5, 3);
+    const FrfEstimate frf = estimate_plant_frf({&log}, lpm);
+    int glitches = 0;
+    for (const DroppedPeriod& dropped : frf.dropped_periods) {
+      EXPECT_EQ(dropped.experiment, 0);
+      if (dropped.reason.find("a glitch: z2 is off") == std::string::npos) continue;
+      EXPECT_EQ(dropped.period, period);
+      ++glitches;
+    }
+    EXPECT_EQ(glitches, 1) << period;
+    const FrfEstimate spoilt = estimate_plant_frf({&log}, unmarked);
+    EXPECT_TRUE(spoilt.dropped_periods.empty());
+    EXPECT_GT(spoilt.noise_variance.row(1).mean(), 1.4 * frf.noise_variance.row(1).mean());
+    log.records[0].marked[period * 800 + 100] = 1;
+    EXPECT_EQ(estimate_plant_frf({&log}, unmarked).response, frf.response);
+  }
+  const MemoryLog two = with_glitch(500.0, 1, 2, 3);
+  EXPECT_TRUE(estimate_plant_frf({&two}, lpm).dropped_periods.empty());
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    const MemoryLog clean = with_glitch(seed % 2 == 0 ? 0.0 : 10.0, 2, 5, seed);
+    EXPECT_TRUE(estimate_plant_frf({&clean}, lpm).dropped_periods.empty()) << seed;
+  }
+}
+
 class Variance : public testing::TestWithParam<int> {};
 
 // A single period too: the noise is seen on the lines that are left empty; 18 are two records.

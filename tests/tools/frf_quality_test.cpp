@@ -108,9 +108,6 @@ TEST_F(FrfQuality, SmoothsTheCovariance) {
   fail({"frf", name("run.slog"), "-o", name("two.h5"), "--smooth-covariance", "2"}, 2,
        "odd number");
   fail({"frf", name("run.slog"), "-o", name("two.h5"), "--periods", "some"}, 2, "--periods");
-  const std::vector<std::string> lpm = {
-      "frf", name("run.slog"), "-o", name("two.h5"), "--method", "lpm", "--periods", "consistent"};
-  fail(lpm, 2, "mark glitches in the log");
 }
 
 TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {

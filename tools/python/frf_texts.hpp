@@ -57,7 +57,7 @@ realizations         which, from 0 (the flag of the program counts from 1); empt
 transient_periods    left out, instead of the log's own; None: the log's own ('lpm': none)
 method               'periodic', or 'lpm': whole records, the transient modelled
 covariance           'diagonal' or 'full'
-periods              'consistent': without those that do not belong with the others; or 'unmarked'
+periods              'consistent': without those that do not belong with the others ('lpm': with a glitch); or 'unmarked'
 covariance_lines     odd: the noise covariance is smoothed over so many lines
 health               examine the data as well: Frf.health
 stage                stage file that they are held against; None: the one that the log carries
