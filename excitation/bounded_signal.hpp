@@ -24,7 +24,9 @@ struct BoundedSignal {
   SignalKind kind = SignalKind::value;
   Eigen::MatrixXcd transfer;    ///< axes x lines, from the excitation of each axis to the value
   Eigen::MatrixXcd below_band;  ///< the same on below_band_hz(grid); empty: as on the first line
-  double rest_margin = 0.0;  ///< added to the peak from rest, a share of it: what is unsure of it
+  double rest_margin = 0.0;     ///< added to the peak from rest, a share of it
+  double below_band_doubt =
+      0.0;  ///< of what lies below the band, that share of its peak is added too
   double peak_limit = std::numeric_limits<double>::infinity();
   double rms_limit = std::numeric_limits<double>::infinity();
   double rms_time_constant_s = 0.0;  ///< of the rms limit's exponential window; 0: over a period

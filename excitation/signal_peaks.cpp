@@ -101,6 +101,7 @@ struct SignalPredictor::Work {
     return begun;
   }
 
+  /// With the margin, and what the doubt below the band adds.
   double largest_from_rest(const BoundedSignal& signal, const Eigen::MatrixXcd& begun);
 
   const FrequencyGrid& grid;
@@ -119,7 +120,14 @@ double SignalPredictor::Work::largest_from_rest(const BoundedSignal& signal,
     half[i] = known.product(i, begun.col(i)) *
               kind_factor(signal.kind, 0.5 * static_cast<double>(i) * grid.resolution_hz(),
                           grid.sample_rate_hz());
-  return twofold.inverse(half).head(grid.samples_per_period()).cwiseAbs().maxCoeff();
+  const auto largest = [&] {
+    return twofold.inverse(half).head(grid.samples_per_period()).cwiseAbs().maxCoeff();
+  };
+  const double of_all = (1.0 + signal.rest_margin) * largest();
+  if (!(signal.below_band_doubt > 0.0)) return of_all;
+  const Index lowest = 2 * Index{grid.lines().front()};
+  half.tail(half.size() - lowest).setZero();
+  return of_all + signal.below_band_doubt * largest();
 }
 
 SignalPredictor::SignalPredictor(const FrequencyGrid& grid) {
@@ -144,7 +152,7 @@ std::vector<SignalPeak> SignalPredictor::predict(const std::vector<BoundedSignal
     peak.steady = work_->looseness * x.cwiseAbs().maxCoeff();
     peak.rms =
         windowed_rms(x, grid.sample_rate_hz() * work_->oversampling, signal.rms_time_constant_s);
-    peak.from_rest = (1.0 + signal.rest_margin) * work_->largest_from_rest(signal, begun);
+    peak.from_rest = work_->largest_from_rest(signal, begun);
     peaks.push_back(peak);
   }
   return peaks;

@@ -217,8 +217,10 @@ BoundedLoop bounded_loop(const FrequencyGrid& grid, const ExperimentSpec& experi
     else if (stage.limits.position_window_m.size() > 0)
       loop.unknown.push_back(stage.info.sensors[i].name);
   }
-  for (BoundedSignal& signal : loop.signals)
-    signal.rest_margin = kRestMargin + prior.extrapolation_misfit;
+  for (BoundedSignal& signal : loop.signals) {
+    signal.rest_margin = kRestMargin;
+    signal.below_band_doubt = prior.extrapolation_misfit;
+  }
   return loop;
 }
 

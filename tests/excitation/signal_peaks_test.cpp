@@ -160,14 +160,22 @@ TEST(SignalPeaks, BelowTheBandTheFirstPeriodFromRestIsThatOfASimulationToo) {
   }
   BoundedSignal careful = seeing;
   careful.rest_margin = 0.1;
+  BoundedSignal doubtful = seeing;
+  doubtful.below_band_doubt = 0.5;
+  BoundedSignal below = seeing;  // nothing but what lies below
+  below.transfer.setZero();
   SignalPredictor predictor(grid);
   double least = 1.0;
   for (const RunId run : plan.runs()) {
     const double value = loop.largest(plan.excitation(run).rowwise().sum());
-    const auto peaks = predictor.predict({blind, seeing, careful}, plan.spectrum(run));
+    const auto peaks =
+        predictor.predict({blind, seeing, careful, doubtful, below}, plan.spectrum(run));
     least = std::min(least, peaks[0].peak() / value);
     EXPECT_NEAR(peaks[1].from_rest, value, 0.01 * value);
     EXPECT_DOUBLE_EQ(peaks[2].from_rest, 1.1 * peaks[1].from_rest);
+    // Interpolation carries some of it on to between the first two lines.
+    EXPECT_NEAR(peaks[3].from_rest - peaks[1].from_rest, 0.5 * peaks[4].from_rest,
+                0.06 * peaks[4].from_rest);
   }
   EXPECT_LT(least, 0.6);
 }
