@@ -164,7 +164,7 @@ std::vector<DenseCovariance> of_given_ranks(const FrfEstimate& frf, const Ended&
 }
 
 /// M of all parameters under weight matrices: globals by products, numerators in pairs of channels.
-Eigen::MatrixXd joint_matrix(const Ended& fit) {
+Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
   const FitProblem& problem = fit.problem;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
   const JointEquations equations(problem, *fit.matrices, fit.beta, fit.groups,
@@ -183,15 +183,14 @@ Eigen::MatrixXd joint_matrix(const Ended& fit) {
     fit.matrices->between(c, d, lines.first, lines.count, re, im);
     return true;
   };
-  FunctionSet all(static_cast<std::size_t>(problem.functions()));
-  std::iota(all.begin(), all.end(), Eigen::Index{0});
   const Eigen::Index globals = problem.globals();
   Eigen::MatrixXd M(equations.size(), equations.size());
   for (Eigen::Index i = 0; i < globals; ++i) {
     M.col(i) = equations.product(Eigen::VectorXd::Unit(equations.size(), i));
     M.row(i) = M.col(i).transpose();
   }
-  M.bottomRightCorner(M.rows() - globals, M.cols() - globals) = pair_grams(pairs, {all}).front();
+  M.bottomRightCorner(M.rows() - globals, M.cols() - globals) =
+      pair_grams(pairs, {all_functions(model)}).front();
   return M;
 }
 
@@ -202,7 +201,7 @@ std::vector<DenseCovariance> of_weight_matrices(const Ended& fit, const FitResul
   const double per_degree =
       residual_per_degree(problem, result.model.fit.cost, problem.parameters());
   const double half = 0.5 * residual_scale(per_degree, weighs_by_variance(options.weighting));
-  const Eigen::MatrixXd inverse = free_inverse(joint_matrix(fit), result.frozen);
+  const Eigen::MatrixXd inverse = free_inverse(joint_matrix(fit, result.model), result.frozen);
   if (!inverse.allFinite()) return {};
   std::vector<DenseCovariance> out;
   for (const FunctionSet& set : sets) {
@@ -233,13 +232,9 @@ bool has_deviations(const FitResult& result) {
                      [](const Submodel& s) { return !s.numerator_std.empty(); });
 }
 
-}  // namespace
-
-std::vector<DenseCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
-                                               const FitOptions& options,
-                                               const std::vector<FunctionSet>& sets) {
-  if (!has_deviations(result)) return {};
-  const Ended fit = ended_fit(frf, result, options);
+std::vector<DenseCovariance> covariances_of(const FrfEstimate& frf, const Ended& fit,
+                                            const FitResult& result, const FitOptions& options,
+                                            const std::vector<FunctionSet>& sets) {
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   if (!are_affordable(fit, sets)) return {};
   std::vector<DenseCovariance> out = fit.matrices ? of_weight_matrices(fit, result, options, sets)
@@ -252,13 +247,23 @@ std::vector<DenseCovariance> dense_covariances(const FrfEstimate& frf, const Fit
   return out;
 }
 
+}  // namespace
+
+std::vector<DenseCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
+                                               const FitOptions& options,
+                                               const std::vector<FunctionSet>& sets) {
+  if (!has_deviations(result)) return {};
+  return covariances_of(frf, ended_fit(frf, result, options), result, options, sets);
+}
+
 void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
   if (!has_deviations(result)) {
     result.decisions.emplace_back("no covariance: the fit has no standard deviations");
     return;
   }
+  const Ended fit = ended_fit(frf, result, options);
   std::vector<DenseCovariance> all =
-      dense_covariances(frf, result, options, {all_functions(result.model)});
+      covariances_of(frf, fit, result, options, {all_functions(result.model)});
   if (all.empty()) {
     result.decisions.push_back(fmt::format(
         "no covariance: the fit has more than {} parameters, or they cannot be told apart; take "
@@ -268,7 +273,6 @@ void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResul
   }
   result.covariance.sandwich = std::move(all.front().sandwich);
   result.covariance.likelihood = std::move(all.front().likelihood);
-  const Ended fit = ended_fit(frf, result, options);
   fill_response_errors(fit.problem, fit.beta, fit.groups, result.covariance);
 }
 
@@ -282,11 +286,10 @@ FunctionSet functions_of(const AdditiveModel& model, std::size_t submodel) {
 }
 
 FunctionSet all_functions(const AdditiveModel& model) {
-  FunctionSet out;
-  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
-    const FunctionSet own = functions_of(model, i);
-    out.insert(out.end(), own.begin(), own.end());
-  }
+  std::size_t count = 0;
+  for (const Submodel& s : model.submodels) count += s.numerator.size();
+  FunctionSet out(count);
+  std::iota(out.begin(), out.end(), Eigen::Index{0});
   return out;
 }
 

@@ -56,9 +56,8 @@ bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const 
   if (coloured_in_a_row_ < kMostColoured) return false;
   finding_ = fmt::format(
       "the search for modes ended: the last {} that it added only model the colour of the "
-      "residual, "
-      "cost {:.6g} -> {:.6g}, and are left out; the variances may be too small, or the data hold "
-      "what modes do not describe (--damping general, --direct-term full, a delay)",
+      "residual, cost {:.6g} -> {:.6g}, and are left out; the variances may be too small, or the "
+      "data hold what modes do not describe (--damping general, --direct-term full, a delay)",
       coloured_in_a_row_, back_to_.model.fit.cost, now.model.fit.cost);
   return true;
 }
