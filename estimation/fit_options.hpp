@@ -68,7 +68,7 @@ enum class FitStatus : std::uint8_t {
   cost_stalled,
   iteration_limit,
   singular,
-  undetermined,  ///< converged, but the data do not determine a submodel that was asked for
+  undetermined,  ///< converged, but the data do not determine a mode or a submodel that was asked for
   unexplained    ///< converged, but the model lacks what the search found to be no mode
 };
 const char* to_string(FitStatus status) noexcept;

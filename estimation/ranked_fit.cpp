@@ -269,9 +269,9 @@ FitResult ranked_fit(const FrfEstimate& frf, const AdditiveModel& start, const F
   FitResult fit = options.residue_rank > 0       ? RankedFit(frf, options, number).run(start)
                   : number == ModeNumber::chosen ? settled_fit(frf, start, options)
                                                  : fit_additive_model(frf, start, options);
-  // Of modes that are given one by one the status tells.
+  // Modes that are given one by one the fit has judged by itself.
   if (number != ModeNumber::given && fit.status != FitStatus::singular)
-    find_undetermined_modes(fit);
+    judge_undetermined_modes(fit);
   return fit;
 }
 

@@ -30,7 +30,7 @@ std::vector<std::size_t> undetermined_modes(const FitResult& fit) {
   return out;
 }
 
-void find_undetermined_modes(FitResult& fit) {
+void judge_undetermined_modes(FitResult& fit) {
   std::vector<std::string> places;
   for (const std::size_t i : undetermined_modes(fit)) {
     const Submodel& s = fit.model.submodels[i];
@@ -45,6 +45,10 @@ void find_undetermined_modes(FitResult& fit) {
                   "resonances; do not read them as such",
                   fmt::join(places, ", ")));
   fit.decisions.push_back(fit.findings.back());
+  if (!fit.trustworthy()) return;
+  fit.status = FitStatus::undetermined;
+  fit.message = fit.findings.back();
+  fit.model.fit.status = to_string(fit.status);
 }
 
 }  // namespace stageid

@@ -16,7 +16,8 @@ inline constexpr double kOpenDamping = 1.0;
 /// that. Beside the lines a mode stands for whatever the plant does there, and is none of them.
 std::vector<std::size_t> undetermined_modes(const FitResult& fit);
 
-/// Adds a finding that names them, if there are any: a fit whose number of modes is asked for keeps them.
-void find_undetermined_modes(FitResult& fit);
+/// Adds a finding that names them, if there are any: a fit whose number of modes is asked for keeps them, and so does
+/// one whose cost they are worth. If it converged it is FitStatus::undetermined then.
+void judge_undetermined_modes(FitResult& fit);
 
 }  // namespace stageid

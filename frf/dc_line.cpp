@@ -1,6 +1,7 @@
 #include "frf/dc_line.hpp"
 
 #include <stdexcept>
+#include <utility>
 
 namespace stageid {
 
@@ -12,7 +13,9 @@ FrfEstimate without_dc_line(FrfEstimate frf) {
     throw std::invalid_argument(
         "the only line lies at 0 Hz, where no fit and no search for modes looks; take a wider "
         "--band");
-  return select_band(frf, frf.frequency_hz[1], frf.frequency_hz[frf.lines() - 1]);
+  const double low_hz = frf.frequency_hz[1];
+  const double high_hz = frf.frequency_hz[frf.lines() - 1];
+  return select_band(std::move(frf), low_hz, high_hz);
 }
 
 }  // namespace stageid

@@ -38,6 +38,14 @@ Matrix rows_or_empty(const Matrix& matrix, const Indices& rows) {
   return matrix.size() == 0 ? Matrix() : Matrix(matrix(rows, Eigen::all));
 }
 
+/// Keeps columns of a matrix whose empty form (unknown) stays empty, within its own memory.
+template <typename Matrix>
+void keep_columns(Matrix& matrix, Eigen::Index first, Eigen::Index kept) {
+  if (matrix.size() == 0) return;
+  for (Eigen::Index k = 0; first > 0 && k < kept; ++k) matrix.col(k) = matrix.col(first + k);
+  matrix.conservativeResize(Eigen::NoChange, kept);
+}
+
 /// Rows of columns that are vec of a square matrix, for the given rows and columns of that matrix.
 Indices square_rows(const Indices& kept, Eigen::Index size) {
   Indices rows;
@@ -71,16 +79,17 @@ Eigen::Map<const Eigen::MatrixXcd> FrfEstimate::at(Eigen::Index k) const {
   return {response.col(k).data(), n_outputs(), n_inputs()};
 }
 
-FrfEstimate select_band(const FrfEstimate& frf, double low_hz, double high_hz) {
-  Indices kept;
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    if (frf.frequency_hz[k] >= low_hz && frf.frequency_hz[k] <= high_hz) kept.push_back(k);
-  }
+FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
   if (low_hz > high_hz)
     throw std::invalid_argument(
         fmt::format("band {} to {} Hz: ends below its beginning; write the lower frequency first",
                     low_hz, high_hz));
-  if (kept.empty()) {
+  const auto* const begin = frf.frequency_hz.data();
+  const auto* const end = begin + frf.lines();
+  const Eigen::Index first = std::lower_bound(begin, end, low_hz) - begin;
+  const bool is_band = low_hz <= high_hz;  // neither end is NaN
+  const Eigen::Index kept = is_band ? std::upper_bound(begin, end, high_hz) - begin - first : 0;
+  if (kept == 0) {
     const std::string range = frf.lines() == 0
                                   ? std::string("no lines")
                                   : fmt::format("lines from {} to {} Hz", frf.frequency_hz[0],
@@ -89,24 +98,19 @@ FrfEstimate select_band(const FrfEstimate& frf, double low_hz, double high_hz) {
         fmt::format("band {} to {} Hz: no line lies in it; the frequency response has {}", low_hz,
                     high_hz, range));
   }
-  const auto columns = [&kept](const auto& matrix) {
-    using Matrix = std::decay_t<decltype(matrix)>;
-    return matrix.size() == 0 ? Matrix() : Matrix(matrix(Eigen::all, kept));
-  };
-  FrfEstimate band = frf;
-  band.frequency_hz = frf.frequency_hz(kept);
-  band.response = columns(frf.response);
-  band.noise_variance = columns(frf.noise_variance);
-  band.total_variance = columns(frf.total_variance);
-  band.residual_covariance_re = columns(frf.residual_covariance_re);
-  band.residual_covariance_im = columns(frf.residual_covariance_im);
-  band.input_factor = columns(frf.input_factor);
-  band.covariance = columns(frf.covariance);
-  band.detection.linear_power = columns(frf.detection.linear_power);
-  if (frf.input_condition.size() != 0) band.input_condition = frf.input_condition(kept);
-  if (frf.interpolation_misfit.size() != 0)
-    band.interpolation_misfit = frf.interpolation_misfit(kept);
-  return band;
+  keep_columns(frf.response, first, kept);
+  keep_columns(frf.noise_variance, first, kept);
+  keep_columns(frf.total_variance, first, kept);
+  keep_columns(frf.residual_covariance_re, first, kept);
+  keep_columns(frf.residual_covariance_im, first, kept);
+  keep_columns(frf.input_factor, first, kept);
+  keep_columns(frf.covariance, first, kept);
+  keep_columns(frf.detection.linear_power, first, kept);
+  for (Eigen::VectorXd* const of_lines :
+       {&frf.input_condition, &frf.interpolation_misfit, &frf.frequency_hz}) {
+    if (of_lines->size() != 0) *of_lines = of_lines->segment(first, kept).eval();
+  }
+  return frf;
 }
 
 FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,

@@ -99,8 +99,8 @@ struct FrfEstimate {
   Eigen::Map<const Eigen::MatrixXcd> at(Eigen::Index k) const;
 };
 
-/// The lines with low_hz <= f <= high_hz. @throws std::invalid_argument if none is left.
-FrfEstimate select_band(const FrfEstimate& frf, double low_hz, double high_hz);
+/// The lines with low_hz <= f <= high_hz; of an estimate that is moved in, no copy. @throws std::invalid_argument if none is left.
+FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz);
 
 /// The named channels, in the order asked. @throws std::invalid_argument naming an unknown channel
 /// and those there are.

@@ -334,9 +334,11 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   average_->finish(frf, workers_);
   if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);
   // Beyond them some axis would have to be extrapolated.
-  if (zippered_)
-    frf = select_band(frf, frf.frequency_hz[zippered_->lines().first()],
-                      frf.frequency_hz[zippered_->lines().last()]);
+  if (zippered_) {
+    const double low_hz = frf.frequency_hz[zippered_->lines().first()];
+    const double high_hz = frf.frequency_hz[zippered_->lines().last()];
+    frf = select_band(std::move(frf), low_hz, high_hz);
+  }
   if (alignment_ && why_linearity_cannot_be_tested(frf).empty())
     frf.nonlinearity = nonlinearity_test(
         frf,

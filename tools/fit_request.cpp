@@ -330,7 +330,8 @@ FitSetup make_fit_setup(const FitRequest& asked, FrfEstimate frf) {
   FitSetup setup;
   const FitRequest request = with_structure(asked, frf, setup.notes);
   const Eigen::VectorXd whole_hz = frf.frequency_hz;
-  if (request.band_hz) frf = select_band(frf, (*request.band_hz)[0], (*request.band_hz)[1]);
+  if (request.band_hz)
+    frf = select_band(std::move(frf), (*request.band_hz)[0], (*request.band_hz)[1]);
   if (has_dc_line(frf)) {
     setup.warnings.emplace_back(kDcLineLeftOut);
     setup.notes.emplace_back(kDcLineLeftOut);

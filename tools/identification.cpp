@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <memory>
 #include <utility>
 
@@ -203,7 +205,8 @@ void Identification::fit() {
   model_variance_ = std::move(step.result.response_variance);
   trustworthy_ = step.result.trustworthy();
   if (!trustworthy_) notes_.push_back("the fit is not to be trusted: " + step.result.message);
-  notes_.insert(notes_.end(), step.result.findings.begin(), step.result.findings.end());
+  std::copy_if(step.result.findings.begin(), step.result.findings.end(), std::back_inserter(notes_),
+               [&](const std::string& finding) { return finding != step.result.message; });
   write_model(path("model.json"), model_);
   finish_step(
       "fit", step.seconds,

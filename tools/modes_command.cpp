@@ -34,7 +34,7 @@ void ModesCommand::run() const {
     require_ending(output_, "a list of modes", {".json"});
   }
   FrfEstimate frf = read_frf(frf_);
-  if (!band_hz_.empty()) frf = select_band(frf, band_hz_[0], band_hz_[1]);
+  if (!band_hz_.empty()) frf = select_band(std::move(frf), band_hz_[0], band_hz_[1]);
   if (has_dc_line(frf)) {
     console_.warning(fmt::format("{}: {}", frf_.string(), kDcLineLeftOut));
     frf = without_dc_line(std::move(frf));

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/file_error.hpp"
@@ -114,10 +115,10 @@ void add_response(ReportData& data, const ReportInput& input) {
   const AdditiveModel& model = *data.model;
   if (!data.frf) return;
   if (model.fit.band_hz[1] > model.fit.band_hz[0]) {
-    data.frf = select_band(*data.frf, model.fit.band_hz[0], model.fit.band_hz[1]);
+    data.frf = select_band(std::move(*data.frf), model.fit.band_hz[0], model.fit.band_hz[1]);
     if (data.validation_frf)
       data.validation_frf =
-          select_band(*data.validation_frf, model.fit.band_hz[0], model.fit.band_hz[1]);
+          select_band(std::move(*data.validation_frf), model.fit.band_hz[0], model.fit.band_hz[1]);
   }
   data.model_response = response_like(model, *data.frf);
   if (!input.model_h5.empty())

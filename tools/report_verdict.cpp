@@ -14,7 +14,11 @@ using Reasons = std::vector<std::string>;
 
 void judge_fit(const ReportData& data, Reasons& reasons) {
   const std::string& status = data.model->fit.status;
-  if (status != "gradient_small" && status != "step_small")
+  if (status == "undetermined")
+    reasons.emplace_back("the data do not determine a mode or a submodel of the model");
+  else if (status == "unexplained")
+    reasons.emplace_back("the model lacks what the search found to be no mode");
+  else if (status != "gradient_small" && status != "step_small")
     reasons.push_back("the fit did not converge: " + (status.empty() ? "no status" : status));
   if (!data.validation) return;
   const double chi_square = data.validation->chi_square_per_dof;

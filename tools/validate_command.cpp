@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <fstream>
 #include <memory>
+#include <utility>
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/counted.hpp"
@@ -129,7 +130,7 @@ void ValidateCommand::run() const {
     step.frf = read_frf(data_);
   else
     step = estimate_frf({data_}, options, {true, stage_}, console_);
-  const FrfEstimate frf = select_channels(step.frf, model.inputs.names, model.outputs.names);
+  FrfEstimate frf = select_channels(step.frf, model.inputs.names, model.outputs.names);
   const bool fitted_band = model.fit.band_hz[1] > 0.0;
   const double low_hz = !band_hz_.empty() ? band_hz_[0]
                         : fitted_band     ? model.fit.band_hz[0]
@@ -137,7 +138,7 @@ void ValidateCommand::run() const {
   const double high_hz = !band_hz_.empty() ? band_hz_[1]
                          : fitted_band     ? model.fit.band_hz[1]
                                            : frf.frequency_hz[frf.lines() - 1];
-  const Validation validation = validate(model, select_band(frf, low_hz, high_hz));
+  const Validation validation = validate(model, select_band(std::move(frf), low_hz, high_hz));
   for (const std::string& line : validation_lines(validation)) console_.result(line);
   nlohmann::ordered_json json = {{"model", model_.string()},
                                  {"data", data_.string()},

@@ -106,22 +106,34 @@ TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
   EXPECT_THAT(fit.decisions.front(), HasSubstr("which the data do not determine"));
 }
 
-// Where a number of modes is asked for they stay, and are told.
-TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFinding) {
+// Where a number of modes is asked for they stay, and such a fit is not to be trusted.
+TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined) {
   FitResult fit = fit_additive_model(frf_, true_, options_);
-  find_undetermined_modes(fit);
+  judge_undetermined_modes(fit);
   EXPECT_TRUE(fit.findings.empty());
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  const FitStatus converged = fit.status;
   fit.held = {1};
   fit.model.submodels[0].damping_ratio_std = 2.0 * fit.model.submodels[0].damping_ratio();
-  find_undetermined_modes(fit);
+  judge_undetermined_modes(fit);
   ASSERT_EQ(fit.findings.size(), 1U);
   EXPECT_THAT(fit.findings[0], HasSubstr(", its deviation as large), 390.0"));
   EXPECT_THAT(fit.findings[0], HasSubstr("at its bound"));
+  EXPECT_EQ(fit.status, FitStatus::undetermined);
+  EXPECT_EQ(fit.message, fit.findings[0]);
+  EXPECT_EQ(fit.model.fit.status, "undetermined");
   fit.findings.clear();
+  fit.status = FitStatus::iteration_limit;  // what kept it from converging is told first
+  judge_undetermined_modes(fit);
+  EXPECT_EQ(fit.findings.size(), 1U);
+  EXPECT_EQ(fit.status, FitStatus::iteration_limit);
+  fit.findings.clear();
+  fit.status = converged;
   fit.model.fit.band_hz[1] = 300.0;  // beside the lines a mode stands for what is there
   fit.model.submodels[0].damping_ratio_std = 1e-4;
-  find_undetermined_modes(fit);
+  judge_undetermined_modes(fit);
   EXPECT_TRUE(fit.findings.empty());
+  EXPECT_EQ(fit.status, converged);
 }
 
 TEST_F(SettledFit, AFitThatConvergesIsLeftAlone) {

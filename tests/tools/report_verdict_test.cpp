@@ -51,6 +51,14 @@ TEST(Verdict, AFitThatDidNotConvergeIsDoubted) {
   }
 }
 
+TEST(Verdict, AFitThatConvergedToWhatTheDataLeaveOpenIsDoubtedForThat) {
+  ReportData data = sound();
+  data.model->fit.status = "undetermined";
+  expect_doubt(data, "do not determine");
+  data.model->fit.status = "unexplained";
+  expect_doubt(data, "no mode");
+}
+
 TEST(Verdict, AnErrorAboveTheNoiseIsDoubted) {
   ReportData data = sound();
   data.validation->chi_square_per_dof = 2.5;

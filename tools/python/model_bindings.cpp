@@ -5,6 +5,7 @@
 #include <array>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "estimation/modal_assurance.hpp"
 #include "estimation/modal_form.hpp"
@@ -100,7 +101,7 @@ py::dict validate_on(const AdditiveModel& model, const FrfHandle& of,
   FrfEstimate frf = select_channels(of.frf, model.inputs.names, model.outputs.names);
   if (!band_hz && model.fit.band_hz[1] > 0.0)
     band_hz = {model.fit.band_hz[0], model.fit.band_hz[1]};
-  if (band_hz) frf = select_band(frf, (*band_hz)[0], (*band_hz)[1]);
+  if (band_hz) frf = select_band(std::move(frf), (*band_hz)[0], (*band_hz)[1]);
   const Validation v = validate(model, frf);
   py::dict out;
   out["relative_rms_error"] = v.relative_rms_error;
