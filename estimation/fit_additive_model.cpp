@@ -25,6 +25,8 @@
 namespace stageid {
 namespace {
 
+constexpr double kPlainMisfit = 4.0;  // times what the variances predict: nobody should miss it
+
 /// Delta method, facts.md section 10:  df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
 void fill_deviations(const ParameterCovariance& covariance, AdditiveModel& model) {
   Eigen::Index first = 0;
@@ -84,11 +86,12 @@ void use_covariance(const FitProblem& problem, ParameterCovariance& covariance, 
   }
   fill_deviations(covariance, result.model);
   result.response_variance = std::move(covariance.response_variance);
-  if (likelihood && covariance.residual_scale > 1.0)
-    result.decisions.push_back(
-        fmt::format("the residual is {:.3g} times what the variances predict: the model does not "
-                    "explain the data; standard deviations are raised by {:.3g}",
-                    covariance.residual_scale, std::sqrt(covariance.residual_scale)));
+  if (!likelihood || !(covariance.residual_scale > 1.0)) return;
+  result.decisions.push_back(
+      fmt::format("the residual is {:.3g} times what the variances predict: the model does not "
+                  "explain the data; standard deviations are raised by {:.3g}",
+                  covariance.residual_scale, std::sqrt(covariance.residual_scale)));
+  if (covariance.residual_scale > kPlainMisfit) result.findings.push_back(result.decisions.back());
 }
 
 /// With free numerators.

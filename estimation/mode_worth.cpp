@@ -13,6 +13,27 @@ double information_criterion(const FrfEstimate& frf, const FitResult& fit) {
          static_cast<double>(fit.parameters) * std::log(data);
 }
 
+namespace {
+
+/// In units of 2 ln(likelihood): ln(data) for each parameter (BIC), and 2 ln(lines) for the choice of the
+/// mode's place among them: without it the best of thousands of places is taken where none is right.
+double cost_of_mode(double parameters, double data, double lines) {
+  return parameters * std::log(data) + 2.0 * std::log(lines);
+}
+
+/// That cost in sum W |E|^2, of which there is `squares`.
+double in_squares(double squares, double cost, double data) {
+  return squares * -std::expm1(-cost / data);
+}
+
+}  // namespace
+
+double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parameters) {
+  const auto lines = static_cast<double>(frf.lines());
+  const double data = independent_numbers(frf);
+  return in_squares(2.0 * lines * fit.model.fit.cost, cost_of_mode(parameters, data, lines), data);
+}
+
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
     : lines_(static_cast<double>(frf.lines())),
@@ -25,10 +46,8 @@ double ModeWorth::squares(const FitResult& fit) const {
   return std::max(2.0 * lines_ * fit.model.fit.cost, rounding_);
 }
 
-/// In units of 2 ln(likelihood): ln(data) for each parameter (BIC), and 2 ln(lines) for the choice of the
-/// mode's place among them: without it the best of thousands of places is taken where none is right.
 double ModeWorth::cost_of_modes(int modes) const {
-  return modes * (parameters_of_mode_ * std::log(data_) + 2.0 * std::log(lines_));
+  return modes * cost_of_mode(parameters_of_mode_, data_, lines_);
 }
 
 double ModeWorth::criterion(const FitResult& fit) const {
@@ -36,7 +55,7 @@ double ModeWorth::criterion(const FitResult& fit) const {
 }
 
 double ModeWorth::price(const FitResult& fit) const {
-  return squares(fit) * -std::expm1(-cost_of_modes(1) / data_);
+  return in_squares(squares(fit), cost_of_modes(1), data_);
 }
 
 double ModeWorth::deviation_tolerance() const { return std::sqrt(0.01 * cost_of_modes(1)); }

@@ -14,6 +14,9 @@ inline constexpr double kRoundingPower = 1e-16;
 /// models whose parameters differ; where modes are searched on the lines, their places cost too: ModeWorth.
 double information_criterion(const FrfEstimate& frf, const FitResult& fit);
 
+/// What sum W |E|^2 of `fit` must rise by without its mode of so many parameters for that to be worth them, see ModeWorth.
+double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parameters);
+
 /// Whether a mode is worth its parameters: an extended Bayesian information criterion (Chen and Chen,
 /// Biometrika 95 (2008) 759) with the scale of the variances unknown. Where the variances are right it
 /// decides like the one with known variance; where the model cannot be right, it does not chase errors.

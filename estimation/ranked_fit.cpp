@@ -271,7 +271,9 @@ FitResult ranked_fit(const FrfEstimate& frf, const AdditiveModel& start, const F
                                                  : fit_additive_model(frf, start, options);
   // Modes that are given one by one the fit has judged by itself.
   if (number != ModeNumber::given && fit.status != FitStatus::singular)
-    judge_undetermined_modes(fit);
+    judge_undetermined_modes(frf, number == ModeNumber::asked, fit);
+  if (number == ModeNumber::asked && options.residue_rank == 0 && fit.trustworthy())
+    judge_close_modes(frf, options, fit);
   return fit;
 }
 

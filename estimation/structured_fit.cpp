@@ -243,6 +243,8 @@ void check_requests(const FrfEstimate& frf, const RequestedStructure& structure)
 FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& structure,
                          const ModeSelection& selection, const FitOptions& options) {
   check(frf);
+  if (frf.response.isZero(0.0))
+    throw std::invalid_argument("fit: the response is zero on all lines; there is nothing to fit");
   check_requests(frf, structure);
   std::vector<std::string> decisions;
   ModelStructure complete = structure.common;

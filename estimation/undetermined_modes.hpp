@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimation/fit_options.hpp"
+#include "frf/frf_estimate.hpp"
 
 namespace stageid {
 
@@ -18,6 +19,12 @@ std::vector<std::size_t> undetermined_modes(const FitResult& fit);
 
 /// Adds a finding that names them, if there are any: a fit whose number of modes is asked for keeps them, and so does
 /// one whose cost they are worth. If it converged it is FitStatus::undetermined then.
-void judge_undetermined_modes(FitResult& fit);
+/// @param number_asked the modes were not chosen by what they are worth: those that are not worth their parameters
+///        (price_of_mode()) are named too, and those beside the lines by less than half their half-power width
+void judge_undetermined_modes(const FrfEstimate& frf, bool number_asked, FitResult& fit);
+
+/// The same for pairs of modes of which one does as well: a mode too many may halve one that is there. Each of at most
+/// four pairs costs a fit.
+void judge_close_modes(const FrfEstimate& frf, const FitOptions& options, FitResult& fit);
 
 }  // namespace stageid

@@ -1,6 +1,9 @@
 #include "estimation/validation.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "frf/confidence.hpp"
@@ -34,6 +37,19 @@ Eigen::MatrixXcd response_like(const AdditiveModel& model, const FrfEstimate& fr
 
 namespace {
 
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// The same numbers in other units are another response.
+void require_same_units(const char* kind, const ChannelList& model, const ChannelList& data) {
+  for (std::size_t i = 0; i < model.units.size() && i < data.units.size(); ++i) {
+    if (model.units[i].empty() || data.units[i].empty() || model.units[i] == data.units[i])
+      continue;
+    throw std::invalid_argument(
+        fmt::format("validate: {} {} is in {} in the model and in {} in the data; convert the data",
+                    kind, model.names[i], model.units[i], data.units[i]));
+  }
+}
+
 /// Largest |autocorrelation| of whitened residuals over lines, all channels together, lags 1 to 10.
 void fill_whiteness(const Eigen::MatrixXcd& white, Validation& out) {
   const double power = white.cwiseAbs2().sum();
@@ -56,14 +72,16 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf) {
     throw std::invalid_argument(
         "validate: the model and the FRF have different channels; select the same inputs and "
         "outputs in the same order");
+  require_same_units("input", model.inputs, frf.inputs);
+  require_same_units("output", model.outputs, frf.outputs);
   const Eigen::MatrixXcd E = frf.response - response_like(model, frf);
   Validation out;
   const Eigen::ArrayXXd squared = E.cwiseAbs2().array();
   const Eigen::ArrayXXd power = frf.response.cwiseAbs2().array();
   const Eigen::ArrayXXd relative = (power > 0.0).select(squared / power.max(1e-300), 0.0);
   const double used = static_cast<double>((power > 0.0).count());
-  out.relative_rms_error = used > 0.0 ? std::sqrt(relative.sum() / used) : 0.0;
-  out.normalized_error = power.sum() > 0.0 ? std::sqrt(squared.sum() / power.sum()) : 0.0;
+  out.relative_rms_error = used > 0.0 ? std::sqrt(relative.sum() / used) : kUnknown;
+  out.normalized_error = power.sum() > 0.0 ? std::sqrt(squared.sum() / power.sum()) : kUnknown;
   out.channel_error = relative.rowwise().mean().sqrt();
   const Eigen::MatrixXd& variance =
       frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;

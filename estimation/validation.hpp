@@ -7,8 +7,8 @@ namespace stageid {
 
 /// How a model does on a response that it was not fitted to.
 struct Validation {
-  double relative_rms_error = 0.0;  ///< sqrt(mean |E|^2/|G|^2)
-  double normalized_error = 0.0;    ///< sum |E|^2 over sum |G|^2, square root
+  double relative_rms_error = 0.0;  ///< sqrt(mean |E|^2/|G|^2); NaN: G is zero
+  double normalized_error = 0.0;    ///< sum |E|^2 over sum |G|^2, square root; NaN: G is zero
   double chi_square_per_dof = 0.0;  ///< mean |E|^2/variance; 0: unknown
   /// What that is if the error is noise: nu / (nu - 1), the mean of F(2, 2 nu), for a variance of nu degrees
   /// of freedom; 1 for an exact one, 0 without a mean.
@@ -23,7 +23,7 @@ struct Validation {
 
 /// Compares a model with measured data on their lines, through the hold and delay that the data
 /// still hold.
-/// @throws std::invalid_argument if channels do not match by name.
+/// @throws std::invalid_argument if channels do not match by name, or have other units (unknown ones match all).
 Validation validate(const AdditiveModel& model, const FrfEstimate& frf);
 
 /// The model's response as it would have been measured: through hold and delay unless the data are

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -122,6 +124,11 @@ Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
             " is zero: no relative error exists there; leave the channel or line out, or use "
             "weighting unit");
       W(c, k) = std::pow(magnitude, -exponent);
+      if (!std::isnormal(W(c, k)))
+        throw std::invalid_argument(fmt::format(
+            "response of {} is {:.2g}: its weight leaves the range of numbers; convert to units "
+            "that fit the plant",
+            channel_name(frf, c, k), magnitude));
     }
   return W;
 }

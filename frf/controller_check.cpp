@@ -1,6 +1,7 @@
 #include "frf/controller_check.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -16,12 +17,16 @@ constexpr double kEpsilon = 1e-3;           // what the model of the controller 
 constexpr double kEpsilonOnePeriod = 5e-2;  // no scatter says what noise is
 constexpr double kRounding = 1e-9;          // of u: float32 records, and u - r of two large numbers
 constexpr double kDeviations = 6.0;
-constexpr double kLeastGain = 0.05;
+constexpr double kLeastGain = 0.02;
 constexpr double kLeastSkew_s = 2e-6;
 constexpr double kLeastShare = 0.3;
 constexpr double kLeastMisfit = 0.05;
 constexpr double kSignificance = 1e-4;
 constexpr int kMostChanges = 40;
+constexpr double kOfAnother =
+    0.05;  // of a row's misfit: what another's record leaves, if it is that
+// Samples that a channel may be late or early by as a whole: beyond the reach of one direction.
+constexpr std::array<double, 6> kWholeSkews = {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0};
 
 /// One line with the changes found so far undone.
 struct Line {
@@ -49,12 +54,15 @@ class Search {
   void refresh();
   std::optional<Candidate> best() const;
   double row_cost(Index row) const;
-  bool follows(Index row) const;
+  bool sensors_follow() const;
+  bool follows(Index row) const { return follows(row, 1); }
+  bool follows(Index first, Index rows) const;
   /// E - d X with X of `direction`, rows x E.
   template <typename Direction>
   void try_direction(ChannelChange change, double cost, Index first, Index rows,
                      const Direction& direction);
   void try_swap(ChannelChange change, double cost, double after);
+  void try_whole_skews(Index actuator, double cost);
   template <typename Term>
   double sum_over_lines(const Term& term) const {
     double sum = 0.0;
@@ -125,17 +133,34 @@ double Search::row_cost(Index row) const {
       [row](const Line& line) { return line.weight[row] * line.E.row(row).squaredNorm(); });
 }
 
-/// Is u of this actuator, but for a factor, r - C y? Without this an actuator that moves by itself
-/// would be explained by a factor that makes it vanish.
-bool Search::follows(Index row) const {
+/// Is u of these actuators, but for a factor, r - C y? Without this one that moves by itself, or that is
+/// another, would be explained by a factor that makes it vanish.
+bool Search::follows(Index first, Index rows) const {
   double along = 0.0;
   double recorded = 0.0;
   double asked = 0.0;
   for (const Line& line : lines_) {
-    const Eigen::RowVectorXcd V = line.U.row(row) - line.E.row(row);
-    along += line.weight[row] * line.U.row(row).conjugate().cwiseProduct(V).sum().real();
-    recorded += line.weight[row] * line.U.row(row).squaredNorm();
-    asked += line.weight[row] * V.squaredNorm();
+    const auto U = line.U.middleRows(first, rows);
+    const Eigen::MatrixXcd V = U - line.E.middleRows(first, rows);
+    const auto w = line.weight.segment(first, rows);
+    along += (w.asDiagonal() * U.conjugate().cwiseProduct(V).real()).sum();
+    recorded += (w.asDiagonal() * U.cwiseAbs2()).sum();
+    asked += (w.asDiagonal() * V.cwiseAbs2()).sum();
+  }
+  return along * along > 0.5 * recorded * asked;
+}
+
+/// The same of all sensors: is C y, but for a factor, r - u?
+bool Search::sensors_follow() const {
+  double along = 0.0;
+  double recorded = 0.0;
+  double asked = 0.0;
+  for (const Line& line : lines_) {
+    const Eigen::MatrixXcd FY = line.F * line.Y;
+    const Eigen::MatrixXcd V = FY + line.E;
+    along += (line.weight.asDiagonal() * FY.conjugate().cwiseProduct(V).real()).sum();
+    recorded += (line.weight.asDiagonal() * FY.cwiseAbs2()).sum();
+    asked += (line.weight.asDiagonal() * V.cwiseAbs2()).sum();
   }
   return along * along > 0.5 * recorded * asked;
 }
@@ -174,6 +199,25 @@ void Search::try_swap(ChannelChange change, double cost, double after) {
     candidates_.push_back({change, cost - after, (cost - after) / cost});
 }
 
+/// A channel late by a sample turns by more than the direction of a small skew follows.
+void Search::try_whole_skews(Index a, double cost) {
+  if (!noise_known_) return;
+  for (const double samples : kWholeSkews) {
+    const double skew_s = samples / record_.info.sample_rate_hz;
+    double length = 0.0;
+    const double after = sum_over_lines([&](const Line& line) {
+      const std::complex<double> turn = std::polar(1.0, line.omega_rad_s * skew_s) - 1.0;
+      length += line.weight[a] * line.omega_rad_s * line.omega_rad_s * line.U.row(a).squaredNorm();
+      return line.weight[a] * (line.E.row(a) + turn * line.U.row(a)).squaredNorm();
+    });
+    if (after > (1.0 - kLeastShare) * cost || !(length > 0.0)) continue;
+    ChannelChange change{ChannelChange::Kind::skew, false, a};
+    change.value = skew_s;
+    change.deviation = 1.0 / std::sqrt(2.0 * length);
+    try_swap(change, cost, after);
+  }
+}
+
 void Search::try_sensors() {
   using Kind = ChannelChange::Kind;
   const Index n_u = record_.n_u();
@@ -182,7 +226,7 @@ void Search::try_sensors() {
     return Eigen::MatrixXcd(line.F.col(s) * line.Y.row(s));
   };
   const auto all = [](const Line& line) { return Eigen::MatrixXcd(line.F * line.Y); };
-  try_direction({Kind::gain, true}, total_, 0, n_u, all);
+  if (sensors_follow()) try_direction({Kind::gain, true}, total_, 0, n_u, all);
   try_direction({Kind::skew, true}, total_, 0, n_u, [&](const Line& line) {
     return Eigen::MatrixXcd(j * line.omega_rad_s * all(line));
   });
@@ -205,8 +249,9 @@ void Search::try_actuators() {
   using Kind = ChannelChange::Kind;
   const std::complex<double> j(0.0, 1.0);
   const Index n_u = record_.n_u();
-  try_direction({Kind::gain, false}, total_, 0, n_u,
-                [](const Line& line) { return Eigen::MatrixXcd(-line.U); });
+  if (follows(0, n_u))
+    try_direction({Kind::gain, false}, total_, 0, n_u,
+                  [](const Line& line) { return Eigen::MatrixXcd(-line.U); });
   try_direction({Kind::skew, false}, total_, 0, n_u,
                 [&](const Line& line) { return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U); });
   for (Index a = 0; a < n_u; ++a) {
@@ -218,6 +263,7 @@ void Search::try_actuators() {
     try_direction({Kind::skew, false, a}, cost, a, 1, [&](const Line& line) {
       return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U.row(a));
     });
+    try_whole_skews(a, cost);
     for (Index b = 0; b < a; ++b) {
       const double cost_b = row_cost(b);
       const auto exchanged = [](Index row, Index with) {
@@ -228,8 +274,11 @@ void Search::try_actuators() {
       };
       const double after_a = sum_over_lines(exchanged(a, b));
       const double after_b = sum_over_lines(exchanged(b, a));
-      // What one row cannot explain is not the other's: both must come out better.
-      if (after_a > 0.5 * cost || after_b > 0.5 * cost_b) continue;
+      // What one row cannot explain is not the other's: both must come out better, or one of them whole (three
+      // that have changed places come right one by one).
+      const bool both = after_a < 0.5 * cost && after_b < 0.5 * cost_b;
+      const bool one = after_a < kOfAnother * cost || after_b < kOfAnother * cost_b;
+      if (!both && !one) continue;
       try_swap({Kind::swap, false, b, a}, cost + cost_b, after_a + after_b);
     }
   }

@@ -33,7 +33,7 @@ struct ControllerCheck {
 /// A change counts if d is 6 deviations off zero (false alarm: 2e-9 a candidate, 6e-7 for the 300
 /// candidates of a wafer stage; s^2 is too large rather than too small, since what noise leaves in E is the
 /// difference of two ends of a period and cancels in the mean), if it explains 30 % of the misfit it is
-/// held against, and if it is large enough to matter: a gain 5 % off, a skew of 2 us. What is left is a misfit if it is
+/// held against, and if it is large enough to matter: a gain 2 % off, a skew of 2 us. What is left is a misfit if it is
 /// both significant (F test over the experiments of each line, Fisher's sum over the lines, 1e-4 over
 /// all actuators) and 5 % of C y.
 ///

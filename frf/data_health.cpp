@@ -115,8 +115,12 @@ void Examination::check_samples() {
     const double stuck_s =
         static_cast<double>(scan.longest_constant()) / record_.info.sample_rate_hz;
     // An actuator that nothing drives stands still by right; a whole run of one value is no clipping.
+    // Nor is one that comes to the same end of its range again and again dead.
+    const bool piles_up = std::min(scan.log_p_high(), scan.log_p_low()) < limit;
+    const bool visits = std::max(scan.high().count, scan.low().count) > scan.longest_constant() &&
+                        scan.high().value != scan.low().value;
     if (static_cast<double>(scan.longest_constant()) > kStuckShare * run_samples &&
-        scan.longest_constant() > 2) {
+        scan.longest_constant() > 2 && !(piles_up && visits)) {
       bool known = false;
       const auto excited = excited_actuators();
       const bool driven =
@@ -128,7 +132,7 @@ void Examination::check_samples() {
       spoilt_.push_back(c);
       continue;
     }
-    if (std::min(scan.log_p_high(), scan.log_p_low()) < limit) find_clipped(c, limit);
+    if (piles_up) find_clipped(c, limit);
   }
 }
 

@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "excitation/counted.hpp"
 #include "excitation/file_error.hpp"
 #include "tools/command_line.hpp"
 #include "tools/config_plan.hpp"
+#include "tools/interrupt.hpp"
 #include "tools/limited_plan.hpp"
 #include "tools/link_load.hpp"
 #include "tools/measurement.hpp"
@@ -117,8 +120,11 @@ DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console
 void DesignCommand::run() const {
   const ExperimentConfig config = load_experiment_config(config_);
   require_writable(output_, {config_});
+  std::optional<EndsAtOnce> computing(std::in_place);
   if (config.limits) {
-    design_within(config);
+    const LimitedPlan limited = make_limited_plan(config);
+    computing.reset();
+    write_limited(config, limited);
     return;
   }
   if (accuracy_ > 0.0)
@@ -128,6 +134,7 @@ void DesignCommand::run() const {
         "use that level");
   const ExperimentPlan plan = make_plan(config);
   const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
+  computing.reset();
   const bool written = force_ || prediction.violations().empty();
   if (written) write_experiment_plan(output_, plan);
   for (const std::string& line : design_table(config, plan, prediction)) console_.result(line);
@@ -137,8 +144,8 @@ void DesignCommand::run() const {
   console_.result(design_json(config, plan, prediction));
 }
 
-void DesignCommand::design_within(const ExperimentConfig& config) const {
-  const LimitedPlan limited = make_limited_plan(config);
+void DesignCommand::write_limited(const ExperimentConfig& config,
+                                  const LimitedPlan& limited) const {
   const ExperimentPlan& plan = limited.design.plan;
   write_experiment_plan(output_, plan);
   console_.result(fmt::format("{}, {:.1f} min in all; {}; prior {}",

@@ -6,6 +6,7 @@
 #include "tools/closed_loop_prediction.hpp"
 #include "tools/console.hpp"
 #include "tools/experiment_config.hpp"
+#include "tools/limited_plan.hpp"
 
 namespace stageid {
 
@@ -16,7 +17,7 @@ class DesignCommand {
 
  private:
   void run() const;
-  void design_within(const ExperimentConfig& config) const;
+  void write_limited(const ExperimentConfig& config, const LimitedPlan& limited) const;
 
   Console& console_;
   std::filesystem::path config_;

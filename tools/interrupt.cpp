@@ -1,6 +1,9 @@
 #include "tools/interrupt.hpp"
 
+#include <unistd.h>
+
 #include <csignal>
+#include <string_view>
 
 #include "tools/exit_code.hpp"
 
@@ -11,7 +14,14 @@ std::atomic<bool> interrupted = false;
 std::atomic<bool> left_to_host = false;
 static_assert(std::atomic<bool>::is_always_lock_free, "the only kind a signal handler may touch");
 
+std::atomic<bool> end_at_once = false;
+
 extern "C" void on_signal(int signal) {
+  if (end_at_once) {
+    constexpr std::string_view kMessage = "stageid: interrupted; nothing was written\n";
+    static_cast<void>(!::write(STDERR_FILENO, kMessage.data(), kMessage.size()));
+    ::_exit(kInterrupted);
+  }
   interrupted = true;
   std::signal(signal, SIG_DFL);
 }
@@ -44,6 +54,10 @@ void leave_signals_to_host() noexcept { left_to_host = true; }
 void request_interrupt() noexcept { interrupted = true; }
 
 void forget_interrupt() noexcept { interrupted = false; }
+
+EndsAtOnce::EndsAtOnce() { end_at_once = true; }
+
+EndsAtOnce::~EndsAtOnce() { end_at_once = false; }
 
 void throw_if_interrupted() {
   if (interrupt_flag()) throw Interrupted();

@@ -19,6 +19,16 @@ void request_interrupt() noexcept;
 /// What was interrupted has ended; the host goes on.
 void forget_interrupt() noexcept;
 
+/// While it lives the first signal ends the program, with exit code 130: for long computations that have written
+/// nothing yet and look at no flag.
+class EndsAtOnce {
+ public:
+  EndsAtOnce();
+  ~EndsAtOnce();
+  EndsAtOnce(const EndsAtOnce&) = delete;
+  EndsAtOnce& operator=(const EndsAtOnce&) = delete;
+};
+
 /// @throws Interrupted if a signal came.
 void throw_if_interrupted();
 

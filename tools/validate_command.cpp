@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <memory>
 #include <utility>
@@ -62,9 +63,11 @@ std::vector<std::string> prediction_lines(const PredictionError& error) {
 }  // namespace
 
 std::vector<std::string> validation_lines(const Validation& v) {
-  std::vector<std::string> lines = {fmt::format(
-      "relative error {:.4e} (mean over lines and channels), {:.4e} (of the whole response)",
-      v.relative_rms_error, v.normalized_error)};
+  std::vector<std::string> lines = {"the response of the data is zero: no relative error exists"};
+  if (std::isfinite(v.relative_rms_error))
+    lines[0] = fmt::format(
+        "relative error {:.4e} (mean over lines and channels), {:.4e} (of the whole response)",
+        v.relative_rms_error, v.normalized_error);
   if (v.chi_square_per_dof > 0.0) {
     const std::string expected = v.expected_chi_square > 0.0
                                      ? fmt::format("{:.3f}", v.expected_chi_square)

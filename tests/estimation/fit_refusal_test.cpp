@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "estimation/fit_additive_model.hpp"
+#include "estimation/structured_fit.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid {
@@ -36,6 +37,20 @@ TEST_F(FitRefusal, NothingIsWrongWithTheFixture) {
 TEST_F(FitRefusal, NoSubmodel) {
   start_.submodels.clear();
   expect_refused("no submodel");
+}
+TEST_F(FitRefusal, AResponseOfZerosHasNoModel) {
+  frf_.response.setZero();
+  for (const int modes : {0, 2})
+    EXPECT_THAT([&] { (void)structured_fit(frf_, {}, {.modes = {}, .exactly = modes}, options_); },
+                testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("is zero")));
+}
+TEST_F(FitRefusal, AResponseWhoseWeightsLeaveTheRangeOfNumbers) {
+  options_.weighting = Weighting::relative;
+  const Eigen::MatrixXcd response = frf_.response;
+  for (const double scale : {1e-170, 1e170}) {
+    frf_.response = scale * response;
+    expect_refused("leaves the range of numbers");
+  }
 }
 TEST_F(FitRefusal, NegativeIterations) {
   options_.max_iterations = -1;

@@ -8,7 +8,9 @@
 #include <complex>
 #include <numbers>
 
+#include "estimation/automatic_fit.hpp"
 #include "estimation/fit_additive_model.hpp"
+#include "estimation/mode_worth.hpp"
 #include "estimation/model_structure.hpp"
 #include "estimation/undetermined_modes.hpp"
 #include "tests/support/model_fit_problem.hpp"
@@ -109,13 +111,13 @@ TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
 // Where a number of modes is asked for they stay, and such a fit is not to be trusted.
 TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined) {
   FitResult fit = fit_additive_model(frf_, true_, options_);
-  judge_undetermined_modes(fit);
+  judge_undetermined_modes(frf_, false, fit);
   EXPECT_TRUE(fit.findings.empty());
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   const FitStatus converged = fit.status;
   fit.held = {1};
   fit.model.submodels[0].damping_ratio_std = 2.0 * fit.model.submodels[0].damping_ratio();
-  judge_undetermined_modes(fit);
+  judge_undetermined_modes(frf_, false, fit);
   ASSERT_EQ(fit.findings.size(), 1U);
   EXPECT_THAT(fit.findings[0], HasSubstr(", its deviation as large), 390.0"));
   EXPECT_THAT(fit.findings[0], HasSubstr("at its bound"));
@@ -124,16 +126,55 @@ TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined
   EXPECT_EQ(fit.model.fit.status, "undetermined");
   fit.findings.clear();
   fit.status = FitStatus::iteration_limit;  // what kept it from converging is told first
-  judge_undetermined_modes(fit);
+  judge_undetermined_modes(frf_, false, fit);
   EXPECT_EQ(fit.findings.size(), 1U);
   EXPECT_EQ(fit.status, FitStatus::iteration_limit);
   fit.findings.clear();
   fit.status = converged;
   fit.model.fit.band_hz[1] = 300.0;  // beside the lines a mode stands for what is there
   fit.model.submodels[0].damping_ratio_std = 1e-4;
-  judge_undetermined_modes(fit);
+  judge_undetermined_modes(frf_, false, fit);
   EXPECT_TRUE(fit.findings.empty());
   EXPECT_EQ(fit.status, converged);
+}
+
+// One mode too many follows the noise: its deviations are a few tenths of its size, and it is worth less than its
+// parameters. Of modes that were chosen by their worth nothing is said.
+TEST_F(SettledFit, AModeThatIsAskedForAndNotWorthItsParametersIsUndetermined) {
+  const auto asked = [&](int modes) {
+    return automatic_fit(frf_, {.rigid_body = false}, {.modes = {}, .exactly = modes}, options_);
+  };
+  const FitResult two = asked(2);
+  EXPECT_TRUE(two.trustworthy()) << two.message;
+  EXPECT_TRUE(two.findings.empty());
+  const FitResult three = asked(3);
+  EXPECT_EQ(three.status, FitStatus::undetermined) << three.message;
+  EXPECT_THAT(three.message, HasSubstr("do not read them as resonances"));
+  for (const bool number_asked : {false, true}) {
+    FitResult weak = two;
+    weak.removal_cost[1] = 0.9 * price_of_mode(frf_, two, 3.0);  // a pole and one residue
+    judge_undetermined_modes(frf_, number_asked, weak);
+    EXPECT_EQ(weak.status == FitStatus::undetermined, number_asked);
+    EXPECT_EQ(weak.message.find("390.0") != std::string::npos, number_asked) << weak.message;
+    FitResult strong = two;
+    strong.removal_cost[1] = 1.1 * price_of_mode(frf_, two, 3.0);
+    judge_undetermined_modes(frf_, number_asked, strong);
+    EXPECT_TRUE(strong.trustworthy()) << strong.message;
+  }
+}
+
+TEST_F(SettledFit, TwoModesOfWhichOneDoesAsWellAreUndetermined) {
+  AdditiveModel halved = true_;
+  halved.submodels.push_back(
+      test::empty_submodel(true_, 0, test::mode_coefficients(1.003 * kTrue_hz[1], 0.0101), 1));
+  FitResult fit = fit_additive_model(frf_, halved, options_);
+  fit.status = FitStatus::gradient_small;
+  judge_close_modes(frf_, options_, fit);
+  EXPECT_EQ(fit.status, FitStatus::undetermined);
+  EXPECT_THAT(fit.message, HasSubstr("one does as well"));
+  FitResult sound = fit_additive_model(frf_, true_, options_);
+  judge_close_modes(frf_, options_, sound);
+  EXPECT_TRUE(sound.trustworthy()) << sound.message;
 }
 
 TEST_F(SettledFit, AFitThatConvergesIsLeftAlone) {

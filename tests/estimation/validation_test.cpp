@@ -278,5 +278,30 @@ TEST(ResponseLike, NeedsASampleRateForSampledData) {
   EXPECT_THROW((void)response_like(model, frf), std::invalid_argument);
 }
 
+TEST(Validation, OtherUnitsAreAnotherResponse) {
+  AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  model.outputs.units = {"m", "m"};
+  frf.outputs.units = {"m", ""};  // unknown: nothing is said against it
+  EXPECT_NO_THROW(validate(model, frf));
+  frf.outputs.units = {"m", "mm"};
+  try {
+    validate(model, frf);
+    FAIL() << "millimetres taken for metres";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(),
+                ::testing::HasSubstr(model.outputs.names[1] + " is in m in the model"));
+  }
+}
+
+TEST(Validation, OfAZeroResponseThereIsNoRelativeError) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  frf.response.setZero();
+  const Validation result = validate(model, frf);
+  EXPECT_TRUE(std::isnan(result.relative_rms_error));
+  EXPECT_TRUE(std::isnan(result.normalized_error));
+}
+
 }  // namespace
 }  // namespace stageid

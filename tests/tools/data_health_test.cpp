@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "tests/support/faulty_log.hpp"
 #include "tests/support/planted_faults.hpp"
@@ -63,6 +66,67 @@ TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
     EXPECT_NE(finding.remedy.find("--stage"), std::string::npos) << finding.remedy;
   }
   EXPECT_EQ(unchecked, 2);  // recording, and stage
+}
+
+class RecordingFault : public ::testing::Test {
+ protected:
+  std::vector<Finding> findings() const {
+    return check_health(read_health_record({&log_}, {}), nominal_stage(request_.configured));
+  }
+
+  test::FaultyLogRequest request_ = request_of(6);
+  MemoryLog log_ = test::simulate_faulty_log(request_, {});
+};
+
+// Three that have changed places in a circle are no factor 1e5 of all actuators.
+TEST_F(RecordingFault, ThreeActuatorsInACircleAreNamedOneExchangeAfterTheOther) {
+  using Kind = test::PlantedFault::Kind;
+  test::spoil_recording({Kind::recorded_swap, false, 0, 1}, log_);
+  test::spoil_recording({Kind::recorded_swap, false, 1, 2}, log_);
+  const std::vector<Finding> found = findings();
+  ASSERT_EQ(health_notes(found).size(), 2U) << told(found);
+  for (int i = 0; i < 2; ++i)
+    EXPECT_EQ(found[static_cast<std::size_t>(i)].cause, Cause::swapped) << told(found);
+}
+
+TEST_F(RecordingFault, AnActuatorThatIsOneOrTwoSamplesLateIsSkewed) {
+  for (const double samples : {1.0, -1.0, 2.0}) {
+    MemoryLog log = log_;
+    test::spoil_recording({test::PlantedFault::Kind::recorded_skew, false, 4, 0,
+                           samples / log_.log_info.sample_rate_hz},
+                          log);
+    std::swap(log, log_);
+    const std::vector<Finding> found = findings();
+    std::swap(log, log_);
+    ASSERT_EQ(health_notes(found).size(), 1U) << samples << "\n" << told(found);
+    EXPECT_EQ(found.front().cause, Cause::skew) << told(found);
+    EXPECT_EQ(found.front().channel, log_.log_info.actuators.names[4]);
+  }
+}
+
+TEST_F(RecordingFault, AFactorOfThreePercentIsFound) {
+  for (const bool of_sensor : {true, false}) {
+    MemoryLog log = log_;
+    test::spoil_recording({test::PlantedFault::Kind::recorded_gain, of_sensor, 2, 0, 1.03}, log);
+    std::swap(log, log_);
+    const std::vector<Finding> found = findings();
+    std::swap(log, log_);
+    ASSERT_EQ(health_notes(found).size(), 1U) << of_sensor << "\n" << told(found);
+    EXPECT_EQ(found.front().cause, Cause::scale) << told(found);
+  }
+}
+
+// At a twentieth of the samples it stands still for longer than a sensor that is stuck, again and again.
+TEST_F(RecordingFault, ASensorThatIsClippedHardIsNotDead) {
+  const Eigen::VectorXd samples = log_.records.front().sensors.col(1).cwiseAbs();
+  std::vector<double> sorted(samples.begin(), samples.end());
+  const auto limit =
+      sorted.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(sorted.size()));
+  std::nth_element(sorted.begin(), limit, sorted.end());
+  test::spoil_recording({test::PlantedFault::Kind::saturation, true, 1, 0, *limit}, log_);
+  const std::vector<Finding> found = findings();
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found.front().cause, Cause::saturated) << told(found);
 }
 
 /// A limit that three samples of every period reach: 25 at one end would tell by themselves, so few do
