@@ -82,6 +82,10 @@ Extreme ChannelScan::low() const noexcept {
   return {-low_.value, -low_.next, low_.count, low_.next_count};
 }
 
+bool ChannelScan::returns() const noexcept {
+  return high_.value != low().value && std::max(high_.count, low_.count) > longest_;
+}
+
 double ChannelScan::log_p_high() const noexcept { return log_p_of_pile(high_); }
 double ChannelScan::log_p_low() const noexcept { return log_p_of_pile(low_); }
 

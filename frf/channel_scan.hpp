@@ -31,6 +31,9 @@ class ChannelScan {
   const Extreme& high() const noexcept { return high_; }
   Extreme low() const noexcept;  ///< of the negated samples, with their sign back
 
+  /// Whether it leaves an end of its range and comes back to it: no channel does that is stuck.
+  bool returns() const noexcept;
+
   /// ln p of the hypothesis that the channel is not clipped. The density of an excited channel falls
   /// towards its ends, so that of the n = count + next_count samples on the two outermost values at
   /// most half lie on the outermost one; clipped samples pile up there:

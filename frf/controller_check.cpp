@@ -25,6 +25,7 @@ constexpr double kSignificance = 1e-4;
 constexpr int kMostChanges = 40;
 constexpr double kOfAnother =
     0.05;  // of a row's misfit: what another's record leaves, if it is that
+constexpr double kHardlyWorse = 4.0;
 // Samples that a channel may be late or early by as a whole: beyond the reach of one direction.
 constexpr std::array<double, 6> kWholeSkews = {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0};
 
@@ -274,10 +275,11 @@ void Search::try_actuators() {
       };
       const double after_a = sum_over_lines(exchanged(a, b));
       const double after_b = sum_over_lines(exchanged(b, a));
-      // What one row cannot explain is not the other's: both must come out better, or one of them whole (three
-      // that have changed places come right one by one).
+      // What one row cannot explain is not the other's: both must come out better, or one of them whole and the
+      // other hardly worse (three that have changed places come right one by one).
       const bool both = after_a < 0.5 * cost && after_b < 0.5 * cost_b;
-      const bool one = after_a < kOfAnother * cost || after_b < kOfAnother * cost_b;
+      const bool one = (after_a < kOfAnother * cost && after_b < kHardlyWorse * cost_b) ||
+                       (after_b < kOfAnother * cost_b && after_a < kHardlyWorse * cost);
       if (!both && !one) continue;
       try_swap({Kind::swap, false, b, a}, cost + cost_b, after_a + after_b);
     }

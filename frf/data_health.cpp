@@ -112,15 +112,10 @@ void Examination::check_samples() {
   for (Index c = 0; c < static_cast<Index>(record_.scan.size()); ++c) {
     const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
     const bool sensor = c < record_.n_y();
-    const double stuck_s =
-        static_cast<double>(scan.longest_constant()) / record_.info.sample_rate_hz;
-    // An actuator that nothing drives stands still by right; a whole run of one value is no clipping.
-    // Nor is one that comes to the same end of its range again and again dead.
+    const auto stuck = static_cast<double>(scan.longest_constant());
     const bool piles_up = std::min(scan.log_p_high(), scan.log_p_low()) < limit;
-    const bool visits = std::max(scan.high().count, scan.low().count) > scan.longest_constant() &&
-                        scan.high().value != scan.low().value;
-    if (static_cast<double>(scan.longest_constant()) > kStuckShare * run_samples &&
-        scan.longest_constant() > 2 && !(piles_up && visits)) {
+    // An actuator that nothing drives stands still by right; a whole run of one value is no clipping.
+    if (stuck > std::max(kStuckShare * run_samples, 2.0) && !(piles_up && scan.returns())) {
       bool known = false;
       const auto excited = excited_actuators();
       const bool driven =
@@ -128,7 +123,8 @@ void Examination::check_samples() {
                  : std::find(excited.begin(), excited.end(), c - record_.n_y()) != excited.end();
       if (!driven) continue;
       find(Severity::fault, Cause::dead, name(c), "dead: shows one value for long",
-           fmt::format("{:.3g} s", stuck_s), "look at its cable and its amplifier; measure again");
+           fmt::format("{:.3g} s", stuck / record_.info.sample_rate_hz),
+           "look at its cable and its amplifier; measure again");
       spoilt_.push_back(c);
       continue;
     }

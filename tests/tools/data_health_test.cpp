@@ -68,6 +68,22 @@ TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
   EXPECT_EQ(unchecked, 2);  // recording, and stage
 }
 
+// Whose record another one's nearly still record would stand for, if that other one's were not spoilt by it.
+TEST(DataHealth, AnActuatorThatMovesByItselfHasNotChangedPlacesWithOneThatStandsStill) {
+  for (const std::uint64_t seed : {2002U, 2004U}) {
+    const test::FaultyLogRequest request = request_of(seed);
+    const auto nominal = std::optional(nominal_stage(request.configured));
+    const MemoryLog clean = test::simulate_faulty_log(request, {});
+    for (const test::NamedFault& planted : test::faults_to_plant(seed, clean)) {
+      if (planted.fault.kind != test::PlantedFault::Kind::hidden_excitation) continue;
+      const MemoryLog log = test::simulate_faulty_log(request, planted.fault);
+      const auto findings = check_health(read_health_record({&log}, {}), nominal);
+      const test::Judgement judgement = test::judge(planted, findings, log.log_info);
+      EXPECT_TRUE(judgement.named && judgement.others == 0) << told(findings);
+    }
+  }
+}
+
 class RecordingFault : public ::testing::Test {
  protected:
   std::vector<Finding> findings() const {
