@@ -106,7 +106,7 @@ std::string FftWisdom::save() {
     const std::lock_guard guard(fft_planner().lock);
     wisdom = sorted_wisdom();
   }
-  const std::string fingerprint = fingerprint_of(wisdom);
+  std::string fingerprint = fingerprint_of(wisdom);
   if (wisdom != kept_)
     write_text_file(file_, fmt::format("{}{}\n{}", kFormat, fingerprint, wisdom));
   kept_ = std::move(wisdom);
