@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -35,8 +34,23 @@ bool gives_measurement(Outcome outcome) noexcept {
 }  // namespace
 
 const char* to_string(StopReason reason) noexcept {
-  constexpr std::array kNames = {"none", "limit", "fault", "misses", "interrupt", "log"};
-  return kNames[static_cast<std::size_t>(reason)];
+  switch (reason) {
+    case StopReason::none:
+      return "none";
+    case StopReason::limit:
+      return "limit";
+    case StopReason::fault:
+      return "fault";
+    case StopReason::misses:
+      return "misses";
+    case StopReason::interrupt:
+      return "interrupt";
+    case StopReason::log:
+      return "log";
+    case StopReason::plant:
+      return "plant";
+  }
+  return "unknown";
 }
 
 MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controller, SampleRing& ring,

@@ -1,22 +1,63 @@
 #include "frf/health_finding.hpp"
 
 #include <algorithm>
-#include <array>
 
 namespace stageid {
 
 const char* to_string(Severity severity) noexcept {
-  constexpr std::array kNames = {"fault", "doubt", "not checked"};
-  return kNames[static_cast<std::size_t>(severity)];
+  switch (severity) {
+    case Severity::fault:
+      return "fault";
+    case Severity::doubt:
+      return "doubt";
+    case Severity::unchecked:
+      return "not checked";
+  }
+  return "unknown";
 }
 
 const char* to_string(Cause cause) noexcept {
-  constexpr std::array kNames = {"dead",       "saturated",  "marked",      "late",
-                                 "swapped",    "sign",       "scale",       "skew",
-                                 "unrecorded", "controller", "rigid_body",  "excluded",
-                                 "excitation", "inputs",     "incoherent",  "interpolation",
-                                 "aperiodic",  "unsettled",  "uneven_noise"};
-  return kNames[static_cast<std::size_t>(cause)];
+  switch (cause) {
+    case Cause::dead:
+      return "dead";
+    case Cause::saturated:
+      return "saturated";
+    case Cause::marked:
+      return "marked";
+    case Cause::late:
+      return "late";
+    case Cause::swapped:
+      return "swapped";
+    case Cause::sign:
+      return "sign";
+    case Cause::scale:
+      return "scale";
+    case Cause::skew:
+      return "skew";
+    case Cause::unrecorded:
+      return "unrecorded";
+    case Cause::controller:
+      return "controller";
+    case Cause::rigid_body:
+      return "rigid_body";
+    case Cause::excluded:
+      return "excluded";
+    case Cause::excitation:
+      return "excitation";
+    case Cause::inputs:
+      return "inputs";
+    case Cause::incoherent:
+      return "incoherent";
+    case Cause::interpolation:
+      return "interpolation";
+    case Cause::aperiodic:
+      return "aperiodic";
+    case Cause::unsettled:
+      return "unsettled";
+    case Cause::uneven_noise:
+      return "uneven_noise";
+  }
+  return "unknown";
 }
 
 bool any_fault(const std::vector<Finding>& findings) noexcept {

@@ -14,8 +14,16 @@
 namespace stageid {
 namespace {
 
-constexpr std::array kNames = {"lost",    "repeated",  "swapped", "late",
-                               "corrupt", "shortened", "foreign"};
+constexpr std::array kKinds = {
+    CanFaultKind::lost,    CanFaultKind::repeated,  CanFaultKind::swapped, CanFaultKind::late,
+    CanFaultKind::corrupt, CanFaultKind::shortened, CanFaultKind::foreign};
+
+std::string names_of_kinds() {
+  std::string names;
+  for (const CanFaultKind kind : kKinds)
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", to_string(kind));
+  return names;
+}
 
 bool carries_values(const CanFrame& frame) {
   return (frame.id & 0x780) == kCanSetpointId || (frame.id & 0x780) == kCanSensorId;
@@ -23,19 +31,38 @@ bool carries_values(const CanFrame& frame) {
 
 }  // namespace
 
-const char* to_string(CanFaultKind kind) noexcept { return kNames[static_cast<std::size_t>(kind)]; }
+const char* to_string(CanFaultKind kind) noexcept {
+  switch (kind) {
+    case CanFaultKind::lost:
+      return "lost";
+    case CanFaultKind::repeated:
+      return "repeated";
+    case CanFaultKind::swapped:
+      return "swapped";
+    case CanFaultKind::late:
+      return "late";
+    case CanFaultKind::corrupt:
+      return "corrupt";
+    case CanFaultKind::shortened:
+      return "shortened";
+    case CanFaultKind::foreign:
+      return "foreign";
+  }
+  return "unknown";
+}
 
 CanFault parse_can_fault(const std::string& text) {
   static const std::regex form("([a-z]+)@([0-9]{1,15})(x([0-9]{1,15}))?(:([0-9.e-]{1,20}))?");
   std::smatch part;
   const bool formed = std::regex_match(text, part, form);
-  const auto name = formed ? std::find(kNames.begin(), kNames.end(), part[1].str()) : kNames.end();
-  if (name == kNames.end())
-    throw std::invalid_argument(
-        fmt::format("'{}': write KIND@FRAME[xCOUNT][:SECONDS] with KIND one of {}", text,
-                    fmt::join(kNames, ", ")));
+  const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](CanFaultKind known) {
+    return formed && part[1].str() == to_string(known);
+  });
+  if (kind == kKinds.end())
+    throw std::invalid_argument(fmt::format(
+        "'{}': write KIND@FRAME[xCOUNT][:SECONDS] with KIND one of {}", text, names_of_kinds()));
   CanFault fault;
-  fault.kind = static_cast<CanFaultKind>(name - kNames.begin());
+  fault.kind = *kind;
   fault.from_frame = std::stoull(part[2]);
   if (part[4].matched) fault.frames = std::stoull(part[4]);
   if (part[6].matched) {

@@ -6,7 +6,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -27,8 +26,9 @@ constexpr double kSvgUnitsPerInch = 96.0;
 constexpr double kPointsPerInch = 72.0;
 
 /// Cairo takes a point of a font for 1/96 inch, SVG's reader takes it for what it is.
-constexpr std::array kFontScale = {kPointsPerInch / kSvgUnitsPerInch, 1.0,
-                                   kPointsPerInch / kSvgUnitsPerInch};
+double font_scale(PictureFormat format) {
+  return format == PictureFormat::svg ? 1.0 : kPointsPerInch / kSvgUnitsPerInch;
+}
 
 /// A directory that only this user can read, and that goes away with all it holds.
 class PrivateDirectory {
@@ -62,7 +62,7 @@ std::string preamble(const Picture& picture, PictureFormat format) {
         "fontscale {:.6g} linewidth {:.6g} dashlength {:.6g}\npoint = {:.6g}\n"
         "set output 'picture'\n",
         name, picture.width_in * per_inch, unit, picture.height_in * per_inch, unit,
-        point * kFontScale.at(static_cast<std::size_t>(format)), line, 2.0 * point, point);
+        point * font_scale(format), line, 2.0 * point, point);
   };
   switch (format) {
     case PictureFormat::pdf:
@@ -135,11 +135,18 @@ std::string first_message(const std::string& text) {
 
 /// Cairo does not tell when a disk is full; a whole picture ends as its format says.
 bool is_whole(const std::string& bytes, PictureFormat format) {
-  static constexpr std::string_view kEnds[] = {"%%EOF\n", "</svg>\n", "IEND\xae\x42\x60\x82"};
   std::string_view text = bytes;
   if (format == PictureFormat::svg)
     while (text.ends_with("\n\n")) text.remove_suffix(1);
-  return text.ends_with(kEnds[static_cast<int>(format)]);
+  switch (format) {
+    case PictureFormat::pdf:
+      return text.ends_with("%%EOF\n");
+    case PictureFormat::svg:
+      return text.ends_with("</svg>\n");
+    case PictureFormat::png:
+      return text.ends_with("IEND\xae\x42\x60\x82");
+  }
+  return false;
 }
 
 /// PDF tells the time it was written; the same request gives the same bytes, so it becomes 1970.

@@ -18,8 +18,15 @@ using Json = nlohmann::ordered_json;
 constexpr double kDoubtfulMisfit = 0.05;
 
 const char* quantity(SignalKind kind) {
-  constexpr const char* kNames[] = {"value", "slew", "velocity"};
-  return kNames[static_cast<std::size_t>(kind)];
+  switch (kind) {
+    case SignalKind::value:
+      return "value";
+    case SignalKind::difference:
+      return "slew";
+    case SignalKind::derivative:
+      return "velocity";
+  }
+  return "unknown";
 }
 
 std::string limit_text(double limit) {

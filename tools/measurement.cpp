@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <stdexcept>
 
 #include "acquisition/event_recorder.hpp"
@@ -118,9 +117,20 @@ void warn_of_until(const ExperimentPlan& plan, const FrfOptions& options, const 
     console.warning("--until: " + why);
 }
 
+const char* name_of(RealTimePolicy policy) noexcept {
+  switch (policy) {
+    case RealTimePolicy::off:
+      return "off";
+    case RealTimePolicy::attempt:
+      return "try";
+    case RealTimePolicy::require:
+      return "require";
+  }
+  return "unknown";
+}
+
 void tell_begin(EventLog& events, const ExperimentConfig& config, const StageInfo& stage,
                 const MeasurementResult& result) {
-  constexpr std::array kPolicies = {"off", "try", "require"};
   const RealTimeOptions& real_time = config.stage.real_time.options;
   events.write(result.runs_before > 0 ? "resume" : "start",
                {{"stage", stage.name},
@@ -129,7 +139,7 @@ void tell_begin(EventLog& events, const ExperimentConfig& config, const StageInf
                 {"measurement_id", config.measurement_id},
                 {"runs_before", std::int64_t{result.runs_before}},
                 {"runs_total", std::int64_t{result.runs_total}},
-                {"realtime", std::string(kPolicies[static_cast<std::size_t>(real_time.policy)])}});
+                {"realtime", std::string(name_of(real_time.policy))}});
 }
 
 void tell_end(EventLog& events, const MeasuredStage& stage, const MeasurementResult& result) {

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -102,8 +101,17 @@ void complete_spec(StageConfig& config, const StageFile& file) {
 }  // namespace
 
 const char* to_string(Backend backend) noexcept {
-  constexpr std::array kNames = {"sim", "can", "modbus", "replay"};
-  return kNames[static_cast<std::size_t>(backend)];
+  switch (backend) {
+    case Backend::sim:
+      return "sim";
+    case Backend::can:
+      return "can";
+    case Backend::modbus:
+      return "modbus";
+    case Backend::replay:
+      return "replay";
+  }
+  return "unknown";
 }
 
 int actuator_of_axis(const StageInfo& stage, const std::string& axis) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <string>
 
 #include "tests/acquisition/measurement_loop_fixture.hpp"
 #include "tests/support/allocation_counter.hpp"
@@ -321,6 +322,15 @@ TEST_F(MeasurementLoopTest, ASlowedStageIsLateByItsOwnPeriods) {
   timed.start(1, excitation_);
   static_cast<void>(timed.step());
   EXPECT_EQ(slow.last_deadline_ns(), 20'000'000);
+}
+
+TEST(StopReasonNames, EveryReasonHasItsOwn) {
+  std::set<std::string> names;
+  for (const StopReason reason :
+       {StopReason::none, StopReason::limit, StopReason::fault, StopReason::misses,
+        StopReason::interrupt, StopReason::log, StopReason::plant})
+    EXPECT_TRUE(names.insert(to_string(reason)).second) << to_string(reason);
+  EXPECT_TRUE(names.contains("plant"));
 }
 
 TEST_F(MeasurementLoopTest, RefusesWhatDoesNotFit) {
