@@ -24,6 +24,9 @@ namespace {
 
 constexpr std::size_t kLongestFile = 1U << 20;
 constexpr std::size_t kDeepestNesting = 20;
+/// Bounds the work of finding duplicate keys and of merging; no configuration has a tenth of either.
+constexpr std::size_t kMostKeys = 1000;
+constexpr std::size_t kMostMerged = 100000;
 
 /// Length of the valid UTF-8 sequence at the head of `text`; 0 if there is none.
 std::size_t utf8_length(std::string_view text) {
@@ -108,7 +111,7 @@ class YamlTreeBuilder final : public YAML::EventHandler {
   /// has to write behind the key.
   YamlMark place_of_null(const YAML::Mark& mark) const {
     const YamlMark here = place(mark);
-    if (open_.empty() || !is_map(open_.back())) return here;
+    if (open_.empty() || !is_map(open_.back()) || !open_.back().has_key) return here;
     const YamlNode::Entry& last = document_.nodes_[open_.back().node].entries.back();
     if (last.mark.line == here.line) return here;
     return {last.mark.line, last.mark.column + static_cast<int>(last.key.size()) + 1};
@@ -137,13 +140,21 @@ class YamlTreeBuilder final : public YAML::EventHandler {
                                               kDeepestNesting));
     open_.push_back({add(kind, mark, anchor), false});
   }
+  /// Of a map whose keys became `keys`.
+  void refuse_too_many(const YamlMark& mark, std::size_t keys) const {
+    if (keys > kMostKeys)
+      document_.fail(
+          mark, fmt::format("more than {} keys in one map; split it or leave keys out", kMostKeys));
+  }
   void take_key(const YAML::Mark& mark, const std::string& key) {
     for (const YamlNode::Entry& entry : document_.nodes_[open_.back().node].entries)
       if (entry.key == key)
         document_.fail(place(mark),
                        fmt::format("key '{}' stands here twice, first in line {}; keep one", key,
                                    entry.mark.line));
-    document_.nodes_[open_.back().node].entries.push_back({key, place(mark), 0});
+    std::vector<YamlNode::Entry>& entries = document_.nodes_[open_.back().node].entries;
+    entries.push_back({key, place(mark), 0});
+    refuse_too_many(place(mark), entries.size());
     open_.back().has_key = true;
   }
   void attach(std::size_t index) {
@@ -170,14 +181,22 @@ class YamlTreeBuilder final : public YAML::EventHandler {
     if (base.kind != YamlNode::Kind::map)
       document_.fail(found->mark, "'<<' merges a map; write '<<: *anchor_of_a_map'");
     const std::vector<YamlNode::Entry> inherited = base.entries;
+    const YamlMark mark = found->mark;
+    merged_ += inherited.size();
+    if (merged_ > kMostMerged)
+      document_.fail(mark, fmt::format("'<<' has copied more than {} keys in this file; write the "
+                                       "keys that differ only",
+                                       kMostMerged));
     entries.erase(found);
     for (const YamlNode::Entry& entry : inherited)
       if (std::none_of(entries.begin(), entries.end(),
                        [&](const YamlNode::Entry& own) { return own.key == entry.key; }))
         entries.push_back(entry);
+    refuse_too_many(mark, entries.size());
   }
 
   YamlDocument& document_;
+  std::size_t merged_ = 0;
   std::vector<Open> open_;
   std::map<YAML::anchor_t, std::size_t> anchors_;
 };

@@ -99,6 +99,23 @@ TEST(StrictYaml, HostileNestingEndsInOneLine) {
   EXPECT_EQ(error_of(laughs), "");
 }
 
+TEST(StrictYaml, AKeyThatIsMissingIsAnErrorAtItsPlace) {
+  for (const char* text : {": x\n", "? \n", "a: {: 1}\n", "a:\n  : 1\n"})
+    EXPECT_THAT(error_of(text), HasSubstr("a key must be a word; write 'key: value'")) << text;
+  EXPECT_EQ(error_of("null: 1\n"), "f.yaml:1:1: a key must be a word; write 'key: value'");
+}
+
+TEST(StrictYaml, MergingIsBoundedWork) {
+  std::string chain = "a0: &a0 {k0: 1}\n";
+  for (int i = 1; i < 20000; ++i)
+    chain += fmt::format("a{0}: &a{0} {{<<: *a{1}, k{0}: 1}}\n", i, i - 1);
+  EXPECT_THAT(error_of(chain), HasSubstr("'<<' has copied more than 100000 keys"));
+  std::string flat;
+  for (int i = 0; i < 100000; ++i) flat += fmt::format("k{}: 1\n", i);
+  EXPECT_EQ(error_of(flat),
+            "f.yaml:1001:1: more than 1000 keys in one map; split it or leave keys out");
+}
+
 TEST(StrictYaml, EveryCutOfAFileIsEitherReadOrOneLine) {
   const std::string whole =
       "format: x\nlist:\n  - {name: \"a b\", p: [1, 2, 3]}\n  - {name: 'c', p: &q [4]}\nlast: *q\n";
