@@ -69,7 +69,9 @@ struct FitRecord {
   double cost = 0.0;  ///< 1/(2N) sum vec(E)^H W vec(E)
   std::string weighting;
   int iterations = 0;
-  std::string status;
+  std::string
+      status;  ///< to_string(FitStatus); empty: unknown, of a model that another program wrote
+  std::string message;  ///< why the fit is not to be trusted; empty: nothing speaks against it
   double relative_rms_error = 0.0;  ///< sqrt(mean |E|^2/|G|^2) over lines and channels
   double band_hz[2] = {0.0, 0.0};
   double seconds = 0.0;

@@ -136,9 +136,7 @@ class AutomaticFit {
     if (!watch_.ended()) return;
     result.findings.push_back(watch_.finding());
     if (!watch_.by_delay() || !result.trustworthy()) return;
-    result.status = FitStatus::unexplained;
-    result.message = watch_.finding();
-    result.model.fit.status = to_string(result.status);
+    result.distrust(FitStatus::unexplained, watch_.finding());
   }
 
   bool many() const { return selection_.exactly > kMostGrown; }

@@ -14,7 +14,10 @@ DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
   const Eigen::MatrixXd& known =
       frf.total_variance.size() > 0 ? frf.total_variance : frf.noise_variance;
   DataNoise noise;
-  if (weighs_by_variance(weighting)) {
+  // The noise variance weighs, but the estimate of a nonlinear plant scatters by more.
+  const bool distorted = weighting != Weighting::total_variance && frf.total_variance.size() > 0 &&
+                         frf.nonlinearity.nonlinear();
+  if (weighs_by_variance(weighting) && !distorted) {
     noise.knowledge = VarianceKnowledge::weights;
     noise.variance = weighed_variance(frf, weighting);
   } else if (known.size() > 0 && known.minCoeff() > 0.0) {

@@ -25,8 +25,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kPlainMisfit = 4.0;  // times what the variances predict: nobody should miss it
-
 /// Delta method, facts.md section 10:  df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
 void fill_deviations(const ParameterCovariance& covariance, AdditiveModel& model) {
   Eigen::Index first = 0;
@@ -91,7 +89,6 @@ void use_covariance(const FitProblem& problem, ParameterCovariance& covariance, 
       fmt::format("the residual is {:.3g} times what the variances predict: the model does not "
                   "explain the data; standard deviations are raised by {:.3g}",
                   covariance.residual_scale, std::sqrt(covariance.residual_scale)));
-  if (covariance.residual_scale > kPlainMisfit) result.findings.push_back(result.decisions.back());
 }
 
 /// With free numerators.
@@ -134,6 +131,7 @@ void fill_record(const FitOptions& options, const IterationResult& iteration, do
   record.weighting = to_string(options.weighting);
   record.iterations = iteration.iterations;
   record.status = to_string(result.status);
+  record.message = result.trustworthy() ? "" : result.message;
   record.relative_rms_error = relative_rms;
   result.model.cost_history = result.cost;
 }
@@ -248,8 +246,7 @@ void judge(const FitProblem& problem, const FitParameters& beta, double cost,
                                 result.held, judge_modes);
   }
   if (reason.empty()) return;
-  result.message = result.trustworthy() ? reason : result.message + "; " + reason;
-  if (result.trustworthy()) result.status = FitStatus::undetermined;
+  result.distrust(FitStatus::undetermined, reason);
 }
 
 }  // namespace

@@ -69,9 +69,14 @@ enum class FitStatus : std::uint8_t {
   iteration_limit,
   singular,
   undetermined,  ///< converged, but the data do not determine a mode or a submodel that was asked for
-  unexplained    ///< converged, but the model lacks what the search found to be no mode
+  unexplained,  ///< converged, but the model leaves clearly more than noise and known distortion
+  faulty_data   ///< the health of the data has a fault: they are not what they say
 };
 const char* to_string(FitStatus status) noexcept;
+/// Whether a fit that ended so may be trusted.
+bool is_trustworthy(FitStatus status) noexcept;
+/// The same of a model's record. Without a status (a model that another program wrote) nothing speaks against it.
+bool is_trustworthy(const FitRecord& record);
 
 /// All that is known of a fit's parameters and response, see dense_covariances(). Parameters: denominator
 /// coefficients in the order of the submodels, free delays, vec B (channels x functions).
@@ -102,9 +107,10 @@ struct FitResult {
   Eigen::MatrixXd response_variance;
   FitCovariance
       covariance;  ///< empty unless asked for; where it cannot be told, a decision says why
-  bool trustworthy() const noexcept {
-    return status == FitStatus::gradient_small || status == FitStatus::step_small;
-  }
+  bool trustworthy() const noexcept { return is_trustworthy(status); }
+  /// Adds a reason not to trust the fit, to status, message and the model's record. The gravest reason is the status and
+  /// comes first in the message: faulty data, then no convergence, then an unexplained residual, then undetermined modes.
+  void distrust(FitStatus why, const std::string& reason);
 };
 
 }  // namespace stageid

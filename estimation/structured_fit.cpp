@@ -12,6 +12,7 @@
 #include "estimation/dense_covariance.hpp"
 #include "estimation/mode_deviation.hpp"
 #include "estimation/ranked_fit.hpp"
+#include "estimation/residual_verdict.hpp"
 #include "excitation/counted.hpp"
 
 namespace stageid {
@@ -238,6 +239,22 @@ void check_requests(const FrfEstimate& frf, const RequestedStructure& structure)
                       frequency_hz, frf.frequency_hz[0]));
 }
 
+/// A fit that leaves clearly more than noise and known distortion is not to be trusted.
+void judge_explained(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+  const AdditiveModel& model = result.model;
+  const ResidualVerdict verdict = judge_residual(
+      frf,
+      [&](Eigen::Index first, Eigen::Index count) {
+        return response(model, frf.frequency_hz.segment(first, count), model.hold);
+      },
+      *options.user_weights, options.threads);
+  if (verdict.explained) return;
+  const std::string finding = verdict.reason + ": the model does not explain the data";
+  result.findings.insert(result.findings.begin(), finding);
+  result.decisions.push_back(finding);
+  result.distrust(FitStatus::unexplained, finding);
+}
+
 }  // namespace
 
 FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& structure,
@@ -255,6 +272,7 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   FitResult result = automatic_fit(frf, complete, selection, options);
   settle_suspension(frf, options, result);
   result.decisions.insert(result.decisions.begin(), decisions.begin(), decisions.end());
+  judge_explained(frf, options, result);
   if (options.uncertainty) fill_shape_deviations(frf, options, result);
   if (options.covariance) fill_covariance(frf, options, result);
   return result;

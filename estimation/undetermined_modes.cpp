@@ -63,10 +63,7 @@ std::string doubt_of(const FrfEstimate& frf, bool number_asked, const FitResult&
 void tell(std::string text, FitResult& fit) {
   fit.decisions.push_back(text);
   fit.findings.push_back(std::move(text));
-  if (!fit.trustworthy()) return;
-  fit.status = FitStatus::undetermined;
-  fit.message = fit.findings.back();
-  fit.model.fit.status = to_string(fit.status);
+  if (fit.trustworthy()) fit.distrust(FitStatus::undetermined, fit.findings.back());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "frf/confidence.hpp"
 
@@ -83,16 +84,23 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf) {
   out.relative_rms_error = used > 0.0 ? std::sqrt(relative.sum() / used) : kUnknown;
   out.normalized_error = power.sum() > 0.0 ? std::sqrt(squared.sum() / power.sum()) : kUnknown;
   out.channel_error = relative.rowwise().mean().sqrt();
-  const Eigen::MatrixXd& variance =
-      frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
+  ResidualVerdict verdict = judge_residual(frf, [&](Eigen::Index first, Eigen::Index count) {
+    return Eigen::MatrixXcd(frf.response.middleCols(first, count) - E.middleCols(first, count));
+  });
+  out.variance = verdict.variance;
+  out.chi_square_per_dof = verdict.chi_square;
+  out.expected_chi_square = verdict.expected;
+  out.explained = verdict.explained;
+  out.reason = std::move(verdict.reason);
+  const Eigen::MatrixXd& variance = verdict.variance == ResidualVariance::scatter ? verdict.scatter
+                                    : verdict.variance == ResidualVariance::total
+                                        ? frf.total_variance
+                                        : frf.noise_variance;
   if (variance.size() > 0 && variance.minCoeff() > 0.0) {
-    const Eigen::ArrayXXd ratio = squared / variance.array();
-    out.chi_square_per_dof = ratio.mean();
-    const double nu = frf.noise_variance.size() > 0 ? frf.noise_dof : frf.total_dof;
-    out.expected_chi_square = nu > 1.0 ? nu / (nu - 1.0) : nu > 0.0 ? 0.0 : 1.0;
     out.whitened_above_95 =
-        static_cast<double>((ratio > squared_error_quantile(0.95, nu)).count()) /
-        static_cast<double>(ratio.size());
+        static_cast<double>(
+            (squared / variance.array() > squared_error_quantile(0.95, verdict.dof)).count()) /
+        static_cast<double>(squared.size());
     fill_whiteness(E.cwiseQuotient(variance.cwiseSqrt().cast<std::complex<double>>()), out);
   }
   return out;

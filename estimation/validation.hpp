@@ -1,6 +1,7 @@
 #pragma once
 
 #include "estimation/additive_model.hpp"
+#include "estimation/residual_verdict.hpp"
 #include "frf/frf_estimate.hpp"
 
 namespace stageid {
@@ -13,6 +14,9 @@ struct Validation {
   /// What that is if the error is noise: nu / (nu - 1), the mean of F(2, 2 nu), for a variance of nu degrees
   /// of freedom; 1 for an exact one, 0 without a mean.
   double expected_chi_square = 0.0;
+  ResidualVariance variance = ResidualVariance::none;  ///< what the figures compare with
+  bool explained = true;  ///< see judge_residual(); true also where the data have no variances
+  std::string reason;     ///< why the error is not explained, one sentence; empty if it is
   double whitened_above_95 =
       0.0;  ///< share of |e|^2 above the 95 % point of noise alone; 0.05 is right
   double whiteness =
@@ -22,7 +26,7 @@ struct Validation {
 };
 
 /// Compares a model with measured data on their lines, through the hold and delay that the data
-/// still hold.
+/// still hold, see judge_residual() for the verdict.
 /// @throws std::invalid_argument if channels do not match by name, or have other units (unknown ones match all).
 Validation validate(const AdditiveModel& model, const FrfEstimate& frf);
 

@@ -117,6 +117,18 @@ bool NonlinearityTest::settled(Eigen::Index b) const {
   return settled_p_value.size() == 0 || settled_p_value[b] >= kUnsettledBelow;
 }
 
+double NonlinearityTest::least_p_value() const {
+  double least = 1.0;
+  for (const Eigen::MatrixXd* p : {&p_value, &even.p_value, &odd.p_value})
+    if (p->size() > 0) least = std::min(least, p->minCoeff());
+  return least;
+}
+
+bool NonlinearityTest::nonlinear() const {
+  const auto tests = p_value.size() + even.p_value.size() + odd.p_value.size();
+  return least_p_value() * static_cast<double>(tests) < kNonlinearBelow;
+}
+
 std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
   if (frf.method != FrfMethod::periodic)
     return "nonlinearity test: neighbouring lines of method 'lpm' share bins; estimate with "
@@ -174,6 +186,12 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
     for (DetectedDistortion* kind : {&test.even, &test.odd}) kind->p_value.setOnes();
   test_settling(evidence.alignment, test);
   return test;
+}
+
+NonlinearityTest linearity_of(const FrfEstimate& frf) {
+  if (frf.nonlinearity.band_hz.rows() > 0 || !why_linearity_cannot_be_tested(frf).empty())
+    return frf.nonlinearity;
+  return nonlinearity_test(frf);
 }
 
 }  // namespace stageid

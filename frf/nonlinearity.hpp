@@ -69,6 +69,11 @@ struct NonlinearityTest {
 
   /// Whether linearity can be told in band b.
   bool settled(Eigen::Index b) const;
+  /// The smallest p-value of all outputs, inputs, bands and detection lines; 1 without a test.
+  double least_p_value() const;
+  /// Whether the plant is nonlinear: least_p_value() is below kNonlinearBelow over the number of tests (Bonferroni), so
+  /// that one of a hundred linear plants is called nonlinear.
+  bool nonlinear() const;
 };
 
 /// A p-value below this is called nonlinear: one of a hundred verdicts on a linear plant.
@@ -102,6 +107,9 @@ inline constexpr double kUnsettledBelow = 0.01;
 /// Directional Statistics (2000), section 6.3 (tests of uniformity).
 /// @throws std::invalid_argument with the text of why_linearity_cannot_be_tested().
 NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEvidence& evidence = {});
+
+/// The test that the estimate holds, else that of its variances; without bands where linearity cannot be tested.
+NonlinearityTest linearity_of(const FrfEstimate& frf);
 
 /// Empty, or what is missing: two periods, two realizations with total_dof = M - 1, the periodic
 /// method (with lpm neighbouring lines share bins), noise that was not smoothed over lines (they

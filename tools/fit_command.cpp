@@ -11,6 +11,7 @@
 #include "tools/covariance_file.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/fit_step.hpp"
+#include "tools/health_step.hpp"
 #include "tools/output_paths.hpp"
 #include "tools/submodel_text.hpp"
 
@@ -91,6 +92,9 @@ void FitCommand::run() const {
   FitSetup setup = make_fit_setup(request, read_frf(frf_));
   setup.options.response_variance = false;  // that of the covariance is exact for all weights
   setup.options.covariance = !covariance_.empty();
+  for (const std::string& doubt :
+       health_notes(health_of(setup.frf.provenance_json), Severity::doubt))
+    console_.warning(fmt::format("{}: {}", frf_.string(), doubt));
   for (const std::string& warning : setup.warnings)
     console_.warning(fmt::format("{}: {}", frf_.string(), warning));
   const FitStep step =
@@ -119,18 +123,15 @@ void FitCommand::run() const {
                    {"modes", modes_json(result.model)},
                    {"seconds", step.seconds}});
   for (const std::string& finding : result.findings)
-    if (finding != result.message)
+    if (result.trustworthy() || result.message.find(finding) == std::string::npos)
       console_.warning(fmt::format("{}: {}", output_.string(), finding));
   if (!whole)
     console_.warning(fmt::format("{}: not written: {}", covariance_.string(),
                                  result.decisions.empty() ? "" : result.decisions.back()));
   if (!result.trustworthy())
     console_.warning(fmt::format(
-        "{}: {}{}; the model is written, do not trust it before you know why", output_.string(),
-        result.status == FitStatus::undetermined || result.status == FitStatus::unexplained
-            ? ""
-            : "the fit did not converge: ",
-        result.message));
+        "{}: not to be trusted: {}. The model was written; do not use it until this is resolved.",
+        output_.string(), result.message));
 }
 
 }  // namespace stageid

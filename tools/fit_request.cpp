@@ -16,6 +16,7 @@
 #include "frf/hold_compensation.hpp"
 #include "frf/line_scatter.hpp"
 #include "tools/flag_values.hpp"
+#include "tools/frf_quality.hpp"
 #include "tools/structure_request.hpp"
 #include "tools/submodel_text.hpp"
 #include "tools/weight_file.hpp"
@@ -111,7 +112,7 @@ class FitDefaults {
       parse_weighting();
       return;
     }
-    if (weigh_by_scatter()) return;
+    if (weigh_by_scatter() || weigh_by_realizations()) return;
     options.weighting = frf.noise_variance.size() > 0   ? Weighting::noise_variance
                         : frf.total_variance.size() > 0 ? Weighting::total_variance
                                                         : Weighting::relative;
@@ -208,6 +209,16 @@ class FitDefaults {
                     "the periods (median): the plant looks nonlinear, and with one realization "
                     "nothing else tells how much; measure several",
                     scatter.over_noise));
+    note(setup_.warnings.back());
+    return true;
+  }
+
+  /// Distortion moves an estimate from realization to realization as noise does; the periods do not show it.
+  bool weigh_by_realizations() {
+    const std::string nonlinear = nonlinearity_sentence(setup_.frf);
+    if (nonlinear.empty() || setup_.frf.total_variance.size() == 0) return false;
+    setup_.options.weighting = Weighting::total_variance;
+    setup_.warnings.push_back("weighting: total_variance; " + nonlinear);
     note(setup_.warnings.back());
     return true;
   }

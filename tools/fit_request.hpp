@@ -50,9 +50,9 @@ struct FitSetup {
 ///                                      receptance of a mode is D + (B_0 + B_1 s) / A
 /// Submodels that are asked for stand alone: then `modes` and `rigid_body` are none unless given, else
 /// auto and full.
-/// And weights: noise variance if there is one, else total variance, else relative; with one realization, or an
-/// unknown number, of a plant whose lines scatter far more than either says: that scatter, see line_scatter(), unless
-/// lines_are_coarse().
+/// And weights: noise variance if there is one, else total variance, else relative. Of a nonlinear plant (linearity_of())
+/// the total variance; with one realization, or an unknown number, of a plant whose lines scatter far more than either
+/// says: that scatter, see line_scatter(), unless lines_are_coarse().
 /// @throws std::invalid_argument naming the flag; FileError, FormatError for files that it names.
 /// `frf` is moved where it can be: nothing else holds as much memory.
 FitSetup make_fit_setup(const FitRequest& request, FrfEstimate frf);

@@ -1,8 +1,10 @@
 #include "tools/fit_step.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "excitation/fingerprint.hpp"
+#include "tools/health_step.hpp"
 #include "tools/interrupt.hpp"
 
 namespace stageid {
@@ -55,6 +57,10 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
   };
   step.result = structured_fit(setup.frf, setup.structure, setup.selection, options);
   throw_if_interrupted();
+  const std::vector<std::string> faults =
+      health_notes(health_of(setup.frf.provenance_json), Severity::fault);
+  if (!faults.empty())
+    step.result.distrust(FitStatus::faulty_data, fmt::format("{}", fmt::join(faults, "; ")));
   step.seconds = progress.seconds();
   step.result.decisions.insert(step.result.decisions.begin(), setup.notes.begin(),
                                setup.notes.end());

@@ -51,24 +51,6 @@ Json detected_json(const DetectedDistortion& found, Eigen::Index band) {
   return {{"p_value", verdict.p_value}, {"level", found.level(verdict.at, band)}};
 }
 
-/// The least probable of all verdicts, and how many there are.
-struct Extreme {
-  double p_value = 1.0;
-  double tests = 0.0;
-  /// More than the least probable of so many is by chance.
-  bool stands_out() const { return p_value * tests < kNonlinearBelow; }
-};
-
-Extreme extreme(const NonlinearityTest& test) {
-  Extreme out{test.p_value.minCoeff(), static_cast<double>(test.p_value.size())};
-  for (const DetectedDistortion* kind : {&test.even, &test.odd}) {
-    if (kind->p_value.size() == 0) continue;
-    out.p_value = std::min(out.p_value, kind->p_value.minCoeff());
-    out.tests += static_cast<double>(kind->p_value.size());
-  }
-  return out;
-}
-
 std::size_t unsettled_bands(const NonlinearityTest& test) {
   std::size_t count = 0;
   for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) count += test.settled(b) ? 0 : 1;
@@ -82,16 +64,30 @@ std::string unsettled_line(const NonlinearityTest& test) {
 }
 
 std::string conclusion(const NonlinearityTest& test) {
-  const Extreme most = extreme(test);
   const std::size_t tests = static_cast<std::size_t>(test.p_value.size()) -
                             unsettled_bands(test) * static_cast<std::size_t>(test.p_value.rows());
   const std::string chance =
       fmt::format("a linear plant shows {:.1f} of {} pairs and bands as nonlinear by chance",
                   kNonlinearBelow * static_cast<double>(tests), tests);
-  if (!most.stands_out()) return "no sign that the plant is not linear: " + chance;
+  if (!test.nonlinear()) return "no sign that the plant is not linear: " + chance;
   return fmt::format(
       "the plant is not linear: {}, but none as improbable as p = {:.0e}, which is here", chance,
-      std::max(most.p_value, 1e-300));
+      std::max(test.least_p_value(), 1e-300));
+}
+
+/// The channel pair and band whose distortion is largest among those that test nonlinear.
+std::string strongest_distortion(const FrfEstimate& frf, const NonlinearityTest& test) {
+  double largest = 0.0;
+  std::string text;
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b)
+    for (Eigen::Index c = 0; c < test.p_value.rows(); ++c) {
+      if (!(test.p_value(c, b) < kNonlinearBelow) || !(test.distortion(c, b) > largest)) continue;
+      largest = test.distortion(c, b);
+      text =
+          fmt::format(", most at {} between {:.4g} and {:.4g} Hz ({} of the response)",
+                      pair_name(frf, c), test.band_hz(b, 0), test.band_hz(b, 1), decibels(largest));
+    }
+  return text;
 }
 
 std::string why_not_tested(const FrfEstimate& frf) {
@@ -136,6 +132,13 @@ std::vector<std::string> linearity_lines(const FrfEstimate& frf) {
   return lines;
 }
 
+std::string nonlinearity_sentence(const FrfEstimate& frf) {
+  const NonlinearityTest test = linearity_of(frf);
+  if (!test.nonlinear()) return {};
+  return fmt::format("the plant is nonlinear: realizations differ by more than noise{}",
+                     strongest_distortion(frf, test));
+}
+
 Json linearity_json(const FrfEstimate& frf) {
   const NonlinearityTest& test = frf.nonlinearity;
   if (test.band_hz.rows() == 0) return {{"tested", false}, {"reason", why_not_tested(frf)}};
@@ -155,7 +158,7 @@ Json linearity_json(const FrfEstimate& frf) {
          {"odd", detected_json(test.odd, b)}});
   }
   return {{"tested", true},
-          {"nonlinear", extreme(test).stands_out()},
+          {"nonlinear", test.nonlinear()},
           {"false_alarm_rate", kNonlinearBelow},
           {"bands", bands}};
 }

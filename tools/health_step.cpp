@@ -81,10 +81,11 @@ Json health_json(const std::vector<Finding>& findings) {
   return list;
 }
 
-std::vector<std::string> health_notes(const std::vector<Finding>& findings) {
+std::vector<std::string> health_notes(const std::vector<Finding>& findings,
+                                      std::optional<Severity> only) {
   std::vector<std::string> notes;
   for (const Finding& f : findings) {
-    if (f.severity == Severity::unchecked) continue;
+    if (f.severity == Severity::unchecked || f.severity != only.value_or(f.severity)) continue;
     notes.push_back(fmt::format("{}{}{} ({}); {}", f.channel, f.channel.empty() ? "" : ": ", f.what,
                                 f.figure, f.remedy));
   }

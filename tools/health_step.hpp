@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,9 @@ std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& file
 std::vector<std::string> health_lines(const std::vector<Finding>& findings);
 nlohmann::ordered_json health_json(const std::vector<Finding>& findings);
 
-/// Faults and doubts as sentences, for notes.
-std::vector<std::string> health_notes(const std::vector<Finding>& findings);
+/// Faults and doubts as sentences, for notes; or those of one severity.
+std::vector<std::string> health_notes(const std::vector<Finding>& findings,
+                                      std::optional<Severity> only = {});
 
 /// Adds what the response itself shows (check_interpolation(), check_settling()) to the findings about its logs and keeps
 /// all of them as "health" in its provenance; returns them, faults first.

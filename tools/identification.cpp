@@ -77,8 +77,8 @@ int Identification::run() {
   check_model();
   write_outputs();
   print_summary();
-  const bool trusted = trustworthy_ && !any_fault(health_);
-  return exit_code_ != kDone || trusted ? exit_code_ : static_cast<int>(kNotTrustworthy);
+  return exit_code_ != kDone || verdict_.trustworthy ? exit_code_
+                                                     : static_cast<int>(kNotTrustworthy);
 }
 
 void Identification::finish_step(const char* name, double seconds, std::string note) {
@@ -179,6 +179,7 @@ void Identification::pick() {
   std::vector<ModeCandidate> modes = setup_->selection.modes;
   if (modes.empty()) modes = pick_modes(setup_->frf);
   write_modes(path("modes.json"), modes);
+  notes_.insert(notes_.end(), setup_->warnings.begin(), setup_->warnings.end());
   finish_step("modes", seconds_since(start), fmt::format("{} candidates", modes.size()));
 }
 
@@ -195,18 +196,17 @@ void Identification::fit() {
   if (fit_is_up_to_date(*setup_, fingerprint)) {
     model_ = read_model(path("model.json"));
     model_variance_ = read_response_variance(path("model.h5"), setup_->frf.frequency_hz);
-    trustworthy_ = model_.fit.status == to_string(FitStatus::gradient_small) ||
-                   model_.fit.status == to_string(FitStatus::step_small);
     finish_step("fit", 0.0, "up to date");
     return;
   }
   FitStep step = fit_model(*setup_, "frf.h5", fingerprint, console_);
   model_ = step.result.model;
   model_variance_ = std::move(step.result.response_variance);
-  trustworthy_ = step.result.trustworthy();
-  if (!trustworthy_) notes_.push_back("the fit is not to be trusted: " + step.result.message);
   std::copy_if(step.result.findings.begin(), step.result.findings.end(), std::back_inserter(notes_),
-               [&](const std::string& finding) { return finding != step.result.message; });
+               [&](const std::string& finding) {
+                 return step.result.trustworthy() ||
+                        step.result.message.find(finding) == std::string::npos;
+               });
   write_model(path("model.json"), model_);
   finish_step(
       "fit", step.seconds,
@@ -220,6 +220,7 @@ void Identification::check_model() {
     const double high_hz = setup_->frf.frequency_hz[setup_->frf.lines() - 1];
     validation_ = validate(model_, select_band(*validation_frf_, low_hz, high_hz));
   }
+  verdict_ = judge_model(model_.fit, health_, validation_);
   truth_ = compare_with_truth(model_, setup_->frf, config_.stage.spec);
 }
 
@@ -244,7 +245,8 @@ Json Identification::summary() const {
                {"configuration", config_.file.filename().string()},
                {"configuration_fingerprint", fingerprint_of(config_.text)},
                {"stage_fingerprint", fingerprint_of(config_.stage.text)},
-               {"trustworthy", trustworthy_ && !any_fault(health_) && exit_code_ == kDone},
+               {"trustworthy", verdict_.trustworthy && exit_code_ == kDone},
+               {"reasons", verdict_.reasons},
                {"fit",
                 {{"status", model_.fit.status},
                  {"weighting", model_.fit.weighting},
@@ -276,6 +278,7 @@ void Identification::print_summary() const {
     for (const std::string& line : validation_lines(*validation_)) console_.result("  " + line);
   }
   for (const std::string& note : notes_) console_.warning(note);
+  console_.result(verdict_line(verdict_));
   console_.result(fmt::format("report: {}", path("report.html").string()));
   console_.result(summary());
 }

@@ -12,6 +12,7 @@
 #include "tools/console.hpp"
 #include "tools/experiment_config.hpp"
 #include "tools/fit_request.hpp"
+#include "tools/model_verdict.hpp"
 #include "tools/truth_comparison.hpp"
 
 namespace stageid {
@@ -63,7 +64,7 @@ class Identification {
   Console& console_;
   ExperimentPlan plan_;
   int exit_code_ = 0;
-  bool trustworthy_ = true;
+  ModelVerdict verdict_;
   std::vector<Step> steps_;
   std::vector<std::string> notes_;
   std::vector<Finding> health_;

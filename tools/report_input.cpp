@@ -151,10 +151,8 @@ ReportMessage::Severity severity_of(const Finding& finding) {
 /// The verdicts that the file holds stand for all lines that were measured, whatever band was fitted.
 void add_checks(ReportData& data) {
   const FrfEstimate& frf = *data.frf;
-  if (frf.nonlinearity.band_hz.rows() > 0)
-    data.nonlinearity = frf.nonlinearity;
-  else if (why_linearity_cannot_be_tested(frf).empty())
-    data.nonlinearity = nonlinearity_test(frf);
+  if (NonlinearityTest test = linearity_of(frf); test.band_hz.rows() > 0)
+    data.nonlinearity = std::move(test);
   for (const Finding& finding : health_of(frf.provenance_json))
     data.findings.push_back(
         {severity_of(finding), finding.channel, finding.what, finding.figure, finding.remedy});

@@ -228,7 +228,7 @@ Json validation_json(const Validation& validation) {
           {"normalized_error", validation.normalized_error},
           {"chi_square_per_dof", validation.chi_square_per_dof},
           {"expected_chi_square", validation.expected_chi_square},
-          {"doubtful_chi_square", doubtful_chi_square},
+          {"explained", validation.explained},
           {"whitened_above_95", validation.whitened_above_95},
           {"whiteness", validation.whiteness},
           {"whiteness_limit", validation.whiteness_limit},

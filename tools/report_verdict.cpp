@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "excitation/counted.hpp"
+#include "tools/model_verdict.hpp"
 #include "tools/report_modes.hpp"
 
 namespace stageid {
@@ -12,21 +13,11 @@ namespace {
 
 using Reasons = std::vector<std::string>;
 
-void judge_fit(const ReportData& data, Reasons& reasons) {
-  const std::string& status = data.model->fit.status;
-  if (status == "undetermined")
-    reasons.emplace_back("the data do not determine a mode or a submodel of the model");
-  else if (status == "unexplained")
-    reasons.emplace_back("the model lacks what the search found to be no mode");
-  else if (status != "gradient_small" && status != "step_small")
-    reasons.push_back("the fit did not converge: " + (status.empty() ? "no status" : status));
-  if (!data.validation) return;
-  const double chi_square = data.validation->chi_square_per_dof;
-  if (chi_square > doubtful_chi_square)
-    reasons.push_back(fmt::format(
-        "on data not used for the fit the error is {:.3g} times what the noise explains "
-        "(chi-square per degree of freedom; 1 is right, above {:.0f} is doubted)",
-        chi_square, doubtful_chi_square));
+/// @returns whether the model is not to be trusted.
+bool judge_fit(const ReportData& data, Reasons& reasons) {
+  const ModelVerdict verdict = judge_model(data.model->fit, {}, data.validation);
+  reasons.insert(reasons.end(), verdict.reasons.begin(), verdict.reasons.end());
+  return !verdict.trustworthy;
 }
 
 void judge_modes(const ReportData& data, Reasons& reasons) {
@@ -98,16 +89,15 @@ const char* to_string(Verdict::Level level) noexcept {
 
 Verdict judge(const ReportData& data) {
   Verdict verdict;
-  bool error = false;
+  bool error = judge_findings(data, verdict.reasons);
   for (const ReportMessage& message : data.messages) {
     if (message.severity == ReportMessage::Severity::note) continue;
     error = error || message.severity == ReportMessage::Severity::error;
     verdict.reasons.push_back(message.text);
   }
-  error = judge_findings(data, verdict.reasons) || error;
   judge_runs(data, verdict.reasons);
   if (data.model) {
-    judge_fit(data, verdict.reasons);
+    error = judge_fit(data, verdict.reasons) || error;
     judge_modes(data, verdict.reasons);
   }
 

@@ -23,10 +23,6 @@ struct Verdict {
 
 const char* to_string(Verdict::Level level) noexcept;
 
-/// Chi-square per degree of freedom on held-back data above which the model is doubted: its error
-/// is then larger than the noise itself.
-inline constexpr double doubtful_chi_square = 2.0;
-
 /// Judges the model by how the fit ended, by held-back data, by the health of the runs, by the
 /// truth where it is known (3 standard deviations and 1e-4) and by the messages.
 Verdict judge(const ReportData& data);

@@ -17,6 +17,7 @@
 #include "tools/frf_step.hpp"
 #include "tools/health_step.hpp"
 #include "tools/mode_correlation.hpp"
+#include "tools/model_verdict.hpp"
 #include "tools/prediction_error.hpp"
 
 namespace stageid {
@@ -72,8 +73,9 @@ std::vector<std::string> validation_lines(const Validation& v) {
     const std::string expected = v.expected_chi_square > 0.0
                                      ? fmt::format("{:.3f}", v.expected_chi_square)
                                      : "without a mean for variances this uncertain";
-    lines.push_back(fmt::format("chi-square per degree of freedom {:.3f}; of noise alone: {}",
-                                v.chi_square_per_dof, expected));
+    lines.push_back(fmt::format(
+        "chi-square per degree of freedom {:.3f}; of {} alone: {}", v.chi_square_per_dof,
+        v.variance == ResidualVariance::noise ? "noise" : "noise and distortion", expected));
     lines.push_back(
         fmt::format("residuals above their 95 % point: {:.1f} %; autocorrelation {:.4f}, 99 % "
                     "limit {:.4f}",
@@ -89,6 +91,8 @@ nlohmann::ordered_json validation_json(const Validation& v) {
           {"normalized_error", v.normalized_error},
           {"chi_square_per_dof", v.chi_square_per_dof},
           {"expected_chi_square", v.expected_chi_square},
+          {"variance", to_string(v.variance)},
+          {"explained", v.explained},
           {"whitened_above_95", v.whitened_above_95},
           {"whiteness", v.whiteness},
           {"whiteness_limit", v.whiteness_limit},
@@ -133,6 +137,7 @@ void ValidateCommand::run() const {
     step.frf = read_frf(data_);
   else
     step = estimate_frf({data_}, options, {true, stage_}, console_);
+  const std::vector<Finding> health = health_of(step.frf.provenance_json);
   FrfEstimate frf = select_channels(step.frf, model.inputs.names, model.outputs.names);
   const bool fitted_band = model.fit.band_hz[1] > 0.0;
   const double low_hz = !band_hz_.empty() ? band_hz_[0]
@@ -148,13 +153,16 @@ void ValidateCommand::run() const {
                                  {"band_hz", {low_hz, high_hz}},
                                  {"frequency_domain", validation_json(validation)}};
   if (!from_frf) {
-    for (const std::string& line : health_lines(step.findings)) console_.result(line);
-    json["health"] = health_json(step.findings);
-    if (any_fault(step.findings)) console_.exit_code = kNotTrustworthy;
+    for (const std::string& line : health_lines(health)) console_.result(line);
+    json["health"] = health_json(health);
     const PredictionError error = prediction_error(model, *open_log(data_), low_hz, high_hz);
     for (const std::string& line : prediction_lines(error)) console_.result(line);
     json["time_domain"] = prediction_json(error);
   }
+  const ModelVerdict verdict = judge_model(model.fit, health, validation);
+  console_.result(verdict_line(verdict));
+  json.update(verdict_json(verdict));
+  if (!verdict.trustworthy) console_.exit_code = kNotTrustworthy;
   console_.result(json);
 }
 

@@ -24,6 +24,12 @@ void expect_doubt(const ReportData& data, const char* why) {
   EXPECT_THAT(verdict.reasons, ElementsAre(HasSubstr(why)));
 }
 
+void expect_bad(const ReportData& data, const char* why) {
+  const Verdict verdict = judge(data);
+  EXPECT_EQ(verdict.level, Level::bad);
+  EXPECT_THAT(verdict.reasons, ElementsAre(HasSubstr(why)));
+}
+
 TEST(Verdict, ASoundResultIsGood) {
   const Verdict verdict = judge(sound());
   EXPECT_EQ(verdict.level, Level::good);
@@ -43,27 +49,30 @@ TEST(Verdict, AFaultOfTheDataIsNotTrustedAndADoubtIsDoubted) {
   EXPECT_THAT(verdict.reasons, ElementsAre("hum (12 dB)", "a1 a2: wired crosswise"));
 }
 
-TEST(Verdict, AFitThatDidNotConvergeIsDoubted) {
-  for (const char* status : {"iteration_limit", "cost_stalled", "singular", ""}) {
+// What `fit` ends with exit code 3 for is not trusted on the page either.
+TEST(Verdict, AFitThatEndedBadlyIsNotTrusted) {
+  for (const char* status : {"iteration_limit", "cost_stalled", "singular", "undetermined",
+                             "unexplained", "faulty_data"}) {
     ReportData data = sound();
     data.model->fit.status = status;
-    expect_doubt(data, "did not converge");
+    expect_bad(data, status);
+    data.model->fit.message = "the data have a reason";
+    expect_bad(data, "the data have a reason");
   }
 }
 
-TEST(Verdict, AFitThatConvergedToWhatTheDataLeaveOpenIsDoubtedForThat) {
+TEST(Verdict, AnErrorThatNoiseDoesNotExplainIsNotTrusted) {
   ReportData data = sound();
-  data.model->fit.status = "undetermined";
-  expect_doubt(data, "do not determine");
-  data.model->fit.status = "unexplained";
-  expect_doubt(data, "no mode");
+  data.validation->explained = false;
+  data.validation->reason = "the residual is 2.5 times what noise explains";
+  expect_bad(data, "2.5 times");
 }
 
-TEST(Verdict, AnErrorAboveTheNoiseIsDoubted) {
+// The mean of F(2, 2 nu) is 2 for nu = 2: a chi-square of 2.02 is what noise gives.
+TEST(Verdict, AnErrorIsComparedWithItsExpectation) {
   ReportData data = sound();
-  data.validation->chi_square_per_dof = 2.5;
-  expect_doubt(data, "2.5 times");
-  data.validation->chi_square_per_dof = 0.0;  // no variances: not known
+  data.validation->chi_square_per_dof = 2.02;
+  data.validation->expected_chi_square = 2.0;
   EXPECT_EQ(judge(data).level, Level::good);
 }
 

@@ -108,6 +108,9 @@ py::dict validate_on(const AdditiveModel& model, const FrfHandle& of,
   out["normalized_error"] = v.normalized_error;
   out["chi_square_per_dof"] = v.chi_square_per_dof;
   out["expected_chi_square"] = v.expected_chi_square;
+  out["variance"] = to_string(v.variance);
+  out["explained"] = v.explained;
+  out["reason"] = v.reason;
   out["whitened_above_95"] = v.whitened_above_95;
   out["whiteness"] = v.whiteness;
   out["whiteness_limit"] = v.whiteness_limit;
@@ -155,7 +158,8 @@ constexpr const char* kValidateDoc =
     R"(Tries the model on a response that it was not fitted to, in band_hz (Hz); None: the band of its fit.
 
 Returns a dict: relative_rms_error, normalized_error, chi_square_per_dof (0: unknown),
-expected_chi_square (of noise alone: 1 for exact variances), whitened_above_95 (0.05 is right), whiteness and whiteness_limit, channel_error [n_y, n_u].
+expected_chi_square (of noise alone: 1 for exact variances), variance that they compare with ('none', 'noise', 'total'
+or 'scatter'), explained (False: clearly more than noise and known distortion) and reason, whitened_above_95 (0.05 is right), whiteness and whiteness_limit, channel_error [n_y, n_u].
 Raises RequestError where channels do not match by name.)";
 
 constexpr const char* kPairsDoc =
