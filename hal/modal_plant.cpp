@@ -54,9 +54,9 @@ ModalPlant::ModalPlant(const std::vector<PlantMode>& modes, double delay_s, doub
   sensors_ = modes[0].sensor_shape.size();
   const auto count = static_cast<Eigen::Index>(modes.size());
   modes_ = padded(count);
-  const double period_s = 1.0 / sample_rate_hz;
+  period_s_ = 1.0 / sample_rate_hz;
   const double whole = std::floor(delay_s * sample_rate_hz);
-  const double fraction = delay_s * sample_rate_hz - whole;
+  fraction_ = delay_s * sample_rate_hz - whole;
 
   actuator_shape_.setZero(modes_, actuators_);
   sensor_shape_.setZero(padded(sensors_), modes_);
@@ -67,20 +67,25 @@ ModalPlant::ModalPlant(const std::vector<PlantMode>& modes, double delay_s, doub
   v_.setZero(modes_);
   for (Eigen::Index i = 0; i < count; ++i) {
     const PlantMode& mode = modes[static_cast<std::size_t>(i)];
-    const double omega = 2.0 * std::numbers::pi * mode.natural_frequency_hz;
-    const auto over = [&](double part) {
-      return modal_propagator(omega, mode.damping_ratio, part * period_s);
-    };
-    const ModalPropagator all = over(1.0);
-    const ModalPropagator late = over(1.0 - fraction);
-    const Eigen::Vector2d of_old = late.transition * over(fraction).input;
-    const Eigen::Matrix2d& e = all.transition;
-    step_.row(i) << e(0, 0), e(0, 1), e(1, 0), e(1, 1), of_old[0], of_old[1], late.input[0],
-        late.input[1];
-    undelayed_.row(i) << all.input[0], all.input[1];
+    retune(i, mode.natural_frequency_hz, mode.damping_ratio);
     actuator_shape_.row(i) = mode.actuator_shape.transpose();
     sensor_shape_.col(i).head(sensors_) = mode.sensor_shape;
   }
+}
+
+void ModalPlant::retune(Eigen::Index mode, double natural_frequency_hz,
+                        double damping_ratio) noexcept {
+  const double omega = 2.0 * std::numbers::pi * natural_frequency_hz;
+  const auto over = [&](double part) {
+    return modal_propagator(omega, damping_ratio, part * period_s_);
+  };
+  const ModalPropagator all = over(1.0);
+  const ModalPropagator late = over(1.0 - fraction_);
+  const Eigen::Vector2d of_old = late.transition * over(fraction_).input;
+  const Eigen::Matrix2d& e = all.transition;
+  step_.row(mode) << e(0, 0), e(0, 1), e(1, 0), e(1, 1), of_old[0], of_old[1], late.input[0],
+      late.input[1];
+  undelayed_.row(mode) << all.input[0], all.input[1];
 }
 
 void ModalPlant::reset() noexcept {

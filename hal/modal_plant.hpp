@@ -32,6 +32,9 @@ class ModalPlant {
 
   /// Modal coordinate, mass-normalized: kg^(1/2) m.
   double coordinate(Eigen::Index mode) const noexcept { return q_[mode]; }
+  /// Gives a mode another frequency and damping ratio from this instant on; its motion goes on.
+  /// For modes that drift. Does not allocate.
+  void retune(Eigen::Index mode, double natural_frequency_hz, double damping_ratio) noexcept;
   /// A modal force that acts, undelayed and constant, during the next step().
   void add_modal_force(Eigen::Index mode, double force) noexcept {
     extra_mode_ = mode;
@@ -41,6 +44,8 @@ class ModalPlant {
  private:
   void modal_force(const double* u, double* force) const noexcept;
 
+  double period_s_ = 0.0;
+  double fraction_ = 0.0;  // of the delay, in samples
   Eigen::Index actuators_ = 0;
   Eigen::Index sensors_ = 0;
   Eigen::Index modes_ = 0;          // padded to a multiple of the lane width

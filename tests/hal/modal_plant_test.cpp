@@ -292,5 +292,27 @@ TEST(Propagator, OverNoTimeIsTheIdentity) {
   EXPECT_EQ(p.input, Eigen::Vector2d::Zero());
 }
 
+TEST(ModalPlant, GoesOnFromItsStateWithARetunedMode) {
+  std::vector<PlantMode> modes = two_modes();
+  ModalPlant retuned(modes, 0.6e-3, 1000.0);
+  retuned.retune(1, 190.0, 0.01);
+  modes[1].natural_frequency_hz = 190.0;
+  modes[1].damping_ratio = 0.01;
+  ModalPlant other(modes, 0.6e-3, 1000.0);
+  const VectorXd u = vector({1.0, -2.0});
+  VectorXd a(2);
+  VectorXd b(2);
+  for (int n = 0; n < 50; ++n) {
+    retuned.step(u.data());
+    other.step(u.data());
+    retuned.output(a.data());
+    other.output(b.data());
+    ASSERT_EQ(a, b);
+  }
+  const double before = retuned.coordinate(1);
+  retuned.retune(1, 170.0, 0.01);
+  EXPECT_EQ(retuned.coordinate(1), before);
+}
+
 }  // namespace
 }  // namespace stageid

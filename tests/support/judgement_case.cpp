@@ -1,0 +1,246 @@
+#include "tests/support/judgement_case.hpp"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "acquisition/convert_log.hpp"
+#include "estimation/validation.hpp"
+#include "frf/frf_file.hpp"
+#include "hal/rigid_body.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tools/truth_comparison.hpp"
+
+namespace stageid::test {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// NaN where JSON has null.
+double number(const Json& object, const char* key) {
+  return object.contains(key) && object[key].is_number() ? object[key].get<double>()
+                                                         : std::numeric_limits<double>::quiet_NaN();
+}
+
+double children_seconds() {
+  rusage usage{};
+  ::getrusage(RUSAGE_CHILDREN, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+/// One command of the program, with what it said.
+struct Command {
+  ProgramResult ran;
+  Json json = Json::object();
+};
+
+class Session {
+ public:
+  explicit Session(std::filesystem::path program) : program_(std::move(program)) {}
+
+  Command run(std::vector<std::string> words) {
+    words.insert(words.begin(), "--json");
+    words.insert(words.end(), {"--threads", "1"});
+    const double before = children_seconds();
+    Command command{stageid::test::run_program(program_, words), Json::object()};
+    seconds_ += children_seconds() - before;
+    const Json parsed = Json::parse(command.ran.out, nullptr, false);
+    if (parsed.is_object()) command.json = parsed;
+    return command;
+  }
+  double seconds() const { return seconds_; }
+
+ private:
+  std::filesystem::path program_;
+  double seconds_ = 0.0;
+};
+
+std::string realization_list(int last) {
+  std::string list = "1";
+  for (int m = 2; m <= last; ++m) list += fmt::format(",{}", m);
+  return list;
+}
+
+std::string last_line(const std::string& text) {
+  std::size_t end = text.find_last_not_of('\n');
+  if (end == std::string::npos) return "";
+  const std::size_t begin = text.rfind('\n', end);
+  return text.substr(begin == std::string::npos ? 0 : begin + 1, end - begin);
+}
+
+/// The plant that the fitted realizations saw on average.
+WaferStageSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
+  WaferStageSpec spec = stage.spec;
+  if (plan.drifting_mode >= 0)
+    spec.in_plane_modes[static_cast<std::size_t>(plan.drifting_mode)].natural_frequency_hz *=
+        1.0 - 0.5 * plan.drift_relative / stage.realizations;
+  return spec;
+}
+
+/// Mean |P - G|^2 over the variance of the measured response, noise and what realizations scatter beyond it.
+double excess_of(const AdditiveModel& model, const FrfEstimate& frf, const WaferStageSpec& spec) {
+  if (frf.noise_variance.size() == 0) return 0.0;
+  const std::vector<PlantMode> modes = wafer_stage_modes(spec);
+  const Eigen::MatrixXcd response = response_like(model, frf);
+  double beyond = 1.0;
+  if (frf.total_variance.size() > 0)
+    beyond = std::max(1.0, (frf.total_variance.array() / frf.noise_variance.array()).mean());
+  double sum = 0.0;
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const Eigen::MatrixXcd whole =
+        sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, frf.frequency_hz[k]);
+    for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
+      for (Eigen::Index i = 0; i < frf.n_outputs(); ++i) {
+        const Eigen::Index c = i + frf.n_outputs() * j;
+        const std::complex<double> exact = whole(
+            channel_index(spec.info.sensors, frf.outputs.names[static_cast<std::size_t>(i)]),
+            channel_index(spec.info.actuators, frf.inputs.names[static_cast<std::size_t>(j)]));
+        sum += std::norm(response(c, k) - exact) / (beyond * frf.noise_variance(c, k));
+      }
+  }
+  return sum / static_cast<double>(response.size());
+}
+
+void compare(const AdditiveModel& model, const FrfEstimate& frf, const WaferStageSpec& spec,
+             Json& result) {
+  const TruthComparison truth = compare_with_truth(model, frf, spec);
+  Json df = Json::array();
+  Json dz = Json::array();
+  int found = 0;
+  for (const ModeComparison& mode : truth.modes) {
+    if (!mode.found) continue;
+    ++found;
+    if (mode.frequency_std_hz > 0.0) df.push_back(mode.frequency_deviation());
+    if (mode.damping_std > 0.0) dz.push_back(mode.damping_deviation());
+  }
+  result["true_modes"] = truth.modes.size();
+  result["found"] = found;
+  result["extra"] = truth.extra_hz;
+  result["df"] = std::move(df);
+  result["dz"] = std::move(dz);
+  result["relative_error"] = truth.relative_rms_error;
+  result["excess"] = excess_of(model, frf, spec);
+}
+
+/// The first thing that a reader of exit code 3 is told: the finding of a log that is not to be trusted, then the
+/// message of the fit, then of the validation.
+std::string first_cause(const Command& frf, const Command& fit, const Command& validation) {
+  if (frf.ran.exit_code != 0) {
+    if (frf.json.contains("health"))
+      for (const Json& finding : frf.json["health"])
+        if (finding["severity"] == "fault") return finding["cause"];
+    return last_line(frf.ran.err);
+  }
+  if (fit.ran.exit_code != 0) return fit.json.value("message", last_line(fit.ran.err));
+  if (validation.ran.exit_code != 0) return last_line(validation.ran.err);
+  return "";
+}
+
+bool names_any(std::string said, const std::vector<std::string>& causes) {
+  std::transform(said.begin(), said.end(), said.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::any_of(causes.begin(), causes.end(), [&](const std::string& cause) {
+    return said.find(cause) != std::string::npos;
+  });
+}
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
+
+void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& session,
+               const std::filesystem::path& directory, Json& result) {
+  const auto path = [&](const char* name) { return (directory / name).string(); };
+  convert_log(measure_with_trouble(stage, plan), directory / "log.h5");
+  std::vector<std::string> words = {
+      "frf",          path("log.h5"),   "-o",
+      path("frf.h5"), "--realizations", realization_list(stage.realizations - 1)};
+  if (stage.stage_file) {
+    write_text(directory / "stage.yaml", stage.nominal_text());
+    words.insert(words.end(), {"--stage", path("stage.yaml")});
+  }
+  const Command frf = session.run(words);
+  Command fit;
+  Command validation;
+  fit.ran.exit_code = validation.ran.exit_code = 0;
+  if (frf.ran.exit_code == 0 || frf.ran.exit_code == 3)
+    fit = session.run({"fit", path("frf.h5"), "-o", path("model.json")});
+  const bool fitted = std::filesystem::exists(directory / "model.json");
+  Command held_back;
+  if (fitted) {
+    held_back = session.run({"frf", path("log.h5"), "-o", path("held_back.h5"), "--no-health",
+                             "--realizations", fmt::format("{}", stage.realizations)});
+    validation = session.run({"validate", path("model.json"), path("held_back.h5")});
+  }
+  const int worst = std::max({frf.ran.exit_code, fit.ran.exit_code, validation.ran.exit_code});
+  result["exit"] = worst;
+  result["exits"] = {frf.ran.exit_code, fit.ran.exit_code, validation.ran.exit_code};
+  result["said"] = first_cause(frf, fit, validation);
+  result["right"] = worst == 3 && names_any(result["said"], plan.right_causes);
+  Json findings = Json::array();
+  if (frf.json.contains("health"))
+    for (const Json& f : frf.json["health"])
+      if (f["severity"] != "not checked")
+        findings.push_back(fmt::format("{} {} {}: {}", std::string(f["severity"]),
+                                       std::string(f["cause"]), std::string(f["channel"]),
+                                       std::string(f["figure"])));
+  result["findings"] = std::move(findings);
+  result["message"] = fit.json.value("message", last_line(fit.ran.err));
+  result["nonlinear"] =
+      frf.json.contains("nonlinearity") && frf.json["nonlinearity"].value("nonlinear", false);
+  if (validation.json.contains("frequency_domain"))
+    result["chi_square"] = number(validation.json["frequency_domain"], "chi_square_per_dof");
+  result["dropped"] = frf.json.contains("dropped_periods") ? frf.json["dropped_periods"].size() : 0;
+  result["periods"] = stage.plan().experiments() * (stage.realizations - 1) * stage.periods;
+  if (fitted)
+    compare(read_model(directory / "model.json"), read_frf(directory / "frf.h5"),
+            plant_of(stage, plan), result);
+}
+
+}  // namespace
+
+nlohmann::ordered_json judge_case(std::uint64_t seed, Trouble trouble,
+                                  const std::filesystem::path& program,
+                                  const std::filesystem::path& keep) {
+  JudgementStage stage = draw_judgement_stage(seed);
+  const TroublePlan plan = draw_trouble(trouble, stage);
+  Json result = {{"seed", seed},
+                 {"trouble", to_string(trouble)},
+                 {"variant", plan.variant},
+                 {"stage", stage.description() + (stage.stage_file ? ", stage file" : "")}};
+  Session session(program);
+  if (keep.empty()) {
+    const TemporaryDirectory scratch;
+    run_steps(stage, plan, session, scratch.path(), result);
+  } else {
+    std::filesystem::create_directories(keep);
+    run_steps(stage, plan, session, keep, result);
+  }
+  result["seconds"] = session.seconds();
+  return result;
+}
+
+bool is_garbage(const nlohmann::ordered_json& result) {
+  if (result.value("exit", -1) != 0) return false;
+  if (!(number(result, "excess") < 1.0)) return true;
+  int intervals = 0;
+  int hold = 0;
+  for (const char* key : {"df", "dz"})
+    if (result.contains(key))
+      for (const Json& deviation : result[key]) {
+        ++intervals;
+        if (std::abs(deviation.get<double>()) < 1.96) ++hold;
+      }
+  return intervals >= 4 && 2 * hold < intervals;
+}
+
+}  // namespace stageid::test

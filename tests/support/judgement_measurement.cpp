@@ -1,0 +1,222 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/run_experiment.hpp"
+#include "hal/modal_plant.hpp"
+#include "hal/motion_controller.hpp"
+#include "hal/noise.hpp"
+#include "hal/rigid_body.hpp"
+#include "tests/support/faulty_log.hpp"
+#include "tests/support/judgement_trouble.hpp"
+
+namespace stageid::test {
+namespace {
+
+constexpr Eigen::Index kSpareSamples = 64;  // behind a run: recordings that are late need them
+constexpr Eigen::Index kHeave = 2;          // of wafer_stage_modes()
+constexpr int kRetunePeriod = 64;           // samples
+
+void quantize(Eigen::Ref<Eigen::VectorXd> values, double quantum) {
+  if (quantum == 0.0) return;
+  for (double& value : values) value = quantum * std::nearbyint(value / quantum);
+}
+
+NoiseSpec white_noise_of(const WaferStageSpec& spec) {
+  return {static_cast<Eigen::Index>(spec.info.actuators.size()),
+          static_cast<Eigen::Index>(spec.info.sensors.size()),
+          spec.info.sample_rate_hz,
+          spec.force_noise_n,
+          spec.sensor_noise_m,
+          0.0,
+          1.0};
+}
+
+/// Slow, smooth, and without the measurement's period: three sines of golden ratios.
+double setpoint(double turns) {
+  constexpr double kTwoPi = 6.283185307179586;
+  return std::sin(kTwoPi * 0.31 * turns) + 0.6 * std::sin(kTwoPi * 0.5017 * turns + 1.0) +
+         0.3 * std::sin(kTwoPi * 1.3124 * turns + 2.0);
+}
+
+/// The closed loop, sample by sample.
+class Loop {
+ public:
+  Loop(const JudgementStage& stage, const TroublePlan& plan)
+      : stage_(stage),
+        plan_(plan),
+        plant_(wafer_stage_modes(stage.spec), stage.spec.delay_s, stage.spec.info.sample_rate_hz),
+        controller_(stage.spec.controller),
+        noise_(white_noise_of(stage.spec)),
+        coloured_(stage.noise),
+        y_(plant_.sensors()),
+        seen_(plant_.sensors()),
+        u_(plant_.actuators()),
+        force_(plant_.actuators()) {
+    if (plan.friction_n > 0.0) friction_.emplace(plan.friction_n, plan.friction_stiffness_n_m);
+    for (const Channel& c : stage.spec.info.sensors) heave_.push_back(c.direction[2]);
+  }
+
+  /// @param done share of the experiment before and behind this run
+  LogSamples run(const Eigen::MatrixXd& r, Eigen::Index samples, std::uint64_t seed,
+                 std::pair<double, double> done) {
+    plant_.reset();
+    controller_.reset();
+    noise_.restart(stage_.spec.seed + stage_.seed, seed);
+    coloured_.restart(~stage_.seed, seed);
+    if (friction_) friction_->reset();
+    LogSamples record;
+    record.actuators.resize(samples, u_.size());
+    record.sensors.resize(samples, y_.size());
+    for (Eigen::Index n = 0; n < samples; ++n) {
+      const double share = static_cast<double>(n) / static_cast<double>(samples);
+      if (plan_.drifting_mode >= 0 && n % kRetunePeriod == 0)
+        drift(done.first + (done.second - done.first) * share);
+      measure(static_cast<double>(n) / static_cast<double>(r.rows()));
+      controller_.update(seen_.data(), u_.data());
+      u_ += r.row(n % r.rows()).transpose();
+      record.sensors.row(n) = y_;
+      record.actuators.row(n) = u_;
+      push();
+    }
+    return record;
+  }
+
+ private:
+  void drift(double done) {
+    const PlantMode& mode =
+        stage_.spec.in_plane_modes[static_cast<std::size_t>(plan_.drifting_mode)];
+    plant_.retune(static_cast<Eigen::Index>(kRigidAxes) + plan_.drifting_mode,
+                  mode.natural_frequency_hz * (1.0 + plan_.drift_relative * (done - 0.5)),
+                  mode.damping_ratio);
+  }
+
+  void measure(double turns) {
+    plant_.output(y_.data());
+    noise_.next();
+    y_ += Eigen::Map<const Eigen::VectorXd>(noise_.sensor_m(), y_.size());
+    y_ += coloured_.next().matrix();
+    quantize(y_, plan_.sensor_quantum_m);
+    if (!(y_.cwiseAbs().maxCoeff() < 1e6))
+      throw std::runtime_error("judgement stage: the loop ran away");
+    seen_ = y_;
+    if (plan_.setpoint_m == 0.0) return;
+    for (Eigen::Index i = 0; i < y_.size(); ++i)
+      seen_[i] -= heave_[static_cast<std::size_t>(i)] * plan_.setpoint_m * setpoint(turns);
+  }
+
+  void push() {
+    force_ = u_;
+    quantize(force_, plan_.actuator_quantum_n);
+    force_ += Eigen::Map<const Eigen::VectorXd>(noise_.force_n(), force_.size());
+    const double shape = 1.0 / std::sqrt(stage_.spec.mass_kg);
+    const double z_m = shape * plant_.coordinate(kHeave);
+    double extra_n = -plan_.cubic_n_m3 * z_m * z_m * z_m;
+    if (friction_) extra_n += friction_->move_to(z_m);
+    if (extra_n != 0.0) plant_.add_modal_force(kHeave, shape * extra_n);
+    plant_.step(force_.data());
+  }
+
+  const JudgementStage& stage_;
+  const TroublePlan& plan_;
+  ModalPlant plant_;
+  MotionController controller_;
+  StageNoise noise_;
+  ColouredNoise coloured_;
+  std::optional<DahlFriction> friction_;
+  std::vector<double> heave_;
+  Eigen::VectorXd y_;
+  Eigen::VectorXd seen_;  // what the controller is given: the error from the setpoint
+  Eigen::VectorXd u_;
+  Eigen::VectorXd force_;
+};
+
+ChannelList list_of(const std::vector<Channel>& channels) {
+  ChannelList list;
+  for (const Channel& channel : channels) {
+    list.names.push_back(channel.name);
+    list.units.push_back(channel.unit);
+  }
+  return list;
+}
+
+void lose_sample(LogSamples& record, Eigen::Index at) {
+  for (Eigen::MatrixXd* x : {&record.actuators, &record.sensors}) {
+    const Eigen::Index rest = x->rows() - at - 1;
+    x->middleRows(at, rest) = x->bottomRows(rest).eval();
+  }
+}
+
+/// What only the recorder does, to a run that is kSpareSamples too long.
+void spoil(const TroublePlan& plan, int run, Eigen::Index transient, MemoryLog& log) {
+  LogSamples& record = log.records.back();
+  const Eigen::Index samples = record.sensors.rows() - kSpareSamples;
+  if (plan.late >= 0) {
+    PlantedFault fault;
+    fault.kind = PlantedFault::Kind::recorded_skew;
+    fault.of_sensor = plan.late_sensor;
+    fault.a = plan.late;
+    fault.value = plan.late_samples / log.log_info.sample_rate_hz;
+    MemoryLog one;
+    one.log_info = log.log_info;
+    one.records.push_back(std::move(record));
+    spoil_recording(fault, one);
+    record = std::move(one.records.front());
+  }
+  if (run == plan.lost_run)
+    lose_sample(record, transient + static_cast<Eigen::Index>(
+                                        plan.lost_at * static_cast<double>(samples - transient)));
+  record.actuators.conservativeResize(samples, Eigen::NoChange);
+  record.sensors.conservativeResize(samples, Eigen::NoChange);
+  Eigen::MatrixXd& r = log.excitation_periods.back();
+  if (plan.excitation_as_actuators)
+    for (Eigen::Index n = 0; n < samples; ++n) record.actuators.row(n) = r.row(n % r.rows());
+  if (plan.swapped[0] >= 0)
+    record.sensors.col(plan.swapped[0]).swap(record.sensors.col(plan.swapped[1]));
+  if (plan.reference_late_samples > 0) {
+    const Eigen::Index late = plan.reference_late_samples;
+    const Eigen::MatrixXd original = r;
+    for (Eigen::Index n = 0; n < r.rows(); ++n) r.row((n + late) % r.rows()) = original.row(n);
+  }
+}
+
+}  // namespace
+
+MemoryLog measure_with_trouble(const JudgementStage& stage, const TroublePlan& plan) {
+  const ExperimentPlan experiment = stage.plan();
+  const Eigen::Index period = stage.period_samples;
+  const Eigen::Index transient = period * stage.transient_periods;
+  const Eigen::Index samples = transient + period * stage.periods;
+  MemoryLog log;
+  log.file = "judgement.h5";
+  log.log_info.sample_rate_hz = stage.spec.info.sample_rate_hz;
+  log.log_info.period_samples = stage.period_samples;
+  log.log_info.transient_periods = stage.transient_periods;
+  log.log_info.actuators = list_of(stage.spec.info.actuators);
+  log.log_info.sensors = list_of(stage.spec.info.sensors);
+  log.log_info.excitation = log.log_info.actuators;
+  Loop loop(stage, plan);
+  const std::vector<RunId> runs = experiment.runs();
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    Eigen::MatrixXd planned = experiment.excitation(runs[i]);
+    Eigen::MatrixXd r = planned;
+    if (plan.silent_axis >= 0) r.col(plan.silent_axis).setZero();
+    const auto done = [&](std::size_t n) {
+      return static_cast<double>(n) / static_cast<double>(runs.size());
+    };
+    LogSamples record =
+        loop.run(r, samples + kSpareSamples, run_seed(stage.seed, runs[i]), {done(i), done(i + 1)});
+    log.append(runs[i].realization, runs[i].experiment,
+               plan.silent_in_record ? std::move(r) : std::move(planned), std::move(record));
+    spoil(plan, static_cast<int>(i), transient, log);
+    log.log_runs.back().samples = static_cast<std::uint64_t>(samples);
+    log.records.back().marked.setZero(samples);
+  }
+  return log;
+}
+
+}  // namespace stageid::test

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hal/dahl_friction.hpp"
+#include "tests/support/judgement_stage.hpp"
+#include "tests/support/memory_log.hpp"
+
+namespace stageid::test {
+
+enum class Trouble : std::uint8_t {
+  clean,
+  dac_step,
+  adc_step,
+  cubic,
+  friction,
+  slow_noise,
+  mode_drift,
+  lost_sample,
+  late_channel,
+  unexcited_axis,
+  unsettled,
+  late_reference,  ///< the excitation is recorded late
+  setpoint_motion,
+  wrong_map
+};
+inline constexpr int kTroubles = 14;
+const char* to_string(Trouble trouble) noexcept;
+std::optional<Trouble> trouble_of(const std::string& name) noexcept;
+
+/// What is planted in one measurement; drawn by draw_trouble().
+struct TroublePlan {
+  Trouble trouble = Trouble::clean;
+  std::string variant;  ///< empty: there is one kind only
+  /// What the program may say, any of these: causes of findings, or parts of a verdict's sentence.
+  std::vector<std::string> right_causes;
+  // at the stage
+  double actuator_quantum_n = 0.0;
+  double sensor_quantum_m = 0.0;
+  double cubic_n_m3 = 0.0;  ///< on the rigid heave
+  double friction_n = 0.0;
+  double friction_stiffness_n_m = 0.0;
+  int drifting_mode = -1;       ///< of JudgementStage::spec.in_plane_modes
+  double drift_relative = 0.0;  ///< of its frequency, from the first to the last sample of all runs
+  double setpoint_m = 0.0;      ///< rms size of slow motion in heave
+  int silent_axis = -1;         ///< its excitation does not arrive
+  // in the recording
+  int lost_run = -1;
+  double lost_at = 0.0;  ///< share of the measured periods
+  bool late_sensor = false;
+  int late = -1;  ///< channel
+  double late_samples = 0.0;
+  int reference_late_samples = 0;
+  int swapped[2] = {-1, -1};  ///< sensors
+  bool excitation_as_actuators = false;
+  bool silent_in_record = false;  ///< the record knows that the silent axis was not excited
+};
+
+/// May change the stage: the strength of its noise, its transient periods.
+TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage);
+
+/// Measures the stage with its trouble, in virtual time, as `stageid run` would, in the layout of a foreign log.
+/// @throws std::runtime_error if the loop runs away.
+MemoryLog measure_with_trouble(const JudgementStage& stage, const TroublePlan& plan);
+
+}  // namespace stageid::test
