@@ -13,6 +13,7 @@
 #include "excitation/fingerprint.hpp"
 #include "excitation/key_suggestion.hpp"
 #include "frf/dc_line.hpp"
+#include "frf/distortion_variance.hpp"
 #include "frf/hold_compensation.hpp"
 #include "frf/line_scatter.hpp"
 #include "tools/flag_values.hpp"
@@ -215,12 +216,23 @@ class FitDefaults {
 
   /// Distortion moves an estimate from realization to realization as noise does; the periods do not show it.
   bool weigh_by_realizations() {
-    const std::string nonlinear = nonlinearity_sentence(setup_.frf);
-    if (nonlinear.empty() || setup_.frf.total_variance.size() == 0) return false;
-    setup_.options.weighting = Weighting::total_variance;
+    FrfEstimate& frf = setup_.frf;
+    frf.nonlinearity = linearity_of(frf);
+    const std::string nonlinear = nonlinearity_sentence(frf);
+    if (nonlinear.empty()) return false;
+    weigh_by_total_variance();
     setup_.warnings.push_back("weighting: total_variance; " + nonlinear);
     note(setup_.warnings.back());
     return true;
+  }
+
+  void weigh_by_total_variance() {
+    FrfEstimate& frf = setup_.frf;
+    setup_.options.weighting = Weighting::total_variance;
+    if (frf.noise_variance.size() == 0 || !(frf.total_dof >= 1.0)) return;
+    DistortionVariance distorted = distortion_variance(frf);
+    frf.total_variance = std::move(distorted.variance);
+    frf.total_dof = distorted.dof;
   }
 
   void parse_weighting() {
@@ -230,6 +242,7 @@ class FitDefaults {
                        std::find(kWeightings.begin(), kWeightings.end(), text) != kWeightings.end();
     if (named) {
       options.weighting = pick<Weighting>("--weighting", text, kWeightings);
+      if (options.weighting == Weighting::total_variance) weigh_by_total_variance();
       return;
     }
     if (text.find('.') == std::string::npos && text.find('/') == std::string::npos) {

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "excitation/fingerprint.hpp"
+#include "tools/frf_quality.hpp"
 #include "tools/health_step.hpp"
 #include "tools/interrupt.hpp"
 
@@ -39,6 +40,13 @@ std::vector<PoleEstimate> poles_of(const Submodel& s) {
            s.damping_ratio_std}};
 }
 
+/// Puts a cause before the message of a fit that is not to be trusted.
+void blame(const std::string& cause, FitResult& result) {
+  if (cause.empty() || result.trustworthy()) return;
+  result.message = cause + "; " + result.message;
+  result.model.fit.message = result.message;
+}
+
 }  // namespace
 
 std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint) {
@@ -57,6 +65,8 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
   };
   step.result = structured_fit(setup.frf, setup.structure, setup.selection, options);
   throw_if_interrupted();
+  // The cause comes before what follows from it: modes that imitate distortion.
+  blame(nonlinearity_sentence(setup.frf), step.result);
   const std::vector<std::string> faults =
       health_notes(health_of(setup.frf.provenance_json), Severity::fault);
   if (!faults.empty())
