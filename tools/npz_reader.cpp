@@ -49,6 +49,7 @@ class Bytes {
 struct Member {
   std::string name;
   unsigned method = 0;
+  std::uint32_t crc = 0;
   std::size_t stored_bytes = 0;
   std::size_t bytes = 0;
   std::size_t offset = 0;
@@ -64,6 +65,7 @@ std::vector<Member> directory_of(const std::filesystem::path& file, std::string_
   for (Member& member : members) {
     if (zip.piece(at, 4) != std::string_view("PK\x01\x02", 4)) zip.fail("its directory is damaged");
     member.method = zip.number<std::uint16_t>(at + 10);
+    member.crc = zip.number<std::uint32_t>(at + 16);
     member.stored_bytes = zip.number<std::uint32_t>(at + 20);
     member.bytes = zip.number<std::uint32_t>(at + 24);
     member.offset = zip.number<std::uint32_t>(at + 42);
@@ -74,9 +76,7 @@ std::vector<Member> directory_of(const std::filesystem::path& file, std::string_
   return members;
 }
 
-std::string content_of(const std::filesystem::path& file, std::string_view content,
-                       const Member& member) {
-  const Bytes zip(file, member.name, content);
+std::string unpacked(const Bytes& zip, const Member& member) {
   const std::size_t start = member.offset + 30 + zip.number<std::uint16_t>(member.offset + 26) +
                             zip.number<std::uint16_t>(member.offset + 28);
   const std::string_view stored = zip.piece(start, member.stored_bytes);
@@ -96,6 +96,17 @@ std::string content_of(const std::filesystem::path& file, std::string_view conte
   inflateEnd(&stream);
   if (!whole) zip.fail("cannot be unpacked; the file is damaged");
   return inflated;
+}
+
+std::string content_of(const std::filesystem::path& file, std::string_view content,
+                       const Member& member) {
+  const Bytes zip(file, member.name, content);
+  std::string bytes = unpacked(zip, member);
+  const uLong crc =
+      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<z_size_t>(bytes.size()));
+  if (crc != member.crc)
+    zip.fail("its checksum (CRC-32) does not match; the file is damaged. Copy or save it again");
+  return bytes;
 }
 
 /// What the header of a .npy member says.
