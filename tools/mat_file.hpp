@@ -45,7 +45,7 @@ void write_mat(const std::filesystem::path& file, const ArrayList& list,
 
 /// Reads any MATLAB file that libmatio does: v4, v5, v7 and v7.3. Numbers of every class are doubles;
 /// shapes are MATLAB's; fields of scalar structs are "struct/field", of struct arrays "struct/0/field".
-/// Sparse matrices, function handles and objects are left out.
+/// Sparse matrices become full ones. Function handles and objects, tables among them, are ArrayList::unread.
 /// @throws FileError, FormatError
 ArrayList read_mat(const std::filesystem::path& file);
 

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <hdf5.h>
 #include <matio.h>
 
 #include <cstdint>
@@ -10,6 +11,7 @@
 
 #include "excitation/file_error.hpp"
 #include "tools/mat_file.hpp"
+#include "tools/mat_objects.hpp"
 #include "tools/output_paths.hpp"
 #include "tools/unicode.hpp"
 
@@ -21,6 +23,9 @@ using Variable = std::unique_ptr<matvar_t, void (*)(matvar_t*)>;
 
 /// Structs in structs deeper than this are no data of people.
 constexpr int kDeepest = 20;
+
+/// 1 GiB of real numbers: what a full matrix made of a sparse one may take.
+constexpr std::size_t kMostFullNumbers = std::size_t{1} << 27;
 
 template <typename Number>
 void append_numbers(const void* data, std::size_t count, std::vector<double>& out) {
@@ -77,9 +82,13 @@ class Reader {
         list_.arrays.push_back({name, {}, std::vector<std::string>{text_of(variable)}});
         return;
       case MAT_C_SPARSE:
+        return read_sparse(variable, name);
       case MAT_C_OBJECT:
-      case MAT_C_FUNCTION:
       case MAT_C_OPAQUE:
+        return;  // named by objects_of_v5() and require_all_of_v73()
+      case MAT_C_FUNCTION:
+        list_.unread.push_back({name, "function handle", "Save its values as an array"});
+        return;
       case MAT_C_EMPTY:
         return;
       default:
@@ -165,6 +174,44 @@ class Reader {
     list_.arrays.push_back(reversed(stored));
   }
 
+  /// As a full matrix: what follows takes channels and samples, which are full.
+  void read_sparse(const matvar_t& variable, const std::string& name) {
+    const auto* sparse = static_cast<const mat_sparse_t*>(variable.data);
+    const std::size_t rows = variable.dims[0];
+    const std::size_t columns = variable.dims[1];
+    if (sparse == nullptr || sparse->jc == nullptr || sparse->njc != columns + 1) damaged(name);
+    if (columns > 0 && rows > kMostFullNumbers / columns)
+      throw FormatError(list_.file, name,
+                        fmt::format("is a sparse matrix of {} x {}, too large for a full one. Save "
+                                    "the part that is needed with full()",
+                                    rows, columns));
+    const std::size_t count = sparse->ndata;
+    std::vector<double> real, imaginary;
+    const auto* parts = static_cast<const mat_complex_split_t*>(sparse->data);
+    const bool complex = variable.isComplex != 0;
+    if (count > 0 &&
+        (sparse->data == nullptr ||
+         !read_numbers(variable.data_type, complex ? parts->Re : sparse->data, count, real) ||
+         (complex && !read_numbers(variable.data_type, parts->Im, count, imaginary))))
+      damaged(name);
+    std::vector<std::complex<double>> values(rows * columns);
+    for (std::size_t c = 0; c < columns; ++c)
+      for (std::size_t k = sparse->jc[c]; k < sparse->jc[c + 1]; ++k) {
+        if (k >= count || k >= sparse->nir || sparse->ir[k] >= rows) damaged(name);
+        values[sparse->ir[k] * columns + c] = {real[k], complex ? imaginary[k] : 0.0};
+      }
+    NamedArray out{name, {rows, columns}, {}};
+    if (complex) {
+      out.values = std::move(values);
+    } else {
+      std::vector<double> numbers;
+      numbers.reserve(values.size());
+      for (const std::complex<double>& value : values) numbers.push_back(value.real());
+      out.values = std::move(numbers);
+    }
+    list_.arrays.push_back(std::move(out));
+  }
+
   ArrayList& list_;
 };
 
@@ -173,6 +220,7 @@ void require_plausible(const std::filesystem::path& path, const matvar_t& variab
                        std::uintmax_t file_bytes) {
   // A deflated stream is at most 1032 times as long when inflated.
   constexpr double kMostInflation = 1032.0;
+  if (variable.class_type == MAT_C_SPARSE) return;  // its shape does not say how much is stored
   double bytes = 1.0;
   for (int q = 0; q < variable.rank; ++q) bytes *= static_cast<double>(variable.dims[q]);
   if (bytes > kMostInflation * static_cast<double>(file_bytes))
@@ -221,6 +269,7 @@ std::string no_matlab_file(const std::filesystem::path& path) {
 
 ArrayList read_mat(const std::filesystem::path& path) {
   require_readable(path);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // libmatio leaves HDF5 to print its errors
   const MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), &Mat_Close);
   if (!file) throw FormatError(path, "", no_matlab_file(path));
   const std::uintmax_t bytes = std::filesystem::file_size(path);
@@ -236,7 +285,11 @@ ArrayList read_mat(const std::filesystem::path& path) {
       throw FormatError(path, variable->name, "its data cannot be read; the file is damaged");
     reader.read(*variable, variable->name, 0);
   }
-  if (list.arrays.empty())
+  if (Mat_GetVersion(file.get()) == MAT_FT_MAT73)
+    require_all_of_v73(list);
+  else
+    for (UnreadVariable& object : objects_of_v5(path)) list.unread.push_back(std::move(object));
+  if (list.arrays.empty() && list.unread.empty())
     throw FormatError(path, "", "holds no variables; the file is empty or damaged");
   return list;
 }

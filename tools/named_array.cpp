@@ -61,6 +61,11 @@ const NamedArray* ArrayList::find(const std::string& name) const {
 
 const NamedArray& ArrayList::at(const std::string& name) const {
   if (const NamedArray* found = find(name)) return *found;
+  for (const UnreadVariable& variable : unread)
+    if (name == variable.name || name.starts_with(variable.name + ".") ||
+        name.starts_with(variable.name + "/"))
+      throw FormatError(file, variable.name,
+                        fmt::format("{} cannot be read. {}", variable.what, variable.remedy));
   std::vector<std::string> names;
   for (const NamedArray& array : arrays) names.push_back(array.name);
   constexpr std::size_t kMostNames = 40;

@@ -25,10 +25,18 @@ struct NamedArray {
   std::size_t size() const;
 };
 
+/// A variable that cannot be read, for listings and errors.
+struct UnreadVariable {
+  std::string name;
+  std::string what;    ///< "MATLAB object (table)"
+  std::string remedy;  ///< "Save its columns as arrays in MATLAB: ..."
+};
+
 /// The arrays of one file, in its order.
 struct ArrayList {
   std::filesystem::path file;  ///< for errors
   std::vector<NamedArray> arrays;
+  std::vector<UnreadVariable> unread = {};
 
   /// By name; a leading slash may be there, and dots may stand for slashes. Null if there is none.
   const NamedArray* find(const std::string& name) const;
