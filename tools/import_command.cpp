@@ -7,39 +7,22 @@
 #include <stdexcept>
 
 #include "excitation/file_error.hpp"
-#include "excitation/file_kind.hpp"
 #include "excitation/fingerprint.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
-#include "tools/csv_table.hpp"
+#include "tools/foreign_arrays.hpp"
 #include "tools/frf_arrays.hpp"
+#include "tools/frf_csv.hpp"
 #include "tools/import_frf.hpp"
 #include "tools/import_log.hpp"
-#include "tools/mat_file.hpp"
 #include "tools/mode_correlation.hpp"
-#include "tools/npz_file.hpp"
 #include "tools/output_paths.hpp"
+#include "tools/si_unit.hpp"
 #include "tools/touchstone_reader.hpp"
 #include "tools/uff_frf.hpp"
 
 namespace stageid {
 namespace {
-
-ArrayList read_arrays(const std::filesystem::path& file) {
-  const std::string ending = file.extension().string();
-  if (ending == ".mat") return read_mat(file);
-  if (ending == ".npz") return read_npz(file);
-  if (ending == ".csv" || ending == ".txt" || ending == ".dat") return read_csv(file);
-  if (ending == ".h5" || ending == ".hdf5") return read_hdf5_arrays(file);
-  if (is_uff_name(file)) return arrays_of_uff(file, read_uff(file));
-  require_readable(file);
-  if (const std::string other = other_kind(file, "a file of another program"); !other.empty())
-    throw FormatError(file, "", other);
-  throw std::invalid_argument(
-      fmt::format("{}: '{}' is not imported; there are .unv, .uff, .mat, .csv, .h5, .npz and .sNp "
-                  "(Touchstone)",
-                  file.string(), ending));
-}
 
 [[noreturn]] void ask_for_map(const ArrayList& arrays) {
   std::string shown;
@@ -62,11 +45,16 @@ void require_frf_output(const std::filesystem::path& output) {
                     output.extension().string()));
 }
 
-FrfEstimate read_foreign_frf(const std::filesystem::path& file,
-                             const std::filesystem::path& output) {
-  if (is_touchstone(file)) return read_touchstone(file);
+FrfEstimate read_foreign_frf(const std::filesystem::path& file, const std::filesystem::path& output,
+                             std::vector<std::string>& notes) {
+  if (is_touchstone(file)) {
+    TouchstoneFrf touchstone = read_touchstone(file);
+    if (!touchstone.note.empty()) notes.push_back(touchstone.note);
+    return std::move(touchstone.frf);
+  }
+  if (is_frf_csv(file)) return read_frf_csv(file);
   if (is_uff_name(file)) return frf_of_uff(file, read_uff(file));
-  const ArrayList arrays = read_arrays(file);
+  const ArrayList arrays = read_foreign_arrays(file);
   if (!holds_frf(arrays)) ask_for_map(arrays);
   return frf_of_arrays(arrays, output);
 }
@@ -76,8 +64,13 @@ FrfEstimate read_foreign_frf(const std::filesystem::path& file,
 namespace {
 
 /// What came with its history keeps it; else the foreign file is the history.
-void write_imported(const std::filesystem::path& output, FrfEstimate frf,
-                    const std::filesystem::path& input) {
+ImportSummary write_imported(const std::filesystem::path& output, FrfEstimate frf,
+                             const std::filesystem::path& input, std::vector<std::string> notes) {
+  try {
+    take_si_units(frf, notes);
+  } catch (const std::invalid_argument& error) {
+    throw FormatError(input, "", error.what());
+  }
   if (frf.provenance_json == "{}")
     frf.provenance_json = nlohmann::ordered_json{
         {"imported", input.filename().string()},
@@ -85,6 +78,7 @@ void write_imported(const std::filesystem::path& output, FrfEstimate frf,
         {"version",
          STAGEID_VERSION}}.dump();
   write_frf(output, frf);
+  return summary_of(frf, notes);
 }
 
 }  // namespace
@@ -92,10 +86,10 @@ void write_imported(const std::filesystem::path& output, FrfEstimate frf,
 ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command =
       add_command(app, "import", "Read a frequency response or a log that another program wrote");
-  command
-      ->add_option("file", input_,
-                   "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone)")
-      ->required();
+  command->add_option(
+      "file", input_,
+      "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone); of a log "
+      "also a pattern such as 'run_{realization}_{experiment}.mat'");
   command->add_option("-o,--output", output_,
                       "frf.h5, or of a log run.slog or run.h5, or of the modes of a universal file "
                       "modes.json for 'fit --modes'; without it the file's arrays are listed, "
@@ -110,35 +104,68 @@ void ImportCommand::list() const {
     throw std::invalid_argument("--map: the file to write is missing; give it with -o");
   std::vector<std::vector<std::string>> rows = {{"array", "size", "holds"}};
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const NamedArray& array : read_arrays(input_).arrays) {
+  const ArrayList arrays = read_foreign_arrays(input_);
+  for (const NamedArray& array : arrays.arrays) {
     const char* holds = array.is_text() ? "text" : array.is_complex() ? "complex" : "real";
     rows.push_back({array.name, fmt::format("{}", fmt::join(array.shape, " x ")), holds});
     json.push_back({{"name", array.name}, {"size", array.shape}, {"holds", holds}});
   }
+  for (const UnreadVariable& variable : arrays.unread) {
+    rows.push_back({variable.name, "", variable.what});
+    json.push_back({{"name", variable.name},
+                    {"size", nlohmann::ordered_json::array()},
+                    {"holds", variable.what},
+                    {"remedy", variable.remedy}});
+  }
   for (const std::string& line : table_lines(rows)) console_.result(line);
+  for (const UnreadVariable& variable : arrays.unread)
+    console_.result(
+        fmt::format("{}: {} cannot be read. {}", variable.name, variable.what, variable.remedy));
   console_.result({{"arrays", json}});
 }
 
+ImportSummary ImportCommand::import_with_map() const {
+  const ImportMap map = read_import_map(map_);
+  if (map.kind == ImportMap::Kind::log) {
+    const std::vector<ForeignFile> files = foreign_files(input_, map);
+    for (const ForeignFile& file : files) require_no_input(output_, {file.path, map_});
+    return import_log(files, map, output_);
+  }
+  if (!map.files.empty())
+    throw FormatError(map_, "", "key files belongs to kind: log; name the file in the command");
+  require_input();
+  require_frf_output(output_);
+  return write_imported(output_, import_frf(read_foreign_arrays(input_), map), input_, {});
+}
+
+void ImportCommand::require_input() const {
+  if (input_.empty()) throw std::invalid_argument("FILE is missing; name the file to import");
+}
+
 void ImportCommand::run() const {
-  if (output_.empty()) return list();
-  require_no_input(output_, {input_, map_});
-  if (is_uff_name(input_) && output_.extension() == ".json") {
+  if (output_.empty()) {
+    require_input();
+    return list();
+  }
+  ImportSummary summary;
+  if (!map_.empty()) {
+    summary = import_with_map();
+  } else if (require_input(); is_uff_name(input_) && output_.extension() == ".json") {
+    require_no_input(output_, {input_});
     write_modes(output_, candidates_of(input_, read_uff(input_)));
-  } else if (map_.empty()) {
-    require_frf_output(output_);
-    write_imported(output_, read_foreign_frf(input_, output_), input_);
   } else {
-    const ImportMap map = read_import_map(map_);
-    if (map.kind == ImportMap::Kind::log) {
-      import_log(read_arrays(input_), map, output_);
-    } else {
-      require_frf_output(output_);
-      write_imported(output_, import_frf(read_arrays(input_), map), input_);
-    }
+    require_no_input(output_, {input_});
+    require_frf_output(output_);
+    std::vector<std::string> notes;
+    FrfEstimate frf = read_foreign_frf(input_, output_, notes);
+    summary = write_imported(output_, std::move(frf), input_, std::move(notes));
   }
   const auto bytes = std::filesystem::file_size(output_);
+  for (const std::string& line : summary.lines) console_.result(line);
   console_.result(fmt::format("wrote {}, {} bytes", output_.string(), bytes));
-  console_.result({{"output", output_.string()}, {"bytes", bytes}});
+  nlohmann::ordered_json json = {{"output", output_.string()}, {"bytes", bytes}};
+  json.update(summary.json);
+  console_.result(json);
 }
 
 }  // namespace stageid

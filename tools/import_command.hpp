@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "tools/console.hpp"
+#include "tools/import_summary.hpp"
 
 namespace stageid {
 
@@ -16,6 +17,8 @@ class ImportCommand {
  private:
   void run() const;
   void list() const;
+  void require_input() const;
+  ImportSummary import_with_map() const;
 
   Console& console_;
   std::filesystem::path input_;

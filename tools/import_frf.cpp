@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "excitation/file_error.hpp"
+#include "tools/import_rate.hpp"
 
 namespace stageid {
 namespace {
@@ -108,6 +109,35 @@ Complex polar_of(const ArrayList& arrays, const ImportMap::Channel& channel) {
   return values;
 }
 
+double scalar_of(const ArrayList& arrays, const ImportMap::Scalar& scalar) {
+  if (scalar.number) return *scalar.number;
+  const std::vector<double> values = real_values(arrays, arrays.at(scalar.variable));
+  if (values.size() != 1)
+    throw FormatError(arrays.file, scalar.variable,
+                      fmt::format("has {} values; expected one number", values.size()));
+  return values.front();
+}
+
+/// As many as the response has lines.
+std::vector<double> even_frequencies(const ArrayList& arrays, const ImportMap& map) {
+  const double first = scalar_of(arrays, map.first_hz), step = scalar_of(arrays, map.step_hz);
+  if (!(step > 0.0)) fail(map, fmt::format("step_hz: {} is not positive; correct it", step));
+  const ImportMap::Channel* channel = map.channels.empty() ? nullptr : &map.channels.front();
+  const NamedArray& array = arrays.at(channel == nullptr            ? map.response
+                                      : !channel->response.empty()  ? channel->response
+                                      : !channel->magnitude.empty() ? channel->magnitude
+                                                                    : channel->real);
+  std::size_t lines = array.size();
+  if (channel == nullptr && !map.axes.empty()) {
+    const std::size_t place = axis_places(map).front();
+    lines = place < array.shape.size() ? array.shape[place] : 1;
+  }
+  std::vector<double> frequency;
+  for (std::size_t k = 0; k < lines; ++k)
+    frequency.push_back(first + static_cast<double>(k) * step);
+  return frequency;
+}
+
 void read_whole_response(const ArrayList& arrays, const ImportMap& map, FrfEstimate& frf) {
   const auto lines = static_cast<std::size_t>(frf.lines());
   NamedArray array = arrays.at(map.response);
@@ -178,7 +208,10 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
 
 FrfEstimate import_frf(const ArrayList& arrays, const ImportMap& map) {
   FrfEstimate frf;
-  const std::vector<double> frequency = real_values(arrays, arrays.at(map.frequency));
+  if (map.sample_rate_hz > 0.0) (void)sample_rate_of(arrays, map);  // the file's must agree
+  const std::vector<double> frequency = map.frequency.empty()
+                                            ? even_frequencies(arrays, map)
+                                            : real_values(arrays, arrays.at(map.frequency));
   frf.frequency_hz = Eigen::Map<const Eigen::VectorXd>(frequency.data(),
                                                        static_cast<Eigen::Index>(frequency.size()));
   if (map.frequency_unit == ImportMap::FrequencyUnit::rad_s)

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <set>
 #include <sstream>
 
 #include "excitation/counted.hpp"
@@ -38,6 +39,18 @@ void describe_signals(ConfigVisitor& v, ImportMap::Signals& signals) {
           "arrays of samples, or of samples x channels");
   v.texts("names", signals.names, {1}, kOptional,
           "of the channels; those of the arrays if left out");
+  v.texts("axes", signals.axes, {1, 5}, kOptional,
+          "of the arrays in their order: sample, channel, realization, experiment, run");
+  static const std::set<std::string> kAxes = {"sample", "channel", "realization", "experiment",
+                                              "run"};
+  const std::set<std::string> axes(signals.axes.begin(), signals.axes.end());
+  v.require(axes.size() == signals.axes.size() && (axes.empty() || axes.contains("sample")) &&
+                std::includes(kAxes.begin(), kAxes.end(), axes.begin(), axes.end()) &&
+                !(axes.contains("run") && axes.contains("realization")) &&
+                !(axes.contains("run") && axes.contains("experiment")),
+            "arrays",
+            "axes name sample, and at most once each channel, realization and experiment or run; "
+            "write for example axes: [sample, channel, run]");
   v.text("unit", signals.unit, kOptional, "one, or one a channel with blanks between");
   v.numbers("scale", signals.scale, {}, {1}, kOptional,
             "unit over number in the file, one a channel");
@@ -65,8 +78,24 @@ void require_another_run(ConfigVisitor& v, const std::vector<ImportMap::Run>& ru
                         place + 1, runs.size(), last.realization, last.experiment));
 }
 
+void describe_scalar(ConfigVisitor& v, const char* key, ImportMap::Scalar& scalar,
+                     const char* help) {
+  FlexibleValue value;
+  value.word = scalar.variable;
+  FlexibleRule rule;
+  rule.number = true;
+  rule.any_text = true;
+  rule.text_meaning = "the name of a variable";
+  rule.rule = not_negative("Hz");
+  v.flexible(key, value, rule, kOptional, help);
+  scalar.variable = value.word;
+  if (!value.numbers.empty()) scalar.number = value.numbers.front();
+}
+
 void describe_frf(ConfigVisitor& v, ImportMap& map) {
   v.text("frequency", map.frequency, kOptional, "array of frequencies");
+  describe_scalar(v, "first_hz", map.first_hz, "first frequency of an even axis, or its variable");
+  describe_scalar(v, "step_hz", map.step_hz, "its step, or the variable that holds it");
   choose(v, "frequency_unit", map.frequency_unit, {"Hz", "rad/s"}, kOptional, "of the frequencies");
   v.text("response", map.response, kOptional, "array of the response, complex or its real part");
   v.text("response_imaginary", map.response_imaginary, kOptional, "array of its imaginary part");
@@ -110,7 +139,6 @@ void describe_log(ConfigVisitor& v, ImportMap& map) {
 
 void require_keys(ConfigVisitor& v, const ImportMap& map) {
   if (map.kind == ImportMap::Kind::log) {
-    v.require(map.sample_rate_hz > 0.0, "kind", "a log needs sample_rate_hz; add it");
     v.require(map.period_samples > 0, "kind", "a log needs period_samples; add it");
     v.require(!map.excitation.arrays.empty(), "kind",
               "a log needs excitation: {arrays: [...]}; add it");
@@ -119,7 +147,15 @@ void require_keys(ConfigVisitor& v, const ImportMap& map) {
     v.require(!map.sensors.arrays.empty(), "kind", "a log needs sensors: {arrays: [...]}; add it");
     return;
   }
-  v.require(!map.frequency.empty(), "kind", "a frequency response needs frequency; add it");
+  const bool even = !map.first_hz.empty() || !map.step_hz.empty();
+  v.require(map.frequency.empty() == even, "kind",
+            map.frequency.empty()
+                ? "a frequency response needs frequency, or first_hz and step_hz; add it"
+                : "a frequency response has either frequency, or first_hz and step_hz; remove one");
+  v.require(!even || (!map.first_hz.empty() && !map.step_hz.empty()), "kind",
+            "first_hz and step_hz belong together; add the other one");
+  v.require(!even || map.frequency_unit == ImportMap::FrequencyUnit::hz, "kind",
+            "first_hz and step_hz are in Hz; remove frequency_unit");
   v.require(map.response.empty() != map.channels.empty(), "kind",
             "a frequency response needs either response or channels; add one of them");
   for (const auto name : {&ImportMap::Channel::noise_variance, &ImportMap::Channel::total_variance})
@@ -151,7 +187,13 @@ ImportMap read_import_map(const std::filesystem::path& file) {
   const YamlDocument document = YamlDocument::read(file);
   read_config(document, [&map](ConfigVisitor& v) {
     choose(v, "kind", map.kind, {"frf", "log"}, Presence::required, "what the file holds");
-    v.number("sample_rate_hz", map.sample_rate_hz, {"Hz", 0.0}, kOptional, "0: unknown");
+    v.text("files", map.files, kOptional,
+           "pattern of the files of a log, such as run_{realization}_{experiment}.mat, from the "
+           "folder of the map");
+    v.number("sample_rate_hz", map.sample_rate_hz, {"Hz", 0.0}, kOptional,
+             "0: unknown; a log takes that of the file");
+    choose(v, "file_sample_rate", map.file_sample_rate, {"checked", "ignored"}, kOptional,
+           "ignored: the file's own sample rate or time axis is known to be wrong");
     describe_frf(v, map);
     describe_log(v, map);
     require_keys(v, map);

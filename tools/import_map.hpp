@@ -2,17 +2,20 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace stageid {
 
 /// What a map says about a foreign file: which of its arrays are what. Names are those of variables,
-/// datasets or columns; fields of structs are "struct/field" or "struct.field".
+/// datasets or columns; fields of structs are "struct/field" or "struct.field". In names of files and of a
+/// log's arrays {realization} and {experiment} stand for numbers.
 struct ImportMap {
   enum class Kind : std::uint8_t { frf, log };
   enum class FrequencyUnit : std::uint8_t { hz, rad_s };
   enum class FrfHold : std::uint8_t { none, zoh };
+  enum class FileSampleRate : std::uint8_t { checked, ignored };
   enum class ExcitationPeriod : std::uint8_t { repeats, mean };
 
   /// One channel of a response that is not in one array: values, or real and imaginary part, or magnitude
@@ -28,17 +31,29 @@ struct ImportMap {
     std::vector<std::string> names;  ///< empty: those of the arrays
     std::string unit;                ///< see units_of()
     std::vector<double> scale;       ///< empty: 1; unit = scale x number in the file
+    std::vector<std::string>
+        axes;  ///< of every array: sample, channel, realization, experiment, run
   };
   struct Run {
     std::int64_t realization = 0, experiment = 0, first_row = 0;
     std::int64_t rows = 0;  ///< 0: to the end
   };
 
+  /// A number, or the variable of the file that holds it.
+  struct Scalar {
+    std::optional<double> number;
+    std::string variable;
+    bool empty() const noexcept { return !number && variable.empty(); }
+  };
+
   std::filesystem::path file;
+  std::string files;  ///< pattern of the files, one or more runs each; relative to the map
   Kind kind = Kind::frf;
-  double sample_rate_hz = 0.0;  ///< 0: unknown (FRF only)
+  double sample_rate_hz = 0.0;  ///< 0: unknown; a log takes that of the file
+  FileSampleRate file_sample_rate = FileSampleRate::checked;
 
   std::string frequency;
+  Scalar first_hz, step_hz;  ///< in the place of `frequency`
   FrequencyUnit frequency_unit = FrequencyUnit::hz;
   FrfHold hold = FrfHold::none;
   std::string response, response_imaginary, noise_variance, total_variance;

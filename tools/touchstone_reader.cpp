@@ -19,6 +19,8 @@ enum class Form : unsigned char { real_imaginary, magnitude_angle, decibel_angle
 struct Options {
   double unit_hz = 1e9;
   Form form = Form::magnitude_angle;
+  char parameters = 'S';
+  double reference_ohm = 50.0;
 };
 
 int ports_of(const std::filesystem::path& file) {
@@ -30,6 +32,15 @@ int ports_of(const std::filesystem::path& file) {
   if (!std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c); }))
     return 0;
   return std::stoi(digits);
+}
+
+double read_reference(const TextLines& lines, std::istringstream& words) {
+  std::string word;
+  words >> word;
+  const std::optional<double> value = parse_number(word);
+  if (!value || !(*value > 0.0))
+    lines.fail(fmt::format("'{}' is not a reference resistance. Write for example R 50", word));
+  return *value;
 }
 
 Options read_options(const TextLines& lines, std::string_view line) {
@@ -47,11 +58,62 @@ Options read_options(const TextLines& lines, std::string_view line) {
     else if (kForms.contains(word))
       options.form = kForms.at(word);
     else if (word == "R")
-      words >> word;
-    else if (std::string("SYZGH").find(word) == std::string::npos)
-      lines.fail(fmt::format("option '{}' is none of Touchstone 1", word));
+      options.reference_ohm = read_reference(lines, words);
+    else if (word.size() == 1 && std::string("SYZGH").find(word) != std::string::npos)
+      options.parameters = word.front();
+    else
+      lines.fail(
+          fmt::format("unknown Touchstone option '{}'. Use HZ, KHZ, MHZ or GHZ, S, Y, Z, G "
+                      "or H, RI, MA or DB, and R with the reference resistance",
+                      word));
   }
   return options;
+}
+
+/// What the ports' outputs and inputs are, so that their ratio has the unit of the parameters.
+struct Quantities {
+  std::vector<std::string> outputs, inputs;  ///< V or A; S: 1
+
+  /// Version 1 divides an impedance by the reference resistance and multiplies an admittance with it.
+  int power_of_ohm(Eigen::Index output, Eigen::Index input) const {
+    const std::string& o = outputs.at(static_cast<std::size_t>(output));
+    const std::string& i = inputs.at(static_cast<std::size_t>(input));
+    return o == i ? 0 : o == "V" ? 1 : -1;
+  }
+};
+
+Quantities quantities_of(const TextLines& lines, char parameters, int ports) {
+  const auto all = [ports](const char* unit) {
+    return std::vector<std::string>(static_cast<std::size_t>(ports), unit);
+  };
+  const bool hybrid = parameters == 'H' || parameters == 'G';
+  if (hybrid && ports != 2)
+    lines.fail(fmt::format("{} parameters have two ports, not {}; name a two-port file .s2p",
+                           parameters, ports));
+  switch (parameters) {
+    case 'Z':
+      return {all("V"), all("A")};
+    case 'Y':
+      return {all("A"), all("V")};
+    case 'H':
+      return {{"V", "A"}, {"A", "V"}};
+    case 'G':
+      return {{"A", "V"}, {"V", "A"}};
+    default:
+      return {all("1"), all("1")};
+  }
+}
+
+std::string note_of(const Options& options) {
+  static const std::map<char, const char*> kTaken = {
+      {'Z', "multiplied by the reference resistance {} ohm: V/A (ohm)"},
+      {'Y', "divided by the reference resistance {} ohm: A/V (S)"},
+      {'H', "rescaled by the reference resistance {} ohm: h11 in V/A (ohm), h22 in A/V (S)"},
+      {'G', "rescaled by the reference resistance {} ohm: g11 in A/V (S), g22 in V/A (ohm)"}};
+  const auto found = kTaken.find(options.parameters);
+  if (found == kTaken.end()) return {};
+  return fmt::format("{} parameters {}", options.parameters,
+                     fmt::format(fmt::runtime(found->second), options.reference_ohm));
 }
 
 std::complex<double> value_of(double a, double b, Form form) {
@@ -90,9 +152,10 @@ std::size_t lines_of(const TextLines& lines, const std::vector<double>& numbers,
 
 bool is_touchstone(const std::filesystem::path& file) { return ports_of(file) > 0; }
 
-FrfEstimate read_touchstone(const std::filesystem::path& file) {
+TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
   TextLines lines(file);
   const int ports = ports_of(file);
+  bool seen = false;
   if (ports < 1) lines.fail("the ending tells no number of ports; write .s1p, .s2p, ...");
   Options options;
   std::vector<double> numbers;
@@ -100,20 +163,24 @@ FrfEstimate read_touchstone(const std::filesystem::path& file) {
     std::string_view line = lines.next();
     line = trimmed(line.substr(0, line.find('!')));
     if (line.starts_with('[')) lines.fail("is Touchstone 2; write Touchstone 1 instead");
-    if (line.starts_with('#'))
-      options = read_options(lines, line);
-    else
+    if (line.starts_with('#')) {
+      // Later option lines are ignored: specification, section "Option Line".
+      if (!seen) options = read_options(lines, line);
+      seen = true;
+    } else {
       append_numbers(lines, line, numbers);
+    }
   }
+  const Quantities quantities = quantities_of(lines, options.parameters, ports);
   const auto n = static_cast<Eigen::Index>(ports);
   const std::size_t step = 1 + 2 * static_cast<std::size_t>(n * n);
   const std::size_t count = lines_of(lines, numbers, step, ports);
   FrfEstimate frf;
   for (int port = 1; port <= ports; ++port) {
     frf.inputs.names.push_back(fmt::format("port{}", port));
-    frf.inputs.units.emplace_back("1");
+    frf.inputs.units.push_back(quantities.inputs.at(static_cast<std::size_t>(port - 1)));
   }
-  frf.outputs = frf.inputs;
+  frf.outputs = {frf.inputs.names, quantities.outputs};
   frf.frequency_hz.resize(static_cast<Eigen::Index>(count));
   frf.response.resize(n * n, static_cast<Eigen::Index>(count));
   for (std::size_t k = 0; k < count; ++k) {
@@ -123,10 +190,12 @@ FrfEstimate read_touchstone(const std::filesystem::path& file) {
       const std::size_t at = k * step + 1 + 2 * static_cast<std::size_t>(q);
       // Row by row, but for two ports: 11, 21, 12, 22.
       const Eigen::Index channel = ports == 2 ? q : q / n + n * (q % n);
-      frf.response(channel, line) = value_of(numbers[at], numbers[at + 1], options.form);
+      frf.response(channel, line) =
+          value_of(numbers[at], numbers[at + 1], options.form) *
+          std::pow(options.reference_ohm, quantities.power_of_ohm(channel % n, channel / n));
     }
   }
-  return frf;
+  return {std::move(frf), note_of(options)};
 }
 
 }  // namespace stageid

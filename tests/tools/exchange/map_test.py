@@ -1,0 +1,320 @@
+#!/usr/bin/python3
+"""Logs of other programs through maps: several runs in arrays, names and files; units; sample rates; advice.
+
+    map_test.py PROGRAM WORK_DIR
+"""
+
+import json
+import sys
+import unittest
+
+import h5py
+import numpy as np
+import scipy.io
+
+from exchange_test import WORK, Case
+from import_test import uff_function, write_map
+
+P, PERIODS = 50, 4
+M, E = 3, 2  # realizations, experiments
+
+
+def signals(seed=4, experiments=E):
+    """r: realization x experiment x period x 2 channels; u, y: x samples x 2 and 3 channels."""
+    g = np.random.default_rng(seed)
+    r = g.normal(size=(M, experiments, P, 2))
+    return r, g.normal(size=(M, experiments, P * PERIODS, 2)), g.normal(size=(M, experiments, P * PERIODS, 3))
+
+
+HEAD = f"kind: log\nsample_rate_hz: 100\nperiod_samples: {P}\ntransient_periods: 1\n"
+NAMES = ("names: [r1, r2], unit: N", "names: [a1, a2], unit: N", "names: [z1, z2, z3], unit: m")
+
+
+def log_map(arrays, axes=("", "", ""), names=NAMES, more="", head=HEAD):
+    text = head
+    for key, array, axis, name in zip(("excitation", "actuators", "sensors"), arrays, axes, names):
+        text += f"{key}: {{arrays: [{array}], {name}{', axes: [' + axis + ']' if axis else ''}}}\n"
+    write_map(text + more)
+
+
+def runs_of(name="run.h5"):
+    """(realization, experiment) -> excitation, actuators, sensors."""
+    with h5py.File(WORK / name) as f:
+        return {(int(run.attrs["realization"]), int(run.attrs["experiment"])):
+                tuple(run[key][()] for key in ("excitation", "actuators", "sensors")) for run in f["runs"].values()}
+
+
+class SeveralRuns(Case):
+    def expect(self, r, u, y, experiments=E):
+        runs = runs_of()
+        self.assertEqual(set(runs), {(m, e) for m in range(M) for e in range(experiments)})
+        for (m, e), run in runs.items():
+            for found, given in zip(run, (r[m, e], u[m, e], y[m, e])):
+                np.testing.assert_array_equal(found, given)
+
+    def test_arrays_of_three_axes_in_any_order(self):
+        r, u, y = signals(experiments=1)
+        for order in (("sample", "channel", "run"), ("run", "sample", "channel"), ("channel", "run", "sample")):
+            with self.subTest(order):
+                place = [("run", "sample", "channel").index(name) for name in order]
+                arrays = [np.transpose(a[:, 0], place) for a in (r, u, y)]
+                scipy.io.savemat(WORK / "x.mat", dict(zip("ruy", arrays)))
+                np.savez(WORK / "x.npz", **dict(zip("ruy", arrays)))
+                log_map("ruy", [", ".join(order)] * 3)
+                for name in ("x.mat", "x.npz"):
+                    self.succeed("import", name, "-o", "run.h5", "--map", "map.yaml")
+                    self.expect(r, u, y, 1)
+
+    def test_axes_of_realizations_and_experiments(self):
+        r, u, y = signals()
+        np.savez(WORK / "x.npz", r=np.transpose(r, (2, 3, 1, 0)), u=np.transpose(u, (2, 3, 1, 0)), y=y)
+        log_map("ruy", ["sample, channel, experiment, realization"] * 2 + ["realization, experiment, sample, channel"])
+        self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml")
+        self.expect(r, u, y)
+
+    def test_one_excitation_for_all_runs_and_arrays_without_channels(self):
+        r, u, y = signals(experiments=1)
+        np.savez(WORK / "x.npz", r=r[0, 0, :, 0], u=u[:, 0, :, 0], y=y[:, 0, :, 0].T)
+        log_map("ruy", ["", "run, sample", "sample, run"], ["unit: N", "unit: N", "unit: m"])
+        self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml")
+        for (m, _), (period, actuators, sensors) in runs_of().items():
+            np.testing.assert_array_equal(period, r[0, 0, :, :1])
+            np.testing.assert_array_equal(actuators, u[m, 0, :, :1])
+            np.testing.assert_array_equal(sensors, y[m, 0, :, :1])
+
+    def test_an_axis_of_runs_with_their_numbers(self):
+        r, u, y = signals()
+        flat = [a.reshape(M * E, *a.shape[2:]) for a in (r, u, y)]
+        np.savez(WORK / "x.npz", **dict(zip("ruy", flat)))
+        entries = ", ".join(f"{{realization: {m}, experiment: {e}}}" for m in range(M) for e in range(E))
+        log_map("ruy", ["run, sample, channel"] * 3, more=f"runs: [{entries}]\n")
+        self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml")
+        self.expect(r, u, y)
+        log_map("ruy", ["run, sample, channel"] * 3, more="runs: [{realization: 0}]\n")
+        self.refuse("runs: 1 entry; axis run has 6", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_a_file_per_run(self):
+        r, u, y = signals()
+        for m in range(M):
+            for e in range(E):
+                scipy.io.savemat(WORK / f"run_{m + 1}_{e + 1:02}.mat", {"r": r[m, e], "u": u[m, e], "y": y[m, e]})
+        scipy.io.savemat(WORK / "run_of_yesterday.mat", {"x": 1.0})
+        log_map("ruy")
+        self.succeed("import", "run_{realization}_{experiment}.mat", "-o", "run.h5", "--map", "map.yaml")
+        self.expect(r, u, y)
+        log_map("ruy", more="files: run_{realization}_{experiment}.mat\n")
+        self.succeed("import", "-o", "run.h5", "--map", "map.yaml")
+        self.expect(r, u, y)
+        self.refuse("leave FILE or the key files out", "import", "run_1_01.mat", "-o", "n.h5", "--map", "map.yaml")
+        (WORK / "run_3_02.mat").unlink()
+        shown = self.succeed("import", "-o", "run.h5", "--map", "map.yaml").stdout
+        self.assertIn("missing: realization 3, experiment 2 (counted from 1)", shown)
+        log_map("ruy", more="files: none_{realization}.mat\n")
+        self.refuse("no file matches this pattern", "import", "-o", "n.h5", "--map", "map.yaml", code=1)
+        log_map("ruy")
+        self.refuse("no file to import", "import", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_folders_with_numbers_and_several_runs_in_a_file(self):
+        r, u, y = signals()
+        for m in range(M):
+            (WORK / f"day{m + 10}").mkdir()
+            np.savez(WORK / f"day{m + 10}" / "all.npz", r=r[m], u=u[m], y=y[m])
+        log_map("ruy", ["experiment, sample, channel"] * 3)
+        self.succeed("import", "day{realization}/all.npz", "-o", "run.h5", "--map", "map.yaml")
+        self.expect(r, u, y)
+        log_map("ruy", ["realization, sample, channel"] * 3)
+        self.refuse("told by the name of its file and by axis realization; keep one",
+                    "import", "day{realization}/all.npz", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_an_array_per_run(self):
+        r, u, y = signals()
+        names = [f"{key}/{m + 1}_{e + 1}" for key in "ruy" for m in range(M) for e in range(E)]
+        values = [a[m, e] for a in (r, u, y) for m in range(M) for e in range(E)]
+        with h5py.File(WORK / "x.h5", "w") as f:
+            for name, value in zip(names, values):
+                f[name] = value
+        log_map([f'"{key}/{{realization}}_{{experiment}}"' for key in "ruy"])
+        self.succeed("import", "x.h5", "-o", "run.h5", "--map", "map.yaml")
+        self.expect(r, u, y)
+        with h5py.File(WORK / "x.h5", "a") as f:
+            del f["u/2_1"]
+        self.refuse("has no 'u/{realization}_{experiment}' of realization 2 experiment 1",
+                    "import", "x.h5", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_axes_that_are_missing_or_wrong(self):
+        r, u, y = signals(experiments=1)
+        np.savez(WORK / "x.npz", r=r[0, 0], u=u[:, 0], y=y[:, 0])
+        log_map("ruy")
+        self.refuse("u: is 3 x 200 x 2. Name its axes in the map: actuators: {arrays: [u], axes: [sample, channel, run]}",
+                    "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        for axes in ("sample, wurst", "channel, run", "sample, run, realization"):
+            log_map("ruy", ["", axes, ""])
+            self.refuse("write for example axes: [sample, channel, run]", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        log_map("ruy", ["", "run, sample, channel", "run, sample"])
+        self.refuse("is 3 x 200 x 3; axes: [run, sample] names 2 axes", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+
+
+class Advice(Case):
+    def test_runs_that_follow_one_another(self):
+        """The excitation repeats piece by piece: the pieces are runs, and it was not measured."""
+        r, u, y = signals()
+        whole = [np.concatenate([np.tile(r[m, e], (PERIODS, 1)) for m in range(M) for e in range(E)])]
+        whole += [a.reshape(-1, a.shape[-1]) for a in (u, y)]
+        np.savez(WORK / "x.npz", **dict(zip("ruy", whole)))
+        for more in ("", "excitation_period: mean\n"):
+            log_map("ruy", more=more)
+            error = self.refuse("excitation: it changes at row 200 and repeats from there on; 6 runs follow one another. "
+                                "Add the key runs: [{realization: ..., experiment: ..., first_row: 0, rows: 200}, "
+                                "{realization: ..., experiment: ..., first_row: 200, rows: 200}",
+                                "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+            self.assertNotIn("excitation_period", error)
+        entries = ", ".join(f"{{realization: {k // E}, experiment: {k % E}, first_row: {200 * k}, rows: 200}}"
+                            for k in range(M * E))
+        log_map("ruy", more=f"runs: [{entries}]\n")
+        self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml")
+        np.testing.assert_array_equal(runs_of()[2, 1][1], u[2, 1])
+
+    def test_rows_that_are_not_whole_periods(self):
+        r, u, y = signals()
+        np.savez(WORK / "x.npz", r=r[0, 0], u=u[0, 0, :170], y=y[0, 0, :170])
+        log_map("ruy")
+        self.refuse("170 rows, which are not all whole periods of period_samples: 50. Add the key runs with "
+                    "{first_row: 0, rows: 150} to take 3 periods", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        np.savez(WORK / "x.npz", r=r[0, 0], u=u[0, 0, :50], y=y[0, 0, :50])
+        error = self.refuse("1 whole period of period_samples: 50; 1 transient period and at least one more are needed. "
+                            "Correct transient_periods or period_samples",
+                            "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        self.assertNotIn("runs", error)
+
+
+class Units(Case):
+    def one(self, units=("N", "N", "m"), more="", rate="sample_rate_hz: 100\n", **arrays):
+        r, u, y = signals()
+        np.savez(WORK / "x.npz", r=r[0, 0, :, 0], u=u[0, 0, :, 0], y=y[0, 0, :, 0], **arrays)
+        log_map("ruy", names=[f"unit: {unit}" for unit in units], more=more, head=HEAD.replace("sample_rate_hz: 100\n", rate))
+        return y[0, 0, :, :1]
+
+    def test_prefixes_become_si_with_a_message(self):
+        for unit, si, factor in (("um", "m", 1e-6), ("\u00b5m", "m", 1e-6), ("nm", "m", 1e-9), ("mm", "m", 1e-3),
+                                 ("kN", "N", 1e3), ("mN", "N", 1e-3), ("mA", "A", 1e-3), ("mV", "V", 1e-3),
+                                 ("mrad", "rad", 1e-3), ("deg", "rad", np.pi / 180), ("mm/s^2", "m/s^2", 1e-3),
+                                 ("um/ms", "m/s", 1e-3), ("in", "m", 0.0254), ("cm^2", "m^2", 1e-4)):
+            with self.subTest(unit):
+                y = self.one(("N", "N", unit))
+                shown = self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml").stdout
+                self.assertIn(f"sensors: {unit} converted to {si}, factor {factor:.10g}", shown)
+                np.testing.assert_allclose(runs_of()[0, 0][2], y * factor, rtol=1e-15)
+                with h5py.File(WORK / "run.h5") as f:
+                    self.assertEqual(f["channels/sensors"].attrs["unit"], si)
+
+    def test_si_units_and_unknown_words_stay(self):
+        for unit in ("m", "m/s^2", "Nm", "rad", "counts", "kg", "T", "m/s2"):
+            y = self.one(("N", "N", unit))
+            shown = self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml").stdout
+            self.assertNotIn("converted", shown)
+            np.testing.assert_array_equal(runs_of()[0, 0][2], y)
+            with h5py.File(WORK / "run.h5") as f:
+                self.assertEqual(f["channels/sensors"].attrs["unit"], unit)
+        self.one(("N", "N", "g"))
+        self.refuse("sensors: unit 'g': 'g' is a gram or the acceleration of gravity. Write kg, or m/s^2",
+                    "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_of_a_frequency_response(self):
+        G = np.arange(1, 13).reshape(3, 2, 2) * (1 + 2j)
+        np.savez(WORK / "x.npz", f=[1.0, 2.0, 3.0], G=G, V=abs(G) ** 2)
+        write_map("kind: frf\nfrequency: f\nresponse: G\nnoise_variance: V\naxes: [line, output, input]\n"
+                  "output_unit: um mrad\ninput_unit: N kN\n")
+        shown = self.succeed("import", "x.npz", "-o", "back.h5", "--map", "map.yaml").stdout
+        self.assertIn("outputs: um converted to m, factor 1e-06", shown)
+        self.assertIn("inputs: kN converted to N, factor 1000", shown)
+        factor = np.array([1e-6, 1e-3])[:, None] / np.array([1.0, 1e3])
+        with h5py.File(WORK / "back.h5") as f:
+            np.testing.assert_allclose(f["response"][()], G * factor, rtol=1e-15)
+            np.testing.assert_allclose(f["noise_variance"][()], abs(G) ** 2 * factor**2, rtol=1e-15)
+            self.assertEqual(list(f["outputs"].attrs["unit"]), ["m", "rad"])
+        (WORK / "x.unv").write_bytes(uff_function(G[:, 0, 0], (1, 3), (1, 3), np.arange(1.0, 4.0), binary="<")
+                                     .replace(b"NONE                 NONE", b"NONE                 mm  ", 1))
+        shown = self.succeed("import", "x.unv", "-o", "back.h5").stdout
+        self.assertIn("outputs: mm converted to m, factor 0.001", shown)
+
+    def test_the_rate_of_the_map_is_that_of_the_file(self):
+        for name, value in (("fs", 65536.0), ("dt", 1 / 65536), ("sample_rate_hz", 65536.0), ("time", np.arange(200) / 65536)):
+            with self.subTest(name):
+                self.one(rate="sample_rate_hz: 1000\n", **{name: value})
+                self.refuse(f"sample_rate_hz: 1000 contradicts 65536 Hz, which '{name}' of x.npz says. Correct "
+                            "sample_rate_hz, or write file_sample_rate: ignored",
+                            "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+                self.one(rate="sample_rate_hz: 1000\nfile_sample_rate: ignored\n", **{name: value})
+                self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml")
+                self.one(rate="", **{name: value})
+                self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml")
+                with h5py.File(WORK / "run.h5") as f:
+                    self.assertEqual(f.attrs["sample_rate_hz"], 65536)
+        self.one(rate="")
+        self.refuse("needs sample_rate_hz", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+
+    def test_the_rate_of_a_universal_file(self):
+        r, u, y = signals()
+        time = np.arange(200) / 65536
+        channels = [np.tile(r[0, 0, :, 0], PERIODS), u[0, 0, :, 0], y[0, 0, :, 0]]
+        (WORK / "x.uff").write_bytes(b"".join(uff_function(c, (0, 0), (k + 1, 3), time, kind=1, binary="<")
+                                              for k, c in enumerate(channels)))
+        arrays = ['"1+Z"', '"2+Z"', '"3+Z"']
+        log_map(arrays, names=["unit: N"] * 3, head=HEAD.replace("100", "1000"))
+        self.refuse("contradicts 65536 Hz", "import", "x.uff", "-o", "n.h5", "--map", "map.yaml")
+        log_map(arrays, names=["unit: N"] * 3, head=HEAD.replace("100", "65536"))
+        self.succeed("import", "x.uff", "-o", "run.h5", "--map", "map.yaml")
+
+
+class Summaries(Case):
+    def test_of_a_log(self):
+        r, u, y = signals()
+        r[:, 0, :, 1] = r[:, 1, :, 0] = 0.0
+        np.savez(WORK / "x.npz", r=r, u=u, y=y)
+        log_map("ruy", ["realization, experiment, sample, channel"] * 3)
+        shown = self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml").stdout
+        for text in ("6 runs: 3 realizations of 2 experiments, 4 periods each (1 transient), 50 samples per period",
+                     "sample rate 100 Hz, duration 12 s in all", "experiment 1 excites r1", "experiment 2 excites r2",
+                     f"a2 {np.sqrt(np.mean(u[..., 1] ** 2)):.4g} N", "wrote run.h5"):
+            self.assertIn(text, shown)
+        told = json.loads(self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml", "--json").stdout)
+        self.assertEqual((told["runs"], told["realizations"], told["experiments"], told["periods"], told["sample_rate_hz"],
+                          told["duration_s"], told["excited"][1]["excites"]), (6, 3, 2, 4, 100.0, 12.0, ["r2"]))
+        np.testing.assert_allclose([c["rms"] for c in told["sensors"]], np.sqrt(np.mean(y**2, axis=(0, 1, 2))), rtol=1e-12)
+
+    def test_of_a_frequency_response(self):
+        frf = self.frf()
+        told = json.loads(self.succeed("import", frf, "-o", "back.h5", "--json").stdout)
+        with h5py.File(frf) as f:
+            self.assertEqual(told["lines"], f["frequency_hz"].shape[0])
+            self.assertEqual(told["band_hz"], [f["frequency_hz"][0], f["frequency_hz"][-1]])
+            rms = np.sqrt(np.mean(abs(f["response"][()]) ** 2, axis=0))
+        np.testing.assert_allclose([c["rms"] for c in told["channels"]], rms.T.ravel(), rtol=1e-12)
+        self.assertTrue(told["noise_variance"])
+
+
+class Frequencies(Case):
+    def test_an_even_axis_by_start_and_step(self):
+        G = np.arange(1, 13).reshape(3, 2, 2) * (1 + 2j)
+        np.savez(WORK / "x.npz", G=np.transpose(G, (1, 2, 0)), f0=0.5, df=0.25)
+        for first, step in (("0.5", "0.25"), ("f0", "df"), ("0.5", "df")):
+            write_map(f"kind: frf\nfirst_hz: {first}\nstep_hz: {step}\nresponse: G\naxes: [output, input, line]\n")
+            self.succeed("import", "x.npz", "-o", "back.h5", "--map", "map.yaml")
+            with h5py.File(WORK / "back.h5") as f:
+                np.testing.assert_array_equal(f["frequency_hz"][()], [0.5, 0.75, 1.0])
+                np.testing.assert_array_equal(f["response"][()], G)
+        (WORK / "x.csv").write_text("re,im\n1,2\n3,4\n5,6\n")
+        write_map("kind: frf\nfirst_hz: 1\nstep_hz: 2\nchannels: [{output: y, input: u, real: re, imaginary: im}]\n")
+        self.succeed("import", "x.csv", "-o", "back.h5", "--map", "map.yaml")
+        with h5py.File(WORK / "back.h5") as f:
+            np.testing.assert_array_equal(f["frequency_hz"][()], [1, 3, 5])
+        for keys, text in (("first_hz: 1\n", "belong together"), ("", "frequency, or first_hz and step_hz; add it"),
+                           ("frequency: f\nfirst_hz: 1\nstep_hz: 1\n", "remove one"),
+                           ("first_hz: 1\nstep_hz: 0\n", "is not positive"), ("first_hz: none\nstep_hz: 1\n", "has no 'none'")):
+            write_map(f"kind: frf\n{keys}response: G\naxes: [output, input, line]\n")
+            self.refuse(text, "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+
+
+if __name__ == "__main__":
+    sys.argv = sys.argv[:1] + sys.argv[3:]
+    unittest.main()

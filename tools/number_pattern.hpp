@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace stageid {
+
+/// The numbers of a run in a name: "run_2_13.mat" of the pattern "run_{realization}_{experiment}.mat".
+struct RunNumbers {
+  std::optional<long long> realization, experiment;
+  friend auto operator<=>(const RunNumbers&, const RunNumbers&) = default;
+};
+
+/// Whether {realization} or {experiment} is in a text.
+bool is_pattern(const std::string& text);
+
+/// The numbers in `text`, which may have leading zeros; nothing where the pattern does not match.
+/// @throws std::invalid_argument if the pattern has a placeholder twice
+std::optional<RunNumbers> match_pattern(const std::string& pattern, const std::string& text);
+
+/// The texts that match, by their numbers.
+/// @throws std::invalid_argument if two of them have the same numbers
+std::map<RunNumbers, std::string> matches_of(const std::string& pattern,
+                                             const std::vector<std::string>& texts);
+
+/// The same for files; folders may have placeholders too.
+std::map<RunNumbers, std::filesystem::path> files_of(const std::filesystem::path& pattern);
+
+}  // namespace stageid
