@@ -12,6 +12,7 @@
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/python/numpy_arrays.hpp"
+#include "tools/python/pickles.hpp"
 #include "tools/submodel_text.hpp"
 
 namespace stageid {
@@ -150,7 +151,8 @@ void define_fit(py::module_& module) {
             return lines_view<double>(r.response_variance, r.model.n_outputs(), self);
           },
           kVarianceDoc)
-      .def_property_readonly("covariance", &covariance_of, kCovarianceDoc);
+      .def_property_readonly("covariance", &covariance_of, kCovarianceDoc)
+      .def(py::pickle([](const FitResult& r) { return state_of(r); }, &fit_of_state));
   module.def("fit", &fit, py::arg("frf"), py::kw_only(), py::arg("band_hz") = py::none(),
              py::arg("modes") = py::none(), py::arg("weighting") = py::none(), py::arg("hold") = "",
              py::arg("delay") = py::none(), py::arg("rigid_body") = py::none(),

@@ -1,10 +1,12 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -20,6 +22,7 @@
 #include "tools/python/frf_texts.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/python/numpy_arrays.hpp"
+#include "tools/python/pickles.hpp"
 #include "tools/python/real_arrays.hpp"
 
 namespace stageid {
@@ -91,6 +94,21 @@ std::vector<std::shared_ptr<LogReader>> logs_of(const py::object& given) {
   return logs;
 }
 
+/// As the program refuses them, but counted as they are given here.
+void require_realizations(const std::vector<const LogReader*>& logs,
+                          const std::vector<int>& realizations) {
+  std::set<int> complete;
+  for (const LogReader* log : logs)
+    for (const LogRun& run : log->runs())
+      if (run.complete) complete.insert(run.realization);
+  for (const int realization : realizations)
+    if (!complete.contains(realization))
+      throw std::invalid_argument(fmt::format(
+          "realizations: {} has no complete run in {}; there are {}. They count from 0 in Python, "
+          "as log[i]['realization'] does, and from 1 in the program",
+          realization, logs.front()->path().string(), fmt::join(complete, ", ")));
+}
+
 FrfHandle frf(const py::object& given, const std::vector<std::string>& inputs,
               const std::vector<std::string>& outputs, const std::vector<int>& realizations,
               std::optional<int> transient_periods, const std::string& method,
@@ -109,6 +127,7 @@ FrfHandle frf(const py::object& given, const std::vector<std::string>& inputs,
   const std::vector<std::shared_ptr<LogReader>> kept = logs_of(given);
   std::vector<const LogReader*> logs;
   for (const auto& log : kept) logs.push_back(log.get());
+  require_realizations(logs, realizations);
   Console silent;
   silent.verbosity = Verbosity::quiet;
   return interruptible([&] {
@@ -217,6 +236,7 @@ void define_frf(py::module_& module) {
         py::arg("outputs") = py::none(), py::arg("input_units") = py::none(),
         py::arg("output_units") = py::none(), py::arg("sample_rate_hz") = 0.0,
         py::arg("hold") = "none", kFrfInitDoc);
+  c.def(py::pickle([](const FrfHandle& frf) { return state_of(frf); }, &frf_of_state));
   define_properties(c);
   c.def("select", &select, py::kw_only(), py::arg("band_hz") = py::none(),
         py::arg("inputs") = py::none(), py::arg("outputs") = py::none(), kSelectDoc);

@@ -14,6 +14,7 @@
 #include "tools/python/bindings.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/python/log_texts.hpp"
+#include "tools/python/pickles.hpp"
 #include "tools/python/real_arrays.hpp"
 #include "tools/python/simulate.hpp"
 
@@ -230,6 +231,7 @@ void define_logs(py::module_& module) {
           py::arg("excitation") = py::none(), py::arg("actuators") = py::none(),
           py::arg("sensors") = py::none(), py::arg("actuator_units") = py::none(),
           py::arg("sensor_units") = py::none(), py::arg("marked") = py::none(), kLogInitDoc);
+  log.def(py::pickle([](const LogReader& of) { return state_of(of); }, &log_of_state));
   define_properties(log);
   log.def(
       "__len__", [](const LogReader& l) { return l.runs().size(); }, "Runs, incomplete ones too");

@@ -15,6 +15,7 @@
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/numpy_arrays.hpp"
+#include "tools/python/pickles.hpp"
 #include "tools/python/real_arrays.hpp"
 
 namespace stageid {
@@ -189,6 +190,7 @@ void define_model(py::module_& module) {
                              "relative_rms_error, band_hz")
       .def_readonly("provenance_json", &Model::provenance_json,
                     "Inputs with their hash, options, versions; JSON")
+      .def(py::pickle([](const Model& m) { return state_of(m); }, &model_of_state))
       .def("response", &response_of, py::arg("frequency_hz"), kResponseDoc)
       .def("modes", &modes_of, kModesDoc)
       .def("state_space", &continuous,

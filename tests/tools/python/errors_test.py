@@ -85,7 +85,11 @@ class Refused(unittest.TestCase):
         self.refuses(stageid.RequestError, "inputs: unknown input 'A1'; did you mean 'a1'", frf.select, inputs=["A1"])
         self.refuses(stageid.RequestError, "outputs: unknown output 'velocity'; there are", frf.select,
                      outputs=["velocity"])
-        self.refuses(stageid.RequestError, "realization 9 has no complete run; counted from 1", stageid.frf, WORK / "run.slog", realizations=[8])
+        self.refuses(stageid.RequestError,
+                     r"realizations: 8 has no complete run in .*run.slog; there are 0, 1, 2.* count from 0 in Python",
+                     stageid.frf, WORK / "run.slog", realizations=[8])
+        self.refuses(stageid.RequestError, "realizations: -1 has no complete run", stageid.frf, WORK / "run.slog",
+                     realizations=[0, -1])
         self.refuses(stageid.RequestError, "covariance_lines|odd", stageid.frf, WORK / "run.slog", covariance_lines=2)
         self.refuses(stageid.FileError, "no.yaml", stageid.frf, WORK / "run.slog", stage=WORK / "no.yaml")
         self.refuses(stageid.RequestError, "max-iterations", stageid.fit, frf, max_iterations=0)

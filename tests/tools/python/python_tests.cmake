@@ -1,5 +1,5 @@
 # The Python package: as the program, its errors, its stub.
-foreach(script module errors stub)
+foreach(script module errors pickle stub)
   add_test(NAME tools.python_${script}
     COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/${script}_test.py
       $<TARGET_FILE:stageid_program> ${PROJECT_BINARY_DIR}/tools/python

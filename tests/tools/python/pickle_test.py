@@ -1,0 +1,97 @@
+#!/usr/bin/python3
+"""Objects of the package go through pickle, copy and deepcopy. Arguments: experiment.py."""
+
+import copy
+import multiprocessing
+import pickle
+import unittest
+
+from experiment import CONFIG, WORK, measure, run_tests
+
+import numpy as np
+
+import stageid
+
+
+def setUpModule():
+    measure()
+
+
+def copies(thing):
+    return (pickle.loads(pickle.dumps(thing)), copy.copy(thing), copy.deepcopy(thing))
+
+
+def half(frf, band_hz):
+    return frf.select(band_hz=band_hz)
+
+
+class Pickles(unittest.TestCase):
+    def same_bytes(self, write, thing):
+        """A copy is written as the same file."""
+        write(thing, "a")
+        for number, other in enumerate(copies(thing)):
+            with self.subTest(number):
+                self.assertIsNot(other, thing)
+                write(other, "b")
+                self.assertEqual((WORK / "b").with_suffix(write.ending).read_bytes(),
+                                 (WORK / "a").with_suffix(write.ending).read_bytes())
+
+    def test_frequency_responses(self):
+        def write(frf, name):
+            stageid.write_frf((WORK / name).with_suffix(".h5"), frf)
+
+        write.ending = ".h5"
+        frf = stageid.frf(WORK / "run.slog", covariance="full")
+        self.same_bytes(write, frf)
+        self.same_bytes(write, stageid.Frf([1.0, 2.0], np.ones((2, 1, 1), complex)))
+        other = pickle.loads(pickle.dumps(frf))
+        self.assertEqual(other.health, frf.health)
+        self.assertIsNone(stageid.Frf([1.0], np.ones((1, 1, 1), complex)).noise_variance)
+
+    def test_fits_and_models(self):
+        def write(model, name):
+            model.save((WORK / name).with_suffix(".json"))
+
+        write.ending = ".json"
+        frf = stageid.read_frf(WORK / "frf.h5")
+        fit = stageid.fit(frf, band_hz=(120, 800), covariance=True)
+        self.same_bytes(write, fit.model)
+        for other in copies(fit):
+            self.assertEqual((other.status, other.message, other.trustworthy, other.cost, other.decisions,
+                              other.removal_cost),
+                             (fit.status, fit.message, fit.trustworthy, fit.cost, fit.decisions, fit.removal_cost))
+            np.testing.assert_array_equal(other.response_variance, fit.response_variance)
+            self.assertEqual(other.covariance["name"], fit.covariance["name"])
+            for key in ("sandwich", "likelihood", "response_variance", "confidence_radius"):
+                np.testing.assert_array_equal(other.covariance[key], fit.covariance[key])
+            np.testing.assert_array_equal(other.model.response([200.0]), fit.model.response([200.0]))
+
+    def test_logs(self):
+        for log in (stageid.simulate(CONFIG), stageid.read_log(WORK / "run.slog")):
+            expected = stageid.frf(log)
+            for other in copies(log):
+                self.assertEqual((len(other), other.sample_rate_hz, other.sensor_units),
+                                 (len(log), log.sample_rate_hz, log.sensor_units))
+                for a, b in zip(other.arrays(), log.arrays()):
+                    np.testing.assert_array_equal(a, b)
+                np.testing.assert_array_equal(stageid.frf(other).response, expected.response)
+
+    def test_a_log_in_memory_keeps_its_marks(self):
+        g = np.random.default_rng(1)
+        marked = np.zeros((1, 1, 200), np.uint8)
+        marked[0, 0, 77] = 1
+        log = stageid.Log(np.ones((1, 1, 50, 1)), g.normal(size=(1, 1, 200, 1)), g.normal(size=(1, 1, 200, 1)),
+                          sample_rate_hz=100.0, marked=marked)
+        for other in copies(log):
+            np.testing.assert_array_equal(other[0]["marked"], log[0]["marked"])
+
+    def test_worker_processes(self):
+        frf = stageid.read_frf(WORK / "frf.h5")
+        with multiprocessing.Pool(2) as pool:
+            low, high = pool.starmap(half, [(frf, (120, 400)), (frf, (400, 800))])
+        np.testing.assert_array_equal(low.response, frf.select(band_hz=(120, 400)).response)
+        np.testing.assert_array_equal(high.frequency_hz, frf.select(band_hz=(400, 800)).frequency_hz)
+
+
+if __name__ == "__main__":
+    run_tests()
