@@ -6,36 +6,44 @@
 
 namespace stageid {
 
+/// Periods of one run that are compared with each other.
+struct ComparedPeriods {
+  std::span<const Eigen::MatrixXcd> spectra;  ///< channels x lines (more columns are ignored)
+  std::span<const Eigen::MatrixXf> samples;   ///< samples x channels, less what all have in common
+  std::span<const int> number;                ///< of each in the run, ascending
+  Eigen::VectorXd frequency_hz;               ///< of the lines, increasing
+  double sample_rate_hz = 0.0;
+};
+
 /// A period that does not belong with the others.
 struct PeriodOutlier {
-  std::size_t period = 0;       ///< position in the span given
-  Eigen::Index channel = 0;     ///< where it stands out most,
-  Eigen::Index first_line = 0;  ///< on lines first_line
-  Eigen::Index last_line = 0;   ///<   ... last_line
-  double ratio = 0.0;           ///< its power of scatter over that of the others there
+  std::size_t period = 0;    ///< position in the span given
+  Eigen::Index channel = 0;  ///< where it stands out most,
+  double low_hz = 0.0;       ///< in this octave
+  double high_hz = 0.0;
+  double ratio = 0.0;  ///< its power of scatter over that of the others there
 };
 
 /// How often a clean run loses a period by chance, at most.
 inline constexpr double kDropByChance = 1e-3;
 
-/// Finds periods with a glitch, a bump or a transient in them by their spectra, worst first.
+/// Finds periods with a glitch, a bump or a transient in them, in ascending order.
 ///
-/// For P periods of stationary Gaussian noise the share of period p in the scatter of a line,
-///   r = |Z_p - Z|^2 / sum_q |Z_q - Z|^2  P / (P - 1),  Z the mean,  P(r > x) = (1 - x)^(P - 2),
-/// whatever the noise's colour, so that -(P - 2) sum ln(1 - r) over the L lines of a band is a sum of
-/// L unit exponentials. What drifts from one end of a period to the other leaks into all lines at once,
-/// as 1/(j omega) where it is slow: that much of each period's deviation is taken out of every band
-/// first, lest its one random number counts as L. A period is an outlier if in some channel and octave (of at least 8 lines)
-/// this sum has a probability below kDropByChance over the number of such tests, and the ratio
-///   (P - 2) sum r / sum (1 - r)  (1 for clean periods)
-/// is above 4: what adds less costs the mean less than a period, and is in its variance. The worst
-/// is taken out and the rest looked at again, as long as less than half is taken and three are left:
-/// of two periods nobody knows which is wrong.
-/// Source: r is a beta variable, as a share of sums of squares (Cochran).
+/// In each channel the periods that lie closest together, more than half, are the core; the next
+/// closest joins it as long as this costs the mean less than to leave it out. A period with g times
+/// the core's noise makes the variance of the mean of n + 1 periods (n + g) / (n + 1)^2, without it
+/// it is 1 / n: it is worth dropping above g = 2 + 1 / n. g is the mean over octaves of the lines.
 ///
-/// `periods`: spectra, channels x lines (more columns are ignored); `frequency_hz`: of the lines,
-/// increasing.
-std::vector<PeriodOutlier> find_outliers(std::span<const Eigen::MatrixXcd> periods,
-                                         const Eigen::VectorXd& frequency_hz);
+/// What is worth dropping must also be no chance. On the lines that cannot be told: what slow noise
+/// is at the ends of a period leaks into all lines at once, and one random number would count as
+/// many. So the record is divided into octaves in time (octave_records()), where nothing leaks, and
+/// in some octave the power of the period over that of the core must have a probability below
+/// kDropByChance over the number of periods, channels and octaves. For Gaussian noise it is F
+/// distributed, with degrees of freedom from the core's own spectrum S,
+///   nu = L (sum S)^2 / (L sum S^2)  of L spectral lines,
+/// of one period where S is smoothed to its resolution, and of the core.
+/// It takes three periods: of two nobody knows which is wrong.
+/// Source: Satterthwaite, Biometrics Bulletin 2 (1946) 110.
+std::vector<PeriodOutlier> find_outliers(const ComparedPeriods& periods);
 
 }  // namespace stageid

@@ -25,11 +25,12 @@ class RunMeasurement {
     // Groups of equal size: a last one of one or two periods could not be judged.
     const int groups = (used.periods + kMostTogether - 1) / kMostTogether;
     together_ = (used.periods + groups - 1) / groups;
-    compare_ = choice == PeriodChoice::consistent;
+    compare_ = choice == PeriodChoice::consistent && together_ >= 3;
     const auto n_lines = static_cast<Eigen::Index>(lines.lines.size());
     const auto n = static_cast<Eigen::Index>(channels.outputs.size() + channels.estimated.size());
     w_.spectra.resize(static_cast<std::size_t>(together_));
     for (Eigen::MatrixXcd& spectrum : w_.spectra) spectrum.resize(n, n_lines);
+    if (compare_) w_.record.resize(static_cast<std::size_t>(together_));
     w_.deviation_re.resize(n);
     w_.deviation_im.resize(n);
     w_.excluded_sum.setZero(w_.dft.length(), static_cast<Eigen::Index>(channels.excluded.size()));
@@ -46,6 +47,7 @@ class RunMeasurement {
     line_spectra(w_.samples.sensors, channels_.outputs, lines_.lines, 0, w_.dft, spectra);
     line_spectra(w_.samples.actuators, channels_.estimated, lines_.lines,
                  static_cast<Eigen::Index>(channels_.outputs.size()), w_.dft, spectra);
+    if (compare_) keep_samples();
     waiting_.push_back(period);
     for (std::size_t c = 0; c < channels_.excluded.size(); ++c)
       w_.excluded_sum.col(static_cast<Eigen::Index>(c)) +=
@@ -66,14 +68,34 @@ class RunMeasurement {
   }
 
  private:
+  /// The period in workspace.samples less the first of those that wait, whose excitation it shares: what
+  /// is left is noise, which a float holds.
+  void keep_samples() {
+    const auto n_y = static_cast<Eigen::Index>(channels_.outputs.size());
+    Eigen::MatrixXd& first = w_.first_samples;
+    Eigen::MatrixXf& kept = w_.record[waiting_.size()];
+    kept.resize(w_.dft.length(), run_.mean.rows());
+    first.resize(kept.rows(), kept.cols());
+    for (Eigen::Index c = 0; c < kept.cols(); ++c) {
+      const Eigen::Ref<const Eigen::VectorXd> samples =
+          c < n_y
+              ? w_.samples.sensors.col(channels_.outputs[static_cast<std::size_t>(c)])
+              : w_.samples.actuators.col(channels_.estimated[static_cast<std::size_t>(c - n_y)]);
+      if (waiting_.empty()) first.col(c) = samples;
+      kept.col(c) = (samples - first.col(c)).cast<float>();
+    }
+  }
+
   void include_waiting() {
     std::vector<char> in(waiting_.size(), 1);
-    if (compare_ && waiting_.size() >= 3) {
-      const Eigen::VectorXd frequency_hz = excited_frequency_hz();
-      for (const PeriodOutlier& outlier :
-           find_outliers(std::span(w_.spectra).first(waiting_.size()), frequency_hz)) {
+    if (compare_) {
+      const ComparedPeriods compared{
+          std::span<const Eigen::MatrixXcd>(w_.spectra).first(waiting_.size()),
+          std::span<const Eigen::MatrixXf>(w_.record).first(waiting_.size()), waiting_,
+          excited_frequency_hz(), used_.log->info().sample_rate_hz};
+      for (const PeriodOutlier& outlier : find_outliers(compared)) {
         in[outlier.period] = 0;
-        run_.drop(waiting_[outlier.period], reason(outlier, frequency_hz));
+        run_.drop(waiting_[outlier.period], reason(outlier));
       }
     }
     std::vector<const Eigen::MatrixXcd*> periods;
@@ -126,7 +148,7 @@ class RunMeasurement {
     return frequency_hz;
   }
 
-  std::string reason(const PeriodOutlier& outlier, const Eigen::VectorXd& frequency_hz) const {
+  std::string reason(const PeriodOutlier& outlier) const {
     const LogInfo& info = used_.log->info();
     const auto c = static_cast<std::size_t>(outlier.channel);
     const std::size_t n_y = channels_.outputs.size();
@@ -134,8 +156,7 @@ class RunMeasurement {
         c < n_y ? info.sensors.names[static_cast<std::size_t>(channels_.outputs[c])]
                 : info.actuators.names[static_cast<std::size_t>(channels_.estimated[c - n_y])];
     return fmt::format("{:.3g} times the scatter of the other periods on {}, {:.4g} ... {:.4g} Hz",
-                       outlier.ratio, name, frequency_hz[outlier.first_line],
-                       frequency_hz[outlier.last_line]);
+                       outlier.ratio, name, outlier.low_hz, outlier.high_hz);
   }
 
   const UsedRun& used_;

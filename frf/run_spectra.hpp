@@ -54,6 +54,8 @@ struct RunWorkspace {
   MatrixPool& pool;  // of all threads: scatters leave the workspace with their run
   LogSamples samples;
   std::vector<Eigen::MatrixXcd> spectra;  // Z_p of some periods, channels x lines
+  std::vector<Eigen::MatrixXf> record;    // of the same, less first_samples
+  Eigen::MatrixXd first_samples;          // samples x channels
   Eigen::MatrixXd excluded_sum;           // of the periods, samples x excluded actuators
   Eigen::VectorXcd deviation;             // of one period on one line
   Eigen::VectorXd deviation_re;
