@@ -155,36 +155,36 @@ struct DegreesOfFreedom {
   double core = 0.0;    ///< of all of the core
 };
 
-/// From the periodogram of the core's residuals one after the other. That of Gaussian noise has a mean square
-/// of twice the spectrum's; smoothed over as many lines as there are periods it is taken as it is, which
-/// counts too few rather than too many.
-DegreesOfFreedom degrees_of_freedom(const Eigen::MatrixXd& residuals) {
-  RealDft dft(static_cast<int>(residuals.size()));
-  std::copy_n(residuals.data(), residuals.size(), dft.input().begin());
+/// From the periodogram of the core's residuals, each period in its place and zeros between: noise whose
+/// correlation lasts for periods has few. A periodogram scatters about the spectrum, so its squares count too
+/// few degrees of freedom rather than too many.
+DegreesOfFreedom degrees_of_freedom(const Eigen::MatrixXd& residuals, const Periods& core,
+                                    std::span<const int> number) {
+  const auto place = [&](Index p) { return Index{number[static_cast<std::size_t>(p)]}; };
+  const Index span = place(core.back()) - place(core.front()) + 1;
+  RealDft dft(static_cast<int>(residuals.rows() * span));
+  std::fill(dft.input().begin(), dft.input().end(), 0.0);
+  for (std::size_t q = 0; q < core.size(); ++q)
+    std::copy_n(residuals.col(static_cast<Index>(q)).data(), residuals.rows(),
+                dft.input().begin() + (place(core[q]) - place(core.front())) * residuals.rows());
   const auto transformed = dft.forward();
-  const Index n = residuals.cols();
   double sum = 0.0;
   double squares = 0.0;
   double smooth_squares = 0.0;
   double smooth = 0.0;
-  Index lines = 0;
-  Index groups = 0;
-  for (Index k = 1; k < static_cast<Index>(transformed.size()); ++k) {
-    const double power = std::norm(transformed[static_cast<std::size_t>(k)]);
+  for (std::size_t k = 1; k < transformed.size(); ++k) {
+    const double power = std::norm(transformed[k]);
     sum += power;
     squares += power * power;
     smooth += power;
-    ++lines;
-    if (lines % n != 0 && k + 1 < static_cast<Index>(transformed.size())) continue;
-    smooth_squares += smooth * smooth / static_cast<double>(n);
+    if (static_cast<Index>(k) % span != 0 && k + 1 < transformed.size()) continue;
+    smooth_squares += smooth * smooth;
     smooth = 0.0;
-    ++groups;
   }
   if (!(sum > 0.0)) return {};
-  const auto degrees = [&](double square) { return 2.0 * sum * sum / square; };
-  return {std::min(degrees(smooth_squares) / static_cast<double>(n),
-                   static_cast<double>(residuals.rows())),
-          std::min(degrees(0.5 * squares), static_cast<double>(residuals.rows() * (n - 1)))};
+  const auto most = static_cast<double>(residuals.rows());
+  return {std::min(2.0 * sum * sum / smooth_squares, most),
+          std::min(2.0 * sum * sum / squares, most * static_cast<double>(residuals.cols() - 1))};
 }
 
 double log_tail(double ratio, const DegreesOfFreedom& dof) {
@@ -193,8 +193,8 @@ double log_tail(double ratio, const DegreesOfFreedom& dof) {
 }
 
 /// How much p stands out of the core in one octave, if that is no chance.
-std::optional<double> excess(const OctaveRecord& octave, const Periods& core, Index p,
-                             double log_chance) {
+std::optional<double> excess(const OctaveRecord& octave, std::span<const int> number,
+                             const Periods& core, Index p, double log_chance) {
   const Periods positions = comparable_positions(octave, core, p);
   const auto M = static_cast<Index>(positions.size());
   if (M < kFewestPositions) return std::nullopt;
@@ -210,7 +210,8 @@ std::optional<double> excess(const OctaveRecord& octave, const Periods& core, In
   const double ratio = deviation / scatter;
   const DegreesOfFreedom most{static_cast<double>(M), static_cast<double>(M * (n - 1))};
   if (!(ratio > 1.0 && log_tail(ratio, most) < log_chance)) return std::nullopt;
-  if (!(log_tail(ratio, degrees_of_freedom(residuals)) < log_chance)) return std::nullopt;
+  if (!(log_tail(ratio, degrees_of_freedom(residuals, core, number)) < log_chance))
+    return std::nullopt;
   return ratio;
 }
 
@@ -249,7 +250,8 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
     Candidate most{{static_cast<std::size_t>(p), channel, 0.0, 0.0, 0.0},
                    mean_ratio(grams, core, p)};
     for (const OctaveRecord& octave : octaves) {
-      const std::optional<double> ratio = excess(octave, core, p, std::log(kDropByChance / tests));
+      const std::optional<double> ratio =
+          excess(octave, periods.number, core, p, std::log(kDropByChance / tests));
       if (ratio.value_or(0.0) > most.outlier.ratio)
         most.outlier = {static_cast<std::size_t>(p), channel, octave.low_hz, octave.high_hz,
                         *ratio};

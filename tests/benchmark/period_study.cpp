@@ -5,7 +5,7 @@
 //
 // Per colour of noise: the clean periods that are dropped, of 1000; the error of the FRF over that of the plain
 // average of the same clean periods; the same with glitches of 5 to 500 standard deviations in every twentieth
-// period, spikes, bumps and steps, in one channel or all; and that without dropping. Errors are rms, on each line
+// period (of less than half of a run's), spikes, bumps and steps, in one channel or all; and that without dropping. Errors are rms, on each line
 // relative to the plain clean average; in brackets absolute, which the noisiest lines decide.
 #include <fmt/format.h>
 
@@ -213,8 +213,9 @@ void study(const Colour& colour, const Study& s) {
     if (std::getenv("PERIOD_STUDY_TELL") != nullptr)
       for (const auto& one : clean.dropped_periods)
         fmt::print("  run {} of {} periods: {} {}\n", run, P, one.period, one.reason);
+    const std::size_t most = spoilt + static_cast<std::size_t>((P - 1) / 2);
     for (int p = 0; p < P; ++p) {
-      if (random.uniform() > 0.05) continue;
+      if (random.uniform() > 0.05 || spoilt == most) continue;
       ++spoilt;
       add_glitch(log.records[0].sensors.middleRows(p * kPeriod, kPeriod), deviation, random);
     }
