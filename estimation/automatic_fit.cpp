@@ -17,6 +17,8 @@
 #include "estimation/pole_relocation.hpp"
 #include "estimation/ranked_fit.hpp"
 #include "estimation/residual_modes.hpp"
+#include "estimation/search_advice.hpp"
+#include "estimation/search_limit.hpp"
 #include "estimation/search_start.hpp"
 #include "excitation/counted.hpp"
 #include "frf/worker_pool.hpp"
@@ -101,6 +103,7 @@ class AutomaticFit {
 
   double cost() const { return best_.model.fit.cost; }
   bool at_rounding() const { return worth_.at_rounding(best_); }
+  bool limit_reached() const { return options_.limit->reached(); }
 
   /// What a search weighs with; the last fit makes its own.
   void release_weights() { quick_.user_weights = {}; }
@@ -108,6 +111,8 @@ class AutomaticFit {
   FitResult finish() {
     release_weights();
     sort_modes(best_.model);
+    const bool cut_short = limit_reached();
+    options_.limit->begin_completion();
     FitOptions last = options_;
     last.judge_modes = selection_.keep_modes;
     if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled_of_many());
@@ -116,7 +121,8 @@ class AutomaticFit {
                               : ranked_fit(frf_, best_.model, last, mode_number());
     if (const std::string ranks = describe(result.residue_ranks); !ranks.empty())
       result.decisions.push_back(ranks);
-    tell_why_the_search_ended(result);
+    watch_.tell(result);
+    if (cut_short) tell_limit(frf_, options_, result);
     sort_modes(result);
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
@@ -130,13 +136,6 @@ class AutomaticFit {
   ModeNumber mode_number() const {
     if (selection_.keep_modes) return ModeNumber::given;
     return selection_.exactly > 0 ? ModeNumber::asked : ModeNumber::chosen;
-  }
-
-  void tell_why_the_search_ended(FitResult& result) const {
-    if (!watch_.ended()) return;
-    result.findings.push_back(watch_.finding());
-    if (!watch_.by_delay() || !result.trustworthy()) return;
-    result.distrust(FitStatus::unexplained, watch_.finding());
   }
 
   bool many() const { return selection_.exactly > kMostGrown; }
@@ -187,7 +186,8 @@ class AutomaticFit {
   bool wanted_more() const {
     const int modes = count_modes(best_.model);
     if (selection_.exactly > 0) return modes < target_;
-    return modes < affordable_modes() && !worth_.at_rounding(best_) && !watch_.ended();
+    return modes < affordable_modes() && !worth_.at_rounding(best_) && !watch_.ended() &&
+           !limit_reached();
   }
 
   /// Adds modes while they are worth it. @returns true if any was added.
@@ -252,7 +252,7 @@ class AutomaticFit {
       found = true;
       // The first candidate is usually right; the others are asked only where it is not worth its
       // parameters.
-      if (worth_.criterion(best_trial) < worth_.criterion(best_)) break;
+      if (worth_.criterion(best_trial) < worth_.criterion(best_) || limit_reached()) break;
     }
     if (!found) {
       say("no further mode: nothing in the weighted residual is worth a mode's parameters (BIC)");
@@ -361,7 +361,7 @@ std::vector<int> surpluses(const ModeSelection& selection, Eigen::Index most) {
 }  // namespace
 
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
-                        const ModeSelection& selection, const FitOptions& options) {
+                        const ModeSelection& selection, const FitOptions& asked) {
   check(frf);
   if (selection.exactly < 0 || selection.most < 1)
     throw std::invalid_argument("fit: the number of modes must be positive");
@@ -371,12 +371,14 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
         "fit: {} lines cannot carry {} modes; ask for at most {}", frf.lines(),
         std::max<std::size_t>(static_cast<std::size_t>(selection.exactly), selection.modes.size()),
         most));
+  FitOptions options = asked;
+  options.limit = search_limit(selection, asked);
   AutomaticFit begun(frf, structure, selection, options);
   std::optional<AutomaticFit> best;
   const auto go = [&](AutomaticFit attempt, int surplus) {
     attempt.search(surplus);
     if (!best || attempt.cost() < best->cost()) best.emplace(std::move(attempt));
-    return best->at_rounding();
+    return best->at_rounding() || best->limit_reached();
   };
   const auto finish = [&] {
     begun.release_weights();

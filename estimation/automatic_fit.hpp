@@ -14,6 +14,8 @@ struct ModeSelection {
   int exactly = 0;                   ///< > 0: so many modes; 0: by statistics (BIC)
   bool keep_modes = false;           ///< fit `modes` as they are: none added, none removed
   int most = 60;
+  /// Of a search that chooses the number, in seconds of an ordinary core, see SearchLimit; 0: no end.
+  double search_seconds = 60.0;
 };
 
 /// A fit that completes its own start: peaks of the CMIF, then modes at the peaks of the weighted

@@ -10,6 +10,7 @@
 #include "estimation/arrow_system.hpp"
 #include "estimation/numerators.hpp"
 #include "estimation/pole_bounds.hpp"
+#include "estimation/search_limit.hpp"
 
 namespace stageid {
 namespace {
@@ -111,6 +112,11 @@ class Iteration {
   }
 
   bool go_on() {
+    if (options_.limit && options_.limit->reached() && problem_.globals() > 0) {
+      if (best_.cost > 0.0 && best_.cost < cost_)
+        return end_at_best(options_.limit->status(), options_.limit->message());
+      return end(options_.limit->status(), options_.limit->message());
+    }
     if (result_.iterations >= options_.max_iterations)
       return end(problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
                  fmt::format("stopped after {} iterations, scaled gradient {:.2g}",

@@ -52,6 +52,10 @@ const char* to_string(FitStatus status) noexcept {
       return "unexplained";
     case FitStatus::faulty_data:
       return "faulty_data";
+    case FitStatus::search_budget:
+      return "search_budget";
+    case FitStatus::interrupted:
+      return "interrupted";
   }
   return "singular";
 }
@@ -71,7 +75,9 @@ int gravity(FitStatus status) noexcept {
   if (is_trustworthy(status)) return 0;
   if (status == FitStatus::undetermined) return 1;
   if (status == FitStatus::unexplained) return 2;
-  return status == FitStatus::faulty_data ? 4 : 3;
+  if (status == FitStatus::interrupted) return 6;  // whatever else: the user asked for it
+  if (status == FitStatus::faulty_data) return 5;
+  return status == FitStatus::search_budget ? 4 : 3;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,8 @@ enum class FitMethod : std::uint8_t {
   sk    ///< Sanathanan-Koerner: biased fixed point, for comparison
 };
 const char* to_string(FitMethod method) noexcept;
+
+class SearchLimit;
 
 enum class DelayModel : std::uint8_t { fixed, estimate, per_channel };
 
@@ -60,6 +63,10 @@ struct FitOptions {
   bool covariance = false;        ///< also FitResult::covariance
   int threads = 0;                ///< 0: all cores; the result does not depend on it
   std::function<void(int iteration, double cost)> progress;
+  std::function<bool()>
+      interrupted;  ///< looked at between steps; then the best model so far is completed
+  std::shared_ptr<SearchLimit>
+      limit;  ///< of the search that the fit belongs to; made by automatic_fit()
 };
 
 enum class FitStatus : std::uint8_t {
@@ -69,8 +76,10 @@ enum class FitStatus : std::uint8_t {
   iteration_limit,
   singular,
   undetermined,  ///< converged, but the data do not determine a mode or a submodel that was asked for
-  unexplained,  ///< converged, but the model leaves clearly more than noise and known distortion
-  faulty_data   ///< the health of the data has a fault: they are not what they say
+  unexplained,    ///< converged, but the model leaves clearly more than noise and known distortion
+  faulty_data,    ///< the health of the data has a fault: they are not what they say
+  search_budget,  ///< the search used its budget, see SearchLimit
+  interrupted     ///< by the user, see SearchLimit
 };
 const char* to_string(FitStatus status) noexcept;
 /// Whether a fit that ended so may be trusted.
@@ -109,7 +118,7 @@ struct FitResult {
       covariance;  ///< empty unless asked for; where it cannot be told, a decision says why
   bool trustworthy() const noexcept { return is_trustworthy(status); }
   /// Adds a reason not to trust the fit, to status, message and the model's record. The gravest reason is the status and
-  /// comes first in the message: faulty data, then no convergence, then an unexplained residual, then undetermined modes.
+  /// comes first in the message: an interrupt, faulty data, a budget, then no convergence, then an unexplained residual, then undetermined modes.
   void distrust(FitStatus why, const std::string& reason);
 };
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "estimation/parallel_tasks.hpp"
+#include "estimation/search_limit.hpp"
 
 namespace stageid {
 
@@ -169,6 +170,14 @@ void evaluate_submodel(const FitProblem& problem, const LineOperator& through,
   group.T_im.middleCols(place.function, functions) = basis.delay.im;
 }
 
+/// The products that are made of the functions grow with their square.
+void add_work(const FitProblem& problem, const WantedBasis& wanted) {
+  auto columns = static_cast<double>(problem.functions());
+  if (wanted.gradient) columns += static_cast<double>(derivative_columns(problem).size());
+  problem.limit->add(static_cast<double>(problem.size()), static_cast<double>(problem.channels()),
+                     columns);
+}
+
 }  // namespace
 
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
@@ -188,6 +197,7 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
   }
 
   const WantedBasis wanted{with_derivatives, with_derivatives && problem.delays() > 0};
+  if (problem.limit) add_work(problem, wanted);
   const std::vector<SubmodelPlace> places = submodel_places(problem);
   std::vector<std::optional<LineOperator>> through(groups.size());
   parallel_tasks(static_cast<int>(groups.size()), problem.threads, [&](int g) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -41,6 +42,7 @@ struct FitProblem {
   DelayModel delay = DelayModel::fixed;
   bool multiplied_out = false;  ///< no sums of fractions for few channels: all digits, more time
   int threads = 1;
+  std::shared_ptr<SearchLimit> limit;  ///< every evaluation counts; empty: none
 
   Eigen::Index channels() const noexcept { return G->rows(); }
   Eigen::Index size() const noexcept { return G->cols(); }

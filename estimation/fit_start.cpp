@@ -98,6 +98,7 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
   for (const Submodel& s : start.submodels) problem.roles.push_back(s.role);
   problem.held = held_frequencies(start);
   problem.delay = options.delay;
+  problem.limit = options.limit;
   const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   problem.threads = options.threads > 0 ? options.threads : cores;
   const Eigen::Index per_channel = problem.functions();

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "estimation/fit_additive_model.hpp"
+#include "estimation/fit_problem.hpp"
 #include "estimation/mode_worth.hpp"
 #include "estimation/model_structure.hpp"
 
@@ -15,7 +16,7 @@ namespace {
 
 constexpr double kBroad = 0.1;  // a damping ratio: such a mode is no peak
 // In a row: a measured aircraft, which is nonlinear, comes to five before it converges.
-constexpr int kMostColoured = 6;
+constexpr int kMostSpurious = 6;
 
 /// A broad mode is no resonance that a narrow one within its width could be part of.
 bool overlaps_another(const AdditiveModel& model, std::size_t i) {
@@ -37,6 +38,24 @@ bool is_coloured(const AdditiveModel& model, std::size_t i) {
          overlaps_another(model, i);
 }
 
+/// Whether the modes that a round added are not worth their parameters without one line each, the best: noise whose
+/// tails are heavier than the variances say asks for a mode on every outlier.
+bool rests_on_single_lines(const FrfEstimate& frf, const FitOptions& options,
+                           const FitResult& before, const FitResult& now, std::size_t added) {
+  const SharedMatrix<Eigen::MatrixXd> weights = make_weights(frf, options);
+  const auto squares = [&](const AdditiveModel& model) -> Eigen::VectorXd {
+    const Eigen::MatrixXcd E = frf.response - response(model, frf.frequency_hz, model.hold);
+    return weights->cwiseProduct(E.cwiseAbs2()).colwise().sum().transpose();
+  };
+  Eigen::VectorXd gain = squares(before.model) - squares(now.model);
+  const auto n = static_cast<Eigen::Index>(added);
+  std::sort(gain.begin(), gain.end());
+  const auto parameters = static_cast<double>(now.parameters - before.parameters);
+  return gain.head(std::max<Eigen::Index>(0, gain.size() - n)).sum() <
+         static_cast<double>(added) *
+             price_of_mode(frf, before, parameters / static_cast<double>(added));
+}
+
 bool is_power_of_two(int n) { return (n & (n - 1)) == 0; }
 
 }  // namespace
@@ -45,21 +64,30 @@ bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const 
                        const FitResult& now, std::size_t added) {
   if (rounds_ == 0) first_ = before;
   ++rounds_;
-  bool coloured = true;
+  bool spurious = true;
   for (std::size_t i = now.model.submodels.size() - added; i < now.model.submodels.size(); ++i)
-    coloured = coloured && is_coloured(now.model, i);
-  if (!coloured) coloured_in_a_row_ = 0;
-  if (coloured && coloured_in_a_row_++ == 0) back_to_ = before;
+    spurious = spurious && is_coloured(now.model, i);
+  spurious = spurious || rests_on_single_lines(frf, options, before, now, added);
+  if (!spurious) spurious_in_a_row_ = 0;
+  if (spurious && spurious_in_a_row_++ == 0) back_to_ = before;
   // Every second, fourth, eighth round: what it costs stays a small part of the search.
   if (rounds_ > 1 && is_power_of_two(rounds_) && a_delay_explains_more(frf, options, now))
     return true;
-  if (coloured_in_a_row_ < kMostColoured) return false;
+  if (spurious_in_a_row_ < kMostSpurious) return false;
   finding_ = fmt::format(
-      "the search for modes ended: the last {} that it added only model the colour of the "
-      "residual, cost {:.6g} -> {:.6g}, and are left out; the variances may be too small, or the "
-      "data hold what modes do not describe (--damping general, --direct-term full, a delay)",
-      coloured_in_a_row_, back_to_.model.fit.cost, now.model.fit.cost);
+      "the search for modes ended: nothing that its last {} steps added is a resonance, cost "
+      "{:.6g} "
+      "-> {:.6g}; it is left out. The variances may be too small, or the plant has what modes do "
+      "not describe: try --damping general, --direct-term full or --delay estimate",
+      spurious_in_a_row_, back_to_.model.fit.cost, now.model.fit.cost);
   return true;
+}
+
+void GrowthWatch::tell(FitResult& result) const {
+  if (!ended()) return;
+  result.findings.push_back(finding_);
+  if (!by_delay_ || !result.trustworthy()) return;
+  result.distrust(FitStatus::unexplained, finding_);
 }
 
 bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions& searched,

@@ -9,6 +9,7 @@
 #include "estimation/fit_iteration.hpp"
 #include "estimation/joint_equations.hpp"
 #include "estimation/pole_bounds.hpp"
+#include "estimation/search_limit.hpp"
 
 namespace stageid {
 namespace {
@@ -53,6 +54,8 @@ class JointIteration {
 
   /// @returns false at the end; `result_` then says why.
   bool iterate_once() {
+    if (options_.limit && options_.limit->reached())
+      return end(options_.limit->status(), options_.limit->message());
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const JointEquations equations(problem_, weights_, beta_, groups, E_);
     if (!equations.regular())

@@ -9,6 +9,7 @@
 #include "estimation/low_rank_covariance.hpp"
 #include "estimation/pole_bounds.hpp"
 #include "estimation/residual.hpp"
+#include "estimation/search_limit.hpp"
 
 namespace stageid {
 namespace {
@@ -80,6 +81,8 @@ class LowRankIteration {
 
   /// @returns whether to go on.
   bool iterate_once() {
+    if (options_.limit && options_.limit->reached())
+      return end(options_.limit->status(), options_.limit->message());
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, FitMethod::gn,
                              ChannelEquationsUse::only_kept);

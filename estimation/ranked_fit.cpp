@@ -12,6 +12,7 @@
 #include "estimation/mode_worth.hpp"
 #include "estimation/model_structure.hpp"
 #include "estimation/overlapping_modes.hpp"
+#include "estimation/search_limit.hpp"
 #include "estimation/settled_fit.hpp"
 #include "estimation/undetermined_modes.hpp"
 #include "excitation/counted.hpp"
@@ -72,7 +73,7 @@ class RankedFit {
 
   /// Modes with B_0 and B_1 have no rank but one.
   bool may_tie() const {
-    return options_.residue_rank == 1 &&
+    return options_.residue_rank == 1 && !(options_.limit && options_.limit->reached()) &&
            std::none_of(
                tied_.model.submodels.begin(), tied_.model.submodels.end(),
                [](const Submodel& s) { return is_searched_mode(s) && s.numerator.size() > 1; });

@@ -13,6 +13,7 @@
 #include "estimation/mode_worth.hpp"
 #include "estimation/model_structure.hpp"
 #include "estimation/overlapping_modes.hpp"
+#include "estimation/search_limit.hpp"
 #include "estimation/undetermined_modes.hpp"
 
 namespace stageid {
@@ -112,7 +113,7 @@ void leave_out_undetermined(const FrfEstimate& frf, const FitOptions& options, F
     fit = std::move(trial);
     return true;
   };
-  while (count_modes(fit.model) > 1) {
+  while (count_modes(fit.model) > 1 && !(options.limit && options.limit->reached())) {
     const std::vector<std::size_t> open = undetermined_modes(fit);
     if (std::none_of(open.begin(), open.end(), without)) return;
   }

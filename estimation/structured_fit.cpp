@@ -13,6 +13,7 @@
 #include "estimation/mode_deviation.hpp"
 #include "estimation/ranked_fit.hpp"
 #include "estimation/residual_verdict.hpp"
+#include "estimation/search_limit.hpp"
 #include "excitation/counted.hpp"
 
 namespace stageid {
@@ -188,6 +189,13 @@ void refit(const FrfEstimate& frf, const FitOptions& options, FitResult& result)
   next.cost.insert(next.cost.begin(), result.cost.begin(), result.cost.end());
   next.model.cost_history = next.cost;
   next.model.fit.iterations = static_cast<int>(next.cost.size()) - 1;
+  if (ended_by_limit(result)) {
+    next.status = result.status;
+    next.message = std::move(result.message);
+    next.findings = std::move(result.findings);
+    next.model.fit.status = to_string(next.status);
+    next.model.fit.message = next.message;
+  }
   result = std::move(next);
 }
 
@@ -258,7 +266,7 @@ void judge_explained(const FrfEstimate& frf, const FitOptions& options, FitResul
 }  // namespace
 
 FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& structure,
-                         const ModeSelection& selection, const FitOptions& options) {
+                         const ModeSelection& selection, const FitOptions& asked) {
   check(frf);
   if (frf.response.isZero(0.0))
     throw std::invalid_argument("fit: the response is zero on all lines; there is nothing to fit");
@@ -267,6 +275,12 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   ModelStructure complete = structure.common;
   if (structure.suspension) complete.given = suspension_modes(frf, structure.suspension_hz);
   std::vector<SubmodelRequest> requests = structure.submodels;
+  FitOptions options = asked;
+  const bool order_is_searched = !requests.empty() && requests.front().order_by_search;
+  options.limit = search_limit(
+      order_is_searched ? ModeSelection{.modes = {}, .search_seconds = selection.search_seconds}
+                        : selection,
+      asked);
   PoleSearch(frf, complete, selection, options, decisions).complete(requests);
   for (const SubmodelRequest& r : requests) complete.given.push_back(start_submodel(frf, r));
   FitResult result = automatic_fit(frf, complete, selection, options);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "estimation/search_limit.hpp"
 #include "excitation/fingerprint.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/command_line.hpp"
@@ -16,6 +17,14 @@
 #include "tools/submodel_text.hpp"
 
 namespace stageid {
+namespace {
+
+ExitCode fit_exit_code(const FitResult& result, bool whole) {
+  if (result.status == FitStatus::interrupted) return kInterrupted;
+  return result.trustworthy() && whole ? kDone : kNotTrustworthy;
+}
+
+}  // namespace
 
 FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "fit", "Fit the additive model to an FRF");
@@ -62,6 +71,13 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
       "general where the outputs are accelerations");
   command->add_option("--method", request_.method, "riv | gn | sk")->capture_default_str();
   command->add_option("--max-iterations", request_.max_iterations, "of one fit")
+      ->capture_default_str();
+  command
+      ->add_option("--search-seconds", request_.search_seconds,
+                   "budget of a search for modes, in seconds of an ordinary core; counted in work, "
+                   "so the result does not depend on the machine; then the best model so far is "
+                   "written, exit code 3. 0: no end")
+      ->check(kNotNegative)
       ->capture_default_str();
   command->add_option("--seed", seed_, "accepted; nothing in a fit is random");
   command
@@ -111,7 +127,7 @@ void FitCommand::run() const {
                               result.model.fit.relative_rms_error, to_string(result.status),
                               result.message));
   const bool whole = told || covariance_.empty();
-  console_.exit_code = result.trustworthy() && whole ? kDone : kNotTrustworthy;
+  console_.exit_code = fit_exit_code(result, whole);
   console_.result({{"output", output_.string()},
                    {"status", to_string(result.status)},
                    {"message", result.message},

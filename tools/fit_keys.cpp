@@ -141,6 +141,9 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
        "numerators B_0, or B_0 + B_1 s; by_frf: general where the outputs are accelerations");
   word("method", f.method, {"riv", "gn", "sk"}, "of the iteration");
   count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "of one fit");
+  v.number("search_seconds", f.search_seconds, not_negative("s"), kOptional,
+           "budget of a search for modes, in seconds of an ordinary core; counted in work, so the "
+           "result does not depend on the machine; 0: no end");
 }
 
 }  // namespace stageid

@@ -332,7 +332,8 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
       {"direct_term", request.direct_term},
       {"damping", request.damping},
       {"method", request.method},
-      {"max_iterations", o.max_iterations}};
+      {"max_iterations", o.max_iterations},
+      {"search_seconds", request.search_seconds}};
   for (const SubmodelRequest& submodel : request.submodels)
     json["submodels"].push_back(submodel_text(submodel));
   if (o.weighting == Weighting::user) {
@@ -375,6 +376,9 @@ FitSetup make_fit_setup(const FitRequest& asked, FrfEstimate frf) {
   if (request.max_iterations < 1)
     refuse("--max-iterations", fmt::format("{}", request.max_iterations), "1 or more");
   setup.options.max_iterations = request.max_iterations;
+  if (!(request.search_seconds >= 0.0))
+    refuse("--search-seconds", fmt::format("{}", request.search_seconds), "0 or more");
+  setup.selection.search_seconds = request.search_seconds;
   setup.options.threads = request.threads;
   setup.request_json = provenance_of(request, setup);
   return setup;

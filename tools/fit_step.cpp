@@ -59,12 +59,12 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
   FitStep step;
   FitOptions options = setup.options;
   Progress progress(console, "fit", "iterations");
+  throw_if_interrupted();
+  options.interrupted = [] { return interrupt_flag().load(); };
   options.progress = [&](int iteration, double cost) {
-    throw_if_interrupted();
     progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));
   };
   step.result = structured_fit(setup.frf, setup.structure, setup.selection, options);
-  throw_if_interrupted();
   // The cause comes before what follows from it: modes that imitate distortion.
   blame(nonlinearity_sentence(setup.frf), step.result);
   const std::vector<std::string> faults =

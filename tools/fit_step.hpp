@@ -15,7 +15,8 @@ struct FitStep {
   double seconds = 0.0;
 };
 
-/// Fits, shows progress, and completes the provenance of the model.
+/// Fits, shows progress, and completes the provenance of the model. A signal ends the fit with the best model so far,
+/// FitStatus::interrupted; before the first step there is none.
 /// @param frf_name, frf_fingerprint of the FRF that was fitted.
 /// @throws std::invalid_argument, Interrupted
 FitStep fit_model(const FitSetup& setup, const std::string& frf_name,

@@ -74,6 +74,7 @@ int Identification::run() {
   estimate();
   pick();
   fit();
+  if (exit_code_ == kInterrupted) return exit_code_;
   check_model();
   write_outputs();
   print_summary();
@@ -185,10 +186,12 @@ void Identification::pick() {
 
 bool Identification::fit_is_up_to_date(const FitSetup& setup,
                                        const std::string& frf_fingerprint) const {
-  return request_.resume && std::filesystem::exists(path("model.json")) &&
-         std::filesystem::exists(path("model.h5")) &&
-         request_id_of(read_model(path("model.json")).provenance_json) ==
-             fit_request_id(setup, frf_fingerprint);
+  if (!request_.resume || !std::filesystem::exists(path("model.json")) ||
+      !std::filesystem::exists(path("model.h5")))
+    return false;
+  const AdditiveModel model = read_model(path("model.json"));
+  return model.fit.status != to_string(FitStatus::interrupted) &&
+         request_id_of(model.provenance_json) == fit_request_id(setup, frf_fingerprint);
 }
 
 void Identification::fit() {
@@ -208,6 +211,11 @@ void Identification::fit() {
                         step.result.message.find(finding) == std::string::npos;
                });
   write_model(path("model.json"), model_);
+  if (step.result.status == FitStatus::interrupted) {
+    exit_code_ = kInterrupted;
+    console_.warning(fmt::format("{}: {}; continue with --resume", path("model.json").string(),
+                                 step.result.message));
+  }
   finish_step(
       "fit", step.seconds,
       fmt::format("{}, relative error {:.3g}, {}", counted(model_.submodels.size(), "submodel"),

@@ -49,7 +49,7 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
               const py::object& delay, const py::object& rigid_body, const py::object& residue_rank,
               const std::string& damping, const std::string& direct_term,
               const std::vector<std::string>& submodels, const std::string& method,
-              int max_iterations, int threads, bool covariance) {
+              int max_iterations, double search_seconds, int threads, bool covariance) {
   FitRequest request;
   request.band_hz = band_hz;
   request.modes = flag_text(modes);
@@ -63,6 +63,7 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
   for (const std::string& text : submodels) request.submodels.push_back(parse_submodel(text));
   request.method = method;
   request.max_iterations = max_iterations;
+  request.search_seconds = search_seconds;
   request.threads = threads;
   const std::shared_ptr<FrfHandle> of = frf_of(given);
   Console silent;
@@ -92,6 +93,7 @@ damping           'proportional' (B_0) or 'general' (B_0 + B_1 s); '': by the un
 direct_term       'none' or 'full'; '': by the unit of the outputs
 submodels         further ones as --submodel takes them, 'n=4,m=3,f=120:180'
 method            'riv', 'gn' or 'sk'; max_iterations of one fit
+search_seconds    budget of a search for modes in seconds of an ordinary core, counted in work; 0: no end
 threads           0: all cores; the result does not depend on it
 covariance        True: also Fit.covariance, at most 4000 parameters
 
@@ -158,8 +160,8 @@ void define_fit(py::module_& module) {
              py::arg("delay") = py::none(), py::arg("rigid_body") = py::none(),
              py::arg("residue_rank") = "full", py::arg("damping") = "", py::arg("direct_term") = "",
              py::arg("submodels") = std::vector<std::string>{}, py::arg("method") = "riv",
-             py::arg("max_iterations") = 100, py::arg("threads") = 0, py::arg("covariance") = false,
-             kFitDoc);
+             py::arg("max_iterations") = 100, py::arg("search_seconds") = 60.0,
+             py::arg("threads") = 0, py::arg("covariance") = false, kFitDoc);
 }
 
 }  // namespace stageid

@@ -277,6 +277,7 @@ def fit(
     submodels: Sequence[str] = ...,
     method: str = "riv",
     max_iterations: int = 100,
+    search_seconds: float = 60.0,
     threads: int = 0,
     covariance: bool = False,
 ) -> Fit: ...

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+
+#include "estimation/fit_options.hpp"
+#include "frf/frf_estimate.hpp"
+
+namespace stageid {
+
+/// What a search that used its budget says: how far it came, and which request fits the data better than more modes
+/// do. That is decided by trial, in this order:
+///   channels whose response is noise on most lines     -> leave them out
+///   one refit of the model with each other structure    -> the one of least BIC, if it beats the model itself
+///   one end of the band holds most of what is left over -> the band without it
+///   else as many modes as the data determine
+/// @param fit the completed model of the search
+std::string budget_message(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit);
+
+/// Makes the completed model of a search that reached options.limit say so: a last fit that has converged is not the
+/// end of a search.
+void tell_limit(const FrfEstimate& frf, const FitOptions& options, FitResult& fit);
+
+}  // namespace stageid
