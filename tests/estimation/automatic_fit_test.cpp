@@ -247,7 +247,7 @@ TEST_F(SmallStage, RoundsInARowThatOnlyModelColourEndTheSearch) {
   EXPECT_FALSE(watch.by_delay());
   EXPECT_EQ(watch.model().model.submodels.size(), kept);
   EXPECT_THAT(watch.finding(),
-              testing::HasSubstr("the last 6 that it added only model the colour"));
+              testing::HasSubstr("nothing that its last 6 steps added is a resonance"));
 }
 
 TEST_F(SmallStage, TheNumberOfThreadsDoesNotChangeABit) {
