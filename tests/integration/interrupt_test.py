@@ -5,6 +5,7 @@ at all, nothing else is left behind, and an interrupted run goes on to the same 
     interrupt_test.py PROGRAM CONFIGS WORK_DIR
 """
 
+import json
 import os
 import pathlib
 import pty
@@ -83,7 +84,13 @@ class InterruptTest(unittest.TestCase):
                     self.assertLessEqual(left, {new})
                     if code == 0:
                         self.assertEqual(left, {new})
-                    if left:
+                    if left and code == 130 and words[0] == "fit":  # the best model so far
+                        model = json.loads((WORK / new).read_text())
+                        self.assertEqual(model["fit"]["status"], "interrupted")
+                        self.assertTrue(model["submodels"])
+                        self.assertTrue(model["provenance"]["decisions"])
+                        (WORK / new).unlink()
+                    elif left:
                         self.assertTrue((WORK / new).read_bytes() == whole, "another file than without Ctrl-C")
                         (WORK / new).unlink()
         self.assertIn(0, ends)
