@@ -141,8 +141,10 @@ std::string first_cause(const Command& frf, const Command& fit, const Command& v
     return last_line(frf.ran.err);
   }
   if (fit.ran.exit_code != 0) return fit.json.value("message", last_line(fit.ran.err));
-  if (validation.ran.exit_code != 0) return last_line(validation.ran.err);
-  return "";
+  if (validation.ran.exit_code == 0) return "";
+  if (validation.json.contains("reasons") && !validation.json["reasons"].empty())
+    return validation.json["reasons"][0];
+  return last_line(validation.ran.err);
 }
 
 bool names_any(std::string said, const std::vector<std::string>& causes) {

@@ -230,10 +230,12 @@ void draw_noise(RandomNumbers& random, JudgementStage& stage) {
   spec.sensor_noise_m = white;
   if (stage.noise.colour == NoiseColour::white) stage.noise.density = 0.0;
   if (stage.noise.colour == NoiseColour::resonant) stage.noise.density *= 30.0;
-  if (stage.noise.colour == NoiseColour::flicker || stage.noise.colour == NoiseColour::drift) {
+  if (stage.noise.colour == NoiseColour::flicker) {
     stage.noise.reference_hz = 0.2 * stage.band_high_hz;
     spec.sensor_noise_m *= 0.5;
   }
+  // What leaks from a random walk is common to all lines: a trouble of its own unless it is below the white noise.
+  if (stage.noise.colour == NoiseColour::drift) stage.noise.reference_hz = 1.5 * stage.band_low_hz;
   // Half of the stages feel forces too: as much as the sensors' noise at 30 % of the band.
   if (random.uniform() < 0.5) {
     const Eigen::MatrixXcd g =
