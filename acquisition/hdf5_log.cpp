@@ -212,6 +212,42 @@ void Hdf5LogReader::read_columns(const Dataset& dataset, std::uint64_t first,
   }
 }
 
+namespace {
+
+constexpr Eigen::Index kFewestRows = 8;  // that tell where a record goes on
+constexpr Eigen::Index kPadding = 4;     // rows at its end, if the gap is in the last period
+
+/// Row n of a periodic signal that is `ahead` rows ahead.
+auto row_of(const Eigen::MatrixXd& period, Eigen::Index n, Eigen::Index ahead) {
+  return period.row((n + ahead) % period.rows());
+}
+
+/// First of the leading `rows` rows, from `from` on, that is not that of the period `ahead`; `rows` if all are.
+Eigen::Index first_other(const Eigen::MatrixXd& samples, const Eigen::MatrixXd& period,
+                         Eigen::Index ahead, double tolerance, Eigen::Index from,
+                         Eigen::Index rows) {
+  const auto differs = [&](Eigen::Index n) {
+    return !((samples.row(n) - row_of(period, n, ahead)).cwiseAbs().maxCoeff() <= tolerance);
+  };
+  while (from < rows && !differs(from)) ++from;
+  return from;
+}
+
+/// A recorder that lost rows, of all its signals, goes on further ahead in the period.
+/// @returns how far, if all rows from `gap` to `rows` are those of one displaced period; else `ahead`
+Eigen::Index ahead_after_gap(const Eigen::MatrixXd& samples, const Eigen::MatrixXd& period,
+                             Eigen::Index ahead, double tolerance, Eigen::Index gap,
+                             Eigen::Index rows) {
+  const Eigen::Index N = period.rows();
+  if (gap + kFewestRows > rows) return ahead;
+  for (Eigen::Index lost = 1; lost < N; ++lost)
+    if (first_other(samples, period, ahead + lost, tolerance, gap, rows) == rows)
+      return (ahead + lost) % N;
+  return ahead;
+}
+
+}  // namespace
+
 Eigen::MatrixXd Hdf5LogReader::excitation(std::size_t run) const {
   check_run_index(path_, runs_, run);
   const LogRun& which = runs_[run];
@@ -237,16 +273,28 @@ void Hdf5LogReader::check_repetition(const LogRun& run, const Dataset& dataset,
                       fmt::format("run {}: its {} rows are not whole periods of {}", run.name,
                                   dataset.rows, rows));
   }
-  const double peak = period.size() == 0 ? 0.0 : period.cwiseAbs().maxCoeff();
+  if (period.size() == 0) return;
+  const double peak = period.cwiseAbs().maxCoeff();
+  const double tolerance = kTolerance * peak;
+  Eigen::Index ahead = 0;
   Eigen::MatrixXd later(period.rows(), period.cols());
   for (std::uint64_t first = rows; first < dataset.rows; first += rows) {
     read_columns(dataset, first, later);
-    Eigen::Index row = 0;
+    // What stands in the place of lost rows at the end of a record is nobody's.
+    const bool last = first + rows == dataset.rows;
+    const Eigen::Index count =
+        last && ahead < period.rows() / 2 ? period.rows() - ahead : period.rows();
+    const Eigen::Index row = first_other(later, period, ahead, tolerance, 0, count);
+    if (row == count) continue;
+    const Eigen::Index next =
+        ahead_after_gap(later, period, ahead, tolerance, row, last ? count - kPadding : count);
+    if (next != ahead) {
+      ahead = next;
+      continue;
+    }
     Eigen::Index column = 0;
-    if (later.size() == 0) continue;
-    const double largest = (later - period).cwiseAbs().maxCoeff(&row, &column);
-    const bool repeats = largest <= kTolerance * peak && later.allFinite();
-    if (repeats) continue;
+    const double largest =
+        (later.row(row) - row_of(period, row, ahead)).cwiseAbs().maxCoeff(&column);
     throw FormatError(
         path_, dataset.name,
         fmt::format("does not repeat: row {} of '{}' differs from the first period by {:.3g} (peak "

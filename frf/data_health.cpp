@@ -9,9 +9,9 @@
 #include "frf/controller_check.hpp"
 #include "frf/health_measures.hpp"
 #include "frf/order_statistic.hpp"
-#include "frf/repetition_check.hpp"
 #include "frf/rigid_body_check.hpp"
 #include "frf/skew_check.hpp"
+#include "frf/timing_check.hpp"
 
 namespace stageid {
 namespace {
@@ -375,7 +375,7 @@ void Examination::check_excluded() {
 }
 
 std::vector<Finding> Examination::examine() {
-  findings_ = check_repetition(record_);
+  findings_ = check_timing(record_, nominal_);
   check_cycles();
   check_samples();
   if (!found(Cause::aperiodic)) {  // else no spectrum is what it seems

@@ -11,7 +11,8 @@ namespace stageid {
 
 /// What is wrong with a log, before anyone fits: one finding a cause, faults first.
 ///
-/// From the samples: dead and clipped channels, marked and late cycles. From the spectra: channels
+/// In time (timing_check.hpp): lost samples, a late excitation, a response that changes. From the samples: dead and
+/// clipped channels, marked and late cycles. From the spectra: channels
 /// without response, cond(R), cond(U), actuators that move beside the sub-plant. With the configuration: whether
 /// u = r - C y holds between the recorded signals (controller_check.hpp: names, signs, scales and
 /// timing of the recording), then whether the rigid body is that of geometry and mass

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frf/order_statistic.hpp"
 #include "frf/tail_probability.hpp"
 #include "frf/worker_pool.hpp"
 
@@ -16,6 +17,7 @@ using Eigen::VectorXd;
 
 constexpr double kByChance = 1e-6;
 constexpr double kWorthwhileRatio = 1.3;
+constexpr double kDeviations = 5.0;
 constexpr Index kFewestLines = 16;
 constexpr Index kBlockLines = 64;
 constexpr Index kMostBlocks = 16;
@@ -98,11 +100,33 @@ double ExperimentNoise::compare(const MatrixXd& mean, const VectorXd& weight) {
     const double centre = x.dot(weight) / weight.sum();
     const double chi_square = weight.dot((x.array() - centre).square().matrix());
     const double ratio = std::exp(x.maxCoeff() - x.minCoeff());
-    if (ratio > std::max(largest, kWorthwhileRatio) &&
-        tail_of_chi_square(chi_square, static_cast<double>(x.size() - 1)) < kByChance / tests)
-      largest = ratio;
+    if (ratio <= kWorthwhileRatio ||
+        tail_of_chi_square(chi_square, static_cast<double>(x.size() - 1)) >= kByChance / tests)
+      continue;
+    largest = std::max(largest, ratio);
+    note(x, weight, i);
   }
   return largest;
+}
+
+void ExperimentNoise::note(const VectorXd& log_power, const VectorXd& weight, Index output) {
+  std::vector<double> values(log_power.begin(), log_power.end());
+  const double middle = order_statistic(values, 0.5);
+  const Eigen::ArrayXd off = (log_power.array() - middle).abs();
+  Index most = 0;
+  off.maxCoeff(&most);
+  for (Index e = 0; e < off.size(); ++e) {
+    const bool differs =
+        off[e] > std::log(kWorthwhileRatio) && off[e] * std::sqrt(weight[e]) > kDeviations;
+    if (!differs && e != most) continue;
+    const double ratio = std::exp(log_power[e] - middle);
+    const auto known = std::find_if(odd_.begin(), odd_.end(),
+                                    [e](const Odd& other) { return other.experiment == e; });
+    if (known == odd_.end())
+      odd_.push_back({e, output, ratio});
+    else if (off[e] > std::abs(std::log(known->ratio)))
+      *known = {e, output, ratio};
+  }
 }
 
 std::size_t ExperimentNoise::at(Index k) const {

@@ -29,6 +29,14 @@ class ExperimentNoise {
   /// Largest over smallest noise power of two experiments, of the output and block where that is most; 1
   /// where none differs.
   double ratio() const noexcept { return ratio_; }
+  /// An experiment whose noise is a factor 1.3 and 5 deviations off the median where they differ; at least the one
+  /// that is most off, if any differs.
+  struct Odd {
+    Eigen::Index experiment = 0;
+    Eigen::Index output = 0;  ///< where it differs most
+    double ratio = 1.0;       ///< to the median
+  };
+  const std::vector<Odd>& odd() const noexcept { return odd_; }
 
   /// C_Ee of one period on line k, an entry an experiment.
   std::vector<Eigen::MatrixXcd> covariances(const LineEstimate& line, Eigen::Index k) const;
@@ -41,6 +49,7 @@ class ExperimentNoise {
  private:
   std::size_t at(Eigen::Index k) const;  ///< the block of line k
   double compare(const Eigen::MatrixXd& mean, const Eigen::VectorXd& weight);
+  void note(const Eigen::VectorXd& log_power, const Eigen::VectorXd& weight, Eigen::Index output);
 
   const RealizationSpectra& spectra_;
   Eigen::Index lines_;
@@ -48,6 +57,7 @@ class ExperimentNoise {
   std::vector<Eigen::MatrixXd> share_;  // a block: outputs x experiments
   std::vector<bool> blocks_differ_;
   double ratio_ = 1.0;
+  std::vector<Odd> odd_;
 };
 
 }  // namespace stageid

@@ -56,6 +56,12 @@ const char* to_string(Cause cause) noexcept {
       return "unsettled";
     case Cause::uneven_noise:
       return "uneven_noise";
+    case Cause::lost_samples:
+      return "lost_samples";
+    case Cause::excitation_timing:
+      return "excitation_timing";
+    case Cause::drift:
+      return "drift";
   }
   return "unknown";
 }

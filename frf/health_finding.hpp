@@ -31,10 +31,13 @@ enum class Cause : std::uint8_t {
   excitation,  ///< cond(R)
   inputs,      ///< cond(U)
   incoherent,
-  interpolation,  ///< zippered lines: a local model leaves more than noise
-  aperiodic,      ///< the inputs do not repeat with the period
-  unsettled,      ///< a transient or a drift: linearity cannot be told
-  uneven_noise,   ///< the noise of one experiment is not that of another
+  interpolation,      ///< zippered lines: a local model leaves more than noise
+  aperiodic,          ///< the inputs do not repeat with the period
+  unsettled,          ///< a transient or a drift: linearity cannot be told
+  uneven_noise,       ///< the noise of one experiment is not that of another
+  lost_samples,       ///< samples are missing in a run, or are there twice
+  excitation_timing,  ///< the excitation was recorded whole samples late or early
+  drift,              ///< the response changes during the measurement
 };
 const char* to_string(Cause cause) noexcept;
 

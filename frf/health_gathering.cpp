@@ -93,7 +93,7 @@ void HealthPart::transform_others(RunWorkspace& w, const std::vector<char>& is_k
     Z.row(n_y + actuators[i]) = others.row(some + static_cast<Eigen::Index>(i));
 }
 
-void HealthPart::leave_out_marked() {
+void HealthPart::leave_out() {
   for (ChannelScan& channel : scan_) channel.break_off();
 }
 
@@ -159,6 +159,7 @@ HealthPart& HealthGathering::part(std::size_t realization, std::size_t experimen
 
 void HealthGathering::add(HealthPart&& part) {
   for (std::size_t c = 0; c < part.scan_.size(); ++c) record_.scan[c].add(part.scan_[c]);
+  record_.slips.insert(record_.slips.end(), part.slips_.begin(), part.slips_.end());
   if (part.periods_.empty()) return;
   record_.periods.push_back(static_cast<int>(part.periods_.size()));
   for (std::size_t k = 0; k < lines_.size(); ++k) {

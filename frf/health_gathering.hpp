@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "frf/health_record.hpp"
@@ -23,7 +25,8 @@ class HealthPart {
  public:
   /// The clean period in workspace.samples. Channels that are not known are transformed here.
   void take(RunWorkspace& workspace, const KnownSpectra* known);
-  void leave_out_marked();
+  void leave_out();
+  void note(const std::vector<SampleSlip>& slips) { slips_ = slips; }
 
  private:
   friend class HealthGathering;
@@ -33,6 +36,7 @@ class HealthPart {
   std::vector<int> lines_;  // empty: spectra of this run are not wanted
   std::vector<Eigen::MatrixXcd> periods_;
   std::vector<ChannelScan> scan_;
+  std::vector<SampleSlip> slips_;
 };
 
 /// A HealthRecord in the making, beside whatever else the logs are read for.
@@ -55,6 +59,12 @@ class HealthGathering {
   /// Where run `experiment` of realization `realization` (positions) goes; different parts may be
   /// filled at once.
   HealthPart& part(std::size_t realization, std::size_t experiment);
+
+  /// What the estimate shows beside.
+  void note(const std::optional<ModeDrift>& drift, std::vector<NoisyRun> noisy_runs) {
+    record_.drift = drift;
+    record_.noisy_runs = std::move(noisy_runs);
+  }
 
   /// After all parts are filled; once. @pre complete()
   HealthRecord finish();

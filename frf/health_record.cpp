@@ -75,9 +75,10 @@ class RecordReading {
   }
 
   void read_run(const Run& run, RunWorkspace& w) {
-    for_each_period(
+    run.part->note(for_each_period(
         *run.used, w, [this](double bytes) { bytes_.add(bytes); },
-        [&](int) { run.part->take(w, nullptr); }, [&](int) { run.part->leave_out_marked(); });
+        [&](int) { run.part->take(w, nullptr); },
+        [&](int, const std::string&) { run.part->leave_out(); }));
   }
 
   std::vector<RealizationRuns> realizations_;

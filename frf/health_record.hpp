@@ -7,6 +7,9 @@
 #include "acquisition/log_reader.hpp"
 #include "frf/channel_scan.hpp"
 #include "frf/frf_options.hpp"
+#include "frf/mode_drift.hpp"
+#include "frf/noisy_run.hpp"
+#include "frf/sample_slip.hpp"
 
 namespace stageid {
 
@@ -20,14 +23,17 @@ struct LineRecord {
 /// What the checks of a log's health look at.
 struct HealthRecord {
   LogInfo info;
-  int realization = 0;             ///< the one whose spectra these are
-  std::vector<int> periods;        ///< clean ones, of each experiment
-  Eigen::VectorXd frequency_hz;    ///< K: excited lines, thinned out if there are many
-  std::vector<LineRecord> lines;   ///< K
-  std::vector<Eigen::Index> axes;  ///< excitation channels that are excited, ascending
-  bool zippered = false;           ///< one experiment excites them all, each on lines of its own
-  std::vector<ChannelScan> scan;   ///< [sensors; actuators], over all runs that are used
-  RunHealth health;                ///< over all runs that are used
+  int realization = 0;               ///< the one whose spectra these are
+  std::vector<int> periods;          ///< clean ones, of each experiment
+  Eigen::VectorXd frequency_hz;      ///< K: excited lines, thinned out if there are many
+  std::vector<LineRecord> lines;     ///< K
+  std::vector<Eigen::Index> axes;    ///< excitation channels that are excited, ascending
+  bool zippered = false;             ///< one experiment excites them all, each on lines of its own
+  std::vector<ChannelScan> scan;     ///< [sensors; actuators], over all runs that are used
+  RunHealth health;                  ///< over all runs that are used
+  std::vector<SampleSlip> slips;     ///< of the same runs
+  std::optional<ModeDrift> drift;    ///< of the response, if there was an estimate
+  std::vector<NoisyRun> noisy_runs;  ///< the same
 
   Eigen::Index n_y() const noexcept { return static_cast<Eigen::Index>(info.sensors.size()); }
   Eigen::Index n_u() const noexcept { return static_cast<Eigen::Index>(info.actuators.size()); }

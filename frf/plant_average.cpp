@@ -53,7 +53,8 @@ PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
       outputs_(outputs),
       inputs_(inputs),
       covariance_kind_(covariance),
-      scatter_(outputs, inputs, frequency_hz_.size()) {
+      scatter_(outputs, inputs, frequency_hz_.size()),
+      drift_(outputs, inputs, frequency_hz_.size()) {
   const Eigen::Index N = frequency_hz_.size();
   const Eigen::Index n_c = outputs * inputs;
   Z_sum_.setZero((outputs + inputs) * inputs, N);
@@ -90,11 +91,14 @@ void PlantAverage::add(const RealizationSpectra& spectra, int workers,
     LineEstimate& line = lines[static_cast<std::size_t>(k)];
     line = estimate_line(spectra.excitation(k), spectra.response(k), outputs_);
     add_response(spectra, line, k);
+    drift_.add(spectra, line, realizations_ - 1, k);
     dof_sum_[k] += spectra.scatter_dof(k);
   });
   if (!noise_known_) return;
   const ExperimentNoise experiments(spectra, lines, lines_that_share(spectra), workers);
   experiment_noise_ratio_ = std::max(experiment_noise_ratio_, experiments.ratio());
+  for (const ExperimentNoise::Odd& odd : experiments.odd())
+    odd_runs_.push_back({spectra.realization(), odd});
   for_each_line(workers, frequency_hz_.size(), [&](Eigen::Index k) {
     add_noise(spectra, lines[static_cast<std::size_t>(k)], experiments, periods, k);
   });
@@ -217,6 +221,11 @@ double PlantAverage::effective_dof() const {
 RealizationScatter PlantAverage::scatter() const {
   if (realizations_ < 2 || !noise_known() || zippered_axes_ > 0) return {};
   return scatter_.finish(realizations_);
+}
+
+std::optional<ModeDrift> PlantAverage::drift(const FrfEstimate& frf, int run_periods) const {
+  if (zippered_axes_ > 0) return std::nullopt;
+  return drift_.find(frf, G_mean_, run_periods);
 }
 
 void PlantAverage::finish_zippered(FrfEstimate& frf) const {

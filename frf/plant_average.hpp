@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
+#include <vector>
 
 #include "frf/experiment_noise.hpp"
 #include "frf/frf_estimate.hpp"
@@ -8,6 +10,7 @@
 #include "frf/plant_frf.hpp"
 #include "frf/realization_scatter.hpp"
 #include "frf/realization_spectra.hpp"
+#include "frf/response_drift.hpp"
 #include "frf/zippered_fit.hpp"
 
 namespace stageid {
@@ -39,6 +42,15 @@ class PlantAverage {
 
   /// For nonlinearity_test(); empty if it needs more realizations, periods or independent lines.
   RealizationScatter scatter() const;
+
+  /// Whether the response changes in time. @param frf as finish() leaves it; `run_periods`: of a run
+  std::optional<ModeDrift> drift(const FrfEstimate& frf, int run_periods) const;
+  /// Runs whose noise is not that of the others.
+  struct OddRun {
+    int realization = 0;
+    ExperimentNoise::Odd odd;
+  };
+  const std::vector<OddRun>& odd_runs() const noexcept { return odd_runs_; }
 
  private:
   void add_noise(const RealizationSpectra& spectra, const LineEstimate& line,
@@ -73,6 +85,8 @@ class PlantAverage {
   Eigen::MatrixXcd covariance_sum_;  // vec(Cov(vec G)), on request
   Eigen::VectorXd condition_;
   ScatterAverage scatter_;
+  ResponseDrift drift_;
+  std::vector<OddRun> odd_runs_;
   Eigen::Index zippered_axes_ = 0;
   Eigen::VectorXd dof_sum_;       // of the noise's degrees of freedom
   Eigen::VectorXd scarcity_sum_;  // zippered: of 1 / degrees of freedom

@@ -80,6 +80,7 @@ class PlantEstimation {
   void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra);
   void include(const RealizationSpectra& spectra, const std::vector<RunExcitation>& excitation);
   FrfEstimate describe() const;
+  void note_change(const FrfEstimate& frf, HealthGathering& health) const;
 
   std::vector<RealizationRuns> realizations_;
   std::vector<LeftOutRealization> incomplete_;
@@ -305,6 +306,20 @@ void PlantEstimation::include(const RealizationSpectra& spectra,
   detection_->add(spectra, average_->mean_response(), axis, workers_);
 }
 
+/// What the response shows of the measurement itself.
+void PlantEstimation::note_change(const FrfEstimate& frf, HealthGathering& health) const {
+  std::vector<NoisyRun> noisy;
+  for (const auto& [realization, odd] : average_->odd_runs()) {
+    const auto of = std::find_if(realizations_.begin(), realizations_.end(),
+                                 [m = realization](const auto& r) { return r.realization == m; });
+    noisy.push_back({realization,
+                     of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
+                     frf.outputs.names[static_cast<std::size_t>(odd.output)], odd.ratio});
+  }
+  const UsedRun& run = realizations_.front().runs.front();
+  health.note(average_->drift(frf, run.transient_periods + run.periods), std::move(noisy));
+}
+
 FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   for (std::size_t m = 0; m < realizations_.size(); ++m) {
     const RealizationRuns& realization = realizations_[m];
@@ -332,6 +347,7 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   if (left_out_.size() == realizations_.size()) refuse_marked_runs(*first_marked_);
   FrfEstimate frf = describe();
   average_->finish(frf, workers_);
+  if (health != nullptr) note_change(frf, *health);
   if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);
   // Beyond them some axis would have to be extrapolated.
   if (zippered_) {

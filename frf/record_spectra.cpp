@@ -62,9 +62,9 @@ class RecordMeasurement {
     if (++segment_.periods == longest_) close_segment();
   }
 
-  void leave_out_marked(int period) {
+  void leave_out(int period, const std::string& why) {
     close_segment();
-    run_.drop(period, "a marked sample");
+    run_.drop(period, why);
   }
 
   RunSpectra finish() {
@@ -202,11 +202,12 @@ RunSpectra measure_record(const UsedRun& used, const RunExcitation& excitation,
     measurement.take(p);
     if (health != nullptr) health->take(w, nullptr);
   };
-  const auto leave_out = [&](int p) {
-    measurement.leave_out_marked(p);
-    if (health != nullptr) health->leave_out_marked();
+  const auto leave_out = [&](int p, const std::string& why) {
+    measurement.leave_out(p, why);
+    if (health != nullptr) health->leave_out();
   };
-  for_each_period(used, w, read_done, take, leave_out);
+  const std::vector<SampleSlip> slips = for_each_period(used, w, read_done, take, leave_out);
+  if (health != nullptr) health->note(slips);
   return measurement.finish();
 }
 

@@ -1,31 +1,25 @@
 #pragma once
 
-#include <cstdint>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "frf/run_spectra.hpp"
 #include "frf/run_table.hpp"
+#include "frf/sample_slip.hpp"
 
 namespace stageid {
 
 /// Reads the measured periods of a run one after the other into the workspace's samples: take(p) for a
-/// clean one, leave_out(p) for one with a marked sample. `read_done` is told the bytes of each.
+/// clean one, leave_out(p, why) for one with a marked sample or with a place where samples were lost or written
+/// twice. Behind such a place the periods are read displaced by as much, so that all have the phase of the first;
+/// where rows are missing for it at the end of the run the last period is turned in itself. `read_done` is told the
+/// bytes of each.
+/// @returns where samples are lost
 /// @throws what LogReader::read() throws
-template <typename Take, typename LeaveOut>
-void for_each_period(const UsedRun& used, RunWorkspace& w,
-                     const std::function<void(double bytes)>& read_done, Take&& take,
-                     LeaveOut&& leave_out) {
-  const auto period = static_cast<std::uint64_t>(w.dft.length());
-  for (int p = 0; p < used.periods; ++p) {
-    const auto first = static_cast<std::uint64_t>(used.transient_periods + p) * period;
-    used.log->read(used.index, first, period, w.samples);
-    read_done(static_cast<double>(w.samples.actuators.size() + w.samples.sensors.size()) *
-              sizeof(double));
-    if ((w.samples.marked != 0).any())
-      leave_out(p);
-    else
-      take(p);
-  }
-}
+std::vector<SampleSlip> for_each_period(
+    const UsedRun& used, RunWorkspace& w, const std::function<void(double bytes)>& read_done,
+    const std::function<void(int period)>& take,
+    const std::function<void(int period, const std::string& why)>& leave_out);
 
 }  // namespace stageid

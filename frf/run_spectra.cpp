@@ -36,6 +36,7 @@ class RunMeasurement {
     w_.excluded_sum.setZero(w_.dft.length(), static_cast<Eigen::Index>(channels.excluded.size()));
     run_.mean.setZero(n, n_lines);
     if (used.periods < 2) return;
+    run_.slope.setZero(n, n_lines);
     run_.scatter_re = w_.pool.take(n * (n + 1) / 2, n_lines);
     run_.scatter_im = w_.pool.take(n * (n + 1) / 2, n_lines);
   }
@@ -55,12 +56,13 @@ class RunMeasurement {
     if (static_cast<int>(waiting_.size()) == together_) include_waiting();
     return spectra;
   }
-  void leave_out_marked(int period) { run_.drop(period, "a marked sample"); }
+  void leave_out(int period, const std::string& why) { run_.drop(period, why); }
 
   RunSpectra finish() {
     include_waiting();
     if (run_.periods == 0) return std::move(run_);
     run_.scatter_dof = run_.periods - 1;
+    finish_slope();
     const std::vector<int> excited(
         lines_.lines.begin(), lines_.lines.begin() + static_cast<std::ptrdiff_t>(lines_.excited));
     run_.excluded_power = excluded_power(excited, unmarked_, w_);
@@ -99,11 +101,32 @@ class RunMeasurement {
       }
     }
     std::vector<const Eigen::MatrixXcd*> periods;
-    for (std::size_t i = 0; i < waiting_.size(); ++i)
-      if (in[i] != 0) periods.push_back(&w_.spectra[i]);
-    for (Eigen::Index k = 0; k < run_.mean.cols(); ++k) include_line(periods, k);
+    std::vector<double> numbers;
+    for (std::size_t i = 0; i < waiting_.size(); ++i) {
+      if (in[i] == 0) continue;
+      periods.push_back(&w_.spectra[i]);
+      numbers.push_back(waiting_[i]);
+      sum_of_numbers_ += waiting_[i];
+      sum_of_squares_ += static_cast<double>(waiting_[i]) * waiting_[i];
+    }
+    for (Eigen::Index k = 0; k < run_.mean.cols(); ++k) {
+      include_line(periods, k);
+      for (std::size_t i = 0; i < periods.size() && run_.slope.size() > 0; ++i)
+        run_.slope.col(k) += numbers[i] * periods[i]->col(k);
+    }
     run_.periods += static_cast<int>(periods.size());
     waiting_.clear();
+  }
+
+  /// From sum_p p Z_p. Rounding is far below noise: few numbers, none large.
+  void finish_slope() {
+    const double mean = sum_of_numbers_ / run_.periods;
+    run_.slope_spread = sum_of_squares_ - run_.periods * mean * mean;
+    if (run_.periods < 2 || run_.slope.size() == 0) {
+      run_.slope.resize(0, 0);
+      return;
+    }
+    run_.slope = (run_.slope - sum_of_numbers_ * run_.mean) / run_.slope_spread;
   }
 
   /// More periods into mean and scatter, by Welford's recursion: a difference of two large sums
@@ -166,6 +189,8 @@ class RunMeasurement {
   int together_ = 1;  // periods that are looked at, and included, together
   bool compare_ = true;
   int unmarked_ = 0;
+  double sum_of_numbers_ = 0.0;  // of the periods included
+  double sum_of_squares_ = 0.0;
   std::vector<int> waiting_;  // periods whose spectra are in the workspace
   RunSpectra run_;
 };
@@ -186,11 +211,12 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
     const KnownSpectra known{spectra, channels.outputs, channels.estimated, lines};
     if (health != nullptr) health->take(w, &known);
   };
-  const auto leave_out = [&](int p) {
-    measurement.leave_out_marked(p);
-    if (health != nullptr) health->leave_out_marked();
+  const auto leave_out = [&](int p, const std::string& why) {
+    measurement.leave_out(p, why);
+    if (health != nullptr) health->leave_out();
   };
-  for_each_period(used, w, read_done, take, leave_out);
+  const std::vector<SampleSlip> slips = for_each_period(used, w, read_done, take, leave_out);
+  if (health != nullptr) health->note(slips);
   RunSpectra run = measurement.finish();
   run.fingerprint = fingerprint.hex();
   return run;

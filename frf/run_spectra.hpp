@@ -27,7 +27,12 @@ struct RunSpectra {
   /// first of them, counted among those that are used. 0 and empty: no line shares with another.
   Eigen::Index scatter_window = 0;
   std::vector<Eigen::Index> scatter_first{};
-  int periods = 0;                 ///< clean ones
+  /// Slope of Z over the periods, of least squares: what Z changes by from one to the next. Empty with one
+  /// period, or from a whole record.
+  Eigen::MatrixXcd slope{};
+  double slope_spread =
+      0.0;          ///< sum_p (p - mean p)^2: the slope's variance is that of a period over it
+  int periods = 0;  ///< clean ones
   Eigen::VectorXd excluded_power;  ///< sum over the lines of |U|^2 of the excluded actuators
   std::string fingerprint;         ///< of the excitation and of every sample that is not marked
   /// In the order of the periods; which realization and experiment this is, others know.
@@ -51,8 +56,10 @@ struct SpectrumLines {
 struct RunWorkspace {
   RunWorkspace(int period_samples, MatrixPool& matrices) : dft(period_samples), pool(matrices) {}
   RealDft dft;
-  MatrixPool& pool;  // of all threads: scatters leave the workspace with their run
-  LogSamples samples;
+  MatrixPool& pool;    // of all threads: scatters leave the workspace with their run
+  LogSamples samples;  // the period that is taken
+  LogSamples ahead;    // the one behind it: for_each_period()
+  LogSamples other;    // of the other kind of channels, where one kind lost samples
   std::vector<Eigen::MatrixXcd> spectra;  // Z_p of some periods, channels x lines
   std::vector<Eigen::MatrixXf> record;    // of the same, less first_samples
   Eigen::MatrixXd first_samples;          // samples x channels

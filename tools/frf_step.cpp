@@ -94,7 +94,7 @@ FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions optio
   if (health.wanted) {
     FrfAndHealth both = estimate_plant_frf_and_health(logs, options);
     step.frf = std::move(both.frf);
-    step.findings = check_health(std::move(both.health), nominal);
+    step.findings = examine(step.frf, std::move(both.health), nominal);
   } else {
     step.frf = estimate_plant_frf(logs, options);
   }

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "acquisition/log_reader.hpp"
+#include "excitation/file_error.hpp"
 #include "frf/experiment_noise_check.hpp"
 #include "frf/interpolation_check.hpp"
 #include "frf/settling_check.hpp"
@@ -30,7 +33,7 @@ Finding finding_of(const Json& object) {
   Finding finding;
   for (const Severity severity : kSeverities)
     if (text_of(object, "severity") == to_string(severity)) finding.severity = severity;
-  for (int cause = 0; cause <= static_cast<int>(Cause::unsettled); ++cause)
+  for (int cause = 0; cause <= static_cast<int>(Cause::drift); ++cause)
     if (text_of(object, "cause") == to_string(static_cast<Cause>(cause)))
       finding.cause = static_cast<Cause>(cause);
   finding.channel = text_of(object, "channel");
@@ -38,6 +41,11 @@ Finding finding_of(const Json& object) {
   finding.figure = text_of(object, "figure");
   finding.remedy = text_of(object, "remedy");
   return finding;
+}
+
+bool has(const std::vector<Finding>& findings, Cause cause) {
+  return std::any_of(findings.begin(), findings.end(),
+                     [&](const Finding& f) { return f.cause == cause; });
 }
 
 }  // namespace
@@ -52,7 +60,25 @@ std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& file
     throw_if_interrupted();
     progress.update(done, total);
   };
-  return check_health(read_health_record(opened.logs(), options), nominal);
+  std::optional<FrfAndHealth> both;
+  try {
+    both = estimate_plant_frf_and_health(opened.logs(), options);
+  } catch (const FormatError&) {
+    // What cannot be estimated may still be examined, and that says why.
+  } catch (const std::invalid_argument&) {
+  }
+  if (!both) return check_health(read_health_record(opened.logs(), options), nominal);
+  return keep_health(both->frf, examine(both->frf, std::move(both->health), nominal));
+}
+
+std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
+                             const std::optional<NominalStage>& nominal) {
+  const std::vector<NoisyRun> noisy = record.noisy_runs;
+  std::vector<Finding> findings = check_health(std::move(record), nominal);
+  if (!has(findings, Cause::drift))
+    for (Finding& finding : check_experiment_noise(frf, noisy))
+      findings.push_back(std::move(finding));
+  return findings;
 }
 
 std::vector<std::string> health_lines(const std::vector<Finding>& findings) {
@@ -94,8 +120,8 @@ std::vector<std::string> health_notes(const std::vector<Finding>& findings,
 
 std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings) {
   for (Finding& finding : check_interpolation(frf)) findings.push_back(std::move(finding));
-  for (Finding& finding : check_experiment_noise(frf)) findings.push_back(std::move(finding));
-  for (Finding& finding : check_settling(frf)) findings.push_back(std::move(finding));
+  if (!has(findings, Cause::drift))  // else it explains them
+    for (Finding& finding : check_settling(frf)) findings.push_back(std::move(finding));
   std::stable_sort(findings.begin(), findings.end(),
                    [](const Finding& a, const Finding& b) { return a.severity < b.severity; });
   Json provenance = Json::parse(frf.provenance_json, nullptr, false);

@@ -8,6 +8,7 @@
 
 #include "frf/data_health.hpp"
 #include "frf/frf_options.hpp"
+#include "frf/plant_frf.hpp"
 #include "tools/console.hpp"
 
 namespace stageid {
@@ -18,6 +19,10 @@ namespace stageid {
 std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
                                   FrfOptions options, const std::filesystem::path& stage_file,
                                   const Console& console);
+
+/// What the logs' record and the response estimated from them show.
+std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
+                             const std::optional<NominalStage>& nominal);
 
 /// The table: one line a finding, in columns; a single line if there is none.
 std::vector<std::string> health_lines(const std::vector<Finding>& findings);

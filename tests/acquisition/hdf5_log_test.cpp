@@ -116,6 +116,21 @@ TEST_F(Hdf5Log, TakesOneUnitOrOneAChannel) {
   expect_refused({.sensor_units = {"m", "rad", "m"}}, "/channels/sensors", "3 units");
 }
 
+// Of all signals, then the periods behind it are only displaced.
+TEST_F(Hdf5Log, AWholeExcitationMayLackARow) {
+  write({.change = [](Hdf5File& file) {
+    add_run(file, "/runs/0002", 1);
+    std::vector<double> values = excitation(2, kRows);
+    const auto lost = values.begin() + 3 * (kPeriod + 2);
+    values.erase(lost, lost + 3);
+    values.insert(values.end(), {0.0, 0.0, 0.0});
+    file.write_reals("/runs/0002/excitation", Shape{kRows, 3}, values.data());
+    file.write_reals("/runs/0002/actuators", Shape{kRows, 3}, actuators(2).data());
+    file.write_reals("/runs/0002/sensors", Shape{kRows, 2}, sensors(2).data());
+  }});
+  EXPECT_EQ(open_log(path_)->excitation(2), test::excitation_of(2));
+}
+
 TEST_F(Hdf5Log, AWholeExcitationMustRepeat) {
   write({.whole_excitation = true});
   EXPECT_EQ(open_log(path_)->excitation(1), test::excitation_of(1));

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "frf/data_health.hpp"
+#include "frf/plant_frf.hpp"
 #include "frf/worker_pool.hpp"
 #include "tests/support/faulty_log.hpp"
 #include "tests/support/planted_faults.hpp"
@@ -99,7 +100,8 @@ PlantResult Study::of_plant(int seed) const {
     }
     FrfOptions options;
     options.threads = 1;
-    const auto findings = check_health(read_health_record({&log}, options), expectation);
+    FrfAndHealth both = estimate_plant_frf_and_health({&log}, options);
+    const auto findings = check_health(std::move(both.health), expectation);
     const test::Judgement judgement = test::judge(planted, findings, log.log_info);
     tally.add(
         {1, judgement.named ? 1 : 0, judgement.others > 0 ? 1 : 0, 0, std::abs(judgement.error)});

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <string>
 
 #include "frf/covariance_smoothing.hpp"
 #include "frf/experiment_noise_check.hpp"
@@ -122,6 +123,24 @@ TEST(ExperimentNoise, TheFactorsComeNearestToIt) {
   EXPECT_LT((diagonal - frf.noise_variance).norm(), 1e-12 * diagonal.norm());
   const Eigen::VectorXd ratio = of_factors.cwiseQuotient(diagonal).rowwise().mean();
   for (Eigen::Index c = 0; c < 6; ++c) EXPECT_NEAR(ratio[c], 1.0, 0.1) << c;
+}
+
+// Counted from 1, as in the program.
+TEST(ExperimentNoise, NamesTheRunsAndByHowMuch) {
+  const MemoryLog log =
+      test::simulate_log(test::small_stage(), uneven(AxisScheme::single_axis, 2, 6));
+  const FrfAndHealth both = estimate_plant_frf_and_health({&log}, {.threads = 1});
+  ASSERT_EQ(both.health.noisy_runs.size(), 2U);
+  for (int m = 0; m < 2; ++m) {
+    const NoisyRun& run = both.health.noisy_runs[static_cast<std::size_t>(m)];
+    EXPECT_EQ(run.realization, m);
+    EXPECT_EQ(run.experiment, 1);
+    EXPECT_NEAR(run.ratio, 10.0, 4.0);
+  }
+  const std::vector<Finding> findings = check_experiment_noise(both.frf, both.health.noisy_runs);
+  ASSERT_EQ(findings.size(), 1U);
+  for (const char* name : {"realization 1, experiment 2", "realization 2, experiment 2"})
+    EXPECT_NE(findings[0].figure.find(name), std::string::npos) << findings[0].figure;
 }
 
 TEST(ExperimentNoise, IsToldAndNotSmoothed) {

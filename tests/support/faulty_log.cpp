@@ -16,7 +16,8 @@ namespace {
 
 using Kind = PlantedFault::Kind;
 
-constexpr int kTaps = 32;  // a side, of the fractional delay
+constexpr int kTaps = 32;               // a side, of the fractional delay
+constexpr Eigen::Index kRetuned = 200;  // samples between changes of a mode that drifts
 
 ChannelList list_of(const std::vector<Channel>& channels) {
   ChannelList list;
@@ -59,11 +60,17 @@ class Loop {
         y_late_(plant_.sensors()),
         u_(plant_.actuators()),
         force_(plant_.actuators()),
-        window_m_(1e-3) {}
+        window_m_(1e-3) {
+    if (fault.kind != Kind::drifting_mode) return;
+    const PlantMode mode = wafer_stage_modes(request.plant)[static_cast<std::size_t>(fault.a)];
+    mode_hz_ = mode.natural_frequency_hz;
+    mode_damping_ = mode.damping_ratio;
+  }
 
   /// @returns false if the loop ran away.
+  /// @param before  the part of the measurement that lies before this run; `share`: that this run is
   bool run(const Eigen::MatrixXd& r, const Eigen::VectorXd& hidden, Eigen::Index samples,
-           std::uint64_t seed, LogSamples& record);
+           std::uint64_t seed, double before, double share, LogSamples& record);
 
  private:
   void measure(RandomNumbers& random, Eigen::Index n, Eigen::Index samples);
@@ -80,6 +87,8 @@ class Loop {
   Eigen::VectorXd force_;
   double window_m_;
   double stuck_ = 0.0;
+  double mode_hz_ = 0.0;
+  double mode_damping_ = 0.0;
 };
 
 void Loop::measure(RandomNumbers& random, Eigen::Index n, Eigen::Index samples) {
@@ -120,7 +129,7 @@ void Loop::push() {
 }
 
 bool Loop::run(const Eigen::MatrixXd& r, const Eigen::VectorXd& hidden, Eigen::Index samples,
-               std::uint64_t seed, LogSamples& record) {
+               std::uint64_t seed, double before, double share, LogSamples& record) {
   RandomNumbers random(seed);
   plant_.reset();
   late_.reset();
@@ -129,6 +138,11 @@ bool Loop::run(const Eigen::MatrixXd& r, const Eigen::VectorXd& hidden, Eigen::I
   record.actuators.resize(samples, u_.size());
   record.marked.setZero(samples);
   for (Eigen::Index n = 0; n < samples; ++n) {
+    if (fault_.kind == Kind::drifting_mode && n % kRetuned == 0) {
+      const double passed =
+          before + share * static_cast<double>(n) / static_cast<double>(samples) - 0.5;
+      plant_.retune(fault_.a, mode_hz_ * (1.0 + fault_.value * passed), mode_damping_);
+    }
     measure(random, n, samples);
     if (!(y_.cwiseAbs().maxCoeff() < window_m_)) return false;
     controller_.update(y_.data(), u_.data());
@@ -198,13 +212,38 @@ MemoryLog simulate_faulty_log(const FaultyLogRequest& request, const PlantedFaul
       spec.seed = next_seed();
       const Eigen::VectorXd hidden = random_phase_multisine(grid, spec).samples;
       LogSamples record;
-      if (!loop.run(r, hidden, samples, next_seed(), record)) return MemoryLog{};
+      const double share = 1.0 / (request.realizations * request.axes);
+      if (!loop.run(r, hidden, samples, next_seed(), (m * request.axes + axis) * share, share,
+                    record))
+        return MemoryLog{};
       log.append(m, axis, std::move(r), std::move(record));
     }
   return log;
 }
 
+void lose_samples(const PlantedFault& fault, Eigen::Index period, Eigen::MatrixXd& x) {
+  const Eigen::MatrixXd good = x;
+  const auto lost = static_cast<Eigen::Index>(fault.value);
+  for (Eigen::Index n = fault.b; n < x.rows(); ++n)
+    x.row(n) = good.row(n + lost < x.rows() ? n + lost : n + lost - period);
+}
+
 void spoil_recording(const PlantedFault& fault, MemoryLog& log) {
+  if (fault.kind == Kind::lost_samples) {
+    LogSamples& record = log.records[static_cast<std::size_t>(fault.a)];
+    lose_samples(fault, log.log_info.period_samples, record.sensors);
+    lose_samples(fault, log.log_info.period_samples, record.actuators);
+    return;
+  }
+  if (fault.kind == Kind::late_excitation) {
+    for (Eigen::MatrixXd& r : log.excitation_periods) {
+      const Eigen::MatrixXd good = r;
+      const auto late = static_cast<Eigen::Index>(fault.value);
+      for (Eigen::Index n = 0; n < r.rows(); ++n)
+        r.row(n) = good.row((n - late + r.rows()) % r.rows());
+    }
+    return;
+  }
   for (LogSamples& record : log.records) {
     Eigen::MatrixXd& x = fault.of_sensor ? record.sensors : record.actuators;
     if (fault.kind == Kind::recorded_swap) x.col(fault.a).swap(x.col(fault.b));

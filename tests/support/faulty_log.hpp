@@ -19,13 +19,16 @@ struct PlantedFault {
     recorded_swap,
     recorded_gain,
     recorded_skew,
+    lost_samples,     ///< `value` rows of run `a` are not recorded, from row `b` on
+    late_excitation,  ///< recorded `value` samples late
     // at the stage: the loop runs with them
     wired_swap,
     wired_gain,
-    wired_skew,        ///< a sensor samples, an actuator acts, `value` seconds late
-    dead_sensor,       ///< measures its noise
-    stuck_sensor,      ///< shows one value from the middle of every run on
-    saturation,        ///< |channel| <= value; an actuator's force is limited with it
+    wired_skew,    ///< a sensor samples, an actuator acts, `value` seconds late
+    dead_sensor,   ///< measures its noise
+    stuck_sensor,  ///< shows one value from the middle of every run on
+    saturation,    ///< |channel| <= value; an actuator's force is limited with it
+    drifting_mode,  ///< the frequency of mode `a` moves by the share `value`, evenly over the measurement
     hidden_excitation  ///< an actuator gets `value` N rms more, on the excited lines, unrecorded
   };
   Kind kind = Kind::none;
@@ -54,7 +57,8 @@ WaferStageSpec random_wafer_stage(std::uint64_t seed, const WaferStageSpec& nomi
 /// @returns a log without runs if the loop did not stay in its sensors' windows: no measurement then.
 MemoryLog simulate_faulty_log(const FaultyLogRequest& request, const PlantedFault& fault);
 
-/// Spoils the recorded signals of a good log: recorded_swap, recorded_gain, recorded_skew, and saturation
+/// Spoils the recorded signals of a good log: recorded_swap, recorded_gain, recorded_skew, lost_samples (the last rows
+/// are those of the period before), late_excitation, and saturation
 /// of a sensor that only the recorder has.
 void spoil_recording(const PlantedFault& fault, MemoryLog& log);
 

@@ -13,6 +13,8 @@
 
 namespace stageid::test {
 
+inline constexpr int kFirstFlexibleMode = 6;  // of wafer_stage_modes()
+
 /// A fault and what ought to be said of it.
 struct NamedFault {
   std::string name;
@@ -103,6 +105,23 @@ inline std::vector<NamedFault> faults_to_plant(std::uint64_t seed, const MemoryL
   plant("stage: in-plane axis excited", false,
         {Kind::hidden_excitation, false, random.integer(kZActuators, kZActuators + 3), 0, 0.2},
         Cause::unrecorded);
+  const auto plant_in_time = [&](const char* name, bool in_recording, const PlantedFault& fault,
+                                 Cause cause, const char* channel) {
+    faults.push_back({name, in_recording, fault, false, cause, channel});
+  };
+  const int runs = static_cast<int>(clean.log_runs.size());
+  const int period = clean.log_info.period_samples;
+  const int rows = static_cast<int>(clean.log_runs.front().samples);
+  for (const int lost : {1, 3})
+    plant_in_time(lost == 1 ? "recorded: a sample lost" : "recorded: three samples lost", true,
+                  {Kind::lost_samples, true, random.integer(0, runs - 1),
+                   random.integer(period + period / 10, rows - period / 10), double(lost)},
+                  Cause::lost_samples, "");
+  plant_in_time("recorded: excitation late", true,
+                {Kind::late_excitation, true, 0, 0, double(random.integer(1, 3))},
+                Cause::excitation_timing, "excitation");
+  plant_in_time("stage: a mode drifts by 0.05 %", false,
+                {Kind::drifting_mode, true, kFirstFlexibleMode, 0, 5e-4}, Cause::drift, "");
   return faults;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "frf/plant_frf.hpp"
 #include "tests/support/faulty_log.hpp"
 #include "tests/support/planted_faults.hpp"
 #include "tests/support/wafer_stage.hpp"
@@ -46,7 +47,7 @@ TEST(DataHealth, EveryPlantedFaultIsNamedAndNothingElse) {
     else
       log = test::simulate_faulty_log(request, planted.fault);
     if (log.log_runs.empty()) continue;  // the loop did not hold: nothing was measured
-    const auto findings = check_health(read_health_record({&log}, {}), nominal);
+    const auto findings = check_health(estimate_plant_frf_and_health({&log}).health, nominal);
     const test::Judgement judgement = test::judge(planted, findings, log.log_info);
     EXPECT_TRUE(judgement.named) << planted.name << " of " << planted.expected_channel << "\n"
                                  << told(findings);
