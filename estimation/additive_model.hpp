@@ -85,6 +85,10 @@ struct AdditiveModel {
   HoldModel hold = HoldModel::none;
   Eigen::VectorXd input_delay_s;   ///< n_u
   Eigen::VectorXd output_delay_s;  ///< n_y
+  /// Standard deviations of estimated delays, n_u and n_y; empty: given, or unknown. Delays per channel are
+  /// differences to that of the last output, which is held: its deviation is 0.
+  Eigen::VectorXd input_delay_std_s;
+  Eigen::VectorXd output_delay_std_s;
   std::vector<Submodel> submodels;
   FitRecord fit;
   std::vector<double> cost_history;

@@ -25,8 +25,24 @@
 namespace stageid {
 namespace {
 
+/// Free delays are the last globals; one delay of the plant is that of every input.
+void fill_delay_deviations(const FitProblem& problem, const Eigen::MatrixXd& globals,
+                           AdditiveModel& model) {
+  if (problem.delays() == 0) return;
+  const Eigen::VectorXd deviation =
+      globals.diagonal().tail(problem.delays()).cwiseMax(0.0).cwiseSqrt();
+  const bool common = problem.delay == DelayModel::estimate;
+  model.input_delay_std_s.setConstant(problem.n_inputs, deviation[0]);
+  model.output_delay_std_s.setZero(problem.n_outputs);
+  if (common) return;
+  model.input_delay_std_s = deviation.head(problem.n_inputs);
+  model.output_delay_std_s.head(problem.n_outputs - 1) = deviation.tail(problem.n_outputs - 1);
+}
+
 /// Delta method, facts.md section 10:  df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
-void fill_deviations(const ParameterCovariance& covariance, AdditiveModel& model) {
+void fill_deviations(const FitProblem& problem, const ParameterCovariance& covariance,
+                     AdditiveModel& model) {
+  fill_delay_deviations(problem, covariance.globals, model);
   Eigen::Index first = 0;
   Eigen::Index f = 0;
   for (Submodel& s : model.submodels) {
@@ -82,7 +98,7 @@ void use_covariance(const FitProblem& problem, ParameterCovariance& covariance, 
         "not in the data");
     return;
   }
-  fill_deviations(covariance, result.model);
+  fill_deviations(problem, covariance, result.model);
   result.response_variance = std::move(covariance.response_variance);
   if (!likelihood || !(covariance.residual_scale > 1.0)) return;
   result.decisions.push_back(
@@ -181,6 +197,8 @@ void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResu
 
 /// What an earlier fit knew about the start is not known about this one.
 void forget_results(AdditiveModel& model) {
+  model.input_delay_std_s.resize(0);
+  model.output_delay_std_s.resize(0);
   for (Submodel& s : model.submodels) {
     s.natural_frequency_std_hz.reset();
     s.damping_ratio_std.reset();

@@ -191,6 +191,15 @@ Eigen::VectorXd delays_from_json(const JsonNode& root, const std::string& key, s
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(size));
 }
 
+/// Empty where the file has none.
+Eigen::VectorXd delay_deviations_from_json(const JsonNode& root, const std::string& key,
+                                           std::size_t size) {
+  if (!root.has(key)) return {};
+  Eigen::VectorXd out = delays_from_json(root, key, size);
+  if (out.minCoeff() < 0.0) root.member(key).fail("must not hold a negative standard deviation");
+  return out;
+}
+
 FitRecord fit_from_json(const JsonNode& node) {
   FitRecord fit;
   fit.cost = node.number_or("cost", 0.0);
@@ -234,6 +243,10 @@ void write_model(const std::filesystem::path& file, const AdditiveModel& model) 
   root["hold"] = to_string(model.hold);
   root["input_delay_s"] = to_list(model.input_delay_s, model.n_inputs());
   root["output_delay_s"] = to_list(model.output_delay_s, model.n_outputs());
+  if (model.input_delay_std_s.size() > 0) {
+    root["input_delay_std_s"] = to_list(model.input_delay_std_s, model.n_inputs());
+    root["output_delay_std_s"] = to_list(model.output_delay_std_s, model.n_outputs());
+  }
   root["submodels"] = Json::array();
   for (const Submodel& s : model.submodels) root["submodels"].push_back(submodel_to_json(s));
   root["fit"] = {{"cost", model.fit.cost},
@@ -262,6 +275,10 @@ AdditiveModel read_model(const std::filesystem::path& file) {
   model.hold = root.has("hold") ? hold_from_text(root.member("hold")) : HoldModel::none;
   model.input_delay_s = delays_from_json(root, "input_delay_s", model.inputs.size());
   model.output_delay_s = delays_from_json(root, "output_delay_s", model.outputs.size());
+  model.input_delay_std_s =
+      delay_deviations_from_json(root, "input_delay_std_s", model.inputs.size());
+  model.output_delay_std_s =
+      delay_deviations_from_json(root, "output_delay_std_s", model.outputs.size());
   for (const JsonNode& node : root.member("submodels").elements())
     model.submodels.push_back(submodel_from_json(node, model.outputs.size(), model.inputs.size()));
   if (root.has("fit")) model.fit = fit_from_json(root.member("fit"));

@@ -123,6 +123,7 @@ void FitCommand::run() const {
   for (const std::string& line : result.decisions) console_.result(line);
   console_.result(cost_line(result.cost));
   for (const std::string& line : mode_table(result.model)) console_.result(line);
+  for (const std::string& line : delay_lines(result.model)) console_.result(line);
   console_.result(fmt::format("{}: relative error {:.4g}, {} ({})", output_.string(),
                               result.model.fit.relative_rms_error, to_string(result.status),
                               result.message));
@@ -137,6 +138,7 @@ void FitCommand::run() const {
                    {"decisions", result.decisions},
                    {"findings", result.findings},
                    {"modes", modes_json(result.model)},
+                   {"delays", delays_json(result.model)},
                    {"seconds", step.seconds}});
   for (const std::string& finding : result.findings)
     if (result.trustworthy() || result.message.find(finding) == std::string::npos)

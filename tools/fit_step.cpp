@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "excitation/fingerprint.hpp"
 #include "tools/frf_quality.hpp"
 #include "tools/health_step.hpp"
@@ -29,6 +32,13 @@ std::string provenance(const FitSetup& setup, const FitResult& result, const std
 
 std::string optional_number(const std::optional<double>& value) {
   return value ? fmt::format("{:.2g}", *value) : "-";
+}
+
+/// Rounded to two digits of the deviation.
+std::string with_deviation(double value, double deviation) {
+  if (!(deviation > 0.0)) return fmt::format("{:.6g} +- 0", value);
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 12);
+  return fmt::format("{:.{}f} +- {:.{}f}", value, decimals, deviation, decimals);
 }
 
 Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
@@ -99,6 +109,47 @@ std::vector<std::string> mode_table(const AdditiveModel& model) {
            fmt::format("{:.6f}", pole.damping_ratio), optional_number(pole.damping_ratio_std)});
   }
   return table_lines(rows);
+}
+
+std::vector<std::string> delay_lines(const AdditiveModel& model) {
+  const bool known = model.input_delay_std_s.size() > 0;
+  const Eigen::VectorXd inputs = model.input_delays_s();
+  const Eigen::VectorXd outputs = model.output_delays_s();
+  const auto line = [&](const std::string& of, double delay_s, const Eigen::VectorXd& std_s,
+                        Eigen::Index at) {
+    return known ? fmt::format("delay{} {} us", of, with_deviation(1e6 * delay_s, 1e6 * std_s[at]))
+                 : fmt::format("delay{} {:.6g} us", of, 1e6 * delay_s);
+  };
+  if (inputs.isConstant(inputs[0], 0.0) && outputs.isZero(0.0) &&
+      (!known || model.input_delay_std_s.isConstant(model.input_delay_std_s[0], 0.0))) {
+    if (!known && inputs[0] == 0.0) return {};
+    return {line("", inputs[0], model.input_delay_std_s, 0)};
+  }
+  std::vector<std::string> lines;
+  for (Eigen::Index u = 0; u < inputs.size(); ++u)
+    lines.push_back(
+        line(fmt::format(" of input {}", model.inputs.names[static_cast<std::size_t>(u)]),
+             inputs[u], model.input_delay_std_s, u));
+  for (Eigen::Index y = 0; y < outputs.size(); ++y) {
+    const std::string& name = model.outputs.names[static_cast<std::size_t>(y)];
+    if (y + 1 == outputs.size() && outputs[y] == 0.0)
+      lines.push_back(fmt::format("delay of output {} 0 us, the reference", name));
+    else
+      lines.push_back(line(" of output " + name, outputs[y], model.output_delay_std_s, y));
+  }
+  return lines;
+}
+
+nlohmann::ordered_json delays_json(const AdditiveModel& model) {
+  Json json = Json::object();
+  const auto add = [&json](const char* key, const Eigen::VectorXd& values) {
+    if (values.size() > 0) json[key] = std::vector<double>(values.begin(), values.end());
+  };
+  add("input_delay_s", model.input_delays_s());
+  add("output_delay_s", model.output_delays_s());
+  add("input_delay_std_s", model.input_delay_std_s);
+  add("output_delay_std_s", model.output_delay_std_s);
+  return json;
 }
 
 std::string cost_line(const std::vector<double>& cost) {

@@ -31,7 +31,12 @@ std::vector<std::string> decisions_of(const AdditiveModel& model);
 /// For people: table of modes with standard deviations; cost history in one line.
 std::vector<std::string> mode_table(const AdditiveModel& model);
 std::string cost_line(const std::vector<double>& cost);
+/// The model's delays with the deviations of estimated ones: one line for a delay that all channels share,
+/// else one per channel; empty without a delay.
+std::vector<std::string> delay_lines(const AdditiveModel& model);
 /// The same for --json.
 nlohmann::ordered_json modes_json(const AdditiveModel& model);
+/// Keys as in model.json: input_delay_s, output_delay_s, and input_delay_std_s, output_delay_std_s if known.
+nlohmann::ordered_json delays_json(const AdditiveModel& model);
 
 }  // namespace stageid

@@ -42,6 +42,8 @@ AdditiveModel full_model() {
   model.hold = HoldModel::exact;
   for (double& value : model.input_delay_s) value = 1e-4 * random.uniform();
   for (double& value : model.output_delay_s) value = -1e-5 * random.uniform();
+  model.input_delay_std_s = model.input_delay_s / 3.0;
+  model.output_delay_std_s = -model.output_delay_s / 3.0;
   model.submodels = {test::empty_submodel(model, 2, {}, 1),
                      test::empty_submodel(model, 0, {1.0 / 30000.0, 1.0 / 9e8}, 2),
                      test::empty_submodel(model, 1, {0.1, 0.01, 0.001 / 3.0}, 1),
@@ -93,6 +95,8 @@ TEST_F(ModelFile, RoundTripsEveryBit) {
   EXPECT_EQ(read.hold, model.hold);
   EXPECT_EQ(read.input_delay_s, model.input_delay_s);
   EXPECT_EQ(read.output_delay_s, model.output_delay_s);
+  EXPECT_EQ(read.input_delay_std_s, model.input_delay_std_s);
+  EXPECT_EQ(read.output_delay_std_s, model.output_delay_std_s);
   ASSERT_EQ(read.submodels.size(), model.submodels.size());
   for (std::size_t i = 0; i < model.submodels.size(); ++i) {
     const Submodel& a = read.submodels[i];
@@ -221,6 +225,8 @@ TEST_F(ModelFile, DeviationsThatDoNotBelongToTheNumerators) {
   };
   expect_format_error(changed([](Json& std) { std.erase(1); }), "numerator_std",
                       "as many matrices as numerator");
+  expect_format_error([](Json& root) { root["output_delay_std_s"][1] = -1e-6; },
+                      "output_delay_std_s", "negative standard deviation");
   expect_format_error(changed([](Json& std) { std[0][1][2] = -1.0; }), "numerator_std",
                       "negative standard deviation");
   expect_format_error(changed([](Json& std) { std[0].erase(1); }), "numerator_std", "2 rows");

@@ -27,6 +27,10 @@ py::object number_or_none(const std::optional<double>& value) {
   return value ? py::object(py::float_(*value)) : py::object(py::none());
 }
 
+py::object deviation_or_none(const Eigen::VectorXd& values) {
+  return values.size() > 0 ? py::cast(values) : py::object(py::none());
+}
+
 py::list modes_of(const AdditiveModel& model) {
   py::list modes;
   for (const ModeShape& shape : mode_shapes(model)) {
@@ -184,6 +188,15 @@ void define_model(py::module_& module) {
           "'none', 'phase', 'sinc' or 'exact'")
       .def_property_readonly("input_delay_s", &Model::input_delays_s, "s, [n_u]")
       .def_property_readonly("output_delay_s", &Model::output_delays_s, "s, [n_y]")
+      .def_property_readonly(
+          "input_delay_std_s",
+          [](const Model& m) { return deviation_or_none(m.input_delay_std_s); },
+          "Standard deviation, s, [n_u]; None: given, or unknown")
+      .def_property_readonly(
+          "output_delay_std_s",
+          [](const Model& m) { return deviation_or_none(m.output_delay_std_s); },
+          "Standard deviation, s, [n_y]; of delays per channel the last is the reference, 0; None: "
+          "given, or unknown")
       .def_property_readonly("submodels", &submodels_of, kSubmodelsDoc)
       .def_property_readonly("fit", &fit_of,
                              "How the fit ended, a dict: cost, weighting, iterations, status, "

@@ -141,6 +141,37 @@ class Covariance(unittest.TestCase):
         self.assertTrue(0.9 < ratio.mean() < 1.1, ratio)
         self.assertAlmostEqual(np.mean(inside), 0.95, delta=0.015)
 
+    def test_delays_with_their_deviations(self):
+        """In the model, in --json and on the terminal: those of the covariance file."""
+        inputs, outputs = np.array([1.3002e-4, 0.9e-4]), np.array([2e-5, 0.0])
+        for kind, delays in (("estimate", np.full((N_Y, N_U), 1.3002e-4)), ("per_channel", outputs[:, None] + inputs)):
+            G = plant(F) * np.exp(-2j * np.pi * F[:, None, None] * delays)
+            write_frf("frf.h5", F, G + self.sd * circular(np.random.default_rng(8), self.sd.shape), self.sd**2)
+            shown = fit("frf.h5", "-o", "model.json", "--delay", kind, *self.arguments).stdout
+            told = json.loads(program("--json", "fit", "frf.h5", "-o", "m2.json", "--delay", kind, *self.arguments).stdout)
+            m = model()
+            for key in ("input_delay_s", "output_delay_s", "input_delay_std_s", "output_delay_std_s"):
+                self.assertEqual(told["delays"][key], m[key])
+            with h5py.File(WORK / "c.h5") as h:
+                std = dict(zip((n.decode() for n in h["parameters/name"]), np.sqrt(np.diag(h["covariance/sandwich"][:]))))
+            if kind == "estimate":
+                np.testing.assert_allclose(m["input_delay_std_s"], [std["input_delay_s"]] * 2, rtol=1e-6)
+                self.assertEqual(m["output_delay_std_s"], [0, 0])
+                self.assertRegex(shown, r"(?m)^delay \d+\.\d+ \+- \d+\.\d+ us$")
+                self.assertLess(abs(m["input_delay_s"][0] - 1.3002e-4), 4 * m["input_delay_std_s"][0])
+            else:
+                np.testing.assert_allclose(m["input_delay_std_s"], [std[f"input_delay_s[{u}]"] for u in range(2)], rtol=1e-6)
+                np.testing.assert_allclose(m["output_delay_std_s"], [std["output_delay_s[0]"], 0], rtol=1e-6)
+                self.assertRegex(shown, r"(?m)^delay of input i0 \d+\.\d+ \+- \d+\.\d+ us$")
+                self.assertRegex(shown, r"(?m)^delay of output o1 0 us, the reference$")
+                for side, truth in (("input", inputs), ("output", outputs)):
+                    error = abs(np.array(m[f"{side}_delay_s"]) - truth)
+                    self.assertTrue((error <= 4 * np.array(m[f"{side}_delay_std_s"])).all(), error)
+        write_frf("frf.h5", F, plant(F))
+        shown = fit("frf.h5", "-o", "model.json", "--modes", "120,250").stdout
+        self.assertNotIn("\ndelay ", shown)
+        self.assertNotIn("input_delay_std_s", model())
+
     def test_another_ending_is_refused(self):
         self.measure(1)
         done = fit("frf.h5", "-o", "model.json", "--covariance", "c.csv", code=2)
