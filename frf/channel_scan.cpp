@@ -44,13 +44,16 @@ void Extreme::add(const Extreme& other) noexcept {
   add(other.next, other.next_count);
 }
 
-void ChannelScan::add(const Eigen::Ref<const Eigen::VectorXd>& samples) noexcept {
+void ChannelScan::add(const Eigen::Ref<const Eigen::VectorXd>& samples,
+                      const char* driven) noexcept {
   for (Eigen::Index first = 0; first < samples.size(); first += kTogether)
-    add_some(samples.segment(first, std::min(kTogether, samples.size() - first)));
+    add_some(samples.segment(first, std::min(kTogether, samples.size() - first)),
+             driven != nullptr ? driven + first : nullptr);
   samples_ += static_cast<std::uint64_t>(samples.size());
 }
 
-void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples) noexcept {
+void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples,
+                           const char* driven) noexcept {
   if (samples.maxCoeff() >= high_.next)
     for (const double v : samples) high_.add(v);
   if (-samples.minCoeff() >= low_.next)
@@ -59,15 +62,21 @@ void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples) noe
   const bool repeats = (stretch_ > 0 && samples[0] == last_) ||
                        (samples.head(rest).array() == samples.tail(rest).array()).any();
   if (repeats) {
-    for (const double v : samples) {
-      stretch_ = stretch_ > 0 && v == last_ ? stretch_ + 1 : 1;
+    for (Eigen::Index i = 0; i < samples.size(); ++i) {
+      const double v = samples[i];
+      const std::uint64_t counts = driven == nullptr || driven[i] != 0 ? 1 : 0;
+      const bool repeats_last = stretch_ > 0 && v == last_;
+      stretch_ = repeats_last ? stretch_ + 1 : 1;
+      driven_ = repeats_last ? driven_ + counts : 1;
       longest_ = std::max(longest_, stretch_);
+      longest_driven_ = std::max(longest_driven_, driven_);
       last_ = v;
     }
     return;
   }
-  stretch_ = 1;
+  stretch_ = driven_ = 1;
   longest_ = std::max(longest_, stretch_);
+  longest_driven_ = std::max(longest_driven_, driven_);
   last_ = samples[rest];
 }
 
@@ -76,6 +85,7 @@ void ChannelScan::add(const ChannelScan& other) noexcept {
   low_.add(other.low_);
   samples_ += other.samples_;
   longest_ = std::max(longest_, other.longest_);
+  longest_driven_ = std::max(longest_driven_, other.longest_driven_);
 }
 
 Extreme ChannelScan::low() const noexcept {

@@ -20,14 +20,18 @@ struct Extreme {
 /// What the samples of one channel look like in time.
 class ChannelScan {
  public:
-  void add(const Eigen::Ref<const Eigen::VectorXd>& samples) noexcept;
+  /// `driven`: per sample, whether what drives the channel differs from the sample before; null: at
+  /// every sample. A channel that shows one value while its drive does is not stuck.
+  void add(const Eigen::Ref<const Eigen::VectorXd>& samples, const char* driven = nullptr) noexcept;
+  /// The channel was not driven in the run just added: what it showed says nothing.
+  void forget_constant() noexcept { longest_driven_ = 0; }
   /// The next samples follow no earlier ones: another run, or a gap.
   void break_off() noexcept { stretch_ = 0; }
   void add(const ChannelScan& other) noexcept;
 
   std::uint64_t samples() const noexcept { return samples_; }
-  /// The longest row of equal samples.
-  std::uint64_t longest_constant() const noexcept { return longest_; }
+  /// The most driven samples in a row of equal ones.
+  std::uint64_t longest_constant() const noexcept { return longest_driven_; }
   const Extreme& high() const noexcept { return high_; }
   Extreme low() const noexcept;  ///< of the negated samples, with their sign back
 
@@ -42,13 +46,15 @@ class ChannelScan {
   double log_p_low() const noexcept;
 
  private:
-  void add_some(const Eigen::Ref<const Eigen::VectorXd>& samples) noexcept;
+  void add_some(const Eigen::Ref<const Eigen::VectorXd>& samples, const char* driven) noexcept;
 
   Extreme high_;
   Extreme low_;  // of the negated samples
   std::uint64_t samples_ = 0;
   std::uint64_t stretch_ = 0;
+  std::uint64_t driven_ = 0;  // of the stretch
   std::uint64_t longest_ = 0;
+  std::uint64_t longest_driven_ = 0;
   double last_ = 0.0;
 };
 

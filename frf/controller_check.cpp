@@ -13,7 +13,6 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kEpsilon = 1e-3;           // what the model of the controller may be off, of C y
 constexpr double kEpsilonOnePeriod = 5e-2;  // no scatter says what noise is
 constexpr double kRounding = 1e-9;          // of u: float32 records, and u - r of two large numbers
 constexpr double kDeviations = 6.0;
@@ -32,6 +31,7 @@ constexpr std::array<double, 6> kWholeSkews = {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0};
 /// One line with the changes found so far undone.
 struct Line {
   double omega_rad_s = 0.0;
+  bool known = true;   // the controller
   Eigen::MatrixXcd F;  // -C, n_u x n_y
   Eigen::MatrixXcd Y;  // means, n_y x E
   Eigen::MatrixXcd U;
@@ -79,12 +79,17 @@ class Search {
   std::vector<Eigen::MatrixXcd> R_;
   std::vector<Line> lines_;
   bool noise_known_;
+  double epsilon_;  // what the model of the controller may be off, of C y
   double total_ = 0.0;
   std::vector<Candidate> candidates_;
 };
 
 Search::Search(HealthRecord& record, const NominalStage& nominal)
-    : record_(record), lines_(record.lines.size()), noise_known_(record.scatter_dof() > 0) {
+    : record_(record),
+      lines_(record.lines.size()),
+      noise_known_(record.scatter_dof() > 0),
+      epsilon_(noise_known_ ? nominal.controller_error
+                            : std::max(kEpsilonOnePeriod, nominal.controller_error)) {
   std::string missing;
   const auto u = positions_in(nominal.actuators, record.info.actuators.names, missing);
   const auto y = positions_in(nominal.sensors, record.info.sensors.names, missing);
@@ -99,7 +104,10 @@ Search::Search(HealthRecord& record, const NominalStage& nominal)
   for (std::size_t k = 0; k < lines_.size(); ++k) {
     const double frequency_hz = record.frequency_hz[static_cast<Index>(k)];
     lines_[k].omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
-    lines_[k].F = nominal.controller(frequency_hz)(u, y);
+    lines_[k].known =
+        frequency_hz >= nominal.controller_from_hz && frequency_hz <= nominal.controller_to_hz;
+    lines_[k].F = lines_[k].known ? Eigen::MatrixXcd(nominal.controller(frequency_hz)(u, y))
+                                  : Eigen::MatrixXcd::Zero(record.n_u(), record.n_y());
     Eigen::MatrixXcd R = Eigen::MatrixXcd::Zero(record.n_u(), record.experiments());
     for (std::size_t a = 0; a < actuator_of_axis.size(); ++a)
       R.row(actuator_of_axis[a]) = record.lines[k].R.row(record.axes[a]);
@@ -108,7 +116,6 @@ Search::Search(HealthRecord& record, const NominalStage& nominal)
 }
 
 void Search::refresh() {
-  const double epsilon = noise_known_ ? kEpsilon : kEpsilonOnePeriod;
   total_ = 0.0;
   for (std::size_t k = 0; k < lines_.size(); ++k) {
     Line& line = lines_[k];
@@ -121,10 +128,15 @@ void Search::refresh() {
     const auto squares = [&](const Eigen::MatrixXcd& X) {
       return Eigen::VectorXd(X.rowwise().squaredNorm() / static_cast<double>(X.cols()));
     };
-    line.weight = (line.variance + epsilon * epsilon * squares(line.F * line.Y) +
+    line.weight = (line.variance + epsilon_ * epsilon_ * squares(line.F * line.Y) +
                    kRounding * kRounding * (squares(line.U) + squares(R_[k])))
                       .cwiseMax(1e-300)
                       .cwiseInverse();
+    if (!line.known) {  // says nothing
+      line.E.setZero();
+      line.variance.setZero();
+      line.weight.setZero();
+    }
     total_ += (line.weight.asDiagonal() * line.E.cwiseAbs2()).sum();
   }
 }
@@ -364,9 +376,11 @@ std::vector<ControllerMisfit> Search::misfits() const {
       moved += line.U.row(a).squaredNorm();
     }
     if (controlled > 0.0) ++driven;
-    const double least = std::max(controlled, kRounding * kRounding * moved);
-    const double relative = std::sqrt(misfit / std::max(least, 1e-300));
-    if (relative > kLeastMisfit && significant(a)) found.push_back({a, relative, false});
+    const bool is_controlled = controlled > kRounding * kRounding * moved;
+    const double whole = is_controlled ? controlled : moved;
+    const double relative = std::sqrt(misfit / std::max(whole, 1e-300));
+    if (relative > kLeastMisfit && significant(a))
+      found.push_back({a, relative, is_controlled, false});
   }
   const bool of_all = 2 * static_cast<Index>(found.size()) > driven && found.size() > 1;
   for (ControllerMisfit& misfit : found) misfit.of_all = of_all;

@@ -11,8 +11,10 @@ namespace stageid {
 /// An actuator that does not do what excitation and controller ask for.
 struct ControllerMisfit {
   Eigen::Index actuator = 0;
-  double relative = 0.0;  ///< |u - r + C y| / |C y| over the lines
-  bool of_all = false;    ///< most actuators are so: it is the controller, not the channel
+  double relative =
+      0.0;  ///< |u - r + C y| / |C y| over the lines; / |u| if the controller leaves it alone
+  bool controlled = true;  ///< C y is not zero
+  bool of_all = false;     ///< most actuators are so: it is the controller, not the channel
 };
 
 struct ControllerCheck {

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 namespace stageid {
-
 const char* to_string(Severity severity) noexcept {
   switch (severity) {
     case Severity::fault:
@@ -40,6 +39,10 @@ const char* to_string(Cause cause) noexcept {
       return "controller";
     case Cause::rigid_body:
       return "rigid_body";
+    case Cause::unknown_stage:
+      return "unknown_stage";
+    case Cause::injection:
+      return "injection";
     case Cause::excluded:
       return "excluded";
     case Cause::excitation:
@@ -64,6 +67,17 @@ const char* to_string(Cause cause) noexcept {
       return "drift";
   }
   return "unknown";
+}
+
+std::optional<Cause> cause_of(std::string_view name) noexcept {
+  constexpr std::string_view kNone = "unknown";  // to_string() of what is not a cause
+  for (int i = 0; to_string(static_cast<Cause>(i)) != kNone; ++i)
+    if (to_string(static_cast<Cause>(i)) == name) return static_cast<Cause>(i);
+  return std::nullopt;
+}
+
+int rank_of(const Finding& finding) noexcept {
+  return finding.cause == Cause::unknown_stage ? -1 : static_cast<int>(finding.severity);
 }
 
 bool any_fault(const std::vector<Finding>& findings) noexcept {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace stageid {
@@ -24,12 +26,14 @@ enum class Cause : std::uint8_t {
   sign,
   scale,
   skew,
-  unrecorded,  ///< an actuator moves by more than excitation and controller
-  controller,  ///< the log's controller is not the configuration's
-  rigid_body,  ///< the plant's rigid body is not the configuration's
-  excluded,    ///< an actuator outside the sub-plant moves on the excited lines
-  excitation,  ///< cond(R)
-  inputs,      ///< cond(U)
+  unrecorded,     ///< an actuator moves by more than excitation and controller
+  controller,     ///< the log's controller is not the configuration's
+  rigid_body,     ///< the plant's rigid body is not the configuration's
+  unknown_stage,  ///< neither controller nor geometry are known: most causes cannot be seen
+  injection,      ///< an actuator's record is the excitation, before the sum
+  excluded,       ///< an actuator outside the sub-plant moves on the excited lines
+  excitation,     ///< cond(R)
+  inputs,         ///< cond(U)
   incoherent,
   interpolation,      ///< zippered lines: a local model leaves more than noise
   aperiodic,          ///< the inputs do not repeat with the period
@@ -40,6 +44,8 @@ enum class Cause : std::uint8_t {
   drift,              ///< the response changes during the measurement
 };
 const char* to_string(Cause cause) noexcept;
+/// The cause of that name; nothing if there is none.
+std::optional<Cause> cause_of(std::string_view name) noexcept;
 
 /// One line of the table of health: one cause.
 struct Finding {
@@ -50,6 +56,10 @@ struct Finding {
   std::string figure;   ///< the number that says so
   std::string remedy;   ///< what to do, or what the check needs
 };
+
+/// Place in the table: that nothing is known of the stage comes first, then faults, doubts, what else is not
+/// checked.
+int rank_of(const Finding& finding) noexcept;
 
 /// The worst severity is a fault.
 bool any_fault(const std::vector<Finding>& findings) noexcept;

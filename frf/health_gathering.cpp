@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "excitation/file_error.hpp"
 #include "frf/run_steps.hpp"
 
 namespace stageid {
@@ -30,11 +31,12 @@ std::vector<int> thinned(const std::vector<int>& lines) {
   return {chosen.begin(), chosen.end()};
 }
 
-void scan_period(const LogSamples& s, std::vector<ChannelScan>& scan) {
+void scan_period(const LogSamples& s, const DriveMask& drive, std::vector<ChannelScan>& scan) {
   for (Eigen::Index c = 0; c < s.sensors.cols(); ++c)
-    scan[static_cast<std::size_t>(c)].add(s.sensors.col(c));
+    scan[static_cast<std::size_t>(c)].add(s.sensors.col(c), drive.any());
   for (Eigen::Index c = 0; c < s.actuators.cols(); ++c)
-    scan[static_cast<std::size_t>(s.sensors.cols() + c)].add(s.actuators.col(c));
+    scan[static_cast<std::size_t>(s.sensors.cols() + c)].add(s.actuators.col(c),
+                                                             drive.of_actuator(c));
 }
 
 /// Columns of excited `wanted` lines. @pre they are among the excited ones of `lines`
@@ -57,8 +59,55 @@ std::vector<Eigen::Index> unknown_channels(const std::vector<char>& is_known, Ei
 
 }  // namespace
 
+void HealthPart::begin(const UsedRun& run, const Eigen::MatrixXd& excitation) {
+  drive_ = DriveMask(excitation, run.log->info());
+  sensors_ = static_cast<Eigen::Index>(run.log->info().sensors.size());
+}
+
+void HealthPart::watch_start(const UsedRun& run, const std::vector<int>& lines,
+                             const std::vector<Eigen::Index>& sensors, RunWorkspace& w) {
+  start_lines_ = lines;
+  start_sensors_ = sensors;
+  start_transient_periods_ = run.transient_periods;
+  Eigen::MatrixXcd start;
+  if (run.transient_periods > 0) {
+    const auto period = static_cast<std::uint64_t>(w.dft.length());
+    try {
+      run.log->read(run.index, static_cast<std::uint64_t>(run.transient_periods - 1) * period,
+                    period, w.samples);
+    } catch (const FormatError&) {
+      return;  // damaged where nothing is used: no reason to refuse the rest
+    }
+    if ((w.samples.marked != 0).any()) return;
+    start.resize(static_cast<Eigen::Index>(sensors.size()),
+                 static_cast<Eigen::Index>(lines.size()));
+    line_spectra(w.samples.sensors, sensors, lines, 0, w.dft, start);
+  }
+  recorder_ = StartRecorder(std::move(start));
+}
+
+void HealthPart::end() {
+  for (Eigen::Index c = sensors_; c < static_cast<Eigen::Index>(scan_.size()); ++c) {
+    // An actuator that stands still throughout a run that does not excite it: an open loop.
+    ChannelScan& scan = scan_[static_cast<std::size_t>(c)];
+    if (!drive_.excites(c - sensors_) && scan.high().value == scan.low().value)
+      scan.forget_constant();
+  }
+  drive_ = DriveMask();
+  start_ = recorder_.finish();
+}
+
 void HealthPart::take(RunWorkspace& w, const KnownSpectra* known) {
-  scan_period(w.samples, scan_);
+  scan_period(w.samples, drive_, scan_);
+  if (recorder_.on() && known != nullptr) {
+    recorder_.take(known->values.topLeftCorner(static_cast<Eigen::Index>(start_sensors_.size()),
+                                               static_cast<Eigen::Index>(start_lines_.size())));
+  } else if (recorder_.on()) {
+    Eigen::MatrixXcd spectra(static_cast<Eigen::Index>(start_sensors_.size()),
+                             static_cast<Eigen::Index>(start_lines_.size()));
+    line_spectra(w.samples.sensors, start_sensors_, start_lines_, 0, w.dft, spectra);
+    recorder_.take(spectra);
+  }
   if (lines_.empty()) return;
   const Eigen::Index n_y = w.samples.sensors.cols();
   Eigen::MatrixXcd Z(n_y + w.samples.actuators.cols(), static_cast<Eigen::Index>(lines_.size()));
@@ -95,6 +144,7 @@ void HealthPart::transform_others(RunWorkspace& w, const std::vector<char>& is_k
 
 void HealthPart::leave_out() {
   for (ChannelScan& channel : scan_) channel.break_off();
+  recorder_.give_up();
 }
 
 HealthGathering::HealthGathering(const std::vector<RealizationRuns>& realizations) {
@@ -157,9 +207,31 @@ HealthPart& HealthGathering::part(std::size_t realization, std::size_t experimen
   return parts_[realization][experiment];
 }
 
+/// Runs of other lines or of fewer periods would need a model of their own.
+void HealthGathering::add_start(HealthPart& part) {
+  if (part.start_.periods == 0) return;
+  StartEvidence& evidence = record_.start;
+  if (evidence.runs.empty()) {
+    start_lines_ = part.start_lines_;
+    evidence.sensors = static_cast<Eigen::Index>(part.start_sensors_.size());
+    evidence.transient_periods = part.start_transient_periods_;
+    evidence.periods = part.start_.periods + (part.start_.start_used ? 1 : 0);
+    evidence.frequency_hz.resize(static_cast<Eigen::Index>(start_lines_.size()));
+    for (std::size_t k = 0; k < start_lines_.size(); ++k)
+      evidence.frequency_hz[static_cast<Eigen::Index>(k)] =
+          start_lines_[k] * record_.info.sample_rate_hz / record_.info.period_samples;
+  } else if (part.start_lines_ != start_lines_ ||
+             part.start_.periods != evidence.runs.front().periods ||
+             part.start_.start_used != evidence.runs.front().start_used) {
+    return;
+  }
+  evidence.runs.push_back(std::move(part.start_));
+}
+
 void HealthGathering::add(HealthPart&& part) {
   for (std::size_t c = 0; c < part.scan_.size(); ++c) record_.scan[c].add(part.scan_[c]);
   record_.slips.insert(record_.slips.end(), part.slips_.begin(), part.slips_.end());
+  add_start(part);
   if (part.periods_.empty()) return;
   record_.periods.push_back(static_cast<int>(part.periods_.size()));
   for (std::size_t k = 0; k < lines_.size(); ++k) {

@@ -5,10 +5,12 @@
 #include <utility>
 #include <vector>
 
+#include "frf/drive_mask.hpp"
 #include "frf/health_record.hpp"
 #include "frf/run_spectra.hpp"
 #include "frf/run_steps.hpp"
 #include "frf/run_table.hpp"
+#include "frf/start_transient.hpp"
 
 namespace stageid {
 
@@ -23,10 +25,18 @@ struct KnownSpectra {
 /// What one run gives to a HealthRecord.
 class HealthPart {
  public:
+  /// Before the run's periods. @param excitation samples x channels, one period
+  void begin(const UsedRun& run, const Eigen::MatrixXd& excitation);
+  /// After begin(): the transient of the start is looked at too, on these lines of these sensors. Reads
+  /// the period before the used ones, if there is one.
+  void watch_start(const UsedRun& run, const std::vector<int>& lines,
+                   const std::vector<Eigen::Index>& sensors, RunWorkspace& workspace);
   /// The clean period in workspace.samples. Channels that are not known are transformed here.
   void take(RunWorkspace& workspace, const KnownSpectra* known);
   void leave_out();
   void note(const std::vector<SampleSlip>& slips) { slips_ = slips; }
+  /// After the run's periods.
+  void end();
 
  private:
   friend class HealthGathering;
@@ -37,6 +47,13 @@ class HealthPart {
   std::vector<Eigen::MatrixXcd> periods_;
   std::vector<ChannelScan> scan_;
   std::vector<SampleSlip> slips_;
+  DriveMask drive_;
+  Eigen::Index sensors_ = 0;  // of the log
+  StartRecorder recorder_;
+  std::vector<int> start_lines_;
+  std::vector<Eigen::Index> start_sensors_;
+  int start_transient_periods_ = 0;
+  RunStart start_;
 };
 
 /// A HealthRecord in the making, beside whatever else the logs are read for.
@@ -71,11 +88,13 @@ class HealthGathering {
 
  private:
   void add(HealthPart&& part);
+  void add_start(HealthPart& part);
 
   std::vector<std::vector<HealthPart>> parts_;  // by realization and experiment
   std::vector<int> realization_;                // their numbers
   std::vector<HealthPart>* excited_ = nullptr;  // parts whose spectra are wanted
   std::vector<int> lines_;
+  std::vector<int> start_lines_;  // of the first run that tells of its start
   HealthRecord record_;
 };
 

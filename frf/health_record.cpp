@@ -20,7 +20,10 @@ class RecordReading {
   RecordReading(const std::vector<const LogReader*>& logs, const FrfOptions& options)
       : realizations_(choose_runs(logs, options).realizations),
         bytes_(options, realizations_),
-        gathering_(realizations_) {
+        gathering_(realizations_),
+        watch_start_(options.method == FrfMethod::periodic),
+        sensors_(realizations_.front().runs.front().log->info().sensors.size()) {
+    std::iota(sensors_.begin(), sensors_.end(), 0);
     std::size_t runs = 0;
     for (const RealizationRuns& realization : realizations_) runs += realization.runs.size();
     const int period = realizations_.front().runs.front().log->info().period_samples;
@@ -75,15 +78,21 @@ class RecordReading {
   }
 
   void read_run(const Run& run, RunWorkspace& w) {
+    const RunExcitation excitation = read_run_excitation(*run.used, w.dft);
+    run.part->begin(*run.used, excitation.period);
+    if (watch_start_) run.part->watch_start(*run.used, excitation.spectrum.lines, sensors_, w);
     run.part->note(for_each_period(
         *run.used, w, [this](double bytes) { bytes_.add(bytes); },
         [&](int) { run.part->take(w, nullptr); },
         [&](int, const std::string&) { run.part->leave_out(); }));
+    run.part->end();
   }
 
   std::vector<RealizationRuns> realizations_;
   ByteCounter bytes_;
   HealthGathering gathering_;
+  bool watch_start_;  // lpm models the transient
+  std::vector<Eigen::Index> sensors_;
   int workers_ = 1;
   MatrixPool pool_;
   std::vector<std::unique_ptr<RunWorkspace>> workspaces_;

@@ -10,6 +10,7 @@
 #include "frf/mode_drift.hpp"
 #include "frf/noisy_run.hpp"
 #include "frf/sample_slip.hpp"
+#include "frf/start_transient.hpp"
 
 namespace stageid {
 
@@ -34,6 +35,7 @@ struct HealthRecord {
   std::vector<SampleSlip> slips;     ///< of the same runs
   std::optional<ModeDrift> drift;    ///< of the response, if there was an estimate
   std::vector<NoisyRun> noisy_runs;  ///< the same
+  StartEvidence start;               ///< of the start of the runs; empty if nothing can be told
 
   Eigen::Index n_y() const noexcept { return static_cast<Eigen::Index>(info.sensors.size()); }
   Eigen::Index n_u() const noexcept { return static_cast<Eigen::Index>(info.actuators.size()); }

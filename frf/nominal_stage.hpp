@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,10 @@ struct NominalStage {
   std::vector<std::string> sensors;
   /// -C(e^{j omega T}) from y to u, actuators x sensors.
   std::function<Eigen::MatrixXcd(double frequency_hz)> controller;
-  /// The rigid body alone through hold, delay and sampler, sensors x actuators.
+  double controller_from_hz = 0.0;  ///< where it is known
+  double controller_to_hz = std::numeric_limits<double>::infinity();
+  double controller_error = 1e-3;  ///< what it may be off, of C y
+  /// The rigid body alone through hold, delay and sampler, sensors x actuators; empty: unknown.
   std::function<Eigen::MatrixXcd(double frequency_hz)> rigid_body;
   double free_from_hz = 0.0;  ///< above it the suspension does not matter
 };

@@ -206,8 +206,12 @@ RunSpectra measure_record(const UsedRun& used, const RunExcitation& excitation,
     measurement.leave_out(p, why);
     if (health != nullptr) health->leave_out();
   };
+  if (health != nullptr) health->begin(used, excitation.period);
   const std::vector<SampleSlip> slips = for_each_period(used, w, read_done, take, leave_out);
-  if (health != nullptr) health->note(slips);
+  if (health != nullptr) {
+    health->note(slips);
+    health->end();
+  }
   return measurement.finish();
 }
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "frf/injection_check.hpp"
+
 namespace stageid {
 namespace {
 
@@ -12,17 +14,6 @@ using Index = Eigen::Index;
 
 constexpr double kMost = 0.5;        // of the lines
 constexpr double kUnexcited = 1e-3;  // of the line's largest excitation
-
-/// For every excitation channel the actuator of its name, or -1.
-std::vector<Index> actuators_of(const LogInfo& info) {
-  std::vector<Index> actuators;
-  const auto& names = info.actuators.names;
-  for (const std::string& name : info.excitation.names) {
-    const auto at = std::find(names.begin(), names.end(), name);
-    actuators.push_back(at == names.end() ? -1 : at - names.begin());
-  }
-  return actuators;
-}
 
 /// 1 over the excitation's power where an actuator is excited, else 0; where the excitation is not
 /// added at actuators, 1 over their own power.
@@ -74,7 +65,7 @@ double share_unlike(const HealthRecord& record, const std::vector<Index>& actuat
 
 std::vector<Finding> check_repetition(const HealthRecord& record) {
   if (record.lines.empty()) return {};
-  const std::vector<Index> actuators = actuators_of(record.info);
+  const std::vector<Index> actuators = actuators_of_excitation(record.info);
   double least = 1.0;
   Index first = 0;
   Index seen = 0;

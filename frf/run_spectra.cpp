@@ -215,8 +215,17 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
     measurement.leave_out(p, why);
     if (health != nullptr) health->leave_out();
   };
+  if (health != nullptr) {
+    const std::vector<int> excited(
+        lines.lines.begin(), lines.lines.begin() + static_cast<std::ptrdiff_t>(lines.excited));
+    health->begin(used, excitation_period);
+    health->watch_start(used, excited, channels.outputs, w);
+  }
   const std::vector<SampleSlip> slips = for_each_period(used, w, read_done, take, leave_out);
-  if (health != nullptr) health->note(slips);
+  if (health != nullptr) {
+    health->note(slips);
+    health->end();
+  }
   RunSpectra run = measurement.finish();
   run.fingerprint = fingerprint.hex();
   return run;

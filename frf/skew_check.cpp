@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "frf/connected_blocks.hpp"
 #include "frf/order_statistic.hpp"
 
 namespace stageid {
@@ -18,6 +19,7 @@ using Index = Eigen::Index;
 constexpr int kBlocks = 20;
 constexpr int kIterations = 6;
 constexpr std::size_t kFewestLines = 100;
+constexpr Index kFewestChannels = 3;  // of a kind: of two, neither is the one that is late
 constexpr double kDeviations = 8.0;
 constexpr double kNear = 0.3;  // ln of the ratio of two frequencies that see the same modes
 constexpr double kLeastDirection = 0.1;  // Im G beside the directions taken already, of |G|
@@ -191,31 +193,39 @@ Eigen::VectorXd SkewFit::deviations() const {
 SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Index>& outputs,
                      const std::vector<Index>& inputs) {
   SkewCheck check;
-  const auto n_y = static_cast<Index>(outputs.size());
-  const auto n_u = static_cast<Index>(inputs.size());
-  if (lines.size() < kFewestLines || n_y < 3 || n_u < 3) {
-    check.unchecked = "100 excited lines, three sensors and three actuators";
-    return check;
-  }
-  SkewFit fit(lines);
-  const Eigen::VectorXd skew = fit.solve();
-  const Eigen::VectorXd deviation = fit.deviations();
-  check.largest_deviation_s = deviation.maxCoeff();
-  const auto look = [&](bool of_sensors, const std::vector<Index>& channels, Index first) {
-    const auto n = static_cast<Index>(channels.size());
-    for (Index i = 0; i < n; ++i) {
-      const double late = skew[first + i];
-      if (std::abs(late) < std::max(kLeastSkew_s, kDeviations * deviation[first + i])) continue;
-      check.changes.push_back({ChannelChange::Kind::skew, of_sensors,
-                               channels[static_cast<std::size_t>(i)], -1, late,
-                               deviation[first + i]});
+  bool any = false;
+  bool all = true;
+  for (const ConnectedBlock& block : connected_blocks(lines)) {
+    const auto n_y = static_cast<Index>(block.outputs.size());
+    const auto n_u = static_cast<Index>(block.inputs.size());
+    if (lines.size() < kFewestLines || n_y < kFewestChannels || n_u < kFewestChannels) {
+      all = false;
+      continue;
     }
-  };
-  look(true, outputs, 0);
-  look(false, inputs, n_y);
-  if (check.changes.empty() && kDeviations * check.largest_deviation_s > kWantedSkew_s)
+    any = true;
+    SkewFit fit(block.lines);
+    const Eigen::VectorXd skew = fit.solve();
+    const Eigen::VectorXd deviation = fit.deviations();
+    check.largest_deviation_s = std::max(check.largest_deviation_s, deviation.maxCoeff());
+    for (Index i = 0; i < n_y + n_u; ++i) {
+      if (!(std::abs(skew[i]) >= std::max(kLeastSkew_s, kDeviations * deviation[i]))) continue;
+      const bool of_sensors = i < n_y;
+      const Index in_log =
+          of_sensors
+              ? outputs[static_cast<std::size_t>(block.outputs[static_cast<std::size_t>(i)])]
+              : inputs[static_cast<std::size_t>(block.inputs[static_cast<std::size_t>(i - n_y)])];
+      check.changes.push_back(
+          {ChannelChange::Kind::skew, of_sensors, in_log, -1, skew[i], deviation[i]});
+    }
+  }
+  if (!any)
+    check.unchecked =
+        "100 excited lines, and three sensors and three actuators that respond to each other";
+  else if (check.changes.empty() && kDeviations * check.largest_deviation_s > kWantedSkew_s)
     check.unchecked = fmt::format("more power or lighter damping: {:.0f} deviations are {:.3g} us",
                                   kDeviations, 1e6 * kDeviations * check.largest_deviation_s);
+  else if (!all)
+    check.unchecked = "three sensors and three actuators in each part that is decoupled";
   return check;
 }
 

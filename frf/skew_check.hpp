@@ -31,7 +31,10 @@ struct SkewCheck {
 /// shapes that are not quite real, with phases of 2 degrees, make errors of 2 us whose deviations come out
 /// at half of that.
 ///
-/// What all sensors, or all actuators, share is the plant's delay and cannot be seen.
+/// Sensors and actuators that do not respond to each other (connected_blocks()) are looked at apart: how their
+/// delays differ, nothing tells, and each block has medians of its own.
+///
+/// What all sensors, or all actuators, of a block share is the plant's delay and cannot be seen.
 /// @param outputs, inputs channels of the log that `lines` are of, see plant_lines().
 SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Eigen::Index>& outputs,
                      const std::vector<Eigen::Index>& inputs);

@@ -33,9 +33,7 @@ Finding finding_of(const Json& object) {
   Finding finding;
   for (const Severity severity : kSeverities)
     if (text_of(object, "severity") == to_string(severity)) finding.severity = severity;
-  for (int cause = 0; cause <= static_cast<int>(Cause::drift); ++cause)
-    if (text_of(object, "cause") == to_string(static_cast<Cause>(cause)))
-      finding.cause = static_cast<Cause>(cause);
+  if (const auto cause = cause_of(text_of(object, "cause"))) finding.cause = *cause;
   finding.channel = text_of(object, "channel");
   finding.what = text_of(object, "what");
   finding.figure = text_of(object, "figure");
@@ -120,10 +118,11 @@ std::vector<std::string> health_notes(const std::vector<Finding>& findings,
 
 std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings) {
   for (Finding& finding : check_interpolation(frf)) findings.push_back(std::move(finding));
-  if (!has(findings, Cause::drift))  // else it explains them
+  // A drift or a mode that rings is named already; the bands that it spoils say less.
+  if (!has(findings, Cause::drift) && !has(findings, Cause::unsettled))
     for (Finding& finding : check_settling(frf)) findings.push_back(std::move(finding));
   std::stable_sort(findings.begin(), findings.end(),
-                   [](const Finding& a, const Finding& b) { return a.severity < b.severity; });
+                   [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });
   Json provenance = Json::parse(frf.provenance_json, nullptr, false);
   if (!provenance.is_object()) provenance = Json::object();
   provenance["health"] = health_json(findings);

@@ -7,7 +7,9 @@
 #include "excitation/file_error.hpp"
 #include "hal/motion_controller.hpp"
 #include "hal/rigid_body.hpp"
+#include "tools/controller_file.hpp"
 #include "tools/stage_config.hpp"
+#include "tools/strict_yaml.hpp"
 
 namespace stageid {
 namespace {
@@ -18,6 +20,33 @@ std::vector<std::string> names_of(const std::vector<Channel>& channels) {
   std::vector<std::string> names;
   for (const Channel& channel : channels) names.push_back(channel.name);
   return names;
+}
+
+/// What a controller file does not name, its controller neither sees nor moves.
+NominalStage with_channels_of(const LogInfo& info, NominalStage known) {
+  NominalStage all = known;
+  const auto append = [](std::vector<std::string>& names, const std::vector<std::string>& more) {
+    for (const std::string& name : more)
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  append(all.actuators, info.actuators.names);
+  append(all.sensors, info.sensors.names);
+  const auto n_u = static_cast<Eigen::Index>(all.actuators.size());
+  const auto n_y = static_cast<Eigen::Index>(all.sensors.size());
+  all.controller = [n_u, n_y, controller = known.controller](double frequency_hz) {
+    const Eigen::MatrixXcd part = controller(frequency_hz);
+    Eigen::MatrixXcd whole = Eigen::MatrixXcd::Zero(n_u, n_y);
+    whole.topLeftCorner(part.rows(), part.cols()) = part;
+    return whole;
+  };
+  if (known.rigid_body)
+    all.rigid_body = [n_u, n_y, rigid_body = known.rigid_body](double frequency_hz) {
+      const Eigen::MatrixXcd part = rigid_body(frequency_hz);
+      Eigen::MatrixXcd whole = Eigen::MatrixXcd::Zero(n_y, n_u);
+      whole.topLeftCorner(part.rows(), part.cols()) = part;
+      return whole;
+    };
+  return all;
 }
 
 }  // namespace
@@ -43,7 +72,11 @@ NominalStage nominal_stage(const WaferStageSpec& spec) {
 
 std::optional<NominalStage> nominal_stage_of(const LogInfo& info,
                                              const std::filesystem::path& stage_file) {
-  if (!stage_file.empty()) return nominal_stage(load_stage_config(stage_file).spec);
+  if (!stage_file.empty()) {
+    const YamlDocument document = YamlDocument::read(stage_file);
+    if (is_controller_file(document)) return with_channels_of(info, read_controller_file(document));
+    return nominal_stage(load_stage_config(stage_file).spec);
+  }
   const auto json = nlohmann::json::parse(info.metadata_json, nullptr, false);
   if (!json.is_object() || !json.contains("stage") || !json["stage"].is_string())
     return std::nullopt;

@@ -186,7 +186,13 @@ WaferStageSpec random_wafer_stage(std::uint64_t seed, const WaferStageSpec& nomi
   return spec;
 }
 
-MemoryLog simulate_faulty_log(const FaultyLogRequest& request, const PlantedFault& fault) {
+MemoryLog simulate_faulty_log(const FaultyLogRequest& asked, const PlantedFault& fault) {
+  FaultyLogRequest request = asked;
+  if (fault.kind == Kind::light_damping) {
+    std::vector<double>& damping = request.plant.flexible_damping;
+    damping.resize(std::max<std::size_t>(damping.size(), 2), damping.back());
+    damping.front() = fault.value;
+  }
   const FrequencyGrid grid = grid_of(request);
   const Eigen::Index period = grid.samples_per_period();
   const Eigen::Index samples = period * (request.transient_periods + request.periods);
@@ -247,6 +253,12 @@ void spoil_recording(const PlantedFault& fault, MemoryLog& log) {
   for (LogSamples& record : log.records) {
     Eigen::MatrixXd& x = fault.of_sensor ? record.sensors : record.actuators;
     if (fault.kind == Kind::recorded_swap) x.col(fault.a).swap(x.col(fault.b));
+    if (fault.kind == Kind::mapped_excitation) {
+      const Eigen::MatrixXd& period =
+          log.excitation_periods[static_cast<std::size_t>(&record - log.records.data())];
+      for (Eigen::Index n = 0; n < x.rows(); ++n)
+        x(n, fault.a) = period(n % period.rows(), fault.a);
+    }
     if (fault.kind == Kind::recorded_gain) x.col(fault.a) *= fault.value;
     if (fault.kind == Kind::recorded_skew)
       x.col(fault.a) = delayed(x.col(fault.a), fault.value * log.log_info.sample_rate_hz);

@@ -82,6 +82,8 @@ inline std::vector<NamedFault> faults_to_plant(std::uint64_t seed, const MemoryL
         Cause::skew);
   plant("recorded: actuator 10 us late", true, {Kind::recorded_skew, false, actuator(), 0, 10e-6},
         Cause::skew);
+  plant("recorded: excitation", true, {Kind::mapped_excitation, false, actuator()},
+        Cause::injection);
   const int clipped = sensor();
   plant("recorded: sensor clipped", true,
         {Kind::saturation, true, clipped, 0, 0.7 * largest(true, clipped)}, Cause::saturated);
@@ -99,6 +101,9 @@ inline std::vector<NamedFault> faults_to_plant(std::uint64_t seed, const MemoryL
         Cause::skew);
   plant("stage: sensor dead", false, {Kind::dead_sensor, true, sensor()}, Cause::dead);
   plant("stage: sensor stuck", false, {Kind::stuck_sensor, true, sensor()}, Cause::dead);
+  plant("stage: a mode still rings", false, {Kind::light_damping, true, 0, 0, 5e-4},
+        Cause::unsettled);
+  faults.back().expected_channel.clear();
   const int limited = actuator();
   plant("stage: actuator saturated", false,
         {Kind::saturation, false, limited, 0, 0.7 * largest(false, limited)}, Cause::saturated);
