@@ -24,8 +24,8 @@ template <typename Read>
 auto parse(std::string_view text, const char* what, Read read) {
   try {
     return read(Json::parse(text));
-  } catch (const Json::exception& error) {
-    throw std::invalid_argument(fmt::format("{}: {}", what, error.what()));
+  } catch (const Json::exception&) {
+    throw std::invalid_argument(fmt::format("the {} is not as stageid writes it", what));
   }
 }
 

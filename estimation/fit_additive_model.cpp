@@ -211,12 +211,14 @@ void forget_results(AdditiveModel& model) {
 
 /// Where the start has no finite response there is nothing to return but itself, without numerators.
 /// @returns relative error of what is returned
-double keep_finite(const FitProblem& problem, const FitParameters& start, FitParameters& beta,
-                   IterationResult& iteration) {
+double keep_finite(const FrfEstimate& frf, const FitProblem& problem, const FitParameters& start,
+                   FitParameters& beta, IterationResult& iteration) {
+  const ChannelFlags responding = responding_channels(frf);
   bool finite = beta.B.allFinite() && !iteration.cost.empty();
   for (const Eigen::VectorXd& a : beta.a) finite = finite && a.allFinite();
   if (finite) {
-    const ResidualSize E = residual_size(problem, evaluate_groups(problem, beta, false), beta.B);
+    const ResidualSize E =
+        residual_size(problem, evaluate_groups(problem, beta, false), beta.B, responding);
     if (E.finite) return E.relative_rms;
   }
   beta = start;
@@ -225,7 +227,7 @@ double keep_finite(const FitProblem& problem, const FitParameters& start, FitPar
   iteration.status = FitStatus::singular;
   iteration.cost.assign(1, iteration.end_cost);
   if (iteration.message.empty()) iteration.message = "the start has no finite response";
-  return residual_size(problem, {}, {}).relative_rms;
+  return residual_size(problem, {}, {}, responding).relative_rms;
 }
 
 std::vector<std::size_t> held_submodels(const FitProblem& problem, const FitParameters& beta,
@@ -307,7 +309,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
     covariance = constrain_ranks(frf, options, problem, beta, iteration, result);
   if (options.shrink_hidden && iteration.status != FitStatus::singular)
     shrink_hidden(problem, beta, iteration, result);
-  const double relative_rms = keep_finite(problem, begun, beta, iteration);
+  const double relative_rms = keep_finite(frf, problem, begun, beta, iteration);
   result.status = iteration.status;
   result.message = iteration.message;
   result.cost = iteration.cost;

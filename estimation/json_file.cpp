@@ -27,6 +27,10 @@ std::vector<JsonNode> JsonNode::elements() const {
   return out;
 }
 
+std::vector<JsonNode> JsonNode::elements_of(const std::string& key) const {
+  return has(key) ? member(key).elements() : std::vector<JsonNode>();
+}
+
 double JsonNode::number() const {
   if (!value_.is_number()) fail("must be a number");
   const auto number = value_.get<double>();
@@ -41,7 +45,7 @@ double JsonNode::positive() const {
 }
 
 double JsonNode::number_or(const std::string& key, double fallback) const {
-  return has(key) ? member(key).number() : fallback;
+  return has(key) && !member(key).raw().is_null() ? member(key).number() : fallback;
 }
 
 long long JsonNode::integer(long long lowest, long long highest) const {

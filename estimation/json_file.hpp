@@ -19,10 +19,11 @@ class JsonNode {
   bool has(const std::string& key) const { return value_.is_object() && value_.contains(key); }
   JsonNode member(const std::string& key) const;
   std::vector<JsonNode> elements() const;
-  double number() const;    ///< finite
-  double positive() const;  ///< > 0
-  double number_or(const std::string& key,
-                   double fallback) const;  ///< a member that may be missing
+  std::vector<JsonNode> elements_of(const std::string& key) const;  ///< none if it is missing
+  double number() const;                                            ///< finite
+  double positive() const;                                          ///< > 0
+  /// A member that may be missing or null, as a number is that could not be told.
+  double number_or(const std::string& key, double fallback) const;
   long long integer(long long lowest, long long highest) const;
   std::string text() const;
   std::vector<double> numbers() const;

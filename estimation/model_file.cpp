@@ -1,3 +1,4 @@
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -208,7 +209,8 @@ FitRecord fit_from_json(const JsonNode& node) {
     fit.iterations = static_cast<int>(node.member("iterations").integer(0, 1'000'000'000));
   if (node.has("status")) fit.status = node.member("status").text();
   if (node.has("message")) fit.message = node.member("message").text();
-  fit.relative_rms_error = node.number_or("relative_rms_error", 0.0);
+  fit.relative_rms_error =
+      node.number_or("relative_rms_error", std::numeric_limits<double>::quiet_NaN());
   if (node.has("band_hz")) {
     const std::vector<double> band = node.member("band_hz").numbers();
     if (band.size() != 2) node.member("band_hz").fail("must be two frequencies");
@@ -253,10 +255,11 @@ void write_model(const std::filesystem::path& file, const AdditiveModel& model) 
                  {"weighting", model.fit.weighting},
                  {"iterations", model.fit.iterations},
                  {"status", model.fit.status},
-                 {"relative_rms_error", model.fit.relative_rms_error},
                  {"band_hz", {model.fit.band_hz[0], model.fit.band_hz[1]}},
                  {"seconds", model.fit.seconds}};
   if (!model.fit.message.empty()) root["fit"]["message"] = model.fit.message;
+  if (std::isfinite(model.fit.relative_rms_error))
+    root["fit"]["relative_rms_error"] = model.fit.relative_rms_error;
   root["cost_history"] = model.cost_history;
   root["provenance"] = Json::parse(model.provenance_json);
   write_text_file(file, root.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");

@@ -1,6 +1,7 @@
 #include "estimation/parameter_covariance.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <atomic>
@@ -104,26 +105,84 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
   return correlated_gram(problem, noise.correlation, problem.globals(), inputs);
 }
 
+/// The nearest matrix that is a covariance, in units of the deviations: where rounding of nearly undetermined
+/// parameters, or two estimates of one noise, have left negative eigenvalues, they become zero.
+Eigen::MatrixXd nearest_covariance(const Eigen::MatrixXd& C) {
+  const Eigen::VectorXd deviation = C.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::VectorXd scale = deviation.cwiseInverse();
+  const Eigen::MatrixXd scaled =
+      scale.asDiagonal() * (0.5 * (C + C.transpose())) * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(scaled);
+  const Eigen::MatrixXd root = deviation.asDiagonal() * parts.eigenvectors() *
+                               parts.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return root * root.transpose();
+}
+
+/// A sum of squares less what the numerators follow: rounding can leave it indefinite.
+Eigen::MatrixXd definite_middle(const Eigen::MatrixXd& K) {
+  const Eigen::VectorXd scale = K.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::LDLT<Eigen::MatrixXd> factors(scale.asDiagonal() * K * scale.asDiagonal());
+  return factors.isPositive() ? K : nearest_covariance(K);
+}
+
+/// Channel and globals together as a covariance, if the parts were not.
+ChannelCovariance made_definite(const ChannelCovariance& channel, Eigen::MatrixXd& globals) {
+  const Eigen::Index g = globals.rows();
+  const Eigen::Index n = channel.own.rows();
+  Eigen::MatrixXd whole(g + n, g + n);
+  whole << globals, channel.cross, channel.cross.transpose(), channel.own;
+  const Eigen::MatrixXd definite = nearest_covariance(whole);
+  globals = definite.topLeftCorner(g, g);
+  return {definite.bottomRightCorner(n, n), definite.topRightCorner(g, n), channel.Z,
+          channel.equations_inverse};
+}
+
+/// The variances of the channel's numerators and response with these covariances.
+struct ChannelVariances {
+  Eigen::VectorXd numerators;
+  Eigen::VectorXd response;  ///< empty unless asked for
+
+  bool negative() const {
+    return numerators.minCoeff() < 0.0 || (response.size() > 0 && response.minCoeff() < 0.0);
+  }
+};
+
+ChannelVariances channel_variances(const FitProblem& problem, const FitParameters& beta,
+                                   const BasisGroup& group, Eigen::Index c,
+                                   const ChannelCovariance& channel, const Eigen::MatrixXd& globals,
+                                   bool with_response) {
+  const Eigen::MatrixXd& Z = channel.Z;
+  ChannelVariances out;
+  out.numerators = channel.own.diagonal();
+  if (problem.globals() > 0)
+    out.numerators +=
+        (Z * globals).cwiseProduct(Z).rowwise().sum() - 2.0 * (Z * channel.cross).diagonal();
+  if (!with_response) return out;
+  out.response = quadratic(group.F_re, group.F_im, channel.own, group.F_re, group.F_im);
+  if (problem.globals() == 0) return out;
+  Eigen::MatrixXd J_re;
+  Eigen::MatrixXd J_im;
+  projected_columns(problem, beta, group, Z, c, derivative_columns(problem), {0, problem.size()},
+                    J_re, J_im);
+  out.response += quadratic(J_re, J_im, globals, J_re, J_im);
+  out.response += 2.0 * quadratic(J_re, J_im, channel.cross, group.F_re, group.F_im);
+  return out;
+}
+
 /// The variances of the channel's numerators and response; out.globals stands.
 void fill_channel(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
                   Eigen::Index c, const ChannelCovariance& channel, ParameterCovariance& out) {
-  const Eigen::MatrixXd& Z = channel.Z;
-  Eigen::VectorXd numerators = channel.own.diagonal();
-  if (problem.globals() > 0)
-    numerators +=
-        (Z * out.globals).cwiseProduct(Z).rowwise().sum() - 2.0 * (Z * channel.cross).diagonal();
-  out.numerator_variance.row(c) = numerators.transpose();
-  if (out.response_variance.size() == 0) return;
-  Eigen::VectorXd total = quadratic(group.F_re, group.F_im, channel.own, group.F_re, group.F_im);
-  if (problem.globals() > 0) {
-    Eigen::MatrixXd J_re;
-    Eigen::MatrixXd J_im;
-    projected_columns(problem, beta, group, Z, c, derivative_columns(problem), {0, problem.size()},
-                      J_re, J_im);
-    total += quadratic(J_re, J_im, out.globals, J_re, J_im);
-    total += 2.0 * quadratic(J_re, J_im, channel.cross, group.F_re, group.F_im);
+  const bool with_response = out.response_variance.size() > 0;
+  ChannelVariances variances =
+      channel_variances(problem, beta, group, c, channel, out.globals, with_response);
+  if (variances.negative()) {
+    Eigen::MatrixXd globals = out.globals;
+    const ChannelCovariance definite = made_definite(channel, globals);
+    variances = channel_variances(problem, beta, group, c, definite, globals, with_response);
   }
-  out.response_variance.row(c) = total.transpose();
+  // What is left is rounding of a sum that is zero.
+  out.numerator_variance.row(c) = variances.numerators.cwiseMax(0.0).transpose();
+  if (with_response) out.response_variance.row(c) = variances.response.cwiseMax(0.0).transpose();
 }
 
 void leave_unknown(const FitProblem& problem, Eigen::Index c, ParameterCovariance& out) {
@@ -220,7 +279,8 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
                    : projected_middle(*equations, part);
   }
   const Eigen::MatrixXd inverse = free_inverse(S, frozen);
-  if (problem.globals() > 0) out.globals = half * inverse * K * inverse.transpose();
+  if (problem.globals() > 0)
+    out.globals = half * inverse * definite_middle(K) * inverse.transpose();
 
   // The equations of a part are made once more: kept, all of them would outgrow the data.
   resize(problem, wanted.response, out);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "estimation/parallel_tasks.hpp"
 
@@ -97,7 +98,7 @@ double residual_cost(const FitProblem& problem, const std::vector<BasisGroup>& g
 }
 
 ResidualSize residual_size(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                           const Eigen::MatrixXd& B) {
+                           const Eigen::MatrixXd& B, const ChannelFlags& responding) {
   ResidualSize out;
   double sum = 0.0;
   Eigen::Index count = 0;
@@ -108,12 +109,13 @@ ResidualSize residual_size(const FitProblem& problem, const std::vector<BasisGro
     for (Eigen::Index k = 0; k < tile.lines; ++k)
       for (Eigen::Index c = 0; c < problem.channels(); ++c) {
         const double power = std::norm((*problem.G)(c, tile.first + k));
-        if (!(power > 0.0)) continue;
+        if (!responding[c] || !(power > 0.0)) continue;
         sum += (E.re(c, k) * E.re(c, k) + E.im(c, k) * E.im(c, k)) / power;
         ++count;
       }
   }
-  out.relative_rms = count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
+  out.relative_rms = count > 0 ? std::sqrt(sum / static_cast<double>(count))
+                               : std::numeric_limits<double>::quiet_NaN();
   return out;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "estimation/fit_problem.hpp"
+#include "frf/responding_channels.hpp"
 
 namespace stageid {
 
@@ -21,11 +22,12 @@ double residual_cost(const FitProblem& problem, const std::vector<BasisGroup>& g
 
 /// What a model leaves of the data.
 struct ResidualSize {
-  double relative_rms = 0.0;  ///< sqrt(mean |E|^2/|G|^2) over lines and channels; where G is not 0
-  bool finite = true;         ///< every residual is
+  /// Over lines and channels that are flagged, where G is not 0; NaN if that is nowhere.
+  double relative_rms = 0.0;
+  bool finite = true;  ///< every residual is
 };
 ResidualSize residual_size(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                           const Eigen::MatrixXd& B);
+                           const Eigen::MatrixXd& B, const ChannelFlags& responding);
 
 /// sum W |P|^2 of the groups' model, and sum W |G|^2.
 struct WeightedPower {

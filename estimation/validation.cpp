@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "frf/confidence.hpp"
+#include "frf/responding_channels.hpp"
 
 namespace stageid {
 
@@ -79,11 +80,11 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf) {
   Validation out;
   const Eigen::ArrayXXd squared = E.cwiseAbs2().array();
   const Eigen::ArrayXXd power = frf.response.cwiseAbs2().array();
-  const Eigen::ArrayXXd relative = (power > 0.0).select(squared / power.max(1e-300), 0.0);
-  const double used = static_cast<double>((power > 0.0).count());
-  out.relative_rms_error = used > 0.0 ? std::sqrt(relative.sum() / used) : kUnknown;
+  const ChannelFlags responding = responding_channels(frf);
+  out.relative_rms_error = relative_rms_error(squared, power, responding);
   out.normalized_error = power.sum() > 0.0 ? std::sqrt(squared.sum() / power.sum()) : kUnknown;
-  out.channel_error = relative.rowwise().mean().sqrt();
+  out.channel_error =
+      responding.select(relative_channel_error(squared, power).array(), kUnknown).matrix();
   ResidualVerdict verdict = judge_residual(frf, [&](Eigen::Index first, Eigen::Index count) {
     return Eigen::MatrixXcd(frf.response.middleCols(first, count) - E.middleCols(first, count));
   });

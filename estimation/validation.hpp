@@ -8,7 +8,9 @@ namespace stageid {
 
 /// How a model does on a response that it was not fitted to.
 struct Validation {
-  double relative_rms_error = 0.0;  ///< sqrt(mean |E|^2/|G|^2); NaN: G is zero
+  /// sqrt(mean |E|^2/|G|^2) over the lines of the channels that respond, see responding_channels(); NaN:
+  /// none does.
+  double relative_rms_error = 0.0;
   double normalized_error = 0.0;    ///< sum |E|^2 over sum |G|^2, square root; NaN: G is zero
   double chi_square_per_dof = 0.0;  ///< mean |E|^2/variance; 0: unknown
   /// What that is if the error is noise: nu / (nu - 1), the mean of F(2, 2 nu), for a variance of nu degrees
@@ -21,8 +23,9 @@ struct Validation {
       0.0;  ///< share of |e|^2 above the 95 % point of noise alone; 0.05 is right
   double whiteness =
       0.0;  ///< largest |autocorrelation| of the whitened residual over lines, lags 1..10,
-  double whiteness_limit = 0.0;   ///<   and its 99 % limit
-  Eigen::VectorXd channel_error;  ///< relative rms a channel, n_y n_u
+  double whiteness_limit = 0.0;  ///<   and its 99 % limit
+  Eigen::VectorXd
+      channel_error;  ///< relative rms error per channel, n_y n_u; NaN: it does not respond
 };
 
 /// Compares a model with measured data on their lines, through the hold and delay that the data

@@ -8,7 +8,9 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <mutex>
 #include <regex>
+#include <set>
 #include <string>
 #include <system_error>
 
@@ -17,6 +19,18 @@
 
 namespace stageid {
 namespace {
+
+/// Temporary files of the outputs that are being written.
+struct UnfinishedFiles {
+  std::mutex mutex;
+  std::set<std::filesystem::path> files;
+};
+
+/// Never destroyed: an interrupt may come while static objects are.
+UnfinishedFiles& unfinished() {
+  static auto* const shared = new UnfinishedFiles;
+  return *shared;
+}
 
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& what, int error,
                        const std::string& remedy = "") {
@@ -110,24 +124,37 @@ std::filesystem::path shown_name(const std::filesystem::path& file) {
 OutputFile::OutputFile(const std::filesystem::path& target)
     : target_(resolve_target(target)), temporary_(temporary_beside(target_)) {
   constexpr mode_t kMode = 0666;  // less the user's umask
+  const std::lock_guard lock(unfinished().mutex);
   const Descriptor descriptor(
       ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
   if (!descriptor)
     fail(target_, "cannot create a file in this directory", errno,
          errno == ENOENT ? "make it first" : "");
+  unfinished().files.insert(temporary_);
 }
 
 OutputFile::~OutputFile() {
-  if (!committed_) ::unlink(temporary_.c_str());
+  if (committed_) return;
+  ::unlink(temporary_.c_str());
+  const std::lock_guard lock(unfinished().mutex);
+  unfinished().files.erase(temporary_);
 }
 
 void OutputFile::commit() {
   synchronize(temporary_, O_RDONLY, target_);
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0) {
-    fail(target_, "cannot be put in its place", errno);
+  {
+    const std::lock_guard lock(unfinished().mutex);
+    if (::rename(temporary_.c_str(), target_.c_str()) != 0)
+      fail(target_, "cannot be put in its place", errno);
+    unfinished().files.erase(temporary_);
   }
   committed_ = true;
   synchronize(directory_of(target_), O_RDONLY | O_DIRECTORY, target_);
+}
+
+void remove_unfinished_files() {
+  unfinished().mutex.lock();  // for ever: nothing is begun or put in its place any more
+  for (const std::filesystem::path& file : unfinished().files) ::unlink(file.c_str());
 }
 
 void write_text_file(const std::filesystem::path& target, std::string_view text) {

@@ -30,6 +30,10 @@ class OutputFile {
   bool committed_ = false;
 };
 
+/// Removes the temporary files of all outputs that are not committed, of a process that ends now: whatever
+/// begins or commits an output afterwards waits for ever.
+void remove_unfinished_files();
+
 /// Writes `text` to `target`, whole or not at all. @throws FileError
 void write_text_file(const std::filesystem::path& target, std::string_view text);
 

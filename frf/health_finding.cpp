@@ -1,8 +1,15 @@
 #include "frf/health_finding.hpp"
 
 #include <algorithm>
+#include <string_view>
 
 namespace stageid {
+namespace {
+
+constexpr const char* kUnknown = "unknown";  // to_string() of what is not a cause
+
+}  // namespace
+
 const char* to_string(Severity severity) noexcept {
   switch (severity) {
     case Severity::fault:
@@ -66,12 +73,11 @@ const char* to_string(Cause cause) noexcept {
     case Cause::drift:
       return "drift";
   }
-  return "unknown";
+  return kUnknown;
 }
 
 std::optional<Cause> cause_of(std::string_view name) noexcept {
-  constexpr std::string_view kNone = "unknown";  // to_string() of what is not a cause
-  for (int i = 0; to_string(static_cast<Cause>(i)) != kNone; ++i)
+  for (int i = 0; to_string(static_cast<Cause>(i)) != std::string_view(kUnknown); ++i)
     if (to_string(static_cast<Cause>(i)) == name) return static_cast<Cause>(i);
   return std::nullopt;
 }

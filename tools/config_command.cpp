@@ -12,7 +12,10 @@
 #include "tools/command_line.hpp"
 #include "tools/config_plan.hpp"
 #include "tools/config_schema.hpp"
+#include "tools/exit_code.hpp"
 #include "tools/experiment_config.hpp"
+#include "tools/format_errors.hpp"
+#include "tools/loop_check.hpp"
 #include "tools/strict_yaml.hpp"
 
 namespace stageid {
@@ -80,22 +83,43 @@ void ConfigCommand::schema() const {
 void ConfigCommand::check() const {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const std::filesystem::path& file : files_) {
-    if (format_of(file) == "stageid-stage") {
-      const StageConfig stage = load_stage_config(file);
-      console_.result(fmt::format(
-          "{}: stage '{}', {}, {}, {} Hz", file.string(), stage.spec.info.name,
-          counted(stage.spec.info.actuators.size(), "actuator"),
-          counted(stage.spec.info.sensors.size(), "sensor"), stage.spec.info.sample_rate_hz));
-    } else {
-      const ExperimentConfig experiment = load_experiment_config(file);
-      const ExperimentPlan plan = outline_plan(experiment);
-      console_.result(fmt::format("{}: {}, {:.1f} min, {}", file.string(),
-                                  counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
-                                  counted(plan.grid().size(), "line")));
+    nlohmann::ordered_json messages = nlohmann::ordered_json::array();
+    const auto tell = [&](const std::string& what) {
+      console_.warning(what);
+      messages.push_back(what);
+    };
+    try {
+      check(file);
+    } catch (const FormatErrors& errors) {
+      for (const FormatError& error : errors.all()) tell(error.what());
+    } catch (const FormatError& error) {
+      tell(error.what());
     }
-    json.push_back({{"file", file.string()}, {"valid", true}});
+    json.push_back({{"file", file.string()}, {"valid", messages.empty()}});
+    if (messages.empty()) continue;
+    json.back()["errors"] = messages;
+    console_.exit_code = kRequestWrong;
   }
   console_.result({{"files", json}});
+}
+
+void ConfigCommand::check(const std::filesystem::path& file) const {
+  if (format_of(file) == "stageid-stage") {
+    const StageConfig stage = load_stage_config(file);
+    require_stable_loop(stage, console_);
+    console_.result(fmt::format(
+        "{}: stage '{}', {}, {}, {} Hz", file.string(), stage.spec.info.name,
+        counted(stage.spec.info.actuators.size(), "actuator"),
+        counted(stage.spec.info.sensors.size(), "sensor"), stage.spec.info.sample_rate_hz));
+    return;
+  }
+  const ExperimentConfig experiment = load_experiment_config(file);
+  const ExperimentPlan plan = outline_plan(experiment);
+  if (!experiment.limits || std::filesystem::exists(experiment.limits->prior))
+    require_stable_loop(experiment, console_);
+  console_.result(fmt::format("{}: {}, {:.1f} min, {}", file.string(),
+                              counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
+                              counted(plan.grid().size(), "line")));
 }
 
 void ConfigCommand::dbc() const {

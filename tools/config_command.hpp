@@ -17,6 +17,7 @@ class ConfigCommand {
  private:
   void schema() const;
   void check() const;
+  void check(const std::filesystem::path& file) const;
   void dbc() const;
 
   Console& console_;

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "excitation/key_suggestion.hpp"
+#include "tools/format_errors.hpp"
 #include "tools/number_range.hpp"
 
 namespace stageid {
@@ -36,115 +37,155 @@ std::string quoted(const YamlNode& node) {
 /// Reads the keys of one map.
 class MapReader final : public ConfigVisitor {
  public:
-  MapReader(const YamlDocument& document, const YamlNode& map, std::string place)
-      : document_(document), map_(map), place_(std::move(place)) {
+  MapReader(const YamlDocument& document, const YamlNode& map, std::string place,
+            FormatErrorList& errors)
+      : document_(document),
+        map_(map),
+        place_(std::move(place)),
+        errors_(errors),
+        errors_before_(errors.size()) {
     if (map.kind != YamlNode::Kind::map)
       document.fail(map.mark, fmt::format("{} is {}; write a map, 'key: value' lines",
                                           place_.empty() ? "the file" : place_, quoted(map)));
   }
 
-  /// What describe() did not ask for is unknown; only then is it worth saying what is missing, which
-  /// may just be misspelt.
+  /// What describe() did not ask for is unknown; only without such a key is it worth saying what is missing, which
+  /// may just be misspelt. Rules between values are for values that are right.
   void finish() const {
-    for (const YamlNode::Entry& entry : map_.entries)
-      if (std::find(known_.begin(), known_.end(), entry.key) == known_.end())
+    bool unknown = false;
+    for (const YamlNode::Entry& entry : map_.entries) {
+      if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
+      unknown = true;
+      errors_.attempt([&] {
         document_.fail(entry.mark, fmt::format("unknown key '{}'; {}", entry.key,
                                                suggest_key(entry.key, known_)));
-    if (!missing_.empty())
-      document_.fail(map_.mark, fmt::format("key '{}' is missing{}; add it ({})", missing_.front(),
-                                            place_.empty() ? "" : " in " + place_, missing_help_));
-    for (const auto& [mark, message] : broken_) document_.fail(mark, message);
+      });
+    }
+    for (const auto& [key, help] : missing_)
+      if (!unknown)
+        errors_.attempt([&] {
+          document_.fail(map_.mark, fmt::format("key '{}' is missing{}; add it ({})", key,
+                                                place_.empty() ? "" : " in " + place_, help));
+        });
+    if (errors_.size() > errors_before_) return;
+    for (const auto& [mark, message] : broken_)
+      errors_.attempt([&] { document_.fail(mark, message); });
   }
 
   void number(const char* key, double& value, const NumberRule& rule, Presence presence,
               const char* help) override {
-    if (const YamlNode* node = find(key, presence, help)) value = parse_number(key, *node, rule);
+    errors_.attempt([&] {
+      if (const YamlNode* node = find(key, presence, help)) value = parse_number(key, *node, rule);
+    });
   }
   void numbers(const char* key, std::vector<double>& values, const NumberRule& rule,
                CountRule count, Presence presence, const char* help) override {
-    const YamlNode* node = find(key, presence, help);
-    if (node == nullptr) return;
-    values.clear();
-    for (const std::size_t item : list(key, *node, count))
-      values.push_back(parse_number(key, document_.node(item), rule));
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      values.clear();
+      for (const std::size_t item : list(key, *node, count))
+        errors_.attempt([&] { values.push_back(parse_number(key, document_.node(item), rule)); });
+    });
   }
   void integer(const char* key, std::int64_t& value, std::int64_t low, std::int64_t high,
                Presence presence, const char* help) override {
-    const YamlNode* node = find(key, presence, help);
-    if (node == nullptr) return;
-    const char* end = node->text.data() + node->text.size();
-    std::int64_t parsed = 0;
-    const auto [stop, error] = std::from_chars(node->text.data(), end, parsed);
-    if (node->kind != YamlNode::Kind::scalar || !node->plain || stop != end || error != std::errc{})
-      wrong(key, *node, "a whole number");
-    if (parsed < low || parsed > high)
-      document_.fail(node->mark, fmt::format("{}: {} is out of range; allowed is {}", key, parsed,
-                                             describe_range(low, high)));
-    value = parsed;
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      const char* end = node->text.data() + node->text.size();
+      std::int64_t parsed = 0;
+      const auto [stop, error] = std::from_chars(node->text.data(), end, parsed);
+      if (node->kind != YamlNode::Kind::scalar || !node->plain || stop != end ||
+          error != std::errc{})
+        wrong(key, *node, "a whole number");
+      if (parsed < low || parsed > high)
+        document_.fail(node->mark, fmt::format("{}: {} is out of range; allowed is {}", key, parsed,
+                                               describe_range(low, high)));
+      value = parsed;
+    });
   }
   void text(const char* key, std::string& value, Presence presence, const char* help) override {
-    if (const YamlNode* node = find(key, presence, help)) value = parse_text(key, *node);
+    errors_.attempt([&] {
+      if (const YamlNode* node = find(key, presence, help)) value = parse_text(key, *node);
+    });
   }
   void texts(const char* key, std::vector<std::string>& values, CountRule count, Presence presence,
              const char* help) override {
-    const YamlNode* node = find(key, presence, help);
-    if (node == nullptr) return;
-    values.clear();
-    for (const std::size_t item : list(key, *node, count)) {
-      values.push_back(parse_text(key, document_.node(item)));
-      if (std::count(values.begin(), values.end(), values.back()) > 1)
-        document_.fail(document_.node(item).mark,
-                       fmt::format("{}: '{}' stands here twice; keep one", key, values.back()));
-    }
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      values.clear();
+      for (const std::size_t item : list(key, *node, count))
+        errors_.attempt([&] {
+          values.push_back(parse_text(key, document_.node(item)));
+          if (std::count(values.begin(), values.end(), values.back()) > 1)
+            document_.fail(document_.node(item).mark,
+                           fmt::format("{}: '{}' stands here twice; keep one", key, values.back()));
+        });
+    });
   }
   void choice(const char* key, std::size_t& index, const std::vector<std::string>& names,
               Presence presence, const char* help) override {
-    const YamlNode* node = find(key, presence, help);
-    if (node == nullptr) return;
-    const auto found = std::find(names.begin(), names.end(), node->text);
-    if (node->kind != YamlNode::Kind::scalar || found == names.end()) wrong_word(key, *node, names);
-    index = static_cast<std::size_t>(found - names.begin());
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      const auto found = std::find(names.begin(), names.end(), node->text);
+      if (node->kind != YamlNode::Kind::scalar || found == names.end())
+        wrong_word(key, *node, names);
+      index = static_cast<std::size_t>(found - names.begin());
+    });
   }
   void flexible(const char* key, FlexibleValue& value, const FlexibleRule& rule, Presence presence,
                 const char* help) override {
-    const YamlNode* node = find(key, presence, help);
-    if (node == nullptr) return;
-    value = {};
-    if (node->kind == YamlNode::Kind::sequence && (rule.list || rule.pairs)) {
-      value.is_list = true;
-      for (const std::size_t item : list(key, *node, {1}))
-        read_item(key, document_.node(item), rule, value);
-    } else if (node->kind == YamlNode::Kind::scalar && is_word(*node, rule)) {
-      value.word = node->text;
-    } else if (node->kind == YamlNode::Kind::scalar && rule.number && looks_numeric(*node)) {
-      value.numbers = {parse_number(key, *node, rule.rule)};
-    } else if (node->kind == YamlNode::Kind::scalar && rule.any_text && !node->text.empty()) {
-      value.word = node->text;
-    } else {
-      wrong(key, *node, describe_forms(rule) + nearest_of(*node, rule.words));
-    }
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      value = {};
+      if (node->kind == YamlNode::Kind::sequence && (rule.list || rule.pairs)) {
+        value.is_list = true;
+        for (const std::size_t item : list(key, *node, {1}))
+          errors_.attempt([&] { read_item(key, document_.node(item), rule, value); });
+      } else if (node->kind == YamlNode::Kind::scalar && is_word(*node, rule)) {
+        value.word = node->text;
+      } else if (node->kind == YamlNode::Kind::scalar && rule.number && looks_numeric(*node)) {
+        value.numbers = {parse_number(key, *node, rule.rule)};
+      } else if (node->kind == YamlNode::Kind::scalar && rule.any_text && !node->text.empty()) {
+        value.word = node->text;
+      } else {
+        wrong(key, *node, describe_forms(rule) + nearest_of(*node, rule.words));
+      }
+    });
   }
   void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,
                      const NumberRule& rule, Presence presence, const char* help) override {
-    const YamlNode* node = find(key, presence, help);
-    if (node == nullptr) return;
-    if (node->kind != YamlNode::Kind::map) wrong(key, *node, "a map {name: number, ...}");
-    values.clear();
-    for (const YamlNode::Entry& entry : node->entries)
-      values.emplace_back(entry.key,
-                          parse_number(entry.key.c_str(), document_.node(entry.value), rule));
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      if (node->kind != YamlNode::Kind::map) wrong(key, *node, "a map {name: number, ...}");
+      values.clear();
+      for (const YamlNode::Entry& entry : node->entries)
+        errors_.attempt([&] {
+          values.emplace_back(entry.key,
+                              parse_number(entry.key.c_str(), document_.node(entry.value), rule));
+        });
+    });
   }
   void group(const char* key, const Describe& describe, Presence presence,
              const char* help) override {
-    if (const YamlNode* node = find(key, presence, help)) read_map(key, *node, describe);
+    errors_.attempt([&] {
+      if (const YamlNode* node = find(key, presence, help)) read_map(key, *node, describe);
+    });
   }
   void items(const char* key, const Describe& describe_item, CountRule count, Presence presence,
              const char* help) override {
-    const YamlNode* node = find(key, presence, help);
-    if (node == nullptr) return;
-    std::size_t index = 0;
-    for (const std::size_t item : list(key, *node, count))
-      read_map(fmt::format("{} {}", key, ++index), document_.node(item), describe_item);
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      std::size_t index = 0;
+      for (const std::size_t item : list(key, *node, count))
+        read_map(fmt::format("{} {}", key, ++index), document_.node(item), describe_item);
+    });
   }
   void require(bool holds, const char* key, const std::string& message) override {
     if (holds) return;
@@ -161,16 +202,15 @@ class MapReader final : public ConfigVisitor {
   const YamlNode* find(const char* key, Presence presence, const char* help) {
     known_.emplace_back(key);
     if (const YamlNode::Entry* entry = entry_of(key)) return &document_.node(entry->value);
-    if (presence == Presence::required) {
-      if (missing_.empty()) missing_help_ = help;
-      missing_.emplace_back(key);
-    }
+    if (presence == Presence::required) missing_.emplace_back(key, help);
     return nullptr;
   }
   void read_map(const std::string& name, const YamlNode& node, const Describe& describe) {
-    MapReader reader(document_, node, name);
-    describe(reader);
-    reader.finish();
+    errors_.attempt([&] {
+      MapReader reader(document_, node, name, errors_);
+      describe(reader);
+      reader.finish();
+    });
   }
   const std::vector<std::size_t>& list(const char* key, const YamlNode& node,
                                        CountRule count) const {
@@ -264,17 +304,22 @@ class MapReader final : public ConfigVisitor {
   const YamlNode& map_;
   std::string place_;
   std::vector<std::string> known_;
-  std::vector<std::string> missing_;
-  std::string missing_help_;
+  std::vector<std::pair<std::string, std::string>> missing_;  // key, help
   std::vector<std::pair<YamlMark, std::string>> broken_;
+  FormatErrorList& errors_;
+  std::size_t errors_before_ = 0;
 };
 
 }  // namespace
 
 void read_config(const YamlDocument& document, const ConfigVisitor::Describe& describe) {
-  MapReader reader(document, document.root(), "");
-  describe(reader);
-  reader.finish();
+  FormatErrorList errors;
+  errors.attempt([&] {
+    MapReader reader(document, document.root(), "", errors);
+    describe(reader);
+    reader.finish();
+  });
+  errors.raise();
 }
 
 }  // namespace stageid

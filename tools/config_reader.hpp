@@ -10,7 +10,7 @@ namespace stageid {
 
 /// Fills a configuration from a document: every key that stands there must be known, every required
 /// one must stand there, every value must have its type and lie in its range.
-/// @throws FormatError "FILE:LINE:COLUMN: what is wrong; what would be right".
+/// @throws FormatErrors, each "FILE:LINE:COLUMN: what is wrong; what would be right".
 void read_config(const YamlDocument& document, const ConfigVisitor::Describe& describe);
 
 }  // namespace stageid

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -12,9 +11,9 @@
 #include "excitation/file_error.hpp"
 #include "tools/command_line.hpp"
 #include "tools/config_plan.hpp"
-#include "tools/interrupt.hpp"
 #include "tools/limited_plan.hpp"
 #include "tools/link_load.hpp"
+#include "tools/loop_check.hpp"
 #include "tools/measurement.hpp"
 #include "tools/output_paths.hpp"
 
@@ -120,10 +119,9 @@ DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console
 void DesignCommand::run() const {
   const ExperimentConfig config = load_experiment_config(config_);
   require_writable(output_, {config_});
-  std::optional<EndsAtOnce> computing(std::in_place);
+  require_stable_loop(config, console_);
   if (config.limits) {
     const LimitedPlan limited = make_limited_plan(config);
-    computing.reset();
     write_limited(config, limited);
     return;
   }
@@ -134,7 +132,6 @@ void DesignCommand::run() const {
         "use that level");
   const ExperimentPlan plan = make_plan(config);
   const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
-  computing.reset();
   const bool written = force_ || prediction.violations().empty();
   if (written) write_experiment_plan(output_, plan);
   for (const std::string& line : design_table(config, plan, prediction)) console_.result(line);

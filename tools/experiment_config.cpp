@@ -12,6 +12,7 @@
 #include "frf/zippered_lines.hpp"
 #include "tools/config_plan.hpp"
 #include "tools/config_reader.hpp"
+#include "tools/format_errors.hpp"
 #include "tools/strict_yaml.hpp"
 
 namespace stageid {
@@ -200,15 +201,18 @@ class ExperimentChecker {
                                   band_hz[1], nyquist_hz));
   }
   void check_names(const char* section, const char* key, const std::vector<std::string>& names,
-                   const std::vector<Channel>& channels, const char* kind) const {
+                   const std::vector<Channel>& channels, const char* kind,
+                   FormatErrorList& errors) const {
     std::vector<std::string> known;
     for (const Channel& channel : channels) known.push_back(channel.name);
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (channel_index(channels, names[i]) >= 0) continue;
       const YamlNode* list = find(section, key);
       const YamlMark mark = list == nullptr ? YamlMark{} : document_.node(list->items.at(i)).mark;
-      document_.fail(mark, fmt::format("{}: the stage has no {} '{}'; {}", key, kind, names[i],
-                                       suggest_key(names[i], known)));
+      errors.attempt([&] {
+        document_.fail(mark, fmt::format("{}: the stage has no {} '{}'; {}", key, kind, names[i],
+                                         suggest_key(names[i], known)));
+      });
     }
   }
   [[noreturn]] void fail(const char* key, const std::string& message) const {
@@ -279,11 +283,13 @@ std::string measurement_id(const ExperimentFile& f, const StageConfig& stage) {
 void complete(ExperimentConfig& config, ExperimentFile& file, const YamlDocument& document) {
   const ExperimentChecker checker(document, config.stage);
   const StageInfo& info = config.stage.spec.info;
-  checker.check_names("experiment", "axes", file.axes, info.actuators, "actuator");
-  checker.check_names("frf", "inputs", file.frf.inputs, info.actuators, "actuator");
-  checker.check_names("frf", "outputs", file.frf.outputs, info.sensors, "sensor");
-  checker.check_band(file.band_hz);
-  config.samples_per_period = checker.samples_per_period(file.period_s);
+  FormatErrorList errors;
+  checker.check_names("experiment", "axes", file.axes, info.actuators, "actuator", errors);
+  checker.check_names("frf", "inputs", file.frf.inputs, info.actuators, "actuator", errors);
+  checker.check_names("frf", "outputs", file.frf.outputs, info.sensors, "sensor", errors);
+  errors.attempt([&] { checker.check_band(file.band_hz); });
+  errors.attempt([&] { config.samples_per_period = checker.samples_per_period(file.period_s); });
+  errors.raise();
   file.lines.low_hz = file.band_hz[0];
   file.lines.high_hz = file.band_hz[1];
   file.lines.seed = file.spec.seed;
@@ -314,24 +320,37 @@ void describe_experiment_keys(ConfigVisitor& visitor) {
   describe(visitor, file);
 }
 
+namespace {
+
+std::filesystem::path stage_file_of(const std::filesystem::path& path, const YamlDocument& document,
+                                    const std::string& stage) {
+  std::filesystem::path file = (path.parent_path() / stage).lexically_normal();
+  if (std::filesystem::exists(file)) return file;
+  for (const YamlNode::Entry& entry : document.root().entries)
+    if (entry.key == "stage")
+      document.fail(
+          document.node(entry.value).mark,
+          fmt::format("stage: there is no file {}; give the path of a stage file, relative "
+                      "to this one",
+                      file.string()));
+  return file;
+}
+
+}  // namespace
+
 ExperimentConfig load_experiment_config(const std::filesystem::path& path) {
   const YamlDocument document = YamlDocument::read(path);
   ExperimentFile file;
-  read_config(document, [&](ConfigVisitor& visitor) { describe(visitor, file); });
   ExperimentConfig config;
   config.file = path;
   config.text = document.text();
-  const std::filesystem::path stage_file = (path.parent_path() / file.stage).lexically_normal();
-  if (!std::filesystem::exists(stage_file)) {
-    for (const YamlNode::Entry& entry : document.root().entries)
-      if (entry.key == "stage")
-        document.fail(
-            document.node(entry.value).mark,
-            fmt::format("stage: there is no file {}; give the path of a stage file, relative "
-                        "to this one",
-                        stage_file.string()));
-  }
-  config.stage = load_stage_config(stage_file);
+  FormatErrorList errors;
+  errors.attempt(
+      [&] { read_config(document, [&](ConfigVisitor& visitor) { describe(visitor, file); }); });
+  if (!file.stage.empty())
+    errors.attempt(
+        [&] { config.stage = load_stage_config(stage_file_of(path, document, file.stage)); });
+  errors.raise();
   if (file.limits)
     file.limits->prior = (path.parent_path() / file.limits->prior).lexically_normal();
   complete(config, file, document);

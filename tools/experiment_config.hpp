@@ -36,7 +36,7 @@ struct ExperimentConfig {
   std::string measurement_id;       ///< fingerprint of all that decides what is measured
 };
 
-/// @throws FileError, FormatError "FILE:LINE:COLUMN: what is wrong; what would be right".
+/// @throws FileError, FormatErrors of this file and the stage file.
 ExperimentConfig load_experiment_config(const std::filesystem::path& file);
 
 /// The keys of an experiment file. Used by `stageid config schema`.

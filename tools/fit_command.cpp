@@ -124,8 +124,8 @@ void FitCommand::run() const {
   console_.result(cost_line(result.cost));
   for (const std::string& line : mode_table(result.model)) console_.result(line);
   for (const std::string& line : delay_lines(result.model)) console_.result(line);
-  console_.result(fmt::format("{}: relative error {:.4g}, {} ({})", output_.string(),
-                              result.model.fit.relative_rms_error, to_string(result.status),
+  console_.result(fmt::format("{}: {}, {} ({})", output_.string(),
+                              relative_error_text(result.model.fit), to_string(result.status),
                               result.message));
   const bool whole = told || covariance_.empty();
   console_.exit_code = fit_exit_code(result, whole);

@@ -98,6 +98,12 @@ std::vector<std::string> decisions_of(const AdditiveModel& model) {
   return decisions;
 }
 
+std::string relative_error_text(const FitRecord& fit) {
+  return std::isfinite(fit.relative_rms_error)
+             ? fmt::format("relative error {:.4g}", fit.relative_rms_error)
+             : "no channel above its noise";
+}
+
 std::vector<std::string> mode_table(const AdditiveModel& model) {
   std::vector<std::vector<std::string>> rows = {
       {"mode", "frequency/Hz", "std/Hz", "damping", "std"}};

@@ -28,6 +28,9 @@ std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerp
 /// The decisions that a model's provenance tells.
 std::vector<std::string> decisions_of(const AdditiveModel& model);
 
+/// "relative error 0.012", or that no channel responds.
+std::string relative_error_text(const FitRecord& fit);
+
 /// For people: table of modes with standard deviations; cost history in one line.
 std::vector<std::string> mode_table(const AdditiveModel& model);
 std::string cost_line(const std::vector<double>& cost);

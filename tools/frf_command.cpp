@@ -11,6 +11,7 @@
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/fft_wisdom.hpp"
+#include "excitation/json_members.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/hold_compensation.hpp"
 #include "frf/order_statistic.hpp"
@@ -26,7 +27,7 @@ namespace {
 /// The delay that a log of ours declares for its stage; 0 for others.
 double declared_delay_s(const std::filesystem::path& log) {
   const auto json = nlohmann::json::parse(open_log(log)->info().metadata_json, nullptr, false);
-  return json.is_object() ? json.value("transport_delay_s", 0.0) : 0.0;
+  return number_in(json, "transport_delay_s").value_or(0.0);
 }
 
 /// Of the responses that there are: an output that shows one value throughout has none.

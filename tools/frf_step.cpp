@@ -10,6 +10,7 @@
 #include "acquisition/log_reader.hpp"
 #include "excitation/counted.hpp"
 #include "excitation/fingerprint.hpp"
+#include "excitation/json_members.hpp"
 #include "frf/data_health.hpp"
 #include "tools/health_step.hpp"
 #include "tools/interrupt.hpp"
@@ -69,10 +70,7 @@ std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfO
 }
 
 std::string request_id_of(const std::string& provenance_json) {
-  const Json json = Json::parse(provenance_json, nullptr, false);
-  if (!json.is_object() || !json.contains("request_id") || !json["request_id"].is_string())
-    return "";
-  return json["request_id"].get<std::string>();
+  return text_in(Json::parse(provenance_json, nullptr, false), "request_id");
 }
 
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,

@@ -6,7 +6,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -40,7 +42,8 @@ class PrivateDirectory {
                                   name, std::strerror(errno)));
     path_ = name;
   }
-  ~PrivateDirectory() {
+  ~PrivateDirectory() { remove(); }
+  void remove() const {
     std::error_code ignored;
     std::filesystem::remove_all(path_, ignored);
   }
@@ -93,6 +96,8 @@ std::string read_whole(const std::filesystem::path& file) {
   return text.str();
 }
 
+std::atomic<pid_t> running_gnuplot = -1;
+
 /// Runs `gnuplot -d script.gp` there, messages into a file. @returns the status that waitpid() gives.
 int run_gnuplot(const std::filesystem::path& directory) {
   std::vector<std::string> environment = environment_of_gnuplot();
@@ -109,17 +114,26 @@ int run_gnuplot(const std::filesystem::path& directory) {
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "messages",
                                    O_WRONLY | O_CREAT | O_TRUNC, 0600);
   posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none;
+  ::sigemptyset(&none);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
   pid_t child = -1;
-  const int error = ::posix_spawnp(&child, words[0].c_str(), &actions, nullptr, arguments,
+  const int error = ::posix_spawnp(&child, words[0].c_str(), &actions, &attributes, arguments,
                                    environment_pointers.data());
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (error == ENOENT)
     throw FileError("gnuplot: is not installed; install the Debian package gnuplot-nox");
   if (error != 0)
     throw FileError(fmt::format("gnuplot: cannot be started: {}", std::strerror(error)));
+  running_gnuplot = child;
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
+  running_gnuplot = -1;
   return status;
 }
 
@@ -172,6 +186,10 @@ PictureFormat picture_format(const std::filesystem::path& file) {
 void draw(const Picture& picture, const std::filesystem::path& file) {
   const PictureFormat format = picture_format(file);
   const PrivateDirectory directory;
+  const CleanedUpAtInterrupt clean_up([&directory] {
+    if (const pid_t child = running_gnuplot; child > 0) ::kill(child, SIGKILL);
+    directory.remove();
+  });
   for (const Picture::Table& table : picture.tables)
     write_text_file(directory.path() / table.name, table.text);
   write_text_file(directory.path() / "script.gp",

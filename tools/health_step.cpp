@@ -9,6 +9,7 @@
 
 #include "acquisition/log_reader.hpp"
 #include "excitation/file_error.hpp"
+#include "excitation/json_members.hpp"
 #include "frf/experiment_noise_check.hpp"
 #include "frf/interpolation_check.hpp"
 #include "frf/settling_check.hpp"
@@ -24,20 +25,16 @@ using Json = nlohmann::ordered_json;
 constexpr double kBytesPerMegabyte = 1e6;
 constexpr Severity kSeverities[] = {Severity::fault, Severity::doubt, Severity::unchecked};
 
-std::string text_of(const Json& object, const char* key) {
-  return object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : "";
-}
-
 /// The cause is for programs that read the table now; notes need severity and texts.
 Finding finding_of(const Json& object) {
   Finding finding;
   for (const Severity severity : kSeverities)
-    if (text_of(object, "severity") == to_string(severity)) finding.severity = severity;
-  if (const auto cause = cause_of(text_of(object, "cause"))) finding.cause = *cause;
-  finding.channel = text_of(object, "channel");
-  finding.what = text_of(object, "what");
-  finding.figure = text_of(object, "figure");
-  finding.remedy = text_of(object, "remedy");
+    if (text_in(object, "severity") == to_string(severity)) finding.severity = severity;
+  if (const auto cause = cause_of(text_in(object, "cause"))) finding.cause = *cause;
+  finding.channel = text_in(object, "channel");
+  finding.what = text_in(object, "what");
+  finding.figure = text_in(object, "figure");
+  finding.remedy = text_in(object, "remedy");
   return finding;
 }
 

@@ -22,6 +22,7 @@
 #include "tools/frf_quality.hpp"
 #include "tools/frf_step.hpp"
 #include "tools/health_step.hpp"
+#include "tools/interrupt.hpp"
 #include "tools/measured_stage.hpp"
 #include "tools/model_export.hpp"
 #include "tools/output_paths.hpp"
@@ -68,6 +69,7 @@ Identification::Identification(const ExperimentConfig& config, IdentificationReq
 
 int Identification::run() {
   require_backend(config_, config_.stage.backend);
+  say_at_interrupt("finished steps are kept; continue with --resume");
   design();
   const int measured = measure_all();
   if (measured != kDone && measured != kNotTrustworthy) return measured;
@@ -125,9 +127,9 @@ int Identification::measure_all() {
                           result.seconds > 0.0 ? stage_s / result.seconds : 0.0,
                           static_cast<double>(result.log_bytes) / 1e6));
   if (exit_code_ != kDone && exit_code_ != kNotTrustworthy)
-    console_.warning(fmt::format(
-        "{}; {} of {} runs are kept, continue with --resume", named(request.log, result.message),
-        result.runs_before + result.experiment.runs_done, result.runs_total));
+    console_.warning(fmt::format("{}; {} of {} runs are kept{}", named(request.log, result.message),
+                                 result.runs_before + result.experiment.runs_done,
+                                 result.runs_total, advice_behind(result)));
   return exit_code_;
 }
 
@@ -216,10 +218,9 @@ void Identification::fit() {
     console_.warning(fmt::format("{}: {}; continue with --resume", path("model.json").string(),
                                  step.result.message));
   }
-  finish_step(
-      "fit", step.seconds,
-      fmt::format("{}, relative error {:.3g}, {}", counted(model_.submodels.size(), "submodel"),
-                  model_.fit.relative_rms_error, cost_line(step.result.cost)));
+  finish_step("fit", step.seconds,
+              fmt::format("{}, {}, {}", counted(model_.submodels.size(), "submodel"),
+                          relative_error_text(model_.fit), cost_line(step.result.cost)));
 }
 
 void Identification::check_model() {
@@ -276,10 +277,7 @@ Json Identification::summary() const {
 void Identification::print_summary() const {
   if (truth_) {
     for (const std::string& line : truth_table(*truth_)) console_.result(line);
-    console_.result(
-        fmt::format("error of the model against the exact plant: {:.3e} (mean relative over "
-                    "lines and channels), {:.3e} (of the whole response)",
-                    truth_->relative_rms_error, truth_->normalized_error));
+    console_.result(truth_error_line(*truth_));
   }
   if (validation_) {
     console_.result("on the realization that was held back:");

@@ -6,6 +6,7 @@
 
 #include "tools/command_line.hpp"
 #include "tools/identification.hpp"
+#include "tools/loop_check.hpp"
 
 namespace stageid {
 
@@ -28,6 +29,7 @@ void IdentifyCommand::run() const {
     throw std::invalid_argument(
         fmt::format("{}: holds a run already; continue it with --resume, or give another -o",
                     output_.string()));
+  require_stable_loop(config, console_);
   Identification identification(config, {output_, resume_, force_, threads_}, console_);
   console_.exit_code = identification.run();
 }

@@ -1,63 +1,106 @@
 #include "tools/interrupt.hpp"
 
+#include <fmt/format.h>
+#include <pthread.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
-#include <string_view>
+#include <mutex>
+#include <thread>
+#include <utility>
 
+#include "excitation/output_file.hpp"
 #include "tools/exit_code.hpp"
 
 namespace stageid {
 namespace {
 
 std::atomic<bool> interrupted = false;
-std::atomic<bool> left_to_host = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "the only kind a signal handler may touch");
+std::atomic<bool> ending = false;
+std::atomic<int> controlled_stops = 0;
 
-std::atomic<bool> end_at_once = false;
+/// What the thread that waits for signals shares with the others.
+struct AtInterrupt {
+  std::mutex mutex;
+  std::function<void()> clean_up;
+  std::string what_is_left = "nothing was written";
+};
 
-extern "C" void on_signal(int signal) {
-  if (end_at_once) {
-    constexpr std::string_view kMessage = "stageid: interrupted; nothing was written\n";
-    static_cast<void>(!::write(STDERR_FILENO, kMessage.data(), kMessage.size()));
-    ::_exit(kInterrupted);
+/// Never destroyed: the thread may outlive main().
+AtInterrupt& at_interrupt() {
+  static auto* const shared = new AtInterrupt;
+  return *shared;
+}
+
+[[noreturn]] void end_program() {
+  ending = true;
+  remove_unfinished_files();
+  AtInterrupt& shared = at_interrupt();
+  const std::lock_guard lock(shared.mutex);
+  if (shared.clean_up) shared.clean_up();
+  const std::string message = fmt::format("stageid: interrupted; {}\n", shared.what_is_left);
+  static_cast<void>(!::write(STDERR_FILENO, message.data(), message.size()));
+  ::_exit(kInterrupted);
+}
+
+[[noreturn]] void wait_for_signals(sigset_t signals) {
+  for (;;) {
+    int signal = 0;
+    if (::sigwait(&signals, &signal) != 0) continue;
+    if (controlled_stops == 0 || interrupted.exchange(true)) end_program();
   }
-  interrupted = true;
-  std::signal(signal, SIG_DFL);
 }
 
-/// Of a terminal or connection that closed. Who ignores it, as nohup does, wants the work to go on.
-void end_at_hangup() {
-  if (std::signal(SIGHUP, on_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
-}
-
-bool install() {
-  if (left_to_host) return false;
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
-  end_at_hangup();
-  std::signal(SIGXFSZ, SIG_IGN);
-  std::signal(SIGPIPE, SIG_IGN);
-  return true;
+bool is_ignored(int signal) {
+  struct sigaction action {};
+  return ::sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
 }
 
 }  // namespace
 
-const std::atomic<bool>& interrupt_flag() {
-  static const bool installed = install();
-  static_cast<void>(installed);
-  return interrupted;
+void catch_signals() {
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+  sigset_t signals;
+  ::sigemptyset(&signals);
+  // Who ignores a signal, as nohup does, wants the work to go on.
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP})
+    if (!is_ignored(signal)) ::sigaddset(&signals, signal);
+  // Threads inherit the mask, so that only the one that waits gets them.
+  ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  static_cast<void>(at_interrupt());
+  std::thread(wait_for_signals, signals).detach();
 }
 
-void leave_signals_to_host() noexcept { left_to_host = true; }
+const std::atomic<bool>& interrupt_flag() { return interrupted; }
 
 void request_interrupt() noexcept { interrupted = true; }
 
 void forget_interrupt() noexcept { interrupted = false; }
 
-EndsAtOnce::EndsAtOnce() { end_at_once = true; }
+ControlledStop::ControlledStop() { ++controlled_stops; }
 
-EndsAtOnce::~EndsAtOnce() { end_at_once = false; }
+ControlledStop::~ControlledStop() { --controlled_stops; }
+
+CleanedUpAtInterrupt::CleanedUpAtInterrupt(std::function<void()> clean_up) {
+  const std::lock_guard lock(at_interrupt().mutex);
+  at_interrupt().clean_up = std::move(clean_up);
+}
+
+CleanedUpAtInterrupt::~CleanedUpAtInterrupt() {
+  const std::lock_guard lock(at_interrupt().mutex);
+  at_interrupt().clean_up = nullptr;
+}
+
+void say_at_interrupt(std::string what_is_left) {
+  const std::lock_guard lock(at_interrupt().mutex);
+  at_interrupt().what_is_left = std::move(what_is_left);
+}
+
+void wait_if_ending() noexcept {
+  while (ending) std::this_thread::sleep_for(std::chrono::seconds(1));
+}
 
 void throw_if_interrupted() {
   if (interrupt_flag()) throw Interrupted();

@@ -6,14 +6,17 @@
 #include "estimation/freed_memory.hpp"
 #include "estimation/weight_matrices.hpp"
 #include "excitation/file_error.hpp"
+#include "excitation/system_reason.hpp"
 #include "hal/stage.hpp"
 #include "tools/console.hpp"
 #include "tools/exit_code.hpp"
+#include "tools/interrupt.hpp"
 #include "tools/program.hpp"
 
 namespace {
 
 int report(const std::exception& error, int exit_code) {
+  stageid::wait_if_ending();
   stageid::Console().warning(error.what());
   return exit_code;
 }
@@ -21,6 +24,7 @@ int report(const std::exception& error, int exit_code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  stageid::catch_signals();  // from the first moment on
   stageid::keep_freed_memory();
   try {
     return stageid::run_program(argc, argv);
@@ -33,7 +37,9 @@ int main(int argc, char** argv) {
   } catch (const stageid::StageError& error) {
     return report(error, stageid::kWorldFailed);
   } catch (const std::filesystem::filesystem_error& error) {
-    return report(error, stageid::kWorldFailed);
+    return report(stageid::FileError(error.path1().string() + ": " +
+                                     stageid::system_reason(error.code().value())),
+                  stageid::kWorldFailed);
   } catch (const stageid::IndefiniteWeights& error) {
     return report(error, stageid::kNotTrustworthy);
   } catch (const std::invalid_argument& error) {
@@ -41,7 +47,10 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return report(std::runtime_error("out of memory; ask for fewer lines, channels or modes"),
                   stageid::kWorldFailed);
-  } catch (const std::exception& error) {
-    return report(error, stageid::kWorldFailed);
+  } catch (const std::exception&) {
+    // Of a library: its words would help nobody.
+    return report(std::runtime_error("an unexpected error, which is a bug of stageid; report the "
+                                     "command with its input files"),
+                  stageid::kWorldFailed);
   }
 }

@@ -184,6 +184,14 @@ void listen(RunExperimentOptions& options, EventLog& events, Progress& progress,
 
 }  // namespace
 
+std::string advice_behind(const MeasurementResult& result) {
+  if (result.exit_code == kInterrupted || result.exit_code == kWorldFailed)
+    return "; continue with --resume";
+  if (result.exit_code == kStoppedForSafety)
+    return "; the same run would be stopped again: lower the level, or check controller and limits";
+  return "";
+}
+
 double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage) {
   const auto words = static_cast<double>(stage.actuators.size() + stage.sensors.size() + 1);
   return static_cast<double>(plan.samples_per_run()) * static_cast<double>(plan.runs().size()) *
@@ -198,6 +206,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   MeasurementResult result;
   result.runs_total = static_cast<int>(plan.runs().size());
   result.runs_before = static_cast<int>(options.skip.size());
+  const ControlledStop stops_in_order;
   const std::unique_ptr<MeasuredStage> stage =
       make_measured_stage(config, plan, request, options.skip);
   const StageInfo& info = stage->info();

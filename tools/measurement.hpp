@@ -42,6 +42,10 @@ struct MeasurementResult {
 MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
                           const MeasurementRequest& request, const Console& console);
 
+/// What to do about a measurement that ended early, behind its message: resuming helps where the link was lost or
+/// somebody interrupted, not where the same run would hit the same limit.
+std::string advice_behind(const MeasurementResult& result);
+
 /// Bytes of the samples of a whole experiment in a native log.
 double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage);
 

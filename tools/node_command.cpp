@@ -129,6 +129,7 @@ void NodeCommand::run() {
     throw std::invalid_argument(
         "node: nothing to serve; add --can INTERFACE, --modbus-tcp PORT or --modbus-rtu DEVICE");
   const StageConfig config = load_stage_config(config_);
+  const ControlledStop comes_to_rest;
   StageNode node = make_node(config);
   if (modbus_.wanted()) modbus_.start(node, config.spec.limits);
   for (const std::string& place : modbus_.places())

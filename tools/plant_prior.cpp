@@ -12,6 +12,7 @@
 #include "estimation/additive_model.hpp"
 #include "estimation/validation.hpp"
 #include "excitation/file_error.hpp"
+#include "excitation/json_members.hpp"
 #include "frf/frf_file.hpp"
 #include "frf/hold_compensation.hpp"
 #include "tools/low_frequency_plant.hpp"
@@ -105,10 +106,8 @@ auto interpolated(const Columns& columns, const Between& at) {
 
 double period_s_of(const FrfEstimate& frf) {
   const auto json = nlohmann::json::parse(frf.provenance_json, nullptr, false);
-  if (!json.is_object() || !json.contains("options") || !json["options"].is_object()) return 0.0;
-  const auto& options = json["options"];
-  if (!options.contains("period_samples") || !options["period_samples"].is_number()) return 0.0;
-  return options["period_samples"].get<double>() / frf.sample_rate_hz;
+  if (!json.is_object() || !json.contains("options")) return 0.0;
+  return number_in(json["options"], "period_samples").value_or(0.0) / frf.sample_rate_hz;
 }
 
 /// Outputs x lines of the FRF, smoothed; empty if unknown.

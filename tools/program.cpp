@@ -195,7 +195,6 @@ class Program {
 }  // namespace
 
 int run_program(int argc, const char* const* argv) {
-  static_cast<void>(interrupt_flag());  // from the first moment on
   Program program;
   const int exit_code = program.run(argc, argv);
   // A full disk or a closed pipe behind stdout must not end in silence.

@@ -76,8 +76,15 @@ std::string block_elements(const std::vector<report::Block>& blocks) {
 }  // namespace
 
 const char* to_string(ReportMessage::Severity severity) noexcept {
-  static constexpr const char* names[] = {"note", "warning", "error"};
-  return names[static_cast<int>(severity)];
+  switch (severity) {
+    case ReportMessage::Severity::note:
+      return "note";
+    case ReportMessage::Severity::warning:
+      return "warning";
+    case ReportMessage::Severity::error:
+      return "error";
+  }
+  return "unknown";
 }
 
 std::string report_page(const ReportData& data) {

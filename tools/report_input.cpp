@@ -10,9 +10,11 @@
 #include <utility>
 
 #include "acquisition/log_reader.hpp"
+#include "estimation/json_file.hpp"
 #include "excitation/file_error.hpp"
 #include "excitation/file_kind.hpp"
 #include "excitation/hdf5_file.hpp"
+#include "excitation/json_members.hpp"
 #include "frf/frf_file.hpp"
 #include "tools/fit_step.hpp"
 #include "tools/health_step.hpp"
@@ -43,9 +45,7 @@ std::string kind_of(const std::filesystem::path& file) {
     const Json json = Json::parse(read_text(file), nullptr, false);
     if (json.is_discarded())
       throw FormatError(file, "", "is not JSON, or cut short; copy it again or write it anew");
-    if (json.is_object() && json.contains("format") && json["format"].is_string())
-      return json["format"];
-    return "";
+    return text_in(json, "format");
   }
   if (ending != ".h5" && ending != ".hdf5") {
     require_readable(file);
@@ -167,32 +167,34 @@ void add_stabilization(ReportData& data) {
 /// What only a summary knows: the truth of a simulated plant, and how long the steps took. Notes that stand
 /// in the table of findings are not told twice.
 void add_summary(ReportData& data, const std::filesystem::path& file) {
-  const Json summary = Json::parse(read_text(file), nullptr, false);
-  if (!summary.is_object()) throw FormatError(file, "", "is not JSON; write it anew with identify");
-  if (summary.contains("truth")) {
-    for (const Json& mode : summary["truth"].value("modes", Json::array()))
-      data.true_modes.push_back(
-          {mode.value("true_frequency_hz", 0.0), mode.value("true_damping_ratio", 0.0), true});
-    data.figures.push_back(
-        {"error against the exact plant",
-         fmt::format("{:.3g} %", 100.0 * summary["truth"].value("relative_rms_error", 0.0))});
+  const JsonFile json(file, "stageid-summary");
+  const JsonNode summary = json.root();
+  if (summary.has("truth")) {
+    const JsonNode truth = summary.member("truth");
+    for (const JsonNode& mode : truth.elements_of("modes"))
+      data.true_modes.push_back({mode.member("true_frequency_hz").number(),
+                                 mode.member("true_damping_ratio").number(), true});
+    if (const std::optional<double> error = number_in(truth.raw(), "relative_rms_error"))
+      data.figures.push_back(
+          {"error against the exact plant", fmt::format("{:.3g} %", 100.0 * *error)});
   }
-  for (const Json& step : summary.value("steps", Json::array()))
+  for (const JsonNode& step : summary.elements_of("steps"))
     data.steps.push_back(
-        {step.value("name", ""), step.value("seconds", 0.0), step.value("note", "")});
+        {text_in(step.raw(), "name"), step.number_or("seconds", 0.0), text_in(step.raw(), "note")});
   const std::vector<std::string> told =
       data.frf ? health_notes(health_of(data.frf->provenance_json)) : std::vector<std::string>();
-  for (const Json& note : summary.value("notes", Json::array()))
-    if (note.is_string() && std::ranges::find(told, note.get<std::string>()) == told.end())
-      data.messages.push_back({ReportMessage::Severity::warning, note.get<std::string>()});
+  for (const JsonNode& note : summary.elements_of("notes"))
+    if (std::ranges::find(told, note.text()) == told.end())
+      data.messages.push_back({ReportMessage::Severity::warning, note.text()});
 }
 
 /// A log keeps the stage file as it was; one of another version may have keys that are unknown here,
 /// and the shapes do without.
 StageGeometry geometry_of_log(const std::filesystem::path& file, const Json& metadata) {
-  if (!metadata.contains("stage") || !metadata["stage"].is_string()) return {};
+  const std::string stage = text_in(metadata, "stage");
+  if (stage.empty()) return {};
   try {
-    return stage_geometry(file, metadata["stage"].get<std::string>());
+    return stage_geometry(file, stage);
   } catch (const FormatError&) {
     return {};
   }
@@ -207,8 +209,8 @@ void add_log(ReportData& data, const std::filesystem::path& file) {
   data.period_s = wall_period_s(log->info());
   data.geometry = geometry_of_log(file, metadata);
   for (const char* name : {"configuration", "stage"})
-    if (metadata.contains(name) && metadata[name].is_string())
-      data.documents.push_back({name, metadata[name].get<std::string>()});
+    if (const std::string text = text_in(metadata, name); !text.empty())
+      data.documents.push_back({name, text});
 }
 
 }  // namespace

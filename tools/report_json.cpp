@@ -6,6 +6,7 @@
 
 #include "estimation/cmif_deviation.hpp"
 #include "frf/confidence.hpp"
+#include "frf/responding_channels.hpp"
 #include "tools/page_template.hpp"
 #include "tools/report_comparison.hpp"
 #include "tools/report_diagrams.hpp"
@@ -157,8 +158,10 @@ Json frf_json(const FrfEstimate& frf) {
         {{"name", frf.excluded_channels[i]},
          {"power", index < frf.excluded_power.size() ? Json(frf.excluded_power[index]) : Json()}});
   }
+  const ChannelFlags responding = responding_channels(frf);
   return {{"inputs", channels(frf.inputs)},
           {"outputs", channels(frf.outputs)},
+          {"responds", std::vector<bool>(responding.begin(), responding.end())},
           {"lines", frf.lines()},
           {"band_hz", {frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1]}},
           {"realizations", frf.realizations},

@@ -11,6 +11,7 @@
 #include "tools/command_line.hpp"
 #include "tools/config_plan.hpp"
 #include "tools/experiment_config.hpp"
+#include "tools/loop_check.hpp"
 #include "tools/measurement.hpp"
 #include "tools/output_paths.hpp"
 
@@ -67,11 +68,13 @@ void RunCommand::run() const {
         output_.string(), ending));
   require_ending(output_, "a log", {".slog"});
   const ExperimentConfig config = load_experiment_config(config_);
+  const Backend backend = backend_of(backend_, config.stage.backend);
+  if (backend != Backend::replay) require_stable_loop(config, console_);
   const ExperimentPlan plan =
       excitation_.empty() ? make_plan(config) : read_plan_of(config, excitation_);
   MeasurementRequest request;
   request.log = output_;
-  request.backend = backend_of(backend_, config.stage.backend);
+  request.backend = backend;
   request.replay = replay_;
   request.replay_tolerance_n = replay_tolerance_n_;
   request.resume = resume_;
@@ -110,7 +113,7 @@ void RunCommand::run() const {
   console_.result(json);
   if (result.exit_code != 0)
     console_.warning(fmt::format("{}{}", named(output_, result.message),
-                                 complete < result.runs_total ? "; continue with --resume" : ""));
+                                 complete < result.runs_total ? advice_behind(result) : ""));
 }
 
 }  // namespace stageid

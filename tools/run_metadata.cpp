@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/utc_time.hpp"
+#include "excitation/json_members.hpp"
 
 namespace stageid {
 
@@ -27,16 +28,12 @@ std::string run_metadata(const ExperimentConfig& config, Backend backend, const 
 }
 
 std::string measurement_id_of(const LogInfo& info) {
-  const Json json = Json::parse(info.metadata_json, nullptr, false);
-  if (!json.is_object() || !json.contains("measurement_id") || !json["measurement_id"].is_string())
-    return "";
-  return json["measurement_id"].get<std::string>();
+  return text_in(Json::parse(info.metadata_json, nullptr, false), "measurement_id");
 }
 
 double wall_period_s(const LogInfo& info) {
-  const Json json = Json::parse(info.metadata_json, nullptr, false);
-  if (!json.is_object() || !json.contains("pace") || !json["pace"].is_number()) return 0.0;
-  const double pace = json["pace"].get<double>();
+  const double pace =
+      number_in(Json::parse(info.metadata_json, nullptr, false), "pace").value_or(0.0);
   return pace > 0.0 ? 1.0 / (info.sample_rate_hz * pace) : 0.0;
 }
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "excitation/file_error.hpp"
+#include "excitation/json_members.hpp"
 #include "hal/motion_controller.hpp"
 #include "hal/rigid_body.hpp"
 #include "tools/controller_file.hpp"
@@ -78,10 +79,10 @@ std::optional<NominalStage> nominal_stage_of(const LogInfo& info,
     return nominal_stage(load_stage_config(stage_file).spec);
   }
   const auto json = nlohmann::json::parse(info.metadata_json, nullptr, false);
-  if (!json.is_object() || !json.contains("stage") || !json["stage"].is_string())
-    return std::nullopt;
+  const std::string stage = text_in(json, "stage");
+  if (stage.empty()) return std::nullopt;
   try {
-    return nominal_stage(parse_stage_config(json.value("stage_file", "stage"), json["stage"]).spec);
+    return nominal_stage(parse_stage_config(text_in(json, "stage_file"), stage).spec);
   } catch (const FormatError&) {
     return std::nullopt;  // written by another version; --stage gives one that is understood
   }

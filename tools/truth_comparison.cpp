@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "estimation/validation.hpp"
+#include "frf/responding_channels.hpp"
 #include "tools/console.hpp"
 #include "tools/stage_config.hpp"
 
@@ -104,7 +105,8 @@ TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate
   match(modes_of(model), frf, out);
   const Eigen::MatrixXcd G = exact_response(frf, stage);
   const Eigen::MatrixXcd E = response_like(model, frf) - G;
-  out.relative_rms_error = std::sqrt((E.cwiseAbs2().array() / G.cwiseAbs2().array()).mean());
+  out.relative_rms_error =
+      relative_rms_error(E.cwiseAbs2().array(), G.cwiseAbs2().array(), responding_channels(frf));
   out.normalized_error = std::sqrt(E.squaredNorm() / G.squaredNorm());
   return out;
 }
@@ -136,6 +138,16 @@ std::vector<std::string> truth_table(const TruthComparison& comparison) {
         fmt::format("beside the band, standing for what the plant does there: {:.5g} Hz",
                     fmt::join(comparison.outside_hz, ", ")));
   return lines;
+}
+
+std::string truth_error_line(const TruthComparison& comparison) {
+  const std::string relative =
+      std::isfinite(comparison.relative_rms_error)
+          ? fmt::format("{:.3e} (relative, over the channels that respond), ",
+                        comparison.relative_rms_error)
+          : "";
+  return fmt::format("error of the model against the exact plant: {}{:.3e} (of the whole response)",
+                     relative, comparison.normalized_error);
 }
 
 nlohmann::ordered_json truth_json(const TruthComparison& comparison) {

@@ -27,8 +27,9 @@ struct TruthComparison {
   std::vector<ModeComparison> modes;  ///< every true mode in the band
   std::vector<double> extra_hz;       ///< estimated modes on the lines that belong to no true one
   std::vector<double> outside_hz;     ///< estimated modes below or above the lines
-  double relative_rms_error = 0.0;    ///< of the model against the exact plant, on the lines fitted
-  double normalized_error = 0.0;      ///< sqrt(sum |P - G|^2 / sum |G|^2)
+  /// Of the model against the exact plant, over lines and channels that respond; NaN: none does.
+  double relative_rms_error = 0.0;
+  double normalized_error = 0.0;  ///< sqrt(sum |P - G|^2 / sum |G|^2)
 };
 
 /// Compares a model with the exact plant of a simulated stage: flexible out-of-plane modes below
@@ -39,6 +40,7 @@ TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate
                                    const WaferStageSpec& stage);
 
 std::vector<std::string> truth_table(const TruthComparison& comparison);
+std::string truth_error_line(const TruthComparison& comparison);
 nlohmann::ordered_json truth_json(const TruthComparison& comparison);
 
 }  // namespace stageid

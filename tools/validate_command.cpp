@@ -64,10 +64,10 @@ std::vector<std::string> prediction_lines(const PredictionError& error) {
 }  // namespace
 
 std::vector<std::string> validation_lines(const Validation& v) {
-  std::vector<std::string> lines = {"the response of the data is zero: no relative error exists"};
+  std::vector<std::string> lines = {"no channel is above its noise: there is no relative error"};
   if (std::isfinite(v.relative_rms_error))
     lines[0] = fmt::format(
-        "relative error {:.4e} (mean over lines and channels), {:.4e} (of the whole response)",
+        "relative error {:.4e} (over the channels that respond), {:.4e} (of the whole response)",
         v.relative_rms_error, v.normalized_error);
   if (v.chi_square_per_dof > 0.0) {
     const std::string expected = v.expected_chi_square > 0.0

@@ -294,6 +294,22 @@ TEST(Validation, OtherUnitsAreAnotherResponse) {
   }
 }
 
+TEST(Validation, AChannelOfNoiseDoesNotDecideTheRelativeError) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  add_noise(frf, 5);
+  frf.noise_dof = 8.0;
+  AdditiveModel decoupled = model;
+  for (Submodel& s : decoupled.submodels) s.numerator[0](1, 2) = 0.0;
+  test::RandomNumbers random(7);
+  for (std::complex<double>& value : frf.response.row(5)) value = 1e-12 * random.circular();
+  frf.noise_variance.row(5).setConstant(1e-24);
+  const Validation result = validate(decoupled, frf);
+  EXPECT_NEAR(result.relative_rms_error, 0.01, 0.001);
+  EXPECT_TRUE(std::isnan(result.channel_error[5]));
+  EXPECT_NEAR(result.channel_error[0], 0.01, 0.002);
+}
+
 TEST(Validation, OfAZeroResponseThereIsNoRelativeError) {
   const AdditiveModel model = stage_model(HoldModel::exact);
   FrfEstimate frf = measured(model, HoldModel::exact);

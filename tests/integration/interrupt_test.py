@@ -95,6 +95,36 @@ class InterruptTest(unittest.TestCase):
                         (WORK / new).unlink()
         self.assertIn(0, ends)
 
+    def test_every_command_ends_at_the_first_signal(self):
+        """A file that never comes to its end: the first signal ends whoever reads it."""
+        for ending, words in {".yaml": ["config", "check"], ".slog": ["log", "verify"], ".csv": ["import"],
+                              ".json": ["report", "-o", "x.html"]}.items():
+            for by in (signal.SIGINT, signal.SIGTERM):
+                with self.subTest(words, by=by):
+                    pipe = WORK / f"endless{ending}"
+                    os.mkfifo(pipe)
+                    before = files()
+                    try:
+                        begun = time.monotonic()
+                        code, error = run(*words, str(pipe), interrupt_after_s=1.0, by=by)
+                        self.assertIn(code, (1, 2, 130), error)  # 1, 2: refuses what is no file
+                        if code == 130:
+                            self.assertRegex(error.strip().splitlines()[-1], "^stageid: interrupted; ")
+                        self.assertLess(time.monotonic() - begun, 30.0)
+                        self.assertEqual(files(), before)
+                    finally:
+                        pipe.unlink()
+
+    def test_a_long_fit_and_a_long_design_end_at_the_first_signal(self):
+        slow = WORK / "configs/experiment/slow.yaml"
+        slow.write_text((WORK / SMALL).read_text().replace("seed: 7", "seed: 7\n  crest_iterations: 100000"))
+        for by in (signal.SIGINT, signal.SIGTERM):
+            with self.subTest(by=by):
+                code, error = run("design", str(slow), "-o", "slow.h5", interrupt_after_s=1.5, by=by)
+                self.assertEqual(code, 130, error)
+                self.assertIn("stageid: interrupted; nothing was written", error)
+                self.assertFalse((WORK / "slow.h5").exists())
+
     def cut_and_resume(self, delay_s):
         for path in WORK.glob("cut.*"):
             path.unlink()

@@ -316,6 +316,17 @@ TEST_F(BadRequest, NamesThatAreNearOnes) {
       2, "(did you mean 'suspension'?)");
 }
 
+TEST_F(BadRequest, AControllerThatDoesNotHoldThePlant) {
+  write_bytes(at("small_stage.yaml"), replaced(read_bytes(at("small_stage.yaml")),
+                                               "crossover_hz: 20,", "crossover_hz: 200,"));
+  const std::string text = "the controller does not hold the plant: the closed loop is unstable at";
+  fail({"design", config_, "-o", name("e.h5")}, 2, text);
+  fail({"run", config_, "-o", name("r.slog")}, 2, text);
+  fail({"identify", config_, "-o", name("all")}, 2, text);
+  fail({"config", "check", config_}, 2, text);
+  fail({"config", "check", name("small_stage.yaml")}, 2, text);
+}
+
 TEST_F(BadRequest, Fits) {
   make_frf();
   const auto wrong = [&](std::vector<std::string> flags, const std::string& text) {

@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 
 #include "excitation/file_error.hpp"
 #include "excitation/key_suggestion.hpp"
 #include "tools/config_schema.hpp"
+#include "tools/format_errors.hpp"
 
 namespace stageid {
 namespace {
@@ -157,6 +159,26 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"period_s: 1\nitems: [{x_m: 1}, {y_m: 2}]\n",
               "f.yaml:2:20: unknown key 'y_m'; did you mean 'x_m'?"},
         Wrong{"[1, 2]\n", "f.yaml:1:1: the file is a list; write a map, 'key: value' lines"}));
+
+TEST(ConfigReader, KeepsAllThatIsWrong) {
+  try {
+    read(
+        "period_s: 0\nsead: 3\nband_hz: [-1, x]\nlevel: {rms_n: a}\nitems: [{y_m: 2}, {x_m: b}]\n");
+    FAIL() << "no error";
+  } catch (const FormatErrors& errors) {
+    std::vector<std::string> all;
+    for (const FormatError& error : errors.all()) all.emplace_back(error.what());
+    EXPECT_EQ(all.size(), 7U) << testing::PrintToString(all);
+    EXPECT_EQ(all.front(), std::string(errors.what()));
+    for (const char* place :
+         {":1:11: period_s", ":2:1: unknown key 'sead'", ":3:11: band_hz", ":3:15: band_hz",
+          ":4:16: rms_n", ":5:10: unknown key 'y_m'", ":5:25: x_m"})
+      EXPECT_TRUE(std::any_of(
+          all.begin(), all.end(),
+          [&](const std::string& text) { return text.find(place) != std::string::npos; }))
+          << place << testing::PrintToString(all);
+  }
+}
 
 TEST(KeySuggestion, FindsSwapsLossesAndUnits) {
   EXPECT_EQ(nearest_word("preiods", {"period_s", "periods"}), "periods");

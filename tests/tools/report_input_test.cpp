@@ -52,6 +52,23 @@ TEST_F(ReportInputTest, FindingsComeFromTheProvenanceOfTheResponse) {
               ElementsAre("a1 a2", "wired crosswise", "0.99", "exchange them"));
 }
 
+TEST_F(ReportInputTest, AFigureOfTheSummaryThatIsAbsentIsLeftOut) {
+  const auto summary = [&](const char* truth) {
+    std::ofstream(directory_ / "summary.json")
+        << R"({"format": "stageid-summary", "truth": )" << truth
+        << R"(, "steps": [{"name": "fit", "seconds": null, "note": null}], "notes": ["n"]})";
+    return read_back(response());
+  };
+  const ReportData absent = summary(R"({"modes": [], "relative_rms_error": null})");
+  EXPECT_TRUE(absent.figures.empty());
+  ASSERT_EQ(absent.steps.size(), 1u);
+  EXPECT_EQ(absent.steps[0].seconds, 0.0);
+  EXPECT_EQ(summary(R"({"modes": [], "relative_rms_error": 0.01})").figures.size(), 1u);
+  EXPECT_THAT([&] { summary(R"({"modes": [{"true_frequency_hz": null}]})"); },
+              testing::ThrowsMessage<FormatError>(testing::HasSubstr(
+                  "summary.json:/truth/modes/0/true_frequency_hz: must be a number")));
+}
+
 TEST_F(ReportInputTest, AProvenanceThatIsNotOursHasNoFindings) {
   FrfEstimate frf = response();
   for (const char* text : {"{}", "no JSON", R"({"health": 3})"}) {

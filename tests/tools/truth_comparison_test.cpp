@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimation/validation.hpp"
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
@@ -74,6 +75,24 @@ TEST(TruthComparison, CountsDeviationsInStandardDeviations) {
   EXPECT_NEAR(truth.modes.at(0).frequency_deviation(), 2.0, 1e-9);
   EXPECT_NEAR(truth.modes.at(0).damping_deviation(), -2.0, 1e-9);
   EXPECT_GT(truth.relative_rms_error, 1e-3);
+}
+
+// An actuator that moves nothing: the exact response is zero, the measured one noise.
+TEST(TruthComparison, WhatIsDecoupledDoesNotDecideTheRelativeError) {
+  WaferStageSpec stage = small_stage();
+  stage.info.actuators[1].direction[2] = 0.0;
+  stage.info.actuators[1].direction[0] = 1.0;
+  const AdditiveModel exact = exact_model(stage);
+  FrfEstimate frf = lines(exact);
+  frf.response = response_like(exact, frf);
+  frf.noise_variance = Eigen::MatrixXd::Constant(2, frf.lines(), 1e-30);
+  frf.noise_dof = 10.0;
+  frf.response.row(1).setConstant(1e-15);
+  AdditiveModel model = exact;
+  for (Submodel& s : model.submodels) s.numerator[0] *= 1.01;
+  const TruthComparison truth = compare_with_truth(model, frf, stage);
+  EXPECT_NEAR(truth.relative_rms_error, 0.01, 1e-6);
+  EXPECT_TRUE(truth_json(truth)["relative_rms_error"].is_number());
 }
 
 TEST(TruthComparison, MatchesOneToOneAndNamesTheRest) {

@@ -31,7 +31,6 @@ Raises RequestError, FormatError, FileError, StageError for all that the program
 }  // namespace
 
 PYBIND11_MODULE(_native, module) {
-  leave_signals_to_host();
   // Users see the package; this is where it is made.
   module.attr("__name__") = "stageid";
   module.doc() = "The compiled part of stageid.";

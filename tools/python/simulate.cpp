@@ -9,6 +9,7 @@
 #include "tools/config_plan.hpp"
 #include "tools/exit_code.hpp"
 #include "tools/interrupt.hpp"
+#include "tools/loop_check.hpp"
 #include "tools/measured_stage.hpp"
 #include "tools/run_metadata.hpp"
 
@@ -49,6 +50,7 @@ void RunMemory::write(std::span<const double> rows) {
 
 SimulatedExperiment simulate_experiment(const std::filesystem::path& file) {
   const ExperimentConfig config = load_experiment_config(file);
+  require_stable_loop(config, Console());
   const ExperimentPlan plan = make_plan(config);
   MeasurementRequest request;
   request.pace = 0.0;

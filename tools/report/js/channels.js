@@ -45,14 +45,20 @@ function makeCurves(channel) {
     const residual = residuals.subarray(2 * channel * lines, 2 * (channel + 1) * lines);
     curves.model = magnitudes(difference(measured, residual));
     curves.residual = magnitudes(residual);
-    let sum = 0;
-    for (let k = 0; k < lines; ++k) {
-      const relative = curves.residual[k] / curves.measured[k];
-      sum += relative * relative;
-    }
-    curves.relativeError = Math.sqrt(sum / lines);
+    if (content.frf.responds[channel]) curves.relativeError = relativeRms(curves.residual, curves.measured);
   }
   return curves;
+}
+
+// Over the lines where there is a response.
+function relativeRms(errors, values) {
+  let sum = 0, used = 0;
+  for (let k = 0; k < values.length; ++k) {
+    if (!(values[k] > 0)) continue;
+    sum += (errors[k] / values[k]) ** 2;
+    ++used;
+  }
+  return used > 0 ? Math.sqrt(sum / used) : null;
 }
 
 // Of another day or model: its magnitudes, and that of its difference from what is here.

@@ -169,7 +169,10 @@ function drawPanel(channel) {
   context.scale(ratio, ratio);
   paintPanel(channel, context, width, height);
   const { relativeError } = channelCurves(channel);
-  if (relativeError === null) return;
+  if (relativeError === null) {
+    if (array('residual')) panel.button.setAttribute('aria-label', channelName(channel) + ', no response above the noise');
+    return;
+  }
   panel.error.textContent = percent(relativeError);
   panel.button.setAttribute('aria-label', channelName(channel) + ', relative rms error ' + percent(relativeError));
 }
