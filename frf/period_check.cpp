@@ -156,8 +156,7 @@ struct DegreesOfFreedom {
 };
 
 /// From the periodogram of the core's residuals, each period in its place and zeros between: noise whose
-/// correlation lasts for periods has few. A periodogram scatters about the spectrum, so its squares count too
-/// few degrees of freedom rather than too many.
+/// correlation lasts for periods has few. Half of what it counts, for a sine between two lines is in both.
 DegreesOfFreedom degrees_of_freedom(const Eigen::MatrixXd& residuals, const Periods& core,
                                     std::span<const int> number) {
   const auto place = [&](Index p) { return Index{number[static_cast<std::size_t>(p)]}; };
@@ -183,8 +182,8 @@ DegreesOfFreedom degrees_of_freedom(const Eigen::MatrixXd& residuals, const Peri
   }
   if (!(sum > 0.0)) return {};
   const auto most = static_cast<double>(residuals.rows());
-  return {std::min(2.0 * sum * sum / smooth_squares, most),
-          std::min(2.0 * sum * sum / squares, most * static_cast<double>(residuals.cols() - 1))};
+  return {std::min(sum * sum / smooth_squares, most),
+          std::min(sum * sum / squares, most * static_cast<double>(residuals.cols() - 1))};
 }
 
 double log_tail(double ratio, const DegreesOfFreedom& dof) {
@@ -224,6 +223,15 @@ Eigen::MatrixXd record_of(const ComparedPeriods& periods, Index channel) {
   return record;
 }
 
+/// ln of how many ways there are to choose a core of n periods and one more: this one was chosen for
+/// being close.
+double log_choices(Index P, std::size_t n) {
+  const auto in = static_cast<double>(n);
+  const auto all = static_cast<double>(P);
+  return std::lgamma(all + 1.0) - std::lgamma(in + 1.0) - std::lgamma(all - in + 1.0) +
+         std::log(all - in);
+}
+
 struct Candidate {
   PeriodOutlier outlier;
   double gain = 0.0;
@@ -251,7 +259,7 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
                    mean_ratio(grams, core, p)};
     for (const OctaveRecord& octave : octaves) {
       const std::optional<double> ratio =
-          excess(octave, periods.number, core, p, std::log(kDropByChance / tests));
+          excess(octave, periods.number, core, p, std::log(kDropByChance) - log_tests);
       if (ratio.value_or(0.0) > most.outlier.ratio)
         most.outlier = {static_cast<std::size_t>(p), channel, octave.low_hz, octave.high_hz,
                         *ratio};

@@ -38,9 +38,9 @@ inline constexpr double kDropByChance = 1e-3;
 /// is at the ends of a period leaks into all lines at once, and one random number would count as
 /// many. So the record is divided into octaves in time (octave_records()), where nothing leaks, and
 /// in some octave the power of the period over that of the core must have a probability below
-/// kDropByChance over the number of periods, channels and octaves. For Gaussian noise it is F
+/// kDropByChance over the number of channels, octaves and ways to choose the core and the period. For Gaussian noise it is F
 /// distributed, with degrees of freedom from the core's own spectrum S,
-///   nu = L (sum S)^2 / (L sum S^2)  of L spectral lines,
+///   nu = (sum S)^2 / sum S^2  over its lines of both signs,
 /// of one period where S is smoothed to its resolution, and of the core.
 /// It takes three periods: of two nobody knows which is wrong.
 /// Source: Satterthwaite, Biometrics Bulletin 2 (1946) 110.

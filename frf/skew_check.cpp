@@ -220,7 +220,8 @@ SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Inde
   }
   if (!any)
     check.unchecked =
-        "100 excited lines, and three sensors and three actuators that respond to each other";
+        "100 excited lines, and three sensors and three actuators that respond to each other "
+        "above the noise";
   else if (check.changes.empty() && kDeviations * check.largest_deviation_s > kWantedSkew_s)
     check.unchecked = fmt::format("more power or lighter damping: {:.0f} deviations are {:.3g} us",
                                   kDeviations, 1e6 * kDeviations * check.largest_deviation_s);

@@ -25,15 +25,17 @@ constexpr int kMostNamed = 4;
 /// Noise of one period on each line, and what the start has over it.
 struct Lines {
   Eigen::VectorXd noise;
-  Eigen::VectorXd excess;  // power of B over its noise, mean over the runs
+  Eigen::VectorXd start;   // power of B, sum over the runs
+  Eigen::VectorXd excess;  // that over its noise, mean over the runs
 };
 
 Lines lines_of(const StartEvidence& e) {
   const Index K = e.frequency_hz.size();
-  Lines lines{Eigen::VectorXd::Zero(K), Eigen::VectorXd::Zero(K)};
+  Lines lines{Eigen::VectorXd::Zero(K), Eigen::VectorXd::Zero(K), Eigen::VectorXd::Zero(K)};
   double dof = 0.0;
   for (const RunStart& run : e.runs) {
     lines.noise += run.noise_dof * run.noise;
+    lines.start += run.start;
     lines.excess += run.start / (1.0 + 1.0 / run.periods);
     dof += run.noise_dof;
   }
@@ -42,15 +44,16 @@ Lines lines_of(const StartEvidence& e) {
   return lines;
 }
 
-/// Lines that have more excess than all others within the reach.
-std::vector<Index> maxima(const Eigen::VectorXd& excess) {
+/// Lines on which the start rings more than on all others within the reach. Over the noise it would be flat
+/// about a mode that rings so long that the scatter of the periods is its own.
+std::vector<Index> maxima(const Lines& lines) {
   std::vector<Index> found;
-  for (Index k = 0; k < excess.size(); ++k) {
+  for (Index k = 0; k < lines.start.size(); ++k) {
     const Index first = std::max<Index>(0, k - kReach);
-    const Index last = std::min(excess.size() - 1, k + kReach);
+    const Index last = std::min(lines.start.size() - 1, k + kReach);
     Index largest = 0;
-    excess.segment(first, last - first + 1).maxCoeff(&largest);
-    if (first + largest == k && excess[k] > 1.0) found.push_back(k);
+    lines.start.segment(first, last - first + 1).maxCoeff(&largest);
+    if (first + largest == k && lines.excess[k] > 1.0) found.push_back(k);
   }
   return found;
 }
@@ -166,7 +169,7 @@ std::string periods_text(int periods) {
 std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
   if (evidence.runs.empty() || evidence.frequency_hz.size() == 0) return {};
   const Lines lines = lines_of(evidence);
-  const std::vector<Index> peaks = maxima(lines.excess);
+  const std::vector<Index> peaks = maxima(lines);
   std::vector<double> frequencies;
   double largest = 0.0;
   double of_largest = 0.0;

@@ -10,7 +10,7 @@ namespace stageid {
 /// Does a mode still ring from the start of the runs? Resonance by resonance, since one lightly damped mode
 /// rings on a few lines only.
 ///
-/// Where the start rings most (a local maximum over the lines of the power of B over the noise, five lines),
+/// Where the start rings most (a local maximum over the lines of the power of B, five lines),
 /// X = sum B* W of each run has any phase if W is noise, whatever its colour and however the sensors
 /// share it. Over the runs the phases are then uniform, and of the resultant R with weights m, which are of B
 /// alone, P(R^2 > t sum m^2) <= e^-t (Rayleigh's test). Noise with a memory longer than a period, as of a

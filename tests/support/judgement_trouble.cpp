@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "tests/support/random_numbers.hpp"
 
@@ -12,6 +13,12 @@ constexpr std::array<const char*, kTroubles> kNames = {
     "clean",      "dac_step",       "adc_step",        "cubic",        "friction",
     "slow_noise", "mode_drift",     "lost_sample",     "late_channel", "unexcited_axis",
     "unsettled",  "late_reference", "setpoint_motion", "wrong_map"};
+
+/// The force on the heave that goes with its motion at the crossover: what keeps the loop stable.
+double loop_force(const JudgementStage& stage) {
+  const double omega = 2.0 * std::numbers::pi * stage.spec.controller.axes[2].crossover_hz;
+  return stage.spec.mass_kg * omega * omega * stage.motion_m;
+}
 
 void draw_late_channel(RandomNumbers& random, const JudgementStage& stage, TroublePlan& plan) {
   plan.late_sensor = random.uniform() < 0.5;
@@ -70,12 +77,11 @@ TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
       plan.right_causes = distortion;
       break;
     case Trouble::cubic:
-      // The spring's force at the rms of the motion is this share of the excitation.
-      plan.cubic_n_m3 = share * stage.level_n / std::pow(stage.motion_m, 3);
+      plan.cubic_n_m3 = share * loop_force(stage) / std::pow(stage.motion_m, 3);
       plan.right_causes = distortion;
       break;
     case Trouble::friction:
-      plan.friction_n = share * stage.level_n;
+      plan.friction_n = share * loop_force(stage);
       plan.friction_stiffness_n_m = plan.friction_n / (0.5 * stage.motion_m);
       plan.right_causes = distortion;
       plan.right_causes.push_back("friction");
