@@ -59,6 +59,46 @@ TEST_F(Workflow, IdentifyFindsEveryModeOfTheStage) {
   EXPECT_NEAR(summary["validation"]["chi_square_per_dof"].get<double>(), 1.0, 0.3);
 }
 
+TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
+  succeed({"identify", config_, "-o", name("all")});
+  const std::vector<std::string> fit = {
+      "fit",          name("all/frf.h5"),  "-o", name("few.json"), "--modes", "1",
+      "--rigid-body", "suspension:0.4:0.5"};
+  const ProgramResult fitted = run(fit);
+  EXPECT_EQ(fitted.exit_code, 3);
+  EXPECT_THAT(fitted.err, HasSubstr("not to be trusted: the residual is "));
+  EXPECT_THAT(fitted.err, HasSubstr("times what noise explains"));
+  std::vector<std::string> as_json = fit;
+  as_json.emplace_back("--json");
+  const json told = json::parse(run(as_json).out);
+  EXPECT_EQ(told["trustworthy"], false);
+  EXPECT_EQ(told["status"], "unexplained");
+
+  const ProgramResult validated =
+      run({"validate", name("few.json"), name("all/frf_validation.h5")});
+  EXPECT_EQ(validated.exit_code, 3);
+  EXPECT_THAT(validated.out, HasSubstr("verdict: not to be trusted: the residual is "));
+  const ProgramResult sound =
+      succeed({"validate", name("all/model.json"), name("all/frf_validation.h5")});
+  EXPECT_THAT(sound.out, HasSubstr("verdict: trustworthy; noise and known distortion explain"));
+}
+
+// Realizations show a cubic stiffness, periods do not: the fit weighs by the realizations.
+TEST_F(Workflow, ANonlinearPlantIsNamedAndItsModesAreFound) {
+  const std::string config =
+      stage("cubic.yaml", "  plate:", "  cubic_stiffness_n_m3: 1e15\n  plate:");
+  const ProgramResult result = run({"identify", config, "-o", name("cubic")});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("weighting: total_variance; the plant is nonlinear"));
+  const json summary = json::parse(read_bytes(at("cubic/summary.json")));
+  EXPECT_EQ(summary["fit"]["weighting"], "total_variance");
+  EXPECT_EQ(summary["truth"]["extra_modes_hz"].size(), 0U);
+  for (const json& mode : summary["truth"]["modes"]) {
+    ASSERT_TRUE(mode["found"]) << mode;
+    EXPECT_LT(std::abs(mode["frequency_deviation_in_std"].get<double>()), 4.5) << mode;
+  }
+}
+
 TEST_F(Workflow, TheSameFilesAgainAndWithOtherThreads) {
   succeed({"identify", config_, "-o", name("one"), "--threads", "1"});
   succeed({"identify", config_, "-o", name("two"), "--threads", "2"});
