@@ -251,8 +251,9 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
   std::erase_if(octaves, [&](const OctaveRecord& octave) {
     return octave.low_hz > periods.frequency_hz[periods.frequency_hz.size() - 1];
   });
-  const double tests =
-      static_cast<double>(P * periods.spectra.front().rows()) * static_cast<double>(octaves.size());
+  const double log_tests =
+      log_choices(P, core.size()) + std::log(static_cast<double>(periods.spectra.front().rows()) *
+                                             static_cast<double>(octaves.size()));
   for (Index p = 0; p < P; ++p) {
     if (std::binary_search(core.begin(), core.end(), p)) continue;
     Candidate most{{static_cast<std::size_t>(p), channel, 0.0, 0.0, 0.0},

@@ -70,6 +70,7 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
   FitOptions options = setup.options;
   Progress progress(console, "fit", "iterations");
   throw_if_interrupted();
+  const ControlledStop keeps_the_best_model;
   options.interrupted = [] { return interrupt_flag().load(); };
   options.progress = [&](int iteration, double cost) {
     progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));

@@ -23,7 +23,7 @@ void request_interrupt() noexcept;
 void forget_interrupt() noexcept;
 
 /// While it lives the first signal only sets the flag: for work that looks at the flag and has to end in order, such
-/// as a stage that moves.
+/// as a stage that moves, or a fit that keeps its best model.
 class ControlledStop {
  public:
   ControlledStop();

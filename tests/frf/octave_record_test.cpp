@@ -61,8 +61,10 @@ TEST_P(OctaveRecords, ASineIsInItsOctave) {
     const auto octaves = octave_records(sine, kInARow, kRateHz, 1.0);
     EXPECT_LT(octaves[at].low_hz, hz);
     EXPECT_GT(octaves[at].high_hz, hz);
-    for (std::size_t other = 0; other < octaves.size(); ++other)
-      if (other != at) EXPECT_LT(largest(octaves[other]), largest(octaves[at])) << hz;
+    for (std::size_t other = 0; other < octaves.size(); ++other) {
+      if (other == at) continue;
+      EXPECT_LT(largest(octaves[other]), largest(octaves[at])) << hz;
+    }
   }
 }
 

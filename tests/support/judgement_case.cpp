@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <utility>
 
 #include "acquisition/convert_log.hpp"
 #include "estimation/validation.hpp"
@@ -83,6 +84,15 @@ WaferStageSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
   if (plan.drifting_mode >= 0)
     spec.in_plane_modes[static_cast<std::size_t>(plan.drifting_mode)].natural_frequency_hz *=
         1.0 - 0.5 * plan.drift_relative / stage.realizations;
+  if (plan.swapped[0] >= 0 && !stage.stage_file) {
+    // Nothing but a stage file can know it: the right answer is that of the names in the log.
+    const auto a = static_cast<std::size_t>(plan.swapped[0]);
+    const auto b = static_cast<std::size_t>(plan.swapped[1]);
+    std::swap(spec.info.sensors[a], spec.info.sensors[b]);
+    std::swap(spec.info.sensors[a].name, spec.info.sensors[b].name);
+    for (PlantMode& mode : spec.in_plane_modes)
+      std::swap(mode.sensor_shape[plan.swapped[0]], mode.sensor_shape[plan.swapped[1]]);
+  }
   return spec;
 }
 
