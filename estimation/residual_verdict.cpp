@@ -168,7 +168,8 @@ const char* to_string(ResidualVariance variance) noexcept {
 }
 
 ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse& model,
-                               const Eigen::MatrixXd& weights, int threads) {
+                               const Eigen::MatrixXd& weights, int threads,
+                               const Distortion& known) {
   if (weights.size() > 0 &&
       (weights.rows() != frf.response.rows() || weights.cols() != frf.response.cols()))
     throw std::invalid_argument("judge_residual: weights and response differ in shape");
@@ -189,6 +190,14 @@ ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse&
     return total.explained || !has_noise ? total : verdict;
   }
   if (!has_noise) return verdict;
+  if (known.level.cols() > 0 && known.level.rows() == frf.response.rows()) {
+    ResidualVerdict distorted =
+        judge_with(ResidualVariance::total, variance_with(known, frf), frf.noise_dof);
+    if (distorted.explained) {
+      distorted.scatter = variance_with(known, frf);
+      return distorted;
+    }
+  }
   LineScatter lines = line_scatter(frf, threads);
   if (lines.variance.size() == 0 || lines_are_coarse(frf, lines, threads)) return verdict;
   ResidualVerdict scatter = judge_with(ResidualVariance::scatter, lines.variance, lines.dof);

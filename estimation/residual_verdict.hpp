@@ -5,15 +5,16 @@
 #include <functional>
 #include <string>
 
+#include "frf/distortion_variance.hpp"
 #include "frf/frf_estimate.hpp"
 
 namespace stageid {
 
 /// Which variance of the data a residual is compared with.
 enum class ResidualVariance : std::uint8_t {
-  none,    ///< the data have no variances
-  noise,   ///< from periods
-  total,   ///< from realizations: noise and stochastic nonlinear contributions
+  none,   ///< the data have no variances
+  noise,  ///< from periods
+  total,  ///< noise and stochastic nonlinear contributions: from realizations, or known from others
   scatter  ///< from neighbouring lines, where one realization was measured: see line_scatter()
 };
 const char* to_string(ResidualVariance variance) noexcept;
@@ -21,7 +22,7 @@ const char* to_string(ResidualVariance variance) noexcept;
 /// Whether what a model leaves of measured data is noise and known distortion.
 struct ResidualVerdict {
   ResidualVariance variance = ResidualVariance::none;
-  Eigen::MatrixXd scatter;  ///< (n_y n_u) x N: that variance, if it is none of the data's own
+  Eigen::MatrixXd scatter;  ///< (n_y n_u) x N: that variance, unless it is one of the data's own
   double dof = 0.0;         ///< nu, complex degrees of freedom of the variance; 0: exact
   double chi_square = 0.0;  ///< mean of r = |E|^2 / variance over entries and lines; 0: unknown
   /// Mean of r if the error is noise: nu / (nu - 1), or 1 for an exact variance; 0: no mean exists.
@@ -44,9 +45,11 @@ using ModelLinesResponse = std::function<Eigen::MatrixXcd(Eigen::Index first, Ei
 /// realization with the scatter of the lines: they contain the distortion of a nonlinear plant. The figures are those of
 /// the variance that explains it, else of the noise.
 /// Source: the tail of F(2, 2 nu) is (1 + x/nu)^-nu; minus its logarithm is exponential for any continuous distribution.
+/// @param known distortion of one realization that the fit of the model has seen: asked where there is no total variance
 /// @param weights of a fit, (n_y n_u) x N: entries of weight 0 are not judged; empty: all are
 /// @throws std::invalid_argument if shapes do not agree
 ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse& model,
-                               const Eigen::MatrixXd& weights = {}, int threads = 0);
+                               const Eigen::MatrixXd& weights = {}, int threads = 0,
+                               const Distortion& known = {});
 
 }  // namespace stageid

@@ -11,6 +11,7 @@
 #include "estimation/fit_problem.hpp"
 #include "estimation/mode_worth.hpp"
 #include "estimation/model_structure.hpp"
+#include "estimation/residual_modes.hpp"
 #include "estimation/search_limit.hpp"
 #include "estimation/undetermined_modes.hpp"
 #include "excitation/counted.hpp"
@@ -115,6 +116,19 @@ std::vector<Alternative> alternatives(const FrfEstimate& frf, const FitOptions& 
     delayed.model.output_delay_s.resize(0);
     out.push_back(std::move(delayed));
   }
+  if (trial.delay != DelayModel::per_channel && model.hold != HoldModel::none &&
+      frf.response.rows() > 1) {
+    Alternative skewed{"--delay per_channel", model, trial};
+    skewed.options.delay = DelayModel::per_channel;
+    out.push_back(std::move(skewed));
+  }
+  const std::vector<ResidualMode> missed =
+      residual_modes(frf, model, trial.user_weights, 1, trial.threads);
+  if (!missed.empty()) {
+    Alternative more{"more modes", model, trial};
+    more.model.submodels.push_back(mode_submodel(frf, {}, missed.front().mode));
+    out.push_back(std::move(more));
+  }
   return out;
 }
 
@@ -147,8 +161,8 @@ std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
     const double criterion = information_criterion(frf, fit);
     if (fit.status == FitStatus::singular || !(criterion < least)) continue;
     least = criterion;
-    advice = fmt::format("Try {}: with these modes it takes the cost from {:.6g} to {:.6g}",
-                         other.flag, same.model.fit.cost, fit.model.fit.cost);
+    advice = fmt::format("Try {}: one refit takes the cost from {:.6g} to {:.6g}", other.flag,
+                         same.model.fit.cost, fit.model.fit.cost);
   }
   return advice;
 }
@@ -177,22 +191,24 @@ std::string better_band(const FrfEstimate& frf, const FitOptions& trial, const F
 
 }  // namespace
 
+std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit) {
+  std::string advice = without_silent_channels(frf);
+  if (!advice.empty()) return advice;
+  const FitOptions trial = trial_options(frf, options);
+  // A search that is cut short leaves poles on their way.
+  const FitResult same = fit_additive_model(frf, fit.model, with_deviations(trial));
+  advice = better_structure(frf, options, trial, same);
+  if (advice.empty()) advice = better_band(frf, trial, same);
+  if (!advice.empty()) return advice;
+  const auto open = static_cast<int>(undetermined_modes(same).size());
+  return fmt::format("No other structure fits better: name the number of modes, --modes {}",
+                     std::max(1, count_modes(fit.model) - open));
+}
+
 std::string budget_message(const FrfEstimate& frf, const FitOptions& options,
                            const FitResult& fit) {
-  std::string advice = without_silent_channels(frf);
-  FitResult same;  // a search that is cut short leaves poles on their way
-  if (advice.empty()) {
-    const FitOptions trial = trial_options(frf, options);
-    same = fit_additive_model(frf, fit.model, with_deviations(trial));
-    advice = better_structure(frf, options, trial, same);
-    if (advice.empty()) advice = better_band(frf, trial, same);
-  }
+  const std::string advice = advice_for(frf, options, fit);
   const int modes = count_modes(fit.model);
-  if (advice.empty()) {
-    const auto open = static_cast<int>(undetermined_modes(same).size());
-    advice = fmt::format("No other structure fits better: name the number of modes, --modes {}",
-                         std::max(1, modes - open));
-  }
   const double budget_s = options.limit->budget_s();
   return fmt::format(
       "the search used its budget of {:.6g} s, at {}. {}; --search-seconds {:.6g} goes on",

@@ -7,13 +7,14 @@
 
 namespace stageid {
 
-/// What a search that used its budget says: how far it came, and which request fits the data better than more modes
-/// do. That is decided by trial, in this order:
+/// Which request fits the data better, one sentence. That is decided by trial, in this order:
 ///   channels whose response is noise on most lines     -> leave them out
 ///   one refit of the model with each other structure    -> the one of least BIC, if it beats the model itself
 ///   one end of the band holds most of what is left over -> the band without it
 ///   else as many modes as the data determine
-/// @param fit the completed model of the search
+std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit);
+
+/// What a search that used its budget says: how far it came, and advice_for() its completed model.
 std::string budget_message(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit);
 
 /// Makes the completed model of a search that reached options.limit say so: a last fit that has converged is not the

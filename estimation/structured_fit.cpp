@@ -13,6 +13,7 @@
 #include "estimation/mode_deviation.hpp"
 #include "estimation/ranked_fit.hpp"
 #include "estimation/residual_verdict.hpp"
+#include "estimation/search_advice.hpp"
 #include "estimation/search_limit.hpp"
 #include "excitation/counted.hpp"
 
@@ -256,8 +257,16 @@ void judge_explained(const FrfEstimate& frf, const FitOptions& options, FitResul
         return response(model, frf.frequency_hz.segment(first, count), model.hold);
       },
       *options.user_weights, options.threads);
-  if (verdict.explained) return;
-  const std::string finding = verdict.reason + ": the model does not explain the data";
+  const bool by_weights = verdict.variance != ResidualVariance::total ||
+                          (options.weighting != Weighting::noise_variance &&
+                           options.weighting != Weighting::likelihood);
+  if (verdict.explained && by_weights) return;
+  const std::string finding =
+      verdict.explained
+          ? "the noise that weighs the fit does not explain the residual, the scatter of the "
+            "realizations does: use --weighting total_variance"
+          : fmt::format("{}: the model does not explain the data. {}", verdict.reason,
+                        advice_for(frf, options, result));
   result.findings.insert(result.findings.begin(), finding);
   result.decisions.push_back(finding);
   result.distrust(FitStatus::unexplained, finding);

@@ -69,7 +69,7 @@ void fill_whiteness(const Eigen::MatrixXcd& white, Validation& out) {
 
 }  // namespace
 
-Validation validate(const AdditiveModel& model, const FrfEstimate& frf) {
+Validation validate(const AdditiveModel& model, const FrfEstimate& frf, const Distortion& known) {
   if (model.inputs.names != frf.inputs.names || model.outputs.names != frf.outputs.names)
     throw std::invalid_argument(
         "validate: the model and the FRF have different channels; select the same inputs and "
@@ -85,15 +85,18 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf) {
   out.normalized_error = power.sum() > 0.0 ? std::sqrt(squared.sum() / power.sum()) : kUnknown;
   out.channel_error =
       responding.select(relative_channel_error(squared, power).array(), kUnknown).matrix();
-  ResidualVerdict verdict = judge_residual(frf, [&](Eigen::Index first, Eigen::Index count) {
-    return Eigen::MatrixXcd(frf.response.middleCols(first, count) - E.middleCols(first, count));
-  });
+  ResidualVerdict verdict = judge_residual(
+      frf,
+      [&](Eigen::Index first, Eigen::Index count) {
+        return Eigen::MatrixXcd(frf.response.middleCols(first, count) - E.middleCols(first, count));
+      },
+      {}, 0, known);
   out.variance = verdict.variance;
   out.chi_square_per_dof = verdict.chi_square;
   out.expected_chi_square = verdict.expected;
   out.explained = verdict.explained;
   out.reason = std::move(verdict.reason);
-  const Eigen::MatrixXd& variance = verdict.variance == ResidualVariance::scatter ? verdict.scatter
+  const Eigen::MatrixXd& variance = verdict.scatter.size() > 0 ? verdict.scatter
                                     : verdict.variance == ResidualVariance::total
                                         ? frf.total_variance
                                         : frf.noise_variance;

@@ -31,7 +31,9 @@ struct Validation {
 /// Compares a model with measured data on their lines, through the hold and delay that the data
 /// still hold, see judge_residual() for the verdict.
 /// @throws std::invalid_argument if channels do not match by name, or have other units (unknown ones match all).
-Validation validate(const AdditiveModel& model, const FrfEstimate& frf);
+/// @param known distortion that the fit of the model has seen, see judge_residual()
+Validation validate(const AdditiveModel& model, const FrfEstimate& frf,
+                    const Distortion& known = {});
 
 /// The model's response as it would have been measured: through hold and delay unless the data are
 /// compensated.

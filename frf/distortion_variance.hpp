@@ -6,8 +6,19 @@
 
 namespace stageid {
 
+/// What one realization of a nonlinear plant adds to its response, as far as an estimate shows it.
+struct Distortion {
+  Eigen::MatrixXd band_hz;  ///< bands x 2: first and last line; empty: none is known
+  Eigen::MatrixXd level;    ///< (n_y n_u) x bands: rms over |G|, of one realization
+};
+
+/// E|dG|^2 of the mean of `realizations` by that distortion and the noise of `frf`, (n_y n_u) x N. Lines outside the bands
+/// take the nearest. @pre frf.noise_variance is there, and the channels are those of the distortion
+Eigen::MatrixXd variance_with(const Distortion& distortion, const FrfEstimate& frf);
+
 /// The total variance of a nonlinear plant, from few realizations.
 struct DistortionVariance {
+  Distortion distortion;
   Eigen::MatrixXd variance;  ///< (n_y n_u) x N, unit of |response|^2
   double dof = 0.0;          ///< complex degrees of freedom, roughly
 };

@@ -141,6 +141,12 @@ void PlantEstimation::check_excitation(const RealizationRuns& realization,
   for (std::size_t e = 0; e < excitation.size(); ++e) {
     const ExcitationSpectrum& spectrum = excitation[e].spectrum;
     const std::string place = realization.runs[e].place() + "/excitation";
+    if (spectrum.lines.empty())
+      throw std::invalid_argument(
+          fmt::format("{}: nothing is excited in this run, but {} lines are in {}. Leave its axis "
+                      "out, --inputs with the "
+                      "others, or measure the run again",
+                      place, excited_.lines.size(), realizations_.front().runs.front().place()));
     if (spectrum.lines != excited_.lines) {
       std::vector<int> differing;
       std::set_symmetric_difference(spectrum.lines.begin(), spectrum.lines.end(),

@@ -214,14 +214,21 @@ class FitDefaults {
     return true;
   }
 
-  /// Distortion moves an estimate from realization to realization as noise does; the periods do not show it.
+  /// Distortion moves an estimate from realization to realization as noise does; the periods do not show it. Nor do
+  /// they show a transient or a drift, where linearity cannot be told.
   bool weigh_by_realizations() {
     FrfEstimate& frf = setup_.frf;
+    if (!why_linearity_cannot_be_tested(frf).empty()) return false;
+    const bool differ = nonlinearity_test(frf).nonlinear();
     frf.nonlinearity = linearity_of(frf);
     const std::string nonlinear = nonlinearity_sentence(frf);
-    if (nonlinear.empty()) return false;
+    if (nonlinear.empty() && !differ) return false;
     weigh_by_total_variance();
-    setup_.warnings.push_back("weighting: total_variance; " + nonlinear);
+    setup_.warnings.push_back(
+        "weighting: total_variance; " +
+        (nonlinear.empty() ? "realizations differ by more than their periods, by a transient or a "
+                             "drift: measure longer after the start, or more realizations"
+                           : nonlinear));
     note(setup_.warnings.back());
     return true;
   }
@@ -231,6 +238,7 @@ class FitDefaults {
     setup_.options.weighting = Weighting::total_variance;
     if (frf.noise_variance.size() == 0 || !(frf.total_dof >= 1.0)) return;
     DistortionVariance distorted = distortion_variance(frf);
+    setup_.distortion = std::move(distorted.distortion);
     frf.total_variance = std::move(distorted.variance);
     frf.total_dof = distorted.dof;
   }

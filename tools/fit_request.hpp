@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "estimation/structured_fit.hpp"
+#include "frf/distortion_variance.hpp"
 #include "frf/frf_estimate.hpp"
 #include "tools/config_visitor.hpp"
 
@@ -37,6 +38,7 @@ struct FitSetup {
   RequestedStructure structure;
   ModeSelection selection;
   FitOptions options;
+  Distortion distortion;              ///< that the weights count; empty: none
   std::vector<std::string> notes;     ///< what was decided by the FRF, one line each
   std::vector<std::string> warnings;  ///< of these, what the user should do something about
   std::string request_json;           ///< the request with every default filled in: for provenance

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "excitation/fingerprint.hpp"
+#include "excitation/json_members.hpp"
 #include "tools/frf_quality.hpp"
 #include "tools/health_step.hpp"
 #include "tools/interrupt.hpp"
@@ -15,6 +16,16 @@ namespace stageid {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+Json distortion_json(const Distortion& distortion) {
+  Json bands = Json::array();
+  for (Eigen::Index b = 0; b < distortion.band_hz.rows(); ++b) {
+    const auto level = distortion.level.col(b);
+    bands.push_back({{"band_hz", {distortion.band_hz(b, 0), distortion.band_hz(b, 1)}},
+                     {"level", std::vector<double>(level.begin(), level.end())}});
+  }
+  return bands;
+}
 
 std::string provenance(const FitSetup& setup, const FitResult& result, const std::string& frf_name,
                        const std::string& frf_fingerprint) {
@@ -25,6 +36,7 @@ std::string provenance(const FitSetup& setup, const FitResult& result, const std
   json["inputs"] = {{{"file", frf_name}, {"fingerprint", frf_fingerprint}}};
   json["options"] = Json::parse(setup.request_json);
   json["decisions"] = result.decisions;
+  if (setup.distortion.band_hz.size() > 0) json["distortion"] = distortion_json(setup.distortion);
   const Json frf = Json::parse(setup.frf.provenance_json, nullptr, false);
   json["frf"] = frf.is_discarded() ? Json::object() : frf;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -78,8 +90,9 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
   step.result = structured_fit(setup.frf, setup.structure, setup.selection, options);
   // The cause comes before what follows from it: modes that imitate distortion.
   blame(nonlinearity_sentence(setup.frf), step.result);
-  const std::vector<std::string> faults =
-      health_notes(health_of(setup.frf.provenance_json), Severity::fault);
+  const std::vector<Finding> health = health_of(setup.frf.provenance_json);
+  blame(fmt::format("{}", fmt::join(health_notes(health, Severity::doubt), "; ")), step.result);
+  const std::vector<std::string> faults = health_notes(health, Severity::fault);
   if (!faults.empty())
     step.result.distrust(FitStatus::faulty_data, fmt::format("{}", fmt::join(faults, "; ")));
   step.seconds = progress.seconds();
@@ -87,6 +100,27 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
                                setup.notes.end());
   step.result.model.provenance_json = provenance(setup, step.result, frf_name, frf_fingerprint);
   return step;
+}
+
+Distortion distortion_of(const AdditiveModel& model) {
+  const Json json = Json::parse(model.provenance_json, nullptr, false);
+  const Eigen::Index channels = model.n_outputs() * model.n_inputs();
+  Distortion out;
+  if (!json.is_object() || !json.contains("distortion") || !json["distortion"].is_array())
+    return out;
+  const Json& bands = json["distortion"];
+  const auto count = static_cast<Eigen::Index>(bands.size());
+  out.band_hz.resize(count, 2);
+  out.level.resize(channels, count);
+  for (Eigen::Index b = 0; b < count; ++b) {
+    const Json& band = bands[static_cast<std::size_t>(b)];
+    const std::vector<double> edges = numbers_in(band, "band_hz");
+    const std::vector<double> level = numbers_in(band, "level");
+    if (edges.size() != 2 || static_cast<Eigen::Index>(level.size()) != channels) return {};
+    out.band_hz.row(b) << edges[0], edges[1];
+    out.level.col(b) = Eigen::Map<const Eigen::VectorXd>(level.data(), channels);
+  }
+  return out;
 }
 
 std::vector<std::string> decisions_of(const AdditiveModel& model) {

@@ -25,6 +25,9 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
 /// Names what is asked of a fit, see frf_request_id().
 std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint);
 
+/// The distortion that a model's provenance tells: what its fit knew of the plant.
+Distortion distortion_of(const AdditiveModel& model);
+
 /// The decisions that a model's provenance tells.
 std::vector<std::string> decisions_of(const AdditiveModel& model);
 

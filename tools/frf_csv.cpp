@@ -38,8 +38,10 @@ std::string head_of(const FrfEstimate& frf) {
     for (std::size_t i = 0; i < frf.outputs.size(); ++i) {
       const Titles titles = titles_of(frf, i, j);
       text += fmt::format(",{},{}", csv_field(titles.real), csv_field(titles.imaginary));
-      if (frf.noise_variance.size() > 0) text += "," + csv_field(titles.noise_variance);
-      if (frf.total_variance.size() > 0) text += "," + csv_field(titles.total_variance);
+      if (frf.noise_variance.size() > 0)
+        text.append(1, ',').append(csv_field(titles.noise_variance));
+      if (frf.total_variance.size() > 0)
+        text.append(1, ',').append(csv_field(titles.total_variance));
     }
   return text;
 }

@@ -227,7 +227,8 @@ void Identification::check_model() {
   if (validation_frf_) {
     const double low_hz = setup_->frf.frequency_hz[0];
     const double high_hz = setup_->frf.frequency_hz[setup_->frf.lines() - 1];
-    validation_ = validate(model_, select_band(*validation_frf_, low_hz, high_hz));
+    validation_ =
+        validate(model_, select_band(*validation_frf_, low_hz, high_hz), distortion_of(model_));
   }
   verdict_ = judge_model(model_.fit, health_, validation_);
   truth_ = compare_with_truth(model_, setup_->frf, config_.stage.spec);

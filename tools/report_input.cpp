@@ -123,7 +123,8 @@ void add_response(ReportData& data, const ReportInput& input) {
   data.model_response = response_like(model, *data.frf);
   if (!input.model_h5.empty())
     data.model_variance = read_response_variance(input.model_h5, data.frf->frequency_hz);
-  if (data.validation_frf) data.validation = validate(model, *data.validation_frf);
+  if (data.validation_frf)
+    data.validation = validate(model, *data.validation_frf, distortion_of(model));
 }
 
 /// All that delays the response, which no polynomial in z should have to imitate.

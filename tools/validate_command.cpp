@@ -1,4 +1,5 @@
 #include "tools/validate_command.hpp"
+#include "tools/fit_step.hpp"
 
 #include <fmt/format.h>
 
@@ -146,7 +147,8 @@ void ValidateCommand::run() const {
   const double high_hz = !band_hz_.empty() ? band_hz_[1]
                          : fitted_band     ? model.fit.band_hz[1]
                                            : frf.frequency_hz[frf.lines() - 1];
-  const Validation validation = validate(model, select_band(std::move(frf), low_hz, high_hz));
+  const Validation validation =
+      validate(model, select_band(std::move(frf), low_hz, high_hz), distortion_of(model));
   for (const std::string& line : validation_lines(validation)) console_.result(line);
   nlohmann::ordered_json json = {{"model", model_.string()},
                                  {"data", data_.string()},

@@ -56,7 +56,7 @@ AdditiveModel full_model() {
   model.submodels[1].residue_rank = 1;
   for (const Eigen::MatrixXd& B : model.submodels[1].numerator)
     model.submodels[1].numerator_std.push_back(B.cwiseAbs() / 3.0);
-  model.fit = {1.0 / 7.0,  "noise_variance", 12, "gradient_small",
+  model.fit = {1.0 / 7.0,  "noise_variance", 12, "unexplained", "the residual is 5 times the noise",
                0.01 / 3.0, {20.25, 1999.75}, 0.0};
   model.cost_history = {3.0, 1.0 / 3.0, 1.0 / 7.0};
   model.provenance_json = R"({"zulu":1,"inputs":{"b.h5":"1234","a.h5":"5678"}})";

@@ -23,13 +23,15 @@ Case draw(std::uint64_t seed, int M, double relative_distortion) {
   Case out;
   FrfEstimate& frf = out.frf;
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(kLines, 10.0, 1000.0);
-  frf.response =
-      frf.frequency_hz.array().square().inverse().matrix().transpose().cast<std::complex<double>>();
+  frf.response.resize(1, kLines);
+  out.truth.resize(1, kLines);
   constexpr double kNoise = 1e-14;
   constexpr int kNoiseDof = 20;
-  const Eigen::MatrixXd distortion =
-      relative_distortion * relative_distortion * frf.response.cwiseAbs2();
-  out.truth = ((distortion.array() + kNoise) / M).matrix();
+  for (Eigen::Index k = 0; k < kLines; ++k) {
+    const double response = std::pow(frf.frequency_hz[k], -2.0);
+    frf.response(0, k) = response;
+    out.truth(0, k) = (std::pow(relative_distortion * response, 2) + kNoise) / M;
+  }
   frf.total_dof = M - 1.0;
   frf.noise_dof = kNoiseDof;
   const auto estimated = [&](double variance, int dof) {

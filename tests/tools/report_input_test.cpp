@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "excitation/file_error.hpp"
 #include "frf/frf_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/tools/report/synthetic_report.hpp"

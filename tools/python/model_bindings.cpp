@@ -11,6 +11,7 @@
 #include "estimation/modal_form.hpp"
 #include "estimation/sampled_state_space.hpp"
 #include "estimation/validation.hpp"
+#include "tools/fit_step.hpp"
 #include "tools/output_paths.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
@@ -107,7 +108,7 @@ py::dict validate_on(const AdditiveModel& model, const FrfHandle& of,
   if (!band_hz && model.fit.band_hz[1] > 0.0)
     band_hz = {model.fit.band_hz[0], model.fit.band_hz[1]};
   if (band_hz) frf = select_band(std::move(frf), (*band_hz)[0], (*band_hz)[1]);
-  const Validation v = validate(model, frf);
+  const Validation v = validate(model, frf, distortion_of(model));
   py::dict out;
   out["relative_rms_error"] = v.relative_rms_error;
   out["normalized_error"] = v.normalized_error;
