@@ -13,21 +13,20 @@
 #include "excitation/file_error.hpp"
 #include "excitation/file_kind.hpp"
 #include "excitation/hdf5_heap_check.hpp"
+#include "excitation/hdf5_library.hpp"
 #include "excitation/hdf5_support.hpp"
 #include "excitation/output_file.hpp"
 #include "excitation/system_reason.hpp"
 
 namespace stageid {
-namespace {
 
-/// HDF5 prints its error stack on stderr unless told not to; we put its reason into the exception.
-/// Before the first call of the library. Its own clean-up at exit crashes on a file that a full disk kept
-/// from being closed; every handle of ours closes itself.
-void prepare_library() {
+void prepare_hdf5() noexcept {
   static const herr_t no_clean_up_at_exit = H5dont_atexit();
   static_cast<void>(no_clean_up_at_exit);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
+
+namespace {
 
 /// HDF5 does not tell a missing file from a forbidden one in words, the operating system does.
 void check_can_be_opened(const std::filesystem::path& file) {
@@ -70,7 +69,7 @@ Hdf5File::Hdf5File(Hdf5File&&) noexcept = default;
 Hdf5File& Hdf5File::operator=(Hdf5File&&) noexcept = default;
 
 Hdf5File Hdf5File::open(const std::filesystem::path& file) {
-  prepare_library();
+  prepare_hdf5();
   check_can_be_opened(file);
   if (H5Fis_hdf5(file.c_str()) <= 0) {
     H5Eclear2(H5E_DEFAULT);
@@ -94,7 +93,7 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
 Hdf5File Hdf5File::create(const std::filesystem::path& file,
                           const std::filesystem::path& shown_as) {
   const std::filesystem::path named = shown_name(shown_as.empty() ? file : shown_as);
-  prepare_library();
+  prepare_hdf5();
   const Hdf5Handle properties = hdf5::property_list(H5P_FILE_CREATE);
   H5Pset_obj_track_times(properties.get(), false);
   // The format of HDF5 1.8 has checksums on most of its structure, so that damage is noticed before

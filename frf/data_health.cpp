@@ -9,10 +9,10 @@
 #include "frf/examination.hpp"
 #include "frf/health_measures.hpp"
 #include "frf/order_statistic.hpp"
+#include "frf/repetition_check.hpp"
 #include "frf/rigid_body_check.hpp"
 #include "frf/skew_check.hpp"
 #include "frf/timing_check.hpp"
-#include "frf/repetition_check.hpp"
 #include "frf/transient_check.hpp"
 
 namespace stageid {

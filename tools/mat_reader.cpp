@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <hdf5.h>
 #include <matio.h>
 
 #include <cstdint>
@@ -10,6 +9,7 @@
 #include <string_view>
 
 #include "excitation/file_error.hpp"
+#include "excitation/hdf5_library.hpp"
 #include "tools/mat_file.hpp"
 #include "tools/mat_objects.hpp"
 #include "tools/output_paths.hpp"
@@ -269,7 +269,7 @@ std::string no_matlab_file(const std::filesystem::path& path) {
 
 ArrayList read_mat(const std::filesystem::path& path) {
   require_readable(path);
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // libmatio leaves HDF5 to print its errors
+  prepare_hdf5();  // libmatio leaves HDF5 to print its errors
   const MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), &Mat_Close);
   if (!file) throw FormatError(path, "", no_matlab_file(path));
   const std::uintmax_t bytes = std::filesystem::file_size(path);

@@ -20,8 +20,8 @@ struct PlantedFault {
     recorded_gain,
     recorded_skew,
     mapped_excitation,  ///< an actuator's record is the excitation, before the sum
-    lost_samples,     ///< `value` rows of run `a` are not recorded, from row `b` on
-    late_excitation,  ///< recorded `value` samples late
+    lost_samples,       ///< `value` rows of run `a` are not recorded, from row `b` on
+    late_excitation,    ///< recorded `value` samples late
     // at the stage: the loop runs with them
     wired_swap,
     wired_gain,
@@ -30,7 +30,7 @@ struct PlantedFault {
     stuck_sensor,  ///< shows one value from the middle of every run on
     saturation,    ///< |channel| <= value; an actuator's force is limited with it
     drifting_mode,  ///< the frequency of mode `a` moves by the share `value`, evenly over the measurement
-    light_damping,      ///< the first flexible mode has this damping ratio, and rings from the start
+    light_damping,     ///< the first flexible mode has this damping ratio, and rings from the start
     hidden_excitation  ///< an actuator gets `value` N rms more, on the excited lines, unrecorded
   };
   Kind kind = Kind::none;
