@@ -13,7 +13,6 @@
 #include "estimation/model_structure.hpp"
 #include "estimation/residual_modes.hpp"
 #include "estimation/search_limit.hpp"
-#include "estimation/undetermined_modes.hpp"
 #include "excitation/counted.hpp"
 
 namespace stageid {
@@ -74,10 +73,13 @@ bool is_rigid_body(const Submodel& s) {
   return s.role != SubmodelRole::given && s.integrators == 2 && s.denominator.size() == 1;
 }
 
-bool is_direct_term(const Submodel& s) { return s.integrators == 0 && s.denominator.size() == 1; }
+bool is_biproper(const Submodel& s) {
+  return s.numerator.size() >= s.denominator.size() + static_cast<std::size_t>(s.integrators);
+}
 
 std::vector<Alternative> alternatives(const FrfEstimate& frf, const FitOptions& asked,
-                                      const FitOptions& trial, const AdditiveModel& model) {
+                                      const FitOptions& trial, const AdditiveModel& model,
+                                      bool cut_short) {
   std::vector<Alternative> out;
   const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
   const auto has = [&](auto is_one) {
@@ -92,7 +94,7 @@ std::vector<Alternative> alternatives(const FrfEstimate& frf, const FitOptions& 
         has([](const Submodel& s) { return is_searched_mode(s) && s.numerator.size() == 1; }))
       out.push_back(std::move(general));
   }
-  if (!has(is_direct_term)) {
+  if (!has(is_biproper)) {
     Alternative direct{"--direct-term full", model, trial};
     direct.model.submodels.push_back({0, {1.0}, {zero}, {}, {}});
     out.push_back(std::move(direct));
@@ -122,6 +124,7 @@ std::vector<Alternative> alternatives(const FrfEstimate& frf, const FitOptions& 
     skewed.options.delay = DelayModel::per_channel;
     out.push_back(std::move(skewed));
   }
+  if (cut_short) return out;  // such a search would add modes in any case
   const std::vector<ResidualMode> missed =
       residual_modes(frf, model, trial.user_weights, 1, trial.threads);
   if (!missed.empty()) {
@@ -153,10 +156,10 @@ FitOptions with_deviations(FitOptions trial) {
 }
 
 std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
-                             const FitOptions& trial, const FitResult& same) {
+                             const FitOptions& trial, const FitResult& same, bool cut_short) {
   double least = information_criterion(frf, same);
   std::string advice;
-  for (const Alternative& other : alternatives(frf, options, trial, same.model)) {
+  for (const Alternative& other : alternatives(frf, options, trial, same.model, cut_short)) {
     const FitResult fit = fit_additive_model(frf, other.model, other.options);
     const double criterion = information_criterion(frf, fit);
     if (fit.status == FitStatus::singular || !(criterion < least)) continue;
@@ -191,23 +194,22 @@ std::string better_band(const FrfEstimate& frf, const FitOptions& trial, const F
 
 }  // namespace
 
-std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit) {
+std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit,
+                       bool cut_short) {
   std::string advice = without_silent_channels(frf);
   if (!advice.empty()) return advice;
   const FitOptions trial = trial_options(frf, options);
   // A search that is cut short leaves poles on their way.
   const FitResult same = fit_additive_model(frf, fit.model, with_deviations(trial));
-  advice = better_structure(frf, options, trial, same);
+  advice = better_structure(frf, options, trial, same, cut_short);
   if (advice.empty()) advice = better_band(frf, trial, same);
   if (!advice.empty()) return advice;
-  const auto open = static_cast<int>(undetermined_modes(same).size());
-  return fmt::format("No other structure fits better: name the number of modes, --modes {}",
-                     std::max(1, count_modes(fit.model) - open));
+  return "No other structure fits better: name the number of modes, --modes N";
 }
 
 std::string budget_message(const FrfEstimate& frf, const FitOptions& options,
                            const FitResult& fit) {
-  const std::string advice = advice_for(frf, options, fit);
+  const std::string advice = advice_for(frf, options, fit, true);
   const int modes = count_modes(fit.model);
   const double budget_s = options.limit->budget_s();
   return fmt::format(

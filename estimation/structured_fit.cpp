@@ -265,8 +265,10 @@ void judge_explained(const FrfEstimate& frf, const FitOptions& options, FitResul
       verdict.explained
           ? "the noise that weighs the fit does not explain the residual, the scatter of the "
             "realizations does: use --weighting total_variance"
+      : ended_by_limit(result)
+          ? verdict.reason + ": the model does not explain the data"
           : fmt::format("{}: the model does not explain the data. {}", verdict.reason,
-                        advice_for(frf, options, result));
+                        advice_for(frf, options, result, false));
   result.findings.insert(result.findings.begin(), finding);
   result.decisions.push_back(finding);
   result.distrust(FitStatus::unexplained, finding);

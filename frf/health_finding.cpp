@@ -83,7 +83,9 @@ std::optional<Cause> cause_of(std::string_view name) noexcept {
 }
 
 int rank_of(const Finding& finding) noexcept {
-  return finding.cause == Cause::unknown_stage ? -1 : static_cast<int>(finding.severity);
+  const bool fault = finding.severity == Severity::fault;
+  if (finding.cause == Cause::unknown_stage) return 1;
+  return fault ? 0 : 1 + static_cast<int>(finding.severity);
 }
 
 bool any_fault(const std::vector<Finding>& findings) noexcept {

@@ -57,8 +57,7 @@ struct Finding {
   std::string remedy;   ///< what to do, or what the check needs
 };
 
-/// Place in the table: that nothing is known of the stage comes first, then faults, doubts, what else is not
-/// checked.
+/// Place in the table: faults, then that nothing is known of the stage, doubts, what else is not checked.
 int rank_of(const Finding& finding) noexcept;
 
 /// The worst severity is a fault.

@@ -67,15 +67,29 @@ bool suspicious(const MatrixXd& earlier, const MatrixXd& later) {
 
 /// What a shift explains of one kind of channels, sample by sample, over the scatter of the channels.
 struct Explained {
-  ArrayXd before;  ///< sum over channels of e_0^2
-  ArrayXd after;   ///<   and of e_d^2
-  Index channels = 0;
+  ArrayXd before;        ///< sum over channels of e_0^2
+  ArrayXd after;         ///<   and of e_d^2
+  double freedom = 0.0;  ///< independent samples of a period, over the channels
 };
 
-Explained explained(const MatrixXd& earlier, const MatrixXd& later, Index shift) {
+/// Independent samples of a stationary signal: (sum S)^2 / sum S^2 over the lines of both signs of its spectrum S, the
+/// length for white noise (Satterthwaite).
+double independent_samples(const ArrayXd& signal, RealDft& dft) {
+  std::copy_n(signal.data(), signal.size(), dft.input().begin());
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const std::complex<double>& line : dft.forward()) {
+    const double power = std::norm(line);
+    sum += power;
+    squares += power * power;
+  }
+  return squares > 0.0 ? 2.0 * sum * sum / squares : 0.0;
+}
+
+Explained explained(const MatrixXd& earlier, const MatrixXd& later, Index shift, RealDft& dft) {
   const Index N = later.rows();
   const Index blocks = blocks_of(N);
-  Explained sum{ArrayXd::Zero(N), ArrayXd::Zero(N), 0};
+  Explained sum{ArrayXd::Zero(N), ArrayXd::Zero(N), 0.0};
   for (Index c = 0; c < later.cols(); ++c) {
     const ArrayXd before = difference(later, earlier, c, 0);
     const ArrayXd after = difference(later, earlier, c, shift);
@@ -86,7 +100,7 @@ Explained explained(const MatrixXd& earlier, const MatrixXd& later, Index shift)
     const double weight = 1.0 / (scatter + floor_of(later, c) / static_cast<double>(N));
     sum.before += weight * before.square();
     sum.after += weight * after.square();
-    ++sum.channels;
+    sum.freedom += std::min(independent_samples(before, dft), independent_samples(after, dft));
   }
   return sum;
 }
@@ -117,8 +131,9 @@ Change best_change(const ArrayXd& gain) {
 /// How much better the rows of `change` follow the shifted period than the period: ln of the ratio, 0 if it is not known.
 double advantage(const Explained& of, const Change& change) {
   const Index rows = change.last - change.first;
-  const double count = static_cast<double>(rows * of.channels);
-  if (count == 0.0) return 0.0;
+  const double count =
+      of.freedom * static_cast<double>(rows) / static_cast<double>(of.before.size());
+  if (!(count > 0.0)) return 0.0;
   const double before = of.before.segment(change.first, rows).sum();
   const double after = of.after.segment(change.first, rows).sum();
   const double ratio = std::log(before / std::max(1e-300, after));
@@ -180,8 +195,8 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
   std::optional<PeriodSlip> found;
   double largest = 0.0;
   for (const Index shift : shifts_to_try(earlier, later, dft)) {
-    const Explained sensors = explained(earlier.sensors, later.sensors, shift);
-    const Explained actuators = explained(earlier.actuators, later.actuators, shift);
+    const Explained sensors = explained(earlier.sensors, later.sensors, shift, dft);
+    const Explained actuators = explained(earlier.actuators, later.actuators, shift, dft);
     const ArrayXd of_sensors = sensors.before - sensors.after;
     const ArrayXd of_actuators = actuators.before - actuators.after;
     const std::array<ArrayXd, 3> gains = {of_sensors + of_actuators, of_sensors, of_actuators};

@@ -23,7 +23,7 @@ struct PeriodSlip {
 /// Behind a gap of d samples a record shows what it showed d samples earlier, x[n] = x'[(n + d) mod N]. With the
 /// differences e of `later` to `earlier` shifted by 0 and by d, both over their smallest scatter, the place of the gap is
 /// where the sum of e_0^2 - e_d^2 up to it, or from it on, is largest. It counts if there mean e_0^2 is more than
-/// 1.5 times mean e_d^2 and more than 8 deviations of white noise beyond it (1e-15 by chance): without a gap the shift can
+/// 1.5 times mean e_d^2 and more than 8 deviations of noise of that spectrum beyond it (1e-15 by chance): without a gap the shift can
 /// only add to the difference, and what is not periodic (a glitch, a transient) is in both. Sensors and actuators may
 /// come from different recorders: all, or those of one kind, are looked at, and one kind alone counts from 10 times on,
 /// since a slow transient may happen to look like a shift of slow signals by half. Few samples at the edge of a period, 1600

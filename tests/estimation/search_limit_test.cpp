@@ -100,7 +100,8 @@ INSTANTIATE_TEST_SUITE_P(
                     BudgetCase{"direct_term", add_direct_term, "--direct-term full"},
                     BudgetCase{"no_rigid_body", leave_out_rigid_body, "--rigid-body none"},
                     BudgetCase{"delay", delay_by_many_samples, "--delay estimate"},
-                    BudgetCase{"nothing", [](test::DenseProblem&) {}, "--modes 3"}),
+                    BudgetCase{"nothing", [](test::DenseProblem&) {},
+                               "No other structure fits better"}),
     [](const auto& one) { return one.param.name; });
 
 TEST(SearchLimit, AnAxisThatWasNotExcitedIsNamed) {

@@ -127,13 +127,28 @@ TEST(Validation, AModelThatIsWrongShowsInEveryFigure) {
   EXPECT_GT(result.relative_rms_error, 0.02);
 }
 
-TEST(Validation, NoiseThatIsLargerThanToldShowsInChiSquareButIsWhite) {
+// One realization: the lines scatter by more than the periods say, about a smooth response.
+TEST(Validation, ScatterOfTheLinesExplainsWhatTheNoiseDoesNot) {
   const AdditiveModel model = stage_model(HoldModel::exact);
   FrfEstimate frf = measured(model, HoldModel::exact);
   add_noise(frf, 4, 4.0);
   const Validation result = validate(model, frf);
-  EXPECT_NEAR(result.chi_square_per_dof, 4.0, 4.0 * 4.5 / std::sqrt(9000.0));
+  EXPECT_TRUE(result.explained) << result.reason;
+  EXPECT_EQ(result.variance, ResidualVariance::scatter);
+  EXPECT_NEAR(result.chi_square_per_dof, result.expected_chi_square, 0.15);
   EXPECT_LT(result.whiteness, result.whiteness_limit * 1.5);
+}
+
+// Without lines enough to tell, the noise is all that is known.
+TEST(Validation, NoiseThatIsLargerThanToldShowsInChiSquare) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  add_noise(frf, 4, 4.0);
+  frf = select_band(std::move(frf), 600.0, 625.0);
+  const Validation result = validate(model, frf);
+  EXPECT_FALSE(result.explained);
+  EXPECT_EQ(result.variance, ResidualVariance::noise);
+  EXPECT_NEAR(result.chi_square_per_dof, 4.0, 4.0 * 4.5 / std::sqrt(6.0 * 18.0));
 }
 
 TEST(Validation, ErrorsAreThoseOfTheirDefinitions) {

@@ -40,7 +40,7 @@ void draw_wrong_map(RandomNumbers& random, JudgementStage& stage, TroublePlan& p
     plan.right_causes = {"swapped", "rigid_body", "controller"};
   } else {
     plan.excitation_as_actuators = true;
-    plan.right_causes = {"inputs", "excitation", "controller", "swapped", "map"};
+    plan.right_causes = {"injection", "inputs", "excitation", "controller", "swapped", "map"};
   }
   plan.variant =
       std::string(swapped ? "sensors" : "excitation") + (stage.stage_file ? ", stage file" : "");

@@ -271,6 +271,7 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
                      .weighting = "total_variance",
                      .iterations = 34,
                      .status = "gradient_small",
+                     .message = {},
                      .relative_rms_error = data.validation->relative_rms_error,
                      .band_hz = {data.frf->frequency_hz[0], data.frf->frequency_hz[size.lines - 1]},
                      .seconds = 21.4};
