@@ -237,8 +237,9 @@ std::vector<Finding> Examination::examine() {
     check_excluded();
     check_stage();
     check_inputs();
-    for (Finding& finding : check_start_transient(record_.start))
-      findings_.push_back(std::move(finding));
+    if (!any_fault(findings_))  // of a channel that is stuck, what follows the start is no ringing
+      for (Finding& finding : check_start_transient(record_.start))
+        findings_.push_back(std::move(finding));
   }
   std::stable_sort(findings_.begin(), findings_.end(),
                    [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });

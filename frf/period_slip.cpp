@@ -205,9 +205,13 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
       if (!(change.gain > largest)) continue;
       const double y = advantage(sensors, change);
       const double u = advantage(actuators, change);
-      // A transient may happen to look like a long shift as well.
-      const bool likely = std::min(y, u) > 0.0 && std::abs(shift) <= kNear;
-      if (!likely && std::max(y, u) < std::log(kLeastRatioAlone)) continue;
+      // A transient or a stuck sensor may look like a long shift, and every period of a wrong length is displaced as a
+      // whole.
+      const bool whole = change.first == 0 && change.last == later.sensors.rows();
+      const double sure = std::log(kLeastRatioAlone);
+      const bool near = std::abs(shift) <= kNear;
+      if (near ? !(std::min(y, u) > 0.0) && std::max(y, u) < sure : whole || std::min(y, u) < sure)
+        continue;
       // A kind of which nothing is known goes with the other.
       const bool until_the_end = change.last == later.sensors.rows();
       found = PeriodSlip{until_the_end ? change.first : change.last, static_cast<int>(shift),

@@ -26,7 +26,8 @@ struct PeriodSlip {
 /// 1.5 times mean e_d^2 and more than 8 deviations of noise of that spectrum beyond it (1e-15 by chance): without a gap the shift can
 /// only add to the difference, and what is not periodic (a glitch, a transient) is in both. Sensors and actuators may
 /// come from different recorders: all, or those of one kind, are looked at, and one kind alone counts from 10 times on,
-/// since a slow transient may happen to look like a shift of slow signals by half. Few samples at the edge of a period, 1600
+/// since a slow transient may happen to look like a shift of slow signals by half. More than 4 samples count from 10
+/// times on in both kinds, and inside a period. Few samples at the edge of a period, 1600
 /// over the channels, are not enough; the next period shows them.
 ///
 /// d is any of -4 ... 4, or one of the three largest peaks of the periods' cross-correlation.

@@ -141,20 +141,23 @@ class MapReader final : public ConfigVisitor {
     errors_.attempt([&] {
       const YamlNode* node = find(key, presence, help);
       if (node == nullptr) return;
-      value = {};
+      FlexibleValue
+          given;  // what is wrong leaves the default: the checks that follow go on with it
+      const std::size_t errors = errors_.size();
       if (node->kind == YamlNode::Kind::sequence && (rule.list || rule.pairs)) {
-        value.is_list = true;
+        given.is_list = true;
         for (const std::size_t item : list(key, *node, {1}))
-          errors_.attempt([&] { read_item(key, document_.node(item), rule, value); });
+          errors_.attempt([&] { read_item(key, document_.node(item), rule, given); });
       } else if (node->kind == YamlNode::Kind::scalar && is_word(*node, rule)) {
-        value.word = node->text;
+        given.word = node->text;
       } else if (node->kind == YamlNode::Kind::scalar && rule.number && looks_numeric(*node)) {
-        value.numbers = {parse_number(key, *node, rule.rule)};
+        given.numbers = {parse_number(key, *node, rule.rule)};
       } else if (node->kind == YamlNode::Kind::scalar && rule.any_text && !node->text.empty()) {
-        value.word = node->text;
+        given.word = node->text;
       } else {
         wrong(key, *node, describe_forms(rule) + nearest_of(*node, rule.words));
       }
+      if (errors_.size() == errors) value = std::move(given);
     });
   }
   void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,

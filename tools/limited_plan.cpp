@@ -41,11 +41,6 @@ double realization_s(const ExperimentPlan& plan) {
 
 LimitedPlan make_limited_plan(const ExperimentConfig& config) {
   const LimitRequest& request = config.limits.value();
-  if (!std::filesystem::exists(request.prior))
-    throw FileError(fmt::format(
-        "{}: is not there; {} designs from it: measure a pilot, 'stageid run' and 'stageid frf -o' "
-        "to this name",
-        request.prior.string(), config.file.string()));
   const ExperimentPlan outline = outline_plan(config);
   const WaferStageSpec& stage = config.stage.spec;
   const PlantPrior prior = read_plant_prior(

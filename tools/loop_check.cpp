@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <filesystem>
 #include <numbers>
 #include <vector>
 
@@ -190,6 +191,11 @@ void require_stable_loop(const StageConfig& stage, const Console& console) {
 }
 
 void require_stable_loop(const ExperimentConfig& config, const Console& console) {
+  if (config.limits && !std::filesystem::exists(config.limits->prior))
+    throw FileError(fmt::format(
+        "{}: is not there; {} designs from it: measure a pilot, 'stageid run' and 'stageid frf -o' "
+        "to this name",
+        config.limits->prior.string(), config.file.string()));
   judge(config.limits ? config.limits->prior : config.stage.file, check_loop(config), console);
 }
 

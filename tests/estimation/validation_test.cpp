@@ -143,12 +143,12 @@ TEST(Validation, ScatterOfTheLinesExplainsWhatTheNoiseDoesNot) {
 TEST(Validation, NoiseThatIsLargerThanToldShowsInChiSquare) {
   const AdditiveModel model = stage_model(HoldModel::exact);
   FrfEstimate frf = measured(model, HoldModel::exact);
-  add_noise(frf, 4, 4.0);
+  add_noise(frf, 4, 25.0);
   frf = select_band(std::move(frf), 600.0, 625.0);
   const Validation result = validate(model, frf);
   EXPECT_FALSE(result.explained);
   EXPECT_EQ(result.variance, ResidualVariance::noise);
-  EXPECT_NEAR(result.chi_square_per_dof, 4.0, 4.0 * 4.5 / std::sqrt(6.0 * 18.0));
+  EXPECT_NEAR(result.chi_square_per_dof, 25.0, 25.0 * 4.5 / std::sqrt(6.0 * 18.0));
 }
 
 TEST(Validation, ErrorsAreThoseOfTheirDefinitions) {

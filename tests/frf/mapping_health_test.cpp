@@ -133,9 +133,9 @@ TEST(UnknownStage, IsSaidFirstWithTheFlagThatHelps) {
   EXPECT_EQ(found[0].cause, Cause::unknown_stage);
   EXPECT_THAT(found[0].remedy, HasSubstr("--stage FILE"));
   EXPECT_THAT(found[0].figure, HasSubstr("over 3 experiments"));
-  log.records[0].sensors.col(0).setConstant(0.0);
   for (LogSamples& record : log.records) record.sensors.col(0).setConstant(0.0);
-  EXPECT_EQ(health_of(log)[0].cause, Cause::unknown_stage);  // before a dead sensor, too
+  EXPECT_EQ(health_of(log)[0].cause, Cause::dead);  // a fault comes before what is not known
+  EXPECT_EQ(health_of(log)[1].cause, Cause::unknown_stage);
 }
 
 TEST(Feedback, IsOneFunctionOfTheSensorsInASoundLog) {

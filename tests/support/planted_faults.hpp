@@ -101,9 +101,6 @@ inline std::vector<NamedFault> faults_to_plant(std::uint64_t seed, const MemoryL
         Cause::skew);
   plant("stage: sensor dead", false, {Kind::dead_sensor, true, sensor()}, Cause::dead);
   plant("stage: sensor stuck", false, {Kind::stuck_sensor, true, sensor()}, Cause::dead);
-  plant("stage: a mode still rings", false, {Kind::light_damping, true, 0, 0, 5e-4},
-        Cause::unsettled);
-  faults.back().expected_channel.clear();
   const int limited = actuator();
   plant("stage: actuator saturated", false,
         {Kind::saturation, false, limited, 0, 0.7 * largest(false, limited)}, Cause::saturated);

@@ -169,7 +169,7 @@ TEST_F(ControllerFileTest, WhatIsWrongIsSaidWithItsPlace) {
   EXPECT_THAT(error_of(head("time: continuous\nstate_spaces: {}\n")),
               HasSubstr("unknown key 'state_spaces'"));
   EXPECT_THAT(error_of("format: stageid-controller\ntime: continuous\nstate_space: {d: [1]}\n"),
-              HasSubstr("name the channels of the matrices"));
+              HasSubstr("a matrix of 0 x 0"));  // without names of the channels
   EXPECT_THROW(nominal_stage_of(small_log().log_info,
                                 write("format: stageid-controller\nmeasured: none.h5\n")),
                FileError);
