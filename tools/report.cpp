@@ -56,8 +56,12 @@ void check_data(const ReportData& data) {
     check_shape("nonlinearity.p_value", data.nonlinearity->p_value, channels, bands);
     check_shape("nonlinearity.distortion", data.nonlinearity->distortion, channels, bands);
   }
-  if (data.validation && data.validation->channel_error.size() > 0)
-    check_shape("validation.channel_error", data.validation->channel_error, channels, 1);
+  if (data.validation) {
+    const Eigen::VectorXd& error =
+        data.validation->channel_error;  // NaN: the channel does not respond
+    check_shape("validation.channel_error",
+                error.array().isNaN().select(0.0, error).matrix().eval(), channels, 1);
+  }
   if (!data.validation_frf) return;
   check(*data.validation_frf);
   check_shape("validation_frf", data.validation_frf->response, channels, frf.lines());

@@ -159,7 +159,7 @@ function channelErrors(errors) {
   const rows = outputs.map((output, o) => element('tr', null, element('th', { scope: 'row', class: 'name' }, output.name),
     ...inputs.map((_, i) => {
       const e = errors[channelIndex(o, i)];
-      return element('td', { class: 'heat', style: '--heat:' + shade(e).toFixed(3) }, percent(e));
+      return element('td', { class: 'heat', style: '--heat:' + shade(e).toFixed(3) }, e === null ? '–' : percent(e));
     })));
   return element('div', { class: 'table-scroll' }, element('table', { class: 'heatmap' },
     element('caption', null, 'Relative rms error of each channel'), element('thead', null, head), element('tbody', null, ...rows)));
