@@ -15,7 +15,7 @@ struct ModeSelection {
   bool keep_modes = false;           ///< fit `modes` as they are: none added, none removed
   int most = 60;
   /// Of a search that chooses the number, in seconds of an ordinary core, see SearchLimit; 0: no end.
-  double search_seconds = 60.0;
+  double search_seconds = 180.0;
 };
 
 /// A fit that completes its own start: peaks of the CMIF, then modes at the peaks of the weighted

@@ -28,7 +28,7 @@ struct FitRequest {
   std::vector<SubmodelRequest>
       submodels;  ///< further ones; alone where `modes` and `rigid_body` are empty
   int max_iterations = 100;
-  double search_seconds = 60.0;  ///< of an ordinary core, see SearchLimit; 0: no end
+  double search_seconds = 180.0;  ///< of an ordinary core, see SearchLimit; 0: no end
   int threads = 0;
 };
 

@@ -160,7 +160,7 @@ void define_fit(py::module_& module) {
              py::arg("delay") = py::none(), py::arg("rigid_body") = py::none(),
              py::arg("residue_rank") = "full", py::arg("damping") = "", py::arg("direct_term") = "",
              py::arg("submodels") = std::vector<std::string>{}, py::arg("method") = "riv",
-             py::arg("max_iterations") = 100, py::arg("search_seconds") = 60.0,
+             py::arg("max_iterations") = 100, py::arg("search_seconds") = 180.0,
              py::arg("threads") = 0, py::arg("covariance") = false, kFitDoc);
 }
 

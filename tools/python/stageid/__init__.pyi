@@ -281,7 +281,7 @@ def fit(
     submodels: Sequence[str] = ...,
     method: str = "riv",
     max_iterations: int = 100,
-    search_seconds: float = 60.0,
+    search_seconds: float = 180.0,
     threads: int = 0,
     covariance: bool = False,
 ) -> Fit: ...
