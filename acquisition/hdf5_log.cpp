@@ -227,7 +227,7 @@ Eigen::Index first_other(const Eigen::MatrixXd& samples, const Eigen::MatrixXd& 
                          Eigen::Index ahead, double tolerance, Eigen::Index from,
                          Eigen::Index rows) {
   const auto differs = [&](Eigen::Index n) {
-    return !((samples.row(n) - row_of(period, n, ahead)).cwiseAbs().maxCoeff() <= tolerance);
+    return !((samples.row(n) - row_of(period, n, ahead)).array().abs() <= tolerance).all();
   };
   while (from < rows && !differs(from)) ++from;
   return from;

@@ -209,8 +209,11 @@ std::optional<double> excess(const OctaveRecord& octave, std::span<const int> nu
   const double ratio = deviation / scatter;
   const DegreesOfFreedom most{static_cast<double>(M), static_cast<double>(M * (n - 1))};
   if (!(ratio > 1.0 && log_tail(ratio, most) < log_chance)) return std::nullopt;
-  if (!(log_tail(ratio, degrees_of_freedom(residuals, core, number)) < log_chance))
-    return std::nullopt;
+  DegreesOfFreedom dof = degrees_of_freedom(residuals, core, number);
+  // A core that was chosen for being close may lack the narrow noise that p has.
+  const double alone = degrees_of_freedom(own - mean, {p}, number).period;
+  dof = {std::min(dof.period, alone), std::min(dof.core, alone * static_cast<double>(n - 1))};
+  if (!(log_tail(ratio, dof) < log_chance)) return std::nullopt;
   return ratio;
 }
 

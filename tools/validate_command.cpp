@@ -94,6 +94,7 @@ nlohmann::ordered_json validation_json(const Validation& v) {
           {"expected_chi_square", v.expected_chi_square},
           {"variance", to_string(v.variance)},
           {"explained", v.explained},
+          {"reason", v.reason},
           {"whitened_above_95", v.whitened_above_95},
           {"whiteness", v.whiteness},
           {"whiteness_limit", v.whiteness_limit},

@@ -44,10 +44,10 @@ TEST_P(ConstantSensor, GivesAResponseOfZeroAndAFault) {
   EXPECT_TRUE(test.settled_p_value.allFinite());
   const std::vector<Finding> found = check_health(both.health, std::nullopt);
   ASSERT_GE(found.size(), 2U);
-  EXPECT_EQ(found[0].cause, Cause::unknown_stage);
-  EXPECT_EQ(found[1].severity, Severity::fault);
-  EXPECT_EQ(found[1].cause, Cause::dead);
-  EXPECT_EQ(found[1].channel, "z2");
+  EXPECT_EQ(found[0].severity, Severity::fault);
+  EXPECT_EQ(found[0].cause, Cause::dead);
+  EXPECT_EQ(found[0].channel, "z2");
+  EXPECT_EQ(found[1].cause, Cause::unknown_stage);
 }
 
 INSTANTIATE_TEST_SUITE_P(AtZeroOrElsewhere, ConstantSensor, testing::Values(0.0, 0.3));
