@@ -214,7 +214,7 @@ void Hdf5LogReader::read_columns(const Dataset& dataset, std::uint64_t first,
 
 namespace {
 
-constexpr Eigen::Index kFewestRows = 8;  // that tell where a record goes on
+constexpr Eigen::Index kFewestRows = 8;  // needed to find where a record goes on
 constexpr Eigen::Index kPadding = 4;     // rows at its end, if the gap is in the last period
 
 /// Row n of a periodic signal that is `ahead` rows ahead.
@@ -280,7 +280,7 @@ void Hdf5LogReader::check_repetition(const LogRun& run, const Dataset& dataset,
   Eigen::MatrixXd later(period.rows(), period.cols());
   for (std::uint64_t first = rows; first < dataset.rows; first += rows) {
     read_columns(dataset, first, later);
-    // What stands in the place of lost rows at the end of a record is nobody's.
+    // Rows that fill the place of lost ones at the end of a record have no meaning.
     const bool last = first + rows == dataset.rows;
     const Eigen::Index count =
         last && ahead < period.rows() / 2 ? period.rows() - ahead : period.rows();

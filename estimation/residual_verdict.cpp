@@ -103,7 +103,7 @@ class Parts {
   }
 
  private:
-  /// Where no mean of r exists, that of t tells the size of the excess.
+  /// Where no mean of r exists, the mean of t is the size of the excess.
   double excess(const Part& part) const {
     return expected() > 0.0 ? part.mean_r() / expected() : kAllowed * part.mean_t();
   }
@@ -191,10 +191,10 @@ ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse&
   }
   if (!has_noise) return verdict;
   if (known.level.cols() > 0 && known.level.rows() == frf.response.rows()) {
-    ResidualVerdict distorted =
-        judge_with(ResidualVariance::total, variance_with(known, frf), frf.noise_dof);
+    Eigen::MatrixXd variance = variance_with(known, frf);
+    ResidualVerdict distorted = judge_with(ResidualVariance::total, variance, frf.noise_dof);
     if (distorted.explained) {
-      distorted.scatter = variance_with(known, frf);
+      distorted.scatter = std::move(variance);
       return distorted;
     }
   }

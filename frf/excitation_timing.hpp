@@ -24,7 +24,7 @@ Finding to_finding(const ExcitationDelay& delay);
 /// of u lowers it further: then it is the actuators that are late. What a loop gain leaves without the controller cannot
 /// look like it: |1 - e^(j omega T d)| grows with frequency where the gain falls.
 ///
-/// Y U^-1 does not depend on r. Without scatter, names of actuators on the excitation, or lines, nothing is told.
+/// Y U^-1 does not depend on r. Without scatter, names of actuators on the excitation, or lines, nothing is reported.
 std::optional<ExcitationDelay> align_excitation(HealthRecord& record,
                                                 const std::optional<NominalStage>& nominal);
 

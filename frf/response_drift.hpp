@@ -15,7 +15,7 @@ namespace stageid {
 ///
 /// Where a mode's frequency moves by the share d, G changes by X d, X = -f dG/df. In windows of nine lines d is
 /// fitted to the slope by weighted least squares, once to that within the runs, once to that over the realizations.
-/// Noise of S kron C_E gives its deviation. A drift is told if d is 8 deviations off zero (Student's t with 36
+/// Noise of S kron C_E gives its deviation. A drift is reported if d is 8 deviations off zero (Student's t with 36
 /// degrees of freedom, the fewest: 2e-9), if X d is more than half, over realizations 0.8, of what the slope has beyond noise (a
 /// transient or distortions have phases of their own on every line), and if half of the whole change exceeds a deviation of the response.
 class ResponseDrift {
