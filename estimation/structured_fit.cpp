@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -11,6 +12,7 @@
 
 #include "estimation/dense_covariance.hpp"
 #include "estimation/mode_deviation.hpp"
+#include "estimation/mode_worth.hpp"
 #include "estimation/ranked_fit.hpp"
 #include "estimation/residual_verdict.hpp"
 #include "estimation/search_advice.hpp"
@@ -22,22 +24,26 @@ namespace {
 
 constexpr double kSuspensionStart = 0.25;  // of the lowest line
 constexpr double kSuspensionDamping = 0.1;
+constexpr double kWeakSpringsStart = 0.02;  // of the lowest line: where a free body comes from
 constexpr int kRealPoleGrid = 17;
 constexpr double kRealPoleBelow = 0.3;  // the grid reaches beyond the lines by these factors
 constexpr double kRealPoleAbove = 3.0;
 constexpr double kLargestDeviation = 0.5;  // of a frequency that counts as determined
 
 /// All residues free: a rigid body of up to min(n_y, n_u) degrees of freedom.
+Submodel suspension_mode(const FrfEstimate& frf, double frequency_hz) {
+  Submodel s = mode_submodel(frf, {}, {frequency_hz, kSuspensionDamping, 1});
+  s.role = SubmodelRole::suspension;
+  return s;
+}
+
 std::vector<Submodel> suspension_modes(const FrfEstimate& frf,
                                        const std::vector<double>& known_hz) {
-  std::vector<double> frequencies_hz = known_hz;
-  if (known_hz.empty()) frequencies_hz.push_back(kSuspensionStart * frf.frequency_hz[0]);
+  if (known_hz.empty()) return {suspension_mode(frf, kSuspensionStart * frf.frequency_hz[0])};
   std::vector<Submodel> out;
-  for (const double frequency_hz : frequencies_hz) {
-    Submodel s = mode_submodel(frf, {}, {frequency_hz, kSuspensionDamping, 1});
-    s.role = SubmodelRole::suspension;
-    s.frequency_held = !known_hz.empty();
-    out.push_back(std::move(s));
+  for (const double frequency_hz : known_hz) {
+    out.push_back(suspension_mode(frf, frequency_hz));
+    out.back().frequency_held = true;
   }
   return out;
 }
@@ -182,10 +188,8 @@ class PoleSearch {
   FitResult found_;
 };
 
-/// Continues from `result`, the way there kept.
-void refit(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
-  FitResult next = ranked_fit(frf, result.model, options, ModeNumber::given);
-  sort_modes(next);
+/// `next` follows `result`, the way there kept.
+void continue_with(FitResult next, FitResult& result) {
   next.decisions.insert(next.decisions.begin(), result.decisions.begin(), result.decisions.end());
   next.cost.insert(next.cost.begin(), result.cost.begin(), result.cost.end());
   next.model.cost_history = next.cost;
@@ -198,6 +202,48 @@ void refit(const FrfEstimate& frf, const FitOptions& options, FitResult& result)
     next.model.fit.message = next.message;
   }
   result = std::move(next);
+}
+
+void refit(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+  FitResult next = ranked_fit(frf, result.model, options, ModeNumber::given);
+  sort_modes(next);
+  continue_with(std::move(next), result);
+}
+
+/// Puts the rigid body on weak springs where that is worth its two parameters (BIC). Far above the suspension the
+/// lines see little of it, but all of them together: as a wrong delay, which shifts every mode, or as a mode among
+/// the lowest lines. So the modes that were found are weighed again.
+void try_springs(const FrfEstimate& frf, const ModelStructure& structure,
+                 const ModeSelection& selection, const FitOptions& options, FitResult& result) {
+  const auto body = std::find_if(result.model.submodels.begin(), result.model.submodels.end(),
+                                 [](const Submodel& s) { return s.integrators == 2; });
+  if (body == result.model.submodels.end() || result.status == FitStatus::singular ||
+      ended_by_limit(result))
+    return;
+  AdditiveModel sprung = result.model;
+  sprung.submodels[static_cast<std::size_t>(body - result.model.submodels.begin())] =
+      suspension_mode(frf, kWeakSpringsStart * frf.frequency_hz[0]);
+  FitOptions quick = options;
+  quick.uncertainty = false;
+  quick.method = FitMethod::gn;
+  const FitResult trial = fit_additive_model(frf, sprung, quick);
+  if (trial.status == FitStatus::singular ||
+      !(information_criterion(frf, trial) < information_criterion(frf, result)))
+    return;
+  result.decisions.push_back(
+      fmt::format("rigid body on weak springs instead of a free one: cost {:.6g} -> {:.6g}",
+                  result.model.fit.cost, trial.model.fit.cost));
+  ModelStructure with_springs = structure;
+  with_springs.rigid_body = false;
+  ModeSelection again = selection;
+  again.keep_modes = selection.keep_modes || selection.exactly > 0;
+  again.modes.clear();
+  for (const Submodel& s : trial.model.submodels) {
+    if (s.role == SubmodelRole::suspension) with_springs.given.push_back(s);
+    if (is_searched_mode(s))
+      again.modes.push_back({s.natural_frequency_hz(), s.damping_ratio(), 1});
+  }
+  continue_with(automatic_fit(frf, with_springs, again, options), result);
 }
 
 /// Holds the frequencies of suspension modes that the lines do not determine, the worst first.
@@ -295,6 +341,8 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   PoleSearch(frf, complete, selection, options, decisions).complete(requests);
   for (const SubmodelRequest& r : requests) complete.given.push_back(start_submodel(frf, r));
   FitResult result = automatic_fit(frf, complete, selection, options);
+  if (structure.springs_if_worth && structure.common.rigid_body)
+    try_springs(frf, complete, selection, options, result);
   settle_suspension(frf, options, result);
   result.decisions.insert(result.decisions.begin(), decisions.begin(), decisions.end());
   judge_explained(frf, options, result);

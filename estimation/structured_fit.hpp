@@ -11,6 +11,8 @@ namespace stageid {
 struct RequestedStructure {
   ModelStructure common;
   std::vector<SubmodelRequest> submodels;
+  /// A free rigid body becomes one on weak springs where that is worth two parameters more (BIC).
+  bool springs_if_worth = true;
   bool suspension =
       false;  ///< modes below the lowest line instead of 1/s^2: a rigid body on weak springs
   /// Their known frequencies, which stay; empty: one mode for all rigid degrees of freedom, whose

@@ -48,8 +48,10 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option(
       "--rigid-body", request_.rigid_body,
       "none | full | RANK: the term B_0 / s^2 | suspension: a mode below the lines instead, for a "
-      "rigid body on weak springs | suspension:F1:F2: at these known frequencies, Hz; default: "
-      "full; none with --submodel or where the outputs are accelerations");
+      "rigid body on weak springs | suspension:F1:F2: at these known frequencies, Hz | auto: full, "
+      "or "
+      "suspension where that is worth its parameters; default: auto; none with --submodel or where "
+      "the outputs are accelerations");
   command->add_option(
       "--direct-term", request_.direct_term,
       "none | full: a constant, the compliance of modes above the band; default: none, "

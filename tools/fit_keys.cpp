@@ -123,9 +123,11 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
                                : (delay.word == "by_frf" ? "" : delay.word);
 
   if (f.rigid_body.empty()) f.rigid_body = "by_submodels";
-  rank("rigid_body", f.rigid_body, {"none", "full", "suspension", "by_submodels"},
-       "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); suspension: a "
-       "mode below the lines instead; by_submodels: none where submodels are listed, else full");
+  rank(
+      "rigid_body", f.rigid_body, {"auto", "none", "full", "suspension", "by_submodels"},
+      "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); suspension: a "
+      "mode below the lines instead; auto: full, or suspension where that is worth its parameters; "
+      "by_submodels: none where submodels are listed, else auto");
   std::vector<double> suspension_hz;
   v.numbers("suspension_hz", suspension_hz, positive("Hz"), {}, kOptional,
             "with rigid_body: suspension, its frequencies where they are known; left out: fitted");

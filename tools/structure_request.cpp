@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view kSuspension = "suspension";
 constexpr const char* kRigidBodies =
-    "none, full or a rank of 1 or more, or suspension, or suspension:F1:F2 (Hz)";
+    "auto, none, full or a rank of 1 or more, or suspension, or suspension:F1:F2 (Hz)";
 
 int rank(const char* flag, const std::string& text, const char* allowed) {
   const std::optional<double> number = to_number(text);
@@ -78,11 +78,14 @@ void choose_rigid_body(const FitRequest& request, FitSetup& setup) {
     return;
   }
   setup.structure.common.rigid_body = true;
+  setup.structure.springs_if_worth = text == "auto";
+  if (text == "auto" || text == "full") return;
   const std::string word = text.substr(0, text.find(':'));
-  const std::string nearest = nearest_word(word, {"none", "full", std::string(kSuspension)});
-  if (!to_number(text) && word != "full" && !nearest.empty())
+  const std::string nearest =
+      nearest_word(word, {"auto", "none", "full", std::string(kSuspension)});
+  if (!to_number(text) && !nearest.empty())
     refuse("--rigid-body", text, fmt::format("{} (did you mean '{}'?)", kRigidBodies, nearest));
-  if (text != "full") setup.options.rigid_body_rank = rank("--rigid-body", text, kRigidBodies);
+  setup.options.rigid_body_rank = rank("--rigid-body", text, kRigidBodies);
 }
 
 void choose_residue_rank(const FitRequest& request, FitSetup& setup) {
@@ -115,7 +118,7 @@ std::string requested_modes(const FitRequest& request) {
 }
 
 std::string requested_rigid_body(const FitRequest& request) {
-  return by_submodels(request, request.rigid_body, "full");
+  return by_submodels(request, request.rigid_body, "auto");
 }
 
 void choose_structure(const FitRequest& request, FitSetup& setup) {

@@ -45,11 +45,46 @@ TEST(Suspension, IsFoundFarBelowTheLines) {
 TEST(Suspension, WhereARigidBodyAloneDoesNotExplainTheLines) {
   const FrfEstimate frf = test::frf_of(suspended(0.4));
   RequestedStructure rigid;
+  rigid.springs_if_worth = false;
   ModeSelection modes;
   modes.modes = {{299.0, 0.01, 1}};
   modes.keep_modes = true;
   EXPECT_GT(structured_fit(frf, rigid, modes, {}).model.fit.relative_rms_error, 2e-5);
   EXPECT_LT(fit_suspended(frf, {}, {}).model.fit.relative_rms_error, 1e-9);
+}
+
+/// A free rigid body is asked for, as it is where nothing is said; the delay is estimated.
+FitResult fit_by_default(const test::DenseProblem& problem, double noise) {
+  FitOptions options;
+  options.weighting = Weighting::noise_variance;
+  options.hold = problem.hold;
+  options.delay = DelayModel::estimate;
+  return structured_fit(test::noisy(problem, noise, 4), {}, {}, options);
+}
+
+TEST(Suspension, IsFoundWhereItIsWorthItsParameters) {
+  // (0.05/5)^2 = 1e-4 of the lowest line is the rigid body's, 2 * 0.1 * 0.05/5 of that its damping's, which a delay
+  // would imitate.
+  const double delay_s = 2e-4;
+  const test::DenseProblem problem = test::measured(
+      {{0, mode_poles(0.05, 0.1), 0}, {0, mode_poles(300.0, 0.01), 0}}, HoldModel::exact, delay_s);
+  const FitResult fit = fit_by_default(problem, 1e-9);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("weak springs")));
+  ASSERT_EQ(fit.model.submodels.size(), 2U);
+  EXPECT_EQ(fit.model.submodels[0].role, SubmodelRole::suspension);
+  EXPECT_NEAR(fit.model.mean_delay_s(), delay_s, 4.0 * fit.model.input_delay_std_s[0]);
+  const Submodel& mode = fit.model.submodels[1];
+  EXPECT_NEAR(mode.natural_frequency_hz(), 300.0, 4.0 * *mode.natural_frequency_std_hz);
+}
+
+TEST(Suspension, IsNotFoundUnderAFreeBody) {
+  const test::DenseProblem problem =
+      test::measured({{2, {}, 0}, {0, mode_poles(300.0, 0.01), 0}}, HoldModel::exact, 2e-4);
+  const FitResult fit = fit_by_default(problem, 1e-5);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  ASSERT_EQ(fit.model.submodels.size(), 2U);
+  EXPECT_EQ(fit.model.submodels[0].integrators, 2);
 }
 
 TEST(Suspension, HasNoDeviationWhereTheLinesDoNotDetermineIt) {
