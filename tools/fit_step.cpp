@@ -28,7 +28,7 @@ Json distortion_json(const Distortion& distortion) {
 }
 
 std::string provenance(const FitSetup& setup, const FitResult& result, const std::string& frf_name,
-                       const std::string& frf_fingerprint) {
+                       const std::string& frf_fingerprint, const std::vector<std::string>& doubts) {
   Json json;
   json["stageid_version"] = STAGEID_VERSION;
   json["made_by"] = "fit";
@@ -36,6 +36,7 @@ std::string provenance(const FitSetup& setup, const FitResult& result, const std
   json["inputs"] = {{{"file", frf_name}, {"fingerprint", frf_fingerprint}}};
   json["options"] = Json::parse(setup.request_json);
   json["decisions"] = result.decisions;
+  if (!doubts.empty()) json["doubts"] = doubts;
   if (setup.distortion.band_hz.size() > 0) json["distortion"] = distortion_json(setup.distortion);
   const Json frf = Json::parse(setup.frf.provenance_json, nullptr, false);
   json["frf"] = frf.is_discarded() ? Json::object() : frf;
@@ -62,11 +63,20 @@ std::vector<PoleEstimate> poles_of(const Submodel& s) {
            s.damping_ratio_std}};
 }
 
-/// Puts a cause before the message of a fit that is not to be trusted.
-void blame(const std::string& cause, FitResult& result) {
-  if (cause.empty() || result.trustworthy()) return;
-  result.message = cause + "; " + result.message;
-  result.model.fit.message = result.message;
+/// What an FRF is known to suffer from, the causes before what follows from them: modes that imitate distortion.
+std::vector<std::string> doubts_about(const FrfEstimate& frf, const std::vector<Finding>& health) {
+  std::vector<std::string> doubts = health_notes(health, Severity::doubt);
+  if (std::string nonlinear = nonlinearity_sentence(frf); !nonlinear.empty())
+    doubts.push_back(std::move(nonlinear));
+  return doubts;
+}
+
+std::vector<std::string> texts_in(const Json& object, const char* key) {
+  std::vector<std::string> texts;
+  if (!object.is_object() || !object.contains(key) || !object[key].is_array()) return texts;
+  for (const Json& text : object[key])
+    if (text.is_string()) texts.push_back(text.get<std::string>());
+  return texts;
 }
 
 }  // namespace
@@ -88,17 +98,20 @@ FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
     progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));
   };
   step.result = structured_fit(setup.frf, setup.structure, setup.selection, options);
-  // The cause comes before what follows from it: modes that imitate distortion.
-  blame(nonlinearity_sentence(setup.frf), step.result);
   const std::vector<Finding> health = health_of(setup.frf.provenance_json);
-  blame(fmt::format("{}", fmt::join(health_notes(health, Severity::doubt), "; ")), step.result);
+  const std::vector<std::string> doubts = doubts_about(setup.frf, health);
+  if (!doubts.empty() && !step.result.trustworthy()) {
+    step.result.message = fmt::format("{}; {}", fmt::join(doubts, "; "), step.result.message);
+    step.result.model.fit.message = step.result.message;
+  }
   const std::vector<std::string> faults = health_notes(health, Severity::fault);
   if (!faults.empty())
     step.result.distrust(FitStatus::faulty_data, fmt::format("{}", fmt::join(faults, "; ")));
   step.seconds = progress.seconds();
   step.result.decisions.insert(step.result.decisions.begin(), setup.notes.begin(),
                                setup.notes.end());
-  step.result.model.provenance_json = provenance(setup, step.result, frf_name, frf_fingerprint);
+  step.result.model.provenance_json =
+      provenance(setup, step.result, frf_name, frf_fingerprint, doubts);
   return step;
 }
 
@@ -124,13 +137,11 @@ Distortion distortion_of(const AdditiveModel& model) {
 }
 
 std::vector<std::string> decisions_of(const AdditiveModel& model) {
-  const Json json = Json::parse(model.provenance_json, nullptr, false);
-  std::vector<std::string> decisions;
-  if (!json.is_object() || !json.contains("decisions") || !json["decisions"].is_array())
-    return decisions;
-  for (const Json& line : json["decisions"])
-    if (line.is_string()) decisions.push_back(line.get<std::string>());
-  return decisions;
+  return texts_in(Json::parse(model.provenance_json, nullptr, false), "decisions");
+}
+
+std::vector<std::string> doubts_of(const AdditiveModel& model) {
+  return texts_in(Json::parse(model.provenance_json, nullptr, false), "doubts");
 }
 
 std::string relative_error_text(const FitRecord& fit) {

@@ -30,6 +30,8 @@ Distortion distortion_of(const AdditiveModel& model);
 
 /// The decisions that a model's provenance tells.
 std::vector<std::string> decisions_of(const AdditiveModel& model);
+/// What the data of the fit were known to suffer from: doubts of their health, nonlinearity.
+std::vector<std::string> doubts_of(const AdditiveModel& model);
 
 /// "relative error 0.012", or that no channel responds.
 std::string relative_error_text(const FitRecord& fit);

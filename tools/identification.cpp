@@ -230,7 +230,7 @@ void Identification::check_model() {
     validation_ =
         validate(model_, select_band(*validation_frf_, low_hz, high_hz), distortion_of(model_));
   }
-  verdict_ = judge_model(model_.fit, health_, validation_);
+  verdict_ = judge_model(model_, health_, validation_);
   truth_ = compare_with_truth(model_, setup_->frf, config_.stage.spec);
 }
 

@@ -6,12 +6,14 @@
 #include <algorithm>
 
 #include "estimation/fit_options.hpp"
+#include "tools/fit_step.hpp"
 #include "tools/health_step.hpp"
 
 namespace stageid {
 
-ModelVerdict judge_model(const FitRecord& fit, const std::vector<Finding>& health,
+ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>& health,
                          const std::optional<Validation>& validation) {
+  const FitRecord& fit = model.fit;
   ModelVerdict verdict;
   const auto add = [&](std::string reason) {
     const auto holds = [&](const std::string& other) {
@@ -31,9 +33,11 @@ ModelVerdict judge_model(const FitRecord& fit, const std::vector<Finding>& healt
   if (fit.status == to_string(FitStatus::faulty_data)) judge_fit();
   for (std::string& fault : health_notes(health, Severity::fault)) distrust(std::move(fault));
   judge_fit();
+  // Before the residual: where that is too large they are the cause.
+  for (std::string& doubt : doubts_of(model)) add(std::move(doubt));
+  for (std::string& doubt : health_notes(health, Severity::doubt)) add(std::move(doubt));
   if (validation && !validation->explained)
     distrust("on data that were held back " + validation->reason);
-  for (std::string& doubt : health_notes(health, Severity::doubt)) add(std::move(doubt));
   verdict.validated = validation && validation->variance != ResidualVariance::none;
   return verdict;
 }

@@ -18,10 +18,10 @@ struct ModelVerdict {
   std::vector<std::string> reasons;  ///< the gravest first; of a trustworthy model what to look at
 };
 
-/// Faults of the data, the end of the fit, then the residual on data that were held back. Doubts about the data are
-/// reasons, but leave the model trustworthy.
+/// Faults of the data, the end of the fit, doubts about the data, then the residual on data that were held back. Doubts
+/// alone leave the model trustworthy.
 /// @param health of the data that the model is compared with, or was fitted to
-ModelVerdict judge_model(const FitRecord& fit, const std::vector<Finding>& health,
+ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>& health,
                          const std::optional<Validation>& validation);
 
 /// One sentence for people: "verdict: trustworthy, ...".

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "excitation/counted.hpp"
@@ -15,8 +16,12 @@ using Reasons = std::vector<std::string>;
 
 /// @returns whether the model is not to be trusted.
 bool judge_fit(const ReportData& data, Reasons& reasons) {
-  const ModelVerdict verdict = judge_model(data.model->fit, {}, data.validation);
-  reasons.insert(reasons.end(), verdict.reasons.begin(), verdict.reasons.end());
+  const ModelVerdict verdict = judge_model(*data.model, {}, data.validation);
+  for (const std::string& reason : verdict.reasons) {
+    // Doubts of the data stand among the findings already, without their remedy.
+    const auto said = [&](const std::string& other) { return reason.starts_with(other); };
+    if (std::ranges::none_of(reasons, said)) reasons.push_back(reason);
+  }
   return !verdict.trustworthy;
 }
 

@@ -162,7 +162,7 @@ void ValidateCommand::run() const {
     for (const std::string& line : prediction_lines(error)) console_.result(line);
     json["time_domain"] = prediction_json(error);
   }
-  const ModelVerdict verdict = judge_model(model.fit, health, validation);
+  const ModelVerdict verdict = judge_model(model, health, validation);
   console_.result(verdict_line(verdict));
   json.update(verdict_json(verdict));
   if (!verdict.trustworthy) console_.exit_code = kNotTrustworthy;
