@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "acquisition/convert_log.hpp"
@@ -22,6 +23,8 @@ namespace stageid::test {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kHeave = 2;  // of wafer_stage_modes()
 
 /// NaN where JSON has null.
 double number(const Json& object, const char* key) {
@@ -96,15 +99,26 @@ WaferStageSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
   return spec;
 }
 
-/// Mean |P - G|^2 over the variance of the measured response, noise and what realizations scatter beyond it.
-double excess_of(const AdditiveModel& model, const FrfEstimate& frf, const WaferStageSpec& spec) {
+/// The modes of the best linear approximation: the plant's, with the nonlinear force on the heave linearized.
+std::vector<PlantMode> linear_modes(const WaferStageSpec& spec, const HeaveLinearization& heave) {
+  std::vector<PlantMode> modes = wafer_stage_modes(spec);
+  PlantMode& mode = modes[kHeave];
+  const double own = 2.0 * std::numbers::pi * mode.natural_frequency_hz;
+  const double omega = std::sqrt(own * own + heave.stiffness_n_m / spec.mass_kg);
+  mode.damping_ratio =
+      (mode.damping_ratio * own + 0.5 * heave.damping_n_s_m / spec.mass_kg) / omega;
+  mode.natural_frequency_hz = omega / (2.0 * std::numbers::pi);
+  return modes;
+}
+
+/// Squared error of the model over that of the measured response, weighed by the variances of noise.
+double excess_of(const AdditiveModel& model, const FrfEstimate& frf, const WaferStageSpec& spec,
+                 const HeaveLinearization& heave) {
   if (frf.noise_variance.size() == 0) return 0.0;
-  const std::vector<PlantMode> modes = wafer_stage_modes(spec);
+  const std::vector<PlantMode> modes = linear_modes(spec, heave);
   const Eigen::MatrixXcd response = response_like(model, frf);
-  double beyond = 1.0;
-  if (frf.total_variance.size() > 0)
-    beyond = std::max(1.0, (frf.total_variance.array() / frf.noise_variance.array()).mean());
-  double sum = 0.0;
+  double of_model = 0.0;
+  double of_measurement = 0.0;
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     const Eigen::MatrixXcd whole =
         sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, frf.frequency_hz[k]);
@@ -114,14 +128,15 @@ double excess_of(const AdditiveModel& model, const FrfEstimate& frf, const Wafer
         const std::complex<double> exact = whole(
             channel_index(spec.info.sensors, frf.outputs.names[static_cast<std::size_t>(i)]),
             channel_index(spec.info.actuators, frf.inputs.names[static_cast<std::size_t>(j)]));
-        sum += std::norm(response(c, k) - exact) / (beyond * frf.noise_variance(c, k));
+        of_model += std::norm(response(c, k) - exact) / frf.noise_variance(c, k);
+        of_measurement += std::norm(frf.response(c, k) - exact) / frf.noise_variance(c, k);
       }
   }
-  return sum / static_cast<double>(response.size());
+  return of_model / of_measurement;
 }
 
 void compare(const AdditiveModel& model, const FrfEstimate& frf, const WaferStageSpec& spec,
-             Json& result) {
+             const HeaveLinearization& heave, Json& result) {
   const TruthComparison truth = compare_with_truth(model, frf, spec);
   Json df = Json::array();
   Json dz = Json::array();
@@ -135,10 +150,14 @@ void compare(const AdditiveModel& model, const FrfEstimate& frf, const WaferStag
   result["true_modes"] = truth.modes.size();
   result["found"] = found;
   result["extra"] = truth.extra_hz;
+  if (model.input_delay_std_s.size() > 0 && model.input_delay_std_s[0] > 0.0)
+    result["delay_deviation"] =
+        (model.input_delays_s()[0] - spec.delay_s) / model.input_delay_std_s[0];
+
   result["df"] = std::move(df);
   result["dz"] = std::move(dz);
   result["relative_error"] = truth.relative_rms_error;
-  result["excess"] = excess_of(model, frf, spec);
+  result["excess"] = excess_of(model, frf, spec, heave);
 }
 
 /// The first thing that a reader of exit code 3 is told: the finding of a log that is not to be trusted, then the
@@ -172,7 +191,8 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
 void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& session,
                const std::filesystem::path& directory, Json& result) {
   const auto path = [&](const char* name) { return (directory / name).string(); };
-  convert_log(measure_with_trouble(stage, plan), directory / "log.h5");
+  const TroubledMeasurement measured = measure_with_trouble(stage, plan);
+  convert_log(measured.log, directory / "log.h5");
   std::vector<std::string> words = {
       "frf",          path("log.h5"),   "-o",
       path("frf.h5"), "--realizations", realization_list(stage.realizations - 1)};
@@ -215,7 +235,7 @@ void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& se
   result["periods"] = stage.plan().experiments() * (stage.realizations - 1) * stage.periods;
   if (fitted)
     compare(read_model(directory / "model.json"), read_frf(directory / "frf.h5"),
-            plant_of(stage, plan), result);
+            plant_of(stage, plan), measured.heave, result);
 }
 
 }  // namespace

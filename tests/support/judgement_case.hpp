@@ -14,7 +14,8 @@ namespace stageid::test {
 /// Keys: seed, trouble, variant, stage, exit (the largest of the exit codes `exits`), said (the first cause: a
 /// finding's, or the sentence of the verdict), right (whether `said` names what was planted), findings, message,
 /// true_modes, found, extra, df, dz (errors of found modes in reported standard deviations), relative_error,
-/// excess (mean |P - G|^2 over the variance of the measured response: p / 2n_data expected of an efficient fit),
+/// excess (squared error of the model over that of the measured response: p / 2n_data expected of an efficient fit),
+/// delay_deviation (error of the delay in reported standard deviations),
 /// dropped, periods, seconds.
 nlohmann::ordered_json judge_case(std::uint64_t seed, Trouble trouble,
                                   const std::filesystem::path& program,

@@ -43,6 +43,27 @@ double setpoint(double turns) {
          0.3 * std::sin(kTwoPi * 1.3124 * turns + 2.0);
 }
 
+/// Sums over the samples of all runs, for a HeaveLinearization.
+class HeaveRegression {
+ public:
+  void add(double z_m, double v_m_s, double force_n) {
+    displacement_ += z_m * z_m;
+    velocity_ += v_m_s * v_m_s;
+    stiffness_ -= force_n * z_m;
+    damping_ -= force_n * v_m_s;
+  }
+  HeaveLinearization result() const {
+    if (displacement_ == 0.0 || velocity_ == 0.0) return {};
+    return {stiffness_ / displacement_, damping_ / velocity_};
+  }
+
+ private:
+  double displacement_ = 0.0;
+  double velocity_ = 0.0;
+  double stiffness_ = 0.0;
+  double damping_ = 0.0;
+};
+
 /// The closed loop, sample by sample.
 class Loop {
  public:
@@ -69,6 +90,7 @@ class Loop {
     noise_.restart(stage_.spec.seed + stage_.seed, seed);
     coloured_.restart(~stage_.seed, seed);
     if (friction_) friction_->reset();
+    last_z_m_ = 0.0;
     LogSamples record;
     record.actuators.resize(samples, u_.size());
     record.sensors.resize(samples, y_.size());
@@ -85,6 +107,7 @@ class Loop {
     }
     return record;
   }
+  HeaveLinearization heave() const { return regression_.result(); }
 
  private:
   void drift(double done) {
@@ -117,6 +140,8 @@ class Loop {
     const double z_m = shape * plant_.coordinate(kHeave);
     double extra_n = -plan_.cubic_n_m3 * z_m * z_m * z_m;
     if (friction_) extra_n += friction_->move_to(z_m);
+    regression_.add(z_m, (z_m - last_z_m_) * stage_.spec.info.sample_rate_hz, extra_n);
+    last_z_m_ = z_m;
     if (extra_n != 0.0) plant_.add_modal_force(kHeave, shape * extra_n);
     plant_.step(force_.data());
   }
@@ -129,6 +154,8 @@ class Loop {
   ColouredNoise coloured_;
   std::optional<DahlFriction> friction_;
   std::vector<double> heave_;
+  HeaveRegression regression_;
+  double last_z_m_ = 0.0;
   Eigen::VectorXd y_;
   Eigen::VectorXd seen_;  // what the controller is given: the error from the setpoint
   Eigen::VectorXd u_;
@@ -186,7 +213,7 @@ void spoil(const TroublePlan& plan, int run, Eigen::Index transient, MemoryLog& 
 
 }  // namespace
 
-MemoryLog measure_with_trouble(const JudgementStage& stage, const TroublePlan& plan) {
+TroubledMeasurement measure_with_trouble(const JudgementStage& stage, const TroublePlan& plan) {
   const ExperimentPlan experiment = stage.plan();
   const Eigen::Index period = stage.period_samples;
   const Eigen::Index transient = period * stage.transient_periods;
@@ -216,7 +243,7 @@ MemoryLog measure_with_trouble(const JudgementStage& stage, const TroublePlan& p
     log.log_runs.back().samples = static_cast<std::uint64_t>(samples);
     log.records.back().marked.setZero(samples);
   }
-  return log;
+  return {std::move(log), loop.heave()};
 }
 
 }  // namespace stageid::test

@@ -18,7 +18,8 @@ namespace stageid::test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kSuspensionHz = 0.02;  // far below all lines: the rigid body is free there
+constexpr double kSuspensionHz =
+    0.02;  // far below all lines: of its springs they see little, but all together enough to shift a delay
 constexpr double kDecayed = 1e-5;
 
 struct Sizes {
