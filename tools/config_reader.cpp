@@ -174,6 +174,21 @@ class MapReader final : public ConfigVisitor {
         });
     });
   }
+  void named_texts(const char* key, std::vector<std::pair<std::string, std::string>>& values,
+                   Presence presence, const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      if (node->kind != YamlNode::Kind::map) wrong(key, *node, "a map {name: text, ...}");
+      values.clear();
+      for (const YamlNode::Entry& entry : node->entries)
+        errors_.attempt([&] {
+          const YamlNode& value = document_.node(entry.value);
+          if (value.kind != YamlNode::Kind::scalar) wrong(entry.key.c_str(), value, "a text");
+          values.emplace_back(entry.key, value.text);
+        });
+    });
+  }
   void group(const char* key, const Describe& describe, Presence presence,
              const char* help) override {
     errors_.attempt([&] {

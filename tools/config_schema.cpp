@@ -54,6 +54,10 @@ class SchemaCollector final : public ConfigVisitor {
                      const NumberRule& rule, Presence presence, const char* help) override {
     add(key, "map of name: number", rule, "{}", presence, help);
   }
+  void named_texts(const char* key, std::vector<std::pair<std::string, std::string>>&,
+                   Presence presence, const char* help) override {
+    add(key, "map of name: text", {}, "{}", presence, help);
+  }
   void group(const char* key, const Describe& describe, Presence presence,
              const char* help) override {
     add(key, "map", {}, "", presence, help);

@@ -76,6 +76,9 @@ class ConfigVisitor {
   /// A map whose keys are free names.
   virtual void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,
                              const NumberRule& rule, Presence presence, const char* help) = 0;
+  virtual void named_texts(const char* key,
+                           std::vector<std::pair<std::string, std::string>>& values,
+                           Presence presence, const char* help) = 0;
   /// A map with keys of its own.
   virtual void group(const char* key, const Describe& describe, Presence presence,
                      const char* help) = 0;

@@ -7,6 +7,7 @@
 #include "acquisition/log_reader.hpp"
 #include "acquisition/run_resident.hpp"
 #include "hal/motion_controller.hpp"
+#include "hal/plugin_stage.hpp"
 #include "hal/replay_stage.hpp"
 #include "tools/can_backend.hpp"
 #include "tools/exit_code.hpp"
@@ -98,6 +99,7 @@ std::unique_ptr<CyclicStage> replayed_stage(const ExperimentConfig& config,
 void require_backend(const ExperimentConfig& config, Backend backend) {
   const bool there = backend == Backend::can      ? config.stage.can.present
                      : backend == Backend::modbus ? config.stage.modbus.has_value()
+                     : backend == Backend::plugin ? config.stage.plugin.has_value()
                                                   : true;
   if (!there)
     throw std::invalid_argument(
@@ -127,6 +129,8 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
     }
     case Backend::modbus:
       return streamed(make_modbus_stage(config.stage, {spec.pace, request.reset_fault}));
+    case Backend::plugin:
+      return streamed(std::make_unique<PluginStage>(spec.info, *config.stage.plugin, spec.pace));
     case Backend::replay:
       break;
   }

@@ -20,10 +20,11 @@ namespace {
 
 Backend backend_of(const std::string& name, Backend configured) {
   if (name.empty()) return configured;
-  for (const Backend backend : {Backend::sim, Backend::can, Backend::modbus, Backend::replay})
+  for (const Backend backend :
+       {Backend::sim, Backend::can, Backend::modbus, Backend::plugin, Backend::replay})
     if (name == to_string(backend)) return backend;
   throw std::invalid_argument(
-      fmt::format("--backend: '{}'; write one of sim, can, modbus, replay", name));
+      fmt::format("--backend: '{}'; write one of sim, can, modbus, plugin, replay", name));
 }
 
 }  // namespace
@@ -33,7 +34,7 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("config", config_, "experiment file (.yaml)")->required();
   command->add_option("-o,--output", output_, "log to write (.slog)")->required();
   command->add_option("--backend", backend_,
-                      "sim | can | modbus | replay, instead of the stage file's");
+                      "sim | can | modbus | plugin | replay, instead of the stage file's");
   command->add_option("--replay", replay_, "backend replay: the log that is played");
   command
       ->add_option("--replay-tolerance", replay_tolerance_n_,

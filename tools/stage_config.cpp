@@ -108,6 +108,8 @@ const char* to_string(Backend backend) noexcept {
       return "can";
     case Backend::modbus:
       return "modbus";
+    case Backend::plugin:
+      return "plugin";
     case Backend::replay:
       return "replay";
   }
@@ -138,6 +140,8 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
   config.real_time = file.real_time;
   config.modbus = file.modbus.stage;
   config.supervisor = file.modbus.supervisor;
+  config.plugin = file.plugin;
+  if (config.plugin) config.plugin->library = path.parent_path() / config.plugin->library;
   // What the libraries refuse gets the file's name; the place is in their own words.
   try {
     complete_spec(config, file);

@@ -9,6 +9,7 @@
 
 #include "hal/limited_stage.hpp"
 #include "hal/motion_controller.hpp"
+#include "hal/plugin_stage.hpp"
 #include "hal/simulated_stage.hpp"
 #include "tools/can_config.hpp"
 #include "tools/config_visitor.hpp"
@@ -17,7 +18,7 @@
 
 namespace stageid {
 
-enum class Backend : std::uint8_t { sim, can, modbus, replay };
+enum class Backend : std::uint8_t { sim, can, modbus, plugin, replay };
 const char* to_string(Backend backend) noexcept;
 
 /// A stage file as it stands, before the geometry becomes a WaferStageSpec.
@@ -29,6 +30,7 @@ struct StageConfig {
   WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
   CanConfig can;
   std::optional<ModbusConfig> modbus;          ///< of the stage
+  std::optional<PluginSpec> plugin;            ///< a back end of others
   std::optional<SupervisorConfig> supervisor;  ///< of what stands around it
 };
 

@@ -168,13 +168,21 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
   list.push_back(std::move(f));
 }
 
+void describe_plugin(ConfigVisitor& v, PluginSpec& plugin) {
+  std::string library = plugin.library.string();
+  v.text("library", library, kRequired,
+         "shared library with the interface of stageid_backend.h; seen from this file");
+  plugin.library = library;
+  v.named_texts("keys", plugin.keys, kOptional, "what the library wants to know");
+}
+
 }  // namespace
 
 void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   WaferStageSpec& s = f.spec;
   v.choice("format", f.format, {"stageid-stage"}, kRequired, "what this file is");
   v.text("name", s.info.name, kRequired, "of the stage");
-  v.choice("backend", f.backend, {"sim", "can", "modbus"}, kOptional,
+  v.choice("backend", f.backend, {"sim", "can", "modbus", "plugin"}, kOptional,
            "what stands behind the stage");
   v.number("sample_rate_hz", s.info.sample_rate_hz, positive("Hz"), kRequired, "of the loop");
   v.number("delay_s", s.delay_s, not_negative("s"), kOptional,
@@ -205,6 +213,14 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
       "realtime", [&](ConfigVisitor& keys) { describe_real_time(keys, f.real_time); }, kOptional,
       "of the loop's thread; without meaning in virtual time");
   describe_modbus_groups(v, f.backend == static_cast<std::size_t>(Backend::modbus), f.modbus);
+  v.group(
+      "plugin",
+      [&](ConfigVisitor& keys) {
+        f.plugin.emplace();
+        describe_plugin(keys, *f.plugin);
+      },
+      f.backend == static_cast<std::size_t>(Backend::plugin) ? kRequired : kOptional,
+      "a back end of your own, see docs/plugins.md");
   v.items(
       "faults", [&](ConfigVisitor& fault) { describe_fault(fault, f.faults); }, {}, kOptional,
       "faults on request, to try the safety");

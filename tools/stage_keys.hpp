@@ -2,10 +2,12 @@
 
 #include <array>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "hal/plugin_stage.hpp"
 #include "hal/rigid_body.hpp"
 #include "hal/simulated_stage.hpp"
 #include "tools/can_config.hpp"
@@ -54,6 +56,7 @@ struct StageFile {
   RealTimeKeys real_time;
   CanFile can;
   ModbusGroups modbus;
+  std::optional<PluginSpec> plugin;
   WaferStageSpec spec;
 };
 

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""A back end of somebody else: docs/examples/plugin/udp_stage.c, built outside the tree against the header alone,
+measures the small stage in another process.
+
+plugin_test.py STAGEID UDP_PEER SOURCE_DIR WORK_DIR
+"""
+
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import unittest
+
+PROGRAM, PEER, SOURCE, WORK = sys.argv[1:5]
+STAGE = pathlib.Path(SOURCE) / "configs/stage/small_stage.yaml"
+EXPERIMENT = pathlib.Path(SOURCE) / "configs/experiment/small_stage.yaml"
+
+
+def run(*words):
+    return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True, timeout=250)
+
+
+class Plugin(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.work = pathlib.Path(WORK)
+        shutil.rmtree(cls.work, ignore_errors=True)
+        cls.work.mkdir(parents=True)
+        shutil.copy(f"{SOURCE}/docs/examples/plugin/udp_stage.c", cls.work)
+        shutil.copy(f"{SOURCE}/hal/stageid_backend.h", cls.work)
+        subprocess.run(["cc", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o", "udp_stage.so",
+                        "udp_stage.c"], cwd=cls.work, check=True)
+
+    def setUp(self):
+        self.peers = []
+
+    def tearDown(self):
+        for peer in self.peers:
+            peer.kill()
+            peer.wait()
+            peer.stdout.close()
+
+    def peer(self, *cycles):
+        peer = subprocess.Popen([PEER, STAGE, *map(str, cycles)], stdout=subprocess.PIPE, text=True)
+        self.peers.append(peer)
+        return int(peer.stdout.readline())
+
+    def experiment(self, name, plugin):
+        stage = STAGE.read_text().replace("backend: sim", f"backend: plugin\nplugin: {plugin}")
+        (self.work / f"{name}_stage.yaml").write_text(stage)
+        file = self.work / f"{name}.yaml"
+        file.write_text(EXPERIMENT.read_text().replace("../stage/small_stage.yaml", f"{name}_stage.yaml"))
+        return file
+
+    def udp(self, name, port):
+        return self.experiment(name, f"{{library: ./udp_stage.so, keys: {{port: {port}}}}}")
+
+    def test_measures_the_small_stage(self):
+        log = self.work / "good.slog"
+        done = run("run", self.udp("good", self.peer()), "-o", log)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        frf, model = self.work / "frf.h5", self.work / "model.json"
+        done = run("frf", log, "-o", frf)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("--json", "fit", frf, "-o", model, "--rigid-body", "suspension:0.4:0.5", "--direct-term", "full")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        modes = [mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"]]
+        truth = run("identify", EXPERIMENT, "-o", self.work / "truth")
+        self.assertEqual(truth.returncode, 0, truth.stderr)
+        true_modes = json.loads((self.work / "truth/summary.json").read_text())["truth"]["modes"]
+        flexible = [m["true_frequency_hz"] for m in true_modes if m["true_frequency_hz"] > 16]
+        self.assertGreaterEqual(len(flexible), 4)
+        for true_hz in flexible:
+            nearest = min(modes, key=lambda hz: abs(hz - true_hz))
+            self.assertLess(abs(nearest / true_hz - 1.0), 1e-4)
+
+    def test_a_silent_stage_ends_the_run_and_the_rest_is_measured_later(self):
+        log = self.work / "silent.slog"
+        done = run("run", self.udp("silent", self.peer(4000)), "-o", log)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        done = run("run", self.udp("silent", self.peer()), "-o", log, "--resume")
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def refused(self, name, plugin, *words):
+        done = run("run", self.experiment(name, plugin), "-o", self.work / f"{name}.slog")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual(len(done.stderr.strip().splitlines()[-1:]), 1)
+        for word in words:
+            self.assertIn(word, done.stderr)
+        self.assertFalse((self.work / f"{name}.slog").exists())
+
+    def test_refuses_what_is_no_back_end(self):
+        self.refused("missing", "{library: ./nothing.so}", "nothing.so", "cannot be loaded")
+        (self.work / "text.so").write_text("no library")
+        self.refused("text", "{library: ./text.so}", "text.so", "cannot be loaded")
+        (self.work / "other.c").write_text("int other(void) { return 1; }\n")
+        subprocess.run(["cc", "-shared", "-fPIC", "-o", "other.so", "other.c"], cwd=self.work, check=True)
+        self.refused("other", "{library: ./other.so}", "stageid_get_backend()")
+        source = (self.work / "udp_stage.c").read_text()
+        (self.work / "old.c").write_text(source.replace("calls = {STAGEID_BACKEND_VERSION", "calls = {99"))
+        subprocess.run(["cc", "-shared", "-fPIC", "-o", "old.so", "old.c"], cwd=self.work, check=True)
+        self.refused("old", "{library: ./old.so}", "interface version 99")
+        self.refused("portless", "{library: ./udp_stage.so}", "write keys")
+        self.refused("nobody", "{library: ./udp_stage.so, keys: {port: 9}}", "does not answer")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
