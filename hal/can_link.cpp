@@ -111,11 +111,10 @@ CanState CanLink::command(CanCommand command, const Other& other) {
   command.host = host_;
   command.session = session_;
   const std::string& bus = transport_.name(0);
-  const PeerStatus stranger = boot_ == 0 ? PeerStatus::two_nodes : PeerStatus::other_node;
+  const bool greeting = boot_ == 0;
   const bool answered = exchange(command, other);
-  if (other_node_)
-    refuse(stranger, fmt::format("can: {}", bus),
-           "; give each bus one node with these identifiers");
+  if (other_node_ && !greeting)
+    refuse(PeerStatus::other_node, fmt::format("can: {}", bus), "; start the run again");
   if (!answered) {
     if (interrupted()) throw StageError(fmt::format("can: {}: interrupted", bus));
     const WorstBus worst = worst_bus(transport_);

@@ -73,7 +73,9 @@ std::string CanPlayer::prepare(const CanCommand& command) {
 }
 
 bool CanPlayer::take_chunk(const CanChunk& chunk) noexcept {
-  if (busy() || chunk.token != token_ || chunk.index >= received_.size()) return false;
+  // What is armed has been compared with its digest.
+  if (busy() || status_ == CanResident::armed) return false;
+  if (chunk.token != token_ || chunk.index >= received_.size()) return false;
   const std::size_t from = chunk.index * kCanChunkBytes;
   if (chunk.bytes.size() != std::min(kCanChunkBytes, waveform_.size() - from)) return false;
   std::copy(chunk.bytes.begin(), chunk.bytes.end(),

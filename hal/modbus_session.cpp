@@ -131,25 +131,14 @@ ModbusState read_state(ModbusLink& link) {
           (block[map::kFlags] & map::kFlagEnabled) != 0};
 }
 
-void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
-  const std::uint32_t sequence = Block(link, map::kCommandEcho, 2)[map::kCommandEcho] + 1;
-  std::array<std::uint16_t, 4> request{};
-  put_u32(std::span(request).first<2>(), static_cast<std::uint32_t>(command) + 1);
-  put_u32(std::span(request).last<2>(), sequence);
-  std::array<std::uint16_t, 4> reply{};
-  const auto replied = std::span<const std::uint16_t, 4>(reply);
-  transact(link, map::kCommand, request, map::kCommandEcho, reply,
-           [&] { return get_u32(replied.first<2>()) == sequence; });
-  if (get_u32(replied.last<2>()) == map::kReplyAccepted) return;
-  const ModbusState status = read_state(link);
-  throw StageError(
-      fmt::format("{}: the command is refused in state {} (fault: {}{}); remove the cause and add "
-                  "--reset-fault",
-                  to_string(link.address()), to_string(status.state), to_string(status.cause),
-                  status.interlock_closed ? "" : "; the interlock is open"));
-}
-
 namespace {
+
+std::string describe(const ModbusState& state) {
+  return fmt::format("state {}, cause: {}{}; remove the cause{}", to_string(state.state),
+                     to_string(state.cause),
+                     state.interlock_closed ? "" : ", the interlock is open",
+                     state.state == NodeState::fault ? " and add --reset-fault" : "");
+}
 
 /// Gives a run command; `session`: the key that the answer must carry, 0: any but 0.
 /// @return the key in the answer.
@@ -172,6 +161,20 @@ std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uin
 
 }  // namespace
 
+void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
+  const std::uint32_t sequence = Block(link, map::kCommandEcho, 2)[map::kCommandEcho] + 1;
+  std::array<std::uint16_t, 4> request{};
+  put_u32(std::span(request).first<2>(), static_cast<std::uint32_t>(command) + 1);
+  put_u32(std::span(request).last<2>(), sequence);
+  std::array<std::uint16_t, 4> reply{};
+  const auto replied = std::span<const std::uint16_t, 4>(reply);
+  transact(link, map::kCommand, request, map::kCommandEcho, reply,
+           [&] { return get_u32(replied.first<2>()) == sequence; });
+  if (get_u32(replied.last<2>()) == map::kReplyAccepted) return;
+  throw StageError(fmt::format("{}: the command is refused: {}", to_string(link.address()),
+                               describe(read_state(link))));
+}
+
 std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
                         std::vector<std::uint16_t>& reply) {
   try {
@@ -181,10 +184,7 @@ std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
   }
   const std::string place = to_string(link.address());
   if (link.refused_as_busy()) refuse(PeerStatus::held, place, "; wait until it has ended");
-  const ModbusState now = read_state(link);
-  throw StageError(
-      fmt::format("{}: no measurement in state {} ({}); enable it, or add --reset-fault", place,
-                  to_string(now.state), to_string(now.cause)));
+  throw StageError(fmt::format("{}: no run begins: {}", place, describe(read_state(link))));
 }
 
 void end_run(ModbusLink& link, std::uint32_t session, std::vector<std::uint16_t>& reply) {

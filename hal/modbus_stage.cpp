@@ -92,8 +92,9 @@ void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
     description_ = read_description(link_, info_);
   }
   const ModbusState node = read_state(link_);
+  const bool reset_fault = std::exchange(reset_fault_, false);
   if (node.state == NodeState::fault) {
-    if (!std::exchange(reset_fault_, false))
+    if (!reset_fault)
       refuse(PeerStatus::in_fault, to_string(link_.address()),
              fmt::format(" ({}{}); remove the cause and add --reset-fault", to_string(node.cause),
                          node.interlock_closed ? "" : "; the interlock is open"));

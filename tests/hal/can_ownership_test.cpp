@@ -355,6 +355,15 @@ TEST(CanOwnership, AnArmedNodeWhoseHostFallsSilentIsFreeAgain) {
   static_cast<void>(rig.pair().host().send({&frame, 1}));
   rig.serve_ms(1);
   ASSERT_NE(rig.node().session(), 0U);
+  // A chunk that comes now must not change the waveform whose digest was looked at.
+  const std::uint32_t rejected = rig.front().rejected();
+  for (int token = 0; token < 256; ++token) {
+    const CanFrame late = encode_can_chunk(
+        kCanUploadId, {0, static_cast<std::uint8_t>(token), std::span(bytes).first(56)});
+    static_cast<void>(rig.pair().host().send({&late, 1}));
+  }
+  rig.serve_ms(5);
+  EXPECT_EQ(rig.front().rejected(), rejected + 256);
   Host host(rig);
   EXPECT_THAT(refusal([&] { host.start(); }), HasSubstr("another host measures"));
   rig.serve_ms(1100);
