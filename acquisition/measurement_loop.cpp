@@ -28,7 +28,7 @@ bool ends_at_once(Outcome outcome) noexcept {
 }
 
 bool gives_measurement(Outcome outcome) noexcept {
-  return outcome == Outcome::ok || outcome == Outcome::late;
+  return outcome == Outcome::ok || outcome == Outcome::late || outcome == Outcome::bus_passive;
 }
 
 }  // namespace
@@ -217,7 +217,7 @@ void MeasurementLoop::take_measurement(Outcome outcome) noexcept {
       bucket_ = std::max(0, bucket_ - 1);
       return;
     }
-    health_.late += recording() ? 1U : 0U;
+    health_.late += recording() && outcome == Outcome::late ? 1U : 0U;
     count_bad_cycle(outcome);
     return;
   }

@@ -159,6 +159,10 @@ class Experiment {
         if (reason == StopReason::none) continue;
         finish(reason);
       } catch (const StageError& error) {  // it does not start
+        if (interrupted()) {
+          finish(StopReason::interrupt);
+          break;
+        }
         result_.end = ExperimentEnd::fault;
         result_.message = fmt::format("stage '{}': {}", stage_.info().name, error.what());
       }

@@ -99,7 +99,8 @@ class ResidentExperiment {
       play(id);
       static_cast<void>(stage_.download(sink));
     } catch (const StageError& error) {
-      end_with(ExperimentEnd::fault, error.what());
+      end_with(options_.interrupted() ? ExperimentEnd::interrupted : ExperimentEnd::fault,
+               error.what());
     }
     run.health = sink.health;
     run.health.seconds =

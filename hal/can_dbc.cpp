@@ -68,7 +68,7 @@ Message values(const CanValueFrame& frame, std::size_t number, bool setpoint,
                const std::vector<CanScale>& scales, const std::vector<Channel>& channels) {
   Message message(frame.id, fmt::format("{}_{}", setpoint ? "setpoint" : "measurement", number),
                   frame.payload_bytes(), setpoint);
-  message.header(setpoint ? "reserved" : "state", "time_us");
+  message.header(setpoint ? "reserved" : "state", setpoint ? "tag" : "time_us");
   std::size_t at = kCanHeaderBytes;
   for (const int channel : frame.channels) {
     const auto index = static_cast<std::size_t>(channel);
@@ -89,12 +89,15 @@ std::string state_names() {
 
 std::string can_dbc(const CanLayout& layout, const StageInfo& info) {
   std::vector<Message> messages;
-  messages.push_back(Message(kCanCommandId, "command", 24, true)
+  messages.push_back(Message(kCanCommandId, "command", kCanCommandBytes, true)
                          .header("code", "reserved")
                          .integer("a", 8, 8)
                          .integer("b", 16, 8)
                          .integer("c", 24, 4)
-                         .integer("d", 28, 4));
+                         .integer("d", 28, 4)
+                         .integer("host", 32, 4)
+                         .integer("session", 36, 4)
+                         .integer("version", 40, 1));
   for (std::size_t i = 0; i < layout.setpoints.size(); ++i)
     messages.push_back(values(layout.setpoints[i], i, true, layout.actuator_scale, info.actuators));
   for (std::size_t i = 0; i < layout.sensors.size(); ++i)
@@ -109,7 +112,10 @@ std::string can_dbc(const CanLayout& layout, const StageInfo& info) {
                          .integer("repeated", 16, 4)
                          .integer("rejected", 20, 4)
                          .integer("sample", 24, 8)
-                         .integer("fingerprint", 32, 4));
+                         .integer("fingerprint", 32, 4)
+                         .integer("boot", 36, 4)
+                         .integer("host", 40, 4)
+                         .integer("session", 44, 4));
   messages.push_back(Message(kCanTextId, "text", kCanChunkBytes, false).header("reserved", "part"));
   messages.push_back(
       Message(kCanUploadId, "upload", kCanChunkBytes, true).header("chunk_high", "bytes"));

@@ -23,8 +23,8 @@ std::size_t can_fd_length(std::size_t bytes) noexcept;
 ///
 ///   0  u16  sequence   of the sample, or of the command
 ///   2  u8   kind       state, command or flags: see can_messages.hpp
-///   3  u8   run        token of the run: frames of another run are foreign
-///   4  u16  detail     time in microseconds, or a number of a part
+///   3  u8   run        low byte of the run's key: frames of another run are foreign
+///   4  u16  detail     time in microseconds, more of the key, or a number of a part
 ///   6  u16  crc        CRC-16 over the identifier and all other bytes of the frame
 struct CanHeader {
   std::uint16_t sequence = 0;

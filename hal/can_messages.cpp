@@ -6,7 +6,7 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kCommandBytes = 24;
+constexpr std::size_t kOldCommandBytes = 24;  // version 1
 constexpr std::size_t kTextBytes = 56;
 constexpr std::size_t kMissingBytes = 48;
 constexpr std::size_t kAt = kCanHeaderBytes;
@@ -17,13 +17,6 @@ CanHeader numbered(std::uint32_t number, std::uint8_t run, std::uint16_t detail)
 }
 std::uint32_t number_of(const CanHeader& header) noexcept {
   return header.sequence | static_cast<std::uint32_t>(header.kind) << 16;
-}
-
-template <typename Enum>
-bool take_enum(const CanFrame& frame, std::size_t at, Enum last, Enum& value) noexcept {
-  const auto raw = get_can<std::uint8_t>(frame, at);
-  value = static_cast<Enum>(raw);
-  return raw <= static_cast<std::uint8_t>(last);
 }
 
 }  // namespace
@@ -67,25 +60,39 @@ CanFrame encode_can_command(const CanCommand& command) noexcept {
   put_can(frame, kAt + 8, command.b);
   put_can(frame, kAt + 16, command.c);
   put_can(frame, kAt + 20, command.d);
-  seal_can_frame(frame, {command.sequence, static_cast<std::uint8_t>(command.code), command.run, 0},
-                 kCommandBytes);
+  put_can(frame, kAt + 24, command.host);
+  put_can(frame, kAt + 28, command.session);
+  put_can(frame, kAt + 32, command.version);
+  seal_can_frame(
+      frame,
+      {command.sequence, static_cast<std::uint8_t>(command.code), can_run(command.session), 0},
+      kCanCommandBytes);
   return frame;
 }
 
 bool decode_can_command(const CanFrame& frame, CanCommand& command) noexcept {
   CanHeader header;
-  if (frame.id != kCanCommandId || !open_can_frame(frame, kCommandBytes, header)) return false;
+  if (frame.id != kCanCommandId) return false;
+  const bool old = open_can_frame(frame, kOldCommandBytes, header);
+  if (!old && !open_can_frame(frame, kCanCommandBytes, header)) return false;
   const bool slow = header.kind >= static_cast<std::uint8_t>(CanCommandCode::upload) &&
                     header.kind <= static_cast<std::uint8_t>(CanCommandCode::download);
   const bool quick = header.kind >= static_cast<std::uint8_t>(CanCommandCode::hello) &&
                      header.kind <= static_cast<std::uint8_t>(CanCommandCode::reset_fault);
-  command = {static_cast<CanCommandCode>(header.kind),
-             header.sequence,
-             header.run,
-             get_can<std::uint64_t>(frame, kAt),
-             get_can<std::uint64_t>(frame, kAt + 8),
-             get_can<std::uint32_t>(frame, kAt + 16),
-             get_can<std::uint32_t>(frame, kAt + 20)};
+  command = {};
+  command.code = static_cast<CanCommandCode>(header.kind);
+  command.sequence = header.sequence;
+  if (old) {
+    command.version = 1;
+    return quick || slow;
+  }
+  command.a = get_can<std::uint64_t>(frame, kAt);
+  command.b = get_can<std::uint64_t>(frame, kAt + 8);
+  command.c = get_can<std::uint32_t>(frame, kAt + 16);
+  command.d = get_can<std::uint32_t>(frame, kAt + 20);
+  command.host = get_can<std::uint32_t>(frame, kAt + 24);
+  command.session = get_can<std::uint32_t>(frame, kAt + 28);
+  command.version = get_can<std::uint8_t>(frame, kAt + 32);
   return quick || slow;
 }
 
@@ -101,6 +108,9 @@ CanFrame encode_can_state(const CanState& state) noexcept {
   put_can(frame, kAt + 12, state.rejected);
   put_can(frame, kAt + 16, state.sample);
   put_can(frame, kAt + 24, state.fingerprint);
+  put_can(frame, kAt + 28, state.boot);
+  put_can(frame, kAt + 32, state.host);
+  put_can(frame, kAt + 36, state.session);
   seal_can_frame(frame, {state.sequence, static_cast<std::uint8_t>(state.state), state.run, 0},
                  kCanStateBytes);
   return frame;
@@ -110,17 +120,21 @@ bool decode_can_state(const CanFrame& frame, CanState& state) noexcept {
   CanHeader header;
   if (frame.id != kCanStateId || !open_can_frame(frame, kCanStateBytes, header)) return false;
   state.sequence = header.sequence;
+  state.state = static_cast<NodeState>(header.kind);
   state.run = header.run;
   state.version = get_can<std::uint8_t>(frame, kAt);
+  state.cause = static_cast<FaultCause>(get_can<std::uint8_t>(frame, kAt + 1));
+  state.answer = static_cast<CanAnswer>(get_can<std::uint8_t>(frame, kAt + 2));
+  state.resident = static_cast<CanResident>(get_can<std::uint8_t>(frame, kAt + 3));
   state.gaps = get_can<std::uint32_t>(frame, kAt + 4);
   state.repeated = get_can<std::uint32_t>(frame, kAt + 8);
   state.rejected = get_can<std::uint32_t>(frame, kAt + 12);
   state.sample = get_can<std::uint64_t>(frame, kAt + 16);
   state.fingerprint = get_can<std::uint32_t>(frame, kAt + 24);
-  return take_enum(frame, 2, NodeState::fault, state.state) &&
-         take_enum(frame, kAt + 1, FaultCause::host_heartbeat, state.cause) &&
-         take_enum(frame, kAt + 2, CanAnswer::refused, state.answer) &&
-         take_enum(frame, kAt + 3, CanResident::failed, state.resident);
+  state.boot = get_can<std::uint32_t>(frame, kAt + 28);
+  state.host = get_can<std::uint32_t>(frame, kAt + 32);
+  state.session = get_can<std::uint32_t>(frame, kAt + 36);
+  return true;
 }
 
 CanFrame encode_can_text(const std::string& text, std::size_t part, std::uint8_t run) noexcept {

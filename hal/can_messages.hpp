@@ -13,12 +13,21 @@ namespace stageid {
 
 // What stands behind the header of each kind of frame. docs/can-protocol.md is the same for people.
 
-inline constexpr std::uint8_t kCanProtocolVersion = 1;
+inline constexpr std::uint8_t kCanProtocolVersion = 2;
 inline constexpr double kCanHeartbeatRate_hz = 10.0;
 
 /// Setpoints and measurements: kind is 0 in a setpoint, the NodeState in a measurement (plus
 /// kCanSaturatedBit); sequence n + 1 stands for u[n] and for its answer y[n+1], 0 for y[0].
 inline constexpr std::uint8_t kCanSaturatedBit = 0x80;
+
+/// The part of a run's key that its frames carry: the low byte in `run`, in setpoints the next two
+/// in `detail`.
+constexpr std::uint8_t can_run(std::uint32_t session) noexcept {
+  return static_cast<std::uint8_t>(session);
+}
+constexpr std::uint16_t can_tag(std::uint32_t session) noexcept {
+  return static_cast<std::uint16_t>(session >> 8);
+}
 
 /// Counts of what was put into frames.
 struct CanConversions {
@@ -52,23 +61,29 @@ enum class CanCommandCode : std::uint8_t {
 struct CanCommand {
   CanCommandCode code = CanCommandCode::hello;
   std::uint16_t sequence = 0;
-  std::uint8_t run = 0;
   std::uint64_t a = 0;
   std::uint64_t b = 0;
   std::uint32_t c = 0;
   std::uint32_t d = 0;
+  std::uint32_t host = 0;     ///< drawn by each host; its low byte, not 0, numbers its transfers
+  std::uint32_t session = 0;  ///< key of the run, from the answer that began it
+  std::uint8_t version = kCanProtocolVersion;
 };
+inline constexpr std::size_t kCanCommandBytes = 33;
 CanFrame encode_can_command(const CanCommand& command) noexcept;
+/// A command of version 1, which was shorter, comes back with that version and nothing else in it
+/// but its code and sequence.
 [[nodiscard]] bool decode_can_command(const CanFrame& frame, CanCommand& command) noexcept;
 
 enum class CanAnswer : std::uint8_t { none, accepted, refused };
 enum class CanResident : std::uint8_t { idle, armed, playing, done, failed };
 
-/// Node to host: after every command, at every change of state, and as a heartbeat.
+/// Node to host: after every command, at every change of state, and as a heartbeat. Codes that this
+/// program does not know come through as they are: peer_status.hpp says what they mean.
 struct CanState {
   std::uint16_t sequence = 0;  ///< of the command that is answered
   NodeState state = NodeState::not_ready;
-  std::uint8_t run = 0;
+  std::uint8_t run = 0;  ///< of the key of the last run
   std::uint8_t version = kCanProtocolVersion;
   FaultCause cause = FaultCause::none;
   CanAnswer answer = CanAnswer::none;
@@ -78,8 +93,11 @@ struct CanState {
   std::uint32_t rejected = 0;  ///< frames with our identifiers that were damaged or foreign
   std::uint64_t sample = 0;    ///< of this run
   std::uint32_t fingerprint = 0;
+  std::uint32_t boot = 0;     ///< drawn at every start of the node
+  std::uint32_t host = 0;     ///< whose command is answered; 0: none
+  std::uint32_t session = 0;  ///< the key, in answers to the host that has the stage; else 0
 };
-inline constexpr std::size_t kCanStateBytes = 28;
+inline constexpr std::size_t kCanStateBytes = 40;
 CanFrame encode_can_state(const CanState& state) noexcept;
 [[nodiscard]] bool decode_can_state(const CanFrame& frame, CanState& state) noexcept;
 

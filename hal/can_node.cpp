@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <stdexcept>
+
+#include "hal/peer_status.hpp"
 
 namespace stageid {
 namespace {
@@ -24,7 +27,11 @@ std::int16_t distance(std::uint16_t sequence, std::uint16_t from) {
 }  // namespace
 
 CanNode::CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transport, double pace)
-    : stage_(stage), layout_(layout), transport_(transport), player_(stage, pace) {
+    : stage_(stage),
+      layout_(layout),
+      transport_(transport),
+      player_(stage, pace),
+      boot_(std::random_device()() | 1U) {
   if (layout_.setpoints.size() > 64)
     throw std::invalid_argument("can: a node takes 64 setpoint frames at most");
   inbox_.resize(kInboxFrames);
@@ -36,12 +43,9 @@ CanNode::CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transp
 void CanNode::serve(std::int64_t until_ns) {
   const std::int64_t now_ns = transport_.now_ns();
   if (!player_.busy() && until_ns > now_ns) transport_.wait(until_ns);
-  while (true) {
-    const std::size_t count = transport_.receive(inbox_);
-    watch_bus();  // before what came in with the news: a bus that is off outweighs a last command
-    for (std::size_t i = 0; i < count; ++i) handle(inbox_[i]);
-    if (count < inbox_.size()) break;
-  }
+  const std::size_t count = transport_.receive(inbox_);
+  watch_bus();  // before what came in with the news: a bus that is off outweighs a last command
+  for (std::size_t i = 0; i < count; ++i) handle(inbox_[i]);
   player_.work(transport_.now_ns(), transport_);
   stage_.tick(transport_.now_ns());
   announce();
@@ -74,15 +78,17 @@ void CanNode::take_setpoint(const CanFrame& frame, std::size_t number) {
     ++rejected_;
     return;
   }
-  if (header.run != run_ || player_.busy()) {
+  // The key of a run that has ended is still good for hearing why.
+  const std::uint32_t holder = stage_.session();
+  if (session_ == 0 || (holder != 0 && holder != session_) || header.run != can_run(session_) ||
+      header.detail != can_tag(session_) || player_.busy()) {
     ++rejected_;
     state_asked_ = true;
     return;
   }
   if (distance(header.sequence, last_sequence_) <= 0) {
     ++repeated_;
-    if (header.sequence == last_sequence_ && number + 1 == layout_.setpoints.size())
-      outbox_.insert(outbox_.end(), answer_.begin(), answer_.end());
+    if (header.sequence == last_sequence_ && number + 1 == layout_.setpoints.size()) put_answer();
     return;
   }
   if (pending_frames_ != 0 && distance(header.sequence, pending_sequence_) < 0) return;
@@ -111,14 +117,15 @@ void CanNode::take_complete_setpoint(std::uint16_t sequence) {
     state_asked_ = true;
     return;
   }
-  put_measurement(sequence, outcome == Outcome::stale ? 0 : inputs.valid);
+  make_answer(sequence, outcome == Outcome::stale ? 0 : inputs.valid);
+  put_answer();
   flush();
 }
 
-void CanNode::put_measurement(std::uint16_t sequence, std::uint64_t valid) {
+void CanNode::make_answer(std::uint16_t sequence, std::uint64_t valid) {
   for (std::size_t i = 0; i < y_.size(); ++i)
     given_[i] = ((valid >> i) & 1U) != 0 ? y_[i] : std::numeric_limits<double>::quiet_NaN();
-  const CanHeader header{sequence, static_cast<std::uint8_t>(stage_.state()), run_,
+  const CanHeader header{sequence, static_cast<std::uint8_t>(stage_.state()), can_run(session_),
                          microseconds(transport_.now_ns())};
   answer_.clear();
   for (const CanValueFrame& layout : layout_.sensors) {
@@ -126,15 +133,40 @@ void CanNode::put_measurement(std::uint16_t sequence, std::uint64_t valid) {
     encode_can_values(layout, layout_.sensor_scale, given_, header, frame, conversions_);
     answer_.push_back(frame);
   }
-  outbox_.insert(outbox_.end(), answer_.begin(), answer_.end());
+}
+
+void CanNode::put_answer() { outbox_.insert(outbox_.end(), answer_.begin(), answer_.end()); }
+
+/// @returns why the command is refused, before anything has changed; empty: its sender may give it.
+std::string CanNode::admit(const CanCommand& command) const {
+  using Code = CanCommandCode;
+  if (command.version != kCanProtocolVersion)
+    return fmt::format("{} ({}, not {}); update the older side",
+                       meaning(PeerStatus::other_version).words, kCanProtocolVersion,
+                       command.version);
+  if (command.code == Code::hello || command.code == Code::missing ||
+      command.code == Code::quick_stop || command.code == Code::reset_fault)
+    return "";
+  if (command.code == Code::download && command.b == static_cast<std::uint64_t>(CanMemory::trace) &&
+      command.session != trace_session_)
+    return "the trace belongs to another host's run";
+  const std::uint32_t holder = stage_.session();
+  const bool again = command.code == begun_by_.code && command.host == begun_by_.host &&
+                     command.sequence == begun_by_.sequence && holder == session_;
+  if (holder == 0 || command.session == holder || again) return "";
+  return fmt::format("{}; wait until it has ended", meaning(PeerStatus::held).words);
 }
 
 void CanNode::obey(const CanCommand& command) {
-  command_sequence_ = command.sequence;
-  player_.host_was_heard(transport_.now_ns());
-  const std::string refusal = execute(command);
-  put_state(command.sequence, refusal.empty() ? CanAnswer::accepted : CanAnswer::refused,
+  std::string refusal = admit(command);
+  if (refusal.empty()) {
+    refusal = execute(command);
+    if (command.session == session_) player_.host_was_heard(transport_.now_ns());
+  }
+  put_state(&command, refusal.empty() ? CanAnswer::accepted : CanAnswer::refused,
             refusal.empty() ? stage_.trouble() : refusal);
+  // Behind the state, whose key tells the host that y[0] is meant for it.
+  if (command.code == CanCommandCode::start && refusal.empty()) put_answer();
   flush();
 }
 
@@ -151,6 +183,7 @@ std::string CanNode::execute(const CanCommand& command) {
         return request(SupervisorCommand::quick_stop);
       }
       stage_.end_run();
+      player_.abandon();
       return request(SupervisorCommand::disable);
     case CanCommandCode::quick_stop:
       player_.abandon();
@@ -163,8 +196,7 @@ std::string CanNode::execute(const CanCommand& command) {
       put_missing();
       return "";
     case CanCommandCode::arm:
-      run_ = command.run;
-      return player_.arm(command);
+      return arm(command);
     case CanCommandCode::trigger:
       return player_.trigger(command, transport_.now_ns());
     case CanCommandCode::download:
@@ -179,35 +211,54 @@ std::string CanNode::request(SupervisorCommand command) {
 }
 
 std::string CanNode::start(const CanCommand& command) {
-  const bool again = command.run == run_ && stage_.state() == NodeState::measuring &&
+  const bool again = stage_.session() == session_ && stage_.state() == NodeState::measuring &&
                      last_sequence_ == 0 && stage_.sample() == 0;
-  if (again) {
-    outbox_.insert(outbox_.end(), answer_.begin(), answer_.end());
-    return "";
-  }
+  if (again) return "";
   if (player_.busy()) return "a resident experiment is running; stop it first";
   const std::string refusal = request(SupervisorCommand::enable);
   if (!refusal.empty()) return refusal;
   Inputs first;
   first.y = y_;
   try {
-    stage_.begin_run(command.a, transport_.now_ns(), first);
+    static_cast<void>(stage_.begin_run(command.a, transport_.now_ns(), first, command.session));
   } catch (const StageError& error) {
     return error.what();
   }
-  run_ = command.run;
+  take_over(command);
   last_sequence_ = 0;
   pending_frames_ = 0;
   gaps_ = repeated_ = 0;
-  put_measurement(0, first.valid);
+  make_answer(0, first.valid);
   return "";
 }
 
-void CanNode::put_state(std::uint16_t sequence, CanAnswer answer, const std::string& text) {
+std::string CanNode::arm(const CanCommand& command) {
+  const std::string refusal = player_.arm(command);
+  if (!refusal.empty()) return refusal;
+  take_over(command);
+  trace_session_ = session_;
+  player_.host_was_heard(transport_.now_ns());
+  return "";
+}
+
+/// The run or reservation that has just begun belongs to this command's sender.
+void CanNode::take_over(const CanCommand& command) {
+  session_ = stage_.session();
+  begun_by_ = command;
+}
+
+/// @param answered the command, or null.
+void CanNode::put_state(const CanCommand* answered, CanAnswer answer, const std::string& text) {
   CanState state;
-  state.sequence = sequence;
   state.state = announced_ = stage_.state();
-  state.run = run_;
+  state.run = can_run(session_);
+  state.boot = boot_;
+  if (answered != nullptr) {
+    state.sequence = answered->sequence;
+    state.host = answered->host;
+    const bool told = answer == CanAnswer::accepted && answered->host == begun_by_.host;
+    state.session = told && stage_.session() == session_ ? session_ : 0;
+  }
   state.cause = stage_.cause();
   state.answer = answer;
   state.resident = player_.status();
@@ -218,7 +269,7 @@ void CanNode::put_state(std::uint16_t sequence, CanAnswer answer, const std::str
   state.fingerprint = layout_.fingerprint;
   // The words first: who sees the state has them.
   for (std::size_t part = 0; !text.empty() && part < kCanTextParts; ++part)
-    outbox_.push_back(encode_can_text(text, part, run_));
+    outbox_.push_back(encode_can_text(text, part, can_run(session_)));
   outbox_.push_back(encode_can_state(state));
   next_heartbeat_ns_ = transport_.now_ns() + kHeartbeat_ns;
   state_asked_ = false;
@@ -229,7 +280,7 @@ void CanNode::put_missing() { outbox_.push_back(encode_can_missing(player_.missi
 void CanNode::announce() {
   const bool changed = stage_.state() != announced_;
   if (changed || state_asked_ || transport_.now_ns() >= next_heartbeat_ns_)
-    put_state(command_sequence_, CanAnswer::none, changed || state_asked_ ? stage_.trouble() : "");
+    put_state(nullptr, CanAnswer::none, changed || state_asked_ ? stage_.trouble() : "");
 }
 
 void CanNode::watch_bus() {

@@ -48,7 +48,7 @@ std::size_t CanPlayer::row_bytes() const noexcept {
 
 std::string CanPlayer::prepare(const CanCommand& command) {
   if (busy()) return "a resident experiment is running; stop it first";
-  token_ = command.run;
+  token_ = static_cast<std::uint8_t>(command.host);
   if (command.a == mask_ && command.b == digest_ && command.c == period_samples_ &&
       !waveform_.empty())
     return "";
@@ -73,7 +73,9 @@ std::string CanPlayer::prepare(const CanCommand& command) {
 }
 
 bool CanPlayer::take_chunk(const CanChunk& chunk) noexcept {
-  if (busy() || chunk.token != token_ || chunk.index >= received_.size()) return false;
+  // What is armed has been compared with its digest.
+  if (busy() || status_ == CanResident::armed) return false;
+  if (chunk.token != token_ || chunk.index >= received_.size()) return false;
   const std::size_t from = chunk.index * kCanChunkBytes;
   if (chunk.bytes.size() != std::min(kCanChunkBytes, waveform_.size() - from)) return false;
   std::copy(chunk.bytes.begin(), chunk.bytes.end(),
@@ -104,6 +106,7 @@ std::string CanPlayer::arm(const CanCommand& command) {
                        depth_bytes() / row_bytes());
   const SupervisorReply reply = stage_.request(SupervisorCommand::enable);
   if (!reply.accepted) return reply.message;
+  if (stage_.session() == 0) static_cast<void>(stage_.reserve());
   seed_ = command.a;
   samples_ = command.b;
   ramp_samples_ = command.c;
@@ -121,7 +124,7 @@ std::string CanPlayer::trigger(const CanCommand& command, std::int64_t now_ns) {
   Inputs first;
   first.y = y_;
   try {
-    stage_.begin_run(seed_, now_ns, first);
+    static_cast<void>(stage_.begin_run(seed_, now_ns, first, stage_.session()));
   } catch (const StageError& error) {
     return error.what();
   }
@@ -141,7 +144,7 @@ std::string CanPlayer::begin_download(const CanCommand& command) {
   if (memory == CanMemory::trace && busy()) return "the trace is still being recorded";
   if (command.a >= chunks)
     return fmt::format("chunk {} asked for, there are {}", command.a, chunks);
-  token_ = command.run;
+  token_ = static_cast<std::uint8_t>(command.host);
   download_of_ = memory;
   download_next_ = command.a;
   download_end_ = std::min(chunks, download_next_ + std::min(command.c, kLargestDownload));
@@ -150,6 +153,10 @@ std::string CanPlayer::begin_download(const CanCommand& command) {
 
 void CanPlayer::work(std::int64_t now_ns, CanTransport& transport) {
   send_chunks(transport);
+  if (status_ == CanResident::armed && now_ns - last_heard_ns_ > kHostSilence_ns) {
+    abandon();
+    static_cast<void>(stage_.request(SupervisorCommand::disable));
+  }
   if (!busy()) return;
   if (stage_.state() != NodeState::measuring) {  // a quick stop, the panel, the watchdog
     finish(CanResident::failed);
@@ -204,8 +211,12 @@ void CanPlayer::finish(CanResident status) {
   status_ = status;
 }
 
-void CanPlayer::abandon() noexcept {
+void CanPlayer::abandon() {
   if (busy()) status_ = CanResident::failed;
+  if (status_ == CanResident::armed) {
+    status_ = CanResident::idle;
+    stage_.release();
+  }
   download_next_ = download_end_ = 0;
 }
 

@@ -35,9 +35,9 @@ class CanPlayer {
 
   /// Plays what is due and sends what is asked for.
   void work(std::int64_t now_ns, CanTransport& transport);
-  /// A host that is silent for a second while the node plays is taken for dead.
+  /// A host that is silent for a second while the node is armed or plays is taken for dead.
   void host_was_heard(std::int64_t now_ns) noexcept { last_heard_ns_ = now_ns; }
-  void abandon() noexcept;
+  void abandon();
 
   bool busy() const noexcept { return status_ == CanResident::playing; }
   CanResident status() const noexcept { return status_; }

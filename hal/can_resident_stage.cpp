@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "hal/can_player.hpp"
+#include "hal/peer_status.hpp"
 
 namespace stageid {
 namespace {
@@ -19,6 +20,7 @@ constexpr std::uint32_t kUploadWindow = 96;  // chunks between two looks at what
 constexpr std::uint32_t kDownloadWindow = 128;
 constexpr std::int64_t kPause_ns = 1'000'000;
 constexpr std::int64_t kSilence_ns = 50'000'000;  // then the rest of a window is asked for again
+constexpr std::int64_t kFull_ns = 1'000'000'000;  // then the rest is sent with the next window
 constexpr int kLargestTries = 20;                 // windows without any progress
 
 std::size_t chunks_of(std::size_t bytes) { return (bytes + kCanChunkBytes - 1) / kCanChunkBytes; }
@@ -38,8 +40,9 @@ CanResidentStage::CanResidentStage(StageInfo info, const CanSpec& spec,
       spec_(spec),
       layout_(can_layout(spec, info_)),
       transport_(std::move(transport)),
-      link_(*transport_, layout_.fingerprint),
-      reset_fault_(options.reset_fault) {
+      link_(*transport_, layout_.fingerprint, options.interrupted),
+      reset_fault_(options.reset_fault),
+      token_(static_cast<std::uint8_t>(link_.host())) {
   if (info_.actuators.size() > 64)
     throw std::invalid_argument("can: resident experiments have 64 actuators at most");
   info_.backend = "can";
@@ -57,7 +60,6 @@ std::uint64_t CanResidentStage::depth_samples() const noexcept {
 CanState CanResidentStage::command(CanCommandCode code, std::uint64_t a, std::uint64_t b,
                                    std::uint32_t c, std::uint32_t d, const CanLink::Other& other) {
   CanCommand command{code};
-  command.run = run_;
   command.a = a;
   command.b = b;
   command.c = c;
@@ -67,8 +69,7 @@ CanState CanResidentStage::command(CanCommandCode code, std::uint64_t a, std::ui
 
 void CanResidentStage::connect() {
   if (greeted_) return;
-  const CanState node = link_.greet(std::exchange(reset_fault_, false));
-  run_ = static_cast<std::uint8_t>(node.run + 1);
+  static_cast<void>(link_.greet(std::exchange(reset_fault_, false)));
   greeted_ = true;
 }
 
@@ -109,11 +110,14 @@ void CanResidentStage::send_missing(const std::vector<std::uint32_t>& chunks) {
     const CanFrame frame = encode_can_chunk(
         kCanUploadId,
         {index,
-         run_,
+         token_,
          {waveform_.data() + from, std::min(kCanChunkBytes, waveform_.size() - from)}});
     // A full queue is the bus saying "not so fast".
-    while (transport_->send({&frame, 1}) == 0 && worst_bus(*transport_).state < CanBusState::off)
+    const std::int64_t until_ns = transport_->now_ns() + kFull_ns;
+    while (transport_->send({&frame, 1}) == 0 && worst_bus(*transport_).state < CanBusState::off) {
+      if (transport_->now_ns() >= until_ns || link_.interrupted()) return;
       transport_->wait(transport_->now_ns() + kPause_ns);
+    }
   }
 }
 
@@ -125,11 +129,11 @@ void CanResidentStage::send_all() {
     CanMissing missing;
     command(CanCommandCode::missing, 0, 0, 0, 0, [&](const CanFrame& frame) {
       CanMissing said;
-      if (decode_can_missing(frame, said) && said.token == run_) missing = said;
+      if (decode_can_missing(frame, said) && said.token == token_) missing = said;
     });
-    if (missing.token == run_ && missing.first >= total) return;
-    tries = missing.token == run_ && missing.first > first ? 0 : tries + 1;
-    if (missing.token != run_) continue;  // the answer itself got lost
+    if (missing.token == token_ && missing.first >= total) return;
+    tries = missing.token == token_ && missing.first > first ? 0 : tries + 1;
+    if (missing.token != token_) continue;  // the answer itself got lost
     first = missing.first;
     std::vector<std::uint32_t> chunks;
     for (std::uint32_t i = 0;
@@ -181,14 +185,20 @@ JobProgress CanResidentStage::poll() {
   JobProgress progress;
   progress.done = std::min(node.sample, samples_);
   progress.total = samples_;
+  if (node.run != can_run(link_.session())) {
+    progress.status = JobStatus::failed;
+    progress.outcome = Outcome::fault;
+    progress.message = meaning(PeerStatus::held).words;
+    return progress;
+  }
   if (node.resident == CanResident::playing || node.resident == CanResident::armed) return progress;
-  const bool done = node.resident == CanResident::done;
-  progress.status = done ? JobStatus::done : JobStatus::failed;
-  const bool limited = node.cause == FaultCause::limit || node.cause == FaultCause::not_finite;
-  if (!done) progress.outcome = limited ? Outcome::limit : Outcome::fault;
-  if (!done)
-    progress.message = fmt::format("the node stopped in state {}{}{}", to_string(node.state),
-                                   link_.text().empty() ? "" : ": ", link_.text());
+  progress.status = JobStatus::done;
+  if (node.resident == CanResident::done) return progress;
+  progress.status = JobStatus::failed;
+  const PeerReport report{.state = node.state, .cause = node.cause, .valid = 1, .all = 1};
+  progress.outcome = std::max(meaning(judge(report)).outcome, Outcome::fault);
+  progress.message = fmt::format("the node stopped in state {}{}{}", to_string(node.state),
+                                 link_.text().empty() ? "" : ": ", link_.text());
   return progress;
 }
 
@@ -201,7 +211,7 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
   std::int64_t heard_ns = 0;
   const CanLink::Other take = [&](const CanFrame& frame) {
     CanChunk chunk;
-    if (frame.id != kCanDownloadId || !decode_can_chunk(frame, chunk) || chunk.token != run_ ||
+    if (frame.id != kCanDownloadId || !decode_can_chunk(frame, chunk) || chunk.token != token_ ||
         chunk.index >= total)
       return;
     const std::size_t from = chunk.index * kCanChunkBytes;
@@ -209,8 +219,8 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
     std::copy(chunk.bytes.begin(), chunk.bytes.end(),
               bytes.begin() + static_cast<std::ptrdiff_t>(from));
     repeated_chunks_ += have[chunk.index] ? 1U : 0U;
+    if (!have[chunk.index]) heard_ns = transport_->now_ns();  // what comes again is no progress
     have[chunk.index] = true;
-    heard_ns = transport_->now_ns();
   };
   std::vector<CanFrame> inbox(64);
   for (int tries = 0; chunks_done < total && tries < kLargestTries; ++tries) {
@@ -253,7 +263,7 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
       const std::size_t at = row * row_bytes();
       for (std::size_t i = 0; i < columns; ++i)
         values.push_back(static_cast<double>(float_at(trace_, at + kFloatBytes * i)));
-      outcomes.push_back(static_cast<Outcome>(trace_[at + kFloatBytes * columns]));
+      outcomes.push_back(outcome_of_code(trace_[at + kFloatBytes * columns]));
     }
     sink.rows(rows_given_, values, outcomes);
     rows_given_ = end;
@@ -262,10 +272,8 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
 }
 
 void CanResidentStage::stop() noexcept {
-  if (!greeted_) return;
-  CanCommand command{CanCommandCode::stop};
-  command.run = run_;
-  static_cast<void>(link_.try_command(command));
+  if (link_.session() == 0) return;  // the node has begun nothing for this host
+  static_cast<void>(link_.try_command({CanCommandCode::stop}));
 }
 
 }  // namespace stageid

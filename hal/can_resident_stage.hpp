@@ -54,7 +54,7 @@ class CanResidentStage final : public ResidentStage {
   CanLink link_;
   bool reset_fault_;
   bool greeted_ = false;
-  std::uint8_t run_ = 0;
+  std::uint8_t token_;  // of this host's transfers
 
   std::vector<std::uint8_t> waveform_;  // as it goes over the bus
   std::uint64_t mask_ = 0;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -32,7 +33,7 @@ CanStage::CanStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTrans
     : info_(std::move(info)),
       layout_(can_layout(spec, info_)),
       transport_(std::move(transport)),
-      link_(*transport_, layout_.fingerprint),
+      link_(*transport_, layout_.fingerprint, options.interrupted),
       pacer_(info_.sample_rate_hz, options.pace),
       wall_(options.pace > 0.0),
       reset_fault_(options.reset_fault),
@@ -41,6 +42,7 @@ CanStage::CanStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTrans
       inbox_(kInboxFrames) {
   info_ = info_of(std::move(info_), spec, layout_, options.pace);
   period_ns_ = std::llround(1e9 / (info_.sample_rate_hz * info_.pace));
+  answers_.resize(layout_.sensors.size());
   fresh_.assign(info_.sensors.size(), kNone);
   decoded_.assign(info_.sensors.size(), kNone);
 }
@@ -49,31 +51,39 @@ void CanStage::connect() { static_cast<void>(link_.greet(std::exchange(reset_fau
 
 void CanStage::start(std::uint64_t run_seed, Inputs& first) {
   trouble_at_stop_.clear();
-  const CanState node = link_.greet(std::exchange(reset_fault_, false));
-  run_ = static_cast<std::uint8_t>(node.run + 1);
+  connect();
+  link_.forget_session();
+  samples_bad_ = 0;
+  conflict_ = false;
+  std::fill(answers_.begin(), answers_.end(), CanFrame{});
   const CanLink::Other take_value = [this](const CanFrame& frame) { take(frame); };
   for (int attempt = 0; attempt < kStartAttempts; ++attempt) {
     begin_cycle(0);
     CanCommand command{CanCommandCode::start};
-    command.run = run_;
     command.a = run_seed;
     static_cast<void>(link_.command(command, take_value));
     states_before_ = link_.states();
     if (!complete()) collect(transport_->now_ns() + reply_timeout_ns_);
     if (complete()) break;
   }
+  give(first);
   if (!complete()) {
     stop();
     throw StageError(fmt::format(
         "can: {}: the node starts but its measurements do not arrive; look at every bus",
         transport_->name(0)));
   }
+  if ((first.valid & all_sensors()) != all_sensors()) {
+    stop();
+    refuse(PeerStatus::first_sample_missing, fmt::format("can: {}", transport_->name(0)),
+           fmt::format("; look at sensor '{}'",
+                       info_.sensors[static_cast<std::size_t>(std::countr_one(first.valid))].name));
+  }
   running_ = true;
   const Pacer::Instant now = pacer_.restart();
   first.cycle = 0;
   first.t_sample_ns = now.sample_ns;
   first.t_rx_ns = now.now_ns;
-  give(first);
 }
 
 void CanStage::begin_cycle(std::uint16_t sequence) noexcept {
@@ -81,13 +91,13 @@ void CanStage::begin_cycle(std::uint16_t sequence) noexcept {
   frames_seen_ = 0;
   frames_missing_ = layout_.sensors.size();
   damaged_in_cycle_ = false;
+  out_of_range_ = false;
   states_before_ = link_.states();
   std::fill(fresh_.begin(), fresh_.end(), kNone);
 }
 
 bool CanStage::send_setpoints(const Outputs& outputs) noexcept {
-  const CanHeader header{expected_, 0, run_,
-                         static_cast<std::uint16_t>(transport_->now_ns() / 1000)};
+  const CanHeader header{expected_, 0, can_run(link_.session()), can_tag(link_.session())};
   const std::uint64_t refused = conversions_.no_number;
   for (std::size_t i = 0; i < layout_.setpoints.size(); ++i)
     encode_can_values(layout_.setpoints[i], layout_.actuator_scale, outputs.u, header, outbox_[i],
@@ -111,7 +121,10 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
     static_cast<void>(transport_->send(outbox_));
     collect(transport_->now_ns() + reply_timeout_ns_);
   }
-  const Outcome outcome = judge(inputs);
+  give(inputs);
+  status_ = judge(inputs);
+  const Outcome outcome = meaning(status_).outcome;
+  samples_bad_ += status_ == PeerStatus::good ? 0U : 1U;
   const Pacer::Instant now = pacer_.wait();
   inputs.t_ready_ns = now.ready_ns;
   inputs.cycle = outputs.cycle + 1;
@@ -129,17 +142,18 @@ std::int64_t CanStage::reply_deadline_ns(Deadline deadline) const noexcept {
 }
 
 /// Nothing more is to be expected in this cycle.
-bool CanStage::over() noexcept {
-  return node_outcome() != Outcome::ok || worst_bus(*transport_).state >= CanBusState::off;
+bool CanStage::over() const noexcept {
+  return meaning(node_status()).reaction == PeerReaction::stop ||
+         worst_bus(*transport_).state >= CanBusState::off;
 }
 
+// The time is looked at on every turn: a bus that is never silent must not keep the loop waiting.
 void CanStage::collect(std::int64_t until_ns) noexcept {
   while (true) {
     const std::size_t count = transport_->receive(inbox_);
     for (std::size_t i = 0; i < count; ++i)
       if (!link_.take(inbox_[i])) take(inbox_[i]);
-    if (complete() || over()) return;
-    if (count == 0 && transport_->now_ns() >= until_ns) return;
+    if (complete() || over() || transport_->now_ns() >= until_ns) return;
     if (count == 0) transport_->wait(until_ns);
   }
 }
@@ -156,18 +170,25 @@ void CanStage::take(const CanFrame& frame) noexcept {
     damaged_in_cycle_ = true;
     return;
   }
-  if (header.run != run_) {
+  if (link_.session() == 0 || header.run != can_run(link_.session())) {
     ++counts_.foreign;
     return;
   }
+  // A node repeats an answer bit by bit.
+  CanFrame& last = answers_[number];
+  conflict_ |=
+      last.length != 0 && header.sequence == get_can<std::uint16_t>(last, 0) &&
+      !std::equal(frame.data.begin(), frame.data.begin() + frame.length, last.data.begin());
   const std::uint64_t bit = std::uint64_t{1} << number;
   if (header.sequence != expected_ || (frames_seen_ & bit) != 0) {
     ++counts_.old;
     return;
   }
+  last = frame;
   frames_seen_ |= bit;
   --frames_missing_;
-  measured_in_ = static_cast<NodeState>(header.kind & 0x0F);
+  measured_in_ = static_cast<NodeState>(header.kind & ~kCanSaturatedBit);
+  out_of_range_ |= (header.kind & kCanSaturatedBit) != 0;
   t_rx_ns_ = frame.t_rx_ns;
   for (const int channel : layout_.sensors[number].channels)
     fresh_[static_cast<std::size_t>(channel)] = decoded_[static_cast<std::size_t>(channel)];
@@ -183,40 +204,45 @@ void CanStage::give(Inputs& inputs) const noexcept {
   inputs.node_state = link_.states() != states_before_ ? link_.state().state : measured_in_;
 }
 
-Outcome CanStage::bus_outcome() const noexcept {
+PeerStatus CanStage::bus_status() const noexcept {
   switch (worst_bus(*transport_).state) {
     case CanBusState::active:
     case CanBusState::warning:
-      return Outcome::ok;
+      return PeerStatus::good;
     case CanBusState::passive:
-      return Outcome::bus_passive;
+      return PeerStatus::passive;
     case CanBusState::off:
-      return Outcome::bus_off;
+      return PeerStatus::bus_off;
     case CanBusState::down:
-      return Outcome::link_down;
+      return PeerStatus::link_down;
   }
-  return Outcome::link_down;
+  return PeerStatus::link_down;
 }
 
-/// What the node's state means, as far as one has come in this cycle.
-Outcome CanStage::node_outcome() const noexcept {
-  if (link_.states() == states_before_) return Outcome::ok;
-  const CanState& node = link_.state();
-  if (node.run == run_ && node.state == NodeState::measuring) return Outcome::ok;
-  const bool limited = node.cause == FaultCause::limit || node.cause == FaultCause::not_finite;
-  return node.run == run_ && limited ? Outcome::limit : Outcome::fault;
+/// What the node has said of itself in this cycle, in states and measurements.
+PeerStatus CanStage::node_status() const noexcept {
+  if (conflict_) return PeerStatus::conflict;
+  if (link_.other_node()) return PeerStatus::other_node;
+  PeerReport report{.valid = 1, .all = 1, .out_of_range = out_of_range_};
+  if (frames_seen_ != 0) report.state = measured_in_;
+  if (link_.states() != states_before_) {
+    const CanState& node = link_.state();
+    const bool of_this_run = node.run == can_run(link_.session());
+    report.state = of_this_run ? node.state : NodeState::not_ready;
+    report.cause = node.cause;
+    report.setpoints_missed = node.gaps > samples_bad_;
+  }
+  return stageid::judge(report);
 }
 
-Outcome CanStage::judge(Inputs& inputs) noexcept {
-  give(inputs);
-  const std::uint64_t all = ~std::uint64_t{0} >> (64 - fresh_.size());
-  const Outcome bus = bus_outcome();
-  const Outcome node = node_outcome();
-  if (bus == Outcome::bus_off || bus == Outcome::link_down) return bus;
-  if (node != Outcome::ok) return node;
-  if (inputs.valid == all) return bus;
-  if (damaged_in_cycle_) return Outcome::corrupt;
-  return inputs.valid != 0 ? Outcome::incomplete : Outcome::stale;
+PeerStatus CanStage::judge(const Inputs& inputs) noexcept {
+  PeerStatus worst = std::max(bus_status(), node_status());
+  // Said once: the samples that the node has missed are marked with this one.
+  if (link_.state().gaps > samples_bad_) samples_bad_ = link_.state().gaps;
+  const std::uint64_t valid = inputs.valid & all_sensors();
+  if (valid == all_sensors()) return worst;
+  worst = std::max(worst, valid == 0 ? PeerStatus::nothing_new : PeerStatus::incomplete);
+  return damaged_in_cycle_ ? std::max(worst, PeerStatus::damaged) : worst;
 }
 
 void CanStage::stop() noexcept {
@@ -225,10 +251,10 @@ void CanStage::stop() noexcept {
   } catch (const std::exception&) {  // no memory for a text: it is only a text
   }
   running_ = false;
-  CanCommand command{CanCommandCode::stop};
-  command.run = run_;
+  if (link_.session() == 0) return;  // the node has begun nothing for this host
   // Without an answer the node's own watchdog has stopped it, or will.
-  static_cast<void>(link_.try_command(command));
+  static_cast<void>(link_.try_command({CanCommandCode::stop}));
+  link_.forget_session();
 }
 
 std::string CanStage::trouble() const {
@@ -237,10 +263,13 @@ std::string CanStage::trouble() const {
   if (worst.state >= CanBusState::passive)
     return fmt::format("{}: {}", transport_->name(worst.bus), to_string(worst.state));
   const CanState& node = link_.state();
-  if (node.run != run_) return "the node was started anew: it knows nothing of this run";
-  if (node.state != NodeState::measuring)
+  const PeerMeaning& said = meaning(status_);
+  const bool of_the_node = status_ <= PeerStatus::unknown_code;
+  if (of_the_node && node.state != NodeState::measuring)
     return fmt::format("the node is in state {}{}", to_string(node.state),
                        link_.text().empty() ? "" : ": " + link_.text());
+  if (said.reaction == PeerReaction::stop || status_ == PeerStatus::setpoints_missed)
+    return said.words;
   for (std::size_t bus = 0; bus < transport_->buses(); ++bus)
     if (transport_->health(bus).send_refused > 0)
       return fmt::format("{}: {} frames found no room in the queue: the bus is too slow",

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "hal/can_link.hpp"
 #include "hal/can_transport.hpp"
 #include "hal/pacer.hpp"
+#include "hal/peer_status.hpp"
 #include "hal/stage.hpp"
 
 namespace stageid {
@@ -16,14 +18,17 @@ namespace stageid {
 struct CanHostOptions {
   double pace = 0.0;         ///< 0: virtual time, as fast as the node answers; 1: wall clock
   bool reset_fault = false;  ///< clear a fault of the node at the first start()
+  /// Looked at while a command waits for its answer; true ends it with StageError.
+  std::function<bool()> interrupted = {};
 };
 
 /// What was not as it should be, over all runs.
 struct CanCounts {
-  std::uint64_t repeats = 0;    ///< setpoints sent again (virtual time only)
-  std::uint64_t old = 0;        ///< answers to earlier samples: late, repeated or swapped
-  std::uint64_t damaged = 0;    ///< CRC or length
-  std::uint64_t foreign = 0;    ///< of another run, or with an identifier that is none of ours
+  std::uint64_t repeats = 0;  ///< setpoints sent again (virtual time only)
+  std::uint64_t old = 0;      ///< answers to earlier samples: late, repeated or swapped
+  std::uint64_t damaged = 0;  ///< CRC or length
+  std::uint64_t foreign =
+      0;  ///< of another run or host, or with an identifier that is none of ours
   std::uint64_t saturated = 0;  ///< values that did not fit into their range
 };
 
@@ -34,9 +39,7 @@ struct CanCounts {
 /// come by then: everything is ok; some channels incomplete; nothing but damaged frames corrupt;
 /// nothing stale. An older answer is counted and thrown away. In virtual time, where nothing moves
 /// while the host waits, the setpoint is repeated three times before that; against the wall clock
-/// never. A node that is not measuring any more gives Outcome::limit if a limit or a value that is
-/// no number stopped it, else fault, at once; a bus that is off or down gives bus_off or link_down,
-/// an error-passive one bus_passive.
+/// never. What the node says of itself and its bus has the meaning that peer_status.hpp gives it.
 class CanStage final : public CyclicStage {
  public:
   /// @throws std::invalid_argument if the spec does not fit the stage, or a bus cannot carry it.
@@ -64,11 +67,12 @@ class CanStage final : public CyclicStage {
   void collect(std::int64_t until_ns) noexcept;
   void take(const CanFrame& frame) noexcept;
   bool complete() const noexcept { return frames_missing_ == 0; }
-  bool over() noexcept;
+  bool over() const noexcept;
   std::int64_t reply_deadline_ns(Deadline deadline) const noexcept;
-  Outcome judge(Inputs& inputs) noexcept;
-  Outcome bus_outcome() const noexcept;
-  Outcome node_outcome() const noexcept;
+  PeerStatus judge(const Inputs& inputs) noexcept;
+  PeerStatus bus_status() const noexcept;
+  PeerStatus node_status() const noexcept;
+  std::uint64_t all_sensors() const noexcept { return ~std::uint64_t{0} >> (64 - fresh_.size()); }
   void give(Inputs& inputs) const noexcept;
 
   StageInfo info_;
@@ -81,7 +85,6 @@ class CanStage final : public CyclicStage {
   std::int64_t reply_timeout_ns_;
   std::int64_t period_ns_;
 
-  std::uint8_t run_ = 0;
   bool running_ = false;
   std::uint16_t expected_ = 0;
   std::size_t frames_missing_ = 0;
@@ -89,14 +92,19 @@ class CanStage final : public CyclicStage {
   bool damaged_in_cycle_ = false;
   std::uint64_t states_before_ = 0;
   NodeState measured_in_ = NodeState::not_ready;
+  bool out_of_range_ = false;
+  bool conflict_ = false;          // two answers to one sample
+  std::uint64_t samples_bad_ = 0;  // of this run
+  PeerStatus status_ = PeerStatus::good;
   std::int64_t t_rx_ns_ = 0;
   CanConversions conversions_;
   CanCounts counts_;
   std::string trouble_at_stop_;
   std::vector<CanFrame> outbox_;
   std::vector<CanFrame> inbox_;
-  std::vector<double> fresh_;    // NaN: nothing came
-  std::vector<double> decoded_;  // of one frame
+  std::vector<CanFrame> answers_;  // the last of each sensor frame
+  std::vector<double> fresh_;      // NaN: nothing came
+  std::vector<double> decoded_;    // of one frame
 };
 
 }  // namespace stageid

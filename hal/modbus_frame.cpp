@@ -10,6 +10,8 @@ namespace {
 constexpr std::size_t kTcpHeader = 7;  // unit included
 constexpr std::size_t kCrcBytes = 2;
 constexpr std::size_t kShortRequest = 8;     // unit, function, two words, CRC
+constexpr std::size_t kExceptionReply = 5;   // unit, function, code, CRC
+constexpr std::size_t kReplyHeader = 3;      // unit, function, byte count
 constexpr std::size_t kWriteManyHeader = 7;  // up to the byte count
 constexpr std::size_t kWriteAndReadHeader = 11;
 
@@ -20,6 +22,24 @@ std::size_t rtu_request_bytes(std::span<const std::uint8_t> bytes) {
   if (bytes[1] == 23) header = kWriteAndReadHeader;
   if (header == 0) return kShortRequest;
   return bytes.size() < header ? 0 : header + bytes[header - 1] + kCrcBytes;
+}
+
+/// Bytes of an RTU reply of another unit; 0: it is none of those that we know.
+std::size_t rtu_reply_bytes(std::span<const std::uint8_t> bytes) {
+  if ((bytes[1] & 0x80U) != 0) return kExceptionReply;
+  if (bytes[1] >= 1 && bytes[1] <= 4)
+    return bytes.size() < 3 ? 3 : kReplyHeader + bytes[2] + kCrcBytes;
+  if (bytes[1] == 23) return bytes.size() < 3 ? 3 : kReplyHeader + bytes[2] + kCrcBytes;
+  return bytes[1] == 5 || bytes[1] == 6 || bytes[1] == 15 || bytes[1] == 16 ? kShortRequest : 0;
+}
+
+/// Whether `length` bytes are there, and their CRC is right. A length of 0 is not known yet.
+FrameStatus rtu_status(std::span<const std::uint8_t> bytes, std::size_t length) {
+  if (length == 0 || bytes.size() < length) return FrameStatus::incomplete;
+  const std::uint16_t crc = modbus_crc16(bytes.first(length - kCrcBytes));
+  const bool intact = bytes[length - 2] == (crc & 0xFFU) &&
+                      bytes[length - 1] == static_cast<std::uint8_t>(crc >> 8);
+  return intact ? FrameStatus::complete : FrameStatus::broken;
 }
 
 void put_word(std::vector<std::uint8_t>& frame, std::size_t at, std::size_t word) {
@@ -61,15 +81,38 @@ ModbusRequest parse_rtu_request(std::span<const std::uint8_t> bytes) noexcept {
   ModbusRequest request;
   if (bytes.size() < 2) return request;
   request.bytes = rtu_request_bytes(bytes);
-  if (request.bytes == 0 || bytes.size() < request.bytes) return request;
-  const std::span<const std::uint8_t> body = bytes.first(request.bytes - kCrcBytes);
-  const std::uint16_t crc = modbus_crc16(body);
-  const bool intact = bytes[request.bytes - 2] == (crc & 0xFFU) &&
-                      bytes[request.bytes - 1] == static_cast<std::uint8_t>(crc >> 8);
-  request.status = intact ? FrameStatus::complete : FrameStatus::broken;
+  request.status = rtu_status(bytes, request.bytes);
+  if (request.status == FrameStatus::incomplete) return request;
   request.unit = bytes[0];
-  request.pdu = body.subspan(1);
+  request.pdu = bytes.subspan(1, request.bytes - 1 - kCrcBytes);
   return request;
+}
+
+ModbusRequest find_rtu_request(std::span<const std::uint8_t> bytes, std::uint8_t unit) noexcept {
+  ModbusRequest none;
+  for (std::size_t at = 0; at < bytes.size();) {
+    const std::span<const std::uint8_t> rest = bytes.subspan(at);
+    ModbusRequest request = parse_rtu_request(rest);
+    none.bytes = at;
+    if (request.status == FrameStatus::complete && request.unit == unit) {
+      request.bytes += at;
+      return request;
+    }
+    if (request.status == FrameStatus::incomplete && (rest.size() < 2 || rest[0] == unit))
+      return none;
+    if (request.status == FrameStatus::complete) {
+      at += request.bytes;
+      continue;
+    }
+    const std::size_t reply = rest[0] == unit ? 0 : rtu_reply_bytes(rest);
+    const FrameStatus as_reply = reply == 0 ? FrameStatus::broken : rtu_status(rest, reply);
+    const bool more_needed =
+        request.status == FrameStatus::incomplete || as_reply == FrameStatus::incomplete;
+    if (as_reply != FrameStatus::complete && more_needed) return none;
+    at += as_reply == FrameStatus::complete ? reply : 1;
+  }
+  none.bytes = bytes.size();
+  return none;
 }
 
 std::vector<std::uint8_t> rtu_frame(std::uint8_t unit, std::span<const std::uint8_t> pdu) {

@@ -119,6 +119,10 @@ void ModbusLink::drain() noexcept {
   modbus_flush(context_.get());
 }
 
+bool ModbusLink::refused_as_busy() const noexcept {
+  return last_.status == LinkStatus::refused && last_.error == EMBXSBUSY;
+}
+
 std::string ModbusLink::describe(const Trouble& trouble) const {
   const auto line = [this](const std::string& what) {
     return fmt::format("{}: {}", to_string(address_), what);

@@ -50,6 +50,8 @@ class ModbusLink {
     int error = 0;  ///< errno, libmodbus' own values included
   };
   const Trouble& last() const noexcept { return last_; }
+  /// The last request was refused because the device is busy (exception 6).
+  bool refused_as_busy() const noexcept;
   /// For people: "Modbus TCP 127.0.0.1:502, unit 1: no reply within 0.2 s".
   std::string describe(const Trouble& trouble) const;
 

@@ -14,11 +14,14 @@ namespace stageid {
 ///
 /// A write is a request only if its sequence number is new: a repeated one changes nothing and is
 /// answered as before, so that a request whose reply was lost may be sent again.
+///
+/// A run belongs to the connection that began it and to the key that was given for it: other writes
+/// to the registers of the run are refused and change nothing.
 namespace modbus_map {
 
 inline constexpr std::uint32_t kMagicValue = 0x53544749;  // "STGI"
-inline constexpr std::uint32_t kVersionValue = 1;
-inline constexpr int kMostChannels = 56;  // as many as one FC23 carries: 114 written, 124 read
+inline constexpr std::uint32_t kVersionValue = 2;
+inline constexpr int kMostChannels = 56;  // as many as one FC23 carries: 116 written, 124 read
 inline constexpr int kMostPanelValues = 8;
 
 // Written by the supervising host.
@@ -30,10 +33,11 @@ inline constexpr int kSupervisorRegisters = 6;
 inline constexpr int kRunCommand = 16;
 inline constexpr int kRunSequence = 18;
 inline constexpr int kRunSeed = 20;
-inline constexpr int kRunRegisters = 8;
-// Written by the measuring host: one sample.
-inline constexpr int kSetpointSequence = 32;
-inline constexpr int kSetpoint = 34;
+inline constexpr int kRunKey = 24;  // to end a run, and with every sample
+inline constexpr int kRunRegisters = 10;
+// Written by the measuring host: one sample, from kRunKey on.
+inline constexpr int kSetpointSequence = 26;
+inline constexpr int kSetpoint = 28;
 inline constexpr int kWritableEnd = kSetpoint + 2 * kMostChannels;
 // Status, read by the supervising host.
 inline constexpr int kMagic = 200;
@@ -53,7 +57,7 @@ inline constexpr int kStatusRegisters = kTemperature + 2 * kMostPanelValues - kM
 // Measurement, read by the measuring host.
 inline constexpr int kMeasurementBootId = 300;
 inline constexpr int kMeasurementSequence = 302;
-inline constexpr int kRunEcho = 304;
+inline constexpr int kSession = 304;
 inline constexpr int kMeasurementStatus = 306;
 inline constexpr int kValid = 308;
 inline constexpr int kMeasurement = 312;

@@ -114,7 +114,8 @@ bool ModbusNode::on(ModbusFault::Kind kind) const noexcept {
   return faults_ != nullptr && faults_->active(kind) != nullptr;
 }
 
-void ModbusNode::begin_request() {
+void ModbusNode::begin_request(ModbusConnection from) {
+  asking_ = from;
   disturb_panel();
   tick();
 }
@@ -134,10 +135,22 @@ void ModbusNode::watch_heartbeat(std::int64_t now_ns) {
     heartbeat_seen_ns_ = now_ns;
   } else if (!powered) {
     heartbeat_seen_ns_ = 0;
+    counting_ = 0;
   } else if (heartbeat_seen_ns_ != 0 && now_ns - heartbeat_seen_ns_ > heartbeat_ns_) {
     node_.fail(FaultCause::host_heartbeat);
     heartbeat_seen_ns_ = 0;
+    counting_ = 0;
   }
+}
+
+bool ModbusNode::needs(ModbusConnection connection) const {
+  const bool runs = session_ != 0 && node_.session() == session_;
+  return connection == counting_ || (runs && connection == owner_);
+}
+
+// Without its heartbeat or setpoints the watchdogs do the rest.
+void ModbusNode::hung_up(ModbusConnection connection) {
+  if (counting_ == connection) counting_ = 0;
 }
 
 void ModbusNode::disturb_panel() {
@@ -158,21 +171,49 @@ void ModbusNode::disturb_panel() {
 ModbusException ModbusNode::write(int first, std::span<const std::uint16_t> values) {
   if (first < 0 || first + static_cast<int>(values.size()) > map::kWritableEnd)
     return ModbusException::illegal_address;
+  std::array<std::uint16_t, map::kWritableEnd> before{};
+  std::copy_n(registers_.begin(), before.size(), before.begin());
+  const std::uint32_t heartbeat = u32(map::kHeartbeat);
   const std::uint32_t command = u32(map::kCommandSequence);
   const std::uint32_t run = u32(map::kRunSequence);
   std::copy(values.begin(), values.end(), registers_.begin() + first);
-  if (touches(first, values.size(), map::kCommandSequence) && u32(map::kCommandSequence) != command)
-    take_supervisor_command();
-  if (touches(first, values.size(), map::kRunSequence) && u32(map::kRunSequence) != run)
-    take_run_command();
-  if (touches(first, values.size(), map::kSetpointSequence)) take_setpoint();
+  const ModbusException refused = obey(first, values.size(), heartbeat, command, run);
+  if (refused != ModbusException::none) std::copy(before.begin(), before.end(), registers_.begin());
+  set_u32(map::kRunKey, 0);  // nobody reads it here
+  return refused;
+}
+
+/// Looks at what the registers hold now, and what they held before.
+ModbusException ModbusNode::obey(int first, std::size_t count, std::uint32_t heartbeat,
+                                 std::uint32_t command, std::uint32_t run) {
+  const bool beats = u32(map::kHeartbeat) != heartbeat;
+  const bool runs = u32(map::kRunSequence) != run;
+  const bool moves = touches(first, count, map::kSetpointSequence);
+  const bool of_the_run = first + static_cast<int>(count) > map::kRunCommand;
+  if (beats && counting_ != 0 && counting_ != asking_) return ModbusException::busy;
+  if (of_the_run && !may_control_the_run(runs, moves)) return ModbusException::busy;
+  if (runs)
+    if (const ModbusException refused = take_run_command(); refused != ModbusException::none)
+      return refused;
+  if (beats) counting_ = asking_;
+  if (u32(map::kCommandSequence) != command) take_supervisor_command();
+  if (moves) take_setpoint();
   return ModbusException::none;
+}
+
+bool ModbusNode::may_control_the_run(bool commands, bool moves) const {
+  const std::uint32_t holder = node_.session();
+  const bool began_it = session_ != 0 && asking_ == owner_ && (holder == 0 || holder == session_);
+  if (began_it && u32(map::kRunKey) == session_) return true;
+  if (began_it && !commands && !moves) return true;  // the same command again
+  return holder == 0 && commands && u32(map::kRunCommand) == map::kRunBegin;
 }
 
 ModbusException ModbusNode::read(int first, std::span<std::uint16_t> values) {
   if (first < 0 || first + static_cast<int>(values.size()) > map::kEnd)
     return ModbusException::illegal_address;
   show_status();
+  set_u32(map::kSession, asking_ == owner_ ? session_ : 0);
   std::copy_n(registers_.begin() + first, values.size(), values.begin());
   return ModbusException::none;
 }
@@ -186,27 +227,33 @@ void ModbusNode::take_supervisor_command() {
   set_u32(map::kCommandReply, accepted ? map::kReplyAccepted : map::kReplyRefused);
 }
 
-void ModbusNode::take_run_command() {
-  Outcome outcome = Outcome::fault;
-  inputs_.valid = 0;
-  std::fill(y_.begin(), y_.end(), 0.0);
-  if (u32(map::kRunCommand) == map::kRunBegin) {
-    const std::uint64_t seed =
-        (static_cast<std::uint64_t>(u32(map::kRunSeed)) << 32) | u32(map::kRunSeed + 2);
-    try {
-      node_.begin_run(seed, monotonic_ns(), inputs_);
-      outcome = Outcome::ok;
-    } catch (const StageError&) {
-      // Told to the host as outcome fault, with state and cause.
-    }
-  } else if (u32(map::kRunCommand) == map::kRunEnd) {
+ModbusException ModbusNode::take_run_command() {
+  const std::uint32_t command = u32(map::kRunCommand);
+  if (command != map::kRunBegin && command != map::kRunEnd) return ModbusException::illegal_value;
+  if (command == map::kRunBegin) {
+    const ModbusException refused = begin_run();
+    if (refused != ModbusException::none) return refused;
+  } else {
     node_.end_run();
-    outcome = Outcome::ok;
+    inputs_.valid = 0;
+    std::fill(y_.begin(), y_.end(), 0.0);
   }
   missed_ = 0;
   set_u32(map::kSetpointSequence, 0);
-  set_u32(map::kRunEcho, u32(map::kRunSequence));
-  show_measurement(outcome, 0);
+  show_measurement(Outcome::ok, 0);
+  return ModbusException::none;
+}
+
+ModbusException ModbusNode::begin_run() {
+  const std::uint64_t seed =
+      (static_cast<std::uint64_t>(u32(map::kRunSeed)) << 32) | u32(map::kRunSeed + 2);
+  try {
+    session_ = node_.begin_run(seed, monotonic_ns(), inputs_);
+  } catch (const StageError&) {  // state and cause tell why
+    return node_.session() != 0 ? ModbusException::busy : ModbusException::device_failure;
+  }
+  owner_ = asking_;
+  return ModbusException::none;
 }
 
 void ModbusNode::take_setpoint() {

@@ -17,8 +17,12 @@ namespace stageid {
 /// is read in the same request belongs to it; the same number again moves nothing. Numbers that were
 /// left out are counted as missed and not made up for.
 ///
+/// A run is controlled by the connection that began it, with the key that the node drew for it; a
+/// request of any other to begin, end or move is answered with exception 6 and changes nothing.
+///
 /// A supervising host that has once counted its heartbeat up must go on with it as long as forces may
-/// act: standing still for heartbeat_s ends in a safe stop (FaultCause::host_heartbeat).
+/// act: standing still for heartbeat_s ends in a safe stop (FaultCause::host_heartbeat). As long as
+/// it counts, no other connection may.
 class ModbusNode final : public ModbusRegisters {
  public:
   /// `boot_id`: another one for every start of the process, so that hosts notice. `faults` may be
@@ -28,17 +32,23 @@ class ModbusNode final : public ModbusRegisters {
   ModbusNode(StageNode& node, const StageLimits& limits, std::uint32_t boot_id,
              ModbusFaultScript* faults, double heartbeat_s = 1.0);
 
-  void begin_request() override;
+  void begin_request(ModbusConnection from) override;
   void tick() override;
   [[nodiscard]] ModbusException write(int first, std::span<const std::uint16_t> values) override;
   [[nodiscard]] ModbusException read(int first, std::span<std::uint16_t> values) override;
+  bool needs(ModbusConnection connection) const override;
+  void hung_up(ModbusConnection connection) override;
 
  private:
   void describe_stage(const StageLimits& limits);
   void disturb_panel();
   void watch_heartbeat(std::int64_t now_ns);
   void take_supervisor_command();
-  void take_run_command();
+  ModbusException obey(int first, std::size_t count, std::uint32_t heartbeat, std::uint32_t command,
+                       std::uint32_t run);
+  bool may_control_the_run(bool commands, bool moves) const;
+  ModbusException take_run_command();
+  ModbusException begin_run();
   void take_setpoint();
   void show_measurement(Outcome outcome, std::uint32_t sequence);
   void show_status();
@@ -51,6 +61,10 @@ class ModbusNode final : public ModbusRegisters {
   ModbusFaultScript* faults_;
   std::array<std::uint16_t, modbus_map::kEnd> registers_{};
   std::uint32_t boot_id_;
+  ModbusConnection asking_ = 0;
+  std::uint32_t session_ = 0;      // key of the last run that was begun here; 0: none
+  ModbusConnection owner_ = 0;     // who began it
+  ModbusConnection counting_ = 0;  // whose heartbeat is watched
   std::int64_t heartbeat_ns_;
   std::uint32_t last_heartbeat_ = 0;
   std::int64_t heartbeat_seen_ns_ = 0;  // 0: nobody counts

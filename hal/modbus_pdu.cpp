@@ -98,9 +98,10 @@ ModbusException answer(Request request, ModbusRegisters& registers, Reply reply,
 
 }  // namespace
 
-std::size_t answer_request(Request request, ModbusRegisters& registers, Reply reply) {
+std::size_t answer_request(Request request, ModbusConnection from, ModbusRegisters& registers,
+                           Reply reply) {
   if (request.empty()) return 0;
-  registers.begin_request();
+  registers.begin_request(from);
   reply[0] = request[0];
   std::size_t bytes = 0;
   const ModbusException refused = answer(request, registers, reply, bytes);

@@ -17,16 +17,23 @@ enum class ModbusException : std::uint8_t {
   gateway_target = 11  ///< the unit asked for is not here
 };
 
+/// One of a server's connections: never given twice.
+using ModbusConnection = std::uint64_t;
+
 /// What a server serves: holding registers.
 class ModbusRegisters {
  public:
   virtual ~ModbusRegisters() = default;
-  /// Called once for every request, before write() and read().
-  virtual void begin_request() = 0;
+  /// Called once for every request, before write() and read(): who asks.
+  virtual void begin_request(ModbusConnection from) = 0;
   /// Called every few milliseconds, whether there are requests or not.
   virtual void tick() = 0;
   [[nodiscard]] virtual ModbusException write(int first, std::span<const std::uint16_t> values) = 0;
   [[nodiscard]] virtual ModbusException read(int first, std::span<std::uint16_t> values) = 0;
+  /// Something depends on this connection: its place is not given to another one.
+  virtual bool needs(ModbusConnection /*connection*/) const { return false; }
+  /// It has ended.
+  virtual void hung_up(ModbusConnection /*connection*/) {}
 };
 
 inline constexpr std::size_t kLargestPdu = 253;
@@ -38,8 +45,8 @@ inline constexpr std::size_t kLargestPdu = 253;
 /// neither run the stage between the write and the read of a function 23 nor spoil a reply on
 /// request.
 /// @return bytes of the reply; 0 for an empty request.
-std::size_t answer_request(std::span<const std::uint8_t> request, ModbusRegisters& registers,
-                           std::span<std::uint8_t, kLargestPdu> reply);
+std::size_t answer_request(std::span<const std::uint8_t> request, ModbusConnection from,
+                           ModbusRegisters& registers, std::span<std::uint8_t, kLargestPdu> reply);
 
 /// The reply that refuses a request of this function. @return its bytes: 2.
 std::size_t exception_reply(std::uint8_t function, ModbusException code,

@@ -15,9 +15,15 @@ namespace stageid {
 /// A Modbus server for one unit, TCP (any number of clients up to kMostClients) or RTU, that can
 /// misbehave on request.
 ///
+/// It never waits for a client: a reply that is not taken and a request that is not completed within
+/// kPatience_ms end the connection, and a client reads one reply before its next request is looked
+/// at. If all places are taken, a new client gets that of the one that has been silent longest, but
+/// never that of a connection that the registers need. Memory is bounded: kMostClients times one
+/// request and one reply.
+///
 /// A TCP request for another unit is refused as a gateway does (exception 11), one on a serial line
-/// is not for us. Bytes that are no request end a TCP connection; on a serial line they are thrown
-/// away at the next silence of kSilence_ms, so that the next request is found again.
+/// is not for us. Bytes that are no request end a TCP connection; on a serial line they are skipped,
+/// and what is left of a request is thrown away at the next silence of kSilence_ms.
 ///
 /// It stands up to garbage but not to an enemy: there is neither encryption nor authentication in
 /// Modbus. Listen on the loopback interface or in a closed network only.
@@ -25,6 +31,7 @@ class ModbusServer {
  public:
   static constexpr std::size_t kMostClients = 16;
   static constexpr int kSilence_ms = 50;
+  static constexpr int kPatience_ms = 1000;
 
   /// TCP: listens on address.host and address.port (0: a free one). RTU: opens the device.
   /// `faults` may be null; it and `registers` must outlive the server.
@@ -37,7 +44,7 @@ class ModbusServer {
   /// With the port that was found.
   const ModbusAddress& address() const noexcept { return address_; }
 
-  /// Waits up to wait_ms for requests and answers them.
+  /// Waits up to wait_ms for something to do, and does it.
   void serve(int wait_ms);
   /// Serves until `stop`.
   void run(const std::atomic<bool>& stop);
@@ -48,14 +55,18 @@ class ModbusServer {
 
   void open();
   void serve_lines(int wait_ms);
-  void accept_client();
-  bool receive(Line& line);
-  void answer_all(Line& line);
+  void work(Line& line, int events);
+  void accept_clients();
+  bool make_room();
+  void receive(Line& line);
+  void answer_next(Line& line);
   void answer(Line& line, std::uint16_t transaction, std::uint8_t unit,
               std::span<const std::uint8_t> request);
-  void send(Line& line, std::uint16_t transaction, std::uint8_t unit,
-            std::span<const std::uint8_t> reply, bool half);
-  void forget_noise(Line& line);
+  void reply(Line& line, std::uint16_t transaction, std::uint8_t unit,
+             std::span<const std::uint8_t> pdu);
+  void send(Line& line);
+  void look_at_time(Line& line);
+  void hang_up(const Line& line);
   const ModbusFault* fault(ModbusFault::Kind kind) const noexcept;
 
   ModbusAddress address_;
@@ -64,6 +75,7 @@ class ModbusServer {
   std::unique_ptr<Context> context_;
   int listener_ = -1;
   std::vector<Line> lines_;
+  ModbusConnection last_connection_ = 0;
   bool dead_ = false;
 };
 

@@ -6,11 +6,13 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <random>
 #include <span>
 #include <string>
 
 #include "hal/modbus_codec.hpp"
 #include "hal/modbus_map.hpp"
+#include "hal/peer_status.hpp"
 
 namespace stageid {
 
@@ -46,6 +48,10 @@ class Block {
   throw StageError(fmt::format("{}: {}", to_string(link.address()), what));
 }
 
+[[noreturn]] void refuse(ModbusLink& link, PeerStatus status, const std::string& detail) {
+  refuse(link, meaning(status).words + detail);
+}
+
 bool sound(const std::vector<double>& scales) {
   return std::all_of(scales.begin(), scales.end(),
                      [](double scale) { return scale > 0.0 && std::isfinite(scale); });
@@ -57,8 +63,9 @@ void check_map(ModbusLink& link, const Block& status) {
                              "unit",
                              map::kMagic, map::kMagicValue));
   if (status[map::kVersion] != map::kVersionValue)
-    refuse(link, fmt::format("register map version {}; this program knows version {}",
-                             status[map::kVersion], map::kVersionValue));
+    refuse(link, PeerStatus::other_version,
+           fmt::format(" (register map {}, not {}); update the older side", status[map::kVersion],
+                       map::kVersionValue));
 }
 
 /// Sends the same request again if no good answer came.
@@ -97,14 +104,16 @@ ModbusDescription read_description(ModbusLink& link, const StageInfo& expected) 
   if (block[map::kActuatorCount] != expected.actuators.size() ||
       block[map::kSensorCount] != expected.sensors.size() ||
       block[map::kChannelHash] != map::channel_hash(expected))
-    refuse(link, fmt::format("another stage: {} actuators and {} sensors there, {} and {} in the "
-                             "stage file, or other names; give both sides the same stage file",
-                             block[map::kActuatorCount], block[map::kSensorCount],
-                             expected.actuators.size(), expected.sensors.size()));
+    refuse(link, PeerStatus::other_stage,
+           fmt::format(": {} actuators and {} sensors there, {} and {} here, or other names; give "
+                       "both the same",
+                       block[map::kActuatorCount], block[map::kSensorCount],
+                       expected.actuators.size(), expected.sensors.size()));
   const auto rate_hz = static_cast<double>(std::bit_cast<float>(block[map::kSampleRate]));
   if (!(std::abs(rate_hz - expected.sample_rate_hz) <= 1e-6 * expected.sample_rate_hz))
-    refuse(link, fmt::format("the stage runs at {} Hz, the stage file says {} Hz", rate_hz,
-                             expected.sample_rate_hz));
+    refuse(link, PeerStatus::other_stage,
+           fmt::format(": the stage runs at {} Hz, the stage file says {} Hz; give both the same",
+                       rate_hz, expected.sample_rate_hz));
   ModbusDescription description;
   description.boot_id = status[map::kBootId];
   description.actuator_scale = block.scales(map::kActuatorScale, expected.actuators.size());
@@ -114,13 +123,43 @@ ModbusDescription read_description(ModbusLink& link, const StageInfo& expected) 
   return description;
 }
 
-bool read_enabled(ModbusLink& link) {
-  return (Block(link, map::kFlags, 2)[map::kFlags] & map::kFlagEnabled) != 0;
+ModbusState read_state(ModbusLink& link) {
+  const Block block(link, map::kState, 6);
+  return {static_cast<NodeState>(block[map::kState] & 0xFFU),
+          static_cast<FaultCause>(block[map::kCause] & 0xFFU),
+          (block[map::kFlags] & map::kFlagInterlockClosed) != 0,
+          (block[map::kFlags] & map::kFlagEnabled) != 0};
 }
 
-NodeState read_state(ModbusLink& link) {
-  return static_cast<NodeState>(Block(link, map::kState, 2)[map::kState] & 0xFFU);
+namespace {
+
+std::string describe(const ModbusState& state) {
+  return fmt::format("state {}, cause: {}{}; remove the cause{}", to_string(state.state),
+                     to_string(state.cause),
+                     state.interlock_closed ? "" : ", the interlock is open",
+                     state.state == NodeState::fault ? " and add --reset-fault" : "");
 }
+
+/// Gives a run command; `session`: the key that the answer must carry, 0: any but 0.
+/// @return the key in the answer.
+std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uint64_t run_seed,
+                               std::uint32_t session, std::vector<std::uint16_t>& reply) {
+  std::random_device random;
+  std::array<std::uint16_t, map::kRunRegisters> request{};
+  const std::span<std::uint16_t> out = request;
+  put_u32(out.first<2>(), command);
+  put_u32(out.subspan(map::kRunSequence - map::kRunCommand).first<2>(), random() | 1U);
+  put_u64(out.subspan(map::kRunSeed - map::kRunCommand).first<4>(), run_seed);
+  put_u32(out.subspan(map::kRunKey - map::kRunCommand).first<2>(), session);
+  const auto shown = std::span<const std::uint16_t>(reply)
+                         .subspan(map::kSession - map::kMeasurementBootId)
+                         .first<2>();
+  transact(link, map::kRunCommand, request, map::kMeasurementBootId, reply,
+           [&] { return get_u32(shown) != 0 && (session == 0 || get_u32(shown) == session); });
+  return get_u32(shown);
+}
+
+}  // namespace
 
 void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
   const std::uint32_t sequence = Block(link, map::kCommandEcho, 2)[map::kCommandEcho] + 1;
@@ -132,27 +171,24 @@ void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
   transact(link, map::kCommand, request, map::kCommandEcho, reply,
            [&] { return get_u32(replied.first<2>()) == sequence; });
   if (get_u32(replied.last<2>()) == map::kReplyAccepted) return;
-  const Block status(link, map::kState, 6);
-  throw StageError(fmt::format(
-      "{}: the command is refused in state {} (fault: {}{}); put that right and reset the fault",
-      to_string(link.address()), to_string(static_cast<NodeState>(status[map::kState])),
-      to_string(static_cast<FaultCause>(status[map::kCause])),
-      (status[map::kFlags] & map::kFlagInterlockClosed) == 0 ? "; the interlock is open" : ""));
+  throw StageError(fmt::format("{}: the command is refused: {}", to_string(link.address()),
+                               describe(read_state(link))));
 }
 
-std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uint64_t run_seed,
-                               std::vector<std::uint16_t>& reply) {
-  const std::uint32_t sequence = Block(link, map::kRunEcho, 2)[map::kRunEcho] + 1;
-  std::array<std::uint16_t, map::kRunRegisters> request{};
-  const std::span<std::uint16_t> out = request;
-  put_u32(out.first<2>(), command);
-  put_u32(out.subspan(map::kRunSequence - map::kRunCommand).first<2>(), sequence);
-  put_u64(out.subspan(map::kRunSeed - map::kRunCommand).first<4>(), run_seed);
-  const auto echo =
-      std::span<const std::uint16_t>(reply).subspan(map::kRunEcho - map::kMeasurementBootId);
-  transact(link, map::kRunCommand, request, map::kMeasurementBootId, reply,
-           [&] { return get_u32(echo.first<2>()) == sequence; });
-  return sequence;
+std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
+                        std::vector<std::uint16_t>& reply) {
+  try {
+    return give_run_command(link, map::kRunBegin, run_seed, 0, reply);
+  } catch (const StageError&) {
+    if (link.last().status != LinkStatus::refused) throw;
+  }
+  const std::string place = to_string(link.address());
+  if (link.refused_as_busy()) refuse(PeerStatus::held, place, "; wait until it has ended");
+  throw StageError(fmt::format("{}: no run begins: {}", place, describe(read_state(link))));
+}
+
+void end_run(ModbusLink& link, std::uint32_t session, std::vector<std::uint16_t>& reply) {
+  static_cast<void>(give_run_command(link, map::kRunEnd, 0, session, reply));
 }
 
 }  // namespace stageid

@@ -26,18 +26,23 @@ struct ModbusDescription {
 /// @throws StageError if it is no stage, has another map, other channels or another rate.
 ModbusDescription read_description(ModbusLink& link, const StageInfo& expected);
 
-/// Whether the stage stands in operation_enabled or measuring. @throws StageError
-bool read_enabled(ModbusLink& link);
-
+struct ModbusState {
+  NodeState state = NodeState::not_ready;
+  FaultCause cause = FaultCause::none;
+  bool interlock_closed = false;
+  bool enabled = false;  ///< operation_enabled or measuring
+};
 /// @throws StageError
-NodeState read_state(ModbusLink& link);
+ModbusState read_state(ModbusLink& link);
 
 /// @throws StageError if it is refused; the message names state and cause.
 void give_supervisor_command(ModbusLink& link, SupervisorCommand command);
 
-/// Begins or ends a run; `reply` receives the measurement block. @return the run's sequence number.
-/// @throws StageError if there is no answer.
-std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uint64_t run_seed,
-                               std::vector<std::uint16_t>& reply);
+/// Begins a run; `reply` receives the measurement block, with y[0]. @return the key of the run.
+/// @throws StageError if there is no answer, or it is refused.
+std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
+                        std::vector<std::uint16_t>& reply);
+/// Ends the run of this key. @throws StageError as begin_run().
+void end_run(ModbusLink& link, std::uint32_t session, std::vector<std::uint16_t>& reply);
 
 }  // namespace stageid

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -16,8 +17,9 @@ namespace map = modbus_map;
 
 namespace {
 
-constexpr std::size_t kSetpointHead = map::kSetpoint - map::kSetpointSequence;
+constexpr std::size_t kSetpointHead = map::kSetpoint - map::kRunKey;
 constexpr std::size_t kMeasurementHead = map::kMeasurement - map::kMeasurementBootId;
+constexpr double kLargestCount = 2147483647.0;
 
 std::span<const std::uint16_t, 2> pair_at(const std::vector<std::uint16_t>& block, int offset) {
   return std::span<const std::uint16_t>(block).subspan(static_cast<std::size_t>(offset)).first<2>();
@@ -89,30 +91,38 @@ void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
     link_.connect();
     description_ = read_description(link_, info_);
   }
-  if (std::exchange(reset_fault_, false) && read_state(link_) == NodeState::fault)
+  const ModbusState node = read_state(link_);
+  const bool reset_fault = std::exchange(reset_fault_, false);
+  if (node.state == NodeState::fault) {
+    if (!reset_fault)
+      refuse(PeerStatus::in_fault, to_string(link_.address()),
+             fmt::format(" ({}{}); remove the cause and add --reset-fault", to_string(node.cause),
+                         node.interlock_closed ? "" : "; the interlock is open"));
     give_supervisor_command(link_, SupervisorCommand::reset_fault);
-  if (!read_enabled(link_)) {
+  }
+  if (!node.enabled) {
     give_supervisor_command(link_, SupervisorCommand::enable);
     enabled_here_ = true;
   }
-  run_sequence_ = give_run_command(link_, map::kRunBegin, run_seed, reply_);
-  if (measured(map::kMeasurementStatus) % 256 != static_cast<std::uint32_t>(Outcome::ok)) {
-    const std::uint32_t status = measured(map::kMeasurementStatus);
-    throw StageError(fmt::format("{}: no measurement in state {} ({}); reset or enable it first",
-                                 to_string(link_.address()), to_string(state_of(status)),
-                                 to_string(cause_of(status))));
-  }
+  session_ = begin_run(link_, run_seed, reply_);
   sequence_ = 0;
+  missed_ = 0;
   running_ = true;
   const Pacer::Instant now = pacer_.restart();
   first.cycle = 0;
   first.t_sample_ns = now.sample_ns;
   first.t_rx_ns = now.now_ns;
-  static_cast<void>(take_measurement(first));
+  const PeerStatus status = status_ = take_measurement(first);
+  if (status == PeerStatus::good) return;
+  stop();
+  const bool missing = status == PeerStatus::incomplete || status == PeerStatus::nothing_new;
+  refuse(missing ? PeerStatus::first_sample_missing : status, to_string(link_.address()),
+         "; look at the node");
 }
 
 bool ModbusStage::write_setpoint(const Outputs& outputs) noexcept {
-  put_u32(std::span(request_).first<2>(), sequence_);
+  put_u32(std::span(request_).first<2>(), session_);
+  put_u32(std::span(request_).subspan<2, 2>(), sequence_);
   for (std::size_t i = 0; i < outputs.u.size(); ++i) {
     if (!std::isfinite(outputs.u[i])) return false;
     put_i32(std::span(request_).subspan(kSetpointHead + 2 * i).first<2>(),
@@ -131,31 +141,32 @@ Outcome ModbusStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline d
     trouble_ = Trouble::not_finite;
     return Outcome::fault;
   }
-  const Outcome link = transact();
+  status_ = transact();
   const Pacer::Instant now = pacer_.wait();
   inputs.cycle = sequence_;
   inputs.t_ready_ns = now.ready_ns;
   inputs.t_sample_ns = now.sample_ns;
   inputs.t_rx_ns = now.now_ns;
-  if (link != Outcome::ok && link != Outcome::late) return link;
-  const Outcome stage = take_measurement(inputs);
-  if (stage != Outcome::ok) return stage;
+  if (status_ == PeerStatus::good || status_ == PeerStatus::late)
+    status_ = std::max(status_, take_measurement(inputs));
   const bool past_deadline = deadline.t_ns != 0 && now.now_ns > deadline.t_ns;
-  return link == Outcome::late || now.late || past_deadline ? Outcome::late : Outcome::ok;
+  if (status_ == PeerStatus::good && (now.late || past_deadline)) status_ = PeerStatus::late;
+  return meaning(status_).outcome;
 }
 
-Outcome ModbusStage::transact() noexcept {
-  Outcome outcome =
-      judge(link_.exchange(map::kSetpointSequence, request_, map::kMeasurementBootId, reply_));
-  if (outcome == Outcome::ok || trouble_ == Trouble::restarted || !link_.connected())
-    return outcome;
+PeerStatus ModbusStage::transact() noexcept {
+  const auto once = [this] {
+    return judge(link_.exchange(map::kRunKey, request_, map::kMeasurementBootId, reply_));
+  };
+  PeerStatus status = once();
+  if (status == PeerStatus::good || status == PeerStatus::other_node || !link_.connected())
+    return status;
   link_.drain();
-  outcome =
-      judge(link_.exchange(map::kSetpointSequence, request_, map::kMeasurementBootId, reply_));
-  return outcome == Outcome::ok ? Outcome::late : outcome;
+  status = once();
+  return status == PeerStatus::good ? PeerStatus::late : status;
 }
 
-Outcome ModbusStage::judge(LinkStatus status) noexcept {
+PeerStatus ModbusStage::judge(LinkStatus status) noexcept {
   trouble_ = status == LinkStatus::ok ? Trouble::none : Trouble::link;
   link_trouble_ = link_.last();
   switch (status) {
@@ -163,37 +174,46 @@ Outcome ModbusStage::judge(LinkStatus status) noexcept {
       return judge_reply();
     case LinkStatus::timeout:
     case LinkStatus::disconnected:
-      return Outcome::link_down;
+      return PeerStatus::link_down;
     case LinkStatus::corrupt:
-      return Outcome::corrupt;
+      return PeerStatus::damaged;
     case LinkStatus::refused:
       break;
   }
-  return Outcome::fault;
+  return PeerStatus::fault;
 }
 
-Outcome ModbusStage::judge_reply() noexcept {
+PeerStatus ModbusStage::judge_reply() noexcept {
   const std::uint32_t boot_id = measured(map::kMeasurementBootId);
   if (boot_id == description_.boot_id && measured(map::kMeasurementSequence) == sequence_ &&
-      measured(map::kRunEcho) == run_sequence_)
-    return Outcome::ok;
+      measured(map::kSession) == session_)
+    return PeerStatus::good;
   // Zeros are what other devices show; a node that is there but new has a boot id of its own.
-  const bool restarted = boot_id != description_.boot_id && boot_id != 0;
-  trouble_ = restarted ? Trouble::restarted : Trouble::foreign_reply;
-  return restarted ? Outcome::link_down : Outcome::corrupt;
+  const bool other = boot_id != description_.boot_id && boot_id != 0;
+  trouble_ = other ? Trouble::node : Trouble::foreign_reply;
+  return other ? PeerStatus::other_node : PeerStatus::damaged;
 }
 
-Outcome ModbusStage::take_measurement(Inputs& inputs) noexcept {
+PeerStatus ModbusStage::take_measurement(Inputs& inputs) noexcept {
   node_status_ = measured(map::kMeasurementStatus);
   inputs.node_state = state_of(node_status_);
   inputs.valid =
       (static_cast<std::uint64_t>(measured(map::kValid)) << 32) | measured(map::kValid + 2);
-  for (std::size_t i = 0; i < inputs.y.size(); ++i)
-    inputs.y[i] = description_.sensor_scale[i] *
-                  get_i32(pair_at(reply_, static_cast<int>(kMeasurementHead + 2 * i)));
-  const auto outcome = static_cast<Outcome>(node_status_ & 0xFFU);
-  if (outcome != Outcome::ok) trouble_ = Trouble::node;
-  return outcome > Outcome::limit ? Outcome::fault : outcome;
+  PeerReport report;
+  report.outcome = static_cast<std::uint8_t>(node_status_ & 0xFFU);
+  report.state = inputs.node_state;
+  report.cause = cause_of(node_status_);
+  report.valid = inputs.valid;
+  report.all = ~std::uint64_t{0} >> (64 - inputs.y.size());
+  report.setpoints_missed = node_status_ >> 24 > std::exchange(missed_, node_status_ >> 24);
+  for (std::size_t i = 0; i < inputs.y.size(); ++i) {
+    const std::int32_t count = get_i32(pair_at(reply_, static_cast<int>(kMeasurementHead + 2 * i)));
+    inputs.y[i] = description_.sensor_scale[i] * count;
+    report.out_of_range |= std::abs(static_cast<double>(count)) >= kLargestCount;
+  }
+  const PeerStatus status = stageid::judge(report);
+  if (status != PeerStatus::good) trouble_ = Trouble::node;
+  return status;
 }
 
 void ModbusStage::stop() noexcept {
@@ -208,11 +228,11 @@ void ModbusStage::stop() noexcept {
 
 void ModbusStage::end_run() {
   // A node that is new, or gone, does not know of this run.
-  if (trouble_ == Trouble::restarted) link_.close();
+  if (status_ == PeerStatus::other_node) link_.close();
   if (!link_.connected()) return;
   if (trouble_ != Trouble::none) link_.drain();
-  static_cast<void>(give_run_command(link_, map::kRunEnd, 0, reply_));
-  if (std::exchange(enabled_here_, false) && read_enabled(link_))
+  stageid::end_run(link_, session_, reply_);
+  if (std::exchange(enabled_here_, false) && read_state(link_).enabled)
     give_supervisor_command(link_, SupervisorCommand::disable);
 }
 
@@ -222,14 +242,13 @@ std::string ModbusStage::trouble() const {
       return "";
     case Trouble::link:
       return link_.describe(link_trouble_);
-    case Trouble::restarted:
-      return fmt::format("{}: the node was restarted", to_string(link_.address()));
     case Trouble::foreign_reply:
       return fmt::format("{}: replies do not belong to the setpoints: another unit or program",
                          to_string(link_.address()));
     case Trouble::node:
-      return fmt::format("{}: the stage is in state {}: {}", to_string(link_.address()),
-                         to_string(state_of(node_status_)), to_string(cause_of(node_status_)));
+      return fmt::format("{}: {} (state {}, cause: {})", to_string(link_.address()),
+                         meaning(status_).words, to_string(state_of(node_status_)),
+                         to_string(cause_of(node_status_)));
     case Trouble::not_finite:
       return "a command was no number";
   }

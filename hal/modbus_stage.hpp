@@ -7,6 +7,7 @@
 #include "hal/modbus_link.hpp"
 #include "hal/modbus_session.hpp"
 #include "hal/pacer.hpp"
+#include "hal/peer_status.hpp"
 #include "hal/stage.hpp"
 
 namespace stageid {
@@ -27,7 +28,7 @@ double modbus_exchange_s(const ModbusAddress& address, const ModbusTiming& timin
 /// a late, old or foreign reply is never taken for the answer. An exchange whose reply is missing or
 /// fails a check is drained and repeated once with the same number, which moves nothing twice:
 /// Outcome::late if that helps, otherwise link_down (no reply), corrupt or fault (refused), within
-/// 2 worst_reply_s. A node that was restarted is link_down at once.
+/// 2 worst_reply_s. What the node says of itself has the meaning that peer_status.hpp gives it.
 ///
 /// start() enables the stage if nobody has, and stop() disables it only then.
 class ModbusStage final : public CyclicStage {
@@ -49,10 +50,10 @@ class ModbusStage final : public CyclicStage {
  private:
   void end_run();
   bool write_setpoint(const Outputs& outputs) noexcept;
-  Outcome transact() noexcept;
-  Outcome judge(LinkStatus status) noexcept;
-  Outcome judge_reply() noexcept;
-  Outcome take_measurement(Inputs& inputs) noexcept;
+  PeerStatus transact() noexcept;
+  PeerStatus judge(LinkStatus status) noexcept;
+  PeerStatus judge_reply() noexcept;
+  PeerStatus take_measurement(Inputs& inputs) noexcept;
   std::uint32_t measured(int address) const noexcept;
 
   StageInfo info_;
@@ -61,15 +62,17 @@ class ModbusStage final : public CyclicStage {
   std::vector<std::uint16_t> request_;  // setpoint block
   std::vector<std::uint16_t> reply_;    // measurement block
   ModbusDescription description_;
-  std::uint32_t run_sequence_ = 0;
+  std::uint32_t session_ = 0;
   std::uint32_t sequence_ = 0;
+  std::uint32_t missed_ = 0;  // setpoints of this run, as the node counts them
   bool running_ = false;
   bool enabled_here_ = false;
   bool reset_fault_;
 
   /// What the last exchange ran into; text is made of it when somebody asks.
-  enum class Trouble : std::uint8_t { none, link, restarted, foreign_reply, node, not_finite };
+  enum class Trouble : std::uint8_t { none, link, foreign_reply, node, not_finite };
   Trouble trouble_ = Trouble::none;
+  PeerStatus status_ = PeerStatus::good;
   ModbusLink::Trouble link_trouble_;
   std::uint32_t node_status_ = 0;
 };

@@ -11,6 +11,7 @@
 #include "hal/modbus_codec.hpp"
 #include "hal/modbus_map.hpp"
 #include "hal/pacer.hpp"
+#include "hal/peer_status.hpp"
 
 namespace stageid {
 
@@ -57,8 +58,9 @@ std::string map_trouble(Status status) {
         "register {} holds {:#010x}, not {:#010x}: no stage is there, or another unit", map::kMagic,
         u32(status, map::kMagic), map::kMagicValue);
   if (u32(status, map::kVersion) != map::kVersionValue)
-    return fmt::format("register map version {}; this program knows version {}",
-                       u32(status, map::kVersion), map::kVersionValue);
+    return fmt::format("{} (register map {}, not {}); update the older side",
+                       meaning(PeerStatus::other_version).words, u32(status, map::kVersion),
+                       map::kVersionValue);
   return "";
 }
 

@@ -70,7 +70,8 @@ std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& 
                     conditions.temperature_high_k, "temperature", "K");
   if (!temperature.empty()) return temperature;
   if (snapshot.state == NodeState::fault || snapshot.state == NodeState::fault_reaction)
-    return fmt::format("the plant is in fault: {}; reset it first", to_string(snapshot.cause));
+    return fmt::format("the plant is in fault: {}; remove the cause and add --reset-fault",
+                       to_string(snapshot.cause));
   return "";
 }
 

@@ -40,14 +40,14 @@ struct StageInfo {
   std::vector<Channel> sensors;
 };
 
-/// How one exchange ended. `ok` and `late` carry valid measurements.
+/// How one exchange ended. `ok`, `late` and `bus_passive` carry valid measurements.
 enum class Outcome : std::uint8_t {
   ok,
-  late,        ///< the deadline passed; measurement valid, marked
-  incomplete,  ///< some sensors missing: see Inputs::valid
-  stale,       ///< nothing new: the last measurement is held
-  corrupt,     ///< a frame or reply failed its check
-  bus_passive,
+  late,         ///< the deadline passed; measurement valid, marked
+  incomplete,   ///< some sensors missing: see Inputs::valid
+  stale,        ///< nothing new: the last measurement is held
+  corrupt,      ///< a frame or reply failed its check
+  bus_passive,  ///< the controller is error-passive; measurement valid, marked
   bus_off,
   link_down,
   fault,  ///< the stage reports a fault (interlock, amplifier, non-finite sensor)

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "hal/peer_status.hpp"
+
 namespace stageid {
 namespace {
 
@@ -118,6 +120,7 @@ void StageNode::set_panel(NodePanel panel) {
 
 SupervisorReply StageNode::request(SupervisorCommand command) {
   const std::lock_guard lock(mutex_);
+  if (machine_.state() != NodeState::operation_enabled) reserved_ = false;
   const bool needs_panel =
       command == SupervisorCommand::enable || command == SupervisorCommand::reset_fault;
   const PanelTrouble trouble = trouble_of(panel_);
@@ -127,14 +130,53 @@ SupervisorReply StageNode::request(SupervisorCommand command) {
   return {true, ""};
 }
 
-void StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& first) {
+// A run or reservation can end in many ways; all of them are changes of the state.
+std::uint32_t StageNode::holder() const {
+  const NodeState state = machine_.state();
+  const bool held =
+      state == NodeState::measuring || (reserved_ && state == NodeState::operation_enabled);
+  return held ? session_ : 0;
+}
+
+// The low byte names the run in each CAN frame: neither 0 nor that of the run before.
+std::uint32_t StageNode::draw_key() {
+  std::uint32_t key = 0;
+  do key = random_();
+  while ((key & 0xFFU) == 0 || (key & 0xFFU) == (session_ & 0xFFU));
+  return key;
+}
+
+std::uint32_t StageNode::session() const {
   const std::lock_guard lock(mutex_);
+  return holder();
+}
+
+std::uint32_t StageNode::reserve() {
+  const std::lock_guard lock(mutex_);
+  if (holder() != 0) refuse(PeerStatus::held, "node", "; wait until it has ended");
+  session_ = draw_key();
+  reserved_ = true;
+  return session_;
+}
+
+void StageNode::release() {
+  const std::lock_guard lock(mutex_);
+  reserved_ = false;
+}
+
+std::uint32_t StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& first,
+                                   std::uint32_t session) {
+  const std::lock_guard lock(mutex_);
+  if (holder() != 0 && (session != holder() || running_))
+    refuse(PeerStatus::held, "node", "; wait until it has ended");
   if (machine_.state() != NodeState::operation_enabled)
     throw StageError(fmt::format("node: no measurement in state {}; enable it first",
                                  to_string(machine_.state())));
   if (first.y.size() != y_.size()) throw StageError("node: Inputs::y must have one entry a sensor");
   stage_.start(run_seed, first);
+  if (holder() == 0) session_ = draw_key();
   static_cast<void>(machine_.begin_measuring());
+  reserved_ = false;
   running_ = true;
   sample_ = 0;
   last_sample_ns_ = now_ns;
@@ -143,6 +185,7 @@ void StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& f
   controller_.reset();
   controller_.update(y_.data(), control_.data());
   first.node_state = machine_.state();
+  return session_;
 }
 
 Outcome StageNode::advance(std::int64_t now_ns, std::span<const double> u, Inputs& inputs) {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <random>
 #include <span>
 #include <string>
 #include <vector>
@@ -65,9 +66,19 @@ class StageNode {
   /// enable and reset_fault are refused while the panel is out of range; the reply says what.
   SupervisorReply request(SupervisorCommand command);
 
-  /// operation_enabled -> measuring; y[0] into `first.y` (size sensors).
-  /// @throws StageError in any other state, or if the stage refuses.
-  void begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& first);
+  /// The key of the host that has the stage, while it measures or keeps it reserved; 0: nobody has.
+  std::uint32_t session() const;
+  /// Keeps the stage for one host until its run ends, it is released, or it is no longer enabled.
+  /// @return the key, another one each time. @throws StageError if another host has the stage.
+  std::uint32_t reserve();
+  /// Ends a reservation.
+  void release();
+
+  /// operation_enabled -> measuring; y[0] into `first.y` (size sensors). `session`: of a
+  /// reservation, 0 without. @return the key of the run.
+  /// @throws StageError in any other state, if another host has the stage, or if the stage refuses.
+  std::uint32_t begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& first,
+                          std::uint32_t session = 0);
   /// u[n] -> y[n+1]. Outcome::fault unless measuring.
   [[nodiscard]] Outcome advance(std::int64_t now_ns, std::span<const double> u, Inputs& inputs);
   /// The same with u[n] = C(y[n]) + r[n] of the node's own controller; u[n] into `u`.
@@ -86,6 +97,8 @@ class StageNode {
  private:
   Outcome exchange(std::int64_t now_ns, std::span<const double> u, Inputs& inputs);
   void give_nothing(Inputs& inputs) const;
+  std::uint32_t holder() const;
+  std::uint32_t draw_key();
   void hold(std::int64_t now_ns);
   void come_to_rest();
 
@@ -98,6 +111,9 @@ class StageNode {
   std::int64_t watchdog_ns_ = 0;
   std::int64_t hold_ns_ = 0;
 
+  std::random_device random_;
+  std::uint32_t session_ = 0;  // of the last run or reservation
+  bool reserved_ = false;
   bool running_ = false;  // the stage is started: forces act in closed loop
   std::uint64_t sample_ = 0;
   std::int64_t last_sample_ns_ = 0;

@@ -29,6 +29,13 @@ void set_socket_options(int socket) {
   ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
 }
 
+constexpr const char* kWholeAddress = "open the address that stageid printed, with its token";
+
+void refuse(httplib::Response& response, int status, const std::string& why) {
+  response.status = status;
+  response.set_content(why + "\n", "text/plain");
+}
+
 std::string host_in_url(const std::string& host) {
   return host.find(':') == std::string::npos ? host : "[" + host + "]";
 }
@@ -36,19 +43,19 @@ std::string host_in_url(const std::string& host) {
 }  // namespace
 
 struct DashboardServer::State {
-  State(const DashboardAddress& asked, DashboardContent& shown) : address(asked), content(shown) {
-    if (!address.is_loopback()) token = make_token();
-  }
+  State(const DashboardAddress& asked, DashboardContent& shown)
+      : address(asked), content(shown), token(make_token()) {}
 
   DashboardAddress address;
   DashboardContent& content;
-  std::string token;  // empty: none is asked for
+  std::string token;
   std::string url;
   httplib::Server server;
   std::thread thread;
   std::atomic<int> watchers = 0;
   std::atomic<bool> finishing = false;
 
+  bool has_token(const httplib::Request& request) const;
   bool allowed(const httplib::Request& request) const;
   void listen();
   void route();
@@ -56,8 +63,12 @@ struct DashboardServer::State {
   bool feed(std::uint64_t& seen, httplib::DataSink& sink);
 };
 
+bool DashboardServer::State::has_token(const httplib::Request& request) const {
+  return same_token(request.get_param_value("token"), token);
+}
+
 bool DashboardServer::State::allowed(const httplib::Request& request) const {
-  if (!token.empty()) return same_token(request.get_param_value("token"), token);
+  if (!address.is_loopback()) return has_token(request);
   const std::string host = request.get_header_value("Host");
   const std::string mine = fmt::format("{}:{}", host_in_url(address.host), address.port);
   return host == mine || host == fmt::format("localhost:{}", address.port) ||
@@ -70,6 +81,7 @@ void DashboardServer::State::listen() {
   server.set_read_timeout(kPatience_s);
   server.set_write_timeout(kPatience_s);
   server.set_keep_alive_timeout(1);
+  server.set_payload_max_length(kLargestBody);
   server.new_task_queue = [] { return new httplib::ThreadPool(kWatchers + kOtherThreads); };
   errno = 0;
   if (address.port == 0) {
@@ -92,10 +104,18 @@ void DashboardServer::State::route() {
         response.set_header("X-Content-Type-Options", "nosniff");
         response.set_header("Referrer-Policy", "no-referrer");
         if (allowed(request)) return httplib::Server::HandlerResponse::Unhandled;
-        response.status = 403;
-        response.set_content("open the address that stageid printed, whole\n", "text/plain");
+        refuse(response, 403, kWholeAddress);
         return httplib::Server::HandlerResponse::Handled;
       });
+  server.set_error_handler([](const httplib::Request& request, httplib::Response& response) {
+    if (!response.body.empty()) return;
+    if (response.status == 404)
+      refuse(response, 404, fmt::format("{}: not found; open /", request.path));
+    else if (response.status == 413)
+      refuse(response, 413, fmt::format("body too large; {} bytes at most", kLargestBody));
+    else
+      refuse(response, response.status, "bad request; open the address that stageid printed");
+  });
   server.Get("/", [this](const httplib::Request&, httplib::Response& response) {
     response.set_content(content.page, "text/html; charset=utf-8");
   });
@@ -104,14 +124,14 @@ void DashboardServer::State::route() {
   server.Get("/response.json", [this](const httplib::Request&, httplib::Response& response) {
     const LatestText::Edition edition = content.response.get();
     if (edition.number == 0) {
-      response.status = 404;
+      refuse(response, 404, "no response yet; it follows the first realization");
     } else {
       response.set_content(*edition.text, "application/json");
     }
   });
   server.Post("/abort", [this](const httplib::Request& request, httplib::Response& response) {
-    if (request.get_header_value(kAbortHeader) != "abort") {
-      response.status = 403;
+    if (!has_token(request) || request.get_header_value(kAbortHeader) != "abort") {
+      refuse(response, 403, kWholeAddress);
       return;
     }
     content.abort();
@@ -122,8 +142,7 @@ void DashboardServer::State::route() {
 void DashboardServer::State::stream(httplib::Response& response) {
   if (watchers.fetch_add(1) >= kWatchers) {
     watchers.fetch_sub(1);
-    response.status = 503;
-    response.set_content("too many watchers\n", "text/plain");
+    refuse(response, 503, fmt::format("{} pages are open already; close one", kWatchers));
     return;
   }
   content.watched();
@@ -153,8 +172,8 @@ DashboardServer::DashboardServer(const DashboardAddress& address, DashboardConte
   State& state = *state_;
   state.listen();
   state.route();
-  state.url = fmt::format("http://{}:{}/{}", host_in_url(state.address.host), state.address.port,
-                          state.token.empty() ? "" : "?token=" + state.token);
+  state.url = fmt::format("http://{}:{}/?token={}", host_in_url(state.address.host),
+                          state.address.port, state.token);
   state.thread = std::thread([&state] {
     // Threads that it starts inherit this.
     ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);

@@ -28,12 +28,14 @@ struct DashboardContent {
 /// not read for kPatience_s is let go. The program's other threads never wait for any of it.
 ///
 /// Where other machines can reach it a token is asked for (?token=...). On loopback only requests
-/// that name this machine are answered, and only a page of ours can abort (a header that other
-/// sites cannot set), so that no web page elsewhere can use the user's browser for it.
+/// that name this machine are answered, and may watch without. To abort takes the token everywhere,
+/// and a page of ours (a header that other sites cannot set), so that no web page elsewhere can use
+/// the user's browser for it. Requests are short: a body above kLargestBody is refused.
 class DashboardServer {
  public:
   static constexpr int kWatchers = 32;
   static constexpr int kPatience_s = 2;
+  static constexpr std::size_t kLargestBody = 1024;
 
   /// Listens, and serves from now on. `content` must outlive the server.
   /// @throws StageError if the address cannot be had: says why and what to do.
@@ -42,7 +44,7 @@ class DashboardServer {
   DashboardServer(const DashboardServer&) = delete;
   DashboardServer& operator=(const DashboardServer&) = delete;
 
-  /// To open in a browser, the token in it if there is one.
+  /// To open in a browser, the token in it.
   const std::string& url() const noexcept;
   int watchers() const noexcept;
   /// Waits until every watcher has left, but no longer than this: a page leaves when it has seen a

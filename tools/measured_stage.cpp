@@ -11,6 +11,7 @@
 #include "hal/replay_stage.hpp"
 #include "tools/can_backend.hpp"
 #include "tools/exit_code.hpp"
+#include "tools/interrupt.hpp"
 #include "tools/modbus_backend.hpp"
 #include "tools/replay_log.hpp"
 
@@ -122,7 +123,8 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
       spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
       return streamed(std::make_unique<SimulatedStage>(spec));
     case Backend::can: {
-      const CanHostOptions options{spec.pace, request.reset_fault};
+      const CanHostOptions options{spec.pace, request.reset_fault,
+                                   [] { return interrupt_flag().load(); }};
       if (config.stage.can.mode == CanMode::resident)
         return std::make_unique<PlayingStage>(plan, make_can_resident_stage(config.stage, options));
       return streamed(make_can_stage(config.stage, options));

@@ -52,9 +52,11 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
       ->check(kPositive);
   command->add_flag("--resume", resume_,
                     "continue an interrupted log: complete runs are not repeated");
-  command->add_option("--dashboard", dashboard_,
-                      "PORT: show the experiment in a browser on this machine (0: any free port); "
-                      "HOST:PORT: on others too, who need the token in the address it prints");
+  command->add_option(
+      "--dashboard", dashboard_,
+      "PORT: show the experiment in a browser on this machine (0: any free port); "
+      "HOST:PORT: on others too, who need the token in the address it prints; so does "
+      "stopping the run, everywhere");
   command->add_flag("--reset-fault", reset_fault_,
                     "clear a fault of the node or plant before the first run");
   command->final_callback([this] { run(); });

@@ -140,7 +140,7 @@ TEST_F(MeasurementLoopTest, AFaultEndsTheRunAtOnce) {
 }
 
 TEST_F(MeasurementLoopTest, AMissingMeasurementIsHeldAndMarked) {
-  for (const Outcome outcome : {Outcome::stale, Outcome::corrupt, Outcome::bus_passive}) {
+  for (const Outcome outcome : {Outcome::stale, Outcome::corrupt}) {
     stage_.outcomes = {{25, outcome}};
     MeasurementLoop loop = make_loop();
     loop.start(1, excitation_);
@@ -208,6 +208,18 @@ TEST_F(MeasurementLoopTest, ALateSampleIsValidAndMarked) {
   EXPECT_EQ(loop.health().late, 2U);
   EXPECT_EQ(loop.health().missing, 0U);
   EXPECT_EQ(loop.health().largest_lateness_ns, 12345);
+}
+
+TEST_F(MeasurementLoopTest, ASampleOfAnErrorPassiveBusIsValidAndMarked) {
+  stage_.outcomes = {{25, Outcome::bus_passive}};
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  const std::vector<Row> all = rows();
+  EXPECT_EQ(marked(all), std::set<std::size_t>{26});
+  EXPECT_NE(all[26].y, all[25].y);
+  EXPECT_EQ(loop.health().late, 0U);
+  EXPECT_EQ(loop.health().missing, 0U);
 }
 
 // Bucket of 10: k misses in a row fill 2 k; the sixth is one too many.

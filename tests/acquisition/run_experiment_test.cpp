@@ -275,6 +275,16 @@ TEST_F(RunExperiment, AStageThatDoesNotStartIsAFaultAndTheLogIsKept) {
   EXPECT_TRUE(reader.runs()[0].complete && reader.runs()[1].complete);
 }
 
+TEST_F(RunExperiment, AnInterruptWhileAStageDoesNotStartIsAnInterrupt) {
+  std::atomic<bool> interrupt = false;
+  inner_->refuse_run = 1;
+  inner_->raise_at_refusal = &interrupt;
+  SlogWriter log = create("a.slog");
+  const ExperimentResult result = measure(log, {.interrupt = &interrupt});
+  EXPECT_EQ(result.end, ExperimentEnd::interrupted);
+  EXPECT_EQ(result.runs_done, 1);
+}
+
 TEST_F(RunExperiment, ReportsProgressFromTheCallingThread) {
   plan_ = plan_of(1, 9);
   std::vector<ExperimentProgress> seen;

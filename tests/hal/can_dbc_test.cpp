@@ -23,6 +23,7 @@ TEST(CanDbc, NamesEveryFrameAndChannel) {
                         "\"N\" node"));
   EXPECT_THAT(text, testing::HasSubstr("BO_ 384 measurement_0: 12 node"));
   EXPECT_THAT(text, testing::HasSubstr("BO_ 512 state: 48 node"));
+  EXPECT_THAT(text, testing::HasSubstr("BO_ 128 command: 48 host"));
   EXPECT_THAT(text, testing::HasSubstr("BA_ \"VFrameFormat\" BO_ 897 14;"));
   EXPECT_THAT(text, testing::HasSubstr("8 \"fault\""));
 }

@@ -169,7 +169,7 @@ TEST(CanStage, ANodeThatFreezesIsStaleAndOneThatRestartsAFault) {
   EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("did not answer sample 6"));
   rig.boot();
   EXPECT_EQ(host.exchange(), Outcome::fault);
-  EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the node was started anew"));
+  EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the node was restarted"));
   EXPECT_EQ(rig.node().sample(), 0U);
 }
 

@@ -86,6 +86,7 @@ class ModbusBench {
 
   ModbusAddress address() const { return server_->address(); }
   StageNode& node() { return node_; }
+  ModbusNode& registers() { return registers_; }
   /// Ends the server, so that the fake stage may be looked at.
   void stop() { server_.reset(); }
   /// Another server, on the same port.

@@ -66,5 +66,36 @@ TEST(ModbusFrame, OneFlippedBitBreaksAnRtuRequest) {
   }
 }
 
+Bytes joined(const std::vector<Bytes>& pieces) {
+  Bytes all;
+  for (const Bytes& piece : pieces) all.insert(all.end(), piece.begin(), piece.end());
+  return all;
+}
+
+TEST(ModbusFrame, OurRequestIsFoundBetweenWhatOthersSay) {
+  const Bytes ours = rtu_frame(1, Bytes{3, 0, 200, 0, 2});
+  const Bytes asked = rtu_frame(2, Bytes{3, 0, 0, 0, 4});
+  const Bytes told = rtu_frame(2, Bytes{3, 8, 1, 3, 0, 200, 0, 2, 1, 16});
+  const Bytes noise = {1, 3, 0, 7, 2, 16, 9};
+  for (const Bytes& before : {Bytes{}, asked, told, joined({asked, told}), joined({noise, told}),
+                              joined({told, noise, asked})}) {
+    const Bytes line = joined({before, ours, asked});
+    const ModbusRequest found = find_rtu_request(line, 1);
+    ASSERT_EQ(found.status, FrameStatus::complete) << before.size();
+    EXPECT_EQ(found.bytes, before.size() + ours.size());
+    EXPECT_EQ(rtu_frame(found.unit, found.pdu), ours);
+  }
+}
+
+TEST(ModbusFrame, OnlyWhatMayBecomeARequestIsKept) {
+  const Bytes told = rtu_frame(2, Bytes{3, 8, 1, 3, 0, 200, 0, 2, 1, 16});
+  const Bytes ours = rtu_frame(1, Bytes{3, 0, 200, 0, 2});
+  const Bytes begun = joined({told, Bytes(ours.begin(), ours.begin() + 5)});
+  const ModbusRequest found = find_rtu_request(begun, 1);
+  EXPECT_EQ(found.status, FrameStatus::incomplete);
+  EXPECT_EQ(found.bytes, told.size());
+  EXPECT_EQ(find_rtu_request(told, 1).bytes, told.size());
+}
+
 }  // namespace
 }  // namespace stageid

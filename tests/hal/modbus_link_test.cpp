@@ -1,15 +1,10 @@
 #include "hal/modbus_link.hpp"
 
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <array>
 #include <chrono>
-#include <random>
 #include <thread>
 
 #include "hal/stage.hpp"
@@ -125,66 +120,6 @@ TEST(ModbusLink, AddressesAndTimesThatMakeNoSenseAreRefused) {
   EXPECT_THROW(ModbusLink({}, {0.2, 0.1, 1e-3}), std::invalid_argument);
   EXPECT_THROW(ModbusLink({}, {0.0, 0.1, 1e-3}), std::invalid_argument);
   EXPECT_NO_THROW(ModbusLink({}, {0.2, 0.2, 1e-3}));
-}
-
-TEST(ModbusServer, APortThatIsTakenIsRefused) {
-  test::NumberedRegisters registers;
-  const test::ServerThread server(registers, nullptr);
-  EXPECT_THROW(ModbusServer(server.address(), registers, nullptr), StageError);
-  ModbusAddress serial;
-  serial.device = "/dev/there-is-none";
-  EXPECT_THROW(ModbusServer(serial, registers, nullptr), StageError);
-}
-
-int raw_client(int port) {
-  const int client = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in name{};
-  name.sin_family = AF_INET;
-  name.sin_port = htons(static_cast<std::uint16_t>(port));
-  name.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  EXPECT_EQ(connect(client, reinterpret_cast<sockaddr*>(&name), sizeof name), 0);
-  return client;
-}
-
-TEST(ModbusServer, GarbageOfOneClientDoesNotDisturbAnother) {
-  test::NumberedRegisters registers;
-  const test::ServerThread server(registers, nullptr);
-  ModbusLink link(server.address(), test::kQuickTiming);
-  link.connect();
-  std::mt19937 engine(2);
-  for (int round = 0; round < 50; ++round) {
-    const int client = raw_client(server.address().port);
-    std::array<std::uint8_t, 64> bytes{};
-    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(engine() & 0xFFU);
-    // Every other time a header that looks sound, followed by a request cut off or made up.
-    if (round % 2 == 0) std::fill_n(bytes.begin() + 2, 3, std::uint8_t{0});
-    EXPECT_GT(send(client, bytes.data(), 7 + engine() % 57, MSG_NOSIGNAL), 0);
-    Pair values{};
-    EXPECT_EQ(link.read(20, values), LinkStatus::ok);
-    EXPECT_EQ(values, (Pair{20, 21}));
-    close(client);
-  }
-}
-
-// A request cut off, then whole ones without a pause longer than the server's silence: a server that
-// waits for the rest takes the next one's bytes for it.
-TEST(ModbusServer, ASerialLineIsFoundAgainAfterHalfARequest) {
-  test::NumberedRegisters registers;
-  const test::ServerThread server(registers, nullptr, true);
-  const int line = open(server.address().device.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
-  const std::array<std::uint8_t, 4> half = {1, 3, 0, 0};
-  EXPECT_EQ(write(line, half.data(), half.size()), 4);
-  ModbusLink link(server.address(), test::kQuickTiming);
-  link.connect();
-  Pair values{};
-  LinkStatus status = link.read(20, values);
-  for (int attempt = 0; status != LinkStatus::ok && attempt < 3; ++attempt) {
-    link.drain();
-    status = link.read(20, values);
-  }
-  EXPECT_EQ(status, LinkStatus::ok);
-  EXPECT_EQ(values, (Pair{20, 21}));
-  close(line);
 }
 
 }  // namespace

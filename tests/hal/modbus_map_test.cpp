@@ -23,10 +23,10 @@ TEST(ModbusMap, EntriesLieInOrderWithoutOverlap) {
 
 // Limits of the protocol: 121 registers written and 125 read by a function 23.
 TEST(ModbusMap, OneTransactionCarriesEveryBlock) {
-  EXPECT_LE(kWritableEnd - kSetpointSequence, 121);
+  EXPECT_LE(kWritableEnd - kRunKey, 121);
   EXPECT_LE(kMeasurement + 2 * kMostChannels - kMeasurementBootId, 125);
   EXPECT_LE(kStatusRegisters, 125);
-  EXPECT_EQ(kRunSeed + 4 - kRunCommand, kRunRegisters);
+  EXPECT_EQ(kRunKey + 2 - kRunCommand, kRunRegisters);
   EXPECT_EQ(kCommandSequence + 2 - kHeartbeat, kSupervisorRegisters);
 }
 

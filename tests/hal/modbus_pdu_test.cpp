@@ -17,7 +17,7 @@ class ModbusPdu : public testing::Test {
  protected:
   Bytes answer(const Bytes& request) {
     std::array<std::uint8_t, kLargestPdu> reply{};
-    const std::size_t bytes = answer_request(request, registers_, reply);
+    const std::size_t bytes = answer_request(request, 1, registers_, reply);
     return {reply.begin(), reply.begin() + static_cast<std::ptrdiff_t>(bytes)};
   }
   test::NumberedRegisters registers_;

@@ -68,8 +68,8 @@ struct FaultCase {
   const char* trouble;
 };
 
-// Magic, description (2), enabled, command echo, enable, run echo, begin.
-constexpr int kStartRequests = 8;
+// Magic, description (2), state, command echo, enable, begin.
+constexpr int kStartRequests = 7;
 
 class ModbusStageFault : public testing::TestWithParam<FaultCase> {};
 
@@ -163,7 +163,7 @@ TEST(ModbusStage, SaysWhyAStageDoesNotStart) {
   ModbusBench measured;
   Host other(measured);
   other.start();
-  EXPECT_THAT(refusal(measured), HasSubstr("no measurement in state measuring"));
+  EXPECT_THAT(refusal(measured), HasSubstr("another host measures with this stage"));
 
   test::NumberedRegisters foreign;
   const test::ServerThread server(foreign, nullptr);
@@ -175,12 +175,13 @@ TEST(ModbusStage, SaysWhyAStageDoesNotStart) {
 }
 
 /// A setpoint as it travels; the reply's sequence and missed count.
-std::pair<std::uint32_t, std::uint32_t> setpoint(ModbusLink& link, std::uint32_t sequence) {
-  std::array<std::uint16_t, 6> request{};
-  put_u32(std::span(request).first<2>(), sequence);
+std::pair<std::uint32_t, std::uint32_t> setpoint(ModbusLink& link, std::uint32_t session,
+                                                 std::uint32_t sequence) {
+  std::array<std::uint16_t, 8> request{};
+  put_u32(std::span(request).first<2>(), session);
+  put_u32(std::span(request).subspan<2, 2>(), sequence);
   std::array<std::uint16_t, 8> reply{};
-  EXPECT_EQ(link.exchange(map::kSetpointSequence, request, map::kMeasurementBootId, reply),
-            LinkStatus::ok);
+  EXPECT_EQ(link.exchange(map::kRunKey, request, map::kMeasurementBootId, reply), LinkStatus::ok);
   const auto replied = std::span<const std::uint16_t>(reply);
   return {get_u32(replied.subspan<2, 2>()), get_u32(replied.subspan<6, 2>()) >> 24};
 }
@@ -191,11 +192,11 @@ TEST(ModbusNode, OnlyANewerSetpointMovesTheStage) {
   ModbusLink link(bench.address(), test::kQuickTiming);
   link.connect();
   std::vector<std::uint16_t> reply(14);
-  static_cast<void>(give_run_command(link, map::kRunBegin, 3, reply));
-  EXPECT_EQ(setpoint(link, 1), std::pair(1U, 0U));
-  EXPECT_EQ(setpoint(link, 1), std::pair(1U, 0U));
-  EXPECT_EQ(setpoint(link, 4), std::pair(4U, 2U)) << "two were left out";
-  EXPECT_EQ(setpoint(link, 2), std::pair(4U, 2U)) << "an old one";
+  const std::uint32_t session = begin_run(link, 3, reply);
+  EXPECT_EQ(setpoint(link, session, 1), std::pair(1U, 0U));
+  EXPECT_EQ(setpoint(link, session, 1), std::pair(1U, 0U));
+  EXPECT_EQ(setpoint(link, session, 4), std::pair(4U, 2U)) << "two were left out";
+  EXPECT_EQ(setpoint(link, session, 2), std::pair(4U, 2U)) << "an old one";
   bench.stop();
   EXPECT_EQ(bench.fake->commands.size(), 2U);
 }

@@ -53,14 +53,14 @@ std::string refusal(const StageInfo& stage, const ModbusAddress& address) {
   return "accepted";
 }
 
-// One actuator and one sensor: 2 + 2 written, 12 + 2 read, 21 + 33 bytes: 594 bits / 19200 = 30.94 ms
-// + 2 x 2.005 + 1 = 35.95 ms: 27 Hz.
+// One actuator and one sensor: 4 + 2 written, 12 + 2 read, 25 + 33 bytes: 638 bits / 19200 = 33.23 ms
+// + 2 x 2.005 + 1 = 38.24 ms: 26 Hz.
 TEST(ModbusStageRate, AFasterStageThanTheLinkIsRefusedWithTheFigures) {
-  EXPECT_EQ(refusal(info(27.0, 1, 1), serial(19200)), "accepted");
-  EXPECT_THAT(refusal(info(28.0, 1, 1), serial(19200)),
-              testing::AllOf(testing::HasSubstr("28 Hz"),
-                             testing::HasSubstr("35.9 ms (21 + 33 bytes at 19200 baud)"),
-                             testing::HasSubstr("27 Hz at most")));
+  EXPECT_EQ(refusal(info(26.0, 1, 1), serial(19200)), "accepted");
+  EXPECT_THAT(refusal(info(27.0, 1, 1), serial(19200)),
+              testing::AllOf(testing::HasSubstr("27 Hz"),
+                             testing::HasSubstr("38.2 ms (25 + 33 bytes at 19200 baud)"),
+                             testing::HasSubstr("26 Hz at most")));
 }
 
 TEST(ModbusStageRate, MoreChannelsThanOneTransactionAreRefused) {

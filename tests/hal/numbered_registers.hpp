@@ -15,7 +15,7 @@ class NumberedRegisters final : public ModbusRegisters {
   NumberedRegisters() {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::uint16_t>(i);
   }
-  void begin_request() override { ++requests; }
+  void begin_request(ModbusConnection) override { ++requests; }
   void tick() override {}
   ModbusException write(int first, std::span<const std::uint16_t> written) override {
     if (!inside(first, written.size())) return ModbusException::illegal_address;

@@ -41,10 +41,11 @@ class AnalyticStage final : public CyclicStage {
 
   // The script: what exchange number n (of every run) does instead of `ok`.
   std::map<std::uint64_t, Outcome> outcomes;
-  std::map<std::uint64_t, std::uint64_t> valid;  ///< mask of an `incomplete` exchange
-  std::map<std::uint64_t, double> first_sensor;  ///< replaces what the first sensor shows
-  std::int64_t lateness_ns = 0;                  ///< of every `late` exchange
-  int refuse_run = -1;                           ///< start() of this run throws
+  std::map<std::uint64_t, std::uint64_t> valid;   ///< mask of an `incomplete` exchange
+  std::map<std::uint64_t, double> first_sensor;   ///< replaces what the first sensor shows
+  std::int64_t lateness_ns = 0;                   ///< of every `late` exchange
+  int refuse_run = -1;                            ///< start() of this run throws
+  std::atomic<bool>* raise_at_refusal = nullptr;  ///< set to true then
   double noise = 0.0;
   bool spoil_missing = true;                          ///< leave NaN where nothing was measured
   std::map<std::uint64_t, std::atomic<bool>*> raise;  ///< set to true at this exchange of any run
@@ -59,7 +60,10 @@ class AnalyticStage final : public CyclicStage {
   const StageInfo& info() const noexcept override { return info_; }
 
   void start(std::uint64_t run_seed, Inputs& first) override {
-    if (static_cast<int>(seeds_.size()) == refuse_run) throw StageError("analytic: refuses");
+    if (static_cast<int>(seeds_.size()) == refuse_run) {
+      if (raise_at_refusal != nullptr) *raise_at_refusal = true;
+      throw StageError("analytic: refuses");
+    }
     seeds_.push_back(run_seed);
     cycle_ = 0;
     sent_.clear();

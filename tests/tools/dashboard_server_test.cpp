@@ -112,9 +112,36 @@ TEST_F(DashboardServerTest, OnlyAPageOfOursCanAbort) {
   serve();
   EXPECT_EQ(client().Post("/abort")->status, 403);
   EXPECT_EQ(client().Get("/abort")->status, 404);
+  EXPECT_EQ(client().Post("/abort?token=" + token_)->status, 403) << "not a page of ours";
   EXPECT_EQ(aborts_, 0);
-  EXPECT_EQ(client().Post("/abort", {{"X-Stageid", "abort"}}, "", "text/plain")->status, 200);
+  EXPECT_EQ(
+      client().Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, "", "text/plain")->status,
+      200);
   EXPECT_EQ(aborts_, 1);
+}
+
+TEST_F(DashboardServerTest, WithoutTheTokenOneMayWatchOnLoopbackButNotAbort) {
+  serve();
+  for (const char* path : {"/abort", "/abort?token=", "/abort?token=wrong"}) {
+    const auto answer = client().Post(path, {{"X-Stageid", "abort"}}, "", "text/plain");
+    EXPECT_EQ(answer->status, 403) << path;
+    EXPECT_THAT(answer->body, testing::HasSubstr("with its token"));
+  }
+  EXPECT_EQ(aborts_, 0);
+  EXPECT_EQ(client().Get("/")->status, 200);
+}
+
+TEST_F(DashboardServerTest, RefusesLargeBodiesAndSaysWhatItRefuses) {
+  serve();
+  const std::string large(DashboardServer::kLargestBody + 1, 'x');
+  const auto answer =
+      client().Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, large, "text/plain");
+  EXPECT_EQ(answer->status, 413);
+  EXPECT_EQ(answer->body, "body too large; 1024 bytes at most\n");
+  EXPECT_EQ(aborts_, 0);
+  EXPECT_EQ(client().Get("/other")->body, "/other: not found; open /\n");
+  EXPECT_EQ(client().Get("/response.json")->body,
+            "no response yet; it follows the first realization\n");
 }
 
 TEST_F(DashboardServerTest, OnLoopbackAnotherNameOfThisMachineIsRefused) {

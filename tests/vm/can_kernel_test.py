@@ -93,7 +93,7 @@ class Interventions(CanTest):
             node.wait()
             with self.machine.node(self.name):
                 process.send_signal(signal.SIGCONT)
-                self.ends(process, 1, "the node was started anew")
+                self.ends(process, 1, "the node was restarted")
 
     def test_node_told_to_end(self):
         with self.machine.node(self.name) as node:

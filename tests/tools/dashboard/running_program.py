@@ -3,6 +3,7 @@
 import re
 import subprocess
 import threading
+import urllib.parse
 import urllib.request
 
 
@@ -26,7 +27,7 @@ class RunningProgram:
         raise RuntimeError("no dashboard: " + "".join(self.lines))
 
     def get(self, path):
-        with urllib.request.urlopen(self.url + path, timeout=10) as answer:
+        with urllib.request.urlopen(urllib.parse.urljoin(self.url, path), timeout=10) as answer:
             return answer.read()
 
     def wait(self, timeout=300):
