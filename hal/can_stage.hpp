@@ -35,7 +35,7 @@ struct CanCounts {
 /// nothing stale. An older answer is counted and thrown away. In virtual time, where nothing moves
 /// while the host waits, the setpoint is repeated three times before that; against the wall clock
 /// never. A node that is not measuring any more gives Outcome::limit if a limit or a value that is
-/// no number stopped it, else fault, at once; a bus that is off or down gives bus_off or link_down,
+/// no number stopped it, else fault, at once, and so is a command that the wire cannot carry; a bus that is off or down gives bus_off or link_down,
 /// an error-passive one bus_passive.
 class CanStage final : public CyclicStage {
  public:
@@ -87,6 +87,7 @@ class CanStage final : public CyclicStage {
   std::size_t frames_missing_ = 0;
   std::uint64_t frames_seen_ = 0;  // bit k: sensor frame k of this cycle
   bool damaged_in_cycle_ = false;
+  bool not_carried_ = false;  // a command that does not fit on the wire
   std::uint64_t states_before_ = 0;
   NodeState measured_in_ = NodeState::not_ready;
   std::int64_t t_rx_ns_ = 0;
