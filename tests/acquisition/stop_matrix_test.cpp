@@ -146,9 +146,9 @@ INSTANTIATE_TEST_SUITE_P(
              2.0 * kStopWindow, 2e-3, StopReason::misses},
         // A single sensor that drifts looks like a stage that does not move: the loop follows it.
         Case{"sensor drifts by 0.3 mm/s", Kind::sensor_drift, 0.3e-3}),
-    [](const testing::TestParamInfo<Case>& info) {
+    [](const testing::TestParamInfo<Case>& at) {
       std::string name;
-      for (const char c : std::string(info.param.name))
+      for (const char c : std::string(at.param.name))
         if (std::isalnum(static_cast<unsigned char>(c)) != 0) name += c;
       return name;
     });

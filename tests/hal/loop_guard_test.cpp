@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <stdexcept>
 
 #include "hal/motion_controller.hpp"
@@ -79,7 +80,7 @@ TEST(LoopGuard, BrakesByThePredictionWhereTheSensorFailed) {
   EXPECT_GT(fast_m_s, 5e-4);
   EXPECT_GT(loop.inputs().y[0], 290e-6) << "the log shows what the sensor shows";
   // Five time constants of a loop of 60 Hz at 10 kHz.
-  EXPECT_NEAR(loop.brake(), 5.0 / (2.0 * M_PI * 60.0) * 1e4, 2.0);
+  EXPECT_NEAR(loop.brake(), 5.0 / (2.0 * std::numbers::pi * 60.0) * 1e4, 2.0);
   EXPECT_LT(loop.watch->speed_m_s(), 0.01 * fast_m_s);
   EXPECT_EQ(loop.stage->emergency().cause.kind, LimitKind::sensor_jump);
   EXPECT_EQ(loop.stage->emergency().response, 1.0);

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <span>
 #include <string>
 #include <utility>
@@ -39,11 +39,12 @@ inline WaferStageSpec stop_stage_spec(double controller_gain = 1.0) {
   spec.force_noise_n = 1e-3;
   spec.seed = 1;
   std::array<AxisController, kRigidAxes> axes;
-  axes[2] = {.crossover_hz = 60,
-             .integrator_hz = 5,
-             .lead_zero_hz = 18,
-             .lead_pole_hz = 240,
-             .lowpass_hz = 600};
+  AxisController& axis = axes[2];
+  axis.crossover_hz = 60.0;
+  axis.integrator_hz = 5.0;
+  axis.lead_zero_hz = 18.0;
+  axis.lead_pole_hz = 240.0;
+  axis.lowpass_hz = 600.0;
   spec.controller =
       motion_controller_spec(spec.info.sample_rate_hz, spec.info.actuators, spec.info.sensors, axes,
                              {kStopMass, kStopMass, kStopMass, 1, 1, 1});
