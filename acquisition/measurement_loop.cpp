@@ -151,6 +151,8 @@ LoopStatus MeasurementLoop::step() noexcept {
   if (inputs_.node_state != node_state_) [[unlikely]]
     tell_state();
 
+  if (!inputs_.applied.empty()) [[unlikely]]
+    std::copy(inputs_.applied.begin(), inputs_.applied.end(), row);
   if (recording()) {
     // u[n] may not have been applied as it stands here: then this sample is no good either.
     SampleStatus stored = status;
@@ -222,10 +224,12 @@ void MeasurementLoop::take_measurement(Outcome outcome) noexcept {
     return;
   }
   status_.marked = true;
-  if (outcome == Outcome::limit) {
+  if (outcome == Outcome::limit || outcome == Outcome::braking || outcome == Outcome::opened) {
     hold_missing(inputs_.valid);
     last_trouble_ = outcome;
     request_stop(StopReason::limit);
+    if (outcome == Outcome::braking) ramp_left_ = std::max<std::uint64_t>(ramp_left_, 1);
+    if (outcome == Outcome::opened) end(StopReason::limit);
     return;
   }
   hold_missing(gives_measurement(outcome)       ? ~std::uint64_t{0}
@@ -234,6 +238,11 @@ void MeasurementLoop::take_measurement(Outcome outcome) noexcept {
   health_.missing += recording() ? 1U : 0U;
   if (ends_at_once(outcome)) {
     last_trouble_ = outcome;
+    // A link that ends in the unrecorded ramp of a good run, as a replay does, has spoilt nothing.
+    if (phase_ == Phase::landing && reason_ == StopReason::none && outcome != Outcome::link_down) {
+      reason_ = StopReason::fault;
+      tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason_));
+    }
     end(StopReason::fault);
     return;
   }
@@ -270,7 +279,6 @@ void MeasurementLoop::request_stop(StopReason reason) noexcept {
 }
 
 void MeasurementLoop::end(StopReason reason) noexcept {
-  // A stage that is gone in the unrecorded ramp of a good run has spoilt nothing.
   if (reason_ == StopReason::none && phase_ != Phase::landing && reason != StopReason::none) {
     reason_ = reason;
     tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason));

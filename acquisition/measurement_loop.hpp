@@ -47,7 +47,8 @@ const char* to_string(StopReason reason) noexcept;
 /// request) go on in closed loop while g falls linearly to 0 over ramp_s; only then is the stage
 /// stopped. At the end of a good run the ramp is not recorded, so that a log has whole periods; in
 /// a stop it is, marked. A fault, bus-off or lost link ends the run at once: there is nothing to
-/// control.
+/// control. So does a stage that has opened the loop (LimitedStage), once it has braked. A row holds
+/// the u that was applied, also where that was not the u asked for.
 ///
 /// Bucket: late cycles count as bad too (their samples are valid, but the loop's phase is not).
 class MeasurementLoop {
@@ -71,7 +72,7 @@ class MeasurementLoop {
   void request_stop(StopReason reason) noexcept;
 
   StopReason reason() const noexcept { return reason_; }
-  /// True once all samples are recorded (a limit may still be hit in the ramp behind them).
+  /// True once all samples are recorded (a limit or a fault may still end the ramp behind them).
   bool complete() const noexcept { return complete_; }
   /// The outcome that ended or first troubled the run.
   Outcome last_trouble() const noexcept { return last_trouble_; }

@@ -29,7 +29,8 @@ namespace {
 constexpr std::chrono::milliseconds kProgressEvery{200};
 constexpr std::size_t kVirtualRingRows = std::size_t{1} << 16;
 constexpr double kWallRingSeconds = 8.0;  // a disk may stall for so long
-constexpr std::uint64_t kPublishEvery = 1024;
+constexpr double kPublishEvery_s = 0.1;
+constexpr double kMostUnpublished = 1024.0;  // cycles
 
 ChannelList channel_list(const std::vector<Channel>& channels) {
   ChannelList list;
@@ -201,7 +202,9 @@ class Experiment {
   }
 
   void cycle_until_end() {
-    std::uint64_t until_publish = kPublishEvery;
+    const auto publish_every = static_cast<std::uint64_t>(
+        std::clamp(kPublishEvery_s * stage_.info().sample_rate_hz, 1.0, kMostUnpublished));
+    std::uint64_t until_publish = publish_every;
     while (true) {
       const LoopStatus status = loop_.step();
       if (status == LoopStatus::ended) return;
@@ -214,10 +217,10 @@ class Experiment {
       }
       if (interrupted()) loop_.request_stop(StopReason::interrupt);
       if (options_.tripped()) loop_.request_stop(StopReason::plant);
+      if (log_.failed()) loop_.request_stop(StopReason::log);
       if (--until_publish == 0) {
-        until_publish = kPublishEvery;
+        until_publish = publish_every;
         progress_.publish(loop_.health(), loop_.timing(), wall_);
-        if (log_.failed()) loop_.request_stop(StopReason::log);
       }
     }
   }
@@ -233,7 +236,7 @@ class Experiment {
         return;
       case StopReason::limit:
         result_.end = ExperimentEnd::limit;
-        result_.message = describe(stage_.violation(), info);
+        result_.message = describe_stop(stage_);
         return;
       case StopReason::fault:
         result_.end = ExperimentEnd::fault;

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <sys/uio.h>
 #include <unistd.h>
 
@@ -169,7 +170,19 @@ void SlogAppender::fail(int error) {
       next_sequence_ == 1 ? "is" : "are", cut ? "" : ", behind them may stand a part of one more"));
 }
 
+// A file without a name takes rows for ever, and none of them can be read again.
+void SlogAppender::require_name() {
+  struct stat status {};
+  if (::fstat(file_.get(), &status) != 0 || status.st_nlink > 0) return;
+  error_ = ENOENT;
+  throw FileError(
+      fmt::format("{}: was removed, or its directory, while it was being written; nothing of it is "
+                  "left. Measure again, and keep the directory until the run has ended",
+                  path_.string()));
+}
+
 void SlogAppender::synchronize() {
+  require_name();
   if (::fdatasync(file_.get()) == 0 || errno == EINVAL || errno == EROFS) return;
   const int error = errno;
   error_ = error;

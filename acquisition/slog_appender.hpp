@@ -49,7 +49,7 @@ class SlogAppender {
   void append(SlogBlockHeader header, std::span<const std::byte> payload);
   void append(const SlogBlockHeader& header, std::string_view json);
 
-  /// Asks the kernel to have everything on the medium. @throws FileError
+  /// Asks the kernel to have everything on the medium. @throws FileError, also if the file was removed.
   void synchronize();
 
   /// @throws FileError if the operating system reports an error of an earlier write.
@@ -65,6 +65,7 @@ class SlogAppender {
   void write_whole(const SlogBlockHeader& header, std::span<const std::byte> payload,
                    std::size_t padding);
   void start_writeback() noexcept;
+  void require_name();
   [[noreturn]] void fail(int error);
 
   std::filesystem::path path_;

@@ -68,6 +68,10 @@ inline constexpr std::int32_t kCanLargestCount = 8388607;
 inline constexpr std::size_t kCanCountBytes = 3;
 /// range = 2^23 counts, so that a value at the range itself saturates by one count.
 inline constexpr double kCanCountsOfRange = 8388608.0;
+/// Whether every value up to `largest` is carried as it is.
+constexpr bool can_range_holds(double range, double largest) noexcept {
+  return largest * kCanCountsOfRange <= range * kCanLargestCount;
+}
 
 enum class CanConversion : std::uint8_t { good, saturated, no_number };
 

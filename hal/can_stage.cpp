@@ -56,6 +56,7 @@ void CanStage::start(std::uint64_t run_seed, Inputs& first) {
   samples_bad_ = 0;
   conflict_ = false;
   std::fill(answers_.begin(), answers_.end(), CanFrame{});
+  not_carried_ = false;
   const CanLink::Other take_value = [this](const CanFrame& frame) { take(frame); };
   for (int attempt = 0; attempt < kStartAttempts; ++attempt) {
     begin_cycle(0);
@@ -98,12 +99,15 @@ void CanStage::begin_cycle(std::uint16_t sequence) noexcept {
 
 bool CanStage::send_setpoints(const Outputs& outputs) noexcept {
   const CanHeader header{expected_, 0, can_run(link_.session()), can_tag(link_.session())};
-  const std::uint64_t refused = conversions_.no_number;
+  const std::uint64_t refused = conversions_.no_number + conversions_.saturated;
   for (std::size_t i = 0; i < layout_.setpoints.size(); ++i)
     encode_can_values(layout_.setpoints[i], layout_.actuator_scale, outputs.u, header, outbox_[i],
                       conversions_);
   counts_.saturated = conversions_.saturated;
-  if (conversions_.no_number != refused) return false;
+  if (conversions_.no_number + conversions_.saturated != refused) {
+    not_carried_ = true;
+    return false;
+  }
   static_cast<void>(transport_->send(outbox_));
   return true;
 }
@@ -114,7 +118,7 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
       inputs.y.size() != info_.sensors.size())
     return Outcome::fault;
   begin_cycle(static_cast<std::uint16_t>(outputs.cycle + 1));
-  if (!send_setpoints(outputs)) return Outcome::fault;  // no number: no frame
+  if (!send_setpoints(outputs)) return Outcome::fault;  // the wire would carry another value
   collect(reply_deadline_ns(deadline));
   for (int repeat = 0; !wall_ && repeat < kRepeats && !complete() && !over(); ++repeat) {
     ++counts_.repeats;
@@ -259,6 +263,8 @@ void CanStage::stop() noexcept {
 
 std::string CanStage::trouble() const {
   if (!running_) return trouble_at_stop_;
+  if (not_carried_)
+    return "a command is not finite or beyond the range of the wire (actuator_range_n)";
   const WorstBus worst = worst_bus(*transport_);
   if (worst.state >= CanBusState::passive)
     return fmt::format("{}: {}", transport_->name(worst.bus), to_string(worst.state));

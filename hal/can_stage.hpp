@@ -39,7 +39,8 @@ struct CanCounts {
 /// come by then: everything is ok; some channels incomplete; nothing but damaged frames corrupt;
 /// nothing stale. An older answer is counted and thrown away. In virtual time, where nothing moves
 /// while the host waits, the setpoint is repeated three times before that; against the wall clock
-/// never. What the node says of itself and its bus has the meaning that peer_status.hpp gives it.
+/// never. What the node says of itself and its bus has the meaning that peer_status.hpp gives it. A command
+/// that the wire cannot carry is a fault.
 class CanStage final : public CyclicStage {
  public:
   /// @throws std::invalid_argument if the spec does not fit the stage, or a bus cannot carry it.
@@ -90,6 +91,7 @@ class CanStage final : public CyclicStage {
   std::size_t frames_missing_ = 0;
   std::uint64_t frames_seen_ = 0;  // bit k: sensor frame k of this cycle
   bool damaged_in_cycle_ = false;
+  bool not_carried_ = false;  // a command that does not fit on the wire
   std::uint64_t states_before_ = 0;
   NodeState measured_in_ = NodeState::not_ready;
   bool out_of_range_ = false;

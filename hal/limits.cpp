@@ -18,6 +18,18 @@ const char* to_string(LimitKind kind) noexcept {
       return "not finite";
     case LimitKind::stuck_sensor:
       return "stuck sensor";
+    case LimitKind::sensor_jump:
+      return "sensor jump";
+    case LimitKind::deviation:
+      return "deviation";
+    case LimitKind::contradiction:
+      return "contradiction";
+    case LimitKind::speed:
+      return "speed";
+    case LimitKind::stopping_distance:
+      return "stopping distance";
+    case LimitKind::hard_position:
+      return "hard position";
   }
   return "unknown limit";
 }

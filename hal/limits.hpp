@@ -5,6 +5,15 @@
 
 namespace stageid {
 
+/// The rigid motion of a stage as its controller sees it: what a loop can know before anything is
+/// identified. Empty matrices: unknown.
+struct RigidMotion {
+  Eigen::MatrixXd acceleration_per_n;      ///< sensors x actuators, 1/kg
+  Eigen::MatrixXd force_per_acceleration;  ///< actuators x sensors, kg; of the axes to be braked
+  Eigen::MatrixXd contradiction;           ///< sensors x sensors: what no rigid motion shows
+  double bandwidth_rad_s = 0.0;            ///< of the slowest axis
+};
+
 /// Limits that are enforced behind every back end. Vectors: one entry a channel; an empty vector
 /// means no limit of that kind.
 struct StageLimits {
@@ -13,8 +22,11 @@ struct StageLimits {
   Eigen::VectorXd thermal_rms_n;         ///< rms of u over an exponential window
   double thermal_time_constant_s = 10.;  ///< of that window
   Eigen::VectorXd position_window_m;     ///< |y|
-  double stuck_sensor_s =
-      0.0;  ///< a sensor may show one and the same value for so long; 0: for ever
+  Eigen::VectorXd hard_window_m;         ///< |y| at which forces are cut; empty: twice the window
+  Eigen::VectorXd speed_m_s;             ///< at each sensor
+  Eigen::VectorXd deviation_m;           ///< from the predicted motion; empty: half the window
+  double stuck_sensor_s = 0.0;           ///< a sensor may repeat one value for so long; 0: for ever
+  RigidMotion motion;                    ///< for predictions and for the brake
 };
 
 enum class LimitKind : std::uint8_t {
@@ -24,7 +36,13 @@ enum class LimitKind : std::uint8_t {
   thermal_rms,
   position,
   not_finite,
-  stuck_sensor
+  stuck_sensor,
+  sensor_jump,
+  deviation,
+  contradiction,
+  speed,
+  stopping_distance,
+  hard_position
 };
 const char* to_string(LimitKind kind) noexcept;
 

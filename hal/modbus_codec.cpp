@@ -13,6 +13,10 @@ constexpr double kLargestCount = 2147483647.0;
 
 }  // namespace
 
+bool fits_counts(double value, double si_per_count) noexcept {
+  return std::abs(std::nearbyint(value / si_per_count)) <= kLargestCount;  // false for NaN
+}
+
 std::int32_t to_counts(double value, double si_per_count) noexcept {
   if (std::isnan(value)) return 0;
   const double counts =

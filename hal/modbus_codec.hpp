@@ -44,6 +44,9 @@ constexpr float get_f32(std::span<const std::uint16_t, 2> r) noexcept {
   return std::bit_cast<float>(get_u32(r));
 }
 
+/// Whether to_counts() carries `value` as it is: finite and within +-(2^31 - 1) counts.
+bool fits_counts(double value, double si_per_count) noexcept;
+
 /// Nearest count of `value`, ties to even, saturated at +-(2^31 - 1). NaN: 0.
 std::int32_t to_counts(double value, double si_per_count) noexcept;
 

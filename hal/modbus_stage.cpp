@@ -124,7 +124,7 @@ bool ModbusStage::write_setpoint(const Outputs& outputs) noexcept {
   put_u32(std::span(request_).first<2>(), session_);
   put_u32(std::span(request_).subspan<2, 2>(), sequence_);
   for (std::size_t i = 0; i < outputs.u.size(); ++i) {
-    if (!std::isfinite(outputs.u[i])) return false;
+    if (!fits_counts(outputs.u[i], description_.actuator_scale[i])) return false;
     put_i32(std::span(request_).subspan(kSetpointHead + 2 * i).first<2>(),
             to_counts(outputs.u[i], description_.actuator_scale[i]));
   }
@@ -138,7 +138,7 @@ Outcome ModbusStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline d
     return Outcome::fault;
   ++sequence_;
   if (!write_setpoint(outputs)) {
-    trouble_ = Trouble::not_finite;
+    trouble_ = Trouble::not_carried;
     return Outcome::fault;
   }
   status_ = transact();
@@ -249,8 +249,8 @@ std::string ModbusStage::trouble() const {
       return fmt::format("{}: {} (state {}, cause: {})", to_string(link_.address()),
                          meaning(status_).words, to_string(state_of(node_status_)),
                          to_string(cause_of(node_status_)));
-    case Trouble::not_finite:
-      return "a command was no number";
+    case Trouble::not_carried:
+      return "a command is not finite or beyond the range of the wire (the node's actuator scale)";
   }
   return "";
 }

@@ -70,7 +70,7 @@ class ModbusStage final : public CyclicStage {
   bool reset_fault_;
 
   /// What the last exchange ran into; text is made of it when somebody asks.
-  enum class Trouble : std::uint8_t { none, link, foreign_reply, node, not_finite };
+  enum class Trouble : std::uint8_t { none, link, foreign_reply, node, not_carried };
   Trouble trouble_ = Trouble::none;
   PeerStatus status_ = PeerStatus::good;
   ModbusLink::Trouble link_trouble_;

@@ -25,6 +25,8 @@ struct AxisController {
     double pole_damping = 0.0;
   };
   std::vector<Notch> notches;
+  /// In an emergency the axis is braked by what is known of its motion; otherwise forces are cut.
+  bool brake = true;
 };
 
 struct MotionControllerSpec {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -104,6 +105,38 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
   }
   static_cast<void>(MotionController(spec));  // checks the rest
   return spec;
+}
+
+RigidMotion rigid_motion(const MotionControllerSpec& controller,
+                         const std::vector<Channel>& actuators,
+                         const std::vector<Channel>& sensors) {
+  const Jacobian actuator_jacobian = rigid_body_jacobian(actuators);
+  const Jacobian sensor_jacobian = rigid_body_jacobian(sensors);
+  RigidMotion motion;
+  const auto add = [](Eigen::MatrixXd& sum, const Eigen::MatrixXd& term) {
+    sum = sum.size() == 0 ? term : sum + term;
+  };
+  for (std::size_t i = 0; i < controller.axes.size(); ++i) {
+    const AxisController& axis = controller.axes[i];
+    if (axis.crossover_hz == 0.0) continue;
+    const auto k = static_cast<Eigen::Index>(i);
+    const double omega = 2.0 * pi * axis.crossover_hz;
+    const double inertia = std::abs(axis_response(axis, axis.crossover_hz)) / (omega * omega);
+    motion.bandwidth_rad_s =
+        motion.bandwidth_rad_s == 0.0 ? omega : std::min(motion.bandwidth_rad_s, omega);
+    add(motion.acceleration_per_n,
+        sensor_jacobian.col(k) * actuator_jacobian.col(k).transpose() / inertia);
+    const double braked = axis.brake ? inertia : 0.0;
+    add(motion.force_per_acceleration,
+        braked * controller.actuator_decoupling.col(k) * controller.sensor_decoupling.row(k));
+  }
+  // y - J q for the least-squares motion q: nothing is left where there are no more sensors than axes.
+  const Eigen::MatrixXd rest =
+      Eigen::MatrixXd::Identity(sensor_jacobian.rows(), sensor_jacobian.rows()) -
+      sensor_jacobian * controller.sensor_decoupling;
+  if (motion.bandwidth_rad_s > 0.0 && rest.cwiseAbs().maxCoeff() > 1e-9)
+    motion.contradiction = rest;
+  return motion;
 }
 
 }  // namespace stageid

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "hal/limits.hpp"
 #include "hal/motion_controller.hpp"
 #include "hal/stage.hpp"
 
@@ -40,6 +41,12 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
                                             const std::vector<Channel>& sensors,
                                             const std::array<AxisController, kRigidAxes>& axes,
                                             const std::array<double, kRigidAxes>& axis_inertia);
+
+/// The motion by which a controller moves its closed axes: an axis has the inertia with which its
+/// open loop C(s) / (inertia s^2) has magnitude 1 at crossover_hz. No closed axis: empty.
+RigidMotion rigid_motion(const MotionControllerSpec& controller,
+                         const std::vector<Channel>& actuators,
+                         const std::vector<Channel>& sensors);
 
 /// C(j 2 pi frequency_hz) of one axis in continuous time, with the gain as it stands.
 std::complex<double> axis_response(const AxisController& axis, double frequency_hz);

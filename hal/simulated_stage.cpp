@@ -60,7 +60,7 @@ struct SimulatedStage::State {
         plant(modes, checked.delay_s, checked.info.sample_rate_hz),
         noise(noise_of(checked)),
         pacer(checked.info.sample_rate_hz, checked.pace),
-        faults(checked.faults, checked.info.actuators.size(), checked.info.sensors.size()),
+        faults(checked.faults, checked.info),
         u(Eigen::ArrayXd::Zero(plant.actuators())),
         commanded(Eigen::ArrayXd::Zero(plant.actuators())),
         applied(Eigen::ArrayXd::Zero(plant.actuators())),
@@ -101,7 +101,7 @@ bool SimulatedStage::State::take_command(std::span<const double> command, bool m
   if (spec.actuator_saturation_n > 0.0)
     u = u.min(spec.actuator_saturation_n).max(-spec.actuator_saturation_n);
   if (!faults.empty() && !off)
-    faults.stick(cycle, {applied.data(), command.size()}, {u.data(), command.size()});
+    faults.drive(cycle, {applied.data(), command.size()}, {u.data(), command.size()});
   applied = u;
   return good;
 }
@@ -135,6 +135,10 @@ SimulatedStage::~SimulatedStage() = default;
 const StageInfo& SimulatedStage::info() const noexcept { return state_->info; }
 
 const std::vector<PlantMode>& SimulatedStage::modes() const noexcept { return state_->modes; }
+
+void SimulatedStage::displacement(std::span<double> y_m) const noexcept {
+  if (y_m.size() == state_->info.sensors.size()) state_->plant.output(y_m.data());
+}
 
 void SimulatedStage::start(std::uint64_t run_seed, Inputs& first) {
   State& s = *state_;

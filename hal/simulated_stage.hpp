@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "hal/limits.hpp"
@@ -61,13 +62,18 @@ struct WaferStageSpec {
       missed_cycle,
       interlock,
       stuck_actuator,
-      stuck_sensor
+      stuck_sensor,
+      sensor_offset,
+      sensor_drift,
+      actuator_gain,
+      extra_delay
     };
     Kind kind = Kind::none;
-    int channel = 0;
+    int channel = 0;  ///< -1: all, where FaultScript allows it
     std::uint64_t from_cycle = 0;
     std::uint64_t cycles = 1;  ///< missed_cycle: how many
     int run = -1;              ///< which start() of the process, 0-based; -1: every one
+    double value = 0.0;        ///< m, m/s, factor or samples: see FaultScript
   };
   std::vector<Fault> faults;
   std::uint64_t seed = 0;
@@ -99,6 +105,8 @@ class SimulatedStage final : public CyclicStage {
   void stop() noexcept override;
 
   const std::vector<PlantMode>& modes() const noexcept;
+  /// Where the stage really is at its sensors, without noise and faults (size sensors, m).
+  void displacement(std::span<double> y_m) const noexcept;
 
  private:
   struct State;

@@ -30,6 +30,10 @@ const char* to_string(Outcome outcome) noexcept {
       return "fault";
     case Outcome::limit:
       return "limit";
+    case Outcome::braking:
+      return "braking";
+    case Outcome::opened:
+      return "opened";
   }
   return "unknown outcome";
 }

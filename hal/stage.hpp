@@ -50,8 +50,10 @@ enum class Outcome : std::uint8_t {
   bus_passive,  ///< the controller is error-passive; measurement valid, marked
   bus_off,
   link_down,
-  fault,  ///< the stage reports a fault (interlock, amplifier, non-finite sensor)
-  limit   ///< a limit would have been or was exceeded: see LimitedStage::violation()
+  fault,    ///< the stage reports a fault (interlock, amplifier, non-finite sensor)
+  limit,    ///< a limit would have been or was exceeded: see LimitedStage::violation()
+  braking,  ///< the loop cannot be trusted and is open: the stage brakes by itself; go on exchanging
+  opened    ///< the loop is open and the forces are to be cut: stop()
 };
 const char* to_string(Outcome outcome) noexcept;
 
@@ -80,6 +82,8 @@ struct Inputs {
   /// When nothing but the wait for t_sample was left to do, CLOCK_MONOTONIC; 0: not told. What lies
   /// behind it is no execution time.
   std::int64_t t_ready_ns = 0;
+  /// What acted instead of Outputs::u, valid until the next exchange; empty: what was asked for.
+  std::span<const double> applied;
 };
 
 /// What the stage shall do. `u`: size actuators, SI.

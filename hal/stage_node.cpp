@@ -201,7 +201,9 @@ Outcome StageNode::advance_excited(std::int64_t now_ns, std::span<const double> 
     return Outcome::fault;
   }
   std::transform(control_.begin(), control_.end(), r.begin(), u.begin(), std::plus<>());
-  return exchange(now_ns, u, inputs);
+  const Outcome outcome = exchange(now_ns, u, inputs);
+  std::copy(inputs.applied.begin(), inputs.applied.end(), u.begin());
+  return outcome;
 }
 
 void StageNode::give_nothing(Inputs& inputs) const {
@@ -215,7 +217,9 @@ Outcome StageNode::exchange(std::int64_t now_ns, std::span<const double> u, Inpu
     return Outcome::fault;
   }
   last_sample_ns_ = now_ns;
-  const Outcome outcome = stage_.exchange({sample_, now_ns, u}, inputs, {});
+  Outcome outcome = stage_.exchange({sample_, now_ns, u}, inputs, {});
+  // The host need not know how the node stops: braked or in closed loop, it does so by itself.
+  if (outcome == Outcome::braking || outcome == Outcome::opened) outcome = Outcome::limit;
   ++sample_;
   std::copy(inputs.y.begin(), inputs.y.end(), y_.begin());
   controller_.update(y_.data(), control_.data());
@@ -273,7 +277,8 @@ void StageNode::hold(std::int64_t now_ns) {
     std::copy(control_.begin(), control_.end(), command_.begin());
     const Outcome outcome = stage_.exchange({sample_, now_ns, command_}, inputs, {});
     controller_.update(y_.data(), control_.data());
-    controlled = outcome != Outcome::fault && outcome != Outcome::link_down;
+    controlled =
+        outcome != Outcome::fault && outcome != Outcome::link_down && outcome != Outcome::opened;
   }
   if (controlled && elapsed_ns < hold_ns_) return;
   come_to_rest();
@@ -282,6 +287,7 @@ void StageNode::hold(std::int64_t now_ns) {
 
 void StageNode::come_to_rest() {
   stage_.stop();
+  if (stage_.emergency().cause.kind != LimitKind::none) reason_ = describe_stop(stage_);
   running_ = false;
   hold_began_ns_.reset();
 }

@@ -40,8 +40,8 @@ struct NodePanel {
 /// While the host measures, each advance() moves the plant by one sample. If none comes for
 /// watchdog_s (of the wall clock, seen by tick()), or advance() reports a limit or a fault, or the
 /// panel leaves its range, or somebody calls fail(), the node stops by itself: its own controller
-/// holds the stage for hold_s in closed loop, then forces go to zero, and the state is fault until
-/// an explicit reset. A quick stop goes the same way but ends in switch_on_disabled.
+/// holds the stage for hold_s in closed loop, or LimitedStage brakes it if the loop is unsound, then
+/// forces go to zero, and the state is fault until an explicit reset. A quick stop goes the same way but ends in switch_on_disabled.
 ///
 /// The node's controller runs along with every sample, so that taking over gives no step but the
 /// end of the excitation.

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <csignal>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -15,6 +16,9 @@
 
 namespace stageid {
 namespace {
+
+// A second signal so soon is the same wish, of an impatient hand; a stage is still in its ramp.
+constexpr std::chrono::seconds kControlledStop{2};
 
 std::atomic<bool> interrupted = false;
 std::atomic<bool> ending = false;
@@ -45,10 +49,15 @@ AtInterrupt& at_interrupt() {
 }
 
 [[noreturn]] void wait_for_signals(sigset_t signals) {
+  using Clock = std::chrono::steady_clock;
+  std::optional<Clock::time_point> first;
   for (;;) {
     int signal = 0;
     if (::sigwait(&signals, &signal) != 0) continue;
-    if (controlled_stops == 0 || interrupted.exchange(true)) end_program();
+    if (controlled_stops == 0) end_program();
+    interrupted = true;
+    if (!first) first = Clock::now();
+    if (Clock::now() - *first > kControlledStop) end_program();
   }
 }
 

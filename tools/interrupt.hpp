@@ -7,8 +7,8 @@
 namespace stageid {
 
 /// From now on the first SIGINT, SIGTERM or SIGHUP (unless it is ignored) removes what is unfinished and ends the
-/// program with exit code 130, whatever it does; under a ControlledStop it only sets interrupt_flag(), and the second
-/// signal ends the program. A thread waits for the signals, so that ending is ordinary code; call it in main(),
+/// program with exit code 130, whatever it does; under a ControlledStop it only sets interrupt_flag(), and a signal more
+/// than two seconds later ends the program. A thread waits for the signals, so that ending is ordinary code; call it in main(),
 /// before other threads are started, and not in a host that handles signals itself, such as Python.
 /// Also ignores SIGXFSZ and SIGPIPE, so that a full disk and a closed pipe are errors of the write.
 void catch_signals();

@@ -118,6 +118,8 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
   const auto streamed = [&](std::unique_ptr<CyclicStage> stage) {
     return std::make_unique<StreamedStage>(plan, std::move(stage), spec);
   };
+  // A played-back motion answers to other forces than these.
+  if (request.backend == Backend::replay) spec.limits.motion = {};
   switch (request.backend) {
     case Backend::sim:
       spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;

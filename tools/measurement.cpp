@@ -212,6 +212,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   const StageInfo& info = stage->info();
   options.real_time = config.stage.real_time.options;
   options.misses_allowed = config.stage.real_time.misses_allowed;
+  options.ramp_s = config.stage.ramp_s;
   if (info.clock == Clock::wall) warn_of_real_time(options.real_time, console);
   if (request.until) warn_of_until(plan, config.frf, console);
   const std::unique_ptr<SupervisedPlant> plant = supervise(config, request, options);
@@ -242,7 +243,9 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   tell_end(*events, *stage, result);
   if (dashboard) dashboard->finish(result.exit_code, result.message);
   if (const std::string error = events->error(); !error.empty()) console.warning(error);
-  result.log_bytes = std::filesystem::file_size(request.log);
+  std::error_code no_log;  // a log that was removed is a failure that is told already
+  const std::uintmax_t bytes = std::filesystem::file_size(request.log, no_log);
+  if (!no_log) result.log_bytes = bytes;
   return result;
 }
 

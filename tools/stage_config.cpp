@@ -54,11 +54,25 @@ Eigen::VectorXd shape_vector(const StageConfig& config, const std::vector<Channe
   return shape;
 }
 
+/// Entries that the file leaves out are `scale` times the window.
+Eigen::VectorXd by_window(const std::vector<ChannelConfig>& sensors, double ChannelConfig::*member,
+                          double scale) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(sensors.size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const ChannelConfig& sensor = sensors[static_cast<std::size_t>(i)];
+    values[i] = sensor.*member > 0.0 ? sensor.*member : scale * sensor.window_m;
+  }
+  return values;
+}
+
 void take_limits(const StageFile& file, WaferStageSpec& spec) {
   spec.limits.actuator_n = limit_vector(file.actuators, &ChannelConfig::limit_n);
   spec.limits.slew_n_s = limit_vector(file.actuators, &ChannelConfig::slew_n_s);
   spec.limits.thermal_rms_n = limit_vector(file.actuators, &ChannelConfig::thermal_rms_n);
   spec.limits.position_window_m = limit_vector(file.sensors, &ChannelConfig::window_m);
+  spec.limits.hard_window_m = by_window(file.sensors, &ChannelConfig::hard_window_m, 2.0);
+  spec.limits.deviation_m = by_window(file.sensors, &ChannelConfig::deviation_m, 0.5);
+  spec.limits.speed_m_s = limit_vector(file.sensors, &ChannelConfig::speed_m_s);
   spec.limits.thermal_time_constant_s = file.thermal_time_constant_s;
 }
 
@@ -66,8 +80,12 @@ void take_faults(const StageConfig& config, const StageFile& file, WaferStageSpe
   using Kind = WaferStageSpec::Fault::Kind;
   for (const FaultConfig& fault : file.faults) {
     spec.faults.push_back(fault.fault);
-    if (fault.channel.empty()) continue;
-    const bool actuator = fault.fault.kind == Kind::stuck_actuator;
+    if (fault.channel.empty()) {
+      spec.faults.back().channel = -1;
+      continue;
+    }
+    const bool actuator =
+        fault.fault.kind == Kind::stuck_actuator || fault.fault.kind == Kind::actuator_gain;
     spec.faults.back().channel =
         require_channel(config, actuator ? spec.info.actuators : spec.info.sensors, fault.channel,
                         actuator ? "actuator" : "sensor", "faults");
@@ -96,6 +114,7 @@ void complete_spec(StageConfig& config, const StageFile& file) {
       spec.info.sample_rate_hz, spec.info.actuators, spec.info.sensors, file.axes,
       {spec.mass_kg, spec.mass_kg, spec.mass_kg, spec.inertia_kg_m2[0], spec.inertia_kg_m2[1],
        spec.inertia_kg_m2[2]});
+  spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
 }
 
 }  // namespace
@@ -138,6 +157,7 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
   config.text = document.text();
   config.backend = static_cast<Backend>(file.backend);
   config.real_time = file.real_time;
+  config.ramp_s = file.ramp_s;
   config.modbus = file.modbus.stage;
   config.supervisor = file.modbus.supervisor;
   config.plugin = file.plugin;

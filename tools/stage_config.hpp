@@ -27,6 +27,7 @@ struct StageConfig {
   std::string text;  ///< of the file, kept for the log
   Backend backend = Backend::sim;
   RealTimeKeys real_time;
+  double ramp_s = 0.1;  ///< of a stop, see LoopOptions
   WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
   CanConfig can;
   std::optional<ModbusConfig> modbus;          ///< of the stage

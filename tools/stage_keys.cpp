@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "hal/can_frame.hpp"
 #include "tools/stage_config.hpp"
 
 namespace stageid {
@@ -54,6 +56,18 @@ void describe_sensor(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
   describe_channel(v, c, "m");
   v.number("window_m", c.window_m, positive("m"), kRequired,
            "largest |y|; past it the stage is stopped");
+  v.number("hard_window_m", c.hard_window_m, not_negative("m"), kOptional,
+           "|y| at which forces are cut; 0: twice window_m");
+  v.number("deviation_m", c.deviation_m, not_negative("m"), kOptional,
+           "largest difference from the motion that the forces explain; past it the loop is opened "
+           "and the stage braked; 0: half of window_m");
+  v.number("speed_m_s", c.speed_m_s, positive("m/s"), kOptional,
+           "largest speed; past it the stage is braked; inf: what full force can stop");
+  v.require(
+      c.hard_window_m == 0.0 || c.hard_window_m >= c.window_m, "hard_window_m",
+      fmt::format("hard_window_m: {} m is inside window_m: {}; write a larger one, or leave it "
+                  "out",
+                  c.hard_window_m, c.window_m));
   add_channel(v, std::move(c), list);
 }
 
@@ -124,6 +138,7 @@ void describe_notch(ConfigVisitor& v, std::vector<AxisController::Notch>& list) 
 }
 
 void describe_axis(ConfigVisitor& v, AxisController& a) {
+  std::size_t emergency = a.brake ? 0 : 1;
   v.number("crossover_hz", a.crossover_hz, positive("Hz"), kRequired, "of the open loop");
   v.number("gain", a.gain, not_negative("N/m or N m/rad"), kOptional,
            "0: from the crossover and the inertia");
@@ -136,6 +151,9 @@ void describe_axis(ConfigVisitor& v, AxisController& a) {
   v.items(
       "notches", [&](ConfigVisitor& notch) { describe_notch(notch, a.notches); }, {}, kOptional,
       "second-order notches");
+  v.choice("emergency", emergency, {"brake", "cut"}, kOptional,
+           "when the loop cannot be trusted: brake by what is known of the motion, or no force");
+  a.brake = emergency == 0;
 }
 
 void describe_controller(ConfigVisitor& v, StageFile& f) {
@@ -149,12 +167,13 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
   FaultConfig f;
   using Kind = WaferStageSpec::Fault::Kind;
   auto kind = static_cast<std::size_t>(Kind::dead_sensor) - 1;
-  v.choice(
-      "kind", kind,
-      {"dead_sensor", "nan_sensor", "missed_cycle", "interlock", "stuck_actuator", "stuck_sensor"},
-      kRequired, "what happens");
+  v.choice("kind", kind,
+           {"dead_sensor", "nan_sensor", "missed_cycle", "interlock", "stuck_actuator",
+            "stuck_sensor", "sensor_offset", "sensor_drift", "actuator_gain", "extra_delay"},
+           kRequired, "what happens");
   f.fault.kind = static_cast<Kind>(kind + 1);
-  v.text("channel", f.channel, kOptional, "name of the sensor or actuator");
+  v.text("channel", f.channel, kOptional,
+         "name of the sensor or actuator; left out of the last four: all");
   const bool needs_channel =
       f.fault.kind == Kind::dead_sensor || f.fault.kind == Kind::nan_sensor ||
       f.fault.kind == Kind::stuck_actuator || f.fault.kind == Kind::stuck_sensor;
@@ -164,6 +183,11 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
         "of the run, 0-based");
   count(v, "cycles", f.fault.cycles, 1, std::numeric_limits<std::int64_t>::max(), kOptional,
         "missed_cycle: how many");
+  v.number("value", f.fault.value, any_number(""), kOptional,
+           "sensor_offset: m; sensor_drift: m/s; actuator_gain: factor, -1 reversed, 0 dead; "
+           "extra_delay: samples");
+  v.require(f.fault.kind != Kind::extra_delay || f.fault.value >= 1.0, "value",
+            "value: extra_delay needs at least 1 sample");
   count(v, "run", f.fault.run, -1, 1000000, kOptional, "0-based; -1: every run");
   list.push_back(std::move(f));
 }
@@ -174,6 +198,32 @@ void describe_plugin(ConfigVisitor& v, PluginSpec& plugin) {
          "shared library with the interface of stageid_backend.h; seen from this file");
   plugin.library = library;
   v.named_texts("keys", plugin.keys, kOptional, "what the library wants to know");
+}
+
+/// A value inside its limits must fit on the wire: the encoder would saturate it.
+void require_range(ConfigVisitor& v, const char* key, const std::vector<double>& ranges,
+                   const std::vector<ChannelConfig>& channels, double ChannelConfig::*limit,
+                   const char* limit_key, const char* unit) {
+  if (ranges.size() != 1 && ranges.size() != channels.size()) return;  // refused elsewhere
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    const double range = ranges[std::min(i, ranges.size() - 1)];
+    const double wanted = channels[i].*limit;
+    if (!std::isfinite(wanted) || can_range_holds(range, wanted)) continue;
+    v.require(
+        false, key,
+        fmt::format("{}: {} {} cannot carry {}: {} {} of '{}'; write more than {}, or leave it "
+                    "out for 1.25 times {}",
+                    key, range, unit, limit_key, wanted, unit, channels[i].channel.name, wanted,
+                    limit_key));
+    return;
+  }
+}
+
+void require_ranges(ConfigVisitor& v, const StageFile& f) {
+  require_range(v, "actuator_range_n", f.can.actuator_range_n, f.actuators, &ChannelConfig::limit_n,
+                "limit_n", "N");
+  require_range(v, "sensor_range_m", f.can.sensor_range_m, f.sensors, &ChannelConfig::window_m,
+                "window_m", "m");
 }
 
 }  // namespace
@@ -196,6 +246,8 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   v.number("stuck_sensor_s", s.limits.stuck_sensor_s, not_negative("s"), kOptional,
            "a sensor may show one and the same value for so long, then the stage is stopped; 0: "
            "for ever");
+  v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
+           "a stop takes the excitation to zero over this, in closed loop while it is sound");
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
            "of the thermal rms limit");
   v.group(
@@ -225,8 +277,12 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
       "faults", [&](ConfigVisitor& fault) { describe_fault(fault, f.faults); }, {}, kOptional,
       "faults on request, to try the safety");
   v.group(
-      "can", [&](ConfigVisitor& can) { describe_can(can, f.can); }, kOptional,
-      "the stage behind CAN FD; needed by backend can and by 'stageid node --can'");
+      "can",
+      [&](ConfigVisitor& can) {
+        describe_can(can, f.can);
+        require_ranges(can, f);
+      },
+      kOptional, "the stage behind CAN FD; needed by backend can and by 'stageid node --can'");
 }
 
 }  // namespace stageid

@@ -27,6 +27,9 @@ struct ChannelConfig {
   double slew_n_s = kNoLimit;
   double thermal_rms_n = kNoLimit;
   double window_m = kNoLimit;
+  double hard_window_m = 0.0;  // 0: derived
+  double deviation_m = 0.0;    // 0: derived
+  double speed_m_s = kNoLimit;
 };
 
 struct InPlaneModeConfig {
@@ -46,6 +49,7 @@ struct StageFile {
   std::size_t format = 0;
   std::size_t backend = 0;
   double thermal_time_constant_s = 10.0;
+  double ramp_s = 0.1;
   std::vector<ChannelConfig> actuators;
   std::vector<ChannelConfig> sensors;
   std::vector<double> inertia_kg_m2;

@@ -302,6 +302,31 @@ TEST_F(MeasurementLoopTest, ALimitInTheRampBehindAGoodRunIsTold) {
   EXPECT_TRUE(marked(rows()).empty());
 }
 
+TEST_F(MeasurementLoopTest, AFaultInTheRampBehindAGoodRunIsTold) {
+  stage_.outcomes = {{kSamples + 3, Outcome::fault}};
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_TRUE(loop.complete());
+  EXPECT_EQ(loop.reason(), StopReason::fault);
+  EXPECT_EQ(loop.last_trouble(), Outcome::fault);
+  EXPECT_TRUE(marked(rows()).empty());
+}
+
+TEST_F(MeasurementLoopTest, AStageThatBrakesIsWaitedForAndThenStopped) {
+  for (std::uint64_t n = 25; n < 60; ++n) stage_.outcomes[n] = Outcome::braking;
+  stage_.outcomes[60] = Outcome::opened;
+  MeasurementLoop loop = make_loop({.ramp_s = 0.01});  // 10 samples: the brake takes longer
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_EQ(loop.reason(), StopReason::limit);
+  EXPECT_EQ(stage_.exchanges(), 61U);
+  EXPECT_EQ(stage_.stops(), 1);
+  const std::vector<Row> all = rows();
+  ASSERT_EQ(all.size(), 61U);
+  for (std::size_t n = 0; n < all.size(); ++n) EXPECT_EQ(all[n].status.marked, n >= 25) << n;
+}
+
 // A replay ends with its record: there is nothing behind it.
 TEST_F(MeasurementLoopTest, AStageThatIsGoneBehindAGoodRunSpoilsNothing) {
   stage_.outcomes = {{kSamples, Outcome::link_down}};

@@ -262,6 +262,15 @@ TEST_F(RunExperiment, AFullDiskEndsInAControlledStop) {
   EXPECT_EQ(reader->runs()[0].samples, log.acknowledged_rows());
 }
 
+TEST_F(RunExperiment, ALogThatIsRemovedEndsInAControlledStop) {
+  SlogWriter log = create("a.slog");
+  std::filesystem::remove(directory_ / "a.slog");
+  const ExperimentResult result = measure(log);
+  EXPECT_EQ(result.end, ExperimentEnd::log_failed);
+  EXPECT_THAT(result.message, HasSubstr("a.slog: was removed"));
+  EXPECT_EQ(result.runs_done, 0);
+}
+
 TEST_F(RunExperiment, AStageThatDoesNotStartIsAFaultAndTheLogIsKept) {
   inner_->refuse_run = 2;
   SlogWriter log = create("a.slog");

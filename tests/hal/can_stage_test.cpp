@@ -261,9 +261,20 @@ TEST(CanStage, WhatIsNoNumberReachesNoFrame) {
   EXPECT_EQ(stage->exchange({0, 0, u}, inputs, {}), Outcome::fault);
   EXPECT_EQ(rig.node().sample(), 0U);
   EXPECT_EQ(stage->exchange({0, 0, {}}, inputs, {}), Outcome::fault);
+}
+
+TEST(CanStage, WhatTheWireCannotCarryStopsTheRun) {
+  CanRig rig;
+  auto stage = rig.host();
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
+  stage->start(1, inputs);
   const std::vector<double> large{100.0, 0.0};
-  EXPECT_NE(stage->exchange({0, 0, large}, inputs, {}), Outcome::fault);
+  EXPECT_EQ(stage->exchange({0, 0, large}, inputs, {}), Outcome::fault);
   EXPECT_EQ(stage->counts().saturated, 1U);
+  EXPECT_EQ(rig.node().sample(), 0U) << "no other value instead";
+  EXPECT_THAT(stage->trouble(), testing::HasSubstr("beyond the range of the wire"));
 }
 
 TEST(CanStage, GarbageDoesNoHarm) {

@@ -65,6 +65,20 @@ TEST_F(LimitedStageTest, PassesOnWhatIsInsideAllLimits) {
   EXPECT_EQ(give(7.9, -14.0), Outcome::ok);
   EXPECT_THAT(reached(), testing::ElementsAre(7.9, -14.0));
   EXPECT_EQ(stage_->violation().kind, LimitKind::none);
+  EXPECT_TRUE(inputs_.applied.empty());
+}
+
+TEST_F(LimitedStageTest, PastTheHardWindowTheForcesAreCut) {
+  start();
+  fake_->measurement = {0.0, 1.9e-3, 0.0};
+  EXPECT_EQ(give(1.0), Outcome::limit);
+  fake_->measurement = {0.0, 2.1e-3, 0.0};  // twice the window
+  EXPECT_EQ(give(1.0), Outcome::opened);
+  give(1.0);
+  EXPECT_THAT(reached(), testing::ElementsAre(0.0, 0.0));
+  EXPECT_EQ(stage_->violation().kind, LimitKind::position);
+  EXPECT_EQ(stage_->emergency().cause.kind, LimitKind::hard_position);
+  EXPECT_THAT(describe_stop(*stage_), testing::HasSubstr("past the hard window"));
 }
 
 TEST_F(LimitedStageTest, ClampsAndSaysWhichActuatorWhereAndWhen) {
@@ -72,6 +86,7 @@ TEST_F(LimitedStageTest, ClampsAndSaysWhichActuatorWhereAndWhen) {
   EXPECT_EQ(give(0.0), Outcome::ok);
   EXPECT_EQ(give(1.0, -25.0), Outcome::limit);
   EXPECT_THAT(reached(), testing::ElementsAre(1.0, -20.0));
+  EXPECT_THAT(inputs_.applied, testing::ElementsAre(1.0, -20.0));
   const LimitViolation& violation = stage_->violation();
   EXPECT_EQ(violation.kind, LimitKind::actuator);
   EXPECT_EQ(violation.channel, 1);
@@ -161,12 +176,20 @@ TEST_F(LimitedStageTest, HoldsTheLastMeasurementInPlaceOfNan) {
   fake_->measurement = {1e-4, 2e-4, 3e-4};
   EXPECT_EQ(give(0.0), Outcome::ok);
   fake_->measurement = {5e-4, 6e-4, kNan};
-  EXPECT_EQ(give(0.0), Outcome::limit);
+  EXPECT_EQ(give(7.0), Outcome::opened);
   EXPECT_THAT(y_, testing::ElementsAre(5e-4, 6e-4, 3e-4));
   EXPECT_EQ(inputs_.valid, 0b011U);
   EXPECT_EQ(stage_->violation().kind, LimitKind::not_finite);
   EXPECT_EQ(describe(stage_->violation(), stage_->info()),
             "sensor u: the measurement is not finite (cycle 2)");
+  EXPECT_EQ(give(7.0), Outcome::opened);
+  EXPECT_THAT(reached(), testing::ElementsAre(0.0, 0.0)) << "no control on a sensor that failed";
+  EXPECT_THAT(inputs_.applied, testing::ElementsAre(0.0, 0.0));
+  stage_->stop();
+  EXPECT_EQ(
+      describe_stop(*stage_),
+      "sensor u: the measurement is not finite (cycle 2); the loop was opened; no brake, 0.0055 "
+      "m/s when the forces were cut");
 }
 
 TEST_F(LimitedStageTest, RefusesToStartOutsideTheWindow) {
@@ -215,7 +238,7 @@ class StuckSensorTest : public LimitedStageTest {
 TEST_F(StuckSensorTest, IsReportedAfterItsTime) {
   for (int n = 1; n <= 3; ++n) EXPECT_EQ(show(1e-5 * n, 2e-5, 1e-5 * n), Outcome::ok) << n;
   EXPECT_EQ(show(4e-5, 2e-5, 4e-5), Outcome::ok);  // shown four times: repeated three times
-  EXPECT_EQ(show(5e-5, 2e-5, 5e-5), Outcome::limit);
+  EXPECT_EQ(show(5e-5, 2e-5, 5e-5), Outcome::opened);
   EXPECT_EQ(describe(stage_->violation(), stage_->info()),
             "sensor t: has shown 2e-05 m and nothing else for 0.004 s (cycle 5)");
 }
@@ -227,7 +250,7 @@ TEST_F(StuckSensorTest, AChangeBeginsAnew) {
 
 TEST_F(StuckSensorTest, StandsAtZeroToo) {
   for (int n = 1; n <= 3; ++n) EXPECT_EQ(show(1e-5 * n, 1e-5 * n, 0.0), Outcome::ok) << n;
-  EXPECT_EQ(show(4e-5, 4e-5, 0.0), Outcome::limit);  // the first value of the run was zero
+  EXPECT_EQ(show(4e-5, 4e-5, 0.0), Outcome::opened);  // the first value of the run was zero
 }
 
 TEST_F(LimitedStageTest, ASensorMayStandStillIfNobodySaysHowLong) {
@@ -267,6 +290,13 @@ TEST(LimitedStage, RefusesLimitsThatDoNotFit) {
   EXPECT_THROW(make([](StageLimits& l) { l.position_window_m.resize(2); }), std::invalid_argument);
   EXPECT_THROW(make([](StageLimits& l) { l.thermal_time_constant_s = 0.0; }),
                std::invalid_argument);
+  EXPECT_THROW(make([](StageLimits& l) {
+                 l.hard_window_m = vector({1e-3, 1e-3, 9e-4});
+               }),
+               std::invalid_argument);
+  EXPECT_THROW(make([](StageLimits& l) { l.speed_m_s = vector({1.0}); }), std::invalid_argument);
+  EXPECT_THROW(make([](StageLimits& l) { l.motion.acceleration_per_n.setOnes(2, 2); }),
+               std::invalid_argument);
   EXPECT_THROW(make([](StageLimits& l) { l.stuck_sensor_s = -1.0; }), std::invalid_argument);
   EXPECT_THROW(make([](StageLimits& l) { l.stuck_sensor_s = kNan; }), std::invalid_argument);
   EXPECT_THROW(make([](StageLimits& l) { l.stuck_sensor_s = 1e-3; }), std::invalid_argument);
@@ -284,6 +314,12 @@ TEST(LimitedStage, DescribesEveryKind) {
   EXPECT_STREQ(to_string(LimitKind::position), "position");
   EXPECT_STREQ(to_string(LimitKind::not_finite), "not finite");
   EXPECT_STREQ(to_string(LimitKind::stuck_sensor), "stuck sensor");
+  EXPECT_STREQ(to_string(LimitKind::sensor_jump), "sensor jump");
+  EXPECT_STREQ(to_string(LimitKind::deviation), "deviation");
+  EXPECT_STREQ(to_string(LimitKind::contradiction), "contradiction");
+  EXPECT_STREQ(to_string(LimitKind::speed), "speed");
+  EXPECT_STREQ(to_string(LimitKind::stopping_distance), "stopping distance");
+  EXPECT_STREQ(to_string(LimitKind::hard_position), "hard position");
 }
 
 }  // namespace

@@ -43,6 +43,14 @@ TEST(ModbusCodec, CountsAreTheNearestAndSaturate) {
   EXPECT_EQ(to_counts(std::numeric_limits<double>::quiet_NaN(), 1.0), 0);
 }
 
+TEST(ModbusCodec, KnowsWhatItCannotCarry) {
+  EXPECT_TRUE(fits_counts(2147483647.0, 1.0));
+  EXPECT_TRUE(fits_counts(-1.0, 0.5));
+  EXPECT_FALSE(fits_counts(2147483648.0, 1.0));
+  EXPECT_FALSE(fits_counts(-1e30, 1.0));
+  EXPECT_FALSE(fits_counts(std::numeric_limits<double>::quiet_NaN(), 1.0));
+}
+
 TEST(ModbusCodec, AScaleIsTheSmallestPowerOfTwoThatHoldsTheRange) {
   for (const double range : {40e-3, 2.0, 1.0, 2147483647.0, 80.0, 1e-20, 1e20}) {
     const auto scale = static_cast<double>(count_scale(range));

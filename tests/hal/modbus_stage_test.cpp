@@ -113,7 +113,9 @@ TEST(ModbusStage, ACommandThatIsNoNumberIsNotSent) {
   Host host(bench);
   host.start();
   EXPECT_EQ(host.exchange(std::numeric_limits<double>::quiet_NaN()), Outcome::fault);
-  EXPECT_THAT(host.stage.trouble(), HasSubstr("no number"));
+  EXPECT_THAT(host.stage.trouble(), HasSubstr("not finite"));
+  EXPECT_EQ(host.exchange(1e9), Outcome::fault);
+  EXPECT_THAT(host.stage.trouble(), HasSubstr("beyond the range of the wire"));
   host.stage.stop();
   bench.stop();
   EXPECT_TRUE(bench.fake->commands.empty());

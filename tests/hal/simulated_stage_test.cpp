@@ -13,6 +13,7 @@
 
 #include "hal/modal_plant.hpp"
 #include "tests/hal/closed_loop.hpp"
+#include "tests/hal/stage_bench.hpp"
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
@@ -20,30 +21,7 @@ namespace {
 
 using Kind = WaferStageSpec::Fault::Kind;
 
-// Open loop, one stage, its commands and measurements at hand.
-class Bench {
- public:
-  explicit Bench(const WaferStageSpec& spec)
-      : stage_(spec), u(spec.info.actuators.size()), y(spec.info.sensors.size()) {
-    inputs.y = y;
-  }
-  void start(std::uint64_t run_seed = 1) { stage_.start(run_seed, inputs); }
-  Outcome step(Deadline deadline = {}) {
-    Outputs outputs;
-    outputs.cycle = inputs.cycle;
-    outputs.u = u;
-    return stage_.exchange(outputs, inputs, deadline);
-  }
-
- private:
-  SimulatedStage stage_;
-
- public:
-  std::vector<double> u;
-  std::vector<double> y;
-  Inputs inputs;
-  SimulatedStage& stage() { return stage_; }
-};
+using test::Bench;
 
 std::vector<double> closed_loop_record(SimulatedStage& stage, const WaferStageSpec& spec,
                                        std::uint64_t run_seed, int samples) {
@@ -201,118 +179,6 @@ TEST(SimulatedStage, StartsFromStandstillWithSensorNoiseOnly) {
   EXPECT_EQ(bench.inputs.valid, 0x7fU);
 }
 
-WaferStageSpec with_fault(Kind kind, int channel, std::uint64_t from, std::uint64_t cycles = 1,
-                          int run = -1) {
-  WaferStageSpec spec = test::small_stage_spec();
-  spec.info.sensors.push_back(spec.info.sensors[0]);
-  spec.info.sensors[1].position_m[0] = -0.5;
-  if (kind != Kind::none) spec.faults = {{kind, channel, from, cycles, run}};
-  return spec;
-}
-
-// Runs a faulty stage beside a healthy one with the same commands.
-class FaultTest : public testing::Test {
- protected:
-  void begin(const WaferStageSpec& spec) {
-    faulty_ = std::make_unique<Bench>(spec);
-    healthy_ = std::make_unique<Bench>(with_fault(Kind::none, 0, 0));
-    faulty_->start();
-    healthy_->start();
-  }
-  Outcome step(double u0, double u1) {
-    faulty_->u = {u0, u1};
-    healthy_->u = {u0, u1};
-    EXPECT_EQ(healthy_->step(), Outcome::ok);
-    return faulty_->step();
-  }
-  std::unique_ptr<Bench> faulty_;
-  std::unique_ptr<Bench> healthy_;
-};
-
-TEST_F(FaultTest, ADeadSensorIsMissingAndHeld) {
-  begin(with_fault(Kind::dead_sensor, 1, 3));
-  double held = 0.0;
-  for (int n = 0; n < 6; ++n) {
-    const Outcome outcome = step(1.0, -1.0);
-    if (n == 2) held = faulty_->y[1];
-    EXPECT_EQ(outcome, n < 3 ? Outcome::ok : Outcome::incomplete);
-    EXPECT_EQ(faulty_->inputs.valid, n < 3 ? 0b11U : 0b01U);
-    EXPECT_EQ(faulty_->y[0], healthy_->y[0]);
-    EXPECT_EQ(faulty_->y[1], n < 3 ? healthy_->y[1] : held);
-  }
-}
-
-TEST_F(FaultTest, ANanSensorClaimsToBeWell) {
-  begin(with_fault(Kind::nan_sensor, 0, 2));
-  for (int n = 0; n < 4; ++n) {
-    EXPECT_EQ(step(1.0, 0.0), Outcome::ok);
-    EXPECT_EQ(std::isnan(faulty_->y[0]), n >= 2);
-    EXPECT_EQ(faulty_->y[1], healthy_->y[1]);
-    EXPECT_EQ(faulty_->inputs.valid, 0b11U);
-  }
-}
-
-TEST_F(FaultTest, AStuckSensorShowsItsLastValueAndClaimsToBeWell) {
-  begin(with_fault(Kind::stuck_sensor, 1, 3));
-  double held = 0.0;
-  for (int n = 0; n < 6; ++n) {
-    EXPECT_EQ(step(1.0, -1.0), Outcome::ok);
-    if (n == 2) held = faulty_->y[1];
-    EXPECT_EQ(faulty_->inputs.valid, 0b11U);
-    EXPECT_EQ(faulty_->y[0], healthy_->y[0]);
-    EXPECT_EQ(faulty_->y[1], n < 3 ? healthy_->y[1] : held);
-  }
-}
-
-TEST_F(FaultTest, MissedCyclesHoldCommandAndMeasurement) {
-  begin(with_fault(Kind::missed_cycle, 0, 2, 2));
-  std::vector<double> held;
-  for (int n = 0; n < 8; ++n) {
-    faulty_->u = {1.0 + n, 0.0};
-    healthy_->u = {n == 2 || n == 3 ? 2.0 : 1.0 + n, 0.0};  // the last command that arrived
-    EXPECT_EQ(healthy_->step(), Outcome::ok);
-    const bool missed = n == 2 || n == 3;
-    if (n == 2) held = faulty_->y;
-    EXPECT_EQ(faulty_->step(), missed ? Outcome::stale : Outcome::ok);
-    EXPECT_EQ(faulty_->inputs.cycle, static_cast<std::uint64_t>(n + 1));
-    EXPECT_EQ(faulty_->inputs.valid, missed ? 0U : 0b11U);
-    EXPECT_EQ(faulty_->y, missed ? held : healthy_->y) << n;
-  }
-}
-
-TEST_F(FaultTest, AnInterlockTakesTheForcesAway) {
-  begin(with_fault(Kind::interlock, 0, 3));
-  for (int n = 0; n < 8; ++n) {
-    faulty_->u = {1.0, 2.0};
-    healthy_->u = n < 3 ? std::vector<double>{1.0, 2.0} : std::vector<double>{0.0, 0.0};
-    EXPECT_EQ(healthy_->step(), Outcome::ok);
-    EXPECT_EQ(faulty_->step(), n < 3 ? Outcome::ok : Outcome::fault);
-    EXPECT_EQ(faulty_->inputs.node_state, n < 3 ? NodeState::operation_enabled : NodeState::fault);
-    EXPECT_EQ(faulty_->y, healthy_->y);
-  }
-}
-
-TEST_F(FaultTest, AStuckActuatorKeepsItsLastForce) {
-  begin(with_fault(Kind::stuck_actuator, 1, 4));
-  for (int n = 0; n < 10; ++n) {
-    faulty_->u = {0.5, 1.0 + n};
-    healthy_->u = {0.5, n < 4 ? 1.0 + n : 4.0};
-    EXPECT_EQ(healthy_->step(), Outcome::ok);
-    EXPECT_EQ(faulty_->step(), Outcome::ok);
-    EXPECT_EQ(faulty_->y, healthy_->y) << n;
-  }
-}
-
-TEST_F(FaultTest, ComesInTheAskedRunOnly) {
-  begin(with_fault(Kind::interlock, 0, 0, 1, 1));
-  EXPECT_EQ(step(0.0, 0.0), Outcome::ok);
-  faulty_->start();
-  EXPECT_EQ(step(0.0, 0.0), Outcome::fault);
-  faulty_->start();
-  EXPECT_EQ(step(0.0, 0.0), Outcome::ok);
-}
-
-// Counts and policies only: wall-clock figures are for benchmarks.
 TEST(SimulatedStage, AgainstTheWallClockIsLateOnlyWhenCalledTooLate) {
   WaferStageSpec spec = test::small_stage_spec();
   spec.pace = 1.0;
@@ -380,6 +246,7 @@ TEST(SimulatedStage, RefusesABadSpecNamingTheField) {
   refuse("faults", [](WaferStageSpec& s) { s.faults = {{Kind::dead_sensor, 1, 0, 1, -1}}; });
   refuse("faults", [](WaferStageSpec& s) { s.faults = {{Kind::stuck_actuator, -1, 0, 1, -1}}; });
   refuse("faults", [](WaferStageSpec& s) { s.faults = {{Kind::missed_cycle, 0, 0, 0, -1}}; });
+  refuse("faults", [](WaferStageSpec& s) { s.faults = {{Kind::extra_delay, -1, 0, 1, -1, 0.5}}; });
 }
 
 TEST(SimulatedStage, WantsRoomForEverySensor) {

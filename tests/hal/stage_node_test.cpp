@@ -147,6 +147,27 @@ TEST_F(StageNodeTest, ALimitStopsTheNodeWhateverTheHostDoes) {
   EXPECT_EQ(node_->state(), NodeState::fault);
 }
 
+TEST_F(StageNodeTest, TheNodesOwnLoopTellsWhatItApplied) {
+  measure();
+  std::vector<double> u(2);
+  const std::vector<double> r{25.0, 0.5};
+  EXPECT_EQ(node_->advance_excited(now_ns_, r, u, inputs_), Outcome::limit);
+  EXPECT_THAT(u, testing::ElementsAre(10.0, 0.5));
+}
+
+TEST_F(StageNodeTest, DoesNotHoldOnASensorThatFailed) {
+  measure();
+  fake_->measurement = {5e-3};
+  EXPECT_EQ(advance(0.0), Outcome::ok);
+  fake_->measurement = {std::numeric_limits<double>::quiet_NaN()};
+  EXPECT_EQ(advance(0.0), Outcome::limit);
+  tick_for(5);
+  EXPECT_EQ(node_->state(), NodeState::fault) << "no motion is known: there is nothing to hold by";
+  EXPECT_EQ(fake_->stops, 1);
+  EXPECT_EQ(fake_->commands.back()[0], 0.0);
+  EXPECT_THAT(node_->trouble(), testing::HasSubstr("the loop was opened; no brake"));
+}
+
 TEST_F(StageNodeTest, AMeasurementThatIsNoNumberStopsTheNode) {
   measure();
   fake_->measurement = {std::numeric_limits<double>::quiet_NaN()};

@@ -148,6 +148,24 @@ class InterruptTest(unittest.TestCase):
                 delays_s.append(2.0 * delay_s)
         self.assertIn(130, codes)
 
+    def test_two_signals_in_a_row_are_one_controlled_stop(self):
+        log = WORK / "twice.slog"
+        process = subprocess.Popen([PROGRAM, "run", SMALL, "-o", log.name, "--pace", "0.1"], cwd=WORK,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.wait_for_samples(log)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.03)
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 130, error)
+        self.assertIn("what was measured is kept", error)  # the loop's own words: it came to its end
+        # The ramp is in the log: 0.1 s of stage time, marked.
+        code, error = run("log", "verify", log.name)
+        self.assertEqual(code, 0, error)
+        marked = subprocess.run([PROGRAM, "log", "info", log.name, "--json"], cwd=WORK, text=True,
+                                stdout=subprocess.PIPE, check=True).stdout
+        self.assertGreaterEqual(sum(r["marked"] for r in json.loads(marked)["runs"]), 200, marked)
+
     def test_a_closed_terminal_ends_a_run_as_ctrl_c_does(self):
         code = None
         for delay_s in (0.3, 0.6, 1.2, 2.4, 4.8):  # on a busy machine main() begins late

@@ -126,6 +126,9 @@ TEST_F(BadRequest, StageFiles) {
   wrong("Ry: *loop", "Rx: *loop", "stage_bad.yaml: ");  // no sensor sees Rx
   wrong("[-0.26, 0, 0]", "[-2.6, 0, 0]", "is not on the plate");
   wrong("noise:", "faults: [{kind: dead_sensor, channel: s9}]\nnoise:", "there is no sensor 's9'");
+  wrong("noise:", "faults: [{kind: extra_delay}]\nnoise:", "extra_delay needs at least 1 sample");
+  wrong("window_m: 1e-3}", "window_m: 1e-3, hard_window_m: 9e-4}", "is inside window_m");
+  wrong("crossover_hz: 20,", "crossover_hz: 20, emergency: stop,", "emergency");
 }
 
 TEST_F(BadRequest, Modbus) {
@@ -189,6 +192,12 @@ TEST_F(BadRequest, WhatACanBusCannotCarry) {
   wrong("buses: [{interface: can0, actuators: [a9]}]", "there is no channel 'a9'");
   wrong("buses: [{interface: can0}, {interface: can0}]", "interface can0 stands twice");
   wrong("actuator_range_n: [1, 2], buses: [{interface: can0}]", "2 entries for 3 channels");
+  wrong("buses: [{interface: can0}], actuator_range_n: 1",
+        "actuator_range_n: 1 N cannot carry limit_n: 40 N of 'a1'; write more than 40, or leave it "
+        "out for 1.25 times limit_n");
+  wrong("buses: [{interface: can0}], actuator_range_n: 40", "cannot carry limit_n: 40 N");
+  wrong("buses: [{interface: can0}], sensor_range_m: 1e-4",
+        "cannot carry window_m: 0.001 m of 's1'");
   wrong("buses: [{interface: can0, data_bit_rate: 5e6}]", "unknown key 'data_bit_rate'");
   wrong("mode: residential, buses: [{interface: can0}]", "did you mean 'resident'?");
 }

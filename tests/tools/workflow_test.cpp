@@ -184,6 +184,39 @@ TEST_F(Workflow, AStuckSensorStopsTheRunWithCodeFour) {
   EXPECT_THAT(result.err, HasSubstr("sensor s1: has shown"));
 }
 
+TEST_F(Workflow, AFaultThatOpensTheLoopEndsWithCodeFourAndItsCause) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"kind: actuator_gain, value: -1", "deviation from the predicted motion"},
+      {"kind: sensor_offset, channel: s1, value: 6e-4", "sensor s1: jumped"},
+      {"kind: nan_sensor, channel: s2", "sensor s2: the measurement is not finite"}};
+  int number = 0;
+  for (const auto& [fault, cause] : cases) {
+    const std::string file = "open" + std::to_string(++number);
+    const std::string config =
+        stage(file + ".yaml",
+              "noise:", std::string("faults: [{") + fault + ", from_cycle: 1700}]\nnoise:");
+    const ProgramResult result = run({"run", config, "-o", name(file + ".slog")});
+    EXPECT_EQ(result.exit_code, 4) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(cause));
+    EXPECT_THAT(result.err, HasSubstr("; braked, "));
+    const json info = json::parse(succeed({"log", "info", name(file + ".slog"), "--json"}).out);
+    EXPECT_GT(info["runs"][0]["marked"], 0);
+  }
+}
+
+TEST_F(Workflow, TheRampOfAStopIsAsLongAsTheStageFileSays) {
+  // Less than half a window: the loop follows it, past a limit of force, and is sound.
+  const std::string config =
+      stage("ramp.yaml", "noise:",
+            "ramp_s: 0.01\nfaults: [{kind: sensor_offset, channel: s1, from_cycle: 1700, "
+            "value: 4e-4}]\nnoise:");
+  const ProgramResult result = run({"run", config, "-o", name("ramp.slog")});
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("|u|"));
+  const json info = json::parse(succeed({"log", "info", name("ramp.slog"), "--json"}).out);
+  EXPECT_NEAR(info["runs"][0]["marked"].get<double>(), 21.0, 2.0);
+}
+
 TEST_F(Workflow, AMissedCycleIsMarkedAndSaid) {
   const std::string config = stage(
       "miss.yaml", "noise:", "faults: [{kind: missed_cycle, from_cycle: 1700, run: 2}]\nnoise:");

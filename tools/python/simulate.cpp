@@ -68,6 +68,7 @@ SimulatedExperiment simulate_experiment(const std::filesystem::path& file) {
   RunExperimentOptions options;
   options.interrupt = &interrupt_flag();
   options.misses_allowed = config.stage.real_time.misses_allowed;
+  options.ramp_s = config.stage.ramp_s;
   const ExperimentResult result = stage->perform(*out.runs, options);
   if (result.end == ExperimentEnd::interrupted) throw Interrupted();
   if (result.end != ExperimentEnd::complete)
