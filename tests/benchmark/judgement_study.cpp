@@ -7,8 +7,8 @@
 // (default: judgement.jsonl); cases that it has are not repeated. The table at the end is of all lines in FILE with
 // seeds and troubles that were asked for. --keep leaves log, FRF and model of every case in DIRECTORY.
 //
-// Columns: cases; how many ended with exit code 0, with 3, with another; of those with 3 how many named the planted
-// cause first; of all how many were judged right (exit 0 and not garbage, or 3 with the right cause); 95 % intervals of
+// Columns: cases; how many ended with exit code 0, with 3, with another; of those without 0 how many named the planted
+// cause first; of all how many were judged right (exit 0 and not garbage, or the right cause); 95 % intervals of
 // natural frequency and damping that hold where the exit code was 0; garbage with exit 0; modes missed and surplus with
 // exit 0; dropped periods per 1000; median processor seconds of the program.
 
@@ -151,7 +151,8 @@ std::string percent(int part, int whole) {
 void print(const std::string& name, Row row) {
   std::sort(row.seconds.begin(), row.seconds.end());
   fmt::print("{:30} {:5} {:6} {:6} {:5} {:6} {:6} {:6} {:6} {:7} {:6} {:7} {:8.2f} {:6.2f}\n", name,
-             row.cases, row.done, row.doubted, row.other, percent(row.right_cause, row.doubted),
+             row.cases, row.done, row.doubted, row.other,
+             percent(row.right_cause, row.doubted + row.other),
              percent(row.judged_right, row.cases), percent(row.hold[0], row.intervals[0]),
              percent(row.hold[1], row.intervals[1]), row.garbage, row.missed, row.surplus,
              row.periods > 0.0 ? 1000.0 * row.dropped / row.periods : 0.0,

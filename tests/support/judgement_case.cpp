@@ -217,7 +217,7 @@ void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& se
   result["exit"] = worst;
   result["exits"] = {frf.ran.exit_code, fit.ran.exit_code, validation.ran.exit_code};
   result["said"] = first_cause(frf, fit, validation);
-  result["right"] = worst == 3 && names_any(result["said"], plan.right_causes);
+  result["right"] = worst != 0 && names_any(result["said"], plan.right_causes);
   Json findings = Json::array();
   if (frf.json.contains("health"))
     for (const Json& f : frf.json["health"])

@@ -117,7 +117,8 @@ TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
       plan.silent_axis = random.integer(0, static_cast<int>(stage.spec.info.actuators.size()) - 1);
       plan.silent_in_record = random.uniform() < 0.5;
       plan.variant = plan.silent_in_record ? "recorded" : "not recorded";
-      plan.right_causes = {"excluded", "excitation", "dead", "inputs", "unrecorded", "controller"};
+      plan.right_causes = {"excluded", "excitation", "nothing is excited", "dead",
+                           "inputs",   "unrecorded", "controller"};
       break;
     case Trouble::unsettled:
       stage.transient_periods = 0;
