@@ -200,7 +200,7 @@ TEST_F(Workflow, AFaultThatOpensTheLoopEndsWithCodeFourAndItsCause) {
     EXPECT_THAT(result.err, HasSubstr(cause));
     EXPECT_THAT(result.err, HasSubstr("; braked, "));
     const json info = json::parse(succeed({"log", "info", name(file + ".slog"), "--json"}).out);
-    EXPECT_GT(info["runs"][0]["marked"], 0);
+    EXPECT_GT(info["runs"][0]["health"]["marked"], 0);
   }
 }
 
@@ -213,7 +213,7 @@ TEST_F(Workflow, TheRampOfAStopIsAsLongAsTheStageFileSays) {
   EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_THAT(result.err, HasSubstr("|u|"));
   const json info = json::parse(succeed({"log", "info", name("ramp.slog"), "--json"}).out);
-  EXPECT_NEAR(info["runs"][0]["marked"].get<double>(), 21.0, 2.0);
+  EXPECT_NEAR(info["runs"][0]["health"]["marked"].get<double>(), 21.0, 2.0);
 }
 
 TEST_F(Workflow, AMissedCycleIsMarkedAndSaid) {
