@@ -8,6 +8,7 @@
 #include "hal/limited_stage.hpp"
 #include "hal/motion_controller.hpp"
 #include "hal/replay_stage.hpp"
+#include "hal/rigid_body.hpp"
 #include "hal/simulated_stage.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/support/wafer_stage.hpp"
@@ -24,7 +25,9 @@ class Allocation : public testing::Test {
   }
   // Allocations of 2000 cycles of control and exchange; `seen` counts the outcomes that were not ok.
   static std::uint64_t cycles(const WaferStageSpec& spec, int& seen) {
-    LimitedStage stage(std::make_unique<SimulatedStage>(spec), spec.limits);
+    StageLimits limits = spec.limits;
+    limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
+    LimitedStage stage(std::make_unique<SimulatedStage>(spec), limits);
     MotionController controller(spec.controller);
     std::vector<double> y(7);
     std::vector<double> u(17);
@@ -55,6 +58,14 @@ TEST_F(Allocation, AHealthyCycleHasNone) {
   int seen = 0;
   EXPECT_EQ(cycles(test::wafer_stage_spec(), seen), 0U);
   EXPECT_EQ(seen, 0);
+}
+
+TEST_F(Allocation, ABrakeHasNone) {
+  WaferStageSpec spec = test::wafer_stage_spec();
+  spec.faults = {{Kind::nan_sensor, 0, 1000, 1, -1}};
+  int seen = 0;
+  EXPECT_EQ(cycles(spec, seen), 0U);
+  EXPECT_EQ(seen, 1000);
 }
 
 TEST_F(Allocation, ACycleWithEveryOptionHasNone) {

@@ -164,7 +164,7 @@ class InterruptTest(unittest.TestCase):
         self.assertEqual(code, 0, error)
         marked = subprocess.run([PROGRAM, "log", "info", log.name, "--json"], cwd=WORK, text=True,
                                 stdout=subprocess.PIPE, check=True).stdout
-        self.assertGreaterEqual(sum(r["marked"] for r in json.loads(marked)["runs"]), 200, marked)
+        self.assertGreaterEqual(sum(r["health"]["marked"] for r in json.loads(marked)["runs"]), 200, marked)
 
     def test_a_closed_terminal_ends_a_run_as_ctrl_c_does(self):
         code = None

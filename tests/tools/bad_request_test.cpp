@@ -192,12 +192,12 @@ TEST_F(BadRequest, WhatACanBusCannotCarry) {
   wrong("buses: [{interface: can0, actuators: [a9]}]", "there is no channel 'a9'");
   wrong("buses: [{interface: can0}, {interface: can0}]", "interface can0 stands twice");
   wrong("actuator_range_n: [1, 2], buses: [{interface: can0}]", "2 entries for 3 channels");
-  wrong("buses: [{interface: can0}], actuator_range_n: 1",
+  wrong("buses: [{interface: can0}], actuator_range_n: [1]",
         "actuator_range_n: 1 N cannot carry limit_n: 40 N of 'a1'; write more than 40, or leave it "
         "out for 1.25 times limit_n");
-  wrong("buses: [{interface: can0}], actuator_range_n: 40", "cannot carry limit_n: 40 N");
-  wrong("buses: [{interface: can0}], sensor_range_m: 1e-4",
-        "cannot carry window_m: 0.001 m of 's1'");
+  wrong("buses: [{interface: can0}], actuator_range_n: [40]", "cannot carry limit_n: 40 N");
+  wrong("buses: [{interface: can0}], sensor_range_m: [1e-4]",
+        "0.0001 m cannot carry window_m: 0.001 m of 's1'");
   wrong("buses: [{interface: can0, data_bit_rate: 5e6}]", "unknown key 'data_bit_rate'");
   wrong("mode: residential, buses: [{interface: can0}]", "did you mean 'resident'?");
 }

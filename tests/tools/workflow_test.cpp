@@ -200,21 +200,20 @@ TEST_F(Workflow, AFaultThatOpensTheLoopEndsWithCodeFourAndItsCause) {
     EXPECT_THAT(result.err, HasSubstr(cause));
     EXPECT_THAT(result.err, HasSubstr("; braked, "));
     const json info = json::parse(succeed({"log", "info", name(file + ".slog"), "--json"}).out);
-    EXPECT_GT(info["runs"][0]["marked"], 0);
+    EXPECT_GT(info["runs"][0]["health"]["marked"], 0);
   }
 }
 
 TEST_F(Workflow, TheRampOfAStopIsAsLongAsTheStageFileSays) {
   // Less than half a window: the loop follows it, past a limit of force, and is sound.
-  const std::string config =
-      stage("ramp.yaml", "noise:",
-            "ramp_s: 0.01\nfaults: [{kind: sensor_offset, channel: s1, from_cycle: 1700, "
-            "value: 4e-4}]\nnoise:");
+  const std::string config = stage("ramp.yaml", "noise:",
+                                   "ramp_s: 0.01\nfaults: [{kind: sensor_offset, from_cycle: 1700, "
+                                   "value: 4.9e-4}]\nnoise:");
   const ProgramResult result = run({"run", config, "-o", name("ramp.slog")});
   EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_THAT(result.err, HasSubstr("|u|"));
   const json info = json::parse(succeed({"log", "info", name("ramp.slog"), "--json"}).out);
-  EXPECT_NEAR(info["runs"][0]["marked"].get<double>(), 21.0, 2.0);
+  EXPECT_NEAR(info["runs"][0]["health"]["marked"].get<double>(), 21.0, 2.0);
 }
 
 TEST_F(Workflow, AMissedCycleIsMarkedAndSaid) {
