@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -163,7 +164,18 @@ PeerStatus ModbusStage::transact() noexcept {
     return status;
   link_.drain();
   status = once();
+  if (link_trouble_.status == LinkStatus::refused && restarted()) {
+    trouble_ = Trouble::node;
+    return PeerStatus::other_node;
+  }
   return status == PeerStatus::good ? PeerStatus::late : status;
+}
+
+/// A node that was restarted refuses what it knows nothing of; its boot id tells.
+bool ModbusStage::restarted() noexcept {
+  std::array<std::uint16_t, 2> boot_id{};
+  if (link_.read(map::kMeasurementBootId, boot_id) != LinkStatus::ok) return false;
+  return get_u32(std::span<const std::uint16_t, 2>(boot_id)) != description_.boot_id;
 }
 
 PeerStatus ModbusStage::judge(LinkStatus status) noexcept {

@@ -51,6 +51,7 @@ class ModbusStage final : public CyclicStage {
   void end_run();
   bool write_setpoint(const Outputs& outputs) noexcept;
   PeerStatus transact() noexcept;
+  bool restarted() noexcept;
   PeerStatus judge(LinkStatus status) noexcept;
   PeerStatus judge_reply() noexcept;
   PeerStatus take_measurement(Inputs& inputs) noexcept;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <random>
 #include <string>
 #include <vector>
@@ -195,6 +196,39 @@ TEST_F(Registers, ForgedAndRandomRequestsOfOthersChangeNoSample) {
   EXPECT_EQ(write(kOwner, map::kRunCommand, {map::kRunEnd, 77, 0, 0, session_}),
             ModbusException::none);
   EXPECT_EQ(bench_->node().state(), NodeState::operation_enabled);
+}
+
+TEST(ModbusOwnership, ANodeThatWasRestartedIsNamedThoughItRefuses) {
+  /// One node after the other on one line.
+  class Line final : public ModbusRegisters {
+   public:
+    explicit Line(ModbusRegisters& first) : now(&first) {}
+    void begin_request(ModbusConnection from) override { now.load()->begin_request(from); }
+    void tick() override { now.load()->tick(); }
+    ModbusException write(int first, std::span<const std::uint16_t> values) override {
+      return now.load()->write(first, values);
+    }
+    ModbusException read(int first, std::span<std::uint16_t> values) override {
+      return now.load()->read(first, values);
+    }
+    std::atomic<ModbusRegisters*> now;
+  };
+  ModbusBench before;
+  before.stop();
+  ModbusBench after;
+  after.stop();
+  ModbusNode restarted(after.node(), ModbusBench::limits(), ModbusBench::kBootId + 1, nullptr);
+  Line line(before.registers());
+  const test::ServerThread server(line, nullptr, true);
+  ModbusStage host(ModbusBench::info(), server.address(), test::kQuickTiming);
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
+  host.start(1, inputs);
+  line.now = &restarted;
+  const std::vector<double> u(2, 1.0);
+  EXPECT_EQ(host.exchange({0, 0, u}, inputs, {}), Outcome::fault);
+  EXPECT_THAT(host.trouble(), HasSubstr("the node was restarted"));
 }
 
 TEST(ModbusOwnership, ASecondHostIsRefusedAndTheFirstNoticesNothing) {

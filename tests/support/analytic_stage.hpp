@@ -92,8 +92,8 @@ class AnalyticStage final : public CyclicStage {
     const auto mask = valid.find(cycle_);
     ++cycle_;
     inputs.valid = mask == valid.end() ? all() : mask->second;
-    if (outcome == Outcome::ok || outcome == Outcome::late || outcome == Outcome::limit ||
-        outcome == Outcome::incomplete) {
+    if (outcome == Outcome::ok || outcome == Outcome::late || outcome == Outcome::bus_passive ||
+        outcome == Outcome::limit || outcome == Outcome::incomplete) {
       give(inputs, y_);
       if (shown != first_sensor.end()) inputs.y[0] = shown->second;
     } else if (spoil_missing) {
