@@ -1,6 +1,6 @@
 // The stage on the other side of docs/examples/plugin/udp_stage.c: the simulated stage of a stage file behind UDP.
 //
-//   udp_peer STAGE.yaml [CYCLES]     prints its port; falls silent after so many cycles of all runs
+//   udp_peer STAGE.yaml [CYCLES] [PORT]     prints its port; falls silent after so many cycles of all runs; 0: never
 
 #include <arpa/inet.h>
 #include <sys/socket.h>
@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
-#include <limits>
 #include <vector>
 
 #include "hal/simulated_stage.hpp"
@@ -28,11 +27,12 @@ struct Datagram {
   std::array<double, 64> values{};
 };
 
-int serve(const WaferStageSpec& spec, std::uint64_t cycles) {
+int serve(const WaferStageSpec& spec, std::uint64_t cycles, std::uint16_t port) {
   const int socket = ::socket(AF_INET, SOCK_DGRAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(port);
   socklen_t size = sizeof address;
   if (::bind(socket, reinterpret_cast<sockaddr*>(&address), size) != 0) return 1;
   ::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size);
@@ -53,7 +53,7 @@ int serve(const WaferStageSpec& spec, std::uint64_t cycles) {
       stage.stop();
       continue;
     }
-    if (cycles-- == 0) return 0;
+    if (cycles > 0 && --cycles == 0) return 0;
     Datagram out;
     if (in.cycle == kStart) {
       std::uint64_t seed = 0;
@@ -74,7 +74,7 @@ int serve(const WaferStageSpec& spec, std::uint64_t cycles) {
 
 int main(int argc, char** argv) {
   if (argc < 2) return 2;
-  const std::uint64_t cycles =
-      argc > 2 ? std::strtoull(argv[2], nullptr, 10) : std::numeric_limits<std::uint64_t>::max();
-  return serve(load_stage_config(argv[1]).spec, cycles);
+  const std::uint64_t cycles = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 0;
+  const int port = argc > 3 ? std::atoi(argv[3]) : 0;
+  return serve(load_stage_config(argv[1]).spec, cycles, static_cast<std::uint16_t>(port));
 }
