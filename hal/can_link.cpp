@@ -141,7 +141,12 @@ bool CanLink::try_command(CanCommand command) noexcept {
     command.sequence = ++sequence_;
     command.host = host_;
     command.session = session_;
-    return exchange(command, {}) && answer_.answer == CanAnswer::accepted;
+    // The stop of a run goes out all the more when somebody has interrupted it.
+    std::function<bool()> interrupted;
+    std::swap(interrupted, interrupted_);
+    const bool answered = exchange(command, {});
+    std::swap(interrupted, interrupted_);
+    return answered && answer_.answer == CanAnswer::accepted;
   } catch (const std::exception&) {
     return false;
   }
