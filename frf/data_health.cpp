@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <cmath>
 
@@ -12,6 +14,7 @@
 #include "frf/repetition_check.hpp"
 #include "frf/rigid_body_check.hpp"
 #include "frf/skew_check.hpp"
+#include "frf/tail_probability.hpp"
 #include "frf/timing_check.hpp"
 #include "frf/transient_check.hpp"
 
@@ -27,6 +30,7 @@ constexpr double kExcludedPower = 1e-4;   // of the inputs' power
 constexpr double kWorstExcitation = 1e3;  // cond(R)
 constexpr double kWorstInputs = 1e2;      // median of cond(U) in the upper half of the band
 constexpr double kLeastCoherence = 0.9;
+constexpr double kCertain = 1e6;  // of evidence, where there is no noise
 
 }  // namespace
 
@@ -128,6 +132,18 @@ bool Examination::find_suspected(Index first, Index count) {
 }
 
 void Examination::check_responses() {
+  bool any = false;
+  for (Index s = 0; s < record_.n_y(); ++s) any = any || responds(record_, s);
+  if (!any && spoilt_.empty()) {
+    find(
+        Severity::fault, Cause::incoherent, "",
+        "nothing that the sensors see repeats with the excitation: something else moves the stage, "
+        "or the excitation does not reach it",
+        fmt::format("no line of {} above its noise",
+                    counted(static_cast<std::size_t>(record_.n_y()), "sensor")),
+        "hold the setpoint still, raise the level, or look at the injection; measure again");
+    return;
+  }
   for (Index s = 0; s < record_.n_y(); ++s) {
     if (spoilt(s)) continue;
     bool known = false;
@@ -150,6 +166,44 @@ void Examination::check_responses() {
            "little of its motion repeats from period to period",
            fmt::format("median coherence {:.2f}", coherence),
            "raise the level, or measure more periods");
+  }
+}
+
+/// Signals per excitation, X = Z R^-1: an axis whose column of X is noise in every channel is not driven. One F
+/// test a line and channel, Fisher's sum over the lines.
+void Examination::check_arrival() {
+  const auto axes = static_cast<Index>(record_.axes.size());
+  const int dof = record_.scatter_dof();
+  if (axes < 2 || record_.zippered || dof == 0 || record_.experiments() != axes) return;
+  const Index channels = record_.n_y() + record_.n_u();
+  Eigen::MatrixXd evidence = Eigen::MatrixXd::Zero(channels, axes);
+  Index lines = 0;
+  for (const LineRecord& line : record_.lines) {
+    const Eigen::MatrixXcd R = line.R(record_.axes, Eigen::all);
+    if (!(condition(R) < kWorstExcitation)) continue;  // check_excitation() tells
+    ++lines;
+    const Eigen::MatrixXcd inverse = R.inverse();
+    const Eigen::MatrixXcd X = record_.mean(line.Z) * inverse;
+    const Eigen::VectorXd variance = record_.variance_of_mean(line.Z);
+    for (Index a = 0; a < axes; ++a)
+      for (Index c = 0; c < channels; ++c) {
+        const double noise = variance[c] * inverse.col(a).squaredNorm();
+        const double power = std::norm(X(c, a));
+        if (power > 0.0)
+          evidence(c, a) -= noise > 0.0 ? log_tail_of_f(power / noise, 1, dof) : -kCertain;
+      }
+  }
+  const double tests = static_cast<double>(channels * axes);
+  for (Index a = 0; a < axes; ++a) {
+    bool driven = lines == 0;
+    for (Index c = 0; c < channels; ++c)
+      driven = driven || tail_of_evidence(evidence(c, a), lines) < kSignificance / tests;
+    if (driven) continue;
+    find(Severity::fault, Cause::excitation,
+         record_.info.excitation
+             .names[static_cast<std::size_t>(record_.axes[static_cast<std::size_t>(a)])],
+         "its excitation does not arrive: no channel moves with it", "no line above its noise",
+         "look at the injection of this axis and measure again, or leave it out with --inputs");
   }
 }
 
@@ -232,6 +286,7 @@ std::vector<Finding> Examination::examine() {
   if (!found(Cause::aperiodic)) {  // else no spectrum is what it seems
     check_injection();
     check_responses();
+    if (!any_fault(findings_)) check_arrival();
     check_excitation();
     check_recording();
     check_excluded();

@@ -24,6 +24,7 @@ class Examination {
   void check_cycles();
   void check_samples();
   void check_responses();
+  void check_arrival();
   void check_excitation();
   void check_injection();
   void check_without_stage();

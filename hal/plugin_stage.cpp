@@ -53,12 +53,12 @@ std::vector<stageid_channel> channels_of(const std::vector<Channel>& channels) {
 struct PluginStage::Library {
   explicit Library(const std::filesystem::path& file) : name(file.string()) {
     // A name without a slash would be looked for in the system's folders.
-    handle = ::dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (handle == nullptr)
+    handle.reset(::dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL));
+    if (!handle)
       fail(fmt::format("cannot be loaded ({}); build it as a shared library for this machine",
                        ::dlerror()));
     using Entry = const struct stageid_backend* (*)();
-    const auto entry = reinterpret_cast<Entry>(::dlsym(handle, "stageid_get_backend"));
+    const auto entry = reinterpret_cast<Entry>(::dlsym(handle.get(), "stageid_get_backend"));
     if (entry == nullptr)
       fail("has no function stageid_get_backend(); write one as in stageid_backend.h");
     calls = entry();
@@ -75,11 +75,9 @@ struct PluginStage::Library {
   Library(const Library&) = delete;
   Library& operator=(const Library&) = delete;
   ~Library() {
-    if (stage != nullptr) {
-      calls->stop(stage);
-      calls->close(stage);
-    }
-    if (handle != nullptr) ::dlclose(handle);
+    if (stage == nullptr) return;
+    calls->stop(stage);
+    calls->close(stage);
   }
 
   [[noreturn]] void fail(const std::string& what) const {
@@ -106,7 +104,7 @@ struct PluginStage::Library {
   }
 
   std::string name;
-  void* handle = nullptr;
+  std::unique_ptr<void, int (*)(void*)> handle{nullptr, ::dlclose};
   const struct stageid_backend* calls = nullptr;
   void* stage = nullptr;
 };

@@ -9,6 +9,7 @@
 #include "frf/feedback_check.hpp"
 #include "frf/injection_check.hpp"
 #include "tests/support/closed_loop.hpp"
+#include "tests/support/random_numbers.hpp"
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
@@ -91,8 +92,9 @@ TEST(MappedExcitation, OfAllActuatorsIsADoubtUnlessTheLoopIsKnown) {
   EXPECT_EQ(first_with(health_of(log, open), Cause::injection), nullptr);
 }
 
-// A chirp in the first third of each period, an open loop, one axis an experiment: nothing of it is dead.
-TEST(Chirp, FollowedByRestIsNotDead) {
+/// A chirp in the first third of each period, an open loop, one axis an experiment.
+/// @param arrives how many of the two axes are driven
+MemoryLog chirp_log(int arrives) {
   const int axes = 2;
   LoopExperiment x{.sample_rate_hz = 1000.0, .period_samples = 1000, .axes = axes};
   const test::SampledPlant plant =
@@ -111,11 +113,18 @@ TEST(Chirp, FollowedByRestIsNotDead) {
       const double t = 1e-3 * n;
       period(n, e) = std::sin(2.0 * std::numbers::pi * (5.0 + 300.0 * t) * t);
     }
-    log.append(0, e, period, test::simulate_sampled_run(plant, x, period, 1e-4, random));
+    const Eigen::MatrixXd driven = period * (e < arrives ? 1.0 : 0.0);
+    log.append(0, e, period, test::simulate_sampled_run(plant, x, driven, 1e-4, random));
   }
+  return log;
+}
+
+TEST(Chirp, FollowedByRestIsNotDead) {
+  MemoryLog log = chirp_log(2);
   const std::vector<Finding> found = health_of(log);
   EXPECT_EQ(first_with(found, Cause::dead), nullptr) << first_with(found, Cause::dead)->channel;
   EXPECT_EQ(first_with(found, Cause::saturated), nullptr);
+  EXPECT_EQ(first_with(found, Cause::excitation), nullptr);
   // A sensor that is stuck while the chirp runs still is.
   double stuck_at = 0.25;
   for (LogSamples& record : log.records)
@@ -123,6 +132,35 @@ TEST(Chirp, FollowedByRestIsNotDead) {
   const std::vector<Finding> stuck = health_of(log);
   ASSERT_NE(first_with(stuck, Cause::dead), nullptr);
   EXPECT_EQ(first_with(stuck, Cause::dead)->channel, "z2");
+}
+
+/// As a controller makes it of the sensors' noise.
+void add_noise_to_actuators(MemoryLog& log, double rms) {
+  test::RandomNumbers random(9);
+  for (LogSamples& record : log.records)
+    for (double& u : record.actuators.reshaped()) u += rms * random.normal();
+}
+
+TEST(SilentAxis, IsNamedThoughItsExcitationIsRecorded) {
+  MemoryLog log = chirp_log(1);
+  add_noise_to_actuators(log, 1e-4);
+  const std::vector<Finding> found = health_of(log);
+  const Finding* finding = first_with(found, Cause::excitation);
+  ASSERT_NE(finding, nullptr);
+  EXPECT_EQ(finding->severity, Severity::fault);
+  EXPECT_EQ(finding->channel, "a2");
+  EXPECT_THAT(finding->what, HasSubstr("does not arrive"));
+}
+
+TEST(SilentStage, IsNoCaseOfDeadSensors) {
+  MemoryLog log = chirp_log(0);  // the sensors see noise, the actuators get the excitation
+  for (Eigen::Index a = 0; a < 2; ++a) map_excitation(log, a, 1.0);
+  add_noise_to_actuators(log, 0.1);
+  const std::vector<Finding> found = health_of(log);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].cause, Cause::incoherent) << found[0].what << found[0].channel;
+  EXPECT_EQ(found[0].severity, Severity::fault);
+  EXPECT_EQ(first_with(found, Cause::dead), nullptr);
 }
 
 TEST(UnknownStage, IsSaidFirstWithTheFlagThatHelps) {
