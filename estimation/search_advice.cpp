@@ -122,6 +122,14 @@ std::vector<Alternative> alternatives(const FrfEstimate& frf, const FitOptions& 
       frf.response.rows() > 1) {
     Alternative skewed{"--delay per_channel", model, trial};
     skewed.options.delay = DelayModel::per_channel;
+    skewed.options.delay_s = 0.0;
+    skewed.options.max_iterations *= 3;  // it comes from farther
+    skewed.model.input_delay_s.resize(0);
+    skewed.model.output_delay_s.resize(0);
+    // Modes that were fitted to channels of different delays lead into another minimum.
+    std::erase_if(skewed.model.submodels, is_searched_mode);
+    for (const ModeCandidate& peak : pick_modes(frf))
+      skewed.model.submodels.push_back(mode_submodel(frf, {}, peak));
     out.push_back(std::move(skewed));
   }
   if (cut_short) return out;  // such a search would add modes in any case

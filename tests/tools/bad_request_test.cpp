@@ -345,7 +345,7 @@ TEST_F(BadRequest, Fits) {
   wrong({"--band", "900", "950"},
         "no line lies in it; the frequency response has lines from 16 to 800 Hz");
   wrong({"--band", "500", "100"}, "write the lower frequency first");
-  wrong({"--rigid-body", "half"}, "--rigid-body: 'half'; write none, full or a rank");
+  wrong({"--rigid-body", "half"}, "--rigid-body: 'half'; write auto, none, full or a rank");
   wrong({"--rigid-body", "suspention"}, "or suspension:F1:F2 (Hz) (did you mean 'suspension'?)");
   wrong({"--residue-rank", "0"}, "--residue-rank: '0'; write full or a rank");
   wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with --damping general");

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -331,16 +333,20 @@ TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
 
 TEST_F(Workflow, ACompensatedResponseGivesTheSameModes) {
   make_log();
-  const auto first_mode = [&](const std::string& compensate) {
+  const auto first_flexible_mode = [&](const std::string& compensate) {
     succeed({"frf", name("run.slog"), "-o", name(compensate + ".h5"), "--compensate", compensate});
     const ProgramResult fit =
         run({"fit", name(compensate + ".h5"), "-o", name(compensate + ".json"), "--direct-term",
              "full", "--modes", "3", "--json"});
-    return json::parse(fit.out)["modes"][0]["natural_frequency_hz"].get<double>();
+    const json modes = json::parse(fit.out)["modes"];
+    const auto flexible = std::find_if(modes.begin(), modes.end(), [](const json& mode) {
+      return mode["natural_frequency_hz"].get<double>() > 16.0;
+    });
+    return (*flexible)["natural_frequency_hz"].get<double>();
   };
-  const double measured = first_mode("none");
-  EXPECT_NEAR(first_mode("delay"), measured, 1e-3 * measured);
-  EXPECT_NEAR(first_mode("hold"), measured, 1e-3 * measured);
+  const double measured = first_flexible_mode("none");
+  EXPECT_NEAR(first_flexible_mode("delay"), measured, 1e-3 * measured);
+  EXPECT_NEAR(first_flexible_mode("hold"), measured, 1e-3 * measured);
 }
 
 }  // namespace
