@@ -42,7 +42,8 @@ class FrameFaults(CanTest):
     ]
 
     def test_rows(self):
-        name = self.machine.configure("frames")
+        name = self.machine.configure("frames", experiment=(("realizations: 3", "realizations: 2"),
+                                                            ("realization: 3", "realization: 2")))
         for label, fault, code, text in self.ROWS:
             with self.subTest(label), self.machine.node(name, "--can-fault", fault):
                 out = self.ends(self.machine.start(name), code, text)

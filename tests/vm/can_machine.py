@@ -139,7 +139,8 @@ def node_state(interface="vcan0"):
 
 
 def wait_for_state(wanted, interface="vcan0"):
-    for _ in range(40):
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
         state = node_state(interface)
         if state[0] == wanted:
             return state
