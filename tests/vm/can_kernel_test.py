@@ -150,7 +150,7 @@ class Interventions(CanTest):
 
     def test_garbage_of_others_does_no_harm(self):
         with self.machine.node(self.name):
-            garbage = [subprocess.Popen(["cangen", "vcan0", "-f", "-g", "3", "-I", i, "-L", "r"])
+            garbage = [subprocess.Popen(["cangen", "vcan0", "-f", "-g", "20", "-I", i, "-L", "r"])
                        for i in ("080", "100", "180", "200", "r")]
             try:
                 out = self.ends(self.machine.start(self.name), 0)

@@ -81,7 +81,7 @@ class Machine:
                                 stderr=subprocess.PIPE, text=True)
 
     def finish(self, process):
-        out, err = process.communicate(timeout=120)
+        out, err = process.communicate(timeout=600)
         lines = [line for line in err.splitlines() if not line.startswith("run:")]
         return process.returncode, out, "\n".join(lines)
 
