@@ -170,7 +170,7 @@ void SlogAppender::fail(int error) {
       next_sequence_ == 1 ? "is" : "are", cut ? "" : ", behind them may stand a part of one more"));
 }
 
-// A file without a name takes rows for ever, and none of them can be read again.
+// Rows written to a file that was removed are lost.
 void SlogAppender::require_name() {
   struct stat status {};
   if (::fstat(file_.get(), &status) != 0 || status.st_nlink > 0) return;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
 
@@ -135,13 +134,12 @@ void Examination::check_responses() {
   bool any = false;
   for (Index s = 0; s < record_.n_y(); ++s) any = any || responds(record_, s);
   if (!any && spoilt_.empty()) {
-    find(
-        Severity::fault, Cause::incoherent, "",
-        "nothing that the sensors see repeats with the excitation: something else moves the stage, "
-        "or the excitation does not reach it",
-        fmt::format("no line of {} above its noise",
-                    counted(static_cast<std::size_t>(record_.n_y()), "sensor")),
-        "hold the setpoint still, raise the level, or look at the injection; measure again");
+    find(Severity::fault, Cause::incoherent, "",
+         "no sensor shows a motion that repeats with the excitation: something else moves the "
+         "stage, or the excitation does not reach it",
+         fmt::format("no line of {} above its noise",
+                     counted(static_cast<std::size_t>(record_.n_y()), "sensor")),
+         "hold the setpoint still, raise the level, or look at the injection; measure again");
     return;
   }
   for (Index s = 0; s < record_.n_y(); ++s) {

@@ -16,7 +16,7 @@ constexpr std::int64_t kAnswer_ns = 60'000'000;
 constexpr std::int64_t kSecondAnswer_ns = 10'000'000;  // a node answers within a millisecond
 constexpr std::size_t kInboxFrames = 64;
 
-// The low byte numbers transfers, where 0 stands for none.
+// The low byte is the number of a transfer; 0 means no transfer, so it is never drawn.
 std::uint32_t draw_host() {
   std::random_device random;
   std::uint32_t host = 0;

@@ -165,7 +165,7 @@ void CanNode::obey(const CanCommand& command) {
   }
   put_state(&command, refusal.empty() ? CanAnswer::accepted : CanAnswer::refused,
             refusal.empty() ? stage_.trouble() : refusal);
-  // Behind the state, whose key tells the host that y[0] is meant for it.
+  // The host needs the key in the state before it can accept y[0]: the state goes first.
   if (command.code == CanCommandCode::start && refusal.empty()) put_answer();
   flush();
 }
