@@ -3,15 +3,15 @@
 #include <new>
 #include <stdexcept>
 
-#include "estimation/freed_memory.hpp"
-#include "estimation/weight_matrices.hpp"
-#include "excitation/file_error.hpp"
-#include "excitation/system_reason.hpp"
-#include "hal/stage.hpp"
-#include "tools/console.hpp"
-#include "tools/exit_code.hpp"
-#include "tools/interrupt.hpp"
-#include "tools/program.hpp"
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/system_reason.hpp"
+#include "estimation/problem/freed_memory.hpp"
+#include "estimation/problem/weight_matrices.hpp"
+#include "hal/stage/stage.hpp"
+#include "tools/commands/program.hpp"
+#include "tools/terminal/console.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/interrupt.hpp"
 
 namespace {
 

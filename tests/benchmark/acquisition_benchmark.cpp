@@ -7,11 +7,11 @@
 #include <ctime>
 #include <vector>
 
-#include "acquisition/crc32c.hpp"
-#include "acquisition/measurement_loop.hpp"
-#include "acquisition/row_transpose.hpp"
-#include "acquisition/slog_reader.hpp"
-#include "acquisition/slog_writer.hpp"
+#include "acquisition/loop/measurement_loop.hpp"
+#include "acquisition/record/row_transpose.hpp"
+#include "acquisition/slog/crc32c.hpp"
+#include "acquisition/slog/slog_reader.hpp"
+#include "acquisition/slog/slog_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {

@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/fit_additive_model.hpp"
+#include "estimation/search/fit_additive_model.hpp"
 #include "tests/support/cramer_rao_bound.hpp"
 #include "tests/support/model_blind_fit.hpp"
 #include "tests/support/random_stage.hpp"

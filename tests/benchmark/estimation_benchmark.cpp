@@ -7,11 +7,11 @@
 #include <fstream>
 #include <string>
 
-#include "estimation/arrow_system.hpp"
-#include "estimation/automatic_fit.hpp"
-#include "estimation/channel_equations.hpp"
-#include "estimation/freed_memory.hpp"
-#include "estimation/numerators.hpp"
+#include "estimation/equations/arrow_system.hpp"
+#include "estimation/equations/numerators.hpp"
+#include "estimation/problem/freed_memory.hpp"
+#include "estimation/products/channel_equations.hpp"
+#include "estimation/search/automatic_fit.hpp"
 #include "tests/support/random_stage.hpp"
 
 namespace {

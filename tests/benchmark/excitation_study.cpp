@@ -18,16 +18,17 @@
 #include <limits>
 #include <memory>
 
-#include "acquisition/measurement_loop.hpp"
-#include "acquisition/run_experiment.hpp"
-#include "acquisition/slog_writer.hpp"
-#include "frf/frf_file.hpp"
-#include "frf/plant_frf.hpp"
-#include "frf/relative_variance.hpp"
-#include "hal/simulated_stage.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/loop/measurement_loop.hpp"
+#include "acquisition/loop/run_experiment.hpp"
+#include "acquisition/slog/slog_writer.hpp"
+#include "frf/file/frf_file.hpp"
+#include "frf/plant/plant_frf.hpp"
+#include "frf/response/relative_variance.hpp"
+#include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tools/limited_excitation.hpp"
-#include "tools/stage_config.hpp"
+#include "tools/config/stage_config.hpp"
+#include "tools/experiment/limited_excitation.hpp"
 
 namespace stageid {
 namespace {

@@ -11,11 +11,11 @@
 #include <numeric>
 #include <optional>
 
-#include "excitation/fft_wisdom.hpp"
-#include "frf/plant_frf.hpp"
-#include "frf/run_steps.hpp"
+#include "frf/plant/plant_frf.hpp"
+#include "frf/runs/run_steps.hpp"
 #include "tests/support/closed_loop.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tools/steps/fft_wisdom_file.hpp"
 
 namespace stageid {
 namespace {
@@ -96,7 +96,7 @@ void spectra_of_30_channels(benchmark::State& state) {
   for (int line = 1; line < 8000; line += 2) lines.push_back(line);
   Eigen::MatrixXcd spectra(kChannels, static_cast<Eigen::Index>(lines.size()));
   const test::TemporaryDirectory directory;
-  std::optional<FftWisdom> timed;
+  std::optional<FftWisdomFile> timed;
   if (state.range(0) == 1) timed.emplace(directory / "wisdom");
   RealDft dft(kPeriod);
   for (auto _ : state) {

@@ -15,8 +15,8 @@
 #include <cstdlib>
 #include <string>
 
-#include "frf/confidence.hpp"
-#include "frf/plant_frf.hpp"
+#include "frf/plant/plant_frf.hpp"
+#include "frf/response/confidence.hpp"
 #include "tests/support/closed_loop.hpp"
 
 namespace {

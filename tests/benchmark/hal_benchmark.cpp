@@ -4,10 +4,10 @@
 #include <memory>
 #include <vector>
 
-#include "hal/limited_stage.hpp"
-#include "hal/modal_plant.hpp"
-#include "hal/motion_controller.hpp"
-#include "hal/noise.hpp"
+#include "hal/simulator/modal_plant.hpp"
+#include "hal/simulator/noise.hpp"
+#include "hal/stage/limited_stage.hpp"
+#include "hal/stage/motion_controller.hpp"
 #include "tests/support/wafer_stage.hpp"
 
 namespace {

@@ -19,13 +19,13 @@
 #include <string>
 #include <vector>
 
-#include "frf/data_health.hpp"
-#include "frf/plant_frf.hpp"
-#include "frf/worker_pool.hpp"
+#include "excitation/threads/worker_pool.hpp"
+#include "frf/health/data_health.hpp"
+#include "frf/plant/plant_frf.hpp"
 #include "tests/support/faulty_log.hpp"
 #include "tests/support/planted_faults.hpp"
 #include "tests/support/wafer_stage.hpp"
-#include "tools/stage_expectation.hpp"
+#include "tools/config/stage_expectation.hpp"
 
 namespace {
 

@@ -7,8 +7,8 @@
 
 #include <cstdlib>
 
-#include "estimation/cmif.hpp"
-#include "frf/frf_file.hpp"
+#include "estimation/model/cmif.hpp"
+#include "frf/file/frf_file.hpp"
 #include "tests/support/random_stage.hpp"
 
 int main(int argc, char** argv) {

@@ -7,9 +7,9 @@
 #include <memory>
 #include <string>
 
-#include "acquisition/run_experiment.hpp"
-#include "acquisition/slog_writer.hpp"
-#include "hal/simulated_stage.hpp"
+#include "acquisition/loop/run_experiment.hpp"
+#include "acquisition/slog/slog_writer.hpp"
+#include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/wafer_stage.hpp"
 

@@ -15,7 +15,7 @@
 #include <numbers>
 #include <string>
 
-#include "frf/plant_frf.hpp"
+#include "frf/plant/plant_frf.hpp"
 #include "tests/support/closed_loop.hpp"
 
 namespace {

@@ -25,7 +25,7 @@
 #include <string_view>
 #include <vector>
 
-#include "frf/interpolation_check.hpp"
+#include "frf/health/interpolation_check.hpp"
 #include "tests/support/estimate_trials.hpp"
 
 namespace {

@@ -8,12 +8,12 @@
 #include <exception>
 #include <numbers>
 
-#include "acquisition/log_info.hpp"
-#include "acquisition/run_experiment.hpp"
-#include "estimation/additive_model.hpp"
-#include "excitation/multisine.hpp"
-#include "frf/frf_estimate.hpp"
-#include "hal/simulated_stage.hpp"
+#include "acquisition/loop/run_experiment.hpp"
+#include "acquisition/record/log_info.hpp"
+#include "estimation/model/additive_model.hpp"
+#include "excitation/multisine/multisine.hpp"
+#include "frf/response/frf_estimate.hpp"
+#include "hal/simulator/simulated_stage.hpp"
 
 namespace {
 

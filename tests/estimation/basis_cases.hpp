@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/basis.hpp"
+#include "estimation/model/basis.hpp"
 #include "tests/support/model_reference.hpp"
 
 // Submodels of every kind, the lines they are evaluated on, and how far rounding may take them.

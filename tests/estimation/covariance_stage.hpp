@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "estimation/fit_options.hpp"
+#include "estimation/problem/fit_options.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid::test {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "estimation/fit_options.hpp"
+#include "estimation/problem/fit_options.hpp"
 
 namespace stageid::test {
 

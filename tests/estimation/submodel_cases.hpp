@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "estimation/poles.hpp"
+#include "estimation/model/poles.hpp"
 #include "tests/support/model_fit_problem.hpp"
 #include "tests/support/model_reference.hpp"
 #include "tests/support/random_stage.hpp"

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "hal/simulated_stage.hpp"
+#include "hal/simulator/simulated_stage.hpp"
 
 namespace stageid::test {
 

@@ -191,7 +191,7 @@ class SelfTest(unittest.TestCase):
         "excitation/grid.cpp": '#include "excitation/grid.hpp"\n#include <fftw3.h>\n',
         "hal/CMakeLists.txt":
             "target_sources(stageid_hal PUBLIC FILE_SET HEADERS BASE_DIRS x FILES stage.hpp)",
-        "hal/stage.hpp": "#pragma once\n",
+        "hal/stage/stage.hpp": "#pragma once\n",
         "acquisition/CMakeLists.txt":
             "target_sources(stageid_record PRIVATE detail.hpp log.cpp\n"
             "  PUBLIC FILE_SET HEADERS BASE_DIRS x FILES log.hpp)\n"
@@ -202,22 +202,22 @@ class SelfTest(unittest.TestCase):
         "acquisition/log.hpp": '#pragma once\n#include "excitation/grid.hpp"\n',
         "acquisition/log.cpp": '#include "acquisition/detail.hpp"\n#include <nlohmann/json.hpp>\n',
         "acquisition/detail.hpp": "#pragma once\n",
-        "acquisition/loop.hpp": '#pragma once\n#include "acquisition/log.hpp"\n#include "hal/stage.hpp"\n',
+        "acquisition/loop.hpp": '#pragma once\n#include "acquisition/log.hpp"\n#include "hal/stage/stage.hpp"\n',
         "tools/CMakeLists.txt": "target_link_libraries(stageid_tools PUBLIC stageid::acquisition)",
         "tools/main.cpp": '#include <CLI/CLI.hpp>\n#include "acquisition/loop.hpp"\n',
     }
 
     PLANTED = {
         "hal may not include excitation/grid.hpp":
-            ("hal/stage.hpp", '#pragma once\n#include "excitation/grid.hpp"\n'),
+            ("hal/stage/stage.hpp", '#pragma once\n#include "excitation/grid.hpp"\n'),
         "record may not include acquisition/loop.hpp":
             ("acquisition/log.hpp", '#pragma once\n  #  include "acquisition/loop.hpp"\n'),
-        "record may not include hal/stage.hpp":
-            ("acquisition/log.cpp", '#include "hal/stage.hpp"\n'),
+        "record may not include hal/stage/stage.hpp":
+            ("acquisition/log.cpp", '#include "hal/stage/stage.hpp"\n'),
         "excitation may not include acquisition/log.hpp":
             ("excitation/grid.cpp", '#include "acquisition/log.hpp"\n'),
         "<yaml-cpp/yaml.h> may be included by tools only":
-            ("hal/stage.hpp", "#pragma once\n#include <yaml-cpp/yaml.h>\n"),
+            ("hal/stage/stage.hpp", "#pragma once\n#include <yaml-cpp/yaml.h>\n"),
         "<CLI/CLI.hpp> may be included by tools only":
             ("acquisition/log.cpp", "#include <CLI/CLI.hpp>\n"),
         "<fftw3.h> may be included by excitation only": ("tools/main.cpp", "#include <fftw3.h>\n"),
@@ -227,10 +227,10 @@ class SelfTest(unittest.TestCase):
             ("excitation/grid.hpp", "#pragma once\n#include <fmt/format.h>\n"),
         "installed, but acquisition/detail.hpp is not":
             ("acquisition/log.hpp", '#pragma once\n#include "acquisition/detail.hpp"\n'),
-        "our own header is written": ("tools/main.cpp", "#include <hal/stage.hpp>\n"),
+        "our own header is written": ("tools/main.cpp", "#include <hal/stage/stage.hpp>\n"),
         "is not a header of ours": ("acquisition/loop.hpp", '#pragma once\n#include "log.hpp"\n'),
         "does not include its tests": ("tools/main.cpp", '#include "tests/support/x.hpp"\n'),
-        "no #pragma once": ("hal/stage.hpp", "struct Stage {};\n"),
+        "no #pragma once": ("hal/stage/stage.hpp", "struct Stage {};\n"),
         "orphan.cpp: not listed in hal/CMakeLists.txt": ("hal/orphan.cpp", "int x;\n"),
         "orphan.hpp: not listed in acquisition/CMakeLists.txt":
             ("acquisition/orphan.hpp", "#pragma once\n"),

@@ -28,7 +28,7 @@ class Plugin(unittest.TestCase):
         shutil.rmtree(cls.work, ignore_errors=True)
         cls.work.mkdir(parents=True)
         shutil.copy(f"{SOURCE}/docs/examples/plugin/udp_stage.c", cls.work)
-        shutil.copy(f"{SOURCE}/hal/stageid_backend.h", cls.work)
+        shutil.copy(f"{SOURCE}/hal/plugin/stageid_backend.h", cls.work)
         subprocess.run(["cc", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o", "udp_stage.so",
                         "udp_stage.c"], cwd=cls.work, check=True)
 

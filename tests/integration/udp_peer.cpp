@@ -13,8 +13,8 @@
 #include <iostream>
 #include <vector>
 
-#include "hal/simulated_stage.hpp"
-#include "tools/stage_config.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "tools/config/stage_config.hpp"
 
 namespace {
 

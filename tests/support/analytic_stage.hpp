@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "hal/motion_controller.hpp"
-#include "hal/stage.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "hal/stage/stage.hpp"
 
 namespace stageid::test {
 

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "excitation/dft.hpp"
+#include "excitation/multisine/dft.hpp"
 #include "tests/support/memory_log.hpp"
 
 /// Closed-loop records solved line by line from u = r - C y, y = G u + v, so that no discretization

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "estimation/additive_model.hpp"
+#include "estimation/model/additive_model.hpp"
 
 namespace stageid::test {
 

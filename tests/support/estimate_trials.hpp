@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "frf/plant_frf.hpp"
+#include "frf/plant/plant_frf.hpp"
 #include "tests/support/sampled_loop.hpp"
 
 /// One loop measured from rest again and again, with other noise.

@@ -5,10 +5,10 @@
 #include <numbers>
 #include <utility>
 
-#include "excitation/frequency_grid.hpp"
-#include "excitation/multisine.hpp"
-#include "hal/modal_plant.hpp"
-#include "hal/motion_controller.hpp"
+#include "excitation/multisine/frequency_grid.hpp"
+#include "excitation/multisine/multisine.hpp"
+#include "hal/simulator/modal_plant.hpp"
+#include "hal/stage/motion_controller.hpp"
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid::test {

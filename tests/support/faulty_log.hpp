@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/simulated_stage.hpp"
+#include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/memory_log.hpp"
 
 /// Logs of random stages with faults planted: the loop is closed here, sample by sample, around hal's

@@ -11,13 +11,13 @@
 #include <numbers>
 #include <utility>
 
-#include "acquisition/convert_log.hpp"
-#include "estimation/validation.hpp"
-#include "frf/frf_file.hpp"
-#include "hal/rigid_body.hpp"
+#include "acquisition/formats/convert_log.hpp"
+#include "estimation/modal/validation.hpp"
+#include "frf/file/frf_file.hpp"
+#include "hal/simulator/rigid_body.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tools/truth_comparison.hpp"
+#include "tools/steps/truth_comparison.hpp"
 
 namespace stageid::test {
 namespace {

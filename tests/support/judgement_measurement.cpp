@@ -6,11 +6,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "acquisition/run_experiment.hpp"
-#include "hal/modal_plant.hpp"
-#include "hal/motion_controller.hpp"
-#include "hal/noise.hpp"
-#include "hal/rigid_body.hpp"
+#include "acquisition/loop/run_experiment.hpp"
+#include "hal/simulator/modal_plant.hpp"
+#include "hal/simulator/noise.hpp"
+#include "hal/simulator/rigid_body.hpp"
+#include "hal/stage/motion_controller.hpp"
 #include "tests/support/faulty_log.hpp"
 #include "tests/support/judgement_trouble.hpp"
 

@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "hal/modal_plant.hpp"
-#include "hal/rigid_body.hpp"
+#include "hal/simulator/modal_plant.hpp"
+#include "hal/simulator/rigid_body.hpp"
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid::test {

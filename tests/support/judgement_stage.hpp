@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <string>
 
-#include "excitation/experiment_plan.hpp"
-#include "hal/coloured_noise.hpp"
-#include "hal/simulated_stage.hpp"
+#include "excitation/plan/experiment_plan.hpp"
+#include "hal/simulator/coloured_noise.hpp"
+#include "hal/simulator/simulated_stage.hpp"
 
 /// Random stages for judgement_study: everything that a measurement needs, drawn from one seed.
 namespace stageid::test {

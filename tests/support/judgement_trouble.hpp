@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/dahl_friction.hpp"
+#include "hal/simulator/dahl_friction.hpp"
 #include "tests/support/judgement_stage.hpp"
 #include "tests/support/memory_log.hpp"
 

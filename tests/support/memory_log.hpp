@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "acquisition/log_reader.hpp"
+#include "acquisition/record/log_reader.hpp"
 
 namespace stageid::test {
 

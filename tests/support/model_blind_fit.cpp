@@ -6,11 +6,11 @@
 #include <chrono>
 #include <cmath>
 
-#include "estimation/arrow_system.hpp"
-#include "estimation/automatic_fit.hpp"
-#include "estimation/fit_start.hpp"
-#include "estimation/numerators.hpp"
-#include "estimation/residual.hpp"
+#include "estimation/equations/arrow_system.hpp"
+#include "estimation/equations/numerators.hpp"
+#include "estimation/problem/fit_start.hpp"
+#include "estimation/problem/residual.hpp"
+#include "estimation/search/automatic_fit.hpp"
 
 namespace stageid::test {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/fit_additive_model.hpp"
+#include "estimation/search/fit_additive_model.hpp"
 #include "tests/support/random_stage.hpp"
 
 namespace stageid::test {

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "estimation/additive_model.hpp"
+#include "estimation/model/additive_model.hpp"
 
 // The paper's estimator as it is written: dense, a line at a time, all K right-hand sides. Only for
 // problems of a few parameters; shares nothing with the library but the structs.

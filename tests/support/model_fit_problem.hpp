@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "estimation/fit_problem.hpp"
+#include "estimation/problem/fit_problem.hpp"
 #include "tests/support/model_dense_step.hpp"
 
 namespace stageid::test {

@@ -4,7 +4,7 @@
 #include <complex>
 #include <vector>
 
-#include "estimation/additive_model.hpp"
+#include "estimation/model/additive_model.hpp"
 
 // What an additive model is, written a second time and in another way: rational functions term by
 // term, and hold, delay and sampler by a matrix exponential in extended precision or by the

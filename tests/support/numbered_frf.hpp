@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <complex>
 
-#include "frf/frf_estimate.hpp"
+#include "frf/response/frf_estimate.hpp"
 
 namespace stageid::test {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "frf/health_finding.hpp"
+#include "frf/periods/health_finding.hpp"
 #include "tests/support/faulty_log.hpp"
 #include "tests/support/random_numbers.hpp"
 #include "tests/support/wafer_stage.hpp"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "estimation/additive_model.hpp"
-#include "frf/frf_estimate.hpp"
+#include "estimation/model/additive_model.hpp"
+#include "frf/response/frf_estimate.hpp"
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid::test {

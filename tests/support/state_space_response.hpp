@@ -4,7 +4,7 @@
 #include <Eigen/SVD>
 #include <numbers>
 
-#include "estimation/sampled_state_space.hpp"
+#include "estimation/modal/sampled_state_space.hpp"
 
 namespace stageid::test {
 

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "hal/limited_stage.hpp"
-#include "hal/rigid_body.hpp"
-#include "hal/simulated_stage.hpp"
+#include "hal/simulator/rigid_body.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "hal/stage/limited_stage.hpp"
 
 namespace stageid::test {
 

@@ -3,7 +3,7 @@
 #include <initializer_list>
 #include <string>
 
-#include "hal/rigid_body.hpp"
+#include "hal/simulator/rigid_body.hpp"
 
 namespace stageid::test {
 namespace {

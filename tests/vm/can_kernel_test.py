@@ -5,7 +5,7 @@
 
 To be run inside the machine of vmrun.sh, which has vcan0. Every row of the fault matrix says what
 happens, the exit code and the words that the user reads; the outputs must be safe afterwards and
-the log intact. The times within which faults are detected are exact in tests/hal/can_fault_test.cpp,
+the log intact. The times within which faults are detected are exact in tests/hal/can/can_fault_test.cpp,
 where the clock is the bus'; here everything must only end.
 """
 

@@ -18,9 +18,9 @@
 #include <thread>
 #include <vector>
 
-#include "hal/can_node.hpp"
-#include "hal/can_socket.hpp"
-#include "hal/can_stage.hpp"
+#include "hal/can/can_node.hpp"
+#include "hal/can/can_socket.hpp"
+#include "hal/can/can_stage.hpp"
 #include "tests/support/wafer_stage.hpp"
 
 namespace {

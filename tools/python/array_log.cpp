@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "acquisition/log_checks.hpp"
-#include "acquisition/row_transpose.hpp"
-#include "excitation/counted.hpp"
+#include "acquisition/files/counted.hpp"
+#include "acquisition/record/log_checks.hpp"
+#include "acquisition/record/row_transpose.hpp"
 
 namespace stageid {
 namespace {

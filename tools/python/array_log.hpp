@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "acquisition/log_reader.hpp"
+#include "acquisition/record/log_reader.hpp"
 #include "tools/python/real_arrays.hpp"
 
 namespace stageid {

@@ -5,10 +5,10 @@
 #include <string>
 #include <string_view>
 
-#include "excitation/file_error.hpp"
-#include "hal/stage.hpp"
-#include "tools/exit_code.hpp"
+#include "acquisition/files/file_error.hpp"
+#include "hal/stage/stage.hpp"
 #include "tools/python/bindings.hpp"
+#include "tools/terminal/exit_code.hpp"
 
 namespace stageid {
 namespace {

@@ -1,8 +1,8 @@
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
-#include "excitation/multisine.hpp"
-#include "tools/flag_values.hpp"
+#include "excitation/multisine/multisine.hpp"
+#include "tools/fit/flag_values.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/real_arrays.hpp"
 

@@ -6,14 +6,14 @@
 #include <memory>
 #include <utility>
 
-#include "tools/covariance_file.hpp"
-#include "tools/fit_step.hpp"
+#include "tools/fit/submodel_text.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/python/numpy_arrays.hpp"
 #include "tools/python/pickles.hpp"
-#include "tools/submodel_text.hpp"
+#include "tools/steps/covariance_file.hpp"
+#include "tools/steps/fit_step.hpp"
 
 namespace stageid {
 namespace {

@@ -10,13 +10,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "frf/confidence.hpp"
-#include "frf/frf_file.hpp"
-#include "frf/hold_compensation.hpp"
-#include "tools/flag_values.hpp"
-#include "tools/frf_step.hpp"
-#include "tools/health_step.hpp"
-#include "tools/output_paths.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "frf/file/frf_file.hpp"
+#include "frf/response/confidence.hpp"
+#include "frf/response/hold_compensation.hpp"
+#include "tools/fit/flag_values.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/frf_texts.hpp"
@@ -24,6 +22,9 @@
 #include "tools/python/numpy_arrays.hpp"
 #include "tools/python/pickles.hpp"
 #include "tools/python/real_arrays.hpp"
+#include "tools/steps/frf_step.hpp"
+#include "tools/steps/health_step.hpp"
+#include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 

@@ -2,8 +2,8 @@
 
 #include <cstddef>
 
-#include "excitation/fingerprint.hpp"
-#include "frf/frf_file.hpp"
+#include "acquisition/files/fingerprint.hpp"
+#include "frf/file/frf_file.hpp"
 
 namespace stageid {
 

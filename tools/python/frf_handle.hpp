@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "frf/frf_estimate.hpp"
+#include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
 

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <thread>
 
-#include "tools/interrupt.hpp"
+#include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
 namespace {

@@ -8,8 +8,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "acquisition/slog_format.hpp"
-#include "excitation/counted.hpp"
+#include "acquisition/files/counted.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/slog/slog_format.hpp"
 #include "tools/python/array_log.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/interruptible.hpp"

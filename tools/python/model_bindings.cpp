@@ -7,17 +7,17 @@
 #include <stdexcept>
 #include <utility>
 
-#include "estimation/modal_assurance.hpp"
-#include "estimation/modal_form.hpp"
-#include "estimation/sampled_state_space.hpp"
-#include "estimation/validation.hpp"
-#include "tools/fit_step.hpp"
-#include "tools/output_paths.hpp"
+#include "estimation/modal/modal_assurance.hpp"
+#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/sampled_state_space.hpp"
+#include "estimation/modal/validation.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/numpy_arrays.hpp"
 #include "tools/python/pickles.hpp"
 #include "tools/python/real_arrays.hpp"
+#include "tools/steps/fit_step.hpp"
+#include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 namespace {

@@ -2,9 +2,9 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include "estimation/cmif.hpp"
-#include "estimation/stabilization.hpp"
-#include "tools/flag_values.hpp"
+#include "estimation/model/cmif.hpp"
+#include "estimation/start/stabilization.hpp"
+#include "tools/fit/flag_values.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/interruptible.hpp"

@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include "tools/interrupt.hpp"
-#include "tools/program.hpp"
+#include "tools/commands/program.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/interruptible.hpp"
+#include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
 namespace {

@@ -9,8 +9,9 @@
 #include <string>
 #include <utility>
 
-#include "excitation/output_file.hpp"
-#include "frf/frf_file.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "frf/file/frf_file.hpp"
 #include "tools/python/array_log.hpp"
 
 namespace stageid {

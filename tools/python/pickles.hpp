@@ -4,8 +4,8 @@
 
 #include <memory>
 
-#include "acquisition/log_reader.hpp"
-#include "estimation/fit_options.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "estimation/problem/fit_options.hpp"
 #include "tools/python/frf_handle.hpp"
 
 namespace stageid {

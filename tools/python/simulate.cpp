@@ -6,12 +6,12 @@
 #include <cstdint>
 #include <utility>
 
-#include "tools/config_plan.hpp"
-#include "tools/exit_code.hpp"
-#include "tools/interrupt.hpp"
-#include "tools/loop_check.hpp"
-#include "tools/measured_stage.hpp"
-#include "tools/run_metadata.hpp"
+#include "tools/experiment/config_plan.hpp"
+#include "tools/experiment/loop_check.hpp"
+#include "tools/experiment/run_metadata.hpp"
+#include "tools/measure/measured_stage.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
 namespace {

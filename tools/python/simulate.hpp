@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "acquisition/run_writer.hpp"
+#include "acquisition/record/run_writer.hpp"
 
 namespace stageid {
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "tools/report.hpp"
+#include "tools/report/report.hpp"
 
 namespace stageid::test {
 

@@ -1,0 +1,99 @@
+#include "acquisition/files/file_kind.hpp"
+
+#include <array>
+#include <fstream>
+#include <regex>
+#include <string_view>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/hdf5_file.hpp"
+
+namespace stageid {
+namespace {
+
+struct FileKind {
+  std::string_view mark;  ///< what the file begins with, or what it says its format is
+  std::string_view name;
+  std::string_view taken_by;
+};
+
+constexpr std::string_view kTakesLogs = "'stageid frf', 'validate', 'report' and 'log' take it";
+constexpr std::string_view kTakesConfigurations =
+    "'stageid identify', 'design', 'run' and 'config check' take it";
+
+/// By the format that a file of ours names.
+constexpr std::array kOurs = {
+    FileKind{"stageid-log.h5", "a log in HDF5", kTakesLogs},
+    FileKind{"stageid-frf.h5", "a frequency response",
+             "'stageid modes', 'fit', 'validate', 'export', 'report' and 'plot' take it"},
+    FileKind{"stageid-excitation.h5", "a designed excitation",
+             "'stageid run --excitation' takes it"},
+    FileKind{"stageid-model.h5", "an exported model, for other programs",
+             "'stageid report' takes it beside the model.json it was made of"},
+    FileKind{"stageid-model", "a model",
+             "'stageid validate', 'export', 'report' and 'plot' take a model.json"},
+    FileKind{"stageid-modes", "a list of modes",
+             "'stageid fit --modes', 'report' and 'plot' take it"},
+    FileKind{"stageid-summary", "a summary of 'stageid identify'", "'stageid report' takes it"},
+    FileKind{"stageid-experiment", "an experiment file", kTakesConfigurations},
+    FileKind{"stageid-stage", "a stage file", "'stageid config check' and 'node' take it"}};
+
+/// By the first bytes.
+constexpr std::array kByHead = {
+    FileKind{"\x89SLOG", "a native log", kTakesLogs},
+    FileKind{"\x89HDF\r\n\x1a\n", "an HDF5 file of another program", "'stageid import' reads it"},
+    FileKind{"MATLAB", "a MATLAB file", "'stageid import' reads it"},
+    FileKind{"PK\x03\x04", "an archive, as .npz is", "'stageid import' reads .npz"},
+    FileKind{"    -1\n", "a universal file", "'stageid import' reads it"},
+    FileKind{"    -1\r\n", "a universal file", "'stageid import' reads it"},
+    FileKind{"<!DOCTYPE html", "a page", "a browser shows it"},
+    FileKind{"{", "JSON", "a model or a list of modes would name its format"}};
+
+std::string sentence(const FileKind& kind, const std::string& wanted) {
+  return std::string("is ").append(kind.name) + ", not " + wanted + "; " +
+         std::string(kind.taken_by);
+}
+
+std::string sentence_of_format(const std::string& format, const std::string& wanted) {
+  for (const FileKind& kind : kOurs)
+    if (format == kind.mark) return sentence(kind, wanted);
+  return "";
+}
+
+/// "stageid-model" of `"format": "stageid-model"` in JSON, `format: stageid-stage` in YAML, with .h5 the
+/// attribute of an HDF5 file; empty if there is none.
+std::string named_format(const std::filesystem::path& file, const std::string& head) {
+  if (head.starts_with("\x89HDF")) {
+    try {
+      const Hdf5File hdf5 = Hdf5File::open(file);
+      return hdf5.has_attribute("/", "format")
+                 ? hdf5.read_text_attribute("/", "format").append(".h5")
+                 : "";
+    } catch (const FormatError&) {
+      return "";  // damaged: its first bytes must do
+    }
+  }
+  static const std::regex text(R"re((?:^|\n)\s*\{?\s*"?format"?\s*:\s*"?(stageid-[a-z]+))re");
+  std::smatch found;
+  return std::regex_search(head, found, text) ? found[1].str() : "";
+}
+
+}  // namespace
+
+std::string other_kind(const std::filesystem::path& file, const std::string& wanted) {
+  std::string head(2048, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(stream.gcount()));
+  const std::string format = named_format(file, head);
+  if (const std::string ours = sentence_of_format(format, wanted); !ours.empty()) return ours;
+  for (const FileKind& kind : kByHead)
+    if (head.starts_with(kind.mark)) return sentence(kind, wanted);
+  return "";
+}
+
+std::string other_hdf5_kind(const std::string& format, const std::string& wanted) {
+  return sentence_of_format(format + ".h5", wanted);
+}
+
+}  // namespace stageid

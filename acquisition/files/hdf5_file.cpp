@@ -1,0 +1,183 @@
+#include "acquisition/files/hdf5_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <string_view>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/file_kind.hpp"
+#include "acquisition/files/hdf5_heap_check.hpp"
+#include "acquisition/files/hdf5_library.hpp"
+#include "acquisition/files/hdf5_support.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "acquisition/files/system_reason.hpp"
+
+namespace stageid {
+
+void prepare_hdf5() noexcept {
+  static const herr_t no_clean_up_at_exit = H5dont_atexit();
+  static_cast<void>(no_clean_up_at_exit);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
+namespace {
+
+/// HDF5 does not tell a missing file from a forbidden one in words, the operating system does.
+void check_can_be_opened(const std::filesystem::path& file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    throw FileError(file.string() + ": cannot be read: " + system_reason(errno));
+  }
+  struct stat status {};
+  const bool regular = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
+  ::close(descriptor);
+  if (!regular) throw FileError(file.string() + ": is not a file; give the name of an HDF5 file");
+}
+
+bool begins_as_hdf5(const std::filesystem::path& file) {
+  char head[4] = {};
+  std::ifstream(file, std::ios::binary).read(head, sizeof(head));
+  return std::string_view(head, sizeof(head)) == "\x89HDF";
+}
+
+}  // namespace
+
+/// The datasets read or appended to last. A dataset that is opened anew for every block of rows
+/// starts with an empty chunk cache and unpacks its compressed chunks again and again.
+struct Hdf5File::OpenDatasets {
+  struct Entry {
+    std::string name;
+    Hdf5Handle handle;
+  };
+  static constexpr std::size_t kEntries = 4;  // the datasets of one run of a log
+  std::array<Entry, kEntries> entries;
+  std::size_t oldest = 0;
+};
+
+Hdf5File::Hdf5File(std::filesystem::path path, Hdf5Handle file)
+    : path_(std::move(path)),
+      file_(std::move(file)),
+      open_datasets_(std::make_unique<OpenDatasets>()) {}
+Hdf5File::~Hdf5File() = default;
+Hdf5File::Hdf5File(Hdf5File&&) noexcept = default;
+Hdf5File& Hdf5File::operator=(Hdf5File&&) noexcept = default;
+
+Hdf5File Hdf5File::open(const std::filesystem::path& file) {
+  prepare_hdf5();
+  check_can_be_opened(file);
+  if (H5Fis_hdf5(file.c_str()) <= 0) {
+    H5Eclear2(H5E_DEFAULT);
+    // other_kind() would open what begins as an HDF5 file, to ask for its format.
+    const std::string other = begins_as_hdf5(file) ? "" : other_kind(file, "an HDF5 file");
+    throw FormatError(file, "",
+                      !other.empty()
+                          ? other
+                          : "is not an HDF5 file, or its beginning is damaged; give an HDF5 file");
+  }
+  hdf5::check_global_heaps(file);
+  Hdf5Handle handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (!handle) {
+    throw FormatError(file, "",
+                      "the HDF5 file is cut short, damaged or still being written (" +
+                          hdf5::take_reason() + "); copy it again or write it anew");
+  }
+  return {file, std::move(handle)};
+}
+
+Hdf5File Hdf5File::create(const std::filesystem::path& file,
+                          const std::filesystem::path& shown_as) {
+  const std::filesystem::path named = shown_name(shown_as.empty() ? file : shown_as);
+  prepare_hdf5();
+  const Hdf5Handle properties = hdf5::property_list(H5P_FILE_CREATE);
+  H5Pset_obj_track_times(properties.get(), false);
+  // The format of HDF5 1.8 has checksums on most of its structure, so that damage is noticed before
+  // the library stumbles over it; the newest one is closed to older MATLABs.
+  const Hdf5Handle access = hdf5::property_list(H5P_FILE_ACCESS);
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
+  Hdf5Handle handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), access.get()),
+                    H5Fclose);
+  if (!handle) {
+    throw FileError(named.string() + ": cannot be created: " + with_remedy(hdf5::take_reason()));
+  }
+  return {named, std::move(handle)};
+}
+
+void Hdf5File::close() {
+  if (!file_) return;
+  open_datasets_ = std::make_unique<OpenDatasets>();
+  const bool flushed = H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0;
+  const std::string reason = flushed ? "" : with_remedy(hdf5::take_reason());
+  file_.reset();
+  if (!flushed) throw FileError(path_.string() + ": cannot be written: " + reason);
+}
+
+bool Hdf5File::exists(const std::string& object) const {
+  // H5Lexists fails, rather than answers no, when a group on the way is missing.
+  for (std::size_t end = object.find('/', 1);; end = object.find('/', end + 1)) {
+    const std::string part = object.substr(0, end);
+    if (part != "/" && H5Lexists(file_.get(), part.c_str(), H5P_DEFAULT) <= 0) {
+      H5Eclear2(H5E_DEFAULT);
+      return false;
+    }
+    if (end == std::string::npos) break;
+  }
+  return object == "/" || H5Oexists_by_name(file_.get(), object.c_str(), H5P_DEFAULT) > 0;
+}
+
+bool Hdf5File::is_group(const std::string& object) const {
+  if (!exists(object)) return false;
+  const Hdf5Handle handle(H5Oopen(file_.get(), object.c_str(), H5P_DEFAULT), H5Oclose);
+  const bool found = handle && H5Iget_type(handle.get()) == H5I_GROUP;
+  H5Eclear2(H5E_DEFAULT);
+  return found;
+}
+
+std::vector<std::string> Hdf5File::children(const std::string& group) const {
+  const auto fail = [&](const std::string& what) { throw FormatError(path_, group, what); };
+  if (!exists(group)) fail("is missing; a group must stand here");
+  const Hdf5Handle handle(H5Gopen2(file_.get(), group.c_str(), H5P_DEFAULT), H5Gclose);
+  if (!handle) {
+    hdf5::take_reason();
+    fail("is not a group; a group must stand here");
+  }
+  const auto collect = [](hid_t, const char* name, const H5L_info_t*, void* names) -> herr_t {
+    static_cast<std::vector<std::string>*>(names)->emplace_back(name);
+    return 0;
+  };
+  std::vector<std::string> names;
+  if (H5Literate(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names) < 0) {
+    fail("cannot be listed (" + hdf5::take_reason() + "); the file is damaged");
+  }
+  return names;
+}
+
+hid_t Hdf5File::open_dataset(const std::string& dataset) const {
+  for (const OpenDatasets::Entry& entry : open_datasets_->entries) {
+    if (entry.handle && entry.name == dataset) return entry.handle.get();
+  }
+  if (!exists(dataset)) throw FormatError(path_, dataset, "is missing; a dataset must stand here");
+  // Room for a chunk across all columns of the usual logs; the default of 1 MiB holds few of them.
+  constexpr std::size_t kChunkCacheBytes = std::size_t{1} << 24;
+  constexpr std::size_t kChunkCacheSlots = 12421;  // a prime, as HDF5 advises
+  const Hdf5Handle access = hdf5::property_list(H5P_DATASET_ACCESS);
+  H5Pset_chunk_cache(access.get(), kChunkCacheSlots, kChunkCacheBytes, 1.0);
+  Hdf5Handle handle(H5Dopen2(file_.get(), dataset.c_str(), access.get()), H5Dclose);
+  if (!handle) {
+    throw FormatError(
+        path_, dataset,
+        "is not a dataset, or damaged (" + hdf5::take_reason() + "); a dataset must stand here");
+  }
+  OpenDatasets::Entry& entry = open_datasets_->entries[open_datasets_->oldest];
+  open_datasets_->oldest = (open_datasets_->oldest + 1) % OpenDatasets::kEntries;
+  entry.handle = std::move(handle);
+  entry.name = dataset;
+  return entry.handle.get();
+}
+
+}  // namespace stageid

@@ -1,0 +1,129 @@
+#include <complex>
+#include <limits>
+#include <new>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/hdf5_support.hpp"
+
+namespace stageid {
+namespace {
+
+/// What there is to know about an open dataset before its data are read.
+struct DatasetInfo {
+  DatasetInfo(const Hdf5File& source, std::string dataset_name, hid_t id)
+      : file(source),
+        name(std::move(dataset_name)),
+        dataset(id),
+        type(H5Dget_type(id), H5Tclose),
+        space(H5Dget_space(id), H5Sclose) {
+    if (!type || !space) fail("cannot be read (" + hdf5::take_reason() + "); the file is damaged");
+    kind = hdf5::kind_of(type.get());
+    shape = hdf5::shape_of(space.get());
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw FormatError(file.path(), name, what);
+  }
+  void expect(bool matches, const std::string& wanted) const {
+    if (!matches) fail("holds " + hdf5::name_of(kind) + "; " + wanted + " must stand here");
+  }
+  bool is_number() const { return kind == Hdf5Kind::real || kind == Hdf5Kind::integer; }
+
+  std::size_t count() const {
+    const Hdf5Handle properties(H5Dget_create_plist(dataset), H5Pclose);
+    const bool compressed = H5Pget_nfilters(properties.get()) > 0;
+    return hdf5::plausible_count(file.path(), name, shape, H5Tget_size(type.get()), compressed);
+  }
+  /// @throws FormatError with HDF5's reason if `status` tells a failure.
+  void check_read(herr_t status) const {
+    if (status < 0) {
+      fail("cannot be read (" + hdf5::take_reason() + "); the file is cut short or damaged");
+    }
+  }
+
+  const Hdf5File& file;
+  std::string name;
+  hid_t dataset;
+  Hdf5Handle type, space;
+  Hdf5Kind kind = Hdf5Kind::other;
+  std::vector<hsize_t> shape;
+};
+
+template <typename Value>
+std::vector<Value> read_all(const DatasetInfo& info, hid_t memory_type) {
+  try {
+    std::vector<Value> values(info.count());
+    if (!values.empty()) {
+      info.check_read(
+          H5Dread(info.dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()));
+    }
+    return values;
+  } catch (const std::bad_alloc&) {
+    info.fail("has the size " + hdf5::text_of(info.shape) + ", which does not fit into memory");
+  }
+}
+
+}  // namespace
+
+std::vector<hsize_t> Hdf5File::shape(const std::string& dataset) const {
+  DatasetInfo info(*this, dataset, open_dataset(dataset));
+  info.count();  // who sizes a buffer by this shape must be able to trust it
+  return std::move(info.shape);
+}
+
+Hdf5Kind Hdf5File::kind(const std::string& dataset) const {
+  return DatasetInfo(*this, dataset, open_dataset(dataset)).kind;
+}
+
+std::vector<double> Hdf5File::read_reals(const std::string& dataset) const {
+  const DatasetInfo info(*this, dataset, open_dataset(dataset));
+  info.expect(info.is_number(), "real numbers");
+  return read_all<double>(info, H5T_NATIVE_DOUBLE);
+}
+
+std::vector<std::complex<double>> Hdf5File::read_complex(const std::string& dataset) const {
+  const DatasetInfo info(*this, dataset, open_dataset(dataset));
+  info.expect(info.kind == Hdf5Kind::complex, "complex numbers (compound of floats r and i)");
+  const Hdf5Handle type = hdf5::complex_type(H5T_NATIVE_DOUBLE);
+  return read_all<std::complex<double>>(info, type.get());
+}
+
+std::vector<std::string> Hdf5File::read_texts(const std::string& dataset) const {
+  const DatasetInfo info(*this, dataset, open_dataset(dataset));
+  info.expect(info.kind == Hdf5Kind::text, "a list of texts");
+  if (info.shape.size() != 1) {
+    info.fail("has the shape " + hdf5::text_of(info.shape) + "; a list of texts must stand here");
+  }
+  std::vector<std::string> texts;
+  const auto read = [&info](hid_t memory_type, void* buffer) {
+    return H5Dread(info.dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, buffer) >= 0;
+  };
+  if (!hdf5::read_strings(info.type.get(), info.space.get(), info.count(), read, texts)) {
+    info.check_read(-1);
+  }
+  return texts;
+}
+
+void Hdf5File::read_rows(const std::string& dataset, hsize_t first, hsize_t count,
+                         double* out) const {
+  const DatasetInfo info(*this, dataset, open_dataset(dataset));
+  info.expect(info.is_number(), "real numbers");
+  const std::size_t rank = info.shape.size();
+  if (rank != 1 && rank != 2) {
+    info.fail("has the shape " + hdf5::text_of(info.shape) + "; rows x columns must stand here");
+  }
+  if (first > info.shape[0] || count > info.shape[0] - first) {
+    info.fail("has " + std::to_string(info.shape[0]) + " rows, fewer than the " +
+              std::to_string(first + count) + " needed");
+  }
+  if (count == 0 || (rank == 2 && info.shape[1] == 0)) return;
+  const hsize_t start[2] = {first, 0};
+  const hsize_t extent[2] = {count, rank == 2 ? info.shape[1] : 1};
+  const Hdf5Handle memory(H5Screate_simple(static_cast<int>(rank), extent, nullptr), H5Sclose);
+  H5Sselect_hyperslab(info.space.get(), H5S_SELECT_SET, start, nullptr, extent, nullptr);
+  info.check_read(
+      H5Dread(info.dataset, H5T_NATIVE_DOUBLE, memory.get(), info.space.get(), H5P_DEFAULT, out));
+}
+
+}  // namespace stageid

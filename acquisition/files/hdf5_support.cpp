@@ -1,0 +1,178 @@
+#include "acquisition/files/hdf5_support.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+#include "acquisition/files/file_error.hpp"
+
+namespace stageid::hdf5 {
+namespace {
+
+herr_t keep_innermost(unsigned depth, const H5E_error2_t* error, void* reason) {
+  if (depth == 0 && error->desc != nullptr) *static_cast<std::string*>(reason) = error->desc;
+  return 0;
+}
+
+/// A failing system call is described over several lines with addresses; only its message matters.
+std::string on_one_line(std::string reason) {
+  const std::string kKey = "error message = '";
+  if (const auto start = reason.find(kKey); start != std::string::npos) {
+    reason.erase(0, start + kKey.size());
+    reason.erase(std::min(reason.find('\''), reason.size()));
+  }
+  std::replace_if(
+      reason.begin(), reason.end(), [](unsigned char c) { return c < ' '; }, ' ');
+  return reason.empty() ? "reason unknown" : reason;
+}
+
+}  // namespace
+
+std::string take_reason() {
+  std::string reason;
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_innermost, &reason);
+  H5Eclear2(H5E_DEFAULT);
+  return on_one_line(std::move(reason));
+}
+
+Hdf5Handle property_list(hid_t class_id) { return {H5Pcreate(class_id), H5Pclose}; }
+
+Hdf5Handle complex_type(hid_t float_type) {
+  const std::size_t part = H5Tget_size(float_type);
+  Hdf5Handle type(H5Tcreate(H5T_COMPOUND, 2 * part), H5Tclose);
+  H5Tinsert(type.get(), "r", 0, float_type);
+  H5Tinsert(type.get(), "i", part, float_type);
+  return type;
+}
+
+Hdf5Handle text_type(H5T_cset_t cset) {
+  Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.get(), H5T_VARIABLE);
+  H5Tset_cset(type.get(), cset);
+  return type;
+}
+
+Hdf5Kind kind_of(hid_t type) {
+  switch (H5Tget_class(type)) {
+    case H5T_FLOAT:
+      return Hdf5Kind::real;
+    case H5T_INTEGER:
+    case H5T_ENUM:  // h5py stores numpy.bool_ as an enumeration of FALSE and TRUE
+      return Hdf5Kind::integer;
+    case H5T_STRING:
+      return Hdf5Kind::text;
+    case H5T_COMPOUND: {
+      const int real = H5Tget_member_index(type, "r");
+      const int imaginary = H5Tget_member_index(type, "i");
+      const bool complex = H5Tget_nmembers(type) == 2 && real >= 0 && imaginary >= 0 &&
+                           H5Tget_member_class(type, static_cast<unsigned>(real)) == H5T_FLOAT &&
+                           H5Tget_member_class(type, static_cast<unsigned>(imaginary)) == H5T_FLOAT;
+      H5Eclear2(H5E_DEFAULT);
+      return complex ? Hdf5Kind::complex : Hdf5Kind::other;
+    }
+    default:
+      return Hdf5Kind::other;
+  }
+}
+
+std::string name_of(Hdf5Kind kind) {
+  switch (kind) {
+    case Hdf5Kind::real:
+      return "real numbers";
+    case Hdf5Kind::integer:
+      return "integers";
+    case Hdf5Kind::complex:
+      return "complex numbers";
+    case Hdf5Kind::text:
+      return "text";
+    case Hdf5Kind::other:
+      break;
+  }
+  return "data of a type that is not understood";
+}
+
+std::vector<hsize_t> shape_of(hid_t space) {
+  const int rank = H5Sget_simple_extent_ndims(space);
+  std::vector<hsize_t> shape(static_cast<std::size_t>(std::max(rank, 0)));
+  if (rank > 0) H5Sget_simple_extent_dims(space, shape.data(), nullptr);
+  return shape;
+}
+
+std::string text_of(const std::vector<hsize_t>& shape) {
+  return shape.empty() ? "one value" : fmt::format("{}", fmt::join(shape, " x "));
+}
+
+std::size_t plausible_count(const std::filesystem::path& file, const std::string& place,
+                            const std::vector<hsize_t>& shape, std::size_t element_bytes,
+                            bool compressed) {
+  // deflate shrinks at most 1032 to 1. Small datasets may exist without any bytes (fill value).
+  constexpr std::uintmax_t kGreatestCompression = 1100;
+  constexpr std::uintmax_t kAlwaysAllowed = std::uintmax_t{1} << 26;
+  std::error_code ignored;
+  const std::uintmax_t file_bytes = std::filesystem::file_size(file, ignored);
+  std::uintmax_t limit = kAlwaysAllowed;
+  if (!ignored) limit += file_bytes * (compressed ? kGreatestCompression : 1);
+
+  std::uintmax_t bytes = std::max<std::size_t>(element_bytes, 1);
+  bool empty = false;
+  for (const hsize_t extent : shape) empty = empty || extent == 0;
+  if (empty) return 0;
+  std::size_t count = 1;
+  for (const hsize_t extent : shape) {
+    if (extent > limit / bytes) {
+      throw FormatError(
+          file, place,
+          "has the size " + text_of(shape) + ", more than this file can hold; the file is damaged");
+    }
+    bytes *= extent;
+    count *= static_cast<std::size_t>(extent);
+  }
+  return count;
+}
+
+namespace {
+
+bool read_variable_strings(hid_t file_type, hid_t space, std::size_t count,
+                           const std::function<bool(hid_t, void*)>& read,
+                           std::vector<std::string>& texts) {
+  const Hdf5Handle type = text_type(H5Tget_cset(file_type));
+  std::vector<char*> pointers(count, nullptr);
+  const bool done = read(type.get(), pointers.data());
+  if (done) {
+    for (const char* pointer : pointers) texts.emplace_back(pointer != nullptr ? pointer : "");
+  }
+  H5Dvlen_reclaim(type.get(), space, H5P_DEFAULT, pointers.data());
+  return done;
+}
+
+bool read_fixed_strings(hid_t file_type, std::size_t count,
+                        const std::function<bool(hid_t, void*)>& read,
+                        std::vector<std::string>& texts) {
+  const std::size_t size = H5Tget_size(file_type);
+  std::vector<char> buffer(count * size);
+  if (!read(file_type, buffer.data())) return false;
+  const bool space_padded = H5Tget_strpad(file_type) == H5T_STR_SPACEPAD;
+  for (std::size_t i = 0; i < count; ++i) {
+    const char* start = buffer.data() + i * size;
+    std::string text(start, ::strnlen(start, size));
+    if (space_padded) text.erase(text.find_last_not_of(' ') + 1);
+    texts.push_back(std::move(text));
+  }
+  return true;
+}
+
+}  // namespace
+
+bool read_strings(hid_t file_type, hid_t space, std::size_t count,
+                  const std::function<bool(hid_t, void*)>& read, std::vector<std::string>& texts) {
+  texts.clear();
+  if (count == 0) return true;
+  texts.reserve(count);
+  return H5Tis_variable_str(file_type) > 0
+             ? read_variable_strings(file_type, space, count, read, texts)
+             : read_fixed_strings(file_type, count, read, texts);
+}
+
+}  // namespace stageid::hdf5

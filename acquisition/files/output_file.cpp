@@ -1,0 +1,170 @@
+#include "acquisition/files/output_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <mutex>
+#include <regex>
+#include <set>
+#include <string>
+#include <system_error>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/system_reason.hpp"
+
+namespace stageid {
+namespace {
+
+/// Temporary files of the outputs that are being written.
+struct UnfinishedFiles {
+  std::mutex mutex;
+  std::set<std::filesystem::path> files;
+};
+
+/// Never destroyed: an interrupt may come while static objects are.
+UnfinishedFiles& unfinished() {
+  static auto* const shared = new UnfinishedFiles;
+  return *shared;
+}
+
+[[noreturn]] void fail(const std::filesystem::path& file, const std::string& what, int error,
+                       const std::string& remedy = "") {
+  throw FileError(fmt::format(
+      "{}: {}: {}", shown_name(file).string(), what,
+      remedy.empty() ? system_reason(error) : fmt::format("{}; {}", std::strerror(error), remedy)));
+}
+
+/// A file descriptor that closes itself; write errors surface at fsync(), so close() is not
+/// checked.
+class Descriptor {
+ public:
+  explicit Descriptor(int descriptor) noexcept : descriptor_(descriptor) {}
+  ~Descriptor() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const noexcept { return descriptor_; }
+  explicit operator bool() const noexcept { return descriptor_ >= 0; }
+
+ private:
+  int descriptor_;
+};
+
+std::filesystem::path directory_of(const std::filesystem::path& file) {
+  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
+/// The file that is to be replaced: a symbolic link stays, what it points to is replaced. Devices
+/// and directories are refused, because rename() would put a file in the place of /dev/null.
+std::filesystem::path resolve_target(const std::filesystem::path& target) {
+  // Not weakly_canonical(): it does not follow a link to a file that is yet to be made.
+  constexpr int kMaxLinks = 40;  // the kernel's own limit
+  std::error_code ignored;
+  std::filesystem::path resolved = target;
+  for (int links = 0; std::filesystem::is_symlink(resolved, ignored); ++links) {
+    if (links == kMaxLinks) fail(target, "cannot follow the symbolic link", ELOOP);
+    std::error_code error;
+    resolved = resolved.parent_path() / std::filesystem::read_symlink(resolved, error);
+    if (error) fail(target, "cannot follow the symbolic link", error.value());
+  }
+  const std::filesystem::file_status status = std::filesystem::status(resolved, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw FileError(
+        target.string() + ": " +
+        (std::filesystem::is_directory(status) ? "is a directory" : "is not a regular file") +
+        "; give the name of a file to write");
+  }
+  if (!resolved.has_filename()) {
+    throw FileError("'" + target.string() +
+                    "': is not a file name; give the name of a file to write");
+  }
+  return resolved;
+}
+
+/// A hidden name beside the target, so that rename() stays within one file system.
+std::filesystem::path temporary_beside(const std::filesystem::path& target) {
+  static std::atomic<unsigned> count = 0;  // several outputs of one process may share a target
+  return directory_of(target) / fmt::format(".{}.{}.{}.tmp", target.filename().string(), ::getpid(),
+                                            count.fetch_add(1, std::memory_order_relaxed));
+}
+
+void synchronize(const std::filesystem::path& file, int flags, const std::filesystem::path& named) {
+  const Descriptor descriptor(::open(file.c_str(), flags | O_CLOEXEC));
+  if (!descriptor) fail(named, "cannot be written", errno);
+  // Some file systems cannot synchronize a directory and say EINVAL: nothing is lost by that.
+  if (::fsync(descriptor.get()) != 0 && errno != EINVAL) fail(named, "cannot be written", errno);
+}
+
+void write_all(int descriptor, std::string_view text, const std::filesystem::path& named) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      fail(named, "cannot be written", errno);
+    }
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+}  // namespace
+
+std::filesystem::path shown_name(const std::filesystem::path& file) {
+  static const std::regex temporary(R"(\.(.+)\.\d+\.\d+\.tmp(\.[a-z0-9]+)?)");
+  std::string name = file.filename().string();
+  for (std::smatch match; std::regex_match(name, match, temporary);) name = std::string(match[1]);
+  return file.has_parent_path() ? file.parent_path() / name : std::filesystem::path(name);
+}
+
+OutputFile::OutputFile(const std::filesystem::path& target)
+    : target_(resolve_target(target)), temporary_(temporary_beside(target_)) {
+  constexpr mode_t kMode = 0666;  // less the user's umask
+  const std::lock_guard lock(unfinished().mutex);
+  const Descriptor descriptor(
+      ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
+  if (!descriptor)
+    fail(target_, "cannot create a file in this directory", errno,
+         errno == ENOENT ? "make it first" : "");
+  unfinished().files.insert(temporary_);
+}
+
+OutputFile::~OutputFile() {
+  if (committed_) return;
+  ::unlink(temporary_.c_str());
+  const std::lock_guard lock(unfinished().mutex);
+  unfinished().files.erase(temporary_);
+}
+
+void OutputFile::commit() {
+  synchronize(temporary_, O_RDONLY, target_);
+  {
+    const std::lock_guard lock(unfinished().mutex);
+    if (::rename(temporary_.c_str(), target_.c_str()) != 0)
+      fail(target_, "cannot be put in its place", errno);
+    unfinished().files.erase(temporary_);
+  }
+  committed_ = true;
+  synchronize(directory_of(target_), O_RDONLY | O_DIRECTORY, target_);
+}
+
+void remove_unfinished_files() {
+  unfinished().mutex.lock();  // for ever: nothing is begun or put in its place any more
+  for (const std::filesystem::path& file : unfinished().files) ::unlink(file.c_str());
+}
+
+void write_text_file(const std::filesystem::path& target, std::string_view text) {
+  OutputFile output(target);
+  {
+    const Descriptor descriptor(::open(output.path().c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
+    if (!descriptor) fail(target, "cannot be written", errno);
+    write_all(descriptor.get(), text, target);
+  }
+  output.commit();
+}
+
+}  // namespace stageid

@@ -1,0 +1,40 @@
+#include "acquisition/formats/open_log.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/file_kind.hpp"
+#include "acquisition/formats/hdf5_log.hpp"
+#include "acquisition/slog/slog_reader.hpp"
+
+namespace stageid {
+
+namespace {
+
+constexpr std::array<unsigned char, 8> kHdf5Magic = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1A, '\n'};
+
+}  // namespace
+
+std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool damaged_is_error) {
+  std::array<unsigned char, 8> magic{};
+  {
+    const SlogSource source(file);
+    if (source.bytes() == 0) {
+      throw FormatError(file, "", "is empty; give a native log (.slog) or an HDF5 log");
+    }
+    source.read(0, magic.data(), std::min<std::uint64_t>(magic.size(), source.bytes()));
+  }
+  if (magic == kSlogMagic) return std::make_unique<SlogReader>(file, damaged_is_error);
+  if (magic == kHdf5Magic) return std::make_unique<Hdf5LogReader>(file);
+  // With its first block damaged a native log still has others.
+  if (!damaged_is_error) return std::make_unique<SlogReader>(file, false);
+  if (const std::string other = other_kind(file, "a log"); !other.empty())
+    throw FormatError(file, "", other);
+  throw FormatError(
+      file, "",
+      "is neither a native log (.slog) nor an HDF5 file; another program's is read with "
+      "'stageid import', a damaged native log with 'stageid log recover'");
+}
+
+}  // namespace stageid

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "acquisition/loop/event_log.hpp"
+#include "acquisition/loop/run_observer.hpp"
+#include "acquisition/slog/slog_format.hpp"
+
+namespace stageid {
+
+/// Writes the events that the rows of a run tell: its begin and end, and every stretch of cycles
+/// that did not go well ("miss"). After kMissesTold stretches of one run only their number is kept,
+/// for the end of the run: a stage that fails all the time must not fill the disk with words.
+class EventRecorder final : public RunObserver {
+ public:
+  static constexpr std::uint64_t kMissesTold = 200;
+
+  EventRecorder(EventLog& events, std::size_t row_words) noexcept
+      : events_(events), row_words_(row_words) {}
+
+  void begin_run(const LogRun& run) noexcept override;
+  void rows(std::span<const double> rows) noexcept override;
+  void end_run(const LogRun& run) noexcept override;
+
+ private:
+  struct Miss {
+    std::uint64_t cycle = 0;
+    std::uint64_t cycles = 0;
+    std::uint8_t outcome = 0;
+    std::uint32_t lateness_ns = 0;
+  };
+  void take(const SampleStatus& status) noexcept;
+  void tell_miss() noexcept;
+
+  EventLog& events_;
+  std::size_t row_words_;
+  LogRun run_;
+  std::uint64_t cycle_ = 0;
+  std::uint64_t misses_ = 0;
+  std::optional<Miss> open_;
+};
+
+}  // namespace stageid

@@ -1,0 +1,21 @@
+#include "acquisition/loop/excited_actuators.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+namespace stageid {
+
+std::vector<int> excited_actuators(const ExperimentPlan& plan, const StageInfo& stage) {
+  std::vector<int> indices;
+  for (const ExcitationAxis& axis : plan.spec().axes) {
+    const int index = channel_index(stage.actuators, axis.channel);
+    if (index < 0)
+      throw std::invalid_argument(fmt::format(
+          "experiment: axis '{}' is no actuator of the stage '{}'", axis.channel, stage.name));
+    indices.push_back(index);
+  }
+  return indices;
+}
+
+}  // namespace stageid

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "acquisition/loop/sample_ring.hpp"
+
+namespace stageid {
+
+/// Something that happened inside a run, to be told by another thread.
+struct LoopEvent {
+  enum class Kind : std::uint8_t {
+    state,  ///< the stage is in another state; code: NodeState
+    stop    ///< the run is being stopped before its time; code: StopReason
+  };
+  int run = 0;              ///< runs started before it by this loop
+  std::uint64_t cycle = 0;  ///< of the run
+  Kind kind = Kind::state;
+  std::uint8_t code = 0;
+};
+
+/// From the loop to one other thread, without locks. What does not fit is dropped and counted: the
+/// loop waits for nobody.
+class LoopEvents {
+ public:
+  void push(const LoopEvent& event) noexcept {
+    double* const row = ring_.reserve();
+    if (row == nullptr) {
+      dropped_.fetch_add(1, std::memory_order_relaxed);
+      return;
+    }
+    row[0] = event.run;
+    row[1] = static_cast<double>(event.cycle);
+    row[2] = static_cast<double>(event.kind);
+    row[3] = event.code;
+    ring_.commit();
+  }
+
+  std::optional<LoopEvent> pop() noexcept {
+    const std::span<const double> row = ring_.front(1);
+    if (row.empty()) return std::nullopt;
+    const LoopEvent event{static_cast<int>(row[0]), static_cast<std::uint64_t>(row[1]),
+                          static_cast<LoopEvent::Kind>(row[2]), static_cast<std::uint8_t>(row[3])};
+    ring_.pop(1);
+    return event;
+  }
+
+  std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
+
+ private:
+  SampleRing ring_{4, 256};
+  std::atomic<std::uint64_t> dropped_ = 0;
+};
+
+}  // namespace stageid

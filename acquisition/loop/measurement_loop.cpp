@@ -1,0 +1,310 @@
+#include "acquisition/loop/measurement_loop.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "hal/stage/pacer.hpp"
+
+namespace stageid {
+
+namespace {
+
+constexpr int kBadCycle = 2;  // what a bad cycle adds to the bucket; a good one takes 1
+
+/// 0 times a finite number is 0, of any other NaN: one pass without branches.
+bool all_finite(const std::vector<double>& values) noexcept {
+  double sum = 0.0;
+  for (const double value : values) sum += 0.0 * value;
+  return sum == 0.0;
+}
+
+bool ends_at_once(Outcome outcome) noexcept {
+  return outcome == Outcome::fault || outcome == Outcome::bus_off || outcome == Outcome::link_down;
+}
+
+bool gives_measurement(Outcome outcome) noexcept {
+  return outcome == Outcome::ok || outcome == Outcome::late || outcome == Outcome::bus_passive;
+}
+
+}  // namespace
+
+const char* to_string(StopReason reason) noexcept {
+  switch (reason) {
+    case StopReason::none:
+      return "none";
+    case StopReason::limit:
+      return "limit";
+    case StopReason::fault:
+      return "fault";
+    case StopReason::misses:
+      return "misses";
+    case StopReason::interrupt:
+      return "interrupt";
+    case StopReason::log:
+      return "log";
+    case StopReason::plant:
+      return "plant";
+  }
+  return "unknown";
+}
+
+MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controller, SampleRing& ring,
+                                 const LoopOptions& options)
+    : stage_(stage), controller_(controller), ring_(ring), misses_allowed_(options.misses_allowed) {
+  const StageInfo& info = stage.info();
+  const std::size_t actuators = info.actuators.size();
+  const std::size_t sensors = info.sensors.size();
+  if (!(options.ramp_s >= 0.0) || !std::isfinite(options.ramp_s) || options.misses_allowed < 0) {
+    throw std::invalid_argument("loop: ramp_s and misses_allowed must be 0 or more");
+  }
+  if (static_cast<std::size_t>(controller.sensors()) != sensors ||
+      static_cast<std::size_t>(controller.actuators()) != actuators) {
+    throw std::invalid_argument(
+        fmt::format("loop: the controller has {} sensors and {} actuators, the stage {} and {}",
+                    controller.sensors(), controller.actuators(), sensors, actuators));
+  }
+  if (ring.row_words() != actuators + sensors + 1 || sensors > 64) {
+    throw std::invalid_argument(fmt::format(
+        "loop: a row of {} words for {} actuators, {} sensors (64 at most) and a status word",
+        ring.row_words(), actuators, sensors));
+  }
+  ramp_samples_ = static_cast<std::uint64_t>(std::llround(options.ramp_s * info.sample_rate_hz));
+  wall_clock_ = info.clock == Clock::wall;
+  period_ns_ = std::llround(1e9 / (info.sample_rate_hz * info.pace));
+  u_.assign(actuators, 0.0);
+  last_finite_u_.assign(actuators, 0.0);
+  y_.assign(sensors, 0.0);
+  fresh_.assign(sensors, 0.0);
+  landing_row_.assign(ring.row_words(), 0.0);
+}
+
+void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excitation) {
+  const Eigen::MatrixXd& period = excitation.period;
+  if (period.rows() == 0 || excitation.samples == 0 || !period.allFinite() ||
+      period.cols() != static_cast<Eigen::Index>(excitation.actuators.size())) {
+    throw std::invalid_argument(
+        "loop: the excitation must have samples, one actuator a column, and be finite");
+  }
+  excited_.clear();
+  std::vector<Eigen::Index> columns;
+  for (Eigen::Index c = 0; c < period.cols(); ++c) {
+    const int actuator = excitation.actuators[static_cast<std::size_t>(c)];
+    if (actuator < 0 || static_cast<std::size_t>(actuator) >= u_.size()) {
+      throw std::invalid_argument(fmt::format("loop: there is no actuator number {}", actuator));
+    }
+    if (period.col(c).isZero(0.0)) continue;
+    excited_.push_back(static_cast<std::size_t>(actuator));
+    columns.push_back(c);
+  }
+  excitation_.clear();
+  for (Eigen::Index n = 0; n < period.rows(); ++n) {
+    for (const Eigen::Index c : columns) excitation_.push_back(period(n, c));
+  }
+  period_samples_ = static_cast<std::uint64_t>(period.rows());
+  samples_ = excitation.samples;
+  cycle_ = phase_sample_ = 0;
+  gain_ = 1.0;
+  bucket_ = 0;
+  complete_ = false;
+  reason_ = StopReason::none;
+  last_trouble_ = Outcome::ok;
+  health_ = {};
+  timing_ = {};
+  status_ = {};
+  ++run_;
+  std::fill(y_.begin(), y_.end(), 0.0);
+  std::fill(last_finite_u_.begin(), last_finite_u_.end(), 0.0);
+  controller_.reset();
+  inputs_ = {};
+  inputs_.y = fresh_;
+  stage_.start(run_seed, inputs_);
+  if (wall_clock_) awake_ns_ = monotonic_ns();
+  tell_state();
+  phase_ = Phase::measuring;
+  take_measurement(Outcome::ok);
+  const std::uint64_t all = ~std::uint64_t{0} >> (64 - y_.size());
+  status_.marked |= (inputs_.valid & all) != all;
+}
+
+LoopStatus MeasurementLoop::step() noexcept {
+  if (phase_ == Phase::idle) return LoopStatus::ended;
+  double* row = recording() ? ring_.reserve() : landing_row_.data();
+  if (row == nullptr) [[unlikely]]
+    return LoopStatus::ring_full;
+
+  compute_command();
+  const SampleStatus status = status_;
+  const bool odd_command = write_row(row);
+  const Deadline deadline{wall_clock_ ? inputs_.t_sample_ns + 2 * period_ns_ : 0};
+  std::int64_t computed_ns = 0;
+  if (wall_clock_) [[unlikely]]
+    computed_ns = monotonic_ns();
+  inputs_.t_ready_ns = 0;
+  const Outcome outcome = stage_.exchange({cycle_, inputs_.t_sample_ns, u_}, inputs_, deadline);
+  if (wall_clock_) [[unlikely]]
+    time_cycle(computed_ns, outcome);
+  if (inputs_.node_state != node_state_) [[unlikely]]
+    tell_state();
+
+  if (!inputs_.applied.empty()) [[unlikely]]
+    std::copy(inputs_.applied.begin(), inputs_.applied.end(), row);
+  if (recording()) {
+    // u[n] may not have been applied as it stands here: then this sample is no good either.
+    SampleStatus stored = status;
+    stored.marked |= odd_command || !gives_measurement(outcome) || phase_ != Phase::measuring;
+    row[ring_.row_words() - 1] = std::bit_cast<double>(pack_status(stored));
+    ring_.commit();
+    ++health_.cycles;
+    health_.marked += stored.marked ? 1U : 0U;
+  }
+  take_measurement(outcome);
+  return advance();
+}
+
+/// A stage that does not tell when it began to wait counts as having waited from the start.
+void MeasurementLoop::time_cycle(std::int64_t computed_ns, Outcome outcome) noexcept {
+  const std::int64_t ready_ns = std::max(computed_ns, inputs_.t_ready_ns);
+  if (recording()) {
+    const std::int64_t lateness_ns = inputs_.t_rx_ns - inputs_.t_sample_ns;
+    timing_.execution.add(ready_ns - awake_ns_);
+    timing_.lateness.add(lateness_ns);
+    if (outcome == Outcome::late && lateness_ns > 0)
+      timing_.skipped += static_cast<std::uint64_t>(lateness_ns / period_ns_);
+  }
+  awake_ns_ = monotonic_ns();
+}
+
+void MeasurementLoop::tell_state() noexcept {
+  node_state_ = inputs_.node_state;
+  tell(LoopEvent::Kind::state, static_cast<std::uint8_t>(node_state_));
+}
+
+void MeasurementLoop::tell(LoopEvent::Kind kind, std::uint8_t code) noexcept {
+  events_.push({run_, cycle_, kind, code});
+}
+
+void MeasurementLoop::compute_command() noexcept {
+  controller_.update(y_.data(), u_.data());
+  const double* r = excitation_.data() + phase_sample_ * excited_.size();
+  for (std::size_t k = 0; k < excited_.size(); ++k) u_[excited_[k]] += gain_ * r[k];
+  if (++phase_sample_ == period_samples_) phase_sample_ = 0;
+}
+
+/// Writes u[n] and y[n]. A command that is not a number goes to the stage as it is, which refuses
+/// it, but not into the log, which holds numbers only; true then.
+bool MeasurementLoop::write_row(double* row) noexcept {
+  const bool finite = all_finite(u_);
+  if (finite) [[likely]] {
+    std::copy(u_.begin(), u_.end(), last_finite_u_.begin());
+  }
+  std::copy(last_finite_u_.begin(), last_finite_u_.end(), row);
+  std::copy(y_.begin(), y_.end(), row + u_.size());
+  return !finite;
+}
+
+void MeasurementLoop::take_measurement(Outcome outcome) noexcept {
+  const std::int64_t lateness = std::clamp<std::int64_t>(inputs_.t_rx_ns - inputs_.t_sample_ns, 0,
+                                                         std::numeric_limits<std::uint32_t>::max());
+  health_.largest_lateness_ns = std::max(health_.largest_lateness_ns, lateness);
+  status_ = {static_cast<std::uint8_t>(outcome), outcome != Outcome::ok,
+             static_cast<std::uint32_t>(lateness)};
+  if (gives_measurement(outcome) && all_finite(fresh_)) [[likely]] {
+    std::copy(fresh_.begin(), fresh_.end(), y_.begin());
+    if (outcome == Outcome::ok) [[likely]] {
+      bucket_ = std::max(0, bucket_ - 1);
+      return;
+    }
+    health_.late += recording() && outcome == Outcome::late ? 1U : 0U;
+    count_bad_cycle(outcome);
+    return;
+  }
+  status_.marked = true;
+  if (outcome == Outcome::limit || outcome == Outcome::braking || outcome == Outcome::opened) {
+    hold_missing(inputs_.valid);
+    last_trouble_ = outcome;
+    request_stop(StopReason::limit);
+    if (outcome == Outcome::braking) ramp_left_ = std::max<std::uint64_t>(ramp_left_, 1);
+    if (outcome == Outcome::opened) end(StopReason::limit);
+    return;
+  }
+  hold_missing(gives_measurement(outcome)       ? ~std::uint64_t{0}
+               : outcome == Outcome::incomplete ? inputs_.valid
+                                                : 0);
+  health_.missing += recording() ? 1U : 0U;
+  if (ends_at_once(outcome)) {
+    last_trouble_ = outcome;
+    // A link that ends in the unrecorded ramp of a good run, as a replay does, has spoilt nothing.
+    if (phase_ == Phase::landing && reason_ == StopReason::none && outcome != Outcome::link_down) {
+      reason_ = StopReason::fault;
+      tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason_));
+    }
+    end(StopReason::fault);
+    return;
+  }
+  count_bad_cycle(outcome);
+}
+
+void MeasurementLoop::hold_missing(std::uint64_t valid) noexcept {
+  for (std::size_t i = 0; i < y_.size(); ++i) {
+    if (((valid >> i) & 1U) != 0 && std::isfinite(fresh_[i])) y_[i] = fresh_[i];
+  }
+}
+
+void MeasurementLoop::count_bad_cycle(Outcome outcome) noexcept {
+  last_trouble_ = outcome;
+  bucket_ += kBadCycle;
+  if (bucket_ <= misses_allowed_) return;
+  if (phase_ == Phase::measuring) {
+    request_stop(StopReason::misses);
+  } else {
+    end(StopReason::misses);  // the stage does not answer in the ramp either
+  }
+}
+
+void MeasurementLoop::request_stop(StopReason reason) noexcept {
+  if (phase_ == Phase::landing && reason == StopReason::limit && reason_ == StopReason::none) {
+    reason_ = reason;
+  }
+  if (phase_ != Phase::measuring) return;
+  reason_ = reason;
+  tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason));
+  bucket_ = 0;  // a fresh allowance for the ramp
+  ramp_left_ = ramp_samples_;
+  phase_ = reason == StopReason::log ? Phase::landing : Phase::stopping;
+}
+
+void MeasurementLoop::end(StopReason reason) noexcept {
+  if (reason_ == StopReason::none && phase_ != Phase::landing && reason != StopReason::none) {
+    reason_ = reason;
+    tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason));
+  }
+  stage_.stop();
+  phase_ = Phase::idle;
+}
+
+LoopStatus MeasurementLoop::advance() noexcept {
+  ++cycle_;
+  if (phase_ == Phase::measuring) [[likely]] {
+    if (cycle_ < samples_) [[likely]]
+      return LoopStatus::running;
+    phase_ = Phase::landing;
+    complete_ = true;
+    bucket_ = 0;
+    ramp_left_ = ramp_samples_;
+  }
+  if (phase_ == Phase::idle) return LoopStatus::ended;
+  if (ramp_left_ == 0) {
+    end(reason_);
+    return LoopStatus::ended;
+  }
+  gain_ = static_cast<double>(ramp_left_) / static_cast<double>(ramp_samples_ + 1);
+  --ramp_left_;
+  return LoopStatus::running;
+}
+
+}  // namespace stageid

@@ -1,0 +1,138 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "acquisition/loop/loop_events.hpp"
+#include "acquisition/loop/sample_ring.hpp"
+#include "acquisition/record/log_info.hpp"
+#include "acquisition/slog/slog_format.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "hal/stage/stage.hpp"
+
+namespace stageid {
+
+struct LoopOptions {
+  double ramp_s = 0.1;      ///< the excitation goes to zero over this before the stage is stopped
+  int misses_allowed = 10;  ///< leaky bucket: +2 a bad cycle, -1 a good one, above: stop
+};
+
+/// What is added to the actuators, and for how long.
+struct LoopExcitation {
+  Eigen::MatrixXd period;      ///< one period, samples x columns
+  std::vector<int> actuators;  ///< index of the actuator of each column
+  std::uint64_t samples = 0;   ///< to be measured in all
+};
+
+enum class LoopStatus : std::uint8_t {
+  running,
+  ring_full,  ///< nothing was done; call again once the log thread has made room
+  ended       ///< look at reason(); the stage is stopped
+};
+
+/// Why a run ended before its time.
+enum class StopReason : std::uint8_t { none, limit, fault, misses, interrupt, log, plant };
+const char* to_string(StopReason reason) noexcept;
+
+/// One closed-loop run, cycle by cycle:  u[n] = C(y[n]) + g r[n],  exchange(u[n]) -> y[n+1].
+///
+/// Every cycle pushes one row, u[n], y[n], status (slog_format.hpp), into the ring. The status'
+/// outcome is that of the exchange that gave y[n]; the row is marked if that was not `ok`, if the
+/// exchange of u[n] did not go well (it may not have been applied), or in the ramp of a controlled
+/// stop. Sensors that are missing or not finite keep their last value, marked.
+///
+/// g is 1. A run that has all its samples, and one that is stopped (a limit, too many misses, a
+/// request) go on in closed loop while g falls linearly to 0 over ramp_s; only then is the stage
+/// stopped. At the end of a good run the ramp is not recorded, so that a log has whole periods; in
+/// a stop it is, marked. A fault, bus-off or lost link ends the run at once: there is nothing to
+/// control. So does a stage that has opened the loop (LimitedStage), once it has braked. A row holds
+/// the u that was applied, also where that was not the u asked for.
+///
+/// Bucket: late cycles count as bad too (their samples are valid, but the loop's phase is not).
+class MeasurementLoop {
+ public:
+  /// All memory is allocated here and in start(). References are kept.
+  /// @throws std::invalid_argument if controller, ring and stage differ in channels, there are more
+  ///         than 64 sensors, or an option is negative.
+  MeasurementLoop(CyclicStage& stage, MotionController& controller, SampleRing& ring,
+                  const LoopOptions& options = {});
+
+  /// Starts the stage and the run. @throws StageError from the stage. @throws std::invalid_argument
+  /// on sizes, an actuator that does not exist, or an excitation that is not finite.
+  void start(std::uint64_t run_seed, const LoopExcitation& excitation);
+
+  /// One cycle. Does not allocate, lock, log or throw; no system call but the exchange's. Against a
+  /// wall clock it reads the time twice, for timing().
+  [[nodiscard]] LoopStatus step() noexcept;
+
+  /// Begins a controlled stop; a second one is ignored, and so is any but a limit when all samples
+  /// are recorded. From the thread that calls step().
+  void request_stop(StopReason reason) noexcept;
+
+  StopReason reason() const noexcept { return reason_; }
+  /// True once all samples are recorded (a limit or a fault may still end the ramp behind them).
+  bool complete() const noexcept { return complete_; }
+  /// The outcome that ended or first troubled the run.
+  Outcome last_trouble() const noexcept { return last_trouble_; }
+  /// Of the current run; `seconds` is left to the caller.
+  const RunHealth& health() const noexcept { return health_; }
+  /// Of the current run; empty in virtual time.
+  const RunTiming& timing() const noexcept { return timing_; }
+  /// Changes of state and stops of all runs so far; pop() is for one other thread.
+  LoopEvents& events() noexcept { return events_; }
+
+ private:
+  enum class Phase : std::uint8_t { idle, measuring, stopping, landing };
+
+  void compute_command() noexcept;
+  bool write_row(double* row) noexcept;
+  void take_measurement(Outcome outcome) noexcept;
+  void hold_missing(std::uint64_t valid) noexcept;
+  void count_bad_cycle(Outcome outcome) noexcept;
+  void time_cycle(std::int64_t computed_ns, Outcome outcome) noexcept;
+  void tell_state() noexcept;
+  void tell(LoopEvent::Kind kind, std::uint8_t code) noexcept;
+  void end(StopReason reason) noexcept;
+  LoopStatus advance() noexcept;
+  bool recording() const noexcept { return phase_ != Phase::landing; }
+
+  CyclicStage& stage_;
+  MotionController& controller_;
+  SampleRing& ring_;
+  std::uint64_t ramp_samples_;
+  int misses_allowed_;
+  bool wall_clock_;
+  std::int64_t period_ns_;
+
+  std::vector<double> u_;
+  std::vector<double> y_;
+  std::vector<double> fresh_;          // y[n+1] as the stage gives it
+  std::vector<double> last_finite_u_;  // logged where a command is not a number
+  std::vector<double> excitation_;     // sample by sample, only the columns that are not zero
+  std::vector<std::size_t> excited_;   // their actuators
+  std::vector<double> landing_row_;
+  Inputs inputs_;
+
+  std::uint64_t period_samples_ = 1;
+  std::uint64_t phase_sample_ = 0;  // n mod period
+  std::uint64_t samples_ = 0;
+  std::uint64_t cycle_ = 0;
+  std::uint64_t ramp_left_ = 0;
+  double gain_ = 1.0;
+  SampleStatus status_;  // of y_
+  int bucket_ = 0;
+  Phase phase_ = Phase::idle;
+  bool complete_ = false;
+  StopReason reason_ = StopReason::none;
+  Outcome last_trouble_ = Outcome::ok;
+  RunHealth health_;
+  RunTiming timing_;
+  std::int64_t awake_ns_ = 0;  // when the loop got hold of y_
+  NodeState node_state_ = NodeState::not_ready;
+  int run_ = -1;
+  LoopEvents events_;
+};
+
+}  // namespace stageid

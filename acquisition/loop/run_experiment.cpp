@@ -1,0 +1,376 @@
+#include "acquisition/loop/run_experiment.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/loop/event_recorder.hpp"
+#include "acquisition/loop/excited_actuators.hpp"
+#include "acquisition/loop/log_thread.hpp"
+#include "acquisition/loop/measurement_loop.hpp"
+#include "acquisition/loop/shared_progress.hpp"
+#include "acquisition/record/utc_time.hpp"
+
+namespace stageid {
+
+namespace {
+
+constexpr std::chrono::milliseconds kProgressEvery{200};
+constexpr std::size_t kVirtualRingRows = std::size_t{1} << 16;
+constexpr double kWallRingSeconds = 8.0;  // a disk may stall for so long
+constexpr double kPublishEvery_s = 0.1;
+constexpr double kMostUnpublished = 1024.0;  // cycles
+
+ChannelList channel_list(const std::vector<Channel>& channels) {
+  ChannelList list;
+  for (const Channel& channel : channels) {
+    list.names.push_back(channel.name);
+    list.units.push_back(channel.unit);
+  }
+  return list;
+}
+
+std::uint64_t mix(std::uint64_t z) noexcept {
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
+  return z ^ (z >> 31);
+}
+
+/// One experiment while it is performed.
+class Experiment {
+ public:
+  Experiment(const ExperimentPlan& plan, LimitedStage& stage, MotionController& controller,
+             RunWriter& log, const RunExperimentOptions& options)
+      : plan_(plan),
+        stage_(stage),
+        options_(options),
+        ring_(log.info().actuators.size() + log.info().sensors.size() + 1, ring_rows(stage.info())),
+        loop_(stage, controller, ring_, {options.ramp_s, options.misses_allowed}),
+        recorder_(make_recorder(options, ring_.row_words())),
+        log_(log, ring_, observers()),
+        wall_(stage.info().clock == Clock::wall),
+        actuators_(excited_actuators(plan, stage.info())),
+        runs_(plan.runs_without(options.skip)) {}
+
+  /// Lets the loop's thread do the work and reports progress meanwhile.
+  ExperimentResult perform() {
+    std::thread loop([this] {
+      try {
+        const RealTime real_time(wall_ ? options_.real_time : RealTimeOptions{});
+        perform_runs();
+      } catch (...) {
+        failure_ = std::current_exception();
+      }
+      const std::lock_guard lock(mutex_);
+      done_ = true;
+      changed_.notify_all();
+    });
+    try {
+      report_until_done();
+    } catch (...) {  // from the progress function
+      abandoned_.store(true, std::memory_order_relaxed);
+      loop.join();
+      throw;
+    }
+    loop.join();
+    log_.drain();
+    if (failure_) std::rethrow_exception(failure_);
+    result_.runs_done = log_.complete_runs();
+    if (log_.failed()) take_log_failure();
+    tell_events();
+    return std::move(result_);
+  }
+
+ private:
+  /// Why the stage was stopped counts for more than that its log has failed too.
+  void take_log_failure() {
+    const bool stage_ended_it =
+        result_.end == ExperimentEnd::limit || result_.end == ExperimentEnd::fault;
+    result_.message = stage_ended_it ? result_.message + "; " + log_.error() : log_.error();
+    if (!stage_ended_it) result_.end = ExperimentEnd::log_failed;
+  }
+
+  static std::unique_ptr<EventRecorder> make_recorder(const RunExperimentOptions& options,
+                                                      std::size_t row_words) {
+    return options.events == nullptr ? nullptr
+                                     : std::make_unique<EventRecorder>(*options.events, row_words);
+  }
+
+  std::vector<RunObserver*> observers() const {
+    std::vector<RunObserver*> all = options_.observers;
+    if (recorder_) all.push_back(recorder_.get());
+    return all;
+  }
+
+  /// Passes on what the loop has left behind. By the reporting thread.
+  void tell_events() {
+    while (const std::optional<LoopEvent> event = loop_.events().pop()) {
+      if (event->kind == LoopEvent::Kind::state) node_state_ = static_cast<NodeState>(event->code);
+      if (options_.events == nullptr) continue;
+      const RunId run = runs_[static_cast<std::size_t>(event->run)];
+      const bool state = event->kind == LoopEvent::Kind::state;
+      options_.events->write(
+          state ? "state" : "stop",
+          {{"realization", std::int64_t{run.realization}},
+           {"experiment", std::int64_t{run.experiment}},
+           {"cycle", static_cast<std::int64_t>(event->cycle)},
+           state ? EventField{"state", std::string(to_string(static_cast<NodeState>(event->code)))}
+                 : EventField{"reason",
+                              std::string(to_string(static_cast<StopReason>(event->code)))}});
+    }
+  }
+
+  static std::size_t ring_rows(const StageInfo& info) {
+    if (info.clock == Clock::virtual_time) return kVirtualRingRows;
+    return std::max(kVirtualRingRows,
+                    static_cast<std::size_t>(kWallRingSeconds * info.sample_rate_hz));
+  }
+
+  void perform_runs() {
+    result_.end = ExperimentEnd::complete;
+    std::string enough;
+    int realization = -1;
+    for (const RunId& run : runs_) {
+      if (interrupted()) {
+        finish(StopReason::interrupt);
+        break;
+      }
+      if (options_.tripped()) {
+        finish(StopReason::plant);
+        break;
+      }
+      if (options_.enough && run.realization != std::exchange(realization, run.realization)) {
+        log_.drain();
+        enough = options_.enough();
+        if (!enough.empty()) break;
+      }
+      try {
+        const StopReason reason = perform_run(run);
+        if (reason == StopReason::none) continue;
+        finish(reason);
+      } catch (const StageError& error) {  // it does not start
+        if (interrupted()) {
+          finish(StopReason::interrupt);
+          break;
+        }
+        result_.end = ExperimentEnd::fault;
+        result_.message = fmt::format("stage '{}': {}", stage_.info().name, error.what());
+      }
+      break;
+    }
+    if (result_.end == ExperimentEnd::complete) {
+      result_.message = fmt::format("{}{}{} measured", enough, enough.empty() ? "" : "; ",
+                                    counted(result_.runs_done, "run"));
+    }
+  }
+
+  StopReason perform_run(RunId id) {
+    const auto started = std::chrono::steady_clock::now();
+    progress_.begin(id, wall_);
+    LoopExcitation excitation{plan_.excitation(id), actuators_,
+                              static_cast<std::uint64_t>(plan_.samples_per_run())};
+    LogRun run;
+    run.realization = id.realization;
+    run.experiment = id.experiment;
+    run.started_utc = utc_now();
+    loop_.start(run_seed(plan_.spec().seed, id), excitation);
+    log_.begin_run(run, std::move(excitation.period));
+    cycle_until_end();
+    run.complete = loop_.complete() && loop_.reason() != StopReason::log;
+    run.health = loop_.health();
+    run.health.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    run.timing = loop_.timing();
+    log_.end_run(run);
+    result_.health += run.health;
+    result_.timing += run.timing;
+    result_.runs_done += run.complete ? 1 : 0;
+    progress_.publish(run.health, run.timing, wall_);
+    progress_.runs_done.store(result_.runs_done, std::memory_order_relaxed);
+    return loop_.reason();
+  }
+
+  void cycle_until_end() {
+    const auto publish_every = static_cast<std::uint64_t>(
+        std::clamp(kPublishEvery_s * stage_.info().sample_rate_hz, 1.0, kMostUnpublished));
+    std::uint64_t until_publish = publish_every;
+    while (true) {
+      const LoopStatus status = loop_.step();
+      if (status == LoopStatus::ended) return;
+      if (status == LoopStatus::ring_full) {
+        if (wall_ || log_.failed()) {
+          loop_.request_stop(StopReason::log);
+        } else {
+          std::this_thread::yield();
+        }
+      }
+      if (interrupted()) loop_.request_stop(StopReason::interrupt);
+      if (options_.tripped()) loop_.request_stop(StopReason::plant);
+      if (log_.failed()) loop_.request_stop(StopReason::log);
+      if (--until_publish == 0) {
+        until_publish = publish_every;
+        progress_.publish(loop_.health(), loop_.timing(), wall_);
+      }
+    }
+  }
+
+  bool interrupted() const noexcept {
+    return abandoned_.load(std::memory_order_relaxed) || options_.interrupted();
+  }
+
+  void finish(StopReason reason) {
+    const StageInfo& info = stage_.info();
+    switch (reason) {
+      case StopReason::none:
+        return;
+      case StopReason::limit:
+        result_.end = ExperimentEnd::limit;
+        result_.message = describe_stop(stage_);
+        return;
+      case StopReason::fault:
+        result_.end = ExperimentEnd::fault;
+        result_.message =
+            fmt::format("stage '{}' reports: {}", info.name, to_string(loop_.last_trouble()));
+        return;
+      case StopReason::misses:
+        result_.end = ExperimentEnd::fault;
+        result_.message = fmt::format("stage '{}': too many bad cycles in a row, the last: {}",
+                                      info.name, to_string(loop_.last_trouble()));
+        return;
+      case StopReason::plant:
+        result_.end = ExperimentEnd::fault;
+        result_.message = options_.trip_reason();
+        return;
+      case StopReason::interrupt:
+        result_.end = ExperimentEnd::interrupted;
+        result_.message = "interrupted; what was measured is kept";
+        return;
+      case StopReason::log:
+        result_.end = ExperimentEnd::log_failed;
+        result_.message = "the log could not be written as fast as the stage was measured";
+        return;
+    }
+  }
+
+  void report_until_done() {
+    std::unique_lock lock(mutex_);
+    while (!changed_.wait_for(lock, kProgressEvery, [this] { return done_; })) {
+      lock.unlock();
+      report();
+      lock.lock();
+    }
+    lock.unlock();
+    report();
+  }
+
+  void report() {
+    tell_events();
+    if (!options_.progress) return;
+    ExperimentProgress progress;
+    progress.node_state = node_state_;
+    progress.run = {progress_.realization.load(std::memory_order_relaxed),
+                    progress_.experiment.load(std::memory_order_relaxed)};
+    progress.runs_done = progress_.runs_done.load(std::memory_order_relaxed);
+    progress.runs_total = static_cast<int>(runs_.size());
+    progress.health = progress_.health();
+    if (wall_) progress.timing = progress_.timing();
+    const double rate_hz = plan_.grid().sample_rate_hz();
+    const double run_s = static_cast<double>(plan_.samples_per_run()) / rate_hz;
+    const int before = std::max(0, progress_.runs_begun.load(std::memory_order_relaxed) - 1);
+    progress.seconds_total = run_s * progress.runs_total;
+    progress.seconds_done =
+        std::min(progress.seconds_total,
+                 run_s * before + static_cast<double>(progress.health.cycles) / rate_hz);
+    options_.progress(progress);
+  }
+
+  const ExperimentPlan& plan_;
+  LimitedStage& stage_;
+  const RunExperimentOptions& options_;
+  SampleRing ring_;
+  MeasurementLoop loop_;
+  std::unique_ptr<EventRecorder> recorder_;
+  LogThread log_;
+  bool wall_;
+  std::vector<int> actuators_;
+  std::vector<RunId> runs_;
+  ExperimentResult result_;
+  std::exception_ptr failure_;
+  SharedProgress progress_;
+  NodeState node_state_ = NodeState::not_ready;  // the reporting thread's
+  std::atomic<bool> abandoned_ = false;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool done_ = false;
+};
+
+}  // namespace
+
+LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
+                            std::string metadata_json) {
+  const double rate_hz = plan.grid().sample_rate_hz();
+  if (std::abs(rate_hz - stage.sample_rate_hz) > 1e-9 * stage.sample_rate_hz) {
+    throw std::invalid_argument(fmt::format(
+        "experiment: designed for {} Hz, the stage runs at {} Hz", rate_hz, stage.sample_rate_hz));
+  }
+  if (stage.maximum_rate_hz > 0.0 && rate_hz > stage.maximum_rate_hz) {
+    throw std::invalid_argument(fmt::format("experiment: {} Hz, but the stage can do {} Hz at most",
+                                            rate_hz, stage.maximum_rate_hz));
+  }
+  LogInfo info;
+  info.sample_rate_hz = rate_hz;
+  info.period_samples = plan.grid().samples_per_period();
+  info.transient_periods = plan.spec().transient_periods;
+  info.actuators = channel_list(stage.actuators);
+  info.sensors = channel_list(stage.sensors);
+  for (const int index : excited_actuators(plan, stage)) {
+    const Channel& actuator = stage.actuators[static_cast<std::size_t>(index)];
+    info.excitation.names.push_back(actuator.name);
+    info.excitation.units.push_back(actuator.unit);
+  }
+  info.metadata_json = std::move(metadata_json);
+  check_log_info(info);
+  return info;
+}
+
+bool RunExperimentOptions::interrupted() const noexcept {
+  return interrupt != nullptr && interrupt->load(std::memory_order_relaxed);
+}
+
+bool RunExperimentOptions::tripped() const noexcept {
+  return plant_tripped != nullptr && plant_tripped->load(std::memory_order_relaxed);
+}
+
+std::string RunExperimentOptions::trip_reason() const {
+  return plant_reason ? plant_reason() : "the plant tripped";
+}
+
+std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept {
+  constexpr std::uint64_t kIncrement = 0x9E3779B97F4A7C15U;
+  const auto step = [](int index) { return kIncrement * (static_cast<std::uint64_t>(index) + 1); };
+  return mix(mix(mix(plan_seed + kIncrement) + step(run.realization)) + step(run.experiment));
+}
+
+ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
+                                MotionController& controller, RunWriter& log,
+                                const RunExperimentOptions& options) {
+  if (!same_measurement(log.info(), experiment_log_info(plan, stage.info()))) {
+    throw std::invalid_argument(
+        "experiment: the log was made for another plan or stage; make it with "
+        "experiment_log_info()");
+  }
+  return Experiment(plan, stage, controller, log, options).perform();
+}
+
+}  // namespace stageid

@@ -1,0 +1,347 @@
+// excitation.h5, an HDF5 file from which any program can play the experiment:
+//
+//   /   attributes: format = "stageid-excitation", format_version = 1, sample_rate_hz,
+//       period_samples, scheme = "single_axis" | "orthogonal_dft" | "orthogonal_hadamard" |
+//       "zippered", scaling = "rms" | "peak", realizations, periods, transient_periods, crest_iterations,
+//       seed (text, decimal: an unsigned 64-bit number fits no signed integer and no double)
+//   /lines         [L] int64    excited lines of the DFT of one period
+//   /frequency_hz  [L]          their frequencies, for reading convenience
+//   /axes          [n] text     excited channels, in the order of all that follows
+//   /level         [n]          rms or peak of each axis (see scaling), unit of the channel
+//   /shape         [n x L]      optional: relative amplitudes as asked for; a row of zeros is flat
+//   /amplitude     [n x L]      A: amplitude of each line of each axis, unit of the channel
+//   /mixing        [n x E] complex   T: factor of axis (row) in experiment (column); E = n,
+//                                    zippered: 1
+//   /realizations/0000, 0001, ...
+//     phase_rad    [n x L]           phi
+//     spectrum     [n x L] complex   X = A / 2 exp(j phi)
+//
+// In realization m and experiment e axis p plays, period by period of N = period_samples,
+//   x(n) = 2 Re sum_k T(p, e) X_m(p, k) exp(2 pi j lines(k) n / N),
+// transient_periods times to settle and then `periods` times to measure.
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/file_kind.hpp"
+#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "excitation/multisine/multisine_lines.hpp"
+#include "excitation/plan/experiment_plan.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+template <typename Value>
+using RowMajor = Eigen::Matrix<Value, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr const char* kFormat = "stageid-excitation";
+constexpr long long kVersion = 1;
+
+struct SchemeName {
+  ExcitationScheme scheme;
+  const char* name;
+};
+constexpr SchemeName kSchemes[] = {{ExcitationScheme::single_axis, "single_axis"},
+                                   {ExcitationScheme::orthogonal_dft, "orthogonal_dft"},
+                                   {ExcitationScheme::orthogonal_hadamard, "orthogonal_hadamard"},
+                                   {ExcitationScheme::zippered, "zippered"}};
+
+std::string realization_group(int realization) {
+  return fmt::format("/realizations/{:04}", realization);
+}
+
+// Writing --------------------------------------------------------------------------------------
+
+void write_matrix(Hdf5File& file, const std::string& dataset, const MatrixXd& matrix) {
+  const RowMajor<double> rows = matrix;
+  file.write_reals(dataset, {static_cast<hsize_t>(rows.rows()), static_cast<hsize_t>(rows.cols())},
+                   rows.data());
+}
+
+void write_matrix(Hdf5File& file, const std::string& dataset, const MatrixXcd& matrix) {
+  const RowMajor<std::complex<double>> rows = matrix;
+  file.write_complex(
+      dataset, {static_cast<hsize_t>(rows.rows()), static_cast<hsize_t>(rows.cols())}, rows.data());
+}
+
+void write_spec(Hdf5File& file, const ExperimentPlan& plan) {
+  const ExperimentSpec& spec = plan.spec();
+  const auto integer = [&file](const char* name, long long value) {
+    file.write_attribute("/", name, value);
+  };
+  file.write_attribute("/", "format", std::string(kFormat));
+  integer("format_version", kVersion);
+  file.write_attribute("/", "sample_rate_hz", plan.grid().sample_rate_hz());
+  integer("period_samples", plan.grid().samples_per_period());
+  for (const SchemeName& entry : kSchemes) {
+    if (entry.scheme == spec.scheme) file.write_attribute("/", "scheme", std::string(entry.name));
+  }
+  const bool rms = spec.scaling == AmplitudeScaling::rms;
+  file.write_attribute("/", "scaling", std::string(rms ? "rms" : "peak"));
+  integer("realizations", spec.realizations);
+  integer("periods", spec.periods);
+  integer("transient_periods", spec.transient_periods);
+  integer("crest_iterations", spec.crest_iterations);
+  file.write_attribute("/", "seed", std::to_string(spec.seed));
+}
+
+void write_axes(Hdf5File& file, const ExperimentPlan& plan) {
+  const FrequencyGrid& grid = plan.grid();
+  const hsize_t lines = grid.lines().size();
+  const std::vector<long long> line_numbers(grid.lines().begin(), grid.lines().end());
+  file.write_integers("/lines", {lines}, line_numbers.data());
+  file.write_reals("/frequency_hz", {lines}, grid.frequency_hz().data());
+
+  std::vector<std::string> channels;
+  std::vector<double> levels;
+  MatrixXd shape = MatrixXd::Zero(plan.axes(), grid.size());
+  for (const ExcitationAxis& axis : plan.spec().axes) {
+    const auto row = static_cast<Index>(channels.size());
+    if (axis.shape.size() > 0) shape.row(row) = axis.shape.transpose();
+    channels.push_back(axis.channel);
+    levels.push_back(axis.level);
+  }
+  file.write_texts("/axes", channels);
+  file.write_reals("/level", {levels.size()}, levels.data());
+  if (!shape.isZero(0.0)) write_matrix(file, "/shape", shape);
+}
+
+MatrixXcd unmixed_spectrum(const MatrixXd& amplitude, const MatrixXd& phase_rad) {
+  MatrixXcd spectrum(amplitude.rows(), amplitude.cols());
+  for (Index p = 0; p < amplitude.rows(); ++p) {
+    spectrum.row(p) =
+        line_coefficients(1.0, amplitude.row(p).transpose(), phase_rad.row(p).transpose())
+            .transpose();
+  }
+  return spectrum;
+}
+
+// Reading --------------------------------------------------------------------------------------
+
+/// An Hdf5File and what reading a plan asks of it.
+class PlanReader {
+ public:
+  explicit PlanReader(const std::filesystem::path& path)
+      : path_(path), file_(Hdf5File::open(path)) {}
+
+  [[noreturn]] void fail(const std::string& place, const std::string& what) const {
+    throw FormatError(path_, place, what);
+  }
+  int integer(const char* name, int least) const {
+    const long long value = file_.read_integer_attribute("/", name);
+    if (value < least || value > std::numeric_limits<int>::max()) {
+      fail("/", fmt::format("attribute '{}' is {}; it must be at least {}", name, value, least));
+    }
+    return static_cast<int>(value);
+  }
+  void expect_shape(const std::string& dataset, const std::vector<hsize_t>& wanted) const {
+    const std::vector<hsize_t> shape = file_.shape(dataset);
+    if (shape != wanted) {
+      fail(dataset, fmt::format("has the shape {}; it must be {}", fmt::join(shape, " x "),
+                                fmt::join(wanted, " x ")));
+    }
+  }
+  MatrixXd reals(const std::string& dataset, Index rows, Index columns) const {
+    expect_shape(dataset, {static_cast<hsize_t>(rows), static_cast<hsize_t>(columns)});
+    const std::vector<double> values = file_.read_reals(dataset);
+    return Eigen::Map<const RowMajor<double>>(values.data(), rows, columns);
+  }
+  MatrixXcd complex(const std::string& dataset, Index rows, Index columns) const {
+    expect_shape(dataset, {static_cast<hsize_t>(rows), static_cast<hsize_t>(columns)});
+    const std::vector<std::complex<double>> values = file_.read_complex(dataset);
+    return Eigen::Map<const RowMajor<std::complex<double>>>(values.data(), rows, columns);
+  }
+
+  void check_format() const;
+  FrequencyGrid grid() const;
+  ExperimentSpec spec(const FrequencyGrid& grid) const;
+  std::vector<MatrixXd> phases(const ExperimentSpec& spec, const FrequencyGrid& grid) const;
+  void check_agrees(const ExperimentPlan& plan) const;
+
+ private:
+  ExcitationScheme scheme() const;
+  std::vector<ExcitationAxis> axes(const FrequencyGrid& grid) const;
+  std::uint64_t seed() const;
+
+  std::filesystem::path path_;
+  Hdf5File file_;
+};
+
+void PlanReader::check_format() const {
+  const bool named = file_.has_attribute("/", "format");
+  const std::string format = named ? file_.read_text_attribute("/", "format") : "";
+  if (format != kFormat) {
+    const std::string other = other_hdf5_kind(format, "a designed excitation");
+    fail("/", other.empty()
+                  ? fmt::format("attribute 'format' is '{}'; it must be '{}'", format, kFormat)
+                  : other);
+  }
+  const long long version = file_.read_integer_attribute("/", "format_version");
+  if (version != kVersion) {
+    fail("/",
+         fmt::format("attribute 'format_version' is {}; this program reads {}", version, kVersion));
+  }
+}
+
+FrequencyGrid PlanReader::grid() const {
+  const std::vector<double> numbers = file_.read_reals("/lines");
+  std::vector<int> lines;
+  for (const double number : numbers) {
+    if (!(number >= 1.0 && number <= std::numeric_limits<int>::max()) ||
+        number != std::floor(number)) {
+      fail("/lines", fmt::format("holds {}; positive integers must stand here", number));
+    }
+    lines.push_back(static_cast<int>(number));
+  }
+  return {file_.read_real_attribute("/", "sample_rate_hz"), integer("period_samples", 3),
+          std::move(lines)};
+}
+
+ExcitationScheme PlanReader::scheme() const {
+  const std::string name = file_.read_text_attribute("/", "scheme");
+  for (const SchemeName& entry : kSchemes) {
+    if (name == entry.name) return entry.scheme;
+  }
+  fail("/", "attribute 'scheme' is '" + name +
+                "'; it must be single_axis, orthogonal_dft, orthogonal_hadamard or zippered");
+}
+
+std::uint64_t PlanReader::seed() const {
+  const std::string text = file_.read_text_attribute("/", "seed");
+  std::uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error != std::errc() || end != text.data() + text.size()) {
+    fail("/", "attribute 'seed' is '" + text + "'; an unsigned decimal number must stand here");
+  }
+  return seed;
+}
+
+std::vector<ExcitationAxis> PlanReader::axes(const FrequencyGrid& grid) const {
+  const std::vector<std::string> channels = file_.read_texts("/axes");
+  const auto count = static_cast<Index>(channels.size());
+  expect_shape("/level", {channels.size()});
+  const std::vector<double> levels = file_.read_reals("/level");
+  const MatrixXd shape = file_.exists("/shape") ? reals("/shape", count, grid.size())
+                                                : MatrixXd::Zero(count, grid.size());
+  std::vector<ExcitationAxis> axes;
+  for (Index p = 0; p < count; ++p) {
+    const auto i = static_cast<std::size_t>(p);
+    axes.push_back({channels[i], levels[i], {}});
+    if (!shape.row(p).isZero(0.0)) axes.back().shape = shape.row(p).transpose();
+  }
+  return axes;
+}
+
+ExperimentSpec PlanReader::spec(const FrequencyGrid& grid) const {
+  const std::string scaling = file_.read_text_attribute("/", "scaling");
+  if (scaling != "rms" && scaling != "peak") {
+    fail("/", "attribute 'scaling' is '" + scaling + "'; it must be rms or peak");
+  }
+  ExperimentSpec spec;
+  spec.scheme = scheme();
+  spec.scaling = scaling == "rms" ? AmplitudeScaling::rms : AmplitudeScaling::peak;
+  spec.axes = axes(grid);
+  spec.realizations = integer("realizations", 1);
+  spec.periods = integer("periods", 1);
+  spec.transient_periods = integer("transient_periods", 0);
+  spec.crest_iterations = integer("crest_iterations", 0);
+  spec.seed = seed();
+  const std::size_t stored = file_.children("/realizations").size();
+  if (stored != static_cast<std::size_t>(spec.realizations)) {
+    fail("/realizations", fmt::format("holds {} realizations; attribute 'realizations' promises {}",
+                                      stored, spec.realizations));
+  }
+  return spec;
+}
+
+std::vector<MatrixXd> PlanReader::phases(const ExperimentSpec& spec,
+                                         const FrequencyGrid& grid) const {
+  const auto axes = static_cast<Index>(spec.axes.size());
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  std::vector<MatrixXd> phases;
+  for (int m = 0; m < spec.realizations; ++m) {
+    const std::string dataset = realization_group(m) + "/phase_rad";
+    phases.push_back(reals(dataset, axes, grid.size()));
+    const auto values = phases.back().array();
+    if (!(values >= 0.0 && values < kTurn).all()) {
+      fail(dataset, "holds phases outside 0 to 2 pi, or NaN; write the file anew");
+    }
+  }
+  return phases;
+}
+
+void PlanReader::check_agrees(const ExperimentPlan& plan) const {
+  // Far above the rounding of another machine's sine and DFT, far below any change that matters.
+  constexpr double kTolerance = 1e-9;
+  const auto check = [this](const auto& stored, const auto& wanted, const std::string& dataset) {
+    const double largest = wanted.cwiseAbs().maxCoeff();
+    const double difference = (stored - wanted).cwiseAbs().maxCoeff();
+    if (!stored.allFinite() || !(difference <= kTolerance * largest)) {
+      fail(dataset,
+           "does not follow from the seed and the other fields of this file; "
+           "it was altered or is damaged: design the experiment anew");
+    }
+  };
+  const Index axes = plan.axes();
+  const Index lines = plan.grid().size();
+  check(reals("/amplitude", axes, lines), plan.amplitude(), "/amplitude");
+  check(complex("/mixing", axes, plan.experiments()), plan.mixing(), "/mixing");
+  for (int m = 0; m < plan.spec().realizations; ++m) {
+    const std::string group = realization_group(m);
+    const MatrixXd phase_rad = plan.phase_rad(m);
+    check(reals(group + "/phase_rad", axes, lines), phase_rad, group + "/phase_rad");
+    check(complex(group + "/spectrum", axes, lines), unmixed_spectrum(plan.amplitude(), phase_rad),
+          group + "/spectrum");
+  }
+}
+
+}  // namespace
+
+void write_experiment_plan(const std::filesystem::path& file, const ExperimentPlan& plan) {
+  OutputFile output(file);
+  Hdf5File hdf5 = Hdf5File::create(output.path(), file);
+  write_spec(hdf5, plan);
+  write_axes(hdf5, plan);
+  write_matrix(hdf5, "/amplitude", plan.amplitude());
+  write_matrix(hdf5, "/mixing", plan.mixing());
+  for (int m = 0; m < plan.spec().realizations; ++m) {
+    const std::string group = realization_group(m);
+    const MatrixXd phase_rad = plan.phase_rad(m);
+    hdf5.create_group(group);
+    write_matrix(hdf5, group + "/phase_rad", phase_rad);
+    write_matrix(hdf5, group + "/spectrum", unmixed_spectrum(plan.amplitude(), phase_rad));
+  }
+  hdf5.close();
+  output.commit();
+}
+
+ExperimentPlan read_experiment_plan(const std::filesystem::path& file) {
+  const PlanReader reader(file);
+  reader.check_format();
+  try {
+    FrequencyGrid grid = reader.grid();
+    ExperimentSpec spec = reader.spec(grid);
+    // Reduced phases are the outcome of hundreds of transforms: the file is the authority, because
+    // another machine's rounding may have led elsewhere.
+    std::vector<MatrixXd> reduced;
+    if (spec.crest_iterations > 0) reduced = reader.phases(spec, grid);
+    ExperimentPlan plan(std::move(grid), std::move(spec), std::move(reduced));
+    reader.check_agrees(plan);
+    return plan;
+  } catch (const std::invalid_argument& e) {
+    throw FormatError(file, "", std::string(e.what()) + "; design the experiment anew");
+  }
+}
+
+}  // namespace stageid

@@ -1,0 +1,78 @@
+#include "acquisition/record/log_checks.hpp"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
+
+namespace stageid {
+
+void check_runs(const std::filesystem::path& file, const LogInfo& info,
+                const std::vector<LogRun>& runs) {
+  const auto period = static_cast<std::uint64_t>(info.period_samples);
+  const auto transient = static_cast<std::uint64_t>(info.transient_periods);
+  std::map<std::pair<int, int>, std::string> seen;
+  for (const LogRun& run : runs) {
+    if (!run.complete) continue;
+    const std::string place = "/runs/" + run.name;
+    if (run.samples % period != 0 || run.samples / period <= transient) {
+      throw FormatError(
+          file, place,
+          fmt::format("has {}; {} and one or more further periods of {} each are wanted",
+                      counted(run.samples, "sample"), counted(transient, "transient period"),
+                      counted(period, "sample")));
+    }
+    if (run.realization < 0 || run.experiment < 0) {
+      throw FormatError(file, place,
+                        fmt::format("is realization {}, experiment {}; both count from 0",
+                                    run.realization, run.experiment));
+    }
+    const auto [other, is_new] = seen.insert({{run.realization, run.experiment}, run.name});
+    if (!is_new) {
+      throw FormatError(file, place,
+                        fmt::format("is realization {}, experiment {}, as is run {}; each may be "
+                                    "there once",
+                                    run.realization, run.experiment, other->second));
+    }
+  }
+}
+
+void check_run_index(const std::filesystem::path& file, const std::vector<LogRun>& runs,
+                     std::size_t run) {
+  if (run < runs.size()) return;
+  throw std::invalid_argument(fmt::format(
+      "{}: run number {} was asked for; there are {}, from 0 on", file.string(), run, runs.size()));
+}
+
+void check_row_range(const std::filesystem::path& file, const LogRun& run, std::uint64_t first,
+                     std::uint64_t count) {
+  if (first <= run.samples && count <= run.samples - first) return;
+  throw std::invalid_argument(
+      fmt::format("{}: {} rows from row {} of run {} were asked for; it has {}", file.string(),
+                  count, first, run.name, run.samples));
+}
+
+void resize_samples(const LogInfo& info, std::uint64_t count, LogSamples& out) {
+  const auto rows = static_cast<Eigen::Index>(count);
+  out.actuators.resize(rows, static_cast<Eigen::Index>(info.actuators.size()));
+  out.sensors.resize(rows, static_cast<Eigen::Index>(info.sensors.size()));
+  out.marked.resize(rows);
+}
+
+void throw_not_finite(const std::filesystem::path& file, const LogInfo& info, const LogRun& run,
+                      std::uint64_t row, std::size_t channel) {
+  const std::size_t actuators = info.actuators.size();
+  const bool is_actuator = channel < actuators;
+  const std::string& name =
+      is_actuator ? info.actuators.names[channel] : info.sensors.names[channel - actuators];
+  throw FormatError(file, "/runs/" + run.name,
+                    fmt::format("row {} of {} '{}' is not a finite number; mark or repair the "
+                                "sample, or leave the run out",
+                                row, is_actuator ? "actuator" : "sensor", name));
+}
+
+}  // namespace stageid

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "acquisition/record/log_info.hpp"
+
+namespace stageid {
+
+/// Where the runs of an experiment go, row by row: a file (SlogWriter), or memory.
+class RunWriter {
+ public:
+  virtual ~RunWriter() = default;
+
+  virtual const LogInfo& info() const noexcept = 0;
+  /// Starts a run; `excitation` is one period, period_samples x excitation channels.
+  /// This and the functions below throw what fails where the rows go; no further run is then written.
+  virtual void begin_run(const LogRun& run,
+                         const Eigen::Ref<const Eigen::MatrixXd>& excitation) = 0;
+  /// Rows of actuators + sensors + status word, row-major (slog_format.hpp).
+  virtual void write(std::span<const double> rows) = 0;
+  /// Ends the run; `complete` in `run` says whether it may be used, `health` how it went.
+  virtual void end_run(const LogRun& run) = 0;
+  /// Brings everything written to the medium, if there is one.
+  virtual void synchronize() = 0;
+
+ protected:
+  RunWriter() = default;
+  RunWriter(const RunWriter&) = default;
+  RunWriter& operator=(const RunWriter&) = default;
+  RunWriter(RunWriter&&) = default;
+  RunWriter& operator=(RunWriter&&) = default;
+};
+
+}  // namespace stageid

@@ -1,0 +1,237 @@
+#include "acquisition/slog/slog_index.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <string_view>
+
+#include "acquisition/files/file_error.hpp"
+
+namespace stageid {
+
+namespace {
+
+/// Follows the blocks in order and books each where it belongs.
+class Indexer {
+ public:
+  Indexer(const SlogSource& source, const SlogScan& scan) : source_(source), scan_(scan) {
+    index_.damage = scan.damage;
+    index_.log_id = scan.log_id;
+    index_.blocks = scan.blocks.size();
+    next_damage_ = scan.damage.begin();
+  }
+
+  SlogIndex run() {
+    read_info();
+    for (const SlogBlock& block : scan_.blocks) {
+      if (passes_damage(block)) close_run();
+      try {
+        take(block);
+      } catch (const std::invalid_argument& error) {
+        book_damage(block, error.what());
+      } catch (const FormatError&) {  // only the payload: the scan looked at headers alone
+        book_damage(block, "its payload is damaged");
+      }
+    }
+    close_run();
+    index_.next_sequence = scan_.blocks.back().header.sequence + 1;
+    std::stable_sort(index_.damage.begin(), index_.damage.end(),
+                     [](const LogDamage& a, const LogDamage& b) { return a.offset < b.offset; });
+    return std::move(index_);
+  }
+
+ private:
+  /// Any intact copy of the description will do; they are all the same.
+  void read_info() {
+    for (const SlogBlock& block : scan_.blocks) {
+      if (!block.header.is(SlogBlockType::log) || !payload_intact(source_, block)) continue;
+      try {
+        index_.info = parse_log_info(json(block));
+        return;
+      } catch (const std::invalid_argument& error) {
+        throw FormatError(source_.path(), "", error.what());
+      }
+    }
+    throw FormatError(source_.path(), "",
+                      "no description of the log (channels, rate) is left; nothing can be read");
+  }
+
+  std::string json(const SlogBlock& block) const {
+    const std::vector<std::byte> payload = read_payload(source_, block);
+    return {reinterpret_cast<const char*>(payload.data()), payload.size()};
+  }
+
+  void book_damage(const SlogBlock& block, const std::string& wrong) {
+    index_.damage.push_back(
+        {block.offset, slog_block_bytes(block.header), describe(block) + ": " + wrong});
+    close_run();
+  }
+
+  /// True if a damaged stretch lies between the last block and this one.
+  bool passes_damage(const SlogBlock& block) {
+    bool passed = false;
+    for (; next_damage_ != scan_.damage.end() && next_damage_->offset <= block.offset;
+         ++next_damage_) {
+      passed = true;
+    }
+    return passed;
+  }
+
+  void take(const SlogBlock& block) {
+    index_.end.reset();  // only the last block of all counts as the end
+    const bool within_run = block.header.is(SlogBlockType::excitation) ||
+                            block.header.is(SlogBlockType::samples) ||
+                            block.header.is(SlogBlockType::run_end);
+    if (within_run && !open_ && !index_.damage.empty()) return;  // said once, not a thousand times
+    switch (static_cast<SlogBlockType>(block.header.type)) {
+      case SlogBlockType::log:
+        if (!same_measurement(parse_log_info(json(block)), index_.info)) {
+          throw std::invalid_argument("describes another measurement than the first one");
+        }
+        return;
+      case SlogBlockType::run_begin:
+        return begin_run(block);
+      case SlogBlockType::excitation:
+        return take_excitation(block);
+      case SlogBlockType::samples:
+        return take_samples(block);
+      case SlogBlockType::run_end:
+        return end_run(block);
+      case SlogBlockType::end:
+        close_run();
+        index_.end = parse_end(json(block));
+        return;
+    }
+    throw std::invalid_argument(fmt::format("is of the unknown type {}", block.header.type));
+  }
+
+  void begin_run(const SlogBlock& block) {
+    close_run();
+    SlogRunBegin begin = parse_run_begin(json(block));
+    const std::vector<int>& columns = begin.excitation_columns;
+    const bool increasing =
+        std::adjacent_find(columns.begin(), columns.end(), std::greater_equal<>()) == columns.end();
+    if (!increasing ||
+        (!columns.empty() && (columns.front() < 0 || static_cast<std::size_t>(columns.back()) >=
+                                                         index_.info.excitation.size()))) {
+      throw std::invalid_argument("names excitation channels that the log does not have");
+    }
+    if (block.header.run < index_.runs.size()) {
+      throw std::invalid_argument(
+          fmt::format("starts run {} a second time", slog_run_name(block.header.run)));
+    }
+    SlogRunIndex run;
+    run.run.name = slog_run_name(block.header.run);
+    run.run.realization = begin.realization;
+    run.run.experiment = begin.experiment;
+    run.run.started_utc = std::move(begin.started_utc);
+    run.run.complete = false;
+    run.excitation_columns = std::move(begin.excitation_columns);
+    index_.runs.push_back(std::move(run));
+    number_ = block.header.run;
+    open_ = true;
+  }
+
+  SlogRunIndex& open_run(const SlogBlock& block) {
+    if (!open_ || block.header.run != number_) {
+      throw std::invalid_argument(
+          fmt::format("belongs to run {}, which is not open", slog_run_name(block.header.run)));
+    }
+    return index_.runs.back();
+  }
+
+  void take_excitation(const SlogBlock& block) {
+    SlogRunIndex& run = open_run(block);
+    const SlogBlockHeader& header = block.header;
+    if (run.excitation || !run.samples.empty() ||
+        header.rows != static_cast<std::uint32_t>(index_.info.period_samples) ||
+        header.cols != run.excitation_columns.size() ||
+        header.payload_bytes != std::uint64_t{8} * header.rows * header.cols) {
+      throw std::invalid_argument("does not fit the run's start");
+    }
+    run.excitation = block;
+  }
+
+  void take_samples(const SlogBlock& block) {
+    SlogRunIndex& run = open_run(block);
+    const SlogBlockHeader& header = block.header;
+    if (header.cols != slog_row_words(index_.info) || header.rows == 0 ||
+        header.payload_bytes != std::uint64_t{8} * header.rows * header.cols) {
+      throw std::invalid_argument("has another number of words a row than the log has channels");
+    }
+    if (header.first_row != run.run.samples) {
+      throw std::invalid_argument(fmt::format("starts with row {} where row {} should follow",
+                                              header.first_row, run.run.samples));
+    }
+    run.run.samples += header.rows;
+    run.samples.push_back(block);
+  }
+
+  void end_run(const SlogBlock& block) {
+    SlogRunIndex& run = open_run(block);
+    const SlogRunEnd end = parse_run_end(json(block));
+    if (end.samples != run.run.samples || end.realization != run.run.realization ||
+        end.experiment != run.run.experiment) {
+      throw std::invalid_argument(
+          fmt::format("ends {} rows where {} were written", end.samples, run.run.samples));
+    }
+    if (end.complete && !run.excitation && !run.excitation_columns.empty()) {
+      throw std::invalid_argument("the run's excitation is missing");
+    }
+    run.run.complete = end.complete;
+    run.run.health = end.health;
+    run.run.timing = end.timing;
+    run.ended = true;
+    open_ = false;
+  }
+
+  void close_run() noexcept { open_ = false; }
+
+  const SlogSource& source_;
+  const SlogScan& scan_;
+  SlogIndex index_;
+  std::vector<LogDamage>::const_iterator next_damage_;
+  std::uint32_t number_ = 0;
+  bool open_ = false;
+};
+
+}  // namespace
+
+SlogIndex index_slog(const SlogSource& source, const SlogScan& scan) {
+  return Indexer(source, scan).run();
+}
+
+std::uint32_t slog_row_words(const LogInfo& info) noexcept {
+  return static_cast<std::uint32_t>(info.actuators.size() + info.sensors.size() + 1);
+}
+
+std::string slog_run_name(std::size_t index) { return fmt::format("{:04}", index); }
+
+Eigen::MatrixXd read_slog_excitation(const SlogSource& source, const LogInfo& info,
+                                     const SlogRunIndex& run) {
+  if (!run.excitation && !run.excitation_columns.empty()) {
+    throw FormatError(
+        source.path(), "",
+        fmt::format("the excitation of run {} is missing; leave this run out", run.run.name));
+  }
+  Eigen::MatrixXd excitation =
+      Eigen::MatrixXd::Zero(info.period_samples, static_cast<Eigen::Index>(info.excitation.size()));
+  if (!run.excitation) return excitation;
+  const std::vector<std::byte> payload = read_payload(source, *run.excitation);
+  const std::size_t column_bytes = sizeof(double) * static_cast<std::size_t>(info.period_samples);
+  for (std::size_t k = 0; k < run.excitation_columns.size(); ++k) {
+    std::memcpy(excitation.col(run.excitation_columns[k]).data(), payload.data() + k * column_bytes,
+                column_bytes);
+  }
+  if (!excitation.allFinite()) {
+    throw FormatError(
+        source.path(), "",
+        fmt::format("the excitation of run {} holds a value that is not finite", run.run.name));
+  }
+  return excitation;
+}
+
+}  // namespace stageid

@@ -1,0 +1,171 @@
+#include "acquisition/slog/slog_json.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace stageid {
+
+namespace {
+
+using Json = nlohmann::ordered_json;  // keeps the order of keys: metadata come back as they went in
+
+std::string text_of(const Json& json) {
+  try {
+    return json.dump();
+  } catch (const Json::exception&) {
+    throw std::invalid_argument("log: a name, unit or message is not UTF-8 text");
+  }
+}
+
+/// Parses, and turns the library's errors into one line of ours.
+template <typename Read>
+auto parse(std::string_view text, const char* what, Read read) {
+  try {
+    return read(Json::parse(text));
+  } catch (const Json::exception&) {
+    throw std::invalid_argument(fmt::format("the {} is not as stageid writes it", what));
+  }
+}
+
+Json json_of(const ChannelList& channels) {
+  return {{"names", channels.names}, {"units", channels.units}};
+}
+
+ChannelList channels_of(const Json& json) {
+  return {json.at("names").get<std::vector<std::string>>(),
+          json.at("units").get<std::vector<std::string>>()};
+}
+
+/// [[from_ns, to_ns, count], ...] of the bins that hold something.
+Json json_of(const TimingHistogram& histogram) {
+  Json bins = Json::array();
+  for (std::size_t bin = 0; bin < TimingHistogram::kBins; ++bin)
+    if (histogram.count(bin) > 0)
+      bins.push_back(
+          {TimingHistogram::lower_ns(bin), TimingHistogram::upper_ns(bin), histogram.count(bin)});
+  return bins;
+}
+
+TimingHistogram histogram_of(const Json& json) {
+  TimingHistogram histogram;
+  for (const Json& bin : json) {
+    const auto lower = bin.at(0).get<std::uint64_t>();
+    if (lower > 0xFFFF'FFFF || TimingHistogram::lower_ns(TimingHistogram::bin_of(
+                                   static_cast<std::uint32_t>(lower))) != lower)
+      throw std::invalid_argument(
+          fmt::format("end of a run: no bin of a timing histogram begins at {} ns", lower));
+    histogram.add_bin(TimingHistogram::bin_of(static_cast<std::uint32_t>(lower)),
+                      bin.at(2).get<std::uint64_t>());
+  }
+  return histogram;
+}
+
+Json json_of(const RunTiming& timing) {
+  return {{"execution", json_of(timing.execution)},
+          {"lateness", json_of(timing.lateness)},
+          {"skipped", timing.skipped}};
+}
+
+RunTiming timing_of(const Json& json) {
+  return {histogram_of(json.at("execution")), histogram_of(json.at("lateness")),
+          json.at("skipped").get<std::uint64_t>()};
+}
+
+}  // namespace
+
+std::string to_json(const LogInfo& info) {
+  Json metadata;
+  try {
+    metadata = Json::parse(info.metadata_json);
+  } catch (const Json::exception&) {
+    throw std::invalid_argument("log: metadata_json is not valid JSON");
+  }
+  return text_of({{"sample_rate_hz", info.sample_rate_hz},
+                  {"period_samples", info.period_samples},
+                  {"transient_periods", info.transient_periods},
+                  {"excitation", json_of(info.excitation)},
+                  {"actuators", json_of(info.actuators)},
+                  {"sensors", json_of(info.sensors)},
+                  {"metadata", metadata}});
+}
+
+LogInfo parse_log_info(std::string_view text) {
+  LogInfo info = parse(text, "log description", [](const Json& json) {
+    LogInfo read;
+    read.sample_rate_hz = json.at("sample_rate_hz").get<double>();
+    read.period_samples = json.at("period_samples").get<int>();
+    read.transient_periods = json.at("transient_periods").get<int>();
+    read.excitation = channels_of(json.at("excitation"));
+    read.actuators = channels_of(json.at("actuators"));
+    read.sensors = channels_of(json.at("sensors"));
+    read.metadata_json = json.at("metadata").dump();
+    return read;
+  });
+  check_log_info(info);
+  return info;
+}
+
+std::string to_json(const SlogRunBegin& begin) {
+  return text_of({{"realization", begin.realization},
+                  {"experiment", begin.experiment},
+                  {"started_utc", begin.started_utc},
+                  {"excitation_columns", begin.excitation_columns}});
+}
+
+SlogRunBegin parse_run_begin(std::string_view text) {
+  return parse(text, "start of a run", [](const Json& json) {
+    return SlogRunBegin{json.at("realization").get<int>(), json.at("experiment").get<int>(),
+                        json.at("started_utc").get<std::string>(),
+                        json.at("excitation_columns").get<std::vector<int>>()};
+  });
+}
+
+std::string to_json(const SlogRunEnd& end) {
+  const RunHealth& health = end.health;
+  Json json = {{"realization", end.realization},
+               {"experiment", end.experiment},
+               {"samples", end.samples},
+               {"complete", end.complete},
+               {"health",
+                {{"cycles", health.cycles},
+                 {"late", health.late},
+                 {"missing", health.missing},
+                 {"marked", health.marked},
+                 {"largest_lateness_ns", health.largest_lateness_ns},
+                 {"seconds", health.seconds}}}};
+  if (!end.timing.empty()) json["timing"] = json_of(end.timing);
+  return text_of(json);
+}
+
+SlogRunEnd parse_run_end(std::string_view text) {
+  return parse(text, "end of a run", [](const Json& json) {
+    const Json& health = json.at("health");
+    SlogRunEnd end;
+    end.realization = json.at("realization").get<int>();
+    end.experiment = json.at("experiment").get<int>();
+    end.samples = json.at("samples").get<std::uint64_t>();
+    end.complete = json.at("complete").get<bool>();
+    end.health.cycles = health.at("cycles").get<std::uint64_t>();
+    end.health.late = health.at("late").get<std::uint64_t>();
+    end.health.missing = health.at("missing").get<std::uint64_t>();
+    end.health.marked = health.at("marked").get<std::uint64_t>();
+    end.health.largest_lateness_ns = health.at("largest_lateness_ns").get<std::int64_t>();
+    end.health.seconds = health.at("seconds").get<double>();
+    if (json.contains("timing")) end.timing = timing_of(json.at("timing"));
+    return end;
+  });
+}
+
+std::string to_json(const SlogEnd& end) {
+  return text_of({{"exit_code", end.exit_code}, {"message", end.message}});
+}
+
+SlogEnd parse_end(std::string_view text) {
+  return parse(text, "end of the log", [](const Json& json) {
+    return SlogEnd{json.at("exit_code").get<int>(), json.at("message").get<std::string>()};
+  });
+}
+
+}  // namespace stageid

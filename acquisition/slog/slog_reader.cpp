@@ -1,0 +1,140 @@
+#include "acquisition/slog/slog_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/record/log_checks.hpp"
+#include "acquisition/record/row_transpose.hpp"
+#include "acquisition/slog/crc32c.hpp"
+
+namespace stageid {
+
+namespace {
+
+// A piece is read, checked and transposed while it is in the second-level cache.
+constexpr std::size_t kPieceBytes = std::size_t{1} << 17;
+
+}  // namespace
+
+/// The rows asked for, and where they go.
+struct SlogReader::Target {
+  std::uint64_t first;
+  std::uint64_t end;
+  LogSamples& out;
+};
+
+SlogReader::SlogReader(const std::filesystem::path& file, bool damaged_is_error,
+                       SlogScanDepth depth)
+    : source_(file) {
+  index_ = index_slog(source_, scan_slog(source_, depth));
+  if (damaged_is_error && !index_.damage.empty()) {
+    const LogDamage& first = index_.damage.front();
+    throw FormatError(file, "",
+                      fmt::format("damaged at byte {}: {}; 'stageid log recover' gives back what "
+                                  "is intact",
+                                  first.offset, first.what));
+  }
+  if (damaged_is_error && !index_.end) {
+    throw FormatError(file, "",
+                      "was not closed: its writer died or is still writing; continue it with "
+                      "--resume, or 'stageid log recover' it");
+  }
+  for (const SlogRunIndex& run : index_.runs) runs_.push_back(run.run);
+  check_runs(file, index_.info, runs_);
+}
+
+const SlogRunIndex& SlogReader::run_index(std::size_t run) const {
+  check_run_index(path(), runs_, run);
+  return index_.runs[run];
+}
+
+Eigen::MatrixXd SlogReader::excitation(std::size_t run) const {
+  return read_slog_excitation(source_, index_.info, run_index(run));
+}
+
+void SlogReader::read(std::size_t run, std::uint64_t first, std::uint64_t count,
+                      LogSamples& out) const {
+  const SlogRunIndex& from = run_index(run);
+  check_row_range(path(), from.run, first, count);
+  resize_samples(index_.info, count, out);
+  if (count == 0) return;
+  const auto starts_behind = [](std::uint64_t row, const SlogBlock& block) {
+    return row < block.header.first_row;
+  };
+  auto block = std::upper_bound(from.samples.begin(), from.samples.end(), first, starts_behind);
+  if (block != from.samples.begin()) --block;
+  for (; block != from.samples.end() && block->header.first_row < first + count; ++block) {
+    read_block(from, *block, {first, first + count, out});
+  }
+}
+
+void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
+                            const Target& target) const {
+  const std::size_t words = block.header.cols;
+  const std::size_t actuators = index_.info.actuators.size();
+  const std::size_t sensors = index_.info.sensors.size();
+  const std::size_t row_bytes = words * sizeof(double);
+  const std::uint64_t padded = slog_padded(block.header.payload_bytes);
+  // Whole rows that are a multiple of 64 bytes, so that only the last piece has padding.
+  const std::size_t piece_rows = std::max<std::size_t>(8, kPieceBytes / row_bytes / 8 * 8);
+  const auto stride = static_cast<std::size_t>(target.end - target.first);
+  const auto piece = std::make_unique_for_overwrite<double[]>(piece_rows * words);
+
+  std::uint32_t crc = 0;
+  std::uint64_t done = 0;
+  for (std::uint64_t row = block.header.first_row; done < padded; row += piece_rows) {
+    const auto size =
+        static_cast<std::size_t>(std::min<std::uint64_t>(piece_rows * row_bytes, padded - done));
+    source_.read(block.payload_offset() + done, piece.get(), size);
+    crc = crc32c({reinterpret_cast<const std::byte*>(piece.get()), size}, crc);
+    done += size;
+
+    const std::uint64_t block_end = block.header.first_row + block.header.rows;
+    const std::uint64_t from = std::max(row, target.first);
+    const std::uint64_t end = std::min({row + piece_rows, block_end, target.end});
+    if (from >= end) continue;
+    const double* rows = piece.get() + static_cast<std::size_t>(from - row) * words;
+    const auto count = static_cast<std::size_t>(end - from);
+    const auto to = static_cast<std::size_t>(from - target.first);
+    const bool finite =
+        transpose_rows(rows, words, count, actuators, target.out.actuators.data() + to, stride) &
+        transpose_rows(rows + actuators, words, count, sensors, target.out.sensors.data() + to,
+                       stride);
+    for (std::size_t r = 0; r < count; ++r) {
+      std::uint64_t status = 0;
+      std::memcpy(&status, rows + r * words + words - 1, sizeof status);
+      target.out.marked[static_cast<Eigen::Index>(to + r)] = (status & kSlogMarkedBit) != 0;
+    }
+    if (!finite) {
+      if (!payload_intact(source_, block)) break;  // damage first: it is the cause
+      report_not_finite(run, rows, from, count);
+    }
+  }
+  if (done < padded || crc != block.header.payload_crc) {
+    throw FormatError(path(), "",
+                      fmt::format("run {}, rows {} to {}: the payload of {} is damaged; 'stageid "
+                                  "log recover' gives back what is intact",
+                                  run.run.name, block.header.first_row,
+                                  block.header.first_row + block.header.rows - 1, describe(block)));
+  }
+}
+
+void SlogReader::report_not_finite(const SlogRunIndex& run, const double* rows,
+                                   std::uint64_t first_row, std::size_t count) const {
+  const std::size_t words = slog_row_words(index_.info);
+  for (std::size_t r = 0; r < count; ++r) {
+    for (std::size_t c = 0; c + 1 < words; ++c) {
+      if (std::isfinite(rows[r * words + c])) continue;
+      throw_not_finite(path(), index_.info, run.run, first_row + r, c);
+    }
+  }
+  throw std::logic_error("a value that is not finite was seen and not found again");
+}
+
+}  // namespace stageid

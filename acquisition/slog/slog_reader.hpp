@@ -1,0 +1,48 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "acquisition/slog/slog_index.hpp"
+
+namespace stageid {
+
+/// Reads the native log. Opening reads block headers only; read() checks the CRC of every block
+/// that it touches, wholly. All functions may be called from several threads at once.
+class SlogReader final : public LogReader {
+ public:
+  /// See open_log(). With SlogScanDepth::payloads every byte is read and checked here.
+  /// @throws FileError, FormatError
+  explicit SlogReader(const std::filesystem::path& file, bool damaged_is_error = true,
+                      SlogScanDepth depth = SlogScanDepth::headers);
+
+  const std::filesystem::path& path() const noexcept override { return source_.path(); }
+  const LogInfo& info() const noexcept override { return index_.info; }
+  const std::vector<LogRun>& runs() const noexcept override { return runs_; }
+  Eigen::MatrixXd excitation(std::size_t run) const override;
+  void read(std::size_t run, std::uint64_t first, std::uint64_t count,
+            LogSamples& out) const override;
+
+  /// What is damaged; empty unless opened with damaged_is_error = false.
+  const std::vector<LogDamage>& damage() const noexcept { return index_.damage; }
+
+  std::uint64_t intact_blocks() const noexcept { return index_.blocks; }
+
+  /// Exit status and message of the experiment, if the log was closed properly.
+  const std::optional<SlogEnd>& end() const noexcept { return index_.end; }
+
+ private:
+  struct Target;
+  const SlogRunIndex& run_index(std::size_t run) const;
+  void read_block(const SlogRunIndex& run, const SlogBlock& block, const Target& target) const;
+  [[noreturn]] void report_not_finite(const SlogRunIndex& run, const double* rows,
+                                      std::uint64_t first_row, std::size_t count) const;
+
+  SlogSource source_;
+  SlogIndex index_;
+  std::vector<LogRun> runs_;
+};
+
+}  // namespace stageid

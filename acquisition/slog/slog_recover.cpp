@@ -1,0 +1,239 @@
+#include "acquisition/slog/slog_recover.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "acquisition/slog/slog_appender.hpp"
+#include "acquisition/slog/slog_index.hpp"
+#include "acquisition/slog/slog_json.hpp"
+#include "acquisition/slog/slog_scan.hpp"
+
+namespace stageid {
+
+namespace {
+
+constexpr std::uint32_t kFillRows = 1024;
+
+/// Copies intact blocks to a new log and closes the gaps that others have left.
+class Recovery {
+ public:
+  Recovery(const SlogSource& source, const std::filesystem::path& to)
+      : source_(source),
+        scan_(scan_slog(source, SlogScanDepth::payloads)),
+        info_(index_slog(source, scan_).info),
+        out_(SlogAppender::create(to)) {}
+
+  RecoverReport run() {
+    // The first block must describe the log, whatever the first intact one of the old log is.
+    append_json(SlogBlockType::log, to_json(info_), 0);
+    for (const SlogBlock& block : scan_.blocks) {
+      try {
+        take(block);
+      } catch (const std::invalid_argument&) {
+        lose(block);  // intact, but written by something that is not this program
+      }
+    }
+    close_run();
+    if (!ended_) {
+      append_json(SlogBlockType::end,
+                  to_json(SlogEnd{1, "recovered: the writer had not closed the log"}), 0);
+    }
+    out_.close();
+    count_losses();
+    return std::move(report_);
+  }
+
+ private:
+  /// The run that is being copied.
+  struct Run {
+    std::uint32_t number = 0;  ///< in the old log
+    SlogRunBegin begin;
+    std::uint64_t rows = 0;
+    bool usable = true;  ///< its start and excitation are there
+    bool excitation = false;
+    RunHealth health;
+    RunTiming timing;
+  };
+
+  void take(const SlogBlock& block) {
+    ++report_.blocks_kept;
+    ended_ = false;
+    switch (static_cast<SlogBlockType>(block.header.type)) {
+      case SlogBlockType::log:
+        return;  // written anew in front of every run
+      case SlogBlockType::run_begin:
+        return begin_run(block.header.run, parse_run_begin(json(block)), block);
+      case SlogBlockType::excitation:
+        return copy_excitation(block);
+      case SlogBlockType::samples:
+        return copy_samples(block);
+      case SlogBlockType::run_end:
+        return end_run(block);
+      case SlogBlockType::end:
+        close_run();
+        append_json(SlogBlockType::end, json(block), block.header.time_ns);
+        ended_ = true;
+        return;
+    }
+    --report_.blocks_kept;
+  }
+
+  std::string json(const SlogBlock& block) const {
+    const std::vector<std::byte> payload = read_payload(source_, block);
+    return {reinterpret_cast<const char*>(payload.data()), payload.size()};
+  }
+
+  SlogBlockHeader header(SlogBlockType type, std::int64_t time_ns) const {
+    SlogBlockHeader made;
+    made.type = static_cast<std::uint16_t>(type);
+    made.run = run_ ? static_cast<std::uint32_t>(report_.runs - 1) : 0U;
+    made.time_ns = time_ns;
+    return made;
+  }
+
+  void append_json(SlogBlockType type, const std::string& text, std::int64_t time_ns) {
+    out_.append(header(type, time_ns), text);
+  }
+
+  void begin_run(std::uint32_t number, SlogRunBegin begin, const SlogBlock& block) {
+    close_run();
+    append_json(SlogBlockType::log, to_json(info_), block.header.time_ns);
+    run_ = Run{};
+    run_->number = number;
+    run_->begin = std::move(begin);
+    ++report_.runs;
+    append_json(SlogBlockType::run_begin, to_json(run_->begin), block.header.time_ns);
+  }
+
+  /// Blocks of a run whose start is lost go to a run that says so: realization -1, incomplete.
+  void open_orphan(const SlogBlock& block) {
+    if (run_ && run_->number == block.header.run) return;
+    SlogRunBegin begin;
+    begin.realization = -1;
+    begin.experiment = -1;
+    begin_run(block.header.run, std::move(begin), block);
+    run_->usable = false;
+  }
+
+  void copy_excitation(const SlogBlock& block) {
+    const bool fits = run_ && run_->number == block.header.run && run_->rows == 0 &&
+                      block.header.cols == run_->begin.excitation_columns.size();
+    if (!fits) return lose(block);
+    copy(block, block.header.first_row);
+    run_->excitation = true;
+  }
+
+  void copy_samples(const SlogBlock& block) {
+    if (block.header.cols != slog_row_words(info_)) return lose(block);
+    open_orphan(block);
+    if (block.header.first_row < run_->rows || !fill(block.header.first_row)) return lose(block);
+    copy(block, run_->rows);
+    run_->rows += block.header.rows;
+    report_.rows_kept += block.header.rows;
+  }
+
+  void end_run(const SlogBlock& block) {
+    const SlogRunEnd end = parse_run_end(json(block));
+    open_orphan(block);
+    const bool whole = end.samples >= run_->rows && fill(end.samples);
+    run_->health = end.health;
+    run_->timing = end.timing;
+    close_run(end.complete && whole, block.header.time_ns);
+  }
+
+  void close_run(bool complete = false, std::int64_t time_ns = 0) {
+    if (!run_) return;
+    const bool excited = run_->excitation || run_->begin.excitation_columns.empty();
+    const bool usable = complete && run_->usable && excited;
+    report_.complete_runs += usable ? 1 : 0;
+    run_->health.marked += filled_;
+    append_json(SlogBlockType::run_end,
+                to_json(SlogRunEnd{run_->begin.realization, run_->begin.experiment, run_->rows,
+                                   usable, run_->health, run_->timing}),
+                time_ns);
+    report_.rows_lost += filled_;
+    filled_ = 0;
+    run_.reset();
+  }
+
+  /// Marked rows of zeros up to `row`; false if there can never have been that many.
+  bool fill(std::uint64_t row) {
+    const std::uint32_t words = slog_row_words(info_);
+    const std::uint64_t missing = row - run_->rows;
+    if (missing > scan_.file_bytes) return false;
+    std::vector<double> rows(std::size_t{words} * kFillRows, 0.0);
+    const std::uint64_t status = pack_status({0, true, 0});
+    for (std::size_t r = 0; r < kFillRows; ++r) {
+      rows[(r + 1) * words - 1] = std::bit_cast<double>(status);
+    }
+    while (run_->rows < row) {
+      SlogBlockHeader made = header(SlogBlockType::samples, 0);
+      made.cols = words;
+      made.rows = static_cast<std::uint32_t>(std::min<std::uint64_t>(kFillRows, row - run_->rows));
+      made.first_row = run_->rows;
+      out_.append(made, std::as_bytes(std::span(rows).first(std::size_t{made.rows} * words)));
+      run_->rows += made.rows;
+    }
+    filled_ += missing;
+    return true;
+  }
+
+  void copy(const SlogBlock& block, std::uint64_t first_row) {
+    SlogBlockHeader made =
+        header(static_cast<SlogBlockType>(block.header.type), block.header.time_ns);
+    made.cols = block.header.cols;
+    made.rows = block.header.rows;
+    made.first_row = first_row;
+    out_.append(made, read_payload(source_, block));
+  }
+
+  void lose(const SlogBlock& block) {
+    --report_.blocks_kept;
+    report_.damage.push_back(
+        {block.offset, slog_block_bytes(block.header), describe(block) + " fits nowhere"});
+  }
+
+  void count_losses() {
+    for (const LogDamage& damage : scan_.damage) {
+      report_.damage.push_back(damage);
+      report_.bytes_lost += damage.bytes;
+    }
+    report_.blocks_lost = scan_.blocks.back().header.sequence + 1 - report_.blocks_kept;
+    const bool tail_lost =
+        !scan_.damage.empty() && scan_.damage.back().offset >= scan_.blocks.back().end();
+    report_.blocks_lost += tail_lost ? 1U : 0U;  // at least; nothing tells how many
+  }
+
+  const SlogSource& source_;
+  SlogScan scan_;
+  LogInfo info_;
+  SlogAppender out_;
+  RecoverReport report_;
+  std::optional<Run> run_;
+  std::uint64_t filled_ = 0;
+  bool ended_ = false;
+};
+
+}  // namespace
+
+RecoverReport recover_log(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(from, to, ignored)) {
+    throw std::invalid_argument(
+        fmt::format("{}: recover to another file; the damaged log stays as it is", from.string()));
+  }
+  const SlogSource source(from);
+  OutputFile output(to);
+  std::filesystem::remove(output.path(), ignored);  // the appender insists on a new file
+  RecoverReport report = Recovery(source, output.path()).run();
+  output.commit();
+  return report;
+}
+
+}  // namespace stageid

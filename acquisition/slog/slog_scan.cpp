@@ -1,0 +1,223 @@
+#include "acquisition/slog/slog_scan.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <optional>
+#include <string_view>
+#include <system_error>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/slog/crc32c.hpp"
+
+namespace stageid {
+
+namespace {
+
+constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
+
+/// Walks through one file and gathers what it finds.
+class Scanner {
+ public:
+  Scanner(const SlogSource& source, SlogScanDepth depth) : source_(source), depth_(depth) {
+    scan_.file_bytes = source.bytes();
+  }
+
+  SlogScan run() {
+    std::uint64_t offset = 0;
+    while (offset < source_.bytes()) {
+      std::string wrong;
+      if (const auto block = block_at(offset, wrong)) {
+        offset = take(*block);
+      } else {
+        const std::uint64_t next = next_header(offset + 1);
+        scan_.damage.push_back({offset, next - offset, std::move(wrong)});
+        offset = next;
+      }
+    }
+    if (scan_.blocks.empty()) {
+      throw FormatError(source_.path(), "",
+                        "holds no intact block of a native log (.slog); give a log written by "
+                        "'stageid run'");
+    }
+    return std::move(scan_);
+  }
+
+ private:
+  /// The block whose header stands at `offset`, or what is wrong there.
+  std::optional<SlogBlock> block_at(std::uint64_t offset, std::string& wrong) const {
+    SlogBlock block{offset, {}};
+    if (source_.bytes() - offset < sizeof block.header) {
+      wrong = "the file ends inside the header of a block";
+      return std::nullopt;
+    }
+    source_.read(offset, &block.header, sizeof block.header);
+    if (!slog_header_intact(block.header)) {
+      wrong = "the header of a block is damaged";
+      return std::nullopt;
+    }
+    if (block.header.version != kSlogVersion) {
+      throw FormatError(source_.path(), "",
+                        fmt::format("is of format version {}; this program reads version {}",
+                                    block.header.version, kSlogVersion));
+    }
+    if (!scan_.blocks.empty() && block.header.log_id != scan_.log_id) {
+      wrong = "a block of another log";
+      return std::nullopt;
+    }
+    if (block.header.payload_bytes > kSlogLargestPayload ||
+        source_.bytes() - offset < slog_block_bytes(block.header)) {
+      wrong = "the file ends inside " + describe(block);
+      return std::nullopt;
+    }
+    return block;
+  }
+
+  /// Books an intact header (and, if asked for, payload); returns where to look next.
+  std::uint64_t take(const SlogBlock& block) {
+    if (scan_.blocks.empty()) scan_.log_id = block.header.log_id;
+    if (depth_ == SlogScanDepth::payloads && !payload_intact(source_, block)) {
+      return skip_payload(block);
+    }
+    if (block.header.sequence < next_sequence_) {
+      scan_.damage.push_back(
+          {block.offset, slog_block_bytes(block.header), describe(block) + " is out of order"});
+      return block.end();
+    }
+    const bool behind_damage =
+        !scan_.damage.empty() && scan_.damage.back().bytes > 0 &&
+        scan_.damage.back().offset + scan_.damage.back().bytes == block.offset;
+    if (block.header.sequence > next_sequence_ && !behind_damage) {
+      scan_.damage.push_back(
+          {block.offset, 0,
+           fmt::format("blocks {} to {} are missing", next_sequence_, block.header.sequence - 1)});
+    }
+    next_sequence_ = block.header.sequence + 1;
+    scan_.blocks.push_back(block);
+    return block.end();
+  }
+
+  /// The length in an intact header is right unless bytes were inserted or deleted behind it.
+  std::uint64_t skip_payload(const SlogBlock& block) {
+    std::string ignored;
+    const bool next_stands = block.end() == source_.bytes() ||
+                             (block.end() < source_.bytes() && block_at(block.end(), ignored));
+    const std::uint64_t next =
+        next_stands ? block.end() : next_header(block.offset + kSlogAlignment);
+    scan_.damage.push_back(
+        {block.offset, next - block.offset, "the payload of " + describe(block) + " is damaged"});
+    return next;
+  }
+
+  /// Offset of the next intact header of this log at or behind `from`, else the end of the file.
+  std::uint64_t next_header(std::uint64_t from) const {
+    const std::string_view magic(reinterpret_cast<const char*>(kSlogMagic.data()),
+                                 kSlogMagic.size());
+    std::vector<char> piece(kPieceBytes);
+    while (from + sizeof(SlogBlockHeader) <= source_.bytes()) {
+      const auto size =
+          static_cast<std::size_t>(std::min<std::uint64_t>(kPieceBytes, source_.bytes() - from));
+      source_.read(from, piece.data(), size);
+      const std::string_view text(piece.data(), size);
+      for (std::size_t at = text.find(magic); at != text.npos; at = text.find(magic, at + 1)) {
+        std::string ignored;
+        if (block_at(from + at, ignored)) return from + at;
+      }
+      if (size < kPieceBytes) break;
+      from += size - (magic.size() - 1);  // a magic may straddle two pieces
+    }
+    return source_.bytes();
+  }
+
+  const SlogSource& source_;
+  SlogScanDepth depth_;
+  SlogScan scan_;
+  std::uint64_t next_sequence_ = 0;
+};
+
+}  // namespace
+
+SlogSource::SlogSource(std::filesystem::path file) : path_(std::move(file)) {
+  file_ = FileDescriptor(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat status {};
+  if (file_.get() < 0 || ::fstat(file_.get(), &status) != 0) {
+    throw FileError(fmt::format("{}: cannot be opened: {}; check the path", path_.string(),
+                                std::error_code(errno, std::generic_category()).message()));
+  }
+  if (!S_ISREG(status.st_mode)) {
+    throw FileError(fmt::format("{}: is not a regular file; give a log file", path_.string()));
+  }
+  bytes_ = static_cast<std::uint64_t>(status.st_size);
+}
+
+void SlogSource::read(std::uint64_t offset, void* to, std::size_t size) const {
+  auto* at = static_cast<std::byte*>(to);
+  while (size > 0) {
+    const ssize_t count = ::pread(file_.get(), at, size, static_cast<off_t>(offset));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      throw FileError(
+          fmt::format("{}: cannot be read at byte {}: {}", path_.string(), offset,
+                      count < 0 ? std::error_code(errno, std::generic_category()).message()
+                                : std::string("the file has become shorter while it was read")));
+    }
+    at += count;
+    offset += static_cast<std::uint64_t>(count);
+    size -= static_cast<std::size_t>(count);
+  }
+}
+
+void SlogSource::expect_headers_only() const noexcept {
+  static_cast<void>(::posix_fadvise(file_.get(), 0, 0, POSIX_FADV_RANDOM));
+}
+
+void SlogSource::expect_everything() const noexcept {
+  static_cast<void>(::posix_fadvise(file_.get(), 0, 0, POSIX_FADV_SEQUENTIAL));
+}
+
+SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth) {
+  if (depth == SlogScanDepth::headers) source.expect_headers_only();
+  SlogScan scan = Scanner(source, depth).run();
+  source.expect_everything();
+  return scan;
+}
+
+bool payload_intact(const SlogSource& source, const SlogBlock& block) {
+  std::uint64_t left = slog_padded(block.header.payload_bytes);
+  std::vector<std::byte> piece(
+      static_cast<std::size_t>(std::min<std::uint64_t>(left, kPieceBytes)));
+  std::uint64_t offset = block.payload_offset();
+  std::uint32_t crc = 0;
+  while (left > 0) {
+    const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(left, kPieceBytes));
+    source.read(offset, piece.data(), size);
+    crc = crc32c(std::span(piece).first(size), crc);
+    offset += size;
+    left -= size;
+  }
+  return crc == block.header.payload_crc;
+}
+
+std::vector<std::byte> read_payload(const SlogSource& source, const SlogBlock& block) {
+  std::vector<std::byte> payload(slog_padded(block.header.payload_bytes));
+  source.read(block.payload_offset(), payload.data(), payload.size());
+  if (crc32c(payload) != block.header.payload_crc) {
+    throw FormatError(source.path(), "",
+                      "the payload of " + describe(block) +
+                          " is damaged; 'stageid log recover' gives back what is intact");
+  }
+  payload.resize(block.header.payload_bytes);
+  return payload;
+}
+
+std::string describe(const SlogBlock& block) {
+  return fmt::format("block {} ({}, byte {})", block.header.sequence,
+                     to_string(static_cast<SlogBlockType>(block.header.type)), block.offset);
+}
+
+}  // namespace stageid

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "acquisition/slog/slog_appender.hpp"
+#include "acquisition/slog/slog_format.hpp"
+
+namespace stageid {
+
+/// A native log opened for reading at any place, by any number of threads.
+class SlogSource {
+ public:
+  /// @throws FileError if the file is missing or cannot be read.
+  explicit SlogSource(std::filesystem::path file);
+
+  const std::filesystem::path& path() const noexcept { return path_; }
+  std::uint64_t bytes() const noexcept { return bytes_; }
+
+  /// Exactly `size` bytes from `offset`.
+  /// @throws FileError if the device fails or the file has become shorter.
+  void read(std::uint64_t offset, void* to, std::size_t size) const;
+
+  /// Tells the kernel what comes: one header every few hundred kB, or everything in order.
+  void expect_headers_only() const noexcept;
+  void expect_everything() const noexcept;
+
+ private:
+  std::filesystem::path path_;
+  FileDescriptor file_;
+  std::uint64_t bytes_ = 0;
+};
+
+/// A block whose header is intact.
+struct SlogBlock {
+  std::uint64_t offset = 0;  ///< of the header
+  SlogBlockHeader header;
+  std::uint64_t payload_offset() const noexcept { return offset + kSlogAlignment; }
+  std::uint64_t end() const noexcept { return offset + slog_block_bytes(header); }
+};
+
+/// A damaged stretch of a file, for people; bytes = 0: something is missing there.
+struct LogDamage {
+  std::uint64_t offset = 0;
+  std::uint64_t bytes = 0;
+  std::string what;
+};
+
+struct SlogScan {
+  std::vector<SlogBlock> blocks;  ///< in order of the file; sequence strictly increasing
+  std::vector<LogDamage> damage;
+  std::uint64_t file_bytes = 0;
+  std::uint32_t log_id = 0;
+};
+
+enum class SlogScanDepth : std::uint8_t {
+  headers,  ///< payloads are not read: under a second for a log of any size
+  payloads  ///< every byte is read and checked
+};
+
+/// Finds all intact blocks. Behind a damaged stretch it goes on at the next intact header that
+/// belongs to this log, wherever it stands.
+/// @throws FileError
+/// @throws FormatError if there is no intact block at all, or one of a version unknown here.
+SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth);
+
+/// The payload of a block, checked. @throws FormatError naming the block.
+std::vector<std::byte> read_payload(const SlogSource& source, const SlogBlock& block);
+
+/// True if payload and padding have the CRC that the header says. Reads in pieces.
+bool payload_intact(const SlogSource& source, const SlogBlock& block);
+
+/// "block 17 (samples, byte 81920)": the place of a block in messages.
+std::string describe(const SlogBlock& block);
+
+}  // namespace stageid

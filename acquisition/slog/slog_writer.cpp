@@ -1,0 +1,216 @@
+#include "acquisition/slog/slog_writer.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/slog/slog_appender.hpp"
+#include "acquisition/slog/slog_index.hpp"
+#include "acquisition/slog/slog_json.hpp"
+#include "acquisition/slog/slog_scan.hpp"
+
+namespace stageid {
+
+namespace {
+
+std::uint16_t number(SlogBlockType type) { return static_cast<std::uint16_t>(type); }
+
+/// Copies everything from `offset` on to a new file FILE.damaged (.2, .3 ... if there is one).
+std::filesystem::path save_tail(const SlogSource& source, std::uint64_t offset) {
+  std::filesystem::path saved;
+  FileDescriptor out;
+  for (int attempt = 1; out.get() < 0; ++attempt) {
+    saved = source.path();
+    saved += attempt == 1 ? std::string(".damaged") : fmt::format(".damaged.{}", attempt);
+    out = FileDescriptor(::open(saved.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
+    if (out.get() < 0 && errno != EEXIST) {
+      throw FileError(
+          fmt::format("{}: cannot be created to keep the damaged end of the log; make "
+                      "the directory writable",
+                      saved.string()));
+    }
+  }
+  std::vector<std::byte> piece(std::size_t{1} << 18);
+  while (offset < source.bytes()) {
+    const auto size =
+        static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), source.bytes() - offset));
+    source.read(offset, piece.data(), size);
+    if (::write(out.get(), piece.data(), size) != static_cast<ssize_t>(size)) {
+      throw FileError(fmt::format("{}: cannot be written; free some space", saved.string()));
+    }
+    offset += size;
+  }
+  if (::fsync(out.get()) != 0) {
+    throw FileError(fmt::format("{}: cannot be brought to the disk", saved.string()));
+  }
+  return saved;
+}
+
+/// Where the intact blocks end, if nothing but the end of the file is damaged.
+std::uint64_t intact_bytes(const SlogSource& source, const SlogScan& scan, const SlogIndex& index) {
+  const std::uint64_t end = scan.blocks.back().end();
+  const bool only_tail = index.damage.empty() || index.damage.front().offset >= end;
+  if (only_tail) return end;
+  throw FormatError(source.path(), "",
+                    fmt::format("damaged at byte {} and intact behind it: {}; first 'stageid log "
+                                "recover' it to a new file, then resume that",
+                                index.damage.front().offset, index.damage.front().what));
+}
+
+}  // namespace
+
+struct SlogWriter::State {
+  LogInfo info;
+  std::string info_json;
+  SlogAppender appender;
+  std::uint32_t runs = 0;  ///< begun, in the whole file
+  std::optional<LogRun> open_run;
+  std::uint64_t acknowledged_rows = 0;
+
+  std::uint32_t row_words() const noexcept { return slog_row_words(info); }
+  SlogBlockHeader header(SlogBlockType type) const {
+    SlogBlockHeader made;
+    made.type = number(type);
+    made.run = open_run ? runs - 1 : 0;
+    return made;
+  }
+  LogRun& run(const char* caller) {
+    if (open_run) return *open_run;
+    throw std::invalid_argument(fmt::format("SlogWriter: {} before begin_run", caller));
+  }
+};
+
+SlogWriter::SlogWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
+SlogWriter::SlogWriter(SlogWriter&&) noexcept = default;
+SlogWriter& SlogWriter::operator=(SlogWriter&&) noexcept = default;
+
+// Without close() the log has no end block, and readers say that its writer died.
+SlogWriter::~SlogWriter() = default;
+
+SlogWriter SlogWriter::create(const std::filesystem::path& file, const LogInfo& info) {
+  check_log_info(info);
+  std::string json = to_json(info);
+  auto state = std::unique_ptr<State>(
+      new State{info, std::move(json), SlogAppender::create(file), 0, std::nullopt, 0});
+  state->appender.append(state->header(SlogBlockType::log), state->info_json);
+  return SlogWriter(std::move(state));
+}
+
+SlogWriter SlogWriter::resume(const std::filesystem::path& file, const LogInfo& info) {
+  check_log_info(info);
+  std::string json = to_json(info);
+  SlogAppender appender = SlogAppender::open_existing(file);  // locked before it is read
+  const SlogSource source(file);
+  const SlogScan scan = scan_slog(source, SlogScanDepth::payloads);
+  const SlogIndex index = index_slog(source, scan);
+  if (!same_measurement(index.info, info)) {
+    throw FormatError(file, "",
+                      "was written for another experiment (rate, period or channels differ); "
+                      "resume with the configuration it was started with, or write a new log");
+  }
+  const std::uint64_t end = intact_bytes(source, scan, index);
+  if (end < source.bytes()) save_tail(source, end);
+  appender.continue_at(end, scan.log_id, index.next_sequence);
+  std::uint32_t runs = 0;
+  for (const SlogBlock& block : scan.blocks) {
+    if (block.header.is(SlogBlockType::run_begin)) runs = block.header.run + 1;
+  }
+  return SlogWriter(std::unique_ptr<State>(
+      new State{info, std::move(json), std::move(appender), runs, std::nullopt, 0}));
+}
+
+void SlogWriter::begin_run(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& excitation) {
+  State& state = *state_;
+  if (state.open_run) throw std::invalid_argument("SlogWriter: begin_run inside a run");
+  if (excitation.rows() != state.info.period_samples ||
+      excitation.cols() != static_cast<Eigen::Index>(state.info.excitation.size()) ||
+      !excitation.allFinite()) {
+    throw std::invalid_argument(
+        fmt::format("SlogWriter: the excitation is {} x {}; it must be one period, {} x {}, of "
+                    "finite numbers",
+                    excitation.rows(), excitation.cols(), state.info.period_samples,
+                    state.info.excitation.size()));
+  }
+  SlogRunBegin begin{run.realization, run.experiment, run.started_utc, {}};
+  std::vector<double> stored;
+  for (Eigen::Index column = 0; column < excitation.cols(); ++column) {
+    if (excitation.col(column).isZero(0.0)) continue;
+    begin.excitation_columns.push_back(static_cast<int>(column));
+    stored.insert(stored.end(), excitation.col(column).begin(), excitation.col(column).end());
+  }
+  state.appender.append(state.header(SlogBlockType::log), state.info_json);
+  state.open_run = run;
+  state.open_run->samples = 0;
+  ++state.runs;
+  state.appender.append(state.header(SlogBlockType::run_begin), to_json(begin));
+  if (stored.empty()) return;
+  SlogBlockHeader header = state.header(SlogBlockType::excitation);
+  header.rows = static_cast<std::uint32_t>(excitation.rows());
+  header.cols = static_cast<std::uint32_t>(begin.excitation_columns.size());
+  state.appender.append(header, std::as_bytes(std::span(stored)));
+}
+
+void SlogWriter::write(std::span<const double> rows) {
+  State& state = *state_;
+  LogRun& run = state.run("write");
+  if (rows.empty()) return;
+  if (rows.size() % state.row_words() != 0) {
+    throw std::invalid_argument(fmt::format("SlogWriter: {} words are not whole rows of {}",
+                                            rows.size(), state.row_words()));
+  }
+  SlogBlockHeader header = state.header(SlogBlockType::samples);
+  header.cols = state.row_words();
+  header.rows = static_cast<std::uint32_t>(rows.size() / state.row_words());
+  header.first_row = run.samples;
+  state.appender.append(header, std::as_bytes(rows));
+  run.samples += header.rows;
+  state.acknowledged_rows += header.rows;
+}
+
+void SlogWriter::end_run(const LogRun& run) {
+  State& state = *state_;
+  const LogRun& open = state.run("end_run");
+  const SlogRunEnd end{open.realization, open.experiment, open.samples,
+                       run.complete,     run.health,      run.timing};
+  state.appender.append(state.header(SlogBlockType::run_end), to_json(end));
+  state.open_run.reset();
+}
+
+void SlogWriter::synchronize() { state_->appender.synchronize(); }
+
+const LogInfo& SlogWriter::info() const noexcept { return state_->info; }
+
+std::uint64_t SlogWriter::acknowledged_rows() const noexcept { return state_->acknowledged_rows; }
+
+std::uint64_t SlogWriter::bytes() const noexcept { return state_->appender.bytes(); }
+
+void SlogWriter::close(int exit_code, const char* message) {
+  State& state = *state_;
+  state.open_run.reset();  // a run without its end is incomplete
+  state.appender.append(state.header(SlogBlockType::end), to_json(SlogEnd{exit_code, message}));
+  state.appender.close();
+}
+
+void write_samples(SlogWriter& writer, const LogSamples& samples) {
+  const Eigen::Index n_u = samples.actuators.cols();
+  const Eigen::Index n_y = samples.sensors.cols();
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> words(
+      samples.actuators.rows(), n_u + n_y + 1);
+  words.leftCols(n_u) = samples.actuators;
+  words.middleCols(n_u, n_y) = samples.sensors;
+  for (Eigen::Index r = 0; r < words.rows(); ++r) {
+    const bool marked = samples.marked.size() > 0 && samples.marked[r] != 0;
+    words(r, n_u + n_y) = std::bit_cast<double>(pack_status({.marked = marked}));
+  }
+  writer.write({words.data(), static_cast<std::size_t>(words.size())});
+}
+
+}  // namespace stageid

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "estimation/products/line_sums.hpp"
+
+namespace stageid {
+
+/// Some channels in a row.
+struct ChannelRange {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+
+/// What becomes of the channels' own equations.
+enum class ChannelEquationsUse : std::uint8_t {
+  eliminated,  ///< and forgotten: memory is that of a block of channels; for solve_globals()
+  kept,        ///< eliminated and kept
+  only_kept    ///< M as it is, which may be singular; without Z, x and the Schur complement
+};
+
+/// The equations of one step, M d_beta = e, in the order beta = (globals, numerators of channel 1,
+/// 2, ...) where globals are the denominator coefficients of all submodels and then the delays.
+///
+/// With J the Jacobian dP/dbeta (the instrument Phih of the paper) and Phi the regressor,
+///   riv: M = sum Re{J^H W Phi},  e = sum Re{J^H W vec E}   (identity of method.md section 6)
+///   gn:  M = sum Re{J^H W J},    e the same
+///   sk:  M = sum Re{Phi^H W Phi}, e = sum Re{Phi^H W vec E}
+/// Phi differs from J only in the denominator columns: those of J minus (j omega)^q E / A_i.
+///
+/// Numerators of different channels never meet in M (diagonal W), so it is an arrow: channels are
+/// eliminated one by one and the Schur complement on the globals is solved.
+class ArrowSystem {
+ public:
+  /// @pre `groups` were evaluated with derivatives at `beta`.
+  ArrowSystem(const FitProblem& problem, const FitParameters& beta,
+              const std::vector<BasisGroup>& groups, FitMethod method,
+              ChannelEquationsUse use = ChannelEquationsUse::kept);
+
+  /// What these channels alone contribute: M, e and the Schur complement are sums over parts.
+  ArrowSystem(const FitProblem& problem, const FitParameters& beta,
+              const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part,
+              ChannelEquationsUse use = ChannelEquationsUse::kept);
+
+  struct Step {
+    Eigen::VectorXd globals;
+    Eigen::MatrixXd B;  ///< n_c x n_f
+    bool ok = false;    ///< false: the equations are singular
+  };
+  /// Solves with `damping` times the diagonal of the Schur complement added to it.
+  Step solve(double damping) const;
+  /// The globals only: enough where numerators are re-solved afterwards.
+  /// `frozen` globals stay where they are.
+  Eigen::VectorXd solve_globals(double damping, const std::vector<Eigen::Index>& frozen = {}) const;
+
+  /// M^-1 times another right-hand side than e, both (globals, vec B); damped alike. @pre regular()
+  Eigen::VectorXd solve(const Eigen::VectorXd& right_side, double damping,
+                        const std::vector<Eigen::Index>& frozen) const;
+
+  /// One channel's part of M: border and numerator block.
+  struct Channel {
+    Eigen::MatrixXd ab;  ///< globals x n_f
+    Eigen::MatrixXd ba;  ///< n_f x globals
+    Eigen::MatrixXd bb;  ///< n_f x n_f
+    Eigen::VectorXd e;   ///< n_f
+    Eigen::MatrixXd Z;   ///< bb^-1 ba, n_f x globals; if eliminated
+    Eigen::VectorXd x;   ///< bb^-1 e
+  };
+  const std::vector<Channel>& channels() const noexcept { return channels_; }
+  /// @pre it is kept
+  const Channel& channel(Eigen::Index c) const {
+    return channels_[static_cast<std::size_t>(c - range_.first)];
+  }
+  const Eigen::MatrixXd& M_globals() const noexcept { return M_; }
+  const Eigen::VectorXd& e_globals() const noexcept { return e_; }
+  const Eigen::MatrixXd& schur() const noexcept { return schur_; }
+  const Eigen::VectorXd& schur_gradient() const noexcept { return schur_e_; }
+  /// Whether all channels could be eliminated; if not, those behind the first that could not are not
+  /// there.
+  bool regular() const noexcept { return regular_; }
+
+ private:
+  bool keeps() const noexcept { return use_ != ChannelEquationsUse::eliminated; }
+  Channel& kept(Eigen::Index c);
+  /// Where these channels' equations go: to stay, or into `passing`.
+  std::vector<Channel*> places(const Eigen::Index* channels, Eigen::Index count,
+                               std::vector<Channel>& passing);
+  void add_block(const BasisGroup& group, const GroupProducts& products, const TileRange& block);
+  void add_few(const BasisGroup& group, const Eigen::Index* begin, const Eigen::Index* end);
+  void add_denominators(const LineSums& sums);
+  void set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
+                   Channel& channel) const;
+  void add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
+                  Eigen::Index index, Channel& channel);
+  void eliminate(const std::vector<Channel*>& channels);  ///< in their order
+  Eigen::VectorXd solve_schur(const Eigen::VectorXd& right_side, double damping,
+                              const std::vector<Eigen::Index>& frozen) const;
+
+  const FitProblem& problem_;
+  const FitParameters& beta_;
+  FitMethod method_;
+  ChannelRange range_;
+  ChannelEquationsUse use_;
+  std::vector<DerivativeColumn> columns_;
+  Eigen::MatrixXd Y_re_;  // equation_error_columns()
+  Eigen::MatrixXd Y_im_;
+  Eigen::MatrixXd M_;
+  Eigen::VectorXd e_;
+  std::vector<Channel> channels_;
+  Eigen::MatrixXd schur_;
+  Eigen::VectorXd schur_e_;
+  bool regular_ = true;
+};
+
+/// Rows and columns of the unit matrix where an unknown stays where it is.
+void hold_unknowns(const std::vector<Eigen::Index>& frozen, Eigen::MatrixXd& M);
+
+/// x solving M x = b for symmetric positive M, scaled to unit diagonal; matrix of right-hand sides.
+/// @returns false if M is singular to rounding.
+bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x);
+
+}  // namespace stageid

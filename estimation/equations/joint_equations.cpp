@@ -1,0 +1,190 @@
+#include "estimation/equations/joint_equations.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "estimation/products/weighted_products.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kTileLines = 256;
+constexpr int kMostIterations = 1000;
+
+/// Calls task(first line, lines) for every tile, tiles in parallel, and adds the results in order.
+template <typename Value, typename Task>
+Value tile_sum(Eigen::Index lines, int threads, Value zero, const Task& task) {
+  const auto tiles = static_cast<int>((lines + kTileLines - 1) / kTileLines);
+  std::vector<Value> parts(static_cast<std::size_t>(tiles), zero);
+  for_each_task(threads, tiles, [&](int tile) {
+    const Eigen::Index first = tile * kTileLines;
+    parts[static_cast<std::size_t>(tile)] = task(first, std::min(kTileLines, lines - first));
+  });
+  for (const Value& part : parts) zero += part;
+  return zero;
+}
+
+Eigen::MatrixXcd residual_tile(const Residual& E, Eigen::Index first, Eigen::Index lines) {
+  Eigen::MatrixXcd X(E.re.rows(), lines);
+  X.real() = E.re.middleCols(first, lines);
+  X.imag() = E.im.middleCols(first, lines);
+  return X;
+}
+
+}  // namespace
+
+JointEquations::JointEquations(const FitProblem& problem, const WeightMatrices& weights,
+                               const FitParameters& beta, const std::vector<BasisGroup>& groups,
+                               const Residual& E)
+    : problem_(problem),
+      weights_(weights),
+      beta_(beta),
+      groups_(groups),
+      columns_(derivative_columns(problem)),
+      arrow_(problem, beta, groups, FitMethod::gn) {
+  if (problem.delays() > 0) {
+    T_re_.resize(problem.channels(), problem.size());
+    T_im_.resize(problem.channels(), problem.size());
+    for (const BasisGroup& group : groups) {
+      const Eigen::MatrixXd B = rows_of(beta.B, group.channels);
+      T_re_(group.channels, Eigen::all) = B * group.T_re.transpose();
+      T_im_(group.channels, Eigen::all) = B * group.T_im.transpose();
+    }
+  }
+  e_ = weighted_adjoint(
+      [&](Eigen::Index first, Eigen::Index lines) { return residual_tile(E, first, lines); });
+}
+
+Eigen::Index JointEquations::size() const noexcept { return problem_.parameters(); }
+
+/// sum Re{J^H W X}, X given by tiles.
+template <typename Columns>
+Eigen::VectorXd JointEquations::weighted_adjoint(const Columns& columns) const {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(size());
+  return tile_sum(problem_.size(), problem_.threads, zero,
+                  [&](Eigen::Index first, Eigen::Index lines) {
+                    Eigen::MatrixXcd X = columns(first, lines);
+                    weights_.apply(first, X);
+                    Eigen::VectorXd part = zero;
+                    add_adjoint(X, first, part);
+                    return part;
+                  });
+}
+
+Eigen::VectorXd JointEquations::product(const Eigen::VectorXd& v) const {
+  return weighted_adjoint(
+      [&](Eigen::Index first, Eigen::Index lines) { return response_change(v, first, lines); });
+}
+
+/// J v on some lines, n_c x lines: dB F^T + B dF^T, and the delays.
+Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, Eigen::Index first,
+                                                 Eigen::Index lines) const {
+  const Eigen::Index n_f = problem_.functions();
+  const Eigen::MatrixXd dB = v.tail(problem_.channels() * n_f).reshaped(problem_.channels(), n_f);
+  Eigen::MatrixXcd change(problem_.channels(), lines);
+  for (const BasisGroup& group : groups_) {
+    Eigen::MatrixXd coefficients(static_cast<Eigen::Index>(group.channels.size()), 2 * n_f);
+    coefficients << rows_of(dB, group.channels), rows_of(beta_.B, group.channels);
+    Eigen::MatrixXd re = Eigen::MatrixXd::Zero(lines, 2 * n_f);
+    Eigen::MatrixXd im = Eigen::MatrixXd::Zero(lines, 2 * n_f);
+    re.leftCols(n_f) = group.F_re.middleRows(first, lines);
+    im.leftCols(n_f) = group.F_im.middleRows(first, lines);
+    for (std::size_t d = 0; d < columns_.size(); ++d) {
+      const auto [function, parameter] = columns_[d];
+      const auto column = static_cast<Eigen::Index>(d);
+      re.col(n_f + function) += v[parameter] * group.D_re.col(column).segment(first, lines);
+      im.col(n_f + function) += v[parameter] * group.D_im.col(column).segment(first, lines);
+    }
+    Eigen::MatrixXcd part(coefficients.rows(), lines);
+    part.real() = coefficients * re.transpose();
+    part.imag() = coefficients * im.transpose();
+    change(group.channels, Eigen::all) = part;
+  }
+  if (problem_.delays() == 0) return change;
+  for (Eigen::Index c = 0; c < problem_.channels(); ++c) {
+    double delay = 0.0;
+    for (const Eigen::Index t : delay_parameters(problem_, c)) delay += v[t];
+    change.row(c).real() += delay * T_re_.row(c).segment(first, lines);
+    change.row(c).imag() += delay * T_im_.row(c).segment(first, lines);
+  }
+  return change;
+}
+
+/// Adds Re{J^H X} of some lines.
+void JointEquations::add_adjoint(const Eigen::MatrixXcd& X, Eigen::Index first,
+                                 Eigen::VectorXd& sum) const {
+  const Eigen::Index n_f = problem_.functions();
+  const Eigen::Index lines = X.cols();
+  const Eigen::MatrixXd X_re = X.real();
+  const Eigen::MatrixXd X_im = X.imag();
+  auto e_b = sum.tail(problem_.channels() * n_f).reshaped(problem_.channels(), n_f);
+  for (const BasisGroup& group : groups_) {
+    const Eigen::MatrixXd re = rows_of(X_re, group.channels);
+    const Eigen::MatrixXd im = rows_of(X_im, group.channels);
+    const Eigen::MatrixXd of_group =
+        re * group.F_re.middleRows(first, lines) + im * group.F_im.middleRows(first, lines);
+    for (std::size_t r = 0; r < group.channels.size(); ++r)
+      e_b.row(group.channels[r]) += of_group.row(static_cast<Eigen::Index>(r));
+    const Eigen::MatrixXd B = rows_of(beta_.B, group.channels);
+    const Eigen::MatrixXd BX_re = re.transpose() * B;
+    const Eigen::MatrixXd BX_im = im.transpose() * B;
+    for (std::size_t d = 0; d < columns_.size(); ++d) {
+      const auto [function, parameter] = columns_[d];
+      const auto column = static_cast<Eigen::Index>(d);
+      sum[parameter] += group.D_re.col(column).segment(first, lines).dot(BX_re.col(function)) +
+                        group.D_im.col(column).segment(first, lines).dot(BX_im.col(function));
+    }
+  }
+  if (problem_.delays() == 0) return;
+  const Eigen::VectorXd TX = T_re_.middleCols(first, lines).cwiseProduct(X_re).rowwise().sum() +
+                             T_im_.middleCols(first, lines).cwiseProduct(X_im).rowwise().sum();
+  for (Eigen::Index c = 0; c < problem_.channels(); ++c)
+    for (const Eigen::Index t : delay_parameters(problem_, c)) sum[t] += TX[c];
+}
+
+JointEquations::Solution JointEquations::solve(const Eigen::VectorXd& right_side,
+                                               const std::vector<Eigen::Index>& frozen,
+                                               double tolerance, double damping) const {
+  const Eigen::Index globals = problem_.globals();
+  const Eigen::VectorXd damped = damping * arrow_.schur().diagonal().cwiseAbs();
+  const auto freeze = [&](Eigen::VectorXd v) {
+    for (const Eigen::Index i : frozen) v[i] = 0.0;
+    return v;
+  };
+  Solution solution{Eigen::VectorXd::Zero(size()), freeze(right_side), 0, false};
+  Eigen::VectorXd& r = solution.residual;
+  Eigen::VectorXd z = arrow_.solve(r, damping, frozen);
+  Eigen::VectorXd direction = z;
+  double rz = r.dot(z);
+  const double wanted = tolerance * tolerance * rz;
+  while (rz > wanted && solution.iterations < kMostIterations) {
+    Eigen::VectorXd q = product(direction);
+    q.head(globals) += damped.cwiseProduct(direction.head(globals));
+    q = freeze(std::move(q));
+    const double curvature = direction.dot(q);
+    if (!(curvature > 0.0)) break;  // singular to rounding
+    ++solution.iterations;
+    solution.x += rz / curvature * direction;
+    r -= rz / curvature * q;
+    z = arrow_.solve(r, damping, frozen);
+    const double next = r.dot(z);
+    direction = z + next / rz * direction;
+    rz = next;
+  }
+  solution.converged = rz <= wanted;
+  return solution;
+}
+
+double weighted_cost(const FitProblem& problem, const WeightMatrices& weights, const Residual& E) {
+  const double sum =
+      tile_sum(problem.size(), problem.threads, 0.0, [&](Eigen::Index first, Eigen::Index lines) {
+        const Eigen::MatrixXcd X = residual_tile(E, first, lines);
+        Eigen::MatrixXcd WX = X;
+        weights.apply(first, WX);
+        return WX.cwiseProduct(X.conjugate()).real().sum();
+      });
+  return sum / (2.0 * static_cast<double>(problem.size()));
+}
+
+}  // namespace stageid

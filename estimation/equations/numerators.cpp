@@ -1,0 +1,302 @@
+#include "estimation/equations/numerators.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <cmath>
+
+#include "estimation/products/weighted_products.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kSlightGain = 1e-3;
+
+/// Solves the scaled normal equations of one channel.
+class ScaledNormalEquations {
+ public:
+  explicit ScaledNormalEquations(const Eigen::MatrixXd& M) {
+    scale_ = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    Eigen::MatrixXd scaled = scale_.asDiagonal() * M * scale_.asDiagonal();
+    // Far below the rounding of the sums: only keeps the factorization of coinciding poles alive.
+    scaled.diagonal().array() += 1e-14;
+    factor_.compute(scaled);
+  }
+  bool ok() const { return factor_.info() == Eigen::Success; }
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const {
+    return scale_.asDiagonal() * factor_.solve(scale_.asDiagonal() * b);
+  }
+
+ private:
+  Eigen::VectorXd scale_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+};
+
+/// sums += sum Re{conj(F) W E} of a tile.
+void add_weighted_gradient(const BasisGroup& group, Eigen::Index first, const DataTile& data,
+                           Eigen::MatrixXd& sums) {
+  const Eigen::Index n = data.W.cols();
+  const Eigen::MatrixXd WE_re = data.W.cwiseProduct(data.E_re);
+  const Eigen::MatrixXd WE_im = data.W.cwiseProduct(data.E_im);
+  sums.noalias() += group.F_re.middleRows(first, n).transpose() * WE_re.transpose();
+  sums.noalias() += group.F_im.middleRows(first, n).transpose() * WE_im.transpose();
+}
+
+/// What the normal equations of a block's channels are made of; a column is a channel.
+struct GramSums {
+  Eigen::MatrixXd FF;  ///< triangle x members: sum W Re{conj(F_i) F_j}
+  Eigen::MatrixXd S;   ///< members x base columns: sum W |first|^2 base; see PairReduction
+  Eigen::MatrixXd FG;  ///< n_f x members: sum Re{conj(F) W G}
+  GramSums& operator+=(const GramSums& other) {
+    FF += other.FF;
+    S += other.S;
+    FG += other.FG;
+    return *this;
+  }
+};
+
+/// Lower triangles of F^H W F of every channel by itself: for few channels.
+class OwnGrams {
+ public:
+  OwnGrams(Eigen::Index members, Eigen::Index n_f)
+      : grams_(static_cast<std::size_t>(members), Eigen::MatrixXd::Zero(n_f, n_f)) {}
+
+  void add(const BasisGroup& group, Eigen::Index first, const DataTile& data) {
+    const Eigen::Index n = data.W.cols();
+    Eigen::MatrixXd X(group.F_re.cols(), 2 * n);
+    for (std::size_t r = 0; r < grams_.size(); ++r) {
+      const Eigen::VectorXd root = data.W.row(static_cast<Eigen::Index>(r)).cwiseSqrt().transpose();
+      X.leftCols(n) = group.F_re.middleRows(first, n).transpose() * root.asDiagonal();
+      X.rightCols(n) = group.F_im.middleRows(first, n).transpose() * root.asDiagonal();
+      grams_[r].selfadjointView<Eigen::Lower>().rankUpdate(X);
+    }
+  }
+
+  /// In the order of triangular_pairs().
+  void pack(Eigen::MatrixXd& FF) const {
+    for (std::size_t r = 0; r < grams_.size(); ++r) {
+      Eigen::Index p = 0;
+      for (Eigen::Index i = 0; i < grams_[r].rows(); ++i)
+        for (Eigen::Index j = 0; j <= i; ++j)
+          FF(p++, static_cast<Eigen::Index>(r)) = grams_[r](i, j);
+    }
+  }
+
+ private:
+  std::vector<Eigen::MatrixXd> grams_;
+};
+
+/// The products of all functions of a group: the same for all of its blocks.
+PairReduction function_pairs(const FitProblem& problem, const BasisGroup& group) {
+  return {group.fractions, group.fractions.F, group.fractions.F,
+          triangular_pairs(problem.functions())};
+}
+
+GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
+                   const TileRange& block) {
+  const bool few = group.few;
+  const Eigen::Index base = few ? 0 : group.fractions.simple_columns();
+  const ComplexColumns F{group.F_re, group.F_im};
+  GramSums all = sum_over_shares<GramSums>(block, problem.threads, [&](const TileRange& share) {
+    GramSums sums;
+    sums.FF.setZero(static_cast<Eigen::Index>(few ? pairs.pairs().size() : pairs.direct().size()),
+                    share.members);
+    sums.FG.setZero(problem.functions(), share.members);
+    sums.S.setZero(share.members, base);
+    OwnGrams own(few ? share.members : 0, problem.functions());
+    DataTile data;
+    for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
+      data.load(problem, group, share, {}, first, n);
+      if (few) {
+        own.add(group, first, data);
+      } else {
+        add_pair_sums(data.W, F, F, pairs.direct(), first, sums.FF);
+        add_fraction_sums(data.W, group.fractions, first, sums.S);
+      }
+      add_weighted_gradient(group, first, data, sums.FG);
+    });
+    if (few) own.pack(sums.FF);
+    return sums;
+  });
+  if (!few) all.FF = pairs.expand(all.S, all.FF, problem.threads);
+  return all;
+}
+
+struct ResidualSums {
+  Eigen::MatrixXd FE;    ///< n_f x members: sum Re{conj(F) W E}
+  double squares = 0.0;  ///< sum W |E|^2
+  ResidualSums& operator+=(const ResidualSums& other) {
+    FE += other.FE;
+    squares += other.squares;
+    return *this;
+  }
+};
+
+ResidualSums residual_sums(const FitProblem& problem, const BasisGroup& group,
+                           const TileRange& block, const Eigen::MatrixXd& B) {
+  return sum_over_shares<ResidualSums>(block, problem.threads, [&](const TileRange& share) {
+    ResidualSums sums;
+    sums.FE.setZero(problem.functions(), share.members);
+    DataTile data;
+    for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
+      data.load(problem, group, share, B, first, n);
+      sums.squares += data.squares();
+      add_weighted_gradient(group, first, data, sums.FE);
+    });
+    return sums;
+  });
+}
+
+std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, Eigen::Index n_f) {
+  std::vector<ScaledNormalEquations> out;
+  out.reserve(static_cast<std::size_t>(FF.cols()));
+  for (Eigen::Index c = 0; c < FF.cols(); ++c) out.emplace_back(from_triangle(FF.col(c), n_f));
+  return out;
+}
+
+/// A block's numerators, members x n_f, and its sum W |E|^2; false if they are not determined.
+///
+/// The first solution is refined with the residual itself. What the refinement d lowers the squares by
+/// is FE . d exactly, because they are quadratic; only where that is much of them are they summed anew.
+bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
+                 const TileRange& block, Eigen::MatrixXd& B, double& squares) {
+  const GramSums gram = gram_sums(problem, group, pairs, block);
+  const std::vector<ScaledNormalEquations> factors = normal_equations(gram.FF, problem.functions());
+  for (const ScaledNormalEquations& channel : factors)
+    if (!channel.ok()) return false;
+  const auto solve = [&](const Eigen::MatrixXd& right_sides) {
+    Eigen::MatrixXd out(block.members, problem.functions());
+    for (Eigen::Index r = 0; r < block.members; ++r)
+      out.row(r) = factors[static_cast<std::size_t>(r)].solve(right_sides.col(r)).transpose();
+    return out;
+  };
+  B = solve(gram.FG);
+  const ResidualSums rest = residual_sums(problem, group, block, B);
+  const Eigen::MatrixXd refinement = solve(rest.FE);
+  B += refinement;
+  const double gain = refinement.cwiseProduct(rest.FE.transpose()).sum();
+  const bool slight = std::abs(gain) < kSlightGain * rest.squares;
+  squares = slight ? rest.squares - gain : residual_sums(problem, group, block, B).squares;
+  return true;
+}
+
+/// Calls visit(i, C_i^-1) for every submodel of a channel with the normal equations M: C_i is its block of
+/// M^-1.
+template <typename Visit>
+void visit_submodels(const FitProblem& problem, const Eigen::MatrixXd& M, Visit visit) {
+  const Eigen::Index n_f = problem.functions();
+  const ScaledNormalEquations factor(M);
+  if (!factor.ok()) return;
+  const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(n_f, n_f));
+  Eigen::Index f = 0;
+  for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
+    const Eigen::Index n = problem.shapes[i].functions();
+    const Eigen::MatrixXd C = inverse.block(f, f, n, n);
+    visit(i, f, Eigen::MatrixXd(C.llt().solve(Eigen::MatrixXd::Identity(n, n))));
+    f += n;
+  }
+}
+
+/// Calls visit(c, M) for every channel with its normal equations, members of a block on all threads.
+template <typename Visit>
+void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
+  for (const BasisGroup& group : groups) {
+    const PairReduction pairs = function_pairs(problem, group);
+    for (const TileRange& block :
+         member_blocks(0, static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
+      const Eigen::MatrixXd FF = gram_sums(problem, group, pairs, block).FF;
+      for_each_task(problem.threads, static_cast<int>(FF.cols()), [&](int r) {
+        visit(group.channels[static_cast<std::size_t>(block.first_member + r)],
+              from_triangle(FF.col(r), problem.functions()));
+      });
+    }
+  }
+}
+
+}  // namespace
+
+bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                      Eigen::MatrixXd& B, double& cost) {
+  B.setZero(problem.channels(), problem.functions());
+  double sum = 0.0;
+  Eigen::MatrixXd of_block;
+  for (const BasisGroup& group : groups) {
+    const PairReduction pairs = function_pairs(problem, group);
+    for (const TileRange& block :
+         member_blocks(0, static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
+      double squares = 0.0;
+      if (!solve_block(problem, group, pairs, block, of_block, squares)) return false;
+      sum += squares;
+      for (Eigen::Index r = 0; r < block.members; ++r)
+        B.row(group.channels[static_cast<std::size_t>(block.first_member + r)]) = of_block.row(r);
+    }
+  }
+  cost = sum / (2.0 * static_cast<double>(problem.size()));
+  return std::isfinite(cost);
+}
+
+void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                       Eigen::MatrixXd& B, double& cost) {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(problem.channels());
+  Eigen::MatrixXd polished = B;
+  for (const BasisGroup& group : groups)
+    for_each_task(problem.threads, static_cast<int>(group.channels.size()), [&](int member) {
+      const Eigen::Index c = group.channels[static_cast<std::size_t>(member)];
+      const Eigen::Index N = problem.size();
+      const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
+      Eigen::MatrixXd A(2 * N, problem.functions());
+      A << root.asDiagonal() * group.F_re, root.asDiagonal() * group.F_im;
+      Eigen::VectorXd rest(2 * N);
+      rest << root.cwiseProduct(problem.G->row(c).real().transpose()),
+          root.cwiseProduct(problem.G->row(c).imag().transpose());
+      const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+      A *= scale.asDiagonal();
+      const Eigen::HouseholderQR<Eigen::MatrixXd> factor(A);
+      Eigen::VectorXd x = factor.solve(rest);
+      rest -= A * x;
+      const Eigen::VectorXd refinement = factor.solve(rest);
+      x += refinement;
+      rest -= A * refinement;
+      polished.row(c) = scale.cwiseProduct(x).transpose();
+      squares[c] = rest.squaredNorm();
+    });
+  const double polished_cost = squares.sum() / (2.0 * static_cast<double>(problem.size()));
+  if (!(polished_cost < cost)) return;
+  B = std::move(polished);
+  cost = polished_cost;
+}
+
+std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                                  const Eigen::MatrixXd& B) {
+  Eigen::MatrixXd costs =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(problem.shapes.size()), problem.channels());
+  visit_channels(problem, groups, [&](Eigen::Index c, const Eigen::MatrixXd& M) {
+    visit_submodels(problem, M, [&](std::size_t i, Eigen::Index f, const Eigen::MatrixXd& inverse) {
+      const Eigen::VectorXd b = B.row(c).segment(f, inverse.cols()).transpose();
+      costs(static_cast<Eigen::Index>(i), c) = b.dot(inverse * b);
+    });
+  });
+  std::vector<double> out(problem.shapes.size(), 0.0);
+  for (Eigen::Index c = 0; c < costs.cols(); ++c)
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] += costs(static_cast<Eigen::Index>(i), c);
+  return out;
+}
+
+double shrink_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                         const std::vector<double>& share, Eigen::MatrixXd& B) {
+  Eigen::VectorXd rise = Eigen::VectorXd::Zero(problem.channels());
+  visit_channels(problem, groups, [&](Eigen::Index c, const Eigen::MatrixXd& M) {
+    Eigen::MatrixXd penalty = Eigen::MatrixXd::Zero(M.rows(), M.cols());
+    visit_submodels(problem, M, [&](std::size_t i, Eigen::Index f, const Eigen::MatrixXd& inverse) {
+      penalty.block(f, f, inverse.rows(), inverse.cols()) = share[i] / (1.0 - share[i]) * inverse;
+    });
+    const ScaledNormalEquations penalized(M + penalty);
+    if (!penalized.ok()) return;
+    const Eigen::VectorXd change = penalized.solve(-penalty * B.row(c).transpose());
+    rise[c] = change.dot(M * change);
+    B.row(c) += change.transpose();
+  });
+  return rise.sum();
+}
+
+}  // namespace stageid

@@ -1,0 +1,179 @@
+#include "estimation/equations/sigma_equations.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "estimation/problem/fit_problem.hpp"
+#include "estimation/products/fraction_gram.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr int kShares = 8;
+constexpr Eigen::Index kTimesOver = 3;
+constexpr double kShift = 1e-13;  // makes Gram matrices of unit columns factor
+
+Eigen::VectorXd inverse_root(const Eigen::VectorXd& diagonal) {
+  return diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+}
+
+/// The triangle R of [R; further] = Q R.
+void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
+  Eigen::MatrixXd both(R.rows() + further.rows(), R.cols());
+  both << R, further;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(std::move(both));
+  R = qr.matrixQR().topRows(R.cols()).triangularView<Eigen::Upper>();
+}
+
+/// The triangle of all of them below each other, two by two.
+Eigen::MatrixXd combined(std::vector<Eigen::MatrixXd> triangles, int threads) {
+  while (triangles.size() > 1) {
+    const std::size_t pairs = triangles.size() / 2;
+    for_each_task(threads, static_cast<int>(pairs), [&](int pair) {
+      const auto p = static_cast<std::size_t>(pair);
+      append(triangles[p], triangles[triangles.size() - 1 - p]);
+    });
+    triangles.resize(triangles.size() - pairs);
+  }
+  return std::move(triangles.front());
+}
+
+/// The lower right corner of R, n+1 x n+1, in  sqrt(w) [phi, own | -H phi, -H] = Q R: what remains of
+/// the channel's equations once its numerators are eliminated.
+Eigen::MatrixXd factor_of_channel(const Eigen::VectorXd& weights, const Eigen::VectorXcd& response,
+                                  const SplitMatrix& phi, const SplitMatrix& own) {
+  const Eigen::Index N = response.size();
+  const Eigen::Index n = phi.cols();
+  const Eigen::Index numerators = n + own.cols();
+  const Eigen::ArrayXd w = weights.cwiseSqrt().array();
+  const Eigen::ArrayXcd H = response.array();
+  const Eigen::ArrayXd h_re = -w * H.real();
+  const Eigen::ArrayXd h_im = -w * H.imag();
+  Eigen::MatrixXd A(2 * N, numerators + n + 1);
+  A.topLeftCorner(N, n) = phi.re.array().colwise() * w;
+  A.bottomLeftCorner(N, n) = phi.im.array().colwise() * w;
+  A.block(0, n, N, own.cols()) = own.re.array().colwise() * w;
+  A.block(N, n, N, own.cols()) = own.im.array().colwise() * w;
+  A.block(0, numerators, N, n) = phi.re.array().colwise() * h_re - phi.im.array().colwise() * h_im;
+  A.block(N, numerators, N, n) = phi.re.array().colwise() * h_im + phi.im.array().colwise() * h_re;
+  A.rightCols(1) << h_re.matrix(), h_im.matrix();
+  const Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(A);
+  return Eigen::MatrixXd(
+      A.block(numerators, numerators, n + 1, n + 1).triangularView<Eigen::Upper>());
+}
+
+/// sum_k Re{conj(X) v}, one a column of X
+Eigen::VectorXd sum(const SplitMatrix& X, const Eigen::VectorXcd& v) {
+  return X.re.transpose() * v.real() + X.im.transpose() * v.imag();
+}
+
+/// Products of sqrt(w) [-H phi, -H] with itself, less what sqrt(w) [phi, own] explains of them.
+Eigen::MatrixXd remaining_products(const Eigen::VectorXd& w, const Eigen::VectorXcd& H,
+                                   const SplitMatrix& phi, const SplitMatrix& own,
+                                   const FractionGram& products) {
+  const Eigen::Index n = phi.cols();
+  const Eigen::Index left = n + own.cols();
+  const Eigen::VectorXcd power = w.cwiseProduct(H.cwiseAbs2()).cast<Complex>();
+  const Eigen::VectorXcd wH = w.cwiseProduct(H);
+  Eigen::MatrixXd LL(left, left);
+  Eigen::MatrixXd LR(left, n + 1);
+  Eigen::MatrixXd RR(n + 1, n + 1);
+  LL.topLeftCorner(n, n) = products(w.cast<Complex>());
+  LR.topLeftCorner(n, n) = products(-wH);
+  LR.col(n) << sum(phi, -wH), sum(own, -wH);
+  RR.topLeftCorner(n, n) = products(power);
+  RR.col(n) << sum(phi, power), power.sum().real();
+  RR.row(n) = RR.col(n).transpose();
+  for (Eigen::Index o = 0; o < own.cols(); ++o) {
+    const Eigen::VectorXcd column =
+        own.re.col(o).cast<Complex>() + Complex(0.0, 1.0) * own.im.col(o).cast<Complex>();
+    LL.col(n + o) << sum(phi, w.cwiseProduct(column)), sum(own, w.cwiseProduct(column));
+    LL.row(n + o) = LL.col(n + o).transpose();
+    LR.row(n + o).head(n) = sum(phi, -wH.conjugate().cwiseProduct(column)).transpose();
+  }
+  const Eigen::VectorXd scale = inverse_root(LL.diagonal());
+  LL = scale.asDiagonal() * LL * scale.asDiagonal();
+  LL.diagonal().array() += kShift;
+  LR = scale.asDiagonal() * LR;
+  LL.llt().matrixL().solveInPlace(LR);
+  return RR - LR.transpose() * LR;
+}
+
+}  // namespace
+
+SigmaEquations::SigmaEquations(Eigen::VectorXcd x, bool unit_circle, const Eigen::MatrixXcd& G,
+                               const Eigen::VectorXcd& factor, const Eigen::MatrixXd& weights,
+                               SplitMatrix own, int threads)
+    : x_(std::move(x)),
+      unit_circle_(unit_circle),
+      H_(G * factor.cwiseInverse().asDiagonal()),
+      power_(factor.cwiseAbs2()),
+      weights_(weights),
+      own_(std::move(own)),
+      threads_(threads) {}
+
+Eigen::MatrixXd SigmaEquations::triangle(const PoleSet& poles, bool accurate) const {
+  const SplitMatrix phi = partial_fractions(poles, x_);
+  if (!accurate)
+    if (std::optional<Eigen::MatrixXd> R = by_sums(poles, phi)) return *std::move(R);
+  return by_factors(phi);
+}
+
+/// A triangle for each of a fixed number of shares of the channels. Data that call for this are next to exact: a few
+/// times as many lines as unknowns say all.
+Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
+  const Eigen::Index unknowns = 2 * phi.cols() + own_.cols() + 1;
+  const Eigen::Index stride = std::max<Eigen::Index>(1, 2 * x_.size() / (kTimesOver * unknowns));
+  const auto lines = Eigen::seq(0, x_.size() - 1, stride);
+  const auto thinned = [&](const SplitMatrix& all) {
+    return SplitMatrix{all.re(lines, Eigen::all), all.im(lines, Eigen::all)};
+  };
+  const SplitMatrix thin_phi = thinned(phi);
+  const SplitMatrix thin_own = thinned(own_);
+  const Eigen::VectorXd thin_power = power_(lines);
+  const auto triangle_of = [&](Eigen::Index c) {
+    const Eigen::RowVectorXd weight = weights_(c, lines);
+    const Eigen::RowVectorXcd response = H_(c, lines);
+    return factor_of_channel(weight.transpose().cwiseProduct(thin_power), response.transpose(),
+                             thin_phi, thin_own);
+  };
+  std::vector<Eigen::MatrixXd> shares(
+      static_cast<std::size_t>(std::min<Eigen::Index>(kShares, H_.rows())));
+  for_each_task(threads_, static_cast<int>(shares.size()), [&](int share) {
+    Eigen::MatrixXd& R = shares[static_cast<std::size_t>(share)];
+    R = triangle_of(share);
+    for (Eigen::Index c = share + kShares; c < H_.rows(); c += kShares) append(R, triangle_of(c));
+  });
+  return combined(std::move(shares), threads_) * std::sqrt(static_cast<double>(stride));
+}
+
+/// From products of fractions. @returns nothing if too few digits are left
+std::optional<Eigen::MatrixXd> SigmaEquations::by_sums(const PoleSet& poles,
+                                                       const SplitMatrix& phi) const {
+  const Eigen::Index n = phi.cols();
+  const FractionGram products(poles, x_, unit_circle_);
+  std::vector<Eigen::MatrixXd> shares(kShares, Eigen::MatrixXd::Zero(n + 1, n + 1));
+  for_each_task(threads_, kShares, [&](int share) {
+    for (Eigen::Index c = share; c < H_.rows(); c += kShares)
+      shares[static_cast<std::size_t>(share)] +=
+          remaining_products(weights_.row(c).transpose().cwiseProduct(power_),
+                             H_.row(c).transpose(), phi, own_, products);
+  });
+  Eigen::MatrixXd S = shares[0];
+  for (std::size_t share = 1; share < kShares; ++share) S += shares[share];
+  const Eigen::VectorXd scale = inverse_root(S.diagonal());
+  const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> factor(scale.asDiagonal() * S *
+                                                         scale.asDiagonal());
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  const Eigen::MatrixXd R = factor.matrixU();
+  return R * scale.cwiseInverse().asDiagonal();
+}
+
+}  // namespace stageid

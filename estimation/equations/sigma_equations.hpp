@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <complex>
+#include <optional>
+
+#include "estimation/model/pole_set.hpp"
+
+namespace stageid {
+
+/// The equations of a pole relocation (Gustavsen and Semlyen, IEEE Trans. Power Delivery 14 (1999) 1052): in every
+/// channel H sigma is a sum of fractions with the same poles, sigma = phi c + d; here with the channels'
+/// numerators eliminated (Deschrijver et al., IEEE MWCL 18 (2008) 383).
+class SigmaEquations {
+ public:
+  /// @param x N: j omega, or e^{j omega T} on the unit circle
+  /// @param G n_c x N, H times a factor on every line  @param weights n_c x N, of |G - P|^2; must stay
+  /// @param own N x any: what the numerators have beside the fractions
+  SigmaEquations(Eigen::VectorXcd x, bool unit_circle, const Eigen::MatrixXcd& G,
+                 const Eigen::VectorXcd& factor, const Eigen::MatrixXd& weights, SplitMatrix own,
+                 int threads);
+
+  /// R, n+1 x n+1: |R (c, d)|^2 is what remains of the equations. The norm of its last column is that of the
+  /// residual that numerators alone leave. The result does not depend on the threads.
+  /// @param accurate to rounding; else to about half of the digits, in a tenth of the time
+  Eigen::MatrixXd triangle(const PoleSet& poles, bool accurate) const;
+
+  const Eigen::VectorXcd& x() const noexcept { return x_; }
+  const Eigen::MatrixXcd& H() const noexcept { return H_; }
+
+ private:
+  Eigen::MatrixXd by_factors(const SplitMatrix& phi) const;
+  std::optional<Eigen::MatrixXd> by_sums(const PoleSet& poles, const SplitMatrix& phi) const;
+
+  Eigen::VectorXcd x_;
+  bool unit_circle_;
+  Eigen::MatrixXcd H_;
+  Eigen::VectorXd power_;  // |factor|^2
+  const Eigen::MatrixXd& weights_;
+  SplitMatrix own_;
+  int threads_;
+};
+
+}  // namespace stageid

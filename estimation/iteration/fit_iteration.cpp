@@ -1,0 +1,342 @@
+#include "estimation/iteration/fit_iteration.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "estimation/equations/arrow_system.hpp"
+#include "estimation/equations/numerators.hpp"
+#include "estimation/problem/pole_bounds.hpp"
+#include "estimation/problem/search_limit.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kNearlyExact = 1e-12;  // of the data's power: normal equations lose what is left
+// Of the cost: a step that gains less there is the last one.
+constexpr double kGainAtRounding = 0.5;
+constexpr int kTriesAtRounding = 3;
+constexpr int kTriesOfRiv = 3;  // before the Gauss-Newton step is taken
+constexpr int kTries = 40;
+constexpr Eigen::Index kChannelsOfSearch = 512;  // tell one delay as well as all that are more
+// Numerators are solved again after every step.
+constexpr ChannelEquationsUse kGlobalsOnly = ChannelEquationsUse::eliminated;
+
+/// A candidate with its numerators solved.
+struct Trial {
+  FitParameters beta;
+  double cost = 0.0;
+};
+
+std::optional<Trial> try_step(const FitProblem& problem, const PoleBounds& bounds,
+                              const FitParameters& beta, const Eigen::VectorXd& step) {
+  if (!step.allFinite()) return std::nullopt;
+  Trial trial{stepped(problem, beta, step)};
+  if (!bounds.stabilize(beta, trial.beta)) return std::nullopt;
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, trial.beta, false);
+  if (!solve_numerators(problem, groups, trial.beta.B, trial.cost)) return std::nullopt;
+  return trial;
+}
+
+/// Largest change of a denominator coefficient or delay, relative to its own size.
+double relative_step(const FitProblem& problem, const FitParameters& beta,
+                     const Eigen::VectorXd& step) {
+  double largest = 0.0;
+  Eigen::Index p = 0;
+  for (const Eigen::VectorXd& a : beta.a)
+    for (Eigen::Index q = 0; q < a.size(); ++q)
+      largest = std::max(largest, std::abs(step[p++]) / std::max(std::abs(a[q]), 1e-300));
+  const double time = 1.0 / problem.lines.omega_rad_s.maxCoeff();
+  for (; p < step.size(); ++p) largest = std::max(largest, std::abs(step[p]) / time);
+  return largest;
+}
+
+/// max_i |e_i| / sqrt(M_ii 2 N cost): 0 to 1, the cosine between the residual and a parameter's
+/// effect.
+double scaled_gradient(const FitProblem& problem, const ArrowSystem& system,
+                       const std::vector<Eigen::Index>& frozen, double cost) {
+  const double total = 2.0 * static_cast<double>(problem.size()) * cost;
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < system.schur_gradient().size(); ++i) {
+    if (std::find(frozen.begin(), frozen.end(), i) != frozen.end()) continue;
+    largest =
+        std::max(largest, std::abs(system.schur_gradient()[i]) /
+                              std::sqrt(std::max(std::abs(system.schur()(i, i)) * total, 1e-300)));
+  }
+  return largest;
+}
+
+class Iteration {
+ public:
+  Iteration(const FitProblem& problem, FitParameters& beta, const FitOptions& options)
+      : problem_(problem),
+        beta_(beta),
+        options_(options),
+        bounds_(problem, beta),
+        signal_cost_(signal_cost(problem)) {}
+
+  IterationResult run() {
+    if (begin()) {
+      while (go_on()) {
+      }
+      result_.end_cost = cost_;
+    }
+    result_.frozen = frozen_;
+    return std::move(result_);
+  }
+
+ private:
+  bool begin() {
+    bounds_.stabilize(beta_, beta_);
+    const auto solve = [&] {
+      return solve_numerators(problem_, evaluate_groups(problem_, beta_, false), beta_.B, cost_);
+    };
+    bool solved = solve();
+    if ((!solved || nearly_exact()) && all_digits()) solved = solve();
+    if (!solved)
+      return end(FitStatus::singular,
+                 "the start's numerators are not determined: two modes coincide or the data do not "
+                 "excite them");
+    result_.cost.push_back(cost_);
+    return true;
+  }
+
+  /// From now on products are multiplied out. @returns false if they were
+  bool all_digits() {
+    if (problem_.multiplied_out || !sums_fractions_of_few(problem_)) return false;
+    problem_.multiplied_out = true;
+    return true;
+  }
+
+  bool go_on() {
+    if (options_.limit && options_.limit->reached() && problem_.globals() > 0) {
+      if (best_.cost > 0.0 && best_.cost < cost_)
+        return end_at_best(options_.limit->status(), options_.limit->message());
+      return end(options_.limit->status(), options_.limit->message());
+    }
+    if (result_.iterations >= options_.max_iterations)
+      return end(problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
+                 fmt::format("stopped after {} iterations, scaled gradient {:.2g}",
+                             result_.iterations, gradient_));
+    return options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
+  }
+
+  bool end(FitStatus status, std::string message) {
+    result_.status = status;
+    result_.message = std::move(message);
+    return false;
+  }
+
+  void accept(Trial&& trial) {
+    beta_ = std::move(trial.beta);
+    cost_ = trial.cost;
+    result_.cost.push_back(cost_);
+    ++result_.iterations;
+    if (options_.progress) options_.progress(result_.iterations, cost_);
+  }
+
+  /// True if the system says that the end is reached; `result_` is then complete.
+  bool at_optimum(const ArrowSystem& system) {
+    frozen_ = bounds_.leaning(beta_, system.schur_gradient());
+    gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
+    if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance) {
+      end(FitStatus::gradient_small,
+          fmt::format("the first-order condition holds: scaled gradient {:.2g}", gradient_));
+      return true;
+    }
+    // Newton decrement: the distance to the stationary point in standard deviations of the noise that the
+    // residual shows.
+    const double data = static_cast<double>(problem_.size() * problem_.channels());
+    const double squares = 2.0 * static_cast<double>(problem_.size()) * cost_;
+    deviations_ = std::sqrt(
+        std::abs(system.solve_globals(0.0, frozen_).dot(system.schur_gradient())) * data / squares);
+    if (deviations_ < options_.deviation_tolerance) {
+      end(FitStatus::gradient_small,
+          fmt::format(
+              "the first-order condition holds: within {:.1g} standard deviations of it, scaled "
+              "gradient {:.2g}",
+              deviations_, gradient_));
+      return true;
+    }
+    if (cost_ < 1e-28 * signal_cost_) {
+      end(FitStatus::gradient_small, "the residual has reached rounding");
+      return true;
+    }
+    return false;
+  }
+
+  bool nearly_exact() const { return cost_ < kNearlyExact * signal_cost_; }
+  bool at_rounding() const { return cost_ < kNothingLeft * signal_cost_; }
+
+  bool descent_step() {
+    // Without a residual the refined-IV equations are those of Gauss-Newton, at twice the price.
+    const FitMethod method = nearly_exact() ? FitMethod::gn : options_.method;
+    if (nearly_exact()) all_digits();
+    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
+    const ArrowSystem system(problem_, beta_, groups, method, kGlobalsOnly);
+    if (!system.regular())
+      return all_digits() ||
+             end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+    if (at_optimum(system)) return false;
+    const double before = cost_;
+    const int tries = at_rounding() ? kTriesAtRounding : kTries;
+    if (attempt(system, method == FitMethod::riv ? kTriesOfRiv : tries)) {
+      if (at_rounding() && cost_ > kGainAtRounding * before) return end_of_descent();
+      return still_moving();
+    }
+    if (method == FitMethod::riv) {
+      const ArrowSystem gauss_newton(problem_, beta_, groups, FitMethod::gn, kGlobalsOnly);
+      if (attempt(gauss_newton, tries)) return still_moving();
+    }
+    return all_digits() || end_of_descent();
+  }
+
+  /// Where no step lowers the cost, or none by a part of it that is worth one more.
+  bool end_of_descent() {
+    if (nearly_exact()) {
+      polish_numerators(problem_, evaluate_groups(problem_, beta_, false), beta_.B, cost_);
+      result_.cost.push_back(cost_);
+    }
+    if (at_rounding())
+      return end(FitStatus::step_small,
+                 "the residual has reached rounding: no step lowers the cost any further");
+    if (deviations_ < kRoundingDeviations)
+      return end(FitStatus::step_small,
+                 fmt::format("the cost is at rounding, within {:.1g} standard deviations of the "
+                             "first-order condition; scaled gradient {:.2g}",
+                             deviations_, gradient_));
+    return end(FitStatus::cost_stalled,
+               fmt::format("no step lowers the cost; scaled gradient {:.2g}", gradient_));
+  }
+
+  /// Tries steps of growing damping; accepts the first that lowers the cost.
+  bool attempt(const ArrowSystem& system, int tries) {
+    for (int i = 0; i < tries && levenberg_ <= kLargestLevenberg; ++i) {
+      const Eigen::VectorXd step = system.solve_globals(levenberg_, frozen_);
+      step_size_ = relative_step(problem_, beta_, step);
+      std::optional<Trial> trial = try_step(problem_, bounds_, beta_, step);
+      if (trial && trial->cost < cost_) {
+        accept(std::move(*trial));
+        levenberg_ = i == 0 ? (levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0) : levenberg_;
+        return true;
+      }
+      if (step_size_ < 1e-15) break;  // nothing moves any more
+      levenberg_ = std::max(10.0 * levenberg_, 1e-4);
+    }
+    if (levenberg_ > kLargestLevenberg) levenberg_ = 1e-4;
+    return false;
+  }
+
+  bool still_moving() {
+    if (step_size_ < options_.step_tolerance)
+      return end(FitStatus::step_small,
+                 fmt::format("the last step was {:.1e} of the parameters", step_size_));
+    return true;
+  }
+
+  bool fixed_point_step() {
+    if (result_.iterations == 0) best_ = Trial{beta_, cost_};
+    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
+    const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
+    if (!system.regular())
+      return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+    frozen_ = bounds_.leaning(beta_, system.schur_gradient());
+    gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
+    Eigen::VectorXd step = system.solve_globals(0.0, frozen_);
+    std::optional<Trial> trial;
+    for (int halvings = 0; halvings < 12 && !trial; ++halvings, step *= 0.5) {
+      step_size_ = relative_step(problem_, beta_, step);
+      trial = try_step(problem_, bounds_, beta_, step);
+    }
+    if (!trial) return end_at_best(FitStatus::cost_stalled, "no acceptable step");
+    accept(std::move(*trial));
+    if (cost_ < best_.cost) best_ = Trial{beta_, cost_};
+    if (step_size_ < std::max(options_.step_tolerance, 1e-9))
+      return end_at_best(FitStatus::step_small,
+                         "the fixed point of Sanathanan and Koerner is reached; it is not the "
+                         "minimum of the cost");
+    if (result_.iterations >= options_.max_iterations)
+      return end_at_best(FitStatus::iteration_limit,
+                         fmt::format("stopped after {} iterations", result_.iterations));
+    return true;
+  }
+
+  bool end_at_best(FitStatus status, std::string message) {
+    beta_ = best_.beta;
+    cost_ = best_.cost;
+    return end(status, std::move(message));
+  }
+
+  FitProblem problem_;
+  FitParameters& beta_;
+  const FitOptions& options_;
+  PoleBounds bounds_;
+  double signal_cost_;
+  std::vector<Eigen::Index> frozen_;  // modes at their bounds
+  IterationResult result_;
+  double cost_ = 0.0;  // at beta_
+  double levenberg_ = 0.0;
+  double gradient_ = 1.0;
+  double step_size_ = 0.0;
+  double deviations_ = 0.0;
+  Trial best_;
+};
+
+/// The problem itself, or that of evenly spread channels of it, as the outputs of one input: without their own
+/// copies of data and weights, memory would be that of all.
+FitProblem some_channels(const FitProblem& problem) {
+  FitProblem out = problem;
+  const Eigen::Index step = (problem.channels() + kChannelsOfSearch - 1) / kChannelsOfSearch;
+  if (step <= 1) return out;
+  const Eigen::Index count = (problem.channels() + step - 1) / step;
+  const auto chosen = Eigen::seqN(0, count, step);
+  out.n_outputs = count;
+  out.n_inputs = 1;
+  out.G = Eigen::MatrixXcd((*problem.G)(chosen, Eigen::all));
+  if (problem.W->size() > 0) out.W = Eigen::MatrixXd((*problem.W)(chosen, Eigen::all));
+  return out;
+}
+
+}  // namespace
+
+double signal_cost(const FitProblem& problem) {
+  return (problem.W->array() * problem.G->array().abs2()).sum() /
+         (2.0 * static_cast<double>(problem.size()));
+}
+
+IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options) {
+  return Iteration(problem, beta, options).run();
+}
+
+void search_delay(const FitProblem& problem, FitParameters& beta) {
+  // The poles are not right yet, and under weights that follow the noise one sharp mode that is off
+  // by a part of its width would outweigh the phase of everything else. Relative errors do not.
+  FitProblem relative = some_channels(problem);
+  const auto power = relative.G->array().abs2();
+  const Eigen::ArrayXd floor = 1e-6 * power.rowwise().mean() + 1e-300;
+  Eigen::MatrixXd weights = (power > 0.0).select((power.colwise() + floor).inverse(), 0.0).matrix();
+  if (relative.W->size() > 0) weights.array() *= (relative.W->array() > 0.0).cast<double>();
+  relative.W = std::move(weights);
+  const double highest = problem.lines.omega_rad_s.maxCoeff();
+  const double step =
+      0.5 / highest;  // rad at the highest line: well inside the basin of the best delay
+  double best_cost = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd best = beta.input_delay_s;
+  FitParameters trial = beta;
+  trial.input_delay_s.setZero(relative.n_inputs);
+  trial.output_delay_s.setZero(relative.n_outputs);
+  for (int i = 0; i <= 24; ++i) {
+    trial.input_delay_s.setConstant(step * i);
+    const std::vector<BasisGroup> groups = evaluate_groups(relative, trial, false);
+    double cost = 0.0;
+    if (!solve_numerators(relative, groups, trial.B, cost) || !(cost < best_cost)) continue;
+    best_cost = cost;
+    best.setConstant(step * i);
+  }
+  beta.input_delay_s = best;
+}
+
+}  // namespace stageid

@@ -1,0 +1,161 @@
+// Gauss-Newton on denominators, delays and numerators at once, for weights that tie the channels
+// together.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "estimation/equations/joint_equations.hpp"
+#include "estimation/iteration/fit_iteration.hpp"
+#include "estimation/problem/pole_bounds.hpp"
+#include "estimation/problem/search_limit.hpp"
+
+namespace stageid {
+namespace {
+
+// Of the step, where the cost is quadratic: the next one corrects it.
+constexpr double kStepTolerance = 1e-2;
+
+class JointIteration {
+ public:
+  JointIteration(const FitProblem& problem, const WeightMatrices& weights, FitParameters& beta,
+                 const FitOptions& options)
+      : problem_(problem),
+        weights_(weights),
+        beta_(beta),
+        options_(options),
+        bounds_(problem, beta) {
+    signal_cost_ = weighted_cost(problem, weights, residual(problem, {}, {}));
+  }
+
+  IterationResult run() {
+    E_ = residual_at(beta_);
+    result_.cost.push_back(E_.cost);
+    while (iterate_once()) {
+    }
+    result_.end_cost = E_.cost;
+    result_.frozen = frozen_;
+    return std::move(result_);
+  }
+
+ private:
+  Residual residual_at(const FitParameters& beta) const {
+    Residual E = residual(problem_, evaluate_groups(problem_, beta, false), beta.B);
+    E.cost = weighted_cost(problem_, weights_, E);
+    return E;
+  }
+
+  bool end(FitStatus status, std::string message) {
+    result_.status = status;
+    result_.message = std::move(message);
+    return false;
+  }
+
+  /// @returns false at the end; `result_` then says why.
+  bool iterate_once() {
+    if (options_.limit && options_.limit->reached())
+      return end(options_.limit->status(), options_.limit->message());
+    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
+    const JointEquations equations(problem_, weights_, beta_, groups, E_);
+    if (!equations.regular())
+      return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+    const Eigen::VectorXd step = free_step(equations);
+    if (at_optimum(equations.gradient().dot(step))) return false;
+    if (result_.iterations >= options_.max_iterations)
+      return end(FitStatus::iteration_limit,
+                 fmt::format("stopped after {} iterations, {:.2g} standard deviations from the "
+                             "first-order condition",
+                             result_.iterations, deviations_));
+    if (descend(equations, step)) return true;
+    if (E_.cost < kNothingLeft * signal_cost_)
+      return end(FitStatus::step_small,
+                 "the residual has reached rounding: no step lowers the cost any further");
+    if (deviations_ < kRoundingDeviations)
+      return end(FitStatus::step_small,
+                 fmt::format("the cost is at rounding, within {:.1g} standard deviations of the "
+                             "first-order condition",
+                             deviations_));
+    return end(FitStatus::cost_stalled, fmt::format("no step lowers the cost, {:.2g} standard "
+                                                    "deviations from the first-order condition",
+                                                    deviations_));
+  }
+
+  /// The step, modes held that stand at a bound and lean on it.
+  Eigen::VectorXd free_step(const JointEquations& equations) {
+    frozen_.clear();
+    Eigen::VectorXd step = equations.solve(equations.gradient(), frozen_, kStepTolerance).x;
+    frozen_ = bounds_.leaning(beta_, step);
+    if (frozen_.empty()) return step;
+    return equations.solve(equations.gradient(), frozen_, kStepTolerance).x;
+  }
+
+  /// By the Newton decrement, over all parameters: the step's length in standard deviations of the
+  /// noise that the residual shows, and as a part of that residual.
+  bool at_optimum(double decrement) {
+    const double squares = 2.0 * static_cast<double>(problem_.size()) * E_.cost;
+    const double gradient = std::sqrt(std::max(decrement, 0.0) / std::max(squares, 1e-300));
+    deviations_ = gradient * std::sqrt(static_cast<double>(problem_.size() * problem_.channels()));
+    if (E_.cost < 1e-28 * signal_cost_) {
+      end(FitStatus::gradient_small, "the residual has reached rounding");
+      return true;
+    }
+    if (gradient >= options_.gradient_tolerance && deviations_ >= options_.deviation_tolerance)
+      return false;
+    end(FitStatus::gradient_small,
+        fmt::format("the first-order condition holds: within {:.1g} standard deviations of it",
+                    deviations_));
+    return true;
+  }
+
+  /// Tries steps of growing damping, `step` being the first; takes the first that lowers the cost.
+  bool descend(const JointEquations& equations, Eigen::VectorXd step) {
+    for (bool first = true; levenberg_ <= kLargestLevenberg; first = false) {
+      if (levenberg_ > 0.0)
+        step = equations.solve(equations.gradient(), frozen_, kStepTolerance, levenberg_).x;
+      if (take(step)) {
+        if (first) levenberg_ = levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0;
+        return true;
+      }
+      levenberg_ = std::max(10.0 * levenberg_, 1e-4);
+    }
+    return false;
+  }
+
+  bool take(const Eigen::VectorXd& step) {
+    if (!step.allFinite()) return false;
+    const Eigen::Index globals = problem_.globals();
+    FitParameters trial = stepped(problem_, beta_, step.head(globals));
+    trial.B += step.tail(step.size() - globals).reshaped(trial.B.rows(), trial.B.cols());
+    if (!bounds_.stabilize(beta_, trial)) return false;
+    Residual E = residual_at(trial);
+    if (!(E.cost < E_.cost)) return false;
+    beta_ = std::move(trial);
+    E_ = std::move(E);
+    result_.cost.push_back(E_.cost);
+    ++result_.iterations;
+    if (options_.progress) options_.progress(result_.iterations, E_.cost);
+    return true;
+  }
+
+  const FitProblem& problem_;
+  const WeightMatrices& weights_;
+  FitParameters& beta_;
+  const FitOptions& options_;
+  PoleBounds bounds_;
+  std::vector<Eigen::Index> frozen_;
+  Residual E_;  // at beta_
+  IterationResult result_;
+  double signal_cost_ = 0.0;
+  double deviations_ = 0.0;
+  double levenberg_ = 0.0;
+};
+
+}  // namespace
+
+IterationResult iterate(const FitProblem& problem, const WeightMatrices& weights,
+                        FitParameters& beta, const FitOptions& options) {
+  return JointIteration(problem, weights, beta, options).run();
+}
+
+}  // namespace stageid

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "acquisition/files/file_error.hpp"
+
+namespace stageid {
+
+/// A place in a JSON file from outside: every access checks, every failure names file and place.
+class JsonNode {
+ public:
+  JsonNode(const std::filesystem::path& file, std::string place,
+           const nlohmann::ordered_json& value)
+      : file_(file), place_(std::move(place)), value_(value) {}
+
+  bool has(const std::string& key) const { return value_.is_object() && value_.contains(key); }
+  JsonNode member(const std::string& key) const;
+  std::vector<JsonNode> elements() const;
+  std::vector<JsonNode> elements_of(const std::string& key) const;  ///< none if it is missing
+  double number() const;                                            ///< finite
+  double positive() const;                                          ///< > 0
+  /// A member that may be missing or null, as a number is that could not be told.
+  double number_or(const std::string& key, double fallback) const;
+  long long integer(long long lowest, long long highest) const;
+  std::string text() const;
+  std::vector<double> numbers() const;
+  std::vector<double> numbers_or_null() const;  ///< null: NaN
+  std::vector<std::string> texts() const;
+  const nlohmann::ordered_json& raw() const noexcept { return value_; }
+  [[noreturn]] void fail(const std::string& what) const { throw FormatError(file_, place_, what); }
+
+ private:
+  const std::filesystem::path& file_;
+  std::string place_;
+  const nlohmann::ordered_json& value_;
+};
+
+/// A JSON file with its "format" checked.
+class JsonFile {
+ public:
+  /// @throws FileError, FormatError
+  JsonFile(std::filesystem::path file, const std::string& format);
+  JsonFile(const JsonFile&) = delete;
+  JsonFile& operator=(const JsonFile&) = delete;
+  JsonNode root() const { return {file_, "/", value_}; }
+
+ private:
+  std::filesystem::path file_;
+  nlohmann::ordered_json value_;
+};
+
+}  // namespace stageid

@@ -1,0 +1,88 @@
+#include "estimation/modal/modal_assurance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+struct Candidate {
+  ModePair pair;
+  double worth = 0.0;
+};
+
+bool is_share(double value) { return value > 0.0 && value <= 1.0; }
+
+std::vector<Candidate> candidates(const std::vector<ModeShape>& first,
+                                  const std::vector<ModeShape>& second,
+                                  const PairingOptions& options) {
+  const Eigen::MatrixXd output_mac = modal_assurance(output_shapes(first), output_shapes(second));
+  const Eigen::MatrixXd input_mac = modal_assurance(input_shapes(first), input_shapes(second));
+  std::vector<Candidate> out;
+  for (std::size_t a = 0; a < first.size(); ++a)
+    for (std::size_t b = 0; b < second.size(); ++b) {
+      const auto row = static_cast<Eigen::Index>(a);
+      const auto column = static_cast<Eigen::Index>(b);
+      const double difference =
+          second[b].natural_frequency_hz / first[a].natural_frequency_hz - 1.0;
+      const ModePair pair{a, b, difference, output_mac(row, column), input_mac(row, column)};
+      const double mac = pair.output_mac * pair.input_mac;
+      const double nearness = 1.0 - std::abs(difference) / options.most_frequency_difference;
+      if (nearness >= 0.0 && mac >= options.least_mac) out.push_back({pair, mac * nearness});
+    }
+  return out;
+}
+
+}  // namespace
+
+Eigen::MatrixXd modal_assurance(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b) {
+  if (a.rows() != b.rows())
+    throw std::invalid_argument("MAC: both sets of shapes must have the same channels");
+  Eigen::MatrixXd mac = (a.adjoint() * b).cwiseAbs2();
+  for (Eigen::Index i = 0; i < mac.rows(); ++i)
+    for (Eigen::Index j = 0; j < mac.cols(); ++j)
+      if (mac(i, j) > 0.0) mac(i, j) /= a.col(i).squaredNorm() * b.col(j).squaredNorm();
+  return mac;
+}
+
+Eigen::MatrixXcd output_shapes(const std::vector<ModeShape>& modes) {
+  Eigen::MatrixXcd out(modes.empty() ? 0 : modes[0].output_shape.size(),
+                       static_cast<Eigen::Index>(modes.size()));
+  for (std::size_t m = 0; m < modes.size(); ++m)
+    out.col(static_cast<Eigen::Index>(m)) = modes[m].output_shape;
+  return out;
+}
+
+Eigen::MatrixXcd input_shapes(const std::vector<ModeShape>& modes) {
+  Eigen::MatrixXcd out(modes.empty() ? 0 : modes[0].input_shape.size(),
+                       static_cast<Eigen::Index>(modes.size()));
+  for (std::size_t m = 0; m < modes.size(); ++m)
+    out.col(static_cast<Eigen::Index>(m)) = modes[m].input_shape;
+  return out;
+}
+
+std::vector<ModePair> pair_modes(const std::vector<ModeShape>& first,
+                                 const std::vector<ModeShape>& second,
+                                 const PairingOptions& options) {
+  if (!is_share(options.most_frequency_difference) || !is_share(options.least_mac))
+    throw std::invalid_argument("pairing of modes: its limits must be above 0 and at most 1");
+  if (first.empty() || second.empty()) return {};
+  std::vector<Candidate> sorted = candidates(first, second, options);
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.worth > b.worth; });
+  std::vector<bool> first_taken(first.size(), false);
+  std::vector<bool> second_taken(second.size(), false);
+  std::vector<ModePair> out;
+  for (const Candidate& candidate : sorted) {
+    const ModePair& pair = candidate.pair;
+    if (first_taken[pair.first] || second_taken[pair.second]) continue;
+    first_taken[pair.first] = second_taken[pair.second] = true;
+    out.push_back(pair);
+  }
+  std::sort(out.begin(), out.end(),
+            [](const ModePair& a, const ModePair& b) { return a.first < b.first; });
+  return out;
+}
+
+}  // namespace stageid

@@ -1,0 +1,209 @@
+#include "estimation/modal/residual_verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "frf/response/line_scatter.hpp"
+#include "frf/statistics/tail_probability.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kAllowed = 2.0;  // times the variance: the model's error is as large as the noise
+constexpr double kByChance = 1e-3;   // that any part of a right model is called not explained
+constexpr Eigen::Index kRun = 32;    // lines that are judged together
+constexpr double kRounding = 1e-20;  // of a line's power: no measurement is more exact
+
+/// Sums over one part of the data.
+struct Part {
+  std::string place;
+  double t = 0.0;
+  double r = 0.0;
+  double entries = 0.0;
+  double lines = 0.0;  ///< that hold at least one entry
+
+  void add(double t_of_entry, double r_of_entry) {
+    t += t_of_entry;
+    r += r_of_entry;
+    entries += 1.0;
+  }
+  double mean_t() const { return entries > 0.0 ? t / entries : 0.0; }
+  double mean_r() const { return entries > 0.0 ? r / entries : 0.0; }
+};
+
+/// The parts of the data, judged by one variance.
+class Parts {
+ public:
+  Parts(const FrfEstimate& frf, double dof) : frf_(frf), dof_(dof) {
+    parts_.push_back({});
+    for (const std::string& name : frf.outputs.names) parts_.push_back({"output " + name});
+    for (const std::string& name : frf.inputs.names) parts_.push_back({"input " + name});
+    for (Eigen::Index first = 0; first < frf.lines(); first += kRun) {
+      const Eigen::Index last = std::min(first + kRun, frf.lines()) - 1;
+      parts_.push_back(
+          {fmt::format("{:.4g} to {:.4g} Hz", frf.frequency_hz[first], frf.frequency_hz[last])});
+    }
+    seen_.resize(parts_.size());
+  }
+
+  /// One line: its residual, variance and weights (empty: all count), n_c each.
+  void add_line(Eigen::Index k, const Eigen::Ref<const Eigen::VectorXcd>& residual,
+                const Eigen::Ref<const Eigen::VectorXd>& variance,
+                const Eigen::Ref<const Eigen::VectorXd>& weights) {
+    const Eigen::Index n_y = frf_.n_outputs();
+    const double rounding = kRounding * frf_.response.col(k).squaredNorm();
+    std::fill(seen_.begin(), seen_.end(), false);
+    for (Eigen::Index c = 0; c < residual.size(); ++c) {
+      // A variance of zero is one that nobody knows.
+      if (!(variance[c] > 0.0) || (weights.size() > 0 && !(weights[c] > 0.0))) continue;
+      const double r = std::norm(residual[c]) / (variance[c] + rounding);
+      const double scaled = r / kAllowed;
+      const double t = dof_ > 0.0 ? dof_ * std::log1p(scaled / dof_) : scaled;
+      const Eigen::Index outputs = 1;
+      const Eigen::Index inputs = outputs + n_y;
+      const Eigen::Index runs = inputs + frf_.n_inputs();
+      for (const Eigen::Index p :
+           {Eigen::Index{0}, outputs + c % n_y, inputs + c / n_y, runs + k / kRun}) {
+        parts_[static_cast<std::size_t>(p)].add(t, r);
+        seen_[static_cast<std::size_t>(p)] = true;
+      }
+    }
+    for (std::size_t p = 0; p < parts_.size(); ++p) parts_[p].lines += seen_[p] ? 1.0 : 0.0;
+  }
+
+  const Part& all() const { return parts_.front(); }
+
+  /// The mean of r if the error is noise; 0: there is none.
+  double expected() const { return dof_ > 1.0 ? dof_ / (dof_ - 1.0) : dof_ > 0.0 ? 0.0 : 1.0; }
+
+  /// Of the parts that are not explained the first if that is all data, else the worst; null: all are explained.
+  const Part* unexplained() const {
+    if (is_unexplained(all())) return &all();
+    const Part* worst = nullptr;
+    for (const Part& part : parts_)
+      if (is_unexplained(part) && (worst == nullptr || part.mean_t() > worst->mean_t()))
+        worst = &part;
+    return worst;
+  }
+
+  /// "the residual is 177 times what noise explains, most of it at output z1".
+  std::string reason(const Part& part, const char* causes) const {
+    const Part* worst = &part;
+    if (&part == &all())
+      for (const Part& other : parts_)
+        if (other.mean_t() > worst->mean_t()) worst = &other;
+    const char* preposition = worst == &all() ? "" : worst == &part ? " at " : ", most of it at ";
+    return fmt::format("the residual is {:.3g} times what {}{}{}", excess(part), causes,
+                       preposition, worst->place);
+  }
+
+ private:
+  /// Where no mean of r exists, the mean of t is the size of the excess.
+  double excess(const Part& part) const {
+    return expected() > 0.0 ? part.mean_r() / expected() : kAllowed * part.mean_t();
+  }
+
+  bool is_unexplained(const Part& part) const {
+    if (!(part.mean_t() > 1.0)) return false;
+    if (!std::isfinite(part.mean_t())) return true;
+    // The sum of n exponential numbers is half a chi-square one with 2 n degrees of freedom.
+    const double n = std::max(1.0, part.lines / frf_.correlated_lines);
+    return tail_of_chi_square(2.0 * n * part.mean_t(), 2.0 * n) *
+               static_cast<double>(parts_.size()) <
+           kByChance;
+  }
+
+  const FrfEstimate& frf_;
+  double dof_;
+  std::vector<Part> parts_;
+  std::vector<bool> seen_;
+};
+
+constexpr Eigen::Index kTile = 64;  // lines
+
+/// Judges by one variance. @returns what is not explained
+void judge_by(const FrfEstimate& frf, const ModelLinesResponse& model,
+              const Eigen::MatrixXd& weights, const Eigen::MatrixXd& variance,
+              ResidualVerdict& verdict) {
+  Parts parts(frf, verdict.dof);
+  const Eigen::VectorXd all;
+  for (Eigen::Index first = 0; first < frf.lines(); first += kTile) {
+    const Eigen::Index count = std::min(kTile, frf.lines() - first);
+    const Eigen::MatrixXcd E = frf.response.middleCols(first, count) - model(first, count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      if (weights.size() > 0)
+        parts.add_line(first + i, E.col(i), variance.col(first + i), weights.col(first + i));
+      else
+        parts.add_line(first + i, E.col(i), variance.col(first + i), all);
+    }
+  }
+  verdict.chi_square = parts.all().mean_r();
+  verdict.expected = parts.expected();
+  const Part* unexplained = parts.unexplained();
+  verdict.explained = unexplained == nullptr;
+  const char* causes = verdict.variance == ResidualVariance::noise ? "noise explains"
+                                                                   : "noise and distortion explain";
+  verdict.reason = verdict.explained ? "" : parts.reason(*unexplained, causes);
+}
+
+}  // namespace
+
+const char* to_string(ResidualVariance variance) noexcept {
+  switch (variance) {
+    case ResidualVariance::none:
+      return "none";
+    case ResidualVariance::noise:
+      return "noise";
+    case ResidualVariance::total:
+      return "total";
+    case ResidualVariance::scatter:
+      return "scatter";
+  }
+  return "none";
+}
+
+ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse& model,
+                               const Eigen::MatrixXd& weights, int threads,
+                               const Distortion& known) {
+  if (weights.size() > 0 &&
+      (weights.rows() != frf.response.rows() || weights.cols() != frf.response.cols()))
+    throw std::invalid_argument("judge_residual: weights and response differ in shape");
+  const auto judge_with = [&](ResidualVariance kind, const Eigen::MatrixXd& variance, double dof) {
+    ResidualVerdict verdict;
+    verdict.variance = kind;
+    verdict.dof = dof;
+    judge_by(frf, model, weights, variance, verdict);
+    return verdict;
+  };
+  const bool has_noise = frf.noise_variance.size() > 0;
+  const bool has_total = frf.total_variance.size() > 0;
+  ResidualVerdict verdict;
+  if (has_noise) verdict = judge_with(ResidualVariance::noise, frf.noise_variance, frf.noise_dof);
+  if (verdict.explained && has_noise) return verdict;
+  if (has_total) {
+    ResidualVerdict total = judge_with(ResidualVariance::total, frf.total_variance, frf.total_dof);
+    return total.explained || !has_noise ? total : verdict;
+  }
+  if (!has_noise) return verdict;
+  if (known.level.cols() > 0 && known.level.rows() == frf.response.rows()) {
+    Eigen::MatrixXd variance = variance_with(known, frf);
+    ResidualVerdict distorted = judge_with(ResidualVariance::total, variance, frf.noise_dof);
+    if (distorted.explained) {
+      distorted.scatter = std::move(variance);
+      return distorted;
+    }
+  }
+  LineScatter lines = line_scatter(frf, threads);
+  if (lines.variance.size() == 0 || lines_are_coarse(frf, lines, threads)) return verdict;
+  ResidualVerdict scatter = judge_with(ResidualVariance::scatter, lines.variance, lines.dof);
+  if (!scatter.explained) return verdict;
+  scatter.scatter = std::move(lines.variance);
+  return scatter;
+}
+
+}  // namespace stageid

@@ -1,0 +1,106 @@
+#include "estimation/modal/submodel_residues.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "estimation/modal/singular_shapes.hpp"
+#include "estimation/model/basis.hpp"
+
+namespace stageid {
+namespace {
+
+using Complex = std::complex<double>;
+
+/// All poles, conjugates too.
+std::vector<Complex> all_poles(const std::vector<Complex>& representatives) {
+  std::vector<Complex> out;
+  for (const Complex pole : representatives) {
+    out.push_back(pole);
+    if (pole.imag() != 0.0) out.push_back(std::conj(pole));
+  }
+  return out;
+}
+
+/// Partial fractions of poles closer than this lose too many digits: the residues grow as the inverse
+/// distance, and the poles themselves, as roots of A, are uncertain by the root of rounding.
+void require_distinct(const std::vector<Complex>& poles, std::size_t index) {
+  constexpr double kClosest = 1e-6;
+  for (std::size_t i = 0; i < poles.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (std::abs(poles[i] - poles[j]) <= kClosest * std::abs(poles[i]))
+        throw std::invalid_argument(
+            fmt::format("model: submodel {}: its poles {:.6g}{:+.6g}j and {:.6g}{:+.6g}j rad/s "
+                        "coincide; a state space needs poles that are distinct within a submodel",
+                        index, poles[j].real(), poles[j].imag(), poles[i].real(), poles[i].imag()));
+}
+
+}  // namespace
+
+std::vector<Complex> pole_representatives(const Submodel& submodel) {
+  const auto n = static_cast<Eigen::Index>(submodel.denominator.size()) - 1;
+  std::vector<Complex> out;
+  for (const Complex pole :
+       roots(Eigen::Map<const Eigen::VectorXd>(submodel.denominator.data() + 1, n)))
+    if (pole.imag() >= 0.0) out.push_back(pole);
+  return out;
+}
+
+Eigen::MatrixXcd numerator_at(const Submodel& submodel, Complex s) {
+  Eigen::MatrixXcd B = submodel.numerator.back().cast<Complex>();
+  for (std::size_t m = submodel.numerator.size() - 1; m-- > 0;)
+    B = B * s + submodel.numerator[m].cast<Complex>();
+  return B;
+}
+
+SubmodelResidues residues(const Submodel& submodel, std::size_t index) {
+  const int l = submodel.integrators;
+  const std::size_t order = submodel.denominator.size() - 1 + static_cast<std::size_t>(l);
+  const auto& B = submodel.numerator;
+  if (l < 0 || l > 2)
+    throw std::invalid_argument(
+        fmt::format("model: submodel {}: it must have 0, 1 or 2 integrators", index));
+  if (B.empty() || B.size() > order + 1)
+    throw std::invalid_argument(fmt::format(
+        "model: submodel {}: it needs one numerator at least and must not be improper", index));
+  const std::vector<Complex> representatives = pole_representatives(submodel);
+  const std::vector<Complex> poles = all_poles(representatives);
+  require_distinct(poles, index);
+
+  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(B[0].rows(), B[0].cols());
+  SubmodelResidues out{zero, zero, zero, {}};
+  const double highest = submodel.denominator.back();
+  if (B.size() == order + 1) out.direct = B.back() / highest;
+  if (l == 1) out.integrator = B[0];
+  if (l == 2) {
+    out.double_integrator = B[0];
+    if (B.size() > 1) out.integrator = B[1];
+    if (submodel.denominator.size() > 1) out.integrator -= submodel.denominator[1] * B[0];
+  }
+  for (const Complex pole : representatives) {
+    Complex slope = std::pow(pole, l) * highest;  // d/ds of s^l A(s) at the pole
+    for (const Complex other : poles)
+      if (other != pole) slope *= pole - other;
+    out.poles.push_back({pole, numerator_at(submodel, pole) / slope});
+  }
+  return out;
+}
+
+Eigen::Index residue_rank(const Submodel& submodel, std::size_t index,
+                          const Eigen::VectorXd& singular_values) {
+  constexpr double kContradiction = 1e-6;
+  const Eigen::Index rank = numerical_rank(singular_values, singular_values[0]);
+  if (!submodel.residue_rank || *submodel.residue_rank >= rank) return rank;
+  const Eigen::Index held = *submodel.residue_rank;
+  const double excess = singular_values[held] / singular_values[0];
+  if (excess > kContradiction)
+    throw std::invalid_argument(fmt::format(
+        "model: submodel {}: residue_rank is {}, but singular value {} of its residue is {:.1e} of "
+        "the first; correct residue_rank or leave it out",
+        index, held, held + 1, excess));
+  return held;
+}
+
+}  // namespace stageid

@@ -1,0 +1,97 @@
+#include "estimation/model/additive_model.hpp"
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <stdexcept>
+
+#include "estimation/model/basis.hpp"
+
+namespace stageid {
+
+double Submodel::natural_frequency_hz() const {
+  return 1.0 / (2.0 * std::numbers::pi * std::sqrt(denominator[2]));
+}
+
+double Submodel::damping_ratio() const {
+  return denominator[1] / (2.0 * std::sqrt(denominator[2]));
+}
+
+Eigen::VectorXd AdditiveModel::input_delays_s() const {
+  return input_delay_s.size() > 0 ? input_delay_s : Eigen::VectorXd::Zero(n_inputs());
+}
+
+Eigen::VectorXd AdditiveModel::output_delays_s() const {
+  return output_delay_s.size() > 0 ? output_delay_s : Eigen::VectorXd::Zero(n_outputs());
+}
+
+double AdditiveModel::mean_delay_s() const {
+  double delay_s = 0.0;
+  if (input_delay_s.size() > 0) delay_s += input_delay_s.mean();
+  if (output_delay_s.size() > 0) delay_s += output_delay_s.mean();
+  return delay_s;
+}
+
+const char* to_string(HoldModel hold) noexcept {
+  switch (hold) {
+    case HoldModel::none:
+      return "none";
+    case HoldModel::phase:
+      return "phase";
+    case HoldModel::sinc:
+      return "sinc";
+    case HoldModel::exact:
+      return "exact";
+  }
+  return "none";
+}
+
+namespace {
+
+/// Channels c = output + n_y input that share one delay.
+std::map<double, std::vector<Eigen::Index>> channels_by_delay(const AdditiveModel& model) {
+  const Eigen::VectorXd input_s = model.input_delays_s();
+  const Eigen::VectorXd output_s = model.output_delays_s();
+  std::map<double, std::vector<Eigen::Index>> groups;
+  for (Eigen::Index u = 0; u < model.n_inputs(); ++u)
+    for (Eigen::Index y = 0; y < model.n_outputs(); ++y)
+      groups[input_s[u] + output_s[y]].push_back(y + model.n_outputs() * u);
+  return groups;
+}
+
+}  // namespace
+
+Eigen::MatrixXcd response(const AdditiveModel& model,
+                          const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold) {
+  if (hold != HoldModel::none && !(model.sample_rate_hz > 0.0))
+    throw std::invalid_argument(
+        "model: a hold needs the sample rate, and the model has none; use hold none");
+  if (hold == HoldModel::exact && frequency_hz.size() > 0 &&
+      frequency_hz.maxCoeff() > 0.5 * model.sample_rate_hz * (1.0 + 1e-9))
+    throw std::invalid_argument(
+        "model: a frequency lies above half the sample rate; leave it out or use hold none");
+  const ModelLines lines{2.0 * std::numbers::pi * frequency_hz,
+                         model.sample_rate_hz > 0.0 ? 1.0 / model.sample_rate_hz : 0.0, hold};
+  const Eigen::Index channels = model.n_outputs() * model.n_inputs();
+  Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(channels, frequency_hz.size());
+  SubmodelBasis basis;
+  for (const auto& [delay, members] : channels_by_delay(model)) {
+    const LineOperator through(lines, delay);
+    for (const Submodel& submodel : model.submodels) {
+      const SubmodelShape shape{submodel.integrators,
+                                static_cast<int>(submodel.denominator.size()) - 1,
+                                static_cast<int>(submodel.numerator.size()) - 1};
+      const Eigen::VectorXd a =
+          Eigen::Map<const Eigen::VectorXd>(submodel.denominator.data() + 1, shape.order);
+      evaluate_basis(through, shape, a, {}, basis);
+      for (Eigen::Index k = 0; k < out.cols(); ++k)
+        for (int m = 0; m <= shape.numerator_degree; ++m) {
+          const double* B = submodel.numerator[static_cast<std::size_t>(m)].data();
+          for (const Eigen::Index c : members) out(c, k) += B[c] * basis.value(k, m);
+        }
+    }
+  }
+  return out;
+}
+
+}  // namespace stageid

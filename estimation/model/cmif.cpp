@@ -1,0 +1,177 @@
+#include "estimation/model/cmif.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include "excitation/threads/worker_pool.hpp"
+#include "frf/response/dc_line.hpp"
+#include "frf/statistics/order_statistic.hpp"
+
+namespace stageid {
+namespace {
+
+/// G(j omega_k) with what `kind` multiplies it by.
+Eigen::MatrixXcd weighted_response(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
+  Eigen::MatrixXcd G = frf.at(k);
+  if (kind == CmifKind::accelerance) {
+    const double omega = 2.0 * std::numbers::pi * frf.frequency_hz[k];
+    G *= omega * omega;
+  } else if (kind == CmifKind::whitened) {
+    const Eigen::MatrixXd& variance =
+        frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
+    if (variance.size() == 0)
+      throw std::invalid_argument(
+          "CMIF: whitening needs variances, and the FRF has none; use accelerance");
+    G.reshaped() =
+        G.reshaped().cwiseQuotient(variance.col(k).cwiseSqrt().cast<std::complex<double>>());
+  }
+  return G;
+}
+
+/// Not taller than wide.
+Eigen::MatrixXcd wide_response(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
+  Eigen::MatrixXcd G = weighted_response(frf, kind, k);
+  if (G.rows() > G.cols()) G.transposeInPlace();
+  return G;
+}
+
+/// Left singular vectors of a line: of all lines they would be as large as the response.
+Eigen::MatrixXcd shapes(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
+  return Eigen::BDCSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k), Eigen::ComputeThinU)
+      .matrixU();
+}
+
+/// How far a peak stands above the higher of the two valleys around it, in dB of power.
+double prominence_db(const Eigen::Ref<const Eigen::RowVectorXd>& curve, Eigen::Index peak) {
+  const double height = curve[peak];
+  double left = height;
+  for (Eigen::Index k = peak - 1; k >= 0 && curve[k] <= height; --k)
+    left = std::min(left, curve[k]);
+  double right = height;
+  for (Eigen::Index k = peak + 1; k < curve.size() && curve[k] <= height; ++k)
+    right = std::min(right, curve[k]);
+  return 10.0 * std::log10(height / std::max({left, right, 1e-300}));
+}
+
+/// Half-power width by linear interpolation; the narrower side counts twice if the other is not
+/// clean.
+double half_power_damping(const Eigen::VectorXd& f,
+                          const Eigen::Ref<const Eigen::RowVectorXd>& curve, Eigen::Index peak) {
+  const double half = 0.5 * curve[peak];
+  const auto side = [&](Eigen::Index direction) {
+    Eigen::Index k = peak;
+    while (k + direction >= 0 && k + direction < curve.size() && curve[k + direction] < curve[k]) {
+      const Eigen::Index next = k + direction;
+      if (curve[next] <= half) {
+        const double share = (curve[k] - half) / (curve[k] - curve[next]);
+        return std::abs(f[k] + share * (f[next] - f[k]) - f[peak]);
+      }
+      k = next;
+    }
+    return 0.0;
+  };
+  const double below = side(-1);
+  const double above = side(+1);
+  const double width = below > 0.0 && above > 0.0 ? below + above : 2.0 * std::max(below, above);
+  if (!(width > 0.0)) return 0.01;
+  return std::clamp(width / (2.0 * f[peak]), 5e-4, 0.1);
+}
+
+/// A peak of a lower curve that only mirrors a crossing: the curve above dips there and the shapes
+/// swap.
+bool is_crossing(const FrfEstimate& frf, CmifKind kind, const Eigen::MatrixXd& curves,
+                 Eigen::Index curve, Eigen::Index k) {
+  if (curve == 0 || k == 0 || k + 1 >= curves.cols()) return false;
+  const double gap_db =
+      10.0 * std::log10(curves(curve - 1, k) / std::max(curves(curve, k), 1e-300));
+  if (gap_db > 3.0) return false;
+  const Eigen::MatrixXcd before = shapes(frf, kind, k - 1);
+  const Eigen::MatrixXcd after = shapes(frf, kind, k + 1);
+  const auto mac = [&](Eigen::Index i, Eigen::Index j) {
+    return std::norm(before.col(i).dot(after.col(j)));
+  };
+  return mac(curve, curve - 1) > 0.5 && mac(curve - 1, curve) > 0.5;
+}
+
+constexpr double kScatterFactor = 5.0;  // a peak of pure noise in thousands of lines stays below
+
+/// Scatter of the curve around a line in dB (standard deviation of its logarithm), from second
+/// differences: slopes and the tops of smooth peaks count for nothing.
+double scatter_db(const Eigen::RowVectorXd& curve_db, Eigen::Index line) {
+  constexpr Eigen::Index kReach = 24;
+  const Eigen::Index first = std::max<Eigen::Index>(1, line - kReach);
+  const Eigen::Index last = std::min<Eigen::Index>(curve_db.size() - 2, line + kReach);
+  std::vector<double> bends;
+  for (Eigen::Index i = first; i <= last; ++i)
+    bends.push_back(std::abs(curve_db[i - 1] - 2.0 * curve_db[i] + curve_db[i + 1]));
+  return order_statistic(bends, 0.5) / (0.6745 * std::sqrt(6.0));  // of normal numbers
+}
+
+/// Lower quartile of the lines beside a peak up to where the curve rises above it again: a base that
+/// the deepest dips of noise do not set.
+double base_db(const Eigen::RowVectorXd& curve_db, Eigen::Index peak, Eigen::Index direction) {
+  std::vector<double> values;
+  for (Eigen::Index k = peak + direction;
+       k >= 0 && k < curve_db.size() && curve_db[k] <= curve_db[peak]; k += direction)
+    values.push_back(curve_db[k]);
+  if (values.empty()) return curve_db[peak];
+  return order_statistic(values, 0.25);
+}
+
+/// Whether a local maximum stands above its surroundings by more than noise makes maxima stand.
+bool above_scatter(const Eigen::RowVectorXd& curve_db, Eigen::Index peak) {
+  const double base = std::max(base_db(curve_db, peak, -1), base_db(curve_db, peak, +1));
+  return curve_db[peak] - base > kScatterFactor * scatter_db(curve_db, peak);
+}
+
+}  // namespace
+
+Eigen::MatrixXd cmif(const FrfEstimate& frf, CmifKind kind) {
+  Eigen::MatrixXd curves(std::min(frf.n_outputs(), frf.n_inputs()), frf.lines());
+  for_each_line(worker_count(0), frf.lines(), [&](Eigen::Index k) {
+    curves.col(k) = Eigen::BDCSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k))
+                        .singularValues()
+                        .head(curves.rows())
+                        .cwiseAbs2();
+  });
+  return curves;
+}
+
+std::vector<ModeCandidate> pick_modes(const FrfEstimate& frf, const PeakOptions& options) {
+  if (has_dc_line(frf)) return pick_modes(without_dc_line(frf), options);
+  const Eigen::MatrixXd curves = cmif(frf, options.kind);
+  struct Peak {
+    ModeCandidate mode;
+    double prominence;
+  };
+  std::vector<Peak> peaks;
+  for (Eigen::Index c = 0; c < curves.rows(); ++c) {
+    const Eigen::RowVectorXd curve = curves.row(c);
+    const Eigen::RowVectorXd curve_db = 10.0 * curve.array().max(1e-300).log10();
+    for (Eigen::Index k = 1; k + 1 < curve.size(); ++k) {
+      if (!(curve[k] > curve[k - 1] && curve[k] >= curve[k + 1])) continue;
+      const double prominence = prominence_db(curve, k);
+      if (prominence < options.minimum_prominence_db || !above_scatter(curve_db, k) ||
+          is_crossing(frf, options.kind, curves, c, k))
+        continue;
+      peaks.push_back({{frf.frequency_hz[k], half_power_damping(frf.frequency_hz, curve, k),
+                        static_cast<int>(c) + 1},
+                       prominence});
+    }
+  }
+  std::stable_sort(peaks.begin(), peaks.end(),
+                   [](const Peak& a, const Peak& b) { return a.prominence > b.prominence; });
+  if (peaks.size() > static_cast<std::size_t>(options.most_peaks))
+    peaks.resize(static_cast<std::size_t>(options.most_peaks));
+  std::vector<ModeCandidate> modes;
+  for (const Peak& peak : peaks) modes.push_back(peak.mode);
+  std::stable_sort(modes.begin(), modes.end(), [](const ModeCandidate& a, const ModeCandidate& b) {
+    return a.frequency_hz < b.frequency_hz;
+  });
+  return modes;
+}
+
+}  // namespace stageid

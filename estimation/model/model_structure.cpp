@@ -1,0 +1,87 @@
+#include "estimation/model/model_structure.hpp"
+
+#include <algorithm>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "estimation/model/basis.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kTaken = 0.05;  // of a frequency: a neighbour as close shows in the residual
+
+}  // namespace
+
+Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,
+                       const ModeCandidate& mode) {
+  const double omega = 2.0 * std::numbers::pi * mode.frequency_hz;
+  Submodel s;
+  s.denominator = {1.0, 2.0 * mode.damping_ratio / omega, 1.0 / (omega * omega)};
+  s.numerator.assign(structure.general_damping ? 2 : 1,
+                     Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs()));
+  return s;
+}
+
+std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructure& structure) {
+  std::vector<Submodel> out;
+  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
+  if (structure.rigid_body) out.push_back({2, {1.0}, {zero}, {}, {}});
+  if (structure.direct_term) out.push_back({0, {1.0}, {zero}, {}, {}});
+  out.insert(out.end(), structure.given.begin(), structure.given.end());
+  return out;
+}
+
+std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candidates,
+                                         const ModelStructure& structure) {
+  std::vector<ModeCandidate> out = candidates;
+  for (const Submodel& s : structure.given) {
+    const Eigen::Map<const Eigen::VectorXd> a(s.denominator.data() + 1,
+                                              static_cast<Eigen::Index>(s.denominator.size()) - 1);
+    for (const std::complex<double> pole : roots(a))
+      std::erase_if(out, [&](const ModeCandidate& mode) {
+        const double omega = 2.0 * std::numbers::pi * mode.frequency_hz;
+        return pole.imag() != 0.0 && std::abs(std::abs(pole) - omega) < kTaken * omega;
+      });
+  }
+  return out;
+}
+
+bool is_searched_mode(const Submodel& submodel) noexcept {
+  return submodel.role == SubmodelRole::searched && submodel.is_mode();
+}
+
+int count_modes(const AdditiveModel& model) {
+  return static_cast<int>(
+      std::count_if(model.submodels.begin(), model.submodels.end(), is_searched_mode));
+}
+
+std::vector<std::size_t> mode_order(const AdditiveModel& model) {
+  std::vector<std::size_t> order(model.submodels.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) {
+    const Submodel& a = model.submodels[i];
+    const Submodel& b = model.submodels[j];
+    const bool mode = is_searched_mode(a);
+    if (mode != is_searched_mode(b)) return !mode;
+    return mode && a.natural_frequency_hz() < b.natural_frequency_hz();
+  });
+  return order;
+}
+
+void sort_modes(AdditiveModel& model) {
+  std::vector<Submodel> sorted;
+  for (const std::size_t i : mode_order(model)) sorted.push_back(std::move(model.submodels[i]));
+  model.submodels = std::move(sorted);
+}
+
+Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure) {
+  const Eigen::Index per_mode = structure.general_damping ? 2 : 1;
+  Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);
+  for (const Submodel& s : structure.given)
+    fixed += static_cast<Eigen::Index>(s.numerator.size() + s.denominator.size()) - 1;
+  return std::max<Eigen::Index>(1, (2 * frf.lines() / 3 - fixed) / (per_mode + 1));
+}
+
+}  // namespace stageid

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <complex>
+#include <vector>
+
+#include "estimation/model/line_operator.hpp"
+
+namespace stageid {
+
+/// Poles of a real rational function of x: of each conjugate pair the upper one, and the real ones.
+struct PoleSet {
+  std::vector<std::complex<double>> pairs;
+  std::vector<double> reals;
+
+  /// Real coefficients of a sum over all poles.
+  Eigen::Index size() const noexcept {
+    return static_cast<Eigen::Index>(2 * pairs.size() + reals.size());
+  }
+};
+
+/// Partial fractions with real coefficients on every line, N x size(): of a pair p the columns
+/// 1/(x-p) + 1/(x-p*) and j/(x-p) - j/(x-p*), of a real one 1/(x-p).
+SplitMatrix partial_fractions(const PoleSet& poles, const Eigen::VectorXcd& x);
+
+/// The zeros of  1 + sum_i c_i phi_i(x),  phi the partial fractions: eigenvalues of the poles' real block
+/// matrix minus b c^T (Gustavsen and Semlyen 1999, eq. B.1). @param c size()
+Eigen::VectorXcd zeros_of_sum(const PoleSet& poles, const Eigen::VectorXd& c);
+
+}  // namespace stageid

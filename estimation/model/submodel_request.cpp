@@ -1,0 +1,105 @@
+#include "estimation/model/submodel_request.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "acquisition/files/counted.hpp"
+#include "estimation/model/poles.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kUsualDamping = 0.01;
+
+std::string fault_of_start(const SubmodelRequest& request) {
+  const auto poles = static_cast<std::size_t>(request.pairs() + (request.has_real_pole() ? 1 : 0));
+  const auto pairs = static_cast<std::size_t>(request.pairs());
+  const std::vector<double>& f = request.frequency_hz;
+  const std::vector<double>& zeta = request.damping_ratio;
+  if (request.order_by_search && !(f.empty() && zeta.empty()))
+    return "with n=auto the poles are searched; leave frequencies and damping ratios out";
+  if (!f.empty() && f.size() != poles)
+    return fmt::format("n={} starts from {}{}; {} given", request.shape.order,
+                       counted(poles, "frequency", "frequencies"),
+                       request.has_real_pole() && pairs > 0 ? ", the last of the real pole" : "",
+                       f.size());
+  if (!std::all_of(f.begin(), f.end(), [](double x) { return std::isfinite(x) && x > 0.0; }))
+    return "a frequency is above 0 Hz";
+  if (!zeta.empty() && f.empty())
+    return "a damping ratio without a frequency; give both, or neither and they are searched";
+  if (zeta.size() > 1 && zeta.size() != pairs)
+    return fmt::format("n={} takes one damping ratio or {}; {} given", request.shape.order, pairs,
+                       zeta.size());
+  if (!zeta.empty() && pairs == 0) return "a real pole has no damping ratio; leave it out";
+  if (!std::all_of(zeta.begin(), zeta.end(), [](double x) { return x > 0.0 && x <= 0.9; }))
+    return "a damping ratio is above 0 and at most 0.9";
+  for (auto at = f.begin();
+       at != f.begin() + static_cast<std::ptrdiff_t>(std::min(pairs, f.size())); ++at)
+    if (std::find(f.begin(), at, *at) != at)
+      return fmt::format("two poles start at {} Hz and could not be told apart; move one", *at);
+  return {};
+}
+
+}  // namespace
+
+std::string fault_of(const SubmodelRequest& request) {
+  const auto [l, n, m] = request.shape;
+  if (request.order_by_search && l > 0) return "n=auto goes without integrators; leave l out";
+  if (l < 0 || l > 2) return fmt::format("l={}; write 0, 1 or 2 integrators", l);
+  if (n < 0 || n > kLargestOrder)
+    return fmt::format("n={}; write an order from 0 to {}, larger ones as several submodels", n,
+                       kLargestOrder);
+  if (m < 0) return fmt::format("m={}; a numerator's degree is 0 or more", m);
+  if (!request.order_by_search && m > n + l)
+    return fmt::format("m={} is above n + l = {}, which is improper; write at most {}", m, n + l,
+                       n + l);
+  return fault_of_start(request);
+}
+
+std::string fault_of(const std::vector<SubmodelRequest>& requests, bool rigid_body,
+                     bool direct_term) {
+  const auto count = [&](auto predicate) {
+    return std::count_if(requests.begin(), requests.end(), predicate);
+  };
+  const auto integrating = count([](const SubmodelRequest& r) { return r.shape.integrators > 0; }) +
+                           (rigid_body ? 1 : 0);
+  if (integrating > 1)
+    return fmt::format(
+        "{} terms with integrators (l > 0{}), which the data cannot tell apart; keep one",
+        integrating, rigid_body ? ", the rigid body is one" : "");
+  const auto biproper =
+      count([](const SubmodelRequest& r) { return r.biproper(); }) + (direct_term ? 1 : 0);
+  if (biproper > 1)
+    return fmt::format(
+        "{} biproper terms (m = n + l{}), which the data cannot tell apart; keep one", biproper,
+        direct_term ? ", the direct term is one" : "");
+  if (requests.size() > 1 && count([](const SubmodelRequest& r) { return r.order_by_search; }) > 0)
+    return "n=auto takes all modes into one denominator; let it be the only submodel";
+  return {};
+}
+
+Submodel start_submodel(const FrfEstimate& frf, const SubmodelRequest& request) {
+  std::vector<std::complex<double>> poles;
+  for (int i = 0; i < request.pairs(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const std::vector<double>& zeta = request.damping_ratio;
+    const double damping = zeta.empty() ? kUsualDamping : zeta[std::min(at, zeta.size() - 1)];
+    for (const std::complex<double> pole : mode_poles(request.frequency_hz[at], damping))
+      poles.push_back(pole);
+  }
+  if (request.has_real_pole())
+    poles.emplace_back(-2.0 * std::numbers::pi * request.frequency_hz.back());
+  Submodel s;
+  s.integrators = request.shape.integrators;
+  const Eigen::VectorXd a = denominator_of(poles);
+  s.denominator.insert(s.denominator.end(), a.begin(), a.end());
+  s.numerator.assign(static_cast<std::size_t>(request.shape.functions()),
+                     Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs()));
+  s.role = SubmodelRole::given;
+  return s;
+}
+
+}  // namespace stageid

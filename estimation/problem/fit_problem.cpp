@@ -1,0 +1,223 @@
+#include "estimation/problem/fit_problem.hpp"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "estimation/problem/search_limit.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+
+Eigen::ArrayXd LineVariance::channel(Eigen::Index c) const {
+  return matrix->row(c).transpose().array() / divisor;
+}
+
+Eigen::VectorXd FitProblem::weights(Eigen::Index channel) const {
+  Eigen::VectorXd w = W->row(channel).transpose();
+  if (middle) w = w.cwiseProduct(w).array() * middle->channel(channel);
+  return w;
+}
+
+Eigen::Index FitProblem::functions() const noexcept {
+  Eigen::Index n = 0;
+  for (const SubmodelShape& shape : shapes) n += shape.functions();
+  return n;
+}
+
+Eigen::Index FitProblem::denominators() const noexcept {
+  Eigen::Index n = 0;
+  for (const SubmodelShape& shape : shapes) n += shape.order;
+  return n;
+}
+
+Eigen::Index FitProblem::delays() const noexcept {
+  switch (delay) {
+    case DelayModel::fixed:
+      return 0;
+    case DelayModel::estimate:
+      return 1;
+    case DelayModel::per_channel:
+      return n_outputs + n_inputs - 1;
+  }
+  return 0;
+}
+
+bool FitProblem::is_held(Eigen::Index global) const noexcept {
+  return std::find(held.begin(), held.end(), global) != held.end();
+}
+
+namespace {
+
+bool is_few(const FitProblem& problem, std::size_t channels) {
+  return static_cast<Eigen::Index>(channels) < kFewChannels &&
+         (problem.multiplied_out || problem.functions() < kManyFunctions);
+}
+
+}  // namespace
+
+std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem) {
+  std::vector<DerivativeColumn> columns;
+  Eigen::Index function = 0;
+  Eigen::Index parameter = 0;
+  for (const SubmodelShape& shape : problem.shapes) {
+    for (int m = 0; m < shape.functions(); ++m)
+      for (int q = 0; q < shape.order; ++q)
+        if (!problem.is_held(parameter + q)) columns.push_back({function + m, parameter + q});
+    function += shape.functions();
+    parameter += shape.order;
+  }
+  return columns;
+}
+
+std::vector<Eigen::Index> delay_parameters(const FitProblem& problem, Eigen::Index channel) {
+  const Eigen::Index first = problem.denominators();
+  if (problem.delay == DelayModel::estimate) return {first};
+  if (problem.delay == DelayModel::fixed) return {};
+  const Eigen::Index y = channel % problem.n_outputs;
+  std::vector<Eigen::Index> out{first + channel / problem.n_outputs};
+  if (y + 1 < problem.n_outputs) out.push_back(first + problem.n_inputs + y);
+  return out;
+}
+
+FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
+                      const Eigen::Ref<const Eigen::VectorXd>& step) {
+  FitParameters out = beta;
+  Eigen::Index p = 0;
+  for (Eigen::VectorXd& a : out.a) {
+    a += step.segment(p, a.size());
+    p += a.size();
+  }
+  if (problem.delay == DelayModel::estimate) {
+    out.input_delay_s.array() += step[p];
+  } else if (problem.delay == DelayModel::per_channel) {
+    out.input_delay_s += step.segment(p, problem.n_inputs);
+    out.output_delay_s.head(problem.n_outputs - 1) += step.tail(problem.n_outputs - 1);
+  }
+  return out;
+}
+
+bool sums_fractions_of_few(const FitProblem& problem) {
+  return problem.functions() >= kManyFunctions &&
+         (problem.channels() < kFewChannels || problem.delay == DelayModel::per_channel);
+}
+
+namespace {
+
+constexpr std::size_t kSubmodelsATask = 32;
+
+/// Where a submodel's columns begin.
+struct SubmodelPlace {
+  Eigen::Index function = 0;
+  Eigen::Index parameter = 0;
+  Eigen::Index derivative = 0;  // see DerivativeColumn
+};
+
+std::vector<SubmodelPlace> submodel_places(const FitProblem& problem) {
+  std::vector<SubmodelPlace> out;
+  SubmodelPlace next;
+  for (const SubmodelShape& shape : problem.shapes) {
+    out.push_back(next);
+    next.function += shape.functions();
+    for (int q = 0; q < shape.order; ++q, ++next.parameter)
+      if (!problem.is_held(next.parameter)) next.derivative += shape.functions();
+  }
+  return out;
+}
+
+void resize(const FitProblem& problem, WantedBasis wanted, BasisGroup& group) {
+  const auto set = [&](Eigen::Index columns, Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+    re.resize(problem.size(), columns);
+    im.resize(problem.size(), columns);
+  };
+  set(problem.functions(), group.F_re, group.F_im);
+  const auto derivatives = static_cast<Eigen::Index>(derivative_columns(problem).size());
+  if (wanted.gradient) set(derivatives, group.D_re, group.D_im);
+  if (wanted.delay) set(problem.functions(), group.T_re, group.T_im);
+}
+
+void evaluate_fractions(const FitProblem& problem, const LineOperator& through,
+                        const FitParameters& beta, bool derivatives, FractionColumns& out) {
+  out = fraction_columns(through, problem.lines.omega_rad_s.maxCoeff(), problem.shapes, beta.a,
+                         derivatives);
+  if (!derivatives) return;
+  const std::vector<FractionColumn> all = std::exchange(out.D, {});
+  std::size_t column = 0;
+  Eigen::Index parameter = 0;
+  for (const SubmodelShape& shape : problem.shapes) {
+    for (int m = 0; m < shape.functions(); ++m)
+      for (int q = 0; q < shape.order; ++q, ++column)
+        if (!problem.is_held(parameter + q)) out.D.push_back(all[column]);
+    parameter += shape.order;
+  }
+}
+
+void evaluate_submodel(const FitProblem& problem, const LineOperator& through,
+                       const FitParameters& beta, std::size_t i, const SubmodelPlace& place,
+                       WantedBasis wanted, SubmodelBasis& basis, BasisGroup& group) {
+  evaluate_basis(through, problem.shapes[i], beta.a[i], wanted, basis);
+  const Eigen::Index functions = basis.value.cols();
+  group.F_re.middleCols(place.function, functions) = basis.value.re;
+  group.F_im.middleCols(place.function, functions) = basis.value.im;
+  Eigen::Index d = place.derivative;
+  for (Eigen::Index c = 0; c < basis.gradient.cols(); ++c) {
+    if (problem.is_held(place.parameter + c % problem.shapes[i].order)) continue;
+    group.D_re.col(d) = basis.gradient.re.col(c);
+    group.D_im.col(d++) = basis.gradient.im.col(c);
+  }
+  if (!wanted.delay) return;
+  group.T_re.middleCols(place.function, functions) = basis.delay.re;
+  group.T_im.middleCols(place.function, functions) = basis.delay.im;
+}
+
+/// The products that are made of the functions grow with their square.
+void add_work(const FitProblem& problem, const WantedBasis& wanted) {
+  auto columns = static_cast<double>(problem.functions());
+  if (wanted.gradient) columns += static_cast<double>(derivative_columns(problem).size());
+  problem.limit->add(static_cast<double>(problem.size()), static_cast<double>(problem.channels()),
+                     columns);
+}
+
+}  // namespace
+
+std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
+                                        bool with_derivatives) {
+  std::map<double, std::vector<Eigen::Index>> members;
+  for (Eigen::Index c = 0; c < problem.channels(); ++c) {
+    const double delay =
+        beta.input_delay_s[c / problem.n_outputs] + beta.output_delay_s[c % problem.n_outputs];
+    members[delay].push_back(c);
+  }
+  std::vector<BasisGroup> groups;
+  for (auto& [delay, channels] : members) {
+    BasisGroup group;
+    group.delay_s = delay;
+    group.channels = std::move(channels);
+    groups.push_back(std::move(group));
+  }
+
+  const WantedBasis wanted{with_derivatives, with_derivatives && problem.delays() > 0};
+  if (problem.limit) add_work(problem, wanted);
+  const std::vector<SubmodelPlace> places = submodel_places(problem);
+  std::vector<std::optional<LineOperator>> through(groups.size());
+  for_each_task(problem.threads, static_cast<int>(groups.size()), [&](int g) {
+    const auto at = static_cast<std::size_t>(g);
+    BasisGroup& group = groups[at];
+    through[at].emplace(problem.lines, group.delay_s);
+    group.few = is_few(problem, group.channels.size());
+    resize(problem, wanted, group);
+    if (!group.few)
+      evaluate_fractions(problem, *through[at], beta, with_derivatives, group.fractions);
+  });
+  const std::size_t parts = (places.size() + kSubmodelsATask - 1) / kSubmodelsATask;
+  for_each_task(problem.threads, static_cast<int>(groups.size() * parts), [&](int task) {
+    const std::size_t g = static_cast<std::size_t>(task) / parts;
+    const std::size_t first = static_cast<std::size_t>(task) % parts * kSubmodelsATask;
+    SubmodelBasis basis;
+    for (std::size_t i = first; i < std::min(places.size(), first + kSubmodelsATask); ++i)
+      evaluate_submodel(problem, *through[g], beta, i, places[i], wanted, basis, groups[g]);
+  });
+  return groups;
+}
+
+}  // namespace stageid

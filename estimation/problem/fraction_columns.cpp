@@ -1,0 +1,129 @@
+#include "estimation/problem/fraction_columns.hpp"
+
+#include <cmath>
+
+#include "estimation/model/partial_fractions.hpp"
+
+namespace stageid {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr double kLeastAngle =
+    0.1;  // |Im| / |lambda|: two poles apart, so that their fractions are small
+
+/// Strictly proper functions of one oscillating pair of poles.
+bool is_one_pair(const SubmodelShape& shape, const Eigen::VectorXd& a) {
+  if (shape.order != 2 || shape.integrators != 0 || shape.numerator_degree > 1) return false;
+  const Complex lambda = roots(a)[0];
+  return lambda.real() < 0.0 && std::abs(lambda.imag()) > kLeastAngle * std::abs(lambda);
+}
+
+/// One submodel's columns; the lines do not matter to them.
+class PairColumns {
+ public:
+  PairColumns(const LineOperator& through, const Eigen::VectorXd& a, Complex lambda,
+              Eigen::Index pair)
+      : through_(through),
+        a_(a),
+        poles_{0.0, lambda, std::conj(lambda)},
+        expansion_(through.expansion(lambda)),
+        pair_(pair) {}
+
+  /// s^power / A^times, with a sign.
+  FractionColumn column(int power, int times, double sign) const {
+    FractionColumn out{pair_};
+    const double leading = std::pow(a_[1], times);
+    PartialFractions{poles_, 0, times, power, leading}.for_each(
+        [&](std::size_t r, Complex simple, Complex squared) {
+          if (r != 1) return;  // the other's are the conjugates
+          const auto coefficient = [&](std::size_t i) {
+            return sign * (simple * expansion_.simple[i] + squared * expansion_.squared[i]);
+          };
+          out.constant = 2.0 * coefficient(0).real();
+          out.simple = coefficient(1);
+          out.squared = coefficient(2);
+        });
+    return out;
+  }
+
+  FractionColumn equation_error(Eigen::Index q) const {
+    FractionColumn out{pair_};
+    out.constant = !through_.exact() && q == a_.size() ? 1.0 / a_[q - 1] : 0.0;
+    out.simple = equation_error_residue(through_, a_, poles_[1], q);
+    return out;
+  }
+
+ private:
+  const LineOperator& through_;
+  const Eigen::VectorXd& a_;
+  std::vector<Complex> poles_;
+  FractionExpansion expansion_;
+  Eigen::Index pair_;
+};
+
+void fill_base(const LineOperator& through, bool squares, FractionColumns& out) {
+  const Eigen::Index simple = out.simple_columns();
+  out.base.resize(through.lines(), squares ? 2 * simple - 1 : simple);
+  out.base.col(0).setOnes();
+  SplitMatrix q;
+  for (Eigen::Index i = 0; i < out.pairs(); ++i)
+    for (Eigen::Index other = 0; other < 2; ++other) {
+      const Complex lambda = out.lambda[static_cast<std::size_t>(i)];
+      through.reciprocal(other == 0 ? lambda : std::conj(lambda), q);
+      const Eigen::Index column = 1 + 4 * i + 2 * other;
+      out.base.col(column) = q.re;
+      out.base.col(column + 1) = q.im;
+      if (!squares) continue;
+      const Eigen::Index square = column + simple - 1;
+      out.base.col(square) = q.re.array().square() - q.im.array().square();
+      out.base.col(square + 1) = 2.0 * q.re.cwiseProduct(q.im);
+    }
+}
+
+}  // namespace
+
+std::complex<double> equation_error_residue(const LineOperator& through,
+                                            const Eigen::Ref<const Eigen::VectorXd>& a,
+                                            Complex lambda, Eigen::Index q) {
+  Complex slope = 0.0;  // A'(lambda)
+  for (Eigen::Index i = a.size(); i > 0; --i)
+    slope = slope * lambda + static_cast<double>(i) * a[i - 1];
+  return through.place_slope(lambda) * std::pow(lambda, static_cast<int>(q)) / slope;
+}
+
+FractionColumns fraction_columns(const LineOperator& through, double highest_rad_s,
+                                 const std::vector<SubmodelShape>& shapes,
+                                 const std::vector<Eigen::VectorXd>& a, bool derivatives) {
+  FractionColumns out;
+  out.exact = through.exact();
+  out.highest_rad_s = highest_rad_s;
+  out.first = through.first();
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const int functions = shapes[i].functions();
+    const int order = shapes[i].order;
+    const auto add = [](auto& columns, int count) {
+      columns.resize(columns.size() + static_cast<std::size_t>(count));
+    };
+    if (!is_one_pair(shapes[i], a[i])) {
+      add(out.F, functions);
+      if (derivatives) add(out.D, functions * order);
+      if (derivatives) add(out.Y, order);
+      continue;
+    }
+    const Complex lambda = roots(a[i])[0];
+    const PairColumns columns(through, a[i], lambda, out.pairs());
+    out.lambda.push_back(lambda);
+    out.place.push_back(through.place(lambda));
+    for (int m = 0; m < functions; ++m) {
+      out.F.push_back(columns.column(m, 1, 1.0));
+      for (int q = 1; derivatives && q <= order; ++q)  // d/da_q = -s^(m+q) / A^2
+        out.D.push_back(columns.column(m + q, 2, -1.0));
+    }
+    for (int q = 1; derivatives && q <= order; ++q) out.Y.push_back(columns.equation_error(q));
+  }
+  fill_base(through, derivatives, out);
+  return out;
+}
+
+}  // namespace stageid

@@ -1,0 +1,214 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "estimation/problem/fit_problem.hpp"
+#include "estimation/problem/weight_matrices.hpp"
+
+namespace stageid {
+namespace {
+
+/// Degrees of freedom that a variance should have before it weighs: the scatter of the weights then
+/// costs 4 % of the efficiency. Smoothing costs more wherever the variance has resonances of its
+/// own.
+constexpr double kWantedDof = 25.0;
+// Degrees of freedom of a smoothed variance below which the scatter of its inverse is not finite or
+// nearly so: only where the lines are fewer than a handful.
+constexpr double kLeastTogether = 4.0;
+constexpr Eigen::Index kChannels = 256;  // smoothed at a time
+
+std::string channel_name(const FrfEstimate& frf, Eigen::Index c, Eigen::Index k) {
+  return frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())] + " <- " +
+         frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())] + " at " +
+         std::to_string(frf.frequency_hz[k]) + " Hz";
+}
+
+/// Variance of the logarithm of a sample variance with nu complex degrees of freedom: trigamma(nu),
+/// by recurrence and its asymptotic series.
+double log_variance(double nu) {
+  double sum = 0.0;
+  for (; nu < 8.0; nu += 1.0) sum += 1.0 / (nu * nu);
+  const double r = 1.0 / (nu * nu);
+  return sum + 1.0 / nu + 0.5 * r + r / nu * (1.0 / 6.0 - r * (1.0 / 30.0 - r / 42.0));
+}
+
+/// Neighbours on each side of a line whose mean scatters like a variance of kWantedDof.
+Eigen::Index window_reach(double dof) {
+  if (!(dof > 0.0) || dof >= kWantedDof) return 0;  // 0: unknown, taken as exact
+  const double lines = kWantedDof * log_variance(std::max(dof, 1.0));
+  return static_cast<Eigen::Index>(std::ceil(0.5 * (lines - 1.0)));
+}
+
+/// How many of N lines lie within the reach of line k.
+Eigen::Index window_lines(Eigen::Index k, Eigen::Index reach, Eigen::Index N) {
+  return std::min<Eigen::Index>(N - 1, k + reach) - std::max<Eigen::Index>(0, k - reach) + 1;
+}
+
+/// E{g^power} of g, the geometric mean of n sample variances of true value 1 with nu complex degrees
+/// of freedom each (Gamma distributed, shape nu, mean 1).
+double expected_power(double power, double n, double nu) {
+  const double share = power / n;
+  if (!(nu + share > 0.0)) return 1.0;  // infinite: one line alone, and one degree of freedom
+  return std::exp(n * (std::lgamma(nu + share) - std::lgamma(nu) - share * std::log(nu)));
+}
+
+/// v^power for power 1 or -1, v being the geometric mean over neighbouring lines: a resonance that
+/// stands out of them does not spread. Its expectation is that of the true variance's power.
+Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, double power) {
+  if (!(dof > 0.0)) return power > 0.0 ? variance : Eigen::MatrixXd(variance.cwiseInverse());
+  const Eigen::Index half = window_reach(dof);
+  const double nu = std::max(dof, 1.0);
+  if (half == 0 && power > 0.0) return variance;
+  if (half == 0) return variance.cwiseInverse() * ((nu - 1.0) / nu);
+  const Eigen::Index N = variance.cols();
+  Eigen::VectorXd bias(N);
+  for (Eigen::Index k = 0; k < N; ++k)
+    bias[k] = std::log(expected_power(power, static_cast<double>(window_lines(k, half, N)), nu));
+  Eigen::MatrixXd out(variance.rows(), N);
+  for (Eigen::Index c = 0; c < variance.rows(); c += kChannels) {
+    const Eigen::Index rows = std::min(kChannels, variance.rows() - c);
+    Eigen::MatrixXd logarithm = variance.middleRows(c, rows);
+    logarithm = logarithm.array().log().matrix();
+    for (Eigen::Index k = 0; k < N; ++k) {
+      const auto window =
+          logarithm.middleCols(std::max<Eigen::Index>(0, k - half), window_lines(k, half, N));
+      out.col(k).segment(c, rows) =
+          (power * window.rowwise().mean().array() - bias[k]).exp().matrix();
+    }
+  }
+  return out;
+}
+
+/// The inverse of the smoothed variance, without bias.
+Eigen::MatrixXd smoothed_inverse(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
+                                 double dof) {
+  if (frf.residual_covariance_re.size() == 0 || &variance != &frf.noise_variance ||
+      window_reach(dof) == 0)
+    return smoothed_power(variance, dof, -1.0);
+  // Var(G_ij) = C_E,ii [(U U^H)^-1]_jj, and only the first factor is random: smooth that one.
+  const Eigen::Index n_y = frf.n_outputs();
+  Eigen::MatrixXd C_E(n_y, variance.cols());
+  for (Eigen::Index y = 0; y < n_y; ++y) C_E.row(y) = frf.residual_covariance_re.row(y * (n_y + 1));
+  if (!(C_E.minCoeff() > 0.0)) return smoothed_power(variance, dof, -1.0);
+  const Eigen::ArrayXXd ratio = smoothed_power(C_E, dof, -1.0).array() * C_E.array();
+  return (ratio.replicate(frf.n_inputs(), 1) / variance.array()).matrix();
+}
+
+Eigen::MatrixXd inverse_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
+                                 double dof, const char* name) {
+  if (variance.size() == 0)
+    throw std::invalid_argument(
+        std::string("weighting ") + name + " needs /" + name +
+        " in the FRF; it has none (use relative, or measure more periods or realizations)");
+  for (Eigen::Index k = 0; k < variance.cols(); ++k)
+    for (Eigen::Index c = 0; c < variance.rows(); ++c)
+      if (!(variance(c, k) > 0.0) || !std::isfinite(variance(c, k)))
+        throw std::invalid_argument(
+            std::string(name) + " of " + channel_name(frf, c, k) +
+            " is zero or not finite; every variance must be positive to weigh with it");
+  return smoothed_inverse(frf, variance, dof);
+}
+
+Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
+  Eigen::MatrixXd W(frf.response.rows(), frf.response.cols());
+  for (Eigen::Index k = 0; k < W.cols(); ++k)
+    for (Eigen::Index c = 0; c < W.rows(); ++c) {
+      const double magnitude = std::abs(frf.response(c, k));
+      if (!(magnitude > 0.0))
+        throw std::invalid_argument(
+            "response of " + channel_name(frf, c, k) +
+            " is zero: no relative error exists there; leave the channel or line out, or use "
+            "weighting unit");
+      W(c, k) = std::pow(magnitude, -exponent);
+      if (!std::isnormal(W(c, k)))
+        throw std::invalid_argument(fmt::format(
+            "response of {} is {:.2g}: its weight leaves the range of numbers; convert to units "
+            "that fit the plant",
+            channel_name(frf, c, k), magnitude));
+    }
+  return W;
+}
+
+}  // namespace
+
+// With g the geometric mean of n sample variances of nu degrees of freedom (Gamma distributed) and W
+// proportional to 1/g, v one of the n:  E{W^2 v} / (E{W^2} E{v}) = E{v^(1-2/n)} / E{v^(-2/n)} E{v}
+//   = 1 - 2 / (n nu).
+std::optional<LineVariance> weighed_variance(const FrfEstimate& frf, Weighting weighting) {
+  const bool noise = weighting == Weighting::noise_variance;
+  const double dof = noise ? frf.noise_dof : frf.total_dof;
+  if ((!noise && weighting != Weighting::total_variance) || !(dof > 0.0)) return std::nullopt;
+  const Eigen::Index half = window_reach(dof);
+  const Eigen::Index N = frf.lines();
+  Eigen::ArrayXd divisor(N);
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const double together = dof * static_cast<double>(window_lines(k, half, N));
+    divisor[k] = 1.0 - 2.0 / std::max(together, kLeastTogether);
+  }
+  return LineVariance{
+      SharedMatrix<Eigen::MatrixXd>::kept(noise ? frf.noise_variance : frf.total_variance),
+      std::move(divisor)};
+}
+
+SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {
+  const Eigen::Index n_y = frf.n_outputs();
+  const Eigen::Index N = frf.lines();
+  SmoothedCovariance out{Eigen::MatrixXcd(n_y * n_y, N), frf.noise_dof};
+  out.matrices.real() = frf.residual_covariance_re;
+  out.matrices.imag() = frf.residual_covariance_im;
+  if (!(frf.noise_dof > 0.0)) return out;
+  // An inverse of n_y x n_y scatters as that of a variance with n_y degrees of freedom less.
+  const double wanted = std::ceil((kWantedDof + static_cast<double>(n_y)) / frf.noise_dof);
+  const auto count = static_cast<Eigen::Index>(std::min(wanted, static_cast<double>(N)));
+  if (count == 1) return out;
+  out.dof = frf.noise_dof * static_cast<double>(count);
+
+  Eigen::MatrixXd variance(n_y, N);
+  for (Eigen::Index y = 0; y < n_y; ++y)
+    variance.row(y) = frf.residual_covariance_re.row(y * (n_y + 1));
+  const Eigen::MatrixXd deviation = smoothed_power(variance, frf.noise_dof, 1.0).cwiseSqrt();
+  Eigen::MatrixXd products(n_y * n_y, N);  // of the deviations of two outputs
+  for (Eigen::Index k = 0; k < N; ++k)
+    products.col(k) = (deviation.col(k) * deviation.col(k).transpose()).reshaped();
+  const Eigen::MatrixXcd correlation = out.matrices.cwiseQuotient(products);
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const Eigen::Index first = std::clamp<Eigen::Index>(k - count / 2, 0, N - count);
+    out.matrices.col(k) =
+        correlation.middleCols(first, count).rowwise().mean().cwiseProduct(products.col(k));
+  }
+  return out;
+}
+
+SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOptions& options) {
+  if (const auto matrices = make_weight_matrices(frf, options)) return matrices->marginal();
+  switch (options.weighting) {
+    case Weighting::unit:
+      return Eigen::MatrixXd(Eigen::MatrixXd::Ones(frf.response.rows(), frf.response.cols()));
+    case Weighting::inverse_magnitude:
+      return inverse_magnitude(frf, 1.0);
+    case Weighting::relative:
+      return inverse_magnitude(frf, 2.0);
+    case Weighting::noise_variance:
+      return inverse_variance(frf, frf.noise_variance, frf.noise_dof, "noise_variance");
+    case Weighting::total_variance:
+      return inverse_variance(frf, frf.total_variance, frf.total_dof, "total_variance");
+    case Weighting::likelihood:
+    case Weighting::user:
+      break;
+  }
+  const Eigen::MatrixXd& W = options.user_weights;
+  if (W.rows() != frf.response.rows() || W.cols() != frf.response.cols())
+    throw std::invalid_argument(
+        "user weights: the shape differs from that of the response in the band");
+  if (W.allFinite() && W.minCoeff() < 0.0)
+    throw IndefiniteWeights("user weights: one is negative; the cost would have no minimum");
+  if (!W.allFinite() || !(W.maxCoeff() > 0.0))
+    throw std::invalid_argument("user weights: every weight must be finite, and one positive");
+  return options.user_weights;
+}
+
+}  // namespace stageid

@@ -1,0 +1,64 @@
+#include "estimation/products/pair_grams.hpp"
+
+#include <algorithm>
+
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+struct Columns {
+  Eigen::MatrixXd re;
+  Eigen::MatrixXd im;
+};
+
+/// Adds what a tile of lines says of channel c and those behind it.
+void add_channel(const ChannelPairs& pairs, const std::vector<Columns>& X, Eigen::Index c,
+                 LineRange lines, const std::vector<FunctionSet>& sets,
+                 std::vector<Eigen::MatrixXd>& out) {
+  const Columns& left = X[static_cast<std::size_t>(c)];
+  Columns right;
+  Eigen::ArrayXd w_re;
+  Eigen::ArrayXd w_im;
+  for (Eigen::Index d = c; d < pairs.channels; ++d) {
+    if (!pairs.between(c, d, lines, w_re, w_im)) continue;
+    const Columns& other = X[static_cast<std::size_t>(d)];
+    right.re = other.re.array().colwise() * w_re - other.im.array().colwise() * w_im;
+    right.im = other.im.array().colwise() * w_re + other.re.array().colwise() * w_im;
+    for (std::size_t s = 0; s < sets.size(); ++s) {
+      const FunctionSet& set = sets[s];
+      const auto n = static_cast<Eigen::Index>(set.size());
+      Eigen::MatrixXd gram = left.re(Eigen::all, set).transpose() * right.re(Eigen::all, set);
+      gram.noalias() += left.im(Eigen::all, set).transpose() * right.im(Eigen::all, set);
+      const auto rows = Eigen::seqN(c, n, pairs.channels);
+      const auto cols = Eigen::seqN(d, n, pairs.channels);
+      out[s](rows, cols) += gram;
+      if (d != c) out[s](cols, rows) += gram.transpose();
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Eigen::MatrixXd> pair_grams(const ChannelPairs& pairs,
+                                        const std::vector<FunctionSet>& sets) {
+  std::vector<Eigen::MatrixXd> out;
+  for (const FunctionSet& set : sets) {
+    const Eigen::Index n = pairs.channels * static_cast<Eigen::Index>(set.size());
+    out.emplace_back(Eigen::MatrixXd::Zero(n, n));
+  }
+  std::vector<Columns> X(static_cast<std::size_t>(pairs.channels));
+  const auto channels = static_cast<int>(pairs.channels);
+  for (Eigen::Index first = 0; first < pairs.lines; first += kTileLines) {
+    const LineRange lines = {first, std::min(kTileLines, pairs.lines - first)};
+    for_each_task(pairs.threads, channels, [&](int c) {
+      Columns& own = X[static_cast<std::size_t>(c)];
+      pairs.columns(c, lines, own.re, own.im);
+    });
+    for_each_task(pairs.threads, channels,
+                  [&](int c) { add_channel(pairs, X, c, lines, sets, out); });
+  }
+  return out;
+}
+
+}  // namespace stageid

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "estimation/problem/fit_problem.hpp"
+#include "estimation/problem/pair_reduction.hpp"
+
+namespace stageid {
+
+std::vector<ColumnPair> triangular_pairs(Eigen::Index n);  ///< left >= right
+/// The symmetric n x n matrix whose lower triangle is given in that order.
+Eigen::MatrixXd from_triangle(const Eigen::Ref<const Eigen::VectorXd>& triangle, Eigen::Index n);
+std::vector<ColumnPair> all_pairs(Eigen::Index left, Eigen::Index right);  ///< left outermost
+
+/// Complex columns as two real matrices, N x n each.
+struct ComplexColumns {
+  const Eigen::MatrixXd& re;
+  const Eigen::MatrixXd& im;
+};
+
+constexpr Eigen::Index kTileLines = 256;  // the weights' tile and the products' stay in the cache
+
+/// Some channels of a group on some lines: what one task works on.
+struct TileRange {
+  Eigen::Index first_member;
+  Eigen::Index members;
+  Eigen::Index first_line;
+  Eigen::Index lines;
+};
+
+constexpr Eigen::Index kMostMembers = 256;  // of a block
+
+/// Channels of a group in blocks, each with all lines: memory for sums is that of a block.
+std::vector<TileRange> member_blocks(Eigen::Index first, Eigen::Index members, Eigen::Index lines);
+
+/// A block's lines in shares for the threads. Shares depend on sizes alone, never on the number of
+/// threads: what is summed in each of them, and in which order, is always the same.
+std::vector<TileRange> line_shares(const TileRange& block);
+
+/// The sum over a block's shares, in their order, of task(share).
+template <typename Sums, typename Task>
+Sums sum_over_shares(const TileRange& block, int threads, Task&& task) {
+  const std::vector<TileRange> shares = line_shares(block);
+  std::vector<Sums> parts(shares.size());
+  for_each_task(threads, static_cast<int>(shares.size()), [&](int i) {
+    parts[static_cast<std::size_t>(i)] = task(shares[static_cast<std::size_t>(i)]);
+  });
+  for (std::size_t i = 1; i < parts.size(); ++i) parts[0] += parts[i];
+  return std::move(parts[0]);
+}
+
+/// Calls task(first line, lines) for the tiles of a share in order.
+template <typename Task>
+void for_each_tile(const TileRange& range, Task&& task) {
+  const Eigen::Index end = range.first_line + range.lines;
+  for (Eigen::Index k = range.first_line; k < end; k += kTileLines)
+    task(k, std::min(kTileLines, end - k));
+}
+
+/// Data, weights and residual of a tile, a row a channel (members x lines).
+struct DataTile {
+  Eigen::MatrixXd W, E_re, E_im;
+  /// @param B numerators of the range's channels, members x n_f; empty: E is the data
+  void load(const FitProblem& problem, const BasisGroup& group, const TileRange& range,
+            const Eigen::MatrixXd& B, Eigen::Index first_line, Eigen::Index lines);
+  double squares() const;  ///< sum W |E|^2
+};
+
+/// S(c, b) += sum_k W(c, k) |first(k)|^2 base(k, b) over lines first_line + k, for the first columns of the
+/// base that S has: what PairReduction makes sums of products of.
+void add_fraction_sums(const Eigen::MatrixXd& W, const FractionColumns& fractions,
+                       Eigen::Index first_line, Eigen::MatrixXd& S);
+
+/// sums(p, c) += sum_k W(c, k) Re{ conj(X(k, left_p)) Y(k, right_p) } over lines first_line + k, for pairs
+/// that are multiplied out. The products are functions of frequency alone and shared by all channels, so
+/// that this is one (pairs x lines) (lines x channels) matrix product.
+void add_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X, const ComplexColumns& Y,
+                   const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
+                   Eigen::MatrixXd& sums);
+
+/// The same with complex weights V: sum_k Re{ conj(X) Y V }. Double precision here too: in single, the
+/// refined-IV step from a start with large residuals is wrong by up to a percent.
+void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im,
+                   const ComplexColumns& X, const ComplexColumns& Y,
+                   const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
+                   Eigen::MatrixXd& sums);
+
+/// Rows `rows` of a matrix.
+Eigen::MatrixXd rows_of(const Eigen::MatrixXd& matrix, const std::vector<Eigen::Index>& rows);
+
+}  // namespace stageid

@@ -1,0 +1,407 @@
+#include "estimation/search/automatic_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <ranges>
+#include <stdexcept>
+
+#include "acquisition/files/counted.hpp"
+#include "estimation/problem/fit_problem.hpp"
+#include "estimation/problem/search_limit.hpp"
+#include "estimation/search/growth_watch.hpp"
+#include "estimation/search/hidden_modes.hpp"
+#include "estimation/search/mode_worth.hpp"
+#include "estimation/search/overlapping_modes.hpp"
+#include "estimation/search/ranked_fit.hpp"
+#include "estimation/search/search_advice.hpp"
+#include "estimation/start/pole_relocation.hpp"
+#include "estimation/start/residual_modes.hpp"
+#include "estimation/start/search_start.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr int kGrowthIterations = 12;       // a mode that is still moving is finished later
+constexpr std::size_t kCandidates = 4;      // tried before it is believed that no mode is missing
+constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
+constexpr double kSettledDeviations = 0.1;  // where ways to a number of modes are compared
+constexpr int kMostGrown = 40;              // modes; more are placed at once, and only then grown
+constexpr int kIterationsOfMany = 6;        // with free poles: those that noise hides never settle
+constexpr double kSettledOfMany = 0.02;     // the same for every pole of so many, root mean square
+
+/// Grows and prunes a model; every decision is written down.
+class AutomaticFit {
+ public:
+  AutomaticFit(const FrfEstimate& frf, const ModelStructure& structure,
+               const ModeSelection& selection, const FitOptions& options)
+      : frf_(frf),
+        structure_(structure),
+        selection_(selection),
+        options_(options),
+        quick_(options),
+        target_(selection.exactly) {
+    quick_.user_weights = make_weights(frf, options);
+    quick_.weighting = Weighting::user;
+    quick_.user_weight_matrices.resize(0, 0);  // the final fit's only: their best diagonal chooses
+    quick_.uncertainty = false;
+    quick_.max_iterations = std::min(kGrowthIterations, options.max_iterations);
+    quick_.gradient_tolerance = 1e-5;
+    quick_.step_tolerance = 1e-7;
+    quick_.method = FitMethod::gn;  // the same minimum; the refined-IV iteration does the final fit
+    quick_.residue_rank = quick_.rigid_body_rank = 0;
+    worth_ = ModeWorth(frf, structure, quick_.user_weights);
+    quick_.deviation_tolerance = worth_.deviation_tolerance();
+    threads_ = worker_count(options.threads);
+  }
+
+  /// The fit that every search begins with.
+  void begin() { adopt(fit_additive_model(frf_, start(), quick_)); }
+
+  /// The same with the number of modes that is asked for, all placed at once.
+  void begin_relocated() {
+    AdditiveModel model = start_of({});
+    const auto wanted = static_cast<std::size_t>(selection_.exactly);
+    const std::vector<ModeCandidate> modes =
+        relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
+    say("start: {} by pole relocation", counted(modes.size(), "mode"));
+    model = start_of(modes);
+    if (many()) {
+      FitOptions still = quick_;
+      still.max_iterations = 0;
+      FitResult placed = fit_additive_model(frf_, model, still);
+      if (worth_.at_rounding(placed)) return adopt(std::move(placed));
+      return hold_hidden(placed.model);
+    }
+    adopt(fit_additive_model(frf_, model, quick_));
+  }
+
+  /// @param surplus modes to grow by beyond the number that is asked for
+  void search(int surplus) {
+    target_ = selection_.exactly + surplus;
+    if (best_.status == FitStatus::singular || selection_.keep_modes) return;
+    // Two peaks of one mode keep a fit from converging, and what is left looks like more modes.
+    if (selection_.exactly == 0) reduce();
+    grow();
+    reduce();
+    if (selection_.exactly == 0) {
+      if (grow()) reduce();
+      return;
+    }
+    if (!at_rounding()) {  // else the last fit says it all
+      quick_.max_iterations = options_.max_iterations;
+      quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
+      adopt(fit_additive_model(frf_, best_.model, quick_));
+    }
+    say("{}, by way of {}: cost {:.6g}", counted(count_modes(best_.model), "mode"), target_,
+        best_.model.fit.cost);
+  }
+
+  double cost() const { return best_.model.fit.cost; }
+  bool at_rounding() const { return worth_.at_rounding(best_); }
+  bool limit_reached() const { return options_.limit->reached(); }
+
+  /// What a search weighs with; the last fit makes its own.
+  void release_weights() { quick_.user_weights = {}; }
+
+  FitResult finish() {
+    release_weights();
+    sort_modes(best_.model);
+    const bool cut_short = limit_reached();
+    options_.limit->begin_completion();
+    FitOptions last = options_;
+    last.judge_modes = selection_.keep_modes;
+    if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled_of_many());
+    last.shrink_hidden = many();
+    FitResult result = many() ? fit_additive_model(frf_, best_.model, last)
+                              : ranked_fit(frf_, best_.model, last, mode_number());
+    if (const std::string ranks = describe(result.residue_ranks); !ranks.empty())
+      result.decisions.push_back(ranks);
+    watch_.tell(result);
+    if (cut_short) tell_limit(frf_, options_, result);
+    sort_modes(result);
+    decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
+    result.decisions = std::move(decisions_);
+    result.cost.insert(result.cost.begin(), history_.begin(), history_.end());
+    result.model.cost_history = result.cost;
+    result.model.fit.iterations = static_cast<int>(result.cost.size()) - 1;
+    return result;
+  }
+
+ private:
+  ModeNumber mode_number() const {
+    if (selection_.keep_modes) return ModeNumber::given;
+    return selection_.exactly > 0 ? ModeNumber::asked : ModeNumber::chosen;
+  }
+
+  bool many() const { return selection_.exactly > kMostGrown; }
+
+  /// Newton decrement at which every free pole is off by kSettledOfMany of its standard deviation.
+  double settled_of_many() const {
+    double free = 0.0;
+    for (const Submodel& s : best_.model.submodels)
+      if (is_searched_mode(s) && !s.frequency_held) free += 2.0;
+    return kSettledOfMany * std::sqrt(free);
+  }
+
+  /// Fits `model` with all poles free, and holds those that noise hides where they have come to.
+  void hold_hidden(const AdditiveModel& model) {
+    FitOptions while_free = quick_;
+    while_free.max_iterations = std::min(kIterationsOfMany, options_.max_iterations);
+    FitResult fit = fit_additive_model(frf_, model, while_free);
+    const int hidden = hold_hidden_modes(fit, frf_.response.rows(), frf_.lines(), fit.model);
+    say("{} of them stand out of the noise; the poles of the other {} are held after {} iterations",
+        count_modes(fit.model) - hidden, hidden, fit.cost.size() - 1);
+    adopt(std::move(fit));
+  }
+
+  AdditiveModel start() {
+    std::vector<ModeCandidate> modes = selection_.modes;
+    if (modes.empty() && !selection_.keep_modes) {
+      modes = without_given(pick_modes(frf_), structure_);
+      const std::size_t most = static_cast<std::size_t>(affordable_modes());
+      if (modes.size() > most) modes.resize(most);
+      say("start: {} of the CMIF", counted(modes.size(), "peak"));
+    } else {
+      say("start: {} given", counted(modes.size(), "mode"));
+    }
+    AdditiveModel model = start_of(modes);
+    if (model.submodels.empty())
+      model.submodels.push_back(mode_submodel(frf_, structure_, strongest_peak(frf_)));
+    return model;
+  }
+
+  AdditiveModel start_of(const std::vector<ModeCandidate>& modes) const {
+    return search_start(frf_, structure_, options_, best_.model, modes);
+  }
+
+  int affordable_modes() const {
+    return static_cast<int>(std::min<Eigen::Index>(most_modes(frf_, structure_), selection_.most));
+  }
+
+  bool wanted_more() const {
+    const int modes = count_modes(best_.model);
+    if (selection_.exactly > 0) return modes < target_;
+    return modes < affordable_modes() && !worth_.at_rounding(best_) && !watch_.ended() &&
+           !limit_reached();
+  }
+
+  /// Adds modes while they are worth it. @returns true if any was added.
+  bool grow() {
+    bool grown = false;
+    watch_.cut();
+    while (wanted_more()) {
+      const std::size_t most =
+          std::max(kCandidates, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
+      const std::vector<ResidualMode> candidates =
+          residual_modes(frf_, best_.model, quick_.user_weights, most, threads_);
+      FitResult before = best_;
+      if (!add_clear_ones(candidates) && !add_one(candidates)) break;
+      grown = true;
+      if (selection_.exactly > 0) continue;
+      const std::size_t added = best_.model.submodels.size() - before.model.submodels.size();
+      if (!watch_.ends(frf_, quick_, before, best_, added)) continue;
+      best_ = watch_.model();
+      say("{}", watch_.finding());
+    }
+    return grown;
+  }
+
+  /// Several at once where each is clearly worth it: pruning corrects what was one too many. Where very
+  /// many are asked for, whatever they are worth.
+  bool add_clear_ones(const std::vector<ResidualMode>& candidates) {
+    const bool demanded = many();
+    std::vector<ResidualMode> clear;
+    for (const ResidualMode& candidate : candidates)
+      if (demanded || candidate.gain > 4.0 * worth_.price(best_)) clear.push_back(candidate);
+    const int room =
+        (selection_.exactly > 0 ? target_ : affordable_modes()) - count_modes(best_.model);
+    if (room < static_cast<int>(clear.size())) clear.resize(static_cast<std::size_t>(room));
+    if (clear.size() < 2) return false;
+    FitResult trial = fit_with(clear);
+    if (trial.status == FitStatus::singular) return false;
+    if (!demanded && !(worth_.criterion(trial) < worth_.criterion(best_))) return false;
+    for (const ResidualMode& candidate : clear)
+      say("added {:.6g} Hz, one of {} together: cost {:.6g} -> {:.6g}", candidate.mode.frequency_hz,
+          clear.size(), best_.model.fit.cost, trial.model.fit.cost);
+    adopt(std::move(trial));
+    return true;
+  }
+
+  FitResult fit_with(const std::vector<ResidualMode>& more) const {
+    AdditiveModel model = best_.model;
+    for (const ResidualMode& candidate : more)
+      model.submodels.push_back(mode_submodel(frf_, structure_, candidate.mode));
+    return fit_additive_model(frf_, model, quick_);
+  }
+
+  bool add_one(const std::vector<ResidualMode>& candidates) {
+    FitResult best_trial;
+    bool found = false;
+    for (const ResidualMode& candidate : candidates) {
+      // The matched filter sees most of what a fit gains; far below the price none is needed.
+      if (selection_.exactly == 0 && candidate.gain < 0.2 * worth_.price(best_)) continue;
+      FitResult trial = fit_with({candidate});
+      if (trial.status == FitStatus::singular) continue;
+      const bool better = !found || trial.model.fit.cost < best_trial.model.fit.cost;
+      if (better) best_trial = std::move(trial);
+      found = true;
+      // The first candidate is usually right; the others are asked only where it is not worth its
+      // parameters.
+      if (worth_.criterion(best_trial) < worth_.criterion(best_) || limit_reached()) break;
+    }
+    if (!found) {
+      say("no further mode: nothing in the weighted residual is worth a mode's parameters (BIC)");
+      return false;
+    }
+    const Submodel& added = best_trial.model.submodels.back();
+    if (selection_.exactly == 0 && !(worth_.criterion(best_trial) < worth_.criterion(best_))) {
+      say("no further mode: the best, {:.6g} Hz, would lower the cost by {:.2g} % and is not worth "
+          "its parameters (BIC)",
+          added.natural_frequency_hz(),
+          100.0 * (1.0 - best_trial.model.fit.cost / best_.model.fit.cost));
+      return false;
+    }
+    say("added {:.6g} Hz (damping {:.3g}): cost {:.6g} -> {:.6g}", added.natural_frequency_hz(),
+        added.damping_ratio(), best_.model.fit.cost, best_trial.model.fit.cost);
+    adopt(std::move(best_trial));
+    return true;
+  }
+
+  /// Replaces two modes closer than a half-power width by one where the second is not worth its
+  /// parameters: on a single resonance two nearly equal modes with large opposite residues fit as
+  /// well as one, and none of them can be dropped alone.
+  void merge() {
+    const std::vector<Submodel>& all = best_.model.submodels;
+    for (const auto& [i, j] : overlapping_modes(best_.model)) {
+      FitResult merged = fit_additive_model(frf_, with_one_of(best_.model, i, j), quick_);
+      if (!(worth_.criterion(merged) < worth_.criterion(best_))) continue;
+      say("merged {:.6g} and {:.6g} Hz: cost {:.6g} -> {:.6g}", all[i].natural_frequency_hz(),
+          all[j].natural_frequency_hz(), best_.model.fit.cost, merged.model.fit.cost);
+      adopt(std::move(merged));
+      return merge();  // the other pairs' places have changed
+    }
+  }
+
+  /// Drops modes that are not worth their parameters, several at a time, one by one where that
+  /// fails.
+  void prune() {
+    std::size_t at_once = best_.model.submodels.size();
+    while (count_modes(best_.model) > 1 && at_once > 0) {
+      const int surplus =
+          selection_.exactly > 0 ? count_modes(best_.model) - selection_.exactly : 0;
+      if (selection_.exactly > 0 && surplus <= 0) return;
+      // A refit regains part of what the removal costs: ask twice the price here, and BIC
+      // afterwards.
+      const double limit =
+          surplus > 0 ? std::numeric_limits<double>::infinity() : 2.0 * worth_.price(best_);
+      const std::size_t most = surplus > 0 ? static_cast<std::size_t>((surplus + 1) / 2) : at_once;
+      const std::vector<std::size_t> out = least_worthy(best_, limit, most);
+      if (out.empty()) return;
+      AdditiveModel model = best_.model;
+      for (const std::size_t i : std::views::reverse(out))
+        model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(i));
+      FitResult without = fit_additive_model(frf_, model, quick_);
+      if (surplus <= 0 && !(worth_.criterion(without) < worth_.criterion(best_))) {
+        at_once = out.size() / 2;
+        continue;
+      }
+      for (const std::size_t i : out)
+        say("dropped {:.6g} Hz: cost {:.6g} -> {:.6g}",
+            best_.model.submodels[i].natural_frequency_hz(), best_.model.fit.cost,
+            without.model.fit.cost);
+      adopt(std::move(without));
+    }
+  }
+
+  void reduce() {
+    prune();
+    if (selection_.exactly == 0) merge();
+  }
+
+  /// Goes on from `result`; its way there becomes part of the history.
+  void adopt(FitResult&& result) {
+    best_ = std::move(result);
+    history_.insert(history_.end(), best_.cost.begin(), best_.cost.end());
+  }
+
+  template <typename... Args>
+  void say(fmt::format_string<Args...> format, Args&&... args) {
+    decisions_.push_back(fmt::format(format, std::forward<Args>(args)...));
+  }
+
+  const FrfEstimate& frf_;
+  const ModelStructure& structure_;
+  const ModeSelection& selection_;
+  const FitOptions& options_;
+  FitOptions quick_;
+  ModeWorth worth_;
+  int target_;  ///< modes to grow to where their number is given
+  int threads_ = 1;
+  GrowthWatch watch_;
+  FitResult best_;
+  std::vector<std::string> decisions_;
+  std::vector<double> history_;
+};
+
+/// Where the number of modes is given, the way to it decides which minimum is reached: it is also
+/// gone with modes too many, of which the least worthy are dropped again.
+std::vector<int> surpluses(const ModeSelection& selection, Eigen::Index most) {
+  std::vector<int> out = {0};
+  if (selection.exactly == 0 || selection.keep_modes) return out;
+  for (const int surplus : {1 + selection.exactly / 4, 2 + selection.exactly / 2})
+    if (selection.exactly + surplus <= most) out.push_back(surplus);
+  return out;
+}
+
+}  // namespace
+
+FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
+                        const ModeSelection& selection, const FitOptions& asked) {
+  check(frf);
+  if (selection.exactly < 0 || selection.most < 1)
+    throw std::invalid_argument("fit: the number of modes must be positive");
+  const Eigen::Index most = most_modes(frf, structure);
+  if (selection.exactly > most || selection.modes.size() > static_cast<std::size_t>(most))
+    throw std::invalid_argument(fmt::format(
+        "fit: {} lines cannot carry {} modes; ask for at most {}", frf.lines(),
+        std::max<std::size_t>(static_cast<std::size_t>(selection.exactly), selection.modes.size()),
+        most));
+  FitOptions options = asked;
+  options.limit = search_limit(selection, asked);
+  AutomaticFit begun(frf, structure, selection, options);
+  std::optional<AutomaticFit> best;
+  const auto go = [&](AutomaticFit attempt, int surplus) {
+    attempt.search(surplus);
+    if (!best || attempt.cost() < best->cost()) best.emplace(std::move(attempt));
+    return best->at_rounding() || best->limit_reached();
+  };
+  const auto finish = [&] {
+    begun.release_weights();
+    return best->finish();
+  };
+  const bool placed = selection.exactly > 0 && selection.modes.empty() && !selection.keep_modes;
+  const bool too_many_to_grow = placed && selection.exactly > kMostGrown;
+  if (!too_many_to_grow || options.delay != DelayModel::fixed) begun.begin();
+  if (placed) {
+    AutomaticFit relocated = begun;
+    relocated.begin_relocated();
+    if (go(std::move(relocated), 0) || too_many_to_grow) return finish();
+  }
+  for (const int surplus : surpluses(selection, most))
+    if (go(begun, surplus)) break;
+  return finish();
+}
+
+std::shared_ptr<SearchLimit> search_limit(const ModeSelection& selection,
+                                          const FitOptions& options) {
+  if (options.limit) return options.limit;
+  const bool open = selection.exactly == 0 && !selection.keep_modes;
+  return std::make_shared<SearchLimit>(open ? selection.search_seconds : 0.0, options.interrupted);
+}
+
+}  // namespace stageid

@@ -1,0 +1,152 @@
+#include "estimation/search/determinacy.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/model/poles.hpp"
+#include "estimation/problem/residual.hpp"
+#include "estimation/search/mode_worth.hpp"
+#include "estimation/search/undetermined_modes.hpp"
+#include "estimation/uncertainty/parameter_covariance.hpp"
+
+namespace stageid {
+namespace {
+
+// Of a normal matrix with unit diagonal. One denominator of order 20 comes down to 1e-12 (the numerators
+// 1e-9) and is determined; sums of thousands of terms are precise to 1e-15.
+constexpr double kSmallestDirection = 1e-12;  // of the numerators
+constexpr double kSmallestShare = 3e-14;      // of the denominators
+constexpr double kShareOfDirection = 0.1;     // from which a submodel is named
+
+/// @param first coefficient of submodel `i` among the globals
+bool is_judged(const FitProblem& problem, std::size_t i, Eigen::Index first, bool judge_modes) {
+  const int order = problem.shapes[i].order;
+  const SubmodelRole role = problem.roles.empty() ? SubmodelRole::searched : problem.roles[i];
+  if (order == 0 || role == SubmodelRole::suspension) return false;
+  if (judge_modes && !problem.is_held(first)) return true;
+  return order != 2 || problem.shapes[i].integrators > 0 || role == SubmodelRole::given;
+}
+
+/// 1 - R^2 of every free global: the part of its effect that no other parameter imitates.
+Eigen::VectorXd own_shares(const ArrowSystem& gn, const std::vector<Eigen::Index>& frozen) {
+  const Eigen::MatrixXd inverse = free_inverse(gn.schur(), frozen);
+  return (gn.M_globals().diagonal().cwiseProduct(inverse.diagonal())).cwiseInverse();
+}
+
+/// What the standard deviations say against the poles of submodel `i`, whose coefficients begin at `first`.
+std::string too_uncertain(const FitProblem& problem, const FitParameters& beta,
+                          const Eigen::MatrixXd& covariance, std::size_t i, Eigen::Index first) {
+  const Eigen::Index n = problem.shapes[i].order;
+  for (const PoleEstimate& pole : pole_estimates(beta.a[i], covariance.block(first, first, n, n))) {
+    const double f = pole.natural_frequency_hz;
+    const double std_hz = pole.natural_frequency_std_hz.value_or(0.0);
+    if (!(std_hz < kOpenFrequency * f))
+      return fmt::format("its pole at {:.4g} Hz has a standard deviation of {:.2g} Hz", f, std_hz);
+    const double damping_std = pole.damping_ratio_std.value_or(0.0);
+    if (!(damping_std < kOpenDamping * pole.damping_ratio))
+      return fmt::format(
+          "the damping ratio {:.2g} of its pole at {:.4g} Hz has a standard deviation of {:.2g}",
+          pole.damping_ratio, f, damping_std);
+  }
+  return {};
+}
+
+/// What the size of the response of submodel `i` says against it, by itself or as far as the others cannot stand in
+/// for it. Noise alone would let a submodel lower
+/// sum W |E|^2 by half of its variance for each parameter, by more where it searches its place.
+std::string too_small(const FitProblem& problem, const FitParameters& beta, double cost,
+                      double removal_cost, std::size_t i) {
+  FitProblem alone = problem;
+  FitParameters own = beta;
+  alone.shapes = {problem.shapes[i]};
+  own.a = {beta.a[i]};
+  Eigen::Index first = 0;
+  for (std::size_t o = 0; o < i; ++o) first += problem.shapes[o].functions();
+  own.B = beta.B.middleCols(first, problem.shapes[i].functions());
+  const WeightedPower power = weighted_power(alone, evaluate_groups(alone, own, false), own.B);
+  if (std::min(power.model, removal_cost) < kRoundingPower * power.data)
+    return "its response is rounding";
+  const Eigen::Index parameters = own.B.size() + own.a[0].size();
+  const double noise = residual_per_degree(problem, cost, problem.parameters());
+  if (removal_cost < noise * static_cast<double>(parameters))
+    return "its response is within the noise";
+  return {};
+}
+
+}  // namespace
+
+std::string submodel_name(const FitProblem& problem, const FitParameters& beta, std::size_t i) {
+  const SubmodelShape& shape = problem.shapes[i];
+  std::string text = fmt::format("submodel {} (l={}, n={}, m={}", i + 1, shape.integrators,
+                                 shape.order, shape.numerator_degree);
+  std::vector<std::string> poles;
+  for (const PoleEstimate& pole : pole_estimates(beta.a[i], Eigen::MatrixXd()))
+    poles.push_back(fmt::format("{:.4g}", pole.natural_frequency_hz));
+  if (!poles.empty())
+    text += fmt::format(", pole{} at {} Hz", poles.size() > 1 ? "s" : "", fmt::join(poles, ", "));
+  return text + ")";
+}
+
+std::string undetermined_numerators(const FitProblem& problem, const FitParameters& beta,
+                                    const std::vector<BasisGroup>& groups) {
+  double weakest = kSmallestDirection;
+  Eigen::VectorXd direction;
+  for (const BasisGroup& group : groups)
+    for (const Eigen::Index c : group.channels) {
+      const Eigen::VectorXd w = problem.weights(c);
+      const Eigen::MatrixXd M = group.F_re.transpose() * w.asDiagonal() * group.F_re +
+                                group.F_im.transpose() * w.asDiagonal() * group.F_im;
+      const Eigen::VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * M *
+                                                                 scale.asDiagonal());
+      const Eigen::VectorXd& values = eigen.eigenvalues();
+      if (!(values[0] < weakest * values[values.size() - 1])) continue;
+      weakest = values[0] / values[values.size() - 1];
+      direction = eigen.eigenvectors().col(0);
+    }
+  if (direction.size() == 0) return {};
+  std::vector<std::string> names;
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
+    const Eigen::Index functions = problem.shapes[i].functions();
+    if (direction.segment(first, functions).norm() > kShareOfDirection)
+      names.push_back(submodel_name(problem, beta, i));
+    first += functions;
+  }
+  return fmt::format("the data do not determine the numerators of {}", fmt::join(names, " and "));
+}
+
+std::string undetermined_poles(const FitProblem& problem, const FitParameters& beta, double cost,
+                               const ArrowSystem& gn, const std::vector<double>& removal_cost,
+                               const Eigen::MatrixXd& covariance,
+                               const std::vector<Eigen::Index>& frozen,
+                               const std::vector<std::size_t>& held, bool judge_modes) {
+  if (problem.globals() == 0) return {};
+  const Eigen::VectorXd shares = own_shares(gn, frozen);
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
+    const Eigen::Index n = problem.shapes[i].order;
+    if (is_judged(problem, i, first, judge_modes)) {
+      std::string reason;
+      if (std::find(held.begin(), held.end(), i) != held.end())
+        reason = "a pole stands at a bound, where the lines do not see it";
+      else if (!(shares.segment(first, n).minCoeff() > kSmallestShare))
+        reason = "a change of its denominator is imitated by the rest of the model";
+      else
+        reason = too_small(problem, beta, cost, removal_cost[i], i);
+      if (reason.empty() && covariance.size() > 0)
+        reason = too_uncertain(problem, beta, covariance, i, first);
+      if (!reason.empty())
+        return fmt::format("the data do not determine {}: {}", submodel_name(problem, beta, i),
+                           reason);
+    }
+    first += n;
+  }
+  return {};
+}
+
+}  // namespace stageid

@@ -1,0 +1,360 @@
+#include "estimation/search/fit_additive_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "acquisition/files/counted.hpp"
+#include "estimation/equations/numerators.hpp"
+#include "estimation/iteration/fit_iteration.hpp"
+#include "estimation/iteration/low_rank_iteration.hpp"
+#include "estimation/model/model_structure.hpp"
+#include "estimation/model/poles.hpp"
+#include "estimation/problem/fit_start.hpp"
+#include "estimation/problem/pole_bounds.hpp"
+#include "estimation/problem/residual.hpp"
+#include "estimation/problem/weight_matrices.hpp"
+#include "estimation/search/determinacy.hpp"
+#include "estimation/search/hidden_modes.hpp"
+#include "estimation/search/ranked_fit.hpp"
+#include "estimation/uncertainty/parameter_covariance.hpp"
+
+namespace stageid {
+namespace {
+
+/// Free delays are the last globals; one delay of the plant is that of every input.
+void fill_delay_deviations(const FitProblem& problem, const Eigen::MatrixXd& globals,
+                           AdditiveModel& model) {
+  if (problem.delays() == 0) return;
+  const Eigen::VectorXd deviation =
+      globals.diagonal().tail(problem.delays()).cwiseMax(0.0).cwiseSqrt();
+  const bool common = problem.delay == DelayModel::estimate;
+  model.input_delay_std_s.setConstant(problem.n_inputs, deviation[0]);
+  model.output_delay_std_s.setZero(problem.n_outputs);
+  if (common) return;
+  model.input_delay_std_s = deviation.head(problem.n_inputs);
+  model.output_delay_std_s.head(problem.n_outputs - 1) = deviation.tail(problem.n_outputs - 1);
+}
+
+/// Delta method, facts.md section 10:  df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
+void fill_deviations(const FitProblem& problem, const ParameterCovariance& covariance,
+                     AdditiveModel& model) {
+  fill_delay_deviations(problem, covariance.globals, model);
+  Eigen::Index first = 0;
+  Eigen::Index f = 0;
+  for (Submodel& s : model.submodels) {
+    const auto order = static_cast<Eigen::Index>(s.denominator.size()) - 1;
+    if (s.is_mode()) {
+      const Eigen::Matrix2d C = covariance.globals.block<2, 2>(first, first);
+      const double a1 = s.denominator[1];
+      const double a2 = s.denominator[2];
+      const Eigen::Vector2d df(0.0, -0.5 * s.natural_frequency_hz() / a2);
+      const Eigen::Vector2d dz = s.damping_ratio() * Eigen::Vector2d(1.0 / a1, -0.5 / a2);
+      // Zero: the mode stands at a bound and its place, or its damping, is not in the data.
+      if (C(1, 1) > 0.0) s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
+      if (C(1, 1) > 0.0 && C(0, 0) > 0.0)
+        s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
+    } else if (order > 0) {
+      const Eigen::MatrixXd C = covariance.globals.block(first, first, order, order);
+      if (C.diagonal().minCoeff() > 0.0)
+        s.poles = pole_estimates(Eigen::Map<const Eigen::VectorXd>(&s.denominator[1], order), C);
+    }
+    first += order;
+    for (const Eigen::MatrixXd& B : s.numerator)
+      s.numerator_std.emplace_back(
+          covariance.numerator_variance.col(f++)
+              .unaryExpr([](double v) { return v < 0.0 ? 0.0 : std::sqrt(v); })
+              .reshaped(B.rows(), B.cols()));
+  }
+}
+
+/// The covariance takes the lines for independent: of so many of them only one is.
+void raise(ParameterCovariance& covariance, double correlated_lines) {
+  covariance.globals *= correlated_lines;
+  covariance.numerator_variance *= correlated_lines;
+  covariance.response_variance *= correlated_lines;
+}
+
+/// What belongs to a channel without weight is not known, and does not touch the rest.
+bool weighted_are_finite(const FitProblem& problem, const ParameterCovariance& covariance) {
+  for (Eigen::Index c = 0; c < problem.channels(); ++c) {
+    const bool finite = covariance.numerator_variance.row(c).allFinite() &&
+                        (covariance.response_variance.size() == 0 ||
+                         covariance.response_variance.row(c).allFinite());
+    if (!finite && !has_no_weight(problem, c)) return false;
+  }
+  return true;
+}
+
+void use_covariance(const FitProblem& problem, ParameterCovariance& covariance, bool likelihood,
+                    FitResult& result) {
+  if (covariance.numerator_variance.size() == 0) return;
+  if (!covariance.globals.allFinite() || !weighted_are_finite(problem, covariance)) {
+    result.decisions.emplace_back(
+        "no standard deviations: the covariance of the parameters is not finite; some of them are "
+        "not in the data");
+    return;
+  }
+  fill_deviations(problem, covariance, result.model);
+  result.response_variance = std::move(covariance.response_variance);
+  if (!likelihood || !(covariance.residual_scale > 1.0)) return;
+  result.decisions.push_back(
+      fmt::format("the residual is {:.3g} times what the variances predict: the model does not "
+                  "explain the data; standard deviations are raised by {:.3g}",
+                  covariance.residual_scale, std::sqrt(covariance.residual_scale)));
+}
+
+/// With free numerators.
+ParameterCovariance free_covariance(const FrfEstimate& frf, const FitOptions& options,
+                                    const FitProblem& problem,
+                                    const std::optional<WeightMatrices>& matrices,
+                                    const FitParameters& beta, const IterationResult& iteration) {
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
+  if (!matrices)
+    return parameter_covariance(problem, beta, groups, iteration.end_cost,
+                                data_noise(frf, options.weighting), iteration.frozen,
+                                {options.response_variance, false});
+  return joint_covariance(
+      problem, beta, groups, iteration.end_cost,
+      JointEquations(problem, *matrices, beta, groups, residual(problem, groups, beta.B)),
+      weighs_by_variance(options.weighting) ? VarianceKnowledge::weights : VarianceKnowledge::none,
+      matrices->scatter_factor(), iteration.frozen, options.response_variance);
+}
+
+void fill_model(const FrfEstimate& frf, const FitOptions& options, const FitProblem& problem,
+                const FitParameters& beta, FitResult& result) {
+  result.model.inputs = frf.inputs;
+  result.model.outputs = frf.outputs;
+  result.model.sample_rate_hz = frf.sample_rate_hz;
+  result.model.hold = options.hold;
+  result.model.fit.band_hz[0] = frf.frequency_hz[0];
+  result.model.fit.band_hz[1] = frf.frequency_hz[frf.lines() - 1];
+  fill_submodels(problem, beta, result.model);
+  for (std::size_t i = 0; i < beta.a.size(); ++i)
+    if (Submodel& s = result.model.submodels[i]; !s.is_mode())
+      s.poles = pole_estimates(beta.a[i], Eigen::MatrixXd());
+  if (result.removal_cost.empty())
+    result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
+}
+
+void fill_record(const FitOptions& options, const IterationResult& iteration, double relative_rms,
+                 FitResult& result) {
+  FitRecord& record = result.model.fit;
+  record.cost = iteration.end_cost;
+  record.weighting = to_string(options.weighting);
+  record.iterations = iteration.iterations;
+  record.status = to_string(result.status);
+  record.message = result.trustworthy() ? "" : result.message;
+  record.relative_rms_error = relative_rms;
+  result.model.cost_history = result.cost;
+}
+
+/// Goes on to residues of the given ranks. @returns the covariance there
+ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& options,
+                                    const FitProblem& problem, FitParameters& beta,
+                                    IterationResult& iteration, FitResult& result) {
+  const bool likelihood = weighs_by_variance(options.weighting);
+  LowRankResult constrained =
+      iterate_low_rank(problem, beta, options, data_noise(frf, options.weighting));
+  if (options.mode_ranks.empty())
+    result.decisions.push_back(rank_decision(iteration.end_cost, constrained.iteration.end_cost,
+                                             2.0 * static_cast<double>(problem.size()),
+                                             problem.parameters() - constrained.parameters,
+                                             likelihood));
+  result.parameters = constrained.parameters;
+  constrained.iteration.cost.insert(constrained.iteration.cost.begin(), iteration.cost.begin(),
+                                    iteration.cost.end());
+  constrained.iteration.iterations += iteration.iterations;
+  iteration = std::move(constrained.iteration);
+  for (std::size_t i = 0; i < constrained.ranks.size(); ++i)
+    if (constrained.ranks[i] > 0) result.model.submodels[i].residue_rank = constrained.ranks[i];
+  return std::move(constrained.covariance);
+}
+
+/// Residues of modes whose poles are held because noise hides them.
+void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResult& iteration,
+                   FitResult& result) {
+  std::vector<std::size_t> hidden;
+  for (std::size_t i = 0; i < result.model.submodels.size(); ++i)
+    if (const Submodel& s = result.model.submodels[i]; is_searched_mode(s) && s.frequency_held)
+      hidden.push_back(i);
+  if (hidden.empty()) return;
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, false);
+  double cost = iteration.end_cost;
+  result.removal_cost =
+      removal_costs(problem, groups, beta.B);  // of what solves the convex problem
+  shrink_hidden_modes(problem, groups, hidden, result.removal_cost, beta.B, cost);
+  result.decisions.push_back(
+      fmt::format("residues of {} that noise hides, shrunk as James and Stein do: cost "
+                  "{:.6g} -> {:.6g}",
+                  counted(hidden.size(), "mode"), iteration.end_cost, cost));
+  iteration.end_cost = cost;
+  iteration.cost.push_back(cost);
+}
+
+/// What an earlier fit knew about the start is not known about this one.
+void forget_results(AdditiveModel& model) {
+  model.input_delay_std_s.resize(0);
+  model.output_delay_std_s.resize(0);
+  for (Submodel& s : model.submodels) {
+    s.natural_frequency_std_hz.reset();
+    s.damping_ratio_std.reset();
+    s.shape_std.reset();
+    s.numerator_std.clear();
+    s.residue_rank.reset();
+    s.poles.clear();
+  }
+}
+
+/// Where the start has no finite response there is nothing to return but itself, without numerators.
+/// @returns relative error of what is returned
+double keep_finite(const FrfEstimate& frf, const FitProblem& problem, const FitParameters& start,
+                   FitParameters& beta, IterationResult& iteration) {
+  const ChannelFlags responding = responding_channels(frf);
+  bool finite = beta.B.allFinite() && !iteration.cost.empty();
+  for (const Eigen::VectorXd& a : beta.a) finite = finite && a.allFinite();
+  if (finite) {
+    const ResidualSize E =
+        residual_size(problem, evaluate_groups(problem, beta, false), beta.B, responding);
+    if (E.finite) return E.relative_rms;
+  }
+  beta = start;
+  beta.B.setZero();
+  iteration.end_cost = signal_cost(problem);
+  iteration.status = FitStatus::singular;
+  iteration.cost.assign(1, iteration.end_cost);
+  if (iteration.message.empty()) iteration.message = "the start has no finite response";
+  return residual_size(problem, {}, {}, responding).relative_rms;
+}
+
+std::vector<std::size_t> held_submodels(const FitProblem& problem, const FitParameters& beta,
+                                        const std::vector<Eigen::Index>& frozen) {
+  const PoleBounds bounds(problem, beta);
+  std::vector<std::size_t> out;
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < beta.a.size(); ++i) {
+    const Eigen::Index n = beta.a[i].size();
+    const bool held = std::any_of(frozen.begin(), frozen.end(),
+                                  [&](Eigen::Index p) { return p >= first && p < first + n; });
+    if (held || (n > 2 && bounds.at_bound(i, beta.a[i]))) out.push_back(i);
+    first += n;
+  }
+  return out;
+}
+
+/// A fit that has converged is undetermined where the data leave a submodel open that was asked for;
+/// one that has not says so as well.
+void judge(const FitProblem& problem, const FitParameters& beta, double cost,
+           const Eigen::MatrixXd& covariance, const std::vector<Eigen::Index>& frozen,
+           bool judge_modes, FitResult& result) {
+  const bool asked_for =
+      judge_modes || std::any_of(result.model.submodels.begin(), result.model.submodels.end(),
+                                 [](const Submodel& s) {
+                                   return s.role == SubmodelRole::given ||
+                                          (s.denominator.size() > 1 && !s.is_mode());
+                                 });
+  const bool singular = result.status == FitStatus::singular;
+  if (!asked_for && !singular) return;
+  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
+  std::string reason = undetermined_numerators(problem, beta, groups);
+  if (reason.empty() && !singular) {
+    const ArrowSystem gn(problem, beta, groups, FitMethod::gn, ChannelEquationsUse::eliminated);
+    reason = undetermined_poles(problem, beta, cost, gn, result.removal_cost, covariance, frozen,
+                                result.held, judge_modes);
+  }
+  if (reason.empty()) return;
+  result.distrust(FitStatus::undetermined, reason);
+}
+
+}  // namespace
+
+FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
+                             const FitOptions& options) {
+  check_start(frf, start, options);
+  const std::optional<WeightMatrices> matrices = make_weight_matrices(frf, options);
+  const bool searched = options.delay != DelayModel::fixed && options.delay_s == 0.0 &&
+                        start.input_delay_s.size() == 0;
+  // The search weighs by itself; all that it asks is which of a user's weights are zero.
+  const bool later = searched && !matrices && options.weighting != Weighting::user;
+  SharedMatrix<Eigen::MatrixXd> W;
+  if (matrices)
+    W = SharedMatrix<Eigen::MatrixXd>::kept(matrices->marginal());
+  else if (!later)
+    W = make_weights(frf, options);
+  FitProblem problem = make_problem(frf, start, options, std::move(W));
+  FitParameters beta = make_parameters(problem, start, options);
+  if (searched) search_delay(problem, beta);
+  if (later) problem.W = make_weights(frf, options);
+
+  const FitParameters begun = beta;
+  FitResult result;
+  result.model = start;
+  forget_results(result.model);
+  IterationResult iteration;
+  if (options.mode_ranks.empty()) iteration = iterate(problem, beta, options);
+  if (matrices && iteration.status != FitStatus::singular) {
+    result.decisions.push_back(
+        fmt::format("weight matrices: started from their best diagonal, {} "
+                    "iterations ({})",
+                    iteration.iterations, to_string(iteration.status)));
+    iteration = iterate(problem, *matrices, beta, options);
+  }
+  ParameterCovariance covariance;
+  result.parameters = problem.parameters();
+  const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
+  if (low_rank && iteration.status != FitStatus::singular)
+    covariance = constrain_ranks(frf, options, problem, beta, iteration, result);
+  if (options.shrink_hidden && iteration.status != FitStatus::singular)
+    shrink_hidden(problem, beta, iteration, result);
+  const double relative_rms = keep_finite(frf, problem, begun, beta, iteration);
+  result.status = iteration.status;
+  result.message = iteration.message;
+  result.cost = iteration.cost;
+  result.held = held_submodels(problem, beta, iteration.frozen);
+  result.frozen = iteration.frozen;
+  fill_model(frf, options, problem, beta, result);
+  if (options.uncertainty) {
+    if (!low_rank && result.status != FitStatus::singular)
+      covariance = free_covariance(frf, options, problem, matrices, beta, iteration);
+    raise(covariance, frf.correlated_lines);
+    use_covariance(problem, covariance, weighs_by_variance(options.weighting), result);
+    if (!low_rank)
+      result.residue_ranks = residue_rank_tests(result.model, independent_numbers(frf));
+    judge(problem, beta, iteration.end_cost, covariance.globals, iteration.frozen,
+          options.judge_modes, result);
+  }
+  fill_record(options, iteration, relative_rms, result);
+  return result;
+}
+
+void rearrange(const std::vector<std::size_t>& sources, FitResult& fit) {
+  std::vector<Eigen::Index> first = {0};  // coefficient of every submodel
+  for (const Submodel& s : fit.model.submodels)
+    first.push_back(first.back() + static_cast<Eigen::Index>(s.denominator.size()) - 1);
+  AdditiveModel model = fit.model;
+  model.submodels.clear();
+  std::vector<double> removal;
+  std::vector<std::size_t> held;
+  std::vector<Eigen::Index> frozen;
+  Eigen::Index next = 0;
+  for (const std::size_t i : sources) {
+    if (std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end())
+      held.push_back(model.submodels.size());
+    for (const Eigen::Index p : fit.frozen)
+      if (p >= first[i] && p < first[i + 1]) frozen.push_back(next + p - first[i]);
+    next += first[i + 1] - first[i];
+    model.submodels.push_back(fit.model.submodels[i]);
+    removal.push_back(fit.removal_cost[i]);
+  }
+  fit.model = std::move(model);
+  fit.removal_cost = std::move(removal);
+  fit.held = std::move(held);
+  fit.frozen = std::move(frozen);
+}
+
+void sort_modes(FitResult& fit) { rearrange(mode_order(fit.model), fit); }
+
+}  // namespace stageid

@@ -1,0 +1,116 @@
+#include "estimation/search/growth_watch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "estimation/model/model_structure.hpp"
+#include "estimation/problem/fit_problem.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/search/mode_worth.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kBroad = 0.1;  // a damping ratio: such a mode is no peak
+// In a row: a measured aircraft, which is nonlinear, comes to five before it converges.
+constexpr int kMostSpurious = 6;
+
+/// A broad mode is no resonance that a narrow one within its width could be part of.
+bool overlaps_another(const AdditiveModel& model, std::size_t i) {
+  const Submodel& one = model.submodels[i];
+  const double f = one.natural_frequency_hz();
+  for (std::size_t o = 0; o < model.submodels.size(); ++o) {
+    const Submodel& other = model.submodels[o];
+    if (o == i || !is_searched_mode(other) || other.damping_ratio() > kBroad) continue;
+    const double width = 2.0 * f * std::max(one.damping_ratio(), other.damping_ratio());
+    if (std::abs(other.natural_frequency_hz() - f) < width) return true;
+  }
+  return false;
+}
+
+bool is_coloured(const AdditiveModel& model, std::size_t i) {
+  const Submodel& s = model.submodels[i];
+  const double f = s.natural_frequency_hz();
+  return f < model.fit.band_hz[0] || f > model.fit.band_hz[1] || s.damping_ratio() > kBroad ||
+         overlaps_another(model, i);
+}
+
+/// Whether the modes that a round added are not worth their parameters without one line each, the best: noise whose
+/// tails are heavier than the variances say asks for a mode on every outlier.
+bool rests_on_single_lines(const FrfEstimate& frf, const FitOptions& options,
+                           const FitResult& before, const FitResult& now, std::size_t added) {
+  const SharedMatrix<Eigen::MatrixXd> weights = make_weights(frf, options);
+  const auto squares = [&](const AdditiveModel& model) -> Eigen::VectorXd {
+    const Eigen::MatrixXcd E = frf.response - response(model, frf.frequency_hz, model.hold);
+    return weights->cwiseProduct(E.cwiseAbs2()).colwise().sum().transpose();
+  };
+  Eigen::VectorXd gain = squares(before.model) - squares(now.model);
+  const auto n = static_cast<Eigen::Index>(added);
+  std::sort(gain.begin(), gain.end());
+  const auto parameters = static_cast<double>(now.parameters - before.parameters);
+  return gain.head(std::max<Eigen::Index>(0, gain.size() - n)).sum() <
+         static_cast<double>(added) *
+             price_of_mode(frf, before, parameters / static_cast<double>(added));
+}
+
+bool is_power_of_two(int n) { return (n & (n - 1)) == 0; }
+
+}  // namespace
+
+bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const FitResult& before,
+                       const FitResult& now, std::size_t added) {
+  if (rounds_ == 0) first_ = before;
+  ++rounds_;
+  bool spurious = true;
+  for (std::size_t i = now.model.submodels.size() - added; i < now.model.submodels.size(); ++i)
+    spurious = spurious && is_coloured(now.model, i);
+  spurious = spurious || rests_on_single_lines(frf, options, before, now, added);
+  if (!spurious) spurious_in_a_row_ = 0;
+  if (spurious && spurious_in_a_row_++ == 0) back_to_ = before;
+  // Every second, fourth, eighth round: what it costs stays a small part of the search.
+  if (rounds_ > 1 && is_power_of_two(rounds_) && a_delay_explains_more(frf, options, now))
+    return true;
+  if (spurious_in_a_row_ < kMostSpurious) return false;
+  finding_ = fmt::format(
+      "the search for modes ended: nothing that its last {} steps added is a resonance, cost "
+      "{:.6g} "
+      "-> {:.6g}; it is left out. The variances may be too small, or the plant has what modes do "
+      "not describe: try --damping general, --direct-term full or --delay estimate",
+      spurious_in_a_row_, back_to_.model.fit.cost, now.model.fit.cost);
+  return true;
+}
+
+void GrowthWatch::tell(FitResult& result) const {
+  if (!ended()) return;
+  result.findings.push_back(finding_);
+  if (!by_delay_ || !result.trustworthy()) return;
+  result.distrust(FitStatus::unexplained, finding_);
+}
+
+bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions& searched,
+                                        const FitResult& now) {
+  if (searched.delay != DelayModel::fixed) return false;
+  FitOptions options = searched;
+  options.delay = DelayModel::estimate;
+  options.delay_s = 0.0;  // searched: a wrong one is no start
+  AdditiveModel start = first_.model;
+  start.input_delay_s.resize(0);
+  start.output_delay_s.resize(0);
+  const FitResult trial = fit_additive_model(frf, start, options);
+  if (trial.status == FitStatus::singular) return false;
+  if (!(information_criterion(frf, trial) < information_criterion(frf, now))) return false;
+  by_delay_ = true;
+  back_to_ = std::move(first_);
+  finding_ = fmt::format(
+      "the search for modes ended: a delay of {:.4g} s instead of {:.4g} s explains more (cost "
+      "{:.6g}) than the {} modes that it added (cost {:.6g}), which are left out; take --delay "
+      "estimate",
+      trial.model.mean_delay_s(), searched.delay_s, trial.model.fit.cost,
+      count_modes(now.model) - count_modes(back_to_.model), now.model.fit.cost);
+  return true;
+}
+
+}  // namespace stageid

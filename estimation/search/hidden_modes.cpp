@@ -1,0 +1,53 @@
+#include "estimation/search/hidden_modes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/equations/numerators.hpp"
+#include "estimation/model/model_structure.hpp"
+#include "estimation/uncertainty/data_noise.hpp"
+#include "frf/statistics/tail_probability.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kPart =
+    0.5;  // of the best share: three quarters of the gain, a quarter of the cost
+constexpr double kLargestShare = 0.99;  // of a mode that is taken away
+
+}  // namespace
+
+int hold_hidden_modes(const FitResult& fit, Eigen::Index channels, Eigen::Index lines,
+                      AdditiveModel& model) {
+  const double noise = fit.model.fit.cost / static_cast<double>(channels);  // of a real number
+  int hidden = 0;
+  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
+    Submodel& s = model.submodels[i];
+    if (!is_searched_mode(s)) continue;
+    const auto numbers =
+        static_cast<double>(s.numerator.size() * static_cast<std::size_t>(channels));
+    const double by_noise = tail_of_chi_square(fit.removal_cost[i] / noise, numbers);
+    if (by_noise * static_cast<double>(lines) < 1.0) continue;
+    s.frequency_held = s.damping_held = true;
+    ++hidden;
+  }
+  return hidden;
+}
+
+void shrink_hidden_modes(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                         const std::vector<std::size_t>& hidden, const std::vector<double>& removal,
+                         Eigen::MatrixXd& B, double& cost) {
+  const auto channels = static_cast<double>(problem.channels());
+  // Of a real number: half of a complex one's.
+  const double noise = 0.5 * residual_per_degree(problem, cost, problem.parameters());
+  std::vector<double> share(problem.shapes.size(), 0.0);
+  for (const std::size_t i : hidden) {
+    const double numbers = channels * static_cast<double>(problem.shapes[i].functions());
+    if (numbers > 2.0)
+      share[i] = std::min(kLargestShare, kPart * (numbers - 2.0) * noise / removal[i]);
+  }
+  cost +=
+      shrink_numerators(problem, groups, share, B) / (2.0 * static_cast<double>(problem.size()));
+}
+
+}  // namespace stageid

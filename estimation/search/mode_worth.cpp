@@ -1,0 +1,86 @@
+#include "estimation/search/mode_worth.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/uncertainty/data_noise.hpp"
+
+namespace stageid {
+
+double information_criterion(const FrfEstimate& frf, const FitResult& fit) {
+  const double data = independent_numbers(frf);
+  return data * std::log(std::max(fit.model.fit.cost, 1e-300)) +
+         static_cast<double>(fit.parameters) * std::log(data);
+}
+
+namespace {
+
+/// In units of 2 ln(likelihood): ln(data) for each parameter (BIC), and 2 ln(lines) for the choice of the
+/// mode's place among them: without it the best of thousands of places is taken where none is right.
+double cost_of_mode(double parameters, double data, double lines) {
+  return parameters * std::log(data) + 2.0 * std::log(lines);
+}
+
+/// That cost in sum W |E|^2, of which there is `squares`.
+double in_squares(double squares, double cost, double data) {
+  return squares * -std::expm1(-cost / data);
+}
+
+}  // namespace
+
+double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parameters) {
+  const auto lines = static_cast<double>(frf.lines());
+  const double data = independent_numbers(frf);
+  return in_squares(2.0 * lines * fit.model.fit.cost, cost_of_mode(parameters, data, lines), data);
+}
+
+ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
+                     const Eigen::MatrixXd& weights)
+    : lines_(static_cast<double>(frf.lines())),
+      data_(independent_numbers(frf)),
+      parameters_of_mode_(2.0 + (structure.general_damping ? 2.0 : 1.0) *
+                                    static_cast<double>(frf.response.rows())),
+      rounding_(kRoundingPower * (weights.array() * frf.response.cwiseAbs2().array()).sum()) {}
+
+double ModeWorth::squares(const FitResult& fit) const {
+  return std::max(2.0 * lines_ * fit.model.fit.cost, rounding_);
+}
+
+double ModeWorth::cost_of_modes(int modes) const {
+  return modes * cost_of_mode(parameters_of_mode_, data_, lines_);
+}
+
+double ModeWorth::criterion(const FitResult& fit) const {
+  return data_ * std::log(squares(fit)) + cost_of_modes(count_modes(fit.model));
+}
+
+double ModeWorth::price(const FitResult& fit) const {
+  return in_squares(squares(fit), cost_of_modes(1), data_);
+}
+
+double ModeWorth::deviation_tolerance() const { return std::sqrt(0.01 * cost_of_modes(1)); }
+
+bool ModeWorth::at_rounding(const FitResult& fit) const { return squares(fit) <= rounding_; }
+
+std::vector<std::size_t> least_worthy(const FitResult& fit, double price, std::size_t most) {
+  const std::vector<Submodel>& all = fit.model.submodels;
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (is_searched_mode(all[i]) && fit.removal_cost[i] < price) order.push_back(i);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return fit.removal_cost[a] < fit.removal_cost[b];
+  });
+  std::vector<std::size_t> out;
+  for (const std::size_t i : order) {
+    const double f = all[i].natural_frequency_hz();
+    const bool stands_in = std::any_of(out.begin(), out.end(), [&](std::size_t o) {
+      const double width = 4.0 * std::max(all[i].damping_ratio(), all[o].damping_ratio()) * f;
+      return std::abs(all[o].natural_frequency_hz() - f) < width;
+    });
+    if (!stands_in && out.size() < most) out.push_back(i);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+}  // namespace stageid

@@ -1,0 +1,296 @@
+#include "estimation/search/ranked_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "acquisition/files/counted.hpp"
+#include "estimation/model/model_structure.hpp"
+#include "estimation/problem/search_limit.hpp"
+#include "estimation/search/coincident_modes.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/search/mode_worth.hpp"
+#include "estimation/search/overlapping_modes.hpp"
+#include "estimation/search/settled_fit.hpp"
+#include "estimation/search/undetermined_modes.hpp"
+#include "estimation/uncertainty/data_noise.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr std::size_t kPairsTried = 3;  // of modes that do not come to rest, at a time
+constexpr double kDearest =
+    1.5;  // times the cost: above, converging is worth less than following the data
+constexpr double kNothing = 0.1;  // of 2 ln(likelihood): what converging may cost
+constexpr double kClearly = 3.0;  // standard deviations of a chi-square variable
+
+/// How far a chi-square is above what its degrees of freedom give, in standard deviations.
+double sigmas_above(double chi_square, Eigen::Index degrees) {
+  const auto n = static_cast<double>(degrees);
+  return (chi_square - n) / std::sqrt(2.0 * std::max(n, 1.0));
+}
+
+class RankedFit {
+ public:
+  RankedFit(const FrfEstimate& frf, const FitOptions& options, ModeNumber number)
+      : frf_(frf), options_(options), number_(number), data_(independent_numbers(frf)) {}
+
+  FitResult run(const AdditiveModel& start) {
+    tied_ = with_coincident_tied(start);
+    fit_free();
+    if (free_.status == FitStatus::singular) return std::move(free_);
+    best_ = constrained(tied_);
+    if (best_.status != FitStatus::singular && may_tie()) {
+      if (number_ == ModeNumber::chosen) raise();
+      settle();
+      if (number_ == ModeNumber::asked) make_room();
+      part();
+      lower();
+    }
+    return finish();
+  }
+
+ private:
+  void fit_free() {
+    FitOptions options = options_;
+    options.residue_rank = options.rigid_body_rank = 0;
+    options.judge_modes = options.response_variance = false;
+    options.uncertainty = true;
+    const auto fit = number_ == ModeNumber::chosen ? settled_fit : fit_additive_model;
+    free_ = fit(frf_, tied_.model, options);
+    if (free_.model.submodels.size() != tied_.ranks.size())  // settled without some of them
+      tied_.ranks.assign(free_.model.submodels.size(), 0);
+    tied_.model = free_.model;
+  }
+
+  FitResult constrained(const TiedModel& tied) const {
+    FitOptions options = options_;
+    options.mode_ranks = tied.ranks;
+    return fit_additive_model(frf_, tied.model, options);
+  }
+
+  /// Modes with B_0 and B_1 have no rank but one.
+  bool may_tie() const {
+    return options_.residue_rank == 1 && !(options_.limit && options_.limit->reached()) &&
+           std::none_of(
+               tied_.model.submodels.begin(), tied_.model.submodels.end(),
+               [](const Submodel& s) { return is_searched_mode(s) && s.numerator.size() > 1; });
+  }
+
+  double criterion(const FitResult& fit) const { return information_criterion(frf_, fit); }
+
+  /// Adopts a fit that is better, or nearly as good (BIC) and converged where the present one has not.
+  bool adopt(const TiedModel& tied, FitResult&& trial) {
+    const bool settles = trial.trustworthy() && !best_.trustworthy();
+    if (trial.status == FitStatus::singular ||
+        !(criterion(trial) < criterion(best_) + (settles ? kNothing : 0.0)))
+      return false;
+    if (!trial.trustworthy() && best_.trustworthy() &&
+        kDearest * trial.model.fit.cost > best_.model.fit.cost)
+      return false;
+    tied_ = {trial.model, tied.ranks};
+    best_ = std::move(trial);
+    return true;
+  }
+
+  /// The modes whose free residues say so get the rank that they have.
+  void raise() {
+    TiedModel raised{free_.model, tied_.ranks};
+    std::vector<std::string> said;
+    for (const ResidueRankTest& test : free_.residue_ranks)
+      if (test.rank > std::max(raised.ranks[test.submodel], 1)) {
+        raised.ranks[test.submodel] = test.rank;
+        said.push_back(fmt::format(
+            "{:.6g} Hz counts as {} of rank one: chi-square {:.4g} for the {} parameters of its "
+            "residue beyond one shape",
+            test.natural_frequency_hz, counted(test.rank, "mode"), test.chi_square,
+            test.parameters));
+      }
+    if (said.empty() || !adopt(raised, constrained(raised))) return;
+    decisions_.insert(decisions_.end(), said.begin(), said.end());
+  }
+
+  /// Ties modes that run into each other and keep the fit from converging.
+  void settle() {
+    while (!best_.trustworthy()) {
+      const std::vector<std::pair<std::size_t, std::size_t>> pairs = overlapping_modes(best_.model);
+      const auto tie = [&](const std::pair<std::size_t, std::size_t>& pair) {
+        const auto [i, j] = pair;
+        const double one_hz = best_.model.submodels[i].natural_frequency_hz();
+        const double other_hz = best_.model.submodels[j].natural_frequency_hz();
+        const double cost = best_.model.fit.cost;
+        const TiedModel tied = with_tied({best_.model, tied_.ranks}, i, j);
+        FitResult trial = constrained(tied);
+        if (!adopt(tied, FitResult(trial))) {
+          // Apart they are, and the way there was too long from where they began.
+          const auto apart = with_parted(frf_, {trial.model, tied.ranks}, i, options_);
+          return apart && adopt(*apart, constrained(*apart));
+        }
+        decisions_.push_back(fmt::format(
+            "modes of {:.7g} and {:.7g} Hz at one place, where the data do not tell them apart: "
+            "cost {:.6g} -> {:.6g}",
+            one_hz, other_hz, cost, best_.model.fit.cost));
+        return true;
+      };
+      if (!std::any_of(
+              pairs.begin(),
+              pairs.begin() + static_cast<std::ptrdiff_t>(std::min(pairs.size(), kPairsTried)),
+              tie))
+        return;
+    }
+  }
+
+  /// Of a number that is asked for: the modes that are worth least make room for the shapes that others lack.
+  void make_room() {
+    TiedModel raised{free_.model, std::vector<int>(free_.model.submodels.size(), 0)};
+    std::size_t wanted = 0;
+    for (const ResidueRankTest& test : free_.residue_ranks) {
+      if (test.rank < 2) continue;
+      raised.ranks[test.submodel] = test.rank;
+      wanted += static_cast<std::size_t>(test.rank) - 1;
+    }
+    if (wanted == 0) return;
+    FitResult candidates = free_;
+    for (std::size_t i = 0; i < raised.ranks.size(); ++i)
+      if (raised.ranks[i] > 1) candidates.removal_cost[i] = HUGE_VAL;
+    const std::vector<std::size_t> out = least_worthy(candidates, HUGE_VAL, wanted);
+    if (out.size() < wanted) return;
+    std::string said = "instead of";
+    for (const std::size_t i : out)
+      said += fmt::format(" {:.6g} Hz", free_.model.submodels[i].natural_frequency_hz());
+    for (auto i = out.rbegin(); i != out.rend(); ++i) {
+      raised.model.submodels.erase(raised.model.submodels.begin() +
+                                   static_cast<std::ptrdiff_t>(*i));
+      raised.ranks.erase(raised.ranks.begin() + static_cast<std::ptrdiff_t>(*i));
+    }
+    const double cost = best_.model.fit.cost;
+    if (!adopt(raised, constrained(raised))) return;
+    for (const ResidueRankTest& test : free_.residue_ranks)
+      if (test.rank > 1)
+        said +=
+            fmt::format(", {} at {:.6g} Hz", counted(test.rank, "mode"), test.natural_frequency_hz);
+    decisions_.push_back(
+        fmt::format("{}: cost {:.6g} -> {:.6g}", said, cost, best_.model.fit.cost));
+  }
+
+  /// Takes modes at one place apart where the data do.
+  void part() {
+    for (std::size_t i = 0; i < tied_.ranks.size(); ++i) {
+      if (tied_.ranks[i] != 2) continue;
+      const std::optional<TiedModel> apart = with_parted(frf_, tied_, i, options_);
+      const double cost = best_.model.fit.cost;
+      if (!apart || !adopt(*apart, constrained(*apart))) continue;
+      decisions_.push_back(fmt::format(
+          "modes of {:.7g} and {:.7g} Hz, which the data tell apart: cost {:.6g} -> {:.6g}",
+          best_.model.submodels[i].natural_frequency_hz(),
+          best_.model.submodels[i + 1].natural_frequency_hz(), cost, best_.model.fit.cost));
+    }
+  }
+
+  /// Takes back what a rank that was raised is not worth, now that the others have theirs.
+  void lower() {
+    for (std::size_t i = 0; i < tied_.ranks.size();) {
+      TiedModel lowered{best_.model, tied_.ranks};
+      const double cost = best_.model.fit.cost;
+      if (number_ != ModeNumber::chosen || lowered.ranks[i]-- < 2 ||
+          !adopt(lowered, constrained(lowered))) {
+        ++i;
+        continue;
+      }
+      decisions_.push_back(fmt::format("one mode less at {:.6g} Hz: cost {:.6g} -> {:.6g}",
+                                       best_.model.submodels[i].natural_frequency_hz(), cost,
+                                       best_.model.fit.cost));
+    }
+  }
+
+  /// The modes whose residues are of a higher rank than they have.
+  void find_too_low_ranks() {
+    if (options_.residue_rank == 0) return;
+    const double rise = data_ * std::log(best_.model.fit.cost / free_.model.fit.cost);
+    const auto given_up = static_cast<double>(free_.parameters - best_.parameters);
+    if (!(rise > std::max(given_up, 1.0) * std::log(data_))) return;
+    std::string places;
+    for (const ResidueRankTest& test : free_.residue_ranks)
+      if (test.rank > options_.residue_rank && !is_raised(test))
+        places += fmt::format("{}{:.6g} Hz (rank {})", places.empty() ? "" : ", ",
+                              test.natural_frequency_hz, test.rank);
+    if (places.empty()) return;
+    const bool of_any_rank = may_tie() || options_.residue_rank > 1;
+    best_.findings.push_back(fmt::format(
+        "rank {} does not suffice for the residues at {}, it costs {:.3g} times what free residues "
+        "do; take --residue-rank {}{}",
+        options_.residue_rank, places, best_.model.fit.cost / free_.model.fit.cost,
+        of_any_rank ? fmt::format("{}", options_.residue_rank + 1) : "full",
+        number_ == ModeNumber::chosen ? "" : ", or one more mode there for each shape"));
+  }
+
+  bool is_raised(const ResidueRankTest& test) const {
+    for (std::size_t i = 0; i < tied_.ranks.size(); ++i) {
+      const Submodel& s = tied_.model.submodels[i];
+      if (!is_searched_mode(s) || tied_.ranks[i] < test.rank) continue;
+      const double width = 2.0 * s.damping_ratio() * s.natural_frequency_hz();
+      if (std::abs(s.natural_frequency_hz() - test.natural_frequency_hz) < width) return true;
+    }
+    return false;
+  }
+
+  FitResult finish() {
+    split_tied(tied_.ranks, best_);
+    const std::string decision = rank_decision(
+        free_.model.fit.cost, best_.model.fit.cost, 2.0 * static_cast<double>(frf_.lines()),
+        free_.parameters - best_.parameters, weighs_by_variance(options_.weighting));
+    find_too_low_ranks();
+    std::vector<std::string> all = std::move(free_.decisions);
+    all.push_back(decision);
+    all.insert(all.end(), decisions_.begin(), decisions_.end());
+    all.insert(all.end(), best_.decisions.begin(), best_.decisions.end());
+    best_.decisions = std::move(all);
+    best_.decisions.insert(best_.decisions.end(), best_.findings.begin(), best_.findings.end());
+    best_.cost.insert(best_.cost.begin(), free_.cost.begin(), free_.cost.end());
+    best_.residue_ranks = std::move(free_.residue_ranks);
+    return std::move(best_);
+  }
+
+  const FrfEstimate& frf_;
+  const FitOptions& options_;
+  ModeNumber number_;
+  double data_;
+  FitResult free_;
+  TiedModel tied_;  // of best_
+  FitResult best_;
+  std::vector<std::string> decisions_;
+};
+
+}  // namespace
+
+FitResult ranked_fit(const FrfEstimate& frf, const AdditiveModel& start, const FitOptions& options,
+                     ModeNumber number) {
+  FitResult fit = options.residue_rank > 0       ? RankedFit(frf, options, number).run(start)
+                  : number == ModeNumber::chosen ? settled_fit(frf, start, options)
+                                                 : fit_additive_model(frf, start, options);
+  // Modes that are given one by one the fit has judged by itself.
+  if (number != ModeNumber::given && fit.status != FitStatus::singular)
+    judge_undetermined_modes(frf, number == ModeNumber::asked, fit);
+  if (number == ModeNumber::asked && options.residue_rank == 0 && fit.trustworthy())
+    judge_close_modes(frf, options, fit);
+  return fit;
+}
+
+std::string rank_decision(double free_cost, double cost, double cost_to_squares,
+                          Eigen::Index given_up, bool likelihood) {
+  std::string text =
+      fmt::format("residues of the given ranks: cost {:.6g} -> {:.6g}", free_cost, cost);
+  if (cost <= free_cost) return text + ", by more modes";
+  if (!likelihood) return text;
+  // Twice the rise of sum W |E|^2 is chi-square distributed where the ranks are right.
+  const double rise = 2.0 * cost_to_squares * (cost - free_cost);
+  return text + fmt::format(", chi-square {:.4g} for {} parameters given up: {}", rise, given_up,
+                            sigmas_above(rise, given_up) < kClearly
+                                ? "what noise explains"
+                                : "more than noise explains, the ranks are too low or the "
+                                  "variances too small");
+}
+
+}  // namespace stageid

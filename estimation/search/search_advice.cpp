@@ -1,0 +1,240 @@
+#include "estimation/search/search_advice.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "acquisition/files/counted.hpp"
+#include "estimation/model/model_structure.hpp"
+#include "estimation/problem/fit_problem.hpp"
+#include "estimation/problem/search_limit.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/search/mode_worth.hpp"
+#include "estimation/start/residual_modes.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr int kTrialIterations = 8;  // enough to see what a structure gains, not to end the fit
+constexpr double kMostOfCost = 0.5;  // one end of the band holds more than the rest
+constexpr double kSmallEnd = 0.25;   // of the lines
+constexpr double kMoreBudget = 4.0;  // times, as the next to try
+constexpr double kNoiseOnly = 2.0;   // |G|^2 over its variance: the response is below the noise
+constexpr double kMostLines = 0.5;
+
+/// The names of inputs or outputs all of whose entries are noise on most lines.
+std::vector<std::string> silent_channels(const FrfEstimate& frf, bool inputs) {
+  const Eigen::MatrixXd& variance =
+      frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
+  std::vector<std::string> names;
+  if (variance.size() == 0) return names;
+  const Eigen::Index count = inputs ? frf.n_inputs() : frf.n_outputs();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    Eigen::Index noisy = 0;
+    Eigen::Index all = 0;
+    for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
+      if ((inputs ? c / frf.n_outputs() : c % frf.n_outputs()) != i) continue;
+      const auto power = frf.response.row(c).cwiseAbs2().array();
+      noisy += (power < kNoiseOnly * variance.row(c).array()).count();
+      all += frf.lines();
+    }
+    if (static_cast<double>(noisy) > kMostLines * static_cast<double>(all))
+      names.push_back((inputs ? frf.inputs : frf.outputs).names[static_cast<std::size_t>(i)]);
+  }
+  if (static_cast<Eigen::Index>(names.size()) == count) names.clear();
+  return names;
+}
+
+std::string without_silent_channels(const FrfEstimate& frf) {
+  for (const bool inputs : {true, false}) {
+    const std::vector<std::string> silent = silent_channels(frf, inputs);
+    if (silent.empty()) continue;
+    std::vector<std::string> rest;
+    for (const std::string& name : (inputs ? frf.inputs : frf.outputs).names)
+      if (std::find(silent.begin(), silent.end(), name) == silent.end()) rest.push_back(name);
+    return fmt::format(
+        "The response of {} is below its noise on most lines: leave it out, 'frf {} {}'",
+        fmt::join(silent, ", "), inputs ? "--inputs" : "--outputs", fmt::join(rest, ","));
+  }
+  return {};
+}
+
+/// Another structure of the same modes.
+struct Alternative {
+  const char* flag;
+  AdditiveModel model;
+  FitOptions options;
+};
+
+bool is_rigid_body(const Submodel& s) {
+  return s.role != SubmodelRole::given && s.integrators == 2 && s.denominator.size() == 1;
+}
+
+bool is_biproper(const Submodel& s) {
+  return s.numerator.size() >= s.denominator.size() + static_cast<std::size_t>(s.integrators);
+}
+
+std::vector<Alternative> alternatives(const FrfEstimate& frf, const FitOptions& asked,
+                                      const FitOptions& trial, const AdditiveModel& model,
+                                      bool cut_short) {
+  std::vector<Alternative> out;
+  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
+  const auto has = [&](auto is_one) {
+    return std::any_of(model.submodels.begin(), model.submodels.end(), is_one);
+  };
+  if (asked.residue_rank <= 1) {
+    Alternative general{"--damping general", model, trial};
+    for (Submodel& s : general.model.submodels)
+      if (is_searched_mode(s) && s.numerator.size() == 1) s.numerator.push_back(zero);
+    const bool fits = 2 * count_modes(model) <= most_modes(frf, {});
+    if (fits &&
+        has([](const Submodel& s) { return is_searched_mode(s) && s.numerator.size() == 1; }))
+      out.push_back(std::move(general));
+  }
+  if (!has(is_biproper)) {
+    Alternative direct{"--direct-term full", model, trial};
+    direct.model.submodels.push_back({0, {1.0}, {zero}, {}, {}});
+    out.push_back(std::move(direct));
+  }
+  if (has(is_rigid_body) && has(is_searched_mode)) {
+    Alternative free{"--rigid-body none", model, trial};
+    std::erase_if(free.model.submodels, is_rigid_body);
+    out.push_back(std::move(free));
+  } else if (!has([](const Submodel& s) {
+               return s.integrators > 0 || s.role == SubmodelRole::suspension;
+             })) {
+    Alternative rigid{"--rigid-body full", model, trial};
+    rigid.model.submodels.push_back({2, {1.0}, {zero}, {}, {}});
+    out.push_back(std::move(rigid));
+  }
+  if (trial.delay == DelayModel::fixed) {
+    Alternative delayed{"--delay estimate", model, trial};
+    delayed.options.delay = DelayModel::estimate;
+    delayed.options.delay_s = 0.0;  // searched: a wrong one is no start
+    delayed.model.input_delay_s.resize(0);
+    delayed.model.output_delay_s.resize(0);
+    out.push_back(std::move(delayed));
+  }
+  if (trial.delay != DelayModel::per_channel && model.hold != HoldModel::none &&
+      frf.response.rows() > 1) {
+    Alternative skewed{"--delay per_channel", model, trial};
+    skewed.options.delay = DelayModel::per_channel;
+    skewed.options.delay_s = 0.0;
+    skewed.options.max_iterations *= 3;  // it comes from farther
+    skewed.model.input_delay_s.resize(0);
+    skewed.model.output_delay_s.resize(0);
+    // Modes that were fitted to channels of different delays lead into another minimum.
+    std::erase_if(skewed.model.submodels, is_searched_mode);
+    for (const ModeCandidate& peak : pick_modes(frf))
+      skewed.model.submodels.push_back(mode_submodel(frf, {}, peak));
+    out.push_back(std::move(skewed));
+  }
+  if (cut_short) return out;  // such a search would add modes in any case
+  const std::vector<ResidualMode> missed =
+      residual_modes(frf, model, trial.user_weights, 1, trial.threads);
+  if (!missed.empty()) {
+    Alternative more{"more modes", model, trial};
+    more.model.submodels.push_back(mode_submodel(frf, {}, missed.front().mode));
+    out.push_back(std::move(more));
+  }
+  return out;
+}
+
+FitOptions trial_options(const FrfEstimate& frf, const FitOptions& options) {
+  FitOptions trial = options;
+  trial.limit.reset();
+  trial.user_weights = make_weights(frf, options);
+  trial.weighting = Weighting::user;
+  trial.user_weight_matrices.resize(0, 0);
+  trial.method = FitMethod::gn;
+  trial.residue_rank = trial.rigid_body_rank = 0;
+  trial.mode_ranks.clear();
+  trial.uncertainty = trial.covariance = trial.judge_modes = trial.shrink_hidden = false;
+  trial.max_iterations = kTrialIterations;
+  return trial;
+}
+
+FitOptions with_deviations(FitOptions trial) {
+  trial.uncertainty = true;
+  trial.response_variance = false;
+  return trial;
+}
+
+std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
+                             const FitOptions& trial, const FitResult& same, bool cut_short) {
+  double least = information_criterion(frf, same);
+  std::string advice;
+  for (const Alternative& other : alternatives(frf, options, trial, same.model, cut_short)) {
+    const FitResult fit = fit_additive_model(frf, other.model, other.options);
+    const double criterion = information_criterion(frf, fit);
+    if (fit.status == FitStatus::singular || !(criterion < least)) continue;
+    least = criterion;
+    advice = fmt::format("Try {}: one refit takes the cost from {:.6g} to {:.6g}", other.flag,
+                         same.model.fit.cost, fit.model.fit.cost);
+  }
+  return advice;
+}
+
+/// Where the smaller part of the lines holds the larger part of the cost.
+std::string better_band(const FrfEstimate& frf, const FitOptions& trial, const FitResult& fit) {
+  const Eigen::MatrixXcd error =
+      frf.response - response(fit.model, frf.frequency_hz, fit.model.hold);
+  const Eigen::VectorXd squares =
+      trial.user_weights->cwiseProduct(error.cwiseAbs2()).colwise().sum().transpose();
+  const auto end = static_cast<Eigen::Index>(kSmallEnd * static_cast<double>(frf.lines()));
+  const double most = kMostOfCost * squares.sum();
+  const Eigen::Index last = frf.lines() - 1;
+  if (end < 1) return {};
+  const auto advice = [&](double low_hz, double high_hz, const char* which) {
+    return fmt::format(
+        "The {} quarter of the lines holds most of the cost: try --band {:.6g} {:.6g}", which,
+        low_hz, high_hz);
+  };
+  if (squares.head(end).sum() > most)
+    return advice(frf.frequency_hz[end], frf.frequency_hz[last], "lowest");
+  if (squares.tail(end).sum() > most)
+    return advice(frf.frequency_hz[0], frf.frequency_hz[last - end], "highest");
+  return {};
+}
+
+}  // namespace
+
+std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit,
+                       bool cut_short) {
+  std::string advice = without_silent_channels(frf);
+  if (!advice.empty()) return advice;
+  const FitOptions trial = trial_options(frf, options);
+  // A search that is cut short leaves poles on their way.
+  const FitResult same = fit_additive_model(frf, fit.model, with_deviations(trial));
+  advice = better_structure(frf, options, trial, same, cut_short);
+  if (advice.empty()) advice = better_band(frf, trial, same);
+  if (!advice.empty()) return advice;
+  return "No other structure fits better: name the number of modes, --modes N";
+}
+
+std::string budget_message(const FrfEstimate& frf, const FitOptions& options,
+                           const FitResult& fit) {
+  const std::string advice = advice_for(frf, options, fit, true);
+  const int modes = count_modes(fit.model);
+  const double budget_s = options.limit->budget_s();
+  return fmt::format(
+      "the search used its budget of {:.6g} s, at {}. {}; --search-seconds {:.6g} goes on",
+      budget_s, counted(modes, "mode"), advice, kMoreBudget * budget_s);
+}
+
+void tell_limit(const FrfEstimate& frf, const FitOptions& options, FitResult& fit) {
+  const FitStatus status = options.limit->status();
+  std::string message = options.limit->message();
+  if (status == FitStatus::search_budget && fit.status != FitStatus::singular) {
+    message = budget_message(frf, options, fit);
+    fit.findings.push_back(message);
+  }
+  fit.decisions.push_back(message);
+  if (ended_by_limit(fit)) fit.status = FitStatus::gradient_small;  // its message says less
+  fit.distrust(status, message);
+}
+
+}  // namespace stageid

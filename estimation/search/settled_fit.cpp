@@ -1,0 +1,154 @@
+#include "estimation/search/settled_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "estimation/model/model_structure.hpp"
+#include "estimation/problem/search_limit.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/search/mode_worth.hpp"
+#include "estimation/search/overlapping_modes.hpp"
+#include "estimation/search/undetermined_modes.hpp"
+
+namespace stageid {
+namespace {
+
+// A mode that is known better than this does not keep a fit from converging.
+constexpr double kLeastDoubt = 1.0;
+constexpr double kUndoubtedWidths = 0.1;
+
+// A model that costs so many times as much does not follow what the data show: better none that converged.
+constexpr double kDearest = 1.5;
+
+struct OpenMode {
+  std::size_t submodel = 0;
+  double doubt = 0.0;  ///< larger of std(zeta)/zeta and std(f)/(zeta f)
+};
+
+std::optional<OpenMode> most_open(const AdditiveModel& model) {
+  std::optional<OpenMode> open;
+  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
+    const Submodel& s = model.submodels[i];
+    if (!is_searched_mode(s)) continue;
+    const double damping = s.damping_ratio();
+    const double width_hz = damping * s.natural_frequency_hz();
+    const double doubt = std::max(s.damping_ratio_std.value_or(0.0) / damping,
+                                  s.natural_frequency_std_hz.value_or(0.0) / width_hz);
+    if (doubt > (open ? open->doubt : kLeastDoubt)) open = {i, doubt};
+  }
+  return open;
+}
+
+/// Standard deviation of the frequency; where there is none, a part of the half-power width.
+double doubt_hz(const Submodel& s) {
+  const double width_hz = 2.0 * s.damping_ratio() * s.natural_frequency_hz();
+  return s.natural_frequency_std_hz.value_or(kUndoubtedWidths * width_hz);
+}
+
+/// Two modes that have run into one: nearer to each other than either of them is known. Their limit is a double pole,
+/// with residues that grow without end and cancel; nothing determines the parameters there.
+std::optional<std::pair<std::size_t, std::size_t>> coalesced(const AdditiveModel& model) {
+  for (const auto& [i, j] : overlapping_modes(model)) {
+    const Submodel& one = model.submodels[i];
+    const Submodel& other = model.submodels[j];
+    const double apart_hz = std::abs(one.natural_frequency_hz() - other.natural_frequency_hz());
+    if (apart_hz < std::min(doubt_hz(one), doubt_hz(other))) return std::pair(i, j);
+  }
+  return std::nullopt;
+}
+
+struct Simpler {
+  AdditiveModel model;
+  std::string reason;
+};
+
+/// The model with one mode less: of two that have run into one, else without the most open one.
+std::optional<Simpler> simpler(const AdditiveModel& model) {
+  if (const auto pair = coalesced(model)) {
+    const auto [i, j] = *pair;
+    return Simpler{with_one_of(model, i, j),
+                   fmt::format("made one mode of {:.6g} and {:.6g} Hz, which ran into each other; "
+                               "the data do not tell them apart and they kept the fit from "
+                               "converging",
+                               model.submodels[i].natural_frequency_hz(),
+                               model.submodels[j].natural_frequency_hz())};
+  }
+  const std::optional<OpenMode> open = most_open(model);
+  if (!open) return std::nullopt;
+  Simpler out{model, {}};
+  const auto place = out.model.submodels.begin() + static_cast<std::ptrdiff_t>(open->submodel);
+  out.reason = fmt::format(
+      "left out {:.6g} Hz, which the data do not determine (standard deviation {:.2g} "
+      "times its size) and which kept the fit from converging",
+      place->natural_frequency_hz(), open->doubt);
+  out.model.submodels.erase(place);
+  return out;
+}
+
+bool may_converge(const FitResult& fit) {
+  return fit.status == FitStatus::iteration_limit || fit.status == FitStatus::cost_stalled;
+}
+
+/// Leaves out modes that the data do not determine, one by one, where they are not worth their parameters.
+void leave_out_undetermined(const FrfEstimate& frf, const FitOptions& options, FitResult& fit,
+                            std::vector<std::string>& left_out) {
+  const auto without = [&](std::size_t i) {
+    AdditiveModel fewer = fit.model;
+    fewer.submodels.erase(fewer.submodels.begin() + static_cast<std::ptrdiff_t>(i));
+    FitResult trial = fit_additive_model(frf, fewer, options);
+    if (!trial.trustworthy() ||
+        !(information_criterion(frf, trial) < information_criterion(frf, fit)))
+      return false;
+    left_out.push_back(fmt::format(
+        "left out {:.6g} Hz (damping {:.3g}), which the data do not determine and which is not "
+        "worth its parameters: cost {:.6g} -> {:.6g}",
+        fit.model.submodels[i].natural_frequency_hz(), fit.model.submodels[i].damping_ratio(),
+        fit.model.fit.cost, trial.model.fit.cost));
+    fit = std::move(trial);
+    return true;
+  };
+  while (count_modes(fit.model) > 1 && !(options.limit && options.limit->reached())) {
+    const std::vector<std::size_t> open = undetermined_modes(fit);
+    if (std::none_of(open.begin(), open.end(), without)) return;
+  }
+}
+
+/// Gives up modes until a fit converges; the first one if none does.
+FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
+                        const FitOptions& options, std::vector<std::string>& left_out) {
+  FitResult first = fit_additive_model(frf, start, options);
+  if (!may_converge(first)) return first;
+  FitResult fit = first;
+  std::vector<std::string> given_up;
+  while (may_converge(fit) && count_modes(fit.model) > 1) {
+    const std::optional<Simpler> fewer = simpler(fit.model);
+    if (!fewer) break;
+    const double cost = fit.model.fit.cost;
+    fit = fit_additive_model(frf, fewer->model, options);
+    if (!(fit.model.fit.cost < kDearest * first.model.fit.cost)) return first;
+    given_up.push_back(
+        fmt::format("{}: cost {:.6g} -> {:.6g}", fewer->reason, cost, fit.model.fit.cost));
+  }
+  if (!fit.trustworthy()) return first;
+  left_out = std::move(given_up);
+  return fit;
+}
+
+}  // namespace
+
+FitResult settled_fit(const FrfEstimate& frf, const AdditiveModel& start,
+                      const FitOptions& options) {
+  std::vector<std::string> left_out;
+  FitResult fit = converged_fit(frf, start, options, left_out);
+  if (fit.trustworthy()) leave_out_undetermined(frf, options, fit, left_out);
+  fit.decisions.insert(fit.decisions.begin(), left_out.begin(), left_out.end());
+  return fit;
+}
+
+}  // namespace stageid

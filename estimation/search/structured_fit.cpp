@@ -1,0 +1,354 @@
+#include "estimation/search/structured_fit.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/files/counted.hpp"
+#include "estimation/modal/residual_verdict.hpp"
+#include "estimation/problem/search_limit.hpp"
+#include "estimation/search/mode_worth.hpp"
+#include "estimation/search/ranked_fit.hpp"
+#include "estimation/search/search_advice.hpp"
+#include "estimation/uncertainty/dense_covariance.hpp"
+#include "estimation/uncertainty/mode_deviation.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kSuspensionStart = 0.25;  // of the lowest line
+constexpr double kSuspensionDamping = 0.1;
+constexpr double kWeakSpringsStart = 0.02;  // of the lowest line: where a free body comes from
+constexpr int kRealPoleGrid = 17;
+constexpr double kRealPoleBelow = 0.3;  // the grid reaches beyond the lines by these factors
+constexpr double kRealPoleAbove = 3.0;
+constexpr double kLargestDeviation = 0.5;  // of a frequency that counts as determined
+
+/// All residues free: a rigid body of up to min(n_y, n_u) degrees of freedom.
+Submodel suspension_mode(const FrfEstimate& frf, double frequency_hz) {
+  Submodel s = mode_submodel(frf, {}, {frequency_hz, kSuspensionDamping, 1});
+  s.role = SubmodelRole::suspension;
+  return s;
+}
+
+std::vector<Submodel> suspension_modes(const FrfEstimate& frf,
+                                       const std::vector<double>& known_hz) {
+  if (known_hz.empty()) return {suspension_mode(frf, kSuspensionStart * frf.frequency_hz[0])};
+  std::vector<Submodel> out;
+  for (const double frequency_hz : known_hz) {
+    out.push_back(suspension_mode(frf, frequency_hz));
+    out.back().frequency_held = true;
+  }
+  return out;
+}
+
+/// Completes requests by their poles' starts.
+class PoleSearch {
+ public:
+  PoleSearch(const FrfEstimate& frf, ModelStructure common, const ModeSelection& selection,
+             const FitOptions& options, std::vector<std::string>& decisions)
+      : frf_(frf),
+        common_(std::move(common)),
+        selection_(selection),
+        quick_(options),
+        decisions_(decisions) {
+    quick_.uncertainty = false;
+    quick_.method = FitMethod::gn;
+    quick_.residue_rank = quick_.rigid_body_rank = 0;
+  }
+
+  void complete(std::vector<SubmodelRequest>& requests) {
+    const int pairs = std::accumulate(
+        requests.begin(), requests.end(), 0,
+        [](int sum, const SubmodelRequest& r) { return sum + (r.has_start() ? 0 : r.pairs()); });
+    const bool by_statistics = !requests.empty() && requests.front().order_by_search;
+    if (pairs > 0 || by_statistics) deal(modes(requests, pairs), requests);
+    for (std::size_t i = 0; i < requests.size(); ++i)
+      if (requests[i].has_real_pole() &&
+          requests[i].frequency_hz.size() < static_cast<std::size_t>(requests[i].pairs()) + 1)
+        place_real_pole(requests, i);
+  }
+
+ private:
+  /// What stands in for the submodels while modes are searched: those with a start themselves, the
+  /// others by what they hold beside their poles.
+  ModelStructure stand_in(const std::vector<SubmodelRequest>& requests) const {
+    ModelStructure out = common_;
+    for (const ModeCandidate& mode : selection_.modes) {  // taken: the search is for others
+      out.given.push_back(mode_submodel(frf_, common_, mode));
+      out.given.back().role = SubmodelRole::given;
+    }
+    for (const SubmodelRequest& r : requests) {
+      if (r.has_start()) {
+        out.given.push_back(start_submodel(frf_, r));
+        continue;
+      }
+      const auto [l, n, m] = r.shape;
+      if (l > 0)
+        out.given.push_back(
+            start_submodel(frf_, {{l, 0, r.biproper() ? l : l - 1}, false, {}, {}}));
+      else if (r.biproper())
+        out.given.push_back(start_submodel(frf_, {{0, 0, 0}, false, {}, {}}));
+      if (r.order_by_search || (n >= 2 && m > 0)) out.general_damping = true;
+    }
+    return out;
+  }
+
+  /// @param pairs 0: as many as are worth their parameters
+  std::vector<const Submodel*> modes(const std::vector<SubmodelRequest>& requests, int pairs) {
+    const ModelStructure structure = stand_in(requests);
+    ModeSelection selection;
+    selection.exactly = pairs;
+    selection.most = std::max(pairs, selection.most);
+    found_ = automatic_fit(frf_, structure, selection, quick_);
+    std::vector<const Submodel*> out;
+    for (const Submodel& s : found_.model.submodels)
+      if (is_searched_mode(s)) out.push_back(&s);
+    if (static_cast<int>(out.size()) < pairs)
+      throw std::invalid_argument(
+          fmt::format("fit: the submodels need {} of poles, {} found; give their frequencies",
+                      counted(pairs, "pair"), out.size()));
+    if (pairs == 0 && static_cast<int>(2 * out.size()) > kLargestOrder)
+      throw std::invalid_argument(
+          fmt::format("fit: n=auto finds {} modes and one denominator carries {}; take a narrower "
+                      "band, or several submodels",
+                      out.size(), kLargestOrder / 2));
+    return out;
+  }
+
+  void deal(const std::vector<const Submodel*>& modes, std::vector<SubmodelRequest>& requests) {
+    auto next = modes.begin();
+    for (SubmodelRequest& r : requests) {
+      if (r.has_start()) continue;
+      if (r.order_by_search) {
+        r.order_by_search = false;
+        r.shape.order = 2 * static_cast<int>(modes.size());
+        r.shape.numerator_degree = r.shape.order - 1;
+      }
+      for (int i = 0; i < r.pairs(); ++i, ++next) {
+        r.frequency_hz.push_back((*next)->natural_frequency_hz());
+        r.damping_ratio.push_back((*next)->damping_ratio());
+      }
+      if (!r.frequency_hz.empty())
+        decisions_.push_back(fmt::format("submodel of order {}: poles start at the modes {:.6g} Hz",
+                                         r.shape.order, fmt::join(r.frequency_hz, ", ")));
+    }
+  }
+
+  void place_real_pole(std::vector<SubmodelRequest>& requests, std::size_t i) {
+    const double low = kRealPoleBelow * frf_.frequency_hz[0];
+    const double high = kRealPoleAbove * frf_.frequency_hz[frf_.lines() - 1];
+    std::vector<double>& f = requests[i].frequency_hz;
+    f.push_back(low);
+    double best = low;
+    double least = std::numeric_limits<double>::infinity();
+    for (int g = 0; g < kRealPoleGrid; ++g) {
+      // Off the places of others: real poles of two submodels must not start as one.
+      const double shift = (static_cast<double>(g) + 0.1 * static_cast<double>(i)) / kRealPoleGrid;
+      f.back() = low * std::pow(high / low, shift);
+      const double cost = cost_at(requests);
+      if (!(cost < least)) continue;
+      least = cost;
+      best = f.back();
+    }
+    f.back() = best;
+    decisions_.push_back(fmt::format("submodel of order {}: its real pole starts at {:.4g} Hz",
+                                     requests[i].shape.order, best));
+  }
+
+  /// Numerators solved, poles where they start; without the submodels that have no start yet.
+  double cost_at(const std::vector<SubmodelRequest>& requests) const {
+    ModelStructure structure = common_;
+    for (const SubmodelRequest& r : requests)
+      if (r.frequency_hz.size() ==
+          static_cast<std::size_t>(r.pairs() + (r.has_real_pole() ? 1 : 0)))
+        structure.given.push_back(start_submodel(frf_, r));
+    AdditiveModel model;
+    model.submodels = fixed_submodels(frf_, structure);
+    for (const ModeCandidate& mode : selection_.modes)
+      model.submodels.push_back(mode_submodel(frf_, structure, mode));
+    FitOptions options = quick_;
+    options.max_iterations = 0;
+    const FitResult fit = fit_additive_model(frf_, model, options);
+    return fit.status == FitStatus::singular ? std::numeric_limits<double>::infinity()
+                                             : fit.model.fit.cost;
+  }
+
+  const FrfEstimate& frf_;
+  ModelStructure common_;
+  const ModeSelection& selection_;
+  FitOptions quick_;
+  std::vector<std::string>& decisions_;
+  FitResult found_;
+};
+
+/// `next` follows `result`, the way there kept.
+void continue_with(FitResult next, FitResult& result) {
+  next.decisions.insert(next.decisions.begin(), result.decisions.begin(), result.decisions.end());
+  next.cost.insert(next.cost.begin(), result.cost.begin(), result.cost.end());
+  next.model.cost_history = next.cost;
+  next.model.fit.iterations = static_cast<int>(next.cost.size()) - 1;
+  if (ended_by_limit(result)) {
+    next.status = result.status;
+    next.message = std::move(result.message);
+    next.findings = std::move(result.findings);
+    next.model.fit.status = to_string(next.status);
+    next.model.fit.message = next.message;
+  }
+  result = std::move(next);
+}
+
+void refit(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+  FitResult next = ranked_fit(frf, result.model, options, ModeNumber::given);
+  sort_modes(next);
+  continue_with(std::move(next), result);
+}
+
+/// Puts the rigid body on weak springs where that is worth its two parameters (BIC). Far above the suspension the
+/// lines see little of it, but all of them together: as a wrong delay, which shifts every mode, or as a mode among
+/// the lowest lines. So the modes that were found are weighed again.
+void try_springs(const FrfEstimate& frf, const ModelStructure& structure,
+                 const ModeSelection& selection, const FitOptions& options, FitResult& result) {
+  const auto body = std::find_if(result.model.submodels.begin(), result.model.submodels.end(),
+                                 [](const Submodel& s) { return s.integrators == 2; });
+  if (body == result.model.submodels.end() || result.status == FitStatus::singular ||
+      ended_by_limit(result))
+    return;
+  AdditiveModel sprung = result.model;
+  sprung.submodels[static_cast<std::size_t>(body - result.model.submodels.begin())] =
+      suspension_mode(frf, kWeakSpringsStart * frf.frequency_hz[0]);
+  FitOptions quick = options;
+  quick.uncertainty = false;
+  quick.method = FitMethod::gn;
+  const FitResult trial = fit_additive_model(frf, sprung, quick);
+  if (trial.status == FitStatus::singular ||
+      !(information_criterion(frf, trial) < information_criterion(frf, result)))
+    return;
+  result.decisions.push_back(
+      fmt::format("rigid body on weak springs instead of a free one: cost {:.6g} -> {:.6g}",
+                  result.model.fit.cost, trial.model.fit.cost));
+  ModelStructure with_springs = structure;
+  with_springs.rigid_body = false;
+  ModeSelection again = selection;
+  again.keep_modes = selection.keep_modes || selection.exactly > 0;
+  again.modes.clear();
+  for (const Submodel& s : trial.model.submodels) {
+    if (s.role == SubmodelRole::suspension) with_springs.given.push_back(s);
+    if (is_searched_mode(s))
+      again.modes.push_back({s.natural_frequency_hz(), s.damping_ratio(), 1});
+  }
+  continue_with(automatic_fit(frf, with_springs, again, options), result);
+}
+
+/// Holds the frequencies of suspension modes that the lines do not determine, the worst first.
+void settle_suspension(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+  for (std::size_t left = result.model.submodels.size(); left > 0; --left) {
+    Submodel* worst = nullptr;
+    double worst_deviation = kLargestDeviation;
+    for (std::size_t i = 0; i < result.model.submodels.size(); ++i) {
+      Submodel& s = result.model.submodels[i];
+      if (s.role != SubmodelRole::suspension || s.frequency_held) continue;
+      const bool at_bound =
+          std::find(result.held.begin(), result.held.end(), i) != result.held.end();
+      const double deviation =
+          at_bound ? std::numeric_limits<double>::infinity()
+                   : s.natural_frequency_std_hz.value_or(0.0) / s.natural_frequency_hz();
+      if (!(deviation > worst_deviation)) continue;
+      worst = &s;
+      worst_deviation = deviation;
+    }
+    if (worst == nullptr || result.status == FitStatus::singular) return;
+    worst->frequency_held = true;
+    result.decisions.push_back(fmt::format(
+        "suspension: the lines do not determine the frequency of its mode at {:.4g} Hz{}; held "
+        "there, without a standard deviation",
+        worst->natural_frequency_hz(),
+        std::isfinite(worst_deviation)
+            ? fmt::format(" (standard deviation {:.2g} Hz)",
+                          worst_deviation * worst->natural_frequency_hz())
+            : " (at its bound)"));
+    refit(frf, options, result);
+  }
+}
+
+void check_requests(const FrfEstimate& frf, const RequestedStructure& structure) {
+  const auto require_faultless = [](const std::string& fault) {
+    if (!fault.empty()) throw std::invalid_argument("fit: submodel: " + fault);
+  };
+  for (const SubmodelRequest& r : structure.submodels) require_faultless(fault_of(r));
+  require_faultless(
+      fault_of(structure.submodels, structure.common.rigid_body, structure.common.direct_term));
+  if (structure.suspension && structure.common.rigid_body)
+    throw std::invalid_argument("fit: a suspension stands instead of the rigid body; ask for one");
+  for (const double frequency_hz : structure.suspension_hz)
+    if (!(frequency_hz > 0.0 && frequency_hz < frf.frequency_hz[0]))
+      throw std::invalid_argument(
+          fmt::format("fit: a suspension at {} Hz does not lie below the lowest line, {} Hz; "
+                      "give it as a mode",
+                      frequency_hz, frf.frequency_hz[0]));
+}
+
+/// A fit that leaves clearly more than noise and known distortion is not to be trusted.
+void judge_explained(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+  const AdditiveModel& model = result.model;
+  const ResidualVerdict verdict = judge_residual(
+      frf,
+      [&](Eigen::Index first, Eigen::Index count) {
+        return response(model, frf.frequency_hz.segment(first, count), model.hold);
+      },
+      *options.user_weights, options.threads);
+  const bool by_weights = verdict.variance != ResidualVariance::total ||
+                          (options.weighting != Weighting::noise_variance &&
+                           options.weighting != Weighting::likelihood);
+  if (verdict.explained && by_weights) return;
+  const std::string finding =
+      verdict.explained
+          ? "the noise that weighs the fit does not explain the residual, the scatter of the "
+            "realizations does: use --weighting total_variance"
+      : ended_by_limit(result)
+          ? verdict.reason + ": the model does not explain the data"
+          : fmt::format("{}: the model does not explain the data. {}", verdict.reason,
+                        advice_for(frf, options, result, false));
+  result.findings.insert(result.findings.begin(), finding);
+  result.decisions.push_back(finding);
+  result.distrust(FitStatus::unexplained, finding);
+}
+
+}  // namespace
+
+FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& structure,
+                         const ModeSelection& selection, const FitOptions& asked) {
+  check(frf);
+  if (frf.response.isZero(0.0))
+    throw std::invalid_argument("fit: the response is zero on all lines; there is nothing to fit");
+  check_requests(frf, structure);
+  std::vector<std::string> decisions;
+  ModelStructure complete = structure.common;
+  if (structure.suspension) complete.given = suspension_modes(frf, structure.suspension_hz);
+  std::vector<SubmodelRequest> requests = structure.submodels;
+  FitOptions options = asked;
+  const bool order_is_searched = !requests.empty() && requests.front().order_by_search;
+  options.limit = search_limit(
+      order_is_searched ? ModeSelection{.modes = {}, .search_seconds = selection.search_seconds}
+                        : selection,
+      asked);
+  PoleSearch(frf, complete, selection, options, decisions).complete(requests);
+  for (const SubmodelRequest& r : requests) complete.given.push_back(start_submodel(frf, r));
+  FitResult result = automatic_fit(frf, complete, selection, options);
+  if (structure.springs_if_worth && structure.common.rigid_body)
+    try_springs(frf, complete, selection, options, result);
+  settle_suspension(frf, options, result);
+  result.decisions.insert(result.decisions.begin(), decisions.begin(), decisions.end());
+  judge_explained(frf, options, result);
+  if (options.uncertainty) fill_shape_deviations(frf, options, result);
+  if (options.covariance) fill_covariance(frf, options, result);
+  return result;
+}
+
+}  // namespace stageid

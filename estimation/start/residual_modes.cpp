@@ -1,0 +1,209 @@
+#include "estimation/start/residual_modes.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "estimation/model/basis.hpp"
+#include "estimation/problem/fit_problem.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kDampings[] = {0.002, 0.006, 0.02, 0.06};
+constexpr double kBelowBand = 0.5;  // candidates reach beyond the band's ends by these factors
+constexpr double kAboveBand = 1.8;
+constexpr double kLeastOwnShare = 0.02;
+constexpr Eigen::Index kBlock = 64;
+constexpr Eigen::Index kChannels = 256;  // whose residual is held at a time
+
+/// Frequencies a fraction of the half-power width apart, not finer than the lines.
+std::vector<ModeCandidate> candidate_grid(const FrfEstimate& frf, const AdditiveModel& model) {
+  // Below the lines a suspension stands for all that is there.
+  const bool suspended =
+      std::any_of(model.submodels.begin(), model.submodels.end(),
+                  [](const Submodel& s) { return s.role == SubmodelRole::suspension; });
+  const double low = (suspended ? 1.0 : kBelowBand) * frf.frequency_hz[0];
+  double high = kAboveBand * frf.frequency_hz[frf.lines() - 1];
+  if (model.hold == HoldModel::exact) high = std::min(high, 0.48 * frf.sample_rate_hz);
+  const double spacing = frf.lines() > 1
+                             ? (frf.frequency_hz[frf.lines() - 1] - frf.frequency_hz[0]) /
+                                   static_cast<double>(frf.lines() - 1)
+                             : low;
+  std::vector<ModeCandidate> grid;
+  for (const double zeta : kDampings)
+    for (double f = low; f <= high; f += std::max(0.7 * zeta * f, 0.5 * spacing)) {
+      const bool outside = f < frf.frequency_hz[0] || f > frf.frequency_hz[frf.lines() - 1];
+      if (outside && zeta < 0.02) continue;  // its width cannot be seen from inside
+      grid.push_back({f, zeta, 1});
+    }
+  return grid;
+}
+
+/// The candidate on the lines, hold and mean delay as factors: good enough to score.
+Eigen::VectorXcd candidate_function(const Eigen::VectorXd& f, const Eigen::VectorXcd& factor,
+                                    const ModeCandidate& mode) {
+  Eigen::VectorXcd out(f.size());
+  for (Eigen::Index k = 0; k < f.size(); ++k) {
+    const double x = f[k] / mode.frequency_hz;
+    out[k] = factor[k] / std::complex<double>(1.0 - x * x, 2.0 * mode.damping_ratio * x);
+  }
+  return out;
+}
+
+Eigen::VectorXcd delay_factor(const FrfEstimate& frf, const AdditiveModel& model) {
+  double delay = model.mean_delay_s();
+  if (model.hold != HoldModel::none) delay += 0.5 / frf.sample_rate_hz;
+  const Eigen::VectorXd omega = frf.omega_rad_s();
+  Eigen::VectorXcd out(omega.size());
+  for (Eigen::Index k = 0; k < out.size(); ++k) out[k] = std::polar(1.0, -omega[k] * delay);
+  return out;
+}
+
+/// Orthonormal columns spanning the model's own functions under the mean weights; real and
+/// imaginary parts stacked, 2N x n.
+Eigen::MatrixXd own_functions(const FrfEstimate& frf, const AdditiveModel& model,
+                              const Eigen::VectorXcd& factor, const Eigen::VectorXd& root_weight) {
+  std::vector<Eigen::VectorXcd> functions;
+  for (const Submodel& s : model.submodels) {
+    if (s.is_mode()) {
+      functions.push_back(candidate_function(frf.frequency_hz, factor,
+                                             {s.natural_frequency_hz(), s.damping_ratio(), 1}));
+    } else if (s.integrators == 2) {
+      functions.push_back(
+          factor.cwiseQuotient(frf.frequency_hz.cwiseAbs2().cast<std::complex<double>>()));
+    } else if (s.denominator.size() == 1) {
+      functions.push_back(factor);
+    }
+  }
+  const Eigen::Index N = frf.lines();
+  Eigen::MatrixXd columns(2 * N, static_cast<Eigen::Index>(functions.size()));
+  for (std::size_t i = 0; i < functions.size(); ++i) {
+    const auto c = static_cast<Eigen::Index>(i);
+    columns.col(c).head(N) = functions[i].real().cwiseProduct(root_weight);
+    columns.col(c).tail(N) = functions[i].imag().cwiseProduct(root_weight);
+    columns.col(c).normalize();
+  }
+  if (columns.cols() == 0) return columns;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(columns);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(2 * N, columns.cols());
+}
+
+/// Root of the mean over channels; those of very different size count alike.
+Eigen::VectorXd mean_root_weight(const Eigen::MatrixXd& weights) {
+  const Eigen::VectorXd channel_scale = weights.rowwise().mean().cwiseInverse();
+  Eigen::VectorXd out(weights.cols());
+  for (Eigen::Index k = 0; k < out.size(); ++k)
+    out[k] = std::sqrt(weights.col(k).cwiseProduct(channel_scale).mean());
+  return out;
+}
+
+/// Inputs in a row, with all outputs.
+struct InputRange {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+
+/// As many at a time as have some hundred channels: what is made of the data must not be as large as they are.
+std::vector<InputRange> input_ranges(const FrfEstimate& frf) {
+  const Eigen::Index most = std::max<Eigen::Index>(1, kChannels / frf.n_outputs());
+  std::vector<InputRange> out;
+  for (Eigen::Index u = 0; u < frf.n_inputs(); u += most)
+    out.push_back({u, std::min(most, frf.n_inputs() - u)});
+  return out;
+}
+
+AdditiveModel of_inputs(const AdditiveModel& model, const InputRange& inputs) {
+  if (inputs.count == model.n_inputs()) return model;
+  AdditiveModel out = model;
+  const auto first = model.inputs.names.begin() + inputs.first;
+  out.inputs.names.assign(first, first + inputs.count);
+  out.inputs.units.assign(out.inputs.names.size(), {});
+  if (model.input_delay_s.size() > 0)
+    out.input_delay_s = model.input_delay_s.segment(inputs.first, inputs.count);
+  for (Submodel& s : out.submodels)
+    for (Eigen::MatrixXd& B : s.numerator)
+      B = Eigen::MatrixXd(B.middleCols(inputs.first, inputs.count));
+  return out;
+}
+
+/// W E, real parts and then imaginary parts of all lines.
+Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& model,
+                                  const Eigen::MatrixXd& weights, const InputRange& inputs) {
+  const Eigen::Index N = frf.lines();
+  const Eigen::Index first = inputs.first * frf.n_outputs();
+  const Eigen::Index rows = inputs.count * frf.n_outputs();
+  const Eigen::MatrixXcd E = frf.response.middleRows(first, rows) -
+                             response(of_inputs(model, inputs), frf.frequency_hz, model.hold);
+  Eigen::MatrixXd WE(rows, 2 * N);
+  WE << weights.middleRows(first, rows).cwiseProduct(E.real()),
+      weights.middleRows(first, rows).cwiseProduct(E.imag());
+  return WE;
+}
+
+}  // namespace
+
+std::vector<ResidualMode> residual_modes(const FrfEstimate& frf, const AdditiveModel& model,
+                                         const Eigen::MatrixXd& weights, std::size_t most,
+                                         int threads) {
+  const Eigen::Index N = frf.lines();
+  const Eigen::VectorXd root_weight = mean_root_weight(weights);
+  const Eigen::VectorXcd factor = delay_factor(frf, model);
+  const Eigen::MatrixXd own = own_functions(frf, model, factor, root_weight);
+
+  const std::vector<ModeCandidate> grid = candidate_grid(frf, model);
+  Eigen::VectorXd raw = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(grid.size()));
+  Eigen::VectorXd share = Eigen::VectorXd::Ones(raw.size());
+  const auto blocks = static_cast<int>((grid.size() + kBlock - 1) / kBlock);
+  for (const InputRange& inputs : input_ranges(frf)) {
+    const Eigen::MatrixXd WE = weighted_residual(frf, model, weights, inputs);
+    const auto W = weights.middleRows(inputs.first * frf.n_outputs(), WE.rows());
+    for_each_task(threads, blocks, [&](int block) {
+      const auto first = static_cast<Eigen::Index>(block) * kBlock;
+      const Eigen::Index count = std::min<Eigen::Index>(kBlock, raw.size() - first);
+      Eigen::MatrixXd phi(2 * N, count);
+      Eigen::MatrixXd power(N, count);
+      for (Eigen::Index i = 0; i < count; ++i) {
+        const Eigen::VectorXcd x =
+            candidate_function(frf.frequency_hz, factor, grid[static_cast<std::size_t>(first + i)]);
+        phi.col(i) << x.real(), x.imag();
+        power.col(i) = x.cwiseAbs2();
+      }
+      const Eigen::MatrixXd correlation = WE * phi;
+      const Eigen::MatrixXd norm = W * power;
+      raw.segment(first, count) += (correlation.array().square() / norm.array().max(1e-300))
+                                       .colwise()
+                                       .sum()
+                                       .matrix()
+                                       .transpose();
+      if (inputs.first > 0 || own.cols() == 0) return;
+      phi.topRows(N).array().colwise() *= root_weight.array();
+      phi.bottomRows(N).array().colwise() *= root_weight.array();
+      const Eigen::ArrayXd total = phi.colwise().squaredNorm().transpose();
+      const Eigen::ArrayXd imitated = (own.transpose() * phi).colwise().squaredNorm().transpose();
+      share.segment(first, count) = (1.0 - imitated / total).max(kLeastOwnShare);
+    });
+  }
+  std::vector<ResidualMode> scored(grid.size());
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    scored[i] = {grid[i], raw[at] / share[at]};
+  }
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const ResidualMode& a, const ResidualMode& b) { return a.gain > b.gain; });
+  std::vector<ResidualMode> best;
+  for (const ResidualMode& candidate : scored) {
+    if (best.size() == most) break;
+    const bool taken = std::any_of(best.begin(), best.end(), [&](const ResidualMode& other) {
+      const double width = 2.0 * std::max(candidate.mode.damping_ratio, other.mode.damping_ratio) *
+                           other.mode.frequency_hz;
+      return std::abs(candidate.mode.frequency_hz - other.mode.frequency_hz) < width;
+    });
+    if (!taken) best.push_back(candidate);
+  }
+  return best;
+}
+
+}  // namespace stageid

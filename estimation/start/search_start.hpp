@@ -1,0 +1,19 @@
+#pragma once
+
+#include <vector>
+
+#include "estimation/model/model_structure.hpp"
+#include "estimation/problem/fit_options.hpp"
+
+namespace stageid {
+
+/// Where a search begins: hold and delays as far as they are known, the submodels beside the modes, and these modes.
+/// @param known a model of which delays are taken, if it has submodels
+AdditiveModel search_start(const FrfEstimate& frf, const ModelStructure& structure,
+                           const FitOptions& options, const AdditiveModel& known,
+                           const std::vector<ModeCandidate>& modes);
+
+/// A mode where the CMIF is largest.
+ModeCandidate strongest_peak(const FrfEstimate& frf);
+
+}  // namespace stageid

@@ -1,0 +1,132 @@
+#include "estimation/start/stabilization.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr double kShift = 1e-12;  // keeps the Toeplitz matrix definite where the lines leave gaps
+
+/// Sums over the lines by lag l = row - column of powers of z^-1; all that the equations consist of.
+class NormalMatrix {
+ public:
+  NormalMatrix(const FrfEstimate& frf, const StabilizationOptions& options)
+      : order_(options.most_order), step_s_(0.5 / frf.frequency_hz.maxCoeff()) {
+    const Eigen::VectorXd omega = frf.omega_rad_s();
+    const Eigen::VectorXcd delay =
+        (Complex(0.0, options.delay_s) * omega.cast<Complex>()).array().exp().matrix();
+    const Eigen::VectorXd squares =
+        omega.array().pow(4).matrix();  // w^2 before the channels' scale
+    const Eigen::MatrixXd lags = Eigen::RowVectorXd::LinSpaced(2 * order_ + 1, -order_, order_);
+    const Eigen::MatrixXd angle = step_s_ * omega * lags;  // N x lags
+    const Eigen::MatrixXd cosine = angle.array().cos().matrix();
+    const Eigen::MatrixXd sine = angle.array().sin().matrix();
+
+    const Eigen::VectorXd own = cosine.transpose() * squares;
+    Eigen::MatrixXd R = toeplitz(own);
+    R.diagonal().array() += kShift * own[order_];
+    const Eigen::LLT<Eigen::MatrixXd> factor(R);
+
+    Eigen::VectorXd both = Eigen::VectorXd::Zero(omega.size());
+    matrix_ = Eigen::MatrixXd::Zero(order_ + 1, order_ + 1);
+    for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
+      const Eigen::VectorXcd H = frf.response.row(c).transpose().cwiseProduct(delay);
+      const Eigen::VectorXd power = squares.cwiseProduct(H.cwiseAbs2());
+      const double scale = 1.0 / std::max(power.mean(), 1e-300);
+      both += scale * power;
+      // Re{H e^{-j omega T l}} = Re H cos + Im H sin
+      const Eigen::VectorXd mixed = cosine.transpose() * squares.cwiseProduct(H.real()) +
+                                    sine.transpose() * squares.cwiseProduct(H.imag());
+      Eigen::MatrixXd S = toeplitz(mixed);
+      factor.matrixL().solveInPlace(S);
+      matrix_.noalias() -= scale * (S.transpose() * S);
+    }
+    matrix_ += toeplitz(cosine.transpose() * both);
+  }
+
+  /// The denominator d_0 ... d_n of that order with d_n = 1.
+  Eigen::VectorXd denominator(int order) const {
+    Eigen::VectorXd d(order + 1);
+    d << matrix_.topLeftCorner(order, order).ldlt().solve(-matrix_.col(order).head(order)), 1.0;
+    return d;
+  }
+
+  double step_s() const noexcept { return step_s_; }
+
+ private:
+  /// Entry (row, column) is the lag column - row.
+  Eigen::MatrixXd toeplitz(const Eigen::VectorXd& by_lag) const {
+    Eigen::MatrixXd out(order_ + 1, order_ + 1);
+    for (Eigen::Index row = 0; row <= order_; ++row)
+      out.row(row) = by_lag.segment(order_ - row, order_ + 1).transpose();
+    return out;
+  }
+
+  int order_;
+  double step_s_;
+  Eigen::MatrixXd matrix_;
+};
+
+/// Zeros in z of d_0 z^n + ... + d_n.
+Eigen::VectorXcd zeros(const Eigen::VectorXd& d) {
+  const Eigen::Index n = d.size() - 1;
+  if (d[0] == 0.0 || !d.allFinite()) return {};
+  Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(n, n);
+  companion.row(0) = -d.tail(n).transpose() / d[0];
+  companion.diagonal(-1).setOnes();
+  return Eigen::EigenSolver<Eigen::MatrixXd>(companion, false).eigenvalues();
+}
+
+void compare(StabilizationPole& pole, const std::vector<StabilizationPole>& before,
+             const StabilizationOptions& options) {
+  const auto apart = [&](const StabilizationPole& other) {
+    return std::abs(other.frequency_hz / pole.frequency_hz - 1.0);
+  };
+  const auto nearest = std::ranges::min_element(before, {}, apart);
+  if (nearest == before.end()) return;
+  pole.stable_frequency = apart(*nearest) <= options.frequency_tolerance;
+  pole.stable_damping =
+      pole.stable_frequency &&
+      std::abs(nearest->damping_ratio / pole.damping_ratio - 1.0) <= options.damping_tolerance;
+}
+
+}  // namespace
+
+std::vector<StabilizationPole> stabilization(const FrfEstimate& frf,
+                                             const StabilizationOptions& options) {
+  if (options.most_order < 2 || 2 * options.most_order >= frf.lines())
+    throw std::invalid_argument(
+        fmt::format("stabilization: most_order is {} with {} lines; 2 to less than half the lines",
+                    options.most_order, frf.lines()));
+  const NormalMatrix normal(frf, options);
+  std::vector<StabilizationPole> all;
+  std::vector<StabilizationPole> before;
+  for (int order = 2; order <= options.most_order; order += 2) {
+    std::vector<StabilizationPole> found;
+    for (const Complex z : zeros(normal.denominator(order))) {
+      const Complex s = std::log(z) / normal.step_s();
+      const double f = std::abs(s) / (2.0 * std::numbers::pi);
+      const double damping = -s.real() / std::abs(s);
+      if (!(s.imag() > 0.0) || !(damping > 0.0) || damping > options.most_damping) continue;
+      if (f < frf.frequency_hz[0] || f > frf.frequency_hz[frf.lines() - 1]) continue;
+      found.push_back({.order = order, .frequency_hz = f, .damping_ratio = damping});
+      compare(found.back(), before, options);
+    }
+    std::ranges::sort(found, {}, &StabilizationPole::frequency_hz);
+    all.insert(all.end(), found.begin(), found.end());
+    before = std::move(found);
+  }
+  return all;
+}
+
+}  // namespace stageid

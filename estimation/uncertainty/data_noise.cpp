@@ -1,0 +1,81 @@
+#include "estimation/uncertainty/data_noise.hpp"
+
+#include <algorithm>
+
+namespace stageid {
+namespace {
+
+/// Above this, a residual cannot be the noise alone.
+constexpr double kClearlyTooLarge = 1.5;
+
+}  // namespace
+
+DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
+  const Eigen::MatrixXd& known =
+      frf.total_variance.size() > 0 ? frf.total_variance : frf.noise_variance;
+  DataNoise noise;
+  // The noise variance weighs, but the estimate of a nonlinear plant scatters by more.
+  const bool distorted = weighting != Weighting::total_variance && frf.total_variance.size() > 0 &&
+                         frf.nonlinearity.nonlinear();
+  if (weighs_by_variance(weighting) && !distorted) {
+    noise.knowledge = VarianceKnowledge::weights;
+    noise.variance = weighed_variance(frf, weighting);
+  } else if (known.size() > 0 && known.minCoeff() > 0.0) {
+    noise.knowledge = VarianceKnowledge::given;
+    noise.variance =
+        LineVariance{SharedMatrix<Eigen::MatrixXd>::kept(known), Eigen::ArrayXd::Ones(frf.lines())};
+  }
+  if (noise.knowledge != VarianceKnowledge::none) noise.correlation = NoiseCorrelation(frf);
+  return noise;
+}
+
+double independent_numbers(const FrfEstimate& frf) {
+  return 2.0 * static_cast<double>(frf.response.size()) / frf.correlated_lines;
+}
+
+bool weighs_by_variance(Weighting weighting) noexcept {
+  return weighting == Weighting::noise_variance || weighting == Weighting::total_variance ||
+         weighting == Weighting::likelihood;
+}
+
+bool has_no_weight(const FitProblem& problem, Eigen::Index channel) {
+  return !(problem.W->row(channel).maxCoeff() > 0.0);
+}
+
+double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters) {
+  Eigen::Index weighted = 0;
+  for (Eigen::Index c = 0; c < problem.channels(); ++c)
+    weighted += has_no_weight(problem, c) ? 0 : 1;
+  const Eigen::Index without = (problem.channels() - weighted) * problem.functions();
+  const double data = static_cast<double>(problem.size() * weighted);
+  return 2.0 * static_cast<double>(problem.size()) * cost /
+         std::max(data - 0.5 * static_cast<double>(parameters - without), 1.0);
+}
+
+double residual_scale(double per_degree, bool likelihood) {
+  return likelihood && per_degree < kClearlyTooLarge ? 1.0 : per_degree;
+}
+
+Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
+                           LineRange lines) {
+  const Eigen::ArrayXd W = problem.W->row(c).segment(lines.first, lines.count).transpose();
+  if (!noise.variance) return W.sqrt();
+  const auto variance = noise.variance->matrix->row(c).segment(lines.first, lines.count);
+  const auto divisor = noise.variance->divisor.segment(lines.first, lines.count);
+  return W * (variance.transpose().array() / divisor).sqrt();
+}
+
+FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise) {
+  FitProblem middle = problem;
+  middle.middle = noise.variance;
+  return middle;
+}
+
+double covariance_scale(const FitProblem& problem, double cost, Eigen::Index parameters,
+                        const DataNoise& noise) {
+  if (noise.knowledge == VarianceKnowledge::given) return 1.0;
+  return residual_scale(residual_per_degree(problem, cost, parameters),
+                        noise.knowledge == VarianceKnowledge::weights);
+}
+
+}  // namespace stageid

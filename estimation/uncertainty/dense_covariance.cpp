@@ -1,0 +1,296 @@
+#include "estimation/uncertainty/dense_covariance.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "estimation/problem/fit_start.hpp"
+#include "estimation/problem/residual.hpp"
+#include "estimation/problem/weight_matrices.hpp"
+#include "estimation/uncertainty/low_rank_covariance.hpp"
+#include "estimation/uncertainty/parameter_covariance.hpp"
+#include "estimation/uncertainty/response_errors.hpp"
+
+namespace stageid {
+namespace {
+
+/// A fit at its end, as its equations see it.
+struct Ended {
+  std::optional<WeightMatrices> matrices;
+  FitProblem problem;
+  FitParameters beta;
+  std::vector<BasisGroup> groups;
+};
+
+Ended ended_fit(const FrfEstimate& frf, const FitResult& result, const FitOptions& options) {
+  Ended out;
+  out.matrices = make_weight_matrices(frf, options);
+  out.problem =
+      make_problem(frf, result.model, options,
+                   out.matrices ? SharedMatrix<Eigen::MatrixXd>::kept(out.matrices->marginal())
+                                : make_weights(frf, options));
+  out.beta = make_parameters(out.problem, result.model, options);
+  out.groups = evaluate_groups(out.problem, out.beta, true);
+  return out;
+}
+
+/// Z of the channels' functions in a set, in the order of DenseCovariance.
+template <typename Row>
+Eigen::MatrixXd stacked(const FitProblem& problem, const FunctionSet& set, const Row& row) {
+  Eigen::MatrixXd out(problem.channels() * static_cast<Eigen::Index>(set.size()),
+                      problem.globals());
+  Eigen::Index at = 0;
+  for (const Eigen::Index f : set)
+    for (Eigen::Index c = 0; c < problem.channels(); ++c) out.row(at++) = row(c, f);
+  return out;
+}
+
+/// Of (a, b) from that of a, that of nu and between a and nu, b = nu - Z a.
+Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& nu,
+                       const Eigen::MatrixXd& cross, const Eigen::MatrixXd& Z) {
+  const Eigen::Index n = a.rows();
+  Eigen::MatrixXd out(n + nu.rows(), n + nu.rows());
+  const Eigen::MatrixXd product = Z * cross;
+  out.topLeftCorner(n, n) = a;
+  out.topRightCorner(n, nu.rows()) = cross - a * Z.transpose();
+  out.bottomLeftCorner(nu.rows(), n) = out.topRightCorner(n, nu.rows()).transpose();
+  out.bottomRightCorner(nu.rows(), nu.rows()) =
+      nu - product - product.transpose() + Z * a * Z.transpose();
+  return out;
+}
+
+/// Cov(nu) between channels, 1/2 sum Re{g_c^H C(c, d) g_d} with g = W F M_bb^-1: zero unless they are
+/// correlated. Its diagonal blocks are those of the channels, which are known.
+std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise& noise, double half,
+                                              const ParameterCovariance& covariance,
+                                              const std::vector<FunctionSet>& sets) {
+  const FitProblem& problem = fit.problem;
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
+  ChannelPairs pairs;
+  pairs.channels = problem.channels();
+  pairs.lines = noise.correlation.known() ? problem.size() : 0;
+  pairs.threads = problem.threads;
+  pairs.columns = [&](Eigen::Index c, LineRange lines, Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+    const auto at = static_cast<std::size_t>(c);
+    const Eigen::ArrayXd weight = noise_scale(problem, noise, c, lines);
+    const Eigen::MatrixXd& inverse = covariance.channels[at].equations_inverse;
+    re = weight.matrix().asDiagonal() *
+         (group_of[at]->F_re.middleRows(lines.first, lines.count) * inverse);
+    im = weight.matrix().asDiagonal() *
+         (group_of[at]->F_im.middleRows(lines.first, lines.count) * inverse);
+  };
+  pairs.between = [&](Eigen::Index c, Eigen::Index d, LineRange lines, Eigen::ArrayXd& re,
+                      Eigen::ArrayXd& im) {
+    return c != d && noise.correlation.of_channels(c, d, lines, re, im);
+  };
+  std::vector<Eigen::MatrixXd> out = pair_grams(pairs, sets);
+  for (Eigen::MatrixXd& matrix : out) matrix *= half;
+  return out;
+}
+
+std::vector<DenseCovariance> of_free_numerators(const FrfEstimate& frf, const Ended& fit,
+                                                const FitResult& result, const FitOptions& options,
+                                                const std::vector<FunctionSet>& sets) {
+  const FitProblem& problem = fit.problem;
+  const DataNoise noise = data_noise(frf, options.weighting);
+  const ParameterCovariance known = parameter_covariance(
+      problem, fit.beta, fit.groups, result.model.fit.cost, noise, result.frozen, {false, true});
+  if (known.channels.empty()) return {};
+  const double half = 0.5 * known.residual_scale;
+  std::vector<Eigen::MatrixXd> nu = between_channels(fit, noise, half, known, sets);
+  std::vector<DenseCovariance> out;
+  for (std::size_t s = 0; s < sets.size(); ++s) {
+    const FunctionSet& set = sets[s];
+    const auto channel = [&](Eigen::Index c) -> const ChannelCovariance& {
+      return known.channels[static_cast<std::size_t>(c)];
+    };
+    const Eigen::MatrixXd Z = stacked(
+        problem, set, [&](Eigen::Index c, Eigen::Index f) { return channel(c).Z.row(f).eval(); });
+    const Eigen::MatrixXd cross = stacked(problem, set, [&](Eigen::Index c, Eigen::Index f) {
+      return channel(c).cross.col(f).transpose().eval();
+    });
+    Eigen::MatrixXd likelihood = Eigen::MatrixXd::Zero(nu[s].rows(), nu[s].cols());
+    for (Eigen::Index c = 0; c < problem.channels(); ++c) {
+      const auto own = Eigen::seqN(c, static_cast<Eigen::Index>(set.size()), problem.channels());
+      nu[s](own, own) = channel(c).own(set, set);
+      likelihood(own, own) = half * channel(c).equations_inverse(set, set);
+    }
+    out.push_back({joined(known.globals, nu[s], cross.transpose(), Z),
+                   joined(half * known.globals_inverse, likelihood,
+                          Eigen::MatrixXd::Zero(problem.globals(), nu[s].rows()), Z)});
+  }
+  return out;
+}
+
+/// The rows of T, d (globals, numerators of the set) / d free parameters, times C times T^T.
+Eigen::MatrixXd of_factors(const FitProblem& problem, const FitParameters& beta,
+                           const ResidueFactors& factors, const FunctionSet& set,
+                           const Eigen::MatrixXd& C) {
+  const Eigen::Index globals = problem.globals();
+  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(
+      globals + problem.channels() * static_cast<Eigen::Index>(set.size()), C.cols());
+  T.topLeftCorner(globals, globals).setIdentity();
+  std::vector<ResidueFactors::Entry> entries;
+  for (Eigen::Index c = 0; c < problem.channels(); ++c) {
+    factors.channel_entries(beta, c, entries);
+    for (const auto& [function, parameter, value] : entries) {
+      const auto place = std::find(set.begin(), set.end(), function);
+      if (place == set.end()) continue;
+      T(globals + c + problem.channels() * (place - set.begin()), parameter) += value;
+    }
+  }
+  return T * C * T.transpose();
+}
+
+std::vector<DenseCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& fit,
+                                            const FitResult& result, const FitOptions& options,
+                                            const std::vector<FunctionSet>& sets) {
+  ResidueFactors factors(fit.problem, fit.beta, options);
+  factors.project(fit.beta, Eigen::MatrixXd::Ones(fit.problem.channels(), fit.problem.functions()));
+  const LowRankParameters free =
+      low_rank_parameters(fit.problem, fit.beta, fit.groups, result.model.fit.cost, factors,
+                          data_noise(frf, options.weighting), result.frozen);
+  std::vector<DenseCovariance> out;
+  if (free.sandwich.size() == 0) return out;
+  for (const FunctionSet& set : sets)
+    out.push_back({of_factors(fit.problem, fit.beta, factors, set, free.sandwich),
+                   of_factors(fit.problem, fit.beta, factors, set, free.likelihood)});
+  return out;
+}
+
+/// M of all parameters under weight matrices: globals by products, numerators in pairs of channels.
+Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
+  const FitProblem& problem = fit.problem;
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
+  const JointEquations equations(problem, *fit.matrices, fit.beta, fit.groups,
+                                 residual(problem, fit.groups, fit.beta.B));
+  ChannelPairs pairs;
+  pairs.channels = problem.channels();
+  pairs.lines = problem.size();
+  pairs.threads = problem.threads;
+  pairs.columns = [&](Eigen::Index c, LineRange lines, Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+    const BasisGroup& group = *group_of[static_cast<std::size_t>(c)];
+    re = group.F_re.middleRows(lines.first, lines.count);
+    im = group.F_im.middleRows(lines.first, lines.count);
+  };
+  pairs.between = [&](Eigen::Index c, Eigen::Index d, LineRange lines, Eigen::ArrayXd& re,
+                      Eigen::ArrayXd& im) {
+    fit.matrices->between(c, d, lines.first, lines.count, re, im);
+    return true;
+  };
+  const Eigen::Index globals = problem.globals();
+  Eigen::MatrixXd M(equations.size(), equations.size());
+  for (Eigen::Index i = 0; i < globals; ++i) {
+    M.col(i) = equations.product(Eigen::VectorXd::Unit(equations.size(), i));
+    M.row(i) = M.col(i).transpose();
+  }
+  M.bottomRightCorner(M.rows() - globals, M.cols() - globals) =
+      pair_grams(pairs, {all_functions(model)}).front();
+  return M;
+}
+
+std::vector<DenseCovariance> of_weight_matrices(const Ended& fit, const FitResult& result,
+                                                const FitOptions& options,
+                                                const std::vector<FunctionSet>& sets) {
+  const FitProblem& problem = fit.problem;
+  const double per_degree =
+      residual_per_degree(problem, result.model.fit.cost, problem.parameters());
+  const double half = 0.5 * residual_scale(per_degree, weighs_by_variance(options.weighting));
+  const Eigen::MatrixXd inverse = free_inverse(joint_matrix(fit, result.model), result.frozen);
+  if (!inverse.allFinite()) return {};
+  std::vector<DenseCovariance> out;
+  for (const FunctionSet& set : sets) {
+    std::vector<Eigen::Index> places(static_cast<std::size_t>(problem.globals()));
+    std::iota(places.begin(), places.end(), Eigen::Index{0});
+    for (const Eigen::Index f : set)
+      for (Eigen::Index c = 0; c < problem.channels(); ++c)
+        places.push_back(problem.globals() + c + problem.channels() * f);
+    const Eigen::MatrixXd part = half * inverse(places, places);
+    out.push_back({fit.matrices->scatter_factor() * part, part});
+  }
+  return out;
+}
+
+/// As many numbers as one covariance of kMostParameters has; under weight matrices all parameters are in one.
+bool are_affordable(const Ended& fit, const std::vector<FunctionSet>& sets) {
+  const auto most = static_cast<double>(kMostParameters);
+  double numbers = 0.0;
+  for (const FunctionSet& set : sets)
+    numbers += std::pow(
+        fit.problem.globals() + fit.problem.channels() * static_cast<Eigen::Index>(set.size()), 2);
+  return numbers <= most * most && !(fit.matrices && fit.problem.parameters() > kMostParameters);
+}
+
+bool has_deviations(const FitResult& result) {
+  return result.status != FitStatus::singular &&
+         std::all_of(result.model.submodels.begin(), result.model.submodels.end(),
+                     [](const Submodel& s) { return !s.numerator_std.empty(); });
+}
+
+std::vector<DenseCovariance> covariances_of(const FrfEstimate& frf, const Ended& fit,
+                                            const FitResult& result, const FitOptions& options,
+                                            const std::vector<FunctionSet>& sets) {
+  const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
+  if (!are_affordable(fit, sets)) return {};
+  std::vector<DenseCovariance> out = fit.matrices ? of_weight_matrices(fit, result, options, sets)
+                                     : low_rank
+                                         ? of_given_ranks(frf, fit, result, options, sets)
+                                         : of_free_numerators(frf, fit, result, options, sets);
+  for (DenseCovariance& one : out)
+    for (Eigen::MatrixXd* matrix : {&one.sandwich, &one.likelihood})  // symmetric to the last bit
+      *matrix = (0.5 * frf.correlated_lines * (*matrix + matrix->transpose())).eval();
+  return out;
+}
+
+}  // namespace
+
+std::vector<DenseCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
+                                               const FitOptions& options,
+                                               const std::vector<FunctionSet>& sets) {
+  if (!has_deviations(result)) return {};
+  return covariances_of(frf, ended_fit(frf, result, options), result, options, sets);
+}
+
+void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+  if (!has_deviations(result)) {
+    result.decisions.emplace_back("no covariance: the fit has no standard deviations");
+    return;
+  }
+  const Ended fit = ended_fit(frf, result, options);
+  std::vector<DenseCovariance> all =
+      covariances_of(frf, fit, result, options, {all_functions(result.model)});
+  if (all.empty()) {
+    result.decisions.push_back(fmt::format(
+        "no covariance: the fit has more than {} parameters, or they cannot be told apart; take "
+        "fewer channels or modes",
+        kMostParameters));
+    return;
+  }
+  result.covariance.sandwich = std::move(all.front().sandwich);
+  result.covariance.likelihood = std::move(all.front().likelihood);
+  fill_response_errors(fit.problem, fit.beta, fit.groups, result.covariance);
+}
+
+FunctionSet functions_of(const AdditiveModel& model, std::size_t submodel) {
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < submodel; ++i)
+    first += static_cast<Eigen::Index>(model.submodels[i].numerator.size());
+  FunctionSet out(model.submodels[submodel].numerator.size());
+  std::iota(out.begin(), out.end(), first);
+  return out;
+}
+
+FunctionSet all_functions(const AdditiveModel& model) {
+  std::size_t count = 0;
+  for (const Submodel& s : model.submodels) count += s.numerator.size();
+  FunctionSet out(count);
+  std::iota(out.begin(), out.end(), Eigen::Index{0});
+  return out;
+}
+
+}  // namespace stageid

@@ -1,0 +1,368 @@
+#include "estimation/uncertainty/parameter_covariance.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "estimation/products/weighted_products.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+// Of conjugate gradients; with their residual, variances have its square.
+constexpr double kColumnTolerance = 1e-2;
+
+/// The part of the globals' columns that the channel's numerators cannot follow: J_a - F Z, with Z the
+/// channel's rows of M_bb^-1 M_ba.
+void projected_columns(const FitProblem& problem, const FitParameters& beta,
+                       const BasisGroup& group, const Eigen::MatrixXd& Z, Eigen::Index c,
+                       const std::vector<DerivativeColumn>& columns, LineRange lines,
+                       Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+  global_columns(problem, beta, group, c, columns, lines, re, im);
+  re -= group.F_re.middleRows(lines.first, lines.count) * Z;
+  im -= group.F_im.middleRows(lines.first, lines.count) * Z;
+}
+
+std::vector<Eigen::Index> all_globals(const FitProblem& problem) {
+  std::vector<Eigen::Index> out(static_cast<std::size_t>(problem.globals()));
+  std::iota(out.begin(), out.end(), Eigen::Index{0});
+  return out;
+}
+
+/// Channels whose equations are kept at a time: all that are correlated with each other.
+std::vector<ChannelRange> channel_parts(const FitProblem& problem, const DataNoise& noise) {
+  const Eigen::Index together = noise.correlation.between_inputs() ? problem.channels()
+                                : noise.correlation.known()        ? problem.n_outputs
+                                                                   : 1;
+  const Eigen::Index most = std::max<Eigen::Index>(1, kMostMembers / together) * together;
+  std::vector<ChannelRange> parts;
+  for (Eigen::Index c = 0; c < problem.channels(); c += most)
+    parts.push_back({c, std::min(most, problem.channels() - c)});
+  return parts;
+}
+
+/// The equations of some channels, M and K = sum Re{J^H W C W J}, the channels' noise uncorrelated.
+struct PartEquations {
+  ArrowSystem gn;
+  std::optional<ArrowSystem> weighed;  ///< with the weights W C W; nothing: K = M
+  const ArrowSystem& middle() const { return weighed ? *weighed : gn; }
+};
+
+/// K for the globals with the numerators' part of their columns taken away, J_a - F Z.
+Eigen::MatrixXd projected_middle(const PartEquations& part, ChannelRange range) {
+  Eigen::MatrixXd K = part.middle().M_globals();
+  for (Eigen::Index c = range.first; c < range.first + range.count; ++c) {
+    const Eigen::MatrixXd& Z = part.gn.channel(c).Z;
+    const ArrowSystem::Channel& k = part.middle().channel(c);
+    K -= Z.transpose() * k.ba + k.ab * Z;
+    K += Z.transpose() * k.bb * Z;
+  }
+  return K;
+}
+
+/// The same, the channels correlated. @param cross of every channel with its numerators, globals x n_f
+/// each: those of the part are filled
+Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
+                                  const std::vector<const BasisGroup*>& group_of,
+                                  const PartEquations& part, ChannelRange range,
+                                  const DataNoise& noise, std::vector<Eigen::MatrixXd>& cross) {
+  const Eigen::Index n_y = problem.n_outputs;
+  const auto columns = derivative_columns(problem);
+  for (Eigen::Index c = range.first; c < range.first + range.count; ++c)
+    cross[static_cast<std::size_t>(c)].setZero(problem.globals(), problem.functions());
+  CorrelatedColumns inputs;
+  inputs.first_input = range.first / n_y;
+  inputs.parameters.assign(static_cast<std::size_t>(range.count / n_y), all_globals(problem));
+  inputs.columns = [&](Eigen::Index u, Eigen::Index y, LineRange lines, Eigen::MatrixXd& re,
+                       Eigen::MatrixXd& im) {
+    const Eigen::Index c = range.first + n_y * u + y;
+    projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)], part.gn.channel(c).Z,
+                      c, columns, lines, re, im);
+    const Eigen::ArrayXd weight = noise_scale(problem, noise, c, lines);
+    re.array().colwise() *= weight;
+    im.array().colwise() *= weight;
+  };
+  inputs.use = [&](Eigen::Index u, LineRange lines, const OutputColumns& Z) {
+    for (Eigen::Index y = 0; y < n_y; ++y) {
+      const auto c = static_cast<std::size_t>(range.first + n_y * u + y);
+      const auto at = static_cast<std::size_t>(y);
+      const Eigen::ArrayXd weight =
+          noise_scale(problem, noise, static_cast<Eigen::Index>(c), lines);
+      const auto F_re = group_of[c]->F_re.middleRows(lines.first, lines.count).array();
+      const auto F_im = group_of[c]->F_im.middleRows(lines.first, lines.count).array();
+      cross[c] += Z.re[at].transpose() * (F_re.colwise() * weight).matrix() +
+                  Z.im[at].transpose() * (F_im.colwise() * weight).matrix();
+    }
+  };
+  return correlated_gram(problem, noise.correlation, problem.globals(), inputs);
+}
+
+/// The nearest matrix that is a covariance, in units of the deviations: where rounding of nearly undetermined
+/// parameters, or two estimates of one noise, have left negative eigenvalues, they become zero.
+Eigen::MatrixXd nearest_covariance(const Eigen::MatrixXd& C) {
+  const Eigen::VectorXd deviation = C.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::VectorXd scale = deviation.cwiseInverse();
+  const Eigen::MatrixXd scaled =
+      scale.asDiagonal() * (0.5 * (C + C.transpose())) * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(scaled);
+  const Eigen::MatrixXd root = deviation.asDiagonal() * parts.eigenvectors() *
+                               parts.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return root * root.transpose();
+}
+
+/// A sum of squares less what the numerators follow: rounding can leave it indefinite.
+Eigen::MatrixXd definite_middle(const Eigen::MatrixXd& K) {
+  const Eigen::VectorXd scale = K.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::LDLT<Eigen::MatrixXd> factors(scale.asDiagonal() * K * scale.asDiagonal());
+  return factors.isPositive() ? K : nearest_covariance(K);
+}
+
+/// Channel and globals together as a covariance, if the parts were not.
+ChannelCovariance made_definite(const ChannelCovariance& channel, Eigen::MatrixXd& globals) {
+  const Eigen::Index g = globals.rows();
+  const Eigen::Index n = channel.own.rows();
+  Eigen::MatrixXd whole(g + n, g + n);
+  whole << globals, channel.cross, channel.cross.transpose(), channel.own;
+  const Eigen::MatrixXd definite = nearest_covariance(whole);
+  globals = definite.topLeftCorner(g, g);
+  return {definite.bottomRightCorner(n, n), definite.topRightCorner(g, n), channel.Z,
+          channel.equations_inverse};
+}
+
+/// The variances of the channel's numerators and response with these covariances.
+struct ChannelVariances {
+  Eigen::VectorXd numerators;
+  Eigen::VectorXd response;  ///< empty unless asked for
+
+  bool negative() const {
+    return numerators.minCoeff() < 0.0 || (response.size() > 0 && response.minCoeff() < 0.0);
+  }
+};
+
+ChannelVariances channel_variances(const FitProblem& problem, const FitParameters& beta,
+                                   const BasisGroup& group, Eigen::Index c,
+                                   const ChannelCovariance& channel, const Eigen::MatrixXd& globals,
+                                   bool with_response) {
+  const Eigen::MatrixXd& Z = channel.Z;
+  ChannelVariances out;
+  out.numerators = channel.own.diagonal();
+  if (problem.globals() > 0)
+    out.numerators +=
+        (Z * globals).cwiseProduct(Z).rowwise().sum() - 2.0 * (Z * channel.cross).diagonal();
+  if (!with_response) return out;
+  out.response = quadratic(group.F_re, group.F_im, channel.own, group.F_re, group.F_im);
+  if (problem.globals() == 0) return out;
+  Eigen::MatrixXd J_re;
+  Eigen::MatrixXd J_im;
+  projected_columns(problem, beta, group, Z, c, derivative_columns(problem), {0, problem.size()},
+                    J_re, J_im);
+  out.response += quadratic(J_re, J_im, globals, J_re, J_im);
+  out.response += 2.0 * quadratic(J_re, J_im, channel.cross, group.F_re, group.F_im);
+  return out;
+}
+
+/// The variances of the channel's numerators and response; out.globals stands.
+void fill_channel(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
+                  Eigen::Index c, const ChannelCovariance& channel, ParameterCovariance& out) {
+  const bool with_response = out.response_variance.size() > 0;
+  ChannelVariances variances =
+      channel_variances(problem, beta, group, c, channel, out.globals, with_response);
+  if (variances.negative()) {
+    Eigen::MatrixXd globals = out.globals;
+    const ChannelCovariance definite = made_definite(channel, globals);
+    variances = channel_variances(problem, beta, group, c, definite, globals, with_response);
+  }
+  // What is left is rounding of a sum that is zero.
+  out.numerator_variance.row(c) = variances.numerators.cwiseMax(0.0).transpose();
+  if (with_response) out.response_variance.row(c) = variances.response.cwiseMax(0.0).transpose();
+}
+
+void leave_unknown(const FitProblem& problem, Eigen::Index c, ParameterCovariance& out) {
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  out.numerator_variance.row(c).setConstant(unknown);
+  if (out.response_variance.size() > 0) out.response_variance.row(c).setConstant(unknown);
+  if (out.channels.empty()) return;
+  const Eigen::Index n_f = problem.functions();
+  const Eigen::Index globals = problem.globals();
+  out.channels[static_cast<std::size_t>(c)] = {
+      Eigen::MatrixXd::Constant(n_f, n_f, unknown), Eigen::MatrixXd::Zero(globals, n_f),
+      Eigen::MatrixXd::Zero(n_f, globals), Eigen::MatrixXd::Constant(n_f, n_f, unknown)};
+}
+
+void resize(const FitProblem& problem, bool with_response, ParameterCovariance& out) {
+  out.numerator_variance.setZero(problem.channels(), problem.functions());
+  if (with_response) out.response_variance.setZero(problem.channels(), problem.size());
+}
+
+/// Calls task(channel) for some channels. @returns whether all return true
+bool fill_channels(ChannelRange range, int threads, const std::function<bool(Eigen::Index)>& task) {
+  std::atomic<bool> determined = true;
+  for_each_task(threads, static_cast<int>(range.count), [&](int r) {
+    if (!task(range.first + r)) determined = false;
+  });
+  return determined;
+}
+
+}  // namespace
+
+Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen) {
+  if (S.size() == 0) return S;
+  Eigen::MatrixXd reduced = S;
+  hold_unknowns(frozen, reduced);
+  const Eigen::VectorXd scale =
+      reduced.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd inverse =
+      scale.asDiagonal() *
+      (scale.asDiagonal() * reduced * scale.asDiagonal()).fullPivLu().inverse() *
+      scale.asDiagonal();
+  for (const Eigen::Index i : frozen) {
+    inverse.row(i).setZero();
+    inverse.col(i).setZero();
+  }
+  return inverse;
+}
+
+Eigen::VectorXd quadratic(const Eigen::MatrixXd& X_re, const Eigen::MatrixXd& X_im,
+                          const Eigen::MatrixXd& C, const Eigen::MatrixXd& Y_re,
+                          const Eigen::MatrixXd& Y_im) {
+  return (X_re * C).cwiseProduct(Y_re).rowwise().sum() +
+         (X_im * C).cwiseProduct(Y_im).rowwise().sum();
+}
+
+std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
+                                                  const std::vector<BasisGroup>& groups) {
+  std::vector<const BasisGroup*> out(static_cast<std::size_t>(problem.channels()));
+  for (const BasisGroup& group : groups)
+    for (const Eigen::Index c : group.channels) out[static_cast<std::size_t>(c)] = &group;
+  return out;
+}
+
+ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
+                                         const std::vector<BasisGroup>& groups, double cost,
+                                         const DataNoise& noise,
+                                         const std::vector<Eigen::Index>& frozen,
+                                         WantedCovariance wanted) {
+  ParameterCovariance out;
+  out.residual_scale = covariance_scale(problem, cost, problem.parameters(), noise);
+  const double half = 0.5 * out.residual_scale;
+  const bool correlate = problem.globals() > 0 && noise.correlation.known();
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
+  const std::vector<ChannelRange> parts = channel_parts(problem, noise);
+  std::optional<FitProblem> weighed;
+  if (noise.variance) weighed = middle_problem(problem, noise);
+  std::optional<PartEquations> equations;
+  const auto make_equations = [&](ChannelRange part) {
+    equations.emplace(
+        PartEquations{ArrowSystem(problem, beta, groups, FitMethod::gn, part), std::nullopt});
+    if (weighed)
+      equations->weighed.emplace(*weighed, beta, groups, FitMethod::gn, part,
+                                 ChannelEquationsUse::only_kept);
+  };
+
+  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(problem.globals(), problem.globals());
+  Eigen::MatrixXd K = S;
+  std::vector<Eigen::MatrixXd> cross(correlate ? static_cast<std::size_t>(problem.channels())
+                                               : std::size_t{0});
+  for (const ChannelRange part : parts) {
+    make_equations(part);
+    if (!equations->gn.regular()) return {};
+    S += equations->gn.schur();
+    K += correlate ? correlated_middle(problem, beta, group_of, *equations, part, noise, cross)
+                   : projected_middle(*equations, part);
+  }
+  const Eigen::MatrixXd inverse = free_inverse(S, frozen);
+  if (problem.globals() > 0)
+    out.globals = half * inverse * definite_middle(K) * inverse.transpose();
+
+  // The equations of a part are made once more: kept, all of them would outgrow the data.
+  resize(problem, wanted.response, out);
+  if (wanted.channels) {
+    out.globals_inverse = inverse;
+    out.channels.resize(static_cast<std::size_t>(problem.channels()));
+  }
+  const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
+  for (const ChannelRange part : parts) {
+    if (parts.size() > 1) make_equations(part);
+    const bool determined = fill_channels(part, problem.threads, [&](Eigen::Index c) {
+      const ArrowSystem::Channel& gn = equations->gn.channel(c);
+      const ArrowSystem::Channel& k = equations->middle().channel(c);
+      if (has_no_weight(problem, c)) {
+        leave_unknown(problem, c, out);
+        return true;
+      }
+      Eigen::MatrixXd bb_inverse;
+      if (!solve_scaled(gn.bb, unit, bb_inverse)) return false;
+      const auto at = static_cast<std::size_t>(c);
+      const Eigen::MatrixXd& k_ab =
+          correlate ? cross[at] : Eigen::MatrixXd(k.ab - gn.Z.transpose() * k.bb);
+      ChannelCovariance channel = {half * bb_inverse * k.bb * bb_inverse,
+                                   half * inverse * k_ab * bb_inverse, gn.Z, bb_inverse};
+      fill_channel(problem, beta, *group_of[at], c, channel, out);
+      if (wanted.channels) out.channels[at] = std::move(channel);
+      return true;
+    });
+    if (!determined) return {};
+  }
+  return out;
+}
+
+ParameterCovariance joint_covariance(const FitProblem& problem, const FitParameters& beta,
+                                     const std::vector<BasisGroup>& groups, double cost,
+                                     const JointEquations& equations, VarianceKnowledge knowledge,
+                                     double scatter_factor, const std::vector<Eigen::Index>& frozen,
+                                     bool with_response) {
+  ParameterCovariance out;
+  if (!equations.regular()) return out;
+  out.residual_scale = residual_scale(residual_per_degree(problem, cost, problem.parameters()),
+                                      knowledge == VarianceKnowledge::weights);
+  const double half = 0.5 * scatter_factor * out.residual_scale;
+
+  // Columns of M^-1 for the globals: X_a of the globals themselves, X_b of the numerators. With X = M^-1
+  // - dX and residuals R = M dX,  X_a + X^T R = (M^-1)_aa - dX^T M dX.
+  const Eigen::Index globals = problem.globals();
+  Eigen::MatrixXd X = Eigen::MatrixXd::Zero(equations.size(), globals);
+  Eigen::MatrixXd R = X;
+  for (Eigen::Index i = 0; i < globals; ++i) {
+    if (std::find(frozen.begin(), frozen.end(), i) != frozen.end()) continue;
+    const Eigen::VectorXd unit = Eigen::VectorXd::Unit(equations.size(), i);
+    const JointEquations::Solution column = equations.solve(unit, frozen, kColumnTolerance);
+    X.col(i) = column.x;
+    R.col(i) = column.residual;
+  }
+  Eigen::MatrixXd X_a = X.topRows(globals) + X.transpose() * R;
+  X_a = (0.5 * (X_a + X_a.transpose())).eval();
+  out.globals = half * X_a;
+  const Eigen::MatrixXd Z = -X.bottomRows(X.rows() - globals) * free_inverse(X_a, frozen);
+
+  const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(globals, problem.functions());
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
+  resize(problem, with_response, out);
+  const bool determined =
+      fill_channels({0, problem.channels()}, problem.threads, [&](Eigen::Index c) {
+        const ArrowSystem::Channel& arrow = equations.preconditioner().channel(c);
+        if (has_no_weight(problem, c)) {
+          leave_unknown(problem, c, out);
+          return true;
+        }
+        Eigen::MatrixXd own;
+        if (!solve_scaled(arrow.bb, unit, own)) return false;
+        const Eigen::MatrixXd Z_c =
+            Z(Eigen::seqN(c, problem.functions(), problem.channels()), Eigen::all);
+        fill_channel(problem, beta, *group_of[static_cast<std::size_t>(c)], c,
+                     {half * own, none, Z_c, own}, out);
+        return true;
+      });
+  if (!determined) return {};
+  return out;
+}
+
+}  // namespace stageid

@@ -1,0 +1,149 @@
+#include "excitation/multisine/frequency_grid.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "excitation/multisine/random_stream.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr bool is_odd(int line) { return line % 2 != 0; }
+
+int highest_line(int samples_per_period) { return (samples_per_period + 1) / 2 - 1; }
+
+void check_rate_and_period(double sample_rate_hz, int samples_per_period) {
+  if (!(sample_rate_hz > 0.0) || !std::isfinite(sample_rate_hz)) {
+    throw std::invalid_argument(fmt::format(
+        "frequency grid: the sample rate must be positive and finite, not {} Hz", sample_rate_hz));
+  }
+  if (samples_per_period < 3) {
+    throw std::invalid_argument(fmt::format(
+        "frequency grid: a period must have at least 3 samples, not {}", samples_per_period));
+  }
+}
+
+void check_band(double sample_rate_hz, const LineSpec& spec) {
+  if (!std::isfinite(spec.low_hz) || !std::isfinite(spec.high_hz) || spec.low_hz < 0.0) {
+    throw std::invalid_argument(fmt::format(
+        "frequency band: {} to {} Hz is not a band; both ends must be finite and not negative",
+        spec.low_hz, spec.high_hz));
+  }
+  if (spec.low_hz > spec.high_hz) {
+    throw std::invalid_argument(
+        fmt::format("frequency band: {} to {} Hz is reversed; low_hz must not exceed high_hz",
+                    spec.low_hz, spec.high_hz));
+  }
+  if (spec.high_hz >= sample_rate_hz / 2.0) {
+    throw std::invalid_argument(fmt::format(
+        "frequency band: {} Hz reaches half the sample rate; high_hz must be below {} Hz",
+        spec.high_hz, sample_rate_hz / 2.0));
+  }
+  if (spec.selection == LineSelection::odd_random && spec.group_size < 2) {
+    throw std::invalid_argument(fmt::format(
+        "frequency band: a group must have at least 2 odd lines, not {}", spec.group_size));
+  }
+}
+
+/// Leaves one line of every complete group out; an incomplete last group stays whole.
+std::vector<int> leave_out_at_random(const std::vector<int>& odd_lines, const LineSpec& spec) {
+  const auto group = static_cast<std::size_t>(spec.group_size);
+  const std::size_t complete = odd_lines.size() - odd_lines.size() % group;
+  UniformStream random(stream_seed(spec.seed, 0, 0));
+  std::vector<int> kept;
+  for (std::size_t first = 0; first < odd_lines.size(); first += group) {
+    const std::size_t end = std::min(first + group, odd_lines.size());
+    const std::size_t left_out =
+        first < complete ? first + static_cast<std::size_t>(random.next() * spec.group_size) : end;
+    for (std::size_t i = first; i < end; ++i) {
+      if (i != left_out) kept.push_back(odd_lines[i]);
+    }
+  }
+  return kept;
+}
+
+std::vector<int> unexcited_between(const std::vector<int>& lines, bool odd) {
+  std::vector<int> unexcited;
+  for (std::size_t i = 1; i < lines.size(); ++i) {
+    for (int line = lines[i - 1] + 1; line < lines[i]; ++line) {
+      if (is_odd(line) == odd) unexcited.push_back(line);
+    }
+  }
+  return unexcited;
+}
+
+}  // namespace
+
+FrequencyGrid::FrequencyGrid(double sample_rate_hz, int samples_per_period, std::vector<int> lines)
+    : sample_rate_hz_(sample_rate_hz),
+      samples_per_period_(samples_per_period),
+      lines_(std::move(lines)) {
+  check_rate_and_period(sample_rate_hz, samples_per_period);
+  if (lines_.empty())
+    throw std::invalid_argument("frequency grid: there must be at least one line");
+  if (std::adjacent_find(lines_.begin(), lines_.end(), std::greater_equal<>()) != lines_.end()) {
+    throw std::invalid_argument("frequency grid: the lines must be strictly increasing");
+  }
+  if (lines_.front() < 1 || lines_.back() > highest_line(samples_per_period)) {
+    throw std::invalid_argument(fmt::format(
+        "frequency grid: lines {} to {} do not lie in 1 to {} (neither zero frequency nor "
+        "half the sample rate) of a period of {} samples",
+        lines_.front(), lines_.back(), highest_line(samples_per_period), samples_per_period));
+  }
+}
+
+FrequencyGrid FrequencyGrid::band(double sample_rate_hz, int samples_per_period,
+                                  const LineSpec& spec) {
+  check_rate_and_period(sample_rate_hz, samples_per_period);
+  check_band(sample_rate_hz, spec);
+
+  // An end that is a line in decimal notation must count as one, although 0.3 Hz / 0.1 Hz < 3. A
+  // billionth of the line number is far above rounding and far below a line distance.
+  constexpr double kRounding = 1e-9;
+  const double lines_per_hz = samples_per_period / sample_rate_hz;
+  const int first =
+      std::max(1, static_cast<int>(std::ceil(spec.low_hz * lines_per_hz * (1.0 - kRounding))));
+  const int last =
+      std::min(highest_line(samples_per_period),
+               static_cast<int>(std::floor(spec.high_hz * lines_per_hz * (1.0 + kRounding))));
+
+  const bool odd_only = spec.selection != LineSelection::all;
+  std::vector<int> lines;
+  for (int line = first; line <= last; ++line) {
+    if (!odd_only || is_odd(line)) lines.push_back(line);
+  }
+  if (lines.empty()) {
+    throw std::invalid_argument(
+        fmt::format("frequency band: no {}line lies in {} to {} Hz; lines are {} Hz apart",
+                    odd_only ? "odd " : "", spec.low_hz, spec.high_hz, 1.0 / lines_per_hz));
+  }
+  if (spec.selection == LineSelection::odd_random) lines = leave_out_at_random(lines, spec);
+  return {sample_rate_hz, samples_per_period, std::move(lines)};
+}
+
+Eigen::VectorXd FrequencyGrid::frequency_hz() const {
+  Eigen::VectorXd frequency(size());
+  // Not line * resolution_hz(): one rounding instead of two.
+  for (Eigen::Index k = 0; k < size(); ++k) {
+    frequency[k] = lines_[static_cast<std::size_t>(k)] * sample_rate_hz_ / samples_per_period_;
+  }
+  return frequency;
+}
+
+Eigen::VectorXd FrequencyGrid::omega_rad_s() const {
+  return 2.0 * std::numbers::pi * frequency_hz();
+}
+
+std::vector<int> FrequencyGrid::even_detection_lines() const {
+  return unexcited_between(lines_, false);
+}
+
+std::vector<int> FrequencyGrid::odd_detection_lines() const {
+  return unexcited_between(lines_, true);
+}
+
+}  // namespace stageid

@@ -1,0 +1,43 @@
+#include "excitation/multisine/line_spectrum.hpp"
+
+#include <algorithm>
+#include <complex>
+#include <limits>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+int dense_length(const FrequencyGrid& grid, int oversampling) {
+  if (grid.samples_per_period() > std::numeric_limits<int>::max() / oversampling) {
+    throw std::invalid_argument("multisine: the period is too long to be oversampled");
+  }
+  return oversampling * grid.samples_per_period();
+}
+
+}  // namespace
+
+LineSpectrum::LineSpectrum(const FrequencyGrid& grid, int oversampling)
+    : lines_(grid.lines()),
+      dft_(dense_length(grid, oversampling)),
+      half_spectrum_(Eigen::VectorXcd::Zero(dft_.half_size())) {}
+
+Eigen::VectorXd LineSpectrum::samples(const Eigen::Ref<const Eigen::VectorXcd>& coefficients) {
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    half_spectrum_[lines_[k]] = coefficients[static_cast<Eigen::Index>(k)];
+  }
+  return dft_.inverse(half_spectrum_);
+}
+
+Eigen::VectorXcd LineSpectrum::coefficients(const Eigen::Ref<const Eigen::VectorXd>& samples) {
+  std::copy(samples.data(), samples.data() + samples.size(), dft_.input().begin());
+  const std::span<const std::complex<double>> spectrum = dft_.forward();
+  Eigen::VectorXcd coefficients(static_cast<Eigen::Index>(lines_.size()));
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    coefficients[static_cast<Eigen::Index>(k)] =
+        spectrum[static_cast<std::size_t>(lines_[k])] / static_cast<double>(dft_.length());
+  }
+  return coefficients;
+}
+
+}  // namespace stageid

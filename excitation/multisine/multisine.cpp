@@ -1,0 +1,62 @@
+#include "excitation/multisine/multisine.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "excitation/multisine/line_spectrum.hpp"
+#include "excitation/multisine/multisine_lines.hpp"
+
+namespace stageid {
+namespace {
+
+void check(const FrequencyGrid& grid, const MultisineSpec& spec) {
+  if (!(spec.level > 0.0) || !std::isfinite(spec.level)) {
+    throw std::invalid_argument(
+        fmt::format("multisine: level must be positive and finite, not {}", spec.level));
+  }
+  if (spec.crest_iterations < 0) {
+    throw std::invalid_argument(fmt::format(
+        "multisine: crest_iterations must not be negative, not {}", spec.crest_iterations));
+  }
+  if (spec.shape.size() == 0) return;
+  if (spec.shape.size() != grid.size()) {
+    throw std::invalid_argument(
+        fmt::format("multisine: shape has {} entries; one for each of the {} lines is needed",
+                    spec.shape.size(), grid.size()));
+  }
+  if (!spec.shape.allFinite() || (spec.shape.array() < 0.0).any()) {
+    throw std::invalid_argument("multisine: shape must be finite and not negative on every line");
+  }
+  if ((spec.shape.array() == 0.0).all()) {
+    throw std::invalid_argument("multisine: shape is zero on every line; one must be positive");
+  }
+}
+
+}  // namespace
+
+Multisine random_phase_multisine(const FrequencyGrid& grid, const MultisineSpec& spec) {
+  check(grid, spec);
+  Eigen::VectorXd amplitude = unit_rms_amplitude(grid, spec.shape);
+
+  Eigen::VectorXd phase_rad =
+      multisine_phase_rad(grid, amplitude, spec.seed, spec.crest_iterations);
+  Eigen::VectorXd samples =
+      LineSpectrum(grid).samples(line_coefficients(1.0, amplitude, phase_rad));
+  const double unit =
+      spec.scaling == AmplitudeScaling::rms ? 1.0 : samples.lpNorm<Eigen::Infinity>();
+  amplitude *= spec.level / unit;
+  samples *= spec.level / unit;
+  return {grid, std::move(samples), std::move(amplitude), std::move(phase_rad)};
+}
+
+double crest_factor(const Eigen::Ref<const Eigen::VectorXd>& samples) {
+  const double peak = samples.size() == 0 ? 0.0 : samples.lpNorm<Eigen::Infinity>();
+  if (!(peak > 0.0)) {
+    throw std::invalid_argument("crest factor: there must be at least one sample that is not zero");
+  }
+  return peak * std::sqrt(static_cast<double>(samples.size())) / samples.stableNorm();
+}
+
+}  // namespace stageid

@@ -1,0 +1,238 @@
+#include "excitation/plan/experiment_plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+
+#include "excitation/multisine/line_spectrum.hpp"
+#include "excitation/multisine/multisine_lines.hpp"
+#include "excitation/multisine/random_stream.hpp"
+#include "excitation/plan/hadamard.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+
+void check_axis(const FrequencyGrid& grid, const ExperimentSpec& spec, std::size_t number) {
+  const ExcitationAxis& axis = spec.axes[number];
+  const std::string place = fmt::format("experiment: axes[{}]", number);
+  if (axis.channel.empty()) throw std::invalid_argument(place + ".channel: a name is needed");
+  if (!(axis.level > 0.0) || !std::isfinite(axis.level)) {
+    throw std::invalid_argument(fmt::format("{}.level ({}): must be positive and finite, not {}",
+                                            place, axis.channel, axis.level));
+  }
+  if (axis.shape.size() == 0) return;
+  if (axis.shape.size() != grid.size()) {
+    throw std::invalid_argument(
+        fmt::format("{}.shape ({}): has {} entries; one for each of the {} lines is needed", place,
+                    axis.channel, axis.shape.size(), grid.size()));
+  }
+  for (Index k = 0; k < grid.size(); ++k) {
+    if (!has_line(spec.scheme, static_cast<Index>(number), static_cast<Index>(spec.axes.size()), k))
+      continue;
+    // A line that one axis does not excite has no FRF: it must not be in the grid.
+    if (!(axis.shape[k] > 0.0) || !std::isfinite(axis.shape[k])) {
+      throw std::invalid_argument(fmt::format(
+          "{}.shape ({}): is {} at line {}; must be positive and finite on every line of the grid",
+          place, axis.channel, axis.shape[k], grid.lines()[static_cast<std::size_t>(k)]));
+    }
+  }
+}
+
+void check(const FrequencyGrid& grid, const ExperimentSpec& spec) {
+  const auto at_least = [](const char* field, int value, int least) {
+    if (value < least) {
+      throw std::invalid_argument(
+          fmt::format("experiment: {} must be at least {}, not {}", field, least, value));
+    }
+  };
+  at_least("realizations", spec.realizations, 1);
+  at_least("periods", spec.periods, 1);
+  at_least("transient_periods", spec.transient_periods, 0);
+  at_least("crest_iterations", spec.crest_iterations, 0);
+  if (spec.axes.empty()) throw std::invalid_argument("experiment: axes: at least one is needed");
+  if (spec.scheme == ExcitationScheme::zippered &&
+      grid.size() < static_cast<Index>(spec.axes.size())) {
+    throw std::invalid_argument(
+        fmt::format("experiment: scheme zippered shares {} lines among {} axes; each needs some: "
+                    "lengthen the period or widen the band",
+                    grid.size(), spec.axes.size()));
+  }
+  std::set<std::string> channels;
+  for (std::size_t p = 0; p < spec.axes.size(); ++p) {
+    check_axis(grid, spec, p);
+    if (!channels.insert(spec.axes[p].channel).second) {
+      throw std::invalid_argument(fmt::format("experiment: axes[{}].channel: '{}' is excited twice",
+                                              p, spec.axes[p].channel));
+    }
+  }
+}
+
+/// T, axes x experiments: T T^H = n I for the orthogonal schemes, I for single_axis.
+MatrixXcd mixing_matrix(ExcitationScheme scheme, int n) {
+  if (scheme == ExcitationScheme::zippered) return MatrixXcd::Ones(n, 1);
+  if (scheme == ExcitationScheme::single_axis) return MatrixXcd::Identity(n, n);
+  if (scheme == ExcitationScheme::orthogonal_hadamard) {
+    try {
+      return hadamard_matrix(n).cast<std::complex<double>>();
+    } catch (const std::invalid_argument& e) {
+      throw std::invalid_argument(
+          fmt::format("experiment: scheme orthogonal_hadamard with {} axes: {}; orthogonal_dft "
+                      "takes any number",
+                      n, e.what()));
+    }
+  }
+  MatrixXcd T(n, n);
+  for (long long p = 0; p < n; ++p) {
+    for (long long e = 0; e < n; ++e) {
+      const double turns = static_cast<double>(p * e % n) / n;
+      T(static_cast<Index>(p), static_cast<Index>(e)) =
+          std::polar(1.0, 2.0 * std::numbers::pi * turns);
+    }
+  }
+  return T;
+}
+
+/// Of rms 1, on the lines that the axis has.
+Eigen::VectorXd axis_amplitude(const FrequencyGrid& grid, const ExperimentSpec& spec, int axis) {
+  Eigen::VectorXd shape = spec.axes[static_cast<std::size_t>(axis)].shape;
+  if (spec.scheme != ExcitationScheme::zippered) return unit_rms_amplitude(grid, shape);
+  if (shape.size() == 0) shape.setOnes(grid.size());
+  for (Index k = 0; k < grid.size(); ++k)
+    if (!has_line(spec.scheme, axis, static_cast<Index>(spec.axes.size()), k)) shape[k] = 0.0;
+  return unit_rms_amplitude(grid, shape);
+}
+
+Eigen::VectorXd draw_phase_rad(const FrequencyGrid& grid, const ExperimentSpec& spec,
+                               int realization, int axis) {
+  return multisine_phase_rad(grid, axis_amplitude(grid, spec, axis),
+                             stream_seed(spec.seed, static_cast<std::uint64_t>(realization),
+                                         static_cast<std::uint64_t>(axis)),
+                             spec.crest_iterations);
+}
+
+/// All phases of a plan with crest reduction, on all cores: every realization is reduced by itself,
+/// so the result does not depend on who takes which.
+std::vector<MatrixXd> reduced_phases(const FrequencyGrid& grid, const ExperimentSpec& spec) {
+  const int axes = static_cast<int>(spec.axes.size());
+  std::vector<MatrixXd> phases(static_cast<std::size_t>(spec.realizations),
+                               MatrixXd(axes, grid.size()));
+  for_each_task(0, spec.realizations, [&](int m) {
+    for (int p = 0; p < axes; ++p)
+      phases[static_cast<std::size_t>(m)].row(p) = draw_phase_rad(grid, spec, m, p).transpose();
+  });
+  return phases;
+}
+
+}  // namespace
+
+ExperimentPlan::ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec)
+    : ExperimentPlan(std::move(grid), std::move(spec), {}) {}
+
+ExperimentPlan::ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec,
+                               std::vector<MatrixXd> phase_rad)
+    : grid_(std::move(grid)), spec_(std::move(spec)), reduced_phase_rad_(std::move(phase_rad)) {
+  check(grid_, spec_);
+  mixing_ = mixing_matrix(spec_.scheme, axes());
+  if (spec_.crest_iterations > 0 && reduced_phase_rad_.empty()) {
+    reduced_phase_rad_ = reduced_phases(grid_, spec_);
+  }
+  set_amplitude();
+}
+
+std::vector<RunId> ExperimentPlan::runs() const {
+  std::vector<RunId> runs;
+  for (int m = 0; m < spec_.realizations; ++m) {
+    for (int e = 0; e < experiments(); ++e) runs.push_back({m, e});
+  }
+  return runs;
+}
+
+std::vector<RunId> ExperimentPlan::runs_without(const std::vector<RunId>& done) const {
+  std::vector<RunId> left = runs();
+  std::erase_if(left, [&](RunId run) { return std::ranges::find(done, run) != done.end(); });
+  return left;
+}
+
+long long ExperimentPlan::samples_per_run() const noexcept {
+  const long long periods = static_cast<long long>(spec_.transient_periods) + spec_.periods;
+  return periods * grid_.samples_per_period();
+}
+
+double ExperimentPlan::duration_s() const noexcept {
+  return static_cast<double>(spec_.realizations) * experiments() *
+         static_cast<double>(samples_per_run()) / grid_.sample_rate_hz();
+}
+
+void ExperimentPlan::check_run(RunId run) const {
+  if (run.realization < 0 || run.realization >= spec_.realizations || run.experiment < 0 ||
+      run.experiment >= experiments()) {
+    throw std::invalid_argument(fmt::format(
+        "experiment: no realization {}, experiment {}; realizations: {}, experiments: {}",
+        run.realization, run.experiment, spec_.realizations, experiments()));
+  }
+}
+
+MatrixXd ExperimentPlan::phase_rad(int realization) const {
+  check_run({realization, 0});
+  if (!reduced_phase_rad_.empty()) return reduced_phase_rad_[static_cast<std::size_t>(realization)];
+  MatrixXd phase_rad(axes(), grid_.size());
+  for (int p = 0; p < axes(); ++p) {
+    phase_rad.row(p) = draw_phase_rad(grid_, spec_, realization, p).transpose();
+  }
+  return phase_rad;
+}
+
+MatrixXcd ExperimentPlan::spectrum(RunId run) const {
+  check_run(run);
+  const MatrixXd phases = phase_rad(run.realization);
+  MatrixXcd spectrum = MatrixXcd::Zero(axes(), grid_.size());
+  for (int p = 0; p < axes(); ++p) {
+    if (!excites(p, run.experiment)) continue;
+    spectrum.row(p) = line_coefficients(mixing_(p, run.experiment), amplitude_.row(p).transpose(),
+                                        phases.row(p).transpose())
+                          .transpose();
+  }
+  return spectrum;
+}
+
+MatrixXd ExperimentPlan::excitation(RunId run) const {
+  const MatrixXcd lines = spectrum(run);
+  LineSpectrum synthesis(grid_);
+  MatrixXd samples = MatrixXd::Zero(grid_.samples_per_period(), axes());
+  for (int p = 0; p < axes(); ++p) {
+    if (excites(p, run.experiment)) samples.col(p) = synthesis.samples(lines.row(p).transpose());
+  }
+  return samples;
+}
+
+/// One amplitude for all runs, also when peaks are prescribed: the best linear approximation of a
+/// stage that is not quite linear depends on the amplitudes, so they must not change between
+/// realizations.
+void ExperimentPlan::set_amplitude() {
+  amplitude_.resize(axes(), grid_.size());
+  Eigen::VectorXd level(axes());
+  for (int p = 0; p < axes(); ++p) {
+    amplitude_.row(p) = axis_amplitude(grid_, spec_, p).transpose();
+    level[p] = spec_.axes[static_cast<std::size_t>(p)].level;
+  }
+  if (spec_.scaling == AmplitudeScaling::peak) {
+    Eigen::VectorXd peak = Eigen::VectorXd::Zero(axes());
+    for (const RunId run : runs()) {
+      peak = peak.cwiseMax(excitation(run).cwiseAbs().colwise().maxCoeff().transpose());
+    }
+    level.array() /= peak.array();
+  }
+  amplitude_ = level.asDiagonal() * amplitude_;
+}
+
+}  // namespace stageid

@@ -1,0 +1,73 @@
+#include "excitation/plan/least_variance_power.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+constexpr int kMostRounds = 3000;
+constexpr double kGap = 1e-6;
+// A multiplier that has died out could not come back if its bound is reached later.
+constexpr double kSmallestMultiplier = 1e-14;
+// Entries without cost get so much of the largest amplitude^2 that costs would ask for: they have
+// to be excited, but nothing is to be learnt there.
+constexpr double kSmallestCost = 1e-12;
+
+void check(const Eigen::Ref<const Eigen::VectorXd>& cost,
+           const Eigen::Ref<const Eigen::MatrixXd>& bounds) {
+  if (cost.size() != bounds.cols() || cost.size() == 0 || bounds.rows() == 0)
+    throw std::invalid_argument(
+        fmt::format("excitation power: {} costs and {} x {} bounds; one column a cost is needed",
+                    cost.size(), bounds.rows(), bounds.cols()));
+  if (!cost.allFinite() || !(cost.minCoeff() >= 0.0) || !(cost.maxCoeff() > 0.0))
+    throw std::invalid_argument(
+        "excitation power: the costs must be finite, not negative, and one of them positive");
+  if (!bounds.allFinite() || !(bounds.minCoeff() >= 0.0))
+    throw std::invalid_argument("excitation power: the bounds must be finite and not negative");
+  for (Eigen::Index i = 0; i < cost.size(); ++i)
+    if (!(bounds.col(i).maxCoeff() > 0.0))
+      throw std::invalid_argument(
+          fmt::format("excitation power: entry {} is under no bound; its amplitude has no end", i));
+}
+
+}  // namespace
+
+PowerSpectrum least_variance_power(const Eigen::Ref<const Eigen::VectorXd>& cost,
+                                   const Eigen::Ref<const Eigen::MatrixXd>& bounds) {
+  check(cost, bounds);
+  const Eigen::ArrayXd c = cost.array().max(kSmallestCost * cost.maxCoeff());
+  Eigen::VectorXd lambda = Eigen::VectorXd::Ones(bounds.rows());
+  PowerSpectrum best;
+  best.cost = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < kMostRounds; ++round) {
+    const Eigen::ArrayXd price = (bounds.transpose() * lambda).array();
+    const Eigen::ArrayXd power = (c / price).sqrt();
+    const Eigen::VectorXd use = bounds * power.matrix();
+    const double scale = 1.0 / use.maxCoeff();
+    const double total = (c / power).sum() / scale;
+    if (total < best.cost) {
+      best.cost = total;
+      best.power = scale * power;
+    }
+    // max over s > 0 of  2 sqrt(s) S - s L,  S = sum sqrt(c price), L = sum lambda.
+    const double root_sum = (c * price).sqrt().sum();
+    const double bound = root_sum * root_sum / lambda.sum();
+    if (bound > best.lower_bound) {
+      best.lower_bound = bound;
+      best.multiplier = lambda * (root_sum * root_sum / (lambda.sum() * lambda.sum()));
+    }
+    if (best.cost <= (1.0 + kGap) * best.lower_bound) break;
+    // B a = 1 at the optimum; a is of degree -1/2 in lambda, so that the scale settles by itself.
+    lambda.array() *= use.array() / use.maxCoeff();
+    lambda = lambda.cwiseMax(kSmallestMultiplier * lambda.maxCoeff());
+    lambda /= lambda.maxCoeff();
+  }
+  return best;
+}
+
+}  // namespace stageid

@@ -1,0 +1,257 @@
+#include "excitation/plan/limited_design.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "excitation/multisine/multisine_lines.hpp"
+#include "excitation/plan/joint_crest_reduction.hpp"
+#include "excitation/plan/least_variance_power.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+// Spectrum and crest factors depend on each other; after three turns the scale moves by less than
+// 1 %.
+constexpr int kTurns = 3;
+constexpr int kLastTurns = 2;  // with the phases of all realizations
+constexpr double kFirstCrestFactor = 2.5;
+constexpr double kEnough = 0.93;  // what lies between the samples has to fit in as well
+
+void check(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
+  const auto fail = [](const std::string& what) {
+    throw std::invalid_argument("limited design: " + what);
+  };
+  const auto axes = static_cast<Index>(spec.experiment.axes.size());
+  if (spec.cost.rows() != axes || spec.cost.cols() != grid.size())
+    fail(fmt::format("cost is {} x {}; {} axes x {} lines are needed", spec.cost.rows(),
+                     spec.cost.cols(), axes, grid.size()));
+  if (!(spec.safety > 0.0 && spec.safety <= 1.0))
+    fail(fmt::format("safety is {}; it must be in (0, 1]", spec.safety));
+  if (spec.experiment.crest_iterations < 1)
+    fail("crest_iterations must be 1 or more: the phases are part of the design");
+  for (const BoundedSignal& s : spec.signals) {
+    if (s.transfer.rows() != axes || s.transfer.cols() != grid.size() || !s.transfer.allFinite())
+      fail(fmt::format("{}: transfer must be {} axes x {} lines and finite", s.name, axes,
+                       grid.size()));
+    if (!(s.peak_limit > 0.0) || !(s.rms_limit > 0.0) || !(s.reserve >= 0.0))
+      fail(fmt::format("{}: limits must be positive and the reserve not negative", s.name));
+    if (!(s.reserve < spec.safety * s.peak_limit))
+      fail(fmt::format("{}: the reserve {:.4g} leaves nothing of the limit {:.4g}", s.name,
+                       s.reserve, s.peak_limit));
+  }
+}
+
+/// The axes of a group are excited in the same runs: one for each axis, or one for all.
+std::vector<std::vector<Index>> groups_of(const ExperimentPlan& plan) {
+  std::vector<std::vector<Index>> groups;
+  const auto axes = static_cast<Index>(plan.spec().axes.size());
+  if (plan.spec().scheme == ExcitationScheme::single_axis) {
+    for (Index p = 0; p < axes; ++p) groups.push_back({p});
+    return groups;
+  }
+  groups.emplace_back();
+  for (Index p = 0; p < axes; ++p) groups.front().push_back(p);
+  return groups;
+}
+
+class Designer {
+ public:
+  Designer(const FrequencyGrid& grid, const LimitedDesignSpec& spec)
+      : grid_(grid), spec_(spec), plan_(flat_plan(grid, spec)), groups_(groups_of(plan_)) {
+    cost_ = (plan_.amplitude().array() > 0.0).select(spec.cost, 0.0);
+    const Eigen::VectorXd frequency_hz = grid.frequency_hz();
+    for (const BoundedSignal& s : spec.signals) {
+      gain_.emplace_back(s.transfer.cwiseAbs2() / 2.0);
+      for (Index k = 0; k < grid.size(); ++k)
+        gain_.back().col(k) *=
+            std::norm(kind_factor(s.kind, frequency_hz[k], grid.sample_rate_hz()));
+    }
+    crest_.setConstant(static_cast<Index>(spec.signals.size()), static_cast<Index>(groups_.size()),
+                       kFirstCrestFactor);
+  }
+
+  LimitedDesign design() {
+    std::vector<MatrixXd> phases(static_cast<std::size_t>(spec_.experiment.realizations));
+    for (int m = 0; m < spec_.experiment.realizations; ++m)
+      phases[static_cast<std::size_t>(m)] = plan_.phase_rad(m);
+    for (int turn = 0; turn < kTurns; ++turn) {
+      set_amplitude();
+      phases.front() = reduced(phases.front());
+      take_crest_factors(predicted(phases.front()));
+    }
+    set_amplitude();
+    for_each_task(0, static_cast<int>(phases.size()), [&](int m) {
+      const auto i = static_cast<std::size_t>(m);
+      phases[i] = reduced(phases[i]);
+    });
+    // Some realization is the worst for some signal: give that signal less where it costs least, rather
+    // than all of them.
+    for (int turn = 0; turn < kLastTurns; ++turn) {
+      take_crest_factors(predicted_all(phases));
+      set_amplitude();
+    }
+    return finish(predicted_all(phases), phases);
+  }
+
+ private:
+  using Peaks = std::vector<std::vector<SignalPeak>>;  // group, signal
+
+  static ExperimentPlan flat_plan(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
+    ExperimentSpec flat = spec.experiment;
+    flat.crest_iterations = 0;  // the plan's own random phases are the start
+    flat.scaling = AmplitudeScaling::rms;
+    for (ExcitationAxis& axis : flat.axes) {
+      axis.level = 1.0;
+      axis.shape = {};
+    }
+    return {grid, flat};
+  }
+
+  /// Mean square of signal s, on the lines of a group.
+  double mean_square(std::size_t s, const std::vector<Index>& group) const {
+    double sum = 0.0;
+    for (const Index p : group) sum += gain_[s].row(p).dot(amplitude_.row(p).cwiseAbs2());
+    return sum;
+  }
+
+  /// Largest mean square that the limits leave to a signal.
+  double allowed(std::size_t s, Index group) const {
+    const BoundedSignal& signal = spec_.signals[s];
+    const double peak =
+        (spec_.safety * signal.peak_limit - signal.reserve) / crest_(static_cast<Index>(s), group);
+    return std::pow(std::min(peak, spec_.safety * signal.rms_limit), 2);
+  }
+
+  void set_amplitude() {
+    amplitude_.resize(spec_.cost.rows(), spec_.cost.cols());
+    const Index lines = grid_.size();
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const std::vector<Index>& group = groups_[g];
+      const auto size = static_cast<Index>(group.size());
+      MatrixXd bounds(static_cast<Index>(spec_.signals.size()), size * lines);
+      Eigen::VectorXd cost(size * lines);
+      for (Index i = 0; i < size; ++i) {
+        const Index p = group[static_cast<std::size_t>(i)];
+        cost.segment(i * lines, lines) = cost_.row(p).transpose();
+        for (std::size_t s = 0; s < spec_.signals.size(); ++s)
+          bounds.block(static_cast<Index>(s), i * lines, 1, lines) =
+              gain_[s].row(p) / allowed(s, static_cast<Index>(g));
+      }
+      const Eigen::VectorXd power = least_variance_power(cost, bounds).power;
+      for (Index i = 0; i < size; ++i)
+        amplitude_.row(group[static_cast<std::size_t>(i)]) =
+            power.segment(i * lines, lines).cwiseSqrt().transpose();
+    }
+    amplitude_ = (plan_.amplitude().array() > 0.0).select(amplitude_, 0.0).eval();
+  }
+
+  MatrixXd reduced(const MatrixXd& phase_rad) const {
+    JointCrestProblem problem{grid_, plan_.mixing(), spec_.signals, amplitude_};
+    problem.enough = enough();
+    return reduce_joint_crest(problem, phase_rad, spec_.experiment.crest_iterations);
+  }
+
+  /// Where rms limits hold the amplitudes down, peaks need not fall far below safety of their limits.
+  double enough() const { return kEnough * spec_.safety; }
+
+  Peaks predicted(const MatrixXd& phase_rad) const {
+    Peaks peaks(groups_.size(), std::vector<SignalPeak>(spec_.signals.size()));
+    SignalPredictor predictor(grid_);
+    for (int e = 0; e < plan_.experiments(); ++e) {
+      Eigen::MatrixXcd R = Eigen::MatrixXcd::Zero(amplitude_.rows(), amplitude_.cols());
+      for (Index p = 0; p < R.rows(); ++p)
+        R.row(p) = line_coefficients(plan_.mixing()(p, e), amplitude_.row(p).transpose(),
+                                     phase_rad.row(p).transpose())
+                       .transpose();
+      const std::size_t group = groups_.size() == 1 ? 0 : static_cast<std::size_t>(e);
+      const std::vector<SignalPeak> run = predictor.predict(spec_.signals, R);
+      for (std::size_t s = 0; s < run.size(); ++s) peaks[group][s].include(run[s]);
+    }
+    return peaks;
+  }
+
+  Peaks predicted_all(const std::vector<MatrixXd>& phases) const {
+    std::vector<Peaks> peaks(phases.size());
+    for_each_task(0, static_cast<int>(phases.size()), [&](int m) {
+      peaks[static_cast<std::size_t>(m)] = predicted(phases[static_cast<std::size_t>(m)]);
+    });
+    for (std::size_t i = 1; i < peaks.size(); ++i) include(peaks.front(), peaks[i]);
+    return std::move(peaks.front());
+  }
+
+  static void include(Peaks& all, const Peaks& more) {
+    for (std::size_t g = 0; g < all.size(); ++g)
+      for (std::size_t s = 0; s < all[g].size(); ++s) all[g][s].include(more[g][s]);
+  }
+
+  void take_crest_factors(const Peaks& peaks) {
+    for (std::size_t g = 0; g < peaks.size(); ++g)
+      for (std::size_t s = 0; s < peaks[g].size(); ++s)
+        crest_(static_cast<Index>(s), static_cast<Index>(g)) =
+            std::max(1.0, peaks[g][s].peak() / std::sqrt(mean_square(s, groups_[g])));
+  }
+
+  /// Largest factor of the group's amplitudes that keeps all limits.
+  double scale_of(const std::vector<SignalPeak>& peaks) const {
+    double scale = std::numeric_limits<double>::infinity();
+    for (std::size_t s = 0; s < peaks.size(); ++s) {
+      const BoundedSignal& signal = spec_.signals[s];
+      scale =
+          std::min(scale, (spec_.safety * signal.peak_limit - signal.reserve) / peaks[s].peak());
+      scale = std::min(scale, spec_.safety * signal.rms_limit / peaks[s].rms);
+    }
+    return scale;
+  }
+
+  LimitedDesign finish(const Peaks& peaks, const std::vector<MatrixXd>& phases) {
+    std::vector<SignalPeak> largest(spec_.signals.size());
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const double scale = scale_of(peaks[g]);
+      for (const Index p : groups_[g]) amplitude_.row(p) *= scale;
+      for (std::size_t s = 0; s < largest.size(); ++s) {
+        const SignalPeak& peak = peaks[g][s];
+        largest[s].include({scale * peak.steady, scale * peak.from_rest, scale * peak.rms});
+      }
+    }
+    ExperimentSpec experiment = spec_.experiment;
+    experiment.scaling = AmplitudeScaling::rms;
+    for (std::size_t p = 0; p < experiment.axes.size(); ++p) {
+      const Eigen::VectorXd A = amplitude_.row(static_cast<Index>(p)).transpose();
+      experiment.axes[p].shape = A;
+      experiment.axes[p].level = A.norm() / std::sqrt(2.0);
+    }
+    const double cost =
+        (cost_.array() > 0.0).select(cost_.array() / amplitude_.array().square(), 0.0).sum();
+    return {ExperimentPlan(grid_, std::move(experiment), phases), std::move(largest), cost};
+  }
+
+  const FrequencyGrid& grid_;
+  const LimitedDesignSpec& spec_;
+  ExperimentPlan plan_;
+  std::vector<std::vector<Index>> groups_;
+  std::vector<MatrixXd> gain_;  // a signal's mean square over that of one line of one axis
+  MatrixXd crest_;              // signals x groups
+  MatrixXd cost_;               // spec_.cost on the lines that an axis has
+  MatrixXd amplitude_;
+};
+
+}  // namespace
+
+LimitedDesign design_within_limits(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
+  check(grid, spec);
+  return Designer(grid, spec).design();
+}
+
+double limit_use(const BoundedSignal& signal, const SignalPeak& peak) {
+  return std::max((peak.peak() + signal.reserve) / signal.peak_limit, peak.rms / signal.rms_limit);
+}
+
+}  // namespace stageid

@@ -1,0 +1,306 @@
+#include "frf/health/data_health.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "acquisition/files/counted.hpp"
+#include "frf/health/health_measures.hpp"
+#include "frf/health/transient_check.hpp"
+#include "frf/statistics/order_statistic.hpp"
+#include "frf/statistics/tail_probability.hpp"
+#include "frf/wiring/examination.hpp"
+#include "frf/wiring/repetition_check.hpp"
+#include "frf/wiring/rigid_body_check.hpp"
+#include "frf/wiring/skew_check.hpp"
+#include "frf/wiring/timing_check.hpp"
+
+namespace stageid {
+namespace {
+
+using Index = Eigen::Index;
+
+constexpr double kSignificance = 1e-4;    // of a check, over all channels
+constexpr double kSuspicion = 0.05;       // of clipping, where u = r - C y fails
+constexpr double kStuckShare = 0.02;      // of a run's samples that show one value
+constexpr double kExcludedPower = 1e-4;   // of the inputs' power
+constexpr double kWorstExcitation = 1e3;  // cond(R)
+constexpr double kWorstInputs = 1e2;      // median of cond(U) in the upper half of the band
+constexpr double kLeastCoherence = 0.9;
+constexpr double kCertain = 1e6;  // of evidence, where there is no noise
+
+}  // namespace
+
+const std::string& Examination::name(Index channel) const {
+  return channel < record_.n_y()
+             ? record_.info.sensors.names[static_cast<std::size_t>(channel)]
+             : record_.info.actuators.names[static_cast<std::size_t>(channel - record_.n_y())];
+}
+
+bool Examination::found(Cause cause) const {
+  return std::any_of(findings_.begin(), findings_.end(),
+                     [&](const Finding& f) { return f.cause == cause; });
+}
+
+std::vector<Index> Examination::excited_actuators() const {
+  std::vector<Index> found;
+  const auto& names = record_.info.actuators.names;
+  for (const Index axis : record_.axes) {
+    const auto at = std::find(names.begin(), names.end(),
+                              record_.info.excitation.names[static_cast<std::size_t>(axis)]);
+    if (at == names.end()) return {};
+    found.push_back(at - names.begin());
+  }
+  return found;
+}
+
+void Examination::check_cycles() {
+  const RunHealth& health = record_.health;
+  if (health.marked + health.missing > 0)
+    find(Severity::doubt, Cause::marked, "", "samples are marked as not to be used",
+         fmt::format("{} of {} cycles", health.marked + health.missing, health.cycles),
+         "their periods are left out; repeat the runs if there are many");
+  if (health.late > 0)
+    find(Severity::doubt, Cause::late, "", "cycles were late: the loop's phase is not the model's",
+         fmt::format("{} of {}, the latest by {:.3g} us", health.late, health.cycles,
+                     1e-3 * static_cast<double>(health.largest_lateness_ns)),
+         "give the loop a core of its own (realtime: in the stage file)");
+}
+
+void Examination::check_samples() {
+  const double limit = std::log(kSignificance / (2.0 * static_cast<double>(record_.scan.size())));
+  const auto run_samples =
+      static_cast<double>(record_.periods.empty() ? 1 : record_.periods.front()) *
+      record_.info.period_samples;
+  for (Index c = 0; c < static_cast<Index>(record_.scan.size()); ++c) {
+    const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
+    const bool sensor = c < record_.n_y();
+    const auto stuck = static_cast<double>(scan.longest_constant());
+    const bool piles_up = std::min(scan.log_p_high(), scan.log_p_low()) < limit;
+    // An actuator that nothing drives stands still by right; a whole run of one value is no clipping.
+    if (stuck > std::max(kStuckShare * run_samples, 2.0) && !(piles_up && scan.returns())) {
+      bool known = false;
+      const auto excited = excited_actuators();
+      const bool driven =
+          sensor ? expected_to_respond(c, known) || !known
+                 : std::find(excited.begin(), excited.end(), c - record_.n_y()) != excited.end();
+      if (!driven) continue;
+      find(Severity::fault, Cause::dead, name(c), "dead: shows one value for long",
+           fmt::format("{:.3g} s", stuck / record_.info.sample_rate_hz),
+           "look at its cable and its amplifier; measure again");
+      spoilt_.push_back(c);
+      continue;
+    }
+    if (piles_up) find_clipped(c, limit);
+  }
+}
+
+/// @param log_p from where on an end of the range tells of clipping
+void Examination::find_clipped(Index c, double log_p) {
+  const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
+  const bool sensor = c < record_.n_y();
+  const bool high = scan.log_p_high() <= log_p;
+  const bool low = scan.log_p_low() <= log_p;
+  const std::string& unit = (sensor ? record_.info.sensors : record_.info.actuators)
+                                .units[static_cast<std::size_t>(sensor ? c : c - record_.n_y())];
+  find(Severity::fault, Cause::saturated, name(c),
+       "clipped: samples pile up at the end of its range",
+       fmt::format("{} at {:.4g} {}",
+                   counted((high ? scan.high().count : 0) + (low ? scan.low().count : 0), "sample"),
+                   high ? scan.high().value : scan.low().value, unit),
+       sensor ? "lower the level, or widen the sensor's range"
+              : "lower the level, or raise the actuator's limit");
+  spoilt_.push_back(c);
+}
+
+/// Where u = r - C y fails, a few samples that pile up are enough to say why: the channel most clipped
+/// of `count` from `first` on.
+bool Examination::find_suspected(Index first, Index count) {
+  const auto log_p = [this](Index c) {
+    const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
+    return scan.log_p_high() + scan.log_p_low();
+  };
+  Index most = first;
+  for (Index c = first; c < first + count; ++c)
+    if (log_p(c) < log_p(most)) most = c;
+  if (log_p(most) > std::log(kSuspicion)) return false;
+  find_clipped(most, 0.5 * std::log(kSuspicion));
+  return true;
+}
+
+void Examination::check_responses() {
+  bool any = false;
+  for (Index s = 0; s < record_.n_y(); ++s) any = any || responds(record_, s);
+  if (!any && spoilt_.empty()) {
+    find(Severity::fault, Cause::incoherent, "",
+         "no sensor shows a motion that repeats with the excitation: something else moves the "
+         "stage, or the excitation does not reach it",
+         fmt::format("no line of {} above its noise",
+                     counted(static_cast<std::size_t>(record_.n_y()), "sensor")),
+         "hold the setpoint still, raise the level, or look at the injection; measure again");
+    return;
+  }
+  for (Index s = 0; s < record_.n_y(); ++s) {
+    if (spoilt(s)) continue;
+    bool known = false;
+    const bool expected = expected_to_respond(s, known);
+    if (!responds(record_, s)) {
+      if (known && !expected) continue;
+      find(known ? Severity::fault : Severity::doubt, Cause::dead, name(s),
+           known ? "dead: noise only, where the rigid body moves it"
+                 : "no response to the excitation: dead, or it does not see these axes",
+           "no line above its noise",
+           known ? "look at its cable and its supply; measure again"
+                 : "leave it out with --outputs, or look at its cable");
+      spoilt_.push_back(s);
+      continue;
+    }
+    const double coherence = median_coherence(record_, s);
+    // A dead sensor in the loop disturbs the others.
+    if (expected && spoilt_.empty() && coherence < kLeastCoherence)
+      find(Severity::doubt, Cause::incoherent, name(s),
+           "little of its motion repeats from period to period",
+           fmt::format("median coherence {:.2f}", coherence),
+           "raise the level, or measure more periods");
+  }
+}
+
+/// Signals per excitation, X = Z R^-1: an axis whose column of X is noise in every channel is not driven. One F
+/// test a line and channel, Fisher's sum over the lines.
+void Examination::check_arrival() {
+  const auto axes = static_cast<Index>(record_.axes.size());
+  const int dof = record_.scatter_dof();
+  if (axes < 2 || record_.zippered || dof == 0 || record_.experiments() != axes) return;
+  const Index channels = record_.n_y() + record_.n_u();
+  Eigen::MatrixXd evidence = Eigen::MatrixXd::Zero(channels, axes);
+  Index lines = 0;
+  for (const LineRecord& line : record_.lines) {
+    const Eigen::MatrixXcd R = line.R(record_.axes, Eigen::all);
+    if (!(condition(R) < kWorstExcitation)) continue;  // check_excitation() tells
+    ++lines;
+    const Eigen::MatrixXcd inverse = R.inverse();
+    const Eigen::MatrixXcd X = record_.mean(line.Z) * inverse;
+    const Eigen::VectorXd variance = record_.variance_of_mean(line.Z);
+    for (Index a = 0; a < axes; ++a)
+      for (Index c = 0; c < channels; ++c) {
+        const double noise = variance[c] * inverse.col(a).squaredNorm();
+        const double power = std::norm(X(c, a));
+        if (power > 0.0)
+          evidence(c, a) -= noise > 0.0 ? log_tail_of_f(power / noise, 1, dof) : -kCertain;
+      }
+  }
+  const double tests = static_cast<double>(channels * axes);
+  for (Index a = 0; a < axes; ++a) {
+    bool driven = lines == 0;
+    for (Index c = 0; c < channels; ++c)
+      driven = driven || tail_of_evidence(evidence(c, a), lines) < kSignificance / tests;
+    if (driven) continue;
+    find(Severity::fault, Cause::excitation,
+         record_.info.excitation
+             .names[static_cast<std::size_t>(record_.axes[static_cast<std::size_t>(a)])],
+         "its excitation does not arrive: no channel moves with it", "no line above its noise",
+         "look at the injection of this axis and measure again, or leave it out with --inputs");
+  }
+}
+
+void Examination::check_excitation() {
+  if (record_.axes.empty() || record_.zippered) return;  // orthogonal: they share no line
+  double worst = 0.0;
+  Index at = 0;
+  for (Index k = 0; k < record_.frequency_hz.size(); ++k) {
+    const LineRecord& line = record_.lines[static_cast<std::size_t>(k)];
+    const double cond = condition(line.R(record_.axes, Eigen::all));
+    if (cond <= worst) continue;
+    worst = cond;
+    at = k;
+  }
+  const auto axes = static_cast<Index>(record_.axes.size());
+  if (record_.experiments() < axes)
+    find(Severity::fault, Cause::excitation, "", "fewer experiments than excited axes",
+         fmt::format("{} for {}",
+                     counted(static_cast<std::size_t>(record_.experiments()), "experiment"),
+                     counted(record_.axes.size(), "axis", "axes")),
+         "one experiment per axis, or an orthogonal scheme");
+  else if (!std::isfinite(worst))
+    find(Severity::fault, Cause::excitation, "", "an axis is not excited on a line that others are",
+         fmt::format("at {:.4g} Hz", record_.frequency_hz[at]),
+         "excite all axes on the same lines");
+  else if (worst > kWorstExcitation)
+    find(Severity::fault, Cause::excitation, "", "the experiments excite the axes almost alike",
+         fmt::format("cond(R) {:.3g} at {:.4g} Hz", worst, record_.frequency_hz[at]),
+         "one experiment per axis, or an orthogonal scheme");
+}
+
+/// After the recording's channels are put right.
+void Examination::check_inputs() {
+  const std::vector<Index> excited = excited_actuators();
+  if (excited.empty() || record_.zippered) return;
+  std::vector<Index> rows;
+  for (const Index a : excited) rows.push_back(record_.n_y() + a);
+  std::vector<double> conditions;
+  const double last_hz = record_.frequency_hz[record_.frequency_hz.size() - 1];
+  for (Index k = 0; k < record_.frequency_hz.size(); ++k)
+    if (record_.frequency_hz[k] > 0.5 * last_hz)
+      conditions.push_back(
+          condition(record_.mean(record_.lines[static_cast<std::size_t>(k)].Z(rows, Eigen::all))));
+  if (conditions.empty()) return;
+  const double median = order_statistic(conditions, 0.5);
+  if (std::isfinite(median) && median > kWorstInputs)  // else an input without power, named already
+    find(Severity::doubt, Cause::inputs, "", "the loop makes the inputs almost alike",
+         fmt::format("median cond(U) {:.3g} above {:.4g} Hz", median, 0.5 * last_hz),
+         "more power on the weak directions; shape the excitation by the sensitivity");
+}
+
+void Examination::check_excluded() {
+  const std::vector<Index> excited = excited_actuators();
+  // Where something drives an axis unseen the loop moves the others too.
+  if (excited.empty() || found(Cause::unrecorded)) return;
+  const auto power = [&](Index a) {
+    double sum = 0.0;
+    for (const LineRecord& line : record_.lines)
+      sum += record_.mean(line.Z.row(record_.n_y() + a)).squaredNorm();
+    return sum;
+  };
+  double inputs = 0.0;
+  for (const Index a : excited) inputs += power(a);
+  if (!(inputs > 0.0)) return;
+  for (Index a = 0; a < record_.n_u(); ++a) {
+    const Index c = record_.n_y() + a;
+    if (std::find(excited.begin(), excited.end(), a) != excited.end()) continue;
+    const double share = power(a) / inputs;
+    if (share > kExcludedPower && responds(record_, c))
+      find(Severity::doubt, Cause::excluded, name(c),
+           "is not part of the sub-plant but moves on the excited lines: it biases the response",
+           fmt::format("{:.2g} of the inputs' power", share), "excite it too, or open its loop");
+  }
+}
+
+std::vector<Finding> Examination::examine() {
+  findings_ = check_timing(record_, nominal_);
+  check_cycles();
+  check_samples();
+  if (!found(Cause::aperiodic)) {  // else no spectrum is what it seems
+    check_injection();
+    check_responses();
+    if (!any_fault(findings_)) check_arrival();
+    check_excitation();
+    check_recording();
+    check_excluded();
+    check_stage();
+    check_inputs();
+    if (!any_fault(findings_))  // of a channel that is stuck, what follows the start is no ringing
+      for (Finding& finding : check_start_transient(record_.start))
+        findings_.push_back(std::move(finding));
+  }
+  std::stable_sort(findings_.begin(), findings_.end(),
+                   [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });
+  return std::move(findings_);
+}
+
+std::vector<Finding> check_health(HealthRecord record, const std::optional<NominalStage>& nominal) {
+  return Examination(std::move(record), nominal).examine();
+}
+
+}  // namespace stageid

@@ -1,0 +1,48 @@
+#include "frf/health/experiment_noise_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace stageid {
+namespace {
+
+constexpr std::size_t kMostNamed = 4;
+
+/// "realization 1, experiment 2: 9.8 times ...; ", the one that differs most first.
+std::string named(std::vector<NoisyRun> runs) {
+  std::stable_sort(runs.begin(), runs.end(), [](const NoisyRun& a, const NoisyRun& b) {
+    return std::abs(std::log(a.ratio)) > std::abs(std::log(b.ratio));
+  });
+  std::string text;
+  for (std::size_t i = 0; i < std::min(runs.size(), kMostNamed); ++i)
+    text +=
+        fmt::format("realization {}, experiment {}: {:.2g} times the power of the others on {}; ",
+                    runs[i].realization + 1, runs[i].experiment + 1, runs[i].ratio, runs[i].output);
+  if (runs.size() > kMostNamed) text += fmt::format("{} more; ", runs.size() - kMostNamed);
+  return text;
+}
+
+}  // namespace
+
+std::vector<Finding> check_experiment_noise(const FrfEstimate& frf,
+                                            const std::vector<NoisyRun>& runs) {
+  if (!(frf.experiment_noise_ratio > 1.0)) return {};
+  Finding finding;
+  finding.severity = Severity::doubt;
+  finding.cause = Cause::uneven_noise;
+  finding.what =
+      "the noise differs between the experiments: each has its own variance, with fewer degrees of "
+      "freedom than a common one";
+  finding.figure =
+      named(runs) + fmt::format("up to {:.2g} times the power; {:.2g} degrees of freedom are left",
+                                frf.experiment_noise_ratio, frf.noise_dof);
+  finding.remedy =
+      "look for what ran during some of them; 'fit --weighting likelihood' takes the nearest "
+      "covariance that is common to all";
+  return {finding};
+}
+
+}  // namespace stageid

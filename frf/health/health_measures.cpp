@@ -1,0 +1,57 @@
+#include "frf/health/health_measures.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include "frf/statistics/order_statistic.hpp"
+#include "frf/statistics/tail_probability.hpp"
+
+namespace stageid {
+namespace {
+
+using Index = Eigen::Index;
+
+constexpr double kSignificance = 1e-4;
+constexpr double kRounding = 1e-24;  // of a line's power: what double precision leaves of no noise
+
+}  // namespace
+
+bool responds(const HealthRecord& record, Index channel) {
+  if (record.scatter_dof() == 0) return true;
+  double evidence = 0.0;
+  for (const LineRecord& line : record.lines) {
+    const Eigen::MatrixXcd row = line.Z.row(channel);
+    const double variance = record.variance_of_mean(row)[0];
+    const double mean_square =
+        record.mean(row).squaredNorm() / static_cast<double>(record.experiments());
+    if (variance > kRounding * mean_square)
+      evidence -= log_tail_of_f(mean_square / variance, static_cast<int>(record.experiments()),
+                                record.scatter_dof());
+    else if (mean_square > 0.0)
+      return true;
+  }
+  return tail_of_evidence(evidence, static_cast<Index>(record.lines.size())) < kSignificance;
+}
+
+double median_coherence(const HealthRecord& record, Index channel) {
+  std::vector<double> values;
+  for (const LineRecord& line : record.lines) {
+    const Eigen::MatrixXcd row = line.Z.row(channel);
+    const double power = row.squaredNorm();
+    if (power > 0.0) values.push_back(1.0 - record.scatter(row)(0, 0).real() / power);
+  }
+  if (values.empty()) return 1.0;
+  return order_statistic(values, 0.5);
+}
+
+double condition(const Eigen::MatrixXcd& M) {
+  const Eigen::VectorXd row_norm = M.rowwise().norm();
+  if (!(row_norm.minCoeff() > 0.0)) return std::numeric_limits<double>::infinity();
+  const Eigen::VectorXd values =
+      Eigen::JacobiSVD<Eigen::MatrixXcd>(row_norm.cwiseInverse().asDiagonal() * M).singularValues();
+  return values[0] / values[values.size() - 1];
+}
+
+}  // namespace stageid

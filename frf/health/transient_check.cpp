@@ -1,0 +1,213 @@
+#include "frf/health/transient_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+
+#include "acquisition/files/counted.hpp"
+#include "frf/statistics/tail_probability.hpp"
+
+namespace stageid {
+namespace {
+
+using Index = Eigen::Index;
+
+constexpr double kFalseAlarms = 0.005;  // a log
+constexpr Index kReach = 2;             // lines on either side of a maximum
+constexpr double kMemory = 0.6;         // see the header
+constexpr double kLargestShift = 0.5;   // deviations
+constexpr int kMostNamed = 4;
+
+/// Noise of one period on each line, and what the start has over it.
+struct Lines {
+  Eigen::VectorXd noise;
+  Eigen::VectorXd start;   // power of B, sum over the runs
+  Eigen::VectorXd excess;  // that over its noise, mean over the runs
+};
+
+Lines lines_of(const StartEvidence& e) {
+  const Index K = e.frequency_hz.size();
+  Lines lines{Eigen::VectorXd::Zero(K), Eigen::VectorXd::Zero(K), Eigen::VectorXd::Zero(K)};
+  double dof = 0.0;
+  for (const RunStart& run : e.runs) {
+    lines.noise += run.noise_dof * run.noise;
+    lines.start += run.start;
+    lines.excess += run.start / (1.0 + 1.0 / run.periods);
+    dof += run.noise_dof;
+  }
+  lines.noise = (lines.noise / dof).cwiseMax(std::numeric_limits<double>::min());
+  lines.excess = (lines.excess.array() / lines.noise.array()) / static_cast<double>(e.runs.size());
+  return lines;
+}
+
+/// Lines on which the start rings more than on all others within the reach. Over the noise it would be flat
+/// about a mode that rings so long that the scatter of the periods is its own.
+std::vector<Index> maxima(const Lines& lines) {
+  std::vector<Index> found;
+  for (Index k = 0; k < lines.start.size(); ++k) {
+    const Index first = std::max<Index>(0, k - kReach);
+    const Index last = std::min(lines.start.size() - 1, k + kReach);
+    Index largest = 0;
+    lines.start.segment(first, last - first + 1).maxCoeff(&largest);
+    if (first + largest == k && lines.excess[k] > 1.0) found.push_back(k);
+  }
+  return found;
+}
+
+/// The sums over one window.
+class Window {
+ public:
+  Window(const StartEvidence& e, const Lines& lines, Index peak)
+      : evidence_(e), peak_(peak), excess_(lines.excess[peak]) {
+    const Index first = std::max<Index>(0, peak - kReach);
+    const Index last = std::min(lines.noise.size() - 1, peak + kReach);
+    for (const RunStart& run : e.runs) {
+      std::complex<double> along = 0.0;
+      double start = 0.0;
+      for (Index k = first; k <= last; ++k) {
+        along += run.along[k] / lines.noise[k];
+        start += run.start[k] / lines.noise[k];
+        first_power_ += run.first[k] / lines.noise[k];
+        last_power_ += run.last[k] / lines.noise[k];
+      }
+      const double m = std::sqrt(start);
+      const double size = std::abs(along);
+      along_ += along;
+      start_ += start;
+      if (size > 0.0) resultant_ += m * along / size;
+      squares_ += m * m;
+    }
+  }
+
+  /// The smaller chance of the two tests, for both.
+  double p_value() const {
+    const double by_memory =
+        kMemory * std::sqrt(static_cast<double>(evidence_.runs.size()) * squares_ / excess_);
+    const double beyond = std::max(0.0, std::abs(resultant_) - by_memory);
+    double p = squares_ > 0.0 ? std::exp(-beyond * beyond / squares_) : 1.0;
+    const int runs = static_cast<int>(evidence_.runs.size());
+    if (evidence_.runs.front().periods >= 3 && last_power_ > 0.0)
+      p = std::min(p, std::exp(log_tail_of_f(first_power_ / last_power_, runs, runs)));
+    return std::min(1.0, 2.0 * p);
+  }
+
+  /// Of a period's transient what the next one has.
+  std::complex<double> ratio() const;
+  /// See the header; deviations.
+  double shift(std::complex<double> q) const;
+  double frequency_hz() const { return evidence_.frequency_hz[peak_]; }
+
+ private:
+  std::complex<double> mean_of_powers(std::complex<double> q, int from, int to) const {
+    std::complex<double> sum = 0.0;
+    for (int p = from; p <= to; ++p) sum += std::pow(q, p);
+    return sum / static_cast<double>(to - from + 1);
+  }
+
+  const StartEvidence& evidence_;
+  Index peak_;
+  double excess_;
+  std::complex<double> along_ = 0.0;
+  double start_ = 0.0;
+  double first_power_ = 0.0;
+  double last_power_ = 0.0;
+  std::complex<double> resultant_ = 0.0;
+  double squares_ = 0.0;
+};
+
+std::complex<double> Window::ratio() const {
+  const int P = evidence_.runs.front().periods;
+  const std::complex<double> c = along_ / start_;
+  std::complex<double> best = 0.0;
+  double least = std::numeric_limits<double>::infinity();
+  const auto look = [&](std::complex<double> q) {
+    const double off =
+        std::abs((q - mean_of_powers(q, 2, P)) / (1.0 - mean_of_powers(q, 1, P)) - c);
+    if (off >= least) return;
+    least = off;
+    best = q;
+  };
+  // A coarse grid, then three finer ones about the best of the one before.
+  constexpr int kAngles = 48;
+  for (int i = 1; i <= 80; ++i)
+    for (int a = 0; a < kAngles; ++a)
+      look(std::polar(std::exp(-0.1 * i), 2.0 * std::numbers::pi * a / kAngles));
+  double reach = 1.0;
+  for (int pass = 0; pass < 3; ++pass, reach /= 5.0) {
+    const std::complex<double> centre = best;
+    for (int i = -5; i <= 5; ++i)
+      for (int a = -5; a <= 5; ++a) {
+        const std::complex<double> q =
+            centre * std::polar(std::exp(0.02 * reach * i), 0.03 * reach * a);
+        if (std::abs(q) < 0.999) look(q);
+      }
+  }
+  return best;
+}
+
+double Window::shift(std::complex<double> q) const {
+  const int P = evidence_.runs.front().periods;
+  const bool used = evidence_.runs.front().start_used;
+  const std::complex<double> left =
+      mean_of_powers(q, used ? 0 : 1, P) / (1.0 - mean_of_powers(q, 1, P));
+  const double averaged = used ? P + 1.0 : P;
+  // Power over noise is a mean over the sensors; the real part has half of the noise.
+  return std::abs(left) *
+         std::sqrt(2.0 * static_cast<double>(evidence_.sensors) * averaged * start_);
+}
+
+std::string periods_text(int periods) {
+  return counted(static_cast<std::size_t>(periods), "period");
+}
+
+}  // namespace
+
+std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
+  if (evidence.runs.empty() || evidence.frequency_hz.size() == 0) return {};
+  const Lines lines = lines_of(evidence);
+  const std::vector<Index> peaks = maxima(lines);
+  std::vector<double> frequencies;
+  double largest = 0.0;
+  double of_largest = 0.0;
+  int more = 0;
+  for (const Index peak : peaks) {
+    const Window window(evidence, lines, peak);
+    if (window.p_value() * static_cast<double>(peaks.size()) >= kFalseAlarms) continue;
+    const std::complex<double> q = window.ratio();
+    const double shift = window.shift(q);
+    if (shift <= kLargestShift) continue;
+    frequencies.push_back(window.frequency_hz());
+    more = std::max(more, static_cast<int>(
+                              std::ceil(std::log(shift / kLargestShift) / -std::log(std::abs(q)))));
+    if (shift > largest) {
+      largest = shift;
+      of_largest = std::abs(q);
+    }
+  }
+  if (frequencies.empty()) return {};
+  std::string names;
+  for (std::size_t i = 0; i < frequencies.size() && i < kMostNamed; ++i)
+    names += fmt::format("{}{:.4g}", i > 0 ? ", " : "", frequencies[i]);
+  if (frequencies.size() > kMostNamed)
+    names += fmt::format(" and {} more", frequencies.size() - kMostNamed);
+  const int needed = evidence.transient_periods + std::max(1, more);
+  Finding finding;
+  finding.severity = Severity::doubt;
+  finding.cause = Cause::unsettled;
+  finding.what = fmt::format("not settled: the start of the runs still rings at {} Hz after {}",
+                             names, periods_text(evidence.transient_periods));
+  finding.figure = fmt::format("shifts a mode by up to {:.2g} deviations; a period leaves {:.2g} %",
+                               largest, 100.0 * of_largest);
+  const int recorded = evidence.transient_periods + evidence.periods;
+  finding.remedy =
+      needed <= recorded - 2
+          ? fmt::format("--transient-periods {}, or --method lpm", needed)
+          : fmt::format("--method lpm, or measure again with transient_periods: {}", needed);
+  return {finding};
+}
+
+}  // namespace stageid

@@ -1,0 +1,96 @@
+#include "frf/periods/health_finding.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+namespace stageid {
+namespace {
+
+constexpr const char* kUnknown = "unknown";  // to_string() of what is not a cause
+
+}  // namespace
+
+const char* to_string(Severity severity) noexcept {
+  switch (severity) {
+    case Severity::fault:
+      return "fault";
+    case Severity::doubt:
+      return "doubt";
+    case Severity::unchecked:
+      return "not checked";
+  }
+  return "unknown";
+}
+
+const char* to_string(Cause cause) noexcept {
+  switch (cause) {
+    case Cause::dead:
+      return "dead";
+    case Cause::saturated:
+      return "saturated";
+    case Cause::marked:
+      return "marked";
+    case Cause::late:
+      return "late";
+    case Cause::swapped:
+      return "swapped";
+    case Cause::sign:
+      return "sign";
+    case Cause::scale:
+      return "scale";
+    case Cause::skew:
+      return "skew";
+    case Cause::unrecorded:
+      return "unrecorded";
+    case Cause::controller:
+      return "controller";
+    case Cause::rigid_body:
+      return "rigid_body";
+    case Cause::unknown_stage:
+      return "unknown_stage";
+    case Cause::injection:
+      return "injection";
+    case Cause::excluded:
+      return "excluded";
+    case Cause::excitation:
+      return "excitation";
+    case Cause::inputs:
+      return "inputs";
+    case Cause::incoherent:
+      return "incoherent";
+    case Cause::interpolation:
+      return "interpolation";
+    case Cause::aperiodic:
+      return "aperiodic";
+    case Cause::unsettled:
+      return "unsettled";
+    case Cause::uneven_noise:
+      return "uneven_noise";
+    case Cause::lost_samples:
+      return "lost_samples";
+    case Cause::excitation_timing:
+      return "excitation_timing";
+    case Cause::drift:
+      return "drift";
+  }
+  return kUnknown;
+}
+
+std::optional<Cause> cause_of(std::string_view name) noexcept {
+  for (int i = 0; to_string(static_cast<Cause>(i)) != std::string_view(kUnknown); ++i)
+    if (to_string(static_cast<Cause>(i)) == name) return static_cast<Cause>(i);
+  return std::nullopt;
+}
+
+int rank_of(const Finding& finding) noexcept {
+  const bool fault = finding.severity == Severity::fault;
+  if (finding.cause == Cause::unknown_stage) return 1;
+  return fault ? 0 : 1 + static_cast<int>(finding.severity);
+}
+
+bool any_fault(const std::vector<Finding>& findings) noexcept {
+  return std::any_of(findings.begin(), findings.end(),
+                     [](const Finding& f) { return f.severity == Severity::fault; });
+}
+
+}  // namespace stageid

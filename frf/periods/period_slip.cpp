@@ -1,0 +1,225 @@
+#include "frf/periods/period_slip.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <vector>
+
+namespace stageid {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr Index kBlocks = 64;
+constexpr Index kShortestBlock = 16;
+constexpr int kNear = 4;           // shifts that are always tried
+constexpr std::size_t kPeaks = 3;  // of the cross-correlation, beyond them
+constexpr double kLeastRatio = 1.5;
+constexpr double kLeastRatioAlone = 10.0;
+constexpr double kDeviations = 8.0;
+constexpr double kRounding = 1e-24;  // of a channel's power
+
+/// x[n] - r[(n + shift) mod N]
+ArrayXd difference(const MatrixXd& later, const MatrixXd& earlier, Index channel, Index shift) {
+  const Index N = later.rows();
+  const Index s = ((shift % N) + N) % N;
+  ArrayXd d = later.col(channel).array();
+  d.head(N - s) -= earlier.col(channel).tail(N - s).array();
+  d.tail(s) -= earlier.col(channel).head(s).array();
+  return d;
+}
+
+/// Sums of squares over blocks of one channel's difference.
+ArrayXd block_power(const ArrayXd& difference, Index blocks) {
+  ArrayXd power(blocks);
+  const Index N = difference.size();
+  for (Index b = 0; b < blocks; ++b) {
+    const Index first = b * N / blocks;
+    power[b] = difference.segment(first, (b + 1) * N / blocks - first).square().sum();
+  }
+  return power;
+}
+
+Index blocks_of(Index N) { return std::clamp<Index>(N / kShortestBlock, 1, kBlocks); }
+
+double floor_of(const MatrixXd& samples, Index channel) {
+  return kRounding * samples.col(channel).squaredNorm() + 1e-300;
+}
+
+/// Whether some block of one kind of channels resembles the earlier period shifted by a sample as much as the
+/// period itself: always so behind a gap, and where there is only noise.
+bool suspicious(const MatrixXd& earlier, const MatrixXd& later) {
+  const Index N = later.rows();
+  const Index blocks = blocks_of(N);
+  ArrayXd evidence = ArrayXd::Zero(blocks);
+  for (Index c = 0; c < later.cols(); ++c) {
+    const double least = floor_of(later, c);
+    const ArrayXd here = block_power(difference(later, earlier, c, 0), blocks) + least;
+    const ArrayXd next = block_power(difference(later, earlier, c, 1), blocks) + least;
+    const ArrayXd last = block_power(difference(later, earlier, c, -1), blocks) + least;
+    evidence += (next.min(last) / here).log();
+  }
+  return later.cols() > 0 && (evidence <= 0.0).any();
+}
+
+/// What a shift explains of one kind of channels, sample by sample, over the scatter of the channels.
+struct Explained {
+  ArrayXd before;        ///< sum over channels of e_0^2
+  ArrayXd after;         ///<   and of e_d^2
+  double freedom = 0.0;  ///< independent samples of a period, over the channels
+};
+
+/// Independent samples of a stationary signal: (sum S)^2 / sum S^2 over the lines of both signs of its spectrum S, the
+/// length for white noise (Satterthwaite).
+double independent_samples(const ArrayXd& signal, RealDft& dft) {
+  std::copy_n(signal.data(), signal.size(), dft.input().begin());
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const std::complex<double>& line : dft.forward()) {
+    const double power = std::norm(line);
+    sum += power;
+    squares += power * power;
+  }
+  return squares > 0.0 ? 2.0 * sum * sum / squares : 0.0;
+}
+
+Explained explained(const MatrixXd& earlier, const MatrixXd& later, Index shift, RealDft& dft) {
+  const Index N = later.rows();
+  const Index blocks = blocks_of(N);
+  Explained sum{ArrayXd::Zero(N), ArrayXd::Zero(N), 0.0};
+  for (Index c = 0; c < later.cols(); ++c) {
+    const ArrayXd before = difference(later, earlier, c, 0);
+    const ArrayXd after = difference(later, earlier, c, shift);
+    const double scatter =
+        block_power(before, blocks).min(block_power(after, blocks)).sum() / static_cast<double>(N);
+    const double power = later.col(c).squaredNorm();
+    if (!(power > 0.0)) continue;
+    const double weight = 1.0 / (scatter + floor_of(later, c) / static_cast<double>(N));
+    sum.before += weight * before.square();
+    sum.after += weight * after.square();
+    sum.freedom += std::min(independent_samples(before, dft), independent_samples(after, dft));
+  }
+  return sum;
+}
+
+struct Change {
+  Index first = 0;  ///< rows first ... last - 1 are displaced
+  Index last = 0;
+  double gain = 0.0;
+};
+
+/// The beginning, or the end, of the period that a shift explains best.
+Change best_change(const ArrayXd& gain) {
+  Change best;
+  const Index N = gain.size();
+  double sum = 0.0;
+  for (Index n = 0; n < N; ++n) {
+    sum += gain[n];
+    if (sum > best.gain) best = {0, n + 1, sum};
+  }
+  sum = 0.0;
+  for (Index n = N; n-- > 0;) {
+    sum += gain[n];
+    if (sum >= best.gain && sum > 0.0) best = {n, N, sum};
+  }
+  return best;
+}
+
+/// How much better the rows of `change` follow the shifted period than the period: ln of the ratio, 0 if it is not known.
+double advantage(const Explained& of, const Change& change) {
+  const Index rows = change.last - change.first;
+  const double count =
+      of.freedom * static_cast<double>(rows) / static_cast<double>(of.before.size());
+  if (!(count > 0.0)) return 0.0;
+  const double before = of.before.segment(change.first, rows).sum();
+  const double after = of.after.segment(change.first, rows).sum();
+  const double ratio = std::log(before / std::max(1e-300, after));
+  const double least = std::max(std::log(kLeastRatio), kDeviations * std::sqrt(4.0 / count));
+  return std::abs(ratio) > least ? ratio : 0.0;
+}
+
+/// Largest local maxima of the cross-correlation, every line of every channel with the same weight.
+void add_peaks(const MatrixXd& earlier, const MatrixXd& later, RealDft& dft,
+               Eigen::VectorXcd& correlation) {
+  for (Index c = 0; c < later.cols(); ++c) {
+    const auto fill = [&](const MatrixXd& samples) {
+      std::copy_n(samples.col(c).data(), samples.rows(), dft.input().begin());
+    };
+    fill(later);
+    const auto X = dft.forward();
+    const std::vector<std::complex<double>> of_later(X.begin(), X.end());
+    fill(earlier);
+    const auto R = dft.forward();
+    for (Index l = 1; l < correlation.size(); ++l) {
+      const auto at = static_cast<std::size_t>(l);
+      const std::complex<double> product = std::conj(R[at]) * of_later[at];
+      const double size = std::abs(product);
+      if (size > 0.0) correlation[l] += product / size;
+    }
+  }
+}
+
+std::vector<Index> shifts_to_try(const LogSamples& earlier, const LogSamples& later, RealDft& dft) {
+  const Index N = dft.length();
+  Eigen::VectorXcd spectrum = Eigen::VectorXcd::Zero(dft.half_size());
+  add_peaks(earlier.sensors, later.sensors, dft, spectrum);
+  add_peaks(earlier.actuators, later.actuators, dft, spectrum);
+  const Eigen::VectorXd correlation = dft.inverse(spectrum);
+  const auto at = [&](Index n) { return correlation[(n + N) % N]; };
+  std::vector<Index> shifts;
+  for (Index d = -kNear; d <= kNear; ++d)
+    if (d != 0) shifts.push_back(d);
+  std::vector<Index> peaks;
+  // x[n] = r[n + d] has its peak at -d.
+  for (Index n = kNear + 1; n < N - kNear; ++n)
+    if (at(n) > at(n - 1) && at(n) >= at(n + 1)) peaks.push_back(n);
+  const std::size_t count = std::min(kPeaks, peaks.size());
+  std::partial_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(count), peaks.end(),
+                    [&](Index a, Index b) { return at(a) > at(b); });
+  for (std::size_t i = 0; i < count; ++i)
+    for (const Index beside : {-1, 0, 1})
+      shifts.push_back((peaks[i] <= N / 2 ? -peaks[i] : N - peaks[i]) + beside);
+  return shifts;
+}
+
+}  // namespace
+
+std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples& later,
+                                    RealDft& dft) {
+  if (!suspicious(earlier.sensors, later.sensors) &&
+      !suspicious(earlier.actuators, later.actuators))
+    return std::nullopt;
+  std::optional<PeriodSlip> found;
+  double largest = 0.0;
+  for (const Index shift : shifts_to_try(earlier, later, dft)) {
+    const Explained sensors = explained(earlier.sensors, later.sensors, shift, dft);
+    const Explained actuators = explained(earlier.actuators, later.actuators, shift, dft);
+    const ArrayXd of_sensors = sensors.before - sensors.after;
+    const ArrayXd of_actuators = actuators.before - actuators.after;
+    const std::array<ArrayXd, 3> gains = {of_sensors + of_actuators, of_sensors, of_actuators};
+    for (const ArrayXd& gain : gains) {
+      const Change change = best_change(gain);
+      if (!(change.gain > largest)) continue;
+      const double y = advantage(sensors, change);
+      const double u = advantage(actuators, change);
+      // A transient or a stuck sensor may look like a long shift, and every period of a wrong length is displaced as a
+      // whole.
+      const bool whole = change.first == 0 && change.last == later.sensors.rows();
+      const double sure = std::log(kLeastRatioAlone);
+      const bool near = std::abs(shift) <= kNear;
+      if (near ? !(std::min(y, u) > 0.0) && std::max(y, u) < sure : whole || std::min(y, u) < sure)
+        continue;
+      // A kind of which nothing is known goes with the other.
+      const bool until_the_end = change.last == later.sensors.rows();
+      found = PeriodSlip{until_the_end ? change.first : change.last, static_cast<int>(shift),
+                         !until_the_end, y >= 0.0, u >= 0.0};
+      largest = change.gain;
+    }
+  }
+  return found;
+}
+
+}  // namespace stageid

@@ -1,0 +1,40 @@
+#include "frf/periods/sample_slip.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+
+#include "acquisition/files/counted.hpp"
+
+namespace stageid {
+
+std::string to_string(const SampleSlip& slip) {
+  const int count = std::abs(slip.lost);
+  const std::string samples = count == 1 ? "one sample" : counted(count, "sample");
+  const char* of = slip.sensors && slip.actuators ? ""
+                   : slip.sensors                 ? " of all sensors"
+                                                  : " of all actuators";
+  return fmt::format("{}{} {} near row {}", samples, of, slip.lost > 0 ? "lost" : "too many",
+                     slip.row);
+}
+
+Finding to_finding(const SampleSlip& slip) {
+  const int count = std::abs(slip.lost);
+  const std::string samples = count == 1 ? "one sample" : counted(count, "sample");
+  const char* of = slip.sensors && slip.actuators ? ""
+                   : slip.sensors                 ? " of all sensors"
+                                                  : " of all actuators";
+  Finding finding;
+  finding.severity = Severity::doubt;
+  finding.cause = Cause::lost_samples;
+  finding.what = fmt::format("{}{} {} in run {} near row {}", samples, of,
+                             slip.lost > 0 ? "lost" : "too many", slip.run, slip.row);
+  finding.figure =
+      fmt::format("realization {}, experiment {}", slip.realization + 1, slip.experiment + 1);
+  finding.remedy =
+      slip.spoilt ? "its period is left out and the later ones are realigned; look at the recorder"
+                  : "the later periods are realigned; look at the recorder";
+  return finding;
+}
+
+}  // namespace stageid

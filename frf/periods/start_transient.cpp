@@ -1,0 +1,76 @@
+#include "frf/periods/start_transient.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "frf/statistics/order_statistic.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kRounding =
+    1e-24;  // of a sensor's power: what double precision leaves of no noise
+
+}  // namespace
+
+StartRecorder::StartRecorder(Eigen::MatrixXcd start)
+    : on_(true), start_used_(start.size() == 0), start_(std::move(start)) {}
+
+void StartRecorder::take(const Eigen::Ref<const Eigen::MatrixXcd>& spectra) {
+  if (!on_) return;
+  if (start_.size() == 0) {
+    start_ = spectra;
+    return;
+  }
+  ++count_;
+  latest_ = spectra;
+  if (count_ == 1) {
+    first_ = spectra;
+    rest_mean_.setZero(spectra.rows(), spectra.cols());
+    rest_scatter_.setZero(spectra.rows(), spectra.cols());
+    return;
+  }
+  const double n = count_ - 1;
+  const Eigen::MatrixXcd deviation = spectra - rest_mean_;
+  rest_mean_ += deviation / n;
+  rest_scatter_ += (1.0 - 1.0 / n) * deviation.cwiseAbs2();
+}
+
+RunStart StartRecorder::finish() {
+  RunStart run;
+  if (!on_ || count_ < 2) return run;
+  on_ = false;
+  const double P = count_;
+  const Eigen::MatrixXcd mean = (first_ + (P - 1.0) * rest_mean_) / P;
+  const Eigen::MatrixXcd B = start_ - mean;
+  const Eigen::MatrixXcd W = first_ - rest_mean_;
+  const Eigen::MatrixXcd V = latest_ - (P * mean - latest_) / (P - 1.0);
+  const double scale = (P - 1.0) / P;
+  run.noise_dof = count_ == 2 ? 1.0 : P - 2.0;
+  Eigen::MatrixXd noise = rest_scatter_ / run.noise_dof;
+  if (count_ == 2) noise = scale * W.cwiseAbs2();
+  // One number a sensor brings their units together and leaves the colour to the lines.
+  for (Eigen::Index c = 0; c < noise.rows(); ++c) {
+    std::vector<double> values(noise.cols());
+    for (Eigen::Index k = 0; k < noise.cols(); ++k)
+      values[static_cast<std::size_t>(k)] = noise(c, k);
+    const double power = mean.row(c).squaredNorm() / static_cast<double>(mean.cols());
+    const double level = std::max(order_statistic(values, 0.5), kRounding * power);
+    const double weight = level > 0.0 ? 1.0 / level : 0.0;
+    if (c == 0) {
+      run.along.setZero(noise.cols());
+      run.start = run.first = run.last = run.noise = Eigen::VectorXd::Zero(noise.cols());
+    }
+    run.along += weight * B.row(c).conjugate().cwiseProduct(W.row(c)).transpose();
+    run.start += weight * B.row(c).cwiseAbs2().transpose();
+    run.first += weight * scale * W.row(c).cwiseAbs2().transpose();
+    run.last += weight * scale * V.row(c).cwiseAbs2().transpose();
+    // Rounding is noise, where there is no other.
+    run.noise.array() += weight * noise.row(c).transpose().array() + weight * kRounding * power;
+  }
+  run.periods = count_;
+  run.start_used = start_used_;
+  return run;
+}
+
+}  // namespace stageid

@@ -1,0 +1,125 @@
+#include "frf/plant/detection_average.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <iterator>
+
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr int kFurthest = 4;
+
+/// First of the ascending `lines` that is not below `line`.
+std::size_t at_or_above(const std::vector<int>& lines, int line) {
+  return static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), line) -
+                                  lines.begin());
+}
+
+}  // namespace
+
+std::vector<int> detection_lines(const std::vector<int>& excited) {
+  std::vector<int> lines;
+  for (std::size_t k = 1; k < excited.size(); ++k) {
+    for (int line = excited[k - 1] + 1; line < excited[k]; ++line) {
+      if (line - excited[k - 1] <= kFurthest || excited[k] - line <= kFurthest)
+        lines.push_back(line);
+    }
+  }
+  return lines;
+}
+
+Eigen::VectorXcd interpolated_response(const std::vector<int>& excited, int line,
+                                       const Eigen::MatrixXcd& G) {
+  const std::size_t above = at_or_above(excited, line);
+  const int low = excited[above - 1];
+  const double t = static_cast<double>(line - low) / (excited[above] - low);
+  const auto k = static_cast<Eigen::Index>(above);
+  return (1.0 - t) * G.col(k - 1) + t * G.col(k);
+}
+
+DetectionAverage::DetectionAverage(const std::vector<int>& lines,
+                                   const std::vector<std::string>& axes, bool single_axis,
+                                   Eigen::Index outputs)
+    : excited_(lines),
+      detection_(detection_lines(lines)),
+      outputs_(outputs),
+      groups_(single_axis ? axes : std::vector<std::string>{"all"}) {
+  const auto D = static_cast<Eigen::Index>(detection_.size());
+  const auto rows = outputs * static_cast<Eigen::Index>(groups_.size());
+  runs_.setZero(static_cast<Eigen::Index>(groups_.size()));
+  power_.setZero(rows, D);
+  noise_.setZero(outputs, D);
+  linear_power_.setZero(rows, static_cast<Eigen::Index>(lines.size()));
+}
+
+void DetectionAverage::add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G,
+                           const std::vector<std::size_t>& axis, int workers) {
+  noise_known_ = noise_known_ && spectra.scatter_dof() > 0;
+  if (!noise_known_ || detection_.empty()) return;
+  noise_dof_ += spectra.scatter_dof();
+  std::vector<Eigen::Index> groups;
+  for (std::size_t e = 0; e < axis.size(); ++e) {
+    groups.push_back(groups_.size() == 1 ? 0 : static_cast<Eigen::Index>(axis[e]));
+    runs_[groups.back()] += 1.0;
+    periods_ += spectra.periods(e);
+  }
+  for_each_line(workers, static_cast<Eigen::Index>(detection_.size()),
+                [&](Eigen::Index d) { add_line(spectra, G, groups, d); });
+  for_each_line(workers, linear_power_.cols(), [&](Eigen::Index k) {
+    const Eigen::MatrixXcd Z = spectra.response(k);
+    for (Eigen::Index e = 0; e < Z.cols(); ++e)
+      linear_power_.col(k).segment(outputs_ * groups[static_cast<std::size_t>(e)], outputs_) +=
+          Z.col(e).head(outputs_).cwiseAbs2();
+  });
+}
+
+void DetectionAverage::add_line(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G,
+                                const std::vector<Eigen::Index>& groups, Eigen::Index d) {
+  const auto column = static_cast<Eigen::Index>(excited_.size()) + d;
+  const Eigen::MatrixXcd Z = spectra.response(column);
+  const Eigen::VectorXcd between =
+      interpolated_response(excited_, detection_[static_cast<std::size_t>(d)], G);
+  Eigen::MatrixXcd residual_of_Z(outputs_, Z.rows());  // [I, -G]
+  residual_of_Z.leftCols(outputs_).setIdentity();
+  residual_of_Z.rightCols(Z.rows() - outputs_) =
+      -Eigen::Map<const Eigen::MatrixXcd>(between.data(), outputs_, Z.rows() - outputs_);
+  const Eigen::MatrixXcd E = residual_of_Z * Z;
+  for (Eigen::Index e = 0; e < E.cols(); ++e) {
+    const auto run = static_cast<std::size_t>(e);
+    power_.col(d).segment(outputs_ * groups[run], outputs_) +=
+        spectra.periods(run) * E.col(e).cwiseAbs2();
+  }
+  const Eigen::MatrixXcd scatter = residual_of_Z * spectra.scatter(column);
+  // Scatter is a sum of squares, but rounding may leave less than nothing of it.
+  noise_.col(d) += (scatter.array() * residual_of_Z.conjugate().array())
+                       .rowwise()
+                       .sum()
+                       .real()
+                       .max(0.0)
+                       .matrix();
+}
+
+DetectionLines DetectionAverage::finish(double resolution_hz) const {
+  DetectionLines found;
+  if (!noise_known_ || detection_.empty() || runs_.size() == 0) return found;
+  if (!(runs_.minCoeff() > 0.0) || !(noise_dof_ > 0.0)) return found;
+  found.line = Eigen::Map<const Eigen::VectorXi>(detection_.data(),
+                                                 static_cast<Eigen::Index>(detection_.size()));
+  found.frequency_hz = resolution_hz * found.line.cast<double>();
+  found.groups = groups_;
+  found.runs = runs_;
+  found.noise_dof = noise_dof_;
+  const double mean_periods = periods_ / runs_.sum();
+  found.noise = noise_ / (noise_dof_ * mean_periods);
+  found.power = power_ / mean_periods;
+  found.linear_power = linear_power_;
+  for (Eigen::Index g = 0; g < runs_.size(); ++g) {
+    found.power.middleRows(outputs_ * g, outputs_) /= runs_[g];
+    found.linear_power.middleRows(outputs_ * g, outputs_) /= runs_[g];
+  }
+  return found;
+}
+
+}  // namespace stageid

@@ -1,0 +1,50 @@
+#include "frf/plant/frf_provenance.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "acquisition/files/fingerprint.hpp"
+
+namespace stageid {
+
+FrfProvenance::FrfProvenance(const LogInfo& info, const FrfOptions& options,
+                             const ChannelChoice& channels)
+    : info_(info), options_(options), channels_(channels) {}
+
+void FrfProvenance::add(const UsedRun& run, const std::string& fingerprint) {
+  auto at =
+      std::find_if(logs_.begin(), logs_.end(), [&](const Log& l) { return l.log == run.log; });
+  if (at == logs_.end()) at = logs_.insert(logs_.end(), Log{run.log, {}, {}});
+  at->runs.emplace_back(run.run().realization, run.run().experiment);
+  at->fingerprints += fingerprint;
+}
+
+std::string FrfProvenance::json() const {
+  using Json = nlohmann::ordered_json;
+  Json inputs = Json::array();
+  for (const Log& log : logs_) {
+    inputs.push_back({{"file", log.log->path().filename().string()},
+                      {"fingerprint", fingerprint_of(log.fingerprints)},
+                      {"runs", log.runs}});
+  }
+  Json outputs = Json::array();
+  for (const Eigen::Index i : channels_.outputs) {
+    outputs.push_back(info_.sensors.names[static_cast<std::size_t>(i)]);
+  }
+  const Json options = {
+      {"method", options_.method == FrfMethod::lpm ? "lpm" : "periodic"},
+      {"inputs", channels_.inputs},
+      {"outputs", outputs},
+      {"transient_periods", transient_periods(info_, options_)},
+      {"period_samples", info_.period_samples},
+      {"covariance", options_.covariance == CovarianceKind::full ? "full" : "diagonal"},
+      {"covariance_lines", options_.covariance_lines},
+      {"periods", options_.periods == PeriodChoice::consistent ? "consistent" : "unmarked"}};
+  return Json{{"stageid_version", STAGEID_VERSION},
+              {"made_by", "estimate_plant_frf"},
+              {"inputs", inputs},
+              {"options", options}}
+      .dump();
+}
+
+}  // namespace stageid

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frf/runs/channel_choice.hpp"
+#include "frf/runs/run_table.hpp"
+
+namespace stageid {
+
+/// Names what an estimate was made of: for each log the file's name and the fingerprint of the
+/// samples used (in the order of realizations and experiments), the runs, the options, the version.
+///
+/// Without anything that may differ between two runs of the same estimate: no directory, no time,
+/// no thread count; so the output files are the same byte for byte.
+class FrfProvenance {
+ public:
+  FrfProvenance(const LogInfo& info, const FrfOptions& options, const ChannelChoice& channels);
+  void add(const UsedRun& run, const std::string& fingerprint);
+  std::string json() const;
+
+ private:
+  struct Log {
+    const LogReader* log = nullptr;
+    std::vector<std::pair<int, int>> runs;  // realization, experiment
+    std::string fingerprints;
+  };
+  const LogInfo& info_;
+  const FrfOptions& options_;
+  const ChannelChoice& channels_;
+  std::vector<Log> logs_;
+};
+
+}  // namespace stageid

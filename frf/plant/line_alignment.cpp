@@ -1,0 +1,87 @@
+#include "frf/plant/line_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "excitation/threads/worker_pool.hpp"
+#include "frf/plant/detection_average.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kRounding = 1e-24;  // of the largest line's power: what double precision leaves
+
+}  // namespace
+
+AlignmentAverage::AlignmentAverage(std::vector<int> excited, std::vector<int> detection,
+                                   Eigen::Index outputs)
+    : excited_(std::move(excited)), detection_(std::move(detection)), outputs_(outputs) {
+  std::size_t e = 0;
+  std::size_t d = 0;
+  while (e < excited_.size() || d < detection_.size()) {
+    const bool is_excited =
+        d == detection_.size() || (e < excited_.size() && excited_[e] < detection_[d]);
+    lines_.push_back(is_excited ? excited_[e] : detection_[d]);
+    column_.push_back(static_cast<Eigen::Index>(is_excited ? e : excited_.size() + d));
+    ++(is_excited ? e : d);
+  }
+  const auto L = static_cast<Eigen::Index>(lines_.size());
+  cosine_.setZero(outputs, L);
+  pairs_.setZero(outputs, L);
+}
+
+void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G_before,
+                           const Eigen::MatrixXcd& G, int workers) {
+  const auto N = static_cast<Eigen::Index>(excited_.size());
+  const auto L = static_cast<Eigen::Index>(lines_.size());
+  const Eigen::Index E = spectra.experiments();
+  Eigen::MatrixXcd residual = Eigen::MatrixXcd::Zero(outputs_ * E, L);
+  for_each_line(workers, L, [&](Eigen::Index l) {
+    const Eigen::Index column = column_[static_cast<std::size_t>(l)];
+    if (column < N && first_) return;
+    const Eigen::VectorXcd response =
+        column < N ? Eigen::VectorXcd(G_before.col(column))
+                   : interpolated_response(excited_, lines_[static_cast<std::size_t>(l)], G);
+    const Eigen::Map<const Eigen::MatrixXcd> at(response.data(), outputs_,
+                                                response.size() / outputs_);
+    const Eigen::MatrixXcd Z = spectra.response(column);
+    residual.col(l) = (Z.topRows(outputs_) - at * Z.bottomRows(at.cols())).reshaped();
+  });
+  for (Eigen::Index e = 0; e < E; ++e) {
+    const Eigen::VectorXd smallest = kRounding * spectra.run(static_cast<std::size_t>(e))
+                                                     .mean.topLeftCorner(outputs_, N)
+                                                     .cwiseAbs2()
+                                                     .rowwise()
+                                                     .maxCoeff();
+    add_run(residual.middleRows(outputs_ * e, outputs_), smallest);
+  }
+  first_ = false;
+}
+
+void AlignmentAverage::add_run(const Eigen::MatrixXcd& residual, const Eigen::VectorXd& smallest) {
+  for (Eigen::Index i = 0; i < outputs_; ++i) {
+    Eigen::Index before = -1;
+    for (Eigen::Index l = 0; l < residual.cols(); ++l) {
+      if (!(std::norm(residual(i, l)) > smallest[i])) continue;
+      if (before >= 0) {
+        const std::complex<double> turn = residual(i, l) * std::conj(residual(i, before));
+        cosine_(i, l) += turn.real() / std::abs(turn);
+        pairs_(i, l) += 1.0;
+      }
+      before = l;
+    }
+  }
+}
+
+LineAlignment AlignmentAverage::finish(double resolution_hz) const {
+  LineAlignment found;
+  found.frequency_hz = resolution_hz * Eigen::Map<const Eigen::VectorXi>(
+                                           lines_.data(), static_cast<Eigen::Index>(lines_.size()))
+                                           .cast<double>();
+  found.cosine = cosine_;
+  found.pairs = pairs_;
+  return found;
+}
+
+}  // namespace stageid

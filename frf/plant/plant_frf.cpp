@@ -1,0 +1,390 @@
+#include "frf/plant/plant_frf.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/files/counted.hpp"
+#include "excitation/multisine/frequency_grid.hpp"
+#include "excitation/threads/worker_pool.hpp"
+#include "frf/plant/detection_average.hpp"
+#include "frf/plant/frf_provenance.hpp"
+#include "frf/plant/line_alignment.hpp"
+#include "frf/plant/plant_average.hpp"
+#include "frf/plant/zippered_fit.hpp"
+#include "frf/response/covariance_smoothing.hpp"
+#include "frf/runs/byte_counter.hpp"
+#include "frf/runs/channel_choice.hpp"
+#include "frf/runs/constant_input.hpp"
+#include "frf/runs/excitation_spectrum.hpp"
+#include "frf/runs/health_gathering.hpp"
+#include "frf/runs/realization_spectra.hpp"
+#include "frf/runs/record_spectra.hpp"
+#include "frf/runs/run_spectra.hpp"
+#include "frf/runs/run_steps.hpp"
+#include "frf/runs/run_table.hpp"
+
+namespace stageid {
+namespace {
+
+/// What the first realization fixes for all: lines and axes.
+struct ExcitedPart {
+  std::vector<int> lines;
+  std::vector<Eigen::Index> axes;
+  bool single_axis = true;           ///< in every run
+  std::vector<Eigen::Index> only{};  ///< zippered: the channel of each line; else empty
+};
+
+/// The estimate in the making: reads realization by realization, threads over the runs of one.
+class PlantEstimation {
+ public:
+  PlantEstimation(ChosenRuns chosen, const FrfOptions& options)
+      : realizations_(std::move(chosen.realizations)),
+        incomplete_(std::move(chosen.incomplete)),
+        options_(options),
+        info_(realizations_.front().runs.front().log->info()),
+        workers_(worker_count(options.threads)),
+        bytes_(options_, realizations_) {
+    const std::size_t most =
+        std::max_element(realizations_.begin(), realizations_.end(),
+                         [](const auto& a, const auto& b) { return a.runs.size() < b.runs.size(); })
+            ->runs.size();
+    // No more workspaces than there is work for: each holds a period of samples.
+    run_workers_ = static_cast<int>(std::min(static_cast<std::size_t>(workers_), most));
+    for (int w = 0; w < run_workers_; ++w) {
+      workspaces_.push_back(std::make_unique<RunWorkspace>(info_.period_samples, pool_));
+    }
+  }
+
+  /// `health`: gathers from the same reading, if there is one.
+  FrfEstimate estimate(HealthGathering* health);
+  const std::vector<RealizationRuns>& realizations() const noexcept { return realizations_; }
+
+ private:
+  std::vector<RunExcitation> read_excitation(const RealizationRuns& realization);
+  ExcitedPart excited_part(const RealizationRuns& realization,
+                           const std::vector<RunExcitation>& excitation) const;
+  void check_excitation(const RealizationRuns& realization,
+                        const std::vector<RunExcitation>& excitation) const;
+  void measure(std::size_t realization, const std::vector<RunExcitation>& excitation,
+               HealthGathering* health, RealizationSpectra& spectra);
+  void prepare(const RealizationRuns& realization, const std::vector<RunExcitation>& excitation);
+  void note_dropped(const RealizationRuns& realization, const RealizationSpectra& spectra);
+  bool leave_out(const RealizationRuns& realization, const RealizationSpectra& spectra);
+  void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra);
+  void include(const RealizationSpectra& spectra, const std::vector<RunExcitation>& excitation);
+  FrfEstimate describe() const;
+  void note_change(const FrfEstimate& frf, HealthGathering& health) const;
+
+  std::vector<RealizationRuns> realizations_;
+  std::vector<LeftOutRealization> incomplete_;
+  const FrfOptions& options_;
+  const LogInfo& info_;
+  int workers_;
+  int run_workers_ = 1;
+  ByteCounter bytes_;
+  MatrixPool pool_;
+  std::vector<std::unique_ptr<RunWorkspace>> workspaces_;
+  ExcitedPart excited_;
+  SpectrumLines lines_;
+  ChannelChoice channels_;
+  std::unique_ptr<ZipperedFit> zippered_;  // if one experiment is a whole realization
+  std::unique_ptr<PlantAverage> average_;
+  std::unique_ptr<DetectionAverage> detection_;
+  std::unique_ptr<AlignmentAverage> alignment_;
+  std::unique_ptr<FrfProvenance> provenance_;
+  std::vector<DroppedPeriod> dropped_;
+  std::vector<LeftOutRealization> left_out_;
+  const UsedRun* first_marked_ = nullptr;  // of those without a clean period
+  int fewest_periods_ = std::numeric_limits<int>::max();
+  double input_power_ = 0.0;
+  Eigen::VectorXd excluded_power_;
+};
+
+std::vector<RunExcitation> PlantEstimation::read_excitation(const RealizationRuns& realization) {
+  std::vector<RunExcitation> excitation(realization.runs.size());
+  for_each_task(run_workers_, realization.runs.size(), [&](int worker, std::size_t e) {
+    excitation[e] = read_run_excitation(realization.runs[e],
+                                        workspaces_[static_cast<std::size_t>(worker)]->dft);
+  });
+  return excitation;
+}
+
+ExcitedPart PlantEstimation::excited_part(const RealizationRuns& realization,
+                                          const std::vector<RunExcitation>& excitation) const {
+  ExcitedPart part{excitation.front().spectrum.lines, {}};
+  if (part.lines.empty()) {
+    throw std::invalid_argument(
+        fmt::format("{}/excitation: nothing is excited; the indirect method needs "
+                    "the signal that was added in the loop",
+                    realization.runs.front().place()));
+  }
+  for (const RunExcitation& run : excitation) {
+    part.axes.insert(part.axes.end(), run.spectrum.channels.begin(), run.spectrum.channels.end());
+    part.single_axis = part.single_axis && run.spectrum.channels.size() == 1;
+  }
+  std::sort(part.axes.begin(), part.axes.end());
+  part.axes.erase(std::unique(part.axes.begin(), part.axes.end()), part.axes.end());
+  const ExcitationSpectrum& first = excitation.front().spectrum;
+  if (excitation.size() == 1 && first.is_zippered()) part.only = first.only;
+  return part;
+}
+
+void PlantEstimation::check_excitation(const RealizationRuns& realization,
+                                       const std::vector<RunExcitation>& excitation) const {
+  for (std::size_t e = 0; e < excitation.size(); ++e) {
+    const ExcitationSpectrum& spectrum = excitation[e].spectrum;
+    const std::string place = realization.runs[e].place() + "/excitation";
+    if (spectrum.lines.empty())
+      throw std::invalid_argument(
+          fmt::format("{}: nothing is excited in this run, but {} lines are in {}. Leave its axis "
+                      "out, --inputs with the "
+                      "others, or measure the run again",
+                      place, excited_.lines.size(), realizations_.front().runs.front().place()));
+    if (spectrum.lines != excited_.lines) {
+      std::vector<int> differing;
+      std::set_symmetric_difference(spectrum.lines.begin(), spectrum.lines.end(),
+                                    excited_.lines.begin(), excited_.lines.end(),
+                                    std::back_inserter(differing));
+      const double resolution_hz = info_.sample_rate_hz / info_.period_samples;
+      throw std::invalid_argument(fmt::format(
+          "{}: {} lines are excited here and {} in {}, line {} ({} Hz) in one only; all runs must "
+          "excite the same lines",
+          place, spectrum.lines.size(), excited_.lines.size(),
+          realizations_.front().runs.front().place(), differing.front(),
+          differing.front() * resolution_hz));
+    }
+    if (!excited_.only.empty() && spectrum.only != excited_.only) {
+      throw std::invalid_argument(
+          fmt::format("{}: the axes have other lines than in {}; all realizations of a zippered "
+                      "experiment must give an axis the same lines",
+                      place, realizations_.front().runs.front().place()));
+    }
+    for (const Eigen::Index axis : spectrum.channels) {
+      if (std::binary_search(excited_.axes.begin(), excited_.axes.end(), axis)) continue;
+      throw std::invalid_argument(
+          fmt::format("{}: channel {} is excited here and never in realization {} (counted from "
+                      "1); all realizations must excite the same axes",
+                      place, info_.excitation.names[static_cast<std::size_t>(axis)],
+                      realizations_.front().realization + 1));
+    }
+  }
+}
+
+void PlantEstimation::measure(std::size_t m, const std::vector<RunExcitation>& excitation,
+                              HealthGathering* health, RealizationSpectra& spectra) {
+  const RealizationRuns& realization = realizations_[m];
+  std::mutex mutex;
+  for_each_task(run_workers_, realization.runs.size(), [&](int worker, std::size_t e) {
+    RunWorkspace& workspace = *workspaces_[static_cast<std::size_t>(worker)];
+    const auto read_done = [this](double bytes) { bytes_.add(bytes); };
+    HealthPart* part = health != nullptr ? &health->part(m, e) : nullptr;
+    RunSpectra run = options_.method == FrfMethod::lpm
+                         ? measure_record(realization.runs[e], excitation[e], channels_,
+                                          options_.periods, workspace, part, read_done)
+                         : measure_run(realization.runs[e], lines_, channels_, excitation[e].period,
+                                       options_.periods, workspace, part, read_done);
+    const std::lock_guard lock(mutex);
+    spectra.add(e, std::move(run));
+  });
+}
+
+void PlantEstimation::note_dropped(const RealizationRuns& realization,
+                                   const RealizationSpectra& spectra) {
+  for (std::size_t e = 0; e < realization.runs.size(); ++e) {
+    for (DroppedPeriod dropped : spectra.run(e).dropped) {
+      dropped.realization = realization.realization;
+      dropped.experiment = realization.runs[e].run().experiment;
+      dropped_.push_back(std::move(dropped));
+    }
+  }
+}
+
+/// Whether a run without a clean period makes the realization useless, and if so, notes it.
+bool PlantEstimation::leave_out(const RealizationRuns& realization,
+                                const RealizationSpectra& spectra) {
+  for (std::size_t e = 0; e < realization.runs.size(); ++e) {
+    if (spectra.run(e).periods > 0) continue;
+    left_out_.push_back(
+        {realization.realization,
+         fmt::format("{}: {}", realization.runs[e].place(), no_clean_period(realization.runs[e]))});
+    if (first_marked_ == nullptr) first_marked_ = &realization.runs[e];
+    return true;
+  }
+  return false;
+}
+
+void PlantEstimation::note_quality(const RealizationRuns& realization,
+                                   const RealizationSpectra& spectra) {
+  const auto inputs = static_cast<Eigen::Index>(channels_.estimated.size());
+  for (std::size_t e = 0; e < realization.runs.size(); ++e) {
+    const RunSpectra& run = spectra.run(e);
+    provenance_->add(realization.runs[e], run.fingerprint);
+    fewest_periods_ = std::min(fewest_periods_, run.periods);
+    for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(excited_.lines.size()); ++k) {
+      for (Eigen::Index i = run.mean.rows() - inputs; i < run.mean.rows(); ++i) {
+        input_power_ += std::norm(run.mean(i, k));
+      }
+    }
+    excluded_power_ += run.excluded_power;
+  }
+}
+
+FrfEstimate PlantEstimation::describe() const {
+  FrfEstimate frf;
+  for (const Eigen::Index i : channels_.outputs) {
+    frf.outputs.names.push_back(info_.sensors.names[static_cast<std::size_t>(i)]);
+    frf.outputs.units.push_back(info_.sensors.units[static_cast<std::size_t>(i)]);
+  }
+  for (const Eigen::Index i : channels_.estimated) {
+    frf.inputs.names.push_back(info_.actuators.names[static_cast<std::size_t>(i)]);
+    frf.inputs.units.push_back(info_.actuators.units[static_cast<std::size_t>(i)]);
+  }
+  for (const Eigen::Index i : channels_.excluded) {
+    frf.excluded_channels.push_back(info_.actuators.names[static_cast<std::size_t>(i)]);
+  }
+  frf.excluded_power = excluded_power_ / input_power_;
+  frf.sample_rate_hz = info_.sample_rate_hz;
+  frf.hold = Hold::zoh;
+  frf.method = options_.method;
+  frf.dropped_periods = dropped_;
+  std::merge(incomplete_.begin(), incomplete_.end(), left_out_.begin(), left_out_.end(),
+             std::back_inserter(frf.left_out_realizations),
+             [](const auto& a, const auto& b) { return a.realization < b.realization; });
+  frf.periods = fewest_periods_;
+  frf.experiments = static_cast<int>(realizations_.front().runs.size());
+  return frf;
+}
+
+void PlantEstimation::prepare(const RealizationRuns& realization,
+                              const std::vector<RunExcitation>& excitation) {
+  excited_ = excited_part(realization, excitation);
+  const bool zippered = !excited_.only.empty();
+  channels_ = choose_channels(info_, excited_.axes,
+                              zippered ? excited_.axes.size() : realization.runs.size(),
+                              realization.realization, options_);
+  const FrequencyGrid grid(info_.sample_rate_hz, info_.period_samples, excited_.lines);
+  const auto outputs = static_cast<Eigen::Index>(channels_.outputs.size());
+  average_ = std::make_unique<PlantAverage>(grid.frequency_hz(), excited_.lines, outputs,
+                                            static_cast<Eigen::Index>(channels_.estimated.size()),
+                                            options_.covariance);
+  provenance_ = std::make_unique<FrfProvenance>(info_, options_, channels_);
+  excluded_power_.setZero(static_cast<Eigen::Index>(channels_.excluded.size()));
+  lines_ = {excited_.lines, excited_.lines.size()};
+  std::vector<std::string> axes;
+  for (const Eigen::Index axis : excited_.axes)
+    axes.push_back(info_.excitation.names[static_cast<std::size_t>(axis)]);
+  if (zippered) {
+    ZipperedLines lines{excited_.lines, {}, static_cast<Eigen::Index>(axes.size())};
+    for (const Eigen::Index channel : excited_.only)
+      lines.axis.push_back(std::lower_bound(excited_.axes.begin(), excited_.axes.end(), channel) -
+                           excited_.axes.begin());
+    require_enough_lines(lines, axes, realization.runs.front().place() + "/excitation");
+    zippered_ = std::make_unique<ZipperedFit>(std::move(lines), outputs);
+  }
+  if (options_.method == FrfMethod::lpm) return;
+  const std::vector<int> detection = detection_lines(excited_.lines);
+  lines_.lines.insert(lines_.lines.end(), detection.begin(), detection.end());
+  detection_ =
+      std::make_unique<DetectionAverage>(excited_.lines, axes, excited_.single_axis, outputs);
+  if (!zippered)
+    alignment_ = std::make_unique<AlignmentAverage>(excited_.lines, detection, outputs);
+}
+
+void PlantEstimation::include(const RealizationSpectra& spectra,
+                              const std::vector<RunExcitation>& excitation) {
+  const Eigen::MatrixXcd G_before = alignment_ ? average_->mean_response() : Eigen::MatrixXcd();
+  average_->add(spectra, workers_, zippered_.get());
+  if (!detection_) return;
+  if (alignment_) alignment_->add(spectra, G_before, average_->mean_response(), workers_);
+  std::vector<std::size_t> axis;
+  for (const RunExcitation& run : excitation) {
+    const auto at =
+        std::lower_bound(excited_.axes.begin(), excited_.axes.end(), run.spectrum.channels.front());
+    axis.push_back(static_cast<std::size_t>(at - excited_.axes.begin()));
+  }
+  detection_->add(spectra, average_->mean_response(), axis, workers_);
+}
+
+/// What the response shows of the measurement itself.
+void PlantEstimation::note_change(const FrfEstimate& frf, HealthGathering& health) const {
+  std::vector<NoisyRun> noisy;
+  for (const auto& [realization, odd] : average_->odd_runs()) {
+    const auto of = std::find_if(realizations_.begin(), realizations_.end(),
+                                 [m = realization](const auto& r) { return r.realization == m; });
+    noisy.push_back({realization,
+                     of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
+                     frf.outputs.names[static_cast<std::size_t>(odd.output)], odd.ratio});
+  }
+  const UsedRun& run = realizations_.front().runs.front();
+  health.note(average_->drift(frf, run.transient_periods + run.periods), std::move(noisy));
+}
+
+FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
+  for (std::size_t m = 0; m < realizations_.size(); ++m) {
+    const RealizationRuns& realization = realizations_[m];
+    const std::vector<RunExcitation> excitation = read_excitation(realization);
+    if (!average_) prepare(realization, excitation);
+    check_excitation(realization, excitation);
+    if (!zippered_ && realization.runs.size() < excited_.axes.size()) {
+      throw std::invalid_argument(fmt::format(
+          "{} but only {} in realization {} (counted from 1); leave this realization out",
+          counted(excited_.axes.size(), "excited axis", "excited axes"),
+          counted(realization.runs.size(), "experiment"), realization.realization + 1));
+    }
+    if (health != nullptr && !health->complete()) health->excite(m, excitation);
+    std::vector<Eigen::MatrixXcd> R;
+    for (const RunExcitation& run : excitation)
+      R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
+    RealizationSpectra spectra(realization.realization, std::move(R), pool_);
+    measure(m, excitation, health, spectra);
+    note_dropped(realization, spectra);
+    if (leave_out(realization, spectra)) continue;
+    refuse_constant_inputs(realization, spectra, channels_);
+    note_quality(realization, spectra);
+    include(spectra, excitation);
+  }
+  if (left_out_.size() == realizations_.size()) refuse_marked_runs(*first_marked_);
+  FrfEstimate frf = describe();
+  average_->finish(frf, workers_);
+  if (health != nullptr) note_change(frf, *health);
+  if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);
+  // Beyond them some axis would have to be extrapolated.
+  if (zippered_) {
+    const double low_hz = frf.frequency_hz[zippered_->lines().first()];
+    const double high_hz = frf.frequency_hz[zippered_->lines().last()];
+    frf = select_band(std::move(frf), low_hz, high_hz);
+  }
+  if (alignment_ && why_linearity_cannot_be_tested(frf).empty())
+    frf.nonlinearity = nonlinearity_test(
+        frf,
+        {average_->scatter(), alignment_->finish(info_.sample_rate_hz / info_.period_samples)});
+  frf.provenance_json = provenance_->json();
+  if (options_.covariance_lines != 1) frf = smooth_covariance(frf, options_.covariance_lines);
+  if (channels_.inputs == frf.inputs.names) return frf;
+  return select_channels(frf, channels_.inputs, frf.outputs.names);
+}
+
+}  // namespace
+
+FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
+                               const FrfOptions& options) {
+  PlantEstimation estimation(choose_runs(logs, options), options);
+  return estimation.estimate(nullptr);
+}
+
+FrfAndHealth estimate_plant_frf_and_health(const std::vector<const LogReader*>& logs,
+                                           const FrfOptions& options) {
+  PlantEstimation estimation(choose_runs(logs, options), options);
+  HealthGathering health(estimation.realizations());
+  FrfEstimate frf = estimation.estimate(&health);
+  return {std::move(frf), health.finish()};
+}
+
+}  // namespace stageid

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "frf/response/line_estimate.hpp"
+#include "frf/response/nonlinearity.hpp"
+
+namespace stageid {
+
+/// Of degrees of freedom that differ from line to line: as the mean of 1 / variance has it.
+double harmonic_mean(const Eigen::VectorXd& dof);
+
+/// Gathers RealizationScatter, realization by realization. With q_m = LineNoise::gain, what realization m makes
+/// of the noise C_E for an entry of G (line_estimate.hpp), and w_m = 1 / q_m, W = sum_m w_m,
+///   total = sum_m w_m |G^[m] - G_w|^2 / ((M - 1) W),  G_w = sum_m w_m G^[m] / W,
+///   noise = C_E / W,  C_E pooled over the realizations by their degrees of freedom.
+/// On a linear plant w_m |G^[m] - G|^2 has the variance C_E for every m, so that their ratio has the
+/// distribution F(2 (M - 1), 2 nu) whatever the levels, phases and controllers of the realizations; that
+/// of the unweighted mean's variances has it if all q_m are alike.
+/// Source: Cochran's theorem, weighted sums of squares.
+class ScatterAverage {
+ public:
+  ScatterAverage(Eigen::Index outputs, Eigen::Index inputs, Eigen::Index lines);
+
+  /// One realization on line k, whose noise has `dof` degrees of freedom. Lines may be added at once.
+  void add(const LineEstimate& line, const LineNoise& noise, double dof, Eigen::Index k);
+
+  /// @pre two realizations were added, on every line
+  RealizationScatter finish(int realizations) const;
+
+ private:
+  Eigen::MatrixXcd mean_;     // (n_y n_u) x N: G_w
+  Eigen::MatrixXd scatter_;   // (n_y n_u) x N: sum w |G - G_w|^2
+  Eigen::MatrixXd weight_;    // (n_y n_u) x N: W
+  Eigen::MatrixXd residual_;  // n_y x N: sum of dof C_E
+  Eigen::VectorXd dof_;       // N
+};
+
+}  // namespace stageid

@@ -1,0 +1,158 @@
+#include "frf/plant/zippered_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include "frf/statistics/local_fit.hpp"
+#include "frf/statistics/tail_probability.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+
+// Two modes close to each other and the flank of a third one. The numerators have the same order: with
+// a lower one what lies outside the window could not be added to the poles.
+constexpr int kMostPoles = 3;
+constexpr double kNarrowestPole = 0.2;
+// That noise alone leaves so much that the residual is not pooled with the noise but taken for itself.
+constexpr double kMisfitByChance = 0.01;
+
+MatrixXcd open_loop_residual(const MatrixXcd& G) {  // [I, -G]
+  MatrixXcd factor(G.rows(), G.rows() + G.cols());
+  factor.leftCols(G.rows()).setIdentity();
+  factor.rightCols(G.cols()) = -G;
+  return factor;
+}
+
+/// A that what not knowing D adds, F_i F_i^H with F_i = [I, -G] X_i U^-1, is A kron diag(C_E) in the
+/// mean over the outputs.
+MatrixXcd pole_part(const LineEstimate& line, const MatrixXcd& pole_spread,
+                    const Eigen::VectorXd& variance) {
+  const Index n_u = line.Q.cols();
+  MatrixXcd part = MatrixXcd::Zero(n_u, n_u);
+  if (!(variance.minCoeff() > 0.0)) return part;
+  const MatrixXcd factor = open_loop_residual(line.G);
+  const Eigen::VectorXd weight = variance.cwiseInverse() / static_cast<double>(variance.size());
+  for (Index i = 0; i < pole_spread.cols(); ++i) {
+    const MatrixXcd X = pole_spread.col(i).reshaped(factor.cols(), n_u);
+    const MatrixXcd F = factor * X * line.Q;
+    part += F.transpose() * weight.asDiagonal() * F.conjugate();
+  }
+  return part;
+}
+
+}  // namespace
+
+ZipperedFit::ZipperedFit(ZipperedLines lines, Index outputs)
+    : lines_(std::move(lines)),
+      outputs_(outputs),
+      bins_(zippered_window(static_cast<int>(lines_.axes))) {
+  for (Index p = 0; p < lines_.axes; ++p) of_axis_.push_back(lines_.of(p));
+}
+
+/// The nearest lines of each axis, axis by axis, ascending.
+std::vector<Index> ZipperedFit::window(Index k) const {
+  const auto at = [this](Index i) { return lines_.lines[static_cast<std::size_t>(i)]; };
+  std::vector<Index> window;
+  for (const std::vector<Index>& own : of_axis_) {
+    auto first = own.begin();
+    while (own.end() - first > bins_ &&
+           std::abs(at(first[bins_]) - at(k)) < std::abs(at(*first) - at(k)))
+      ++first;
+    window.insert(window.end(), first, first + bins_);
+  }
+  return window;
+}
+
+ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index k) const {
+  const std::vector<Index> window = this->window(k);
+  const auto B = static_cast<Index>(window.size());
+  const Index axes = lines_.axes;
+  const auto distance = [&](Index i) {
+    const auto line = [this](Index at) { return lines_.lines[static_cast<std::size_t>(at)]; };
+    return static_cast<double>(line(window[static_cast<std::size_t>(i)]) - line(k));
+  };
+  LocalProblem problem;
+  problem.Z.resize(spectra.run(0).mean.rows(), B);
+  problem.r.resize(B);
+  for (Index i = 0; i < B; ++i) {
+    problem.Z.col(i) = spectra.run(0).mean.col(window[static_cast<std::size_t>(i)]);
+    problem.r[i] = distance(i);
+  }
+  problem.r /= problem.r.cwiseAbs().maxCoeff();
+  Eigen::VectorXcd R(B);
+  for (Index i = 0; i < B; ++i)
+    R[i] = spectra.excitation(window[static_cast<std::size_t>(i)])(i / bins_, 0);
+  problem.K.resize(kRegressors, B);
+  for (Index i = 0; i < B; ++i)
+    for (Index s = 0; s < kRegressors; ++s)
+      problem.K(s, i) = R[i] * std::pow(problem.r[i], static_cast<double>(s));
+  problem.k0 = Eigen::VectorXcd::Unit(kRegressors, 0);
+  problem.groups.assign(static_cast<std::size_t>(axes), bins_);
+  problem.independent_noise = outputs_;
+  problem.pole_channels = outputs_;
+  problem.tested_noise = outputs_;
+  problem.narrowest_pole = kNarrowestPole;
+
+  const LocalFit fit = average_locally(problem, kMostPoles);
+  ZipperedEstimate result;
+  result.line = estimate_line(MatrixXcd::Identity(axes, axes), fit.value, outputs_);
+  if (result.line.status != LineStatus::good) return result;
+  result.variance_share = (fit.weight.array() * R.array()).abs2().sum() / static_cast<double>(axes);
+
+  // Of the mean of periods, as the local model sees it.
+  const MatrixXcd left = open_loop_residual(result.line.G) * fit.residual;
+  const Eigen::VectorXd left_variance = left.rowwise().squaredNorm() / fit.dof;
+  const bool from_periods = spectra.scatter_dof() > 0;
+  const double periods = from_periods ? spectra.periods(0) : 1.0;
+  const Eigen::VectorXd effective = periods * fit.leverage.cwiseInverse();
+  if (from_periods) {
+    MatrixXcd scatter = MatrixXcd::Zero(problem.Z.rows(), problem.Z.rows());
+    Eigen::VectorXd share = fit.weight.cwiseAbs2();
+    for (Index p = 0; p < axes; ++p) {
+      auto own = share.segment(p * bins_, bins_);
+      own /= own.sum() * static_cast<double>(axes);
+    }
+    double scarcity = 0.0;  // 1 / degrees of freedom
+    for (Index i = 0; i < B; ++i) {
+      const Index line = window[static_cast<std::size_t>(i)];
+      scatter += share[i] * spectra.scatter(line);
+      for (Index j = 0; j < B; ++j) {
+        const Index other = window[static_cast<std::size_t>(j)];
+        scarcity += share[i] * share[j] * common_scatter(spectra.run(0), line, other) /
+                    std::sqrt(spectra.scatter_dof(line) * spectra.scatter_dof(other));
+      }
+    }
+    result.noise = line_noise(result.line, scatter, spectra.scatter_dof(), effective);
+    const double dof = 1.0 / scarcity;
+    const Eigen::VectorXd noise = result.noise.residual.diagonal().real() / periods;
+    if (noise.minCoeff() > 0.0) result.misfit = left_variance.cwiseQuotient(noise).mean();
+    if (result.misfit > 1.0 && log_tail_of_f(result.misfit, static_cast<int>(std::ceil(fit.dof)),
+                                             dof) < std::log(kMisfitByChance)) {
+      // More than noise: what the model cannot follow, of which the value has its part.
+      result.noise.residual *= result.misfit;
+      result.noise_dof = fit.variance_dof;
+    } else {
+      result.noise_dof = dof + fit.variance_dof;
+      const double share_of_left = fit.variance_dof / (result.noise_dof * fit.dof);
+      result.noise.residual = dof / result.noise_dof * result.noise.residual +
+                              periods * share_of_left * left * left.adjoint();
+    }
+  } else {
+    // Not an integer where a pole took its share: divided before.
+    const MatrixXcd scatter = fit.residual * fit.residual.adjoint() / fit.dof;
+    result.noise = line_noise(result.line, scatter, 1, effective);
+    result.noise_dof = fit.variance_dof;
+  }
+  result.noise.mean_of_periods = 1.0 / periods;
+  if (fit.pole_spread.cols() > 0)
+    result.noise.input_part +=
+        pole_part(result.line, fit.pole_spread, result.noise.residual.diagonal().real());
+  return result;
+}
+
+}  // namespace stageid

@@ -1,0 +1,36 @@
+#include "frf/response/channel_positions.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include "acquisition/files/key_suggestion.hpp"
+
+namespace stageid {
+
+std::vector<Eigen::Index> channel_positions(const ChannelList& channels,
+                                            const std::vector<std::string>& wanted,
+                                            const char* option, const char* kind) {
+  const std::vector<std::string>& names = channels.names;
+  std::vector<Eigen::Index> found;
+  for (const std::string& name : wanted) {
+    const auto at = std::find(names.begin(), names.end(), name);
+    if (at == names.end()) {
+      const std::string nearest = nearest_word(name, names);
+      throw std::invalid_argument(fmt::format(
+          "{}: unknown {} '{}'; {} {}", option, kind, name,
+          nearest.empty() ? "there are" : fmt::format("did you mean '{}'? There are", nearest),
+          fmt::join(names, ", ")));
+    }
+    found.push_back(at - names.begin());
+  }
+  if (std::set<Eigen::Index>(found.begin(), found.end()).size() != found.size())
+    throw std::invalid_argument(
+        fmt::format("{}: a channel is named twice; name each once", option));
+  return found;
+}
+
+}  // namespace stageid

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "acquisition/record/log_info.hpp"
+
+namespace stageid {
+
+/// Where each of `wanted` stands in `channels`.
+/// @param option, kind for messages: "inputs", "actuator"
+/// @throws std::invalid_argument "OPTION: unknown KIND 'x'; did you mean 'y'? There are ...", or where a
+///         channel is named twice
+std::vector<Eigen::Index> channel_positions(const ChannelList& channels,
+                                            const std::vector<std::string>& wanted,
+                                            const char* option, const char* kind);
+
+}  // namespace stageid

@@ -1,0 +1,34 @@
+#include "frf/response/confidence.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace stageid {
+
+double squared_error_quantile(double level, double dof) {
+  const double known = -std::log1p(-level);
+  // expm1: many degrees of freedom leave little of the difference.
+  return dof > 0.0 ? dof * std::expm1(known / dof) : known;
+}
+
+Eigen::MatrixXd confidence_radius(const FrfEstimate& frf, double level, VarianceKind kind) {
+  if (!(level > 0.0 && level < 1.0)) {
+    throw std::invalid_argument(
+        fmt::format("confidence level: {}; a probability between 0 and 1 belongs there", level));
+  }
+  const bool total = kind == VarianceKind::total;
+  const Eigen::MatrixXd& variance = total ? frf.total_variance : frf.noise_variance;
+  const double dof = total ? frf.total_dof : frf.noise_dof;
+  if (variance.size() == 0 || !(dof > 0.0)) {
+    throw std::invalid_argument(
+        total ? "confidence radius: the total variance or its total_dof is unknown; measure two "
+                "realizations"
+              : "confidence radius: the noise variance or its noise_dof is unknown; measure two "
+                "periods");
+  }
+  return (squared_error_quantile(level, dof) * variance).cwiseSqrt();
+}
+
+}  // namespace stageid

@@ -1,0 +1,77 @@
+#include "frf/response/distortion_variance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "frf/statistics/frequency_bands.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kLines =
+    8;                      // of a band, which give the expectation as many degrees of freedom
+constexpr int kPasses = 5;  // of the weights: alpha changes by less than a percent afterwards
+
+/// alpha of one channel in one band. @param power |G|^2
+double relative_distortion(const Eigen::ArrayXd& total, const Eigen::ArrayXd& noise,
+                           const Eigen::ArrayXd& power) {
+  if (!(power.sum() > 0.0)) return 0.0;
+  const Eigen::ArrayXd excess = total - noise;
+  double alpha = std::max(0.0, excess.sum() / power.sum());
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const Eigen::ArrayXd v = noise + alpha * power;
+    if (!(v.minCoeff() > 0.0)) return alpha;
+    alpha = std::max(0.0, (power * excess / v.square()).sum() / (power / v).square().sum());
+  }
+  return alpha;
+}
+
+}  // namespace
+
+DistortionVariance distortion_variance(const FrfEstimate& frf) {
+  const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kLines);
+  DistortionVariance out;
+  out.variance.resize(frf.response.rows(), frf.lines());
+  const double prior_dof = static_cast<double>(kLines);
+  out.dof = frf.total_dof + prior_dof;
+  const auto bands = static_cast<Eigen::Index>(limits.size()) - 1;
+  out.distortion.band_hz.resize(bands, 2);
+  out.distortion.level.resize(frf.response.rows(), bands);
+  for (std::size_t b = 0; b + 1 < limits.size(); ++b) {
+    const Eigen::Index count = limits[b + 1] - limits[b];
+    const auto at = static_cast<Eigen::Index>(b);
+    out.distortion.band_hz.row(at) << frf.frequency_hz[limits[b]],
+        frf.frequency_hz[limits[b + 1] - 1];
+    for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
+      const auto band = [&](const auto& matrix) {
+        return matrix.row(c).segment(limits[b], count).transpose().array().eval();
+      };
+      const Eigen::ArrayXd total = band(frf.total_variance);
+      const Eigen::ArrayXd noise = band(frf.noise_variance);
+      const Eigen::ArrayXd power = band(frf.response).abs2();
+      const double alpha = relative_distortion(total, noise, power);
+      out.distortion.level(c, at) = std::sqrt((frf.total_dof + 1.0) * alpha);
+      const Eigen::ArrayXd expected = noise + alpha * power;
+      out.variance.row(c).segment(limits[b], count) =
+          ((frf.total_dof * total + prior_dof * expected) / out.dof).matrix().transpose();
+    }
+  }
+  return out;
+}
+
+Eigen::MatrixXd variance_with(const Distortion& distortion, const FrfEstimate& frf) {
+  Eigen::MatrixXd variance = frf.noise_variance;
+  const double realizations = std::max(1, frf.realizations);
+  Eigen::Index b = 0;
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    while (b + 1 < distortion.band_hz.rows() && frf.frequency_hz[k] >= distortion.band_hz(b + 1, 0))
+      ++b;
+    variance.col(k) += (distortion.level.col(b).array().square() *
+                        frf.response.col(k).array().abs2() / realizations)
+                           .matrix();
+  }
+  return variance;
+}
+
+}  // namespace stageid

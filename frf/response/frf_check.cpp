@@ -1,0 +1,197 @@
+// check(): what every frequency response must satisfy, wherever it comes from.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "acquisition/files/counted.hpp"
+#include "frf/response/frf_estimate.hpp"
+
+namespace stageid {
+namespace {
+
+[[noreturn]] void refuse(const std::string& place, const std::string& wrong) {
+  throw std::invalid_argument(place + ": " + wrong);
+}
+
+void check_names(const char* place, const ChannelList& channels) {
+  if (channels.names.empty()) refuse(place, "no channel; name at least one");
+  if (channels.units.size() != channels.names.size()) {
+    refuse(place,
+           fmt::format("{} for {}; give one a channel", counted(channels.units.size(), "unit"),
+                       counted(channels.names.size(), "channel")));
+  }
+  std::set<std::string> seen;
+  for (const std::string& name : channels.names) {
+    if (!seen.insert(name).second) {
+      refuse(place, fmt::format("'{}' stands there twice; channel names must differ", name));
+    }
+  }
+}
+
+void check_frequencies(const FrfEstimate& frf) {
+  const Eigen::VectorXd& f = frf.frequency_hz;
+  if (f.size() == 0) refuse("frequency_hz", "no line; give at least one");
+  for (Eigen::Index k = 0; k < f.size(); ++k) {
+    const std::string place = fmt::format("frequency_hz[line {}]", k);
+    if (!std::isfinite(f[k]) || f[k] < 0.0) {
+      refuse(place, "not a finite number >= 0");
+    }
+    if (k > 0 && !(f[k] > f[k - 1])) {
+      refuse(place,
+             fmt::format("{} Hz after {} Hz; frequencies must increase strictly", f[k], f[k - 1]));
+    }
+  }
+  const double last = f[f.size() - 1];
+  if (frf.hold == Hold::zoh && frf.sample_rate_hz > 0.0 && last > 0.5 * frf.sample_rate_hz) {
+    refuse(fmt::format("frequency_hz[line {}]", f.size() - 1),
+           fmt::format("{} Hz is above half the sample rate of {} Hz", last, frf.sample_rate_hz));
+  }
+}
+
+bool is_finite(double value) { return std::isfinite(value); }
+bool is_finite(const std::complex<double>& value) {
+  return std::isfinite(value.real()) && std::isfinite(value.imag());
+}
+
+std::string entry_place(const char* dataset, const FrfEstimate& frf, Eigen::Index c,
+                        Eigen::Index k) {
+  return fmt::format("{}[line {}, {} <- {}]", dataset, k,
+                     frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())],
+                     frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]);
+}
+
+template <typename Matrix>
+void check_shape(const char* dataset, const Matrix& matrix, Eigen::Index rows, Eigen::Index lines) {
+  if (matrix.rows() != rows || matrix.cols() != lines) {
+    refuse(dataset, fmt::format("{} values on {} lines; {} on {} belong there", matrix.rows(),
+                                matrix.cols(), rows, lines));
+  }
+}
+
+void check_variance(const char* dataset, const FrfEstimate& frf, const Eigen::MatrixXd& variance) {
+  if (variance.size() == 0) return;
+  check_shape(dataset, variance, frf.n_outputs() * frf.n_inputs(), frf.lines());
+  for (Eigen::Index k = 0; k < variance.cols(); ++k) {
+    for (Eigen::Index c = 0; c < variance.rows(); ++c) {
+      if (!is_finite(variance(c, k))) refuse(entry_place(dataset, frf, c, k), "not finite");
+      if (variance(c, k) < 0.0)
+        refuse(entry_place(dataset, frf, c, k), "a variance is not negative");
+    }
+  }
+}
+
+/// An optional dataset of numbers without channel names to speak of.
+template <typename Matrix>
+void check_optional(const char* dataset, const Matrix& matrix, Eigen::Index rows,
+                    Eigen::Index lines) {
+  if (matrix.size() == 0) return;
+  check_shape(dataset, matrix, rows, lines);
+  for (Eigen::Index k = 0; k < matrix.cols(); ++k) {
+    for (Eigen::Index c = 0; c < matrix.rows(); ++c) {
+      if (!is_finite(matrix(c, k))) refuse(fmt::format("{}[line {}]", dataset, k), "not finite");
+    }
+  }
+}
+
+void check_scalars(const FrfEstimate& frf) {
+  if (!std::isfinite(frf.sample_rate_hz) || frf.sample_rate_hz < 0.0) {
+    refuse("sample_rate_hz", "not a finite number >= 0; 0 means unknown");
+  }
+  if (!std::isfinite(frf.delay_s)) refuse("delay_s", "not finite");
+  if (!std::isfinite(frf.experiment_noise_ratio) || frf.experiment_noise_ratio < 1.0)
+    refuse("experiment_noise_ratio", "not a finite number >= 1");
+  if (!std::isfinite(frf.correlated_lines) || frf.correlated_lines < 1.0)
+    refuse("correlated_lines", "not a finite number >= 1");
+  for (const double dof : {frf.noise_dof, frf.total_dof}) {
+    if (!std::isfinite(dof) || dof < 0.0)
+      refuse("noise_dof, total_dof", "not a finite number >= 0");
+  }
+}
+
+void check_detection(const FrfEstimate& frf) {
+  const DetectionLines& lines = frf.detection;
+  const Eigen::Index D = lines.frequency_hz.size();
+  const Eigen::Index rows = frf.n_outputs() * static_cast<Eigen::Index>(lines.groups.size());
+  if (lines.line.size() != D) refuse("detection_line", "as many as frequencies belong there");
+  if (D == 0) return;
+  if (lines.runs.size() != static_cast<Eigen::Index>(lines.groups.size()))
+    refuse("detection_runs",
+           fmt::format("{} values for {} groups", lines.runs.size(), lines.groups.size()));
+  if (!lines.runs.allFinite() || !lines.frequency_hz.allFinite() || !std::isfinite(lines.noise_dof))
+    refuse("detection_frequency_hz", "this, detection_runs and the dof must be finite");
+  check_shape("detection_power", lines.power, rows, D);
+  check_optional("detection_power", lines.power, rows, D);
+  check_shape("detection_noise", lines.noise, frf.n_outputs(), D);
+  check_optional("detection_noise", lines.noise, frf.n_outputs(), D);
+  check_optional("detection_linear_power", lines.linear_power, rows, frf.lines());
+}
+
+void check_nonlinearity(const FrfEstimate& frf) {
+  const NonlinearityTest& test = frf.nonlinearity;
+  const Eigen::Index bands = test.band_hz.rows();
+  if (bands == 0) return;
+  if (test.band_hz.cols() != 2 || !test.band_hz.allFinite())
+    refuse("nonlinearity_band_hz", "two finite frequencies a band belong there");
+  const Eigen::Index n_c = frf.n_outputs() * frf.n_inputs();
+  check_shape("nonlinearity_p_value", test.p_value, n_c, bands);
+  check_optional("nonlinearity_p_value", test.p_value, n_c, bands);
+  check_shape("nonlinearity_distortion", test.distortion, n_c, bands);
+  check_optional("nonlinearity_distortion", test.distortion, n_c, bands);
+  if (test.settled_p_value.size() > 0 &&
+      (test.settled_p_value.size() != bands || !test.settled_p_value.allFinite()))
+    refuse("nonlinearity_settled_p_value", "a probability a band belongs there");
+  const Eigen::Index rows =
+      frf.n_outputs() * static_cast<Eigen::Index>(frf.detection.groups.size());
+  for (const DetectedDistortion* kind : {&test.even, &test.odd}) {
+    const char* dataset = kind == &test.even ? "nonlinearity_even" : "nonlinearity_odd";
+    check_optional(dataset, kind->p_value, rows, bands);
+    check_optional(dataset, kind->level, rows, bands);
+  }
+}
+
+}  // namespace
+
+void check(const FrfEstimate& frf) {
+  check_names("inputs", frf.inputs);
+  check_names("outputs", frf.outputs);
+  check_scalars(frf);
+  check_frequencies(frf);
+
+  const Eigen::Index n_channels = frf.n_outputs() * frf.n_inputs();
+  check_shape("response", frf.response, n_channels, frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    for (Eigen::Index c = 0; c < n_channels; ++c) {
+      if (!is_finite(frf.response(c, k))) refuse(entry_place("response", frf, c, k), "not finite");
+    }
+  }
+  check_variance("noise_variance", frf, frf.noise_variance);
+  check_variance("total_variance", frf, frf.total_variance);
+  const Eigen::Index n_residuals = frf.n_outputs() * frf.n_outputs();
+  check_optional("residual_covariance", frf.residual_covariance_re, n_residuals, frf.lines());
+  check_optional("residual_covariance", frf.residual_covariance_im, n_residuals, frf.lines());
+  if (frf.residual_covariance_re.size() != frf.residual_covariance_im.size()) {
+    refuse("residual_covariance", "real and imaginary part differ in size");
+  }
+  check_optional("input_factor", frf.input_factor, frf.n_inputs() * frf.n_inputs(), frf.lines());
+  check_optional("covariance", frf.covariance, n_channels * n_channels, frf.lines());
+  if (frf.input_condition.size() != 0) {
+    check_optional("input_condition", Eigen::MatrixXd(frf.input_condition.transpose()), 1,
+                   frf.lines());
+  }
+  if (frf.interpolation_misfit.size() != 0) {
+    check_optional("interpolation_misfit", Eigen::MatrixXd(frf.interpolation_misfit.transpose()), 1,
+                   frf.lines());
+  }
+  check_detection(frf);
+  check_nonlinearity(frf);
+  if (frf.excluded_power.size() != static_cast<Eigen::Index>(frf.excluded_channels.size())) {
+    refuse("excluded_power", fmt::format("{} values for {} channels", frf.excluded_power.size(),
+                                         frf.excluded_channels.size()));
+  }
+  if (!frf.excluded_power.allFinite()) refuse("excluded_power", "not finite");
+}
+
+}  // namespace stageid

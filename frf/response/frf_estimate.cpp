@@ -1,0 +1,144 @@
+#include "frf/response/frf_estimate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+
+#include "frf/response/channel_positions.hpp"
+
+namespace stageid {
+namespace {
+
+using Indices = std::vector<Eigen::Index>;
+
+Indices positions(const ChannelList& channels, const std::vector<std::string>& wanted,
+                  const char* option, const char* kind) {
+  if (wanted.empty())
+    throw std::invalid_argument(
+        fmt::format("select_channels: no {} asked for; name at least one", kind));
+  return channel_positions(channels, wanted, option, kind);
+}
+
+ChannelList pick(const ChannelList& channels, const Indices& at) {
+  ChannelList picked;
+  for (const Eigen::Index i : at) {
+    picked.names.push_back(channels.names[static_cast<std::size_t>(i)]);
+    picked.units.push_back(channels.units[static_cast<std::size_t>(i)]);
+  }
+  return picked;
+}
+
+/// Rows of a matrix whose empty form (unknown) stays empty.
+template <typename Matrix>
+Matrix rows_or_empty(const Matrix& matrix, const Indices& rows) {
+  return matrix.size() == 0 ? Matrix() : Matrix(matrix(rows, Eigen::all));
+}
+
+/// Keeps columns of a matrix whose empty form (unknown) stays empty, within its own memory.
+template <typename Matrix>
+void keep_columns(Matrix& matrix, Eigen::Index first, Eigen::Index kept) {
+  if (matrix.size() == 0) return;
+  for (Eigen::Index k = 0; first > 0 && k < kept; ++k) matrix.col(k) = matrix.col(first + k);
+  matrix.conservativeResize(Eigen::NoChange, kept);
+}
+
+/// Rows of columns that are vec of a square matrix, for the given rows and columns of that matrix.
+Indices square_rows(const Indices& kept, Eigen::Index size) {
+  Indices rows;
+  for (const Eigen::Index column : kept) {
+    for (const Eigen::Index row : kept) rows.push_back(row + size * column);
+  }
+  return rows;
+}
+
+/// The rows output + n_y * group of the outputs kept, in all that detection lines tell.
+void select_detection(const FrfEstimate& frf, const Indices& outputs, FrfEstimate& part) {
+  Indices rows;
+  for (std::size_t g = 0; g < frf.detection.groups.size(); ++g) {
+    for (const Eigen::Index i : outputs)
+      rows.push_back(i + frf.n_outputs() * static_cast<Eigen::Index>(g));
+  }
+  part.detection.power = rows_or_empty(frf.detection.power, rows);
+  part.detection.noise = rows_or_empty(frf.detection.noise, outputs);
+  part.detection.linear_power = rows_or_empty(frf.detection.linear_power, rows);
+  for (const auto kind : {&NonlinearityTest::even, &NonlinearityTest::odd}) {
+    (part.nonlinearity.*kind).p_value = rows_or_empty((frf.nonlinearity.*kind).p_value, rows);
+    (part.nonlinearity.*kind).level = rows_or_empty((frf.nonlinearity.*kind).level, rows);
+  }
+}
+
+}  // namespace
+
+Eigen::VectorXd FrfEstimate::omega_rad_s() const { return 2.0 * std::numbers::pi * frequency_hz; }
+
+Eigen::Map<const Eigen::MatrixXcd> FrfEstimate::at(Eigen::Index k) const {
+  return {response.col(k).data(), n_outputs(), n_inputs()};
+}
+
+FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
+  if (low_hz > high_hz)
+    throw std::invalid_argument(
+        fmt::format("band {} to {} Hz: ends below its beginning; write the lower frequency first",
+                    low_hz, high_hz));
+  const auto* const begin = frf.frequency_hz.data();
+  const auto* const end = begin + frf.lines();
+  const Eigen::Index first = std::lower_bound(begin, end, low_hz) - begin;
+  const bool is_band = low_hz <= high_hz;  // neither end is NaN
+  const Eigen::Index kept = is_band ? std::upper_bound(begin, end, high_hz) - begin - first : 0;
+  if (kept == 0) {
+    const std::string range = frf.lines() == 0
+                                  ? std::string("no lines")
+                                  : fmt::format("lines from {} to {} Hz", frf.frequency_hz[0],
+                                                frf.frequency_hz[frf.lines() - 1]);
+    throw std::invalid_argument(
+        fmt::format("band {} to {} Hz: no line lies in it; the frequency response has {}", low_hz,
+                    high_hz, range));
+  }
+  keep_columns(frf.response, first, kept);
+  keep_columns(frf.noise_variance, first, kept);
+  keep_columns(frf.total_variance, first, kept);
+  keep_columns(frf.residual_covariance_re, first, kept);
+  keep_columns(frf.residual_covariance_im, first, kept);
+  keep_columns(frf.input_factor, first, kept);
+  keep_columns(frf.covariance, first, kept);
+  keep_columns(frf.detection.linear_power, first, kept);
+  for (Eigen::VectorXd* const of_lines :
+       {&frf.input_condition, &frf.interpolation_misfit, &frf.frequency_hz}) {
+    if (of_lines->size() != 0) *of_lines = of_lines->segment(first, kept).eval();
+  }
+  return frf;
+}
+
+FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,
+                            const std::vector<std::string>& outputs) {
+  const Indices input_at = positions(frf.inputs, inputs, "inputs", "input");
+  const Indices output_at = positions(frf.outputs, outputs, "outputs", "output");
+  Indices entries;
+  for (const Eigen::Index j : input_at) {
+    for (const Eigen::Index i : output_at) entries.push_back(i + frf.n_outputs() * j);
+  }
+  const Indices residual_rows = square_rows(output_at, frf.n_outputs());
+
+  FrfEstimate part = frf;
+  part.inputs = pick(frf.inputs, input_at);
+  part.outputs = pick(frf.outputs, output_at);
+  part.response = rows_or_empty(frf.response, entries);
+  part.noise_variance = rows_or_empty(frf.noise_variance, entries);
+  part.total_variance = rows_or_empty(frf.total_variance, entries);
+  part.residual_covariance_re = rows_or_empty(frf.residual_covariance_re, residual_rows);
+  part.residual_covariance_im = rows_or_empty(frf.residual_covariance_im, residual_rows);
+  // The other inputs' estimates are marginalized: a part of S, which is already an inverse.
+  part.input_factor = rows_or_empty(frf.input_factor, square_rows(input_at, frf.n_inputs()));
+  part.covariance =
+      rows_or_empty(frf.covariance, square_rows(entries, frf.n_outputs() * frf.n_inputs()));
+  part.nonlinearity.p_value = rows_or_empty(frf.nonlinearity.p_value, entries);
+  part.nonlinearity.distortion = rows_or_empty(frf.nonlinearity.distortion, entries);
+  select_detection(frf, output_at, part);
+  return part;
+}
+
+}  // namespace stageid

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "acquisition/record/log_info.hpp"
+#include "frf/response/nonlinearity.hpp"
+
+namespace stageid {
+
+/// Whether the response still contains a zero-order hold (and sampler), as measured by a digital
+/// loop.
+enum class Hold : std::uint8_t { none, zoh };
+
+/// What was divided out of the response: nothing; e^{-j omega delay_s}; or the delay and the hold's
+/// (1 - e^{-j omega T}) / (j omega T).
+enum class Compensation : std::uint8_t { none, delay, hold };
+
+enum class FrfMethod : std::uint8_t {
+  periodic,  ///< means over the periods after the transient ones
+  lpm        ///< whole records; the transient is modelled between the lines, nothing is passed over
+};
+
+/// A recorded period that was left out of the means.
+struct DroppedPeriod {
+  int realization = 0;  ///< all three are counted from 0,
+  int experiment = 0;
+  int period = 0;  ///< the periods after the transient ones
+  std::string reason;
+  friend bool operator==(const DroppedPeriod&, const DroppedPeriod&) = default;
+};
+
+/// A realization that was left out as a whole.
+struct LeftOutRealization {
+  int realization = 0;  ///< counted from 0
+  std::string reason;
+  friend bool operator==(const LeftOutRealization&, const LeftOutRealization&) = default;
+};
+
+/// A frequency response with its uncertainty: what frf.h5 holds.
+///
+/// Storage is the paper's vec: column k of a channel matrix is vec(G(j omega_k)), channel
+/// c = output + outputs * input.
+struct FrfEstimate {
+  Eigen::VectorXd frequency_hz;  ///< N, strictly increasing
+  ChannelList inputs;            ///< n_u
+  ChannelList outputs;           ///< n_y
+  Eigen::MatrixXcd response;     ///< (n_y n_u) x N, unit of output / unit of input
+
+  /// E|dG|^2 of the response given (the mean), same shape; empty (0 x 0) if unknown.
+  Eigen::MatrixXd noise_variance;  ///< from periods: what repeating the same phases would give
+  Eigen::MatrixXd
+      total_variance;  ///< from realizations: noise and stochastic nonlinear contributions
+
+  double sample_rate_hz = 0.0;  ///< 0: unknown
+  Hold hold = Hold::none;
+  Compensation compensated = Compensation::none;
+  double delay_s = 0.0;  ///< what `compensated` took out (without the hold's own T/2)
+
+  FrfMethod method = FrfMethod::periodic;
+  int realizations = 0;
+  int periods = 0;  ///< used, of each run
+  int experiments = 0;
+  double noise_dof = 0.0;  ///< degrees of freedom of noise_variance: M E (P-1), see plant_frf.hpp
+  double total_dof = 0.0;  ///< M - 1
+  Eigen::VectorXd input_condition;         ///< N: cond(U(k)), 1 is perfect; empty if unknown
+  Eigen::MatrixXd residual_covariance_re;  ///< (n_y n_y) x N: C_E, Hermitian, per experiment and
+  Eigen::MatrixXd residual_covariance_im;  ///<   the mean of periods; empty if unknown
+  /// (n_u n_u) x N: S, Hermitian, with Cov(vec G) = S kron C_E for the mean over realizations; with one
+  /// realization S = [(U U^H)^-1]^T. Empty if unknown.
+  Eigen::MatrixXcd input_factor;
+  /// Largest over smallest noise power of two experiments of a realization whose noise is not that of the
+  /// others, see experiment_noise.hpp: their covariances were not pooled, and S kron C_E is the nearest to them
+  /// only. 1: the experiments agree.
+  double experiment_noise_ratio = 1.0;
+  Eigen::MatrixXcd covariance;  ///< (n_c n_c) x N on request, n_c = n_y n_u: Cov(vec G); else empty
+  int covariance_lines = 1;     ///< C_E is the mean over so many lines: smooth_covariance()
+  /// Errors of the response on neighbouring lines are correlated: all N lines tell a smooth model as
+  /// much as N / correlated_lines independent ones (zippered experiments; else 1).
+  double correlated_lines = 1.0;
+  /// N, zippered: residual of the local models over what noise would leave; about 1 where the
+  /// interpolation holds and the plant is linear. Empty if unknown.
+  Eigen::VectorXd interpolation_misfit;
+  DetectionLines detection;       ///< empty if unknown
+  NonlinearityTest nonlinearity;  ///< empty unless there are two periods and two realizations
+  std::vector<DroppedPeriod> dropped_periods;
+  std::vector<LeftOutRealization> left_out_realizations;
+  std::vector<std::string> excluded_channels;  ///< actuators outside the sub-plant
+  Eigen::VectorXd excluded_power;              ///< their excited-line power over that of the inputs
+  std::string provenance_json = "{}";          ///< inputs (hash), configuration, version, seeds
+
+  Eigen::Index lines() const noexcept { return frequency_hz.size(); }
+  Eigen::Index n_outputs() const noexcept { return static_cast<Eigen::Index>(outputs.size()); }
+  Eigen::Index n_inputs() const noexcept { return static_cast<Eigen::Index>(inputs.size()); }
+  Eigen::VectorXd omega_rad_s() const;
+  /// G(j omega_k), n_y x n_u; a view, valid while *this lives.
+  Eigen::Map<const Eigen::MatrixXcd> at(Eigen::Index k) const;
+};
+
+/// The lines with low_hz <= f <= high_hz; of an estimate that is moved in, no copy. @throws std::invalid_argument if none is left.
+FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz);
+
+/// The named channels, in the order asked. @throws std::invalid_argument naming an unknown channel
+/// and those there are.
+FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,
+                            const std::vector<std::string>& outputs);
+
+/// Shapes agree, frequencies increase, numbers finite, variances not negative.
+/// @throws std::invalid_argument "response[line 12, z1 <- a3]: not finite".
+void check(const FrfEstimate& frf);
+
+}  // namespace stageid

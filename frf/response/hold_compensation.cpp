@@ -1,0 +1,84 @@
+#include "frf/response/hold_compensation.hpp"
+
+#include <cmath>
+#include <complex>
+#include <functional>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+/// sin(x) / x.
+double sinc(double x) { return x == 0.0 ? 1.0 : std::sin(x) / x; }
+
+void check_request(const FrfEstimate& frf, double delay_s) {
+  if (frf.compensated != Compensation::none) {
+    throw std::invalid_argument(
+        "compensate: the response was compensated already; start from the one as measured");
+  }
+  if (!(frf.sample_rate_hz > 0.0) || !std::isfinite(frf.sample_rate_hz)) {
+    throw std::invalid_argument(
+        "compensate: the sample rate is unknown; the hold lasts one sample, so give "
+        "sample_rate_hz");
+  }
+  if (frf.hold == Hold::none) {
+    throw std::invalid_argument(
+        "compensate: the response has no zero-order hold (hold = none); there is nothing to take "
+        "out");
+  }
+  if (!std::isfinite(delay_s)) {
+    throw std::invalid_argument("compensate: delay_s must be a finite number of seconds");
+  }
+}
+
+/// Response and everything that goes with its square, times a factor a line.
+void multiply(FrfEstimate& frf, const std::function<std::complex<double>(double)>& factor) {
+  const Eigen::VectorXd omega = frf.omega_rad_s();
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const std::complex<double> value = factor(omega[k]);
+    frf.response.col(k) *= value;
+    const double power = std::norm(value);
+    for (Eigen::MatrixXd* variance : {&frf.noise_variance, &frf.total_variance,
+                                      &frf.residual_covariance_re, &frf.residual_covariance_im}) {
+      if (variance->size() != 0) variance->col(k) *= power;
+    }
+    if (frf.covariance.size() != 0) frf.covariance.col(k) *= power;
+  }
+}
+
+/// What `kind` takes out at omega: (1 - e^{-j omega T}) / (j omega T) = e^{-j omega T / 2}
+/// sinc(omega T / 2), so both kinds turn by the same angle, and only `hold` changes the magnitude.
+std::complex<double> taken_out(Compensation kind, double delay_s, double T, double omega) {
+  const double gain = kind == Compensation::hold ? sinc(0.5 * omega * T) : 1.0;
+  return std::polar(gain, -omega * (delay_s + 0.5 * T));
+}
+
+}  // namespace
+
+FrfEstimate compensate(const FrfEstimate& frf, Compensation kind, double delay_s) {
+  if (kind == Compensation::none) return frf;
+  check_request(frf, delay_s);
+  const double T = 1.0 / frf.sample_rate_hz;
+  FrfEstimate result = frf;
+  multiply(result, [&](double omega) { return 1.0 / taken_out(kind, delay_s, T, omega); });
+  if (kind == Compensation::hold) result.hold = Hold::none;
+  result.compensated = kind;
+  result.delay_s = delay_s;
+  return result;
+}
+
+FrfEstimate as_measured(FrfEstimate frf) {
+  if (frf.compensated == Compensation::none)
+    throw std::invalid_argument("the response was not compensated: it is as measured already");
+  if (!(frf.sample_rate_hz > 0.0) || !std::isfinite(frf.sample_rate_hz))
+    throw std::invalid_argument(
+        "the sample rate is unknown: what the compensation took out cannot be put back");
+  const double T = 1.0 / frf.sample_rate_hz;
+  multiply(frf, [&](double omega) { return taken_out(frf.compensated, frf.delay_s, T, omega); });
+  frf.hold = Hold::zoh;
+  frf.compensated = Compensation::none;
+  frf.delay_s = 0.0;
+  return frf;
+}
+
+}  // namespace stageid

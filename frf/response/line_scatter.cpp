@@ -1,0 +1,102 @@
+#include "frf/response/line_scatter.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "excitation/threads/worker_pool.hpp"
+#include "frf/statistics/local_fit.hpp"
+#include "frf/statistics/order_statistic.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kOrder = 2;
+constexpr int kMostPoles = 2;  // two modes close to each other
+constexpr Eigen::Index kDof = 9;
+constexpr Eigen::Index kWindow = kOrder + 1 + kDof;
+
+// Medians. Of errors that do not depend on the lines the first is 1; of a response that the quadratic part cannot
+// follow it is 2^6.
+constexpr double kMostByDistance = 3.0;
+constexpr double kMostOfResponse = 0.04;
+
+LocalFit fit_around(const FrfEstimate& frf, Eigen::Index k) {
+  const Eigen::Index first = std::clamp<Eigen::Index>(k - kWindow / 2, 0, frf.lines() - kWindow);
+  const Eigen::ArrayXd away =
+      frf.frequency_hz.segment(first, kWindow).array() - frf.frequency_hz[k];
+  LocalProblem problem;
+  problem.Z = frf.response.middleCols(first, kWindow);
+  problem.r = (away / away.abs().maxCoeff()).matrix();
+  problem.groups = {kWindow};
+  problem.independent_noise = problem.pole_channels = frf.response.rows();
+  problem.K.resize(kOrder + 1, kWindow);
+  for (Eigen::Index i = 0; i <= kOrder; ++i)
+    problem.K.row(i) = problem.r.array()
+                           .pow(static_cast<double>(i))
+                           .matrix()
+                           .cast<std::complex<double>>()
+                           .transpose();
+  problem.k0 = Eigen::VectorXcd::Unit(kOrder + 1, 0);
+  return fit_locally(problem, kMostPoles);
+}
+
+/// Calls use(a / b) wherever b > 0.
+template <typename Use>
+void for_each_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const Use& use) {
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (b.data()[i] > 0.0) use(a.data()[i] / b.data()[i]);
+}
+
+/// Numbers that are not negative are ordered as their bits are: exponent and four bits of the fraction.
+std::size_t bin_of(double ratio) { return std::bit_cast<std::uint64_t>(ratio) >> 48; }
+
+/// The upper median of numbers that are not negative. They are as many as the data: first counted in
+/// bins, and only those of the middle bin are stored.
+double median_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  if (a.size() == 0 || b.size() != a.size()) return 0.0;
+  std::vector<std::size_t> counts(std::size_t{1} << 16);
+  for_each_ratio(a, b, [&](double ratio) { ++counts[bin_of(ratio)]; });
+  std::size_t rank = std::accumulate(counts.begin(), counts.end(), std::size_t{0}) / 2;
+  std::size_t bin = 0;
+  while (bin < counts.size() && rank >= counts[bin]) rank -= counts[bin++];
+  if (bin == counts.size()) return 0.0;
+  std::vector<double> ratios;
+  ratios.reserve(counts[bin]);
+  for_each_ratio(a, b, [&](double ratio) {
+    if (bin_of(ratio) == bin) ratios.push_back(ratio);
+  });
+  return value_of_rank(ratios, rank);
+}
+
+}  // namespace
+
+LineScatter line_scatter(const FrfEstimate& frf, int threads) {
+  LineScatter scatter;
+  if (frf.lines() < kWindow) return scatter;
+  scatter.variance.resize(frf.response.rows(), frf.lines());
+  for_each_line(worker_count(threads), frf.lines(), [&](Eigen::Index k) {
+    const LocalFit fit = fit_around(frf, k);
+    scatter.variance.col(k) = fit.residual.rowwise().squaredNorm() / fit.dof;
+  });
+  scatter.dof = static_cast<double>(kDof);
+  scatter.over_noise = median_ratio(scatter.variance, frf.noise_variance);
+  return scatter;
+}
+
+bool lines_are_coarse(const FrfEstimate& frf, const LineScatter& scatter, int threads) {
+  if (frf.lines() < 2 * kWindow) return true;
+  if (median_ratio(scatter.variance, frf.response.cwiseAbs2()) > kMostOfResponse) return true;
+  const auto others = Eigen::seq(0, frf.lines() - 1, 2);
+  FrfEstimate half;
+  half.inputs = frf.inputs;
+  half.outputs = frf.outputs;
+  half.frequency_hz = frf.frequency_hz(others);
+  half.response = frf.response(Eigen::all, others);
+  return median_ratio(line_scatter(half, threads).variance, scatter.variance(Eigen::all, others)) >
+         kMostByDistance;
+}
+
+}  // namespace stageid

@@ -1,0 +1,197 @@
+#include "frf/response/nonlinearity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "frf/response/frf_estimate.hpp"
+#include "frf/statistics/frequency_bands.hpp"
+#include "frf/statistics/tail_probability.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kFewestLines = 8;
+constexpr double kCertain = 1e3;  // -ln p of a scatter where there is no noise at all
+
+constexpr double kRounding = 1e-24;  // of the linear power: what double precision leaves of nothing
+
+/// -ln p of one line. Without any noise every scatter is certain; without either there is nothing
+/// to see, nor in the rounding of `linear` power.
+double evidence(double power, double noise, double linear, int power_dof, double noise_dof) {
+  if (power <= kRounding * linear) return 0.0;
+  if (noise > 0.0) return -log_tail_of_f(power / noise, power_dof, noise_dof);
+  return kCertain;
+}
+
+/// From the scatter of the realizations: column b of p_value and distortion.
+void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, Eigen::Index first,
+                  Eigen::Index K, Eigen::Index b, NonlinearityTest& test) {
+  const int a = static_cast<int>(frf.total_dof);
+  for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
+    double sum = 0.0;
+    double excess = 0.0;
+    for (Eigen::Index k = first; k < first + K; ++k) {
+      sum += evidence(scatter.total(c, k), scatter.noise(c, k), std::norm(frf.response(c, k)), a,
+                      scatter.noise_dof);
+      excess += std::max(0.0, frf.total_variance(c, k) - frf.noise_variance(c, k));
+    }
+    test.p_value(c, b) = tail_of_evidence(sum, K);
+    const double linear = frf.response.row(c).segment(first, K).squaredNorm();
+    // An output that shows one value throughout has no response, and nothing that is distorted.
+    test.distortion(c, b) = linear > 0.0 ? std::sqrt((a + 1) * excess / linear) : 0.0;
+  }
+}
+
+/// Detection lines of one parity in [low_hz, high_hz).
+std::vector<Eigen::Index> lines_of(const DetectionLines& detection, int parity, double low_hz,
+                                   double high_hz) {
+  std::vector<Eigen::Index> lines;
+  for (Eigen::Index d = 0; d < detection.line.size(); ++d) {
+    const double f = detection.frequency_hz[d];
+    if (detection.line[d] % 2 == parity && f >= low_hz && f < high_hz) lines.push_back(d);
+  }
+  return lines;
+}
+
+void test_detection(const DetectionLines& detection, const std::vector<Eigen::Index>& lines,
+                    const Eigen::VectorXd& linear_power, Eigen::Index b,
+                    DetectedDistortion& found) {
+  const Eigen::Index n_y = detection.noise.rows();
+  const auto K = static_cast<Eigen::Index>(lines.size());
+  for (Eigen::Index c = 0; c < detection.power.rows(); ++c) {
+    double sum = 0.0;
+    double excess = 0.0;
+    for (const Eigen::Index d : lines) {
+      const double power = detection.power(c, d);
+      const double noise = detection.noise(c % n_y, d);
+      sum += evidence(power, noise, linear_power[c], static_cast<int>(detection.runs[c / n_y]),
+                      detection.noise_dof);
+      excess += std::max(0.0, power - noise);
+    }
+    found.p_value(c, b) = tail_of_evidence(sum, K);
+    found.level(c, b) = K == 0 || !(linear_power[c] > 0.0)
+                            ? 0.0
+                            : std::sqrt(excess / static_cast<double>(K) / linear_power[c]);
+  }
+}
+
+/// The smallest upper tail of any output on the lines [low_hz, high_hz].
+double least_tail(const LineAlignment& alignment, double low_hz, double high_hz) {
+  double least = 1.0;
+  for (Eigen::Index i = 0; i < alignment.cosine.rows(); ++i) {
+    double cosine = 0.0;
+    double pairs = 0.0;
+    for (Eigen::Index l = 0; l < alignment.frequency_hz.size(); ++l) {
+      if (alignment.frequency_hz[l] < low_hz || alignment.frequency_hz[l] > high_hz) continue;
+      cosine += alignment.cosine(i, l);
+      pairs += alignment.pairs(i, l);
+    }
+    if (pairs >= kFewestLines)
+      least = std::min(least, tail_of_normal(cosine / std::sqrt(0.5 * pairs)));
+  }
+  return least;
+}
+
+/// Into settled_p_value, with what follows for the verdicts. @pre band_hz and the p-values are known
+void test_settling(const LineAlignment& alignment, NonlinearityTest& test) {
+  if (alignment.frequency_hz.size() == 0) return;
+  const Eigen::Index bands = test.band_hz.rows();
+  const double tests = 2.0 * static_cast<double>(alignment.cosine.rows());
+  const double everywhere = least_tail(alignment, test.band_hz(0, 0), test.band_hz(bands - 1, 1));
+  test.settled_p_value.resize(bands);
+  for (Eigen::Index b = 0; b < bands; ++b) {
+    const double band = least_tail(alignment, test.band_hz(b, 0), test.band_hz(b, 1));
+    test.settled_p_value[b] = std::min(1.0, tests * std::min(band, everywhere));
+    if (test.settled(b)) continue;
+    test.p_value.col(b).setOnes();
+    for (DetectedDistortion* kind : {&test.even, &test.odd})
+      if (kind->p_value.size() > 0) kind->p_value.col(b).setOnes();
+  }
+}
+
+}  // namespace
+
+bool NonlinearityTest::settled(Eigen::Index b) const {
+  return settled_p_value.size() == 0 || settled_p_value[b] >= kUnsettledBelow;
+}
+
+double NonlinearityTest::least_p_value() const {
+  double least = 1.0;
+  for (const Eigen::MatrixXd* p : {&p_value, &even.p_value, &odd.p_value})
+    if (p->size() > 0) least = std::min(least, p->minCoeff());
+  return least;
+}
+
+bool NonlinearityTest::nonlinear() const {
+  const auto tests = p_value.size() + even.p_value.size() + odd.p_value.size();
+  return least_p_value() * static_cast<double>(tests) < kNonlinearBelow;
+}
+
+std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
+  if (frf.method != FrfMethod::periodic)
+    return "nonlinearity test: neighbouring lines of method 'lpm' share bins; estimate with "
+           "'periodic'";
+  if (frf.correlated_lines != 1.0)
+    return "nonlinearity test: neighbouring lines of a zippered experiment share their data; "
+           "measure with 'orthogonal_dft' or 'single_axis'";
+  if (frf.covariance_lines > 1)
+    return "nonlinearity test: neighbouring lines share their smoothed noise; estimate without "
+           "smoothing";
+  if (frf.noise_variance.size() == 0 || !(frf.noise_dof > 0.0))
+    return "nonlinearity test: the noise variance or its noise_dof is unknown; measure two periods";
+  if (frf.total_variance.size() == 0 || !(frf.total_dof >= 1.0) ||
+      frf.total_dof != std::floor(frf.total_dof))
+    return "nonlinearity test: the total variance or its total_dof, realizations - 1, is unknown; "
+           "measure two realizations";
+  return "";
+}
+
+NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEvidence& evidence) {
+  if (const std::string why = why_linearity_cannot_be_tested(frf); !why.empty())
+    throw std::invalid_argument(why);
+  const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kFewestLines);
+  const auto bands = static_cast<Eigen::Index>(limits.size()) - 1;
+  const Eigen::Index n_c = frf.response.rows();
+  NonlinearityTest test;
+  test.band_hz.resize(bands, 2);
+  test.p_value.resize(n_c, bands);
+  test.distortion.resize(n_c, bands);
+  const RealizationScatter scatter =
+      evidence.scatter.total.size() > 0
+          ? evidence.scatter
+          : RealizationScatter{frf.total_variance, frf.noise_variance, frf.noise_dof};
+  const DetectionLines& detection = frf.detection;
+  if (detection.line.size() > 0) {
+    test.even.p_value.resize(detection.power.rows(), bands);
+    test.even.level = test.even.p_value;
+    test.odd = test.even;
+  }
+  for (Eigen::Index b = 0; b < bands; ++b) {
+    const Eigen::Index first = limits[static_cast<std::size_t>(b)];
+    const Eigen::Index next = limits[static_cast<std::size_t>(b) + 1];
+    test.band_hz.row(b) << frf.frequency_hz[first], frf.frequency_hz[next - 1];
+    test_scatter(frf, scatter, first, next - first, b, test);
+    if (detection.line.size() == 0) continue;
+    const Eigen::VectorXd linear_power =
+        detection.linear_power.middleCols(first, next - first).rowwise().mean();
+    const double low_hz = frf.frequency_hz[first];
+    const double high_hz = frf.frequency_hz[std::min(next, frf.lines() - 1)];
+    test_detection(detection, lines_of(detection, 0, low_hz, high_hz), linear_power, b, test.even);
+    test_detection(detection, lines_of(detection, 1, low_hz, high_hz), linear_power, b, test.odd);
+  }
+  // The noise of detection lines is pooled over the experiments, their power is that of some.
+  if (frf.experiment_noise_ratio > 1.0)
+    for (DetectedDistortion* kind : {&test.even, &test.odd}) kind->p_value.setOnes();
+  test_settling(evidence.alignment, test);
+  return test;
+}
+
+NonlinearityTest linearity_of(const FrfEstimate& frf) {
+  if (frf.nonlinearity.band_hz.rows() > 0 || !why_linearity_cannot_be_tested(frf).empty())
+    return frf.nonlinearity;
+  return nonlinearity_test(frf);
+}
+
+}  // namespace stageid

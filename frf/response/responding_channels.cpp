@@ -1,0 +1,59 @@
+#include "frf/response/responding_channels.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "frf/response/confidence.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+struct RatioSum {
+  double sum = 0.0;
+  Eigen::Index count = 0;
+
+  double rms() const { return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : kUnknown; }
+};
+
+void add_channel(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& power,
+                 Eigen::Index channel, RatioSum& ratios) {
+  for (Eigen::Index k = 0; k < power.cols(); ++k) {
+    if (!(power(channel, k) > 0.0)) continue;
+    ratios.sum += error_power(channel, k) / power(channel, k);
+    ++ratios.count;
+  }
+}
+
+}  // namespace
+
+ChannelFlags responding_channels(const FrfEstimate& frf) {
+  const auto power = frf.response.cwiseAbs2().array();  // not evaluated: as large as half the data
+  const bool noise = frf.noise_variance.size() > 0;
+  const Eigen::MatrixXd& variance = noise ? frf.noise_variance : frf.total_variance;
+  if (variance.size() == 0) return (power > 0.0).rowwise().any();
+  const double limit = squared_error_quantile(0.95, noise ? frf.noise_dof : frf.total_dof);
+  return 2 * (power > limit * variance.array()).rowwise().count() >= power.cols();
+}
+
+Eigen::VectorXd relative_channel_error(const Eigen::ArrayXXd& error_power,
+                                       const Eigen::ArrayXXd& power) {
+  Eigen::VectorXd out(power.rows());
+  for (Eigen::Index c = 0; c < power.rows(); ++c) {
+    RatioSum ratios;
+    add_channel(error_power, power, c, ratios);
+    out[c] = ratios.rms();
+  }
+  return out;
+}
+
+double relative_rms_error(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& power,
+                          const ChannelFlags& channels) {
+  RatioSum ratios;
+  for (Eigen::Index c = 0; c < power.rows(); ++c)
+    if (channels[c]) add_channel(error_power, power, c, ratios);
+  return ratios.rms();
+}
+
+}  // namespace stageid

@@ -1,0 +1,99 @@
+#include "frf/runs/channel_choice.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include "acquisition/files/counted.hpp"
+#include "frf/response/channel_positions.hpp"
+
+namespace stageid {
+namespace {
+
+using Indices = std::vector<Eigen::Index>;
+
+bool contains(const Indices& list, Eigen::Index value) {
+  return std::find(list.begin(), list.end(), value) != list.end();
+}
+
+Indices all_of(const ChannelList& channels) {
+  Indices indices(channels.size());
+  for (std::size_t i = 0; i < channels.size(); ++i) indices[i] = static_cast<Eigen::Index>(i);
+  return indices;
+}
+
+std::vector<std::string> names_of(const ChannelList& channels, const Indices& at) {
+  std::vector<std::string> names;
+  for (const Eigen::Index i : at) names.push_back(channels.names[static_cast<std::size_t>(i)]);
+  return names;
+}
+
+/// The actuators named like the excited channels; all of them if some name does not match.
+Indices excited_actuators(const LogInfo& info, const Indices& excited) {
+  Indices found;
+  for (const std::string& name : names_of(info.excitation, excited)) {
+    const auto at = std::find(info.actuators.names.begin(), info.actuators.names.end(), name);
+    if (at == info.actuators.names.end()) return all_of(info.actuators);
+    found.push_back(at - info.actuators.names.begin());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+void check_counts(const LogInfo& info, const Indices& excited, std::size_t inputs,
+                  std::size_t experiments, int realization) {
+  const std::string axes = fmt::format("{}", fmt::join(names_of(info.excitation, excited), ", "));
+  if (inputs > experiments) {
+    throw std::invalid_argument(
+        fmt::format("{} but only {} in realization {} (counted from 1); measure one experiment "
+                    "for each input, or select at most {}",
+                    counted(inputs, "input"), counted(experiments, "experiment"), realization + 1,
+                    counted(experiments, "input")));
+  }
+  if (inputs > excited.size()) {
+    throw std::invalid_argument(fmt::format(
+        "{} but only {} ({}); excite one axis for each input, or select {}",
+        counted(inputs, "input"), counted(excited.size(), "excited axis", "excited axes"), axes,
+        counted(excited.size(), "input")));
+  }
+  if (inputs < excited.size()) {
+    throw std::invalid_argument(
+        fmt::format("{} but {} excited axes ({}): what the others do would be taken for the "
+                    "selected inputs' work; select {} inputs",
+                    counted(inputs, "input"), excited.size(), axes, excited.size()));
+  }
+  if (experiments < excited.size()) {
+    throw std::invalid_argument(
+        fmt::format("{} but only {} in realization {} (counted from 1); leave it out, or measure "
+                    "one experiment for each axis",
+                    counted(excited.size(), "excited axis", "excited axes"),
+                    counted(experiments, "experiment"), realization + 1));
+  }
+}
+
+}  // namespace
+
+ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Index>& excited,
+                              std::size_t experiments, int realization, const FrfOptions& options) {
+  ChannelChoice choice;
+  choice.outputs = options.outputs.empty()
+                       ? all_of(info.sensors)
+                       : channel_positions(info.sensors, options.outputs, "outputs", "sensor");
+  const Indices asked = channel_positions(info.actuators, options.inputs, "inputs", "actuator");
+  const Indices by_excitation = excited_actuators(info, excited);
+  const bool part_of_the_excited =
+      asked.size() < excited.size() && by_excitation.size() == excited.size() &&
+      std::all_of(asked.begin(), asked.end(),
+                  [&](Eigen::Index i) { return contains(by_excitation, i); });
+  choice.estimated = asked.empty() || part_of_the_excited ? by_excitation : asked;
+  choice.inputs = names_of(info.actuators, asked.empty() ? by_excitation : asked);
+  check_counts(info, excited, choice.estimated.size(), experiments, realization);
+  for (const Eigen::Index i : all_of(info.actuators)) {
+    if (!contains(choice.estimated, i)) choice.excluded.push_back(i);
+  }
+  return choice;
+}
+
+}  // namespace stageid

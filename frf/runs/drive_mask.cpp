@@ -1,0 +1,37 @@
+#include "frf/runs/drive_mask.hpp"
+
+#include <algorithm>
+
+namespace stageid {
+
+DriveMask::DriveMask(const Eigen::MatrixXd& period, const LogInfo& info)
+    : own_(info.actuators.size()) {
+  const Eigen::Index samples = period.rows();
+  if (samples == 0) return;
+  any_.assign(static_cast<std::size_t>(samples), 0);
+  for (Eigen::Index r = 0; r < period.cols(); ++r) {
+    std::vector<char> changes(static_cast<std::size_t>(samples), 0);
+    bool moves = false;
+    for (Eigen::Index n = 0; n < samples; ++n) {
+      if (period(n, r) == period(n > 0 ? n - 1 : samples - 1, r)) continue;
+      changes[static_cast<std::size_t>(n)] = any_[static_cast<std::size_t>(n)] = 1;
+      moves = true;
+    }
+    const auto& names = info.actuators.names;
+    const auto at =
+        std::find(names.begin(), names.end(), info.excitation.names[static_cast<std::size_t>(r)]);
+    if (moves && at != names.end())
+      own_[static_cast<std::size_t>(at - names.begin())] = std::move(changes);
+  }
+}
+
+const char* DriveMask::of_actuator(Eigen::Index actuator) const noexcept {
+  return excites(actuator) ? own_[static_cast<std::size_t>(actuator)].data() : any();
+}
+
+bool DriveMask::excites(Eigen::Index actuator) const noexcept {
+  return static_cast<std::size_t>(actuator) < own_.size() &&
+         !own_[static_cast<std::size_t>(actuator)].empty();
+}
+
+}  // namespace stageid

@@ -1,0 +1,87 @@
+#include "frf/runs/excitation_spectrum.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stageid {
+namespace {
+
+constexpr double kSmallestLine = 1e-6;     // of the largest line of the channel
+constexpr double kSmallestChannel = 1e-9;  // of the largest line of all channels: units may differ
+constexpr double kRoundingMargin = 8.0;  // exp(-64): no line of any experiment gets there by chance
+constexpr double kRoundingAtMost = 1e-2;  // a binary sequence has a large step and no rounding
+
+/// Distance between neighbouring values of integer samples; tiny if the samples are real numbers.
+/// A few thousand samples meet every neighbour of a 16 bit code; finer codes do not matter here.
+double smallest_step(const Eigen::VectorXd& samples) {
+  constexpr Eigen::Index kEnough = 4096;
+  std::vector<double> sorted(samples.data(), samples.data() + std::min(samples.size(), kEnough));
+  std::sort(sorted.begin(), sorted.end());
+  double step = sorted.back() - sorted.front();
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    const double distance = sorted[i] - sorted[i - 1];
+    if (distance > 0.0) step = std::min(step, distance);
+  }
+  return step;
+}
+
+Eigen::VectorXcd channel_spectrum(const Eigen::VectorXd& samples, RealDft& dft) {
+  std::copy(samples.data(), samples.data() + samples.size(), dft.input().begin());
+  const auto spectrum = dft.forward();
+  Eigen::VectorXcd values(dft.half_size());
+  std::copy(spectrum.begin(), spectrum.end(), values.data());
+  return values / static_cast<double>(dft.length());
+}
+
+}  // namespace
+
+bool ExcitationSpectrum::is_zippered() const {
+  return channels.size() > 1 &&
+         std::all_of(only.begin(), only.end(), [](Eigen::Index c) { return c >= 0; });
+}
+
+ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& dft) {
+  const Eigen::Index last = (period.rows() + 1) / 2 - 1;  // below Nyquist
+  Eigen::MatrixXcd spectra(dft.half_size(), period.cols());
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(period.cols());
+  for (Eigen::Index c = 0; c < period.cols(); ++c) {
+    if ((period.col(c).array() == period(0, c)).all()) continue;
+    spectra.col(c) = channel_spectrum(period.col(c), dft);
+    largest[c] = std::sqrt(spectra.col(c).segment(1, last).cwiseAbs2().maxCoeff());
+  }
+
+  ExcitationSpectrum result;
+  constexpr Eigen::Index kNone = -2;
+  constexpr Eigen::Index kSeveral = -1;
+  std::vector<Eigen::Index> only(static_cast<std::size_t>(last) + 1, kNone);
+  for (Eigen::Index c = 0; c < period.cols(); ++c) {
+    if (!(largest[c] > kSmallestChannel * largest.maxCoeff())) continue;
+    const double rounding =
+        smallest_step(period.col(c)) / std::sqrt(12.0 * static_cast<double>(period.rows()));
+    const double threshold =
+        std::max(kSmallestLine * largest[c],
+                 std::min(kRoundingMargin * rounding, kRoundingAtMost * largest[c]));
+    bool any = false;
+    for (Eigen::Index l = 1; l <= last; ++l) {
+      if (std::norm(spectra(l, c)) <= threshold * threshold) continue;
+      Eigen::Index& channel = only[static_cast<std::size_t>(l)];
+      channel = channel == kNone ? c : kSeveral;
+      any = true;
+    }
+    if (any) result.channels.push_back(c);
+  }
+  for (int l = 1; l <= last; ++l) {
+    if (only[static_cast<std::size_t>(l)] == kNone) continue;
+    result.lines.push_back(l);
+    result.only.push_back(only[static_cast<std::size_t>(l)]);
+  }
+  result.values.setZero(period.cols(), static_cast<Eigen::Index>(result.lines.size()));
+  for (const Eigen::Index c : result.channels) {
+    for (Eigen::Index k = 0; k < result.values.cols(); ++k) {
+      result.values(c, k) = spectra(result.lines[static_cast<std::size_t>(k)], c);
+    }
+  }
+  return result;
+}
+
+}  // namespace stageid

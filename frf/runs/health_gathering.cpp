@@ -1,0 +1,254 @@
+#include "frf/runs/health_gathering.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "frf/runs/run_steps.hpp"
+
+namespace stageid {
+namespace {
+
+/// At most kHealthLines of the lines: half of them in equal ratios, for the rigid body, half in equal steps, for
+/// the flexible modes.
+std::vector<int> thinned(const std::vector<int>& lines) {
+  if (static_cast<Eigen::Index>(lines.size()) <= kHealthLines) return lines;
+  std::set<int> chosen;
+  const auto half = static_cast<int>(kHealthLines / 2);
+  const double first = lines.front();
+  const double last = lines.back();
+  for (int i = 0; i < half; ++i) {
+    const double share = static_cast<double>(i) / (half - 1);
+    for (const double wanted :
+         {first * std::pow(last / first, share), first + share * (last - first)}) {
+      const auto at =
+          std::lower_bound(lines.begin(), lines.end(), static_cast<int>(std::lround(wanted)));
+      chosen.insert(at == lines.end() ? lines.back() : *at);
+    }
+  }
+  return {chosen.begin(), chosen.end()};
+}
+
+void scan_period(const LogSamples& s, const DriveMask& drive, std::vector<ChannelScan>& scan) {
+  for (Eigen::Index c = 0; c < s.sensors.cols(); ++c)
+    scan[static_cast<std::size_t>(c)].add(s.sensors.col(c), drive.any());
+  for (Eigen::Index c = 0; c < s.actuators.cols(); ++c)
+    scan[static_cast<std::size_t>(s.sensors.cols() + c)].add(s.actuators.col(c),
+                                                             drive.of_actuator(c));
+}
+
+/// Columns of excited `wanted` lines. @pre they are among the excited ones of `lines`
+std::vector<Eigen::Index> columns_of(const std::vector<int>& wanted, const SpectrumLines& lines) {
+  const auto end = lines.lines.begin() + static_cast<std::ptrdiff_t>(lines.excited);
+  std::vector<Eigen::Index> columns;
+  for (const int line : wanted)
+    columns.push_back(std::lower_bound(lines.lines.begin(), end, line) - lines.lines.begin());
+  return columns;
+}
+
+/// Positions with is_known = 0 of `count` channels from `first` on, counted from there.
+std::vector<Eigen::Index> unknown_channels(const std::vector<char>& is_known, Eigen::Index first,
+                                           Eigen::Index count) {
+  std::vector<Eigen::Index> channels;
+  for (Eigen::Index c = 0; c < count; ++c)
+    if (is_known[static_cast<std::size_t>(first + c)] == 0) channels.push_back(c);
+  return channels;
+}
+
+}  // namespace
+
+void HealthPart::begin(const UsedRun& run, const Eigen::MatrixXd& excitation) {
+  drive_ = DriveMask(excitation, run.log->info());
+  sensors_ = static_cast<Eigen::Index>(run.log->info().sensors.size());
+}
+
+void HealthPart::watch_start(const UsedRun& run, const std::vector<int>& lines,
+                             const std::vector<Eigen::Index>& sensors, RunWorkspace& w) {
+  start_lines_ = lines;
+  start_sensors_ = sensors;
+  start_transient_periods_ = run.transient_periods;
+  Eigen::MatrixXcd start;
+  if (run.transient_periods > 0) {
+    const auto period = static_cast<std::uint64_t>(w.dft.length());
+    try {
+      run.log->read(run.index, static_cast<std::uint64_t>(run.transient_periods - 1) * period,
+                    period, w.samples);
+    } catch (const FormatError&) {
+      return;  // damaged where nothing is used: no reason to refuse the rest
+    }
+    if ((w.samples.marked != 0).any()) return;
+    start.resize(static_cast<Eigen::Index>(sensors.size()),
+                 static_cast<Eigen::Index>(lines.size()));
+    line_spectra(w.samples.sensors, sensors, lines, 0, w.dft, start);
+  }
+  recorder_ = StartRecorder(std::move(start));
+}
+
+void HealthPart::end() {
+  for (Eigen::Index c = sensors_; c < static_cast<Eigen::Index>(scan_.size()); ++c) {
+    // An actuator that stands still throughout a run that does not excite it: an open loop.
+    ChannelScan& scan = scan_[static_cast<std::size_t>(c)];
+    if (!drive_.excites(c - sensors_) && scan.high().value == scan.low().value)
+      scan.forget_constant();
+  }
+  drive_ = DriveMask();
+  start_ = recorder_.finish();
+}
+
+void HealthPart::take(RunWorkspace& w, const KnownSpectra* known) {
+  scan_period(w.samples, drive_, scan_);
+  if (recorder_.on() && known != nullptr) {
+    recorder_.take(known->values.topLeftCorner(static_cast<Eigen::Index>(start_sensors_.size()),
+                                               static_cast<Eigen::Index>(start_lines_.size())));
+  } else if (recorder_.on()) {
+    Eigen::MatrixXcd spectra(static_cast<Eigen::Index>(start_sensors_.size()),
+                             static_cast<Eigen::Index>(start_lines_.size()));
+    line_spectra(w.samples.sensors, start_sensors_, start_lines_, 0, w.dft, spectra);
+    recorder_.take(spectra);
+  }
+  if (lines_.empty()) return;
+  const Eigen::Index n_y = w.samples.sensors.cols();
+  Eigen::MatrixXcd Z(n_y + w.samples.actuators.cols(), static_cast<Eigen::Index>(lines_.size()));
+  std::vector<char> is_known(static_cast<std::size_t>(Z.rows()), 0);
+  if (known != nullptr) {
+    std::vector<Eigen::Index> rows = known->sensors;
+    for (const Eigen::Index a : known->actuators) rows.push_back(n_y + a);
+    for (const Eigen::Index row : rows) is_known[static_cast<std::size_t>(row)] = 1;
+    const std::vector<Eigen::Index> columns = columns_of(lines_, known->lines);
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      for (std::size_t i = 0; i < rows.size(); ++i)
+        Z(rows[i], static_cast<Eigen::Index>(k)) =
+            known->values(static_cast<Eigen::Index>(i), columns[k]);
+  }
+  transform_others(w, is_known, Z);
+  periods_.push_back(std::move(Z));
+}
+
+void HealthPart::transform_others(RunWorkspace& w, const std::vector<char>& is_known,
+                                  Eigen::MatrixXcd& Z) const {
+  const Eigen::Index n_y = w.samples.sensors.cols();
+  const std::vector<Eigen::Index> sensors = unknown_channels(is_known, 0, n_y);
+  const std::vector<Eigen::Index> actuators =
+      unknown_channels(is_known, n_y, w.samples.actuators.cols());
+  const auto some = static_cast<Eigen::Index>(sensors.size());
+  Eigen::MatrixXcd others(some + static_cast<Eigen::Index>(actuators.size()), Z.cols());
+  line_spectra(w.samples.sensors, sensors, lines_, 0, w.dft, others);
+  line_spectra(w.samples.actuators, actuators, lines_, some, w.dft, others);
+  for (std::size_t i = 0; i < sensors.size(); ++i)
+    Z.row(sensors[i]) = others.row(static_cast<Eigen::Index>(i));
+  for (std::size_t i = 0; i < actuators.size(); ++i)
+    Z.row(n_y + actuators[i]) = others.row(some + static_cast<Eigen::Index>(i));
+}
+
+void HealthPart::leave_out() {
+  for (ChannelScan& channel : scan_) channel.break_off();
+  recorder_.give_up();
+}
+
+HealthGathering::HealthGathering(const std::vector<RealizationRuns>& realizations) {
+  const LogInfo& info = realizations.front().runs.front().log->info();
+  record_.info = info;
+  record_.scan.resize(info.sensors.size() + info.actuators.size());
+  HealthPart empty;
+  empty.scan_.resize(record_.scan.size());
+  for (const RealizationRuns& realization : realizations) {
+    parts_.emplace_back(realization.runs.size(), empty);
+    realization_.push_back(realization.realization);
+    for (const UsedRun& used : realization.runs) record_.health += used.run().health;
+  }
+}
+
+std::size_t HealthGathering::first_without_spectra() const {
+  const auto missing = [](const HealthPart& part) { return part.periods_.empty(); };
+  return static_cast<std::size_t>(std::find_if(excited_->begin(), excited_->end(), missing) -
+                                  excited_->begin());
+}
+
+bool HealthGathering::complete() const {
+  return excited_ != nullptr && first_without_spectra() == excited_->size();
+}
+
+void HealthGathering::excite(std::size_t realization, const std::vector<RunExcitation>& runs) {
+  if (excited_ != nullptr)
+    for (HealthPart& part : *excited_) part.periods_.clear();
+  excited_ = &parts_[realization];
+  record_.realization = realization_[realization];
+  record_.axes.clear();
+  for (const RunExcitation& run : runs)
+    record_.axes.insert(record_.axes.end(), run.spectrum.channels.begin(),
+                        run.spectrum.channels.end());
+  std::sort(record_.axes.begin(), record_.axes.end());
+  record_.axes.erase(std::unique(record_.axes.begin(), record_.axes.end()), record_.axes.end());
+  record_.zippered = runs.size() == 1 && runs.front().spectrum.is_zippered();
+  lines_ = thinned(runs.front().spectrum.lines);
+  for (HealthPart& part : *excited_) part.lines_ = lines_;
+  const auto K = static_cast<Eigen::Index>(lines_.size());
+  record_.frequency_hz.resize(K);
+  record_.lines.resize(lines_.size());
+  for (Eigen::Index k = 0; k < K; ++k) {
+    const int line = lines_[static_cast<std::size_t>(k)];
+    record_.frequency_hz[k] = line * record_.info.sample_rate_hz / record_.info.period_samples;
+    LineRecord& at = record_.lines[static_cast<std::size_t>(k)];
+    at.R.setZero(static_cast<Eigen::Index>(record_.info.excitation.size()),
+                 static_cast<Eigen::Index>(runs.size()));
+    for (std::size_t e = 0; e < runs.size(); ++e) {
+      const ExcitationSpectrum& spectrum = runs[e].spectrum;
+      const auto found = std::lower_bound(spectrum.lines.begin(), spectrum.lines.end(), line);
+      if (found != spectrum.lines.end() && *found == line)
+        at.R.col(static_cast<Eigen::Index>(e)) =
+            spectrum.values.col(found - spectrum.lines.begin());
+    }
+  }
+}
+
+HealthPart& HealthGathering::part(std::size_t realization, std::size_t experiment) {
+  return parts_[realization][experiment];
+}
+
+/// Runs of other lines or of fewer periods would need a model of their own.
+void HealthGathering::add_start(HealthPart& part) {
+  if (part.start_.periods == 0) return;
+  StartEvidence& evidence = record_.start;
+  if (evidence.runs.empty()) {
+    start_lines_ = part.start_lines_;
+    evidence.sensors = static_cast<Eigen::Index>(part.start_sensors_.size());
+    evidence.transient_periods = part.start_transient_periods_;
+    evidence.periods = part.start_.periods + (part.start_.start_used ? 1 : 0);
+    evidence.frequency_hz.resize(static_cast<Eigen::Index>(start_lines_.size()));
+    for (std::size_t k = 0; k < start_lines_.size(); ++k)
+      evidence.frequency_hz[static_cast<Eigen::Index>(k)] =
+          start_lines_[k] * record_.info.sample_rate_hz / record_.info.period_samples;
+  } else if (part.start_lines_ != start_lines_ ||
+             part.start_.periods != evidence.runs.front().periods ||
+             part.start_.start_used != evidence.runs.front().start_used) {
+    return;
+  }
+  evidence.runs.push_back(std::move(part.start_));
+}
+
+void HealthGathering::add(HealthPart&& part) {
+  for (std::size_t c = 0; c < part.scan_.size(); ++c) record_.scan[c].add(part.scan_[c]);
+  record_.slips.insert(record_.slips.end(), part.slips_.begin(), part.slips_.end());
+  add_start(part);
+  if (part.periods_.empty()) return;
+  record_.periods.push_back(static_cast<int>(part.periods_.size()));
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    Eigen::MatrixXcd& Z = record_.lines[k].Z;
+    const Eigen::Index first = Z.cols();
+    Z.conservativeResize(part.periods_.front().rows(),
+                         first + static_cast<Eigen::Index>(part.periods_.size()));
+    for (std::size_t p = 0; p < part.periods_.size(); ++p)
+      Z.col(first + static_cast<Eigen::Index>(p)) =
+          part.periods_[p].col(static_cast<Eigen::Index>(k));
+  }
+}
+
+HealthRecord HealthGathering::finish() {
+  for (std::vector<HealthPart>& realization : parts_)
+    for (HealthPart& part : realization) add(std::move(part));
+  return std::move(record_);
+}
+
+}  // namespace stageid

@@ -1,0 +1,252 @@
+#include "frf/runs/run_spectra.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+
+#include "frf/periods/period_check.hpp"
+#include "frf/runs/health_gathering.hpp"
+#include "frf/runs/run_periods.hpp"
+#include "frf/runs/run_steps.hpp"
+
+namespace stageid {
+namespace {
+
+/// Periods that are compared with each other and averaged together, whose spectra are held for it.
+constexpr int kMostTogether = 16;
+
+/// One run in the making.
+class RunMeasurement {
+ public:
+  RunMeasurement(const UsedRun& used, const SpectrumLines& lines, const ChannelChoice& channels,
+                 PeriodChoice choice, RunWorkspace& workspace)
+      : used_(used), lines_(lines), channels_(channels), w_(workspace) {
+    // Groups of equal size: a last one of one or two periods could not be judged.
+    const int groups = (used.periods + kMostTogether - 1) / kMostTogether;
+    together_ = (used.periods + groups - 1) / groups;
+    compare_ = choice == PeriodChoice::consistent && together_ >= 3;
+    const auto n_lines = static_cast<Eigen::Index>(lines.lines.size());
+    const auto n = static_cast<Eigen::Index>(channels.outputs.size() + channels.estimated.size());
+    w_.spectra.resize(static_cast<std::size_t>(together_));
+    for (Eigen::MatrixXcd& spectrum : w_.spectra) spectrum.resize(n, n_lines);
+    if (compare_) w_.record.resize(static_cast<std::size_t>(together_));
+    w_.deviation_re.resize(n);
+    w_.deviation_im.resize(n);
+    w_.excluded_sum.setZero(w_.dft.length(), static_cast<Eigen::Index>(channels.excluded.size()));
+    run_.mean.setZero(n, n_lines);
+    if (used.periods < 2) return;
+    run_.slope.setZero(n, n_lines);
+    run_.scatter_re = w_.pool.take(n * (n + 1) / 2, n_lines);
+    run_.scatter_im = w_.pool.take(n * (n + 1) / 2, n_lines);
+  }
+
+  /// The period in workspace.samples. @returns its spectra
+  const Eigen::MatrixXcd& take(int period) {
+    ++unmarked_;
+    Eigen::MatrixXcd& spectra = w_.spectra[waiting_.size()];
+    line_spectra(w_.samples.sensors, channels_.outputs, lines_.lines, 0, w_.dft, spectra);
+    line_spectra(w_.samples.actuators, channels_.estimated, lines_.lines,
+                 static_cast<Eigen::Index>(channels_.outputs.size()), w_.dft, spectra);
+    if (compare_) keep_samples();
+    waiting_.push_back(period);
+    for (std::size_t c = 0; c < channels_.excluded.size(); ++c)
+      w_.excluded_sum.col(static_cast<Eigen::Index>(c)) +=
+          w_.samples.actuators.col(channels_.excluded[c]);
+    if (static_cast<int>(waiting_.size()) == together_) include_waiting();
+    return spectra;
+  }
+  void leave_out(int period, const std::string& why) { run_.drop(period, why); }
+
+  RunSpectra finish() {
+    include_waiting();
+    if (run_.periods == 0) return std::move(run_);
+    run_.scatter_dof = run_.periods - 1;
+    finish_slope();
+    const std::vector<int> excited(
+        lines_.lines.begin(), lines_.lines.begin() + static_cast<std::ptrdiff_t>(lines_.excited));
+    run_.excluded_power = excluded_power(excited, unmarked_, w_);
+    return std::move(run_);
+  }
+
+ private:
+  /// The period in workspace.samples less the first of those that wait, whose excitation it shares: what
+  /// is left is noise, which a float holds.
+  void keep_samples() {
+    const auto n_y = static_cast<Eigen::Index>(channels_.outputs.size());
+    Eigen::MatrixXd& first = w_.first_samples;
+    Eigen::MatrixXf& kept = w_.record[waiting_.size()];
+    kept.resize(w_.dft.length(), run_.mean.rows());
+    first.resize(kept.rows(), kept.cols());
+    for (Eigen::Index c = 0; c < kept.cols(); ++c) {
+      const Eigen::Ref<const Eigen::VectorXd> samples =
+          c < n_y
+              ? w_.samples.sensors.col(channels_.outputs[static_cast<std::size_t>(c)])
+              : w_.samples.actuators.col(channels_.estimated[static_cast<std::size_t>(c - n_y)]);
+      if (waiting_.empty()) first.col(c) = samples;
+      kept.col(c) = (samples - first.col(c)).cast<float>();
+    }
+  }
+
+  void include_waiting() {
+    std::vector<char> in(waiting_.size(), 1);
+    if (compare_) {
+      const ComparedPeriods compared{
+          std::span<const Eigen::MatrixXcd>(w_.spectra).first(waiting_.size()),
+          std::span<const Eigen::MatrixXf>(w_.record).first(waiting_.size()), waiting_,
+          excited_frequency_hz(), used_.log->info().sample_rate_hz};
+      for (const PeriodOutlier& outlier : find_outliers(compared)) {
+        in[outlier.period] = 0;
+        run_.drop(waiting_[outlier.period], reason(outlier));
+      }
+    }
+    std::vector<const Eigen::MatrixXcd*> periods;
+    std::vector<double> numbers;
+    for (std::size_t i = 0; i < waiting_.size(); ++i) {
+      if (in[i] == 0) continue;
+      periods.push_back(&w_.spectra[i]);
+      numbers.push_back(waiting_[i]);
+      sum_of_numbers_ += waiting_[i];
+      sum_of_squares_ += static_cast<double>(waiting_[i]) * waiting_[i];
+    }
+    for (Eigen::Index k = 0; k < run_.mean.cols(); ++k) {
+      include_line(periods, k);
+      for (std::size_t i = 0; i < periods.size() && run_.slope.size() > 0; ++i)
+        run_.slope.col(k) += numbers[i] * periods[i]->col(k);
+    }
+    run_.periods += static_cast<int>(periods.size());
+    waiting_.clear();
+  }
+
+  /// From sum_p p Z_p. Rounding is far below noise: few numbers, none large.
+  void finish_slope() {
+    const double mean = sum_of_numbers_ / run_.periods;
+    run_.slope_spread = sum_of_squares_ - run_.periods * mean * mean;
+    if (run_.periods < 2 || run_.slope.size() == 0) {
+      run_.slope.resize(0, 0);
+      return;
+    }
+    run_.slope = (run_.slope - sum_of_numbers_ * run_.mean) / run_.slope_spread;
+  }
+
+  /// More periods into mean and scatter, by Welford's recursion: a difference of two large sums
+  /// would lose the noise, which is 1e-6 of the signal, in rounding; and this way the diagonal stays
+  /// >= 0. All periods into one line, whose scatter stays in the cache, then into the next.
+  void include_line(const std::vector<const Eigen::MatrixXcd*>& periods, Eigen::Index k) {
+    const bool scatter = run_.scatter_re.size() > 0;
+    if (scatter && run_.periods == 0) {
+      w_.scatter_re.setZero(run_.scatter_re.rows());
+      w_.scatter_im.setZero(run_.scatter_im.rows());
+    } else if (scatter) {
+      w_.scatter_re = run_.scatter_re.col(k);
+      w_.scatter_im = run_.scatter_im.col(k);
+    }
+    const Eigen::Index n = run_.mean.rows();
+    int count = run_.periods;
+    for (const Eigen::MatrixXcd* spectra : periods) {
+      const double inverse_count = 1.0 / ++count;
+      w_.deviation = spectra->col(k) - run_.mean.col(k);
+      // Componentwise, which the compiler makes vectors of; complex numbers it does not.
+      Eigen::Map<Eigen::VectorXd>(reinterpret_cast<double*>(run_.mean.col(k).data()), 2 * n) +=
+          Eigen::Map<const Eigen::VectorXd>(reinterpret_cast<const double*>(w_.deviation.data()),
+                                            2 * n) *
+          inverse_count;
+      if (count < 2) continue;
+      w_.deviation_re = w_.deviation.real();
+      w_.deviation_im = w_.deviation.imag();
+      add_outer_product(1.0 - inverse_count, w_.deviation_re, w_.deviation_im, w_.scatter_re.data(),
+                        w_.scatter_im.data());
+    }
+    if (!scatter) return;
+    run_.scatter_re.col(k) = w_.scatter_re;
+    run_.scatter_im.col(k) = w_.scatter_im;
+  }
+
+  Eigen::VectorXd excited_frequency_hz() const {
+    const LogInfo& info = used_.log->info();
+    Eigen::VectorXd frequency_hz(static_cast<Eigen::Index>(lines_.excited));
+    for (std::size_t k = 0; k < lines_.excited; ++k)
+      frequency_hz[static_cast<Eigen::Index>(k)] =
+          lines_.lines[k] * info.sample_rate_hz / info.period_samples;
+    return frequency_hz;
+  }
+
+  std::string reason(const PeriodOutlier& outlier) const {
+    const LogInfo& info = used_.log->info();
+    const auto c = static_cast<std::size_t>(outlier.channel);
+    const std::size_t n_y = channels_.outputs.size();
+    const std::string& name =
+        c < n_y ? info.sensors.names[static_cast<std::size_t>(channels_.outputs[c])]
+                : info.actuators.names[static_cast<std::size_t>(channels_.estimated[c - n_y])];
+    return fmt::format("{:.3g} times the scatter of the other periods on {}, {:.4g} ... {:.4g} Hz",
+                       outlier.ratio, name, outlier.low_hz, outlier.high_hz);
+  }
+
+  const UsedRun& used_;
+  const SpectrumLines& lines_;
+  const ChannelChoice& channels_;
+  RunWorkspace& w_;
+  int together_ = 1;  // periods that are looked at, and included, together
+  bool compare_ = true;
+  int unmarked_ = 0;
+  double sum_of_numbers_ = 0.0;  // of the periods included
+  double sum_of_squares_ = 0.0;
+  std::vector<int> waiting_;  // periods whose spectra are in the workspace
+  RunSpectra run_;
+};
+
+}  // namespace
+
+RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
+                       const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
+                       PeriodChoice choice, RunWorkspace& w, HealthPart* health,
+                       const std::function<void(double bytes)>& read_done) {
+  RunMeasurement measurement(used, lines, channels, choice, w);
+  Fingerprint fingerprint;
+  add_matrix(fingerprint, excitation_period);
+  const auto take = [&](int p) {
+    add_matrix(fingerprint, w.samples.actuators);
+    add_matrix(fingerprint, w.samples.sensors);
+    const Eigen::MatrixXcd& spectra = measurement.take(p);
+    const KnownSpectra known{spectra, channels.outputs, channels.estimated, lines};
+    if (health != nullptr) health->take(w, &known);
+  };
+  const auto leave_out = [&](int p, const std::string& why) {
+    measurement.leave_out(p, why);
+    if (health != nullptr) health->leave_out();
+  };
+  if (health != nullptr) {
+    const std::vector<int> excited(
+        lines.lines.begin(), lines.lines.begin() + static_cast<std::ptrdiff_t>(lines.excited));
+    health->begin(used, excitation_period);
+    health->watch_start(used, excited, channels.outputs, w);
+  }
+  const std::vector<SampleSlip> slips = for_each_period(used, w, read_done, take, leave_out);
+  if (health != nullptr) {
+    health->note(slips);
+    health->end();
+  }
+  RunSpectra run = measurement.finish();
+  run.fingerprint = fingerprint.hex();
+  return run;
+}
+
+void RunSpectra::drop(int period, std::string reason) {
+  const auto at =
+      std::upper_bound(dropped.begin(), dropped.end(), period,
+                       [](int p, const DroppedPeriod& other) { return p < other.period; });
+  DroppedPeriod& one = *dropped.emplace(at);
+  one.period = period;
+  one.reason = std::move(reason);
+}
+
+double common_scatter(const RunSpectra& run, Eigen::Index k, Eigen::Index l) {
+  if (k == l || run.scatter_window == 0) return k == l ? 1.0 : 0.0;
+  const Eigen::Index apart = std::abs(run.scatter_first[static_cast<std::size_t>(k)] -
+                                      run.scatter_first[static_cast<std::size_t>(l)]);
+  const double x =
+      std::max(0.0, 1.0 - static_cast<double>(apart) / static_cast<double>(run.scatter_window));
+  return x * (2.0 + x) / 3.0;
+}
+
+}  // namespace stageid

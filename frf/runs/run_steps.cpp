@@ -1,0 +1,93 @@
+#include "frf/runs/run_steps.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+
+namespace stageid {
+
+RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft) {
+  RunExcitation excitation{run.log->excitation(run.index), {}};
+  if (excitation.period.rows() != dft.length()) {
+    throw std::invalid_argument(
+        fmt::format("{}/excitation: {} samples; one period of {} belongs there", run.place(),
+                    excitation.period.rows(), dft.length()));
+  }
+  excitation.spectrum = excitation_spectrum(excitation.period, dft);
+  return excitation;
+}
+
+std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
+                                                Eigen::Index channel, RealDft& dft) {
+  fill_for_lines(samples.col(channel), dft);
+  return dft.forward();
+}
+
+void fill_for_lines(const Eigen::Ref<const Eigen::VectorXd>& samples, RealDft& dft) {
+  const auto input = dft.input();
+  if (samples.size() > 0 && (samples.array() == samples[0]).all())
+    std::fill_n(input.begin(), samples.size(), 0.0);
+  else
+    std::copy_n(samples.data(), samples.size(), input.begin());
+}
+
+// Spectra lie line by line. One channel's lines are so far apart that every value would cost a cache
+// line of its own; four channels at a time fill it.
+void line_spectra(const Eigen::MatrixXd& samples, const std::vector<Eigen::Index>& channels,
+                  const std::vector<int>& lines, Eigen::Index first_row, RealDft& dft,
+                  Eigen::MatrixXcd& spectra) {
+  constexpr Eigen::Index kTogether = 4;
+  const double scale = 1.0 / static_cast<double>(dft.length());
+  const auto count = static_cast<Eigen::Index>(channels.size());
+  Eigen::MatrixXcd some(spectra.cols(), kTogether);
+  for (Eigen::Index first = 0; first < count; first += kTogether) {
+    const Eigen::Index n = std::min(kTogether, count - first);
+    for (Eigen::Index c = 0; c < n; ++c) {
+      const auto spectrum = transform(samples, channels[static_cast<std::size_t>(first + c)], dft);
+      for (Eigen::Index k = 0; k < some.rows(); ++k)
+        some(k, c) = scale * spectrum[static_cast<std::size_t>(lines[static_cast<std::size_t>(k)])];
+    }
+    for (Eigen::Index k = 0; k < some.rows(); ++k)
+      for (Eigen::Index c = 0; c < n; ++c) spectra(first_row + first + c, k) = some(k, c);
+  }
+}
+
+void add_outer_product(double weight, const Eigen::VectorXd& re, const Eigen::VectorXd& im,
+                       double* packed_re, double* packed_im) {
+  for (Eigen::Index i = 0; i < re.size(); ++i) {
+    const double a = weight * re[i];
+    const double b = weight * im[i];
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      packed_re[j] += a * re[j] + b * im[j];
+      packed_im[j] += b * re[j] - a * im[j];
+    }
+    packed_re += i + 1;
+    packed_im += i + 1;
+  }
+}
+
+Eigen::VectorXd excluded_power(const std::vector<int>& lines, int periods, RunWorkspace& w) {
+  const double scale = 1.0 / (static_cast<double>(w.dft.length()) * periods);
+  Eigen::VectorXd power = Eigen::VectorXd::Zero(w.excluded_sum.cols());
+  for (Eigen::Index c = 0; c < power.size(); ++c) {
+    const auto spectrum = transform(w.excluded_sum, c, w.dft);
+    for (const int line : lines)
+      power[c] += std::norm(scale * spectrum[static_cast<std::size_t>(line)]);
+  }
+  return power;
+}
+
+std::string no_clean_period(const UsedRun& run) {
+  return fmt::format("each of its {} periods after the transient has a marked sample", run.periods);
+}
+
+void refuse_marked_runs(const UsedRun& run) {
+  throw FormatError(
+      run.log->path(), fmt::format("/runs/{}", run.run().name),
+      no_clean_period(run) + ", and no realization is without such a run; measure again");
+}
+
+}  // namespace stageid

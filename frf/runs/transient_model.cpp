@@ -1,0 +1,134 @@
+// Symbols: l a line, b = P l its bin, r = (bin - b) / half of the window's width; regressors of T are
+// 1, r, ..., r^5.
+#include "frf/runs/transient_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "acquisition/files/counted.hpp"
+#include "frf/runs/run_steps.hpp"
+#include "frf/statistics/local_fit.hpp"
+
+namespace stageid {
+namespace {
+
+// With one period the window has 30 lines: order 2 and two poles left a remainder of the transient that
+// was 1.5 times the noise, and thousands of times next to a mode (docs/theory.md, section 4).
+constexpr Eigen::Index kOrder = 5;
+constexpr int kMostPoles = 4;
+// A pole in vain takes more of the residual than its degree of freedom, having been chosen for it.
+constexpr double kChanceOfAPole = 0.005;
+// Degrees of freedom left by the polynomials. More give a better noise estimate for a run, fewer a
+// narrower window, on which the polynomials hold. An even number of bins: as many below as above.
+constexpr Eigen::Index kResidualDof = 10;
+constexpr int kDof = 9;  // and of the scatter, whose bins have unequal weights: 9.5 to 9.7
+
+/// Adds weight e e^H, packed as in RunSpectra, for each column e.
+void add_scatter(double weight, const Eigen::MatrixXcd& columns, Eigen::Index k, RunSpectra& run) {
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+    add_outer_product(weight, columns.col(c).real(), columns.col(c).imag(),
+                      run.scatter_re.col(k).data(), run.scatter_im.col(k).data());
+  }
+}
+
+}  // namespace
+
+TransientModel::TransientModel(int period_samples, int periods,
+                               const ExcitationSpectrum& excitation, Eigen::Index outputs,
+                               const std::string& place)
+    : periods_(periods),
+      bins_((static_cast<Eigen::Index>(period_samples) * periods + 1) / 2),
+      excitation_(excitation),
+      outputs_(outputs) {
+  std::vector<char> taken(static_cast<std::size_t>(bins_), 0);
+  taken[0] = 1;  // an offset, not a transient
+  if (periods > 1) {
+    // Every line, excited or not: distortions of the plant stand there.
+    for (Eigen::Index b = 0; b < bins_; b += periods) taken[static_cast<std::size_t>(b)] = 1;
+  } else {
+    for (const int line : excitation.lines) taken[static_cast<std::size_t>(line)] = 1;
+  }
+  const auto first = taken.begin() + static_cast<Eigen::Index>(excitation.lines.front());
+  const auto last = taken.begin() + static_cast<Eigen::Index>(excitation.lines.back());
+  if (periods == 1 && 2 * std::count(first, last, char{0}) + 1 <
+                          static_cast<Eigen::Index>(excitation.lines.size())) {
+    throw std::invalid_argument(fmt::format(
+        "{}: method 'lpm' tells the transient of a single period on lines that are left empty, and "
+        "here hardly any are; excite odd lines only, or measure two periods",
+        place));
+  }
+  for (Eigen::Index b = 0; b < bins_; ++b) {
+    if (taken[static_cast<std::size_t>(b)] == 0) usable_.push_back(b);
+  }
+  window_ = kOrder + 1 + kResidualDof;
+  if (static_cast<Eigen::Index>(usable_.size()) < window_) {
+    throw std::invalid_argument(
+        fmt::format("{}: method 'lpm' needs {} bins beside the lines, this record of {} has {}; "
+                    "measure more periods",
+                    place, window_, counted(periods, "period"), usable_.size()));
+  }
+}
+
+std::vector<Eigen::Index> TransientModel::window(Eigen::Index bin) const {
+  const auto above = std::lower_bound(usable_.begin(), usable_.end(), bin) - usable_.begin();
+  const auto last_first = static_cast<Eigen::Index>(usable_.size()) - window_;
+  const Eigen::Index first = std::clamp<Eigen::Index>(above - window_ / 2, 0, last_first);
+  return {usable_.begin() + first, usable_.begin() + first + window_};
+}
+
+void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
+                                   RunSpectra& run) const {
+  const Eigen::Index bin = periods_ * excitation_.lines[static_cast<std::size_t>(k)];
+  const std::vector<Eigen::Index> bins = window(bin);
+  const double reach =
+      static_cast<double>(std::max(std::abs(bins.front() - bin), std::abs(bins.back() - bin)));
+  LocalProblem problem;
+  problem.Z = Z(Eigen::all, bins);
+  problem.r.resize(window_);
+  problem.groups = {window_};
+  problem.independent_noise = outputs_;
+  problem.pole_channels = outputs_;  // the inputs repeat their noise
+  problem.tested_noise = outputs_;
+  problem.chance_of_a_pole = kChanceOfAPole;
+  problem.K.resize(kOrder + 1, window_);
+  for (Eigen::Index i = 0; i < window_; ++i) {
+    const double r = static_cast<double>(bins[static_cast<std::size_t>(i)] - bin) / reach;
+    problem.r[i] = r;
+    for (Eigen::Index q = 0; q <= kOrder; ++q)
+      problem.K(q, i) = std::pow(r, static_cast<double>(q));
+  }
+  problem.k0 = Eigen::VectorXcd::Unit(kOrder + 1, 0);
+
+  const LocalFit fit = fit_locally(problem, kMostPoles);
+  run.scatter_first[static_cast<std::size_t>(k)] =
+      std::lower_bound(usable_.begin(), usable_.end(), bins.front()) - usable_.begin();
+  run.mean.col(k) = Z.col(bin) - fit.value.col(0);
+  run.line_dof[k] = static_cast<double>(kDof) * fit.dof / static_cast<double>(kResidualDof);
+  // As of one period, for the scatter is of single periods: the line's own noise, as the mean of the
+  // bins' has it, and that of T, the sum of |weight|^2 times the bin's own, for the loop colours the
+  // noise from bin to bin. A white one comes to 1 + leverage times what fit.dof is said to give.
+  const double periods = periods_ * static_cast<double>(kDof);
+  const double shared = static_cast<double>(kResidualDof) / fit.dof;  // by poles
+  const Eigen::ArrayXd weight =
+      1.0 / fit.dof + shared * fit.weight.array().abs2() / fit.freedom.array();
+  add_scatter(periods, fit.residual * weight.sqrt().matrix().asDiagonal(), k, run);
+  if (fit.poles > 0) add_scatter(periods, fit.pole_spread, k, run);
+}
+
+void TransientModel::separate(const Eigen::MatrixXcd& Z, RunSpectra& run) const {
+  const auto lines = static_cast<Eigen::Index>(excitation_.lines.size());
+  const Eigen::Index n = Z.rows();
+  run.mean.resize(n, lines);
+  run.scatter_re.setZero(n * (n + 1) / 2, lines);
+  run.scatter_im.setZero(n * (n + 1) / 2, lines);
+  run.scatter_dof = kDof;
+  run.line_dof.resize(lines);
+  run.scatter_window = window_;
+  run.scatter_first.resize(excitation_.lines.size());
+  for (Eigen::Index k = 0; k < lines; ++k) separate_line(Z, k, run);
+}
+
+}  // namespace stageid

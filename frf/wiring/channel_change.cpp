@@ -1,0 +1,113 @@
+#include "frf/wiring/channel_change.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+namespace stageid {
+namespace {
+
+constexpr double kMicroseconds = 1e6;
+
+std::string with_deviation(double value, double deviation) {
+  return deviation > 0.0 ? fmt::format("{:.4g} +- {:.1g}", value, deviation)
+                         : fmt::format("{:.3g}", value);
+}
+
+Finding swap_finding(bool in_recording, bool of_sensors) {
+  Finding finding;
+  finding.cause = Cause::swapped;
+  if (in_recording) {
+    finding.what = "recorded under each other's name: u = r - C y holds with the two exchanged";
+    finding.remedy = "exchange the two names in the recorder's channel list";
+  } else {
+    finding.what = "wired crosswise: the rigid body fits with the two exchanged";
+    finding.remedy =
+        of_sensors ? "exchange the two sensors' cables, or their positions in the stage file"
+                   : "exchange the two amplifiers' cables, or their positions in the stage file";
+  }
+  finding.figure = "exchanged";
+  return finding;
+}
+
+Finding gain_finding(const ChannelChange& change, bool in_recording) {
+  Finding finding;
+  const double factor = std::abs(change.value);
+  const bool sign_only = change.value < 0.0 && std::abs(std::log(factor)) < std::log(1.3);
+  finding.cause = sign_only ? Cause::sign : Cause::scale;
+  const char* where = in_recording ? "in the recording" : "at the stage";
+  if (sign_only) {
+    finding.what = fmt::format("sign flipped {}", where);
+    finding.remedy = in_recording
+                         ? "change the channel's sign in the recorder's scaling"
+                         : "change the channel's polarity, or its direction in the stage file";
+  } else {
+    finding.what =
+        fmt::format("{} {}", change.value < 0.0 ? "sign and scale wrong" : "scale wrong", where);
+    finding.remedy = fmt::format(
+        "divide the channel by the factor: look at its unit and {}",
+        in_recording ? "the recorder's scaling" : "its gain, or the mass in the stage file");
+  }
+  finding.figure = fmt::format("factor {}", with_deviation(change.value, change.deviation));
+  return finding;
+}
+
+Finding skew_finding(const ChannelChange& change, bool in_recording) {
+  Finding finding;
+  finding.cause = Cause::skew;
+  finding.what =
+      fmt::format("{} {} than the other channels", in_recording ? "recorded" : "acts or samples",
+                  change.value > 0.0 ? "later" : "earlier");
+  finding.figure = fmt::format("{} us", with_deviation(kMicroseconds * std::abs(change.value),
+                                                       kMicroseconds * change.deviation));
+  finding.remedy = in_recording
+                       ? "sample all channels at one instant, or shift this one back"
+                       : "sample all channels at one instant, or fit with --delay per_channel";
+  return finding;
+}
+
+}  // namespace
+
+void undo(const ChannelChange& change, HealthRecord& record) {
+  const Eigen::Index offset = change.of_sensors ? 0 : record.n_y();
+  const Eigen::Index first = offset + std::max<Eigen::Index>(change.a, 0);
+  const Eigen::Index count = change.a >= 0 ? 1 : change.of_sensors ? record.n_y() : record.n_u();
+  for (std::size_t k = 0; k < record.lines.size(); ++k) {
+    Eigen::MatrixXcd& Z = record.lines[k].Z;
+    const double omega_rad_s =
+        2.0 * std::numbers::pi * record.frequency_hz[static_cast<Eigen::Index>(k)];
+    switch (change.kind) {
+      case ChannelChange::Kind::gain:
+        Z.middleRows(first, count) /= change.value;
+        break;
+      case ChannelChange::Kind::skew:
+        Z.middleRows(first, count) *= std::polar(1.0, omega_rad_s * change.value);
+        break;
+      case ChannelChange::Kind::swap:
+        Z.row(first).swap(Z.row(offset + change.b));
+        break;
+    }
+  }
+}
+
+std::string channel_names(const ChannelChange& change, const LogInfo& info) {
+  const ChannelList& list = change.of_sensors ? info.sensors : info.actuators;
+  if (change.a < 0) return change.of_sensors ? "all sensors" : "all actuators";
+  const std::string& a = list.names[static_cast<std::size_t>(change.a)];
+  return change.b < 0 ? a : a + " " + list.names[static_cast<std::size_t>(change.b)];
+}
+
+Finding to_finding(const ChannelChange& change, const LogInfo& info, bool in_recording) {
+  Finding finding = change.kind == ChannelChange::Kind::swap
+                        ? swap_finding(in_recording, change.of_sensors)
+                    : change.kind == ChannelChange::Kind::gain ? gain_finding(change, in_recording)
+                                                               : skew_finding(change, in_recording);
+  finding.severity = Severity::fault;
+  finding.channel = channel_names(change, info);
+  return finding;
+}
+
+}  // namespace stageid

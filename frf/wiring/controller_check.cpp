@@ -1,0 +1,396 @@
+#include "frf/wiring/controller_check.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "frf/statistics/tail_probability.hpp"
+
+namespace stageid {
+namespace {
+
+using Index = Eigen::Index;
+
+constexpr double kEpsilonOnePeriod = 5e-2;  // no scatter says what noise is
+constexpr double kRounding = 1e-9;          // of u: float32 records, and u - r of two large numbers
+constexpr double kDeviations = 6.0;
+constexpr double kLeastGain = 0.02;
+constexpr double kLeastSkew_s = 2e-6;
+constexpr double kLeastShare = 0.3;
+constexpr double kLeastMisfit = 0.05;
+constexpr double kSignificance = 1e-4;
+constexpr int kMostChanges = 40;
+constexpr double kOfAnother =
+    0.05;  // of a row's misfit: what another's record leaves, if it is that
+constexpr double kHardlyWorse = 4.0;
+// Samples that a channel may be late or early by as a whole: beyond the reach of one direction.
+constexpr std::array<double, 6> kWholeSkews = {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0};
+
+/// One line with the changes found so far undone.
+struct Line {
+  double omega_rad_s = 0.0;
+  bool known = true;   // the controller
+  Eigen::MatrixXcd F;  // -C, n_u x n_y
+  Eigen::MatrixXcd Y;  // means, n_y x E
+  Eigen::MatrixXcd U;
+  Eigen::MatrixXcd E;        // U - R - F Y
+  Eigen::VectorXd variance;  // of E
+  Eigen::VectorXd weight;    // n_u
+};
+
+struct Candidate {
+  ChannelChange change;
+  double explained = 0.0;
+  double share = 0.0;  // of the misfit of the rows that it touches
+};
+
+class Search {
+ public:
+  Search(HealthRecord& record, const NominalStage& nominal);
+  ControllerCheck run();
+
+ private:
+  void refresh();
+  std::optional<Candidate> best() const;
+  double row_cost(Index row) const;
+  bool sensors_follow() const;
+  bool follows(Index row) const { return follows(row, 1); }
+  bool follows(Index first, Index rows) const;
+  /// E - d X with X of `direction`, rows x E.
+  template <typename Direction>
+  void try_direction(ChannelChange change, double cost, Index first, Index rows,
+                     const Direction& direction);
+  void try_swap(ChannelChange change, double cost, double after);
+  void try_whole_skews(Index actuator, double cost);
+  template <typename Term>
+  double sum_over_lines(const Term& term) const {
+    double sum = 0.0;
+    for (const Line& line : lines_) sum += term(line);
+    return sum;
+  }
+  void try_sensors();
+  void try_actuators();
+  std::vector<ControllerMisfit> misfits() const;
+  bool significant(Index row) const;
+
+  HealthRecord& record_;
+  std::vector<Eigen::MatrixXcd> R_;
+  std::vector<Line> lines_;
+  bool noise_known_;
+  double epsilon_;  // what the model of the controller may be off, of C y
+  double total_ = 0.0;
+  std::vector<Candidate> candidates_;
+};
+
+Search::Search(HealthRecord& record, const NominalStage& nominal)
+    : record_(record),
+      lines_(record.lines.size()),
+      noise_known_(record.scatter_dof() > 0),
+      epsilon_(noise_known_ ? nominal.controller_error
+                            : std::max(kEpsilonOnePeriod, nominal.controller_error)) {
+  std::string missing;
+  const auto u = positions_in(nominal.actuators, record.info.actuators.names, missing);
+  const auto y = positions_in(nominal.sensors, record.info.sensors.names, missing);
+  std::vector<Index> actuator_of_axis;
+  for (const Index axis : record.axes) {
+    const auto& names = record.info.actuators.names;
+    actuator_of_axis.push_back(
+        std::find(names.begin(), names.end(),
+                  record.info.excitation.names[static_cast<std::size_t>(axis)]) -
+        names.begin());
+  }
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    const double frequency_hz = record.frequency_hz[static_cast<Index>(k)];
+    lines_[k].omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
+    lines_[k].known =
+        frequency_hz >= nominal.controller_from_hz && frequency_hz <= nominal.controller_to_hz;
+    lines_[k].F = lines_[k].known ? Eigen::MatrixXcd(nominal.controller(frequency_hz)(u, y))
+                                  : Eigen::MatrixXcd::Zero(record.n_u(), record.n_y());
+    Eigen::MatrixXcd R = Eigen::MatrixXcd::Zero(record.n_u(), record.experiments());
+    for (std::size_t a = 0; a < actuator_of_axis.size(); ++a)
+      R.row(actuator_of_axis[a]) = record.lines[k].R.row(record.axes[a]);
+    R_.push_back(std::move(R));
+  }
+}
+
+void Search::refresh() {
+  total_ = 0.0;
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    Line& line = lines_[k];
+    const Eigen::MatrixXcd& Z = record_.lines[k].Z;
+    const Eigen::MatrixXcd controlled = line.F * Z.topRows(record_.n_y());
+    line.Y = record_.mean(Z.topRows(record_.n_y()));
+    line.U = record_.mean(Z.bottomRows(record_.n_u()));
+    line.E = line.U - R_[k] - line.F * line.Y;
+    line.variance = record_.variance_of_mean(Z.bottomRows(record_.n_u()) - controlled);
+    const auto squares = [&](const Eigen::MatrixXcd& X) {
+      return Eigen::VectorXd(X.rowwise().squaredNorm() / static_cast<double>(X.cols()));
+    };
+    line.weight = (line.variance + epsilon_ * epsilon_ * squares(line.F * line.Y) +
+                   kRounding * kRounding * (squares(line.U) + squares(R_[k])))
+                      .cwiseMax(1e-300)
+                      .cwiseInverse();
+    if (!line.known) {  // says nothing
+      line.E.setZero();
+      line.variance.setZero();
+      line.weight.setZero();
+    }
+    total_ += (line.weight.asDiagonal() * line.E.cwiseAbs2()).sum();
+  }
+}
+
+double Search::row_cost(Index row) const {
+  return sum_over_lines(
+      [row](const Line& line) { return line.weight[row] * line.E.row(row).squaredNorm(); });
+}
+
+/// Is u of these actuators, but for a factor, r - C y? Without this one that moves by itself, or that is
+/// another, would be explained by a factor that makes it vanish.
+bool Search::follows(Index first, Index rows) const {
+  double along = 0.0;
+  double recorded = 0.0;
+  double asked = 0.0;
+  for (const Line& line : lines_) {
+    const auto U = line.U.middleRows(first, rows);
+    const Eigen::MatrixXcd V = U - line.E.middleRows(first, rows);
+    const auto w = line.weight.segment(first, rows);
+    along += (w.asDiagonal() * U.conjugate().cwiseProduct(V).real()).sum();
+    recorded += (w.asDiagonal() * U.cwiseAbs2()).sum();
+    asked += (w.asDiagonal() * V.cwiseAbs2()).sum();
+  }
+  return along * along > 0.5 * recorded * asked;
+}
+
+/// The same of all sensors: is C y, but for a factor, r - u?
+bool Search::sensors_follow() const {
+  double along = 0.0;
+  double recorded = 0.0;
+  double asked = 0.0;
+  for (const Line& line : lines_) {
+    const Eigen::MatrixXcd FY = line.F * line.Y;
+    const Eigen::MatrixXcd V = FY + line.E;
+    along += (line.weight.asDiagonal() * FY.conjugate().cwiseProduct(V).real()).sum();
+    recorded += (line.weight.asDiagonal() * FY.cwiseAbs2()).sum();
+    asked += (line.weight.asDiagonal() * V.cwiseAbs2()).sum();
+  }
+  return along * along > 0.5 * recorded * asked;
+}
+
+template <typename Direction>
+void Search::try_direction(ChannelChange change, double cost, Index first, Index rows,
+                           const Direction& direction) {
+  double along = 0.0;
+  double length = 0.0;
+  for (const Line& line : lines_) {
+    const Eigen::MatrixXcd X = direction(line);
+    const auto w = line.weight.segment(first, rows);
+    along +=
+        (w.asDiagonal() * X.cwiseProduct(line.E.middleRows(first, rows).conjugate()).real()).sum();
+    length += (w.asDiagonal() * X.cwiseAbs2()).sum();
+  }
+  if (!(length > 0.0)) return;
+  const double d = along / length;
+  const double deviation = 1.0 / std::sqrt(2.0 * length);
+  if (std::abs(d) < kDeviations * deviation) return;
+  if (change.kind == ChannelChange::Kind::gain) {
+    // The true signal is (1 + d) times the recorded one.
+    change.value = 1.0 / (1.0 + d);
+    change.deviation = noise_known_ ? deviation * change.value * change.value : 0.0;
+    if (!std::isfinite(change.value) || std::abs(change.value - 1.0) < kLeastGain) return;
+  } else {
+    change.value = d;
+    change.deviation = deviation;
+    if (!noise_known_ || std::abs(d) < kLeastSkew_s) return;
+  }
+  candidates_.push_back({change, along * d, along * d / cost});
+}
+
+void Search::try_swap(ChannelChange change, double cost, double after) {
+  if (cost - after > kDeviations * kDeviations)
+    candidates_.push_back({change, cost - after, (cost - after) / cost});
+}
+
+/// A channel late by a sample turns by more than the direction of a small skew follows.
+void Search::try_whole_skews(Index a, double cost) {
+  if (!noise_known_) return;
+  for (const double samples : kWholeSkews) {
+    const double skew_s = samples / record_.info.sample_rate_hz;
+    double length = 0.0;
+    const double after = sum_over_lines([&](const Line& line) {
+      const std::complex<double> turn = std::polar(1.0, line.omega_rad_s * skew_s) - 1.0;
+      length += line.weight[a] * line.omega_rad_s * line.omega_rad_s * line.U.row(a).squaredNorm();
+      return line.weight[a] * (line.E.row(a) + turn * line.U.row(a)).squaredNorm();
+    });
+    if (after > (1.0 - kLeastShare) * cost || !(length > 0.0)) continue;
+    ChannelChange change{ChannelChange::Kind::skew, false, a};
+    change.value = skew_s;
+    change.deviation = 1.0 / std::sqrt(2.0 * length);
+    try_swap(change, cost, after);
+  }
+}
+
+void Search::try_sensors() {
+  using Kind = ChannelChange::Kind;
+  const Index n_u = record_.n_u();
+  const std::complex<double> j(0.0, 1.0);
+  const auto of = [](const Line& line, Index s) {
+    return Eigen::MatrixXcd(line.F.col(s) * line.Y.row(s));
+  };
+  const auto all = [](const Line& line) { return Eigen::MatrixXcd(line.F * line.Y); };
+  if (sensors_follow()) try_direction({Kind::gain, true}, total_, 0, n_u, all);
+  try_direction({Kind::skew, true}, total_, 0, n_u, [&](const Line& line) {
+    return Eigen::MatrixXcd(j * line.omega_rad_s * all(line));
+  });
+  for (Index s = 0; s < record_.n_y(); ++s) {
+    try_direction({Kind::gain, true, s}, total_, 0, n_u,
+                  [&](const Line& line) { return of(line, s); });
+    try_direction({Kind::skew, true, s}, total_, 0, n_u, [&](const Line& line) {
+      return Eigen::MatrixXcd(j * line.omega_rad_s * of(line, s));
+    });
+    for (Index t = 0; t < s; ++t)
+      try_swap({Kind::swap, true, t, s}, total_, sum_over_lines([&](const Line& line) {
+                 const Eigen::MatrixXcd changed =
+                     line.E - (line.F.col(s) - line.F.col(t)) * (line.Y.row(t) - line.Y.row(s));
+                 return (line.weight.asDiagonal() * changed.cwiseAbs2()).sum();
+               }));
+  }
+}
+
+void Search::try_actuators() {
+  using Kind = ChannelChange::Kind;
+  const std::complex<double> j(0.0, 1.0);
+  const Index n_u = record_.n_u();
+  if (follows(0, n_u))
+    try_direction({Kind::gain, false}, total_, 0, n_u,
+                  [](const Line& line) { return Eigen::MatrixXcd(-line.U); });
+  try_direction({Kind::skew, false}, total_, 0, n_u,
+                [&](const Line& line) { return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U); });
+  for (Index a = 0; a < n_u; ++a) {
+    const double cost = row_cost(a);
+    if (!(cost > 0.0)) continue;
+    if (follows(a))
+      try_direction({Kind::gain, false, a}, cost, a, 1,
+                    [&](const Line& line) { return Eigen::MatrixXcd(-line.U.row(a)); });
+    try_direction({Kind::skew, false, a}, cost, a, 1, [&](const Line& line) {
+      return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U.row(a));
+    });
+    try_whole_skews(a, cost);
+    for (Index b = 0; b < a; ++b) {
+      const double cost_b = row_cost(b);
+      const auto exchanged = [](Index row, Index with) {
+        return [row, with](const Line& line) {
+          return line.weight[row] *
+                 (line.E.row(row) + line.U.row(with) - line.U.row(row)).squaredNorm();
+        };
+      };
+      const double after_a = sum_over_lines(exchanged(a, b));
+      const double after_b = sum_over_lines(exchanged(b, a));
+      // What one row cannot explain is not the other's: both must come out better, or one of them whole and the
+      // other hardly worse (three that have changed places come right one by one).
+      const bool both = after_a < 0.5 * cost && after_b < 0.5 * cost_b;
+      const bool one = (after_a < kOfAnother * cost && after_b < kHardlyWorse * cost_b) ||
+                       (after_b < kOfAnother * cost_b && after_a < kHardlyWorse * cost);
+      if (!both && !one) continue;
+      try_swap({Kind::swap, false, b, a}, cost + cost_b, after_a + after_b);
+    }
+  }
+}
+
+std::optional<Candidate> Search::best() const {
+  const Candidate* most = nullptr;
+  for (const Candidate& candidate : candidates_)
+    if (candidate.share >= kLeastShare &&
+        (most == nullptr || candidate.explained > most->explained))
+      most = &candidate;
+  return most != nullptr ? std::optional<Candidate>(*most) : std::nullopt;
+}
+
+/// A change of a channel that was changed so already: one change by both.
+bool merge(const ChannelChange& change, std::vector<ChannelChange>& changes) {
+  for (ChannelChange& earlier : changes) {
+    if (earlier.kind != change.kind || earlier.of_sensors != change.of_sensors ||
+        earlier.a != change.a || change.kind == ChannelChange::Kind::swap)
+      continue;
+    earlier.value = change.kind == ChannelChange::Kind::gain ? earlier.value * change.value
+                                                             : earlier.value + change.value;
+    earlier.deviation = change.deviation;
+    return true;
+  }
+  return false;
+}
+
+/// Weights follow what is recorded, so that costs before and after a change are not quite the same cost:
+/// an exchange and its undoing could follow each other for ever.
+bool exchanged_before(const ChannelChange& change, const std::vector<ChannelChange>& changes) {
+  return change.kind == ChannelChange::Kind::swap &&
+         std::any_of(changes.begin(), changes.end(), [&](const ChannelChange& earlier) {
+           return earlier.kind == change.kind && earlier.of_sensors == change.of_sensors &&
+                  earlier.a == change.a && earlier.b == change.b;
+         });
+}
+
+ControllerCheck Search::run() {
+  ControllerCheck check;
+  refresh();
+  for (int i = 0; i < kMostChanges; ++i) {
+    candidates_.clear();
+    try_sensors();
+    try_actuators();
+    const std::optional<Candidate> chosen = best();
+    if (!chosen || exchanged_before(chosen->change, check.changes)) break;
+    undo(chosen->change, record_);
+    if (!merge(chosen->change, check.changes)) check.changes.push_back(chosen->change);
+    refresh();
+  }
+  check.misfits = misfits();
+  return check;
+}
+
+bool Search::significant(Index row) const {
+  if (!noise_known_) return true;
+  double evidence = 0.0;
+  for (const Line& line : lines_) {
+    const double mean_square = line.E.row(row).squaredNorm() / static_cast<double>(line.E.cols());
+    if (line.variance[row] > 0.0)
+      evidence -= log_tail_of_f(mean_square / line.variance[row], static_cast<int>(line.E.cols()),
+                                record_.scatter_dof());
+    else if (mean_square > 0.0)
+      evidence += 1e3;
+  }
+  return tail_of_evidence(evidence, static_cast<Index>(lines_.size())) <
+         kSignificance / static_cast<double>(record_.n_u());
+}
+
+std::vector<ControllerMisfit> Search::misfits() const {
+  std::vector<ControllerMisfit> found;
+  Index driven = 0;
+  for (Index a = 0; a < record_.n_u(); ++a) {
+    double misfit = 0.0;
+    double controlled = 0.0;
+    double moved = 0.0;
+    for (const Line& line : lines_) {
+      misfit += line.E.row(a).squaredNorm();
+      controlled += (line.F.row(a) * line.Y).squaredNorm();
+      moved += line.U.row(a).squaredNorm();
+    }
+    if (controlled > 0.0) ++driven;
+    const bool is_controlled = controlled > kRounding * kRounding * moved;
+    const double whole = is_controlled ? controlled : moved;
+    const double relative = std::sqrt(misfit / std::max(whole, 1e-300));
+    if (relative > kLeastMisfit && significant(a))
+      found.push_back({a, relative, is_controlled, false});
+  }
+  const bool of_all = 2 * static_cast<Index>(found.size()) > driven && found.size() > 1;
+  for (ControllerMisfit& misfit : found) misfit.of_all = of_all;
+  return found;
+}
+
+}  // namespace
+
+ControllerCheck check_controller(HealthRecord& record, const NominalStage& nominal) {
+  return Search(record, nominal).run();
+}
+
+}  // namespace stageid

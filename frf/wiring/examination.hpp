@@ -1,0 +1,59 @@
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frf/periods/health_finding.hpp"
+#include "frf/runs/health_record.hpp"
+#include "frf/wiring/nominal_stage.hpp"
+
+namespace stageid {
+
+/// The checks of one log, in the order in which one rules out the next.
+class Examination {
+ public:
+  Examination(HealthRecord&& record, const std::optional<NominalStage>& nominal)
+      : record_(std::move(record)), nominal_(nominal) {}
+
+  std::vector<Finding> examine();
+
+ private:
+  void check_cycles();
+  void check_samples();
+  void check_responses();
+  void check_arrival();
+  void check_excitation();
+  void check_injection();
+  void check_without_stage();
+  void check_recording();
+  void check_stage();
+  void check_inputs();
+  void check_excluded();
+
+  void find(Severity severity, Cause cause, std::string channel, std::string what,
+            std::string figure, std::string remedy) {
+    findings_.push_back({severity, cause, std::move(channel), std::move(what), std::move(figure),
+                         std::move(remedy)});
+  }
+  const std::string& name(Eigen::Index channel) const;  // of [sensors; actuators]
+  bool spoilt(Eigen::Index channel) const {
+    return std::find(spoilt_.begin(), spoilt_.end(), channel) != spoilt_.end();
+  }
+  bool found(Cause cause) const;
+  void find_clipped(Eigen::Index channel, double log_p);
+  bool find_suspected(Eigen::Index first, Eigen::Index count);
+  std::vector<Eigen::Index> excited_actuators() const;
+  bool expected_to_respond(Eigen::Index sensor, bool& known) const;
+  bool controlled(Eigen::Index actuator, bool& known) const;
+  std::string why_no_nominal(bool all_sensors) const;
+
+  HealthRecord record_;
+  const std::optional<NominalStage>& nominal_;
+  std::vector<Finding> findings_;
+  std::vector<Eigen::Index> spoilt_;  // of [sensors; actuators]: dead or clipped
+};
+
+}  // namespace stageid

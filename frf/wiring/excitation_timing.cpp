@@ -1,0 +1,183 @@
+#include "frf/wiring/excitation_timing.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "acquisition/files/counted.hpp"
+#include "excitation/multisine/dft.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kLeastReduction = 4.0;
+constexpr double kClearly = 2.0;  // of the misfits of one explanation and another
+constexpr Index kFewestLines = 8;
+
+/// One excited axis on one line of one experiment, over |r|.
+struct Entry {
+  Index experiment = 0;
+  int line = 0;
+  std::complex<double> u;           // over r
+  std::complex<double> controlled;  // -C y over r
+};
+
+/// Positions of the excited axes in the actuators; empty if a name is missing.
+std::vector<Index> actuators_of(const HealthRecord& record) {
+  std::vector<Index> found;
+  const auto& names = record.info.actuators.names;
+  for (const Index axis : record.axes) {
+    const auto at = std::find(names.begin(), names.end(),
+                              record.info.excitation.names[static_cast<std::size_t>(axis)]);
+    if (at == names.end()) return {};
+    found.push_back(at - names.begin());
+  }
+  return found;
+}
+
+/// The controller between the recorded channels, if all of them are known.
+bool knows_all(const HealthRecord& record, const std::optional<NominalStage>& nominal,
+               std::vector<Index>& u, std::vector<Index>& y) {
+  if (!nominal) return false;
+  std::string missing;
+  u = positions_in(nominal->actuators, record.info.actuators.names, missing);
+  y = positions_in(nominal->sensors, record.info.sensors.names, missing);
+  return !u.empty() && !y.empty() && y.size() == nominal->sensors.size();
+}
+
+class Alignment {
+ public:
+  Alignment(const HealthRecord& record, const std::optional<NominalStage>& nominal);
+  std::optional<ExcitationDelay> find() const;
+
+ private:
+  std::complex<double> turned(int line, double samples) const {
+    return std::polar(1.0, 2.0 * std::numbers::pi * line * samples / period_);
+  }
+  Eigen::VectorXd misfit_of_r(int samples) const;
+  double misfit_of_u(int samples) const;
+  int best() const;
+
+  int period_;
+  Index experiments_;
+  bool controller_known_ = false;
+  std::vector<Entry> entries_;
+};
+
+Alignment::Alignment(const HealthRecord& record, const std::optional<NominalStage>& nominal)
+    : period_(record.info.period_samples), experiments_(record.experiments()) {
+  const std::vector<Index> actuators = actuators_of(record);
+  if (actuators.empty()) return;
+  std::vector<Index> u;
+  std::vector<Index> y;
+  controller_known_ = knows_all(record, nominal, u, y);
+  const Index K = record.frequency_hz.size();
+  for (Index k = 0; k < K; ++k) {
+    const double frequency_hz = record.frequency_hz[k];
+    if (!controller_known_ && frequency_hz < 0.5 * record.frequency_hz[K - 1]) continue;
+    const LineRecord& line = record.lines[static_cast<std::size_t>(k)];
+    const Eigen::MatrixXcd Z = record.mean(line.Z);
+    const Eigen::MatrixXcd U = Z.bottomRows(record.n_u());
+    Eigen::MatrixXcd controlled = Eigen::MatrixXcd::Zero(U.rows(), U.cols());
+    if (controller_known_)
+      controlled = nominal->controller(frequency_hz)(u, y) * Z.topRows(record.n_y());
+    const int at = static_cast<int>(
+        std::lround(frequency_hz * record.info.period_samples / record.info.sample_rate_hz));
+    for (Index e = 0; e < experiments_; ++e)
+      for (std::size_t a = 0; a < actuators.size(); ++a) {
+        const std::complex<double> r = line.R(record.axes[a], e);
+        if (std::abs(r) == 0.0) continue;
+        entries_.push_back({e, at, U(actuators[a], e) / r, controlled(actuators[a], e) / r});
+      }
+  }
+}
+
+/// By experiment.
+Eigen::VectorXd Alignment::misfit_of_r(int samples) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(experiments_);
+  for (const Entry& at : entries_)
+    sum[at.experiment] += std::norm(at.u - at.controlled - turned(at.line, samples));
+  return sum;
+}
+
+double Alignment::misfit_of_u(int samples) const {
+  double sum = 0.0;
+  for (const Entry& at : entries_)
+    sum += std::norm(turned(at.line, -samples) * at.u - at.controlled - 1.0);
+  return sum;
+}
+
+/// Where the cross-correlation is largest.
+int Alignment::best() const {
+  RealDft dft(period_);
+  Eigen::VectorXcd spectrum = Eigen::VectorXcd::Zero(dft.half_size());
+  for (const Entry& at : entries_) {
+    const std::complex<double> v = at.u - at.controlled;
+    if (std::abs(v) > 0.0) spectrum[at.line] += std::conj(v) / std::abs(v);
+  }
+  const Eigen::VectorXd correlation = dft.inverse(spectrum);
+  Index peak = 0;
+  correlation.maxCoeff(&peak);
+  return static_cast<int>(peak <= period_ / 2 ? peak : peak - period_);
+}
+
+std::optional<ExcitationDelay> Alignment::find() const {
+  if (static_cast<Index>(entries_.size()) < kFewestLines * experiments_) return std::nullopt;
+  const int samples = best();
+  if (samples == 0) return std::nullopt;
+  const Eigen::VectorXd as_recorded = misfit_of_r(0);
+  const Eigen::VectorXd aligned = misfit_of_r(samples);
+  if (!(aligned.sum() * kLeastReduction < as_recorded.sum())) return std::nullopt;
+  if ((aligned.array() > as_recorded.array()).any()) return std::nullopt;
+  // Without a controller, or with hardly any gain in the band, they are the same.
+  const double of_actuators = misfit_of_u(samples);
+  if (of_actuators * kClearly < aligned.sum()) return std::nullopt;
+  return ExcitationDelay{samples, std::sqrt(as_recorded.sum() / std::max(1e-300, aligned.sum())),
+                         of_actuators > kClearly * aligned.sum()};
+}
+
+}  // namespace
+
+std::optional<ExcitationDelay> align_excitation(HealthRecord& record,
+                                                const std::optional<NominalStage>& nominal) {
+  if (record.frequency_hz.size() == 0 || record.axes.empty()) return std::nullopt;
+  const std::optional<ExcitationDelay> delay = Alignment(record, nominal).find();
+  if (!delay) return delay;
+  const double late_s = delay->samples / record.info.sample_rate_hz;
+  for (Index k = 0; k < record.frequency_hz.size(); ++k)
+    record.lines[static_cast<std::size_t>(k)].R *=
+        std::polar(1.0, 2.0 * std::numbers::pi * record.frequency_hz[k] * late_s);
+  return delay;
+}
+
+Finding to_finding(const ExcitationDelay& delay) {
+  const std::string samples = counted(std::abs(delay.samples), "sample");
+  const bool late = delay.samples > 0;
+  Finding finding;
+  finding.severity = Severity::doubt;
+  finding.cause = Cause::excitation_timing;
+  finding.channel = "excitation";
+  if (delay.certain) {
+    finding.what =
+        fmt::format("the excitation was recorded {} {}; the FRF does not depend on it and is right",
+                    samples, late ? "late" : "early");
+    finding.remedy = "correct the time at which the excitation is recorded";
+  } else {
+    finding.what = fmt::format(
+        "the excitation was recorded {} {} than all actuators; if it alone is, the FRF is "
+        "unaffected",
+        samples, late ? "later" : "earlier");
+    finding.remedy = "give the stage file of this log, whose controller can tell: --stage";
+  }
+  finding.figure = fmt::format("u follows it {:.2g} times better when shifted", delay.misfit);
+  return finding;
+}
+
+}  // namespace stageid

@@ -1,0 +1,193 @@
+#include "frf/wiring/rigid_body_check.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "frf/statistics/order_statistic.hpp"
+
+namespace stageid {
+namespace {
+
+using Index = Eigen::Index;
+
+constexpr double kTolerance = 0.1;       // of the rms of a row
+constexpr double kModelError = 0.02;     // of what the fit leaves of flexible modes
+constexpr double kLeastLogGain = 0.262;  // ln 1.3
+constexpr double kLeastExplained = 20.0;
+constexpr double kLeastShare = 0.3;
+constexpr double kGrowth = 1.5;
+constexpr double kBelowGrowth = 0.7;
+constexpr double kDead = 0.05;
+constexpr std::size_t kFewestLines = 8;
+
+/// The lines up to where flexible modes begin.
+std::vector<PlantLine> rigid_lines(const std::vector<PlantLine>& lines) {
+  std::vector<double> sizes;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const double omega = lines[k].omega_rad_s;
+    sizes.push_back(omega * omega * lines[k].G.norm());
+    std::vector<double> sorted = sizes;
+    if (sizes.size() < kFewestLines || sizes.back() <= kGrowth * order_statistic(sorted, 0.5))
+      continue;
+    std::vector<PlantLine> band;
+    for (const PlantLine& line : lines)
+      if (line.omega_rad_s < kBelowGrowth * omega) band.push_back(line);
+    return band;
+  }
+  return lines;
+}
+
+/// A and A0 with what they are held to.
+struct Gains {
+  Eigen::MatrixXd A;
+  Eigen::MatrixXd A0;
+  Eigen::MatrixXd weight;
+};
+
+/// The constant term of entry (i, j): of A, of A0, and the variance of both.
+Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j) {
+  const auto K = static_cast<Index>(lines.size());
+  const double highest = std::pow(lines.back().omega_rad_s, 2);
+  Eigen::MatrixXd X(K, 3);
+  Eigen::MatrixXd rhs(K, 2);
+  for (Index k = 0; k < K; ++k) {
+    const PlantLine& line = lines[static_cast<std::size_t>(k)];
+    const double omega2 = std::pow(line.omega_rad_s, 2);
+    const double x = omega2 / highest;
+    const double row_square = line.G.row(i).squaredNorm() / static_cast<double>(line.G.cols());
+    const double variance = 0.5 * line.variance(i, j) + kModelError * kModelError * row_square;
+    const double w = 1.0 / (omega2 * std::sqrt(std::max(1e-300, variance)));
+    X.row(k) << w, w * x, w * x * x;
+    rhs.row(k) << -w * omega2 * line.G(i, j).real(), -w * omega2 * line.G0(i, j).real();
+  }
+  const Eigen::Matrix3d normal_inverse = (X.transpose() * X).inverse();
+  const Eigen::MatrixXd solution = normal_inverse * X.transpose() * rhs;
+  return {solution(0, 0), solution(0, 1), normal_inverse(0, 0)};
+}
+
+Gains fit_gains(const std::vector<PlantLine>& lines) {
+  const Index n_y = lines.front().G.rows();
+  const Index n_u = lines.front().G.cols();
+  Gains gains{Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u)};
+  Eigen::MatrixXd variance(n_y, n_u);
+  for (Index i = 0; i < n_y; ++i)
+    for (Index j = 0; j < n_u; ++j) {
+      const Eigen::Vector3d entry = fit_entry(lines, i, j);
+      gains.A(i, j) = entry[0];
+      gains.A0(i, j) = entry[1];
+      variance(i, j) = entry[2];
+    }
+  const Eigen::VectorXd row_square = gains.A0.rowwise().squaredNorm() / static_cast<double>(n_u);
+  gains.weight = (variance.colwise() + kTolerance * kTolerance * row_square).cwiseInverse();
+  return gains;
+}
+
+struct Candidate {
+  ChannelChange change;
+  double explained = 0.0;
+};
+
+double cost(const Eigen::MatrixXd& A, const Gains& gains) {
+  return (gains.weight.array() * (A - gains.A0).array().square()).sum();
+}
+
+/// The rows and columns of A with the change undone; positions are those in A.
+Eigen::MatrixXd undone(const ChannelChange& change, const Eigen::MatrixXd& A) {
+  Eigen::MatrixXd B = change.of_sensors ? A : Eigen::MatrixXd(A.transpose());
+  if (change.kind == ChannelChange::Kind::swap)
+    B.row(change.a).swap(B.row(change.b));
+  else if (change.a < 0)
+    B /= change.value;
+  else
+    B.row(change.a) /= change.value;
+  return change.of_sensors ? B : Eigen::MatrixXd(B.transpose());
+}
+
+void try_gain(ChannelChange change, const Gains& gains, const Eigen::MatrixXd& A,
+              std::vector<Candidate>& candidates) {
+  // c A = A0 by least squares over the row, the column, or all.
+  Eigen::MatrixXd part = Eigen::MatrixXd::Zero(A.rows(), A.cols());
+  if (change.a < 0)
+    part = A;
+  else if (change.of_sensors)
+    part.row(change.a) = A.row(change.a);
+  else
+    part.col(change.a) = A.col(change.a);
+  const double square = (gains.weight.array() * part.array().square()).sum();
+  const double c = (gains.weight.array() * part.array() * gains.A0.array()).sum() / square;
+  change.value = 1.0 / c;
+  if (!std::isfinite(change.value) || c == 0.0) return;
+  if (c > 0.0 && std::abs(std::log(c)) < kLeastLogGain) return;
+  candidates.push_back({change, cost(A, gains) - cost(undone(change, A), gains)});
+}
+
+std::optional<Candidate> best_change(const Gains& gains, const Eigen::MatrixXd& A) {
+  using Kind = ChannelChange::Kind;
+  std::vector<Candidate> candidates;
+  const double before = cost(A, gains);
+  try_gain({Kind::gain, true}, gains, A, candidates);
+  for (const bool of_sensors : {true, false}) {
+    const Index n = of_sensors ? A.rows() : A.cols();
+    for (Index a = 0; a < n; ++a) {
+      try_gain({Kind::gain, of_sensors, a}, gains, A, candidates);
+      for (Index b = 0; b < a; ++b) {
+        const ChannelChange swap{Kind::swap, of_sensors, b, a};
+        candidates.push_back({swap, before - cost(undone(swap, A), gains)});
+      }
+    }
+  }
+  const Candidate* most = nullptr;
+  for (const Candidate& candidate : candidates)
+    if (candidate.explained > std::max(kLeastExplained, kLeastShare * before) &&
+        (most == nullptr || candidate.explained > most->explained))
+      most = &candidate;
+  return most != nullptr ? std::optional<Candidate>(*most) : std::nullopt;
+}
+
+/// From positions in A to those in the log.
+ChannelChange in_log(ChannelChange change, const std::vector<Index>& outputs,
+                     const std::vector<Index>& inputs) {
+  const std::vector<Index>& at = change.of_sensors ? outputs : inputs;
+  if (change.a >= 0) change.a = at[static_cast<std::size_t>(change.a)];
+  if (change.b >= 0) change.b = at[static_cast<std::size_t>(change.b)];
+  return change;
+}
+
+}  // namespace
+
+RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
+                                const std::vector<Index>& outputs,
+                                const std::vector<Index>& inputs) {
+  RigidBodyCheck check;
+  const std::vector<PlantLine> lines = rigid_lines(all);
+  if (lines.size() < kFewestLines) {
+    check.unchecked =
+        fmt::format("{} excited lines between suspension and flexible modes; {} are needed",
+                    lines.size(), kFewestLines);
+    return check;
+  }
+  check.band_hz[0] = lines.front().omega_rad_s / (2.0 * std::numbers::pi);
+  check.band_hz[1] = lines.back().omega_rad_s / (2.0 * std::numbers::pi);
+  Gains gains = fit_gains(lines);
+  for (Index j = 0; j < gains.A.cols(); ++j) {
+    if (gains.A.col(j).norm() > kDead * gains.A0.col(j).norm()) continue;
+    check.dead_actuators.push_back(inputs[static_cast<std::size_t>(j)]);
+    gains.weight.col(j).setZero();
+  }
+  Eigen::MatrixXd A = gains.A;
+  for (Index i = 0; i < A.rows() + A.cols(); ++i) {
+    const std::optional<Candidate> chosen = best_change(gains, A);
+    if (!chosen) break;
+    A = undone(chosen->change, A);
+    check.changes.push_back(in_log(chosen->change, outputs, inputs));
+  }
+  check.deviation = kTolerance * std::sqrt(cost(A, gains) / static_cast<double>(A.size()));
+  return check;
+}
+
+}  // namespace stageid

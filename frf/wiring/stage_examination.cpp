@@ -1,0 +1,224 @@
+// What needs the stage: the recorded signals against its controller, the plant against its rigid body.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "frf/wiring/controller_check.hpp"
+#include "frf/wiring/examination.hpp"
+#include "frf/wiring/feedback_check.hpp"
+#include "frf/wiring/injection_check.hpp"
+#include "frf/wiring/rigid_body_check.hpp"
+#include "frf/wiring/skew_check.hpp"
+
+namespace stageid {
+namespace {
+
+using Index = Eigen::Index;
+
+constexpr double kResponds = 1e-3;  // of the largest nominal response
+constexpr double kFedBack = 1e-4;   // of an actuator: ten times what is called exact
+constexpr double kLargestRigidDeviation = 0.3;
+
+}  // namespace
+
+/// Whether the rigid body moves this sensor when the excited actuators push.
+bool Examination::expected_to_respond(Index sensor, bool& known) const {
+  std::string missing;
+  known = false;
+  if (!nominal_ || !nominal_->rigid_body || record_.frequency_hz.size() == 0) return false;
+  const auto y = positions_in(nominal_->sensors, record_.info.sensors.names, missing);
+  const auto u = positions_in(nominal_->actuators, record_.info.actuators.names, missing);
+  const std::vector<Index> excited = excited_actuators();
+  if (y.empty() || u.empty() || excited.empty()) return false;
+  known = true;
+  const Eigen::MatrixXcd G =
+      nominal_->rigid_body(record_.frequency_hz[record_.frequency_hz.size() / 2]);
+  double here = 0.0;
+  for (const Index a : excited)
+    here = std::max(
+        here, std::abs(G(y[static_cast<std::size_t>(sensor)], u[static_cast<std::size_t>(a)])));
+  return here > kResponds * G.cwiseAbs().maxCoeff();
+}
+
+std::string Examination::why_no_nominal(bool all_sensors) const {
+  if (excited_actuators().empty())
+    return "an excitation that is added at the actuators, under their names";
+  std::string missing;
+  if (positions_in(nominal_->actuators, record_.info.actuators.names, missing).empty() ||
+      positions_in(nominal_->sensors, record_.info.sensors.names, missing).empty())
+    return fmt::format("a stage file that knows channel {}", missing);
+  if (all_sensors && positions_in(record_.info.sensors.names, nominal_->sensors, missing).empty())
+    return fmt::format("the record of sensor {}, which the controller sees", missing);
+  return "";
+}
+
+/// An actuator that is the excitation says nothing of the loop. Whether there is a loop, the controller says,
+/// or the other actuators.
+void Examination::check_injection() {
+  const std::vector<MappedExcitation> mapped = find_mapped_excitation(record_);
+  const auto all = static_cast<std::size_t>(
+      std::count_if(record_.scan.begin() + record_.n_y(), record_.scan.end(),
+                    [](const ChannelScan& scan) { return scan.high().value != scan.low().value; }));
+  for (const MappedExcitation& m : mapped) {
+    bool known = false;
+    const bool fed_back = controlled(m.actuator, known);
+    if (known && !fed_back) continue;  // its loop is open
+    const std::string& excitation =
+        record_.info.excitation.names[static_cast<std::size_t>(m.excitation)];
+    const std::string figure = std::abs(m.factor - 1.0) < 1e-5
+                                   ? std::string("identical")
+                                   : fmt::format("factor {:.6g}", m.factor);
+    if (known || mapped.size() < all) {
+      find(Severity::fault, Cause::injection, name(record_.n_y() + m.actuator),
+           fmt::format("equals the excitation {}: nothing of the loop is in it", excitation),
+           figure, "map the plant input (after the injection sum)");
+    } else {
+      find(Severity::doubt, Cause::injection, name(record_.n_y() + m.actuator),
+           fmt::format("equals the excitation {}: right in open loop only", excitation), figure,
+           "in a closed loop, map the plant input (after the injection sum)");
+    }
+    spoilt_.push_back(record_.n_y() + m.actuator);
+  }
+}
+
+/// Whether the controller adds to this actuator what would be seen beside the excitation.
+bool Examination::controlled(Index actuator, bool& known) const {
+  known = nominal_.has_value() && why_no_nominal(false).empty();
+  if (!known) return false;
+  std::string missing;
+  const auto u = positions_in(nominal_->actuators, record_.info.actuators.names, missing);
+  const auto y = positions_in(nominal_->sensors, record_.info.sensors.names, missing);
+  double fed_back = 0.0;
+  double moved = 0.0;
+  for (std::size_t k = 0; k < record_.lines.size(); ++k) {
+    const double frequency_hz = record_.frequency_hz[static_cast<Index>(k)];
+    if (frequency_hz < nominal_->controller_from_hz || frequency_hz > nominal_->controller_to_hz)
+      continue;
+    const Eigen::MatrixXcd F = nominal_->controller(frequency_hz);
+    const Eigen::MatrixXcd& Z = record_.lines[k].Z;
+    fed_back += (F(u, y).row(actuator) * Z.topRows(record_.n_y())).squaredNorm();
+    moved += Z.row(record_.n_y() + actuator).squaredNorm();
+  }
+  return fed_back > kFedBack * kFedBack * moved;
+}
+
+/// Said first: what cannot be seen in this log, what file would let it be seen, and what the data alone tell.
+void Examination::check_without_stage() {
+  const FeedbackCheck check = check_feedback(record_);
+  const bool tells = check.unchecked.empty() && spoilt_.empty();
+  find(Severity::unchecked, Cause::unknown_stage, "",
+       "names, signs, scales and timing of the channels and their wiring: the log's stage is "
+       "unknown",
+       tells ? fmt::format("u - r is linear in y to {:.1g} over {} experiments", check.relative,
+                           check.experiments)
+             : "",
+       "--stage FILE: a stage file, or a controller file for the recording alone");
+  if (!tells || check.inconsistent.empty()) return;
+  const bool one = check.inconsistent.size() == 1;
+  find(Severity::doubt, Cause::controller,
+       one ? name(record_.n_y() + check.inconsistent.front()) : "",
+       "u - r is not one linear function of the recorded sensors in all experiments",
+       fmt::format("{:.2g} of u - r is not", check.worst),
+       "record all that the controller sees and adds; keep it the same in all experiments");
+}
+
+void Examination::check_recording() {
+  if (!nominal_) {
+    check_without_stage();
+    return;
+  }
+  const char* what = "names, signs, scales and timing of the recorded channels (u = r - C y)";
+  if (const std::string why = why_no_nominal(true); !why.empty()) {
+    find(Severity::unchecked, Cause::controller, "", what, "", "needs " + why);
+    return;
+  }
+  if (!spoilt_.empty()) {
+    find(Severity::unchecked, Cause::controller, "", what, "",
+         fmt::format("needs channel {} in order", name(spoilt_.front())));
+    return;
+  }
+  const ControllerCheck check = check_controller(record_, *nominal_);
+  for (const ChannelChange& change : check.changes)
+    findings_.push_back(to_finding(change, record_.info, true));
+  if (!check.misfits.empty() && check.misfits.front().of_all) {
+    if (find_suspected(0, record_.n_y())) return;
+    find(Severity::doubt, Cause::controller, "",
+         "the loop was closed by another controller than the configuration's",
+         fmt::format("u - r + C y is {:.2g} of C y", check.misfits.front().relative),
+         "give the stage file of this log: --stage");
+    return;
+  }
+  for (const ControllerMisfit& misfit : check.misfits) {
+    if (find_suspected(record_.n_y() + misfit.actuator, 1)) continue;
+    const std::vector<Index> excited = excited_actuators();
+    const bool is_input =
+        std::find(excited.begin(), excited.end(), misfit.actuator) != excited.end();
+    find(Severity::fault, Cause::unrecorded, name(record_.n_y() + misfit.actuator),
+         is_input ? "moves by more than r - C y: an excitation that was not recorded"
+                  : "moves by itself beside the sub-plant: it is excited and that was not recorded",
+         fmt::format("u - r + C y is {:.2g} of {}", misfit.relative,
+                     misfit.controlled ? "C y" : "u; C y is zero"),
+         "switch off what drives it, or record it as excitation");
+  }
+  if (record_.scatter_dof() == 0)
+    find(Severity::unchecked, Cause::skew, "", "timing skew of the recorded channels", "",
+         "needs two periods a run");
+}
+
+void Examination::check_stage() {
+  const char* what = "wiring behind the recording (rigid body against geometry and mass)";
+  if (!nominal_) return;  // said already
+  std::string why = why_no_nominal(false);
+  if (why.empty() && !nominal_->rigid_body)
+    why = "geometry and mass: a stage file, or 'stage: FILE' in the controller file";
+  std::vector<Index> outputs;
+  if (why.empty()) {
+    for (Index s = 0; s < record_.n_y(); ++s) {
+      bool known = false;
+      if (!spoilt(s) && expected_to_respond(s, known)) outputs.push_back(s);
+    }
+  }
+  const std::vector<Index> inputs = excited_actuators();
+  if (!why.empty() || outputs.empty()) {
+    find(Severity::unchecked, Cause::rigid_body, "", what, "",
+         "needs " + (why.empty() ? std::string("a sensor that sees the excited axes") : why));
+    return;
+  }
+  for (const Index a : inputs)
+    if (spoilt(record_.n_y() + a)) return;
+  if (found(Cause::excluded)) {
+    find(Severity::unchecked, Cause::rigid_body, "", what, "",
+         "needs every actuator that moves excited: Y U^-1 is not the plant without");
+    return;
+  }
+  if (record_.zippered) {
+    find(Severity::unchecked, Cause::rigid_body, "", what, "",
+         "needs all axes on one line: a scheme other than zippered");
+    return;
+  }
+  const std::vector<PlantLine> lines = plant_lines(record_, *nominal_, outputs, inputs);
+  const RigidBodyCheck check = check_rigid_body(lines, outputs, inputs);
+  if (!check.unchecked.empty()) {
+    find(Severity::unchecked, Cause::rigid_body, "", what, "", "there are " + check.unchecked);
+    return;
+  }
+  for (const Index a : check.dead_actuators)
+    find(Severity::fault, Cause::dead, name(record_.n_y() + a), "dead: its force moves nothing",
+         "less than 5 % of the rigid body's motion", "look at its amplifier and its cable");
+  for (const ChannelChange& change : check.changes)
+    findings_.push_back(to_finding(change, record_.info, false));
+  if (check.deviation > kLargestRigidDeviation)
+    find(Severity::doubt, Cause::rigid_body, "", "the rigid body is not that of the configuration",
+         fmt::format("{:.0f} % off, {:.3g} ... {:.3g} Hz", 100.0 * check.deviation,
+                     check.band_hz[0], check.band_hz[1]),
+         "correct mass, inertia or positions in the stage file");
+  if (!check.dead_actuators.empty()) return;  // noise has no phase
+  const SkewCheck skew = check_skew(lines, outputs, inputs);
+  for (const ChannelChange& change : skew.changes)
+    findings_.push_back(to_finding(change, record_.info, false));
+  if (!skew.unchecked.empty())
+    find(Severity::unchecked, Cause::skew, "", "timing skew behind the recording", "",
+         "needs " + skew.unchecked + "; fit --delay per_channel estimates it");
+}
+
+}  // namespace stageid

@@ -1,0 +1,60 @@
+#include "hal/can/can_bus_load.hpp"
+
+#include <fmt/format.h>
+
+#include <limits>
+#include <stdexcept>
+
+#include "hal/can/can_messages.hpp"
+
+namespace stageid {
+
+double can_fd_frame_time_s(std::size_t bytes, double nominal_bit_rate_hz, double data_bit_rate_hz) {
+  constexpr std::size_t kNominalBits = 17 + 4 + 13;
+  const std::size_t dynamic = 5 + 8 * bytes;
+  const std::size_t check = bytes > 16 ? 21 + 7 : 17 + 6;
+  const std::size_t data_bits = dynamic + dynamic / 4 + 4 + check;
+  return static_cast<double>(kNominalBits) / nominal_bit_rate_hz +
+         static_cast<double>(data_bits) / data_bit_rate_hz;
+}
+
+std::vector<CanBusLoad> can_bus_load(const CanSpec& spec, const CanLayout& layout,
+                                     double sample_rate_hz) {
+  std::vector<CanBusLoad> loads;
+  for (const CanBusSpec& bus : spec.buses) {
+    const auto frame_s = [&](std::size_t payload) {
+      return can_fd_frame_time_s(can_fd_length(kCanHeaderBytes + payload), bus.nominal_bit_rate_hz,
+                                 bus.data_bit_rate_hz);
+    };
+    CanBusLoad load;
+    load.interface = bus.interface;
+    for (const std::vector<CanValueFrame>* list : {&layout.setpoints, &layout.sensors})
+      for (const CanValueFrame& frame : *list)
+        if (frame.bus == loads.size()) load.cycle_s += frame_s(frame.payload_bytes());
+    const double other = loads.empty() ? frame_s(kCanStateBytes) * kCanHeartbeatRate_hz : 0.0;
+    load.load = load.cycle_s * sample_rate_hz + other;
+    load.highest_rate_hz = load.cycle_s > 0.0 ? (spec.largest_load - other) / load.cycle_s
+                                              : std::numeric_limits<double>::infinity();
+    loads.push_back(load);
+  }
+  return loads;
+}
+
+void require_bus_carries(const CanSpec& spec, const CanLayout& layout, double sample_rate_hz) {
+  for (const CanBusLoad& load : can_bus_load(spec, layout, sample_rate_hz)) {
+    if (load.load <= spec.largest_load) continue;
+    throw std::invalid_argument(fmt::format(
+        "can: {} would be loaded to {:.0f} % at {:g} Hz ({:.0f} us a cycle), {:.0f} % are allowed; "
+        "at most {:.0f} Hz, or more buses, or mode: resident",
+        load.interface, 100.0 * load.load, sample_rate_hz, 1e6 * load.cycle_s,
+        100.0 * spec.largest_load, load.highest_rate_hz));
+  }
+}
+
+double can_transfer_time_s(const CanSpec& spec, double bytes) {
+  const CanBusSpec& bus = spec.buses.front();
+  const double frame_s = can_fd_frame_time_s(64, bus.nominal_bit_rate_hz, bus.data_bit_rate_hz);
+  return bytes / static_cast<double>(kCanChunkBytes) * frame_s / spec.largest_load;
+}
+
+}  // namespace stageid

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "hal/can/can_layout.hpp"
+
+namespace stageid {
+
+/// Longest time that a CAN FD frame with an 11-bit identifier occupies the bus, intermission
+/// included, with the worst-case stuffing:
+///
+///   t = (17 + 4 + 13) / f_nominal + (d + floor((d + 8 n) / 4) + 8 n + 4 + c + s) / f_data
+///
+/// 17 bits from SOF to BRS with 4 stuff bits, 13 from the CRC delimiter to the intermission; d = 5
+/// bits (ESI, DLC), n bytes, 4 of the stuff count; a CRC of c = 17 bits with s = 6 fixed stuff bits
+/// up to 16 bytes, 21 with 7 above. Source: ISO 11898-1:2015, frame format.
+double can_fd_frame_time_s(std::size_t bytes, double nominal_bit_rate_hz, double data_bit_rate_hz);
+
+/// What one bus has to carry.
+struct CanBusLoad {
+  std::string interface;
+  double cycle_s = 0.0;          ///< frames of one sample
+  double load = 0.0;             ///< at the stage's rate, state frames included
+  double highest_rate_hz = 0.0;  ///< at the largest load that is allowed
+};
+
+/// Load by the cyclic exchange at `sample_rate_hz`: every frame of the layout once a sample, and on
+/// the first bus the node's state ten times a second.
+std::vector<CanBusLoad> can_bus_load(const CanSpec& spec, const CanLayout& layout,
+                                     double sample_rate_hz);
+
+/// @throws std::invalid_argument with the computed loads if a bus would carry more than
+/// spec.largest_load.
+void require_bus_carries(const CanSpec& spec, const CanLayout& layout, double sample_rate_hz);
+
+/// Seconds that a transfer of `bytes` takes on the first bus at its largest load.
+double can_transfer_time_s(const CanSpec& spec, double bytes);
+
+}  // namespace stageid

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "hal/can/can_frame.hpp"
+#include "hal/stage/stage.hpp"
+
+namespace stageid {
+
+/// One CAN FD bus and what runs on it. The first bus also carries commands, states and transfers.
+struct CanBusSpec {
+  std::string interface;  ///< "can0"
+  double nominal_bit_rate_hz = 1e6;
+  double data_bit_rate_hz = 5e6;
+  std::vector<int> actuators;  ///< indices
+  std::vector<int> sensors;
+};
+
+/// How a stage lies behind CAN.
+struct CanSpec {
+  std::vector<CanBusSpec> buses;
+  std::vector<double> actuator_range_n;  ///< one an actuator: 2^23 counts
+  std::vector<double> sensor_range_m;    ///< one a sensor
+  /// The host waits so long for the answer of a cycle if the loop sets no deadline.
+  double reply_timeout_s = 5e-3;
+  /// The node stops by itself after so long without a setpoint.
+  double watchdog_s = 20e-3;
+  double largest_load = 0.8;  ///< of a bus
+};
+
+// Identifiers: the lower wins on the bus.
+inline constexpr std::uint16_t kCanCommandId = 0x080;
+inline constexpr std::uint16_t kCanSetpointId = 0x100;  ///< + number of the frame
+inline constexpr std::uint16_t kCanSensorId = 0x180;    ///< + number of the frame
+inline constexpr std::uint16_t kCanStateId = 0x200;
+inline constexpr std::uint16_t kCanTextId = 0x201;
+inline constexpr std::uint16_t kCanUploadId = 0x300;
+inline constexpr std::uint16_t kCanDownloadId = 0x380;
+inline constexpr std::uint16_t kCanMissingId = 0x381;
+inline constexpr std::size_t kCanValuesOfFrame = 18;  ///< (64 - 8) / 3
+
+/// A frame of setpoints or measurements: which channels, in order, with three bytes each.
+struct CanValueFrame {
+  std::uint16_t id = 0;
+  std::uint8_t bus = 0;
+  std::vector<int> channels;
+  std::size_t payload_bytes() const noexcept { return kCanCountBytes * channels.size(); }
+};
+
+/// Which channel stands where. Host and node compute it from the same stage file.
+struct CanLayout {
+  std::vector<CanValueFrame> setpoints;
+  std::vector<CanValueFrame> sensors;
+  std::vector<CanScale> actuator_scale;
+  std::vector<CanScale> sensor_scale;
+  /// Of everything that both sides must agree on: rate, frames, channels by name, scaling.
+  std::uint32_t fingerprint = 0;
+};
+
+/// @throws std::invalid_argument naming the bus or channel: a channel on no bus or on two, a range
+/// that is not positive, more frames than there are identifiers, times or rates that make no sense.
+CanLayout can_layout(const CanSpec& spec, const StageInfo& info);
+
+/// What the host and what the node listens to.
+std::vector<std::uint16_t> can_host_identifiers(const CanLayout& layout);
+std::vector<std::uint16_t> can_node_identifiers(const CanLayout& layout);
+
+}  // namespace stageid

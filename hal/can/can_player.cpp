@@ -1,0 +1,235 @@
+#include "hal/can/can_player.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace stageid {
+namespace {
+
+constexpr std::size_t kFloatBytes = 4;
+constexpr std::int64_t kHostSilence_ns = 1'000'000'000;
+constexpr int kSamplesAtOnce = 256;  // then the bus is looked at again
+constexpr std::size_t kChunksAtOnce = 32;
+constexpr std::uint32_t kLargestDownload = 256;
+
+std::size_t chunks_of(std::size_t bytes) { return (bytes + kCanChunkBytes - 1) / kCanChunkBytes; }
+
+std::span<const std::uint8_t> chunk_of(const std::vector<std::uint8_t>& memory, std::size_t index) {
+  const std::size_t from = index * kCanChunkBytes;
+  return {memory.data() + from, std::min(kCanChunkBytes, memory.size() - from)};
+}
+
+void append(std::vector<std::uint8_t>& bytes, std::uint32_t word) {
+  for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<std::uint8_t>(word >> (8 * i)));
+}
+
+bool gives_measurement(Outcome outcome) {
+  return outcome != Outcome::fault && outcome != Outcome::limit && outcome != Outcome::bus_off &&
+         outcome != Outcome::link_down;
+}
+
+}  // namespace
+
+CanPlayer::CanPlayer(StageNode& stage, double pace)
+    : stage_(stage),
+      pace_(pace),
+      r_(stage.info().actuators.size()),
+      u_(stage.info().actuators.size()),
+      y_(stage.info().sensors.size()) {}
+
+std::size_t CanPlayer::row_bytes() const noexcept {
+  return kFloatBytes * (u_.size() + y_.size() + 1);
+}
+
+std::string CanPlayer::prepare(const CanCommand& command) {
+  if (busy()) return "a resident experiment is running; stop it first";
+  token_ = static_cast<std::uint8_t>(command.host);
+  if (command.a == mask_ && command.b == digest_ && command.c == period_samples_ &&
+      !waveform_.empty())
+    return "";
+  const auto channels = static_cast<std::size_t>(std::popcount(command.a));
+  if (channels == 0 || command.c == 0) return "an upload needs samples and actuators";
+  if (r_.size() < 64 && (command.a >> r_.size()) != 0)
+    return fmt::format("there are {} actuators only", r_.size());
+  const std::uint64_t bytes = std::uint64_t{command.c} * channels * kFloatBytes;
+  if (bytes > depth_bytes())
+    return fmt::format("{} bytes of waveform, there is memory for {}", bytes, depth_bytes());
+  mask_ = command.a;
+  digest_ = command.b;
+  period_samples_ = command.c;
+  columns_.clear();
+  for (std::size_t i = 0; i < r_.size(); ++i)
+    if (((mask_ >> i) & 1U) != 0) columns_.push_back(i);
+  waveform_.assign(bytes, 0);
+  received_.assign(chunks_of(bytes), false);
+  missing_from_ = 0;
+  status_ = CanResident::idle;
+  return "";
+}
+
+bool CanPlayer::take_chunk(const CanChunk& chunk) noexcept {
+  // What is armed has been compared with its digest.
+  if (busy() || status_ == CanResident::armed) return false;
+  if (chunk.token != token_ || chunk.index >= received_.size()) return false;
+  const std::size_t from = chunk.index * kCanChunkBytes;
+  if (chunk.bytes.size() != std::min(kCanChunkBytes, waveform_.size() - from)) return false;
+  std::copy(chunk.bytes.begin(), chunk.bytes.end(),
+            waveform_.begin() + static_cast<std::ptrdiff_t>(from));
+  received_[chunk.index] = true;
+  while (missing_from_ < received_.size() && received_[missing_from_]) ++missing_from_;
+  return true;
+}
+
+CanMissing CanPlayer::missing() const noexcept {
+  CanMissing missing;
+  missing.first = static_cast<std::uint32_t>(missing_from_);
+  missing.token = token_;
+  for (std::size_t i = 0; i < kCanMissingBits && missing_from_ + i < received_.size(); ++i)
+    if (received_[missing_from_ + i])
+      missing.received[i / 8] |= static_cast<std::uint8_t>(1U << (i % 8));
+  return missing;
+}
+
+std::string CanPlayer::arm(const CanCommand& command) {
+  if (busy()) return "a resident experiment is running; stop it first";
+  if (waveform_.empty() || missing_from_ < received_.size())
+    return "the waveform is not there completely; upload it first";
+  if (can_digest(waveform_) != digest_ || static_cast<std::uint32_t>(digest_) != command.d)
+    return "the waveform in memory is another one; upload it again";
+  if (command.b == 0 || command.b > depth_bytes() / row_bytes())
+    return fmt::format("{} samples, the trace has room for {}", command.b,
+                       depth_bytes() / row_bytes());
+  const SupervisorReply reply = stage_.request(SupervisorCommand::enable);
+  if (!reply.accepted) return reply.message;
+  if (stage_.session() == 0) static_cast<void>(stage_.reserve());
+  seed_ = command.a;
+  samples_ = command.b;
+  ramp_samples_ = command.c;
+  trace_.clear();
+  trace_.reserve(samples_ * row_bytes());
+  status_ = CanResident::armed;
+  return "";
+}
+
+std::string CanPlayer::trigger(const CanCommand& command, std::int64_t now_ns) {
+  const bool again = command.sequence == trigger_sequence_ &&
+                     (busy() || status_ == CanResident::done || status_ == CanResident::failed);
+  if (again) return "";
+  if (status_ != CanResident::armed) return "not armed; arm it first";
+  Inputs first;
+  first.y = y_;
+  try {
+    static_cast<void>(stage_.begin_run(seed_, now_ns, first, stage_.session()));
+  } catch (const StageError& error) {
+    return error.what();
+  }
+  trigger_sequence_ = command.sequence;
+  played_ = 0;
+  began_ns_ = now_ns;
+  outcome_ = Outcome::ok;
+  status_ = CanResident::playing;
+  return "";
+}
+
+std::string CanPlayer::begin_download(const CanCommand& command) {
+  const auto memory = static_cast<CanMemory>(command.b);
+  if (command.b > static_cast<std::uint64_t>(CanMemory::trace)) return "there is no such memory";
+  const std::size_t chunks =
+      chunks_of(memory == CanMemory::trace ? trace_.size() : waveform_.size());
+  if (memory == CanMemory::trace && busy()) return "the trace is still being recorded";
+  if (command.a >= chunks)
+    return fmt::format("chunk {} asked for, there are {}", command.a, chunks);
+  token_ = static_cast<std::uint8_t>(command.host);
+  download_of_ = memory;
+  download_next_ = command.a;
+  download_end_ = std::min(chunks, download_next_ + std::min(command.c, kLargestDownload));
+  return "";
+}
+
+void CanPlayer::work(std::int64_t now_ns, CanTransport& transport) {
+  send_chunks(transport);
+  if (status_ == CanResident::armed && now_ns - last_heard_ns_ > kHostSilence_ns) {
+    abandon();
+    static_cast<void>(stage_.request(SupervisorCommand::disable));
+  }
+  if (!busy()) return;
+  if (stage_.state() != NodeState::measuring) {  // a quick stop, the panel, the watchdog
+    finish(CanResident::failed);
+    return;
+  }
+  if (now_ns - last_heard_ns_ > kHostSilence_ns) {
+    stage_.fail(FaultCause::watchdog);
+    finish(CanResident::failed);
+    return;
+  }
+  const double due = pace_ > 0.0 ? 1e-9 * static_cast<double>(now_ns - began_ns_) *
+                                       stage_.info().sample_rate_hz * pace_
+                                 : std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kSamplesAtOnce && busy() && static_cast<double>(played_) < due; ++i)
+    play_sample(now_ns);
+}
+
+void CanPlayer::play_sample(std::int64_t now_ns) {
+  const std::uint64_t past = played_ < samples_ ? 0 : played_ - samples_ + 1;
+  const double gain =
+      static_cast<double>(ramp_samples_ + 1 - past) / static_cast<double>(ramp_samples_ + 1);
+  const std::size_t row = static_cast<std::size_t>(played_ % period_samples_) * columns_.size();
+  for (std::size_t k = 0; k < columns_.size(); ++k) {
+    float value = 0.0F;
+    std::memcpy(&value, waveform_.data() + kFloatBytes * (row + k), kFloatBytes);
+    r_[columns_[k]] = gain * static_cast<double>(value);
+  }
+  measured_ = y_;  // y[n], which u[n] is computed from
+  Inputs inputs;
+  inputs.y = y_;
+  const Outcome next = stage_.advance_excited(now_ns, r_, u_, inputs);
+  if (played_ < samples_) record();
+  outcome_ = next;
+  ++played_;
+  if (!gives_measurement(next)) {
+    finish(CanResident::failed);
+  } else if (played_ >= samples_ + ramp_samples_) {
+    stage_.end_run();
+    finish(CanResident::done);
+  }
+}
+
+void CanPlayer::record() {
+  for (const std::vector<double>* values : {&u_, &measured_})
+    for (const double value : *values)
+      append(trace_, std::bit_cast<std::uint32_t>(static_cast<float>(value)));
+  append(trace_, static_cast<std::uint32_t>(outcome_));
+}
+
+void CanPlayer::finish(CanResident status) {
+  std::fill(r_.begin(), r_.end(), 0.0);
+  status_ = status;
+}
+
+void CanPlayer::abandon() {
+  if (busy()) status_ = CanResident::failed;
+  if (status_ == CanResident::armed) {
+    status_ = CanResident::idle;
+    stage_.release();
+  }
+  download_next_ = download_end_ = 0;
+}
+
+// What the bus does not take now is sent with the next call: its queue is the flow control.
+void CanPlayer::send_chunks(CanTransport& transport) {
+  const std::vector<std::uint8_t>& memory = download_of_ == CanMemory::trace ? trace_ : waveform_;
+  for (std::size_t i = 0; i < kChunksAtOnce && download_next_ < download_end_; ++i) {
+    const CanFrame frame = encode_can_chunk(
+        kCanDownloadId,
+        {static_cast<std::uint32_t>(download_next_), token_, chunk_of(memory, download_next_)});
+    if (transport.send({&frame, 1}) == 0) return;
+    ++download_next_;
+  }
+}
+
+}  // namespace stageid

@@ -1,0 +1,279 @@
+#include "hal/can/can_resident_stage.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include "hal/can/can_player.hpp"
+#include "hal/stage/peer_status.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr std::size_t kFloatBytes = 4;
+constexpr std::uint32_t kUploadWindow = 96;  // chunks between two looks at what is missing
+constexpr std::uint32_t kDownloadWindow = 128;
+constexpr std::int64_t kPause_ns = 1'000'000;
+constexpr std::int64_t kSilence_ns = 50'000'000;  // then the rest of a window is asked for again
+constexpr std::int64_t kFull_ns = 1'000'000'000;  // then the rest is sent with the next window
+constexpr int kLargestTries = 20;                 // windows without any progress
+
+std::size_t chunks_of(std::size_t bytes) { return (bytes + kCanChunkBytes - 1) / kCanChunkBytes; }
+
+float float_at(const std::vector<std::uint8_t>& bytes, std::size_t at) {
+  float value = 0.0F;
+  std::memcpy(&value, bytes.data() + at, kFloatBytes);
+  return value;
+}
+
+}  // namespace
+
+CanResidentStage::CanResidentStage(StageInfo info, const CanSpec& spec,
+                                   std::unique_ptr<CanTransport> transport,
+                                   const CanHostOptions& options)
+    : info_(std::move(info)),
+      spec_(spec),
+      layout_(can_layout(spec, info_)),
+      transport_(std::move(transport)),
+      link_(*transport_, layout_.fingerprint, options.interrupted),
+      reset_fault_(options.reset_fault),
+      token_(static_cast<std::uint8_t>(link_.host())) {
+  if (info_.actuators.size() > 64)
+    throw std::invalid_argument("can: resident experiments have 64 actuators at most");
+  info_.backend = "can";
+  info_.clock = Clock::virtual_time;  // nobody on this side waits for samples
+}
+
+std::size_t CanResidentStage::row_bytes() const noexcept {
+  return kFloatBytes * (info_.actuators.size() + info_.sensors.size() + 1);
+}
+
+std::uint64_t CanResidentStage::depth_samples() const noexcept {
+  return CanPlayer::depth_bytes() / row_bytes();
+}
+
+CanState CanResidentStage::command(CanCommandCode code, std::uint64_t a, std::uint64_t b,
+                                   std::uint32_t c, std::uint32_t d, const CanLink::Other& other) {
+  CanCommand command{code};
+  command.a = a;
+  command.b = b;
+  command.c = c;
+  command.d = d;
+  return link_.command(command, other);
+}
+
+void CanResidentStage::connect() {
+  if (greeted_) return;
+  static_cast<void>(link_.greet(std::exchange(reset_fault_, false)));
+  greeted_ = true;
+}
+
+/// Only the columns that are not zero, as float32.
+void CanResidentStage::pack(const Waveforms& waveforms) {
+  const Eigen::MatrixXd& samples = waveforms.samples;
+  if (samples.cols() != static_cast<Eigen::Index>(info_.actuators.size()) || samples.rows() == 0 ||
+      !samples.allFinite() || waveforms.periods < 1 || waveforms.transient_periods < 0)
+    throw std::invalid_argument(
+        "can: waveforms need samples, a column for every actuator, finite values and periods");
+  std::vector<Eigen::Index> columns;
+  mask_ = 0;
+  for (Eigen::Index column = 0; column < samples.cols(); ++column) {
+    if (samples.col(column).isZero(0.0)) continue;
+    columns.push_back(column);
+    mask_ |= std::uint64_t{1} << column;
+  }
+  if (columns.empty()) throw std::invalid_argument("can: the waveforms are zero");
+  period_samples_ = static_cast<std::uint32_t>(samples.rows());
+  samples_ = std::uint64_t{period_samples_} *
+             static_cast<std::uint64_t>(waveforms.periods + waveforms.transient_periods);
+  if (samples_ > depth_samples())
+    throw std::invalid_argument(
+        fmt::format("can: {} samples a run, the node records {} at most; fewer periods", samples_,
+                    depth_samples()));
+  waveform_.clear();
+  for (Eigen::Index n = 0; n < samples.rows(); ++n)
+    for (const Eigen::Index column : columns) {
+      const auto word = std::bit_cast<std::uint32_t>(static_cast<float>(samples(n, column)));
+      for (int i = 0; i < 4; ++i) waveform_.push_back(static_cast<std::uint8_t>(word >> (8 * i)));
+    }
+  digest_ = can_digest(waveform_);
+}
+
+void CanResidentStage::send_missing(const std::vector<std::uint32_t>& chunks) {
+  for (const std::uint32_t index : chunks) {
+    const std::size_t from = index * kCanChunkBytes;
+    const CanFrame frame = encode_can_chunk(
+        kCanUploadId,
+        {index,
+         token_,
+         {waveform_.data() + from, std::min(kCanChunkBytes, waveform_.size() - from)}});
+    // A full queue is the bus saying "not so fast".
+    const std::int64_t until_ns = transport_->now_ns() + kFull_ns;
+    while (transport_->send({&frame, 1}) == 0 && worst_bus(*transport_).state < CanBusState::off) {
+      if (transport_->now_ns() >= until_ns || link_.interrupted()) return;
+      transport_->wait(transport_->now_ns() + kPause_ns);
+    }
+  }
+}
+
+void CanResidentStage::send_all() {
+  const auto total = static_cast<std::uint32_t>(chunks_of(waveform_.size()));
+  std::uint32_t highest = 0;  // chunks below have been sent once
+  std::uint32_t first = 0;
+  for (int tries = 0; tries < kLargestTries;) {
+    CanMissing missing;
+    command(CanCommandCode::missing, 0, 0, 0, 0, [&](const CanFrame& frame) {
+      CanMissing said;
+      if (decode_can_missing(frame, said) && said.token == token_) missing = said;
+    });
+    if (missing.token == token_ && missing.first >= total) return;
+    tries = missing.token == token_ && missing.first > first ? 0 : tries + 1;
+    if (missing.token != token_) continue;  // the answer itself got lost
+    first = missing.first;
+    std::vector<std::uint32_t> chunks;
+    for (std::uint32_t i = 0;
+         i < kCanMissingBits && first + i < total && chunks.size() < kUploadWindow; ++i)
+      if ((missing.received[i / 8] >> (i % 8) & 1U) == 0) chunks.push_back(first + i);
+    for (const std::uint32_t chunk : chunks) repeated_chunks_ += chunk < highest ? 1U : 0U;
+    if (!chunks.empty()) highest = std::max(highest, chunks.back() + 1);
+    send_missing(chunks);
+  }
+  throw StageError(
+      fmt::format("can: {}: the upload does not get on at chunk {} of {}; call it again "
+                  "when the bus is well",
+                  transport_->name(0), first, total));
+}
+
+JobProgress CanResidentStage::upload(const Waveforms& waveforms) {
+  pack(waveforms);
+  connect();
+  command(CanCommandCode::upload, mask_, digest_, period_samples_);
+  send_all();
+  std::vector<std::uint8_t> back;
+  std::size_t chunks = 0;
+  back.resize(waveform_.size());
+  if (!read(CanMemory::waveform, back, chunks) || back != waveform_)
+    throw StageError(fmt::format(
+        "can: {}: the waveform read back differs from the one that was sent; upload it again",
+        transport_->name(0)));
+  trace_.clear();
+  trace_chunks_ = 0;
+  rows_given_ = 0;
+  return {JobStatus::done, waveform_.size(), waveform_.size(), ""};
+}
+
+JobProgress CanResidentStage::arm(const Trigger& trigger) {
+  connect();
+  const double ramp = std::round(trigger.ramp_s * info_.sample_rate_hz);
+  if (!(ramp >= 0.0 && ramp < 1e9))
+    throw std::invalid_argument(
+        fmt::format("can: ramp_s must not be negative: {}", trigger.ramp_s));
+  command(CanCommandCode::arm, trigger.run_seed, samples_, static_cast<std::uint32_t>(ramp),
+          static_cast<std::uint32_t>(digest_));
+  while (transport_->now_ns() < trigger.t_start_ns) transport_->wait(trigger.t_start_ns);
+  command(CanCommandCode::trigger);
+  return poll();
+}
+
+JobProgress CanResidentStage::poll() {
+  const CanState node = command(CanCommandCode::hello);
+  JobProgress progress;
+  progress.done = std::min(node.sample, samples_);
+  progress.total = samples_;
+  if (node.run != can_run(link_.session())) {
+    progress.status = JobStatus::failed;
+    progress.outcome = Outcome::fault;
+    progress.message = meaning(PeerStatus::held).words;
+    return progress;
+  }
+  if (node.resident == CanResident::playing || node.resident == CanResident::armed) return progress;
+  progress.status = JobStatus::done;
+  if (node.resident == CanResident::done) return progress;
+  progress.status = JobStatus::failed;
+  const PeerReport report{.state = node.state, .cause = node.cause, .valid = 1, .all = 1};
+  progress.outcome = std::max(meaning(judge(report)).outcome, Outcome::fault);
+  progress.message = fmt::format("the node stopped in state {}{}{}", to_string(node.state),
+                                 link_.text().empty() ? "" : ": ", link_.text());
+  return progress;
+}
+
+/// Fetches `bytes.size()` bytes, from chunk `chunks_done` on. @returns false if the node has fewer.
+bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
+                            std::size_t& chunks_done) {
+  const std::size_t total = chunks_of(bytes.size());
+  std::vector<bool> have(total, false);
+  for (std::size_t i = 0; i < chunks_done; ++i) have[i] = true;
+  std::int64_t heard_ns = 0;
+  const CanLink::Other take = [&](const CanFrame& frame) {
+    CanChunk chunk;
+    if (frame.id != kCanDownloadId || !decode_can_chunk(frame, chunk) || chunk.token != token_ ||
+        chunk.index >= total)
+      return;
+    const std::size_t from = chunk.index * kCanChunkBytes;
+    if (chunk.bytes.size() != std::min(kCanChunkBytes, bytes.size() - from)) return;
+    std::copy(chunk.bytes.begin(), chunk.bytes.end(),
+              bytes.begin() + static_cast<std::ptrdiff_t>(from));
+    repeated_chunks_ += have[chunk.index] ? 1U : 0U;
+    if (!have[chunk.index]) heard_ns = transport_->now_ns();  // what comes again is no progress
+    have[chunk.index] = true;
+  };
+  std::vector<CanFrame> inbox(64);
+  for (int tries = 0; chunks_done < total && tries < kLargestTries; ++tries) {
+    const std::size_t before = chunks_done;
+    const std::size_t end = std::min<std::size_t>(total, chunks_done + kDownloadWindow);
+    command(CanCommandCode::download, chunks_done, static_cast<std::uint64_t>(memory),
+            static_cast<std::uint32_t>(end - chunks_done), 0, take);
+    heard_ns = transport_->now_ns();
+    const auto advance = [&] {
+      while (chunks_done < total && have[chunks_done]) ++chunks_done;
+    };
+    for (advance(); chunks_done < end && transport_->now_ns() < heard_ns + kSilence_ns; advance()) {
+      const std::size_t count = transport_->receive(inbox);
+      for (std::size_t i = 0; i < count; ++i)
+        if (!link_.take(inbox[i])) take(inbox[i]);
+      if (count == 0) transport_->wait(heard_ns + kSilence_ns);
+    }
+    if (chunks_done > before) tries = -1;
+  }
+  return chunks_done == total;
+}
+
+JobProgress CanResidentStage::download(TraceSink& sink) {
+  const CanState node = command(CanCommandCode::hello);
+  const std::uint64_t rows = std::min(node.sample, samples_);
+  trace_.resize(rows * row_bytes());
+  if (!read(CanMemory::trace, trace_, trace_chunks_))
+    throw StageError(fmt::format(
+        "can: {}: the download stopped after {} of {} chunks; call it again when the bus is well",
+        transport_->name(0), trace_chunks_, chunks_of(trace_.size())));
+  const std::size_t columns = info_.actuators.size() + info_.sensors.size();
+  std::vector<double> values;
+  std::vector<Outcome> outcomes;
+  constexpr std::uint64_t kRowsAtOnce = 1024;
+  while (rows_given_ < rows) {
+    const std::uint64_t end = std::min(rows, rows_given_ + kRowsAtOnce);
+    values.clear();
+    outcomes.clear();
+    for (std::uint64_t row = rows_given_; row < end; ++row) {
+      const std::size_t at = row * row_bytes();
+      for (std::size_t i = 0; i < columns; ++i)
+        values.push_back(static_cast<double>(float_at(trace_, at + kFloatBytes * i)));
+      outcomes.push_back(outcome_of_code(trace_[at + kFloatBytes * columns]));
+    }
+    sink.rows(rows_given_, values, outcomes);
+    rows_given_ = end;
+  }
+  return {JobStatus::done, rows, samples_, ""};
+}
+
+void CanResidentStage::stop() noexcept {
+  if (link_.session() == 0) return;  // the node has begun nothing for this host
+  static_cast<void>(link_.try_command({CanCommandCode::stop}));
+}
+
+}  // namespace stageid

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "hal/can/can_layout.hpp"
+#include "hal/can/can_link.hpp"
+#include "hal/can/can_stage.hpp"
+#include "hal/can/can_transport.hpp"
+#include "hal/stage/resident_stage.hpp"
+
+namespace stageid {
+
+/// A node behind CAN that plays experiments by itself. docs/can-protocol.md says what is on the wire.
+///
+/// Transfers go in windows of chunks; what got lost is asked for and sent again, so that they end
+/// on any bus that carries something. If nothing at all arrives for a second they end with
+/// StageError and can be continued.
+class CanResidentStage final : public ResidentStage {
+ public:
+  /// @throws std::invalid_argument if the spec does not fit the stage.
+  CanResidentStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTransport> transport,
+                   const CanHostOptions& options);
+
+  /// Looks whether a node answers that fits; upload() and arm() do too. @throws StageError
+  void connect();
+
+  const StageInfo& info() const noexcept override { return info_; }
+  std::uint64_t depth_samples() const noexcept override;
+  JobProgress upload(const Waveforms& waveforms) override;
+  JobProgress arm(const Trigger& trigger) override;
+  JobProgress poll() override;
+  JobProgress download(TraceSink& sink) override;
+  void stop() noexcept override;
+
+  /// Chunks that were sent or asked for more than once.
+  std::uint64_t repeated_chunks() const noexcept { return repeated_chunks_; }
+
+ private:
+  CanState command(CanCommandCode code, std::uint64_t a = 0, std::uint64_t b = 0,
+                   std::uint32_t c = 0, std::uint32_t d = 0, const CanLink::Other& other = {});
+  void pack(const Waveforms& waveforms);
+  void send_missing(const std::vector<std::uint32_t>& chunks);
+  void send_all();
+  bool read(CanMemory memory, std::vector<std::uint8_t>& bytes, std::size_t& chunks_done);
+  std::size_t row_bytes() const noexcept;
+
+  StageInfo info_;
+  CanSpec spec_;
+  CanLayout layout_;
+  std::unique_ptr<CanTransport> transport_;
+  CanLink link_;
+  bool reset_fault_;
+  bool greeted_ = false;
+  std::uint8_t token_;  // of this host's transfers
+
+  std::vector<std::uint8_t> waveform_;  // as it goes over the bus
+  std::uint64_t mask_ = 0;
+  std::uint32_t period_samples_ = 0;
+  std::uint64_t samples_ = 0;
+  std::uint64_t digest_ = 0;
+
+  std::vector<std::uint8_t> trace_;
+  std::size_t trace_chunks_ = 0;  // that have come
+  std::uint64_t rows_given_ = 0;
+  std::uint64_t repeated_chunks_ = 0;
+};
+
+}  // namespace stageid

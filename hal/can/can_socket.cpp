@@ -1,0 +1,249 @@
+#include "hal/can/can_socket.hpp"
+
+#include <fmt/format.h>
+#include <linux/can.h>
+#include <linux/can/error.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+
+#include "hal/stage/pacer.hpp"
+#include "hal/stage/stage.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr std::size_t kBatch = 32;
+constexpr std::size_t kLargestBusCount = 16;
+
+bool is_down(int error) { return error == ENETDOWN || error == ENXIO || error == ENODEV; }
+
+[[noreturn]] void refuse(const std::string& interface, const std::string& why) {
+  throw StageError(fmt::format("can: {}: {}", interface, why));
+}
+
+int open_socket(const std::string& interface) {
+  const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
+  if (fd < 0)
+    refuse(interface, fmt::format("no CAN socket ({}); load the modules can and can_raw",
+                                  std::strerror(errno)));
+  return fd;
+}
+
+void bind_to(int fd, const std::string& interface) {
+  ifreq request{};
+  std::strncpy(request.ifr_name, interface.c_str(), IFNAMSIZ - 1);
+  if (ioctl(fd, SIOCGIFINDEX, &request) != 0)
+    refuse(interface, "there is no such interface; 'ip link' lists them");
+  sockaddr_can address{};
+  address.can_family = AF_CAN;
+  address.can_ifindex = request.ifr_ifindex;
+  if (ioctl(fd, SIOCGIFMTU, &request) == 0 && request.ifr_mtu < static_cast<int>(CANFD_MTU))
+    refuse(interface, fmt::format("no CAN FD (mtu {}); 'ip link set {} mtu 72', or 'fd on'",
+                                  request.ifr_mtu, interface));
+  if (ioctl(fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP) == 0)
+    refuse(interface, fmt::format("the interface is down; 'ip link set {} up'", interface));
+  if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
+    refuse(interface, fmt::format("cannot be bound: {}", std::strerror(errno)));
+}
+
+void configure(int fd, const std::string& interface,
+               const std::vector<std::uint16_t>& identifiers) {
+  const int on = 1;
+  const can_err_mask_t errors = CAN_ERR_MASK;
+  std::vector<can_filter> filters;
+  for (const std::uint16_t id : identifiers)
+    filters.push_back({id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG});
+  const auto bytes = static_cast<socklen_t>(filters.size() * sizeof(can_filter));
+  if (setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof(on)) != 0 ||
+      setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) != 0 ||
+      setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof(errors)) != 0 ||
+      setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof(on)) != 0)
+    refuse(interface, fmt::format("cannot be configured: {}", std::strerror(errno)));
+}
+
+canfd_frame to_kernel(const CanFrame& frame) noexcept {
+  canfd_frame raw{};
+  raw.can_id = frame.id;
+  raw.len = frame.length;
+  raw.flags = CANFD_BRS;
+  std::copy_n(frame.data.begin(), frame.length, raw.data);
+  return raw;
+}
+
+}  // namespace
+
+struct SocketCan::Bus {
+  explicit Bus(std::string name) : interface(std::move(name)), fd(open_socket(interface)) {}
+  ~Bus() { close(fd); }
+  Bus(const Bus&) = delete;
+  Bus& operator=(const Bus&) = delete;
+
+  void failed(int error, std::size_t frames) noexcept {
+    if (is_down(error)) health.state = CanBusState::down;
+    health.send_refused += frames;
+  }
+  std::size_t send(std::span<const CanFrame> frames) noexcept;
+  std::size_t receive(std::span<CanFrame> frames, std::uint8_t number, std::int64_t now) noexcept;
+  bool take(const canfd_frame& raw, CanFrame& frame) noexcept;
+  void watch_overflow(msghdr& header) noexcept;
+
+  std::string interface;
+  int fd;
+  CanBusHealth health;
+};
+
+SocketCan::SocketCan(const std::vector<std::string>& interfaces,
+                     const std::vector<std::uint16_t>& identifiers) {
+  if (interfaces.empty() || interfaces.size() > kLargestBusCount)
+    throw StageError(
+        fmt::format("can: {} interfaces; give 1 ... {}", interfaces.size(), kLargestBusCount));
+  for (const std::string& interface : interfaces) {
+    buses_.push_back(std::make_unique<Bus>(interface));
+    configure(buses_.back()->fd, interface, identifiers);
+    bind_to(buses_.back()->fd, interface);
+  }
+}
+
+SocketCan::~SocketCan() = default;
+
+std::size_t SocketCan::buses() const noexcept { return buses_.size(); }
+const std::string& SocketCan::name(std::size_t bus) const noexcept {
+  return buses_[bus]->interface;
+}
+const CanBusHealth& SocketCan::health(std::size_t bus) const noexcept {
+  return buses_[bus]->health;
+}
+
+std::int64_t SocketCan::now_ns() const noexcept { return monotonic_ns(); }
+
+std::size_t SocketCan::send(std::span<const CanFrame> frames) noexcept {
+  std::size_t sent = 0;
+  for (std::size_t first = 0; first < frames.size();) {
+    std::size_t last = first + 1;  // frames of one bus that stand together are one system call
+    while (last < frames.size() && frames[last].bus == frames[first].bus && last - first < kBatch)
+      ++last;
+    if (frames[first].bus < buses_.size())
+      sent += buses_[frames[first].bus]->send(frames.subspan(first, last - first));
+    first = last;
+  }
+  return sent;
+}
+
+std::size_t SocketCan::Bus::send(std::span<const CanFrame> frames) noexcept {
+  canfd_frame raw[kBatch];
+  iovec part[kBatch];
+  mmsghdr message[kBatch]{};
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    raw[i] = to_kernel(frames[i]);
+    part[i] = {&raw[i], sizeof(raw[i])};
+    message[i].msg_hdr.msg_iov = &part[i];
+    message[i].msg_hdr.msg_iovlen = 1;
+  }
+  std::size_t sent = 0;
+  while (sent < frames.size()) {
+    const int n = sendmmsg(fd, message + sent, static_cast<unsigned>(frames.size() - sent), 0);
+    if (n <= 0) {
+      if (n < 0 && errno == EINTR) continue;
+      failed(n < 0 ? errno : 0, frames.size() - sent);
+      break;
+    }
+    sent += static_cast<std::size_t>(n);
+    if (health.state == CanBusState::down) health.state = CanBusState::active;
+  }
+  return sent;
+}
+
+std::size_t SocketCan::receive(std::span<CanFrame> frames) noexcept {
+  std::size_t count = 0;
+  const std::int64_t now = now_ns();
+  for (std::size_t bus = 0; bus < buses_.size(); ++bus)
+    count += buses_[bus]->receive(frames.subspan(count), static_cast<std::uint8_t>(bus), now);
+  return count;
+}
+
+std::size_t SocketCan::Bus::receive(std::span<CanFrame> frames, std::uint8_t number,
+                                    std::int64_t now) noexcept {
+  canfd_frame raw[kBatch];
+  iovec part[kBatch];
+  mmsghdr message[kBatch]{};
+  alignas(cmsghdr) char control[kBatch][CMSG_SPACE(sizeof(std::uint32_t))];
+  std::size_t count = 0;
+  while (count < frames.size()) {
+    const std::size_t asked = std::min(kBatch, frames.size() - count);
+    for (std::size_t i = 0; i < asked; ++i) {
+      part[i] = {&raw[i], sizeof(raw[i])};
+      message[i].msg_hdr = {};
+      message[i].msg_hdr.msg_iov = &part[i];
+      message[i].msg_hdr.msg_iovlen = 1;
+      message[i].msg_hdr.msg_control = control[i];
+      message[i].msg_hdr.msg_controllen = sizeof(control[i]);
+    }
+    const int n = recvmmsg(fd, message, static_cast<unsigned>(asked), MSG_DONTWAIT, nullptr);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0 && is_down(errno)) health.state = CanBusState::down;
+    if (n <= 0) break;
+    for (int i = 0; i < n; ++i) {
+      watch_overflow(message[i].msg_hdr);
+      frames[count].bus = number;
+      frames[count].t_rx_ns = now;
+      if (take(raw[i], frames[count])) ++count;
+    }
+    if (static_cast<std::size_t>(n) < asked) break;
+  }
+  return count;
+}
+
+// False: an error frame, which says something about the bus and carries no data.
+bool SocketCan::Bus::take(const canfd_frame& raw, CanFrame& frame) noexcept {
+  if ((raw.can_id & CAN_ERR_FLAG) != 0) {
+    ++health.error_frames;
+    health.state = can_state_after_error(health.state, raw.can_id & CAN_ERR_MASK, raw.data[1]);
+    return false;
+  }
+  frame.id = static_cast<std::uint16_t>(raw.can_id & CAN_SFF_MASK);
+  frame.length = std::min<std::uint8_t>(raw.len, sizeof(raw.data));
+  std::copy_n(raw.data, frame.length, frame.data.begin());
+  return true;
+}
+
+void SocketCan::Bus::watch_overflow(msghdr& header) noexcept {
+  for (cmsghdr* c = CMSG_FIRSTHDR(&header); c != nullptr; c = CMSG_NXTHDR(&header, c)) {
+    if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SO_RXQ_OVFL) continue;
+    std::uint32_t dropped = 0;
+    std::memcpy(&dropped, CMSG_DATA(c), sizeof(dropped));
+    health.dropped = dropped;
+  }
+}
+
+void SocketCan::wait(std::int64_t until_ns) noexcept {
+  pollfd fds[kLargestBusCount];
+  for (std::size_t i = 0; i < buses_.size(); ++i) fds[i] = {buses_[i]->fd, POLLIN, 0};
+  const std::int64_t left = std::max<std::int64_t>(0, until_ns - now_ns());
+  const timespec time{static_cast<std::time_t>(left / 1'000'000'000),
+                      static_cast<long>(left % 1'000'000'000)};
+  static_cast<void>(ppoll(fds, static_cast<nfds_t>(buses_.size()), &time, nullptr));
+}
+
+CanBusState can_state_after_error(CanBusState before, std::uint32_t class_bits,
+                                  std::uint8_t controller) noexcept {
+  if ((class_bits & CAN_ERR_BUSOFF) != 0) return CanBusState::off;
+  if ((class_bits & CAN_ERR_RESTARTED) != 0) return CanBusState::active;
+  if ((class_bits & CAN_ERR_CRTL) == 0) return before;
+  if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0)
+    return CanBusState::passive;
+  if ((controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0)
+    return CanBusState::warning;
+  if ((controller & CAN_ERR_CRTL_ACTIVE) != 0) return CanBusState::active;
+  return before;
+}
+
+}  // namespace stageid

@@ -1,0 +1,290 @@
+#include "hal/can/can_stage.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "hal/can/can_bus_load.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr std::size_t kInboxFrames = 64;
+constexpr int kRepeats = 3;
+constexpr int kStartAttempts = 3;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+StageInfo info_of(StageInfo info, const CanSpec& spec, const CanLayout& layout, double pace) {
+  require_bus_carries(spec, layout, info.sample_rate_hz);
+  info.backend = "can";
+  info.clock = pace > 0.0 ? Clock::wall : Clock::virtual_time;
+  info.pace = pace > 0.0 ? pace : 1.0;
+  return info;
+}
+
+}  // namespace
+
+CanStage::CanStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTransport> transport,
+                   const CanHostOptions& options)
+    : info_(std::move(info)),
+      layout_(can_layout(spec, info_)),
+      transport_(std::move(transport)),
+      link_(*transport_, layout_.fingerprint, options.interrupted),
+      pacer_(info_.sample_rate_hz, options.pace),
+      wall_(options.pace > 0.0),
+      reset_fault_(options.reset_fault),
+      reply_timeout_ns_(std::llround(1e9 * spec.reply_timeout_s)),
+      outbox_(layout_.setpoints.size()),
+      inbox_(kInboxFrames) {
+  info_ = info_of(std::move(info_), spec, layout_, options.pace);
+  period_ns_ = std::llround(1e9 / (info_.sample_rate_hz * info_.pace));
+  answers_.resize(layout_.sensors.size());
+  fresh_.assign(info_.sensors.size(), kNone);
+  decoded_.assign(info_.sensors.size(), kNone);
+}
+
+void CanStage::connect() { static_cast<void>(link_.greet(std::exchange(reset_fault_, false))); }
+
+void CanStage::start(std::uint64_t run_seed, Inputs& first) {
+  trouble_at_stop_.clear();
+  connect();
+  link_.forget_session();
+  samples_bad_ = 0;
+  conflict_ = false;
+  std::fill(answers_.begin(), answers_.end(), CanFrame{});
+  not_carried_ = false;
+  const CanLink::Other take_value = [this](const CanFrame& frame) { take(frame); };
+  for (int attempt = 0; attempt < kStartAttempts; ++attempt) {
+    begin_cycle(0);
+    CanCommand command{CanCommandCode::start};
+    command.a = run_seed;
+    static_cast<void>(link_.command(command, take_value));
+    states_before_ = link_.states();
+    if (!complete()) collect(transport_->now_ns() + reply_timeout_ns_);
+    if (complete()) break;
+  }
+  give(first);
+  if (!complete()) {
+    stop();
+    throw StageError(fmt::format(
+        "can: {}: the node starts but its measurements do not arrive; look at every bus",
+        transport_->name(0)));
+  }
+  if ((first.valid & all_sensors()) != all_sensors()) {
+    stop();
+    refuse(PeerStatus::first_sample_missing, fmt::format("can: {}", transport_->name(0)),
+           fmt::format("; look at sensor '{}'",
+                       info_.sensors[static_cast<std::size_t>(std::countr_one(first.valid))].name));
+  }
+  running_ = true;
+  const Pacer::Instant now = pacer_.restart();
+  first.cycle = 0;
+  first.t_sample_ns = now.sample_ns;
+  first.t_rx_ns = now.now_ns;
+}
+
+void CanStage::begin_cycle(std::uint16_t sequence) noexcept {
+  expected_ = sequence;
+  frames_seen_ = 0;
+  frames_missing_ = layout_.sensors.size();
+  damaged_in_cycle_ = false;
+  out_of_range_ = false;
+  states_before_ = link_.states();
+  std::fill(fresh_.begin(), fresh_.end(), kNone);
+}
+
+bool CanStage::send_setpoints(const Outputs& outputs) noexcept {
+  const CanHeader header{expected_, 0, can_run(link_.session()), can_tag(link_.session())};
+  const std::uint64_t refused = conversions_.no_number + conversions_.saturated;
+  for (std::size_t i = 0; i < layout_.setpoints.size(); ++i)
+    encode_can_values(layout_.setpoints[i], layout_.actuator_scale, outputs.u, header, outbox_[i],
+                      conversions_);
+  counts_.saturated = conversions_.saturated;
+  if (conversions_.no_number + conversions_.saturated != refused) {
+    not_carried_ = true;
+    return false;
+  }
+  static_cast<void>(transport_->send(outbox_));
+  return true;
+}
+
+Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept {
+  inputs.valid = 0;
+  if (!running_ || outputs.u.size() != info_.actuators.size() ||
+      inputs.y.size() != info_.sensors.size())
+    return Outcome::fault;
+  begin_cycle(static_cast<std::uint16_t>(outputs.cycle + 1));
+  if (!send_setpoints(outputs)) return Outcome::fault;  // the wire would carry another value
+  collect(reply_deadline_ns(deadline));
+  for (int repeat = 0; !wall_ && repeat < kRepeats && !complete() && !over(); ++repeat) {
+    ++counts_.repeats;
+    static_cast<void>(transport_->send(outbox_));
+    collect(transport_->now_ns() + reply_timeout_ns_);
+  }
+  give(inputs);
+  status_ = judge(inputs);
+  const Outcome outcome = meaning(status_).outcome;
+  samples_bad_ += status_ == PeerStatus::good ? 0U : 1U;
+  const Pacer::Instant now = pacer_.wait();
+  inputs.t_ready_ns = now.ready_ns;
+  inputs.cycle = outputs.cycle + 1;
+  inputs.t_sample_ns = now.sample_ns;
+  inputs.t_rx_ns = now.now_ns;
+  const bool past_deadline = deadline.t_ns != 0 && now.now_ns > deadline.t_ns;
+  return outcome == Outcome::ok && (now.late || past_deadline) ? Outcome::late : outcome;
+}
+
+std::int64_t CanStage::reply_deadline_ns(Deadline deadline) const noexcept {
+  const std::int64_t now_ns = transport_->now_ns();
+  // A loop that is late itself still gives the node a period to answer, or it would never recover.
+  if (wall_ && deadline.t_ns != 0) return std::max(deadline.t_ns, now_ns + period_ns_);
+  return now_ns + reply_timeout_ns_;
+}
+
+/// Nothing more is to be expected in this cycle.
+bool CanStage::over() const noexcept {
+  return meaning(node_status()).reaction == PeerReaction::stop ||
+         worst_bus(*transport_).state >= CanBusState::off;
+}
+
+// The time is looked at on every turn: a bus that is never silent must not keep the loop waiting.
+void CanStage::collect(std::int64_t until_ns) noexcept {
+  while (true) {
+    const std::size_t count = transport_->receive(inbox_);
+    for (std::size_t i = 0; i < count; ++i)
+      if (!link_.take(inbox_[i])) take(inbox_[i]);
+    if (complete() || over() || transport_->now_ns() >= until_ns) return;
+    if (count == 0) transport_->wait(until_ns);
+  }
+}
+
+void CanStage::take(const CanFrame& frame) noexcept {
+  const auto number = static_cast<std::size_t>(frame.id - kCanSensorId);
+  if (frame.id < kCanSensorId || number >= layout_.sensors.size()) {
+    ++counts_.foreign;
+    return;
+  }
+  CanHeader header;
+  if (!decode_can_values(layout_.sensors[number], layout_.sensor_scale, frame, header, decoded_)) {
+    ++counts_.damaged;
+    damaged_in_cycle_ = true;
+    return;
+  }
+  if (link_.session() == 0 || header.run != can_run(link_.session())) {
+    ++counts_.foreign;
+    return;
+  }
+  // A node repeats an answer bit by bit.
+  CanFrame& last = answers_[number];
+  conflict_ |=
+      last.length != 0 && header.sequence == get_can<std::uint16_t>(last, 0) &&
+      !std::equal(frame.data.begin(), frame.data.begin() + frame.length, last.data.begin());
+  const std::uint64_t bit = std::uint64_t{1} << number;
+  if (header.sequence != expected_ || (frames_seen_ & bit) != 0) {
+    ++counts_.old;
+    return;
+  }
+  last = frame;
+  frames_seen_ |= bit;
+  --frames_missing_;
+  measured_in_ = static_cast<NodeState>(header.kind & ~kCanSaturatedBit);
+  out_of_range_ |= (header.kind & kCanSaturatedBit) != 0;
+  t_rx_ns_ = frame.t_rx_ns;
+  for (const int channel : layout_.sensors[number].channels)
+    fresh_[static_cast<std::size_t>(channel)] = decoded_[static_cast<std::size_t>(channel)];
+}
+
+void CanStage::give(Inputs& inputs) const noexcept {
+  inputs.valid = 0;
+  for (std::size_t i = 0; i < fresh_.size(); ++i) {
+    if (std::isnan(fresh_[i])) continue;
+    inputs.y[i] = fresh_[i];
+    inputs.valid |= std::uint64_t{1} << i;
+  }
+  inputs.node_state = link_.states() != states_before_ ? link_.state().state : measured_in_;
+}
+
+PeerStatus CanStage::bus_status() const noexcept {
+  switch (worst_bus(*transport_).state) {
+    case CanBusState::active:
+    case CanBusState::warning:
+      return PeerStatus::good;
+    case CanBusState::passive:
+      return PeerStatus::passive;
+    case CanBusState::off:
+      return PeerStatus::bus_off;
+    case CanBusState::down:
+      return PeerStatus::link_down;
+  }
+  return PeerStatus::link_down;
+}
+
+/// What the node has said of itself in this cycle, in states and measurements.
+PeerStatus CanStage::node_status() const noexcept {
+  if (conflict_) return PeerStatus::conflict;
+  if (link_.other_node()) return PeerStatus::other_node;
+  PeerReport report{.valid = 1, .all = 1, .out_of_range = out_of_range_};
+  if (frames_seen_ != 0) report.state = measured_in_;
+  if (link_.states() != states_before_) {
+    const CanState& node = link_.state();
+    const bool of_this_run = node.run == can_run(link_.session());
+    report.state = of_this_run ? node.state : NodeState::not_ready;
+    report.cause = node.cause;
+    report.setpoints_missed = node.gaps > samples_bad_;
+  }
+  return stageid::judge(report);
+}
+
+PeerStatus CanStage::judge(const Inputs& inputs) noexcept {
+  PeerStatus worst = std::max(bus_status(), node_status());
+  // Said once: the samples that the node has missed are marked with this one.
+  if (link_.state().gaps > samples_bad_) samples_bad_ = link_.state().gaps;
+  const std::uint64_t valid = inputs.valid & all_sensors();
+  if (valid == all_sensors()) return worst;
+  worst = std::max(worst, valid == 0 ? PeerStatus::nothing_new : PeerStatus::incomplete);
+  return damaged_in_cycle_ ? std::max(worst, PeerStatus::damaged) : worst;
+}
+
+void CanStage::stop() noexcept {
+  try {
+    if (running_) trouble_at_stop_ = trouble();
+  } catch (const std::exception&) {  // no memory for a text: it is only a text
+  }
+  running_ = false;
+  if (link_.session() == 0) return;  // the node has begun nothing for this host
+  // Without an answer the node's own watchdog has stopped it, or will.
+  static_cast<void>(link_.try_command({CanCommandCode::stop}));
+  link_.forget_session();
+}
+
+std::string CanStage::trouble() const {
+  if (!running_) return trouble_at_stop_;
+  if (not_carried_)
+    return "a command is not finite or beyond the range of the wire (actuator_range_n)";
+  const WorstBus worst = worst_bus(*transport_);
+  if (worst.state >= CanBusState::passive)
+    return fmt::format("{}: {}", transport_->name(worst.bus), to_string(worst.state));
+  const CanState& node = link_.state();
+  const PeerMeaning& said = meaning(status_);
+  const bool of_the_node = status_ <= PeerStatus::unknown_code;
+  if (of_the_node && node.state != NodeState::measuring)
+    return fmt::format("the node is in state {}{}", to_string(node.state),
+                       link_.text().empty() ? "" : ": " + link_.text());
+  if (said.reaction == PeerReaction::stop || status_ == PeerStatus::setpoints_missed)
+    return said.words;
+  for (std::size_t bus = 0; bus < transport_->buses(); ++bus)
+    if (transport_->health(bus).send_refused > 0)
+      return fmt::format("{}: {} frames found no room in the queue: the bus is too slow",
+                         transport_->name(bus), transport_->health(bus).send_refused);
+  if (!complete())
+    return fmt::format(
+        "the node did not answer sample {} in time ({} damaged, {} old, {} foreign frames so far)",
+        expected_, counts_.damaged, counts_.old, counts_.foreign);
+  return "";
+}
+
+}  // namespace stageid

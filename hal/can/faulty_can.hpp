@@ -1,0 +1,64 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hal/can/can_transport.hpp"
+
+namespace stageid {
+
+/// What happens to value frames (setpoints or measurements) on their way, on request.
+enum class CanFaultKind : std::uint8_t {
+  lost,       ///< does not arrive
+  repeated,   ///< arrives twice
+  swapped,    ///< arrives behind the next one
+  late,       ///< arrives `delay_s` later
+  corrupt,    ///< one bit is wrong
+  shortened,  ///< the last bytes are missing
+  foreign     ///< its content comes under an identifier of ours that is not its own
+};
+const char* to_string(CanFaultKind kind) noexcept;
+
+struct CanFault {
+  CanFaultKind kind = CanFaultKind::lost;
+  std::uint64_t from_frame = 0;  ///< counted over the frames with kCanSensorId or kCanSetpointId
+  std::uint64_t frames = 1;
+  double delay_s = 0.0;
+};
+
+/// "lost@100x3", "late@50x1:0.004": `KIND@FRAME[xCOUNT][:SECONDS]`.
+/// @throws std::invalid_argument naming what is wrong.
+CanFault parse_can_fault(const std::string& text);
+
+/// Sends through another transport, and spoils what it sends as the script says. Receiving is left
+/// alone.
+class FaultyCan final : public CanTransport {
+ public:
+  FaultyCan(CanTransport& inner, std::vector<CanFault> faults);
+
+  std::size_t buses() const noexcept override { return inner_.buses(); }
+  const std::string& name(std::size_t bus) const noexcept override { return inner_.name(bus); }
+  std::size_t send(std::span<const CanFrame> frames) noexcept override;
+  std::size_t receive(std::span<CanFrame> frames) noexcept override;
+  void wait(std::int64_t until_ns) noexcept override;
+  const CanBusHealth& health(std::size_t bus) const noexcept override { return inner_.health(bus); }
+  std::int64_t now_ns() const noexcept override { return inner_.now_ns(); }
+
+ private:
+  struct Held {
+    CanFrame frame;
+    std::int64_t due_ns = 0;
+    bool behind_next = false;
+  };
+  void send_spoiled(CanFrame frame, const CanFault& fault) noexcept;
+  void release(bool one_has_passed) noexcept;
+  const CanFault* fault_of(std::uint64_t frame) const noexcept;
+
+  CanTransport& inner_;
+  std::vector<CanFault> faults_;
+  std::vector<Held> held_;
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace stageid

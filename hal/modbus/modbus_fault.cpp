@@ -1,0 +1,112 @@
+#include "hal/modbus/modbus_fault.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace stageid {
+namespace {
+
+using Kind = ModbusFault::Kind;
+
+struct KindRule {
+  std::string_view name;
+  bool lasting = false;  // without COUNT: for good
+  bool needs_value = false;
+};
+
+constexpr std::array<KindRule, 9> kRules = {{{"late_reply", false, true},
+                                             {"half_frame", false, false},
+                                             {"wrong_unit", false, false},
+                                             {"exception", false, true},
+                                             {"dead_server", true, false},
+                                             {"heartbeat", true, false},
+                                             {"interlock", true, false},
+                                             {"temperature", true, true},
+                                             {"gravity", true, true}}};
+
+[[noreturn]] void refuse(std::string_view text, const std::string& what) {
+  throw std::invalid_argument(
+      fmt::format("fault '{}': {}; write KIND[@REQUEST][xCOUNT][:VALUE]", text, what));
+}
+
+/// Cuts off what stands behind `separator`, if it is there.
+std::string_view cut(std::string_view& text, char separator) {
+  const std::size_t at = text.find(separator);
+  if (at == std::string_view::npos) return {};
+  const std::string_view behind = text.substr(at + 1);
+  text = text.substr(0, at);
+  return behind;
+}
+
+template <typename Number>
+Number parse(std::string_view whole, std::string_view text, const char* name) {
+  Number value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size())
+    refuse(whole, fmt::format("{} '{}' is no number", name, text));
+  return value;
+}
+
+std::size_t kind_index(std::string_view whole, std::string_view name) {
+  for (std::size_t i = 0; i < kRules.size(); ++i)
+    if (kRules[i].name == name) return i;
+  std::vector<std::string_view> names;
+  for (const KindRule& rule : kRules) names.push_back(rule.name);
+  refuse(whole, fmt::format("there is no kind '{}', but {}", name, fmt::join(names, ", ")));
+}
+
+void check_value(std::string_view whole, const ModbusFault& fault) {
+  if (!std::isfinite(fault.value)) refuse(whole, "VALUE must be finite");
+  if (fault.kind == Kind::late_reply && !(fault.value > 0.0 && fault.value <= 60.0))
+    refuse(whole, "a reply can be more than 0 and up to 60 s late");
+  if (fault.kind == Kind::exception && !(fault.value >= 1.0 && fault.value <= 11.0))
+    refuse(whole, "exception codes are 1 to 11");
+}
+
+}  // namespace
+
+ModbusFault parse_modbus_fault(std::string_view text) {
+  std::string_view rest = text;
+  const bool has_value = rest.find(':') != std::string_view::npos;
+  const std::string_view value = cut(rest, ':');
+  const bool has_place = rest.find('@') != std::string_view::npos;
+  std::string_view place = cut(rest, '@');
+  const std::string_view count = cut(place, 'x');
+  ModbusFault fault;
+  const std::size_t kind = kind_index(text, rest);
+  fault.kind = static_cast<Kind>(kind);
+  fault.count = kRules[kind].lasting ? 0 : 1;
+  if (has_place) fault.from = parse<std::uint64_t>(text, place, "REQUEST");
+  if (fault.from == 0) refuse(text, "requests are counted from 1");
+  if (!count.empty()) fault.count = parse<std::uint64_t>(text, count, "COUNT");
+  if (has_value != kRules[kind].needs_value)
+    refuse(text, has_value ? "this kind takes no VALUE" : "this kind needs a VALUE");
+  if (has_value) fault.value = parse<double>(text, value, "VALUE");
+  check_value(text, fault);
+  return fault;
+}
+
+ModbusFaultScript::ModbusFaultScript(std::vector<ModbusFault> faults)
+    : faults_(std::move(faults)) {}
+
+const ModbusFault* ModbusFaultScript::active(Kind kind) const noexcept {
+  for (const ModbusFault& fault : faults_) {
+    const bool begun = fault.kind == kind && request_ >= fault.from;
+    if (begun && (fault.count == 0 || request_ - fault.from < fault.count)) return &fault;
+  }
+  return nullptr;
+}
+
+bool ModbusFaultScript::mentions(Kind kind) const noexcept {
+  return std::any_of(faults_.begin(), faults_.end(),
+                     [kind](const ModbusFault& fault) { return fault.kind == kind; });
+}
+
+}  // namespace stageid

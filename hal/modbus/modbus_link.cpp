@@ -1,0 +1,146 @@
+#include "hal/modbus/modbus_link.hpp"
+
+#include <fmt/format.h>
+#include <modbus/modbus.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <thread>
+
+#include "hal/stage/pacer.hpp"
+#include "hal/stage/stage.hpp"
+
+namespace stageid {
+namespace {
+
+struct Duration {
+  std::uint32_t seconds = 0;
+  std::uint32_t microseconds = 0;
+};
+
+Duration duration(double seconds) {
+  const auto whole = static_cast<std::uint32_t>(seconds);
+  return {whole, static_cast<std::uint32_t>(1e6 * (seconds - whole))};
+}
+
+bool is_exception(int error) { return error >= EMBXILFUN && error <= EMBXGTAR; }
+
+bool is_bad_reply(int error) { return error >= EMBBADCRC && error <= EMBBADSLAVE; }
+
+}  // namespace
+
+ModbusLink::ModbusLink(const ModbusAddress& address, const ModbusTiming& timing)
+    : address_(address), timing_(timing), context_(make_modbus_context(address)) {
+  const bool sound = timing.response_s >= 1e-3 && timing.response_s <= timing.worst_reply_s &&
+                     timing.worst_reply_s <= 3600.0;
+  if (!sound)
+    throw std::invalid_argument(
+        fmt::format("modbus: response time-out {} s, worst reply {} s; write at least 0.001 s, and "
+                    "the worst reply not below the time-out",
+                    timing.response_s, timing.worst_reply_s));
+  const Duration response = duration(timing.response_s);
+  modbus_set_response_timeout(context_.get(), response.seconds, response.microseconds);
+  // The response time-out restarts at every group of bytes: with the byte time-out off it is one
+  // deadline for the whole reply.
+  modbus_set_byte_timeout(context_.get(), 0, 0);
+}
+
+void ModbusLink::connect() {
+  if (!try_connect()) throw StageError(describe(last_));
+}
+
+bool ModbusLink::try_connect() noexcept {
+  if (connected_) return true;
+  if (modbus_connect(context_.get()) != 0) {
+    last_ = {LinkStatus::disconnected, errno};
+    return false;
+  }
+  connected_ = true;
+  modbus_flush(context_.get());
+  return true;
+}
+
+void ModbusLink::close() noexcept {
+  if (connected_) modbus_close(context_.get());
+  connected_ = false;
+}
+
+void ModbusLink::begin() noexcept {
+  request_ns_ = monotonic_ns();
+  errno = 0;
+}
+
+LinkStatus ModbusLink::judge(int done, std::size_t wanted) noexcept {
+  const int error = done < 0 ? errno : 0;
+  last_ = {LinkStatus::disconnected, error};
+  if (done == static_cast<int>(wanted)) {
+    last_.status = LinkStatus::ok;
+  } else if (done >= 0 || is_bad_reply(error)) {
+    last_.status = LinkStatus::corrupt;
+  } else if (is_exception(error)) {
+    last_.status = LinkStatus::refused;
+  } else if (error == ETIMEDOUT) {
+    last_.status = LinkStatus::timeout;
+  } else {
+    close();
+  }
+  return last_.status;
+}
+
+LinkStatus ModbusLink::not_connected() noexcept {
+  last_ = {LinkStatus::disconnected, ENOTCONN};
+  return last_.status;
+}
+
+LinkStatus ModbusLink::exchange(int write_first, std::span<const std::uint16_t> written,
+                                int read_first, std::span<std::uint16_t> read) noexcept {
+  if (!connected_) return not_connected();
+  begin();
+  return judge(modbus_write_and_read_registers(
+                   context_.get(), write_first, static_cast<int>(written.size()), written.data(),
+                   read_first, static_cast<int>(read.size()), read.data()),
+               read.size());
+}
+
+LinkStatus ModbusLink::read(int first, std::span<std::uint16_t> registers) noexcept {
+  if (!connected_) return not_connected();
+  begin();
+  return judge(modbus_read_registers(context_.get(), first, static_cast<int>(registers.size()),
+                                     registers.data()),
+               registers.size());
+}
+
+void ModbusLink::drain() noexcept {
+  if (!connected_) return;
+  const std::int64_t silent_ns = request_ns_ + std::llround(1e9 * timing_.worst_reply_s);
+  std::this_thread::sleep_for(std::chrono::nanoseconds(silent_ns - monotonic_ns()));
+  modbus_flush(context_.get());
+}
+
+bool ModbusLink::refused_as_busy() const noexcept {
+  return last_.status == LinkStatus::refused && last_.error == EMBXSBUSY;
+}
+
+std::string ModbusLink::describe(const Trouble& trouble) const {
+  const auto line = [this](const std::string& what) {
+    return fmt::format("{}: {}", to_string(address_), what);
+  };
+  switch (trouble.status) {
+    case LinkStatus::ok:
+      return line("no trouble");
+    case LinkStatus::timeout:
+      return line(fmt::format("no reply within {:.4g} s; is it running, and the unit right?",
+                              timing_.response_s));
+    case LinkStatus::corrupt:
+      return line(fmt::format("a reply failed its check: {}", modbus_strerror(trouble.error)));
+    case LinkStatus::refused:
+      return line(fmt::format("refused: {}", modbus_strerror(trouble.error)));
+    case LinkStatus::disconnected:
+      return line(fmt::format("not connected: {}; is it running?", modbus_strerror(trouble.error)));
+  }
+  return line("unknown trouble");
+}
+
+}  // namespace stageid

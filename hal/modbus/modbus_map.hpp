@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "hal/stage/stage.hpp"
+
+namespace stageid {
+
+/// The register map of a stage behind Modbus: addresses of holding registers, 0-based as they
+/// travel. docs/modbus-map.md is its table for people; a test keeps both the same.
+///
+/// A write is a request only if its sequence number is new: a repeated one changes nothing and is
+/// answered as before, so that a request whose reply was lost may be sent again.
+///
+/// A run belongs to the connection that began it and to the key that was given for it: other writes
+/// to the registers of the run are refused and change nothing.
+namespace modbus_map {
+
+inline constexpr std::uint32_t kMagicValue = 0x53544749;  // "STGI"
+inline constexpr std::uint32_t kVersionValue = 2;
+inline constexpr int kMostChannels = 56;  // as many as one FC23 carries: 116 written, 124 read
+inline constexpr int kMostPanelValues = 8;
+
+// Written by the supervising host.
+inline constexpr int kHeartbeat = 0;
+inline constexpr int kCommand = 2;  // SupervisorCommand + 1
+inline constexpr int kCommandSequence = 4;
+inline constexpr int kSupervisorRegisters = 6;
+// Written by the measuring host: begin and end of a run.
+inline constexpr int kRunCommand = 16;
+inline constexpr int kRunSequence = 18;
+inline constexpr int kRunSeed = 20;
+inline constexpr int kRunKey = 24;  // to end a run, and with every sample
+inline constexpr int kRunRegisters = 10;
+// Written by the measuring host: one sample, from kRunKey on.
+inline constexpr int kSetpointSequence = 26;
+inline constexpr int kSetpoint = 28;
+inline constexpr int kWritableEnd = kSetpoint + 2 * kMostChannels;
+// Status, read by the supervising host.
+inline constexpr int kMagic = 200;
+inline constexpr int kVersion = 202;
+inline constexpr int kBootId = 204;
+inline constexpr int kHeartbeatEcho = 206;
+inline constexpr int kState = 208;
+inline constexpr int kCause = 210;
+inline constexpr int kFlags = 212;
+inline constexpr int kCommandEcho = 214;
+inline constexpr int kCommandReply = 216;
+inline constexpr int kGravityCount = 218;
+inline constexpr int kTemperatureCount = 220;
+inline constexpr int kGravity = 222;
+inline constexpr int kTemperature = kGravity + 2 * kMostPanelValues;
+inline constexpr int kStatusRegisters = kTemperature + 2 * kMostPanelValues - kMagic;
+// Measurement, read by the measuring host.
+inline constexpr int kMeasurementBootId = 300;
+inline constexpr int kMeasurementSequence = 302;
+inline constexpr int kSession = 304;
+inline constexpr int kMeasurementStatus = 306;
+inline constexpr int kValid = 308;
+inline constexpr int kMeasurement = 312;
+// Description, read once.
+inline constexpr int kActuatorCount = 500;
+inline constexpr int kSensorCount = 502;
+inline constexpr int kSampleRate = 504;
+inline constexpr int kChannelHash = 506;
+inline constexpr int kActuatorScale = 508;
+inline constexpr int kSensorScale = kActuatorScale + 2 * kMostChannels;
+inline constexpr int kEnd = kSensorScale + 2 * kMostChannels;
+
+inline constexpr std::uint32_t kRunBegin = 1;
+inline constexpr std::uint32_t kRunEnd = 2;
+inline constexpr std::uint32_t kFlagInterlockClosed = 1U << 0;
+inline constexpr std::uint32_t kFlagEnabled = 1U << 1;
+inline constexpr std::uint32_t kReplyAccepted = 1;
+inline constexpr std::uint32_t kReplyRefused = 2;
+
+enum class Type : std::uint8_t { u32, u64, i32, f32 };
+enum class Access : std::uint8_t { read, write };
+
+struct Entry {
+  int address = 0;
+  std::string_view name;
+  Type type = Type::u32;
+  int count = 1;
+  std::string_view unit;         ///< "1": none
+  Access access = Access::read;  ///< write: by FC 6, 16, 23; everything is read by FC 3, 4, 23
+  std::string_view meaning;
+
+  constexpr int registers() const noexcept { return count * (type == Type::u64 ? 4 : 2); }
+};
+
+/// Every entry, by address.
+std::span<const Entry> entries() noexcept;
+
+/// The entries as a Markdown table, as it stands in docs/modbus-map.md.
+std::string markdown_table();
+
+/// FNV-1a over "NAME UNIT\n" of all actuators, then sensors: host and stage mean the same channels in
+/// the same order.
+std::uint32_t channel_hash(const StageInfo& info);
+
+}  // namespace modbus_map
+}  // namespace stageid

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "hal/modbus/modbus_fault.hpp"
+#include "hal/modbus/modbus_map.hpp"
+#include "hal/modbus/modbus_pdu.hpp"
+#include "hal/node/stage_node.hpp"
+
+namespace stageid {
+
+/// Shows a StageNode as the registers of modbus_map, to one server.
+///
+/// A setpoint with a newer sequence number moves the stage by one sample, and the measurement that
+/// is read in the same request belongs to it; the same number again moves nothing. Numbers that were
+/// left out are counted as missed and not made up for.
+///
+/// A run is controlled by the connection that began it, with the key that the node drew for it; a
+/// request of any other to begin, end or move is answered with exception 6 and changes nothing.
+///
+/// A supervising host that has once counted its heartbeat up must go on with it as long as forces may
+/// act: standing still for heartbeat_s ends in a safe stop (FaultCause::host_heartbeat). As long as
+/// it counts, no other connection may.
+class ModbusNode final : public ModbusRegisters {
+ public:
+  /// `boot_id`: another one for every start of the process, so that hosts notice. `faults` may be
+  /// null: panel and heartbeat misbehave as it says. All references are kept.
+  /// @throws std::invalid_argument if the stage has more channels or panel values than the map, or
+  /// `limits` leave a channel without a range, or a fault needs a panel value that is not there.
+  ModbusNode(StageNode& node, const StageLimits& limits, std::uint32_t boot_id,
+             ModbusFaultScript* faults, double heartbeat_s = 1.0);
+
+  void begin_request(ModbusConnection from) override;
+  void tick() override;
+  [[nodiscard]] ModbusException write(int first, std::span<const std::uint16_t> values) override;
+  [[nodiscard]] ModbusException read(int first, std::span<std::uint16_t> values) override;
+  bool needs(ModbusConnection connection) const override;
+  void hung_up(ModbusConnection connection) override;
+
+ private:
+  void describe_stage(const StageLimits& limits);
+  void disturb_panel();
+  void watch_heartbeat(std::int64_t now_ns);
+  void take_supervisor_command();
+  ModbusException obey(int first, std::size_t count, std::uint32_t heartbeat, std::uint32_t command,
+                       std::uint32_t run);
+  bool may_control_the_run(bool commands, bool moves) const;
+  ModbusException take_run_command();
+  ModbusException begin_run();
+  void take_setpoint();
+  void show_measurement(Outcome outcome, std::uint32_t sequence);
+  void show_status();
+  bool on(ModbusFault::Kind kind) const noexcept;
+
+  std::uint32_t u32(int address) const noexcept;
+  void set_u32(int address, std::uint32_t value) noexcept;
+
+  StageNode& node_;
+  ModbusFaultScript* faults_;
+  std::array<std::uint16_t, modbus_map::kEnd> registers_{};
+  std::uint32_t boot_id_;
+  ModbusConnection asking_ = 0;
+  std::uint32_t session_ = 0;      // key of the last run that was begun here; 0: none
+  ModbusConnection owner_ = 0;     // who began it
+  ModbusConnection counting_ = 0;  // whose heartbeat is watched
+  std::int64_t heartbeat_ns_;
+  std::uint32_t last_heartbeat_ = 0;
+  std::int64_t heartbeat_seen_ns_ = 0;  // 0: nobody counts
+  NodePanel undisturbed_;
+  bool disturbed_ = false;
+  std::vector<double> actuator_scale_;
+  std::vector<double> sensor_scale_;
+  std::vector<double> u_;
+  std::vector<double> y_;
+  Inputs inputs_;
+  std::uint32_t missed_ = 0;  // setpoints of this run that were left out
+};
+
+/// Range of every channel on the wire: twice its limit, so that a limit is seen before the wire
+/// saturates. @throws std::invalid_argument if there is no limit.
+std::vector<float> modbus_scales(const Eigen::VectorXd& limits, std::size_t channels,
+                                 const char* what);
+
+}  // namespace stageid

@@ -1,0 +1,194 @@
+#include "hal/modbus/modbus_session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <random>
+#include <span>
+#include <string>
+
+#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_map.hpp"
+#include "hal/stage/peer_status.hpp"
+
+namespace stageid {
+
+namespace map = modbus_map;
+
+namespace {
+
+/// Registers with their addresses.
+class Block {
+ public:
+  Block(ModbusLink& link, int first, std::size_t count)
+      : first_(first), registers_(read_registers(link, first, count)) {}
+  std::uint32_t operator[](int address) const {
+    return get_u32(std::span<const std::uint16_t>(registers_)
+                       .subspan(static_cast<std::size_t>(address - first_))
+                       .first<2>());
+  }
+  std::vector<double> scales(int address, std::size_t count) const {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < count; ++i)
+      values.push_back(
+          static_cast<double>(std::bit_cast<float>((*this)[address + 2 * static_cast<int>(i)])));
+    return values;
+  }
+
+ private:
+  int first_;
+  std::vector<std::uint16_t> registers_;
+};
+
+[[noreturn]] void refuse(ModbusLink& link, const std::string& what) {
+  link.close();
+  throw StageError(fmt::format("{}: {}", to_string(link.address()), what));
+}
+
+[[noreturn]] void refuse(ModbusLink& link, PeerStatus status, const std::string& detail) {
+  refuse(link, meaning(status).words + detail);
+}
+
+bool sound(const std::vector<double>& scales) {
+  return std::all_of(scales.begin(), scales.end(),
+                     [](double scale) { return scale > 0.0 && std::isfinite(scale); });
+}
+
+void check_map(ModbusLink& link, const Block& status) {
+  if (status[map::kMagic] != map::kMagicValue)
+    refuse(link, fmt::format("register {} does not hold {:#010x}: no stage is there, or another "
+                             "unit",
+                             map::kMagic, map::kMagicValue));
+  if (status[map::kVersion] != map::kVersionValue)
+    refuse(link, PeerStatus::other_version,
+           fmt::format(" (register map {}, not {}); update the older side", status[map::kVersion],
+                       map::kVersionValue));
+}
+
+/// Sends the same request again if no good answer came.
+template <std::size_t Count, typename Answered>
+void transact(ModbusLink& link, int first, const std::array<std::uint16_t, Count>& request,
+              int read_first, std::span<std::uint16_t> reply, Answered answered) {
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    if (attempt > 0) link.drain();
+    if (link.exchange(first, request, read_first, reply) == LinkStatus::ok && answered()) return;
+  }
+  throw StageError(link.describe(link.last()));
+}
+
+}  // namespace
+
+std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size_t count) {
+  constexpr std::size_t kMost = 120;
+  std::vector<std::uint16_t> registers(count);
+  for (std::size_t at = 0; at < count; at += kMost) {
+    const auto part = std::span(registers).subspan(at, std::min(kMost, count - at));
+    if (link.read(first + static_cast<int>(at), part) == LinkStatus::ok) continue;
+    link.drain();
+    if (link.read(first + static_cast<int>(at), part) == LinkStatus::ok) continue;
+    const std::string trouble = link.describe(link.last());
+    link.close();
+    throw StageError(trouble);
+  }
+  return registers;
+}
+
+ModbusDescription read_description(ModbusLink& link, const StageInfo& expected) {
+  const Block status(link, map::kMagic, 6);
+  check_map(link, status);
+  const Block block(link, map::kActuatorCount,
+                    static_cast<std::size_t>(map::kEnd - map::kActuatorCount));
+  if (block[map::kActuatorCount] != expected.actuators.size() ||
+      block[map::kSensorCount] != expected.sensors.size() ||
+      block[map::kChannelHash] != map::channel_hash(expected))
+    refuse(link, PeerStatus::other_stage,
+           fmt::format(": {} actuators and {} sensors there, {} and {} here, or other names; give "
+                       "both the same",
+                       block[map::kActuatorCount], block[map::kSensorCount],
+                       expected.actuators.size(), expected.sensors.size()));
+  const auto rate_hz = static_cast<double>(std::bit_cast<float>(block[map::kSampleRate]));
+  if (!(std::abs(rate_hz - expected.sample_rate_hz) <= 1e-6 * expected.sample_rate_hz))
+    refuse(link, PeerStatus::other_stage,
+           fmt::format(": the stage runs at {} Hz, the stage file says {} Hz; give both the same",
+                       rate_hz, expected.sample_rate_hz));
+  ModbusDescription description;
+  description.boot_id = status[map::kBootId];
+  description.actuator_scale = block.scales(map::kActuatorScale, expected.actuators.size());
+  description.sensor_scale = block.scales(map::kSensorScale, expected.sensors.size());
+  if (!sound(description.actuator_scale) || !sound(description.sensor_scale))
+    refuse(link, "a channel's scale is not positive");
+  return description;
+}
+
+ModbusState read_state(ModbusLink& link) {
+  const Block block(link, map::kState, 6);
+  return {static_cast<NodeState>(block[map::kState] & 0xFFU),
+          static_cast<FaultCause>(block[map::kCause] & 0xFFU),
+          (block[map::kFlags] & map::kFlagInterlockClosed) != 0,
+          (block[map::kFlags] & map::kFlagEnabled) != 0};
+}
+
+namespace {
+
+std::string describe(const ModbusState& state) {
+  return fmt::format("state {}, cause: {}{}; remove the cause{}", to_string(state.state),
+                     to_string(state.cause),
+                     state.interlock_closed ? "" : ", the interlock is open",
+                     state.state == NodeState::fault ? " and add --reset-fault" : "");
+}
+
+/// Gives a run command; `session`: the key that the answer must carry, 0: any but 0.
+/// @return the key in the answer.
+std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uint64_t run_seed,
+                               std::uint32_t session, std::vector<std::uint16_t>& reply) {
+  std::random_device random;
+  std::array<std::uint16_t, map::kRunRegisters> request{};
+  const std::span<std::uint16_t> out = request;
+  put_u32(out.first<2>(), command);
+  put_u32(out.subspan(map::kRunSequence - map::kRunCommand).first<2>(), random() | 1U);
+  put_u64(out.subspan(map::kRunSeed - map::kRunCommand).first<4>(), run_seed);
+  put_u32(out.subspan(map::kRunKey - map::kRunCommand).first<2>(), session);
+  const auto shown = std::span<const std::uint16_t>(reply)
+                         .subspan(map::kSession - map::kMeasurementBootId)
+                         .first<2>();
+  transact(link, map::kRunCommand, request, map::kMeasurementBootId, reply,
+           [&] { return get_u32(shown) != 0 && (session == 0 || get_u32(shown) == session); });
+  return get_u32(shown);
+}
+
+}  // namespace
+
+void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
+  const std::uint32_t sequence = Block(link, map::kCommandEcho, 2)[map::kCommandEcho] + 1;
+  std::array<std::uint16_t, 4> request{};
+  put_u32(std::span(request).first<2>(), static_cast<std::uint32_t>(command) + 1);
+  put_u32(std::span(request).last<2>(), sequence);
+  std::array<std::uint16_t, 4> reply{};
+  const auto replied = std::span<const std::uint16_t, 4>(reply);
+  transact(link, map::kCommand, request, map::kCommandEcho, reply,
+           [&] { return get_u32(replied.first<2>()) == sequence; });
+  if (get_u32(replied.last<2>()) == map::kReplyAccepted) return;
+  throw StageError(fmt::format("{}: the command is refused: {}", to_string(link.address()),
+                               describe(read_state(link))));
+}
+
+std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
+                        std::vector<std::uint16_t>& reply) {
+  try {
+    return give_run_command(link, map::kRunBegin, run_seed, 0, reply);
+  } catch (const StageError&) {
+    if (link.last().status != LinkStatus::refused) throw;
+  }
+  const std::string place = to_string(link.address());
+  if (link.refused_as_busy()) refuse(PeerStatus::held, place, "; wait until it has ended");
+  throw StageError(fmt::format("{}: no run begins: {}", place, describe(read_state(link))));
+}
+
+void end_run(ModbusLink& link, std::uint32_t session, std::vector<std::uint16_t>& reply) {
+  static_cast<void>(give_run_command(link, map::kRunEnd, 0, session, reply));
+}
+
+}  // namespace stageid

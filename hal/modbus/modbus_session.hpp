@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hal/modbus/modbus_link.hpp"
+#include "hal/stage/stage.hpp"
+#include "hal/stage/supervisor.hpp"
+
+namespace stageid {
+
+// What a host says to a stage behind Modbus before and after a run, when time does not matter.
+// Everything is tried twice, with a drain between.
+
+/// Reads `count` registers from `first` on, in as many transactions as it takes.
+/// @throws StageError, the link closed.
+std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size_t count);
+
+struct ModbusDescription {
+  std::uint32_t boot_id = 0;
+  std::vector<double> actuator_scale;  ///< SI per count
+  std::vector<double> sensor_scale;
+};
+
+/// Reads what the node says of itself, and checks it against what is expected.
+/// @throws StageError if it is no stage, has another map, other channels or another rate.
+ModbusDescription read_description(ModbusLink& link, const StageInfo& expected);
+
+struct ModbusState {
+  NodeState state = NodeState::not_ready;
+  FaultCause cause = FaultCause::none;
+  bool interlock_closed = false;
+  bool enabled = false;  ///< operation_enabled or measuring
+};
+/// @throws StageError
+ModbusState read_state(ModbusLink& link);
+
+/// @throws StageError if it is refused; the message names state and cause.
+void give_supervisor_command(ModbusLink& link, SupervisorCommand command);
+
+/// Begins a run; `reply` receives the measurement block, with y[0]. @return the key of the run.
+/// @throws StageError if there is no answer, or it is refused.
+std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
+                        std::vector<std::uint16_t>& reply);
+/// Ends the run of this key. @throws StageError as begin_run().
+void end_run(ModbusLink& link, std::uint32_t session, std::vector<std::uint16_t>& reply);
+
+}  // namespace stageid

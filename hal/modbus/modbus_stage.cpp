@@ -1,0 +1,270 @@
+#include "hal/modbus/modbus_stage.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_map.hpp"
+#include "hal/stage/supervisor.hpp"
+
+namespace stageid {
+
+namespace map = modbus_map;
+
+namespace {
+
+constexpr std::size_t kSetpointHead = map::kSetpoint - map::kRunKey;
+constexpr std::size_t kMeasurementHead = map::kMeasurement - map::kMeasurementBootId;
+constexpr double kLargestCount = 2147483647.0;
+
+std::span<const std::uint16_t, 2> pair_at(const std::vector<std::uint16_t>& block, int offset) {
+  return std::span<const std::uint16_t>(block).subspan(static_cast<std::size_t>(offset)).first<2>();
+}
+
+NodeState state_of(std::uint32_t status) { return static_cast<NodeState>((status >> 8) & 0xFFU); }
+FaultCause cause_of(std::uint32_t status) {
+  return static_cast<FaultCause>((status >> 16) & 0xFFU);
+}
+
+struct Exchange {
+  int written = 0;  // registers
+  int read = 0;
+};
+
+Exchange exchange_of(const StageInfo& info) {
+  return {static_cast<int>(kSetpointHead + 2 * info.actuators.size()),
+          static_cast<int>(kMeasurementHead + 2 * info.sensors.size())};
+}
+
+double checked_rate_hz(const StageInfo& info, const ModbusAddress& address,
+                       const ModbusTiming& timing) {
+  if (info.actuators.size() > map::kMostChannels || info.sensors.size() > map::kMostChannels)
+    throw std::invalid_argument(
+        fmt::format("modbus: {} actuators and {} sensors; one transaction carries {} of each",
+                    info.actuators.size(), info.sensors.size(), map::kMostChannels));
+  const double longest_hz = 1.0 / modbus_exchange_s(address, timing, info);
+  const auto [written, read] = exchange_of(info);
+  if (info.sample_rate_hz > longest_hz)
+    throw std::invalid_argument(fmt::format(
+        "modbus: {:.6g} Hz is faster than the link: one transaction takes {}, so {:.3g} "
+        "Hz at most; lower sample_rate_hz or take a faster link",
+        info.sample_rate_hz, describe_transaction(address, timing, written, read),
+        std::floor(longest_hz)));
+  return longest_hz;
+}
+
+}  // namespace
+
+double modbus_exchange_s(const ModbusAddress& address, const ModbusTiming& timing,
+                         const StageInfo& info) {
+  const auto [written, read] = exchange_of(info);
+  return modbus_transaction_s(address, timing, written, read);
+}
+
+ModbusStage::ModbusStage(StageInfo info, const ModbusAddress& address, const ModbusTiming& timing,
+                         const ModbusHostOptions& options)
+    : info_(std::move(info)),
+      link_(address, timing),
+      pacer_(info_.sample_rate_hz, options.pace),
+      reset_fault_(options.reset_fault) {
+  info_.backend = "modbus";
+  info_.maximum_rate_hz = checked_rate_hz(info_, address, timing);
+  info_.clock = options.pace > 0.0 ? Clock::wall : Clock::virtual_time;
+  info_.pace = options.pace > 0.0 ? options.pace : 1.0;
+  request_.assign(kSetpointHead + 2 * info_.actuators.size(), 0);
+  reply_.assign(kMeasurementHead + 2 * info_.sensors.size(), 0);
+}
+
+std::uint32_t ModbusStage::measured(int address) const noexcept {
+  return get_u32(pair_at(reply_, address - map::kMeasurementBootId));
+}
+
+void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
+  if (first.y.size() != info_.sensors.size())
+    throw std::invalid_argument("modbus stage: Inputs::y must have one entry a sensor");
+  trouble_ = Trouble::none;
+  if (!link_.connected()) {
+    link_.connect();
+    description_ = read_description(link_, info_);
+  }
+  const ModbusState node = read_state(link_);
+  const bool reset_fault = std::exchange(reset_fault_, false);
+  if (node.state == NodeState::fault) {
+    if (!reset_fault)
+      refuse(PeerStatus::in_fault, to_string(link_.address()),
+             fmt::format(" ({}{}); remove the cause and add --reset-fault", to_string(node.cause),
+                         node.interlock_closed ? "" : "; the interlock is open"));
+    give_supervisor_command(link_, SupervisorCommand::reset_fault);
+  }
+  if (!node.enabled) {
+    give_supervisor_command(link_, SupervisorCommand::enable);
+    enabled_here_ = true;
+  }
+  session_ = begin_run(link_, run_seed, reply_);
+  sequence_ = 0;
+  missed_ = 0;
+  running_ = true;
+  const Pacer::Instant now = pacer_.restart();
+  first.cycle = 0;
+  first.t_sample_ns = now.sample_ns;
+  first.t_rx_ns = now.now_ns;
+  const PeerStatus status = status_ = take_measurement(first);
+  if (status == PeerStatus::good) return;
+  stop();
+  const bool missing = status == PeerStatus::incomplete || status == PeerStatus::nothing_new;
+  refuse(missing ? PeerStatus::first_sample_missing : status, to_string(link_.address()),
+         "; look at the node");
+}
+
+bool ModbusStage::write_setpoint(const Outputs& outputs) noexcept {
+  put_u32(std::span(request_).first<2>(), session_);
+  put_u32(std::span(request_).subspan<2, 2>(), sequence_);
+  for (std::size_t i = 0; i < outputs.u.size(); ++i) {
+    if (!fits_counts(outputs.u[i], description_.actuator_scale[i])) return false;
+    put_i32(std::span(request_).subspan(kSetpointHead + 2 * i).first<2>(),
+            to_counts(outputs.u[i], description_.actuator_scale[i]));
+  }
+  return true;
+}
+
+Outcome ModbusStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept {
+  inputs.valid = 0;
+  if (!running_ || outputs.u.size() != info_.actuators.size() ||
+      inputs.y.size() != info_.sensors.size())
+    return Outcome::fault;
+  ++sequence_;
+  if (!write_setpoint(outputs)) {
+    trouble_ = Trouble::not_carried;
+    return Outcome::fault;
+  }
+  status_ = transact();
+  const Pacer::Instant now = pacer_.wait();
+  inputs.cycle = sequence_;
+  inputs.t_ready_ns = now.ready_ns;
+  inputs.t_sample_ns = now.sample_ns;
+  inputs.t_rx_ns = now.now_ns;
+  if (status_ == PeerStatus::good || status_ == PeerStatus::late)
+    status_ = std::max(status_, take_measurement(inputs));
+  const bool past_deadline = deadline.t_ns != 0 && now.now_ns > deadline.t_ns;
+  if (status_ == PeerStatus::good && (now.late || past_deadline)) status_ = PeerStatus::late;
+  return meaning(status_).outcome;
+}
+
+PeerStatus ModbusStage::transact() noexcept {
+  const auto once = [this] {
+    return judge(link_.exchange(map::kRunKey, request_, map::kMeasurementBootId, reply_));
+  };
+  PeerStatus status = once();
+  if (status == PeerStatus::good || status == PeerStatus::other_node || !link_.connected())
+    return status;
+  link_.drain();
+  status = once();
+  if (link_trouble_.status == LinkStatus::refused && restarted()) {
+    trouble_ = Trouble::node;
+    return PeerStatus::other_node;
+  }
+  return status == PeerStatus::good ? PeerStatus::late : status;
+}
+
+/// A node that was restarted refuses what it knows nothing of; its boot id tells.
+bool ModbusStage::restarted() noexcept {
+  std::array<std::uint16_t, 2> boot_id{};
+  if (link_.read(map::kMeasurementBootId, boot_id) != LinkStatus::ok) return false;
+  return get_u32(std::span<const std::uint16_t, 2>(boot_id)) != description_.boot_id;
+}
+
+PeerStatus ModbusStage::judge(LinkStatus status) noexcept {
+  trouble_ = status == LinkStatus::ok ? Trouble::none : Trouble::link;
+  link_trouble_ = link_.last();
+  switch (status) {
+    case LinkStatus::ok:
+      return judge_reply();
+    case LinkStatus::timeout:
+    case LinkStatus::disconnected:
+      return PeerStatus::link_down;
+    case LinkStatus::corrupt:
+      return PeerStatus::damaged;
+    case LinkStatus::refused:
+      break;
+  }
+  return PeerStatus::fault;
+}
+
+PeerStatus ModbusStage::judge_reply() noexcept {
+  const std::uint32_t boot_id = measured(map::kMeasurementBootId);
+  if (boot_id == description_.boot_id && measured(map::kMeasurementSequence) == sequence_ &&
+      measured(map::kSession) == session_)
+    return PeerStatus::good;
+  // Zeros are what other devices show; a node that is there but new has a boot id of its own.
+  const bool other = boot_id != description_.boot_id && boot_id != 0;
+  trouble_ = other ? Trouble::node : Trouble::foreign_reply;
+  return other ? PeerStatus::other_node : PeerStatus::damaged;
+}
+
+PeerStatus ModbusStage::take_measurement(Inputs& inputs) noexcept {
+  node_status_ = measured(map::kMeasurementStatus);
+  inputs.node_state = state_of(node_status_);
+  inputs.valid =
+      (static_cast<std::uint64_t>(measured(map::kValid)) << 32) | measured(map::kValid + 2);
+  PeerReport report;
+  report.outcome = static_cast<std::uint8_t>(node_status_ & 0xFFU);
+  report.state = inputs.node_state;
+  report.cause = cause_of(node_status_);
+  report.valid = inputs.valid;
+  report.all = ~std::uint64_t{0} >> (64 - inputs.y.size());
+  report.setpoints_missed = node_status_ >> 24 > std::exchange(missed_, node_status_ >> 24);
+  for (std::size_t i = 0; i < inputs.y.size(); ++i) {
+    const std::int32_t count = get_i32(pair_at(reply_, static_cast<int>(kMeasurementHead + 2 * i)));
+    inputs.y[i] = description_.sensor_scale[i] * count;
+    report.out_of_range |= std::abs(static_cast<double>(count)) >= kLargestCount;
+  }
+  const PeerStatus status = stageid::judge(report);
+  if (status != PeerStatus::good) trouble_ = Trouble::node;
+  return status;
+}
+
+void ModbusStage::stop() noexcept {
+  if (!running_) return;
+  running_ = false;
+  try {
+    end_run();
+  } catch (...) {
+    link_.close();  // the node's watchdog brings the stage to rest
+  }
+}
+
+void ModbusStage::end_run() {
+  // A node that is new, or gone, does not know of this run.
+  if (status_ == PeerStatus::other_node) link_.close();
+  if (!link_.connected()) return;
+  if (trouble_ != Trouble::none) link_.drain();
+  stageid::end_run(link_, session_, reply_);
+  if (std::exchange(enabled_here_, false) && read_state(link_).enabled)
+    give_supervisor_command(link_, SupervisorCommand::disable);
+}
+
+std::string ModbusStage::trouble() const {
+  switch (trouble_) {
+    case Trouble::none:
+      return "";
+    case Trouble::link:
+      return link_.describe(link_trouble_);
+    case Trouble::foreign_reply:
+      return fmt::format("{}: replies do not belong to the setpoints: another unit or program",
+                         to_string(link_.address()));
+    case Trouble::node:
+      return fmt::format("{}: {} (state {}, cause: {})", to_string(link_.address()),
+                         meaning(status_).words, to_string(state_of(node_status_)),
+                         to_string(cause_of(node_status_)));
+    case Trouble::not_carried:
+      return "a command is not finite or beyond the range of the wire (the node's actuator scale)";
+  }
+  return "";
+}
+
+}  // namespace stageid

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "hal/modbus/modbus_link.hpp"
+#include "hal/stage/supervisor.hpp"
+
+namespace stageid {
+
+struct ModbusSupervisorOptions {
+  double poll_period_s = 0.1;      ///< 10-20 Hz over TCP, 5-10 Hz over RTU
+  double backoff_first_s = 0.1;    ///< before the second attempt to connect; doubled up to ...
+  double backoff_longest_s = 5.0;  ///< ... this
+};
+
+/// The supervisor behind Modbus. A thread of its own polls with one function 23 (heartbeat and
+/// command out, status in), because a time-out, a drain and a reconnection take their time.
+///
+/// A poll counts only if the status has the map's magic and version and echoes one of the last
+/// kEchoPolls heartbeats: that proves the program behind the server, not only its network card. A
+/// poll that fails is drained and repeated once; then the link is closed and opened again.
+class ModbusSupervisor final : public Supervisor {
+ public:
+  static constexpr std::uint32_t kEchoPolls = 2;  // a PLC may copy the heartbeat one scan later
+
+  /// Starts the thread; whether somebody answers is seen by snapshot().
+  /// @throws std::invalid_argument if an address, a time or the poll period makes no sense.
+  ModbusSupervisor(const ModbusAddress& address, const ModbusTiming& timing,
+                   const ModbusSupervisorOptions& options = {});
+  ~ModbusSupervisor() override;
+  ModbusSupervisor(const ModbusSupervisor&) = delete;
+  ModbusSupervisor& operator=(const ModbusSupervisor&) = delete;
+
+  PlantSnapshot snapshot() const override;
+  SupervisorReply request(SupervisorCommand command) override;
+  std::string trouble() const override;
+
+ private:
+  void run();
+  bool connect();
+  bool poll();
+  LinkStatus transact(std::span<std::uint16_t> status);
+  bool take_status(std::span<const std::uint16_t> status);
+  void set_trouble(std::string trouble);
+  double reply_allowance_s() const noexcept;
+
+  ModbusLink link_;
+  ModbusSupervisorOptions options_;
+  std::uint32_t heartbeat_ = 0;
+  std::uint32_t command_ = 0;
+  std::uint32_t command_sequence_ = 0;
+
+  std::mutex request_mutex_;  // one request at a time
+  mutable std::mutex mutex_;  // of all below
+  std::condition_variable changed_;
+  PlantSnapshot snapshot_;
+  std::string trouble_;
+  std::optional<SupervisorCommand> wanted_;
+  bool sent_ = false;  // wanted_ has its sequence number
+  std::optional<SupervisorReply> reply_;
+  bool stop_ = false;
+  std::thread thread_;  // last: it uses all the others
+};
+
+}  // namespace stageid

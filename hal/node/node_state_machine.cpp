@@ -1,0 +1,96 @@
+#include "hal/node/node_state_machine.hpp"
+
+namespace stageid {
+
+const char* to_string(FaultCause cause) noexcept {
+  switch (cause) {
+    case FaultCause::none:
+      return "none";
+    case FaultCause::watchdog:
+      return "the host fell silent";
+    case FaultCause::limit:
+      return "a limit was hit";
+    case FaultCause::not_finite:
+      return "a value was no number";
+    case FaultCause::interlock:
+      return "the interlock opened";
+    case FaultCause::amplifier:
+      return "the stage reported a fault";
+    case FaultCause::gravity:
+      return "a gravity compensator is out of range";
+    case FaultCause::temperature:
+      return "a temperature is out of range";
+    case FaultCause::bus_off:
+      return "the bus is off";
+    case FaultCause::host_heartbeat:
+      return "the supervisor's heartbeat stands still";
+  }
+  return "unknown";
+}
+
+bool NodeStateMachine::powered() const noexcept {
+  switch (state_) {
+    case NodeState::switched_on:
+    case NodeState::operation_enabled:
+    case NodeState::measuring:
+    case NodeState::quick_stop:
+    case NodeState::fault_reaction:
+      return true;
+    case NodeState::not_ready:
+    case NodeState::switch_on_disabled:
+    case NodeState::ready:
+    case NodeState::fault:
+      break;
+  }
+  return false;
+}
+
+void NodeStateMachine::self_test_passed() noexcept {
+  if (state_ == NodeState::not_ready) state_ = NodeState::switch_on_disabled;
+}
+
+bool NodeStateMachine::request(SupervisorCommand command) noexcept {
+  const bool running = state_ == NodeState::operation_enabled || state_ == NodeState::measuring;
+  const bool idle = state_ == NodeState::switch_on_disabled || state_ == NodeState::ready ||
+                    state_ == NodeState::switched_on;
+  switch (command) {
+    case SupervisorCommand::enable:
+      if (idle) state_ = NodeState::operation_enabled;
+      return idle || running;
+    case SupervisorCommand::disable:
+      if (state_ == NodeState::operation_enabled || idle) state_ = NodeState::switch_on_disabled;
+      return state_ == NodeState::switch_on_disabled;
+    case SupervisorCommand::quick_stop:
+      if (running) state_ = NodeState::quick_stop;
+      return running || idle || state_ == NodeState::quick_stop;
+    case SupervisorCommand::reset_fault:
+      if (state_ != NodeState::fault) return idle || running;
+      state_ = NodeState::switch_on_disabled;
+      cause_ = FaultCause::none;
+      return true;
+  }
+  return false;
+}
+
+bool NodeStateMachine::begin_measuring() noexcept {
+  if (state_ != NodeState::operation_enabled) return false;
+  state_ = NodeState::measuring;
+  return true;
+}
+
+void NodeStateMachine::end_measuring() noexcept {
+  if (state_ == NodeState::measuring) state_ = NodeState::operation_enabled;
+}
+
+void NodeStateMachine::fail(FaultCause cause) noexcept {
+  if (cause_ == FaultCause::none) cause_ = cause;
+  if (state_ == NodeState::fault || state_ == NodeState::fault_reaction) return;
+  state_ = powered() ? NodeState::fault_reaction : NodeState::fault;
+}
+
+void NodeStateMachine::at_rest() noexcept {
+  if (state_ == NodeState::quick_stop) state_ = NodeState::switch_on_disabled;
+  if (state_ == NodeState::fault_reaction) state_ = NodeState::fault;
+}
+
+}  // namespace stageid

@@ -1,0 +1,295 @@
+#include "hal/node/stage_node.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "hal/stage/peer_status.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kWatchdogSamples = 3.0;
+
+std::int64_t nanoseconds(double seconds, const char* name) {
+  if (!(seconds >= 0.0) || !std::isfinite(seconds))
+    throw std::invalid_argument(fmt::format("node: {} must not be negative: {}", name, seconds));
+  return std::llround(1e9 * seconds);
+}
+
+struct PanelTrouble {
+  FaultCause cause = FaultCause::none;
+  std::string message;
+};
+
+PanelTrouble trouble_of(const NodePanel& panel) {
+  if (!panel.interlock_closed) return {FaultCause::interlock, "the interlock is open; close it"};
+  for (std::size_t i = 0; i < panel.gravity_compensator_n.size(); ++i) {
+    const double force_n = panel.gravity_compensator_n[i];
+    // Written so that NaN is out of range.
+    if (!(force_n >= panel.gravity_low_n && force_n <= panel.gravity_high_n))
+      return {FaultCause::gravity,
+              fmt::format("gravity compensator {}: {:.4g} N is not within {:.4g} ... {:.4g} N",
+                          i + 1, force_n, panel.gravity_low_n, panel.gravity_high_n)};
+  }
+  for (std::size_t i = 0; i < panel.temperature_k.size(); ++i)
+    if (!(panel.temperature_k[i] <= panel.temperature_high_k))
+      return {FaultCause::temperature,
+              fmt::format("temperature {}: {:.4g} K is above {:.4g} K", i + 1,
+                          panel.temperature_k[i], panel.temperature_high_k)};
+  return {};
+}
+
+const char* to_string(SupervisorCommand command) noexcept {
+  switch (command) {
+    case SupervisorCommand::enable:
+      return "enable";
+    case SupervisorCommand::disable:
+      return "disable";
+    case SupervisorCommand::quick_stop:
+      return "quick stop";
+    case SupervisorCommand::reset_fault:
+      return "reset";
+  }
+  return "unknown";
+}
+
+std::string refusal(SupervisorCommand command, NodeState state) {
+  const bool in_fault = state == NodeState::fault;
+  const char* remedy = in_fault ? "reset the fault first" : "wait, or end the measurement first";
+  return fmt::format("{} is not allowed in state {}; {}", to_string(command), to_string(state),
+                     remedy);
+}
+
+}  // namespace
+
+StageNode::StageNode(std::unique_ptr<CyclicStage> stage, const StageLimits& limits,
+                     const MotionControllerSpec& controller, NodePanel panel,
+                     const NodeOptions& options)
+    : stage_(std::move(stage), limits), controller_(controller), panel_(std::move(panel)) {
+  const StageInfo& info = stage_.info();
+  if (controller_.sensors() != static_cast<Eigen::Index>(info.sensors.size()) ||
+      controller_.actuators() != static_cast<Eigen::Index>(info.actuators.size()))
+    throw std::invalid_argument(
+        fmt::format("node: the controller has {} sensors and {} actuators, the stage {} and {}",
+                    controller_.sensors(), controller_.actuators(), info.sensors.size(),
+                    info.actuators.size()));
+  const double watchdog_s =
+      options.watchdog_s == 0.0 ? kWatchdogSamples / info.sample_rate_hz : options.watchdog_s;
+  watchdog_ns_ = nanoseconds(watchdog_s, "watchdog_s");
+  hold_ns_ = nanoseconds(options.hold_s, "hold_s");
+  y_.assign(info.sensors.size(), 0.0);
+  control_.assign(info.actuators.size(), 0.0);
+  command_.assign(info.actuators.size(), 0.0);
+  machine_.self_test_passed();  // stage, limits and controller fit: there is no more to test
+}
+
+NodeState StageNode::state() const {
+  const std::lock_guard lock(mutex_);
+  return machine_.state();
+}
+
+FaultCause StageNode::cause() const {
+  const std::lock_guard lock(mutex_);
+  return machine_.cause();
+}
+
+std::string StageNode::trouble() const {
+  const std::lock_guard lock(mutex_);
+  if (machine_.cause() == FaultCause::none) return "";
+  return reason_.empty() ? to_string(machine_.cause()) : reason_;
+}
+
+std::uint64_t StageNode::sample() const {
+  const std::lock_guard lock(mutex_);
+  return sample_;
+}
+
+NodePanel StageNode::panel() const {
+  const std::lock_guard lock(mutex_);
+  return panel_;
+}
+
+void StageNode::set_panel(NodePanel panel) {
+  const std::lock_guard lock(mutex_);
+  panel_ = std::move(panel);
+}
+
+SupervisorReply StageNode::request(SupervisorCommand command) {
+  const std::lock_guard lock(mutex_);
+  if (machine_.state() != NodeState::operation_enabled) reserved_ = false;
+  const bool needs_panel =
+      command == SupervisorCommand::enable || command == SupervisorCommand::reset_fault;
+  const PanelTrouble trouble = trouble_of(panel_);
+  if (needs_panel && trouble.cause != FaultCause::none) return {false, trouble.message};
+  if (!machine_.request(command)) return {false, refusal(command, machine_.state())};
+  if (command == SupervisorCommand::reset_fault) reason_.clear();
+  return {true, ""};
+}
+
+// A run or reservation can end in many ways; all of them are changes of the state.
+std::uint32_t StageNode::holder() const {
+  const NodeState state = machine_.state();
+  const bool held =
+      state == NodeState::measuring || (reserved_ && state == NodeState::operation_enabled);
+  return held ? session_ : 0;
+}
+
+// The low byte names the run in each CAN frame: neither 0 nor that of the run before.
+std::uint32_t StageNode::draw_key() {
+  std::uint32_t key = 0;
+  do key = random_();
+  while ((key & 0xFFU) == 0 || (key & 0xFFU) == (session_ & 0xFFU));
+  return key;
+}
+
+std::uint32_t StageNode::session() const {
+  const std::lock_guard lock(mutex_);
+  return holder();
+}
+
+std::uint32_t StageNode::reserve() {
+  const std::lock_guard lock(mutex_);
+  if (holder() != 0) refuse(PeerStatus::held, "node", "; wait until it has ended");
+  session_ = draw_key();
+  reserved_ = true;
+  return session_;
+}
+
+void StageNode::release() {
+  const std::lock_guard lock(mutex_);
+  reserved_ = false;
+}
+
+std::uint32_t StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& first,
+                                   std::uint32_t session) {
+  const std::lock_guard lock(mutex_);
+  if (holder() != 0 && (session != holder() || running_))
+    refuse(PeerStatus::held, "node", "; wait until it has ended");
+  if (machine_.state() != NodeState::operation_enabled)
+    throw StageError(fmt::format("node: no measurement in state {}; enable it first",
+                                 to_string(machine_.state())));
+  if (first.y.size() != y_.size()) throw StageError("node: Inputs::y must have one entry a sensor");
+  stage_.start(run_seed, first);
+  if (holder() == 0) session_ = draw_key();
+  static_cast<void>(machine_.begin_measuring());
+  reserved_ = false;
+  running_ = true;
+  sample_ = 0;
+  last_sample_ns_ = now_ns;
+  hold_began_ns_.reset();
+  std::copy(first.y.begin(), first.y.end(), y_.begin());
+  controller_.reset();
+  controller_.update(y_.data(), control_.data());
+  first.node_state = machine_.state();
+  return session_;
+}
+
+Outcome StageNode::advance(std::int64_t now_ns, std::span<const double> u, Inputs& inputs) {
+  const std::lock_guard lock(mutex_);
+  return exchange(now_ns, u, inputs);
+}
+
+Outcome StageNode::advance_excited(std::int64_t now_ns, std::span<const double> r,
+                                   std::span<double> u, Inputs& inputs) {
+  const std::lock_guard lock(mutex_);
+  if (r.size() != control_.size() || u.size() != control_.size()) {
+    give_nothing(inputs);
+    return Outcome::fault;
+  }
+  std::transform(control_.begin(), control_.end(), r.begin(), u.begin(), std::plus<>());
+  const Outcome outcome = exchange(now_ns, u, inputs);
+  std::copy(inputs.applied.begin(), inputs.applied.end(), u.begin());
+  return outcome;
+}
+
+void StageNode::give_nothing(Inputs& inputs) const {
+  inputs.valid = 0;
+  inputs.node_state = machine_.state();
+}
+
+Outcome StageNode::exchange(std::int64_t now_ns, std::span<const double> u, Inputs& inputs) {
+  if (machine_.state() != NodeState::measuring || inputs.y.size() != y_.size()) {
+    give_nothing(inputs);
+    return Outcome::fault;
+  }
+  last_sample_ns_ = now_ns;
+  Outcome outcome = stage_.exchange({sample_, now_ns, u}, inputs, {});
+  // The host need not know how the node stops: braked or in closed loop, it does so by itself.
+  if (outcome == Outcome::braking || outcome == Outcome::opened) outcome = Outcome::limit;
+  ++sample_;
+  std::copy(inputs.y.begin(), inputs.y.end(), y_.begin());
+  controller_.update(y_.data(), control_.data());
+  if (outcome == Outcome::limit) {
+    const bool no_number = stage_.violation().kind == LimitKind::not_finite;
+    machine_.fail(no_number ? FaultCause::not_finite : FaultCause::limit);
+    reason_ = describe(stage_.violation(), stage_.info());
+  } else if (outcome == Outcome::fault || outcome == Outcome::bus_off ||
+             outcome == Outcome::link_down) {
+    machine_.fail(FaultCause::amplifier);
+  }
+  inputs.node_state = machine_.state();
+  return outcome;
+}
+
+void StageNode::end_run() {
+  const std::lock_guard lock(mutex_);
+  if (machine_.state() != NodeState::measuring) return;  // a safe stop ends by itself
+  come_to_rest();
+  machine_.end_measuring();
+}
+
+void StageNode::fail(FaultCause cause) {
+  const std::lock_guard lock(mutex_);
+  machine_.fail(cause);
+}
+
+void StageNode::tick(std::int64_t now_ns) {
+  const std::lock_guard lock(mutex_);
+  const PanelTrouble panel = trouble_of(panel_);
+  if (panel.cause != FaultCause::none && machine_.powered() &&
+      machine_.cause() == FaultCause::none) {
+    machine_.fail(panel.cause);
+    reason_ = panel.message;
+  }
+  if (machine_.state() == NodeState::measuring && now_ns - last_sample_ns_ > watchdog_ns_)
+    machine_.fail(FaultCause::watchdog);
+  if (machine_.state() == NodeState::quick_stop || machine_.state() == NodeState::fault_reaction)
+    hold(now_ns);
+}
+
+// The samples that have become due since the last tick; a tick that came late makes up for them.
+void StageNode::hold(std::int64_t now_ns) {
+  if (!hold_began_ns_) {
+    hold_began_ns_ = now_ns;
+    held_samples_ = 0;
+  }
+  const std::int64_t elapsed_ns = std::min(now_ns - *hold_began_ns_, hold_ns_);
+  const auto due = static_cast<std::int64_t>(1e-9 * static_cast<double>(elapsed_ns) *
+                                             stage_.info().sample_rate_hz);
+  Inputs inputs;
+  inputs.y = y_;
+  bool controlled = running_;
+  for (; controlled && held_samples_ < due; ++held_samples_) {
+    std::copy(control_.begin(), control_.end(), command_.begin());
+    const Outcome outcome = stage_.exchange({sample_, now_ns, command_}, inputs, {});
+    controller_.update(y_.data(), control_.data());
+    controlled =
+        outcome != Outcome::fault && outcome != Outcome::link_down && outcome != Outcome::opened;
+  }
+  if (controlled && elapsed_ns < hold_ns_) return;
+  come_to_rest();
+  machine_.at_rest();
+}
+
+void StageNode::come_to_rest() {
+  stage_.stop();
+  if (stage_.emergency().cause.kind != LimitKind::none) reason_ = describe_stop(stage_);
+  running_ = false;
+  hold_began_ns_.reset();
+}
+
+}  // namespace stageid

@@ -1,0 +1,128 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hal/node/node_state_machine.hpp"
+#include "hal/stage/limited_stage.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "hal/stage/stage.hpp"
+#include "hal/stage/supervisor.hpp"
+
+namespace stageid {
+
+struct NodeOptions {
+  /// The host may be silent for so long while it measures; 0: 3 samples.
+  double watchdog_s = 0.0;
+  /// The node's own controller holds the stage for so long before power is cut.
+  double hold_s = 0.1;
+};
+
+/// What stands around the simulated stage and can be disturbed on request.
+struct NodePanel {
+  bool interlock_closed = true;
+  std::vector<double> gravity_compensator_n;  ///< force of each
+  std::vector<double> temperature_k;
+  double gravity_low_n = 0.0;  ///< allowed range of each
+  double gravity_high_n = 0.0;
+  double temperature_high_k = 0.0;
+};
+
+/// A stage behind wires, without the wires: plant, state machine, watchdog, safe stop. Front ends
+/// (CAN, Modbus) of one process share it; every call takes its lock.
+///
+/// While the host measures, each advance() moves the plant by one sample. If none comes for
+/// watchdog_s (of the wall clock, seen by tick()), or advance() reports a limit or a fault, or the
+/// panel leaves its range, or somebody calls fail(), the node stops by itself: its own controller
+/// holds the stage for hold_s in closed loop, or LimitedStage brakes it if the loop is unsound, then
+/// forces go to zero, and the state is fault until an explicit reset. A quick stop goes the same way but ends in switch_on_disabled.
+///
+/// The node's controller runs along with every sample, so that taking over gives no step but the
+/// end of the excitation.
+class StageNode {
+ public:
+  /// The stage must not wait in exchange() (pace 0): it is called under the lock.
+  /// @throws std::invalid_argument if controller or limits do not fit the stage, or an option is
+  /// negative.
+  StageNode(std::unique_ptr<CyclicStage> stage, const StageLimits& limits,
+            const MotionControllerSpec& controller, NodePanel panel, const NodeOptions& options);
+
+  const StageInfo& info() const noexcept { return stage_.info(); }
+  NodeState state() const;
+  FaultCause cause() const;
+  /// One line: why the node is in fault; empty if it is not.
+  std::string trouble() const;
+  std::uint64_t sample() const;  ///< of the current run; those of a safe stop do not count
+  NodePanel panel() const;
+  /// Takes effect with the next tick().
+  void set_panel(NodePanel panel);
+
+  /// enable and reset_fault are refused while the panel is out of range; the reply says what.
+  SupervisorReply request(SupervisorCommand command);
+
+  /// The key of the host that has the stage, while it measures or keeps it reserved; 0: nobody has.
+  std::uint32_t session() const;
+  /// Keeps the stage for one host until its run ends, it is released, or it is no longer enabled.
+  /// @return the key, another one each time. @throws StageError if another host has the stage.
+  std::uint32_t reserve();
+  /// Ends a reservation.
+  void release();
+
+  /// operation_enabled -> measuring; y[0] into `first.y` (size sensors). `session`: of a
+  /// reservation, 0 without. @return the key of the run.
+  /// @throws StageError in any other state, if another host has the stage, or if the stage refuses.
+  std::uint32_t begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& first,
+                          std::uint32_t session = 0);
+  /// u[n] -> y[n+1]. Outcome::fault unless measuring.
+  [[nodiscard]] Outcome advance(std::int64_t now_ns, std::span<const double> u, Inputs& inputs);
+  /// The same with u[n] = C(y[n]) + r[n] of the node's own controller; u[n] into `u`.
+  [[nodiscard]] Outcome advance_excited(std::int64_t now_ns, std::span<const double> r,
+                                        std::span<double> u, Inputs& inputs);
+  /// measuring -> operation_enabled, forces zero.
+  void end_run();
+
+  /// Something outside of the stage failed (bus, heartbeat): safe stop, then fault.
+  void fail(FaultCause cause);
+
+  /// Watchdog, panel and safe stop; to be called at least every millisecond. `now_ns`:
+  /// CLOCK_MONOTONIC, the same clock as in the calls above.
+  void tick(std::int64_t now_ns);
+
+ private:
+  Outcome exchange(std::int64_t now_ns, std::span<const double> u, Inputs& inputs);
+  void give_nothing(Inputs& inputs) const;
+  std::uint32_t holder() const;
+  std::uint32_t draw_key();
+  void hold(std::int64_t now_ns);
+  void come_to_rest();
+
+  // One lock for all of it: a node's own time is not the host's.
+  mutable std::mutex mutex_;
+  LimitedStage stage_;
+  MotionController controller_;
+  NodeStateMachine machine_;
+  NodePanel panel_;
+  std::int64_t watchdog_ns_ = 0;
+  std::int64_t hold_ns_ = 0;
+
+  std::random_device random_;
+  std::uint32_t session_ = 0;  // of the last run or reservation
+  bool reserved_ = false;
+  bool running_ = false;  // the stage is started: forces act in closed loop
+  std::uint64_t sample_ = 0;
+  std::int64_t last_sample_ns_ = 0;
+  std::optional<std::int64_t> hold_began_ns_;
+  std::int64_t held_samples_ = 0;
+  std::string reason_;  // of the fault, if more is known than its cause
+  std::vector<double> y_;
+  std::vector<double> control_;  // C(y), the node's own
+  std::vector<double> command_;
+};
+
+}  // namespace stageid

@@ -1,0 +1,162 @@
+#include "hal/plugin/plugin_stage.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "hal/plugin/stageid_backend.h"
+
+namespace stageid {
+namespace {
+
+constexpr std::size_t kTextSize = 512;
+using Text = std::array<char, kTextSize>;
+
+/// What a library wrote, whether it ended it or not.
+std::string text_of(Text& text) {
+  text.back() = '\0';
+  return text.data();
+}
+
+Outcome outcome_of(int code) noexcept {
+  switch (code) {
+    case STAGEID_OK:
+      return Outcome::ok;
+    case STAGEID_LATE:
+      return Outcome::late;
+    case STAGEID_INCOMPLETE:
+      return Outcome::incomplete;
+    case STAGEID_STALE:
+      return Outcome::stale;
+    case STAGEID_CORRUPT:
+      return Outcome::corrupt;
+    case STAGEID_LINK_DOWN:
+      return Outcome::link_down;
+    default:
+      return Outcome::fault;
+  }
+}
+
+std::vector<stageid_channel> channels_of(const std::vector<Channel>& channels) {
+  std::vector<stageid_channel> out;
+  for (const Channel& channel : channels)
+    out.push_back({channel.name.c_str(), channel.unit.c_str()});
+  return out;
+}
+
+}  // namespace
+
+/// The loaded library and the stage that it opened.
+struct PluginStage::Library {
+  explicit Library(const std::filesystem::path& file) : name(file.string()) {
+    // A name without a slash would be looked for in the system's folders.
+    handle.reset(::dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL));
+    if (!handle)
+      fail(fmt::format("cannot be loaded ({}); build it as a shared library for this machine",
+                       ::dlerror()));
+    using Entry = const struct stageid_backend* (*)();
+    const auto entry = reinterpret_cast<Entry>(::dlsym(handle.get(), "stageid_get_backend"));
+    if (entry == nullptr)
+      fail("has no function stageid_get_backend(); write one as in stageid_backend.h");
+    calls = entry();
+    if (calls == nullptr || calls->version != STAGEID_BACKEND_VERSION)
+      fail(
+          fmt::format("is of interface version {}, this program of {}; build it with this "
+                      "program's stageid_backend.h",
+                      calls == nullptr ? 0 : calls->version, STAGEID_BACKEND_VERSION));
+    if (calls->size < sizeof(struct stageid_backend) || calls->open == nullptr ||
+        calls->describe == nullptr || calls->start == nullptr || calls->exchange == nullptr ||
+        calls->stop == nullptr || calls->trouble == nullptr || calls->close == nullptr)
+      fail("lacks functions; all of struct stageid_backend must be there, and size its size");
+  }
+  Library(const Library&) = delete;
+  Library& operator=(const Library&) = delete;
+  ~Library() {
+    if (stage == nullptr) return;
+    calls->stop(stage);
+    calls->close(stage);
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw StageError(fmt::format("plugin: {}: {}", name, what));
+  }
+
+  void open(const StageInfo& info, const PluginSpec& spec, double pace) {
+    const std::vector<stageid_channel> actuators = channels_of(info.actuators);
+    const std::vector<stageid_channel> sensors = channels_of(info.sensors);
+    std::vector<stageid_key> keys;
+    for (const auto& [key, value] : spec.keys) keys.push_back({key.c_str(), value.c_str()});
+    const stageid_request request = {STAGEID_BACKEND_VERSION,
+                                     info.sample_rate_hz,
+                                     pace,
+                                     static_cast<std::uint32_t>(actuators.size()),
+                                     static_cast<std::uint32_t>(sensors.size()),
+                                     static_cast<std::uint32_t>(keys.size()),
+                                     actuators.data(),
+                                     sensors.data(),
+                                     keys.data()};
+    Text error{};
+    stage = calls->open(&request, error.data(), error.size());
+    if (stage == nullptr) fail(text_of(error));
+  }
+
+  std::string name;
+  std::unique_ptr<void, int (*)(void*)> handle{nullptr, ::dlclose};
+  const struct stageid_backend* calls = nullptr;
+  void* stage = nullptr;
+};
+
+PluginStage::PluginStage(StageInfo info, const PluginSpec& spec, double pace)
+    : info_(std::move(info)), library_(std::make_unique<Library>(spec.library)) {
+  library_->open(info_, spec, pace);
+  stageid_description description{};
+  library_->calls->describe(library_->stage, &description);
+  if (description.maximum_rate_hz > 0.0 && description.maximum_rate_hz < info_.sample_rate_hz)
+    library_->fail(fmt::format("carries {} Hz at most; the stage file asks for {} Hz",
+                               description.maximum_rate_hz, info_.sample_rate_hz));
+  info_.backend = "plugin";
+  if (description.maximum_rate_hz > 0.0) info_.maximum_rate_hz = description.maximum_rate_hz;
+  if (description.transport_delay_s > 0.0) info_.transport_delay_s = description.transport_delay_s;
+  info_.clock = description.virtual_time != 0 ? Clock::virtual_time : Clock::wall;
+  info_.pace = info_.clock == Clock::wall && pace > 0.0 ? pace : 1.0;
+}
+
+PluginStage::~PluginStage() = default;
+
+void PluginStage::start(std::uint64_t run_seed, Inputs& first) {
+  stageid_sample sample{first.y.data(), 0, 0, 0};
+  Text error{};
+  if (library_->calls->start(library_->stage, run_seed, &sample, error.data(), error.size()) != 0) {
+    stop();
+    library_->fail(text_of(error));
+  }
+  first.cycle = 0;
+  first.valid = sample.valid;
+  first.t_sample_ns = sample.t_sample_ns;
+  first.t_rx_ns = sample.t_receive_ns;
+  first.node_state = NodeState::operation_enabled;
+}
+
+Outcome PluginStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept {
+  stageid_sample sample{inputs.y.data(), 0, inputs.t_sample_ns, inputs.t_rx_ns};
+  const int code = library_->calls->exchange(library_->stage, outputs.cycle, outputs.u.data(),
+                                             deadline.t_ns, &sample);
+  inputs.cycle = outputs.cycle + 1;
+  inputs.valid = sample.valid;
+  inputs.t_sample_ns = sample.t_sample_ns;
+  inputs.t_rx_ns = sample.t_receive_ns;
+  return outcome_of(code);
+}
+
+void PluginStage::stop() noexcept { library_->calls->stop(library_->stage); }
+
+std::string PluginStage::trouble() const {
+  Text text{};
+  library_->calls->trouble(library_->stage, text.data(), text.size());
+  return text_of(text);
+}
+
+}  // namespace stageid

@@ -1,0 +1,159 @@
+#include "hal/simulator/modal_plant.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "hal/simulator/modal_propagator.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kLanes = 8;     // one AVX-512 register of doubles, two of AVX2
+constexpr double kLongestDelay = 1e5;  // samples; all of them are stored
+
+Eigen::Index padded(Eigen::Index n) { return (n + kLanes - 1) / kLanes * kLanes; }
+
+void check(const std::vector<PlantMode>& modes, double delay_s, double sample_rate_hz) {
+  if (modes.empty()) throw std::invalid_argument("plant: at least one mode is needed");
+  if (!(sample_rate_hz > 0.0) || !std::isfinite(sample_rate_hz))
+    throw std::invalid_argument(
+        fmt::format("plant: the sample rate must be positive, not {} Hz", sample_rate_hz));
+  if (!(delay_s >= 0.0) || !std::isfinite(delay_s))
+    throw std::invalid_argument(
+        fmt::format("plant: the delay must not be negative: {} s", delay_s));
+  if (delay_s * sample_rate_hz > kLongestDelay)
+    throw std::invalid_argument(
+        fmt::format("plant: a delay of {} s is {:.0f} samples; at most {:.0f}", delay_s,
+                    delay_s * sample_rate_hz, kLongestDelay));
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    const PlantMode& mode = modes[i];
+    if (!(mode.natural_frequency_hz >= 0.0) || !std::isfinite(mode.natural_frequency_hz))
+      throw std::invalid_argument(fmt::format("plant: mode {}: natural_frequency_hz is {}", i + 1,
+                                              mode.natural_frequency_hz));
+    if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0))
+      throw std::invalid_argument(fmt::format(
+          "plant: mode {}: damping_ratio must be in [0, 1), not {}", i + 1, mode.damping_ratio));
+    if (mode.actuator_shape.size() != modes[0].actuator_shape.size() ||
+        mode.sensor_shape.size() != modes[0].sensor_shape.size())
+      throw std::invalid_argument(
+          fmt::format("plant: mode {}: its shapes differ in size from those of mode 1", i + 1));
+    if (!mode.actuator_shape.allFinite() || !mode.sensor_shape.allFinite())
+      throw std::invalid_argument(fmt::format("plant: mode {}: a shape is not finite", i + 1));
+  }
+}
+
+}  // namespace
+
+ModalPlant::ModalPlant(const std::vector<PlantMode>& modes, double delay_s, double sample_rate_hz) {
+  check(modes, delay_s, sample_rate_hz);
+  actuators_ = modes[0].actuator_shape.size();
+  sensors_ = modes[0].sensor_shape.size();
+  const auto count = static_cast<Eigen::Index>(modes.size());
+  modes_ = padded(count);
+  period_s_ = 1.0 / sample_rate_hz;
+  const double whole = std::floor(delay_s * sample_rate_hz);
+  fraction_ = delay_s * sample_rate_hz - whole;
+
+  actuator_shape_.setZero(modes_, actuators_);
+  sensor_shape_.setZero(padded(sensors_), modes_);
+  step_.setZero(modes_, 8);
+  undelayed_.setZero(modes_, 2);
+  held_.setZero(modes_, static_cast<Eigen::Index>(whole) + 2);
+  q_.setZero(modes_);
+  v_.setZero(modes_);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const PlantMode& mode = modes[static_cast<std::size_t>(i)];
+    retune(i, mode.natural_frequency_hz, mode.damping_ratio);
+    actuator_shape_.row(i) = mode.actuator_shape.transpose();
+    sensor_shape_.col(i).head(sensors_) = mode.sensor_shape;
+  }
+}
+
+void ModalPlant::retune(Eigen::Index mode, double natural_frequency_hz,
+                        double damping_ratio) noexcept {
+  const double omega = 2.0 * std::numbers::pi * natural_frequency_hz;
+  const auto over = [&](double part) {
+    return modal_propagator(omega, damping_ratio, part * period_s_);
+  };
+  const ModalPropagator all = over(1.0);
+  const ModalPropagator late = over(1.0 - fraction_);
+  const Eigen::Vector2d of_old = late.transition * over(fraction_).input;
+  const Eigen::Matrix2d& e = all.transition;
+  step_.row(mode) << e(0, 0), e(0, 1), e(1, 0), e(1, 1), of_old[0], of_old[1], late.input[0],
+      late.input[1];
+  undelayed_.row(mode) << all.input[0], all.input[1];
+}
+
+void ModalPlant::reset() noexcept {
+  held_.setZero();
+  q_.setZero();
+  v_.setZero();
+  newest_ = 0;
+  extra_mode_ = -1;
+}
+
+void ModalPlant::modal_force(const double* u, double* __restrict__ force) const noexcept {
+  for (Eigen::Index block = 0; block < modes_; block += kLanes) {
+    double sum[kLanes] = {};
+    const double* shape = actuator_shape_.data() + block;
+    for (Eigen::Index j = 0; j < actuators_; ++j, shape += modes_)
+      for (Eigen::Index lane = 0; lane < kLanes; ++lane) sum[lane] += u[j] * shape[lane];
+    for (Eigen::Index lane = 0; lane < kLanes; ++lane) force[block + lane] = sum[lane];
+  }
+}
+
+void ModalPlant::step(const double* u) noexcept {
+  // held_ has d + 2 columns; with u[n] in column `newest_`, u[n-d] lies d columns back, which is
+  // two ahead in the ring, and u[n-d-1] one ahead.
+  const Eigen::Index columns = held_.cols();
+  newest_ = newest_ + 1 == columns ? 0 : newest_ + 1;
+  modal_force(u, held_.data() + newest_ * modes_);
+  const Eigen::Index older = newest_ + 1 == columns ? 0 : newest_ + 1;
+  const Eigen::Index newer = older + 1 == columns ? 0 : older + 1;
+  const double* old_force = held_.data() + older * modes_;
+  const double* new_force = held_.data() + newer * modes_;
+  const double* c = step_.data();
+  double* __restrict__ q = q_.data();
+  double* __restrict__ v = v_.data();
+  const Eigen::Index n = modes_;
+  for (Eigen::Index block = 0; block < n; block += kLanes) {
+    for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
+      const Eigen::Index i = block + lane;
+      const double q_next =
+          c[i] * q[i] + c[n + i] * v[i] + c[4 * n + i] * old_force[i] + c[6 * n + i] * new_force[i];
+      const double v_next = c[2 * n + i] * q[i] + c[3 * n + i] * v[i] +
+                            c[5 * n + i] * old_force[i] + c[7 * n + i] * new_force[i];
+      q[i] = q_next;
+      v[i] = v_next;
+    }
+  }
+  if (extra_mode_ >= 0) {
+    q[extra_mode_] += undelayed_(extra_mode_, 0) * extra_force_;
+    v[extra_mode_] += undelayed_(extra_mode_, 1) * extra_force_;
+    extra_mode_ = -1;
+  }
+}
+
+void ModalPlant::output(double* y) const noexcept {
+  const Eigen::Index rows = sensor_shape_.rows();
+  for (Eigen::Index block = 0; block < rows; block += kLanes) {
+    // Four partial sums: the chain of dependent additions is a quarter as long.
+    double sum[4][kLanes] = {};
+    const double* shape = sensor_shape_.data() + block;
+    for (Eigen::Index i = 0; i < modes_; i += 4)
+      for (Eigen::Index part = 0; part < 4; ++part, shape += rows)
+        for (Eigen::Index lane = 0; lane < kLanes; ++lane)
+          sum[part][lane] += q_[i + part] * shape[lane];
+    const Eigen::Index used = std::min(kLanes, sensors_ - block);
+    double total[kLanes];
+    for (Eigen::Index lane = 0; lane < kLanes; ++lane)
+      total[lane] = (sum[0][lane] + sum[1][lane]) + (sum[2][lane] + sum[3][lane]);
+    for (Eigen::Index lane = 0; lane < used; ++lane) y[block + lane] = total[lane];
+  }
+}
+
+}  // namespace stageid

@@ -1,0 +1,113 @@
+// Frequency responses in closed form, by partial fractions over the poles. Nothing here is shared
+// with the simulator, which goes through real propagators in the time domain.
+//
+// One mode, 1 / ((s - p)(s - p*)), is the divided difference over p and p* of 1 / (s - p). Through
+// a hold delayed by (d + e) samples, 0 <= e < 1, and a sampler, 1 / (s - p) becomes
+//   z^-d [ f((1-e) T) + e^(p (1-e) T) f(e T) z^-1 ] / (z - e^(p T)),   f(t) = (e^(p t) - 1) / p.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <stdexcept>
+
+#include "hal/simulator/simulated_stage.hpp"
+
+namespace stageid {
+namespace {
+
+using Complex = std::complex<double>;
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+
+// e^z - 1 without cancellation for small z: e^x cos y - 1 = expm1(x) cos y - 2 sin^2(y/2).
+Complex expm1(Complex z) {
+  const double half_sine = std::sin(0.5 * z.imag());
+  return {std::expm1(z.real()) * std::cos(z.imag()) - 2.0 * half_sine * half_sine,
+          std::exp(z.real()) * std::sin(z.imag())};
+}
+
+struct Sampling {
+  double period_s;
+  double omega_rad_s;
+  double fraction;    // e
+  Complex z_inverse;  // e^(-j omega T)
+  Complex z_delay;    // z^-d
+};
+
+Sampling sampling(double delay_s, double sample_rate_hz, double frequency_hz) {
+  const double whole = std::floor(delay_s * sample_rate_hz);
+  const double turns = frequency_hz / sample_rate_hz;
+  return {1.0 / sample_rate_hz, kTwoPi * frequency_hz, delay_s * sample_rate_hz - whole,
+          std::polar(1.0, -kTwoPi * turns), std::polar(1.0, -kTwoPi * turns * whole)};
+}
+
+// 1 / (s - p), sampled. z - e^(pT) = e^(pT) (e^((j omega - p) T) - 1) keeps its digits near the
+// pole.
+Complex sampled_first_order(Complex pole, const Sampling& at) {
+  const double late = (1.0 - at.fraction) * at.period_s;
+  const double early = at.fraction * at.period_s;
+  const Complex numerator =
+      (expm1(pole * late) + std::exp(pole * late) * expm1(pole * early) * at.z_inverse) / pole;
+  const Complex j_omega(0.0, at.omega_rad_s);
+  const Complex denominator = std::exp(pole * at.period_s) * expm1((j_omega - pole) * at.period_s);
+  return at.z_delay * numerator / denominator;
+}
+
+// 1 / s^2, sampled: position and velocity of a free mass under two held forces an interval.
+Complex sampled_double_integrator(const Sampling& at) {
+  const double late = (1.0 - at.fraction) * at.period_s;
+  const double early = at.fraction * at.period_s;
+  const Complex position = 0.5 * late * late + (early * late + 0.5 * early * early) * at.z_inverse;
+  const Complex velocity = late + early * at.z_inverse;
+  const Complex z_minus_1 = expm1(Complex(0.0, at.omega_rad_s * at.period_s));
+  return at.z_delay * (position + at.period_s * velocity / z_minus_1) / z_minus_1;
+}
+
+Complex sampled_mode(const PlantMode& mode, const Sampling& at) {
+  if (mode.natural_frequency_hz == 0.0) return sampled_double_integrator(at);
+  const double omega = kTwoPi * mode.natural_frequency_hz;
+  const double zeta = mode.damping_ratio;
+  const Complex pole(-zeta * omega, omega * std::sqrt(1.0 - zeta * zeta));
+  return (sampled_first_order(pole, at) - sampled_first_order(std::conj(pole), at)) /
+         Complex(0.0, 2.0 * pole.imag());
+}
+
+template <typename ModalResponse>
+Eigen::MatrixXcd sum_of_modes(const std::vector<PlantMode>& modes, ModalResponse response) {
+  if (modes.empty()) throw std::invalid_argument("plant response: at least one mode is needed");
+  Eigen::MatrixXcd sum =
+      Eigen::MatrixXcd::Zero(modes[0].sensor_shape.size(), modes[0].actuator_shape.size());
+  for (const PlantMode& mode : modes) {
+    if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0)) {
+      throw std::invalid_argument(fmt::format(
+          "plant response: damping_ratio must be in [0, 1), not {}", mode.damping_ratio));
+    }
+    sum += response(mode) * (mode.sensor_shape * mode.actuator_shape.transpose());
+  }
+  return sum;
+}
+
+}  // namespace
+
+Eigen::MatrixXcd continuous_response(const std::vector<PlantMode>& modes, double frequency_hz) {
+  const double omega = kTwoPi * frequency_hz;
+  return sum_of_modes(modes, [omega](const PlantMode& mode) {
+    const double omega_0 = kTwoPi * mode.natural_frequency_hz;
+    return 1.0 / Complex((omega_0 - omega) * (omega_0 + omega),
+                         2.0 * mode.damping_ratio * omega_0 * omega);
+  });
+}
+
+Eigen::MatrixXcd sampled_response(const std::vector<PlantMode>& modes, double delay_s,
+                                  double sample_rate_hz, double frequency_hz) {
+  if (!(sample_rate_hz > 0.0) || !(delay_s >= 0.0)) {
+    throw std::invalid_argument(
+        fmt::format("plant response: needs a positive sample rate and a delay of at least 0, not "
+                    "{} Hz and {} s",
+                    sample_rate_hz, delay_s));
+  }
+  const Sampling at = sampling(delay_s, sample_rate_hz, frequency_hz);
+  return sum_of_modes(modes, [&at](const PlantMode& mode) { return sampled_mode(mode, at); });
+}
+
+}  // namespace stageid

@@ -1,0 +1,142 @@
+#include "hal/simulator/rigid_body.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+using std::numbers::pi;
+using Jacobian = Eigen::MatrixXd;
+
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix) {
+  return matrix.completeOrthogonalDecomposition().pseudoInverse();
+}
+
+// J^+ J is the projection on the motions that the channels see; an axis lies wholly in it exactly
+// if its unit vector is left unchanged. J^+ mixes metres and radians, the row it leaves does not.
+void require_independent(const Jacobian& jacobian, const Eigen::MatrixXd& inverse,
+                         Eigen::Index axis, const char* what) {
+  constexpr double kTolerance = 1e-9;
+  Eigen::RowVectorXd row = inverse.row(axis) * jacobian;
+  row[axis] -= 1.0;
+  if (row.cwiseAbs().maxCoeff() > kTolerance) {
+    throw std::invalid_argument(fmt::format(
+        "controller: axis {} is closed, but the {} do not reach it independently of the "
+        "other axes; add {} or leave the axis open",
+        kRigidAxisNames[static_cast<std::size_t>(axis)], what, what));
+  }
+}
+
+// The gain that makes |C(j w_c)| / (inertia w_c^2) = 1.
+double unit_crossover_gain(AxisController axis, double inertia, const char* name) {
+  if (!(inertia > 0.0) || !std::isfinite(inertia)) {
+    throw std::invalid_argument(fmt::format(
+        "controller: axis {} has gain 0 (automatic), which needs a positive inertia, not {}", name,
+        inertia));
+  }
+  axis.gain = 1.0;
+  const double omega = 2.0 * pi * axis.crossover_hz;
+  return inertia * omega * omega / std::abs(axis_response(axis, axis.crossover_hz));
+}
+
+}  // namespace
+
+Eigen::MatrixXd rigid_body_jacobian(const std::vector<Channel>& channels) {
+  Eigen::MatrixXd jacobian(static_cast<Eigen::Index>(channels.size()), 6);
+  for (Eigen::Index row = 0; row < jacobian.rows(); ++row) {
+    const Channel& channel = channels[static_cast<std::size_t>(row)];
+    const auto position = Eigen::Map<const Eigen::RowVector3d>(channel.position_m);
+    const auto direction = Eigen::Map<const Eigen::RowVector3d>(channel.direction);
+    jacobian.block<1, 3>(row, 0) = direction;
+    jacobian.block<1, 3>(row, 3) = position.cross(direction);
+  }
+  return jacobian;
+}
+
+std::complex<double> axis_response(const AxisController& axis, double frequency_hz) {
+  const std::complex<double> s(0.0, 2.0 * pi * frequency_hz);
+  const auto omega = [](double hz) { return 2.0 * pi * hz; };
+  std::complex<double> value = axis.gain;
+  if (axis.integrator_hz > 0.0) value *= 1.0 + omega(axis.integrator_hz) / s;
+  if (axis.lead_zero_hz > 0.0) value *= s / omega(axis.lead_zero_hz) + 1.0;
+  if (axis.lead_pole_hz > 0.0) value /= s / omega(axis.lead_pole_hz) + 1.0;
+  if (axis.lowpass_hz > 0.0) {
+    const std::complex<double> x = s / omega(axis.lowpass_hz);
+    value /= x * x + 2.0 * axis.lowpass_damping * x + 1.0;
+  }
+  for (const auto& notch : axis.notches) {
+    const std::complex<double> x = s / omega(notch.frequency_hz);
+    value *=
+        (x * x + 2.0 * notch.zero_damping * x + 1.0) / (x * x + 2.0 * notch.pole_damping * x + 1.0);
+  }
+  return value;
+}
+
+MotionControllerSpec motion_controller_spec(double sample_rate_hz,
+                                            const std::vector<Channel>& actuators,
+                                            const std::vector<Channel>& sensors,
+                                            const std::array<AxisController, kRigidAxes>& axes,
+                                            const std::array<double, kRigidAxes>& axis_inertia) {
+  const Jacobian actuator_jacobian = rigid_body_jacobian(actuators);
+  const Jacobian sensor_jacobian = rigid_body_jacobian(sensors);
+  const Eigen::MatrixXd actuator_inverse = pseudo_inverse(actuator_jacobian);
+  const Eigen::MatrixXd sensor_inverse = pseudo_inverse(sensor_jacobian);
+
+  MotionControllerSpec spec;
+  spec.sample_rate_hz = sample_rate_hz;
+  spec.sensor_decoupling = sensor_inverse;
+  spec.actuator_decoupling = actuator_inverse.transpose();
+  spec.axes.assign(axes.begin(), axes.end());
+  for (std::size_t i = 0; i < kRigidAxes; ++i) {
+    AxisController& axis = spec.axes[i];
+    if (axis.crossover_hz == 0.0) continue;
+    const auto row = static_cast<Eigen::Index>(i);
+    require_independent(sensor_jacobian, sensor_inverse, row, "sensors");
+    require_independent(actuator_jacobian, actuator_inverse, row, "actuators");
+    if (axis.gain == 0.0) {
+      axis.gain = unit_crossover_gain(axis, axis_inertia[i], kRigidAxisNames[i]);
+    }
+  }
+  static_cast<void>(MotionController(spec));  // checks the rest
+  return spec;
+}
+
+RigidMotion rigid_motion(const MotionControllerSpec& controller,
+                         const std::vector<Channel>& actuators,
+                         const std::vector<Channel>& sensors) {
+  const Jacobian actuator_jacobian = rigid_body_jacobian(actuators);
+  const Jacobian sensor_jacobian = rigid_body_jacobian(sensors);
+  RigidMotion motion;
+  const auto add = [](Eigen::MatrixXd& sum, const Eigen::MatrixXd& term) {
+    sum = sum.size() == 0 ? term : sum + term;
+  };
+  for (std::size_t i = 0; i < controller.axes.size(); ++i) {
+    const AxisController& axis = controller.axes[i];
+    if (axis.crossover_hz == 0.0) continue;
+    const auto k = static_cast<Eigen::Index>(i);
+    const double omega = 2.0 * pi * axis.crossover_hz;
+    const double inertia = std::abs(axis_response(axis, axis.crossover_hz)) / (omega * omega);
+    motion.bandwidth_rad_s =
+        motion.bandwidth_rad_s == 0.0 ? omega : std::min(motion.bandwidth_rad_s, omega);
+    add(motion.acceleration_per_n,
+        sensor_jacobian.col(k) * actuator_jacobian.col(k).transpose() / inertia);
+    const double braked = axis.brake ? inertia : 0.0;
+    add(motion.force_per_acceleration,
+        braked * controller.actuator_decoupling.col(k) * controller.sensor_decoupling.row(k));
+  }
+  // y - J q for the least-squares motion q: nothing is left where there are no more sensors than axes.
+  const Eigen::MatrixXd rest =
+      Eigen::MatrixXd::Identity(sensor_jacobian.rows(), sensor_jacobian.rows()) -
+      sensor_jacobian * controller.sensor_decoupling;
+  if (motion.bandwidth_rad_s > 0.0 && rest.cwiseAbs().maxCoeff() > 1e-9)
+    motion.contradiction = rest;
+  return motion;
+}
+
+}  // namespace stageid

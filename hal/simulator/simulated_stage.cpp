@@ -1,0 +1,211 @@
+#include "hal/simulator/simulated_stage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "hal/simulator/fault_script.hpp"
+#include "hal/simulator/modal_plant.hpp"
+#include "hal/simulator/noise.hpp"
+#include "hal/simulator/wafer_stage_check.hpp"
+#include "hal/stage/pacer.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kHeaveMode = 2;  // of wafer_stage_modes(): x y z ...
+
+NoiseSpec noise_of(const WaferStageSpec& spec) {
+  return {static_cast<Eigen::Index>(spec.info.actuators.size()),
+          static_cast<Eigen::Index>(spec.info.sensors.size()),
+          spec.info.sample_rate_hz,
+          spec.force_noise_n,
+          spec.sensor_noise_m,
+          spec.sensor_noise_coloured_m,
+          spec.sensor_noise_corner_hz};
+}
+
+std::uint64_t all_bits(std::size_t count) {
+  return count >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
+}
+
+StageInfo info_of(const WaferStageSpec& spec) {
+  StageInfo info = spec.info;
+  if (info.backend.empty()) info.backend = "sim";
+  if (info.maximum_rate_hz == 0.0) info.maximum_rate_hz = info.sample_rate_hz;
+  info.transport_delay_s = spec.delay_s;
+  info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
+  if (spec.pace > 0.0) info.pace = spec.pace;
+  return info;
+}
+
+void quantize(Eigen::ArrayXd& values, double quantum) {
+  for (double& value : values) value = quantum * std::nearbyint(value / quantum);
+}
+
+// Adding the products with zero leaves zero exactly if every entry is finite: no branch an entry.
+bool all_finite(std::span<const double> values) {
+  double sum = 0.0;
+  for (const double value : values) sum += 0.0 * value;
+  return sum == 0.0;
+}
+
+}  // namespace
+
+struct SimulatedStage::State {
+  explicit State(const WaferStageSpec& checked)
+      : spec(checked),
+        info(info_of(checked)),
+        modes(wafer_stage_modes(checked)),
+        plant(modes, checked.delay_s, checked.info.sample_rate_hz),
+        noise(noise_of(checked)),
+        pacer(checked.info.sample_rate_hz, checked.pace),
+        faults(checked.faults, checked.info),
+        u(Eigen::ArrayXd::Zero(plant.actuators())),
+        commanded(Eigen::ArrayXd::Zero(plant.actuators())),
+        applied(Eigen::ArrayXd::Zero(plant.actuators())),
+        y(Eigen::ArrayXd::Zero(plant.sensors())),
+        last_y(Eigen::ArrayXd::Zero(plant.sensors())),
+        all_sensors(all_bits(checked.info.sensors.size())) {}
+
+  WaferStageSpec spec;
+  StageInfo info;
+  std::vector<PlantMode> modes;
+  ModalPlant plant;
+  StageNoise noise;
+  Pacer pacer;
+  FaultScript faults;
+  Eigen::ArrayXd u;          // what drives the plant, disturbance included
+  Eigen::ArrayXd commanded;  // the last command that arrived
+  Eigen::ArrayXd applied;    // what the amplifiers make of it
+  Eigen::ArrayXd y;
+  Eigen::ArrayXd last_y;
+  std::uint64_t all_sensors;
+  std::uint64_t cycle = 0;
+  int run = -1;
+  bool running = false;
+
+  bool take_command(std::span<const double> command, bool missed, bool off) noexcept;
+  void drive() noexcept;
+  void measure() noexcept;
+};
+
+// What the amplifiers make of the command. False: it was not finite and has been refused.
+bool SimulatedStage::State::take_command(std::span<const double> command, bool missed,
+                                         bool off) noexcept {
+  const bool good = missed || all_finite(command);
+  if (!missed && good) std::copy(command.begin(), command.end(), commanded.begin());
+  u = commanded;
+  if (off) u.setZero();
+  if (spec.actuator_quantum_n > 0.0) quantize(u, spec.actuator_quantum_n);
+  if (spec.actuator_saturation_n > 0.0)
+    u = u.min(spec.actuator_saturation_n).max(-spec.actuator_saturation_n);
+  if (!faults.empty() && !off)
+    faults.drive(cycle, {applied.data(), command.size()}, {u.data(), command.size()});
+  applied = u;
+  return good;
+}
+
+void SimulatedStage::State::drive() noexcept {
+  noise.next();
+  u += Eigen::Map<const Eigen::ArrayXd>(noise.force_n(), u.size());
+  if (spec.cubic_stiffness_n_m3 > 0.0) {
+    // Taken at the start of the interval and held over it: exact for the sampled nonlinearity.
+    const double shape = 1.0 / std::sqrt(spec.mass_kg);
+    const double z_m = shape * plant.coordinate(kHeaveMode);
+    plant.add_modal_force(kHeaveMode, -shape * spec.cubic_stiffness_n_m3 * z_m * z_m * z_m);
+  }
+  plant.step(u.data());
+}
+
+void SimulatedStage::State::measure() noexcept {
+  last_y = y;
+  plant.output(y.data());
+  y += Eigen::Map<const Eigen::ArrayXd>(noise.sensor_m(), y.size());
+  if (spec.sensor_quantum_m > 0.0) quantize(y, spec.sensor_quantum_m);
+}
+
+SimulatedStage::SimulatedStage(const WaferStageSpec& spec) {
+  require_valid(spec);
+  state_ = std::make_unique<State>(spec);
+}
+
+SimulatedStage::~SimulatedStage() = default;
+
+const StageInfo& SimulatedStage::info() const noexcept { return state_->info; }
+
+const std::vector<PlantMode>& SimulatedStage::modes() const noexcept { return state_->modes; }
+
+void SimulatedStage::displacement(std::span<double> y_m) const noexcept {
+  if (y_m.size() == state_->info.sensors.size()) state_->plant.output(y_m.data());
+}
+
+void SimulatedStage::start(std::uint64_t run_seed, Inputs& first) {
+  State& s = *state_;
+  if (first.y.size() != s.info.sensors.size())
+    throw std::invalid_argument("simulated stage: Inputs::y must have one entry a sensor");
+  ++s.run;
+  s.faults.start_run(s.run);
+  s.cycle = 0;
+  s.plant.reset();
+  s.commanded.setZero();
+  s.applied.setZero();
+  s.y.setZero();
+  s.noise.restart(s.spec.seed, run_seed);
+  s.noise.next();
+  s.measure();
+  const Pacer::Instant now = s.pacer.restart();
+  std::copy(s.y.begin(), s.y.end(), first.y.begin());
+  first.cycle = 0;
+  first.t_sample_ns = now.sample_ns;
+  first.t_rx_ns = now.now_ns;
+  first.valid = s.all_sensors;
+  first.node_state = NodeState::operation_enabled;
+  s.running = true;
+}
+
+Outcome SimulatedStage::exchange(const Outputs& outputs, Inputs& inputs,
+                                 Deadline deadline) noexcept {
+  State& s = *state_;
+  if (!s.running || outputs.u.size() != static_cast<std::size_t>(s.u.size()) ||
+      inputs.y.size() != static_cast<std::size_t>(s.y.size())) {
+    inputs.valid = 0;
+    inputs.node_state = NodeState::switch_on_disabled;
+    return Outcome::fault;
+  }
+  const bool faulty = !s.faults.empty();
+  const bool missed = faulty && s.faults.missed(s.cycle);
+  const bool off = faulty && s.faults.interlock(s.cycle);
+  const bool accepted = s.take_command(outputs.u, missed, off);
+  s.drive();
+  s.measure();
+  const std::span<double> fresh{s.y.data(), inputs.y.size()};
+  const std::uint64_t missing =
+      faulty ? s.faults.spoil(s.cycle, fresh, {s.last_y.data(), inputs.y.size()}) : 0;
+  const Pacer::Instant now = s.pacer.wait();
+
+  ++s.cycle;
+  inputs.cycle = s.cycle;
+  inputs.t_sample_ns = now.sample_ns;
+  inputs.t_rx_ns = now.now_ns;
+  inputs.t_ready_ns = now.ready_ns;
+  inputs.node_state = off || !accepted ? NodeState::fault : NodeState::operation_enabled;
+  inputs.valid = missed ? 0 : s.all_sensors & ~missing;
+  if (missed) {
+    s.y = s.last_y;
+  } else {
+    std::copy(fresh.begin(), fresh.end(), inputs.y.begin());
+  }
+  if (off || !accepted) return Outcome::fault;
+  if (missed) return Outcome::stale;
+  if (missing != 0) return Outcome::incomplete;
+  const bool past_deadline = deadline.t_ns != 0 && now.now_ns > deadline.t_ns;
+  return now.late || past_deadline ? Outcome::late : Outcome::ok;
+}
+
+void SimulatedStage::stop() noexcept {
+  state_->running = false;
+  state_->commanded.setZero();
+}
+
+}  // namespace stageid

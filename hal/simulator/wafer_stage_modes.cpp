@@ -1,0 +1,62 @@
+#include <algorithm>
+#include <cmath>
+
+#include "hal/simulator/plate_modes.hpp"
+#include "hal/simulator/rigid_body.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "hal/simulator/wafer_stage_check.hpp"
+
+namespace stageid {
+namespace {
+
+// One mode a degree of freedom, each on a spring of its own: shape J(:, axis) / sqrt(inertia).
+void append_rigid_body(const WaferStageSpec& spec, std::vector<PlantMode>& modes) {
+  const Eigen::MatrixXd actuators = rigid_body_jacobian(spec.info.actuators);
+  const Eigen::MatrixXd sensors = rigid_body_jacobian(spec.info.sensors);
+  for (std::size_t axis = 0; axis < kRigidAxes; ++axis) {
+    const double inertia = axis < 3 ? spec.mass_kg : spec.inertia_kg_m2[axis - 3];
+    const auto column = static_cast<Eigen::Index>(axis);
+    modes.push_back({spec.suspension_hz[axis], spec.suspension_damping,
+                     actuators.col(column) / std::sqrt(inertia),
+                     sensors.col(column) / std::sqrt(inertia)});
+  }
+}
+
+// A shape whose mean square over the plate is 1 has the modal mass of the whole plate.
+Eigen::VectorXd shape_at(const PlateModes& plate, int mode, double mass_kg,
+                         const std::vector<Channel>& channels) {
+  Eigen::VectorXd shape(static_cast<Eigen::Index>(channels.size()));
+  for (Eigen::Index i = 0; i < shape.size(); ++i) {
+    const Channel& channel = channels[static_cast<std::size_t>(i)];
+    shape[i] = channel.direction[2] *
+               plate.shape(mode, channel.position_m[0], channel.position_m[1]) / std::sqrt(mass_kg);
+  }
+  return shape;
+}
+
+void append_flexible(const WaferStageSpec& spec, std::vector<PlantMode>& modes) {
+  if (spec.flexible_modes == 0) return;
+  const PlateModes plate({spec.length_x_m, spec.length_y_m, spec.poisson_ratio},
+                         spec.flexible_modes);
+  for (int i = 0; i < plate.count(); ++i) {
+    const std::size_t damping =
+        std::min(static_cast<std::size_t>(i), spec.flexible_damping.size() - 1);
+    modes.push_back({spec.first_mode_hz * plate.wave_parameter(i) / plate.wave_parameter(0),
+                     spec.flexible_damping[damping],
+                     shape_at(plate, i, spec.mass_kg, spec.info.actuators),
+                     shape_at(plate, i, spec.mass_kg, spec.info.sensors)});
+  }
+}
+
+}  // namespace
+
+std::vector<PlantMode> wafer_stage_modes(const WaferStageSpec& spec) {
+  require_valid(spec);
+  std::vector<PlantMode> modes;
+  append_rigid_body(spec, modes);
+  append_flexible(spec, modes);
+  modes.insert(modes.end(), spec.in_plane_modes.begin(), spec.in_plane_modes.end());
+  return modes;
+}
+
+}  // namespace stageid

@@ -1,0 +1,104 @@
+#include "hal/stage/controller_sections.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+
+// c2 s^2 + c1 s + c0
+struct Quadratic {
+  double c2, c1, c0;
+};
+
+// s -> k (z - 1) / (z + 1), multiplied through by (z + 1)^2 and divided by z^2.
+BiquadSection tustin(const Quadratic& numerator, const Quadratic& denominator, double k) {
+  const auto substitute = [k](const Quadratic& q, double out[3]) {
+    const double square = q.c2 * k * k;
+    const double linear = q.c1 * k;
+    out[0] = square + linear + q.c0;
+    out[1] = 2.0 * (q.c0 - square);
+    out[2] = square - linear + q.c0;
+  };
+  double b[3];
+  double a[3];
+  substitute(numerator, b);
+  substitute(denominator, a);
+  return {b[0] / a[0], b[1] / a[0], b[2] / a[0], a[1] / a[0], a[2] / a[0]};
+}
+
+// Maps this frequency exactly.
+double prewarped(double frequency_hz, double sample_rate_hz) {
+  return kTwoPi * frequency_hz / std::tan(std::numbers::pi * frequency_hz / sample_rate_hz);
+}
+
+[[noreturn]] void refuse(const char* field, double value, const std::string& wanted) {
+  throw std::invalid_argument(
+      fmt::format("controller: {} is {}; must be {}", field, value, wanted));
+}
+
+void check_frequency(const char* field, double hz, double nyquist_hz, bool zero_allowed) {
+  const bool holds = (zero_allowed ? hz >= 0.0 : hz > 0.0) && hz < nyquist_hz;
+  if (!holds)
+    refuse(field, hz,
+           fmt::format("{} and below the Nyquist frequency, {} Hz",
+                       zero_allowed ? "0 (off) or positive" : "positive", nyquist_hz));
+}
+
+void check(const AxisController& axis, double nyquist_hz) {
+  if (!std::isfinite(axis.gain)) refuse("gain", axis.gain, "finite");
+  check_frequency("crossover_hz", axis.crossover_hz, nyquist_hz, false);
+  check_frequency("integrator_hz", axis.integrator_hz, nyquist_hz, true);
+  check_frequency("lead_zero_hz", axis.lead_zero_hz, nyquist_hz, true);
+  check_frequency("lead_pole_hz", axis.lead_pole_hz, nyquist_hz, true);
+  check_frequency("lowpass_hz", axis.lowpass_hz, nyquist_hz, true);
+  if (axis.lead_zero_hz > 0.0 && axis.lead_pole_hz == 0.0)
+    refuse("lead_pole_hz", 0.0, "positive where there is a lead_zero_hz");
+  if (axis.lowpass_hz > 0.0 && !(axis.lowpass_damping > 0.0 && std::isfinite(axis.lowpass_damping)))
+    refuse("lowpass_damping", axis.lowpass_damping, "positive");
+  for (const auto& notch : axis.notches) {
+    check_frequency("notch frequency_hz", notch.frequency_hz, nyquist_hz, false);
+    if (!(notch.zero_damping >= 0.0 && std::isfinite(notch.zero_damping)))
+      refuse("notch zero_damping", notch.zero_damping, "0 or more");
+    if (!(notch.pole_damping > 0.0 && std::isfinite(notch.pole_damping)))
+      refuse("notch pole_damping", notch.pole_damping, "positive");
+  }
+}
+
+}  // namespace
+
+std::vector<BiquadSection> controller_sections(const AxisController& axis, double sample_rate_hz) {
+  check(axis, 0.5 * sample_rate_hz);
+  const double k = prewarped(axis.crossover_hz, sample_rate_hz);
+  std::vector<BiquadSection> sections;
+
+  // gain (s + w_i)(s/w_1 + 1) over s (s/w_2 + 1), each factor only where it is switched on.
+  const double wi = kTwoPi * axis.integrator_hz;
+  const double zero = axis.lead_zero_hz > 0.0 ? 1.0 / (kTwoPi * axis.lead_zero_hz) : 0.0;
+  const double pole = axis.lead_pole_hz > 0.0 ? 1.0 / (kTwoPi * axis.lead_pole_hz) : 0.0;
+  const double g = axis.gain;
+  if (wi > 0.0) {
+    sections.push_back(tustin({g * zero, g * (1.0 + wi * zero), g * wi}, {pole, 1.0, 0.0}, k));
+  } else {
+    sections.push_back(tustin({0.0, g * zero, g}, {0.0, pole, 1.0}, k));
+  }
+  if (axis.lowpass_hz > 0.0) {
+    const double w = kTwoPi * axis.lowpass_hz;
+    sections.push_back(
+        tustin({0.0, 0.0, 1.0}, {1.0 / (w * w), 2.0 * axis.lowpass_damping / w, 1.0}, k));
+  }
+  for (const auto& notch : axis.notches) {
+    const double w = kTwoPi * notch.frequency_hz;
+    sections.push_back(tustin({1.0 / (w * w), 2.0 * notch.zero_damping / w, 1.0},
+                              {1.0 / (w * w), 2.0 * notch.pole_damping / w, 1.0},
+                              prewarped(notch.frequency_hz, sample_rate_hz)));
+  }
+  return sections;
+}
+
+}  // namespace stageid

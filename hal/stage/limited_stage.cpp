@@ -1,0 +1,257 @@
+#include "hal/stage/limited_stage.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace stageid {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Eigen::ArrayXd limit_vector(const Eigen::VectorXd& given, std::size_t channels, const char* name) {
+  const auto size = static_cast<Eigen::Index>(channels);
+  if (given.size() == 0) return Eigen::ArrayXd::Constant(size, kInfinity);
+  if (given.size() != size)
+    throw std::invalid_argument(
+        fmt::format("limits: {} has {} entries for {} channels", name, given.size(), channels));
+  for (Eigen::Index i = 0; i < size; ++i)
+    if (!(given[i] > 0.0))
+      throw std::invalid_argument(
+          fmt::format("limits: {}, entry {}: {} is not positive", name, i + 1, given[i]));
+  return given.array();
+}
+
+std::unique_ptr<CyclicStage> checked(std::unique_ptr<CyclicStage> stage) {
+  if (!stage) throw std::invalid_argument("limits: there is no stage to put them on");
+  if (!(stage->info().sample_rate_hz > 0.0))
+    throw std::invalid_argument("limits: the stage tells no sample rate");
+  return stage;
+}
+
+bool worse_than_limit(Outcome outcome) {
+  return outcome == Outcome::fault || outcome == Outcome::bus_off || outcome == Outcome::link_down;
+}
+
+}  // namespace
+
+LimitedStage::LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limits)
+    : stage_(checked(std::move(stage))),
+      limits_(std::move(limits)),
+      guard_(limits_, stage_->info()) {
+  const StageInfo& info = stage_->info();
+  const std::size_t actuators = info.actuators.size();
+  largest_n_ = limit_vector(limits_.actuator_n, actuators, "actuator_n");
+  step_n_ = limit_vector(limits_.slew_n_s, actuators, "slew_n_s") / info.sample_rate_hz;
+  mean_square_limit_n2_ = limit_vector(limits_.thermal_rms_n, actuators, "thermal_rms_n").square();
+  if (!(limits_.thermal_time_constant_s > 0.0) || !std::isfinite(limits_.thermal_time_constant_s))
+    throw std::invalid_argument(
+        fmt::format("limits: thermal_time_constant_s must be positive, not {}",
+                    limits_.thermal_time_constant_s));
+  decay_ = std::exp(-1.0 / (info.sample_rate_hz * limits_.thermal_time_constant_s));
+  wanted_.setZero(largest_n_.size());
+  applied_.setZero(largest_n_.size());
+  mean_square_.setZero(largest_n_.size());
+}
+
+void LimitedStage::start(std::uint64_t run_seed, Inputs& first) {
+  violation_ = {};
+  emergency_ = {};
+  limited_ = false;
+  loop_ = Loop::closed;
+  applied_.setZero();
+  mean_square_.setZero();
+  stage_->start(run_seed, first);
+  guard_.start(first);
+  const LoopGuard::Finding finding = guard_.inspect(first);
+  if (finding.violation.kind != LimitKind::none) {
+    violation_ = finding.violation;
+    stage_->stop();
+    throw StageError(describe(violation_, info()) + "; bring the stage into its window first");
+  }
+}
+
+Outcome LimitedStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept {
+  if (outputs.u.size() != static_cast<std::size_t>(wanted_.size()) ||
+      inputs.y.size() != info().sensors.size()) {
+    return Outcome::fault;
+  }
+  if (loop_ == Loop::closed)
+    std::copy(outputs.u.begin(), outputs.u.end(), wanted_.begin());
+  else if (loop_ == Loop::braking)
+    guard_.brake(wanted_);
+  else
+    wanted_.setZero();
+  apply(outputs.cycle);
+  guard_.predict(applied_);
+  Outputs limited = outputs;
+  limited.u = {applied_.data(), outputs.u.size()};
+  const Outcome outcome = stage_->exchange(limited, inputs, deadline);
+  inputs.applied = {};
+  if (limited_) inputs.applied = limited.u;
+  inspect(inputs);
+  if (!limited_ || worse_than_limit(outcome)) return outcome;
+  return loop_ == Loop::closed    ? Outcome::limit
+         : loop_ == Loop::braking ? Outcome::braking
+                                  : Outcome::opened;
+}
+
+void LimitedStage::stop() noexcept {
+  stage_->stop();
+  if (loop_ != Loop::closed) emergency_.speed_m_s = guard_.speed_m_s();
+  limited_ = false;  // violation() and emergency() keep the reason until the next start()
+  loop_ = Loop::closed;
+}
+
+// Nearly every command is inside all limits: one pass without branches finds that out.
+void LimitedStage::apply(std::uint64_t cycle) noexcept {
+  const double fresh = 1.0 - decay_;
+  int outside = 0;
+  for (Eigen::Index i = 0; i < wanted_.size(); ++i) {
+    const double u = wanted_[i];
+    // Written so that NaN counts as outside.
+    const bool inside = (std::abs(u) <= largest_n_[i]) & (std::abs(u - applied_[i]) <= step_n_[i]) &
+                        (decay_ * mean_square_[i] + fresh * u * u <= mean_square_limit_n2_[i]);
+    outside |= static_cast<int>(!inside);
+  }
+  if (outside != 0) limit_command(cycle);
+  for (Eigen::Index i = 0; i < wanted_.size(); ++i) {
+    applied_[i] = wanted_[i];
+    mean_square_[i] = decay_ * mean_square_[i] + fresh * applied_[i] * applied_[i];
+  }
+}
+
+void LimitedStage::limit_command(std::uint64_t cycle) noexcept {
+  for (Eigen::Index i = 0; i < wanted_.size(); ++i)
+    wanted_[i] = limit_channel(i, wanted_[i], cycle);
+}
+
+double LimitedStage::limit_channel(Eigen::Index channel, double wanted,
+                                   std::uint64_t cycle) noexcept {
+  const auto number = static_cast<int>(channel);
+  const double last = applied_[channel];
+  if (!std::isfinite(wanted)) {
+    report_command({LimitKind::not_finite, number, wanted, 0.0, cycle});
+    wanted = last;
+  }
+  const double largest = largest_n_[channel];
+  if (std::abs(wanted) > largest)
+    report_command({LimitKind::actuator, number, wanted, largest, cycle});
+
+  const double step = step_n_[channel];
+  const double rate_hz = info().sample_rate_hz;
+  if (std::abs(wanted - last) > step)
+    report_command({LimitKind::slew, number, (wanted - last) * rate_hz, step * rate_hz, cycle});
+
+  // The largest |u| whose square still fits into the mean square.
+  const double kept = decay_ * mean_square_[channel];
+  const double room = (mean_square_limit_n2_[channel] - kept) / (1.0 - decay_);
+  const double warm = std::sqrt(std::max(0.0, room));
+  if (kept + (1.0 - decay_) * wanted * wanted > mean_square_limit_n2_[channel])
+    report_command({LimitKind::thermal_rms, number,
+                    std::sqrt(kept + (1.0 - decay_) * wanted * wanted),
+                    std::sqrt(mean_square_limit_n2_[channel]), cycle});
+
+  const double slewed = std::clamp(wanted, last - step, last + step);
+  const double bound = std::min(largest, warm);
+  return std::clamp(slewed, -bound, bound);
+}
+
+void LimitedStage::inspect(Inputs& inputs) noexcept {
+  const LoopGuard::Finding finding = guard_.inspect(inputs);
+  if (finding.violation.kind != LimitKind::none) [[unlikely]] {
+    report(finding.violation);
+    if (!finding.sound) take_emergency(finding.violation);
+  }
+  if (loop_ == Loop::braking && !guard_.braking()) loop_ = Loop::open;
+}
+
+void LimitedStage::take_emergency(const LimitViolation& cause) noexcept {
+  // Past the hard window a brake has failed, or nothing that is known has kept the stage inside.
+  const bool hard = cause.kind == LimitKind::hard_position;
+  if (emergency_.cause.kind == LimitKind::none) {
+    emergency_.cause = cause;
+    emergency_.braked = guard_.begin_brake() && !hard;
+    emergency_.response = guard_.response();
+    loop_ = emergency_.braked ? Loop::braking : Loop::open;
+  } else if (hard) {
+    loop_ = Loop::open;
+  }
+}
+
+void LimitedStage::report(const LimitViolation& violation) noexcept {
+  if (violation_.kind == LimitKind::none) violation_ = violation;
+  limited_ = true;
+}
+
+// A loop that converges has its commands back inside the limits within a few of its time constants.
+void LimitedStage::report_command(const LimitViolation& violation) noexcept {
+  report(violation);
+  if (loop_ == Loop::closed && violation.cycle - violation_.cycle > guard_.settling_samples())
+    take_emergency(violation);
+}
+
+std::string describe(const LimitViolation& violation, const StageInfo& info) {
+  if (violation.kind == LimitKind::none) return "no limit was hit";
+  const std::vector<Channel>& channels = violation.of_sensor ? info.sensors : info.actuators;
+  const auto index = static_cast<std::size_t>(violation.channel);
+  std::string who = fmt::format(
+      "{} {}", violation.of_sensor ? "sensor" : "actuator",
+      index < channels.size() ? channels[index].name : std::to_string(violation.channel));
+  const auto line = [&](const char* what, const char* unit) {
+    return fmt::format("{}: {} {:.4g} {}, limit {:.4g} {} (cycle {})", who, what,
+                       std::abs(violation.value), unit, violation.limit, unit, violation.cycle);
+  };
+  switch (violation.kind) {
+    case LimitKind::none:
+      break;
+    case LimitKind::actuator:
+      return line("|u| would be", "N");
+    case LimitKind::slew:
+      return line("slew would be", "N/s");
+    case LimitKind::thermal_rms:
+      return line("thermal rms would be", "N");
+    case LimitKind::position:
+      return line("|y| is", "m");
+    case LimitKind::not_finite:
+      return fmt::format("{}: {} is not finite (cycle {})", who,
+                         violation.of_sensor ? "the measurement" : "the command", violation.cycle);
+    case LimitKind::stuck_sensor:
+      return fmt::format("{}: has shown {:.6g} m and nothing else for {:.4g} s (cycle {})", who,
+                         violation.value, violation.limit, violation.cycle);
+    case LimitKind::sensor_jump:
+      return line("jumped away from the predicted motion by", "m");
+    case LimitKind::deviation:
+      return line("deviation from the predicted motion is", "m");
+    case LimitKind::contradiction:
+      return line("differs from the rigid motion that all sensors show by", "m");
+    case LimitKind::speed:
+      return line("speed is", "m/s");
+    case LimitKind::stopping_distance:
+      return line("half of all forces could stop the stage only at", "m");
+    case LimitKind::hard_position:
+      return line("|y| is", "m").insert(who.size() + 1, " past the hard window,");
+  }
+  return who;
+}
+
+std::string describe_stop(const LimitedStage& stage) {
+  std::string text = describe(stage.violation(), stage.info());
+  const Emergency& emergency = stage.emergency();
+  const LimitViolation& cause = emergency.cause;
+  if (cause.kind == LimitKind::none) return text;
+  const LimitViolation& first = stage.violation();
+  if (cause.kind != first.kind || cause.cycle != first.cycle)
+    text += "; then " + describe(cause, stage.info());
+  text += "; the loop was opened";
+  if (std::abs(emergency.response - 1.0) > 0.1)
+    text += fmt::format(", the stage answering {:.2g} times as expected", emergency.response);
+  return text + fmt::format("; {}, {:.2g} m/s when the forces were cut",
+                            emergency.braked ? "braked" : "no brake", emergency.speed_m_s);
+}
+
+}  // namespace stageid

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+
+#include "hal/stage/limits.hpp"
+#include "hal/stage/loop_guard.hpp"
+#include "hal/stage/stage.hpp"
+
+namespace stageid {
+
+/// How a loop that could not be trusted was ended. Cause of kind none: it was not.
+struct Emergency {
+  LimitViolation cause;
+  bool braked = false;
+  double response = 1.0;   ///< of the stage, in units of the expected one; 1 if a sensor failed
+  double speed_m_s = 0.0;  ///< largest of the sensors when the forces were cut
+};
+
+/// Puts StageLimits between the loop and any back end.
+///
+/// A command that would break a limit never reaches the back end: it is replaced by the nearest one
+/// inside the limits (clamped, slew-limited; NaN by the last good one), exchange() says
+/// Outcome::limit from then on until stop(), and violation() says which limit, where, when. A
+/// position past its window is reported the same way. The loop then ramps its excitation down under
+/// control and stops; its samples are marked.
+///
+/// That needs a sound loop. As soon as LoopGuard finds it unsound, commands are ignored: the stage is
+/// braked (Outcome::braking) if its motion is known, then the forces are zero and exchange() says
+/// Outcome::opened, upon which the loop stops the stage at once. emergency() says why and what came of
+/// it. Inputs::applied holds what acted wherever it is not what was asked for.
+///
+/// The thermal limit is on sqrt(m), m[n] = a m[n-1] + (1 - a) u[n]^2, a = exp(-T / time constant),
+/// from m = 0 at start(). Where a slew limit and a limit on |u| contradict each other, |u| wins.
+/// Worse news of the back end (fault, bus off, link down) is passed on in place of these outcomes.
+class LimitedStage final : public CyclicStage {
+ public:
+  /// @throws std::invalid_argument if a limit vector has the wrong size or an entry is not
+  /// positive.
+  LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limits);
+
+  const StageInfo& info() const noexcept override { return stage_->info(); }
+  /// @throws StageError also if the stage stands outside its position window or measures no number.
+  void start(std::uint64_t run_seed, Inputs& first) override;
+  [[nodiscard]] Outcome exchange(const Outputs& outputs, Inputs& inputs,
+                                 Deadline deadline) noexcept override;
+  void stop() noexcept override;
+  std::string trouble() const override { return stage_->trouble(); }
+
+  const LimitViolation& violation() const noexcept { return violation_; }
+  const Emergency& emergency() const noexcept { return emergency_; }
+  const CyclicStage& inner() const noexcept { return *stage_; }
+
+ private:
+  enum class Loop : std::uint8_t { closed, braking, open };
+
+  void apply(std::uint64_t cycle) noexcept;
+  void limit_command(std::uint64_t cycle) noexcept;
+  double limit_channel(Eigen::Index channel, double wanted, std::uint64_t cycle) noexcept;
+  void inspect(Inputs& inputs) noexcept;
+  void take_emergency(const LimitViolation& cause) noexcept;
+  void report(const LimitViolation& violation) noexcept;
+  void report_command(const LimitViolation& violation) noexcept;
+
+  std::unique_ptr<CyclicStage> stage_;
+  StageLimits limits_;
+  LoopGuard guard_;
+  LimitViolation violation_;
+  Emergency emergency_;
+  bool limited_ = false;
+  Loop loop_ = Loop::closed;
+  double decay_ = 1.0;  // a, of one sample
+  // Limits per sample, infinite where there is none.
+  Eigen::ArrayXd largest_n_;
+  Eigen::ArrayXd step_n_;
+  Eigen::ArrayXd mean_square_limit_n2_;
+  Eigen::ArrayXd wanted_;
+  Eigen::ArrayXd applied_;
+  Eigen::ArrayXd mean_square_;
+};
+
+/// One line for people: "actuator z3: |u| would be 12.4 N, limit 10 N (cycle 40123)".
+std::string describe(const LimitViolation& violation, const StageInfo& info);
+/// The same of a whole stop: the first limit and, if the loop was opened, why and how that ended.
+std::string describe_stop(const LimitedStage& stage);
+
+}  // namespace stageid

@@ -1,0 +1,318 @@
+#include "hal/stage/loop_guard.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kObserverPoles = 1.0 / 3.0;  // of the loop's bandwidth
+constexpr double kBrakeObserverPoles = 3.0;
+constexpr double kBrakeRate = 2.0;
+constexpr double kLargestBrakeRate = 4.0;
+constexpr double kBrakeTimeConstants = 5.0;  // of the loop
+constexpr double kForceForStopping = 0.5;    // of all actuators; the rest is for the other axes
+constexpr double kBlindPoles = 0.05;  // of the sample rate, where the loop's bandwidth is unknown
+constexpr double kLeastResponse = 0.25;  // a stage that answers less cannot be braked
+constexpr double kErrorThatTells = 0.1;  // of deviation_m: below it the response counts as expected
+
+void require_size(Eigen::Index size, std::size_t channels, const char* name) {
+  if (size == static_cast<Eigen::Index>(channels)) return;
+  throw std::invalid_argument(
+      fmt::format("limits: {} has {} entries for {} channels", name, size, channels));
+}
+
+Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& otherwise,
+                           const char* name) {
+  if (given.size() == 0) return otherwise;
+  require_size(given.size(), static_cast<std::size_t>(otherwise.size()), name);
+  for (Eigen::Index i = 0; i < given.size(); ++i)
+    if (!(given[i] > 0.0))
+      throw std::invalid_argument(
+          fmt::format("limits: {}, entry {}: {} is not positive", name, i + 1, given[i]));
+  return given.array();
+}
+
+}  // namespace
+
+LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
+    : period_s_(1.0 / info.sample_rate_hz), stuck_sensor_s_(limits.stuck_sensor_s) {
+  const auto sensors = static_cast<Eigen::Index>(info.sensors.size());
+  const auto actuators = static_cast<Eigen::Index>(info.actuators.size());
+  const RigidMotion& motion = limits.motion;
+  model_known_ = motion.acceleration_per_n.size() > 0;
+  const Eigen::ArrayXd unlimited = Eigen::ArrayXd::Constant(sensors, kInfinity);
+  window_m_ = positive_or(limits.position_window_m, unlimited, "position_window_m");
+  hard_window_m_ = positive_or(limits.hard_window_m, 2.0 * window_m_, "hard_window_m");
+  deviation_m_ =
+      model_known_ ? positive_or(limits.deviation_m, 0.5 * window_m_, "deviation_m") : unlimited;
+  speed_limit_m_s_ = positive_or(limits.speed_m_s, unlimited, "speed_m_s");
+  for (Eigen::Index i = 0; i < sensors; ++i)
+    if (!(hard_window_m_[i] >= window_m_[i]))
+      throw std::invalid_argument(
+          fmt::format("limits: hard_window_m, entry {}: {} is inside the window of {}", i + 1,
+                      hard_window_m_[i], window_m_[i]));
+
+  const double repeats = limits.stuck_sensor_s * info.sample_rate_hz;
+  if (!(repeats >= 0.0 && repeats < 1e9) || (repeats > 0.0 && repeats < 2.0))
+    throw std::invalid_argument(
+        fmt::format("limits: stuck_sensor_s is {} s at {} Hz; allowed: 0, or two samples and more",
+                    limits.stuck_sensor_s, info.sample_rate_hz));
+  repeats_allowed_ = static_cast<std::uint32_t>(std::llround(repeats));
+
+  stopping_s2_m_.setZero(sensors);
+  double pole_rad_s = kBlindPoles * info.sample_rate_hz;
+  Eigen::Index delay_samples = 0;
+  if (model_known_) {
+    require_size(motion.acceleration_per_n.rows(), info.sensors.size(), "motion");
+    require_size(motion.acceleration_per_n.cols(), info.actuators.size(), "motion");
+    require_size(motion.force_per_acceleration.rows(), info.actuators.size(), "motion");
+    require_size(motion.force_per_acceleration.cols(), info.sensors.size(), "motion");
+    if (!(motion.bandwidth_rad_s > 0.0) || !std::isfinite(motion.bandwidth_rad_s))
+      throw std::invalid_argument("limits: the bandwidth of the motion must be positive");
+    acceleration_per_n_ = motion.acceleration_per_n;
+    force_per_acceleration_ = motion.force_per_acceleration;
+    contradiction_ = motion.contradiction;
+    if (contradiction_.size() > 0) {
+      require_size(contradiction_.rows(), info.sensors.size(), "motion");
+      require_size(contradiction_.cols(), info.sensors.size(), "motion");
+    }
+    pole_rad_s = kObserverPoles * motion.bandwidth_rad_s;
+    if (limits.actuator_n.size() == actuators) {
+      const Eigen::ArrayXd a =
+          kForceForStopping * (acceleration_per_n_.cwiseAbs() * limits.actuator_n).array();
+      stopping_s2_m_ = (a > 0.0).select(0.5 / a, 0.0);
+    }
+    brake_gains_ =
+        observer_gains(kBrakeObserverPoles * motion.bandwidth_rad_s, info.sample_rate_hz);
+    bandwidth_rad_s_ = motion.bandwidth_rad_s;
+    brake_samples_ = static_cast<std::uint64_t>(
+        std::ceil(kBrakeTimeConstants / motion.bandwidth_rad_s * info.sample_rate_hz));
+    const double delay = info.transport_delay_s * info.sample_rate_hz;
+    delay_samples = static_cast<Eigen::Index>(std::floor(delay));
+    late_fraction_ = delay - std::floor(delay);
+  } else {
+    acceleration_per_n_.setZero(sensors, actuators);
+  }
+  room_m_ = (stopping_s2_m_ > 0.0).select(0.5 * (window_m_ + hard_window_m_), kInfinity);
+  gains_ = observer_gains(pole_rad_s, info.sample_rate_hz);
+  forget_ = std::exp(-pole_rad_s / info.sample_rate_hz);
+  weight_m2_ = (1.0 - forget_) / deviation_m_.square();
+
+  accelerations_.setZero(sensors, delay_samples + 2);
+  acting_.setZero(sensors);
+  force_.setZero(actuators);
+  wanted_acceleration_.setZero(sensors);
+  measured_.setZero(sensors);
+  contradicting_.setZero(sensors);
+  contradicting_at_start_.setZero(sensors);
+  p_.setZero(sensors);
+  for (Eigen::ArrayXd* state :
+       {&v_, &d_, &force_p_, &force_v_, &force_d_, &last_error_m_, &last_y_})
+    *state = p_;
+  repeats_.setZero(sensors);
+  believed_.setConstant(sensors, true);
+}
+
+/// Three equal poles of a constant-acceleration observer (a g-h-k filter, critically damped).
+LoopGuard::Gains LoopGuard::observer_gains(double pole_rad_s, double rate_hz) noexcept {
+  const double pole = std::exp(-pole_rad_s / rate_hz);
+  const double rest = 1.0 - pole;
+  return {1.0 - pole * pole * pole, 1.5 * rest * rest * (1.0 + pole) * rate_hz,
+          rest * rest * rest * rate_hz * rate_hz};
+}
+
+void LoopGuard::start(const Inputs& first) noexcept {
+  for (Eigen::Index i = 0; i < p_.size(); ++i) {
+    const double y = first.y[static_cast<std::size_t>(i)];
+    p_[i] = std::isfinite(y) ? y : 0.0;
+  }
+  measured_ = p_.matrix();
+  if (contradiction_.size() > 0) contradicting_at_start_.noalias() = contradiction_ * measured_;
+  v_.setZero();
+  d_.setZero();
+  force_p_.setZero();
+  force_v_.setZero();
+  force_d_.setZero();
+  last_error_m_.setZero();
+  last_y_.setConstant(std::numeric_limits<double>::quiet_NaN());  // equal to nothing
+  accelerations_.setZero();
+  repeats_.setZero();
+  believed_.setConstant(true);
+  sensor_failed_ = open_ = false;
+  error_by_force_ = force_by_force_ = 0.0;
+  response_ = force_scale_ = 1.0;
+  brake_samples_left_ = 0;
+}
+
+void LoopGuard::predict(const Eigen::ArrayXd& u) noexcept {
+  if (model_known_) find_acceleration(u);
+  const double t = period_s_;
+  for (Eigen::Index i = 0; i < p_.size(); ++i) {
+    const double a = acting_[i] * force_scale_;
+    p_[i] += t * (v_[i] + 0.5 * t * (a + d_[i]));
+    v_[i] += t * (a + d_[i]);
+    if (open_) continue;
+    force_p_[i] += t * (force_v_[i] + 0.5 * t * (a + force_d_[i]));
+    force_v_[i] += t * (a + force_d_[i]);
+  }
+}
+
+/// Of the commands that act in this interval: they are late by whole samples and a part.
+void LoopGuard::find_acceleration(const Eigen::ArrayXd& u) noexcept {
+  force_ = u.matrix();
+  newest_ = newest_ + 1 == accelerations_.cols() ? 0 : newest_ + 1;
+  acting_.noalias() = acceleration_per_n_ * force_;
+  accelerations_.col(newest_) = acting_.array();
+  // The ring has d + 2 columns: behind the newest come the oldest, u[n-d-1], and u[n-d].
+  const Eigen::Index oldest = newest_ + 1 == accelerations_.cols() ? 0 : newest_ + 1;
+  const Eigen::Index next = oldest + 1 == accelerations_.cols() ? 0 : oldest + 1;
+  acting_ = late_fraction_ * accelerations_.col(oldest).matrix() +
+            (1.0 - late_fraction_) * accelerations_.col(next).matrix();
+}
+
+LoopGuard::Finding LoopGuard::inspect(Inputs& inputs) noexcept {
+  Finding finding;
+  error_by_force_ *= forget_;
+  force_by_force_ *= forget_;
+  for (Eigen::Index i = 0; i < p_.size(); ++i) {
+    double& y = inputs.y[static_cast<std::size_t>(i)];
+    const std::uint64_t bit = std::uint64_t{1} << i;
+    if (!std::isfinite(y)) {
+      finding.add(sensor_failure(i, LimitKind::not_finite, y, 0.0, inputs.cycle), false);
+      inputs.valid &= ~bit;
+      y = std::isfinite(last_y_[i]) ? last_y_[i] : 0.0;
+    } else {
+      if (believed_[i] && (inputs.valid & bit) != 0) judge_motion(i, y, inputs.cycle, finding);
+      if (believed_[i]) judge_place(i, y, inputs.cycle, finding);
+    }
+    last_y_[i] = y;
+  }
+  if (contradiction_.size() > 0 && !sensor_failed_) compare_sensors(inputs, finding);
+  if (!open_)
+    response_ = 1.0 - error_by_force_ / (force_by_force_ + kErrorThatTells * kErrorThatTells);
+  return finding;
+}
+
+/// Is the measurement what the forces explain?
+void LoopGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
+                             Finding& finding) noexcept {
+  const double error = y - p_[i];
+  const bool far = std::abs(error) > deviation_m_[i];
+  const bool was_near = std::abs(last_error_m_[i]) < 0.5 * deviation_m_[i];
+  last_error_m_[i] = error;
+  if (repeats_allowed_ > 0 && y == last_y_[i]) {
+    ++repeats_[i];  // nothing new: the prediction goes on alone
+    if (far || repeats_[i] >= repeats_allowed_)
+      finding.add(sensor_failure(i, LimitKind::stuck_sensor, y, repeats_[i] * period_s_, cycle),
+                  false);
+    return;
+  }
+  repeats_[i] = 0;
+  if (far && !open_) {
+    if (was_near) {
+      finding.add(sensor_failure(i, LimitKind::sensor_jump, error, deviation_m_[i], cycle), false);
+      return;
+    }
+    finding.add(violation(LimitKind::deviation, i, error, deviation_m_[i], cycle), false);
+  }
+  correct(i, error);
+}
+
+/// Do all sensors show one rigid motion?
+void LoopGuard::compare_sensors(const Inputs& inputs, Finding& finding) noexcept {
+  const std::uint64_t all = ~std::uint64_t{0} >> (64 - p_.size());
+  if ((inputs.valid & all) != all) return;
+  measured_ = last_y_.matrix();
+  contradicting_.noalias() = contradiction_ * measured_;
+  for (Eigen::Index i = 0; i < p_.size(); ++i) {
+    const double difference = contradicting_[i] - contradicting_at_start_[i];
+    if (!(std::abs(difference) > deviation_m_[i])) continue;
+    sensor_failed_ = true;  // one of them, whichever
+    finding.add(violation(LimitKind::contradiction, i, difference, deviation_m_[i], inputs.cycle),
+                false);
+    return;
+  }
+}
+
+/// Is there room to stop?
+void LoopGuard::judge_place(Eigen::Index i, double y, std::uint64_t cycle,
+                            Finding& finding) noexcept {
+  const double v = speed(i);
+  const double rest_m = y + v * std::abs(v) * stopping_s2_m_[i];
+  if (std::abs(y) > hard_window_m_[i])
+    finding.add(violation(LimitKind::hard_position, i, y, hard_window_m_[i], cycle), false);
+  else if (std::abs(v) > speed_limit_m_s_[i])
+    finding.add(violation(LimitKind::speed, i, v, speed_limit_m_s_[i], cycle), false);
+  else if (std::abs(rest_m) > room_m_[i])
+    finding.add(violation(LimitKind::stopping_distance, i, rest_m, room_m_[i], cycle), false);
+  if (std::abs(y) > window_m_[i])
+    finding.add(violation(LimitKind::position, i, y, window_m_[i], cycle), true);
+}
+
+LimitViolation LoopGuard::sensor_failure(Eigen::Index i, LimitKind kind, double value, double limit,
+                                         std::uint64_t cycle) noexcept {
+  believed_[i] = false;
+  sensor_failed_ = true;
+  return violation(kind, i, value, limit, cycle);
+}
+
+void LoopGuard::correct(Eigen::Index i, double error) noexcept {
+  const Gains& k = open_ ? brake_gains_ : gains_;
+  p_[i] += k.position * error;
+  v_[i] += k.speed_hz * error;
+  d_[i] += k.acceleration_hz2 * error;
+  if (open_) return;
+  const double force_error = -force_p_[i];
+  force_p_[i] += k.position * force_error;
+  force_v_[i] += k.speed_hz * force_error;
+  force_d_[i] += k.acceleration_hz2 * force_error;
+  error_by_force_ += weight_m2_[i] * error * force_error;
+  force_by_force_ += weight_m2_[i] * force_error * force_error;
+}
+
+bool LoopGuard::begin_brake() noexcept {
+  open_ = true;
+  if (!sensor_failed_) {
+    p_ += (response_ - 1.0) * force_p_;
+    v_ += (response_ - 1.0) * force_v_;
+    d_ += (response_ - 1.0) * force_d_;
+    force_scale_ = response_;
+  }
+  brake_divisor_ = std::copysign(std::max(1.0, std::abs(force_scale_)), force_scale_);
+  if (force_per_acceleration_.size() == 0 || std::abs(force_scale_) < kLeastResponse) return false;
+  choose_brake_rate();
+  brake_samples_left_ = brake_samples_;
+  return true;
+}
+
+// Proportional to the speed v, a brake of rate w needs the way v / w.
+void LoopGuard::choose_brake_rate() noexcept {
+  double needed_rad_s = kBrakeRate * bandwidth_rad_s_;
+  for (Eigen::Index i = 0; i < p_.size(); ++i) {
+    const double room_m = room_m_[i] - std::abs(p_[i]);
+    if (p_[i] * v_[i] > 0.0)
+      needed_rad_s = std::max(needed_rad_s, std::abs(v_[i]) / std::max(room_m, 0.0));
+  }
+  brake_rate_rad_s_ = std::min(needed_rad_s, kLargestBrakeRate * bandwidth_rad_s_);
+}
+
+void LoopGuard::brake(Eigen::ArrayXd& u) noexcept {
+  wanted_acceleration_ = -(brake_rate_rad_s_ * v_ + d_).matrix() / brake_divisor_;
+  force_.noalias() = force_per_acceleration_ * wanted_acceleration_;
+  u = force_.array();
+  --brake_samples_left_;
+}
+
+double LoopGuard::speed_m_s() const noexcept {
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < v_.size(); ++i) largest = std::max(largest, std::abs(speed(i)));
+  return largest;
+}
+
+}  // namespace stageid

@@ -1,0 +1,146 @@
+#include "hal/stage/plant_watch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+
+#include "hal/stage/pacer.hpp"
+
+namespace stageid {
+namespace {
+
+using Seconds = std::chrono::duration<double>;
+
+constexpr double kLooksAWindow = 10.0;  // how often within stale_s the snapshot is looked at
+
+void check(const PlantConditions& c) {
+  const bool sound = c.stale_s > 0.0 && std::isfinite(c.stale_s) && c.enable_s > 0.0 &&
+                     std::isfinite(c.enable_s) && c.gravity_low_n <= c.gravity_high_n &&
+                     c.temperature_low_k <= c.temperature_high_k;
+  if (!sound)
+    throw std::invalid_argument(
+        "supervisor: times must be positive, and ranges [low, high] with low <= high");
+}
+
+/// "gravity compensator 2: 12 N is not within 40 ... 60 N"; empty if all are. NaN is not.
+std::string range_trouble(const std::vector<double>& values, double low, double high,
+                          const char* what, const char* unit) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!(values[i] >= low && values[i] <= high))
+      return fmt::format("{} {}: {:.4g} {} is not within {:.4g} ... {:.4g} {}", what, i + 1,
+                         values[i], unit, low, high, unit);
+  return "";
+}
+
+/// What a look says; `enabled`: the plant has to be enabled too.
+std::string trouble_of(const Supervisor& supervisor, const PlantConditions& conditions,
+                       bool enabled) {
+  const PlantSnapshot snapshot = supervisor.snapshot();
+  std::string trouble = plant_trouble(snapshot, conditions, monotonic_ns());
+  const bool stale = snapshot.t_ns == 0 || !trouble.empty();
+  if (stale) {
+    const std::string link = supervisor.trouble();
+    const bool of_link = !link.empty() && static_cast<double>(monotonic_ns() - snapshot.t_ns) >
+                                              1e9 * conditions.stale_s;
+    return of_link ? fmt::format("{}; {}", trouble, link) : trouble;
+  }
+  if (enabled && !snapshot.enabled)
+    return fmt::format("the plant is not enabled any more (state {})", to_string(snapshot.state));
+  return "";
+}
+
+}  // namespace
+
+std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& conditions,
+                          std::int64_t now_ns) {
+  if (snapshot.t_ns == 0) return "supervisor: no status was read yet";
+  const double age_s = 1e-9 * static_cast<double>(now_ns - snapshot.t_ns);
+  if (age_s > conditions.stale_s)
+    return fmt::format("supervisor: no fresh status for more than {:.3g} s", conditions.stale_s);
+  if (!snapshot.interlock_closed) return "the interlock is open; close it";
+  const std::string gravity =
+      range_trouble(snapshot.gravity_compensator_n, conditions.gravity_low_n,
+                    conditions.gravity_high_n, "gravity compensator", "N");
+  if (!gravity.empty()) return gravity;
+  const std::string temperature =
+      range_trouble(snapshot.temperature_k, conditions.temperature_low_k,
+                    conditions.temperature_high_k, "temperature", "K");
+  if (!temperature.empty()) return temperature;
+  if (snapshot.state == NodeState::fault || snapshot.state == NodeState::fault_reaction)
+    return fmt::format("the plant is in fault: {}; remove the cause and add --reset-fault",
+                       to_string(snapshot.cause));
+  return "";
+}
+
+PlantWatch::PlantWatch(Supervisor& supervisor, const PlantConditions& conditions, bool reset_fault)
+    : supervisor_(supervisor), conditions_(conditions) {
+  check(conditions);
+  if (reset_fault) clear_fault();
+  std::string trouble = wait_until_good(false);
+  if (!trouble.empty()) throw StageError(trouble);
+  const SupervisorReply reply = supervisor_.request(SupervisorCommand::enable);
+  if (!reply.accepted)
+    throw StageError(fmt::format("the plant cannot be enabled: {}", reply.message));
+  trouble = wait_until_good(true);
+  if (!trouble.empty()) {
+    supervisor_.request(SupervisorCommand::disable);
+    throw StageError(trouble);
+  }
+  thread_ = std::thread([this] { watch(); });
+}
+
+PlantWatch::~PlantWatch() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+  supervisor_.request(SupervisorCommand::disable);
+}
+
+/// Waits for the plant to be there, and takes it out of its fault, if it is in one and lets itself.
+void PlantWatch::clear_fault() {
+  static_cast<void>(wait_until_good(false));
+  if (supervisor_.snapshot().state == NodeState::fault)
+    static_cast<void>(supervisor_.request(SupervisorCommand::reset_fault));
+}
+
+/// The last trouble, if it did not go within enable_s.
+std::string PlantWatch::wait_until_good(bool enabled) {
+  const std::int64_t until_ns = monotonic_ns() + std::llround(1e9 * conditions_.enable_s);
+  while (true) {
+    std::string trouble = trouble_of(supervisor_, conditions_, enabled);
+    if (trouble.empty() || monotonic_ns() > until_ns) return trouble;
+    // What the panel says does not change by waiting; a link that comes up and states that go by do.
+    const PlantSnapshot snapshot = supervisor_.snapshot();
+    const bool fresh = snapshot.t_ns != 0 && static_cast<double>(monotonic_ns() - snapshot.t_ns) <
+                                                 1e9 * conditions_.stale_s;
+    if (fresh && !enabled) return trouble;
+    std::this_thread::sleep_for(Seconds(conditions_.stale_s / kLooksAWindow));
+  }
+}
+
+void PlantWatch::watch() {
+  std::unique_lock lock(mutex_);
+  while (!changed_.wait_for(lock, Seconds(conditions_.stale_s / kLooksAWindow),
+                            [this] { return stop_; })) {
+    lock.unlock();
+    std::string trouble = trouble_of(supervisor_, conditions_, true);
+    lock.lock();
+    if (trouble.empty()) continue;
+    reason_ = std::move(trouble);
+    tripped_.store(true, std::memory_order_release);
+    return;
+  }
+}
+
+std::string PlantWatch::reason() const {
+  const std::lock_guard lock(mutex_);
+  return reason_;
+}
+
+}  // namespace stageid

@@ -1,0 +1,126 @@
+#include "hal/stage/real_time.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <stdexcept>
+#include <thread>
+
+#include "hal/stage/stage.hpp"
+
+namespace stageid {
+namespace {
+
+void check(const RealTimeOptions& options) {
+  if (options.priority < 1 || options.priority > 99)
+    throw std::invalid_argument(
+        fmt::format("realtime: priority {}; give 1 to 99", options.priority));
+  const long processors = ::sysconf(_SC_NPROCESSORS_CONF);
+  if (options.cpu < -1 || options.cpu >= processors)
+    throw std::invalid_argument(
+        fmt::format("realtime: cpu {}; this machine has 0 to {}, and -1 is none in particular",
+                    options.cpu, processors - 1));
+}
+
+bool kernel_is_preempt_rt() {
+  utsname name{};
+  ::uname(&name);
+  std::string flag;
+  std::ifstream("/sys/kernel/realtime") >> flag;
+  return is_preempt_rt(name.version, flag);
+}
+
+/// Empty if it worked.
+std::string take_priority(int priority) {
+  sched_param wanted{};
+  wanted.sched_priority = priority;
+  const int error = ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &wanted);
+  if (error == 0) return "";
+  return fmt::format(
+      "SCHED_FIFO with priority {} was refused ({}); run as root, or give the user 'rtprio {}' in "
+      "/etc/security/limits.conf",
+      priority, std::strerror(error), priority);
+}
+
+std::string pin(int cpu) {
+  if (cpu < 0) return "";
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  CPU_SET(static_cast<std::size_t>(cpu), &set);
+  const int error = ::pthread_setaffinity_np(::pthread_self(), sizeof set, &set);
+  if (error == 0) return "";
+  return fmt::format(
+      "the loop could not be pinned to processor {} ({}); give one that this process may use", cpu,
+      std::strerror(error));
+}
+
+std::string lock_memory() {
+  if (::mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return "";
+  return fmt::format(
+      "memory could not be locked ({}); run as root, or give the user 'memlock unlimited' in "
+      "/etc/security/limits.conf, or write lock_memory: false",
+      std::strerror(errno));
+}
+
+}  // namespace
+
+bool is_preempt_rt(std::string_view version, std::string_view flag) noexcept {
+  // Kernels before 6.12 carry it as a patch and tell by the file, later ones by their version.
+  return flag == "1" || version.find("PREEMPT_RT") != std::string_view::npos;
+}
+
+RealTime::RealTime(const RealTimeOptions& options) {
+  if (options.policy == RealTimePolicy::off) return;
+  check(options);
+  const auto note = [this](std::string what) {
+    if (!what.empty()) missing_.push_back(std::move(what));
+  };
+  if (!kernel_is_preempt_rt())
+    note(
+        "the kernel is not a PREEMPT_RT one: cycles can be late by milliseconds; boot one "
+        "(Debian: linux-image-rt-amd64)");
+  note(pin(options.cpu));
+  note(take_priority(options.priority));
+  // Of use where the priority was refused: a plain thread is woken up to 50 us late on purpose.
+  ::prctl(PR_SET_TIMERSLACK, 1UL);
+  if (options.lock_memory) {
+    std::string failure = lock_memory();
+    locked_ = failure.empty();
+    note(std::move(failure));
+  }
+  if (options.policy == RealTimePolicy::require && !missing_.empty()) {
+    if (locked_) ::munlockall();
+    throw StageError(
+        fmt::format("realtime: {}; or write policy: try", fmt::join(missing_, "; and ")));
+  }
+}
+
+RealTime::~RealTime() {
+  if (locked_) ::munlockall();
+}
+
+std::vector<std::string> missing_for_real_time(const RealTimeOptions& options) {
+  std::vector<std::string> missing;
+  std::exception_ptr failure;
+  std::thread([&] {
+    try {
+      missing = RealTime(options).missing();
+    } catch (...) {
+      failure = std::current_exception();
+    }
+  }).join();
+  if (failure) std::rethrow_exception(failure);
+  return missing;
+}
+
+}  // namespace stageid

@@ -1,0 +1,184 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <numeric>
+#include <sstream>
+#include <string>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/hdf5_file.hpp"
+#include "tests/acquisition/files/expect_error.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+namespace fs = std::filesystem;
+using test::expect_error;
+using test::TemporaryDirectory;
+
+std::string content(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+void write_bytes(const fs::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+std::string healthy_file(const TemporaryDirectory& directory) {
+  Hdf5File file = Hdf5File::create(directory / "healthy.h5");
+  std::vector<double> values(std::size_t{1234} * 7);
+  std::iota(values.begin(), values.end(), 0.0);
+  file.write_attribute("/", "format", std::string("test"));
+  file.write_texts("/names", {"one", "two"});
+  file.write_reals("/values", {1234, 7}, values.data());
+  file.create_growing("/rows", 2, H5T_IEEE_F64LE, 100);
+  file.append_rows("/rows", 500, values.data());
+  file.close();
+  return content(directory / "healthy.h5");
+}
+
+struct Everything {
+  std::vector<std::string> names;
+  std::vector<double> values, rows, last_row;
+  bool operator==(const Everything&) const = default;
+};
+
+bool has_nan(const Everything& all) {
+  const auto nan = [](double value) { return std::isnan(value); };
+  return std::any_of(all.values.begin(), all.values.end(), nan) ||
+         std::any_of(all.rows.begin(), all.rows.end(), nan);
+}
+
+/// Reads all there is; whatever is wrong with the file must come out as FormatError.
+Everything read_everything(const fs::path& path) {
+  const Hdf5File file = Hdf5File::open(path);
+  file.children("/");
+  file.read_text_attribute("/", "format");
+  Everything all{
+      file.read_texts("/names"), file.read_reals("/values"), file.read_reals("/rows"), {}};
+  const std::vector<hsize_t> shape = file.shape("/values");
+  all.last_row.resize(shape.at(1));
+  file.read_rows("/values", shape[0] - 1, 1, all.last_row.data());
+  return all;
+}
+
+TEST(DamagedHdf5, IsToldFromMissingAndForeignFiles) {
+  const TemporaryDirectory directory;
+  expect_error<FileError>([&] { Hdf5File::open(directory / "absent.h5"); }, directory / "absent.h5",
+                          std::strerror(ENOENT));
+  expect_error<FileError>([&] { Hdf5File::open(directory.path()); }, directory.path(),
+                          "is not a file");
+  write_bytes(directory / "text.h5", "this is not HDF5\n");
+  expect_error<FormatError>([&] { Hdf5File::open(directory / "text.h5"); }, directory / "text.h5",
+                            "not an HDF5 file");
+  write_bytes(directory / "empty.h5", "");
+  expect_error<FormatError>([&] { Hdf5File::open(directory / "empty.h5"); }, directory / "empty.h5",
+                            "not an HDF5 file");
+}
+
+TEST(DamagedHdf5, CutShortAnywhereIsAFormatError) {
+  const TemporaryDirectory directory;
+  const std::string healthy = healthy_file(directory);
+  EXPECT_NO_THROW(read_everything(directory / "healthy.h5"));
+  for (std::size_t length = 0; length < healthy.size(); length += 97) {
+    write_bytes(directory / "cut.h5", healthy.substr(0, length));
+    EXPECT_THROW(read_everything(directory / "cut.h5"), FormatError) << length << " bytes";
+  }
+  write_bytes(directory / "cut.h5", healthy.substr(0, healthy.size() - 1));
+  expect_error<FormatError>([&] { read_everything(directory / "cut.h5"); }, directory / "cut.h5",
+                            "cut short");
+}
+
+TEST(DamagedHdf5, AHugeSizeDoesNotAskForAllTheMemory) {
+  const TemporaryDirectory directory;
+  const fs::path path = directory / "hostile.h5";
+  for (const hsize_t rows : {hsize_t{1} << 34, hsize_t{1} << 61}) {
+    {
+      // Datasets that were declared and never written have a shape and no bytes.
+      const Hdf5Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
+                            H5Fclose);
+      const hsize_t shape[2] = {rows, 7};
+      const hsize_t chunk[2] = {100, 7};
+      const Hdf5Handle space(H5Screate_simple(2, shape, nullptr), H5Sclose);
+      const Hdf5Handle properties(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+      H5Pset_chunk(properties.get(), 2, chunk);
+      const auto create = [&](const char* name, hid_t type, hid_t creation) {
+        const Hdf5Handle dataset(
+            H5Dcreate2(file.get(), name, type, space.get(), H5P_DEFAULT, creation, H5P_DEFAULT),
+            H5Dclose);
+        ASSERT_TRUE(dataset);
+      };
+      create("values", H5T_IEEE_F64LE, properties.get());
+      H5Pset_deflate(properties.get(), 1);
+      create("packed", H5T_IEEE_F64LE, properties.get());
+      if (rows < hsize_t{1} << 40) create("whole", H5T_IEEE_F64LE, H5P_DEFAULT);
+    }
+    const Hdf5File file = Hdf5File::open(path);
+    for (const std::string& name : file.children("/")) {
+      const std::string place = path.string() + ":/" + name + ": ";
+      expect_error<FormatError>([&] { file.read_reals("/" + name); }, place, "damaged");
+      expect_error<FormatError>([&] { file.shape("/" + name); }, place, "damaged");
+    }
+  }
+}
+
+TEST(DamagedHdf5, OneWrongByteIsNoticedOrChangesNothing) {
+  // Checksums guard structure and data. (Not the letters of attributes: those stand in a heap that
+  // has no checksum.) Unused bytes may change.
+  const TemporaryDirectory directory;
+  const std::string healthy = healthy_file(directory);
+  const Everything truth = read_everything(directory / "healthy.h5");
+  int noticed = 0;
+  int harmless = 0;
+  const auto flip = [&](std::size_t at, int bits) {
+    std::string damaged = healthy;
+    damaged[at] = static_cast<char>(damaged[at] ^ bits);
+    write_bytes(directory / "damaged.h5", damaged);
+    try {
+      const Everything read = read_everything(directory / "damaged.h5");
+      if (has_nan(read)) {
+        ++noticed;  // by whoever asks for numbers
+      } else {
+        EXPECT_TRUE(read == truth) << "byte " << at << " ^ " << bits;
+        ++harmless;
+      }
+    } catch (const FormatError&) {
+      ++noticed;
+    }
+  };
+  constexpr std::size_t kStructure = 6000;  // at both ends; the data stand between
+  for (std::size_t at = 0; at < healthy.size(); at += 7) {
+    const bool data = at > kStructure && healthy.size() - at > kStructure;
+    if (!data || at % 70 == 0) flip(at, at % 2 == 0 ? 0xFF : 0x01);
+  }
+  EXPECT_GT(noticed, 1000);
+  EXPECT_GT(harmless, 10);
+}
+
+TEST(DamagedHdf5, AHeapWhoseTextsOverlapIsRefused) {
+  const TemporaryDirectory directory;
+  const std::string healthy = healthy_file(directory);
+  const std::size_t heap = healthy.find(std::string("GCOL\1\0\0\0", 8));
+  ASSERT_NE(heap, std::string::npos);
+  // The size of the collection, of its first text, and of the free space behind: HDF5 1.10 crashes
+  // or never returns on each.
+  for (const std::size_t place : {heap + 8, heap + 24, heap + 48}) {
+    for (const std::size_t byte : {0, 1, 5}) {
+      std::string damaged = healthy;
+      damaged[place + byte] = static_cast<char>(damaged[place + byte] ^ 0x80);
+      write_bytes(directory / "damaged.h5", damaged);
+      expect_error<FormatError>([&] { Hdf5File::open(directory / "damaged.h5"); },
+                                directory / "damaged.h5", "damaged");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stageid

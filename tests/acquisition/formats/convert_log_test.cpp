@@ -1,0 +1,140 @@
+#include "acquisition/formats/convert_log.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/slog/slog_recover.hpp"
+#include "tests/acquisition/record/small_log.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+/// Two complete runs and one that was broken off.
+std::unique_ptr<LogReader> write_log(const std::filesystem::path& file) {
+  SlogWriter log = SlogWriter::create(file, test::small_info());
+  test::write_run(log, 0);
+  test::write_run(log, 1);
+  log.begin_run(test::run_of(2), test::excitation_of(2));
+  log.write(test::rows_of(2, 0, 5));
+  log.end_run(test::run_of(2, false));
+  log.close(130, "interrupted");
+  return open_log(file);
+}
+
+TEST(ConvertLog, HDF5HoldsTheSame) {
+  const test::TemporaryDirectory directory;
+  const auto native = write_log(directory / "a.slog");
+  std::uint64_t done = 0;
+  convert_log(*native, directory / "a.h5",
+              {.progress = [&](std::uint64_t rows, std::uint64_t total) {
+                EXPECT_EQ(total, 77U);
+                done = rows;
+              }});
+  EXPECT_EQ(done, 77U);
+  const auto hdf5 = open_log(directory / "a.h5");
+  EXPECT_TRUE(same_measurement(hdf5->info(), native->info()));
+  EXPECT_EQ(hdf5->info().metadata_json, test::small_info().metadata_json);
+  ASSERT_EQ(hdf5->runs().size(), 3U);
+  LogSamples samples;
+  for (std::size_t run = 0; run < 3; ++run) {
+    const LogRun& read = hdf5->runs()[run];
+    EXPECT_EQ(read.complete, run != 2);
+    EXPECT_EQ(read.realization, native->runs()[run].realization);
+    EXPECT_EQ(read.experiment, native->runs()[run].experiment);
+    EXPECT_EQ(read.started_utc, native->runs()[run].started_utc);
+    EXPECT_EQ(hdf5->excitation(run), test::excitation_of(run));
+    hdf5->read(run, 0, read.samples, samples);
+    EXPECT_TRUE(test::holds_rows(samples, run, 0));
+  }
+  EXPECT_TRUE(verify_log(directory / "a.h5").intact());
+  EXPECT_EQ(verify_log(directory / "a.h5").rows, 77U);
+  const Hdf5File file = Hdf5File::open(directory / "a.h5");
+  EXPECT_EQ(file.read_integer_attribute("/runs/0001", "marked_samples"), 5);
+}
+
+TEST(ConvertLog, AnHDF5LogIsConvertedToTheSameAgain) {
+  const test::TemporaryDirectory directory;
+  convert_log(*write_log(directory / "a.slog"), directory / "a.h5");
+  convert_log(*open_log(directory / "a.h5"), directory / "b.h5");
+  const auto a = open_log(directory / "a.h5");
+  const auto b = open_log(directory / "b.h5");
+  LogSamples of_a;
+  LogSamples of_b;
+  for (std::size_t run = 0; run < 3; ++run) {
+    a->read(run, 0, a->runs()[run].samples, of_a);
+    b->read(run, 0, b->runs()[run].samples, of_b);
+    EXPECT_EQ(of_a.actuators, of_b.actuators);
+    EXPECT_EQ(of_a.sensors, of_b.sensors);
+    EXPECT_TRUE((of_a.marked == of_b.marked).all());
+  }
+}
+
+TEST(ConvertLog, RunsThatWereBrokenOffCanBeLeftOut) {
+  const test::TemporaryDirectory directory;
+  convert_log(*write_log(directory / "a.slog"), directory / "a.h5", {.incomplete_runs = false});
+  EXPECT_EQ(open_log(directory / "a.h5")->runs().size(), 2U);
+}
+
+TEST(ConvertLog, CsvReadsBackToTheSameNumbers) {
+  const test::TemporaryDirectory directory;
+  convert_log(*write_log(directory / "a.slog"), directory / "a.csv");
+  std::ifstream in(directory / "a.csv");
+  std::string line;
+  std::getline(in, line);
+  EXPECT_EQ(line,
+            "run,realization,experiment,time_s,marked,\"excitation z1 [N]\",\"excitation z2 [N]\","
+            "\"excitation z3 [N]\",\"actuator z1 [N]\",\"actuator z2 [N]\",\"actuator z3 [N]\","
+            "\"sensor s1 [m]\",\"sensor s2 [m]\"");
+  std::size_t lines = 0;
+  for (std::size_t run = 0; run < 3; ++run) {
+    const Eigen::MatrixXd excitation = test::excitation_of(run);
+    for (std::uint64_t row = 0; row < (run == 2 ? 5U : 36U); ++row) {
+      ASSERT_TRUE(std::getline(in, line));
+      ++lines;
+      std::istringstream cells(line);
+      std::vector<double> values;
+      for (std::string cell; std::getline(cells, cell, ',');) values.push_back(std::stod(cell));
+      ASSERT_EQ(values.size(), 13U);
+      EXPECT_EQ(values[0], static_cast<double>(run));
+      EXPECT_EQ(values[2], static_cast<double>(run % 3));
+      EXPECT_EQ(values[3], static_cast<double>(row) / 1000.0);
+      EXPECT_EQ(values[4], test::is_marked(run, row) ? 1.0 : 0.0);
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_EQ(values[static_cast<std::size_t>(5 + c)],
+                  excitation(static_cast<Eigen::Index>(row % test::kPeriod), c));
+        EXPECT_EQ(values[static_cast<std::size_t>(8 + c)], test::actuator_value(run, row, c));
+      }
+      EXPECT_EQ(values[12], test::sensor_value(run, row, 1));
+    }
+  }
+  EXPECT_FALSE(std::getline(in, line)) << "nothing more";
+  EXPECT_EQ(lines, 77U);
+}
+
+TEST(ConvertLog, LeavesNothingHalfWritten) {
+  const test::TemporaryDirectory directory;
+  const auto reader = write_log(directory / "a.slog");
+  EXPECT_THROW(convert_log(*reader, directory / "a.txt"), std::invalid_argument);
+  EXPECT_THROW(convert_log(*reader, directory / "none/a.h5"), FileError);
+  // The log is damaged after it was opened: the conversion fails on the way.
+  std::string bytes = test::bytes_of(directory / "a.slog");
+  bytes[bytes.size() * 3 / 4] ^= 1;
+  test::write_bytes(directory / "a.slog", bytes);
+  EXPECT_THROW(convert_log(*reader, directory / "a.h5"), FormatError);
+  EXPECT_THROW(convert_log(*reader, directory / "a.csv"), FormatError);
+  std::size_t files = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(directory.path())) {
+    ++files;
+  }
+  EXPECT_EQ(files, 1U) << "the log alone";
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,376 @@
+#include "acquisition/formats/hdf5_log.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <thread>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "tests/acquisition/record/foreign_log.hpp"
+#include "tests/acquisition/record/small_log.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+using test::kPeriod;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+using namespace test::foreign_log;
+
+class Hdf5Log : public testing::Test {
+ protected:
+  void write(const Foreign& foreign) {
+    std::filesystem::remove(path_);
+    Hdf5File file = Hdf5File::create(path_);
+    file.write_attribute("/", "format", foreign.format);
+    file.write_attribute("/", "format_version", foreign.version);
+    file.write_attribute("/", "sample_rate_hz", foreign.sample_rate_hz);
+    if (foreign.left_out != "period_samples") {
+      file.write_attribute("/", "period_samples", foreign.period_samples);
+    }
+    file.write_attribute("/", "transient_periods", foreign.transient_periods);
+    file.create_group("/channels");
+    const LogInfo info = test::small_info();
+    file.write_texts("/channels/excitation", info.excitation.names);
+    file.write_attribute("/channels/excitation", "unit", std::string("N"));
+    file.write_texts("/channels/actuators", info.actuators.names);
+    file.write_attribute("/channels/actuators", "unit", info.actuators.units);
+    if (foreign.left_out != "/channels/sensors") {
+      file.write_texts("/channels/sensors", info.sensors.names);
+      file.write_attribute("/channels/sensors", "unit", foreign.sensor_units);
+    }
+    if (foreign.left_out != "/runs") write_runs(file, foreign);
+    foreign.change(file);
+    file.close();
+  }
+
+  static void write_runs(Hdf5File& file, const Foreign& foreign) {
+    file.create_group("/runs");
+    for (std::size_t run = 0; run < foreign.ids.size(); ++run) {
+      const std::string group = "/runs/000" + std::to_string(run);
+      file.create_group(group);
+      file.write_attribute(group, "realization", foreign.ids[run].first);
+      file.write_attribute(group, "experiment", foreign.ids[run].second);
+      const std::uint64_t rows = foreign.whole_excitation ? kRows : kPeriod;
+      if (foreign.left_out != "excitation") {
+        file.write_reals(group + "/excitation", Shape{rows, 3}, excitation(run, rows).data());
+      }
+      if (foreign.left_out != "actuators") {
+        file.write_reals(group + "/actuators", Shape{kRows, 3}, actuators(run).data());
+      }
+      if (foreign.left_out != "sensors") {
+        file.write_reals(group + "/sensors", Shape{kRows, 2}, sensors(run).data());
+      }
+    }
+  }
+
+  /// Adds a third run whose datasets the caller gives.
+  static void add_run(Hdf5File& file, const std::string& group, long long realization) {
+    file.create_group(group);
+    file.write_attribute(group, "realization", realization);
+    file.write_attribute(group, "experiment", 0LL);
+  }
+
+  void expect_refused(const Foreign& foreign, const std::string& place, const std::string& reason) {
+    write(foreign);
+    EXPECT_THAT([&] { open_log(path_); },
+                ThrowsMessage<FormatError>(
+                    AllOf(HasSubstr(path_.string()), HasSubstr(place), HasSubstr(reason))));
+  }
+
+  test::TemporaryDirectory directory_;
+  std::filesystem::path path_ = directory_ / "log.h5";
+};
+
+TEST_F(Hdf5Log, ReadsWhatAForeignProgramWrites) {
+  write({});
+  const auto reader = open_log(path_);
+  EXPECT_TRUE(same_measurement(reader->info(), test::small_info()));
+  ASSERT_EQ(reader->runs().size(), 2U);
+  LogSamples samples;
+  for (std::size_t run = 0; run < 2; ++run) {
+    EXPECT_EQ(reader->runs()[run].samples, kRows);
+    EXPECT_TRUE(reader->runs()[run].complete);
+    EXPECT_EQ(reader->runs()[run].experiment, static_cast<int>(run));
+    EXPECT_EQ(reader->excitation(run), test::excitation_of(run));
+    for (std::uint64_t first = 0; first <= kRows; first += 5) {
+      reader->read(run, first, kRows - first, samples);
+      ASSERT_TRUE((samples.marked == 0).all());
+      for (Eigen::Index r = 0; r < samples.marked.size(); ++r) {
+        samples.marked[r] = test::is_marked(run, first + static_cast<std::uint64_t>(r)) ? 1 : 0;
+      }
+      ASSERT_TRUE(test::holds_rows(samples, run, first));
+    }
+  }
+  EXPECT_THROW(reader->read(2, 0, 1, samples), std::invalid_argument);
+  EXPECT_THROW(reader->read(0, 30, 7, samples), std::invalid_argument);
+}
+
+TEST_F(Hdf5Log, TakesOneUnitOrOneAChannel) {
+  write({.sensor_units = {"m", "rad"}});
+  EXPECT_EQ(open_log(path_)->info().sensors.units, (std::vector<std::string>{"m", "rad"}));
+  expect_refused({.sensor_units = {"m", "rad", "m"}}, "/channels/sensors", "3 units");
+}
+
+// Of all signals, then the periods behind it are only displaced.
+TEST_F(Hdf5Log, AWholeExcitationMayLackARow) {
+  write({.change = [](Hdf5File& file) {
+    add_run(file, "/runs/0002", 1);
+    std::vector<double> values = excitation(2, kRows);
+    const auto lost = values.begin() + 3 * (kPeriod + 2);
+    values.erase(lost, lost + 3);
+    values.insert(values.end(), {0.0, 0.0, 0.0});
+    file.write_reals("/runs/0002/excitation", Shape{kRows, 3}, values.data());
+    file.write_reals("/runs/0002/actuators", Shape{kRows, 3}, actuators(2).data());
+    file.write_reals("/runs/0002/sensors", Shape{kRows, 2}, sensors(2).data());
+  }});
+  EXPECT_EQ(open_log(path_)->excitation(2), test::excitation_of(2));
+}
+
+TEST_F(Hdf5Log, AWholeExcitationMustRepeat) {
+  write({.whole_excitation = true});
+  EXPECT_EQ(open_log(path_)->excitation(1), test::excitation_of(1));
+
+  const auto with_error = [&](double error) {
+    write({.change = [error](Hdf5File& file) {
+      add_run(file, "/runs/0002", 1);
+      std::vector<double> values = excitation(2, kRows);
+      values[3 * 30 + 2] += error;
+      file.write_reals("/runs/0002/excitation", Shape{kRows, 3}, values.data());
+      file.write_reals("/runs/0002/actuators", Shape{kRows, 3}, actuators(2).data());
+      file.write_reals("/runs/0002/sensors", Shape{kRows, 2}, sensors(2).data());
+    }});
+    return open_log(path_)->excitation(2);
+  };
+  const double peak = test::excitation_of(2).cwiseAbs().maxCoeff();
+  EXPECT_EQ(with_error(0.5e-9 * peak), test::excitation_of(2));
+  EXPECT_THAT([&] { with_error(2e-9 * peak); },
+              ThrowsMessage<FormatError>(
+                  AllOf(HasSubstr("does not repeat"), HasSubstr("row 30"), HasSubstr("z3"))));
+  EXPECT_THROW(with_error(std::numeric_limits<double>::quiet_NaN()), FormatError);
+}
+
+TEST_F(Hdf5Log, IntegersAreScaled) {
+  const std::vector<double> counts = {1, -2, 3, 4};
+  write(
+      {.ids = {}, .change = [&](Hdf5File& file) {
+         add_run(file, "/runs/0000", 0);
+         std::vector<long long> u(kRows * 3);
+         std::vector<long long> y(kRows * 2);
+         for (std::size_t i = 0; i < u.size(); ++i) u[i] = static_cast<long long>(i) - 50;
+         for (std::size_t i = 0; i < y.size(); ++i) y[i] = 7 * static_cast<long long>(i);
+         file.write_integers("/runs/0000/actuators", Shape{kRows, 3}, u.data());
+         file.write_attribute("/runs/0000/actuators", "scale", std::vector<double>{0.5, 0.25, 2.0});
+         file.write_attribute("/runs/0000/actuators", "offset",
+                              std::vector<double>{1.0, 0.0, -1.0});
+         file.write_integers("/runs/0000/sensors", Shape{kRows, 2}, y.data());
+         file.write_attribute("/runs/0000/sensors", "scale", 1e-9);
+         file.write_reals("/runs/0000/excitation", Shape{kPeriod, 3},
+                          excitation(0, kPeriod).data());
+         file.write_attribute("/runs/0000/excitation", "offset", 0.5);
+       }});
+  const auto reader = open_log(path_);
+  LogSamples samples;
+  reader->read(0, 4, 10, samples);
+  const double scale[] = {0.5, 0.25, 2.0};
+  const double offset[] = {1.0, 0.0, -1.0};
+  for (Eigen::Index r = 0; r < 10; ++r) {
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const double stored = static_cast<double>((r + 4) * 3 + c - 50);
+      EXPECT_DOUBLE_EQ(samples.actuators(r, c), scale[c] * stored + offset[c]);
+    }
+    EXPECT_DOUBLE_EQ(samples.sensors(r, 1), 1e-9 * 7 * static_cast<double>((r + 4) * 2 + 1));
+  }
+  EXPECT_EQ(reader->excitation(0), Eigen::MatrixXd(test::excitation_of(0).array() + 0.5));
+  for (const std::vector<double>& bad :
+       {std::vector<double>{1.0, 2.0}, std::vector<double>{1.0, std::nan(""), 1.0}}) {
+    Foreign foreign;
+    foreign.change = [&](Hdf5File& file) {
+      file.write_attribute("/runs/0001/actuators", "scale", bad);
+    };
+    expect_refused(foreign, "/runs/0001/actuators", "scale");
+  }
+}
+
+TEST_F(Hdf5Log, MarkedSamplesAreGiven) {
+  std::vector<long long> marked(kRows, 0);
+  marked[3] = 1;
+  marked[20] = 255;
+  Foreign foreign;
+  foreign.change = [&](Hdf5File& file) {
+    file.write_integers("/runs/0001/marked", Shape{kRows}, marked.data());
+  };
+  write(foreign);
+  LogSamples samples;
+  open_log(path_)->read(1, 2, 30, samples);
+  for (Eigen::Index r = 0; r < 30; ++r) EXPECT_EQ(samples.marked[r] != 0, r == 1 || r == 18);
+
+  foreign.change = [&](Hdf5File& file) {
+    file.write_integers("/runs/0001/marked", Shape{kRows - 1}, marked.data());
+  };
+  expect_refused(foreign, "/runs/0001/marked", "36");
+}
+
+TEST_F(Hdf5Log, RefusesWhatIsMissing) {
+  const std::pair<const char*, const char*> parts[] = {{"period_samples", "period_samples"},
+                                                       {"/channels/sensors", "/channels/sensors"},
+                                                       {"/runs", "/runs"},
+                                                       {"excitation", "/runs/0000/excitation"},
+                                                       {"actuators", "/runs/0000/actuators"},
+                                                       {"sensors", "/runs/0000/sensors"}};
+  for (const auto& [left_out, place] : parts)
+    expect_refused({.left_out = left_out}, place, "missing");
+}
+
+TEST_F(Hdf5Log, RefusesAttributesThatMakeNoSense) {
+  expect_refused({.format = "stageid-frf"}, "/", "is a frequency response, not a log;");
+  expect_refused({.version = 2}, "/", "version 2");
+  expect_refused({.sample_rate_hz = 0.0}, "/", "sample_rate_hz");
+  expect_refused({.sample_rate_hz = std::nan("")}, "/", "sample_rate_hz");
+  expect_refused({.period_samples = 0}, "/", "period_samples");
+  expect_refused({.period_samples = -12}, "/", "period_samples");
+  expect_refused({.period_samples = 1LL << 40}, "/", "period_samples");
+  expect_refused({.period_samples = 2'000'000'000}, "/", "period_samples");
+  expect_refused({.transient_periods = -1}, "/", "transient_periods");
+}
+
+TEST_F(Hdf5Log, RefusesRunsOfNoWholePeriods) {
+  // 36 samples are three periods of 12, not whole ones of 10 or 11, nor any behind 3 transient ones.
+  Foreign foreign;
+  foreign.period_samples = 7;
+  foreign.left_out = "excitation";
+  foreign.ids = {{0, 0}};
+  foreign.change = [](Hdf5File& file) {
+    file.write_reals("/runs/0000/excitation", Shape{7, 3}, excitation(0, 7).data());
+  };
+  expect_refused(foreign, "/runs/0000", "36 samples");
+  expect_refused({.transient_periods = 3}, "/runs/0000", "36 samples");
+  expect_refused({.transient_periods = 1LL << 30}, "/runs/0000", "36 samples");
+}
+
+TEST_F(Hdf5Log, RefusesWrongShapes) {
+  const auto with = [&](const std::string& name, const Shape& shape, const std::string& reason) {
+    Foreign foreign;
+    foreign.left_out = name;
+    foreign.ids = {{0, 0}};
+    foreign.change = [&](Hdf5File& file) {
+      const std::vector<double> values(1000, 1.0);
+      file.write_reals("/runs/0000/" + name, shape, values.data());
+    };
+    expect_refused(foreign, "/runs/0000", reason);
+  };
+  with("sensors", {kRows, 3}, "[36 x 3]");
+  with("sensors", {kRows}, "[36]");
+  with("sensors", {kRows, 2, 1}, "[36 x 2 x 1]");
+  with("sensors", {kRows - 1, 2}, "36 rows");
+  with("actuators", {kRows, 2}, "samples x 3 channels");
+  with("actuators", {3, kRows}, "samples x 3 channels");
+  with("excitation", {kPeriod + 1, 3}, "13 rows");
+  with("excitation", {kPeriod, 2}, "samples x 3 channels");
+}
+
+TEST_F(Hdf5Log, RefusesRunsThatCannotBe) {
+  expect_refused({.ids = {{0, 0}, {0, 0}}}, "/runs/0001", "once");
+  expect_refused({.ids = {{0, 0}, {-1, 0}}}, "/runs/0001", "realization -1");
+  expect_refused({.ids = {{0, 0}, {0, -2}}}, "/runs/0001", "experiment -2");
+  expect_refused({.ids = {{0, 0}, {1LL << 33, 0}}}, "/runs/0001", "out of range");
+}
+
+TEST_F(Hdf5Log, ARunThatWasBrokenOffMayHaveAnyLength) {
+  Foreign foreign;
+  foreign.change = [](Hdf5File& file) {
+    add_run(file, "/runs/0002", 0);  // the same as run 0000, which is complete
+    file.write_attribute("/runs/0002", "complete", 0LL);
+    file.write_attribute("/runs/0002", "started_utc", std::string("2024-01-01T00:00:00Z"));
+    file.write_reals("/runs/0002/excitation", Shape{kPeriod, 3}, excitation(2, kPeriod).data());
+    file.write_reals("/runs/0002/actuators", Shape{5, 3}, actuators(2, 5).data());
+    file.write_reals("/runs/0002/sensors", Shape{5, 2}, sensors(2, 5).data());
+  };
+  write(foreign);
+  const auto reader = open_log(path_);
+  EXPECT_FALSE(reader->runs()[2].complete);
+  EXPECT_EQ(reader->runs()[2].samples, 5U);
+  EXPECT_EQ(reader->runs()[2].started_utc, "2024-01-01T00:00:00Z");
+}
+
+TEST_F(Hdf5Log, NamesTheValueThatIsNotFinite) {
+  for (const bool actuator : {true, false}) {
+    Foreign foreign;
+    foreign.ids = {};
+    foreign.change = [&](Hdf5File& file) {
+      add_run(file, "/runs/0000", 0);
+      std::vector<double> u = actuators(0);
+      std::vector<double> y = sensors(0);
+      (actuator ? u[3 * 17 + 1] : y[2 * 17 + 1]) = std::numeric_limits<double>::infinity();
+      file.write_reals("/runs/0000/excitation", Shape{kPeriod, 3}, excitation(0, kPeriod).data());
+      file.write_reals("/runs/0000/actuators", Shape{kRows, 3}, u.data());
+      file.write_reals("/runs/0000/sensors", Shape{kRows, 2}, y.data());
+    };
+    write(foreign);
+    const auto reader = open_log(path_);
+    LogSamples samples;
+    EXPECT_THAT([&] { reader->read(0, 12, 12, samples); },
+                ThrowsMessage<FormatError>(AllOf(HasSubstr("/runs/0000"), HasSubstr("row 17"),
+                                                 HasSubstr(actuator ? "'z2'" : "'s2'"))));
+    EXPECT_NO_THROW(reader->read(0, 18, 18, samples));
+  }
+}
+
+TEST_F(Hdf5Log, AFileCutShortIsAnErrorNotACrash) {
+  write({});
+  const std::string good = test::bytes_of(path_);
+  for (std::size_t size = 8; size < good.size(); size += 311) {
+    test::write_bytes(path_, good.substr(0, size));
+    EXPECT_THROW(
+        {
+          const auto reader = open_log(path_);
+          LogSamples samples;
+          reader->read(0, 0, kRows, samples);
+          reader->read(1, 0, kRows, samples);
+        },
+        FormatError)
+        << size;
+  }
+}
+
+TEST_F(Hdf5Log, SeveralThreadsMayRead) {
+  write({});
+  const auto reader = open_log(path_);
+  std::vector<int> good(2, 0);
+  std::vector<std::thread> threads;
+  for (std::size_t run = 0; run < 2; ++run) {
+    threads.emplace_back([&, run] {
+      LogSamples samples;
+      for (int repeat = 0; repeat < 50; ++repeat) {
+        reader->read(run, 0, kRows, samples);
+        good[run] += samples.actuators(20, 1) == test::actuator_value(run, 20, 1) ? 1 : 0;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_THAT(good, testing::Each(50));
+}
+
+// Written by an independent program: bool attributes, float32, variable-length strings.
+TEST(ForeignLog, IsRead) {
+  const auto file = std::filesystem::path(STAGEID_SOURCE_DIR) / "../shared/data/foreign_log/log.h5";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not here";
+  const auto reader = open_log(file);
+  EXPECT_EQ(reader->info().sample_rate_hz, 5000.0);
+  EXPECT_EQ(reader->info().period_samples, 10000);
+  EXPECT_EQ(reader->info().actuators.size(), 13U);
+  EXPECT_EQ(reader->info().sensors.units, std::vector<std::string>(4, "m"));
+  ASSERT_EQ(reader->runs().size(), 26U);
+  LogSamples samples;
+  reader->read(25, 10000, 20000, samples);
+  EXPECT_GT(samples.actuators.norm(), 0.0);
+  EXPECT_EQ(reader->excitation(25).rows(), 10000);
+}
+
+}  // namespace
+}  // namespace stageid

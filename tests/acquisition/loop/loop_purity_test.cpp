@@ -1,0 +1,146 @@
+// Between start() and the end of a run the whole cycle (controller, limits, simulated plant, ring)
+// allocates nothing, takes no lock, and asks nothing of the kernel but the time and to sleep.
+#include <gtest/gtest.h>
+#include <linux/audit.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "acquisition/loop/measurement_loop.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "hal/stage/limited_stage.hpp"
+#include "tests/support/allocation_counter.hpp"
+#include "tests/support/lock_counter.hpp"
+#include "tests/support/wafer_stage.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr std::uint64_t kSamples = 2000;
+
+/// The whole wafer stage in closed loop, in virtual time (pace 0) or against the clock, with a miss,
+/// so that the odd paths are walked too.
+class WholeLoop {
+ public:
+  explicit WholeLoop(double pace)
+      : spec_(spec_of(pace)),
+        stage_(std::make_unique<SimulatedStage>(spec_), spec_.limits),
+        controller_(spec_.controller),
+        ring_(spec_.info.actuators.size() + spec_.info.sensors.size() + 1, 4096),
+        loop_(stage_, controller_, ring_, {.ramp_s = 0.01, .misses_allowed = 1'000'000}) {
+    LoopExcitation excitation;
+    excitation.period = Eigen::MatrixXd::Constant(100, 1, 0.1);
+    excitation.actuators = {0};
+    excitation.samples = kSamples;
+    loop_.start(1, excitation);
+  }
+  void run() noexcept {
+    while (loop_.step() == LoopStatus::running) {
+    }
+  }
+  const MeasurementLoop& loop() const { return loop_; }
+
+ private:
+  static WaferStageSpec spec_of(double pace) {
+    WaferStageSpec spec = test::wafer_stage_spec();
+    spec.pace = pace;
+    spec.faults = {{WaferStageSpec::Fault::Kind::missed_cycle, 0, 300, 2, -1}};
+    return spec;
+  }
+
+  WaferStageSpec spec_;
+  LimitedStage stage_;
+  MotionController controller_;
+  SampleRing ring_;
+  MeasurementLoop loop_;
+};
+
+class LoopPurity : public testing::TestWithParam<double> {};
+
+TEST_P(LoopPurity, NoAllocationAndNoLock) {
+  if (!test::AllocationCounter::works() || !test::LockCounter::works())
+    GTEST_SKIP() << "malloc or the locks are not ours in this build";
+  WholeLoop whole(GetParam());
+  const test::AllocationCounter allocations;
+  const test::LockCounter locks;
+  whole.run();
+  EXPECT_EQ(allocations.count(), 0U);
+  EXPECT_EQ(locks.count(), 0U);
+  EXPECT_EQ(whole.loop().health().cycles, kSamples);
+  EXPECT_EQ(whole.loop().timing().empty(), GetParam() == 0.0);
+}
+
+TEST(LockCounter, CountsALockThatIsFree) {
+  if (!test::LockCounter::works()) GTEST_SKIP() << "the locks are not ours in this build";
+  std::mutex mutex;
+  const test::LockCounter counter;
+  for (int i = 0; i < 3; ++i) const std::lock_guard lock(mutex);
+  EXPECT_EQ(counter.count(), 3U);
+}
+
+/// From now on this process dies of any system call but sleep, time and its own end.
+bool forbid_system_calls() {
+  std::vector<sock_filter> filter = {
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
+  for (const unsigned number : {SYS_clock_nanosleep, SYS_clock_gettime, SYS_exit_group}) {
+    filter.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, number, 0, 1));
+    filter.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
+  }
+  filter.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS));
+  const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
+  return ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
+         ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
+}
+
+/// How a child ends that does `work` with system calls forbidden: its wait status; 77 exits where
+/// they cannot be forbidden.
+template <typename Work>
+int status_without_system_calls(Work work) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (!forbid_system_calls()) ::_exit(77);
+    work();
+    ::_exit(0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return status;
+}
+
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr bool kOwnSystemCalls = false;  // sanitizers make calls of their own
+#else
+constexpr bool kOwnSystemCalls = true;
+#endif
+
+TEST_P(LoopPurity, NoSystemCallButSleepAndTime) {
+  if (!kOwnSystemCalls) GTEST_SKIP() << "the sanitizer makes system calls of its own";
+  WholeLoop whole(GetParam());
+  const int status = status_without_system_calls([&] { whole.run(); });
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no seccomp here";
+  EXPECT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status);
+}
+
+TEST(LoopPurityControl, AMemoryMapWouldHaveBeenSeen) {
+  if (!kOwnSystemCalls) GTEST_SKIP() << "the sanitizer makes system calls of its own";
+  const int status = status_without_system_calls([] {
+    static_cast<void>(::mmap(nullptr, 4096, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
+  });
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no seccomp here";
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGSYS);
+}
+
+INSTANTIATE_TEST_SUITE_P(VirtualAndWall, LoopPurity, testing::Values(0.0, 1.0));
+
+}  // namespace
+}  // namespace stageid

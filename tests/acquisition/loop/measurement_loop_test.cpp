@@ -1,0 +1,402 @@
+#include "acquisition/loop/measurement_loop.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+
+#include "tests/acquisition/loop/measurement_loop_fixture.hpp"
+#include "tests/support/allocation_counter.hpp"
+#include "tests/support/analytic_stage.hpp"
+
+namespace stageid {
+namespace {
+
+using namespace test::measurement_loop;
+using test::AnalyticStage;
+
+TEST_F(MeasurementLoopTest, RecordsTheEquationsOfTheLoop) {
+  MeasurementLoop loop = make_loop();
+  loop.start(42, excitation_);
+  run(loop);
+  EXPECT_TRUE(loop.complete());
+  EXPECT_EQ(loop.reason(), StopReason::none);
+  EXPECT_EQ(stage_.seeds(), std::vector<std::uint64_t>{42});
+  EXPECT_EQ(stage_.stops(), 1);
+
+  const std::vector<Row> all = rows();
+  ASSERT_EQ(all.size(), kSamples);
+  EXPECT_TRUE(marked(all).empty());
+  const std::vector<Eigen::VectorXd> control = controls(all);
+  EXPECT_TRUE(all[0].y.isZero(0.0));
+  for (std::size_t n = 0; n < kSamples; ++n) {
+    ASSERT_EQ(all[n].u, control[n] + excitation_at(n)) << "u[n] = C(y[n]) + r[n], n = " << n;
+    if (n + 1 == kSamples) break;
+    for (Eigen::Index i = 0; i < kSensors; ++i) {
+      double y = AnalyticStage::kPole * all[n].y[i];
+      for (Eigen::Index j = 0; j < kActuators; ++j) {
+        y += AnalyticStage::input_gain(i, j) * all[n].u[j];
+      }
+      // One rounding may be fused differently; without the loop's delay it would be off by
+      // percents.
+      ASSERT_NEAR(all[n + 1].y[i], y, 1e-15 + 1e-14 * std::abs(y)) << "y[n+1] = P(y[n], u[n])";
+    }
+  }
+  EXPECT_GT(control[kSamples - 1].norm(), 1e-6) << "the controller does something";
+  EXPECT_EQ(loop.health().cycles, kSamples);
+  EXPECT_EQ(loop.health().marked, 0U);
+}
+
+TEST_F(MeasurementLoopTest, AGoodRunRampsDownBehindItsRecord) {
+  MeasurementLoop loop = make_loop({.ramp_s = 0.01});  // 10 samples
+  loop.start(1, excitation_);
+  run(loop);
+  ASSERT_EQ(stage_.exchanges(), kSamples + 10);
+  EXPECT_EQ(rows().size(), kSamples);
+  // Actuator 2 has the ramp of the period, offset 1, times the gain; its control part is small.
+  const std::vector<double>& sent = stage_.sent();
+  for (std::uint64_t k = 0; k < 10; ++k) {
+    const double gain = static_cast<double>(10 - k) / 11.0;
+    const double r = excitation_at(kSamples + k)[2];
+    EXPECT_NEAR(sent[(kSamples + k) * kActuators + 2], gain * r, 0.05 * excitation_at(19)[2]);
+  }
+}
+
+TEST_F(MeasurementLoopTest, TheSameSeedAndExcitationGiveTheSameBits) {
+  stage_.noise = 1e-3;
+  MeasurementLoop loop = make_loop();
+  std::vector<std::vector<double>> runs;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    loop.start(9, excitation_);
+    run(loop);
+    const auto words = ring_.front(kSamples);
+    runs.emplace_back(words.begin(), words.end());
+    ring_.pop(kSamples);
+  }
+  EXPECT_EQ(runs[0], runs[1]);
+}
+
+TEST_F(MeasurementLoopTest, AStepDoesNotAllocate) {
+  if (!test::AllocationCounter::works()) GTEST_SKIP() << "malloc is not ours in this build";
+  // Everything that can happen in a run: lateness, gaps, a value that is no number, a limit, its
+  // ramp.
+  stage_.outcomes = {{3, Outcome::late}, {5, Outcome::stale}, {8, Outcome::incomplete}};
+  stage_.valid = {{8, 1}};
+  stage_.first_sensor = {{11, std::numeric_limits<double>::quiet_NaN()}};
+  for (std::uint64_t n = 40; n < 100; ++n) stage_.outcomes[n] = Outcome::limit;
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  std::uint64_t allocations = 0;
+  {
+    const test::AllocationCounter counter;
+    run(loop);
+    allocations = counter.count();
+  }
+  EXPECT_EQ(loop.reason(), StopReason::limit);
+  EXPECT_EQ(allocations, 0U);
+}
+
+TEST_F(MeasurementLoopTest, ALimitRampsDownInClosedLoopAndMarksTheRamp) {
+  for (std::uint64_t n = 25; n < 200; ++n) stage_.outcomes[n] = Outcome::limit;
+  MeasurementLoop loop = make_loop({.ramp_s = 0.01});
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_EQ(loop.reason(), StopReason::limit);
+  EXPECT_FALSE(loop.complete());
+  EXPECT_EQ(stage_.stops(), 1);
+  const std::vector<Row> all = rows();
+  // Row 25 is the one whose command was not taken as it stands; 10 of the ramp follow.
+  ASSERT_EQ(all.size(), 26U + 10);
+  for (std::size_t n = 0; n < all.size(); ++n) EXPECT_EQ(all[n].status.marked, n >= 25) << n;
+  const std::vector<Eigen::VectorXd> control = controls(all);
+  for (std::size_t n = 0; n < all.size(); ++n) {
+    const double gain = n <= 25 ? 1.0 : static_cast<double>(36 - n) / 11.0;
+    const Eigen::VectorXd r = all[n].u - control[n];
+    EXPECT_LT((r - gain * excitation_at(n)).norm(), 1e-12 * 20.0) << n;
+  }
+  EXPECT_EQ(loop.health().marked, 11U);
+}
+
+TEST_F(MeasurementLoopTest, AFaultEndsTheRunAtOnce) {
+  for (const Outcome outcome : {Outcome::fault, Outcome::bus_off, Outcome::link_down}) {
+    stage_.outcomes = {{25, outcome}};
+    const int stops = stage_.stops();
+    MeasurementLoop loop = make_loop();
+    loop.start(1, excitation_);
+    run(loop);
+    EXPECT_EQ(loop.reason(), StopReason::fault);
+    EXPECT_EQ(loop.last_trouble(), outcome);
+    EXPECT_FALSE(loop.complete());
+    EXPECT_EQ(stage_.exchanges(), 26U) << "nothing is sent any more";
+    EXPECT_EQ(stage_.stops(), stops + 1);
+    EXPECT_EQ(marked(rows()), std::set<std::size_t>{25});
+    EXPECT_EQ(loop.step(), LoopStatus::ended);
+    ring_.pop(rows().size());
+  }
+}
+
+TEST_F(MeasurementLoopTest, AMissingMeasurementIsHeldAndMarked) {
+  for (const Outcome outcome : {Outcome::stale, Outcome::corrupt}) {
+    stage_.outcomes = {{25, outcome}};
+    MeasurementLoop loop = make_loop();
+    loop.start(1, excitation_);
+    run(loop);
+    EXPECT_TRUE(loop.complete());
+    const std::vector<Row> all = rows();
+    // Command 25 may not have arrived, measurement 26 did not.
+    EXPECT_EQ(marked(all), (std::set<std::size_t>{25, 26}));
+    EXPECT_EQ(all[26].y, all[25].y);
+    EXPECT_EQ(all[26].status.outcome, static_cast<std::uint8_t>(outcome));
+    EXPECT_EQ(loop.health().missing, 1U);
+    EXPECT_EQ(loop.health().marked, 2U);
+    ring_.pop(all.size());
+  }
+}
+
+TEST_F(MeasurementLoopTest, OnlyTheMissingSensorIsHeld) {
+  stage_.outcomes = {{25, Outcome::incomplete}};
+  stage_.valid = {{25, 0b10}};
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  const std::vector<Row> all = rows();
+  EXPECT_EQ(all[26].y[0], all[25].y[0]);
+  EXPECT_NE(all[26].y[1], all[25].y[1]);
+  EXPECT_TRUE(all[26].status.marked);
+}
+
+TEST_F(MeasurementLoopTest, AValueThatIsNoNumberNeitherReachesControllerNorLog) {
+  stage_.first_sensor = {{25, std::numeric_limits<double>::quiet_NaN()},
+                         {40, std::numeric_limits<double>::infinity()}};
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  const std::vector<Row> all = rows();
+  ASSERT_EQ(all.size(), kSamples);
+  for (const Row& row : all) ASSERT_TRUE(row.u.allFinite() && row.y.allFinite());
+  EXPECT_EQ(all[26].y[0], all[25].y[0]);
+  EXPECT_TRUE(all[26].status.marked);
+  EXPECT_TRUE(all[41].status.marked);
+  EXPECT_EQ(loop.health().missing, 2U);
+}
+
+TEST_F(MeasurementLoopTest, ACommandThatIsNoNumberIsSentToBeRefusedButNotLogged) {
+  stage_.first_sensor = {{25, 1e308}};
+  controller_ = MotionController(test::analytic_controller(stage_.info(), 1e6));
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_FALSE(std::isfinite(stage_.sent()[26 * kActuators]));
+  for (const Row& row : rows()) ASSERT_TRUE(row.u.allFinite());
+  EXPECT_TRUE(rows()[26].status.marked);
+}
+
+TEST_F(MeasurementLoopTest, ALateSampleIsValidAndMarked) {
+  stage_.outcomes = {{25, Outcome::late}, {30, Outcome::late}};
+  stage_.lateness_ns = 12345;
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  const std::vector<Row> all = rows();
+  EXPECT_EQ(marked(all), (std::set<std::size_t>{26, 31}));
+  EXPECT_NE(all[26].y, all[25].y);
+  EXPECT_EQ(all[26].status.lateness_ns, 12345U);
+  EXPECT_EQ(loop.health().late, 2U);
+  EXPECT_EQ(loop.health().missing, 0U);
+  EXPECT_EQ(loop.health().largest_lateness_ns, 12345);
+}
+
+TEST_F(MeasurementLoopTest, ASampleOfAnErrorPassiveBusIsValidAndMarked) {
+  stage_.outcomes = {{25, Outcome::bus_passive}};
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  const std::vector<Row> all = rows();
+  EXPECT_EQ(marked(all), std::set<std::size_t>{26});
+  EXPECT_NE(all[26].y, all[25].y);
+  EXPECT_EQ(loop.health().late, 0U);
+  EXPECT_EQ(loop.health().missing, 0U);
+}
+
+// Bucket of 10: k misses in a row fill 2 k; the sixth is one too many.
+TEST_F(MeasurementLoopTest, TheBucketForgivesFiveMissesInARowAndNotSix) {
+  for (const std::uint64_t misses : {5U, 6U}) {
+    stage_.outcomes.clear();
+    for (std::uint64_t n = 0; n < misses; ++n) stage_.outcomes[20 + n] = Outcome::stale;
+    MeasurementLoop loop = make_loop({.ramp_s = 0.01, .misses_allowed = 10});
+    loop.start(1, excitation_);
+    run(loop);
+    EXPECT_EQ(loop.complete(), misses == 5);
+    EXPECT_EQ(loop.reason(), misses == 5 ? StopReason::none : StopReason::misses);
+    EXPECT_EQ(rows().size(), misses == 5 ? kSamples : 26 + 10);
+    ring_.pop(rows().size());
+  }
+}
+
+// Every third cycle missed: +2 -1 -1 = 0. Every second: +1 each two cycles, full after 20.
+TEST_F(MeasurementLoopTest, TheBucketLeaks) {
+  for (const std::uint64_t every : {3U, 2U}) {
+    stage_.outcomes.clear();
+    for (std::uint64_t n = 0; n < kSamples; n += every) stage_.outcomes[n] = Outcome::stale;
+    MeasurementLoop loop = make_loop();
+    loop.start(1, excitation_);
+    run(loop);
+    EXPECT_EQ(loop.complete(), every == 3);
+    ring_.pop(rows().size());
+  }
+}
+
+TEST_F(MeasurementLoopTest, AStageThatDoesNotAnswerInTheRampIsStoppedAtOnce) {
+  for (std::uint64_t n = 20; n < 1000; ++n) stage_.outcomes[n] = Outcome::stale;
+  MeasurementLoop loop = make_loop({.ramp_s = 0.1});  // 100 samples
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_EQ(loop.reason(), StopReason::misses);
+  EXPECT_EQ(stage_.exchanges(), 20U + 6 + 6);
+  EXPECT_EQ(stage_.stops(), 1);
+}
+
+TEST_F(MeasurementLoopTest, AnInterruptRampsDownAndMarks) {
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  for (int n = 0; n < 15; ++n) ASSERT_EQ(loop.step(), LoopStatus::running);
+  loop.request_stop(StopReason::interrupt);
+  loop.request_stop(StopReason::log);  // ignored: the first reason counts
+  run(loop);
+  EXPECT_EQ(loop.reason(), StopReason::interrupt);
+  EXPECT_FALSE(loop.complete());
+  const std::vector<Row> all = rows();
+  ASSERT_EQ(all.size(), 15U + 11);
+  for (std::size_t n = 0; n < all.size(); ++n) EXPECT_EQ(all[n].status.marked, n >= 15);
+}
+
+TEST_F(MeasurementLoopTest, AFullRingStopsNothingHalfWay) {
+  SampleRing small(kActuators + kSensors + 1, 8);
+  MeasurementLoop loop(stage_, controller_, small, {.ramp_s = 0.01});
+  loop.start(1, excitation_);
+  for (int n = 0; n < 8; ++n) ASSERT_EQ(loop.step(), LoopStatus::running);
+  for (int n = 0; n < 3; ++n) ASSERT_EQ(loop.step(), LoopStatus::ring_full);
+  EXPECT_EQ(stage_.exchanges(), 8U);
+  small.pop(8);
+  EXPECT_EQ(loop.step(), LoopStatus::running);
+  // The log is lost: the ramp goes on without it.
+  loop.request_stop(StopReason::log);
+  run(loop);
+  EXPECT_EQ(loop.reason(), StopReason::log);
+  EXPECT_EQ(small.pushed(), 9U);
+  EXPECT_EQ(stage_.exchanges(), 9U + 11);
+  EXPECT_EQ(stage_.stops(), 1);
+}
+
+TEST_F(MeasurementLoopTest, ALimitInTheRampBehindAGoodRunIsTold) {
+  for (std::uint64_t n = kSamples + 3; n < 200; ++n) stage_.outcomes[n] = Outcome::limit;
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_TRUE(loop.complete());
+  EXPECT_EQ(loop.reason(), StopReason::limit);
+  EXPECT_TRUE(marked(rows()).empty());
+}
+
+TEST_F(MeasurementLoopTest, AFaultInTheRampBehindAGoodRunIsTold) {
+  stage_.outcomes = {{kSamples + 3, Outcome::fault}};
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_TRUE(loop.complete());
+  EXPECT_EQ(loop.reason(), StopReason::fault);
+  EXPECT_EQ(loop.last_trouble(), Outcome::fault);
+  EXPECT_TRUE(marked(rows()).empty());
+}
+
+TEST_F(MeasurementLoopTest, AStageThatBrakesIsWaitedForAndThenStopped) {
+  for (std::uint64_t n = 25; n < 60; ++n) stage_.outcomes[n] = Outcome::braking;
+  stage_.outcomes[60] = Outcome::opened;
+  MeasurementLoop loop = make_loop({.ramp_s = 0.01});  // 10 samples: the brake takes longer
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_EQ(loop.reason(), StopReason::limit);
+  EXPECT_EQ(stage_.exchanges(), 61U);
+  EXPECT_EQ(stage_.stops(), 1);
+  const std::vector<Row> all = rows();
+  ASSERT_EQ(all.size(), 61U);
+  for (std::size_t n = 0; n < all.size(); ++n) EXPECT_EQ(all[n].status.marked, n >= 25) << n;
+}
+
+// A replay ends with its record: there is nothing behind it.
+TEST_F(MeasurementLoopTest, AStageThatIsGoneBehindAGoodRunSpoilsNothing) {
+  stage_.outcomes = {{kSamples, Outcome::link_down}};
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_TRUE(loop.complete());
+  EXPECT_EQ(loop.reason(), StopReason::none);
+  EXPECT_EQ(loop.health().missing, 0U);
+}
+
+TEST_F(MeasurementLoopTest, DeadlinesAreForTheWallClockOnly) {
+  MeasurementLoop loop = make_loop();
+  loop.start(1, excitation_);
+  static_cast<void>(loop.step());
+  EXPECT_EQ(stage_.last_deadline_ns(), 0);
+
+  AnalyticStage wall(kActuators, kSensors, 1000.0, Clock::wall);
+  MeasurementLoop timed(wall, controller_, ring_);
+  timed.start(1, excitation_);
+  static_cast<void>(timed.step());
+  EXPECT_EQ(wall.last_deadline_ns(), 2'000'000) << "y[1] is due before sample 2";
+  static_cast<void>(timed.step());
+  EXPECT_EQ(wall.last_deadline_ns(), 3'000'000);
+}
+
+TEST_F(MeasurementLoopTest, ASlowedStageIsLateByItsOwnPeriods) {
+  AnalyticStage slow(kActuators, kSensors, 1000.0, Clock::wall, 0.1);
+  MeasurementLoop timed(slow, controller_, ring_);
+  timed.start(1, excitation_);
+  static_cast<void>(timed.step());
+  EXPECT_EQ(slow.last_deadline_ns(), 20'000'000);
+}
+
+TEST(StopReasonNames, EveryReasonHasItsOwn) {
+  std::set<std::string> names;
+  for (const StopReason reason :
+       {StopReason::none, StopReason::limit, StopReason::fault, StopReason::misses,
+        StopReason::interrupt, StopReason::log, StopReason::plant})
+    EXPECT_TRUE(names.insert(to_string(reason)).second) << to_string(reason);
+  EXPECT_TRUE(names.contains("plant"));
+}
+
+TEST_F(MeasurementLoopTest, RefusesWhatDoesNotFit) {
+  EXPECT_THROW(make_loop({.ramp_s = -1.0}), std::invalid_argument);
+  EXPECT_THROW(make_loop({.ramp_s = std::numeric_limits<double>::quiet_NaN()}),
+               std::invalid_argument);
+  EXPECT_THROW(make_loop({.misses_allowed = -1}), std::invalid_argument);
+  SampleRing narrow(kActuators + kSensors, 8);
+  EXPECT_THROW(MeasurementLoop(stage_, controller_, narrow), std::invalid_argument);
+  AnalyticStage other(kActuators + 1, kSensors);
+  EXPECT_THROW(MeasurementLoop(other, controller_, ring_), std::invalid_argument);
+
+  MeasurementLoop loop = make_loop();
+  const auto refused = [&](auto spoil) {
+    LoopExcitation bad = excitation_;
+    spoil(bad);
+    EXPECT_THROW(loop.start(1, bad), std::invalid_argument);
+  };
+  refused([](LoopExcitation& e) { e.samples = 0; });
+  refused([](LoopExcitation& e) { e.actuators.pop_back(); });
+  refused([](LoopExcitation& e) { e.actuators[0] = kActuators; });
+  refused([](LoopExcitation& e) { e.actuators[0] = -1; });
+  refused([](LoopExcitation& e) { e.period(0, 0) = std::nan(""); });
+  refused([](LoopExcitation& e) { e.period.resize(0, 3); });
+  EXPECT_TRUE(stage_.seeds().empty()) << "the stage was not started";
+  stage_.refuse_run = 0;
+  EXPECT_THROW(loop.start(1, excitation_), StageError);
+  EXPECT_EQ(loop.step(), LoopStatus::ended);
+}
+
+}  // namespace
+}  // namespace stageid

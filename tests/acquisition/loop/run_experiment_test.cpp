@@ -1,0 +1,375 @@
+#include "acquisition/loop/run_experiment.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+#include <thread>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/slog/slog_reader.hpp"
+#include "acquisition/slog/slog_writer.hpp"
+#include "tests/acquisition/record/small_log.hpp"
+#include "tests/support/analytic_stage.hpp"
+#include "tests/support/file_size_limit.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+using test::AnalyticStage;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr int kActuators = 3;
+constexpr int kSensors = 2;
+constexpr int kPeriod = 100;
+constexpr std::uint64_t kSamples = 3 * kPeriod;
+
+/// Axes in another order than the actuators.
+ExperimentPlan plan_of(int realizations = 2, int periods = 2) {
+  ExperimentSpec spec;
+  spec.axes = {{"u3", 1.0, {}}, {"u1", 0.5, {}}};
+  spec.realizations = realizations;
+  spec.periods = periods;
+  spec.transient_periods = 1;
+  spec.seed = 17;
+  return {FrequencyGrid::band(1000.0, kPeriod, {.low_hz = 10.0, .high_hz = 400.0}), spec};
+}
+
+class RunExperiment : public testing::Test {
+ protected:
+  RunExperiment() {
+    auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors);
+    stage->noise = 1e-3;
+    stage->spoil_missing = false;  // a driver holds the last measurement: LimitedStage insists
+    inner_ = stage.get();
+    StageLimits limits;
+    limits.actuator_n = Eigen::VectorXd::Constant(kActuators, 50.0);
+    stage_ = std::make_unique<LimitedStage>(std::move(stage), limits);
+    controller_ = std::make_unique<MotionController>(test::analytic_controller(inner_->info()));
+  }
+
+  SlogWriter create(const std::string& name) {
+    return SlogWriter::create(directory_ / name, experiment_log_info(plan_, stage_->info()));
+  }
+
+  ExperimentResult measure(SlogWriter& log, const RunExperimentOptions& options = {}) {
+    return run_experiment(plan_, *stage_, *controller_, log, options);
+  }
+
+  /// Measures everything into a closed log.
+  ExperimentResult measure_whole(const std::string& name) {
+    SlogWriter log = create(name);
+    const ExperimentResult result = measure(log);
+    log.close(0, "done");
+    return result;
+  }
+
+  static LogSamples all_samples(const LogReader& reader, std::size_t run) {
+    LogSamples samples;
+    reader.read(run, 0, reader.runs()[run].samples, samples);
+    return samples;
+  }
+
+  static bool same(const LogSamples& a, const LogSamples& b) {
+    return a.actuators == b.actuators && a.sensors == b.sensors && (a.marked == b.marked).all();
+  }
+
+  test::TemporaryDirectory directory_;
+  ExperimentPlan plan_ = plan_of();
+  AnalyticStage* inner_ = nullptr;
+  std::unique_ptr<LimitedStage> stage_;
+  std::unique_ptr<MotionController> controller_;
+};
+
+TEST_F(RunExperiment, LogsEveryRunOfThePlan) {
+  const ExperimentResult result = measure_whole("a.slog");
+  EXPECT_EQ(result.end, ExperimentEnd::complete);
+  EXPECT_EQ(result.runs_done, 4);
+  EXPECT_EQ(result.health.cycles, 4 * kSamples);
+  EXPECT_EQ(result.health.marked, 0U);
+
+  const SlogReader reader(directory_ / "a.slog");
+  EXPECT_EQ(reader.info().excitation.names, (std::vector<std::string>{"u3", "u1"}));
+  EXPECT_EQ(reader.info().excitation.units, (std::vector<std::string>{"N", "N"}));
+  const std::vector<RunId> runs = plan_.runs();
+  ASSERT_EQ(reader.runs().size(), runs.size());
+  for (std::size_t run = 0; run < runs.size(); ++run) {
+    const LogRun& read = reader.runs()[run];
+    EXPECT_TRUE(read.complete);
+    EXPECT_EQ(read.samples, kSamples);
+    EXPECT_EQ(read.realization, runs[run].realization);
+    EXPECT_EQ(read.experiment, runs[run].experiment);
+    EXPECT_EQ(read.started_utc.size(), 20U);
+    EXPECT_EQ(reader.excitation(run), plan_.excitation(runs[run]));
+    EXPECT_EQ(inner_->seeds()[run], run_seed(17, runs[run]));
+  }
+}
+
+// The controller starts from rest in every run: with the recorded y it gives the recorded u again.
+TEST_F(RunExperiment, TheRecordIsControllerPlusExcitationOnTheRightActuators) {
+  measure_whole("a.slog");
+  const SlogReader reader(directory_ / "a.slog");
+  for (std::size_t run = 0; run < reader.runs().size(); ++run) {
+    const LogSamples samples = all_samples(reader, run);
+    const Eigen::MatrixXd excitation = plan_.excitation(plan_.runs()[run]);
+    MotionController again(test::analytic_controller(inner_->info()));
+    for (Eigen::Index n = 0; n < static_cast<Eigen::Index>(kSamples); ++n) {
+      const Eigen::VectorXd y = samples.sensors.row(n);
+      Eigen::VectorXd u(kActuators);
+      again.update(y.data(), u.data());
+      u[2] += excitation(n % kPeriod, 0);
+      u[0] += excitation(n % kPeriod, 1);
+      ASSERT_EQ(u, samples.actuators.row(n).transpose()) << "run " << run << ", row " << n;
+    }
+  }
+}
+
+TEST_F(RunExperiment, InterruptedAndResumedItGivesTheSameBits) {
+  measure_whole("whole.slog");
+  std::atomic<bool> interrupt = false;
+  ExperimentResult result;
+  {
+    SlogWriter log = create("parts.slog");
+    // The second run is broken off; the first is skipped here as if it were there already.
+    inner_->raise = {{150, &interrupt}};
+    result = measure(log, {.skip = {{0, 1}, {1, 0}, {1, 1}}});  // run (0, 0), flag not looked at
+    EXPECT_EQ(result.end, ExperimentEnd::complete);
+    interrupt = false;
+    result = measure(log, {.skip = {{0, 0}}, .interrupt = &interrupt, .ramp_s = 0.02});
+    EXPECT_EQ(result.end, ExperimentEnd::interrupted);
+    EXPECT_EQ(result.runs_done, 0);
+    log.close(130, result.message.c_str());
+    inner_->raise.clear();
+  }
+  std::vector<RunId> done;
+  {
+    const SlogReader reader(directory_ / "parts.slog");
+    ASSERT_EQ(reader.runs().size(), 2U);
+    EXPECT_FALSE(reader.runs()[1].complete);
+    const LogSamples broken = all_samples(reader, 1);
+    // Exchange 150 raised the flag: its row is good, the next begins the stop, 20 of ramp follow.
+    EXPECT_EQ(reader.runs()[1].samples, 151U + 1 + 20);
+    EXPECT_TRUE((broken.marked.head(151) == 0).all() && (broken.marked.tail(21) == 1).all());
+    for (const LogRun& run : reader.runs()) {
+      if (run.complete) done.push_back({run.realization, run.experiment});
+    }
+  }
+  {
+    SlogWriter log =
+        SlogWriter::resume(directory_ / "parts.slog", experiment_log_info(plan_, stage_->info()));
+    result = measure(log, {.skip = done});
+    EXPECT_EQ(result.end, ExperimentEnd::complete);
+    EXPECT_EQ(result.runs_done, 3);
+    log.close(0, "done");
+  }
+  const SlogReader whole(directory_ / "whole.slog");
+  const SlogReader parts(directory_ / "parts.slog");
+  std::size_t compared = 0;
+  for (std::size_t run = 0; run < parts.runs().size(); ++run) {
+    if (!parts.runs()[run].complete) continue;
+    EXPECT_TRUE(same(all_samples(parts, run), all_samples(whole, compared)));
+    EXPECT_EQ(parts.excitation(run), whole.excitation(compared));
+    ++compared;
+  }
+  EXPECT_EQ(compared, 4U);
+}
+
+TEST_F(RunExperiment, AnInterruptBeforeTheFirstRunMeasuresNothing) {
+  const std::atomic<bool> interrupt = true;
+  SlogWriter log = create("a.slog");
+  const ExperimentResult result = measure(log, {.interrupt = &interrupt});
+  EXPECT_EQ(result.end, ExperimentEnd::interrupted);
+  EXPECT_TRUE(inner_->seeds().empty());
+}
+
+TEST_F(RunExperiment, APlantThatTripsEndsInAControlledStopWithItsReason) {
+  std::atomic<bool> tripped = false;
+  inner_->raise = {{150, &tripped}};
+  SlogWriter log = create("a.slog");
+  const RunExperimentOptions options{
+      .plant_tripped = &tripped, .plant_reason = [] { return "too hot"; }, .ramp_s = 0.02};
+  const ExperimentResult result = measure(log, options);
+  log.close(1, result.message.c_str());
+  EXPECT_EQ(result.end, ExperimentEnd::fault);
+  EXPECT_EQ(result.message, "too hot");
+  EXPECT_EQ(inner_->stops(), 1);
+  EXPECT_EQ(inner_->seeds().size(), 1U) << "no further run";
+  const SlogReader reader(directory_ / "a.slog");
+  // As with an interrupt: the row of the exchange that raised it is good, then the stop and its ramp.
+  EXPECT_EQ(reader.runs()[0].samples, 151U + 1 + 20);
+  const LogSamples samples = all_samples(reader, 0);
+  EXPECT_TRUE((samples.marked.head(151) == 0).all() && (samples.marked.tail(21) == 1).all());
+  SlogWriter next = create("b.slog");
+  EXPECT_EQ(measure(next, options).end, ExperimentEnd::fault) << "before a run";
+  EXPECT_EQ(inner_->seeds().size(), 1U);
+}
+
+TEST_F(RunExperiment, ALimitEndsInAControlledStopAndKeepsTheLog) {
+  inner_->first_sensor = {{140, 1e9}};  // far off: the controller asks for more than 50 N
+  SlogWriter log = create("a.slog");
+  const ExperimentResult result = measure(log, {.ramp_s = 0.03});
+  log.close(4, result.message.c_str());
+  EXPECT_EQ(result.end, ExperimentEnd::limit);
+  EXPECT_EQ(result.message, describe(stage_->violation(), stage_->info()));
+  EXPECT_THAT(result.message, HasSubstr("50"));
+  EXPECT_EQ(inner_->stops(), 1);
+  EXPECT_EQ(inner_->seeds().size(), 1U) << "no further run";
+  for (const double u : inner_->sent()) ASSERT_LE(std::abs(u), 50.0);
+
+  const SlogReader reader(directory_ / "a.slog");
+  ASSERT_EQ(reader.runs().size(), 1U);
+  EXPECT_FALSE(reader.runs()[0].complete);
+  EXPECT_EQ(reader.runs()[0].samples, 142U + 30);
+  const LogSamples samples = all_samples(reader, 0);
+  EXPECT_TRUE((samples.marked.head(141) == 0).all());
+  EXPECT_TRUE((samples.marked.tail(31) == 1).all());
+}
+
+TEST_F(RunExperiment, AFaultAndTooManyMissesAreTold) {
+  inner_->outcomes = {{10, Outcome::fault}};
+  SlogWriter log = create("a.slog");
+  ExperimentResult result = measure(log);
+  EXPECT_EQ(result.end, ExperimentEnd::fault);
+  EXPECT_THAT(result.message, HasSubstr("fault"));
+
+  inner_->outcomes.clear();
+  for (std::uint64_t n = 10; n < 20; ++n) inner_->outcomes[n] = Outcome::stale;
+  result = measure(log);
+  EXPECT_EQ(result.end, ExperimentEnd::fault);
+  EXPECT_THAT(result.message, HasSubstr("stale"));
+  EXPECT_EQ(result.runs_done, 0);
+  EXPECT_GT(result.health.missing, 0U);
+}
+
+TEST_F(RunExperiment, AFullDiskEndsInAControlledStop) {
+  plan_ = plan_of(2, 900);  // 90 000 rows of 48 bytes a run: more than the ring holds
+  const auto file = directory_ / "a.slog";
+  SlogWriter log = create("a.slog");
+  ExperimentResult result;
+  {
+    const test::FileSizeLimit limit(log.bytes() + 300'000);
+    result = measure(log);
+  }
+  EXPECT_EQ(result.end, ExperimentEnd::log_failed);
+  EXPECT_THAT(result.message, HasSubstr("are kept"));
+  EXPECT_EQ(inner_->stops(), 1);
+  const auto reader = open_log(file, false);
+  ASSERT_EQ(reader->runs().size(), 1U);
+  EXPECT_FALSE(reader->runs()[0].complete);
+  EXPECT_GE(reader->runs()[0].samples, 4096U);
+  EXPECT_EQ(reader->runs()[0].samples, log.acknowledged_rows());
+}
+
+TEST_F(RunExperiment, ALogThatIsRemovedEndsInAControlledStop) {
+  SlogWriter log = create("a.slog");
+  std::filesystem::remove(directory_ / "a.slog");
+  const ExperimentResult result = measure(log);
+  EXPECT_EQ(result.end, ExperimentEnd::log_failed);
+  EXPECT_THAT(result.message, HasSubstr("a.slog: was removed"));
+  EXPECT_EQ(result.runs_done, 0);
+}
+
+TEST_F(RunExperiment, AStageThatDoesNotStartIsAFaultAndTheLogIsKept) {
+  inner_->refuse_run = 2;
+  SlogWriter log = create("a.slog");
+  const ExperimentResult result = measure(log);
+  EXPECT_EQ(result.end, ExperimentEnd::fault);
+  EXPECT_THAT(result.message, HasSubstr("refuses"));
+  EXPECT_EQ(result.runs_done, 2);
+  log.close(1, "");
+  const SlogReader reader(directory_ / "a.slog");
+  ASSERT_EQ(reader.runs().size(), 2U);
+  EXPECT_TRUE(reader.runs()[0].complete && reader.runs()[1].complete);
+}
+
+TEST_F(RunExperiment, AnInterruptWhileAStageDoesNotStartIsAnInterrupt) {
+  std::atomic<bool> interrupt = false;
+  inner_->refuse_run = 1;
+  inner_->raise_at_refusal = &interrupt;
+  SlogWriter log = create("a.slog");
+  const ExperimentResult result = measure(log, {.interrupt = &interrupt});
+  EXPECT_EQ(result.end, ExperimentEnd::interrupted);
+  EXPECT_EQ(result.runs_done, 1);
+}
+
+TEST_F(RunExperiment, ReportsProgressFromTheCallingThread) {
+  plan_ = plan_of(1, 9);
+  std::vector<ExperimentProgress> seen;
+  const auto caller = std::this_thread::get_id();
+  SlogWriter log = create("a.slog");
+  measure(log, {.skip = {{0, 0}}, .progress = [&](const ExperimentProgress& progress) {
+                  EXPECT_TRUE(std::this_thread::get_id() == caller);
+                  seen.push_back(progress);
+                }});
+  ASSERT_FALSE(seen.empty());
+  const ExperimentProgress& last = seen.back();
+  EXPECT_EQ(last.run, (RunId{0, 1}));
+  EXPECT_EQ(last.runs_total, 1);
+  EXPECT_EQ(last.runs_done, 1);
+  EXPECT_DOUBLE_EQ(last.seconds_total, 1.0);
+  EXPECT_DOUBLE_EQ(last.seconds_done, 1.0);
+}
+
+TEST_F(RunExperiment, AnExceptionOfTheProgressFunctionStopsTheStage) {
+  SlogWriter log = create("a.slog");
+  RunExperimentOptions options;
+  options.progress = [](const ExperimentProgress&) { throw std::runtime_error("enough"); };
+  EXPECT_THAT([&] { measure(log, options); }, ThrowsMessage<std::runtime_error>("enough"));
+  EXPECT_EQ(inner_->stops(), static_cast<int>(inner_->seeds().size()));
+}
+
+TEST_F(RunExperiment, RefusesAPlanThatDoesNotFit) {
+  StageInfo other = inner_->info();
+  other.sample_rate_hz = 2000.0;
+  EXPECT_THROW(experiment_log_info(plan_, other), std::invalid_argument);
+  other = inner_->info();
+  other.actuators[2].name = "u9";
+  EXPECT_THAT([&] { experiment_log_info(plan_, other); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("'u3'")));
+  other = inner_->info();
+  other.maximum_rate_hz = 500.0;
+  EXPECT_THROW(experiment_log_info(plan_, other), std::invalid_argument);
+
+  LogInfo info = experiment_log_info(plan_, stage_->info());
+  info.period_samples *= 2;
+  SlogWriter log = SlogWriter::create(directory_ / "a.slog", info);
+  EXPECT_THROW(measure(log), std::invalid_argument);
+  EXPECT_TRUE(inner_->seeds().empty());
+}
+
+// Values computed with the reference splitmix64 in Python.
+TEST(RunSeed, IsTheDocumentedMix) {
+  EXPECT_EQ(run_seed(0, {0, 0}), 0x238275BC38FCBE91U);
+  EXPECT_EQ(run_seed(17, {2, 12}), 0xFC6CCF55DC557BBU);
+  std::set<std::uint64_t> seeds;
+  for (std::uint64_t plan : {0U, 1U}) {
+    for (int r = 0; r < 20; ++r) {
+      for (int e = 0; e < 20; ++e) seeds.insert(run_seed(plan, {r, e}));
+    }
+  }
+  EXPECT_EQ(seeds.size(), 800U);
+}
+
+// Asked before every realization, with all before it in the log.
+TEST_F(RunExperiment, EndsCompleteBetweenRealizationsWhenItIsEnough) {
+  plan_ = plan_of(3);
+  SlogWriter log = create("enough.slog");
+  std::vector<std::size_t> seen;
+  RunExperimentOptions options;
+  options.enough = [&]() -> std::string {
+    seen.push_back(SlogReader(directory_ / "enough.slog", false).runs().size());  // not closed yet
+    return seen.size() == 3 ? "good enough" : "";
+  };
+  const ExperimentResult result = measure(log, options);
+  log.close(0, result.message.c_str());
+  EXPECT_EQ(result.end, ExperimentEnd::complete);
+  EXPECT_EQ(result.message, "good enough; 4 runs measured");
+  EXPECT_EQ(seen, (std::vector<std::size_t>{0, 2, 4}));
+  EXPECT_EQ(SlogReader(directory_ / "enough.slog").runs().size(), 4U);
+}
+
+}  // namespace
+}  // namespace stageid

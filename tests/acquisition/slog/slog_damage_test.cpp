@@ -1,0 +1,312 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <optional>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/slog/slog_reader.hpp"
+#include "acquisition/slog/slog_recover.hpp"
+#include "tests/acquisition/record/small_log.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+using test::TemporaryDirectory;
+
+/// Everything that a log says, or nothing if it is refused.
+std::optional<std::string> content(const std::filesystem::path& file) {
+  try {
+    const auto reader = open_log(file);
+    std::string all = reader->info().metadata_json;
+    LogSamples samples;
+    for (std::size_t run = 0; run < reader->runs().size(); ++run) {
+      const LogRun& which = reader->runs()[run];
+      all += which.started_utc + std::to_string(which.realization) +
+             std::to_string(which.experiment) + std::to_string(which.complete);
+      const auto add = [&](const auto& values) {
+        all.append(reinterpret_cast<const char*>(values.data()),
+                   static_cast<std::size_t>(values.size()) * sizeof *values.data());
+      };
+      add(reader->excitation(run));
+      reader->read(run, 0, which.samples, samples);
+      add(samples.actuators);
+      add(samples.sensors);
+      add(samples.marked);
+    }
+    return all;
+  } catch (const FormatError&) {
+    return std::nullopt;
+  }
+}
+
+TEST(SlogDamage, EveryFlippedByteIsAnError) {
+  const TemporaryDirectory directory;
+  const auto file = directory / "a.slog";
+  test::write_small_log(file, 2, 18);
+  const std::string good = test::bytes_of(file);
+  ASSERT_TRUE(content(file).has_value());
+  for (std::size_t at = 0; at < good.size(); ++at) {
+    std::string bad = good;
+    bad[at] ^= static_cast<char>(1U << (at % 8));
+    test::write_bytes(file, bad);
+    ASSERT_FALSE(content(file).has_value()) << "byte " << at << " of " << good.size();
+    if (at % 37 == 0) {
+      const bool intact = [&] {
+        try {
+          return verify_log(file).intact();
+        } catch (const FormatError&) {
+          return false;
+        }
+      }();
+      ASSERT_FALSE(intact) << "byte " << at;
+    }
+  }
+}
+
+TEST(SlogDamage, EveryTruncationIsAnErrorAndItsIntactRowsAreGiven) {
+  const TemporaryDirectory directory;
+  const auto file = directory / "a.slog";
+  test::write_small_log(file, 2, 9);
+  const std::string good = test::bytes_of(file);
+  std::uint64_t rows_before = 0;
+  for (std::size_t size = 0; size < good.size(); ++size) {
+    test::write_bytes(file, good.substr(0, size));
+    ASSERT_THROW(open_log(file), FormatError) << size;
+    if (size == 0) continue;
+    std::unique_ptr<LogReader> reader;
+    try {
+      reader = open_log(file, false);
+    } catch (const FormatError&) {
+      ASSERT_EQ(rows_before, 0U) << "byte " << size << ": what was there is gone";
+      continue;
+    }
+    std::uint64_t rows = 0;
+    LogSamples samples;
+    for (std::size_t run = 0; run < reader->runs().size(); ++run) {
+      const std::uint64_t count = reader->runs()[run].samples;
+      reader->read(run, 0, count, samples);
+      ASSERT_TRUE(test::holds_rows(samples, run, 0));
+      rows += count;
+    }
+    ASSERT_GE(rows, rows_before);
+    rows_before = rows;
+  }
+  EXPECT_EQ(rows_before, 72U);
+}
+
+// What follows is the case that a disk, not a process, has failed: any length may be cut, then
+// resumed.
+TEST(SlogDamage, EveryTruncationCanBeResumed) {
+  const TemporaryDirectory directory;
+  const auto file = directory / "a.slog";
+  test::write_small_log(file, 1, 9);
+  const std::string good = test::bytes_of(file);
+  SlogBlockHeader first;
+  std::memcpy(&first, good.data(), sizeof first);
+  for (std::size_t size = slog_block_bytes(first); size < good.size(); size += 13) {
+    test::write_bytes(file, good.substr(0, size));
+    bool complete_before = false;
+    {
+      const auto reader = open_log(file, false);
+      complete_before = !reader->runs().empty() && reader->runs()[0].complete;
+    }
+    {
+      SlogWriter log = SlogWriter::resume(file, test::small_info());
+      if (!complete_before) test::write_run(log, 0);
+      log.close(0, "");
+    }
+    const SlogReader reader(file);
+    const LogRun& last = reader.runs().back();
+    ASSERT_TRUE(last.complete);
+    LogSamples samples;
+    reader.read(reader.runs().size() - 1, 0, last.samples, samples);
+    ASSERT_TRUE(test::holds_rows(samples, 0, 0));
+  }
+}
+
+TEST(SlogDamage, BlocksOfAnotherLogAreNotTaken) {
+  const TemporaryDirectory directory;
+  test::write_small_log(directory / "a.slog");
+  test::write_small_log(directory / "b.slog");
+  const std::string a = test::bytes_of(directory / "a.slog");
+  const std::string b = test::bytes_of(directory / "b.slog");
+  ASSERT_EQ(a.size(), b.size());
+  // As after a power failure: the second half was never written and shows an older file.
+  SlogSource source(directory / "a.slog");
+  const std::uint64_t cut = scan_slog(source, SlogScanDepth::headers).blocks[6].offset;
+  test::write_bytes(directory / "c.slog", a.substr(0, cut) + b.substr(cut));
+  EXPECT_THROW(open_log(directory / "c.slog"), FormatError);
+  EXPECT_LT(open_log(directory / "c.slog", false)->runs()[0].samples, 36U);
+}
+
+TEST(SlogDamage, AMissingBlockIsNoticedThoughAllOthersAreIntact) {
+  const TemporaryDirectory directory;
+  const auto file = directory / "a.slog";
+  test::write_small_log(file, 2, 9);
+  const std::string good = test::bytes_of(file);
+  const std::vector<SlogBlock> blocks = [&] {
+    return scan_slog(SlogSource(file), SlogScanDepth::headers).blocks;
+  }();
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    test::write_bytes(file, good.substr(0, blocks[k].offset) + good.substr(blocks[k].end()));
+    EXPECT_THROW(open_log(file), FormatError) << describe(blocks[k]);
+  }
+}
+
+// Recover ------------------------------------------------------------------------------------
+
+class SlogRecover : public testing::Test {
+ protected:
+  void SetUp() override {
+    test::write_small_log(file_, 3, 9);
+    good_ = test::bytes_of(file_);
+    blocks_ = scan_slog(SlogSource(file_), SlogScanDepth::headers).blocks;
+  }
+
+  /// Index of the `nth` block of a type.
+  std::size_t block(SlogBlockType type, int nth) const {
+    for (std::size_t k = 0; k < blocks_.size(); ++k) {
+      if (blocks_[k].header.is(type) && nth-- == 0) return k;
+    }
+    return blocks_.size();
+  }
+
+  RecoverReport recover(const std::string& bytes) {
+    test::write_bytes(file_, bytes);
+    return recover_log(file_, directory_ / "out.slog");
+  }
+
+  std::string with_damage(std::size_t block, std::uint64_t at) const {
+    std::string bytes = good_;
+    bytes[blocks_[block].offset + at] ^= 0x10;
+    return bytes;
+  }
+
+  TemporaryDirectory directory_;
+  std::filesystem::path file_ = directory_ / "a.slog";
+  std::filesystem::path out_ = directory_ / "out.slog";
+  std::string good_;
+  std::vector<SlogBlock> blocks_;
+};
+
+TEST_F(SlogRecover, AnIntactLogIsCopiedWhole) {
+  const RecoverReport report = recover(good_);
+  EXPECT_EQ(report.blocks_kept, blocks_.size());
+  EXPECT_EQ(report.blocks_lost, 0U);
+  EXPECT_EQ(report.rows_kept, 3U * 36);
+  EXPECT_EQ(report.rows_lost, 0U);
+  EXPECT_EQ(report.complete_runs, 3);
+  EXPECT_TRUE(report.damage.empty());
+  EXPECT_EQ(content(out_), content(file_));
+  EXPECT_EQ(test::bytes_of(file_), good_);
+}
+
+TEST_F(SlogRecover, RowsLostInTheMiddleBecomeMarkedRows) {
+  const std::size_t damaged = block(SlogBlockType::samples, 5);             // run 1, rows 9 to 17
+  for (const std::uint64_t at : {std::uint64_t{20}, std::uint64_t{100}}) {  // header, payload
+    const RecoverReport report = recover(with_damage(damaged, at));
+    EXPECT_EQ(report.blocks_lost, 1U);
+    EXPECT_EQ(report.rows_lost, 9U);
+    EXPECT_EQ(report.rows_kept, 3U * 36 - 9);
+    EXPECT_EQ(report.complete_runs, 3);
+    ASSERT_EQ(report.damage.size(), 1U);
+    EXPECT_EQ(report.damage[0].offset, blocks_[damaged].offset);
+
+    const SlogReader reader(out_);
+    LogSamples samples;
+    reader.read(1, 0, 9, samples);
+    EXPECT_TRUE(test::holds_rows(samples, 1, 0));
+    reader.read(1, 9, 9, samples);
+    EXPECT_TRUE((samples.marked == 1).all());
+    EXPECT_TRUE(samples.actuators.isZero(0.0) && samples.sensors.isZero(0.0));
+    reader.read(1, 18, 18, samples);
+    EXPECT_TRUE(test::holds_rows(samples, 1, 18));
+    EXPECT_EQ(reader.runs()[1].health.marked, test::run_of(1).health.marked + 9);
+  }
+}
+
+TEST_F(SlogRecover, EverySingleDamagedBlockLeavesAllOthers) {
+  for (std::size_t damaged = 0; damaged < blocks_.size(); ++damaged) {
+    const RecoverReport report = recover(with_damage(damaged, 70));
+    // An excitation whose columns nobody knows any more is lost with its run_begin.
+    const std::size_t lost = blocks_[damaged].header.is(SlogBlockType::run_begin) ? 2 : 1;
+    EXPECT_EQ(report.blocks_kept, blocks_.size() - lost) << describe(blocks_[damaged]);
+    EXPECT_EQ(report.blocks_lost, lost);
+    const SlogReader reader(out_);  // the new log is intact, whatever the old one was
+    EXPECT_TRUE(verify_log(out_).intact());
+    const bool rows_lost = blocks_[damaged].header.is(SlogBlockType::samples);
+    EXPECT_EQ(report.rows_kept, 3U * 36 - (rows_lost ? blocks_[damaged].header.rows : 0U));
+    const bool run_lost = blocks_[damaged].header.is(SlogBlockType::run_begin) ||
+                          blocks_[damaged].header.is(SlogBlockType::excitation) ||
+                          blocks_[damaged].header.is(SlogBlockType::run_end);
+    EXPECT_EQ(report.complete_runs, run_lost ? 2 : 3) << describe(blocks_[damaged]);
+  }
+}
+
+TEST_F(SlogRecover, FindsTheBlocksBehindInsertedAndDeletedBytes) {
+  const std::size_t damaged = block(SlogBlockType::samples, 2);
+  const std::uint64_t at = blocks_[damaged].offset + 80;
+  for (const std::string& bytes : {good_.substr(0, at) + "12345" + good_.substr(at),
+                                   good_.substr(0, at) + good_.substr(at + 7)}) {
+    const RecoverReport report = recover(bytes);
+    EXPECT_EQ(report.blocks_kept, blocks_.size() - 1);
+    EXPECT_EQ(report.rows_lost, blocks_[damaged].header.rows);
+    EXPECT_EQ(report.complete_runs, 3);
+    EXPECT_TRUE(content(out_).has_value());
+  }
+}
+
+TEST_F(SlogRecover, ALogCutAtAnyByteGivesItsWholeBlocks) {
+  for (std::size_t size = slog_block_bytes(blocks_[0].header); size < good_.size(); size += 41) {
+    const RecoverReport report = recover(good_.substr(0, size));
+    std::uint64_t whole = 0;
+    for (const SlogBlock& b : blocks_) whole += b.end() <= size ? 1U : 0U;
+    ASSERT_EQ(report.blocks_kept, whole);
+    ASSERT_EQ(report.rows_lost, 0U) << "nobody knows how many would have followed";
+    ASSERT_TRUE(verify_log(out_).intact());
+    ASSERT_EQ(verify_log(out_).exit_code, 1);
+  }
+}
+
+TEST_F(SlogRecover, RefusesWhatItCannotSave) {
+  EXPECT_THROW(recover_log(file_, file_), std::invalid_argument);
+  EXPECT_THROW(recover_log(directory_ / "none", out_), FileError);
+  EXPECT_THROW(recover("not a log, but long enough to hold a header: "
+                       "0123456789012345678901234567890123456789"),
+               FormatError);
+  EXPECT_FALSE(std::filesystem::exists(out_)) << "no partial output";
+  // All three descriptions of the log damaged, the one in front and those of the runs.
+  std::string bytes = good_;
+  for (const SlogBlock& b : blocks_) {
+    if (b.header.is(SlogBlockType::log)) bytes[b.offset + 70] ^= 1;
+  }
+  EXPECT_THROW(recover(bytes), FormatError);
+  EXPECT_FALSE(std::filesystem::exists(out_));
+}
+
+TEST_F(SlogRecover, VerifyCountsAndNamesTheDamage) {
+  VerifyReport report = verify_log(file_);
+  EXPECT_TRUE(report.intact());
+  EXPECT_EQ(report.bytes, good_.size());
+  EXPECT_EQ(report.blocks, blocks_.size());
+  EXPECT_EQ(report.rows, 108U);
+  EXPECT_EQ(report.marked_rows, 15U);  // rows with (row + run) % 7 == 3: 5 of 36 in each run
+  EXPECT_EQ(report.runs, 3);
+  EXPECT_EQ(report.complete_runs, 3);
+  EXPECT_EQ(report.exit_message, "done");
+
+  const std::size_t damaged = block(SlogBlockType::samples, 5);
+  test::write_bytes(file_, with_damage(damaged, 100));
+  report = verify_log(file_);
+  EXPECT_FALSE(report.intact());
+  EXPECT_TRUE(report.closed);
+  EXPECT_EQ(report.blocks, blocks_.size() - 1);
+  ASSERT_FALSE(report.damage.empty());
+  EXPECT_EQ(report.damage[0].offset, blocks_[damaged].offset);
+  EXPECT_EQ(report.damage[0].bytes, slog_block_bytes(blocks_[damaged].header));
+}
+
+}  // namespace
+}  // namespace stageid

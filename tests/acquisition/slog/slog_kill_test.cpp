@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <new>
+#include <random>
+#include <thread>
+
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/slog/slog_reader.hpp"
+#include "tests/acquisition/record/small_log.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+/// A counter that outlives the process that counts.
+class SharedCounter {
+ public:
+  SharedCounter()
+      : memory_(::mmap(nullptr, sizeof(Counter), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
+                       -1, 0)),
+        counter_(new (memory_) Counter(0)) {}
+  ~SharedCounter() { ::munmap(memory_, sizeof(Counter)); }
+  SharedCounter(const SharedCounter&) = delete;
+  SharedCounter& operator=(const SharedCounter&) = delete;
+  std::atomic<std::uint64_t>& operator*() const { return *counter_; }
+
+ private:
+  using Counter = std::atomic<std::uint64_t>;
+  static_assert(Counter::is_always_lock_free);
+  void* memory_;
+  Counter* counter_;
+};
+
+constexpr std::uint64_t kRunRows = 12 * 5000;
+
+/// Writes run after run until it is killed; acknowledged rows are counted over all of them.
+[[noreturn]] void write_until_killed(const std::filesystem::path& file, std::uint64_t block_rows,
+                                     std::atomic<std::uint64_t>& acknowledged) {
+  SlogWriter log = SlogWriter::create(file, test::small_info());
+  for (std::size_t run = 0;; ++run) {
+    log.begin_run(test::run_of(run), test::excitation_of(run));
+    for (std::uint64_t first = 0; first < kRunRows; first += block_rows) {
+      log.write(test::rows_of(run, first, std::min(block_rows, kRunRows - first)));
+      acknowledged.store(log.acknowledged_rows());
+    }
+    log.end_run(test::run_of(run));
+  }
+}
+
+std::uint64_t intact_rows(const std::filesystem::path& file) {
+  const auto reader = open_log(file, false);
+  LogSamples samples;
+  std::uint64_t rows = 0;
+  for (std::size_t run = 0; run < reader->runs().size(); ++run) {
+    const std::uint64_t count = reader->runs()[run].samples;
+    reader->read(run, 0, count, samples);
+    EXPECT_TRUE(test::holds_rows(samples, run, 0));
+    rows += count;
+  }
+  return rows;
+}
+
+TEST(SlogKill, EveryAcknowledgedRowOutlivesTheProcess) {
+  std::mt19937 engine(11);
+  int with_rows = 0;
+  for (int attempt = 0; attempt < 20; ++attempt) {
+    const test::TemporaryDirectory directory;
+    const auto file = directory / "a.slog";
+    const SharedCounter acknowledged;
+    const std::uint64_t block_rows = attempt % 2 == 0 ? 5 : 997;
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) write_until_killed(file, block_rows, *acknowledged);
+    while ((*acknowledged).load() == 0) std::this_thread::yield();
+    std::this_thread::sleep_for(std::chrono::microseconds(engine() % 40'000));
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status));
+
+    const std::uint64_t promised = (*acknowledged).load();
+    const std::uint64_t there = intact_rows(file);
+    ASSERT_GE(there, promised);
+    ASSERT_LE(there, promised + block_rows) << "one block may be written and not yet counted";
+    with_rows += promised > 0 ? 1 : 0;
+
+    // And the log goes on where it was.
+    SlogWriter log = SlogWriter::resume(file, test::small_info());
+    log.close(0, "");
+    ASSERT_EQ(intact_rows(file), there);
+  }
+  EXPECT_EQ(with_rows, 20);
+}
+
+}  // namespace
+}  // namespace stageid

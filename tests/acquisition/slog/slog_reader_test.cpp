@@ -1,0 +1,250 @@
+#include "acquisition/slog/slog_reader.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <limits>
+#include <random>
+#include <thread>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/row_transpose.hpp"
+#include "tests/acquisition/record/small_log.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+using test::TemporaryDirectory;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(SlogStatus, PacksAndUnpacks) {
+  const SampleStatus status{9, true, 0xFEDCBA98U};
+  EXPECT_EQ(pack_status(status), 0xFEDCBA9800000109U);
+  EXPECT_EQ(unpack_status(pack_status(status)), status);
+  EXPECT_EQ(unpack_status(0), SampleStatus{});
+}
+
+TEST(SlogReader, GivesEveryRangeOfRows) {
+  const TemporaryDirectory directory;
+  for (const std::uint64_t block_rows : {1U, 7U, 10U, 36U}) {
+    const auto file = directory / ("a" + std::to_string(block_rows));
+    test::write_small_log(file, 2, block_rows);
+    const SlogReader reader(file);
+    LogSamples samples;
+    for (std::uint64_t first = 0; first <= 36; ++first) {
+      for (std::uint64_t count = 0; count <= 36 - first; ++count) {
+        reader.read(1, first, count, samples);
+        ASSERT_EQ(samples.marked.size(), static_cast<Eigen::Index>(count));
+        ASSERT_TRUE(test::holds_rows(samples, 1, first)) << first << " + " << count;
+      }
+    }
+  }
+}
+
+// Blocks larger than the reader's piece, so that pieces, tiles and padding all have their turn.
+TEST(SlogReader, GivesRowsOfLargeBlocks) {
+  const TemporaryDirectory directory;
+  constexpr std::uint64_t kRows = 12 * 1751;
+  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+  test::write_run(log, 2, kRows, 9001);
+  log.close(0, "");
+  const SlogReader reader(directory / "a.slog");
+  std::mt19937_64 engine(5);
+  LogSamples samples;
+  for (int i = 0; i < 50; ++i) {
+    const std::uint64_t first = engine() % kRows;
+    const std::uint64_t count = engine() % (kRows - first + 1);
+    reader.read(0, first, count, samples);
+    ASSERT_TRUE(test::holds_rows(samples, 2, first)) << first << " + " << count;
+  }
+}
+
+TEST(SlogReader, DoesNotAllocateAnewForTheSameSize) {
+  const TemporaryDirectory directory;
+  test::write_small_log(directory / "a.slog");
+  const SlogReader reader(directory / "a.slog");
+  LogSamples samples;
+  reader.read(0, 0, 12, samples);
+  const double* const before = samples.actuators.data();
+  reader.read(1, 12, 12, samples);
+  EXPECT_EQ(samples.actuators.data(), before);
+}
+
+TEST(SlogReader, SeveralThreadsReadAtOnce) {
+  const TemporaryDirectory directory;
+  constexpr std::uint64_t kRows = 12 * 400;
+  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+  for (std::size_t run = 0; run < 4; ++run) test::write_run(log, run, kRows, 1000);
+  log.close(0, "");
+  const SlogReader reader(directory / "a.slog");
+  std::vector<int> good(4, 0);
+  std::vector<std::thread> threads;
+  for (std::size_t run = 0; run < 4; ++run) {
+    threads.emplace_back([&, run] {
+      LogSamples samples;
+      for (std::uint64_t first = 0; first < kRows; first += 600) {
+        reader.read(run, first, 600, samples);
+        good[run] += test::holds_rows(samples, run, first) ? 1 : 0;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_THAT(good, testing::Each(8));
+}
+
+TEST(SlogReader, RefusesRangesOutsideARun) {
+  const TemporaryDirectory directory;
+  test::write_small_log(directory / "a.slog");
+  const SlogReader reader(directory / "a.slog");
+  LogSamples samples;
+  EXPECT_THROW(reader.read(2, 0, 1, samples), std::invalid_argument);
+  EXPECT_THROW(reader.read(0, 36, 1, samples), std::invalid_argument);
+  EXPECT_THROW(reader.read(0, 1, ~std::uint64_t{0}, samples), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(reader.excitation(2)), std::invalid_argument);
+}
+
+TEST(SlogReader, NamesTheChannelOfAValueThatIsNotFinite) {
+  const TemporaryDirectory directory;
+  for (const double value :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+        -std::numeric_limits<double>::infinity()}) {
+    const auto file = directory / "a.slog";
+    std::filesystem::remove(file);
+    SlogWriter log = SlogWriter::create(file, test::small_info());
+    log.begin_run(test::run_of(0), test::excitation_of(0));
+    std::vector<double> rows = test::rows_of(0, 0, 36);
+    rows[17 * 6 + 4] = value;  // sensor s2
+    log.write(rows);
+    log.end_run(test::run_of(0));
+    log.close(0, "");
+    const SlogReader reader(file);
+    LogSamples samples;
+    EXPECT_THAT([&] { reader.read(0, 12, 24, samples); },
+                ThrowsMessage<FormatError>(AllOf(HasSubstr(file.string()), HasSubstr("0000"),
+                                                 HasSubstr("row 17"), HasSubstr("s2"))));
+    EXPECT_NO_THROW(reader.read(0, 0, 17, samples));
+  }
+}
+
+/// Writes one run of `rows` rows that says it is complete.
+std::filesystem::path log_of_length(const TemporaryDirectory& directory, std::uint64_t rows) {
+  const auto file = directory / ("rows" + std::to_string(rows));
+  SlogWriter log = SlogWriter::create(file, test::small_info());
+  test::write_run(log, 0, rows);
+  log.close(0, "");
+  return file;
+}
+
+TEST(SlogReader, RefusesCompleteRunsOfNoWholePeriods) {
+  const TemporaryDirectory directory;
+  EXPECT_THAT([&] { SlogReader reader(log_of_length(directory, 35)); },
+              ThrowsMessage<FormatError>(AllOf(HasSubstr("/runs/0000"), HasSubstr("35 samples"))));
+  EXPECT_THROW(SlogReader reader(log_of_length(directory, 12)), FormatError) << "transient only";
+  EXPECT_THROW(SlogReader reader(log_of_length(directory, 0)), FormatError);
+  EXPECT_NO_THROW(SlogReader reader(log_of_length(directory, 24)));
+}
+
+TEST(SlogReader, RefusesTheSameCompleteRunTwice) {
+  const TemporaryDirectory directory;
+  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+  test::write_run(log, 1);
+  test::write_run(log, 1);
+  log.close(0, "");
+  EXPECT_THAT([&] { SlogReader reader(directory / "a.slog"); },
+              ThrowsMessage<FormatError>(HasSubstr("may be there once")));
+}
+
+TEST(SlogReader, SaysThatALogWasNotClosed) {
+  const TemporaryDirectory directory;
+  {
+    SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+    test::write_run(log, 0);
+    log.begin_run(test::run_of(1), test::excitation_of(1));
+    log.write(test::rows_of(1, 0, 10));
+  }
+  EXPECT_THAT([&] { open_log(directory / "a.slog"); },
+              ThrowsMessage<FormatError>(HasSubstr("stageid log recover")));
+  const auto reader = open_log(directory / "a.slog", false);
+  ASSERT_EQ(reader->runs().size(), 2U);
+  EXPECT_TRUE(reader->runs()[0].complete);
+  EXPECT_FALSE(reader->runs()[1].complete);
+  EXPECT_EQ(reader->runs()[1].samples, 10U);
+}
+
+TEST(OpenLog, SaysWhatAFileIsNot) {
+  const TemporaryDirectory directory;
+  EXPECT_THROW(open_log(directory / "none"), FileError);
+  EXPECT_THROW(open_log(directory.path()), FileError);
+  test::write_bytes(directory / "empty", "");
+  EXPECT_THAT([&] { open_log(directory / "empty"); },
+              ThrowsMessage<FormatError>(HasSubstr("is empty")));
+  test::write_bytes(directory / "text", "time,u,y\n");
+  EXPECT_THAT([&] { open_log(directory / "text"); },
+              ThrowsMessage<FormatError>(HasSubstr("neither")));
+}
+
+TEST(RowTranspose, MovesEveryValueAndSeesEveryNonFiniteOne) {
+  for (const std::size_t count : {1U, 7U, 8U, 63U, 64U, 65U, 200U}) {
+    for (const std::size_t columns : {1U, 3U, 8U, 17U, 24U}) {
+      const std::size_t words = columns + 1;
+      std::vector<double> rows(count * words);
+      for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = static_cast<double>(i);
+      // The word behind the columns is no number: it must not be looked at.
+      for (std::size_t r = 0; r < count; ++r) {
+        rows[r * words + columns] = std::numeric_limits<double>::quiet_NaN();
+      }
+      const std::size_t stride = count + 3;
+      std::vector<double> out(columns * stride, -1.0);
+      ASSERT_TRUE(transpose_rows(rows.data(), words, count, columns, out.data(), stride));
+      for (std::size_t c = 0; c < columns; ++c) {
+        for (std::size_t r = 0; r < stride; ++r) {
+          const double expected = r < count ? rows[r * words + c] : -1.0;
+          ASSERT_EQ(out[c * stride + r], expected);
+        }
+      }
+      for (std::size_t i = 0; i < count * columns; i += 5) {
+        double& value = rows[i / columns * words + i % columns];
+        const double before = value;
+        value = std::numeric_limits<double>::infinity();
+        ASSERT_FALSE(transpose_rows(rows.data(), words, count, columns, out.data(), stride));
+        value = before;
+      }
+    }
+  }
+}
+
+// The lines of numpy in slog_format.hpp are what other people will copy.
+TEST(SlogFormat, TheNumpyLinesOfTheHeaderReadALog) {
+  if (std::system("/usr/bin/python3 -c 'import numpy' 2> /dev/null") != 0) {
+    GTEST_SKIP() << "needs python3 with numpy";
+  }
+  const TemporaryDirectory directory;
+  test::write_small_log(directory / "run.slog", 2, 10);
+  std::ifstream header(std::string(STAGEID_SOURCE_DIR) + "/acquisition/slog_format.hpp");
+  std::ofstream script(directory / "read.py");
+  for (std::string line; std::getline(header, line);) {
+    if (line.rfind("//   import numpy", 0) == 0) {
+      do script << line.substr(5) << '\n';
+      while (std::getline(header, line) && line.rfind("//", 0) == 0);
+      break;
+    }
+  }
+  script << "for run in (0, 1):\n"
+            "  n = np.arange(36)\n"
+            "  assert samples[run].shape == (36, 6)\n"
+            "  for c in range(3):\n"
+            "    assert (samples[run][:, c] == 1000 * run + n + 0.125 * (c + 1)).all()\n"
+            "  marked = samples[run][:, 5].copy().view('<u8') >> 8 & 1\n"
+            "  assert (marked == ((n + run) % 7 == 3)).all()\n";
+  script.close();
+  const std::string command = "cd " + directory.path().string() + " && /usr/bin/python3 read.py";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+}
+
+}  // namespace
+}  // namespace stageid

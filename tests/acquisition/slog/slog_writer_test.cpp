@@ -1,0 +1,223 @@
+#include "acquisition/slog/slog_writer.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/slog/slog_reader.hpp"
+#include "tests/acquisition/record/small_log.hpp"
+#include "tests/support/file_size_limit.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+using test::TemporaryDirectory;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(SlogWriter, WhatIsWrittenIsReadBack) {
+  const TemporaryDirectory directory;
+  test::write_small_log(directory / "a.slog", 4, 11);
+  const SlogReader reader(directory / "a.slog");
+
+  EXPECT_TRUE(same_measurement(reader.info(), test::small_info()));
+  EXPECT_EQ(reader.info().metadata_json, test::small_info().metadata_json);
+  ASSERT_EQ(reader.runs().size(), 4U);
+  ASSERT_TRUE(reader.end().has_value());
+  EXPECT_EQ(reader.end()->exit_code, 0);
+  EXPECT_EQ(reader.end()->message, "done");
+  LogSamples samples;
+  for (std::size_t run = 0; run < 4; ++run) {
+    const LogRun& read = reader.runs()[run];
+    const LogRun written = test::run_of(run);
+    EXPECT_EQ(read.name, "000" + std::to_string(run));
+    EXPECT_EQ(read.realization, written.realization);
+    EXPECT_EQ(read.experiment, written.experiment);
+    EXPECT_EQ(read.samples, 36U);
+    EXPECT_TRUE(read.complete);
+    EXPECT_EQ(read.started_utc, written.started_utc);
+    EXPECT_EQ(read.health, written.health);
+    EXPECT_EQ(reader.excitation(run), test::excitation_of(run));
+    reader.read(run, 0, read.samples, samples);
+    EXPECT_TRUE(test::holds_rows(samples, run, 0));
+  }
+}
+
+TEST(SlogWriter, ARunWithoutExcitationHasNone) {
+  const TemporaryDirectory directory;
+  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+  log.begin_run(test::run_of(0), Eigen::MatrixXd::Zero(test::kPeriod, 3));
+  log.write(test::rows_of(0, 0, 24));
+  log.end_run(test::run_of(0));
+  log.close(0, "");
+  EXPECT_EQ(SlogReader(directory / "a.slog").excitation(0),
+            Eigen::MatrixXd::Zero(test::kPeriod, 3));
+}
+
+TEST(SlogWriter, RefusesAnExistingFileAndLeavesItAlone) {
+  const TemporaryDirectory directory;
+  test::write_bytes(directory / "a.slog", "precious");
+  EXPECT_THAT([&] { SlogWriter::create(directory / "a.slog", test::small_info()); },
+              ThrowsMessage<FileError>(HasSubstr("exists already")));
+  EXPECT_EQ(test::bytes_of(directory / "a.slog"), "precious");
+  EXPECT_THROW(SlogWriter::create(directory / "none/a.slog", test::small_info()), FileError);
+  EXPECT_THROW(SlogWriter::resume(directory / "none.slog", test::small_info()), FileError);
+}
+
+TEST(SlogWriter, RefusesInfosThatMakeNoSense) {
+  const TemporaryDirectory directory;
+  const auto refused = [&](auto spoil) {
+    LogInfo info = test::small_info();
+    spoil(info);
+    EXPECT_THROW(SlogWriter::create(directory / "a.slog", info), std::invalid_argument);
+    EXPECT_FALSE(std::filesystem::exists(directory / "a.slog"));
+  };
+  refused([](LogInfo& info) { info.sample_rate_hz = 0.0; });
+  refused([](LogInfo& info) { info.sample_rate_hz = std::numeric_limits<double>::infinity(); });
+  refused([](LogInfo& info) { info.period_samples = 0; });
+  refused([](LogInfo& info) { info.transient_periods = -1; });
+  refused([](LogInfo& info) { info.sensors.units.pop_back(); });
+  refused([](LogInfo& info) { info.actuators.names[1] = "z1"; });
+  refused([](LogInfo& info) { info.sensors = {}; });
+  refused([](LogInfo& info) { info.metadata_json = "{"; });
+  refused([](LogInfo& info) { info.sensors.names[0] = "\xFF"; });
+}
+
+TEST(SlogWriter, RefusesCallsOutOfOrderAndOfWrongSize) {
+  const TemporaryDirectory directory;
+  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+  const Eigen::MatrixXd excitation = test::excitation_of(0);
+  EXPECT_THROW(log.write(test::rows_of(0, 0, 1)), std::invalid_argument);
+  EXPECT_THROW(log.end_run(test::run_of(0)), std::invalid_argument);
+  EXPECT_THROW(log.begin_run(test::run_of(0), excitation.topRows(5)), std::invalid_argument);
+  EXPECT_THROW(log.begin_run(test::run_of(0), excitation.leftCols(2)), std::invalid_argument);
+  Eigen::MatrixXd bad = excitation;
+  bad(3, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(log.begin_run(test::run_of(0), bad), std::invalid_argument);
+  log.begin_run(test::run_of(0), excitation);
+  EXPECT_THROW(log.begin_run(test::run_of(0), excitation), std::invalid_argument);
+  const std::vector<double> rows = test::rows_of(0, 0, 2);
+  EXPECT_THROW(log.write(std::span(rows).first(7)), std::invalid_argument);
+  EXPECT_EQ(log.acknowledged_rows(), 0U);
+}
+
+TEST(SlogWriter, OneWriterAtATime) {
+  const TemporaryDirectory directory;
+  const SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+  EXPECT_THAT([&] { SlogWriter::resume(directory / "a.slog", test::small_info()); },
+              ThrowsMessage<FileError>(HasSubstr("another process")));
+}
+
+TEST(SlogWriter, AFullDiskKeepsWhatWasAcknowledgedAndCanBeResumed) {
+  const TemporaryDirectory directory;
+  const auto file = directory / "a.slog";
+  std::uint64_t acknowledged = 0;
+  {
+    SlogWriter log = SlogWriter::create(file, test::small_info());
+    log.begin_run(test::run_of(0), test::excitation_of(0));
+    log.write(test::rows_of(0, 0, 10));
+    const test::FileSizeLimit limit(log.bytes() + 200);  // room for a part of the next block
+    EXPECT_THAT([&] { log.write(test::rows_of(0, 10, 10)); },
+                ThrowsMessage<FileError>(HasSubstr("are kept")));
+    EXPECT_THROW(log.write(test::rows_of(0, 10, 1)), FileError) << "a gap would follow";
+    acknowledged = log.acknowledged_rows();
+    EXPECT_EQ(std::filesystem::file_size(file), log.bytes());
+  }
+  EXPECT_EQ(acknowledged, 10U);
+  SlogWriter log = SlogWriter::resume(file, test::small_info());
+  EXPECT_FALSE(std::filesystem::exists(directory / "a.slog.damaged"));
+  test::write_run(log, 0);
+  log.close(0, "");
+  const SlogReader reader(file);
+  ASSERT_EQ(reader.runs().size(), 2U);
+  EXPECT_FALSE(reader.runs()[0].complete);
+  EXPECT_EQ(reader.runs()[0].samples, acknowledged);
+  EXPECT_TRUE(reader.runs()[1].complete);
+}
+
+TEST(SlogWriter, ResumeAppendsToACleanlyClosedLog) {
+  const TemporaryDirectory directory;
+  const auto file = directory / "a.slog";
+  test::write_small_log(file, 1);
+  const std::string before = test::bytes_of(file);
+  {
+    SlogWriter log = SlogWriter::resume(file, test::small_info());
+    test::write_run(log, 1);
+    log.close(3, "later");
+  }
+  EXPECT_EQ(test::bytes_of(file).substr(0, before.size()), before) << "append-only";
+  const SlogReader reader(file);
+  ASSERT_EQ(reader.runs().size(), 2U);
+  EXPECT_EQ(reader.end()->exit_code, 3);
+  LogSamples samples;
+  for (std::size_t run = 0; run < 2; ++run) {
+    reader.read(run, 0, 36, samples);
+    EXPECT_TRUE(test::holds_rows(samples, run, 0));
+    EXPECT_EQ(reader.excitation(run), test::excitation_of(run));
+  }
+}
+
+TEST(SlogWriter, ResumeRefusesAnotherExperiment) {
+  const TemporaryDirectory directory;
+  const auto file = directory / "a.slog";
+  test::write_small_log(file, 1);
+  const std::string before = test::bytes_of(file);
+  LogInfo other = test::small_info();
+  other.period_samples = 24;
+  EXPECT_THAT([&] { SlogWriter::resume(file, other); },
+              ThrowsMessage<FormatError>(HasSubstr("another experiment")));
+  other = test::small_info();
+  other.sensors.names[0] = "s9";
+  EXPECT_THROW(SlogWriter::resume(file, other), FormatError);
+  test::write_bytes(directory / "text", "no log at all");
+  EXPECT_THROW(SlogWriter::resume(directory / "text", other), FormatError);
+  other = test::small_info();
+  other.metadata_json = R"({"started":"another time"})";
+  EXPECT_NO_THROW(SlogWriter::resume(file, other));
+  EXPECT_EQ(test::bytes_of(file), before) << "nothing was written yet";
+}
+
+TEST(SlogWriter, ResumeMovesADamagedTailAside) {
+  const TemporaryDirectory directory;
+  const auto file = directory / "a.slog";
+  for (const char* saved : {"a.slog.damaged", "a.slog.damaged.2"}) {
+    std::filesystem::remove(file);
+    std::uint64_t intact = 0;
+    {
+      SlogWriter log = SlogWriter::create(file, test::small_info());
+      log.begin_run(test::run_of(0), test::excitation_of(0));
+      log.write(test::rows_of(0, 0, 20));
+      intact = log.bytes();
+      log.write(test::rows_of(0, 20, 10));
+    }
+    const std::string whole = test::bytes_of(file);
+    test::write_bytes(file, whole.substr(0, whole.size() - 100));
+    SlogWriter log = SlogWriter::resume(file, test::small_info());
+    EXPECT_EQ(log.bytes(), intact);
+    EXPECT_EQ(test::bytes_of(directory / saved), whole.substr(intact, whole.size() - 100 - intact));
+    test::write_run(log, 0);
+    log.close(0, "");
+    const SlogReader reader(file);
+    EXPECT_EQ(reader.runs()[0].samples, 20U);
+    EXPECT_FALSE(reader.runs()[0].complete);
+    EXPECT_TRUE(reader.runs()[1].complete);
+  }
+}
+
+TEST(SlogWriter, ResumeDoesNotThrowIntactBlocksAway) {
+  const TemporaryDirectory directory;
+  const auto file = directory / "a.slog";
+  test::write_small_log(file, 2);
+  std::string bytes = test::bytes_of(file);
+  bytes[bytes.size() / 2] ^= 1;
+  test::write_bytes(file, bytes);
+  EXPECT_THAT([&] { SlogWriter::resume(file, test::small_info()); },
+              ThrowsMessage<FormatError>(HasSubstr("recover")));
+  EXPECT_EQ(test::bytes_of(file), bytes);
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,130 @@
+#include "estimation/modal/residual_verdict.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/random_numbers.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr Eigen::Index kOutputs = 2;
+constexpr Eigen::Index kInputs = 3;
+
+/// A response of noise about zero, so that the model to judge is zero; variances of `dof` degrees of freedom.
+FrfEstimate noise(std::uint64_t seed, Eigen::Index lines, int dof) {
+  test::RandomNumbers random(seed);
+  FrfEstimate frf;
+  const AdditiveModel model = test::named_model(kOutputs, kInputs);
+  frf.inputs = model.inputs;
+  frf.outputs = model.outputs;
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(lines, 1.0, static_cast<double>(lines));
+  frf.response.resize(kOutputs * kInputs, lines);
+  for (std::complex<double>& value : frf.response.reshaped()) value = random.circular();
+  frf.noise_variance.setOnes(kOutputs * kInputs, lines);
+  frf.noise_dof = dof;
+  for (double& variance : frf.noise_variance.reshaped()) {
+    if (dof == 0) break;
+    variance = 0.0;
+    for (int i = 0; i < dof; ++i) variance += std::norm(random.circular()) / dof;
+  }
+  return frf;
+}
+
+ResidualVerdict judge(const FrfEstimate& frf, const Eigen::MatrixXd& weights = {}) {
+  return judge_residual(
+      frf,
+      [&](Eigen::Index, Eigen::Index count) {
+        return Eigen::MatrixXcd::Zero(frf.response.rows(), count).eval();
+      },
+      weights, 1);
+}
+
+TEST(ResidualVerdict, NoiseIsExplainedHoweverFewDegreesOfFreedomItsVarianceHas) {
+  for (const int dof : {0, 1, 2, 5, 50})
+    for (std::uint64_t seed = 1; seed <= 200; ++seed)
+      for (const Eigen::Index lines : {3, 40, 400}) {
+        const ResidualVerdict verdict = judge(noise(seed, lines, dof));
+        ASSERT_TRUE(verdict.explained)
+            << dof << " degrees, seed " << seed << ", " << lines << " lines: " << verdict.reason;
+      }
+}
+
+// The error of the model is as large as the noise, in power: that is where the line is drawn.
+TEST(ResidualVerdict, TheLineIsAtTwiceTheNoise) {
+  for (const int dof : {0, 1, 2, 5, 50}) {
+    FrfEstimate frf = noise(7, 2000, dof);
+    frf.response *= std::sqrt(1.8);
+    EXPECT_TRUE(judge(frf).explained) << dof;
+    frf.response *= std::sqrt(2.4 / 1.8);
+    const ResidualVerdict verdict = judge(frf);
+    EXPECT_FALSE(verdict.explained) << dof;
+    EXPECT_THAT(verdict.reason, HasSubstr("times what noise explains"));
+  }
+}
+
+TEST(ResidualVerdict, OneOutputOneInputOrOneModeThatIsMissedIsNamed) {
+  const FrfEstimate sound = noise(11, 640, 20);
+  FrfEstimate frf = sound;
+  for (Eigen::Index c = 1; c < frf.response.rows(); c += kOutputs) frf.response.row(c) *= 3.0;
+  EXPECT_THAT(judge(frf).reason, HasSubstr("output " + frf.outputs.names[1]));
+  frf = sound;
+  frf.response.middleRows(2 * kOutputs, kOutputs) *= 3.0;
+  EXPECT_THAT(judge(frf).reason, HasSubstr("input " + frf.inputs.names[2]));
+  frf = sound;
+  frf.response.middleCols(100, 3) *= 30.0;  // of 640 lines
+  EXPECT_THAT(judge(frf).reason, HasSubstr("97 to 128 Hz"));
+}
+
+TEST(ResidualVerdict, DistortionThatTheRealizationsShowIsKnown) {
+  FrfEstimate frf = noise(13, 500, 50);
+  frf.response *= 10.0;
+  EXPECT_FALSE(judge(frf).explained);
+  frf.total_variance = 100.0 * noise(14, 500, 2).noise_variance;
+  frf.total_dof = 2.0;
+  const ResidualVerdict verdict = judge(frf);
+  EXPECT_TRUE(verdict.explained) << verdict.reason;
+  EXPECT_EQ(verdict.variance, ResidualVariance::total);
+  frf.response *= 2.0;
+  EXPECT_FALSE(judge(frf).explained);
+  frf.noise_variance.resize(0, 0);
+  EXPECT_THAT(judge(frf).reason, HasSubstr("noise and distortion explain"));
+}
+
+// One realization: the lines scatter about a smooth response by noise and distortion.
+TEST(ResidualVerdict, DistortionOfOneRealizationIsTheScatterOfItsLines) {
+  FrfEstimate frf = noise(15, 500, 50);
+  frf.response *= 10.0;  // noise variance 1
+  frf.response.array() += 300.0;
+  const auto judge_by = [&](double level) {
+    return judge_residual(frf, [&](Eigen::Index, Eigen::Index count) {
+      return Eigen::MatrixXcd::Constant(frf.response.rows(), count, level).eval();
+    });
+  };
+  const ResidualVerdict right = judge_by(300.0);
+  EXPECT_TRUE(right.explained) << right.reason;
+  EXPECT_EQ(right.variance, ResidualVariance::scatter);
+  EXPECT_NEAR(right.chi_square, right.expected, 0.1 * right.expected);
+  EXPECT_FALSE(judge_by(330.0).explained);
+}
+
+TEST(ResidualVerdict, WithoutVariancesOrWeightsNothingIsJudged) {
+  FrfEstimate frf = noise(17, 100, 0);
+  frf.response *= 100.0;
+  Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(frf.response.rows(), 100);
+  EXPECT_TRUE(judge(frf, weights).explained);
+  weights(0, 5) = 1.0;
+  EXPECT_FALSE(judge(frf, weights).explained);
+  frf.noise_variance.resize(0, 0);
+  const ResidualVerdict verdict = judge(frf);
+  EXPECT_TRUE(verdict.explained);
+  EXPECT_EQ(verdict.variance, ResidualVariance::none);
+}
+
+}  // namespace
+}  // namespace stageid

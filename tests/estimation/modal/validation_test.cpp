@@ -1,0 +1,338 @@
+#include "estimation/modal/validation.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/model_reference.hpp"
+#include "tests/support/random_stage.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kDelay = 1.37e-4;
+
+AdditiveModel stage_model(HoldModel hold) {
+  test::RandomNumbers random(6);
+  AdditiveModel model = test::named_model(2, 3);
+  model.hold = hold;
+  model.sample_rate_hz = 1e4;
+  model.input_delay_s.setConstant(kDelay);
+  model.submodels = {test::empty_submodel(model, 2, {}, 1),
+                     test::empty_submodel(model, 0, test::mode_coefficients(300.0, 0.02), 1),
+                     test::empty_submodel(model, 0, test::mode_coefficients(950.0, 0.01), 1)};
+  for (Submodel& s : model.submodels)
+    for (double& value : s.numerator[0].reshaped())
+      value = (s.is_mode() ? s.denominator[2] : 1.0) * random.normal();
+  return model;
+}
+
+FrfEstimate measured(const AdditiveModel& model, HoldModel hold) {
+  test::DenseProblem problem;
+  problem.model = model;
+  problem.hold = hold;
+  problem.frequency_hz = Eigen::VectorXd::LinSpaced(1500, 20.0, 2000.0);
+  problem.G = test::reference_response(model, problem.frequency_hz, hold);
+  return test::frf_of(problem);
+}
+
+/// Adds noise of the variance that the FRF then tells, or of `factor` times it.
+void add_noise(FrfEstimate& frf, std::uint64_t seed, double factor = 1.0) {
+  test::RandomNumbers random(seed);
+  frf.noise_variance = 1e-4 * frf.response.cwiseAbs2();
+  for (Eigen::Index k = 0; k < frf.lines(); ++k)
+    for (Eigen::Index c = 0; c < frf.response.rows(); ++c)
+      frf.response(c, k) += std::sqrt(factor * frf.noise_variance(c, k)) * random.circular();
+}
+
+TEST(Validation, ATrueModelIsWithinTheNoise) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  int too_coloured = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    FrfEstimate frf = measured(model, HoldModel::exact);
+    add_noise(frf, seed);
+    const Validation result = validate(model, frf);
+    const double values = 6.0 * 1500.0;
+    // |e|^2 is Exp(1): mean 1 and deviation 1 each.
+    EXPECT_NEAR(result.chi_square_per_dof, 1.0, 4.5 / std::sqrt(values));
+    EXPECT_NEAR(result.whitened_above_95, 0.05, 4.5 * std::sqrt(0.05 * 0.95 / values));
+    EXPECT_NEAR(result.relative_rms_error, 0.01, 0.01 * 4.5 * 0.5 / std::sqrt(values) + 1e-6);
+    EXPECT_GT(result.whiteness, 0.0);
+    EXPECT_LT(result.whiteness_limit, 0.05);
+    if (result.whiteness > result.whiteness_limit) ++too_coloured;
+  }
+  // A 99 % limit: 0.4 of 40 are expected above it, more than 4 have a probability below 1e-4.
+  EXPECT_LE(too_coloured, 4);
+}
+
+// Variances from few degrees of freedom: |e|^2 over them is F(2, 2 nu).
+TEST(Validation, CountsWhatVariancesFromFewDegreesOfFreedomExceed) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  add_noise(frf, 71);
+  test::RandomNumbers random(72);
+  constexpr int kDof = 4;
+  for (double& variance : frf.noise_variance.reshaped()) {
+    double sum = 0.0;
+    for (int i = 0; i < kDof; ++i) sum += std::norm(random.circular());
+    variance *= sum / kDof;
+  }
+  frf.noise_dof = kDof;
+  const Validation result = validate(model, frf);
+  EXPECT_NEAR(result.whitened_above_95, 0.05, 4.5 * std::sqrt(0.05 * 0.95 / 9000.0));
+  frf.noise_dof = 0.0;  // taken for exact
+  EXPECT_GT(validate(model, frf).whitened_above_95, 0.09);
+}
+
+// The limit is 99 %, not 99.9999 %: of many white residuals some are above it.
+TEST(Validation, TheWhitenessLimitIsTheOneItSays) {
+  AdditiveModel model = test::named_model(1, 1);
+  Submodel constant = test::empty_submodel(model, 0, {}, 1);
+  constant.numerator[0].setConstant(1.0);
+  model.submodels = {constant};
+  int above = 0;
+  constexpr int kRuns = 2000;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    test::DenseProblem problem;
+    problem.model = model;
+    problem.frequency_hz = Eigen::VectorXd::LinSpaced(200, 1.0, 200.0);
+    problem.G = Eigen::MatrixXcd::Ones(1, 200);
+    FrfEstimate frf = test::frf_of(problem);
+    test::RandomNumbers random(seed);
+    for (std::complex<double>& value : frf.response.reshaped()) value += 0.1 * random.circular();
+    frf.noise_variance = Eigen::MatrixXd::Constant(1, 200, 0.01);
+    const Validation result = validate(model, frf);
+    if (result.whiteness > result.whiteness_limit) ++above;
+  }
+  // 20 expected; the limit takes all lags alike, of which the longer ones sum fewer lines.
+  EXPECT_GE(above, 5);
+  EXPECT_LE(above, 40);
+}
+
+TEST(Validation, AModelThatIsWrongShowsInEveryFigure) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  add_noise(frf, 3);
+  AdditiveModel wrong = model;
+  const std::vector<double> a = test::mode_coefficients(303.0, 0.02);
+  wrong.submodels[1].denominator = {1.0, a[0], a[1]};
+  const Validation result = validate(wrong, frf);
+  EXPECT_GT(result.chi_square_per_dof, 2.0);
+  EXPECT_GT(result.whitened_above_95, 0.1);
+  EXPECT_GT(result.whiteness, 5.0 * result.whiteness_limit);
+  EXPECT_GT(result.relative_rms_error, 0.02);
+}
+
+// One realization: the lines scatter by more than the periods say, about a smooth response.
+TEST(Validation, ScatterOfTheLinesExplainsWhatTheNoiseDoesNot) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  add_noise(frf, 4, 4.0);
+  const Validation result = validate(model, frf);
+  EXPECT_TRUE(result.explained) << result.reason;
+  EXPECT_EQ(result.variance, ResidualVariance::scatter);
+  EXPECT_NEAR(result.chi_square_per_dof, result.expected_chi_square, 0.15);
+  EXPECT_LT(result.whiteness, result.whiteness_limit * 1.5);
+}
+
+// Without lines enough to tell, the noise is all that is known.
+TEST(Validation, NoiseThatIsLargerThanToldShowsInChiSquare) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  add_noise(frf, 4, 25.0);
+  frf = select_band(std::move(frf), 600.0, 625.0);
+  const Validation result = validate(model, frf);
+  EXPECT_FALSE(result.explained);
+  EXPECT_EQ(result.variance, ResidualVariance::noise);
+  EXPECT_NEAR(result.chi_square_per_dof, 25.0, 25.0 * 4.5 / std::sqrt(6.0 * 18.0));
+}
+
+TEST(Validation, ErrorsAreThoseOfTheirDefinitions) {
+  AdditiveModel model = test::named_model(2, 1);
+  Submodel constant = test::empty_submodel(model, 0, {}, 1);
+  constant.numerator[0] << 1.0, 2.0;
+  model.submodels = {constant};
+  test::DenseProblem problem;
+  problem.model = model;
+  problem.frequency_hz = Eigen::VectorXd{{1.0, 2.0}};
+  problem.G.resize(2, 2);
+  problem.G << 2.0, std::complex<double>(1.0, 1.0),  //
+      4.0, 0.0;                                      // a zero has no relative error
+  const Validation result = validate(model, test::frf_of(problem));
+  // |E|^2 = 1, 1; 4, 4.  |G|^2 = 4, 2; 16, 0.
+  EXPECT_NEAR(result.relative_rms_error, std::sqrt((0.25 + 0.5 + 0.25) / 3.0), 1e-15);
+  EXPECT_NEAR(result.normalized_error, std::sqrt(10.0 / 22.0), 1e-15);
+  ASSERT_EQ(result.channel_error.size(), 2);
+  EXPECT_NEAR(result.channel_error[0], std::sqrt(0.375), 1e-15);
+  EXPECT_EQ(result.chi_square_per_dof, 0.0) << "unknown without variances";
+  EXPECT_EQ(result.whiteness_limit, 0.0);
+}
+
+TEST(Validation, TotalVarianceServesWhereNoNoiseVarianceIs) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  add_noise(frf, 5);
+  frf.total_variance = frf.noise_variance;
+  frf.noise_variance.resize(0, 0);
+  EXPECT_NEAR(validate(model, frf).chi_square_per_dof, 1.0, 0.06);
+}
+
+// A variance that is itself the mean of nu squares: the ratio is F(2, 2 nu).
+TEST(Validation, FewPeriodsRaiseTheChiSquareOfNoiseAlone) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  EXPECT_EQ(validate(model, measured(model, HoldModel::exact)).expected_chi_square, 0.0)
+      << "without variances";
+  for (const int nu : {4, 9}) {
+    FrfEstimate frf = measured(model, HoldModel::exact);
+    add_noise(frf, 7);
+    EXPECT_EQ(validate(model, frf).expected_chi_square, 1.0) << "exact variances";
+    test::RandomNumbers random(static_cast<std::uint64_t>(nu));
+    for (double& variance : frf.noise_variance.reshaped()) {
+      double sum = 0.0;
+      for (int i = 0; i < nu; ++i) sum += std::norm(random.circular());
+      variance *= sum / nu;
+    }
+    frf.noise_dof = nu;
+    const Validation result = validate(model, frf);
+    EXPECT_DOUBLE_EQ(result.expected_chi_square, nu / (nu - 1.0));
+    // F(2, 2 nu) has the variance nu^3 / ((nu - 1)^2 (nu - 2)).
+    const double deviation = std::sqrt(std::pow(nu, 3) / (std::pow(nu - 1, 2) * (nu - 2)));
+    EXPECT_NEAR(result.chi_square_per_dof, result.expected_chi_square,
+                4.5 * deviation / std::sqrt(9000.0));
+  }
+  FrfEstimate one = measured(model, HoldModel::exact);
+  add_noise(one, 7);
+  one.noise_dof = 1.0;
+  EXPECT_EQ(validate(model, one).expected_chi_square, 0.0) << "no mean";
+}
+
+TEST(Validation, ChannelsMustMatchByName) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  const auto message =
+      testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("different channels"));
+  frf.inputs.names[1] = "other";
+  EXPECT_THAT([&] { (void)validate(model, frf); }, message);
+  frf = measured(model, HoldModel::exact);
+  std::swap(frf.outputs.names[0], frf.outputs.names[1]);
+  EXPECT_THAT([&] { (void)validate(model, frf); }, message);
+  frf = select_channels(measured(model, HoldModel::exact), {"a1", "a2"}, {"z1", "z2"});
+  EXPECT_THAT([&] { (void)validate(model, frf); }, message);
+}
+
+// The data's history -----------------------------------------------------------------------------
+
+/// Largest relative difference of two responses.
+double distance(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b) {
+  return ((a - b).cwiseAbs().array() / b.cwiseAbs().array()).maxCoeff();
+}
+
+TEST(ResponseLike, SampledDataAreComparedThroughHoldAndDelay) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  EXPECT_LT(distance(response_like(model, measured(model, HoldModel::exact)),
+                     test::reference_response(model, measured(model, HoldModel::exact).frequency_hz,
+                                              HoldModel::exact)),
+            1e-9);
+}
+
+TEST(ResponseLike, ContinuousDataAreComparedWithoutThem) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  AdditiveModel bare = model;
+  bare.input_delay_s.setZero();
+  FrfEstimate frf = measured(bare, HoldModel::none);
+  EXPECT_LT(distance(response_like(model, frf), frf.response), 1e-12);
+  // A model that was fitted to such data with a delay keeps it.
+  AdditiveModel continuous = model;
+  continuous.hold = HoldModel::none;
+  frf = measured(continuous, HoldModel::none);
+  EXPECT_LT(distance(response_like(continuous, frf), frf.response), 1e-12);
+}
+
+TEST(ResponseLike, DataThatHaveLostHoldAndDelayMeetAModelThatLosesThemToo) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  frf.delay_s = 1.1e-4;  // not quite the model's
+  const double T = 1e-4;
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const std::complex<double> s(0.0, 2.0 * std::numbers::pi * frf.frequency_hz[k]);
+    frf.response.col(k) /= std::exp(-s * frf.delay_s) * (1.0 - std::exp(-s * T)) / (s * T);
+  }
+  frf.compensated = Compensation::hold;
+  EXPECT_LT(distance(response_like(model, frf), frf.response), 1e-9);
+}
+
+// method.md section 4, level 1: e^{-j omega (delay_s + T/2)} is divided out, the magnitude is left.
+TEST(ResponseLike, DataThatHaveLostTheirDelayMeetAModelThatLosesItToo) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  frf.delay_s = 1.1e-4;
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const std::complex<double> s(0.0, 2.0 * std::numbers::pi * frf.frequency_hz[k]);
+    frf.response.col(k) /= std::exp(-s * (frf.delay_s + 0.5e-4));
+  }
+  frf.compensated = Compensation::delay;
+  EXPECT_LT(distance(response_like(model, frf), frf.response), 1e-9);
+}
+
+TEST(ResponseLike, AContinuousModelOfCompensatedDataIsTakenAsItIs) {
+  const AdditiveModel model = stage_model(HoldModel::none);
+  FrfEstimate frf = measured(model, HoldModel::none);
+  frf.hold = Hold::zoh;
+  frf.compensated = Compensation::hold;
+  EXPECT_LT(distance(response_like(model, frf), frf.response), 1e-12);
+}
+
+TEST(ResponseLike, NeedsASampleRateForSampledData) {
+  AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  model.sample_rate_hz = 0.0;
+  EXPECT_THROW((void)response_like(model, frf), std::invalid_argument);
+}
+
+TEST(Validation, OtherUnitsAreAnotherResponse) {
+  AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  model.outputs.units = {"m", "m"};
+  frf.outputs.units = {"m", ""};  // unknown: nothing is said against it
+  EXPECT_NO_THROW(validate(model, frf));
+  frf.outputs.units = {"m", "mm"};
+  try {
+    validate(model, frf);
+    FAIL() << "millimetres taken for metres";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(),
+                ::testing::HasSubstr(model.outputs.names[1] + " is in m in the model"));
+  }
+}
+
+TEST(Validation, AChannelOfNoiseDoesNotDecideTheRelativeError) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  add_noise(frf, 5);
+  frf.noise_dof = 8.0;
+  AdditiveModel decoupled = model;
+  for (Submodel& s : decoupled.submodels) s.numerator[0](1, 2) = 0.0;
+  test::RandomNumbers random(7);
+  for (std::complex<double>& value : frf.response.row(5)) value = 1e-12 * random.circular();
+  frf.noise_variance.row(5).setConstant(1e-24);
+  const Validation result = validate(decoupled, frf);
+  EXPECT_NEAR(result.relative_rms_error, 0.01, 0.001);
+  EXPECT_TRUE(std::isnan(result.channel_error[5]));
+  EXPECT_NEAR(result.channel_error[0], 0.01, 0.002);
+}
+
+TEST(Validation, OfAZeroResponseThereIsNoRelativeError) {
+  const AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+  frf.response.setZero();
+  const Validation result = validate(model, frf);
+  EXPECT_TRUE(std::isnan(result.relative_rms_error));
+  EXPECT_TRUE(std::isnan(result.normalized_error));
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,57 @@
+// Data whose best pole lies where no stable or visible pole is: the fit ends at the bound and says
+// that it has converged.
+
+#include <gtest/gtest.h>
+
+#include "estimation/search/fit_additive_model.hpp"
+#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/model_reference.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kLowestLineHz = 20.0;
+
+/// One input, one output, rigid body and two modes, 2 Hz between lines; no noise.
+FrfEstimate response_of(double first_hz, double first_damping) {
+  test::DenseProblem problem;
+  problem.model = test::named_model(1, 1);
+  problem.frequency_hz = Eigen::VectorXd::LinSpaced(241, kLowestLineHz, 500.0);
+  problem.model.submodels = {
+      test::empty_submodel(problem.model, 2, {}, 1),
+      test::empty_submodel(problem.model, 0, test::mode_coefficients(first_hz, first_damping), 1),
+      test::empty_submodel(problem.model, 0, test::mode_coefficients(301.0, 0.01), 1)};
+  for (Submodel& s : problem.model.submodels)
+    s.numerator[0](0, 0) = s.is_mode() ? s.denominator[2] : 1.0;
+  problem.G = test::reference_response(problem.model, problem.frequency_hz, HoldModel::none);
+  return test::frf_of(problem);
+}
+
+FitResult fit_from(const FrfEstimate& frf, double first_hz) {
+  AdditiveModel start = test::named_model(1, 1);
+  start.submodels.push_back(test::empty_submodel(start, 2, {}, 1));
+  for (const double f : {first_hz, 300.0})
+    start.submodels.push_back(test::empty_submodel(start, 0, test::mode_coefficients(f, 0.01), 1));
+  return fit_additive_model(frf, start, {});
+}
+
+TEST(PoleBounds, AModeThatWouldBeUnstableIsHeldAtTheSmallestDamping) {
+  const FitResult fit = fit_from(response_of(121.0, -0.002), 120.5);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_NEAR(fit.model.submodels[1].damping_ratio(), 1e-5, 1e-8);
+  EXPECT_NEAR(fit.model.submodels[1].natural_frequency_hz(), 121.0, 0.1);
+  EXPECT_FALSE(fit.model.submodels[1].damping_ratio_std) << "it is not an unknown any more";
+  EXPECT_NEAR(fit.model.submodels[2].natural_frequency_hz(), 301.0, 0.1);
+}
+
+TEST(PoleBounds, AModeFarBelowTheLinesIsHeldThereWithoutADeviation) {
+  // From a start inside the lines towards 1 Hz, which is seen as a slope only.
+  const FitResult fit = fit_from(response_of(1.0, 0.02), 30.0);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_NEAR(fit.model.submodels[1].natural_frequency_hz(), kLowestLineHz / 4.0, 1e-6);
+  EXPECT_FALSE(fit.model.submodels[1].natural_frequency_std_hz);
+  EXPECT_NEAR(fit.model.submodels[2].natural_frequency_hz(), 301.0, 0.1);
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,225 @@
+// Weight matrices: what they are made of, and what is refused.
+
+#include "estimation/problem/weight_matrices.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "estimation/problem/fit_problem.hpp"
+#include "tests/estimation/correlated_stage.hpp"
+
+namespace stageid {
+namespace {
+
+using test::correlated_noise;
+using test::CorrelatedNoise;
+using test::DenseProblem;
+using test::RandomNumbers;
+
+DenseProblem stage() { return test::noisy_stage(HoldModel::none, 0.0); }
+
+/// W_k read off, column by column.
+Eigen::MatrixXcd matrix_of(const WeightMatrices& weights, Eigen::Index k, Eigen::Index n_c) {
+  Eigen::MatrixXcd out(n_c, n_c);
+  for (Eigen::Index c = 0; c < n_c; ++c) {
+    Eigen::MatrixXcd unit = Eigen::VectorXcd::Unit(n_c, c);
+    weights.apply(k, unit);
+    out.col(c) = unit;
+  }
+  return out;
+}
+
+TEST(WeightMatrices, OfALikelihoodInvertTheKroneckerProduct) {
+  const DenseProblem problem = stage();
+  const CorrelatedNoise noise = correlated_noise(problem, 0.01, 0.9);
+  RandomNumbers random(1);
+  const FrfEstimate frf = test::measured(problem, noise, random);
+  const WeightMatrices weights = WeightMatrices::likelihood(frf);
+  EXPECT_EQ(weights.scatter_factor(), 1.0);
+  for (const Eigen::Index k : {0, 57, 399}) {
+    const Eigen::MatrixXcd C = noise.covariance(static_cast<std::size_t>(k));
+    const Eigen::MatrixXcd unit = matrix_of(weights, k, 6) * C;
+    // Condition of C: about (1.9 / 0.1)^2 and the scales' 100.
+    EXPECT_LT((unit - Eigen::MatrixXcd::Identity(6, 6)).cwiseAbs().maxCoeff(), 1e-11);
+    for (Eigen::Index c = 0; c < 6; ++c)
+      EXPECT_NEAR(weights.marginal()(c, k) * C(c, c).real(), 1.0, 1e-12);
+  }
+}
+
+TEST(WeightMatrices, OfAUserAreTakenAsTheyAre) {
+  const DenseProblem problem = stage();
+  const CorrelatedNoise noise = correlated_noise(problem, 0.01, 0.9);
+  const FrfEstimate frf = test::frf_of(problem);
+  FitOptions options;
+  options.weighting = Weighting::user;
+  options.user_weight_matrices.resize(36, frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k)
+    options.user_weight_matrices.col(k) =
+        noise.covariance(static_cast<std::size_t>(k)).inverse().reshaped();
+  // Singular ones are allowed: a line that does not count, a channel, a difference of two.
+  options.user_weight_matrices.col(3).setZero();
+  const Eigen::VectorXcd difference{{1.0, -1.0, 0.0, 0.0, 0.0, 0.0}};
+  options.user_weight_matrices.col(4) = (difference * difference.adjoint()).reshaped();
+  const auto weights = make_weight_matrices(frf, options);
+  ASSERT_TRUE(weights.has_value());
+  for (const Eigen::Index k : {0, 4, 200})
+    EXPECT_EQ(matrix_of(*weights, k, 6).reshaped(), options.user_weight_matrices.col(k));
+  EXPECT_EQ(weights->marginal().col(3), Eigen::VectorXd::Zero(6));
+  EXPECT_EQ(weights->marginal().col(4), difference.cwiseAbs());
+  const Eigen::MatrixXcd C = noise.covariance(200);
+  EXPECT_NEAR(weights->marginal()(5, 200) * C(5, 5).real(), 1.0, 1e-10);
+  EXPECT_EQ(*make_weights(frf, options), weights->marginal());
+}
+
+TEST(WeightMatrices, AreNoneWithDiagonalWeights) {
+  FitOptions options;
+  for (const Weighting weighting : {Weighting::unit, Weighting::relative, Weighting::user}) {
+    options.weighting = weighting;
+    EXPECT_FALSE(make_weight_matrices(test::frf_of(stage()), options).has_value());
+  }
+}
+
+// E{C_hat^-1} = nu / (nu - n) C^-1, infinite for nu <= n: after smoothing the mean of the weights is
+// C^-1, and E{W C W} is scatter_factor() times it, whatever nu.
+TEST(WeightMatrices, FromFewDegreesOfFreedomAreUnbiased) {
+  constexpr Eigen::Index kOutputs = 3;
+  constexpr Eigen::Index kLines = 4000;
+  for (const int dof : {1, 2, 5, 20, 26, 60}) {
+    RandomNumbers random(static_cast<std::uint64_t>(40 + dof));
+    const Eigen::MatrixXcd C = test::correlated_matrix(random, kOutputs, 0.8);
+    FrfEstimate frf;
+    frf.outputs.names = {"z1", "z2", "z3"};
+    frf.inputs.names = {"a1"};
+    frf.frequency_hz = Eigen::VectorXd::LinSpaced(kLines, 1.0, 4000.0);
+    frf.response.setOnes(kOutputs, kLines);
+    frf.input_factor.setOnes(1, kLines);
+    frf.noise_dof = dof;
+    frf.residual_covariance_re.resize(9, kLines);
+    frf.residual_covariance_im.resize(9, kLines);
+    const Eigen::MatrixXcd L = C.llt().matrixL();
+    for (Eigen::Index k = 0; k < kLines; ++k) {
+      Eigen::MatrixXcd samples(kOutputs, dof);
+      for (std::complex<double>& value : samples.reshaped()) value = random.circular();
+      // The level drifts: 1 over the band, little over a window.
+      const Eigen::MatrixXcd scaled = std::exp(0.00025 * static_cast<double>(k)) * L * samples;
+      const Eigen::MatrixXcd estimate = scaled * scaled.adjoint() / static_cast<double>(dof);
+      frf.residual_covariance_re.col(k) = estimate.reshaped().real();
+      frf.residual_covariance_im.col(k) = estimate.reshaped().imag();
+    }
+    const WeightMatrices weights = WeightMatrices::likelihood(frf);
+    Eigen::MatrixXcd first = Eigen::MatrixXcd::Zero(kOutputs, kOutputs);
+    Eigen::MatrixXcd second = first;
+    for (Eigen::Index k = 0; k < kLines; ++k) {
+      const double level = std::exp(0.0005 * static_cast<double>(k));
+      const Eigen::MatrixXcd W = L.adjoint() * matrix_of(weights, k, kOutputs) * L * level;
+      first += W / static_cast<double>(kLines);
+      second += W * W / static_cast<double>(kLines);
+    }
+    const Eigen::MatrixXcd unit = Eigen::MatrixXcd::Identity(kOutputs, kOutputs);
+    // Relative scatter of an entry 1/5, one independent value every 28 lines (dof 1): 1.7 %; the
+    // smoothed variances add a few per cent where they come from one degree of freedom.
+    EXPECT_LT((first - unit).cwiseAbs().maxCoeff(), 0.06) << dof;
+    EXPECT_LT((second - weights.scatter_factor() * unit).cwiseAbs().maxCoeff(), 0.15) << dof;
+  }
+}
+
+class WeightMatrixRefusal : public testing::Test {
+ protected:
+  WeightMatrixRefusal() {
+    RandomNumbers random(1);
+    frf_ = test::measured(problem_, correlated_noise(problem_, 0.01, 0.9), random);
+    options_.weighting = Weighting::likelihood;
+  }
+  void expect_refused(const std::string& part, const std::string& other = "") {
+    EXPECT_THAT([this] { (void)make_weight_matrices(frf_, options_); },
+                testing::ThrowsMessage<std::invalid_argument>(
+                    testing::AllOf(testing::HasSubstr(part), testing::HasSubstr(other))));
+  }
+  void ask_for_matrices() {
+    options_.weighting = Weighting::user;
+    const Eigen::MatrixXcd unit = Eigen::MatrixXcd::Identity(6, 6);
+    options_.user_weight_matrices = unit.reshaped().replicate(1, frf_.lines());
+  }
+  DenseProblem problem_ = stage();
+  FrfEstimate frf_;
+  FitOptions options_;
+};
+
+TEST_F(WeightMatrixRefusal, NothingIsWrongWithTheFixture) {
+  EXPECT_TRUE(make_weight_matrices(frf_, options_).has_value());
+  ask_for_matrices();
+  EXPECT_TRUE(make_weight_matrices(frf_, options_).has_value());
+}
+TEST_F(WeightMatrixRefusal, AnFrfWithoutTheInputsFactor) {
+  frf_.input_factor.resize(0, 0);
+  expect_refused("needs /input_factor in the FRF", "stageid frf");
+}
+TEST_F(WeightMatrixRefusal, AnFrfWithoutTheResidualCovariance) {
+  frf_.residual_covariance_re.resize(0, 0);
+  frf_.residual_covariance_im.resize(0, 0);
+  expect_refused("needs /residual_covariance in the FRF", "two periods");
+}
+TEST_F(WeightMatrixRefusal, AnOutputWithoutNoise) {
+  frf_.residual_covariance_re(3, 7) = 0.0;
+  expect_refused("residual_covariance of z2 on line 7");
+}
+TEST_F(WeightMatrixRefusal, OutputsThatDependOnEachOther) {
+  frf_.residual_covariance_re.col(9).setOnes();
+  frf_.residual_covariance_im.col(9).setZero();
+  expect_refused("residual_covariance of line 9", "leave one of them out");
+}
+TEST_F(WeightMatrixRefusal, InputsThatDependOnEachOtherOrAFactorThatIsNotHermitian) {
+  const Eigen::MatrixXcd before = frf_.input_factor;
+  frf_.input_factor.col(11).setOnes();
+  expect_refused("input_factor of line 11", "leave one of them out");
+  frf_.input_factor = before;
+  frf_.input_factor(1, 12) *= 2.0;
+  expect_refused("input_factor of line 12", "Hermitian");
+}
+TEST_F(WeightMatrixRefusal, TooFewDegreesOfFreedomInAll) {
+  frf_.noise_dof = 1.0;
+  frf_ = select_band(frf_, frf_.frequency_hz[0], frf_.frequency_hz[2]);
+  expect_refused("3 degrees of freedom", "needs 4");
+}
+TEST_F(WeightMatrixRefusal, UsersOfAnotherShape) {
+  ask_for_matrices();
+  options_.user_weight_matrices.conservativeResize(36, frf_.lines() - 1);
+  expect_refused("shape");
+}
+TEST_F(WeightMatrixRefusal, UsersThatAreNotFinite) {
+  ask_for_matrices();
+  options_.user_weight_matrices(5, 20) = std::nan("");
+  expect_refused("line 20", "not finite");
+}
+TEST_F(WeightMatrixRefusal, UsersThatAreNotHermitian) {
+  ask_for_matrices();
+  options_.user_weight_matrices(5, 21) = std::complex<double>(0.0, 1e-6);
+  expect_refused("line 21", "not Hermitian");
+}
+TEST_F(WeightMatrixRefusal, UsersThatAreNotPositive) {
+  ask_for_matrices();
+  options_.user_weight_matrices(0, 22) = -1e-6;
+  expect_refused("line 22", "not positive semidefinite");
+  ask_for_matrices();
+  // Positive diagonal, but 1 - 1.1 along the difference of two channels.
+  options_.user_weight_matrices(1, 23) = 1.1;
+  options_.user_weight_matrices(6, 23) = 1.1;
+  expect_refused("line 23", "not positive semidefinite");
+}
+TEST_F(WeightMatrixRefusal, UsersThatAreAllZero) {
+  ask_for_matrices();
+  options_.user_weight_matrices.setZero();
+  expect_refused("every one is zero");
+}
+TEST_F(WeightMatrixRefusal, UsersThatWouldNotFitInMemory) {
+  EXPECT_NO_THROW(require_memory_for_weight_matrices(52, 4000));
+  EXPECT_THAT([] { require_memory_for_weight_matrices(221, 4000); },
+              testing::ThrowsMessage<std::invalid_argument>(
+                  testing::AllOf(testing::HasSubstr("2.9 GiB"), testing::HasSubstr("likelihood"))));
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,210 @@
+// Sums over lines that channels share, against those of every channel by itself.
+
+#include "estimation/products/line_sums.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "estimation/equations/arrow_system.hpp"
+#include "estimation/equations/numerators.hpp"
+#include "estimation/problem/residual.hpp"
+#include "estimation/products/channel_equations.hpp"
+#include "tests/estimation/disturbed_problem.hpp"
+#include "tests/estimation/noisy_stage.hpp"
+
+namespace stageid {
+namespace {
+
+using test::DenseProblem;
+using test::measure_and_disturb;
+using test::random_matrix;
+using test::RandomNumbers;
+
+/// 4 x 5: more channels than go each by itself.
+DenseProblem wide_problem(HoldModel hold) {
+  RandomNumbers random(31);
+  DenseProblem problem;
+  problem.hold = hold;
+  problem.model = test::named_model(4, 5);
+  if (hold != HoldModel::none) problem.model.sample_rate_hz = 1e4;
+  problem.frequency_hz = Eigen::VectorXd::LinSpaced(300, 30.0, 1500.0);
+  problem.model.submodels = {
+      test::empty_submodel(problem.model, 2, {}, 1),
+      test::empty_submodel(problem.model, 0, test::mode_coefficients(240.0, 0.03), 1),
+      test::empty_submodel(problem.model, 0, test::mode_coefficients(800.0, 0.02), 2)};
+  measure_and_disturb(random, problem, 1e-3);
+  return problem;
+}
+
+TEST(LineSums, SharedSumsOfManyChannelsAreTheChannelsOwn) {
+  for (const FitMethod method : {FitMethod::riv, FitMethod::gn, FitMethod::sk})
+    for (const DelayModel delay : {DelayModel::fixed, DelayModel::estimate}) {
+      const DenseProblem problem = wide_problem(HoldModel::exact);
+      const FitProblem fit = test::fit_problem(problem, delay);
+      const FitParameters beta = test::fit_parameters(problem);
+      const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
+      ASSERT_EQ(groups.size(), 1U);
+      ASSERT_GE(fit.channels(), kFewChannels);
+      const ArrowSystem system(fit, beta, groups, method);
+      const ArrowSystem passing(fit, beta, groups, method, ChannelEquationsUse::eliminated);
+      EXPECT_EQ(system.schur(), passing.schur());
+
+      const auto columns = derivative_columns(fit);
+      Eigen::MatrixXd Y_re;
+      Eigen::MatrixXd Y_im;
+      equation_error_columns(fit, beta, Y_re, Y_im);
+      const ComplexColumns Y{Y_re, Y_im};
+      const Eigen::Index n_f = fit.functions();
+      Eigen::MatrixXd M = Eigen::MatrixXd::Zero(fit.globals(), fit.globals());
+      Eigen::VectorXd e = Eigen::VectorXd::Zero(fit.globals());
+      // Sums of 600 products: rounding of either is far below 1e-10 of the largest.
+      const auto expect_same = [](const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+        EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-10 * b.cwiseAbs().maxCoeff());
+      };
+      for (Eigen::Index c = 0; c < fit.channels(); ++c) {
+        const ChannelEquations own =
+            channel_equations(fit, beta, groups[0], c, columns, &Y, method);
+        const ArrowSystem::Channel& channel = system.channels()[static_cast<std::size_t>(c)];
+        expect_same(channel.bb, own.M.topLeftCorner(n_f, n_f));
+        expect_same(channel.ab, own.M.bottomLeftCorner(fit.globals(), n_f));
+        expect_same(channel.ba, own.M.topRightCorner(n_f, fit.globals()));
+        expect_same(channel.e, own.e.head(n_f));
+        M += own.M.bottomRightCorner(fit.globals(), fit.globals());
+        e += own.e.tail(fit.globals());
+      }
+      expect_same(system.M_globals(), M);
+      expect_same(system.e_globals(), e);
+    }
+}
+
+// One that cannot be eliminated keeps nobody from the equations of the others: modal forms and
+// covariances of other weights need no more.
+TEST(LineSums, ChannelsThatAreOnlyKeptAreAllThere) {
+  DenseProblem problem = wide_problem(HoldModel::exact);
+  constexpr Eigen::Index kSpoilt = 3;
+  problem.W(kSpoilt, 7) = std::numeric_limits<double>::infinity();
+  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
+  const FitParameters beta = test::fit_parameters(problem);
+  const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
+  ASSERT_FALSE(ArrowSystem(fit, beta, groups, FitMethod::gn).regular());
+  const ArrowSystem kept(fit, beta, groups, FitMethod::gn, ChannelEquationsUse::only_kept);
+  EXPECT_TRUE(kept.regular());
+  const auto columns = derivative_columns(fit);
+  for (Eigen::Index c = 0; c < fit.channels(); ++c) {
+    if (c == kSpoilt) continue;
+    const ChannelEquations own =
+        channel_equations(fit, beta, groups[0], c, columns, nullptr, FitMethod::gn);
+    const Eigen::MatrixXd bb = own.M.topLeftCorner(fit.functions(), fit.functions());
+    const Eigen::MatrixXd ab = own.M.bottomLeftCorner(fit.globals(), fit.functions());
+    EXPECT_LT((kept.channel(c).bb - bb).norm(), 1e-10 * bb.norm());
+    EXPECT_LT((kept.channel(c).ab - ab).norm(), 1e-10 * ab.norm());
+  }
+}
+
+TEST(LineSums, NumeratorsOfManyChannelsAreThoseOfEachAlone) {
+  const DenseProblem problem = wide_problem(HoldModel::exact);
+  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
+  const FitParameters beta = test::fit_parameters(problem);
+  std::vector<BasisGroup> groups = evaluate_groups(fit, beta, false);
+  Eigen::MatrixXd together;
+  double cost = 0.0;
+  ASSERT_TRUE(solve_numerators(fit, groups, together, cost));
+  EXPECT_NEAR(cost, residual(fit, groups, together).cost, 1e-12 * cost);
+  const std::vector<Eigen::Index> all = groups[0].channels;
+  groups.assign(all.size(), groups[0]);
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    groups[c].channels = {all[c]};
+    groups[c].few = true;
+  }
+  Eigen::MatrixXd alone;
+  double cost_alone = 0.0;
+  ASSERT_TRUE(solve_numerators(fit, groups, alone, cost_alone));
+  EXPECT_LT((together - alone).cwiseAbs().maxCoeff(), 1e-10 * alone.cwiseAbs().maxCoeff());
+  EXPECT_NEAR(cost, cost_alone, 1e-12 * cost);
+}
+
+// Two poles that differ in the eighth digit: normal equations leave 1e-9 of exact data, and more.
+TEST(Numerators, PolishedHaveAllDigitsOfExactData) {
+  DenseProblem problem = test::noisy_stage(HoldModel::none, 0.0);
+  Submodel twin = problem.model.submodels[1];
+  twin.denominator[2] *= 1.0 + 1e-8;
+  problem.model.submodels.push_back(twin);
+  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+  problem.W = problem.G.cwiseAbs2().cwiseInverse();
+  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
+  const std::vector<BasisGroup> groups = evaluate_groups(fit, test::fit_parameters(problem), false);
+  Eigen::MatrixXd B;
+  double cost = 0.0;
+  ASSERT_TRUE(solve_numerators(fit, groups, B, cost));
+  const double plain = cost;
+  polish_numerators(fit, groups, B, cost);
+  EXPECT_LT(cost, 1e-3 * plain);
+  EXPECT_LT(std::sqrt(2.0 * cost / static_cast<double>(fit.channels())), 1e-13);
+  EXPECT_NEAR(residual(fit, groups, B).cost, cost, 0.5 * cost);
+}
+
+TEST(Numerators, PolishingWhatIsBestChangesNothing) {
+  const DenseProblem problem = wide_problem(HoldModel::exact);
+  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
+  const std::vector<BasisGroup> groups = evaluate_groups(fit, test::fit_parameters(problem), false);
+  Eigen::MatrixXd B;
+  double cost = 0.0;
+  ASSERT_TRUE(solve_numerators(fit, groups, B, cost));
+  const Eigen::MatrixXd before = B;
+  polish_numerators(fit, groups, B, cost);
+  EXPECT_LT((B - before).cwiseAbs().maxCoeff(), 1e-10 * before.cwiseAbs().maxCoeff());
+}
+
+TEST(WeightedProducts, AreTheSumsTheySay) {
+  RandomNumbers random(21);
+  const Eigen::Index N = 700;  // more than two tiles
+  const Eigen::MatrixXd W = random_matrix(random, 3, N).cwiseAbs();
+  const Eigen::MatrixXd V = random_matrix(random, 3, N);
+  const Eigen::MatrixXd X_re = random_matrix(random, N, 4);
+  const Eigen::MatrixXd X_im = random_matrix(random, N, 4);
+  const Eigen::MatrixXd Y_re = random_matrix(random, N, 60);
+  const Eigen::MatrixXd Y_im = random_matrix(random, N, 60);
+  const auto pairs = all_pairs(4, 60);  // 240: more than one block
+  Eigen::MatrixXd real = Eigen::MatrixXd::Zero(240, 3);
+  Eigen::MatrixXd complex = Eigen::MatrixXd::Zero(240, 3);
+  for_each_tile({0, 3, 0, N}, [&](Eigen::Index first, Eigen::Index n) {
+    const Eigen::MatrixXd W_tile = W.middleCols(first, n);
+    add_pair_sums(W_tile, {X_re, X_im}, {Y_re, Y_im}, pairs, first, real);
+    add_pair_sums(W_tile, V.middleCols(first, n), {X_re, X_im}, {Y_re, Y_im}, pairs, first,
+                  complex);
+  });
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      std::complex<double> with_weight = 0.0;
+      std::complex<double> with_error = 0.0;
+      for (Eigen::Index k = 0; k < N; ++k) {
+        const std::complex<double> x(X_re(k, pairs[p].left), X_im(k, pairs[p].left));
+        const std::complex<double> y(Y_re(k, pairs[p].right), Y_im(k, pairs[p].right));
+        with_weight += W(c, k) * std::conj(x) * y;
+        with_error += std::complex<double>(W(c, k), V(c, k)) * std::conj(x) * y;
+      }
+      // Sums of N numbers of order one.
+      EXPECT_NEAR(real(static_cast<Eigen::Index>(p), c), with_weight.real(), 1e-11);
+      EXPECT_NEAR(complex(static_cast<Eigen::Index>(p), c), with_error.real(), 1e-11);
+    }
+}
+
+TEST(WeightedProducts, SharesCoverEveryLineOfEveryChannelOnce) {
+  for (const auto& [members, lines] : {std::pair<Eigen::Index, Eigen::Index>{1, 1},
+                                       {3, 256},
+                                       {52, 3960},
+                                       {257, 257},
+                                       {1000, 5000}}) {
+    Eigen::MatrixXi seen = Eigen::MatrixXi::Zero(members, lines);
+    for (const TileRange& block : member_blocks(0, members, lines))
+      for (const TileRange& share : line_shares(block))
+        for_each_tile(share, [&, rows = share](Eigen::Index first, Eigen::Index n) {
+          seen.block(rows.first_member, first, rows.members, n).array() += 1;
+        });
+    EXPECT_TRUE((seen.array() == 1).all()) << members << " x " << lines;
+  }
+}
+
+}  // namespace
+}  // namespace stageid

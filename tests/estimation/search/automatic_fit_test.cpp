@@ -1,0 +1,327 @@
+// A fit that is told nothing must find what is there.
+
+#include "estimation/search/automatic_fit.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "estimation/search/growth_watch.hpp"
+#include "tests/support/model_blind_fit.hpp"
+#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/model_reference.hpp"
+
+namespace stageid {
+namespace {
+
+/// The paper's stage on every third of its lines: quick, and the sharpest modes (0.2 % at 100 Hz)
+/// have hardly a line in their half-power width.
+test::RandomStageSpec quick_stage() {
+  test::RandomStageSpec spec;
+  spec.line_spacing_hz = 1.5;
+  return spec;
+}
+
+// The share is a promise, and below it something has become worse: 500 of 500 stages on the paper's
+// full grid succeed in tests/benchmark/blind_fit_study (docs/benchmarks.md).
+TEST(AutomaticFit, FindsWhatIsThereBlind) {
+  constexpr int kStages = 10;
+  constexpr int kDemanded = 9;
+  int successes = 0;
+  std::string failures;
+  for (std::uint64_t seed = 101; seed < 101 + kStages; ++seed) {
+    const test::RandomStage stage = test::draw_random_stage(seed, quick_stage());
+    const test::BlindFit fit = test::fit_blind(stage, 0);
+    if (fit.success)
+      ++successes;
+    else
+      failures += fmt::format("seed {}: {}\n{}\n", seed, stage.description(), fit.report());
+  }
+  RecordProperty("successes", successes);
+  EXPECT_GE(successes, kDemanded) << failures;
+  if (!failures.empty()) std::fputs(failures.c_str(), stdout);
+}
+
+// The measure itself must be able to fail: a fit of two modes too few is no success.
+TEST(AutomaticFit, TheMeasureOfSuccessSeesAMissingMode) {
+  const test::RandomStage stage = test::draw_random_stage(101, quick_stage());
+  FitOptions options;
+  options.weighting = Weighting::noise_variance;
+  options.hold = HoldModel::exact;
+  options.delay_s = stage.delay_s;
+  options.uncertainty = false;
+  AdditiveModel less = stage.truth;
+  less.submodels.pop_back();
+  const double all = fit_additive_model(stage.frf, stage.truth, options).model.fit.cost;
+  EXPECT_GT(fit_additive_model(stage.frf, less, options).model.fit.cost, 1.005 * all);
+}
+
+// Structures --------------------------------------------------------------------------------------
+
+/// A 2 x 2 stage with three well separated modes and 0.5 % relative noise; no sample rate.
+class SmallStage : public testing::Test {
+ protected:
+  void SetUp() override {
+    test::RandomNumbers random(55);
+    problem_.model = test::named_model(2, 2);
+    problem_.frequency_hz = Eigen::VectorXd::LinSpaced(500, 10.0, 1000.0);
+    problem_.model.submodels.push_back(test::empty_submodel(problem_.model, 2, {}, 1));
+    for (const double f : {120.0, 390.0, 640.0})
+      problem_.model.submodels.push_back(
+          test::empty_submodel(problem_.model, 0, test::mode_coefficients(f, 0.01), 1));
+    for (Submodel& s : problem_.model.submodels)
+      for (double& value : s.numerator[0].reshaped())
+        value = (s.is_mode() ? s.denominator[2] : 1.0) * (random.uniform() < 0.5 ? -1.0 : 1.0) *
+                random.uniform(0.5, 2.0);
+    problem_.G = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+    frf_ = test::frf_of(problem_);
+    for (std::complex<double>& value : frf_.response.reshaped())
+      value *= 1.0 + 0.005 * random.circular();
+  }
+
+  static std::vector<double> frequencies(const AdditiveModel& model) {
+    std::vector<double> out;
+    for (const Submodel& s : model.submodels)
+      if (s.is_mode()) out.push_back(s.natural_frequency_hz());
+    return out;
+  }
+
+  test::DenseProblem problem_;
+  FrfEstimate frf_;
+};
+
+testing::Matcher<std::vector<double>> near_hz(std::initializer_list<double> expected) {
+  std::vector<testing::Matcher<double>> each;
+  for (const double f : expected) each.push_back(testing::DoubleNear(f, 1e-4 * f));
+  return testing::ElementsAreArray(each);
+}
+
+TEST_F(SmallStage, FindsItsModesAndSaysWhatItDid) {
+  const FitResult fit = automatic_fit(frf_, {}, {}, {});
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_EQ(fit.model.submodels.size(), 4U);
+  EXPECT_EQ(fit.model.submodels[0].integrators, 2);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_THAT(fit.decisions.front(), testing::HasSubstr("peaks of the CMIF"));
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::HasSubstr("no further mode")));
+}
+
+TEST_F(SmallStage, CompletesAStartThatLacksAMode) {
+  const FitResult fit =
+      automatic_fit(frf_, {}, {.modes = {{121.0, 0.01, 1}, {638.0, 0.01, 1}}}, {});
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("added 39")));
+}
+
+TEST_F(SmallStage, DropsModesThatAreNotThereAndMergesTwoOnOnePeak) {
+  const std::vector<ModeCandidate> modes = {
+      {119.5, 0.01, 1}, {120.5, 0.01, 1}, {250.0, 0.01, 1}, {391.0, 0.01, 1}, {639.0, 0.01, 1}};
+  const FitResult fit = automatic_fit(frf_, {}, {.modes = modes}, {});
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("dropped")));
+}
+
+TEST_F(SmallStage, FitsSoManyModesAsAsked) {
+  for (const int count : {1, 2, 3, 4}) {
+    const FitResult fit = automatic_fit(frf_, {}, {.modes = {}, .exactly = count}, {});
+    EXPECT_EQ(frequencies(fit.model).size(), static_cast<std::size_t>(count));
+  }
+}
+
+// Growing mode by mode ends beside the best place for a given number; going by way of more modes and
+// dropping the least worthy finds it.
+TEST_F(SmallStage, TriesMoreThanOneWayToTheNumberAsked) {
+  const FitResult fit = automatic_fit(frf_, {}, {.modes = {}, .exactly = 2}, {});
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("2 modes, by way of ")));
+  double best = HUGE_VAL;  // of every pair of the three true modes
+  for (const auto& pair : {std::pair{120.0, 390.0}, {120.0, 640.0}, {390.0, 640.0}}) {
+    const FitResult two = automatic_fit(
+        frf_, {}, {.modes = {{pair.first, 0.01, 1}, {pair.second, 0.01, 1}}, .keep_modes = true},
+        {});
+    best = std::min(best, two.model.fit.cost);
+  }
+  EXPECT_LE(fit.model.fit.cost, best * (1.0 + 1e-9));
+}
+
+TEST_F(SmallStage, KeepsTheModesThatItIsToldToKeep) {
+  const FitResult fit = automatic_fit(
+      frf_, {}, {.modes = {{121.0, 0.01, 1}, {638.0, 0.01, 1}}, .keep_modes = true}, {});
+  EXPECT_EQ(frequencies(fit.model).size(), 2U);
+}
+
+TEST_F(SmallStage, NeverExceedsTheMostModes) {
+  const FitResult fit = automatic_fit(frf_, {}, {.modes = {}, .most = 2}, {});
+  EXPECT_LE(frequencies(fit.model).size(), 2U);
+}
+
+TEST_F(SmallStage, NoiseFreeDataGetTheirModesAndNoMore) {
+  frf_.response = problem_.G;
+  const FitResult fit = automatic_fit(frf_, {}, {}, {});
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_LT(fit.model.fit.relative_rms_error, 1e-8);
+}
+
+TEST_F(SmallStage, GeneralDampingAndDirectTermAreFoundWhereTheyAre) {
+  for (Submodel& s : problem_.model.submodels)
+    if (s.is_mode()) s.numerator.push_back(3e-4 * s.numerator[0].colwise().reverse());
+  Submodel direct = test::empty_submodel(problem_.model, 0, {}, 1);
+  direct.numerator[0].setConstant(2e-8);
+  problem_.model.submodels.push_back(direct);
+  frf_.response = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+  const FitResult fit = automatic_fit(
+      frf_, {.rigid_body = true, .direct_term = true, .general_damping = true}, {}, {});
+  EXPECT_LT(fit.model.fit.relative_rms_error, 1e-7) << fit.message;
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+}
+
+TEST_F(SmallStage, WithoutRigidBodyThereIsNone) {
+  problem_.model.submodels.erase(problem_.model.submodels.begin());
+  frf_.response = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+  const FitResult fit = automatic_fit(frf_, {.rigid_body = false}, {}, {});
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+  EXPECT_EQ(fit.model.submodels.size(), 3U);
+}
+
+// A search that goes on for what is no mode ------------------------------------------------------
+
+TEST_F(SmallStage, ADelayThatIsDeniedEndsTheSearchAndIsNamed) {
+  constexpr double kDelay_s = 1e-4;
+  for (Eigen::Index k = 0; k < frf_.lines(); ++k)
+    frf_.response.col(k) *= std::polar(1.0, -kDelay_s * frf_.omega_rad_s()[k]);
+  for (const double denied_s : {0.0, -2e-4}) {
+    FitOptions options;
+    options.delay_s = denied_s;
+    const FitResult fit = automatic_fit(frf_, {}, {}, options);
+    EXPECT_FALSE(fit.trustworthy());
+    EXPECT_THAT(fit.findings,
+                testing::ElementsAre(testing::AllOf(
+                    testing::ContainsRegex("a delay of (9\\.99|0\\.0001).* s instead of"),
+                    testing::HasSubstr("take --delay estimate"))));
+    EXPECT_LE(frequencies(fit.model).size(), 6U);
+    if (denied_s != 0.0) continue;  // such a fit need not converge
+    EXPECT_EQ(fit.status, FitStatus::unexplained) << fit.message;
+    EXPECT_EQ(fit.model.fit.status, "unexplained");
+  }
+  FitOptions options;
+  options.delay = DelayModel::estimate;
+  const FitResult fit = automatic_fit(frf_, {}, {}, options);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.findings.empty());
+  EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
+}
+
+/// Feeds a watch with rounds that add one mode each. @returns whether the last one ended the search
+bool ends_after(GrowthWatch& watch, const FrfEstimate& frf, FitResult& fit,
+                const std::vector<std::pair<double, double>>& modes) {
+  FitOptions options;
+  options.delay = DelayModel::estimate;  // no other is tried
+  bool ended = false;
+  for (const auto& [frequency_hz, damping] : modes) {
+    const FitResult before = fit;
+    fit.model.submodels.push_back(mode_submodel(frf, {}, {frequency_hz, damping, 1}));
+    ended = watch.ends(frf, options, before, fit, 1);
+  }
+  return ended;
+}
+
+TEST_F(SmallStage, RoundsInARowThatOnlyModelColourEndTheSearch) {
+  FitResult fit;
+  fit.model.fit.band_hz[0] = 10.0;
+  fit.model.fit.band_hz[1] = 1000.0;
+  GrowthWatch watch;
+  // Broad, beside the lines on either side, on another; a resonance of its own begins the count anew.
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{120.0, 0.01}, {300.0, 0.3}, {5.0, 0.01}}));
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{1100.0, 0.02}, {120.5, 0.01}, {500.0, 0.2}}));
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{300.0, 0.01}}));
+  EXPECT_FALSE(watch.ended());
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{300.2, 0.01}, {5.0, 0.01}, {119.9, 0.01}}));
+  watch.cut();
+  const std::size_t kept = fit.model.submodels.size();
+  EXPECT_FALSE(ends_after(watch, frf_, fit, {{400.0, 0.3}, {5.0, 0.02}, {600.0, 0.4}}));
+  EXPECT_TRUE(ends_after(watch, frf_, fit, {{700.0, 0.3}, {2000.0, 0.02}, {800.0, 0.2}}));
+  EXPECT_TRUE(watch.ended());
+  EXPECT_FALSE(watch.by_delay());
+  EXPECT_EQ(watch.model().model.submodels.size(), kept);
+  EXPECT_THAT(watch.finding(),
+              testing::HasSubstr("nothing that its last 6 steps added is a resonance"));
+}
+
+/// Whether six rounds that each went from `before` to `now` end a search.
+bool six_rounds_end(const FrfEstimate& frf, const FitResult& before, const FitResult& now) {
+  FitOptions options;
+  options.delay = DelayModel::estimate;  // no other is tried
+  GrowthWatch watch;
+  bool ended = false;
+  for (int round = 0; round < 6; ++round) ended = watch.ends(frf, options, before, now, 1);
+  return ended;
+}
+
+// Noise with heavier tails than its variances say: every outlier looks like a mode sharper than the lines.
+TEST_F(SmallStage, ModesThatRestOnOneLineEachEndTheSearchAndResonancesDoNot) {
+  AdditiveModel less = problem_.model;
+  less.submodels.pop_back();
+  const FitResult two = fit_additive_model(frf_, less, {});
+  const FitResult three = fit_additive_model(frf_, problem_.model, {});
+  EXPECT_FALSE(six_rounds_end(frf_, two, three));
+
+  constexpr Eigen::Index kOutlier = 250;
+  frf_.response.col(kOutlier) *= 3.0;
+  const FitResult before = fit_additive_model(frf_, problem_.model, {});
+  AdditiveModel more = before.model;
+  more.submodels.push_back(mode_submodel(frf_, {}, {frf_.frequency_hz[kOutlier], 1e-4, 1}));
+  const FitResult now = fit_additive_model(frf_, more, {});
+  ASSERT_LT(now.model.fit.cost, before.model.fit.cost);
+  EXPECT_TRUE(six_rounds_end(frf_, before, now));
+}
+
+TEST_F(SmallStage, TheNumberOfThreadsDoesNotChangeABit) {
+  FitOptions options;
+  options.threads = 1;
+  const FitResult one = automatic_fit(frf_, {}, {}, options);
+  options.threads = 2;
+  const FitResult two = automatic_fit(frf_, {}, {}, options);
+  ASSERT_EQ(one.model.submodels.size(), two.model.submodels.size());
+  EXPECT_EQ(one.cost, two.cost);
+  EXPECT_EQ(one.decisions, two.decisions);
+  for (std::size_t i = 0; i < one.model.submodels.size(); ++i) {
+    EXPECT_EQ(one.model.submodels[i].denominator, two.model.submodels[i].denominator);
+    EXPECT_EQ(one.model.submodels[i].numerator, two.model.submodels[i].numerator);
+  }
+}
+
+TEST_F(SmallStage, FewLinesAreNotOverfitted) {
+  const FrfEstimate few = select_band(frf_, 100.0, 140.0);  // 20 lines, one mode
+  const FitResult fit = automatic_fit(few, {}, {}, {});
+  EXPECT_LE(frequencies(fit.model).size(), 3U);
+  EXPECT_THAT(frequencies(fit.model), testing::Contains(testing::DoubleNear(120.0, 0.1)));
+}
+
+TEST_F(SmallStage, RefusesNumbersOfModesThatAreNone) {
+  const auto message = testing::ThrowsMessage<std::invalid_argument>(
+      testing::HasSubstr("number of modes must be positive"));
+  EXPECT_THAT([this] { (void)automatic_fit(frf_, {}, {.modes = {}, .exactly = -1}, {}); }, message);
+  EXPECT_THAT([this] { (void)automatic_fit(frf_, {}, {.modes = {}, .most = 0}, {}); }, message);
+}
+
+TEST_F(SmallStage, RefusesMoreModesThanTheLinesCarryBeforeItTries) {
+  const FrfEstimate few = select_band(frf_, 100.0, 140.0);  // 21 lines
+  const auto message = testing::ThrowsMessage<std::invalid_argument>(
+      testing::HasSubstr("cannot carry 60 modes; ask for at most"));
+  EXPECT_THAT([&] { (void)automatic_fit(few, {}, {.modes = {}, .exactly = 60}, {}); }, message);
+  const std::vector<ModeCandidate> modes(60, {120.0, 0.01, 1});
+  EXPECT_THAT([&] { (void)automatic_fit(few, {}, {.modes = modes}, {}); }, message);
+}
+
+TEST_F(SmallStage, RefusesWeightsThatAreNotThere) {
+  FitOptions options;
+  options.weighting = Weighting::total_variance;
+  EXPECT_THAT([&] { (void)automatic_fit(frf_, {}, {}, options); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("total_variance")));
+}
+
+}  // namespace
+}  // namespace stageid

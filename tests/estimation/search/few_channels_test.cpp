@@ -1,0 +1,95 @@
+// Few channels with many functions: sums of fractions while there is noise, multiplied out where
+// nothing is left but digits; and globals that are known, which no equation has columns of.
+
+#include <gtest/gtest.h>
+
+#include "estimation/equations/arrow_system.hpp"
+#include "estimation/iteration/fit_iteration.hpp"
+#include "tests/estimation/disturbed_problem.hpp"
+#include "tests/support/model_fit_problem.hpp"
+
+namespace stageid {
+namespace {
+
+using test::DenseProblem;
+
+/// 2 x 3 channels, 36 modes with B_0 + B_1 s: 72 functions, each mode as wide as half the way to the next.
+DenseProblem many_functions() {
+  test::RandomNumbers random(37);
+  DenseProblem problem;
+  problem.hold = HoldModel::none;
+  problem.model = test::named_model(2, 3);
+  problem.frequency_hz = Eigen::VectorXd::LinSpaced(600, 5.0, 1500.0);
+  for (int i = 0; i < 36; ++i) {
+    const double hz = 40.0 * (i + 1);
+    problem.model.submodels.push_back(
+        test::empty_submodel(problem.model, 0, test::mode_coefficients(hz, 0.03), 2));
+  }
+  test::measure_and_disturb(random, problem, 1e-3);
+  return problem;
+}
+
+void expect_same(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-8 * b.cwiseAbs().maxCoeff());
+}
+
+TEST(FewChannels, ManyFunctionsAreSummedAsFractionsToEightDigits) {
+  const DenseProblem problem = many_functions();
+  FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
+  const FitParameters beta = test::fit_parameters(problem);
+  const std::vector<BasisGroup> summed = evaluate_groups(fit, beta, true);
+  ASSERT_TRUE(sums_fractions_of_few(fit));
+  fit.multiplied_out = true;
+  const std::vector<BasisGroup> multiplied = evaluate_groups(fit, beta, true);
+  ASSERT_FALSE(summed.at(0).few);
+  ASSERT_TRUE(multiplied.at(0).few);
+  for (const FitMethod method : {FitMethod::riv, FitMethod::gn}) {
+    const ArrowSystem a(fit, beta, summed, method);
+    const ArrowSystem b(fit, beta, multiplied, method);
+    expect_same(a.M_globals(), b.M_globals());
+    expect_same(a.e_globals(), b.e_globals());
+    expect_same(a.schur_gradient(), b.schur_gradient());
+    for (Eigen::Index c = 0; c < fit.channels(); ++c) {
+      expect_same(a.channel(c).bb, b.channel(c).bb);
+      expect_same(a.channel(c).ab, b.channel(c).ab);
+      expect_same(a.channel(c).ba, b.channel(c).ba);
+    }
+  }
+}
+
+// Where poles are exact, what tells so is a residual of nothing but rounding.
+TEST(FewChannels, ExactPolesLeaveRoundingOnly) {
+  DenseProblem problem = many_functions();
+  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+  problem.W = problem.G.cwiseAbs2().cwiseInverse();
+  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
+  FitParameters beta = test::fit_parameters(problem);
+  FitOptions as_placed;
+  as_placed.max_iterations = 0;
+  const IterationResult result = iterate(fit, beta, as_placed);
+  EXPECT_LT(std::sqrt(result.end_cost / signal_cost(fit)), 1e-12);
+}
+
+TEST(HeldGlobals, HaveNoEquationsAndLeaveThoseOfTheOthers) {
+  const DenseProblem problem = many_functions();
+  FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
+  const FitParameters beta = test::fit_parameters(problem);
+  const ArrowSystem free(fit, beta, evaluate_groups(fit, beta, true), FitMethod::gn);
+  fit.held = {3, 10, 11};  // one of a mode, and both of another
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index i = 0; i < fit.globals(); ++i)
+    if (std::find(fit.held.begin(), fit.held.end(), i) == fit.held.end()) others.push_back(i);
+  for (const bool multiplied_out : {false, true}) {
+    fit.multiplied_out = multiplied_out;
+    const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
+    EXPECT_EQ(groups.at(0).D_re.cols(), 2 * (fit.globals() - 3));
+    const ArrowSystem held(fit, beta, groups, FitMethod::gn);
+    expect_same(held.M_globals()(others, others), free.M_globals()(others, others));
+    expect_same(held.e_globals()(others), free.e_globals()(others));
+    EXPECT_EQ(held.M_globals()(fit.held, others).norm(), 0.0);
+    EXPECT_EQ(held.channel(0).ab(fit.held, Eigen::all).norm(), 0.0);
+  }
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,135 @@
+// Modes that noise hides: which are, what becomes of their poles, and what shrinking their numerators is worth.
+
+#include "estimation/search/hidden_modes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "estimation/model/model_structure.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "tests/estimation/noisy_stage.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kNoise = 1e-2;
+
+/// The noisy stage: three modes where they are, and others where nothing is.
+struct Placed {
+  Placed(std::uint64_t seed, std::initializer_list<double> nothing_hz)
+      : problem(test::noisy_stage(HoldModel::none, kNoise, seed)) {
+    options.weighting = Weighting::user;
+    options.user_weights = problem.W;
+    options.uncertainty = false;
+    for (const double hz : nothing_hz) {
+      const std::vector<double> a = test::mode_coefficients(hz, 0.01);
+      model.submodels.push_back(model.submodels.back());
+      model.submodels.back().denominator = {1.0, a[0], a[1]};
+    }
+  }
+  FitResult fit_numerators() {
+    options.max_iterations = 0;
+    return fit_additive_model(frf, model, options);
+  }
+  void hold_from(std::size_t first) {
+    for (std::size_t i = first; i < model.submodels.size(); ++i)
+      model.submodels[i].frequency_held = model.submodels[i].damping_held = true;
+  }
+  /// sum W |P - truth|^2
+  double squared_error(const AdditiveModel& fitted) const {
+    const Eigen::MatrixXcd truth =
+        test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+    const Eigen::MatrixXcd P = response(fitted, problem.frequency_hz, problem.hold);
+    return (problem.W.array() * (P - truth).array().abs2()).sum();
+  }
+
+  test::DenseProblem problem;
+  FrfEstimate frf = test::frf_of(problem);
+  FitOptions options;
+  AdditiveModel model = test::moved(problem.model, 1.0, 1.0);
+};
+
+TEST(HiddenModes, OnlyWhatIsNotThereIsHeld) {
+  int held = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    Placed placed(seed, {500.0, 1000.0, 1070.0, 1140.0, 1300.0});
+    AdditiveModel model = placed.model;
+    const int hidden = hold_hidden_modes(placed.fit_numerators(), 6, placed.frf.lines(), model);
+    for (std::size_t i = 0; i < model.submodels.size(); ++i) {
+      const Submodel& s = model.submodels[i];
+      EXPECT_EQ(s.frequency_held, s.damping_held);
+      EXPECT_TRUE(i >= 4 || !s.frequency_held) << i;
+    }
+    held += hidden;
+  }
+  EXPECT_GE(held, 49) << "of 50; noise alone is above the threshold at one place of 400";
+}
+
+// Held poles are no unknowns: the fit leaves them, to the last bit, and finds the others as if they were known.
+TEST(HiddenModes, AFitLeavesHeldPolesWhereTheyAre) {
+  Placed placed(1, {500.0, 1300.0});
+  placed.hold_from(4);
+  for (const FitMethod method : {FitMethod::riv, FitMethod::gn}) {
+    placed.options.method = method;
+    AdditiveModel start = placed.model;
+    for (std::size_t i = 1; i < 4; ++i) start.submodels[i].denominator[1] *= 1.1;
+    const FitResult fit = fit_additive_model(placed.frf, start, placed.options);
+    EXPECT_TRUE(fit.trustworthy()) << fit.message;
+    for (std::size_t i = 1; i < 6; ++i)
+      EXPECT_EQ(fit.model.submodels[i].denominator == start.submodels[i].denominator, i >= 4) << i;
+  }
+}
+
+// By itself a hidden mode keeps 1 - s of its numerators; the record's cost is that of what is returned.
+TEST(HiddenModes, OneHiddenModeKeepsItsPart) {
+  Placed placed(3, {500.0});
+  placed.hold_from(4);
+  const FitResult before = placed.fit_numerators();
+  placed.options.shrink_hidden = true;
+  const FitResult after = placed.fit_numerators();
+  const double lines = static_cast<double>(placed.frf.lines());
+  const double numbers = 6.0;
+  const double unknowns = 5.0 * numbers + 6.0;  // held poles are not free, but known to be small
+  const double noise = 2.0 * lines * before.model.fit.cost / (2.0 * lines * numbers - unknowns);
+  const double kept = 1.0 - 0.5 * (numbers - 2.0) * noise / before.removal_cost[4];
+  for (Eigen::Index i = 0; i < 2; ++i)
+    for (Eigen::Index j = 0; j < 3; ++j)
+      EXPECT_NEAR(after.model.submodels[4].numerator[0](i, j) /
+                      before.model.submodels[4].numerator[0](i, j),
+                  kept, 1e-3 * kept);
+  const Eigen::MatrixXcd E =
+      placed.problem.G - response(after.model, placed.problem.frequency_hz, placed.problem.hold);
+  const double cost = (placed.problem.W.array() * E.array().abs2()).sum() / (2.0 * lines);
+  EXPECT_NEAR(after.model.fit.cost, cost, 1e-9 * cost);
+  EXPECT_GT(cost, before.model.fit.cost);
+  EXPECT_EQ(after.decisions.size(), 1U);
+}
+
+// James and Stein's risk where the truth is zero: of d sigma^2, (d - 2) (2 a - a^2) is saved; a = 1/2.
+TEST(HiddenModes, ShrinkingSavesWhatTheorySays) {
+  constexpr int kSeeds = 300;
+  double saved = 0.0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    Placed placed(seed, {500.0});
+    placed.hold_from(4);
+    const double plain = placed.squared_error(placed.fit_numerators().model);
+    placed.options.shrink_hidden = true;
+    saved += plain - placed.squared_error(placed.fit_numerators().model);
+  }
+  const double of_a_number = 0.5 * kNoise * kNoise;
+  EXPECT_NEAR(saved / kSeeds / of_a_number, 0.75 * 4.0, 0.3);  // 0.1 by chance
+}
+
+// What stands out keeps its numerators, whatever is hidden beside it.
+TEST(HiddenModes, WithoutAHiddenModeNothingChanges) {
+  Placed placed(5, {});
+  const FitResult before = placed.fit_numerators();
+  placed.options.shrink_hidden = true;
+  const FitResult after = placed.fit_numerators();
+  EXPECT_EQ(before.model.fit.cost, after.model.fit.cost);
+  EXPECT_TRUE(after.decisions.empty());
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,211 @@
+// Modes at one place: the rank that the data ask of a residue, and what a fit of rank one makes of it.
+
+#include "estimation/search/ranked_fit.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/SVD>
+#include <cmath>
+
+#include "estimation/search/automatic_fit.hpp"
+#include "estimation/search/coincident_modes.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/model_reference.hpp"
+#include "tests/support/random_numbers.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+constexpr double kDamping = 0.01;
+constexpr double kPlace_hz = 150.0;
+
+/// 3 x 3 on 20 to 400 Hz, 1 % noise whose variance is known: a rigid body, and modes of random shapes.
+class CoincidentModes : public testing::Test {
+ protected:
+  explicit CoincidentModes(std::uint64_t seed = 21) : random_(seed) {
+    problem_.model = test::named_model(3, 3);
+    problem_.frequency_hz = Eigen::VectorXd::LinSpaced(400, 20.0, 400.0);
+    problem_.model.submodels.push_back(test::empty_submodel(problem_.model, 2, {}, 1));
+    problem_.model.submodels[0].numerator[0] = 0.1 * normal(3, 3);
+    options_.weighting = Weighting::noise_variance;
+  }
+
+  Eigen::MatrixXd normal(Eigen::Index rows, Eigen::Index cols) {
+    Eigen::MatrixXd out(rows, cols);
+    for (double& value : out.reshaped()) value = random_.normal();
+    return out;
+  }
+
+  void add_mode(double frequency_hz, int rank) {
+    problem_.model.submodels.push_back(test::empty_submodel(
+        problem_.model, 0, test::mode_coefficients(frequency_hz, kDamping), 1));
+    Submodel& s = problem_.model.submodels.back();
+    s.numerator[0] = s.denominator[2] * normal(3, rank) * normal(rank, 3);
+  }
+
+  FrfEstimate measured() {
+    problem_.G = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+    FrfEstimate frf = test::frf_of(problem_);
+    frf.noise_variance = 1e-4 * frf.response.cwiseAbs2();
+    for (Eigen::Index k = 0; k < frf.lines(); ++k)
+      for (Eigen::Index c = 0; c < 9; ++c)
+        frf.response(c, k) += std::sqrt(frf.noise_variance(c, k)) * random_.circular();
+    return frf;
+  }
+
+  static std::vector<const Submodel*> modes(const FitResult& fit) {
+    std::vector<const Submodel*> out;
+    for (const Submodel& s : fit.model.submodels)
+      if (s.is_mode()) out.push_back(&s);
+    return out;
+  }
+
+  static double second_share(const Submodel& s) {
+    const Eigen::VectorXd values =
+        Eigen::JacobiSVD<Eigen::MatrixXd>(s.numerator[0]).singularValues();
+    return values[1] / values[0];
+  }
+
+  /// The cost that noise leaves: channels / 2 with the right variances.
+  static constexpr double kNoiseCost = 4.5;
+
+  test::RandomNumbers random_;
+  test::DenseProblem problem_;
+  FitOptions options_;
+};
+
+// Of a residue that is of rank one the distance from it is chi-square distributed; of one that is not, no noise
+// explains it.
+TEST_F(CoincidentModes, TheDistanceFromRankOneIsChiSquareOnlyWhereTheRankIsOne) {
+  add_mode(100.0, 1);
+  add_mode(kPlace_hz, 2);
+  add_mode(260.0, 3);
+  constexpr int kRuns = 60;
+  double sum = 0.0;
+  for (int run = 0; run < kRuns; ++run) {
+    const FitResult fit = fit_additive_model(measured(), problem_.model, options_);
+    ASSERT_EQ(fit.residue_ranks.size(), 3U) << fit.message;
+    EXPECT_EQ(fit.residue_ranks[0].rank, 1);
+    EXPECT_EQ(fit.residue_ranks[0].parameters, 4);
+    EXPECT_EQ(fit.residue_ranks[1].rank, 2);
+    EXPECT_EQ(fit.residue_ranks[2].rank, 3);
+    EXPECT_LT(fit.residue_ranks[1].probability, 1e-12);
+    sum += fit.residue_ranks[0].chi_square;
+  }
+  // The mean of 60 chi-squares of 4: 4 with a deviation of sqrt(8 / 60) = 0.37; three of them.
+  EXPECT_NEAR(sum / kRuns, 4.0, 1.1);
+}
+
+TEST_F(CoincidentModes, OneModeOfRankTwoIsTwoOfRankOne) {
+  add_mode(kPlace_hz, 2);
+  options_.residue_rank = 1;
+  const FitResult fit = automatic_fit(measured(), {}, {}, options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_NEAR(fit.model.fit.cost, kNoiseCost, 0.05 * kNoiseCost);
+  const auto found = modes(fit);
+  ASSERT_EQ(found.size(), 2U);
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(3, 3);
+  for (const Submodel* s : found) {
+    EXPECT_NEAR(s->natural_frequency_hz(), kPlace_hz, 4.0 * s->natural_frequency_std_hz.value());
+    EXPECT_EQ(s->residue_rank, 1);
+    EXPECT_LT(second_share(*s), 1e-12);
+    sum += s->numerator[0];
+  }
+  const Eigen::MatrixXd& truth = problem_.model.submodels[1].numerator[0];
+  EXPECT_LT((sum - truth).norm(), 0.01 * truth.norm());
+  EXPECT_EQ(fit.removal_cost.size(), fit.model.submodels.size());
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("counts as 2 modes of rank one")));
+  EXPECT_TRUE(fit.findings.empty());
+}
+
+TEST_F(CoincidentModes, TwoModesThatAreAskedForComeToRest) {
+  add_mode(kPlace_hz, 2);
+  options_.residue_rank = 1;
+  const FrfEstimate frf = measured();
+  const FitResult asked = automatic_fit(frf, {}, {.modes = {}, .exactly = 2}, options_);
+  const FitResult named = automatic_fit(
+      frf, {}, {.modes = {{150.0, 0.01, 1}, {150.05, 0.01, 1}}, .keep_modes = true}, options_);
+  for (const FitResult* fit : {&asked, &named}) {
+    EXPECT_TRUE(fit->trustworthy()) << fit->message;
+    EXPECT_EQ(modes(*fit).size(), 2U);
+    EXPECT_NEAR(fit->model.fit.cost, kNoiseCost, 0.05 * kNoiseCost);
+  }
+}
+
+// The search puts the third of three modes on noise; the second shape of another is worth more.
+TEST_F(CoincidentModes, OfANumberThatIsAskedForTheLeastMakesRoom) {
+  add_mode(kPlace_hz, 2);
+  add_mode(260.0, 1);
+  options_.residue_rank = 1;
+  const FitResult fit = automatic_fit(measured(), {}, {.modes = {}, .exactly = 3}, options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  ASSERT_EQ(modes(fit).size(), 3U);
+  EXPECT_NEAR(modes(fit)[1]->natural_frequency_hz(), kPlace_hz, 0.1);
+  EXPECT_NEAR(modes(fit)[2]->natural_frequency_hz(), 260.0, 0.1);
+  EXPECT_NEAR(fit.model.fit.cost, kNoiseCost, 0.05 * kNoiseCost);
+}
+
+TEST_F(CoincidentModes, ARankThatDoesNotSufficeIsAFinding) {
+  add_mode(kPlace_hz, 2);
+  options_.residue_rank = 1;
+  const FitResult fit = automatic_fit(measured(), {}, {.modes = {}, .exactly = 1}, options_);
+  EXPECT_GT(fit.model.fit.cost, 10.0 * kNoiseCost);
+  EXPECT_THAT(fit.findings, Contains(HasSubstr("rank 1 does not suffice for the residues at 150")));
+  EXPECT_THAT(fit.findings, Contains(HasSubstr("--residue-rank 2")));
+}
+
+TEST_F(CoincidentModes, ACloseRankOnePairIsTakenApart) {
+  add_mode(kPlace_hz, 1);
+  add_mode(kPlace_hz + 0.15, 1);  // a twentieth of the half-power width
+  const FrfEstimate frf = measured();
+  options_.residue_rank = 1;
+  AdditiveModel start = problem_.model;
+  start.submodels.pop_back();
+  const FitResult fit = ranked_fit(frf, start, options_, ModeNumber::chosen);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  const auto found = modes(fit);
+  ASSERT_EQ(found.size(), 2U);
+  std::vector<double> f = {found[0]->natural_frequency_hz(), found[1]->natural_frequency_hz()};
+  std::sort(f.begin(), f.end());
+  EXPECT_NEAR(f[0], kPlace_hz, 0.03);
+  EXPECT_NEAR(f[1], kPlace_hz + 0.15, 0.03);
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("which the data tell apart")));
+}
+
+TEST_F(CoincidentModes, AShapeThatIsNotWorthItsParametersIsTakenBack) {
+  add_mode(80.0, 1);
+  add_mode(kPlace_hz, 1);
+  AdditiveModel start = problem_.model;
+  start.submodels.push_back(start.submodels[1]);  // at 80 Hz twice
+  options_.residue_rank = 1;
+  const FitResult fit = ranked_fit(measured(), start, options_, ModeNumber::chosen);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_EQ(modes(fit).size(), 2U);
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("one mode less at 80")));
+}
+
+TEST_F(CoincidentModes, ToFirstOrderTwoPlacesFollowFromTheNeighbourhoodOfOne) {
+  add_mode(kPlace_hz, 1);
+  add_mode(kPlace_hz + 0.06, 1);
+  problem_.G = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+  const FrfEstimate frf = test::frf_of(problem_);
+  TiedModel tied{problem_.model, {0, 2}};
+  tied.model.submodels.pop_back();
+  options_.weighting = Weighting::relative;
+  const std::optional<TiedModel> apart = with_parted(frf, tied, 1, options_);
+  ASSERT_TRUE(apart.has_value());
+  std::vector<double> f = {apart->model.submodels[1].natural_frequency_hz(),
+                           apart->model.submodels[2].natural_frequency_hz()};
+  std::sort(f.begin(), f.end());
+  EXPECT_NEAR(f[0], kPlace_hz, 0.006);
+  EXPECT_NEAR(f[1], kPlace_hz + 0.06, 0.006);
+  for (const std::size_t i : {1U, 2U}) EXPECT_LT(second_share(apart->model.submodels[i]), 1e-9);
+}
+
+}  // namespace
+}  // namespace stageid

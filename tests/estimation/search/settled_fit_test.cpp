@@ -1,0 +1,197 @@
+// A search may take noise for a mode, and such a mode may keep the last fit from converging.
+
+#include "estimation/search/settled_fit.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <complex>
+#include <numbers>
+
+#include "estimation/model/model_structure.hpp"
+#include "estimation/search/automatic_fit.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/search/mode_worth.hpp"
+#include "estimation/search/undetermined_modes.hpp"
+#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/model_reference.hpp"
+#include "tests/support/random_numbers.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kTrue_hz[] = {120.0, 390.0};
+
+/// One channel with two modes, 2 % noise whose variance is known.
+class SettledFit : public testing::Test {
+ protected:
+  void SetUp() override {
+    test::RandomNumbers random(7);
+    test::DenseProblem problem;
+    problem.model = test::named_model(1, 1);
+    problem.frequency_hz = Eigen::VectorXd::LinSpaced(150, 50.0, 500.0);
+    for (const double f : kTrue_hz) {
+      problem.model.submodels.push_back(
+          test::empty_submodel(problem.model, 0, test::mode_coefficients(f, 0.01), 1));
+      problem.model.submodels.back().numerator[0](0, 0) =
+          problem.model.submodels.back().denominator[2];
+    }
+    problem.G = test::reference_response(problem.model, problem.frequency_hz, HoldModel::none);
+    frf_ = test::frf_of(problem);
+    frf_.noise_variance = 4e-4 * frf_.response.cwiseAbs2();
+    for (Eigen::Index k = 0; k < frf_.lines(); ++k)
+      frf_.response(0, k) += std::sqrt(frf_.noise_variance(0, k)) * random.circular();
+    options_.weighting = Weighting::noise_variance;
+    true_ = problem.model;
+  }
+
+  /// With a mode where there is none, narrower than the lines are apart.
+  AdditiveModel with_a_ghost() const {
+    AdditiveModel model = true_;
+    model.submodels.push_back(
+        test::empty_submodel(true_, 0, test::mode_coefficients(251.2, 1e-4), 1));
+    return model;
+  }
+
+  FrfEstimate frf_;
+  FitOptions options_;
+  AdditiveModel true_;
+};
+
+TEST_F(SettledFit, AModeThatTheDataLeaveOpenIsLeftOut) {
+  options_.max_iterations = 3;  // enough for the two modes, which begin where they are
+  ASSERT_FALSE(fit_additive_model(frf_, with_a_ghost(), options_).trustworthy());
+  const FitResult fit = settled_fit(frf_, with_a_ghost(), options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  ASSERT_EQ(count_modes(fit.model), 2);
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("left out 25"));
+}
+
+// The data have a double pole: nothing that two modes with numerators B_0 reach, though the nearer they come the better
+// they fit.
+TEST_F(SettledFit, TwoModesThatRunIntoEachOtherBecomeOne) {
+  const std::vector<double> a = test::mode_coefficients(250.0, 0.02);
+  AdditiveModel twice = true_;
+  twice.submodels.push_back(test::empty_submodel(true_, 0, a, 1));
+  twice.submodels.push_back(test::empty_submodel(true_, 0, a, 1));
+  const std::complex<double> j(0.0, 1.0);
+  for (Eigen::Index k = 0; k < frf_.lines(); ++k) {
+    const std::complex<double> s = j * 2.0 * std::numbers::pi * frf_.frequency_hz[k];
+    const std::complex<double> A = 1.0 + a[0] * s + a[1] * s * s;
+    frf_.response(0, k) += a[1] * (0.1 / A + 8e-4 / (A * A));
+  }
+  twice.submodels[2].denominator = {1.0, 1.02 * a[0], a[1]};
+  ASSERT_FALSE(fit_additive_model(frf_, twice, options_).trustworthy());
+  const FitResult fit = settled_fit(frf_, twice, options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_EQ(count_modes(fit.model), 3);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("made one mode of"));
+}
+
+// A mode so broad that its damping ratio ends at the bound converges; it is worth nothing.
+TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
+  AdditiveModel broad = true_;
+  broad.submodels.push_back(test::empty_submodel(true_, 0, test::mode_coefficients(250.0, 0.9), 1));
+  const FitResult kept = fit_additive_model(frf_, broad, options_);
+  ASSERT_TRUE(kept.trustworthy()) << kept.message;
+  ASSERT_EQ(undetermined_modes(kept), std::vector<std::size_t>{2}) << "no mode to leave out";
+  const FitResult fit = settled_fit(frf_, broad, options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_EQ(count_modes(fit.model), 2);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("which the data do not determine"));
+}
+
+// Where a number of modes is asked for they stay, and such a fit is not to be trusted.
+TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined) {
+  FitResult fit = fit_additive_model(frf_, true_, options_);
+  judge_undetermined_modes(frf_, false, fit);
+  EXPECT_TRUE(fit.findings.empty());
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  const FitStatus converged = fit.status;
+  fit.held = {1};
+  fit.model.submodels[0].damping_ratio_std = 2.0 * fit.model.submodels[0].damping_ratio();
+  judge_undetermined_modes(frf_, false, fit);
+  ASSERT_EQ(fit.findings.size(), 1U);
+  EXPECT_THAT(fit.findings[0], HasSubstr(", its deviation as large), 390.0"));
+  EXPECT_THAT(fit.findings[0], HasSubstr("at its bound"));
+  EXPECT_EQ(fit.status, FitStatus::undetermined);
+  EXPECT_EQ(fit.message, fit.findings[0]);
+  EXPECT_EQ(fit.model.fit.status, "undetermined");
+  fit.findings.clear();
+  fit.status = FitStatus::iteration_limit;  // what kept it from converging is told first
+  judge_undetermined_modes(frf_, false, fit);
+  EXPECT_EQ(fit.findings.size(), 1U);
+  EXPECT_EQ(fit.status, FitStatus::iteration_limit);
+  fit.findings.clear();
+  fit.status = converged;
+  fit.model.fit.band_hz[1] = 300.0;  // beside the lines a mode stands for what is there
+  fit.model.submodels[0].damping_ratio_std = 1e-4;
+  judge_undetermined_modes(frf_, false, fit);
+  EXPECT_TRUE(fit.findings.empty());
+  EXPECT_EQ(fit.status, converged);
+}
+
+// One mode too many follows the noise: its deviations are a few tenths of its size, and it is worth less than its
+// parameters. Of modes that were chosen by their worth nothing is said.
+TEST_F(SettledFit, AModeThatIsAskedForAndNotWorthItsParametersIsUndetermined) {
+  const auto asked = [&](int modes) {
+    return automatic_fit(frf_, {.rigid_body = false}, {.modes = {}, .exactly = modes}, options_);
+  };
+  const FitResult two = asked(2);
+  EXPECT_TRUE(two.trustworthy()) << two.message;
+  EXPECT_TRUE(two.findings.empty());
+  const FitResult three = asked(3);
+  EXPECT_EQ(three.status, FitStatus::undetermined) << three.message;
+  EXPECT_THAT(three.message, HasSubstr("do not read them as resonances"));
+  for (const bool number_asked : {false, true}) {
+    FitResult weak = two;
+    weak.removal_cost[1] = 0.9 * price_of_mode(frf_, two, 3.0);  // a pole and one residue
+    judge_undetermined_modes(frf_, number_asked, weak);
+    EXPECT_EQ(weak.status == FitStatus::undetermined, number_asked);
+    EXPECT_EQ(weak.message.find("390.0") != std::string::npos, number_asked) << weak.message;
+    FitResult strong = two;
+    strong.removal_cost[1] = 1.1 * price_of_mode(frf_, two, 3.0);
+    judge_undetermined_modes(frf_, number_asked, strong);
+    EXPECT_TRUE(strong.trustworthy()) << strong.message;
+  }
+}
+
+TEST_F(SettledFit, TwoModesOfWhichOneDoesAsWellAreUndetermined) {
+  AdditiveModel halved = true_;
+  halved.submodels.push_back(
+      test::empty_submodel(true_, 0, test::mode_coefficients(1.003 * kTrue_hz[1], 0.0101), 1));
+  FitResult fit = fit_additive_model(frf_, halved, options_);
+  fit.status = FitStatus::gradient_small;
+  judge_close_modes(frf_, options_, fit);
+  EXPECT_EQ(fit.status, FitStatus::undetermined);
+  EXPECT_THAT(fit.message, HasSubstr("one does as well"));
+  FitResult sound = fit_additive_model(frf_, true_, options_);
+  judge_close_modes(frf_, options_, sound);
+  EXPECT_TRUE(sound.trustworthy()) << sound.message;
+}
+
+TEST_F(SettledFit, AFitThatConvergesIsLeftAlone) {
+  const FitResult fit = settled_fit(frf_, true_, options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_EQ(count_modes(fit.model), 2);
+  EXPECT_TRUE(fit.decisions.empty());
+}
+
+TEST_F(SettledFit, WhereNothingHelpsTheFirstFitIsReturned) {
+  options_.max_iterations = 1;
+  options_.deviation_tolerance = options_.gradient_tolerance = options_.step_tolerance = 0.0;
+  const FitResult fit = settled_fit(frf_, with_a_ghost(), options_);
+  EXPECT_FALSE(fit.trustworthy());
+  EXPECT_EQ(count_modes(fit.model), 3);
+  EXPECT_TRUE(fit.decisions.empty());
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,114 @@
+// The general additive structure: what is put in comes out, for submodels that are no modes. Data
+// from the matrix exponential of tests/support, not from the library.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "estimation/search/fit_additive_model.hpp"
+#include "tests/estimation/submodel_cases.hpp"
+
+namespace stageid {
+namespace {
+
+using test::DenseProblem;
+using test::joined;
+using test::measured;
+using test::Part;
+using test::Poles;
+using test::real_pole;
+using test::start_of;
+
+void expect_recovered(const AdditiveModel& found, const AdditiveModel& truth) {
+  ASSERT_EQ(found.submodels.size(), truth.submodels.size());
+  for (std::size_t i = 0; i < truth.submodels.size(); ++i) {
+    const Submodel& f = found.submodels[i];
+    const Submodel& t = truth.submodels[i];
+    for (std::size_t q = 1; q < t.denominator.size(); ++q)
+      EXPECT_NEAR(f.denominator[q], t.denominator[q], 1e-6 * std::abs(t.denominator[q]))
+          << "submodel " << i << ", a_" << q;
+    for (std::size_t m = 0; m < t.numerator.size(); ++m)
+      EXPECT_LT((f.numerator[m] - t.numerator[m]).norm(), 1e-5 * t.numerator[m].norm())
+          << "submodel " << i << ", B_" << m;
+  }
+}
+
+struct Case {
+  const char* name;
+  std::vector<Part> parts;
+};
+
+std::vector<Case> cases() {
+  const Poles mode = mode_poles(130.0, 0.02);
+  const Poles other = mode_poles(410.0, 0.01);
+  const Poles third = mode_poles(640.0, 0.015);
+  return {
+      {"ModeWithVelocity", {{0, mode, 1}}},
+      {"RealPole", {{0, {real_pole(60.0)}, 0}, {0, mode, 0}}},
+      {"FourthOrder", {{0, joined(mode, other), 3}, {0, third, 0}}},
+      {"FourthOrderConstantNumerator", {{0, joined(mode, other), 0}}},
+      {"ThirdOrder", {{0, joined(mode, {real_pole(90.0)}), 2}}},
+      {"OneIntegrator", {{1, {}, 0}, {0, mode, 1}}},
+      {"IntegratorsAndPoles", {{2, mode, 1}, {0, other, 1}}},
+      {"DirectTerm", {{0, {}, 0}, {0, mode, 0}}},
+      {"Biproper", {{0, joined(mode, third), 4}, {2, {}, 0}, {0, other, 1}}},
+  };
+}
+
+class SubmodelRecovery : public testing::TestWithParam<Case> {};
+
+TEST_P(SubmodelRecovery, ByEveryDescentMethodThroughHoldAndDelay) {
+  const std::vector<Part>& parts = GetParam().parts;
+  for (const HoldModel hold : {HoldModel::none, HoldModel::exact}) {
+    const double delay_s = hold == HoldModel::none ? 0.0 : 3.1e-4;
+    const DenseProblem problem = measured(parts, hold, delay_s);
+    for (const FitMethod method : {FitMethod::riv, FitMethod::gn}) {
+      FitOptions options;
+      options.hold = hold;
+      options.delay = hold == HoldModel::none ? DelayModel::fixed : DelayModel::estimate;
+      options.method = method;
+      options.max_iterations = 200;
+      const FitResult fit =
+          fit_additive_model(test::frf_of(problem), start_of(parts, problem), options);
+      EXPECT_TRUE(fit.trustworthy())
+          << to_string(hold) << ", " << to_string(method) << ": " << fit.message;
+      expect_recovered(fit.model, problem.model);
+      EXPECT_NEAR(fit.model.input_delay_s[0], delay_s, 1e-10);
+    }
+  }
+}
+
+// Its fixed point is the truth where there is no noise.
+TEST_P(SubmodelRecovery, BySanathananAndKoerner) {
+  const DenseProblem problem = measured(GetParam().parts, HoldModel::none, 0.0);
+  FitOptions options;
+  options.method = FitMethod::sk;
+  options.max_iterations = 200;
+  const FitResult fit =
+      fit_additive_model(test::frf_of(problem), start_of(GetParam().parts, problem), options);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  expect_recovered(fit.model, problem.model);
+}
+
+TEST_P(SubmodelRecovery, UnderWeightMatrices) {
+  const DenseProblem problem = measured(GetParam().parts, HoldModel::none, 0.0);
+  FitOptions options;
+  options.weighting = Weighting::user;
+  // Hermitian, positive definite, with ties between all channels.
+  Eigen::MatrixXcd W = Eigen::MatrixXcd::Identity(4, 4);
+  W(0, 1) = {0.3, 0.2};
+  W(2, 3) = {0.1, -0.4};
+  W = Eigen::MatrixXcd(W * W.adjoint());
+  options.user_weight_matrices = W.reshaped().replicate(1, problem.frequency_hz.size());
+  options.max_iterations = 200;
+  const FitResult fit =
+      fit_additive_model(test::frf_of(problem), start_of(GetParam().parts, problem), options);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  expect_recovered(fit.model, problem.model);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, SubmodelRecovery, testing::ValuesIn(cases()),
+                         [](const auto& each) { return each.param.name; });
+
+}  // namespace
+}  // namespace stageid

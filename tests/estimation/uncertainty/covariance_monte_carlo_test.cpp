@@ -1,0 +1,107 @@
+// What a fit says about its own uncertainty, against what happens when the measurement is repeated.
+
+#include <gtest/gtest.h>
+
+#include "estimation/search/fit_additive_model.hpp"
+#include "tests/estimation/covariance_stage.hpp"
+#include "tests/estimation/delayed_fit_options.hpp"
+
+namespace stageid {
+namespace {
+
+using test::covariance_stage;
+using test::DenseProblem;
+using test::noisy;
+using test::options_with;
+
+constexpr int kRuns = 150;
+// chi^2 of 149 degrees of freedom over its mean lies in here with 99.99 %: 1 +- 3.9 sqrt(2 / 149)
+// with its skewness (Wilson and Hilferty).
+constexpr double kLowest = 0.62;
+constexpr double kHighest = 1.52;
+
+/// Fits kRuns noisy measurements; scatter over what was reported, and the errors of the response
+/// over theirs.
+void expect_honest(Weighting weighting, const Eigen::MatrixXd& variance, bool tell_variance) {
+  const DenseProblem problem = covariance_stage();
+  test::RandomNumbers random(77);
+  FitOptions options = options_with(weighting);
+  options.threads = 1;
+  constexpr Eigen::Index kQuantities = 6;  // f and zeta of three modes
+  Eigen::MatrixXd values(kQuantities, kRuns);
+  Eigen::VectorXd reported = Eigen::VectorXd::Zero(kQuantities);
+  Eigen::VectorXd response_ratio(kRuns);
+  Eigen::VectorXd channel_ratio = Eigen::VectorXd::Zero(problem.channels());
+  const auto n_numerators = 4 * problem.channels();
+  Eigen::MatrixXd numerators(n_numerators, kRuns);
+  Eigen::VectorXd numerators_reported = Eigen::VectorXd::Zero(n_numerators);
+  for (int run = 0; run < kRuns; ++run) {
+    FrfEstimate frf = test::frf_of(problem);
+    frf.response = noisy(random, problem, variance);
+    if (tell_variance) frf.noise_variance = variance;
+    const FitResult fit = fit_additive_model(frf, problem.model, options);
+    ASSERT_TRUE(fit.trustworthy()) << fit.message;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const Submodel& s = fit.model.submodels[static_cast<std::size_t>(i) + 1];
+      values(2 * i, run) = s.natural_frequency_hz();
+      values(2 * i + 1, run) = s.damping_ratio();
+      reported[2 * i] += std::pow(*s.natural_frequency_std_hz, 2) / kRuns;
+      reported[2 * i + 1] += std::pow(*s.damping_ratio_std, 2) / kRuns;
+    }
+    for (Eigen::Index i = 0; i < 4; ++i) {
+      const Submodel& s = fit.model.submodels[static_cast<std::size_t>(i)];
+      const auto rows = Eigen::seqN(i * problem.channels(), problem.channels());
+      numerators(rows, run) = s.numerator[0].reshaped();
+      numerators_reported(rows) += s.numerator_std[0].reshaped().cwiseAbs2() / kRuns;
+    }
+    const Eigen::MatrixXd ratio =
+        (test::reference_response(fit.model, problem.frequency_hz, problem.hold) - problem.G)
+            .cwiseAbs2()
+            .cwiseQuotient(fit.response_variance);
+    response_ratio[run] = ratio.mean();
+    channel_ratio += ratio.rowwise().mean() / kRuns;
+  }
+  for (Eigen::Index q = 0; q < kQuantities; ++q) {
+    const double mean = values.row(q).mean();
+    const double scatter = (values.row(q).array() - mean).square().sum() / (kRuns - 1);
+    EXPECT_GT(scatter / reported[q], kLowest) << "quantity " << q;
+    EXPECT_LT(scatter / reported[q], kHighest) << "quantity " << q;
+    // Unbiased within the scatter of the mean.
+    const Submodel& truth = problem.model.submodels[static_cast<std::size_t>(q / 2) + 1];
+    EXPECT_NEAR(mean, q % 2 == 0 ? truth.natural_frequency_hz() : truth.damping_ratio(),
+                4.0 * std::sqrt(reported[q] / kRuns));
+  }
+  for (Eigen::Index q = 0; q < n_numerators; ++q) {
+    const double scatter =
+        (numerators.row(q).array() - numerators.row(q).mean()).square().sum() / (kRuns - 1);
+    EXPECT_GT(scatter / numerators_reported[q], kLowest) << "numerator " << q;
+    EXPECT_LT(scatter / numerators_reported[q], kHighest) << "numerator " << q;
+  }
+  const double error = std::sqrt((response_ratio.array() - response_ratio.mean()).square().sum() /
+                                 (kRuns - 1) / kRuns);
+  EXPECT_NEAR(response_ratio.mean(), 1.0, 4.0 * error);
+  // A channel has 4 numerators and a share of the poles: about 8 real degrees a run.
+  for (const double ratio : channel_ratio)
+    EXPECT_NEAR(ratio, 1.0, 4.0 * std::sqrt(2.0 / (8.0 * kRuns)) * 1.5);
+}
+
+TEST(CovarianceMonteCarlo, MaximumLikelihood) {
+  expect_honest(Weighting::noise_variance, covariance_stage().W.cwiseInverse(), true);
+}
+
+TEST(CovarianceMonteCarlo, RelativeWeightsWithKnownVariance) {
+  const DenseProblem problem = covariance_stage();
+  // A floor that is high where the response is low: relative weights are wrong for it.
+  const double floor = 0.02 * problem.G.cwiseAbs().reshaped().minCoeff();
+  const Eigen::MatrixXd variance =
+      1e-6 * problem.G.cwiseAbs2() +
+      Eigen::MatrixXd::Constant(problem.G.rows(), problem.G.cols(), floor * floor);
+  expect_honest(Weighting::relative, variance, true);
+}
+
+TEST(CovarianceMonteCarlo, RelativeWeightsWithUnknownVariance) {
+  expect_honest(Weighting::relative, 1e-5 * covariance_stage().G.cwiseAbs2(), false);
+}
+
+}  // namespace
+}  // namespace stageid

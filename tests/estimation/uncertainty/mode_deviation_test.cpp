@@ -1,0 +1,260 @@
+// Standard deviations of mode shapes and masses, covariance of all parameters and circles around P, against
+// differences, dense matrices and what happens when the measurement is repeated.
+
+#include "estimation/uncertainty/mode_deviation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "estimation/modal/modal_form.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/uncertainty/dense_covariance.hpp"
+#include "estimation/uncertainty/response_errors.hpp"
+#include "tests/estimation/correlated_stage.hpp"
+#include "tests/estimation/covariance_stage.hpp"
+#include "tests/estimation/delayed_fit_options.hpp"
+
+namespace stageid {
+namespace {
+
+using test::covariance_stage;
+using test::DenseProblem;
+
+/// Shapes (real parts, imaginary parts) and mass of a mode, one under the other.
+Eigen::VectorXd modal_quantities(const Submodel& s) {
+  const ModeShape mode = mode_shape(s, 0);
+  Eigen::VectorXd out(2 * (mode.output_shape.size() + mode.input_shape.size()) + 1);
+  out << mode.output_shape.real(), mode.output_shape.imag(), mode.input_shape.real(),
+      mode.input_shape.imag(), mode.modal_mass;
+  return out;
+}
+
+Eigen::VectorXd reported(const Submodel& s) {
+  const ModeShapeDeviation& d = s.shape_std.value();
+  Eigen::VectorXd out(2 * (d.output_shape.size() + d.input_shape.size()) + 1);
+  out << d.output_shape.real(), d.output_shape.imag(), d.input_shape.real(), d.input_shape.imag(),
+      d.modal_mass;
+  return out;
+}
+
+void expect_slopes(const Submodel& mode) {
+  const ModeShapeSlopes slopes = mode_shape_slopes(mode);
+  Eigen::MatrixXd J(modal_quantities(mode).size(), slopes.modal_mass.size());
+  J << slopes.output_shape.real(), slopes.output_shape.imag(), slopes.input_shape.real(),
+      slopes.input_shape.imag(), slopes.modal_mass;
+  for (Eigen::Index p = 0; p < J.cols(); ++p) {
+    const auto moved = [&](double by) {
+      Submodel s = mode;
+      const Eigen::Index n = s.numerator[0].size();
+      double& value =
+          p < 2 ? s.denominator[static_cast<std::size_t>(p) + 1]
+                : s.numerator[static_cast<std::size_t>((p - 2) / n)].reshaped()[(p - 2) % n];
+      const double scale =
+          p < 2 ? value : s.numerator[static_cast<std::size_t>((p - 2) / n)].norm();
+      value += by * scale;
+      return std::pair(modal_quantities(s), by * scale);
+    };
+    const double h = 1e-5;
+    const auto [up, step] = moved(h);
+    const auto [down, back] = moved(-h);
+    // By as much as the parameter is large: of the second differences, h^2, and rounding, 1e-16 / h.
+    const Eigen::VectorXd difference = (up - down) / (2.0 * h);
+    const Eigen::VectorXd slope = J.col(p) * ((step - back) / (2.0 * h));
+    EXPECT_LT((slope - difference).norm(), 1e-8 * (1.0 + difference.norm())) << "parameter " << p;
+  }
+}
+
+TEST(ModeShapeSlopes, AreThoseOfDifferences) {
+  Submodel mode = covariance_stage().model.submodels[1];
+  expect_slopes(mode);  // a residue of full rank
+  const Eigen::VectorXd phi{{0.6, -1.0}};
+  const Eigen::VectorXd psi{{1.0, 0.3, -0.7}};
+  mode.numerator[0] = phi * psi.transpose();
+  expect_slopes(mode);  // of rank one, the leading component negative before it is turned
+}
+
+TEST(ModeShapeSlopes, OfGeneralDampingTurnWithTheLeadingComponent) {
+  Submodel mode = covariance_stage().model.submodels[1];
+  const double period_s = 1.0 / (2.0 * std::numbers::pi * mode.natural_frequency_hz());
+  Eigen::MatrixXd velocity(2, 3);
+  velocity << 0.4, -0.2, 0.7, 0.9, 0.1, -0.5;
+  mode.numerator.emplace_back(period_s * mode.numerator[0].norm() * velocity);
+  expect_slopes(mode);
+}
+
+TEST(ErrorQuantile, IsThatOfACircleAndOfALine) {
+  EXPECT_NEAR(error_quantile_95(0.0), std::sqrt(-std::log(0.05)), 1e-7);
+  EXPECT_NEAR(error_quantile_95(1.0), 1.959963985, 2e-4);  // the integrand has an essential zero
+}
+
+// Repeated measurements -------------------------------------------------------------------------------
+
+constexpr int kRuns = 200;
+
+struct Repeated {
+  Eigen::ArrayXd
+      variance_ratio;    ///< scatter over reported, of every quantity that is not held by its gauge
+  double covered = 0.0;  ///< share of P, over lines and channels, inside its circle
+};
+
+Repeated repeat(const test::DenseProblem& problem, const FitOptions& options,
+                const std::function<FrfEstimate(int)>& measured) {
+  std::vector<Eigen::VectorXd> values;
+  Eigen::ArrayXd known;
+  double inside = 0.0;
+  for (int run = 0; run < kRuns; ++run) {
+    const FrfEstimate frf = measured(run);
+    FitResult fit = fit_additive_model(frf, problem.model, options);
+    EXPECT_TRUE(fit.trustworthy()) << fit.message;
+    fill_shape_deviations(frf, options, fit);
+    fill_covariance(frf, options, fit);
+    Eigen::VectorXd value;
+    Eigen::VectorXd deviation;
+    for (const Submodel& s : fit.model.submodels) {
+      if (!s.is_mode()) continue;
+      value =
+          (Eigen::VectorXd(value.size() + modal_quantities(s).size()) << value, modal_quantities(s))
+              .finished();
+      deviation = (Eigen::VectorXd(deviation.size() + reported(s).size()) << deviation, reported(s))
+                      .finished();
+    }
+    if (run == 0) known.setZero(deviation.size());
+    known += deviation.array().square() / kRuns;
+    values.push_back(value);
+    const Eigen::MatrixXd error =
+        (test::reference_response(fit.model, problem.frequency_hz, problem.hold) - problem.G)
+            .cwiseAbs();
+    inside += (error.array() < fit.covariance.response_radius.array()).cast<double>().mean();
+  }
+  Repeated out;
+  out.covered = inside / kRuns;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(known.size());
+  for (const Eigen::VectorXd& v : values) mean += v / kRuns;
+  Eigen::ArrayXd scatter = Eigen::ArrayXd::Zero(known.size());
+  for (const Eigen::VectorXd& v : values) scatter += (v - mean).array().square() / (kRuns - 1);
+  std::vector<double> ratio;
+  for (Eigen::Index q = 0; q < known.size(); ++q)
+    if (known[q] > 1e-24) ratio.push_back(scatter[q] / known[q]);
+  out.variance_ratio =
+      Eigen::Map<const Eigen::ArrayXd>(ratio.data(), static_cast<Eigen::Index>(ratio.size()));
+  return out;
+}
+
+void expect_honest(const Repeated& repeated) {
+  // chi^2 of 199 degrees of freedom over its mean: 99.99 % in 0.66 to 1.43.
+  EXPECT_GT(repeated.variance_ratio.minCoeff(), 0.66);
+  EXPECT_LT(repeated.variance_ratio.maxCoeff(), 1.43);
+  EXPECT_GT(std::sqrt(repeated.variance_ratio.mean()), 0.9);
+  EXPECT_LT(std::sqrt(repeated.variance_ratio.mean()), 1.1);
+  // A fit has about 30 directions: 200 runs are some thousand independent trials.
+  EXPECT_NEAR(repeated.covered, 0.95, 0.012);
+}
+
+TEST(ShapeDeviationMonteCarlo, FreeResidues) {
+  const DenseProblem problem = covariance_stage();
+  const Eigen::MatrixXd variance = problem.W.cwiseInverse();
+  FitOptions options = test::options_with(Weighting::noise_variance);
+  options.threads = 1;
+  expect_honest(repeat(problem, options, [&](int run) {
+    test::RandomNumbers random(static_cast<std::uint64_t>(500 + run));
+    FrfEstimate frf = test::frf_of(problem);
+    frf.response = test::noisy(random, problem, variance);
+    frf.noise_variance = variance;
+    return frf;
+  }));
+}
+
+/// The 2 x 3 stage with modes of rank one, noise correlated between outputs and inputs.
+struct CorrelatedStage {
+  DenseProblem problem = test::noisy_stage(HoldModel::exact, 0.0);
+  test::CorrelatedNoise noise;
+  CorrelatedStage() {
+    test::RandomNumbers random(12);
+    for (Submodel& s : problem.model.submodels) {
+      if (!s.is_mode()) continue;
+      const Eigen::VectorXd phi{{random.uniform(0.5, 1.5), random.uniform(0.5, 1.5)}};
+      const Eigen::VectorXd psi{{random.normal(), random.normal(), random.normal()}};
+      s.numerator[0] = s.denominator[2] * phi * psi.transpose();
+    }
+    problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+    noise = test::correlated_noise(problem, 0.01, 0.9);
+  }
+  FrfEstimate measured(int run) const {
+    test::RandomNumbers random(static_cast<std::uint64_t>(7000 + run));
+    return test::measured(problem, noise, random);
+  }
+};
+
+class CorrelatedShapes : public testing::TestWithParam<std::pair<Weighting, int>> {};
+
+TEST_P(CorrelatedShapes, AreAsSureAsReported) {
+  const CorrelatedStage stage;
+  FitOptions options = test::options_with(GetParam().first);
+  options.residue_rank = GetParam().second;
+  options.threads = 1;
+  expect_honest(repeat(stage.problem, options, [&](int run) { return stage.measured(run); }));
+}
+
+INSTANTIATE_TEST_SUITE_P(ShapeDeviationMonteCarlo, CorrelatedShapes,
+                         testing::Values(std::pair(Weighting::noise_variance, 0),
+                                         std::pair(Weighting::noise_variance, 1),
+                                         std::pair(Weighting::likelihood, 0)));
+
+// One fit ---------------------------------------------------------------------------------------------
+
+TEST(DenseCovariance, HasTheDeviationsOfTheModelOnItsDiagonal) {
+  const CorrelatedStage stage;
+  const FrfEstimate frf = stage.measured(0);
+  for (const int rank : {0, 1}) {
+    FitOptions options = test::options_with(Weighting::noise_variance);
+    options.residue_rank = rank;
+    FitResult fit = fit_additive_model(frf, stage.problem.model, options);
+    fill_covariance(frf, options, fit);
+    const Eigen::MatrixXd& C = fit.covariance.sandwich;
+    ASSERT_GT(C.rows(), 0);
+    Eigen::Index at = C.rows();
+    for (const Submodel& s : fit.model.submodels) at -= s.numerator[0].size();
+    for (const Submodel& s : fit.model.submodels)
+      for (const double deviation : s.numerator_std[0].reshaped()) {
+        EXPECT_NEAR(std::sqrt(C(at, at)), deviation, 1e-9 * deviation) << "rank " << rank;
+        ++at;
+      }
+    EXPECT_LT((fit.response_variance.array() / fit.covariance.response_variance.array() - 1.0)
+                  .abs()
+                  .maxCoeff(),
+              1e-6);
+    EXPECT_EQ(C, C.transpose());
+  }
+}
+
+TEST(DenseCovariance, WithoutCorrelationAndWithTheRightWeightsIsTheInverseFisherMatrix) {
+  const DenseProblem problem = covariance_stage();
+  test::RandomNumbers random(3);
+  FrfEstimate frf = test::frf_of(problem);
+  frf.noise_variance = problem.W.cwiseInverse();
+  frf.response = test::noisy(random, problem, frf.noise_variance);
+  const FitOptions options = test::options_with(Weighting::noise_variance);
+  FitResult fit = fit_additive_model(frf, problem.model, options);
+  fill_covariance(frf, options, fit);
+  const FitCovariance& C = fit.covariance;
+  const Eigen::VectorXd scale = C.sandwich.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_LT((scale.asDiagonal() * (C.sandwich - C.likelihood) * scale.asDiagonal()).norm(), 1e-6);
+}
+
+TEST(DenseCovariance, SaysWhyThereIsNone) {
+  const DenseProblem problem = covariance_stage();
+  FitOptions options = test::options_with(Weighting::relative);
+  options.uncertainty = false;
+  FitResult fit = fit_additive_model(test::frf_of(problem), problem.model, options);
+  fill_covariance(test::frf_of(problem), options, fit);
+  EXPECT_EQ(fit.covariance.sandwich.size(), 0);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_NE(fit.decisions.back().find("no standard deviations"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace stageid

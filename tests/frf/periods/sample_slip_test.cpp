@@ -1,0 +1,168 @@
+// A recorder that loses samples, or writes them twice: told, and the rest is used.
+#include "frf/periods/sample_slip.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "frf/health/data_health.hpp"
+#include "frf/plant/plant_frf.hpp"
+#include "tests/support/sampled_loop.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+using test::MemoryLog;
+
+test::LoopExperiment experiment(std::uint64_t seed) {
+  test::LoopExperiment x;
+  x.sample_rate_hz = 2000.0;
+  x.period_samples = 2000;
+  x.lines = test::line_range(3, 401, 2);
+  x.axes = 2;
+  x.realizations = 2;
+  x.periods = 4;
+  x.transient_periods = 1;
+  x.seed = seed;
+  return x;
+}
+
+/// Plant and noise drawn from `seed`.
+struct Case {
+  explicit Case(std::uint64_t seed) : x(experiment(seed)) {
+    test::ComplexNoise random(seed + 100);
+    const double first_hz = 60.0 + 60.0 * random.uniform();
+    plant = test::sampled_plant(3, 2, {{first_hz, 0.05}, {2.1 * first_hz, 0.04}}, x.sample_rate_hz,
+                                0.02);
+    log = test::simulate_sampled_log(plant, x, 1e-4 * std::pow(30.0, random.uniform()));
+  }
+  test::LoopExperiment x;
+  test::SampledPlant plant;
+  MemoryLog log;
+};
+
+/// Row `row` of a run is not recorded; the record goes on with what comes after it. A negative count writes the
+/// rows before it again. What is missing at the end is what a longer record would have held.
+void lose(MemoryLog& log, std::size_t run, Index row, Index count, bool sensors = true,
+          bool actuators = true) {
+  const auto shift = [&](Eigen::MatrixXd& x) {
+    const Index rows = x.rows();
+    const Index N = log.log_info.period_samples;
+    Eigen::MatrixXd spoilt = x;
+    for (Index n = row; n < rows; ++n) {
+      Index from = n + count;
+      while (from >= rows) from -= N;
+      spoilt.row(n) = x.row(from);
+    }
+    x = spoilt;
+  };
+  if (sensors) shift(log.records[run].sensors);
+  if (actuators) shift(log.records[run].actuators);
+}
+
+std::vector<Finding> told(const HealthRecord& record) {
+  std::vector<Finding> findings = check_health(record, std::nullopt);
+  std::erase_if(findings, [](const Finding& f) { return f.severity == Severity::unchecked; });
+  return findings;
+}
+
+std::string text(const std::vector<Finding>& findings) {
+  std::string all;
+  for (const Finding& f : findings) all += f.channel + " " + f.what + " (" + f.figure + ")\n";
+  return all;
+}
+
+/// Mean over lines and entries of |G - truth|^2 over the stated variance: 1 on average for intervals that hold.
+double chi_square(const FrfEstimate& frf, const Case& c) {
+  double sum = 0.0;
+  for (Index k = 0; k < frf.lines(); ++k) {
+    const Eigen::MatrixXcd truth =
+        c.plant.response(2.0 * std::numbers::pi * frf.frequency_hz[k], c.x.sample_rate_hz);
+    const Eigen::VectorXcd off = frf.response.col(k) - truth.reshaped();
+    sum += (off.cwiseAbs2().array() / frf.noise_variance.col(k).array()).mean();
+  }
+  return sum / static_cast<double>(frf.lines());
+}
+
+TEST(SampleSlip, CleanRunsHaveNone) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const Case c(seed);
+    const FrfAndHealth both = estimate_plant_frf_and_health({&c.log});
+    EXPECT_TRUE(both.health.slips.empty()) << seed;
+    EXPECT_TRUE(told(both.health).empty()) << seed << "\n" << text(told(both.health));
+  }
+}
+
+TEST(SampleSlip, OneLostSampleIsToldWithItsRowAndTheRestIsUsed) {
+  int exact = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    Case c(seed);
+    test::ComplexNoise random(seed);
+    const auto run = static_cast<std::size_t>(4.0 * random.uniform());
+    const auto row = static_cast<Index>((1.05 + 3.9 * random.uniform()) * c.x.period_samples);
+    lose(c.log, run, row, 1);
+    const FrfAndHealth both = estimate_plant_frf_and_health({&c.log});
+    const std::vector<Finding> findings = told(both.health);
+    ASSERT_EQ(findings.size(), 1U) << seed << " row " << row << "\n" << text(findings);
+    EXPECT_EQ(findings.front().cause, Cause::lost_samples);
+    ASSERT_EQ(both.health.slips.size(), 1U);
+    const SampleSlip& slip = both.health.slips.front();
+    EXPECT_EQ(slip.run, c.log.log_runs[run].name);
+    EXPECT_EQ(slip.lost, 1);
+    EXPECT_NEAR(static_cast<double>(slip.row), static_cast<double>(row), 200.0) << seed;
+    exact += std::abs(static_cast<double>(slip.row) - static_cast<double>(row)) <= 20.0 ? 1 : 0;
+    EXPECT_LE(both.frf.dropped_periods.size(), 1U) << seed;
+    const double ratio = chi_square(both.frf, c);
+    EXPECT_LT(ratio, 1.6) << seed;
+    EXPECT_GT(ratio, 0.6) << seed;
+  }
+  EXPECT_GE(exact, 36);
+}
+
+TEST(SampleSlip, SeveralLostOrDoubledSamplesOfAllOrOneKindOfChannels) {
+  struct Kind {
+    Index count;
+    bool sensors, actuators;
+  };
+  for (const Kind& kind : {Kind{3, true, true}, Kind{-1, true, true}, Kind{57, true, true},
+                           Kind{-200, true, true}, Kind{1, true, false}, Kind{1, false, true}}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Case c(seed);
+      const Index row = 4500 + 313 * static_cast<Index>(seed);
+      lose(c.log, 1, row, kind.count, kind.sensors, kind.actuators);
+      const FrfAndHealth both = estimate_plant_frf_and_health({&c.log});
+      ASSERT_EQ(both.health.slips.size(), 1U) << kind.count << " " << seed;
+      const SampleSlip& slip = both.health.slips.front();
+      EXPECT_EQ(slip.lost, kind.count) << seed;
+      EXPECT_EQ(slip.sensors, kind.sensors) << kind.count << " " << seed;
+      EXPECT_EQ(slip.actuators, kind.actuators) << kind.count << " " << seed;
+      EXPECT_NEAR(static_cast<double>(slip.row), static_cast<double>(row), 200.0);
+      EXPECT_LT(chi_square(both.frf, c), 1.6) << kind.count << " " << seed;
+    }
+  }
+}
+
+TEST(SampleSlip, IsTheSameForBothMethodsAndForTheRecordAlone) {
+  Case c(3);
+  lose(c.log, 2, 5100, 1);
+  const auto rows = [](const HealthRecord& record) {
+    std::vector<std::uint64_t> all;
+    for (const SampleSlip& slip : record.slips) all.push_back(slip.row);
+    return all;
+  };
+  const std::vector<std::uint64_t> one = rows(read_health_record({&c.log}, {}));
+  ASSERT_EQ(one.size(), 1U);
+  EXPECT_EQ(rows(estimate_plant_frf_and_health({&c.log}).health), one);
+  const FrfAndHealth lpm =
+      estimate_plant_frf_and_health({&c.log}, {.transient_periods = 1, .method = FrfMethod::lpm});
+  EXPECT_EQ(rows(lpm.health), one);
+  EXPECT_LT(chi_square(lpm.frf, c), 1.6);
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,88 @@
+#include "frf/response/distortion_variance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/random_numbers.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kLines = 400;
+
+/// A plant that falls by 80 dB, its noise flat and its distortion in proportion to the response; the variances are those of
+/// M realizations of P periods.
+struct Case {
+  Eigen::MatrixXd truth;  ///< of the mean of the realizations
+  FrfEstimate frf;
+};
+
+Case draw(std::uint64_t seed, int M, double relative_distortion) {
+  test::RandomNumbers random(seed);
+  Case out;
+  FrfEstimate& frf = out.frf;
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(kLines, 10.0, 1000.0);
+  frf.response.resize(1, kLines);
+  out.truth.resize(1, kLines);
+  constexpr double kNoise = 1e-14;
+  constexpr int kNoiseDof = 20;
+  for (Eigen::Index k = 0; k < kLines; ++k) {
+    const double response = std::pow(frf.frequency_hz[k], -2.0);
+    frf.response(0, k) = response;
+    out.truth(0, k) = (std::pow(relative_distortion * response, 2) + kNoise) / M;
+  }
+  frf.total_dof = M - 1.0;
+  frf.noise_dof = kNoiseDof;
+  const auto estimated = [&](double variance, int dof) {
+    double sum = 0.0;
+    for (int i = 0; i < dof; ++i) sum += std::norm(random.circular());
+    return variance * sum / dof;
+  };
+  frf.noise_variance.resize(1, kLines);
+  frf.total_variance.resize(1, kLines);
+  for (Eigen::Index k = 0; k < kLines; ++k) {
+    frf.noise_variance(0, k) = estimated(kNoise / M, kNoiseDof);
+    frf.total_variance(0, k) = estimated(out.truth(0, k), M - 1);
+  }
+  return out;
+}
+
+/// What weights 1/v cost: the variance of a weighted mean over that with the true variance, minus 1.
+double loss(const Eigen::MatrixXd& variance, const Eigen::MatrixXd& truth) {
+  const Eigen::ArrayXd w = variance.row(0).transpose().array().inverse();
+  const Eigen::ArrayXd v = truth.row(0).transpose().array();
+  return (w.square() * v).sum() / std::pow(w.sum(), 2) * v.inverse().sum() - 1.0;
+}
+
+TEST(DistortionVariance, IsNearTheTruthWithTwoRealizations) {
+  for (const double distortion : {0.0, 1e-3, 0.03, 0.3})
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      const Case drawn = draw(seed, 2, distortion);
+      const DistortionVariance found = distortion_variance(drawn.frf);
+      EXPECT_EQ(found.dof, 9.0);
+      const Eigen::ArrayXXd ratio = found.variance.array() / drawn.truth.array();
+      EXPECT_NEAR(ratio.mean(), 1.0, 0.15) << distortion << ", seed " << seed;
+      EXPECT_LT(ratio.log().abs().mean(), 0.35) << distortion << ", seed " << seed;
+      EXPECT_LT(loss(found.variance, drawn.truth), 0.1) << distortion << ", seed " << seed;
+    }
+}
+
+TEST(DistortionVariance, IsTheTotalVarianceOfManyRealizations) {
+  const Case drawn = draw(5, 1000, 0.03);
+  const DistortionVariance found = distortion_variance(drawn.frf);
+  EXPECT_LT((found.variance.array() / drawn.frf.total_variance.array() - 1.0).abs().maxCoeff(),
+            0.01);
+}
+
+// An octave without response has no distortion in proportion to it.
+TEST(DistortionVariance, AnOutputThatShowsNothingHasItsNoise) {
+  Case drawn = draw(6, 3, 0.0);
+  drawn.frf.response.setZero();
+  const DistortionVariance found = distortion_variance(drawn.frf);
+  EXPECT_TRUE(found.variance.allFinite());
+  EXPECT_GT(found.variance.minCoeff(), 0.0);
+}
+
+}  // namespace
+}  // namespace stageid

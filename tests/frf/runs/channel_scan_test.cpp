@@ -1,0 +1,104 @@
+#include "frf/runs/channel_scan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+
+#include "tests/support/random_numbers.hpp"
+
+namespace stageid {
+namespace {
+
+Eigen::VectorXd normal_samples(Eigen::Index n, std::uint64_t seed) {
+  test::RandomNumbers random(seed);
+  Eigen::VectorXd x(n);
+  for (double& value : x) value = random.normal();
+  return x;
+}
+
+TEST(ChannelScan, CountsTheOutermostValuesAndTheLongestStretch) {
+  ChannelScan scan;
+  scan.add(Eigen::VectorXd{{1.0, 3.0, 3.0, 2.0, -1.0, -1.0, -1.0, 3.0}});
+  EXPECT_EQ(scan.high().value, 3.0);
+  EXPECT_EQ(scan.high().count, 3U);
+  EXPECT_EQ(scan.high().next, 2.0);
+  EXPECT_EQ(scan.low().value, -1.0);
+  EXPECT_EQ(scan.low().count, 3U);
+  EXPECT_EQ(scan.longest_constant(), 3U);
+  EXPECT_EQ(scan.samples(), 8U);
+}
+
+TEST(ChannelScan, SumOfPartsIsTheWhole) {
+  const Eigen::VectorXd x = (normal_samples(400, 1) * 2.0).array().round();
+  ChannelScan whole;
+  whole.add(x);
+  ChannelScan first;
+  ChannelScan second;
+  first.add(x.head(150));
+  second.add(x.tail(250));
+  first.add(second);
+  EXPECT_EQ(first.high().count, whole.high().count);
+  EXPECT_EQ(first.low().count, whole.low().count);
+  EXPECT_EQ(first.samples(), whole.samples());
+}
+
+/// The definition, sample by sample.
+std::uint64_t longest_stretch(const Eigen::VectorXd& x) {
+  std::uint64_t longest = 0;
+  std::uint64_t stretch = 0;
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    stretch = i > 0 && x[i] == x[i - 1] ? stretch + 1 : 1;
+    longest = std::max(longest, stretch);
+  }
+  return longest;
+}
+
+TEST(ChannelScan, NothingIsMissedWhereverItStands) {
+  for (Eigen::Index at = 600; at < 624; ++at) {  // around borders between pieces of 256
+    Eigen::VectorXd x = normal_samples(3000, static_cast<std::uint64_t>(at));
+    if (at % 2 == 0) x = (x * 4.0).array().round();  // values come again far apart
+    x.segment(at, 5).setConstant(x.maxCoeff());
+    x.segment(2048 + at, 3).setConstant(x.minCoeff());
+    std::map<double, std::uint64_t> count;
+    for (const double value : x) ++count[value];
+    ChannelScan scan;
+    scan.add(x.head(100));
+    scan.add(x.tail(2900));
+    EXPECT_EQ(scan.longest_constant(), longest_stretch(x)) << at;
+    EXPECT_EQ(scan.high().value, count.rbegin()->first) << at;
+    EXPECT_EQ(scan.high().count, count.rbegin()->second) << at;
+    EXPECT_EQ(scan.high().next, std::next(count.rbegin())->first) << at;
+    EXPECT_EQ(scan.high().next_count, std::next(count.rbegin())->second) << at;
+    EXPECT_EQ(scan.low().value, count.begin()->first) << at;
+    EXPECT_EQ(scan.low().count, count.begin()->second) << at;
+    EXPECT_EQ(scan.low().next, std::next(count.begin())->first) << at;
+    EXPECT_EQ(scan.low().next_count, std::next(count.begin())->second) << at;
+    EXPECT_EQ(scan.samples(), 3000U) << at;
+  }
+}
+
+TEST(ChannelScan, ClippedSamplesPileUpAndOthersDoNot) {
+  const double limit = std::log(1e-6);
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    const Eigen::VectorXd x = normal_samples(4000, seed);
+    ChannelScan clean;
+    clean.add(x);
+    EXPECT_GE(clean.log_p_high(), limit) << seed;
+    // A coarse converter repeats its outermost level, but not more often than the one before it.
+    ChannelScan coarse;
+    coarse.add((x * 4.0).array().round().matrix());
+    EXPECT_GE(coarse.log_p_high(), limit) << seed;
+    EXPECT_GE(coarse.log_p_low(), limit) << seed;
+    // 2 % of the samples lie above 2.05.
+    ChannelScan clipped;
+    clipped.add(x.cwiseMin(2.05));
+    EXPECT_LT(clipped.log_p_high(), limit) << seed;
+    EXPECT_GE(clipped.log_p_low(), limit) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,102 @@
+#include "frf/runs/health_record.hpp"
+
+#include <gtest/gtest.h>
+
+#include "frf/plant/plant_frf.hpp"
+#include "tests/support/closed_loop.hpp"
+
+namespace stageid {
+namespace {
+
+using test::LoopExperiment;
+using test::MemoryLog;
+
+/// Three actuators, of which two are excited; two sensors; a marked period.
+MemoryLog recorded_log() {
+  LoopExperiment x{.axes = 2, .realizations = 2, .periods = 4};
+  x.lines.clear();
+  for (int line = 1; line < 120; line += 2) x.lines.push_back(line);
+  x.noise_factor = 0.1 * Eigen::MatrixXcd::Identity(2, 2);
+  MemoryLog log = test::simulate_log(test::small_stage(), x);
+  log.records[1].marked[2 * log.log_info.period_samples + 17] = 1;
+  return log;
+}
+
+void expect_equal(const HealthRecord& a, const HealthRecord& b) {
+  EXPECT_EQ(a.realization, b.realization);
+  EXPECT_EQ(a.periods, b.periods);
+  EXPECT_EQ(a.frequency_hz, b.frequency_hz);
+  EXPECT_EQ(a.axes, b.axes);
+  EXPECT_EQ(a.health.marked, b.health.marked);
+  ASSERT_EQ(a.lines.size(), b.lines.size());
+  for (std::size_t k = 0; k < a.lines.size(); ++k) {
+    EXPECT_EQ(a.lines[k].R, b.lines[k].R);
+    EXPECT_EQ(a.lines[k].Z, b.lines[k].Z);
+  }
+  ASSERT_EQ(a.scan.size(), b.scan.size());
+  for (std::size_t c = 0; c < a.scan.size(); ++c) {
+    EXPECT_EQ(a.scan[c].samples(), b.scan[c].samples());
+    EXPECT_EQ(a.scan[c].high().value, b.scan[c].high().value);
+    EXPECT_EQ(a.scan[c].low().value, b.scan[c].low().value);
+    EXPECT_EQ(a.scan[c].longest_constant(), b.scan[c].longest_constant());
+  }
+}
+
+// By the definition, not by what else is in the library: a DFT sum.
+std::complex<double> dft_of(const Eigen::VectorXd& samples, int line) {
+  std::complex<double> sum = 0.0;
+  const auto N = static_cast<double>(samples.size());
+  for (Eigen::Index n = 0; n < samples.size(); ++n)
+    sum += samples[n] * std::polar(1.0, -2.0 * M_PI * line * static_cast<double>(n) / N);
+  return sum / N;
+}
+
+TEST(HealthRecord, HoldsTheSpectraOfEveryChannelAndCleanPeriod) {
+  const MemoryLog log = recorded_log();
+  const HealthRecord record = estimate_plant_frf_and_health({&log}).health;
+  const Eigen::Index N = log.log_info.period_samples;
+  const Eigen::Index skipped = log.log_info.transient_periods;
+  ASSERT_EQ(record.periods, (std::vector<int>{4, 3}));
+  ASSERT_EQ(record.lines.size(), 60U);
+  ASSERT_EQ(record.lines[3].Z.rows(), 2 + 3);
+  for (const Eigen::Index column : {0, 2, 4, 6}) {
+    // Of the second run the period behind the transient that is marked is missing.
+    const bool second = column >= 4;
+    const Eigen::Index period =
+        skipped + (second ? column - 4 + (column - 4 >= 2 - skipped ? 1 : 0) : column);
+    const LogSamples& samples = log.records[second ? 1 : 0];
+    for (Eigen::Index c = 0; c < 5; ++c) {
+      const Eigen::VectorXd x =
+          (c < 2 ? samples.sensors.col(c) : samples.actuators.col(c - 2)).segment(period * N, N);
+      // Rounding of sums of N terms.
+      EXPECT_LT(std::abs(record.lines[3].Z(c, column) - dft_of(x, 7)),
+                1e-13 * x.cwiseAbs().maxCoeff())
+          << column << " " << c;
+    }
+  }
+}
+
+TEST(HealthRecord, IsTheSameFromTheReadingOfTheEstimate) {
+  const MemoryLog log = recorded_log();
+  const HealthRecord alone = read_health_record({&log}, {.threads = 1});
+  const FrfEstimate estimate = estimate_plant_frf({&log});
+  for (const int threads : {1, 2, 5}) {
+    const FrfAndHealth both = estimate_plant_frf_and_health({&log}, {.threads = threads});
+    expect_equal(both.health, alone);
+    EXPECT_EQ(both.frf.response, estimate.response);
+    EXPECT_EQ(both.frf.noise_variance, estimate.noise_variance);
+    EXPECT_EQ(both.frf.provenance_json, estimate.provenance_json);
+  }
+}
+
+TEST(HealthRecord, HoldsAllChannelsWhateverIsEstimated) {
+  const MemoryLog log = recorded_log();
+  const HealthRecord alone = read_health_record({&log}, {});
+  expect_equal(estimate_plant_frf_and_health({&log}, {.outputs = {"z2"}}).health, alone);
+  const FrfOptions lpm{.transient_periods = log.log_info.transient_periods,
+                       .method = FrfMethod::lpm};
+  expect_equal(estimate_plant_frf_and_health({&log}, lpm).health, alone);
+}
+
+}  // namespace
+}  // namespace stageid

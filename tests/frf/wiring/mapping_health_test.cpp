@@ -1,0 +1,217 @@
+// What is mapped wrongly, or cannot be known, in a log of others: said for what it is.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "frf/health/data_health.hpp"
+#include "frf/wiring/feedback_check.hpp"
+#include "frf/wiring/injection_check.hpp"
+#include "tests/support/closed_loop.hpp"
+#include "tests/support/random_numbers.hpp"
+#include "tests/support/sampled_loop.hpp"
+
+namespace stageid {
+namespace {
+
+using test::LoopExperiment;
+using test::MemoryLog;
+using testing::HasSubstr;
+
+std::vector<int> odd_lines(int last) { return test::line_range(1, last, 2); }
+
+MemoryLog closed_loop_log(std::uint64_t seed = 1) {
+  LoopExperiment x{.periods = 3, .seed = seed};
+  x.lines = odd_lines(60);
+  x.noise_factor = 1e-3 * Eigen::MatrixXcd::Identity(2, 2);
+  return test::simulate_log(test::small_stage(), x);
+}
+
+/// The loop of test::small_stage().
+NominalStage small_nominal() {
+  NominalStage nominal;
+  nominal.actuators = {"a1", "a2", "a3"};
+  nominal.sensors = {"z1", "z2"};
+  nominal.controller = [](double hz) {
+    return Eigen::MatrixXcd(-test::small_stage().controller(2.0 * std::numbers::pi * hz));
+  };
+  return nominal;
+}
+
+/// Records the excitation where the plant input belongs.
+void map_excitation(MemoryLog& log, Eigen::Index actuator, double factor) {
+  for (std::size_t e = 0; e < log.records.size(); ++e) {
+    const Eigen::MatrixXd& period = log.excitation_periods[e];
+    for (Eigen::Index n = 0; n < log.records[e].actuators.rows(); ++n)
+      log.records[e].actuators(n, actuator) = factor * period(n % period.rows(), actuator);
+  }
+}
+
+std::vector<Finding> health_of(const MemoryLog& log,
+                               const std::optional<NominalStage>& nominal = std::nullopt) {
+  return check_health(read_health_record({&log}, {}), nominal);
+}
+
+const Finding* first_with(const std::vector<Finding>& findings, Cause cause) {
+  const auto at = std::find_if(findings.begin(), findings.end(),
+                               [&](const Finding& f) { return f.cause == cause; });
+  return at == findings.end() ? nullptr : &*at;
+}
+
+TEST(MappedExcitation, IsNamedAndNotCalledDead) {
+  for (const double factor : {1.0, -2.5}) {
+    MemoryLog log = closed_loop_log();
+    map_excitation(log, 0, factor);
+    for (const auto& nominal : {std::optional<NominalStage>(), std::optional(small_nominal())}) {
+      const std::vector<Finding> found = health_of(log, nominal);
+      const Finding* finding = first_with(found, Cause::injection);
+      ASSERT_NE(finding, nullptr);
+      EXPECT_EQ(finding->severity, Severity::fault);
+      EXPECT_EQ(finding->channel, "a1");
+      EXPECT_THAT(finding->what, HasSubstr("equals the excitation a1"));
+      EXPECT_THAT(finding->remedy, HasSubstr("after the injection sum"));
+      EXPECT_EQ(first_with(found, Cause::dead), nullptr);
+      EXPECT_EQ(std::count_if(found.begin(), found.end(),
+                              [](const Finding& f) { return f.severity == Severity::fault; }),
+                1);
+    }
+  }
+}
+
+TEST(MappedExcitation, OfAllActuatorsIsADoubtUnlessTheLoopIsKnown) {
+  MemoryLog log = closed_loop_log();
+  for (Eigen::Index a = 0; a < 3; ++a) map_excitation(log, a, 1.0);
+  const std::vector<Finding> found = health_of(log);
+  EXPECT_FALSE(any_fault(found));
+  ASSERT_NE(first_with(found, Cause::injection), nullptr);
+  EXPECT_EQ(first_with(found, Cause::injection)->severity, Severity::doubt);
+  EXPECT_TRUE(any_fault(health_of(log, small_nominal())));
+  NominalStage open = small_nominal();
+  open.controller = [](double) { return Eigen::MatrixXcd::Zero(3, 2); };
+  EXPECT_EQ(first_with(health_of(log, open), Cause::injection), nullptr);
+}
+
+/// A chirp in the first third of each period, an open loop, one axis an experiment.
+/// @param arrives how many of the two axes are driven
+MemoryLog chirp_log(int arrives) {
+  const int axes = 2;
+  LoopExperiment x{.sample_rate_hz = 1000.0, .period_samples = 1000, .axes = axes};
+  const test::SampledPlant plant =
+      test::sampled_plant(axes, axes, {{30.0, 0.05}, {70.0, 0.05}}, 1000.0, 0.0);
+  MemoryLog log;
+  log.log_info.sample_rate_hz = 1000.0;
+  log.log_info.period_samples = 1000;
+  log.log_info.transient_periods = 1;
+  log.log_info.excitation = log.log_info.actuators = test::channels("a", axes, "N");
+  log.log_info.sensors = test::channels("z", axes, "m");
+  test::ComplexNoise random(3);
+  x.periods = 3;
+  for (int e = 0; e < axes; ++e) {
+    Eigen::MatrixXd period = Eigen::MatrixXd::Zero(1000, axes);
+    for (int n = 0; n < 333; ++n) {
+      const double t = 1e-3 * n;
+      period(n, e) = std::sin(2.0 * std::numbers::pi * (5.0 + 300.0 * t) * t);
+    }
+    const Eigen::MatrixXd driven = period * (e < arrives ? 1.0 : 0.0);
+    log.append(0, e, period, test::simulate_sampled_run(plant, x, driven, 1e-4, random));
+  }
+  return log;
+}
+
+TEST(Chirp, FollowedByRestIsNotDead) {
+  MemoryLog log = chirp_log(2);
+  const std::vector<Finding> found = health_of(log);
+  EXPECT_EQ(first_with(found, Cause::dead), nullptr) << first_with(found, Cause::dead)->channel;
+  EXPECT_EQ(first_with(found, Cause::saturated), nullptr);
+  EXPECT_EQ(first_with(found, Cause::excitation), nullptr);
+  // A sensor that is stuck while the chirp runs still is.
+  double stuck_at = 0.25;
+  for (LogSamples& record : log.records)
+    record.sensors.col(1).tail(2500).setConstant(stuck_at += 0.01);
+  const std::vector<Finding> stuck = health_of(log);
+  ASSERT_NE(first_with(stuck, Cause::dead), nullptr);
+  EXPECT_EQ(first_with(stuck, Cause::dead)->channel, "z2");
+}
+
+/// As a controller makes it of the sensors' noise.
+void add_noise_to_actuators(MemoryLog& log, double rms) {
+  test::RandomNumbers random(9);
+  for (LogSamples& record : log.records)
+    for (double& u : record.actuators.reshaped()) u += rms * random.normal();
+}
+
+TEST(SilentAxis, IsNamedThoughItsExcitationIsRecorded) {
+  MemoryLog log = chirp_log(1);
+  add_noise_to_actuators(log, 1e-4);
+  const std::vector<Finding> found = health_of(log);
+  const Finding* finding = first_with(found, Cause::excitation);
+  ASSERT_NE(finding, nullptr);
+  EXPECT_EQ(finding->severity, Severity::fault);
+  EXPECT_EQ(finding->channel, "a2");
+  EXPECT_THAT(finding->what, HasSubstr("does not arrive"));
+}
+
+TEST(SilentStage, IsNoCaseOfDeadSensors) {
+  MemoryLog log = chirp_log(0);  // the sensors see noise, the actuators get the excitation
+  for (Eigen::Index a = 0; a < 2; ++a) map_excitation(log, a, 1.0);
+  add_noise_to_actuators(log, 0.1);
+  const std::vector<Finding> found = health_of(log);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].cause, Cause::incoherent) << found[0].what << found[0].channel;
+  EXPECT_EQ(found[0].severity, Severity::fault);
+  EXPECT_EQ(first_with(found, Cause::dead), nullptr);
+}
+
+TEST(UnknownStage, IsSaidFirstWithTheFlagThatHelps) {
+  MemoryLog log = closed_loop_log();
+  const std::vector<Finding> found = health_of(log);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].severity, Severity::unchecked);
+  EXPECT_EQ(found[0].cause, Cause::unknown_stage);
+  EXPECT_THAT(found[0].remedy, HasSubstr("--stage FILE"));
+  EXPECT_THAT(found[0].figure, HasSubstr("over 3 experiments"));
+  for (LogSamples& record : log.records) record.sensors.col(0).setConstant(0.0);
+  EXPECT_EQ(health_of(log)[0].cause, Cause::dead);  // a fault comes before what is not known
+  EXPECT_EQ(health_of(log)[1].cause, Cause::unknown_stage);
+}
+
+TEST(Feedback, IsOneFunctionOfTheSensorsInASoundLog) {
+  int wrong = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    const MemoryLog log = closed_loop_log(seed);
+    const FeedbackCheck check = check_feedback(read_health_record({&log}, {}));
+    ASSERT_TRUE(check.unchecked.empty()) << check.unchecked;
+    EXPECT_LT(check.relative, 1e-2);
+    if (!check.inconsistent.empty()) ++wrong;
+  }
+  EXPECT_EQ(wrong, 0);
+}
+
+// The controller of one experiment has half the gain.
+TEST(Feedback, OfAnotherControllerInOneExperimentIsNot) {
+  LoopExperiment x{.periods = 3};
+  x.lines = odd_lines(60);
+  x.noise_factor = 1e-3 * Eigen::MatrixXcd::Identity(2, 2);
+  MemoryLog log = test::simulate_log(test::small_stage(), x);
+  test::ClosedLoop other = test::small_stage();
+  other.controller = [](double omega) {
+    return Eigen::MatrixXcd(0.5 * test::small_stage().controller(omega));
+  };
+  log.records[2] = test::simulate_log(other, x).records[2];
+  const std::vector<Finding> found = health_of(log);
+  const Finding* finding = first_with(found, Cause::controller);
+  ASSERT_NE(finding, nullptr);
+  EXPECT_EQ(finding->severity, Severity::doubt);
+  EXPECT_THAT(finding->what, HasSubstr("not one linear function"));
+}
+
+TEST(Feedback, SaysWhatItNeeds) {
+  MemoryLog log = closed_loop_log();
+  log.log_runs.resize(2);
+  EXPECT_THAT(check_feedback(read_health_record({&log}, {})).unchecked,
+              HasSubstr("more experiments than the 2 sensors"));
+}
+
+}  // namespace
+}  // namespace stageid

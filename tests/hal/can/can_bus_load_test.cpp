@@ -1,0 +1,95 @@
+#include "hal/can/can_bus_load.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include "tests/support/wafer_stage.hpp"
+
+namespace stageid {
+namespace {
+
+// Longest frames in microseconds, rounded, computed by a program that counts the bits of worst
+// cases one by one (11-bit identifiers, 1 Mbit/s nominal).
+TEST(CanBusLoad, FrameTimesAgreeWithCountedBits) {
+  struct Row {
+    std::size_t bytes;
+    double at_2m_us, at_5m_us, at_8m_us;
+  };
+  for (const Row& row :
+       {Row{64, 373, 170, 119}, Row{32, 213, 106, 79}, Row{8, 91, 57, 48}, Row{0, 51, 41, 38}}) {
+    // Half a microsecond of rounding.
+    EXPECT_NEAR(1e6 * can_fd_frame_time_s(row.bytes, 1e6, 2e6), row.at_2m_us, 0.501);
+    EXPECT_NEAR(1e6 * can_fd_frame_time_s(row.bytes, 1e6, 5e6), row.at_5m_us, 0.501);
+    EXPECT_NEAR(1e6 * can_fd_frame_time_s(row.bytes, 1e6, 8e6), row.at_8m_us, 0.501);
+  }
+}
+
+CanSpec wafer_spec(const StageInfo& info, double data_bit_rate_hz) {
+  CanSpec spec;
+  spec.buses = {{"can0", 1e6, data_bit_rate_hz, {}, {}}};
+  spec.buses[0].actuators.resize(info.actuators.size());
+  spec.buses[0].sensors.resize(info.sensors.size());
+  std::iota(spec.buses[0].actuators.begin(), spec.buses[0].actuators.end(), 0);
+  std::iota(spec.buses[0].sensors.begin(), spec.buses[0].sensors.end(), 0);
+  spec.actuator_range_n.assign(info.actuators.size(), 60.0);
+  spec.sensor_range_m.assign(info.sensors.size(), 250e-6);
+  return spec;
+}
+
+// 17 setpoints and 7 measurements, 64 + 32 bytes: 316, 637 and 236 us with a frame that only
+// synchronizes (41, 51 and 38 us), which this protocol does without.
+TEST(CanBusLoad, AWaferStageAsInTheTable) {
+  const StageInfo info = test::silent_wafer_stage_spec().info;
+  struct Row {
+    double data_bit_rate_hz, cycle_us, sync_us;
+  };
+  for (const Row& row : {Row{2e6, 637, 51}, Row{5e6, 316, 41}, Row{8e6, 236, 38}}) {
+    const CanSpec spec = wafer_spec(info, row.data_bit_rate_hz);
+    const CanBusLoad load = can_bus_load(spec, can_layout(spec, info), 1e3).front();
+    EXPECT_NEAR(1e6 * load.cycle_s, row.cycle_us - row.sync_us, 1.0);
+    // Ten state frames of 48 bytes a second beside it.
+    const double heartbeat = 10.0 * can_fd_frame_time_s(48, 1e6, row.data_bit_rate_hz);
+    EXPECT_NEAR(load.load, 1e3 * load.cycle_s + heartbeat, 1e-12);
+    EXPECT_NEAR(load.highest_rate_hz * load.cycle_s + heartbeat, 0.8, 1e-12);
+  }
+}
+
+TEST(CanBusLoad, WhatABusCannotCarryIsRefusedWithTheLoad) {
+  const StageInfo info = test::silent_wafer_stage_spec().info;
+  const CanSpec spec = wafer_spec(info, 5e6);
+  const CanLayout layout = can_layout(spec, info);
+  EXPECT_NO_THROW(require_bus_carries(spec, layout, 2500.0));
+  try {
+    require_bus_carries(spec, layout, 1e4);
+    FAIL() << "10 kHz do not fit";
+  } catch (const std::invalid_argument& error) {
+    // (34 + 678 / 5) + (34 + 358 / 5) us
+    EXPECT_STREQ(error.what(),
+                 "can: can0 would be loaded to 275 % at 10000 Hz (275 us a cycle), 80 % are "
+                 "allowed; at most 2902 Hz, or more buses, or mode: resident");
+  }
+}
+
+TEST(CanBusLoad, EveryBusCarriesItsOwnOnly) {
+  const StageInfo info = test::silent_wafer_stage_spec().info;
+  CanSpec spec = wafer_spec(info, 5e6);
+  spec.buses.push_back({"can1", 1e6, 5e6, {}, spec.buses[0].sensors});
+  spec.buses[0].sensors.clear();
+  const auto loads = can_bus_load(spec, can_layout(spec, info), 1e3);
+  ASSERT_EQ(loads.size(), 2U);
+  EXPECT_DOUBLE_EQ(loads[0].cycle_s, can_fd_frame_time_s(64, 1e6, 5e6));
+  EXPECT_DOUBLE_EQ(loads[1].cycle_s, can_fd_frame_time_s(32, 1e6, 5e6));
+  EXPECT_DOUBLE_EQ(loads[1].load, 1e3 * loads[1].cycle_s) << "heartbeats are on the first bus";
+}
+
+TEST(CanBusLoad, TransferTime) {
+  const StageInfo info = test::silent_wafer_stage_spec().info;
+  // 10^6 chunks of 56 bytes in frames of 64: 169.6 us each, at 80 %.
+  EXPECT_NEAR(can_transfer_time_s(wafer_spec(info, 5e6), 56e6), 169.6 / 0.8, 1e-9);
+}
+
+}  // namespace
+}  // namespace stageid

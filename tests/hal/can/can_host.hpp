@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "tests/hal/can/can_rig.hpp"
+
+namespace stageid::test {
+
+/// A host that gives commands and writes down how each exchange ended.
+class CanHost {
+ public:
+  explicit CanHost(CanRig& rig, CanHostOptions options = {}) : stage_(rig.host(options)) {
+    inputs_.y = y_;
+  }
+  void start(std::uint64_t seed = 7) { stage_->start(seed, inputs_); }
+  Outcome exchange() {
+    const double u = command(cycle_);
+    const std::vector<double> both{u, -0.5 * u};
+    const Outcome outcome = stage_->exchange({cycle_++, 0, both}, inputs_, {});
+    // A run by the wall clock is late on a busy machine; that is not what is looked at here.
+    return outcome == Outcome::late ? Outcome::ok : outcome;
+  }
+  std::vector<Outcome> exchange(int count) {
+    std::vector<Outcome> outcomes;
+    for (int i = 0; i < count; ++i) outcomes.push_back(exchange());
+    return outcomes;
+  }
+  /// An even multiple of the counts of the bus, so that the wire adds no rounding.
+  static double command(std::uint64_t cycle) {
+    const double counts = 2.0 * std::nearbyint(5e4 * std::sin(0.3 * static_cast<double>(cycle)));
+    return counts * 62.5 / kCanCountsOfRange;
+  }
+  CanStage& stage() { return *stage_; }
+  const std::vector<double>& y() const { return y_; }
+  const Inputs& inputs() const { return inputs_; }
+
+ private:
+  std::unique_ptr<CanStage> stage_;
+  std::vector<double> y_ = std::vector<double>(1);
+  Inputs inputs_;
+  std::uint64_t cycle_ = 0;
+};
+
+inline std::vector<Outcome> all_ok(int count) {
+  return std::vector<Outcome>(static_cast<std::size_t>(count), Outcome::ok);
+}
+
+}  // namespace stageid::test

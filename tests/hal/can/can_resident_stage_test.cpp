@@ -1,0 +1,253 @@
+#include "hal/can/can_resident_stage.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hal/stage/motion_controller.hpp"
+#include "tests/hal/can/can_rig.hpp"
+
+namespace stageid {
+namespace {
+
+using test::CanRig;
+
+constexpr int kPeriod = 400;
+
+/// Loses every n-th frame in both directions, whatever it is.
+class LossyCan final : public CanTransport {
+ public:
+  LossyCan(std::unique_ptr<CanTransport> inner, unsigned lost_of_hundred)
+      : inner_(std::move(inner)), lost_of_hundred_(lost_of_hundred) {}
+  std::size_t buses() const noexcept override { return inner_->buses(); }
+  const std::string& name(std::size_t bus) const noexcept override { return inner_->name(bus); }
+  std::size_t send(std::span<const CanFrame> frames) noexcept override {
+    for (const CanFrame& frame : frames)
+      if (!lost()) static_cast<void>(inner_->send({&frame, 1}));
+    return frames.size();
+  }
+  std::size_t receive(std::span<CanFrame> frames) noexcept override {
+    const std::size_t count = inner_->receive(frames);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i)
+      if (!lost()) frames[kept++] = frames[i];
+    return kept;
+  }
+  void wait(std::int64_t until_ns) noexcept override { inner_->wait(until_ns); }
+  const CanBusHealth& health(std::size_t bus) const noexcept override {
+    return inner_->health(bus);
+  }
+  std::int64_t now_ns() const noexcept override { return inner_->now_ns(); }
+  void cut() { lost_of_hundred_ = 100; }
+  void mend() { lost_of_hundred_ = 0; }
+
+ private:
+  bool lost() {
+    random_ = random_ * 6364136223846793005U + 1442695040888963407U;
+    return (random_ >> 40) % 100 < lost_of_hundred_;
+  }
+  std::unique_ptr<CanTransport> inner_;
+  unsigned lost_of_hundred_;
+  std::uint64_t random_ = 1;
+};
+
+class Rows final : public TraceSink {
+ public:
+  void rows(std::uint64_t first_cycle, std::span<const double> values,
+            std::span<const Outcome> outcomes) override {
+    EXPECT_EQ(first_cycle, outcome.size());
+    value.insert(value.end(), values.begin(), values.end());
+    outcome.insert(outcome.end(), outcomes.begin(), outcomes.end());
+    if (after_block) after_block();
+  }
+  std::vector<double> value;
+  std::vector<Outcome> outcome;
+  std::function<void()> after_block;
+};
+
+Waveforms waveforms() {
+  Waveforms w;
+  w.samples.setZero(kPeriod, 2);
+  for (int n = 0; n < kPeriod; ++n)
+    w.samples(n, 1) = 0.5 * std::sin(2.0 * M_PI * 7.0 * n / kPeriod);
+  w.periods = 2;
+  w.transient_periods = 1;
+  return w;
+}
+
+WaferStageSpec noisy_stage() {
+  WaferStageSpec spec = CanRig::quiet_stage();
+  spec.sensor_noise_m = 1e-9;
+  spec.force_noise_n = 1e-3;
+  return spec;
+}
+
+std::unique_ptr<CanResidentStage> resident(CanRig& rig, CanHostOptions options = {}) {
+  return std::make_unique<CanResidentStage>(rig.stage_spec().info, rig.spec(), rig.host_bus(),
+                                            options);
+}
+
+JobProgress play(CanRig& rig, CanResidentStage& stage, std::uint64_t seed) {
+  Trigger trigger;
+  trigger.run_seed = seed;
+  JobProgress progress = stage.arm(trigger);
+  while (progress.status == JobStatus::running) {
+    rig.serve_ms(1);
+    progress = stage.poll();
+  }
+  return progress;
+}
+
+/// u = C(y) + r on the bare stage: rows of u and y.
+std::vector<double> expected_rows(const WaferStageSpec& spec, std::uint64_t seed) {
+  SimulatedStage stage(spec);
+  MotionController controller(spec.controller);
+  const Waveforms w = waveforms();
+  std::vector<double> y(1);
+  std::vector<double> u(2);
+  std::vector<double> rows;
+  Inputs inputs;
+  inputs.y = y;
+  stage.start(seed, inputs);
+  for (std::uint64_t n = 0; n < 3 * kPeriod; ++n) {
+    controller.update(y.data(), u.data());
+    // The waveform goes over as float32.
+    u[1] += static_cast<double>(static_cast<float>(w.samples(static_cast<int>(n % kPeriod), 1)));
+    rows.insert(rows.end(), {u[0], u[1], y[0]});
+    EXPECT_EQ(stage.exchange({n, 0, u}, inputs, {}), Outcome::ok);
+  }
+  return rows;
+}
+
+TEST(CanResidentStage, RecordsWhatTheLoopHereWouldHaveMeasured) {
+  CanRig rig({}, noisy_stage());
+  const auto stage = resident(rig);
+  EXPECT_EQ(stage->upload(waveforms()).status, JobStatus::done);
+  for (const std::uint64_t seed : {3U, 4U}) {
+    if (seed == 4U) stage->upload(waveforms());
+    ASSERT_EQ(play(rig, *stage, seed).status, JobStatus::done);
+    Rows rows;
+    EXPECT_EQ(stage->download(rows).done, 3U * kPeriod);
+    const std::vector<double> expected = expected_rows(rig.stage_spec(), seed);
+    ASSERT_EQ(rows.value.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i)  // half a unit of float32's last place
+      ASSERT_NEAR(rows.value[i], expected[i], 0x1p-24 * std::abs(expected[i]) + 1e-40) << i;
+    EXPECT_THAT(rows.outcome, testing::Each(Outcome::ok));
+  }
+  EXPECT_EQ(rig.node().state(), NodeState::operation_enabled);
+  stage->stop();
+  EXPECT_EQ(rig.node().state(), NodeState::switch_on_disabled);
+}
+
+TEST(CanResidentStage, TransfersHealOnABusThatLosesAFifth) {
+  CanRig rig({}, noisy_stage());
+  CanResidentStage stage(rig.stage_spec().info, rig.spec(),
+                         std::make_unique<LossyCan>(rig.host_bus(), 20), {});
+  stage.upload(waveforms());
+  ASSERT_EQ(play(rig, stage, 3).status, JobStatus::done);
+  Rows rows;
+  stage.download(rows);
+  EXPECT_GT(stage.repeated_chunks(), 0U);
+  const std::vector<double> expected = expected_rows(rig.stage_spec(), 3);
+  ASSERT_EQ(rows.value.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    ASSERT_NEAR(rows.value[i], expected[i], 0x1p-24 * std::abs(expected[i]) + 1e-40) << i;
+}
+
+TEST(CanResidentStage, ATransferThatBrokeOffGoesOn) {
+  CanRig rig;
+  auto bus = std::make_unique<LossyCan>(rig.host_bus(), 0);
+  LossyCan& wire = *bus;
+  CanResidentStage stage(rig.stage_spec().info, rig.spec(), std::move(bus), {});
+  stage.connect();
+  wire.cut();
+  EXPECT_THROW(stage.upload(waveforms()), StageError);
+  wire.mend();
+  EXPECT_EQ(stage.upload(waveforms()).status, JobStatus::done);
+  ASSERT_EQ(play(rig, stage, 3).status, JobStatus::done);
+  Rows rows;
+  wire.cut();
+  EXPECT_THROW(stage.download(rows), StageError);
+  wire.mend();
+  EXPECT_EQ(stage.download(rows).done, 3U * kPeriod);
+  EXPECT_EQ(rows.outcome.size(), 3U * kPeriod);
+}
+
+TEST(CanResidentStage, ALimitEndsTheRunAndTheRowsUpToItAreThere) {
+  WaferStageSpec spec = CanRig::quiet_stage();
+  spec.limits.actuator_n[1] = 0.4;
+  CanRig rig({}, spec);
+  const auto stage = resident(rig);
+  stage->upload(waveforms());
+  const JobProgress progress = play(rig, *stage, 3);
+  EXPECT_EQ(progress.status, JobStatus::failed);
+  EXPECT_EQ(progress.outcome, Outcome::limit);
+  EXPECT_THAT(progress.message, testing::HasSubstr("actuator a2: |u| would be 0.4"));
+  Rows rows;
+  stage->download(rows);
+  ASSERT_GT(rows.outcome.size(), 1U);
+  EXPECT_GT(std::abs(rows.value[3 * (rows.outcome.size() - 1) + 1]), 0.4);
+  rig.serve_ms(200);
+  EXPECT_EQ(rig.node().state(), NodeState::fault);
+}
+
+TEST(CanResidentStage, ANodeWhoseHostFallsSilentStops) {
+  CanRig rig;
+  rig.boot();
+  const auto stage = resident(rig);
+  Waveforms endless = waveforms();
+  endless.periods = 5000;
+  stage->upload(endless);
+  stage->arm({});
+  rig.serve_ms(1000);
+  EXPECT_EQ(rig.node().state(), NodeState::measuring);
+  rig.serve_ms(2);
+  EXPECT_EQ(rig.node().cause(), FaultCause::watchdog);
+  rig.serve_ms(120);
+  EXPECT_EQ(rig.node().state(), NodeState::fault);
+}
+
+TEST(CanResidentStage, StopBringsAPlayingNodeToRestUnderControl) {
+  CanRig rig;
+  const auto stage = resident(rig);
+  Waveforms endless = waveforms();
+  endless.periods = 5000;
+  stage->upload(endless);
+  stage->arm({});
+  stage->stop();
+  EXPECT_EQ(rig.node().state(), NodeState::quick_stop);
+  rig.serve_ms(120);
+  EXPECT_EQ(rig.node().state(), NodeState::switch_on_disabled);
+}
+
+TEST(CanResidentStage, RefusesWhatDoesNotFit) {
+  CanRig rig;
+  const auto stage = resident(rig);
+  const auto refused = [&](auto change) {
+    Waveforms w = waveforms();
+    change(w);
+    EXPECT_THROW(stage->upload(w), std::invalid_argument);
+  };
+  refused([](Waveforms& w) { w.samples.setZero(); });
+  refused([](Waveforms& w) { w.samples.resize(0, 2); });
+  refused([](Waveforms& w) { w.samples.conservativeResize(kPeriod, 1); });
+  refused([](Waveforms& w) { w.samples(3, 0) = NAN; });
+  refused([](Waveforms& w) { w.periods = 0; });
+  refused([](Waveforms& w) { w.periods = 1 << 30; });
+  EXPECT_THROW(stage->arm({}), StageError) << "nothing uploaded";
+  stage->upload(waveforms());
+  Trigger backwards;
+  backwards.ramp_s = -1.0;
+  EXPECT_THROW(stage->arm(backwards), std::invalid_argument);
+  rig.freeze();
+  EXPECT_THROW(stage->poll(), StageError);
+  EXPECT_NO_THROW(stage->stop());
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,122 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hal/can/can_node.hpp"
+#include "hal/can/can_pair.hpp"
+#include "hal/can/can_stage.hpp"
+#include "hal/can/faulty_can.hpp"
+#include "hal/node/stage_node.hpp"
+#include "tests/support/wafer_stage.hpp"
+
+namespace stageid::test {
+
+inline std::vector<CanFault> can_faults(const std::vector<std::string>& texts) {
+  std::vector<CanFault> faults;
+  for (const std::string& text : texts) faults.push_back(parse_can_fault(text));
+  return faults;
+}
+
+struct CanRigOptions {
+  std::vector<std::string> host_faults;  ///< of setpoint frames
+  std::vector<std::string> node_faults;  ///< of measurement frames
+  int buses = 1;                         ///< actuator a2 on the second
+};
+
+/// A simulated stage of two actuators and one sensor behind buses within the process, at 1 kHz: the
+/// node works while the host waits, and time is that of the bus.
+class CanRig {
+ public:
+  explicit CanRig(CanRigOptions options = {}, WaferStageSpec stage = quiet_stage())
+      : stage_spec_(std::move(stage)),
+        spec_(can_spec(options.buses)),
+        layout_(can_layout(spec_, stage_spec_.info)),
+        pair_(names(options.buses)),
+        node_bus_(pair_.node(), can_faults(options.node_faults)),
+        host_faults_(can_faults(options.host_faults)) {
+    boot();
+  }
+
+  static WaferStageSpec quiet_stage() {
+    WaferStageSpec spec = small_stage_spec();
+    spec.limits.actuator_n = Eigen::VectorXd::Constant(2, 50.0);
+    spec.limits.position_window_m = Eigen::VectorXd::Constant(1, 1e-3);
+    AxisController axis;
+    axis.crossover_hz = 10.0;
+    axis.gain = 100.0;
+    spec.controller.sample_rate_hz = spec.info.sample_rate_hz;
+    spec.controller.sensor_decoupling = Eigen::MatrixXd::Ones(1, 1);
+    spec.controller.actuator_decoupling = Eigen::MatrixXd::Ones(2, 1);
+    spec.controller.axes = {axis};
+    return spec;
+  }
+
+  /// A new node process: nothing of the old one is left.
+  void boot() {
+    NodeOptions options;
+    options.watchdog_s = spec_.watchdog_s;
+    front_.reset();
+    stage_node_ = std::make_unique<StageNode>(std::make_unique<SimulatedStage>(stage_spec_),
+                                              stage_spec_.limits, stage_spec_.controller,
+                                              NodePanel{}, options);
+    front_ = std::make_unique<CanNode>(*stage_node_, layout_, node_bus_);
+    thaw();
+  }
+  void freeze() {
+    pair_.when_host_waits([] {});
+  }
+  void thaw() {
+    pair_.when_host_waits([this] { front_->serve(0); });
+  }
+  /// The node alone, for so long.
+  void serve_ms(int milliseconds) {
+    for (int i = 0; i < milliseconds; ++i) {
+      pair_.pass_time(1'000'000);
+      front_->serve(0);
+    }
+  }
+
+  std::unique_ptr<CanTransport> host_bus() {
+    return std::make_unique<FaultyCan>(pair_.host(), host_faults_);
+  }
+  std::unique_ptr<CanStage> host(CanHostOptions options = {}) {
+    return std::make_unique<CanStage>(stage_spec_.info, spec_, host_bus(), options);
+  }
+
+  const WaferStageSpec& stage_spec() const { return stage_spec_; }
+  const CanSpec& spec() const { return spec_; }
+  const CanLayout& layout() const { return layout_; }
+  CanPair& pair() { return pair_; }
+  StageNode& node() { return *stage_node_; }
+  CanNode& front() { return *front_; }
+
+ private:
+  static std::vector<std::string> names(int buses) {
+    std::vector<std::string> list;
+    for (int i = 0; i < buses; ++i) list.push_back("pair" + std::to_string(i));
+    return list;
+  }
+  static CanSpec can_spec(int buses) {
+    CanSpec spec;
+    spec.buses.push_back({"pair0", 1e6, 5e6, {0}, {0}});
+    if (buses > 1) spec.buses.push_back({"pair1", 1e6, 5e6, {}, {}});
+    spec.buses.back().actuators.push_back(1);
+    spec.actuator_range_n = {62.5, 62.5};
+    spec.sensor_range_m = {1.25e-3};
+    return spec;
+  }
+
+  WaferStageSpec stage_spec_;
+  CanSpec spec_;
+  CanLayout layout_;
+  CanPair pair_;
+  FaultyCan node_bus_;
+  std::vector<CanFault> host_faults_;
+  std::unique_ptr<StageNode> stage_node_;
+  std::unique_ptr<CanNode> front_;
+};
+
+}  // namespace stageid::test

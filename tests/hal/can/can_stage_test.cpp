@@ -1,0 +1,305 @@
+#include "hal/can/can_stage.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "tests/hal/can/can_host.hpp"
+
+namespace stageid {
+namespace {
+
+using test::all_ok;
+using test::CanRig;
+using Host = test::CanHost;
+using Wire = test::CanRigOptions;
+
+TEST(CanStage, GivesTheSamplesOfTheStageItselfButForRounding) {
+  WaferStageSpec spec = CanRig::quiet_stage();
+  spec.sensor_noise_m = 1e-9;
+  spec.force_noise_n = 1e-3;
+  CanRig rig({}, spec);
+  Host host(rig);
+  SimulatedStage bare(spec);
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
+  for (const std::uint64_t seed : {7U, 8U}) {
+    Host again(rig);
+    again.start(seed);
+    bare.start(seed, inputs);
+    for (std::uint64_t n = 0; n < 300; ++n) {
+      // Half a count of the sensor is all that the wire may change.
+      ASSERT_NEAR(again.y()[0], y[0], 0.5001 * 1.25e-3 / kCanCountsOfRange) << n;
+      const std::vector<double> u{Host::command(n), -0.5 * Host::command(n)};
+      ASSERT_EQ(again.exchange(), Outcome::ok);
+      ASSERT_EQ(bare.exchange({n, 0, u}, inputs, {}), Outcome::ok);
+    }
+    again.stage().stop();
+    EXPECT_EQ(rig.node().state(), NodeState::switch_on_disabled);
+  }
+  EXPECT_EQ(rig.front().rejected(), 0U);
+}
+
+TEST(CanStage, SequenceNumbersGoRound) {
+  CanRig rig;
+  Host host(rig);
+  host.start();
+  for (int n = 0; n < 70000; ++n) ASSERT_EQ(host.exchange(), Outcome::ok) << n;
+  EXPECT_EQ(rig.node().sample(), 70000U);
+}
+
+TEST(CanStage, FourLostAnswersInARowAreStale) {
+  CanRig rig(Wire{{}, {"lost@3x4"}});
+  Host host(rig);
+  host.start();
+  EXPECT_THAT(host.exchange(4),
+              testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::stale, Outcome::ok));
+  EXPECT_EQ(host.stage().counts().repeats, 3U);
+}
+
+TEST(CanStage, AChannelWithoutAValueIsIncompleteOrStale) {
+  WaferStageSpec spec = CanRig::quiet_stage();
+  spec.faults = {{WaferStageSpec::Fault::Kind::missed_cycle, 0, 2, 1, -1}};
+  CanRig rig({}, spec);
+  Host host(rig);
+  host.start();
+  EXPECT_THAT(host.exchange(4),
+              testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::stale, Outcome::ok));
+}
+
+TEST(CanStage, ASetpointThatIsMissingOnOneBusMovesNothing) {
+  // Frames in turn: u[2] on the second bus is frame 5.
+  CanRig rig(Wire{{"lost@5"}, {}, 2});
+  Host host(rig, {1e3, false});
+  host.start();
+  std::vector<Outcome> expected = all_ok(6);
+  expected[2] = Outcome::stale;
+  EXPECT_EQ(host.exchange(6), expected);
+  EXPECT_EQ(rig.node().sample(), 5U);
+  host.stage().stop();
+  EXPECT_EQ(host.stage().node().gaps, 1U);
+}
+
+TEST(CanStage, ALimitInTheNodeEndsTheRunForSafety) {
+  WaferStageSpec spec = CanRig::quiet_stage();
+  spec.limits.actuator_n[0] = 0.4;  // reached in cycle 2: 0.745 N sin 0.6
+  CanRig rig({}, spec);
+  Host host(rig);
+  host.start();
+  EXPECT_THAT(host.exchange(4),
+              testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::limit, Outcome::limit));
+  EXPECT_THAT(
+      host.stage().trouble(),
+      testing::HasSubstr("fault reaction: actuator a1: |u| would be 0.4207 N, limit 0.4 N"));
+  rig.serve_ms(200);
+  EXPECT_EQ(rig.node().state(), NodeState::fault);
+  host.stage().stop();
+}
+
+TEST(CanStage, ASensorThatGivesNoNumberEndsTheRunForSafety) {
+  WaferStageSpec spec = CanRig::quiet_stage();
+  spec.faults = {{WaferStageSpec::Fault::Kind::nan_sensor, 0, 2, 1, -1}};
+  CanRig rig({}, spec);
+  Host host(rig);
+  host.start();
+  EXPECT_THAT(host.exchange(3), testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::limit));
+  EXPECT_EQ(host.inputs().valid, 0U);
+  EXPECT_THAT(host.stage().trouble(),
+              testing::HasSubstr("sensor s1: the measurement is not finite"));
+}
+
+TEST(CanStage, AnInterlockIsAFault) {
+  WaferStageSpec spec = CanRig::quiet_stage();
+  spec.faults = {{WaferStageSpec::Fault::Kind::interlock, 0, 2, 1, -1}};
+  CanRig rig({}, spec);
+  Host host(rig);
+  host.start();
+  EXPECT_THAT(host.exchange(3), testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::fault));
+  EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the stage reported a fault"));
+}
+
+TEST(CanStage, AHostThatFallsSilentIsStoppedWithinTheWatchdog) {
+  CanRig rig;
+  Host host(rig);
+  host.start();
+  host.exchange(5);
+  rig.serve_ms(20);
+  EXPECT_EQ(rig.node().state(), NodeState::measuring);
+  rig.serve_ms(2);
+  EXPECT_EQ(rig.node().state(), NodeState::fault_reaction);
+  EXPECT_EQ(host.exchange(), Outcome::fault);
+  EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the host fell silent"));
+  rig.serve_ms(110);
+  EXPECT_EQ(rig.node().state(), NodeState::fault);
+}
+
+TEST(CanStage, AFaultIsLeftByAnExplicitResetOnly) {
+  CanRig rig;
+  Host host(rig);
+  host.start();
+  rig.serve_ms(200);
+  ASSERT_EQ(rig.node().state(), NodeState::fault);
+  try {
+    Host(rig).start();
+    FAIL() << "in fault";
+  } catch (const StageError& error) {
+    EXPECT_STREQ(error.what(),
+                 "can: pair0: the node is in fault (the host fell silent); remove the cause and "
+                 "add --reset-fault");
+  }
+  Host resetting(rig, {0.0, true});
+  resetting.start();
+  EXPECT_EQ(resetting.exchange(), Outcome::ok);
+}
+
+TEST(CanStage, ANodeThatFreezesIsStaleAndOneThatRestartsAFault) {
+  CanRig rig;
+  Host host(rig);
+  host.start();
+  host.exchange(5);
+  rig.freeze();
+  const std::int64_t before_ns = rig.pair().now_ns();
+  EXPECT_EQ(host.exchange(), Outcome::stale);
+  EXPECT_EQ(rig.pair().now_ns() - before_ns, 4 * 5'000'000) << "four times reply_timeout_s";
+  EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("did not answer sample 6"));
+  rig.boot();
+  EXPECT_EQ(host.exchange(), Outcome::fault);
+  EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the node was restarted"));
+  EXPECT_EQ(rig.node().sample(), 0U);
+}
+
+TEST(CanStage, TheStateOfTheBusIsAnOutcome) {
+  const auto with = [](CanBusState state, const char* text) {
+    CanRig rig(Wire{{}, {}, 2});
+    Host host(rig);
+    host.start();
+    host.exchange(3);
+    rig.pair().set_state(1, state);
+    const Outcome outcome = host.exchange();
+    if (outcome != Outcome::ok) {
+      EXPECT_EQ(host.stage().trouble(), text);
+    }
+    rig.pair().set_state(1, CanBusState::active);
+    rig.serve_ms(5);
+    return outcome;
+  };
+  EXPECT_EQ(with(CanBusState::warning, ""), Outcome::ok);
+  EXPECT_EQ(with(CanBusState::passive, "pair1: error passive"), Outcome::bus_passive);
+  EXPECT_EQ(with(CanBusState::off, "pair1: bus off"), Outcome::bus_off);
+  EXPECT_EQ(with(CanBusState::down, "pair1: interface down"), Outcome::link_down);
+}
+
+TEST(CanStage, ANodeWhoseBusIsOffStopsByItself) {
+  CanRig rig;
+  Host host(rig);
+  host.start();
+  host.exchange(3);
+  rig.pair().set_state(0, CanBusState::off);
+  rig.serve_ms(1);
+  EXPECT_EQ(rig.node().cause(), FaultCause::bus_off);
+  rig.serve_ms(120);
+  EXPECT_EQ(rig.node().state(), NodeState::fault);
+}
+
+TEST(CanStage, StartRefusesInWords) {
+  CanRig rig;
+  rig.freeze();
+  try {
+    Host(rig).start();
+    FAIL() << "nobody there";
+  } catch (const StageError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("can: pair0: no node answers within 600 ms"));
+  }
+  rig.pair().set_state(0, CanBusState::off);
+  try {
+    Host(rig).start();
+    FAIL() << "bus off";
+  } catch (const StageError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("can: pair0: bus off"));
+  }
+  rig.pair().set_state(0, CanBusState::active);
+  rig.thaw();
+  WaferStageSpec other = rig.stage_spec();
+  other.info.sensors[0].name = "other";
+  CanStage stranger(other.info, rig.spec(), rig.host_bus(), {});
+  EXPECT_THROW(stranger.connect(), StageError);
+  NodePanel open;
+  open.interlock_closed = false;
+  rig.node().set_panel(open);
+  try {
+    Host(rig).start();
+    FAIL() << "interlock";
+  } catch (const StageError& error) {
+    EXPECT_STREQ(error.what(), "can: pair0: the node refuses: the interlock is open; close it");
+  }
+}
+
+TEST(CanStage, ARunStartsThoughItsFirstFramesAreLost) {
+  CanRig rig(Wire{{}, {"lost@0x2"}});
+  Host host(rig);
+  host.start();
+  EXPECT_THAT(host.exchange(3), testing::ElementsAreArray(all_ok(3)));
+  CanRig deaf(Wire{{}, {"lost@0x3"}});
+  Host unlucky(deaf);
+  EXPECT_THROW(unlucky.start(), StageError);
+  EXPECT_EQ(deaf.node().state(), NodeState::switch_on_disabled);
+}
+
+TEST(CanStage, WhatIsNoNumberReachesNoFrame) {
+  CanRig rig;
+  auto stage = rig.host();
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
+  stage->start(1, inputs);
+  const std::vector<double> u{std::numeric_limits<double>::quiet_NaN(), 0.0};
+  EXPECT_EQ(stage->exchange({0, 0, u}, inputs, {}), Outcome::fault);
+  EXPECT_EQ(rig.node().sample(), 0U);
+  EXPECT_EQ(stage->exchange({0, 0, {}}, inputs, {}), Outcome::fault);
+}
+
+TEST(CanStage, WhatTheWireCannotCarryStopsTheRun) {
+  CanRig rig;
+  auto stage = rig.host();
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
+  stage->start(1, inputs);
+  const std::vector<double> large{100.0, 0.0};
+  EXPECT_EQ(stage->exchange({0, 0, large}, inputs, {}), Outcome::fault);
+  EXPECT_EQ(stage->counts().saturated, 1U);
+  EXPECT_EQ(rig.node().sample(), 0U) << "no other value instead";
+  EXPECT_THAT(stage->trouble(), testing::HasSubstr("beyond the range of the wire"));
+}
+
+TEST(CanStage, GarbageDoesNoHarm) {
+  CanRig rig;
+  Host host(rig);
+  host.start();
+  std::uint64_t random = 1;
+  for (int n = 0; n < 2000; ++n) {
+    CanFrame frame;
+    for (std::uint8_t& byte : frame.data) {
+      random = random * 6364136223846793005U + 1442695040888963407U;
+      byte = static_cast<std::uint8_t>(random >> 56);
+    }
+    constexpr std::uint16_t kIds[] = {kCanCommandId, kCanSetpointId, kCanUploadId, kCanStateId,
+                                      kCanSensorId,  kCanTextId,     0x7FF,        kCanMissingId};
+    frame.id = kIds[random >> 40 & 7U];
+    frame.length = static_cast<std::uint8_t>(can_fd_length(random >> 33 & 63U));
+    static_cast<void>(rig.pair().host().send({&frame, 1}));
+    static_cast<void>(rig.pair().node().send({&frame, 1}));
+    ASSERT_EQ(host.exchange(), Outcome::ok) << n;
+  }
+  EXPECT_EQ(rig.node().sample(), 2000U);
+  EXPECT_EQ(rig.node().state(), NodeState::measuring);
+  EXPECT_EQ(rig.front().rejected(), 2000U);
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,71 @@
+#include "hal/modbus/modbus_codec.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+TEST(ModbusCodec, TheMoreSignificantWordComesFirst) {
+  std::array<std::uint16_t, 4> r{};
+  put_u32(std::span(r).first<2>(), 0x53544749);
+  EXPECT_EQ(r[0], 0x5354);
+  EXPECT_EQ(r[1], 0x4749);
+  put_u64(r, 0x0123456789ABCDEF);
+  EXPECT_EQ(r, (std::array<std::uint16_t, 4>{0x0123, 0x4567, 0x89AB, 0xCDEF}));
+  EXPECT_EQ(get_u64(r), 0x0123456789ABCDEFU);
+}
+
+// Bit patterns of IEEE 754 and of two's complement, written out.
+TEST(ModbusCodec, FloatsAndSignedNumbersAreTheirBits) {
+  std::array<std::uint16_t, 2> r{};
+  put_f32(r, 1.5F);
+  EXPECT_EQ(r, (std::array<std::uint16_t, 2>{0x3FC0, 0x0000}));
+  EXPECT_EQ(get_f32(r), 1.5F);
+  put_f32(r, -295.25F);
+  EXPECT_EQ(r, (std::array<std::uint16_t, 2>{0xC393, 0xA000}));
+  EXPECT_EQ(get_f32(r), -295.25F);
+  put_i32(r, -2);
+  EXPECT_EQ(r, (std::array<std::uint16_t, 2>{0xFFFF, 0xFFFE}));
+  EXPECT_EQ(get_i32(r), -2);
+}
+
+TEST(ModbusCodec, CountsAreTheNearestAndSaturate) {
+  EXPECT_EQ(to_counts(3.4, 1.0), 3);
+  EXPECT_EQ(to_counts(-3.6, 1.0), -4);
+  EXPECT_EQ(to_counts(0.75, 0.5), 2);  // 1.5: to even
+  EXPECT_EQ(to_counts(1e30, 1.0), 2147483647);
+  EXPECT_EQ(to_counts(-std::numeric_limits<double>::infinity(), 1.0), -2147483647);
+  EXPECT_EQ(to_counts(std::numeric_limits<double>::quiet_NaN(), 1.0), 0);
+}
+
+TEST(ModbusCodec, KnowsWhatItCannotCarry) {
+  EXPECT_TRUE(fits_counts(2147483647.0, 1.0));
+  EXPECT_TRUE(fits_counts(-1.0, 0.5));
+  EXPECT_FALSE(fits_counts(2147483648.0, 1.0));
+  EXPECT_FALSE(fits_counts(-1e30, 1.0));
+  EXPECT_FALSE(fits_counts(std::numeric_limits<double>::quiet_NaN(), 1.0));
+}
+
+TEST(ModbusCodec, AScaleIsTheSmallestPowerOfTwoThatHoldsTheRange) {
+  for (const double range : {40e-3, 2.0, 1.0, 2147483647.0, 80.0, 1e-20, 1e20}) {
+    const auto scale = static_cast<double>(count_scale(range));
+    int exponent = 0;
+    EXPECT_EQ(std::frexp(scale, &exponent), 0.5) << range;
+    EXPECT_GE(scale * 2147483647.0, range);
+    EXPECT_LT(0.5 * scale * 2147483647.0, range);
+  }
+}
+
+TEST(ModbusCodec, ARangeThatCannotBeScaledIsRefused) {
+  for (const double range : {0.0, -1.0, 1e-21, 1e21, std::numeric_limits<double>::infinity(),
+                             std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THROW(static_cast<void>(count_scale(range)), std::invalid_argument) << range;
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,217 @@
+#include "hal/modbus/modbus_stage.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <limits>
+
+#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_map.hpp"
+#include "tests/hal/modbus/modbus_bench.hpp"
+#include "tests/hal/modbus/numbered_registers.hpp"
+
+namespace stageid {
+namespace {
+
+namespace map = modbus_map;
+using test::ModbusBench;
+using testing::HasSubstr;
+
+/// The host's side of a bench.
+class Host {
+ public:
+  explicit Host(const ModbusBench& bench, const StageInfo& info = ModbusBench::info())
+      : stage(info, bench.address(), test::kQuickTiming) {
+    inputs.y = y;
+  }
+  void start(std::uint64_t seed = 1) { stage.start(seed, inputs); }
+  Outcome exchange(double u0, double u1 = 0.0) {
+    const std::array<double, 2> u = {u0, u1};
+    return stage.exchange({cycle++, 0, u}, inputs, {});
+  }
+
+  ModbusStage stage;
+  std::vector<double> y = std::vector<double>(1);
+  Inputs inputs;
+  std::uint64_t cycle = 0;
+};
+
+// The smallest powers of two that hold 20 N and 20 mm in 2^31 - 1 counts.
+constexpr double kForceCount_n = 0x1p-26;
+constexpr double kPositionCount_m = 0x1p-36;
+
+TEST(ModbusStage, CarriesCommandsAndMeasurementsToHalfACount) {
+  ModbusBench bench;
+  Host host(bench);
+  host.start(0xFEDCBA9876543210U);
+  EXPECT_NEAR(host.y[0], 1.25e-3, 0.5 * kPositionCount_m);
+  EXPECT_EQ(host.inputs.valid, 1U);
+  EXPECT_EQ(host.inputs.node_state, NodeState::measuring);
+  EXPECT_EQ(host.exchange(0.1, -7.7), Outcome::ok);
+  EXPECT_EQ(host.inputs.cycle, 1U);
+  EXPECT_EQ(host.exchange(9.99, 0.0), Outcome::ok);
+  host.stage.stop();
+  bench.stop();
+  EXPECT_EQ(bench.fake->seed, 0xFEDCBA9876543210U);
+  ASSERT_EQ(bench.fake->commands.size(), 2U);
+  EXPECT_NEAR(bench.fake->commands[0][0], 0.1, 0.5 * kForceCount_n);
+  EXPECT_NEAR(bench.fake->commands[0][1], -7.7, 0.5 * kForceCount_n);
+  EXPECT_NEAR(bench.fake->commands[1][0], 9.99, 0.5 * kForceCount_n);
+}
+
+struct FaultCase {
+  const char* fault;
+  bool serial;
+  Outcome outcome;
+  std::size_t moved;  // samples of the fake stage
+  const char* trouble;
+};
+
+// Magic, description (2), state, command echo, enable, begin.
+constexpr int kStartRequests = 7;
+
+class ModbusStageFault : public testing::TestWithParam<FaultCase> {};
+
+TEST_P(ModbusStageFault, EndsAsItShould) {
+  const FaultCase& row = GetParam();
+  std::string fault = row.fault;
+  fault.replace(fault.find('#'), 1, "@" + std::to_string(kStartRequests + 2));
+  ModbusBench bench({fault}, row.serial);
+  Host host(bench);
+  host.start();
+  EXPECT_EQ(host.exchange(1.0), Outcome::ok);
+  EXPECT_EQ(host.exchange(2.0), row.outcome) << host.stage.trouble();
+  EXPECT_THAT(host.stage.trouble(), HasSubstr(row.trouble));
+  if (row.outcome == Outcome::late) {
+    EXPECT_EQ(host.exchange(3.0), Outcome::ok);
+  }
+  host.stage.stop();
+  bench.stop();
+  EXPECT_EQ(bench.fake->commands.size(), row.moved) << "moved twice, or not at all";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, ModbusStageFault,
+    testing::Values(FaultCase{"late_reply#:0.6", false, Outcome::late, 3, ""},
+                    FaultCase{"late_reply#:0.6", true, Outcome::late, 3, ""},
+                    FaultCase{"half_frame#", false, Outcome::late, 3, ""},
+                    FaultCase{"half_frame#", true, Outcome::late, 3, ""},
+                    FaultCase{"wrong_unit#", false, Outcome::late, 3, ""},
+                    FaultCase{"wrong_unit#", true, Outcome::late, 3, ""},
+                    FaultCase{"exception#:6", false, Outcome::late, 3, ""},
+                    FaultCase{"half_frame#x2", false, Outcome::link_down, 2, "no reply within"},
+                    FaultCase{"half_frame#x2", true, Outcome::link_down, 2, "no reply within"},
+                    FaultCase{"wrong_unit#x2", false, Outcome::corrupt, 2, "do not belong"},
+                    FaultCase{"wrong_unit#x2", true, Outcome::corrupt, 2, "failed its check"},
+                    FaultCase{"exception#x2:4", false, Outcome::fault, 1, "refused"},
+                    FaultCase{"dead_server#", false, Outcome::link_down, 1, "not connected"},
+                    FaultCase{"interlock#", false, Outcome::fault, 1, "interlock"}));
+
+TEST(ModbusStage, ACommandThatIsNoNumberIsNotSent) {
+  ModbusBench bench;
+  Host host(bench);
+  host.start();
+  EXPECT_EQ(host.exchange(std::numeric_limits<double>::quiet_NaN()), Outcome::fault);
+  EXPECT_THAT(host.stage.trouble(), HasSubstr("not finite"));
+  EXPECT_EQ(host.exchange(1e9), Outcome::fault);
+  EXPECT_THAT(host.stage.trouble(), HasSubstr("beyond the range of the wire"));
+  host.stage.stop();
+  bench.stop();
+  EXPECT_TRUE(bench.fake->commands.empty());
+}
+
+TEST(ModbusStage, DisablesOnlyWhatItEnabled) {
+  ModbusBench bench;
+  Host host(bench);
+  EXPECT_EQ(host.exchange(0.0), Outcome::fault) << "not started";
+  host.start();
+  host.stage.stop();
+  EXPECT_EQ(bench.node().state(), NodeState::switch_on_disabled);
+  ASSERT_TRUE(bench.node().request(SupervisorCommand::enable).accepted);
+  host.start();
+  host.stage.stop();
+  EXPECT_EQ(bench.node().state(), NodeState::operation_enabled);
+}
+
+std::string refusal(const ModbusBench& bench, const StageInfo& info = ModbusBench::info()) {
+  try {
+    Host(bench, info).start();
+  } catch (const StageError& error) {
+    return error.what();
+  }
+  return "started";
+}
+
+TEST(ModbusStage, StartsOnNothingButItsOwnStage) {
+  const ModbusBench bench;
+  StageInfo info = ModbusBench::info();
+  info.sample_rate_hz = 51.0;
+  EXPECT_THAT(refusal(bench, info), HasSubstr("50 Hz, the stage file says 51 Hz"));
+  info = ModbusBench::info();
+  std::swap(info.actuators[0], info.actuators[1]);
+  EXPECT_THAT(refusal(bench, info), HasSubstr("another stage"));
+  Inputs wrong_size;
+  ModbusStage stage(ModbusBench::info(), bench.address(), test::kQuickTiming);
+  EXPECT_THROW(stage.start(1, wrong_size), std::invalid_argument);
+  EXPECT_EQ(refusal(bench), "started");
+}
+
+TEST(ModbusStage, SaysWhyAStageDoesNotStart) {
+  NodePanel panel = test::good_panel();
+  panel.interlock_closed = false;
+  EXPECT_THAT(refusal(ModbusBench({}, false, 1.0, panel)), HasSubstr("the interlock is open"));
+
+  ModbusBench measured;
+  Host other(measured);
+  other.start();
+  EXPECT_THAT(refusal(measured), HasSubstr("another host measures with this stage"));
+
+  test::NumberedRegisters foreign;
+  const test::ServerThread server(foreign, nullptr);
+  ModbusStage stage(ModbusBench::info(), server.address(), test::kQuickTiming);
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
+  EXPECT_THROW(stage.start(1, inputs), StageError);
+}
+
+/// A setpoint as it travels; the reply's sequence and missed count.
+std::pair<std::uint32_t, std::uint32_t> setpoint(ModbusLink& link, std::uint32_t session,
+                                                 std::uint32_t sequence) {
+  std::array<std::uint16_t, 8> request{};
+  put_u32(std::span(request).first<2>(), session);
+  put_u32(std::span(request).subspan<2, 2>(), sequence);
+  std::array<std::uint16_t, 8> reply{};
+  EXPECT_EQ(link.exchange(map::kRunKey, request, map::kMeasurementBootId, reply), LinkStatus::ok);
+  const auto replied = std::span<const std::uint16_t>(reply);
+  return {get_u32(replied.subspan<2, 2>()), get_u32(replied.subspan<6, 2>()) >> 24};
+}
+
+TEST(ModbusNode, OnlyANewerSetpointMovesTheStage) {
+  ModbusBench bench;
+  ASSERT_TRUE(bench.node().request(SupervisorCommand::enable).accepted);
+  ModbusLink link(bench.address(), test::kQuickTiming);
+  link.connect();
+  std::vector<std::uint16_t> reply(14);
+  const std::uint32_t session = begin_run(link, 3, reply);
+  EXPECT_EQ(setpoint(link, session, 1), std::pair(1U, 0U));
+  EXPECT_EQ(setpoint(link, session, 1), std::pair(1U, 0U));
+  EXPECT_EQ(setpoint(link, session, 4), std::pair(4U, 2U)) << "two were left out";
+  EXPECT_EQ(setpoint(link, session, 2), std::pair(4U, 2U)) << "an old one";
+  bench.stop();
+  EXPECT_EQ(bench.fake->commands.size(), 2U);
+}
+
+TEST(ModbusNode, RefusesWhatTheMapCannotShow) {
+  NodePanel panel = test::good_panel();
+  panel.temperature_k.assign(9, 295.0);
+  EXPECT_THROW(ModbusBench({}, false, 1.0, panel), std::invalid_argument);
+  panel.temperature_k.clear();
+  EXPECT_THROW(ModbusBench({"temperature:400"}, false, 1.0, panel), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(modbus_scales(Eigen::VectorXd(), 2, "actuator")),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "hal/modbus/modbus_pdu.hpp"
+
+namespace stageid::test {
+
+/// 130 registers that hold their own number.
+class NumberedRegisters final : public ModbusRegisters {
+ public:
+  NumberedRegisters() {
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::uint16_t>(i);
+  }
+  void begin_request(ModbusConnection) override { ++requests; }
+  void tick() override {}
+  ModbusException write(int first, std::span<const std::uint16_t> written) override {
+    if (!inside(first, written.size())) return ModbusException::illegal_address;
+    std::copy(written.begin(), written.end(), values.begin() + first);
+    return ModbusException::none;
+  }
+  ModbusException read(int first, std::span<std::uint16_t> out) override {
+    if (!inside(first, out.size())) return ModbusException::illegal_address;
+    std::copy_n(values.begin() + first, out.size(), out.begin());
+    return ModbusException::none;
+  }
+  std::array<std::uint16_t, 130> values{};
+  int requests = 0;
+
+ private:
+  bool inside(int first, std::size_t count) const {
+    return first >= 0 && static_cast<std::size_t>(first) + count <= values.size();
+  }
+};
+
+}  // namespace stageid::test

@@ -1,0 +1,38 @@
+// What a stage file can get wrong about a library. What a library does is tested with a real one, in another process:
+// integration.plugin.
+
+#include "hal/plugin/plugin_stage.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(PluginStage, NamesALibraryThatIsNotThere) {
+  EXPECT_THAT(
+      [] {
+        PluginStage({}, {"/nowhere/stage.so", {}}, 0.0);
+      },
+      ThrowsMessage<StageError>(HasSubstr("/nowhere/stage.so: cannot be loaded")));
+}
+
+TEST(PluginStage, RefusesALibraryWithoutTheInterface) {
+  EXPECT_THAT(
+      [] {
+        PluginStage({}, {"libm.so.6", {}}, 0.0);
+      },
+      ThrowsMessage<StageError>(HasSubstr("cannot be loaded")))
+      << "not looked for in the system's folders";
+  EXPECT_THAT(
+      [] {
+        PluginStage({}, {"/lib/x86_64-linux-gnu/libm.so.6", {}}, 0.0);
+      },
+      ThrowsMessage<StageError>(HasSubstr("has no function stageid_get_backend()")));
+}
+
+}  // namespace
+}  // namespace stageid

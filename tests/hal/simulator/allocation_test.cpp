@@ -1,0 +1,127 @@
+// Between start() and stop() nothing of hal allocates: not in health, not at a limit, not in a fault.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <tuple>
+#include <vector>
+
+#include "hal/simulator/rigid_body.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "hal/stage/limited_stage.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "hal/stage/replay_stage.hpp"
+#include "tests/support/allocation_counter.hpp"
+#include "tests/support/wafer_stage.hpp"
+
+namespace stageid {
+namespace {
+
+using Kind = WaferStageSpec::Fault::Kind;
+
+class Allocation : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!test::AllocationCounter::works()) GTEST_SKIP() << "malloc is not ours in this build";
+  }
+  // Allocations of 2000 cycles of control and exchange; `seen` counts the outcomes that were not ok.
+  static std::uint64_t cycles(const WaferStageSpec& spec, int& seen) {
+    StageLimits limits = spec.limits;
+    limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
+    LimitedStage stage(std::make_unique<SimulatedStage>(spec), limits);
+    MotionController controller(spec.controller);
+    std::vector<double> y(7);
+    std::vector<double> u(17);
+    Inputs inputs;
+    inputs.y = y;
+    stage.start(1, inputs);
+    Outputs outputs;
+    outputs.u = u;
+    const test::AllocationCounter counter;
+    for (int n = 0; n < 2000; ++n) {
+      controller.update(y.data(), u.data());
+      u[0] += n % 100 < 50 ? 1.0 : -1.0;
+      outputs.cycle = inputs.cycle;
+      seen += stage.exchange(outputs, inputs, {}) == Outcome::ok ? 0 : 1;
+    }
+    return counter.count();
+  }
+};
+
+TEST_F(Allocation, CounterCounts) {
+  const test::AllocationCounter counter;
+  double* volatile memory = new double[3];  // volatile: the pair must not be optimized away
+  delete[] memory;
+  EXPECT_GE(counter.count(), 1U);
+}
+
+TEST_F(Allocation, AHealthyCycleHasNone) {
+  int seen = 0;
+  EXPECT_EQ(cycles(test::wafer_stage_spec(), seen), 0U);
+  EXPECT_EQ(seen, 0);
+}
+
+TEST_F(Allocation, ABrakeHasNone) {
+  WaferStageSpec spec = test::wafer_stage_spec();
+  spec.faults = {{Kind::nan_sensor, 0, 1000, 1, -1}};
+  int seen = 0;
+  EXPECT_EQ(cycles(spec, seen), 0U);
+  EXPECT_EQ(seen, 1000);
+}
+
+TEST_F(Allocation, ACycleWithEveryOptionHasNone) {
+  WaferStageSpec spec = test::wafer_stage_spec();
+  spec.cubic_stiffness_n_m3 = 1e9;
+  spec.actuator_saturation_n = 10.0;
+  spec.actuator_quantum_n = 1e-4;
+  spec.sensor_quantum_m = 1e-10;
+  spec.faults = {{Kind::stuck_actuator, 3, 100, 1, -1},
+                 {Kind::missed_cycle, 0, 200, 5, -1},
+                 {Kind::dead_sensor, 4, 300, 1, -1},
+                 {Kind::nan_sensor, 0, 400, 1, -1},
+                 {Kind::interlock, 0, 1500, 1, -1}};
+  int seen = 0;
+  EXPECT_EQ(cycles(spec, seen), 0U);
+  EXPECT_EQ(seen, 1705);  // five missed, and everything from cycle 300 on
+}
+
+TEST_F(Allocation, ACycleAtALimitHasNone) {
+  WaferStageSpec spec = test::wafer_stage_spec();
+  spec.limits.actuator_n.setConstant(0.9);
+  spec.limits.thermal_rms_n.setConstant(0.5);
+  spec.limits.thermal_time_constant_s = 0.01;
+  spec.limits.position_window_m.setConstant(1e-8);
+  int seen = 0;
+  EXPECT_EQ(cycles(spec, seen), 0U);
+  EXPECT_EQ(seen, 2000);
+}
+
+class OneRun final : public ReplaySource {
+ public:
+  int runs() const override { return 1; }
+  void load(int, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) override {
+    u.setZero(2, 100);
+    y.setZero(1, 100);
+    marked.setZero(100);
+  }
+};
+
+TEST_F(Allocation, AReplayedCycleHasNone) {
+  StageInfo info;
+  info.sample_rate_hz = 1e3;
+  info.actuators.resize(2);
+  info.sensors.resize(1);
+  ReplayStage replay(info, std::make_unique<OneRun>(), 0.0);
+  std::vector<double> y(1);
+  const std::vector<double> u(2);
+  Inputs inputs;
+  inputs.y = y;
+  replay.start(0, inputs);
+  Outputs outputs;
+  outputs.u = u;
+  const test::AllocationCounter counter;
+  for (int n = 0; n < 101; ++n) std::ignore = replay.exchange(outputs, inputs, {});
+  EXPECT_EQ(counter.count(), 0U);
+}
+
+}  // namespace
+}  // namespace stageid

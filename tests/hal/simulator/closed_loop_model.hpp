@@ -1,0 +1,18 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "hal/simulator/simulated_stage.hpp"
+
+namespace stageid::test {
+
+/// The whole closed loop of a noise-free stage as one discrete-time system,
+///   x[n+1] = a x[n] + b r[n],   y[n] = c x[n],
+/// built with the general matrix exponential, by code that shares none with the simulator.
+struct ClosedLoopModel {
+  Eigen::MatrixXd a, b, c;
+};
+
+ClosedLoopModel closed_loop_model(const WaferStageSpec& spec);
+
+}  // namespace stageid::test

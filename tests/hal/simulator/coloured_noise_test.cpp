@@ -1,0 +1,92 @@
+#include "hal/simulator/coloured_noise.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <stdexcept>
+#include <vector>
+
+namespace stageid {
+namespace {
+
+constexpr double kRateHz = 1000.0;
+
+ColouredNoiseSpec spec_of(NoiseColour colour, double reference_hz) {
+  ColouredNoiseSpec spec;
+  spec.colour = colour;
+  spec.channels = 1;
+  spec.sample_rate_hz = kRateHz;
+  spec.density = 4.0;
+  spec.reference_hz = reference_hz;
+  spec.damping_ratio = 0.05;
+  return spec;
+}
+
+/// One-sided density at `hz`: mean of many periodograms of 1000 samples through a Hann window, whose power sums up to
+/// 3/8 of the samples.
+double density(ColouredNoise& noise, double hz) {
+  constexpr int kSamples = 1000;
+  constexpr int kPeriodograms = 2000;
+  const double turn = 2.0 * std::numbers::pi / kSamples;
+  std::vector<std::complex<double>> kernel(kSamples);
+  for (int n = 0; n < kSamples; ++n)
+    kernel[static_cast<std::size_t>(n)] =
+        0.5 * (1.0 - std::cos(turn * n)) * std::polar(1.0, -turn * n * hz * kSamples / kRateHz);
+  double sum = 0.0;
+  for (int i = 0; i < kPeriodograms; ++i) {
+    std::complex<double> line = 0.0;
+    for (const std::complex<double>& k : kernel) line += k * noise.next()[0];
+    sum += std::norm(line);
+  }
+  return 2.0 * sum / kPeriodograms / (0.375 * kSamples * kRateHz);
+}
+
+double density(NoiseColour colour, double reference_hz, double hz) {
+  ColouredNoise noise(spec_of(colour, reference_hz));
+  noise.restart(7, 1);
+  return density(noise, hz);
+}
+
+// The deviation of a mean of 2000 periodograms is 2.2 %: bounds of five.
+constexpr double kBound = 0.12;
+
+TEST(ColouredNoise, WhiteIsFlat) {
+  EXPECT_NEAR(density(NoiseColour::white, 50.0, 20.0) / 4.0, 1.0, kBound);
+  EXPECT_NEAR(density(NoiseColour::white, 50.0, 400.0) / 4.0, 1.0, kBound);
+}
+
+TEST(ColouredNoise, FlickerFallsWithTheFrequency) {
+  EXPECT_NEAR(density(NoiseColour::flicker, 50.0, 50.0) / 4.0, 1.0, kBound + 0.03);
+  EXPECT_NEAR(density(NoiseColour::flicker, 50.0, 10.0) / 20.0, 1.0, kBound + 0.03);
+}
+
+TEST(ColouredNoise, DriftFallsWithTheSquare) {
+  EXPECT_NEAR(density(NoiseColour::drift, 50.0, 50.0) / 4.0, 1.0, kBound);
+  EXPECT_NEAR(density(NoiseColour::drift, 50.0, 10.0) / 100.0, 1.0, kBound);
+}
+
+TEST(ColouredNoise, ResonantHasItsDensityAtTheResonance) {
+  EXPECT_NEAR(density(NoiseColour::resonant, 50.0, 50.0) / 4.0, 1.0, kBound);
+  // |H(f0)|^2 / |H(2 f0)|^2 of a second-order system is (9 + 16 zeta^2) / (4 zeta^2); the sampled one lies close.
+  const double ratio = (9.0 + 16.0 * 0.0025) / (4.0 * 0.0025);
+  EXPECT_NEAR(density(NoiseColour::resonant, 50.0, 100.0) * ratio / 4.0, 1.0, 0.25);
+}
+
+TEST(ColouredNoise, RepeatsFromItsSeed) {
+  ColouredNoise a(spec_of(NoiseColour::flicker, 50.0));
+  ColouredNoise b(spec_of(NoiseColour::flicker, 50.0));
+  a.restart(3, 4);
+  b.restart(3, 4);
+  for (int n = 0; n < 100; ++n) ASSERT_EQ(a.next()[0], b.next()[0]);
+  b.restart(3, 5);
+  EXPECT_NE(a.next()[0], b.next()[0]);
+}
+
+TEST(ColouredNoise, RefusesAReferenceAboveHalfTheRate) {
+  EXPECT_THROW(ColouredNoise(spec_of(NoiseColour::drift, 500.0)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,70 @@
+#include "hal/simulator/loop_stability.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "tests/hal/simulator/closed_loop_model.hpp"
+#include "tests/support/wafer_stage.hpp"
+
+namespace stageid {
+namespace {
+
+WaferStageSpec with_crossovers(double factor) {
+  WaferStageSpec spec = test::silent_wafer_stage_spec();
+  for (AxisController& axis : spec.controller.axes) {
+    axis.crossover_hz *= factor;
+    axis.gain *= factor * factor;
+  }
+  return spec;
+}
+
+/// Growth per sample of a free motion of the loop, by steps of the matrix itself: the eigenvalues of a matrix in metres
+/// and newtons have lost half their digits.
+double growth(const Eigen::MatrixXd& a) {
+  constexpr int kSteps = 20000;
+  Eigen::VectorXd x = Eigen::VectorXd::Ones(a.rows());
+  double half = 0.0;
+  double log_size = 0.0;
+  for (int n = 1; n <= kSteps; ++n) {
+    x = a * x;
+    const double size = x.norm();
+    log_size += std::log(size);
+    x /= size;
+    if (n == kSteps / 2) half = log_size;
+  }
+  return std::exp((log_size - half) / (kSteps / 2));
+}
+
+// The reference is made with the general matrix exponential, from the actuators and sensors themselves.
+TEST(LoopStability, TheOutermostPoleIsThatOfTheWholeLoop) {
+  for (const double factor : {0.5, 1.0, 3.0, 10.0}) {
+    const WaferStageSpec spec = with_crossovers(factor);
+    const double reference = growth(test::closed_loop_model(spec).a);
+    const LoopStability loop = loop_stability(spec);
+    ASSERT_TRUE(loop.tested);
+    EXPECT_NEAR(loop.largest_pole, reference, 2e-4) << factor;
+    EXPECT_EQ(loop.stable(), reference < 1.0) << factor;
+  }
+}
+
+TEST(LoopStability, TheShippedStageHasMarginAndAFasterOneHasNot) {
+  const LoopStability shipped = loop_stability(test::silent_wafer_stage_spec());
+  EXPECT_TRUE(shipped.stable());
+  EXPECT_LT(shipped.largest_sensitivity, 1.75);  // the stage file promises 1.7, per channel
+  EXPECT_FALSE(loop_stability(with_crossovers(10.0)).stable());
+}
+
+// One axis, L = l: S = 1 / |1 + l|. Two axes of other units: the same, whatever the units.
+TEST(LoopStability, SensitivityDoesNotDependOnUnits) {
+  Eigen::MatrixXcd L{{std::complex<double>(-0.5, 0.0), 0.3}, {0.1, std::complex<double>(0.2, 1.0)}};
+  const double size = largest_sensitivity(L);
+  const Eigen::Vector2d units(1e-6, 1.0);
+  EXPECT_NEAR(largest_sensitivity(units.asDiagonal() * L * units.cwiseInverse().asDiagonal()), size,
+              1e-9 * size);
+  EXPECT_DOUBLE_EQ(largest_sensitivity(L.topLeftCorner(1, 1)), 2.0);
+}
+
+}  // namespace
+}  // namespace stageid

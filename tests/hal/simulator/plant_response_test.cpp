@@ -1,0 +1,153 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <complex>
+#include <numbers>
+#include <stdexcept>
+
+#include "hal/simulator/rigid_body.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "tests/support/wafer_stage.hpp"
+
+namespace stageid {
+namespace {
+
+using Complex = std::complex<double>;
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kRate_hz = 1e4;
+
+std::vector<PlantMode> one_mode(double frequency_hz, double damping) {
+  return {{frequency_hz, damping, Eigen::VectorXd::Ones(1), Eigen::VectorXd::Ones(1)}};
+}
+
+// Sampling folds: G_d(e^(j w T)) = sum_k G(s_k) e^(-s_k tau) (1 - e^(-s_k T)) / (s_k T),
+// s_k = j (w + 2 pi k / T). Terms fall like 1/k^3: 2000 of them leave 1e-7 of the first ones' size.
+Complex folded(const std::vector<PlantMode>& modes, double delay_s, double frequency_hz) {
+  Complex sum = 0.0;
+  for (int k = -2000; k <= 2000; ++k) {
+    const double f = frequency_hz + k * kRate_hz;
+    const Complex s(0.0, kTwoPi * f);
+    const Complex hold = (1.0 - std::exp(-s / kRate_hz)) / (s / kRate_hz);
+    sum += continuous_response(modes, f)(0, 0) * std::exp(-s * delay_s) * hold;
+  }
+  return sum;
+}
+
+TEST(SampledResponse, IsTheFoldedContinuousOne) {
+  for (const auto& modes :
+       {one_mode(300.0, 0.01), one_mode(2600.0, 0.005), one_mode(7000.0, 0.02)}) {
+    for (const double delay_s : {0.0, 130e-6, 200e-6, 470e-6}) {
+      for (const double f : {3.0, 290.0, 1999.75, 4900.0}) {
+        const Complex exact = sampled_response(modes, delay_s, kRate_hz, f)(0, 0);
+        EXPECT_LT(std::abs(exact - folded(modes, delay_s, f)), 1e-6 * std::abs(exact))
+            << modes[0].natural_frequency_hz << " Hz, delay " << delay_s << ", at " << f;
+      }
+    }
+  }
+}
+
+TEST(SampledResponse, OfAFreeMassIsTheLimitOfEverWeakerSprings) {
+  for (const double delay_s : {0.0, 130e-6}) {
+    for (const double f : {1.0, 100.0, 3000.0}) {
+      const Complex free_mass = sampled_response(one_mode(0.0, 0.0), delay_s, kRate_hz, f)(0, 0);
+      const Complex sprung = sampled_response(one_mode(1e-4, 0.0), delay_s, kRate_hz, f)(0, 0);
+      // The spring changes it by (1e-4 / f)^2; partial fractions lose f / 1e-4 of their digits.
+      EXPECT_LT(std::abs(free_mass - sprung), 2e-8 * std::abs(free_mass)) << f;
+    }
+  }
+}
+
+TEST(SampledResponse, AtZeroFrequencyIsTheStaticCompliance) {
+  const double omega = kTwoPi * 300.0;
+  const Complex compliance = sampled_response(one_mode(300.0, 0.01), 130e-6, kRate_hz, 0.0)(0, 0);
+  EXPECT_NEAR(compliance.real() * omega * omega, 1.0, 1e-12);
+  EXPECT_NEAR(compliance.imag() * omega * omega, 0.0, 1e-12);
+}
+
+TEST(SampledResponse, DelayedByWholeSamplesTurnsThePhaseOnly) {
+  const auto modes = wafer_stage_modes(test::silent_wafer_stage_spec());
+  const double f = 777.0;
+  const Eigen::MatrixXcd once = sampled_response(modes, 130e-6, kRate_hz, f);
+  const Eigen::MatrixXcd later = sampled_response(modes, 430e-6, kRate_hz, f);
+  const Complex turn = std::polar(1.0, -kTwoPi * f * 3.0 / kRate_hz);
+  EXPECT_LT((later - turn * once).norm(), 1e-12 * once.norm());
+}
+
+// Between suspension and first flexible mode the stage is a rigid body: G = J_y M^-1 J_u^T / s^2.
+TEST(ContinuousResponse, OfTheStageIsARigidBodyBelowTheFlexibleModes) {
+  WaferStageSpec spec = test::silent_wafer_stage_spec();
+  Eigen::MatrixXd inertia = Eigen::MatrixXd::Zero(6, 6);
+  inertia.diagonal() << 20.0, 20.0, 20.0, spec.inertia_kg_m2[0], spec.inertia_kg_m2[1],
+      spec.inertia_kg_m2[2];
+  const Eigen::MatrixXd mass_line = rigid_body_jacobian(spec.info.sensors) * inertia.inverse() *
+                                    rigid_body_jacobian(spec.info.actuators).transpose();
+  const double f = 10.0;
+  const double omega = kTwoPi * f;
+  const Eigen::MatrixXcd G = continuous_response(wafer_stage_modes(spec), f);
+  // Springs: (0.5 / 10)^2 = 2.5e-3, damping 2 * 0.1 * 0.05 = 1e-2, compliance (10 / 180)^2 = 3e-3
+  // of an entry of like size, summed over 23 modes.
+  EXPECT_LT((-omega * omega * G - mass_line).norm(), 3e-2 * mass_line.norm());
+  spec.flexible_modes = 0;
+  spec.in_plane_modes.clear();
+  for (double& hz : spec.suspension_hz) hz = 0.0;
+  const Eigen::MatrixXcd rigid = continuous_response(wafer_stage_modes(spec), f);
+  EXPECT_LT((-omega * omega * rigid - mass_line).norm(), 1e-12 * mass_line.norm());
+}
+
+// With sensors at the actuators: symmetric (Maxwell, Betti), and dissipative: Im G is negative
+// semidefinite at every positive frequency.
+TEST(ContinuousResponse, OfCollocatedChannelsIsReciprocalAndDissipative) {
+  WaferStageSpec spec = test::silent_wafer_stage_spec();
+  spec.info.sensors = spec.info.actuators;
+  spec.in_plane_modes.clear();
+  const auto modes = wafer_stage_modes(spec);
+  for (const double f : {0.1, 5.0, 180.0, 452.0, 1000.0, 1959.0}) {
+    const Eigen::MatrixXcd G = continuous_response(modes, f);
+    EXPECT_LT((G - G.transpose()).norm(), 1e-14 * G.norm());
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(G.imag());
+    EXPECT_LT(solver.eigenvalues().maxCoeff(), 1e-12 * G.norm()) << f;
+  }
+}
+
+TEST(WaferStageModes, HaveSeventeenFlexibleOnesBelowTwoKilohertz) {
+  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  const auto modes = wafer_stage_modes(spec);
+  ASSERT_EQ(modes.size(), 32U);
+  const auto frequency = [&](int flexible) {
+    return modes[static_cast<std::size_t>(6 + flexible)].natural_frequency_hz;
+  };
+  EXPECT_DOUBLE_EQ(frequency(0), 180.0);
+  EXPECT_LT(frequency(16), 1970.0);
+  EXPECT_GT(frequency(17), 2050.0);
+  EXPECT_LT(frequency(22), 4500.0);
+  int close = 0;
+  for (int i = 0; i + 1 < test::kModesInBand; ++i)
+    close += frequency(i + 1) / frequency(i) < 1.01 ? 1 : 0;
+  EXPECT_EQ(close, 2);
+}
+
+// The plate's own rms of every shape is 1/sqrt(mass).
+TEST(WaferStageModes, AreAllSeenBySensorsAndDrivenByActuators) {
+  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  const auto modes = wafer_stage_modes(spec);
+  for (std::size_t i = 6; i < 6 + test::kModesInBand; ++i) {
+    const auto rms = [&](const Eigen::VectorXd& shape) {
+      return std::sqrt(spec.mass_kg * shape.squaredNorm() / static_cast<double>(shape.size()));
+    };
+    EXPECT_GT(rms(modes[i].sensor_shape.head(test::kZSensors)), 0.8) << "mode " << i;
+    EXPECT_GT(rms(modes[i].actuator_shape.head(test::kZActuators)), 0.55) << "mode " << i;
+    EXPECT_EQ(modes[i].sensor_shape.tail(3), Eigen::VectorXd::Zero(3));
+    EXPECT_EQ(modes[i].actuator_shape.tail(4), Eigen::VectorXd::Zero(4));
+  }
+}
+
+TEST(PlantResponse, RefusesWhatHasNone) {
+  const auto modes = one_mode(10.0, 0.1);
+  EXPECT_THROW(continuous_response({}, 1.0), std::invalid_argument);
+  EXPECT_THROW(continuous_response(one_mode(10.0, 1.0), 1.0), std::invalid_argument);
+  EXPECT_THROW(sampled_response(modes, 0.0, 0.0, 1.0), std::invalid_argument);
+  EXPECT_THROW(sampled_response(modes, -1.0, 1e3, 1.0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,137 @@
+#include "hal/simulator/rigid_body.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "tests/support/wafer_stage.hpp"
+
+namespace stageid {
+namespace {
+
+AxisController lead(double crossover_hz) {
+  AxisController axis;
+  axis.crossover_hz = crossover_hz;
+  axis.lead_zero_hz = crossover_hz / 3.0;
+  axis.lead_pole_hz = crossover_hz * 3.0;
+  return axis;
+}
+
+// Against the motion of a real rotation: J is its first-order part, so the difference is of second
+// order in the angle.
+TEST(RigidBodyJacobian, IsTheFirstOrderMotionOfEveryChannel) {
+  Channel channel;
+  channel.position_m[0] = 0.3;
+  channel.position_m[1] = -0.2;
+  channel.position_m[2] = 0.15;
+  channel.direction[0] = 0.6;
+  channel.direction[1] = 0.0;
+  channel.direction[2] = 0.8;
+  const Eigen::MatrixXd J = rigid_body_jacobian({channel});
+  ASSERT_EQ(J.rows(), 1);
+  ASSERT_EQ(J.cols(), 6);
+  const Eigen::Vector3d p(0.3, -0.2, 0.15);
+  const Eigen::Vector3d d(0.6, 0.0, 0.8);
+  const double h = 1e-5;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
+    EXPECT_DOUBLE_EQ(J(0, axis), d[axis]);
+    const Eigen::Vector3d moved = Eigen::AngleAxisd(h, unit) * p - p;
+    EXPECT_NEAR(J(0, 3 + axis), d.dot(moved) / h, h);
+  }
+}
+
+TEST(MotionControllerSpec, DecouplesTheWaferStage) {
+  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(6, 6);
+  const Eigen::MatrixXd seen =
+      spec.controller.sensor_decoupling * rigid_body_jacobian(spec.info.sensors);
+  const Eigen::MatrixXd driven =
+      rigid_body_jacobian(spec.info.actuators).transpose() * spec.controller.actuator_decoupling;
+  EXPECT_LT((seen - identity).norm(), 1e-12);
+  EXPECT_LT((driven - identity).norm(), 1e-12);
+  EXPECT_EQ(spec.controller.sensor_decoupling.cols(), 7);
+  EXPECT_EQ(spec.controller.actuator_decoupling.rows(), 17);
+}
+
+TEST(MotionControllerSpec, KeepsInPlaneAndOutOfPlaneApart) {
+  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  for (const Eigen::Index axis : {2, 3, 4}) {  // z, Rx, Ry
+    EXPECT_LT(spec.controller.sensor_decoupling.row(axis).tail(3).norm(), 1e-12);
+    EXPECT_LT(spec.controller.actuator_decoupling.col(axis).tail(4).norm(), 1e-12);
+  }
+  for (const Eigen::Index axis : {0, 1, 5}) {  // x, y, Rz
+    EXPECT_LT(spec.controller.sensor_decoupling.row(axis).head(4).norm(), 1e-12);
+    EXPECT_LT(spec.controller.actuator_decoupling.col(axis).head(13).norm(), 1e-12);
+  }
+}
+
+TEST(MotionControllerSpec, ComputesTheGainOfUnitLoopGainAtTheCrossover) {
+  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  const double inertia[6] = {20.0, 20.0, 20.0, 0.61206, 0.6, 1.21206};
+  for (std::size_t i = 0; i < 6; ++i) {
+    const AxisController& axis = spec.controller.axes[i];
+    const double omega = 2.0 * std::numbers::pi * axis.crossover_hz;
+    const double loop =
+        std::abs(axis_response(axis, axis.crossover_hz)) / (inertia[i] * omega * omega);
+    EXPECT_NEAR(loop, 1.0, 1e-12) << kRigidAxisNames[i];
+  }
+}
+
+TEST(MotionControllerSpec, LeavesAGivenGainAndOpenAxesAlone) {
+  const WaferStageSpec stage = test::silent_wafer_stage_spec();
+  AxisController z = lead(20.0);
+  z.gain = 123.0;
+  const auto spec = motion_controller_spec(
+      1e4, stage.info.actuators, stage.info.sensors,
+      {AxisController{}, AxisController{}, z, AxisController{}, AxisController{}, AxisController{}},
+      {0., 0., 0., 0., 0., 0.});
+  EXPECT_EQ(spec.axes[2].gain, 123.0);
+  EXPECT_EQ(spec.axes[0].gain, 0.0);
+}
+
+class UncontrollableStage : public testing::Test {
+ protected:
+  MotionControllerSpec build(const std::vector<Channel>& actuators,
+                             const std::vector<Channel>& sensors, std::size_t closed,
+                             double inertia) const {
+    std::array<AxisController, 6> axes;
+    axes[closed] = lead(20.0);
+    return motion_controller_spec(1e4, actuators, sensors, axes,
+                                  {inertia, inertia, inertia, inertia, inertia, inertia});
+  }
+  WaferStageSpec stage_ = test::silent_wafer_stage_spec();
+  std::vector<Channel> vertical_actuators_{stage_.info.actuators.begin(),
+                                           stage_.info.actuators.begin() + 13};
+  std::vector<Channel> two_sensors_{stage_.info.sensors.begin(), stage_.info.sensors.begin() + 2};
+};
+
+TEST_F(UncontrollableStage, IsRefusedByTheAxisThatCannotBeDriven) {
+  EXPECT_THROW(build(vertical_actuators_, stage_.info.sensors, 0, 1.0), std::invalid_argument);
+  EXPECT_NO_THROW(build(vertical_actuators_, stage_.info.sensors, 2, 1.0));
+}
+
+TEST_F(UncontrollableStage, IsRefusedByTheAxisThatCannotBeToldFromOthers) {
+  // Two z sensors see heave and tilt, but only in combinations.
+  EXPECT_THROW(build(stage_.info.actuators, two_sensors_, 2, 1.0), std::invalid_argument);
+}
+
+TEST_F(UncontrollableStage, IsRefusedWithoutInertiaForTheAutomaticGain) {
+  for (const double inertia : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THROW(build(stage_.info.actuators, stage_.info.sensors, 2, inertia),
+                 std::invalid_argument);
+}
+
+TEST_F(UncontrollableStage, IsRefusedWithImpossibleFrequencies) {
+  std::array<AxisController, 6> axes;
+  axes[2] = lead(6000.0);
+  EXPECT_THROW(motion_controller_spec(1e4, stage_.info.actuators, stage_.info.sensors, axes,
+                                      {1., 1., 1., 1., 1., 1.}),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace stageid

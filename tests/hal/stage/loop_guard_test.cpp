@@ -1,0 +1,183 @@
+#include "hal/stage/loop_guard.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <stdexcept>
+
+#include "hal/stage/motion_controller.hpp"
+#include "tests/support/stop_case.hpp"
+#include "tests/support/wafer_stage.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+using Kind = WaferStageSpec::Fault::Kind;
+
+/// A stage in closed loop without excitation, pushed once a sample by `push_n` on every actuator.
+class GuardedLoop {
+ public:
+  explicit GuardedLoop(const WaferStageSpec& spec) : controller_(spec.controller) {
+    auto watched = std::make_unique<test::WatchedStage>(spec);
+    watch = watched.get();
+    stage = std::make_unique<LimitedStage>(std::move(watched), spec.limits);
+    y_.resize(spec.info.sensors.size());
+    u_.resize(spec.info.actuators.size());
+    inputs_.y = y_;
+    stage->start(1, inputs_);
+  }
+  Outcome step(double push_n = 0.0) {
+    controller_.update(y_.data(), u_.data());
+    for (double& u : u_) u += push_n;
+    return stage->exchange({inputs_.cycle, 0, u_}, inputs_, {});
+  }
+  /// Until it is anything but ok; at most so many samples.
+  Outcome steps(int samples, double push_n = 0.0) {
+    Outcome outcome = Outcome::ok;
+    for (int n = 0; n < samples && outcome == Outcome::ok; ++n) outcome = step(push_n);
+    return outcome;
+  }
+  /// Until the brake has ended. @return how many samples it took.
+  int brake() {
+    int samples = 0;
+    while (step() == Outcome::braking) ++samples;
+    stage->stop();
+    return samples;
+  }
+  const Inputs& inputs() const { return inputs_; }
+
+  std::unique_ptr<LimitedStage> stage;
+  const test::WatchedStage* watch = nullptr;
+
+ private:
+  MotionController controller_;
+  std::vector<double> y_;
+  std::vector<double> u_;
+  Inputs inputs_;
+};
+
+WaferStageSpec with_fault(Kind kind, double value, int channel = -1) {
+  WaferStageSpec spec = test::stop_stage_spec();
+  WaferStageSpec::Fault fault;
+  fault.kind = kind;
+  fault.channel = channel;
+  fault.from_cycle = 100;
+  fault.value = value;
+  spec.faults = {fault};
+  return spec;
+}
+
+TEST(LoopGuard, BrakesByThePredictionWhereTheSensorFailed) {
+  WaferStageSpec spec = with_fault(Kind::sensor_offset, 300e-6);
+  GuardedLoop loop(spec);
+  ASSERT_EQ(loop.steps(100, 20.0), Outcome::ok);
+  EXPECT_EQ(loop.step(), Outcome::braking);
+  const double fast_m_s = loop.watch->speed_m_s();
+  EXPECT_GT(fast_m_s, 5e-4);
+  EXPECT_GT(loop.inputs().y[0], 290e-6) << "the log shows what the sensor shows";
+  // Five time constants of a loop of 60 Hz at 10 kHz.
+  EXPECT_NEAR(loop.brake(), 5.0 / (2.0 * std::numbers::pi * 60.0) * 1e4, 2.0);
+  EXPECT_LT(loop.watch->speed_m_s(), 0.01 * fast_m_s);
+  EXPECT_EQ(loop.stage->emergency().cause.kind, LimitKind::sensor_jump);
+  EXPECT_EQ(loop.stage->emergency().response, 1.0);
+}
+
+TEST(LoopGuard, CutsTheForcesOfAnAxisThatIsNotToBeBraked) {
+  WaferStageSpec spec = with_fault(Kind::nan_sensor, 0.0, 0);
+  spec.controller.axes[2].brake = false;
+  spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
+  GuardedLoop loop(spec);
+  ASSERT_EQ(loop.steps(100, 20.0), Outcome::ok);
+  EXPECT_EQ(loop.step(), Outcome::braking);
+  EXPECT_EQ(loop.step(100.0), Outcome::braking);
+  EXPECT_EQ(loop.inputs().applied[0], 0.0);
+}
+
+TEST(LoopGuard, LearnsThatTheStageAnswersTheOtherWayRound) {
+  WaferStageSpec spec = with_fault(Kind::actuator_gain, -1.0);
+  GuardedLoop loop(spec);
+  ASSERT_EQ(loop.steps(101, 2.0), Outcome::ok);
+  ASSERT_EQ(loop.steps(2000), Outcome::braking);
+  loop.brake();
+  EXPECT_EQ(loop.stage->emergency().cause.kind, LimitKind::deviation);
+  EXPECT_LT(loop.stage->emergency().response, -0.5);
+  EXPECT_LT(loop.watch->largest_m, 2.0 * test::kStopWindow);
+  EXPECT_LT(loop.watch->speed_m_s(), 1e-3);
+  EXPECT_THAT(describe_stop(*loop.stage), HasSubstr("times as expected; braked"));
+}
+
+TEST(LoopGuard, ASpeedLimitBrakes) {
+  WaferStageSpec spec = test::stop_stage_spec();
+  spec.limits.speed_m_s = Eigen::VectorXd::Constant(1, 2e-3);
+  GuardedLoop loop(spec);
+  EXPECT_EQ(loop.steps(200, 20.0), Outcome::braking);
+  EXPECT_EQ(loop.stage->violation().kind, LimitKind::speed);
+  loop.brake();
+  EXPECT_LT(loop.watch->speed_m_s(), 1e-4);
+}
+
+TEST(LoopGuard, AStageThatCouldNotBeStoppedInTimeIsBraked) {
+  WaferStageSpec spec = test::stop_stage_spec();
+  GuardedLoop loop(spec);
+  // As if something had pushed it, past what the controller can hold.
+  EXPECT_EQ(loop.steps(200, 640.0), Outcome::braking);
+  EXPECT_EQ(loop.stage->emergency().cause.kind, LimitKind::stopping_distance);
+  loop.brake();
+  EXPECT_LT(loop.watch->largest_m, 2.0 * test::kStopWindow);
+}
+
+TEST(LoopGuard, ARampThatDoesNotConvergeIsEndedByTheBrake) {
+  GuardedLoop loop(test::stop_stage_spec(10.0));  // ten times the gain: unstable
+  ASSERT_EQ(loop.steps(2000, 1.0), Outcome::limit);
+  EXPECT_EQ(loop.stage->violation().kind, LimitKind::actuator);
+  int samples = 0;
+  Outcome outcome = Outcome::limit;
+  for (; outcome == Outcome::limit && samples < 1000; ++samples) outcome = loop.step();
+  EXPECT_EQ(outcome, Outcome::braking);
+  loop.brake();
+  EXPECT_LT(loop.watch->speed_m_s(), 1e-3);
+}
+
+// Four sensors see three motions out of plane: they cannot all be right.
+TEST(LoopGuard, ASensorThatDriftsContradictsTheOthers) {
+  WaferStageSpec spec = test::wafer_stage_spec();
+  spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
+  WaferStageSpec::Fault fault;
+  fault.kind = Kind::sensor_drift;
+  fault.from_cycle = 100;
+  fault.value = 1e-3;
+  spec.faults = {fault};
+  GuardedLoop loop(spec);
+  EXPECT_EQ(loop.steps(6000), Outcome::braking);
+  EXPECT_EQ(loop.stage->violation().kind, LimitKind::contradiction);
+  EXPECT_LT(loop.watch->largest_m, 2.0 * spec.limits.position_window_m[0]);
+}
+
+TEST(LoopGuard, WithoutAMotionNothingIsPredicted) {
+  WaferStageSpec spec = with_fault(Kind::sensor_offset, 150e-6);
+  spec.limits.motion = {};
+  GuardedLoop loop(spec);
+  EXPECT_EQ(loop.steps(1000), Outcome::limit) << "the controller's command, then the ramp";
+  EXPECT_EQ(loop.stage->violation().kind, LimitKind::actuator);
+}
+
+TEST(LoopGuard, RefusesAMotionThatDoesNotFit) {
+  const WaferStageSpec spec = test::stop_stage_spec();
+  const auto make = [&](auto change) {
+    StageLimits limits = spec.limits;
+    change(limits.motion);
+    return LoopGuard(limits, spec.info);
+  };
+  EXPECT_NO_THROW(make([](RigidMotion&) {}));
+  EXPECT_THROW(make([](RigidMotion& m) { m.bandwidth_rad_s = 0.0; }), std::invalid_argument);
+  EXPECT_THROW(make([](RigidMotion& m) { m.force_per_acceleration.resize(2, 1); }),
+               std::invalid_argument);
+  EXPECT_THROW(make([](RigidMotion& m) { m.contradiction.setZero(2, 2); }), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,339 @@
+#include "hal/stage/peer_status.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_map.hpp"
+#include "hal/modbus/modbus_stage.hpp"
+#include "tests/hal/can/altered_can.hpp"
+#include "tests/hal/can/can_host.hpp"
+#include "tests/hal/modbus/modbus_bench.hpp"
+
+namespace stageid {
+namespace {
+
+namespace map = modbus_map;
+using test::CanRig;
+using test::reseal;
+
+TEST(PeerStatus, HasOneMeaningEach) {
+  std::size_t number = 0;
+  for (const PeerMeaning& row : peer_meanings()) {
+    EXPECT_EQ(static_cast<std::size_t>(row.status), number++);
+    EXPECT_EQ(&meaning(row.status), &row);
+    EXPECT_EQ(row.outcome == Outcome::ok, row.reaction == PeerReaction::use) << row.words;
+  }
+  EXPECT_EQ(number, static_cast<std::size_t>(PeerStatus::other_stage) + 1);
+}
+
+TEST(PeerStatus, TheGuideHoldsTheTable) {
+  const std::ifstream file(STAGEID_SOURCE_DIR "/docs/guide.md");
+  std::ostringstream text;
+  text << file.rdbuf();
+  EXPECT_THAT(text.str(), testing::HasSubstr(peer_meanings_table()));
+}
+
+TEST(PeerStatus, CodesOfOutcomesMeanThemselvesOrAFault) {
+  for (int code = 0; code <= 255; ++code)
+    EXPECT_EQ(outcome_of_code(static_cast<std::uint8_t>(code)),
+              code <= 9 ? static_cast<Outcome>(code) : Outcome::fault);
+}
+
+/// What a node says in the third sample, and what the host makes of it.
+template <typename Node>
+struct Row {
+  PeerStatus status;
+  std::function<void(Node&)> say;
+  bool before_the_run = false;
+};
+
+template <typename Node>
+std::string name_of(const testing::TestParamInfo<Row<Node>>& row) {
+  std::string name = meaning(row.param.status).words;
+  for (char& c : name)
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  return name + std::to_string(row.index);
+}
+
+/// A frame of the node, and the bus that it comes from.
+struct CanSaid {
+  CanRig* rig;
+  CanFrame* frame;
+  std::vector<CanFrame>* more;
+
+  bool measurement() const { return frame->id == kCanSensorId; }
+  void state(const std::function<void(CanState&)>& change) const {
+    CanState state = rig_state();
+    change(state);
+    more->push_back(encode_can_state(state));
+  }
+  CanState rig_state() const {
+    CanState state = *last;
+    state.answer = CanAnswer::none;
+    state.session = 0;
+    return state;
+  }
+  const CanState* last;
+};
+
+/// A byte of the measurement.
+std::function<void(CanSaid&)> byte(std::size_t at, std::uint8_t value) {
+  return [=](CanSaid& said) {
+    if (said.measurement()) said.frame->data[at] = value;
+    reseal(*said.frame);
+  };
+}
+
+std::function<void(CanSaid&)> with_state(std::function<void(CanState&)> change) {
+  return [change = std::move(change)](CanSaid& said) {
+    if (said.measurement()) said.state(change);
+  };
+}
+
+void no_value(CanSaid& said) {
+  if (!said.measurement()) return;
+  put_can_value(*said.frame, kCanHeaderBytes, NAN, {1.0});
+  reseal(*said.frame);
+}
+
+void every_state(CanSaid& said, const std::function<void(CanState&)>& change) {
+  CanState state;
+  if (said.frame->id != kCanStateId || !decode_can_state(*said.frame, state)) return;
+  change(state);
+  *said.frame = encode_can_state(state);
+}
+
+class CanPeer : public testing::TestWithParam<Row<CanSaid>> {};
+
+TEST_P(CanPeer, HasTheReactionOfTheTable) {
+  const Row<CanSaid>& row = GetParam();
+  const PeerMeaning& wanted = meaning(row.status);
+  CanRig rig;
+  bool say = row.before_the_run;
+  CanState last;
+  const auto alter = [&](std::span<CanFrame> frames, std::size_t count) {
+    std::vector<CanFrame> more;
+    for (std::size_t i = 0; i < count; ++i) {
+      CanState state;
+      if (frames[i].id == kCanStateId && decode_can_state(frames[i], state)) last = state;
+      CanSaid said{&rig, &frames[i], &more, &last};
+      if (say) row.say(said);
+    }
+    for (const CanFrame& frame : more) frames[count++] = frame;
+    return count;
+  };
+  const auto bus = rig.host_bus();
+  CanStage stage(rig.stage_spec().info, rig.spec(), std::make_unique<test::AlteredCan>(*bus, alter),
+                 {1e3, false});
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
+  if (row.before_the_run) {
+    try {
+      stage.start(1, inputs);
+      FAIL() << "started";
+    } catch (const StageError& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr(wanted.words));
+    }
+    EXPECT_NE(rig.node().state(), NodeState::measuring);
+    return;
+  }
+  stage.start(1, inputs);
+  const std::vector<double> u(2, 0.1);
+  const auto exchange = [&](std::uint64_t cycle) {
+    const Outcome outcome = stage.exchange({cycle, 0, u}, inputs, {});
+    rig.pair().pass_time(1'000'000);
+    return outcome == Outcome::late ? Outcome::ok : outcome;  // of a busy machine
+  };
+  for (std::uint64_t cycle = 0; cycle < 2; ++cycle) ASSERT_EQ(exchange(cycle), Outcome::ok);
+  say = true;
+  const Outcome outcome = stage.exchange({2, 0, u}, inputs, {});
+  say = false;
+  EXPECT_EQ(outcome, wanted.outcome) << stage.trouble();
+  if (wanted.reaction == PeerReaction::mark) {
+    EXPECT_EQ(exchange(3), Outcome::ok);
+  } else {
+    EXPECT_THAT(stage.trouble(), testing::Not(testing::IsEmpty()));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Rows, CanPeer,
+    testing::Values(
+        Row<CanSaid>{PeerStatus::setpoints_missed, with_state([](CanState& s) { s.gaps = 5; })},
+        Row<CanSaid>{PeerStatus::nothing_new, no_value},
+        Row<CanSaid>{PeerStatus::damaged, [](CanSaid& s) { s.frame->data[9] ^= 1U; }},
+        Row<CanSaid>{PeerStatus::out_of_range,
+                     byte(2, kCanSaturatedBit | static_cast<std::uint8_t>(NodeState::measuring))},
+        Row<CanSaid>{PeerStatus::limit, with_state([](CanState& s) {
+                       s.state = NodeState::fault_reaction;
+                       s.cause = FaultCause::limit;
+                     })},
+        Row<CanSaid>{PeerStatus::not_measuring,
+                     byte(2, static_cast<std::uint8_t>(NodeState::operation_enabled))},
+        Row<CanSaid>{PeerStatus::not_measuring,
+                     with_state([](CanState& s) { s.state = NodeState::quick_stop; })},
+        Row<CanSaid>{PeerStatus::not_measuring,
+                     with_state([](CanState& s) { s.run = static_cast<std::uint8_t>(s.run + 1); })},
+        Row<CanSaid>{PeerStatus::fault, with_state([](CanState& s) {
+                       s.state = NodeState::fault;
+                       s.cause = FaultCause::temperature;
+                     })},
+        Row<CanSaid>{PeerStatus::fault,
+                     with_state([](CanState& s) { s.cause = static_cast<FaultCause>(77); })},
+        Row<CanSaid>{PeerStatus::unknown_code, byte(2, 9)},
+        Row<CanSaid>{PeerStatus::unknown_code,
+                     with_state([](CanState& s) { s.state = static_cast<NodeState>(42); })},
+        Row<CanSaid>{PeerStatus::conflict,
+                     [](CanSaid& s) {
+                       if (!s.measurement()) return;
+                       CanFrame other = *s.frame;
+                       std::swap(other, *s.frame);
+                       s.frame->data[8] ^= 0x10U;
+                       reseal(*s.frame);
+                       s.more->push_back(other);
+                     }},
+        Row<CanSaid>{PeerStatus::other_node, with_state([](CanState& s) { s.boot ^= 8U; })},
+        Row<CanSaid>{PeerStatus::first_sample_missing, no_value, true},
+        Row<CanSaid>{PeerStatus::in_fault,
+                     [](CanSaid& s) {
+                       every_state(s, [](CanState& told) { told.state = NodeState::fault; });
+                     },
+                     true},
+        Row<CanSaid>{PeerStatus::two_nodes,
+                     [](CanSaid& s) {
+                       if (s.frame->id == kCanStateId)
+                         s.state([](CanState& told) { told.boot ^= 8U; });
+                     },
+                     true},
+        Row<CanSaid>{PeerStatus::other_version,
+                     [](CanSaid& s) { every_state(s, [](CanState& told) { told.version = 1; }); },
+                     true},
+        Row<CanSaid>{
+            PeerStatus::other_stage,
+            [](CanSaid& s) { every_state(s, [](CanState& told) { told.fingerprint ^= 1U; }); },
+            true}),
+    name_of<CanSaid>);
+
+/// The registers of a node, changed on their way out.
+class LyingRegisters final : public ModbusRegisters {
+ public:
+  explicit LyingRegisters(ModbusRegisters& node) : node_(node) {}
+  void begin_request(ModbusConnection from) override { node_.begin_request(from); }
+  void tick() override { node_.tick(); }
+  ModbusException write(int first, std::span<const std::uint16_t> values) override {
+    return node_.write(first, values);
+  }
+  ModbusException read(int first, std::span<std::uint16_t> values) override {
+    const ModbusException refused = node_.read(first, values);
+    first_ = first;
+    values_ = values;
+    if (say && (first == map::kMeasurementBootId || always)) say(*this);
+    return refused;
+  }
+  void set(int address, std::uint32_t value) {
+    const int at = address - first_;
+    if (at < 0 || at + 2 > static_cast<int>(values_.size())) return;
+    put_u32(values_.subspan(static_cast<std::size_t>(at)).first<2>(), value);
+  }
+  std::function<void(LyingRegisters&)> say;
+  bool always = false;
+
+ private:
+  ModbusRegisters& node_;
+  int first_ = 0;
+  std::span<std::uint16_t> values_;
+};
+
+/// Outcome, state and cause of the measurement status.
+std::function<void(LyingRegisters&)> status(unsigned outcome, unsigned state = 5,
+                                            unsigned cause = 0, unsigned missed = 0) {
+  return [=](LyingRegisters& r) {
+    r.set(map::kMeasurementStatus, outcome | state << 8 | cause << 16 | missed << 24);
+  };
+}
+
+class ModbusPeer : public testing::TestWithParam<Row<LyingRegisters>> {};
+
+TEST_P(ModbusPeer, HasTheReactionOfTheTable) {
+  const Row<LyingRegisters>& row = GetParam();
+  const PeerMeaning& wanted = meaning(row.status);
+  test::ModbusBench bench;
+  LyingRegisters lying(bench.registers());
+  bench.stop();
+  const test::ServerThread server(lying, nullptr);
+  lying.always = row.before_the_run;
+  if (row.before_the_run) lying.say = row.say;
+  const auto stage = std::make_unique<ModbusStage>(test::ModbusBench::info(), server.address(),
+                                                   test::kQuickTiming);
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
+  if (row.before_the_run) {
+    try {
+      stage->start(1, inputs);
+      FAIL() << "started";
+    } catch (const StageError& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr(wanted.words));
+    }
+    EXPECT_NE(bench.node().state(), NodeState::measuring);
+    return;
+  }
+  stage->start(1, inputs);
+  const std::vector<double> u(2, 0.1);
+  ASSERT_EQ(stage->exchange({0, 0, u}, inputs, {}), Outcome::ok);
+  lying.say = row.say;
+  EXPECT_EQ(stage->exchange({1, 0, u}, inputs, {}), wanted.outcome) << stage->trouble();
+  EXPECT_THAT(stage->trouble(), testing::Not(testing::IsEmpty()));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Rows, ModbusPeer,
+    testing::Values(
+        Row<LyingRegisters>{PeerStatus::setpoints_missed, status(0, 5, 0, 1)},
+        Row<LyingRegisters>{PeerStatus::late, status(1)},
+        Row<LyingRegisters>{PeerStatus::passive, status(5)},
+        Row<LyingRegisters>{PeerStatus::incomplete, status(2)},
+        Row<LyingRegisters>{PeerStatus::nothing_new, status(3)},
+        Row<LyingRegisters>{PeerStatus::nothing_new,
+                            [](LyingRegisters& r) { r.set(map::kValid + 2, 0); }},
+        Row<LyingRegisters>{PeerStatus::damaged, status(4)},
+        Row<LyingRegisters>{PeerStatus::out_of_range,
+                            [](LyingRegisters& r) { r.set(map::kMeasurement, 0x7FFFFFFFU); }},
+        Row<LyingRegisters>{PeerStatus::limit, status(9)},
+        Row<LyingRegisters>{PeerStatus::limit, status(0, 7, 2)},
+        Row<LyingRegisters>{PeerStatus::not_measuring, status(0, 4)},
+        Row<LyingRegisters>{PeerStatus::fault, status(8)},
+        Row<LyingRegisters>{PeerStatus::fault, status(0, 8, 7)},
+        Row<LyingRegisters>{PeerStatus::fault, status(0, 5, 4)},
+        Row<LyingRegisters>{PeerStatus::unknown_code, status(10)},
+        Row<LyingRegisters>{PeerStatus::unknown_code, status(0, 9)},
+        Row<LyingRegisters>{PeerStatus::bus_off, status(6)},
+        Row<LyingRegisters>{PeerStatus::link_down, status(7)},
+        Row<LyingRegisters>{PeerStatus::other_node,
+                            [](LyingRegisters& r) { r.set(map::kMeasurementBootId, 9); }},
+        Row<LyingRegisters>{PeerStatus::first_sample_missing,
+                            [](LyingRegisters& r) { r.set(map::kValid + 2, 0); }, true},
+        Row<LyingRegisters>{PeerStatus::in_fault, [](LyingRegisters& r) { r.set(map::kState, 8); },
+                            true},
+        Row<LyingRegisters>{PeerStatus::other_version,
+                            [](LyingRegisters& r) { r.set(map::kVersion, 1); }, true},
+        Row<LyingRegisters>{PeerStatus::other_stage,
+                            [](LyingRegisters& r) { r.set(map::kChannelHash, 1); }, true}),
+    name_of<LyingRegisters>);
+
+// The rows that need more than one peer are in ownership_test.cpp, those of a bus in can_stage_test.cpp
+// and can_fault_test.cpp, those of a link in modbus_stage_test.cpp.
+
+}  // namespace
+}  // namespace stageid

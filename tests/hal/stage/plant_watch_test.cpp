@@ -1,0 +1,178 @@
+#include "hal/stage/plant_watch.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "hal/stage/pacer.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+PlantSnapshot good_snapshot() {
+  PlantSnapshot snapshot;
+  snapshot.t_ns = 10 * kSecond_ns;
+  snapshot.interlock_closed = true;
+  snapshot.state = NodeState::switch_on_disabled;
+  snapshot.gravity_compensator_n = {50.0, 51.0};
+  snapshot.temperature_k = {295.0};
+  return snapshot;
+}
+
+PlantConditions conditions() { return {0.1, 40.0, 60.0, 285.0, 310.0, 0.2}; }
+
+std::string trouble(const PlantSnapshot& snapshot, double age_s = 0.0) {
+  return plant_trouble(snapshot, conditions(),
+                       snapshot.t_ns + static_cast<std::int64_t>(age_s * 1e9));
+}
+
+TEST(PlantTrouble, EveryConditionIsNamed) {
+  EXPECT_EQ(trouble(good_snapshot(), 0.09), "");
+  EXPECT_THAT(trouble(good_snapshot(), 0.11), HasSubstr("no fresh status for more than 0.1 s"));
+  EXPECT_THAT(trouble({}), HasSubstr("no status was read yet"));
+  PlantSnapshot s = good_snapshot();
+  s.interlock_closed = false;
+  EXPECT_THAT(trouble(s), HasSubstr("the interlock is open"));
+  s = good_snapshot();
+  s.gravity_compensator_n[1] = 39.0;
+  EXPECT_EQ(trouble(s), "gravity compensator 2: 39 N is not within 40 ... 60 N");
+  s.gravity_compensator_n[1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(trouble(s), HasSubstr("gravity compensator 2: nan N"));
+  s = good_snapshot();
+  s.temperature_k[0] = 311.0;
+  EXPECT_EQ(trouble(s), "temperature 1: 311 K is not within 285 ... 310 K");
+  s = good_snapshot();
+  s.state = NodeState::fault;
+  s.cause = FaultCause::watchdog;
+  EXPECT_THAT(trouble(s), HasSubstr("the plant is in fault: the host fell silent"));
+}
+
+/// A plant that does what it is told, unless it is told otherwise by the test.
+class FakeSupervisor final : public Supervisor {
+ public:
+  PlantSnapshot snapshot() const override {
+    const std::lock_guard lock(mutex_);
+    PlantSnapshot snapshot = state_;
+    if (alive_) snapshot.t_ns = monotonic_ns();
+    return snapshot;
+  }
+  SupervisorReply request(SupervisorCommand command) override {
+    const std::lock_guard lock(mutex_);
+    requests_.push_back(command);
+    if (!obedient_) return {false, "out of order"};
+    state_.enabled = command == SupervisorCommand::enable && comes_up_;
+    return {true, ""};
+  }
+  std::string trouble() const override { return alive_ ? "" : "the cable is cut"; }
+
+  template <typename Change>
+  void set(Change change) {
+    const std::lock_guard lock(mutex_);
+    change(*this);
+  }
+  std::vector<SupervisorCommand> requests() const {
+    const std::lock_guard lock(mutex_);
+    return requests_;
+  }
+
+  PlantSnapshot state_ = good_snapshot();
+  std::atomic<bool> alive_ = true;
+  bool obedient_ = true;
+  bool comes_up_ = true;
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<SupervisorCommand> requests_;
+};
+
+/// Waits for a flag that must come; ten seconds are for a machine that is busy.
+bool trips(const PlantWatch& watch) {
+  for (int i = 0; i < 2000 && !watch.tripped(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  return watch.tripped();
+}
+
+TEST(PlantWatch, EnablesWatchesAndDisables) {
+  FakeSupervisor supervisor;
+  {
+    const PlantWatch watch(supervisor, conditions());
+    EXPECT_TRUE(supervisor.snapshot().enabled);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_FALSE(watch.tripped());
+    EXPECT_EQ(watch.reason(), "");
+  }
+  EXPECT_EQ(supervisor.requests(), (std::vector<SupervisorCommand>{SupervisorCommand::enable,
+                                                                   SupervisorCommand::disable}));
+}
+
+template <typename Change>
+std::string reason_after(Change change) {
+  FakeSupervisor supervisor;
+  const PlantWatch watch(supervisor, conditions());
+  supervisor.set(change);
+  EXPECT_TRUE(trips(watch));
+  return watch.reason();
+}
+
+TEST(PlantWatch, TripsWithTheReason) {
+  EXPECT_THAT(reason_after([](auto& s) { s.state_.interlock_closed = false; }),
+              HasSubstr("the interlock is open"));
+  EXPECT_THAT(reason_after([](auto& s) { s.state_.temperature_k[0] = 400.0; }), HasSubstr("400 K"));
+  EXPECT_THAT(reason_after([](auto& s) { s.state_.enabled = false; }),
+              HasSubstr("not enabled any more"));
+  EXPECT_THAT(reason_after([](auto& s) { s.alive_ = false; }),
+              testing::AllOf(HasSubstr("no fresh status"), HasSubstr("the cable is cut")));
+}
+
+TEST(PlantWatch, StaysTripped) {
+  FakeSupervisor supervisor;
+  const PlantWatch watch(supervisor, conditions());
+  supervisor.set([](auto& s) { s.state_.interlock_closed = false; });
+  ASSERT_TRUE(trips(watch));
+  supervisor.set([](auto& s) { s.state_.interlock_closed = true; });
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_TRUE(watch.tripped());
+}
+
+template <typename Change>
+std::string refusal(Change change) {
+  FakeSupervisor supervisor;
+  change(supervisor);
+  try {
+    const PlantWatch watch(supervisor, conditions());
+  } catch (const StageError& error) {
+    return error.what();
+  }
+  return "came up";
+}
+
+TEST(PlantWatch, DoesNotBringUpAPlantThatIsNotReady) {
+  EXPECT_EQ(refusal([](auto&) {}), "came up");
+  EXPECT_THAT(refusal([](auto& s) { s.state_.interlock_closed = false; }),
+              HasSubstr("the interlock is open"));
+  EXPECT_THAT(refusal([](auto& s) { s.alive_ = false; }), HasSubstr("the cable is cut"));
+  EXPECT_THAT(refusal([](auto& s) { s.obedient_ = false; }),
+              HasSubstr("the plant cannot be enabled: out of order"));
+  EXPECT_THAT(refusal([](auto& s) { s.comes_up_ = false; }), HasSubstr("not enabled"));
+}
+
+TEST(PlantWatch, ConditionsThatNothingFulfilsAreRefused) {
+  FakeSupervisor supervisor;
+  PlantConditions empty = conditions();
+  empty.gravity_low_n = 61.0;
+  EXPECT_THROW(PlantWatch(supervisor, empty), std::invalid_argument);
+  empty = conditions();
+  empty.stale_s = 0.0;
+  EXPECT_THROW(PlantWatch(supervisor, empty), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace stageid

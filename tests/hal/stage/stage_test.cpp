@@ -1,0 +1,30 @@
+#include "hal/stage/stage.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+namespace stageid {
+namespace {
+
+TEST(Outcome, HasANameOfItsOwn) {
+  std::set<std::string> names;
+  for (int i = 0; i <= static_cast<int>(Outcome::limit); ++i)
+    names.insert(to_string(static_cast<Outcome>(i)));
+  EXPECT_EQ(names.size(), 10U);
+  EXPECT_EQ(names.count("unknown outcome"), 0U);
+  EXPECT_STREQ(to_string(static_cast<Outcome>(200)), "unknown outcome");
+}
+
+TEST(NodeState, HasANameOfItsOwn) {
+  std::set<std::string> names;
+  for (int i = 0; i <= static_cast<int>(NodeState::fault); ++i)
+    names.insert(to_string(static_cast<NodeState>(i)));
+  EXPECT_EQ(names.size(), 9U);
+  EXPECT_EQ(names.count("unknown state"), 0U);
+  EXPECT_STREQ(to_string(static_cast<NodeState>(200)), "unknown state");
+}
+
+}  // namespace
+}  // namespace stageid

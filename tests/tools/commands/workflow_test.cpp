@@ -1,0 +1,354 @@
+// The commands in their order, on the real program with the small stage.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "estimation/model/additive_model.hpp"
+#include "frf/file/frf_file.hpp"
+#include "tests/tools/program_fixture.hpp"
+#include "tools/experiment/closed_loop_prediction.hpp"
+#include "tools/experiment/config_plan.hpp"
+#include "tools/experiment/experiment_config.hpp"
+
+namespace stageid::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class Workflow : public ProgramTest {};
+
+constexpr std::array kOutputs = {"excitation.h5", "run.slog",   "frf.h5",   "frf_validation.h5",
+                                 "modes.json",    "model.json", "model.h5", "model.csv",
+                                 "summary.json",  "report.html"};
+
+TEST_F(Workflow, ANewcomerIsToldThreeThingsToTry) {
+  const ProgramResult result = succeed({});
+  EXPECT_THAT(result.out, HasSubstr("stageid identify"));
+  EXPECT_THAT(result.out, HasSubstr("stageid import"));
+  EXPECT_THAT(result.out, HasSubstr("stageid config schema"));
+  EXPECT_THAT(succeed({"--help"}).out, HasSubstr("import"));
+  EXPECT_THAT(succeed({"--version"}).out, testing::MatchesRegex("stageid [0-9.]+\n"));
+  EXPECT_THAT(succeed({"fit", "--help"}).out, HasSubstr("--weighting"));
+}
+
+TEST_F(Workflow, IdentifyFindsEveryModeOfTheStage) {
+  const ProgramResult result = succeed({"identify", config_, "-o", name("all")});
+  for (const char* output : kOutputs)
+    EXPECT_TRUE(std::filesystem::exists(at("all") / output)) << output;
+  EXPECT_THAT(result.out, HasSubstr("report: " + name("all/report.html")));
+  const json summary = json::parse(read_bytes(at("all/summary.json")));
+  EXPECT_TRUE(summary["trustworthy"]);
+  EXPECT_EQ(summary["truth"]["extra_modes_hz"].size(), 0U);
+  ASSERT_GE(summary["truth"]["modes"].size(), 3U);
+  for (const json& mode : summary["truth"]["modes"]) {
+    ASSERT_TRUE(mode["found"]) << mode;
+    // 3 standard deviations is the issue's bound; 4.5 leaves a chance of 1e-4 to a right program that
+    // draws other noise, and the relative bound holds where bias is all there is.
+    const double error =
+        mode["natural_frequency_hz"].get<double>() / mode["true_frequency_hz"].get<double>() - 1.0;
+    EXPECT_TRUE(std::abs(mode["frequency_deviation_in_std"].get<double>()) < 4.5 ||
+                std::abs(error) < 1e-4)
+        << mode;
+    EXPECT_GT(mode["natural_frequency_std_hz"].get<double>(), 0.0);
+  }
+  EXPECT_LT(summary["truth"]["relative_rms_error"].get<double>(), 0.05);
+  EXPECT_NEAR(summary["validation"]["chi_square_per_dof"].get<double>(), 1.0, 0.3);
+}
+
+TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
+  succeed({"identify", config_, "-o", name("all")});
+  const std::vector<std::string> fit = {
+      "fit",          name("all/frf.h5"),  "-o", name("few.json"), "--modes", "1",
+      "--rigid-body", "suspension:0.4:0.5"};
+  const ProgramResult fitted = run(fit);
+  EXPECT_EQ(fitted.exit_code, 3);
+  EXPECT_THAT(fitted.err, HasSubstr("not to be trusted: the residual is "));
+  EXPECT_THAT(fitted.err, HasSubstr("times what noise explains"));
+  std::vector<std::string> as_json = fit;
+  as_json.emplace_back("--json");
+  const json told = json::parse(run(as_json).out);
+  EXPECT_EQ(told["trustworthy"], false);
+  EXPECT_EQ(told["status"], "unexplained");
+
+  const ProgramResult validated =
+      run({"validate", name("few.json"), name("all/frf_validation.h5")});
+  EXPECT_EQ(validated.exit_code, 3);
+  EXPECT_THAT(validated.out, HasSubstr("verdict: not to be trusted: the residual is "));
+  const ProgramResult sound =
+      succeed({"validate", name("all/model.json"), name("all/frf_validation.h5")});
+  EXPECT_THAT(sound.out, HasSubstr("verdict: trustworthy; noise and known distortion explain"));
+}
+
+// Realizations show a cubic stiffness, periods do not: the fit weighs by the realizations.
+TEST_F(Workflow, ANonlinearPlantIsNamedAndItsModesAreFound) {
+  const std::string config =
+      stage("cubic.yaml", "  plate:", "  cubic_stiffness_n_m3: 1e15\n  plate:");
+  const ProgramResult result = run({"identify", config, "-o", name("cubic")});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("weighting: total_variance; the plant is nonlinear"));
+  const json summary = json::parse(read_bytes(at("cubic/summary.json")));
+  EXPECT_EQ(summary["fit"]["weighting"], "total_variance");
+  EXPECT_EQ(summary["truth"]["extra_modes_hz"].size(), 0U);
+  for (const json& mode : summary["truth"]["modes"]) {
+    ASSERT_TRUE(mode["found"]) << mode;
+    EXPECT_LT(std::abs(mode["frequency_deviation_in_std"].get<double>()), 4.5) << mode;
+  }
+}
+
+TEST_F(Workflow, TheSameFilesAgainAndWithOtherThreads) {
+  succeed({"identify", config_, "-o", name("one"), "--threads", "1"});
+  succeed({"identify", config_, "-o", name("two"), "--threads", "2"});
+  for (const char* file : {"excitation.h5", "frf.h5", "frf_validation.h5", "modes.json",
+                           "model.json", "model.h5", "model.csv"})
+    EXPECT_TRUE(same_bytes(read_bytes(at("one") / file), read_bytes(at("two") / file))) << file;
+}
+
+TEST_F(Workflow, ResumePassesOverWhatIsUpToDate) {
+  succeed({"identify", config_, "-o", name("all")});
+  const auto before = snapshot(at("all"));
+  EXPECT_EQ(run({"identify", config_, "-o", name("all")}).exit_code, 2);
+  const ProgramResult again = succeed({"identify", config_, "-o", name("all"), "--resume"});
+  for (const char* step : {"design", "run", "frf", "fit"})
+    EXPECT_THAT(again.err, testing::ContainsRegex(std::string(step) + " .*up to date"));
+  const auto after = snapshot(at("all"));
+  for (const char* file : {"run.slog", "frf.h5", "model.json", "model.h5"})
+    EXPECT_TRUE(same_bytes(before.at(name("all/") + file), after.at(name("all/") + file))) << file;
+  // Another fit: the measurement stays, the model does not.
+  write_bytes(config_, replaced(read_bytes(config_), "direct_term: full", "direct_term: none"));
+  const ProgramResult refit = run({"identify", config_, "-o", name("all"), "--resume"});
+  EXPECT_THAT(refit.err, testing::ContainsRegex("run .*up to date"));
+  EXPECT_THAT(refit.err, testing::Not(testing::ContainsRegex("fit .*up to date")));
+  EXPECT_FALSE(same_bytes(before.at(name("all/model.json")), read_bytes(at("all/model.json"))));
+}
+
+TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
+  // One run lasts 25 s on the wall clock, so the signal, half a second after the log is there, comes in
+  // the middle of the first. However late a busy machine makes its cycles, they do not end it: lateness
+  // is marked, and this run is measured anew.
+  const std::string config =
+      stage("long.yaml", "noise:", "realtime: {misses_allowed: 1000000}\nnoise:");
+  write_bytes(config, replaced(read_bytes(config), "periods: 3", "periods: 8"));
+  ProgramOptions interrupt;
+  interrupt.interrupt_after_file = at("cut.slog");
+  interrupt.interrupt_after_s = 0.5;
+  const ProgramResult first =
+      run({"run", config, "-o", name("cut.slog"), "--pace", "0.1"}, interrupt);
+  EXPECT_EQ(first.exit_code, 130) << first.err;
+  EXPECT_THAT(first.err, HasSubstr("continue with --resume"));
+  ASSERT_TRUE(std::filesystem::exists(at("cut.slog")));
+  succeed({"log", "verify", name("cut.slog")});
+  const json info = json::parse(succeed({"log", "info", name("cut.slog"), "--json"}).out);
+  for (const json& cut : info["runs"]) EXPECT_FALSE(cut["complete"]);
+  succeed({"run", config, "-o", name("cut.slog"), "--resume"});
+  succeed({"run", config, "-o", name("whole.slog")});
+  succeed({"frf", name("cut.slog"), "-o", name("cut.h5")});
+  succeed({"frf", name("whole.slog"), "-o", name("whole.h5")});
+  const FrfEstimate cut = read_frf(at("cut.h5"));
+  const FrfEstimate whole = read_frf(at("whole.h5"));
+  EXPECT_EQ(cut.response, whole.response);
+  EXPECT_EQ(cut.noise_variance, whole.noise_variance);
+}
+
+TEST_F(Workflow, ALimitStopsTheRunWithCodeFourAndKeepsTheLog) {
+  const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
+  const ProgramResult result = run({"run", loud, "-o", name("loud.slog")});
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("|u|"));
+  const json info = json::parse(succeed({"log", "info", name("loud.slog"), "--json"}).out);
+  ASSERT_EQ(info["runs"].size(), 1U);
+  EXPECT_FALSE(info["runs"][0]["complete"]);
+  EXPECT_GT(info["runs"][0]["samples"], 0);
+}
+
+TEST_F(Workflow, AnInterlockEndsTheRunWithCodeOne) {
+  const std::string config =
+      stage("lock.yaml", "noise:", "faults: [{kind: interlock, from_cycle: 700, run: 1}]\nnoise:");
+  const ProgramResult result = run({"run", config, "-o", name("lock.slog")});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  const json info = json::parse(succeed({"log", "info", name("lock.slog"), "--json"}).out);
+  ASSERT_EQ(info["runs"].size(), 2U);
+  EXPECT_TRUE(info["runs"][0]["complete"]);
+  EXPECT_FALSE(info["runs"][1]["complete"]);
+}
+
+TEST_F(Workflow, AStuckSensorStopsTheRunWithCodeFour) {
+  const std::string config =
+      stage("stuck.yaml",
+            "noise:", "faults: [{kind: stuck_sensor, channel: s1, from_cycle: 1700}]\nnoise:");
+  const ProgramResult result = run({"run", config, "-o", name("stuck.slog")});
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("sensor s1: has shown"));
+}
+
+TEST_F(Workflow, AFaultThatOpensTheLoopEndsWithCodeFourAndItsCause) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"kind: actuator_gain, value: -1", "deviation from the predicted motion"},
+      {"kind: sensor_offset, channel: s1, value: 6e-4", "sensor s1: jumped"},
+      {"kind: nan_sensor, channel: s2", "sensor s2: the measurement is not finite"}};
+  int number = 0;
+  for (const auto& [fault, cause] : cases) {
+    const std::string file = "open" + std::to_string(++number);
+    const std::string config =
+        stage(file + ".yaml",
+              "noise:", std::string("faults: [{") + fault + ", from_cycle: 1700}]\nnoise:");
+    const ProgramResult result = run({"run", config, "-o", name(file + ".slog")});
+    EXPECT_EQ(result.exit_code, 4) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(cause));
+    EXPECT_THAT(result.err, HasSubstr("; braked, "));
+    const json info = json::parse(succeed({"log", "info", name(file + ".slog"), "--json"}).out);
+    EXPECT_GT(info["runs"][0]["health"]["marked"], 0);
+  }
+}
+
+TEST_F(Workflow, TheRampOfAStopIsAsLongAsTheStageFileSays) {
+  // Less than half a window: the loop follows it, past a limit of force, and is sound.
+  const std::string config = stage("ramp.yaml", "noise:",
+                                   "ramp_s: 0.01\nfaults: [{kind: sensor_offset, from_cycle: 1700, "
+                                   "value: 4.9e-4}]\nnoise:");
+  const ProgramResult result = run({"run", config, "-o", name("ramp.slog")});
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("|u|"));
+  const json info = json::parse(succeed({"log", "info", name("ramp.slog"), "--json"}).out);
+  EXPECT_NEAR(info["runs"][0]["health"]["marked"].get<double>(), 21.0, 2.0);
+}
+
+TEST_F(Workflow, AMissedCycleIsMarkedAndSaid) {
+  const std::string config = stage(
+      "miss.yaml", "noise:", "faults: [{kind: missed_cycle, from_cycle: 1700, run: 2}]\nnoise:");
+  const ProgramResult result = run({"run", config, "-o", name("miss.slog")});
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_THAT(
+      result.err,
+      HasSubstr("1 cycle is missing, 2 samples are marked as not to be used: 'stageid log info'"));
+  succeed({"frf", name("miss.slog"), "-o", name("f.h5")});
+}
+
+TEST_F(Workflow, ReplayGivesTheSameLogAndNoticesADifference) {
+  make_log();
+  succeed({"run", config_, "-o", name("again.slog"), "--backend", "replay", "--replay",
+           name("run.slog")});
+  succeed({"frf", name("run.slog"), "-o", name("a.h5")});
+  succeed({"frf", name("again.slog"), "-o", name("b.h5")});
+  EXPECT_EQ(read_frf(at("a.h5")).response, read_frf(at("b.h5")).response);
+  const std::string other = experiment("other.yaml", "rms_n: 1.0", "rms_n: 1.001");
+  const ProgramResult different = run(
+      {"run", other, "-o", name("c.slog"), "--backend", "replay", "--replay", name("run.slog")});
+  EXPECT_EQ(different.exit_code, 3);
+  EXPECT_THAT(different.err, HasSubstr("differ from the recorded ones"));
+}
+
+TEST_F(Workflow, TheDesignForetellsWhatTheRunDoes) {
+  make_log();
+  const ExperimentConfig config = load_experiment_config(config_);
+  const DesignPrediction prediction = predict_closed_loop(make_plan(config), config.stage.spec);
+  const std::unique_ptr<LogReader> log = open_log(at("run.slog"));
+  const auto N = static_cast<std::uint64_t>(log->info().period_samples);
+  Eigen::VectorXd u_rms = Eigen::VectorXd::Zero(3), u_peak = u_rms;
+  Eigen::VectorXd y_rms = Eigen::VectorXd::Zero(2), y_peak = y_rms;
+  for (std::size_t run = 0; run < log->runs().size(); ++run) {
+    LogSamples last;
+    log->read(run, 4 * N, N, last);
+    u_rms =
+        u_rms.cwiseMax(last.actuators.colwise().squaredNorm().transpose() / static_cast<double>(N));
+    u_peak = u_peak.cwiseMax(last.actuators.cwiseAbs().colwise().maxCoeff().transpose());
+    y_rms =
+        y_rms.cwiseMax(last.sensors.colwise().squaredNorm().transpose() / static_cast<double>(N));
+    y_peak = y_peak.cwiseMax(last.sensors.cwiseAbs().colwise().maxCoeff().transpose());
+  }
+  // What is left of the transient after four periods of 0.25 s with loops of 20 Hz and a slowly
+  // integrating controller, and noise of 1e-9 m beside motions of some 1e-6 m.
+  constexpr double kTolerance = 0.02;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const ChannelPrediction& channel = prediction.actuators[static_cast<std::size_t>(i)];
+    EXPECT_NEAR(channel.rms, std::sqrt(u_rms[i]), kTolerance * channel.rms);
+    EXPECT_NEAR(channel.peak, u_peak[i], kTolerance * channel.peak);
+  }
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    const ChannelPrediction& channel = prediction.sensors[static_cast<std::size_t>(i)];
+    EXPECT_NEAR(channel.rms, std::sqrt(y_rms[i]), kTolerance * channel.rms);
+    EXPECT_NEAR(channel.peak, y_peak[i], kTolerance * channel.peak);
+  }
+}
+
+TEST_F(Workflow, AReportComparesWithAnotherDay) {
+  make_frf();
+  succeed({"fit", name("frf.h5"), "-o", name("model.json"), "--band", "120", "800"});
+  succeed({"report", name("frf.h5"), name("model.json"), "--compare", name("frf.h5"),
+           name("model.json"), "-o", name("r.html")});
+  EXPECT_THAT(read_bytes(at("r.html")), HasSubstr(R"("comparison":{)"));
+  EXPECT_THAT(read_bytes(at("r.html")), HasSubstr("it is the same response"));
+  fail({"report", name("frf.h5"), "--compare", name("run.slog"), "-o", name("no.html")}, 2,
+       "run.slog: holds no FRF and no model");
+}
+
+TEST_F(Workflow, EveryCommandSpeaksOneJsonObject) {
+  make_frf();
+  const std::vector<std::vector<std::string>> commands = {
+      {"design", config_, "-o", name("e.h5")},
+      {"run", config_, "-o", name("r.slog")},
+      {"log", "info", name("run.slog")},
+      {"log", "verify", name("run.slog")},
+      {"log", "convert", name("run.slog"), "-o", name("r.csv")},
+      {"frf", name("run.slog"), "-o", name("f.h5")},
+      {"modes", name("frf.h5"), "-o", name("modes.json")},
+      {"fit", name("frf.h5"), "-o", name("model.json"), "--band", "120", "800"},
+      {"validate", name("model.json"), name("frf.h5")},
+      {"validate", name("model.json"), name("run.slog")},
+      {"export", name("model.json"), "-o", name("m.csv")},
+      {"report", name("frf.h5"), name("model.json"), name("run.slog"), "-o", name("r.html")},
+      {"config", "schema"},
+      {"config", "check", config_, name("small_stage.yaml")},
+      {"identify", config_, "-o", name("all")}};
+  for (std::vector<std::string> command : commands) {
+    SCOPED_TRACE(command[0]);
+    command.insert(command.begin(), "--json");
+    const ProgramResult result = succeed(command);
+    EXPECT_TRUE(json::parse(result.out, nullptr, false).is_object()) << result.out;
+  }
+}
+
+TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
+  make_model();
+  const json figures =
+      json::parse(succeed({"validate", name("model.json"), name("run.slog"), "--json"}).out);
+  // Small against the motion itself; the transient and noise are what is left.
+  EXPECT_LT(figures["time_domain"]["normalized"].get<double>(), 0.05);
+  EXPECT_EQ(figures["time_domain"]["runs"], 9);
+  // A model that is wrong by a factor must not pass.
+  AdditiveModel model = read_model(at("model.json"));
+  for (Submodel& s : model.submodels)
+    for (Eigen::MatrixXd& B : s.numerator) B *= 1.5;
+  write_model(at("wrong.json"), model);
+  const json wrong =
+      json::parse(run({"validate", name("wrong.json"), name("run.slog"), "--json"}).out);
+  EXPECT_EQ(wrong["trustworthy"], false);
+  EXPECT_NEAR(wrong["time_domain"]["normalized"].get<double>(), 0.5, 0.05);
+}
+
+TEST_F(Workflow, ACompensatedResponseGivesTheSameModes) {
+  make_log();
+  const auto first_flexible_mode = [&](const std::string& compensate) {
+    succeed({"frf", name("run.slog"), "-o", name(compensate + ".h5"), "--compensate", compensate});
+    const ProgramResult fit =
+        run({"fit", name(compensate + ".h5"), "-o", name(compensate + ".json"), "--direct-term",
+             "full", "--modes", "3", "--json"});
+    const json modes = json::parse(fit.out)["modes"];
+    const auto flexible = std::find_if(modes.begin(), modes.end(), [](const json& mode) {
+      return mode["natural_frequency_hz"].get<double>() > 16.0;
+    });
+    return (*flexible)["natural_frequency_hz"].get<double>();
+  };
+  const double measured = first_flexible_mode("none");
+  EXPECT_NEAR(first_flexible_mode("delay"), measured, 1e-3 * measured);
+  EXPECT_NEAR(first_flexible_mode("hold"), measured, 1e-3 * measured);
+}
+
+}  // namespace
+}  // namespace stageid::test

@@ -1,0 +1,158 @@
+// Every configuration that we ship loads, and is what it says.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "hal/can/can_dbc.hpp"
+#include "tests/support/wafer_stage.hpp"
+#include "tools/config/stage_config.hpp"
+#include "tools/experiment/closed_loop_prediction.hpp"
+#include "tools/experiment/config_plan.hpp"
+#include "tools/experiment/experiment_config.hpp"
+#include "tools/experiment/link_load.hpp"
+
+namespace stageid {
+namespace {
+
+const std::filesystem::path kConfigs = std::filesystem::path(STAGEID_SOURCE_DIR) / "configs";
+
+TEST(Configs, EveryStageLoads) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "stage")) {
+    SCOPED_TRACE(entry.path());
+    EXPECT_NO_THROW(load_stage_config(entry.path()));
+    ++count;
+  }
+  EXPECT_GE(count, 2);
+}
+
+TEST(Configs, EveryExperimentLoads) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "experiment")) {
+    SCOPED_TRACE(entry.path());
+    const ExperimentConfig config = load_experiment_config(entry.path());
+    EXPECT_GT(outline_plan(config).runs().size(), 0U);
+    ++count;
+  }
+  EXPECT_GE(count, 3);
+}
+
+TEST(Configs, WhatTheWiresHaveToCarryIsForetold) {
+  StageConfig can = load_stage_config(kConfigs / "stage/small_stage_can.yaml");
+  can.can.mode = CanMode::streaming;
+  const std::vector<LinkLoad> buses = link_loads(can);
+  ASSERT_FALSE(buses.empty());
+  for (const LinkLoad& bus : buses) {
+    EXPECT_GE(bus.load, bus.cycle_s * can.spec.info.sample_rate_hz);  // states beside the cycle
+    EXPECT_LT(bus.load, 0.8);
+    EXPECT_GT(bus.most_hz, can.spec.info.sample_rate_hz);
+  }
+  can.can.mode = CanMode::resident;
+  EXPECT_TRUE(link_loads(can).empty());
+
+  const StageConfig modbus = load_stage_config(kConfigs / "stage/small_stage_modbus.yaml");
+  const std::vector<LinkLoad> links = link_loads(modbus);
+  ASSERT_EQ(links.size(), 1U);
+  EXPECT_DOUBLE_EQ(links[0].load, links[0].cycle_s * modbus.spec.info.sample_rate_hz);
+  EXPECT_LE(links[0].load, 1.0);
+  EXPECT_TRUE(link_loads(load_stage_config(kConfigs / "stage/small_stage.yaml")).empty());
+}
+
+// The file for can-utils and SavvyCAN is what `config dbc` writes for the wafer stage today.
+TEST(Configs, TheDatabaseOfFramesIsOfTheWaferStage) {
+  const StageConfig stage = load_stage_config(kConfigs / "stage/wafer_stage_can.yaml");
+  std::ifstream file(std::filesystem::path(STAGEID_SOURCE_DIR) / "docs/wafer_stage_can.dbc");
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  EXPECT_EQ(text, can_dbc(can_layout(stage.can.spec, stage.spec.info), stage.spec.info));
+}
+
+TEST(Configs, TheMainJobHasItsNumbers) {
+  const ExperimentConfig config =
+      load_experiment_config(kConfigs / "experiment/wafer_stage_quick.yaml");
+  const ExperimentPlan plan = make_plan(config);
+  EXPECT_EQ(plan.grid().size(), 4000);
+  EXPECT_EQ(plan.grid().frequency_hz()[0], 0.25);
+  EXPECT_EQ(plan.grid().frequency_hz()[3999], 1999.75);
+  EXPECT_EQ(plan.experiments(), 13);
+  EXPECT_EQ(plan.runs().size(), 39U);
+  EXPECT_EQ(plan.samples_per_run(), 4 * 40000);
+  EXPECT_EQ(config.validation_realization, 2);
+  EXPECT_EQ(config.frf.outputs.size(), 4U);
+}
+
+TEST(Configs, ThePaperScaleHasItsNumbers) {
+  const ExperimentPlan plan =
+      make_plan(load_experiment_config(kConfigs / "experiment/wafer_stage_paper.yaml"));
+  EXPECT_EQ(plan.runs().size(), 130U);
+  EXPECT_EQ(plan.samples_per_run(), 11 * 40000);
+}
+
+void expect_same_channels(const std::vector<Channel>& a, const std::vector<Channel>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].name, b[i].name);
+    EXPECT_EQ(a[i].unit, b[i].unit);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_EQ(a[i].position_m[k], b[i].position_m[k]) << a[i].name;
+      EXPECT_EQ(a[i].direction[k], b[i].direction[k]) << a[i].name;
+    }
+  }
+}
+
+TEST(Configs, TheWaferStageIsTheOneThatTheLibrariesAreTestedWith) {
+  const WaferStageSpec file = load_stage_config(kConfigs / "stage/wafer_stage.yaml").spec;
+  const WaferStageSpec code = test::wafer_stage_spec();
+  expect_same_channels(file.info.actuators, code.info.actuators);
+  expect_same_channels(file.info.sensors, code.info.sensors);
+  EXPECT_EQ(file.info.sample_rate_hz, code.info.sample_rate_hz);
+  EXPECT_EQ(file.delay_s, code.delay_s);
+  EXPECT_EQ(file.limits.actuator_n, code.limits.actuator_n);
+  EXPECT_EQ(file.limits.slew_n_s, code.limits.slew_n_s);
+  EXPECT_EQ(file.limits.thermal_rms_n, code.limits.thermal_rms_n);
+  EXPECT_EQ(file.limits.position_window_m, code.limits.position_window_m);
+  EXPECT_EQ(file.sensor_noise_m, code.sensor_noise_m);
+  EXPECT_EQ(file.sensor_noise_coloured_m, code.sensor_noise_coloured_m);
+  EXPECT_EQ(file.force_noise_n, code.force_noise_n);
+  const std::vector<PlantMode> a = wafer_stage_modes(file);
+  const std::vector<PlantMode> b = wafer_stage_modes(code);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].natural_frequency_hz, b[i].natural_frequency_hz);
+    EXPECT_EQ(a[i].damping_ratio, b[i].damping_ratio);
+    EXPECT_EQ(a[i].actuator_shape, b[i].actuator_shape);
+    EXPECT_EQ(a[i].sensor_shape, b[i].sensor_shape);
+  }
+  EXPECT_EQ(file.controller.actuator_decoupling, code.controller.actuator_decoupling);
+  EXPECT_EQ(file.controller.sensor_decoupling, code.controller.sensor_decoupling);
+  ASSERT_EQ(file.controller.axes.size(), code.controller.axes.size());
+  for (std::size_t i = 0; i < file.controller.axes.size(); ++i) {
+    EXPECT_EQ(file.controller.axes[i].gain, code.controller.axes[i].gain);
+    EXPECT_EQ(file.controller.axes[i].lowpass_hz, code.controller.axes[i].lowpass_hz);
+  }
+}
+
+TEST(Configs, SeventeenModesOfTheWaferStageAreSeenBelowTwoKilohertz) {
+  const WaferStageSpec spec = load_stage_config(kConfigs / "stage/wafer_stage.yaml").spec;
+  int below = 0;
+  for (const PlantMode& mode :
+       flexible_modes_seen(spec, {"z1", "z5", "z13"}, {"sz1", "sz2", "sz3", "sz4"}))
+    below += mode.natural_frequency_hz < 2000.0 ? 1 : 0;
+  EXPECT_EQ(below, test::kModesInBand);
+  EXPECT_EQ(flexible_modes_seen(spec, {"z1"}, {"sx1"}).size(), 0U);  // x sensors see none of z
+}
+
+TEST(Configs, TheMeasurementIsAnotherIfStageOrExcitationChange) {
+  const ExperimentConfig quick =
+      load_experiment_config(kConfigs / "experiment/wafer_stage_quick.yaml");
+  const ExperimentConfig paper =
+      load_experiment_config(kConfigs / "experiment/wafer_stage_paper.yaml");
+  const ExperimentConfig again =
+      load_experiment_config(kConfigs / "experiment/wafer_stage_quick.yaml");
+  EXPECT_EQ(quick.measurement_id, again.measurement_id);
+  EXPECT_NE(quick.measurement_id, paper.measurement_id);
+}
+
+}  // namespace
+}  // namespace stageid

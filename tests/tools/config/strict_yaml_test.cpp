@@ -1,0 +1,142 @@
+#include "tools/config/strict_yaml.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "acquisition/files/file_error.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// The message of the FormatError that parsing gives; empty if there was none.
+std::string error_of(const std::string& text) {
+  try {
+    YamlDocument::parse("f.yaml", text);
+  } catch (const FormatError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+const YamlNode& value_of(const YamlDocument& document, const YamlNode& map,
+                         const std::string& key) {
+  for (const YamlNode::Entry& entry : map.entries)
+    if (entry.key == key) return document.node(entry.value);
+  throw std::out_of_range(key);
+}
+
+TEST(StrictYaml, KnowsWhereEverythingStands) {
+  const YamlDocument d = YamlDocument::parse("f.yaml", "a: 1\nlist:\n  - {x: 'y'}\n");
+  const YamlNode& root = d.root();
+  ASSERT_EQ(root.kind, YamlNode::Kind::map);
+  ASSERT_EQ(root.entries.size(), 2U);
+  EXPECT_EQ(root.entries[1].mark.line, 2);
+  EXPECT_EQ(root.entries[1].mark.column, 1);
+  const YamlNode& map = d.node(value_of(d, root, "list").items.at(0));
+  EXPECT_EQ(map.entries.at(0).mark.line, 3);
+  EXPECT_EQ(map.entries.at(0).mark.column, 6);
+  const YamlNode& y = d.node(map.entries.at(0).value);
+  EXPECT_EQ(y.mark.column, 9);
+  EXPECT_FALSE(y.plain);
+  EXPECT_TRUE(value_of(d, root, "a").plain);
+}
+
+TEST(StrictYaml, AnchorsAliasesAndMergeKeysWork) {
+  const YamlDocument d =
+      YamlDocument::parse("f.yaml", "base: &b {p: 1, q: 2}\nsame: *b\nmore:\n  <<: *b\n  q: 3\n");
+  const YamlNode& same = value_of(d, d.root(), "same");
+  EXPECT_EQ(value_of(d, same, "p").text, "1");
+  const YamlNode& more = value_of(d, d.root(), "more");
+  EXPECT_EQ(more.entries.size(), 2U);
+  EXPECT_EQ(value_of(d, more, "p").text, "1");
+  EXPECT_EQ(value_of(d, more, "q").text, "3");
+}
+
+TEST(StrictYaml, ADuplicateKeyIsAnErrorAtItsPlace) {
+  EXPECT_EQ(error_of("a: 1\nb: 2\na: 3\n"),
+            "f.yaml:3:1: key 'a' stands here twice, first in line 1; keep one");
+}
+
+TEST(StrictYaml, RefusesWhatIsNotOneTextDocument) {
+  EXPECT_THAT(error_of(""), HasSubstr("f.yaml:1:1: the file is empty"));
+  EXPECT_THAT(error_of("# only a comment\n"), HasSubstr("is empty"));
+  EXPECT_THAT(error_of("a: 1\n---\nb: 2\n"), HasSubstr("a second document"));
+  EXPECT_THAT(error_of("a: !!int 3\n"), HasSubstr("f.yaml:1:4: tag"));
+  EXPECT_THAT(error_of("? [a, b]\n: 1\n"), HasSubstr("a key must be a word"));
+  EXPECT_THAT(error_of("a: *missing\n"), HasSubstr("f.yaml:1:"));
+  EXPECT_THAT(error_of("a: &x [1, *x]\n"), HasSubstr("refers to itself"));
+}
+
+TEST(StrictYaml, BinaryAndForeignEncodingsAreNamedByPlace) {
+  EXPECT_EQ(error_of("a: 1\nb: \xE9t\xE9\n"),
+            "f.yaml:2:4: byte 0xE9 is not UTF-8 text; save the file as UTF-8");
+  EXPECT_THAT(error_of(std::string("a: \0b\n", 6)), HasSubstr("f.yaml:1:4: byte 0x00 is not text"));
+  EXPECT_THAT(error_of("\xFF\xFE"
+                       "a"),
+              HasSubstr("f.yaml:1:1: byte 0xFF"));
+  EXPECT_THAT(error_of("a: \xC0\x80\n"), HasSubstr("byte 0xC0"));          // overlong
+  EXPECT_THAT(error_of("a: \xED\xA0\x80\n"), HasSubstr("byte 0xED"));      // surrogate
+  EXPECT_THAT(error_of("a: \xF4\x90\x80\x80\n"), HasSubstr("byte 0xF4"));  // beyond Unicode
+  EXPECT_EQ(error_of("a: \xC3\xA9\n"), "");
+}
+
+TEST(StrictYaml, HostileNestingEndsInOneLine) {
+  for (const char* bracket : {"[", "{a: "}) {
+    std::string text;
+    for (int i = 0; i < 100000; ++i) text += bracket;
+    const std::string error = error_of(text);
+    EXPECT_THAT(error, HasSubstr("f.yaml:1:"));
+    EXPECT_THAT(error, Not(HasSubstr("\n")));
+  }
+  // Every level doubles; expanded it would have 2^30 leaves.
+  std::string laughs = "a0: &a0 [x, x]\n";
+  for (int i = 1; i < 30; ++i) laughs += fmt::format("a{0}: &a{0} [*a{1}, *a{1}]\n", i, i - 1);
+  EXPECT_EQ(error_of(laughs), "");
+}
+
+TEST(StrictYaml, AKeyThatIsMissingIsAnErrorAtItsPlace) {
+  for (const char* text : {": x\n", "? \n", "a: {: 1}\n", "a:\n  : 1\n"})
+    EXPECT_THAT(error_of(text), HasSubstr("a key must be a word; write 'key: value'")) << text;
+  EXPECT_EQ(error_of("null: 1\n"), "f.yaml:1:1: a key must be a word; write 'key: value'");
+}
+
+TEST(StrictYaml, MergingIsBoundedWork) {
+  std::string chain = "a0: &a0 {k0: 1}\n";
+  for (int i = 1; i < 20000; ++i)
+    chain += fmt::format("a{0}: &a{0} {{<<: *a{1}, k{0}: 1}}\n", i, i - 1);
+  EXPECT_THAT(error_of(chain), HasSubstr("'<<' has copied more than 100000 keys"));
+  std::string flat;
+  for (int i = 0; i < 100000; ++i) flat += fmt::format("k{}: 1\n", i);
+  EXPECT_EQ(error_of(flat),
+            "f.yaml:1001:1: more than 1000 keys in one map; split it or leave keys out");
+}
+
+TEST(StrictYaml, EveryCutOfAFileIsEitherReadOrOneLine) {
+  const std::string whole =
+      "format: x\nlist:\n  - {name: \"a b\", p: [1, 2, 3]}\n  - {name: 'c', p: &q [4]}\nlast: *q\n";
+  for (std::size_t n = 0; n <= whole.size(); ++n) {
+    const std::string error = error_of(whole.substr(0, n));
+    if (!error.empty()) {
+      EXPECT_THAT(error, testing::MatchesRegex("f\\.yaml:[0-9]+:[0-9]+: .+; .+")) << n;
+      EXPECT_THAT(error, Not(HasSubstr("\n"))) << n;
+    }
+  }
+}
+
+TEST(StrictYaml, AFileThatCannotBeReadIsAFileError) {
+  const test::TemporaryDirectory directory;
+  EXPECT_THROW(YamlDocument::read(directory / "missing.yaml"), FileError);
+  EXPECT_THROW(YamlDocument::read(directory.path()), FileError);
+}
+
+TEST(StrictYaml, AFileOfMoreThanAMegabyteIsRefused) {
+  EXPECT_THAT(error_of(std::string((1U << 20) + 1, ' ')), HasSubstr("longer than 1 MiB"));
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,88 @@
+#include "tools/experiment/loop_check.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "frf/file/frf_file.hpp"
+#include "hal/simulator/loop_stability.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+
+/// The exact response of the stage, as a pilot of it without noise.
+FrfEstimate exact_pilot(const WaferStageSpec& stage) {
+  FrfEstimate frf;
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(474, 4.0, 950.0);
+  frf.sample_rate_hz = stage.info.sample_rate_hz;
+  frf.hold = Hold::zoh;
+  for (const Channel& channel : stage.info.actuators) {
+    frf.inputs.names.push_back(channel.name);
+    frf.inputs.units.push_back(channel.unit);
+  }
+  for (const Channel& channel : stage.info.sensors) {
+    frf.outputs.names.push_back(channel.name);
+    frf.outputs.units.push_back(channel.unit);
+  }
+  const std::vector<PlantMode> modes = wafer_stage_modes(stage);
+  frf.response.resize(frf.n_outputs() * frf.n_inputs(), frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k)
+    frf.response.col(k) =
+        sampled_response(modes, stage.delay_s, stage.info.sample_rate_hz, frf.frequency_hz[k])
+            .reshaped();
+  return frf;
+}
+
+WaferStageSpec with_gain(WaferStageSpec stage, double factor) {
+  for (AxisController& axis : stage.controller.axes) axis.gain *= factor;
+  return stage;
+}
+
+class LoopCheckTest : public testing::Test {
+ protected:
+  LoopCheckTest()
+      : config_(load_experiment_config(std::filesystem::path(STAGEID_SOURCE_DIR) /
+                                       "configs/experiment/small_stage_limits.yaml")) {
+    config_.limits->prior = directory_ / "pilot.h5";
+    write_frf(config_.limits->prior, exact_pilot(config_.stage.spec));
+  }
+  const test::TemporaryDirectory directory_;
+  ExperimentConfig config_;
+};
+
+// Two ways to one verdict: the eigenvalues of the configured plant, and the turns of what a pilot has measured.
+TEST_F(LoopCheckTest, APriorAndThePlantItselfAgree) {
+  const WaferStageSpec stage = config_.stage.spec;
+  int stable = 0;
+  int unstable = 0;
+  for (const double factor : {0.3, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, -1.0}) {
+    config_.stage.spec = with_gain(stage, factor);
+    const bool holds = loop_stability(config_.stage.spec).stable();
+    const LoopCheck of_prior = check_loop(config_);
+    ++(holds ? stable : unstable);
+    if (of_prior.doubt.empty() || holds) {
+      EXPECT_EQ(of_prior.problem.empty(), holds) << factor << " " << of_prior.problem;
+    }
+    EXPECT_EQ(check_loop(config_.stage.spec).problem.empty(), holds) << factor;
+  }
+  EXPECT_GE(stable, 2);
+  EXPECT_GE(unstable, 2);
+}
+
+TEST_F(LoopCheckTest, ALittleMarginIsADoubt) {
+  const WaferStageSpec stage = config_.stage.spec;
+  bool doubted = false;
+  for (double factor = 1.0; factor < 30.0; factor *= 1.1) {
+    const LoopCheck check = check_loop(with_gain(stage, factor));
+    if (!check.problem.empty()) break;
+    doubted = !check.doubt.empty();
+    EXPECT_EQ(doubted, check.largest_sensitivity > 3.0) << factor;
+  }
+  EXPECT_TRUE(doubted) << "the loop became unstable without a doubt before";
+  EXPECT_THAT(check_loop(stage).doubt, testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace stageid

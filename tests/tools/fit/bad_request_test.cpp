@@ -1,0 +1,377 @@
+// Every request that is wrong, on the real program: one clear line, the right exit code, nothing
+// left behind.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "estimation/model/additive_model.hpp"
+#include "tests/tools/program_fixture.hpp"
+
+namespace stageid::test {
+namespace {
+
+class BadRequest : public ProgramTest {};
+
+TEST_F(BadRequest, WhatAModelHasNot) {
+  AdditiveModel model;
+  model.inputs = {{"a1"}, {"N"}};
+  model.outputs = {{"z1", "z2"}, {"m", "m"}};
+  model.submodels = {{0, {1.0, 2e-3, 1e-6}, {Eigen::MatrixXd::Ones(2, 1)}, {}, {}}};
+  write_model(at("model.json"), model);
+  const std::string file = name("model.json");
+  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z3", "a1"}, 2,
+       "--driving-point: 'z3' is no output of the model; there are z1, z2");
+  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1", "z1"}, 2, "'z1' is no input");
+  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1"}, 2, "--driving-point");
+  fail({"export", file, "-o", name("m.h5")}, 2, "submodel 0: its poles");
+}
+
+TEST_F(BadRequest, SubmodelsThatAreNone) {
+  fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "2,0,0"}, 2,
+       "--submodel: '2,0,0': '2' is no key=value; write for example n=4,m=3");
+  fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "n=2,m=3"}, 2, "write at most 2");
+}
+
+TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
+  fail({"run", config_, "-o", name("run.h5")}, 2, "'stageid log convert' makes .h5 of it");
+  make_log();
+  fail({"frf", config_, "-o", name("x.h5")}, 2,
+       "is an experiment file, not a log; 'stageid identify'");
+  succeed({"log", "convert", name("run.slog"), "-o", name("run.h5")});
+  fail({"fit", name("run.h5"), "-o", name("m.json")}, 2,
+       "is a log in HDF5, not a frequency response; 'stageid frf', 'validate'");
+  const std::string log = name("run.slog");
+  fail({"export", log, "-o", name("m.mat")}, 2, "run.slog: is a native log, not a model (.json);");
+  fail({"validate", log, name("frf.h5")}, 2, "run.slog: is a native log, not a model (.json);");
+  fail({"run", log, "-o", name("x.slog")}, 2, "run.slog: is a native log, not a YAML file;");
+  fail({"export", config_, "-o", name("m.mat")}, 2, "is an experiment file, not a model (.json);");
+  std::filesystem::create_directory(at("folder.json"));
+  fail({"export", name("folder.json"), "-o", name("m.mat")}, 1, "is a directory; give a JSON file");
+}
+
+TEST_F(BadRequest, MissingFiles) {
+  fail({"run", name("none.yaml"), "-o", name("x.slog")}, 1, "none.yaml: cannot be read");
+  fail({"frf", name("none.slog"), "-o", name("x.h5")}, 1, "none.slog");
+  fail({"fit", name("none.h5"), "-o", name("m.json")}, 1, "none.h5");
+  fail({"validate", name("none.json"), name("none.h5")}, 1, "none.json");
+  fail({"report", name("none"), "-o", name("r.html")}, 1, "does not exist");
+  fail({"log", "info", name("none.slog")}, 1, "none.slog");
+  fail({"import", name("none.csv")}, 1, "none.csv: cannot be read: No such file or directory;");
+  fail({"import", name(".")}, 1, "cannot be read: Is a directory; give the name of a file");
+}
+
+TEST_F(BadRequest, WhatIsNoTableAndNoReport) {
+  write_bytes(at("empty.csv"), "");
+  fail({"import", name("empty.csv")}, 2, "empty.csv: holds no table;");
+  write_bytes(at("head.csv"), "u,y\n");
+  fail({"import", name("head.csv")}, 2, "head.csv: holds names of columns and no row of numbers;");
+  fail({"report", name("head.csv"), "-o", name("r.html")}, 2, "is nothing that the report shows");
+  fail({"import", config_}, 2, "is an experiment file, not a file of another program;");
+  fail({"run", config_, "-o", name("x.txt")}, 2, "x.txt: a log is written as .slog;");
+}
+
+TEST_F(BadRequest, Configurations) {
+  const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
+    fail({"design", experiment("bad.yaml", from, to), "-o", name("e.h5")}, 2, text);
+  };
+  wrong("seed: 7", "sead: 7", "bad.yaml:15:3: unknown key 'sead'; did you mean 'seed'?");
+  wrong("rms_n", "rms_v", "unknown key 'rms_v'; the unit stands in the key: write 'rms_n'");
+  wrong("period_s: 0.25", "period_ms: 250", "write 'period_s'");
+  wrong("period_s: 0.25", "period_s: 250 ms", "the number alone, in s");
+  wrong("period_s: 0.25", "period_s: -1", "period_s: -1 is out of range; allowed is > 0 s");
+  wrong("period_s: 0.25", "period_s: .nan", "is not finite");
+  wrong("period_s: 0.25", "period_s: 0.00025", "must be a whole number of samples");
+  wrong("period_s: 0.25", "periods: 3\n  period_s: 0.25", "stands here twice");
+  wrong("band_hz: [16, 800]", "band_hz: [800, 16]", "band_hz: is empty");
+  wrong("band_hz: [16, 800]", "band_hz: [16, 1000]", "is not below half the sample rate");
+  wrong("band_hz: [16, 800]", "band_hz: [16.5, 17]",
+        "bad.yaml:10:12: frequency band: no line lies in 16.5 to 17 Hz");
+  wrong("axes: [a1, a2, a3]", "axes: [a1, a2, z3]",
+        "bad.yaml:7:18: axes: the stage has no actuator 'z3'");
+  wrong("axes: [a1, a2, a3]", "axes: [a1, a1]", "stands here twice");
+  wrong("{rms_n: 1.0}", "{rms_n: [1, 2]}", "2 numbers for 3 axes");
+  wrong("{rms_n: 1.0}", "{rms_n: 1, peak_n: 2}", "one of");
+  wrong("lines: all", "lines: every", "write one of all, odd, odd_random");
+  wrong("realization: 3 ", "realization: 4 ", "hold back one that is measured");
+  wrong("stage: small_stage.yaml", "stage: nowhere.yaml", "bad.yaml:4:8: stage: there is no file");
+  wrong("direct_term: full", "hold: perfect", "write one of none, phase, sinc, exact, by_frf");
+  wrong("direct_term: full", "submodels: [{n: 2, m: 3}]", "m=3 is above n + l = 2");
+  wrong("direct_term: full", "submodels: [{order: 2}]", "unknown key 'order'");
+  wrong("direct_term: full", "submodels: [{n: 17}]", "n: an order is a whole number from 0 to 16");
+  wrong("direct_term: full", "submodels: [{n: many}]", "n: ");
+  wrong("direct_term: full", "submodels: [{n: 2, damping_ratio: [2]}]", "damping_ratio");
+  wrong("rigid_body: suspension", "rigid_body: full", "goes with rigid_body: suspension");
+  wrong("suspension_hz: [0.4, 0.5]", "suspension_hz: [0.4, -1]", "suspension_hz");
+  write_bytes(at("cut.yaml"), read_bytes(config_).substr(0, 320));
+  fail({"design", name("cut.yaml"), "-o", name("e.h5")}, 2, "cut.yaml:");
+  write_bytes(at("binary.yaml"), std::string("\x7F"
+                                             "ELF\x02\x01\x01\x00",
+                                             8));
+  fail({"design", name("binary.yaml"), "-o", name("e.h5")}, 2,
+       "binary.yaml:1:1: byte 0x7F is not text");
+  write_bytes(at("deep.yaml"), std::string(500000, '['));
+  fail({"design", name("deep.yaml"), "-o", name("e.h5")}, 2, "deep.yaml:1:");
+}
+
+TEST_F(BadRequest, StageFiles) {
+  const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
+    fail({"design", stage("bad.yaml", from, to), "-o", name("e.h5")}, 2, text);
+  };
+  wrong("mass_kg: 8", "mass_kg: 0",
+        "stage_bad.yaml:19:12: mass_kg: 0 is out of range; allowed is > 0 kg");
+  wrong("mass_kg: 8", "mass_g: 8000", "the unit stands in the key: write 'mass_kg'");
+  wrong("limit_n: 40", "limit_v: 40", "write 'limit_n'");
+  wrong("direction: [0, 0, 1], limit_n", "direction: [0, 0, 2], limit_n", "write a unit vector");
+  wrong("name: a2", "name: a1", "stands twice");
+  wrong("backend: sim", "backend: cann", "did you mean 'can'?");
+  wrong("Ry: *loop", "Rx: *loop", "stage_bad.yaml: ");  // no sensor sees Rx
+  wrong("[-0.26, 0, 0]", "[-2.6, 0, 0]", "is not on the plate");
+  wrong("noise:", "faults: [{kind: dead_sensor, channel: s9}]\nnoise:", "there is no sensor 's9'");
+  wrong("noise:", "faults: [{kind: extra_delay}]\nnoise:", "extra_delay needs at least 1 sample");
+  wrong("window_m: 1e-3}", "window_m: 1e-3, hard_window_m: 9e-4}", "is inside window_m");
+  wrong("crossover_hz: 20,", "crossover_hz: 20, emergency: stop,", "emergency");
+}
+
+TEST_F(BadRequest, Modbus) {
+  const auto wrong = [&](const std::string& group, const std::string& text) {
+    fail({"design", stage("bad.yaml", "noise:", group + "\nnoise:"), "-o", name("e.h5")}, 2, text);
+  };
+  wrong("modbus: {unit: 1}", "modbus: write one of tcp and rtu");
+  wrong("modbus: {tcp: {port: 1}, rtu: {device: x}}", "modbus: write one of tcp and rtu");
+  wrong("modbus: {tcp: {port: 0}}", "port: 0 is out of range");
+  wrong("modbus: {rtu: {baud: 9600}}", "key 'device' is missing in rtu");
+  wrong("modbus: {rtu: {device: x, parity: S}}", "parity: 'S' stands here; write one of N, E, O");
+  wrong("modbus: {tcp: {port: 1}, response_s: 2}", "worst_reply_s: below response_s");
+  wrong("supervisor: {modbus: {tcp: {port: 1}}, temperature_k: [1, 2]}",
+        "key 'gravity_compensator_n' is missing in supervisor");
+  wrong(
+      "supervisor: {modbus: {tcp: {port: 1}}, temperature_k: [2, 1], gravity_compensator_n: [1, "
+      "2]}",
+      "temperature_k: write [low, high]");
+  wrong(
+      "modbus: {rtu: {device: x}}\nsupervisor: {modbus: {rtu: {device: x}}, temperature_k: [1, 2], "
+      "gravity_compensator_n: [1, 2]}",
+      "a serial line carries one conversation");
+  fail({"design", stage("bad.yaml", "backend: sim", "backend: modbus"), "-o", name("e.h5")}, 2,
+       "backend: modbus needs a group 'modbus:'");
+  fail({"run", config_, "-o", name("x.slog"), "--backend", "modbus"}, 2, "has no group 'modbus'");
+}
+
+TEST_F(BadRequest, NodesThatCannotBeServed) {
+  const std::string file = std::string(STAGEID_SOURCE_DIR) + "/configs/stage/small_stage.yaml";
+  fail({"node", file}, 2, "nothing to serve; add --can INTERFACE, --modbus-tcp PORT");
+  fail({"node", file, "--modbus-tcp", "70000"}, 2, "--modbus-tcp");
+  fail({"node", file, "--modbus-tcp", "0", "--modbus-fault", "late"}, 2,
+       "--modbus-fault: fault 'late'");
+  fail({"node", file, "--modbus-rtu", "/dev/there-is-none"}, 1, "cannot be opened");
+  fail({"node", file, "--modbus-rtu", "/dev/null", "--modbus-baud", "9601"}, 2,
+       "no such baud rate");
+}
+
+TEST_F(BadRequest, BackEndsOfTheStageFile) {
+  const std::string can = stage("can.yaml", "backend: sim", "backend: can");
+  fail({"run", can, "-o", name("x.slog")}, 2, "has no group 'can'");
+  fail({"identify", can, "-o", name("dir")}, 2, "has no group 'can'");
+}
+
+TEST_F(BadRequest, WhatACanBusCannotCarry) {
+  const auto behind_can = [&](const std::string& group) {
+    return stage("can.yaml", "backend: sim", "backend: can\ncan: {" + group + "}");
+  };
+  // Frames of 20 and 16 bytes at 1 and 0.5 Mbit/s: (34 + 476) + (34 + 386) us; heartbeats: 1.07 %.
+  fail({"run", behind_can("buses: [{interface: can0, data_bit_rate_hz: 500e3}]"), "-o",
+        name("x.slog")},
+       2,
+       "can: can0 would be loaded to 187 % at 2000 Hz (930 us a cycle), 80 % are allowed; at most "
+       "849 Hz");
+  const auto wrong = [&](const std::string& group, const std::string& text) {
+    fail({"run", behind_can(group), "-o", name("x.slog")}, 2, text);
+  };
+  wrong("mode: resident", "'buses'");
+  wrong("buses: []", "buses");
+  wrong("buses: [{interface: can0, actuators: [a1]}]", "channel 'a2' stands on no bus");
+  wrong("buses: [{interface: can0, actuators: [a9]}]", "there is no channel 'a9'");
+  wrong("buses: [{interface: can0}, {interface: can0}]", "interface can0 stands twice");
+  wrong("actuator_range_n: [1, 2], buses: [{interface: can0}]", "2 entries for 3 channels");
+  wrong("buses: [{interface: can0}], actuator_range_n: [1]",
+        "actuator_range_n: 1 N cannot carry limit_n: 40 N of 'a1'; write more than 40, or leave it "
+        "out for 1.25 times limit_n");
+  wrong("buses: [{interface: can0}], actuator_range_n: [40]", "cannot carry limit_n: 40 N");
+  wrong("buses: [{interface: can0}], sensor_range_m: [1e-4]",
+        "0.0001 m cannot carry window_m: 0.001 m of 's1'");
+  wrong("buses: [{interface: can0, data_bit_rate: 5e6}]", "unknown key 'data_bit_rate'");
+  wrong("mode: residential, buses: [{interface: can0}]", "did you mean 'resident'?");
+}
+
+TEST_F(BadRequest, ANodeThatServesNothing) {
+  fail({"node", name("small_stage.yaml")}, 2, "nothing to serve; add --can INTERFACE");
+  fail({"node", name("small_stage.yaml"), "--can", "can0"}, 2, "has no group 'can'");
+}
+
+TEST_F(BadRequest, AnExperimentPastTheLimitsIsNotDesigned) {
+  const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
+  fail({"identify", loud, "-o", name("dir")}, 2, "|u| would be");
+  const ProgramResult design = run({"design", loud, "-o", name("e.h5")});
+  EXPECT_EQ(design.exit_code, 2);
+  EXPECT_THAT(design.out, testing::HasSubstr("EXCEEDED"));
+  EXPECT_FALSE(std::filesystem::exists(at("e.h5")));
+  EXPECT_EQ(run({"design", loud, "-o", name("e.h5"), "--force"}).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(at("e.h5")));
+}
+
+TEST_F(BadRequest, AnExistingLogIsNotOverwritten) {
+  make_log();
+  fail({"run", config_, "-o", name("run.slog")}, 2, "exists already; continue it with --resume");
+  const std::string other = experiment("other.yaml", "seed: 7", "seed: 8");
+  fail({"run", other, "-o", name("run.slog"), "--resume"}, 2, "belongs to another experiment");
+}
+
+TEST_F(BadRequest, Outputs) {
+  make_model();
+  std::filesystem::create_directory(at("folder"));
+  const std::vector<std::vector<std::string>> commands = {
+      {"design", config_},        {"run", config_},
+      {"frf", name("run.slog")},  {"modes", name("frf.h5")},
+      {"fit", name("frf.h5")},    {"export", name("model.json")},
+      {"report", name("frf.h5")}, {"log", "convert", name("run.slog")}};
+  for (std::vector<std::string> command : commands) {
+    command.insert(command.end(), {"-o", ""});
+    for (std::string place : {"nowhere/x.h5", "experiment.yaml/x.h5"}) {
+      if (command[0] == "run") place = replaced(place, ".h5", ".slog");
+      command.back() = name(place);
+      fail(command, 1, place);
+    }
+    if (command[0] == "export" || command[0] == "log" || command[0] == "run") continue;
+    command.back() = name("folder");
+    fail(command, 1, "is a directory");
+  }
+  fail({"identify", config_, "-o", name("experiment.yaml")}, 1, "experiment.yaml");
+  fail({"identify", config_, "-o", "/proc/stageid"}, 1, "/proc/stageid");
+}
+
+TEST_F(BadRequest, AFullDiskLeavesNothingBehind) {
+  make_model();
+  ProgramOptions full;
+  full.largest_file_bytes = 2000;
+  fail({"design", config_, "-o", name("e.h5")}, 1, "e.h5", full);
+  fail({"frf", name("run.slog"), "-o", name("f.h5")}, 1, "f.h5", full);
+  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--band", "120", "800"}, 1, "m.json", full);
+  fail({"export", name("model.json"), "-o", name("m.h5")}, 1, "m.h5", full);
+  fail({"export", name("model.json"), "-o", name("m.csv")}, 1, "m.csv", full);
+  fail({"report", name("frf.h5"), "-o", name("r.html")}, 1, "r.html", full);
+  fail({"export", name("model.json"), "-o", name("m.mat")}, 1, "m.mat: cannot be written", full);
+  fail({"log", "convert", name("run.slog"), "-o", name("l.h5")}, 1, "l.h5", full);
+  fail({"log", "convert", name("run.slog"), "-o", name("l.csv")}, 1, "l.csv: cannot be wr", full);
+  // What was recorded before the disk was full stays.
+  full.largest_file_bytes = 200000;
+  const ProgramResult run_full = run({"run", config_, "-o", name("full.slog")}, full);
+  EXPECT_EQ(run_full.exit_code, 1);
+  const std::string place = name("full.slog") + ": cannot be written: File too large; raise";
+  EXPECT_THAT(run_full.err, testing::HasSubstr("stageid: " + place));  // the file is named once
+  EXPECT_TRUE(std::filesystem::exists(at("full.slog")));
+}
+
+TEST_F(BadRequest, AResultThatWouldReplaceWhatItIsMadeOf) {
+  make_log();
+  make_frf();
+  const auto refused = [&](const std::vector<std::string>& words) {
+    fail(words, 2, "is an input, which the result would replace; give -o another name");
+  };
+  const std::string log = name("run.slog");
+  const std::string frf = name("frf.h5");
+  refused({"frf", log, "-o", log});
+  refused({"fit", frf, "-o", frf});
+  refused({"modes", frf, "-o", frf});
+  refused({"design", config_, "-o", config_});
+  succeed({"log", "convert", log, "-o", name("log.h5")});
+  refused({"log", "convert", name("log.h5"), "-o", name("log.h5")});
+  succeed({"export", frf, "-o", name("f.uff")});
+  // Another name of the same file.
+  const auto link = [&](const char* to, const char* from) {
+    std::filesystem::create_symlink(to, at(from));
+    return name(from);
+  };
+  refused({"frf", log, "-o", link("run.slog", "link.h5")});
+  refused({"import", name("f.uff"), "-o", link("f.uff", "again.h5")});
+  refused({"export", frf, "-o", link("frf.h5", "export.mat")});
+  refused({"report", frf, "-o", link("frf.h5", "page.html")});
+  refused({"report", log, "-o", link("frf.h5", "other.html"), "--compare", frf});
+  refused({"plot", "cmif", frf, "-o", link("frf.h5", "plot.svg")});
+}
+
+TEST_F(BadRequest, Reports) {
+  make_frf();
+  const std::string frf = name("frf.h5");
+  fail({"report", frf, "-o", name("r.pdf")}, 2,
+       "r.pdf: the report is a page; write a name that ends in .html");
+  fail({"report", frf, frf, "-o", name("r.html")}, 2, "frf.h5: is given twice");
+  write_bytes(at("cut.json"), "{\"format\": \"stageid-mo");
+  fail({"report", frf, name("cut.json"), "-o", name("r.html")}, 2,
+       "cut.json: is not JSON, or cut short");
+  write_bytes(at("new.json"), "{\"format\": \"stageid-model\", \"format_version\": 9}");
+  fail({"report", frf, name("new.json"), "-o", name("r.html")}, 2,
+       "format_version: is 9 and must be 1");
+  fail({"report", frf, "-o", name("nowhere/r.html")}, 1,
+       "No such file or directory; make it first");
+  fail({"report", frf, "-o", name("r.html"), "--compare", name("none")}, 1,
+       "none: does not exist; check the path");
+}
+
+TEST_F(BadRequest, NamesThatAreNearOnes) {
+  make_log();
+  fail({"frf", name("run.slog"), "-o", name("x.h5"), "--inputs", "a1,A2,a3"}, 2,
+       "inputs: unknown actuator 'A2'; did you mean 'a2'? There are a1, a2, a3");
+  fail(
+      {"config", "check", experiment("e.yaml", "rigid_body: suspension", "rigid_body: suspention")},
+      2, "(did you mean 'suspension'?)");
+}
+
+TEST_F(BadRequest, AControllerThatDoesNotHoldThePlant) {
+  write_bytes(at("small_stage.yaml"), replaced(read_bytes(at("small_stage.yaml")),
+                                               "crossover_hz: 20,", "crossover_hz: 200,"));
+  const std::string text = "the controller does not hold the plant: the closed loop is unstable at";
+  fail({"design", config_, "-o", name("e.h5")}, 2, text);
+  fail({"run", config_, "-o", name("r.slog")}, 2, text);
+  fail({"identify", config_, "-o", name("all")}, 2, text);
+  fail({"config", "check", config_}, 2, text);
+  fail({"config", "check", name("small_stage.yaml")}, 2, text);
+}
+
+TEST_F(BadRequest, Fits) {
+  make_frf();
+  const auto wrong = [&](std::vector<std::string> flags, const std::string& text) {
+    flags.insert(flags.begin(), {"fit", name("frf.h5"), "-o", name("m.json")});
+    fail(flags, 2, text);
+  };
+  wrong({"--band", "900", "950"},
+        "no line lies in it; the frequency response has lines from 16 to 800 Hz");
+  wrong({"--band", "500", "100"}, "write the lower frequency first");
+  wrong({"--rigid-body", "half"}, "--rigid-body: 'half'; write auto, none, full or a rank");
+  wrong({"--rigid-body", "suspention"}, "or suspension:F1:F2 (Hz) (did you mean 'suspension'?)");
+  wrong({"--residue-rank", "0"}, "--residue-rank: '0'; write full or a rank");
+  wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with --damping general");
+  wrong({"--modes", "500"}, "--modes: 500; 197 lines carry no more than 65;");
+  wrong({"--modes", "0"}, "--modes");
+  wrong({"--modes", "12,x"}, "--modes");
+  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--modes", "many"}, 1,
+       "--modes: 'many': there is no such file; write auto");
+  wrong({"--modes", "100,5000"}, "--modes: 5000 Hz is not below half the sample rate, 1000 Hz");
+  wrong({"--weighting", "relativ"}, "did you mean 'relative'?");
+  wrong({"--hold", "exakt"}, "did you mean 'exact'?");
+  wrong({"--delay", "soon"}, "--delay");
+  wrong({"--delay", "nan"}, "--delay");
+  wrong({"--damping", "viscous"}, "--damping");
+  wrong({"--method", "sgd"}, "--method");
+  wrong({"--max-iterations", "0"}, "--max-iterations");
+  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--weighting", name("none.h5")}, 1, "none.h5");
+  fail({"modes", name("frf.h5"), "--band", "900", "950"}, 2, "no line lies in it");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--inputs", "a9"}, 2, "a9");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--outputs", "s9"}, 2, "s9");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "0"}, 2, "counted from 1");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "9"}, 2,
+       "realization 9 has no complete run; counted from 1, those that have one are 1, 2, 3");
+  fail({"frf", name("run.slog"), "-o", name("f.h5"), "--transient-periods", "9"}, 2,
+       "5 periods recorded, 9 transient");
+}
+
+}  // namespace
+}  // namespace stageid::test

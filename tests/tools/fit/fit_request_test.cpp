@@ -1,0 +1,361 @@
+#include "tools/fit/fit_request.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <complex>
+#include <numbers>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/hdf5_file.hpp"
+#include "estimation/model/cmif.hpp"
+#include "estimation/problem/weight_matrices.hpp"
+#include "frf/response/hold_compensation.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tools/fit/submodel_text.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::HasSubstr;
+
+/// One output, two inputs, four lines, measured through a hold.
+FrfEstimate measured() {
+  FrfEstimate frf;
+  frf.frequency_hz = Eigen::VectorXd{{10.0, 20.0, 30.0, 40.0}};
+  frf.inputs = {{"a", "b"}, {"N", "N"}};
+  frf.outputs = {{"y"}, {"m"}};
+  frf.response = Eigen::MatrixXcd::NullaryExpr(2, 4, [](Eigen::Index channel, Eigen::Index line) {
+    return std::polar(1.0 + static_cast<double>(channel), 0.7 * static_cast<double>(line));
+  });
+  frf.noise_variance = Eigen::MatrixXd::Constant(2, 4, 0.25);
+  frf.sample_rate_hz = 1000.0;
+  frf.hold = Hold::zoh;
+  return frf;
+}
+
+FrfEstimate without_variances() {
+  FrfEstimate frf = measured();
+  frf.noise_variance.resize(0, 0);
+  return frf;
+}
+
+TEST(FitRequest, AMeasuredResponseIsFittedExactlyWithEstimatedDelay) {
+  const FitSetup setup = make_fit_setup({}, measured());
+  EXPECT_EQ(setup.options.hold, HoldModel::exact);
+  EXPECT_EQ(setup.options.delay, DelayModel::estimate);
+  EXPECT_EQ(setup.options.weighting, Weighting::noise_variance);
+  EXPECT_TRUE(setup.structure.common.rigid_body);
+  EXPECT_FALSE(setup.structure.common.general_damping);
+  EXPECT_EQ(setup.selection.exactly, 0);
+  EXPECT_TRUE(setup.selection.modes.empty());
+}
+
+TEST(FitRequest, AContinuousResponseHasNoHoldAndNoDelay) {
+  FrfEstimate frf = without_variances();
+  frf.hold = Hold::none;
+  frf.sample_rate_hz = 0.0;
+  const FitSetup setup = make_fit_setup({}, frf);
+  EXPECT_EQ(setup.options.hold, HoldModel::none);
+  EXPECT_EQ(setup.options.delay, DelayModel::fixed);
+  EXPECT_EQ(setup.options.delay_s, 0.0);
+  EXPECT_EQ(setup.options.weighting, Weighting::relative);
+}
+
+TEST(FitRequest, WithoutNoiseTheTotalVarianceWeighs) {
+  FrfEstimate frf = without_variances();
+  frf.total_variance = Eigen::MatrixXd::Constant(2, 4, 0.5);
+  EXPECT_EQ(make_fit_setup({}, frf).options.weighting, Weighting::total_variance);
+}
+
+/// Thirty lines that stand `scatter` off a constant, now on this side, now on that; their variance is 0.25.
+FrfEstimate scattered(double scatter) {
+  FrfEstimate frf = measured();
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(30, 10.0, 39.0);
+  frf.noise_variance = Eigen::MatrixXd::Constant(2, 30, 0.25);
+  frf.response = Eigen::MatrixXcd::NullaryExpr(2, 30, [scatter](Eigen::Index, Eigen::Index line) {
+    return 10.0 + std::polar(scatter, 2.4 * static_cast<double>(line * line));
+  });
+  frf.realizations = 1;
+  return frf;
+}
+
+TEST(FitRequest, OneRealizationOfADistortedPlantIsWeighedByTheScatterOfItsLines) {
+  const FitSetup setup = make_fit_setup({}, scattered(2.0));
+  EXPECT_EQ(setup.options.weighting, Weighting::total_variance);
+  EXPECT_EQ(setup.frf.total_variance.cols(), 30);
+  EXPECT_GT(setup.frf.total_dof, 0.0);
+  EXPECT_THAT(setup.notes, testing::Contains(HasSubstr("scatter of neighbouring lines")));
+  EXPECT_THAT(setup.warnings, testing::ElementsAre(HasSubstr("scatter of neighbouring lines")));
+  FitRequest asked;
+  asked.weighting = "noise_variance";
+  EXPECT_EQ(make_fit_setup(asked, scattered(2.0)).options.weighting, Weighting::noise_variance);
+}
+
+TEST(FitRequest, LinesThatScatterAsTheNoiseSaysOrSeveralRealizationsAreWeighedByTheNoise) {
+  EXPECT_EQ(make_fit_setup({}, scattered(0.5)).options.weighting, Weighting::noise_variance);
+  FrfEstimate several = scattered(2.0);
+  several.realizations = 2;
+  EXPECT_EQ(make_fit_setup({}, several).options.weighting, Weighting::noise_variance);
+}
+
+TEST(FitRequest, AccelerationsGetTheStructureThatTheyHave) {
+  FrfEstimate frf = measured();
+  for (const char* unit : {"m/s^2", "mm/s2", "rad/s²", "g"}) {
+    frf.outputs.units = {unit};
+    const FitSetup setup = make_fit_setup({}, frf);
+    EXPECT_TRUE(setup.structure.common.general_damping) << unit;
+    EXPECT_TRUE(setup.structure.common.direct_term);
+    EXPECT_FALSE(setup.structure.common.rigid_body);
+    EXPECT_THAT(setup.notes.front(), HasSubstr("accelerations"));
+  }
+  FitRequest asked;  // whoever says one of the three is taken at his word
+  asked.damping = "proportional";
+  const ModelStructure own = make_fit_setup(asked, frf).structure.common;
+  EXPECT_FALSE(own.general_damping);
+  EXPECT_FALSE(own.direct_term);
+  EXPECT_TRUE(own.rigid_body);
+  frf.outputs.units = {"kg"};
+  EXPECT_FALSE(make_fit_setup({}, frf).structure.common.general_damping);
+}
+
+TEST(FitRequest, RefusesADelayThatTheLinesCannotTellFromItsAlias) {
+  FitRequest request;
+  for (const char* delay : {"0.05", "-0.05"}) {  // 1/(2 df) of lines 10 Hz apart
+    request.delay = delay;
+    EXPECT_NO_THROW((void)make_fit_setup(request, measured())) << delay;
+  }
+  for (const char* delay : {"0.051", "-0.051", "1e9"}) {
+    request.delay = delay;
+    EXPECT_THAT([&] { (void)make_fit_setup(request, measured()); },
+                testing::ThrowsMessage<std::invalid_argument>(testing::AllOf(
+                    HasSubstr("--delay"), HasSubstr("at most 0.05 s"), HasSubstr("10 Hz apart"))));
+  }
+}
+
+TEST(FitRequest, ADelayThatWasTakenOutIsPutBackAndModelled) {
+  const FrfEstimate raw = measured();
+  const FitSetup setup = make_fit_setup({}, compensate(raw, Compensation::delay, 1.3e-3));
+  // Two rotations on the unit circle that undo each other.
+  EXPECT_LT((setup.frf.response - raw.response).cwiseAbs().maxCoeff(), 1e-14);
+  EXPECT_EQ(setup.frf.compensated, Compensation::none);
+  EXPECT_EQ(setup.options.hold, HoldModel::exact);
+  EXPECT_EQ(setup.options.delay, DelayModel::fixed);
+  EXPECT_EQ(setup.options.delay_s, 1.3e-3);
+}
+
+TEST(FitRequest, WithHoldNoneACompensatedResponseStaysAsItIs) {
+  const FrfEstimate compensated = compensate(measured(), Compensation::delay, 1.3e-3);
+  FitRequest request;
+  request.hold = "none";
+  const FitSetup setup = make_fit_setup(request, compensated);
+  EXPECT_EQ(setup.frf.response, compensated.response);
+  EXPECT_EQ(setup.options.delay_s, 0.0);
+  EXPECT_EQ(setup.options.delay, DelayModel::fixed);
+}
+
+TEST(FitRequest, AHoldThatWasTakenOutIsPutBackUnlessNoHoldIsAsked) {
+  const FrfEstimate raw = measured();
+  const FrfEstimate compensated = compensate(raw, Compensation::hold, 1.3e-3);
+  const FitSetup setup = make_fit_setup({}, compensated);
+  EXPECT_LT((setup.frf.response - raw.response).cwiseAbs().maxCoeff(), 1e-14);
+  EXPECT_EQ(setup.options.hold, HoldModel::exact);
+  EXPECT_EQ(setup.options.delay_s, 1.3e-3);
+  FitRequest request;
+  request.hold = "none";
+  EXPECT_EQ(make_fit_setup(request, compensated).frf.response, compensated.response);
+  EXPECT_EQ(make_fit_setup(request, compensated).options.delay_s, 0.0);
+}
+
+TEST(FitRequest, ModesAreACountFrequenciesOrAFile) {
+  const test::TemporaryDirectory directory;
+  write_modes(directory / "modes.json", {{12.0, 0.02, 1}, {34.0, 0.03, 2}});
+  FitRequest request;
+  request.modes = "1";
+  EXPECT_EQ(make_fit_setup(request, measured()).selection.exactly, 1);
+  request.modes = "30.5,12";
+  FitSetup setup = make_fit_setup(request, measured());
+  ASSERT_EQ(setup.selection.modes.size(), 2U);
+  EXPECT_EQ(setup.selection.modes[0].frequency_hz, 12.0);
+  EXPECT_TRUE(setup.selection.keep_modes);
+  request.modes = "76.2";  // a point makes it a frequency
+  EXPECT_EQ(make_fit_setup(request, measured()).selection.modes.at(0).frequency_hz, 76.2);
+  request.modes = "76,";  // so does a comma
+  EXPECT_EQ(make_fit_setup(request, measured()).selection.modes.at(0).frequency_hz, 76.0);
+  request.modes = (directory / "modes.json").string();
+  setup = make_fit_setup(request, measured());
+  ASSERT_EQ(setup.selection.modes.size(), 2U);
+  EXPECT_EQ(setup.selection.modes[1].damping_ratio, 0.03);
+  EXPECT_TRUE(setup.selection.keep_modes);
+}
+
+TEST(FitRequest, ModesThatTheLinesCannotTellAreRefused) {
+  const auto error_of = [](FitRequest request, const FrfEstimate& frf) -> std::string {
+    try {
+      make_fit_setup(request, frf);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  // As the automatic fit counts: two functions for four lines, one of them the rigid body's. One mode
+  // is always granted.
+  FitRequest request;
+  request.modes = "2";
+  EXPECT_EQ(error_of(request, measured()),
+            "--modes: 2; 4 lines carry no more than 1; ask for fewer or take a wider band");
+  request.modes = "499.9";
+  EXPECT_EQ(error_of(request, measured()), "");
+  request.modes = "12,500";
+  EXPECT_EQ(error_of(request, measured()),
+            "--modes: 500 Hz is not below half the sample rate, 500 Hz; write lower frequencies");
+  const test::TemporaryDirectory directory;
+  write_modes(directory / "modes.json", {{12.0, 0.02, 1}, {500.0, 0.03, 2}});
+  FitRequest by_file;
+  by_file.modes = (directory / "modes.json").string();
+  EXPECT_THAT(error_of(by_file, measured()), HasSubstr("500 Hz is not below"));
+  FrfEstimate continuous = measured();
+  continuous.hold = Hold::none;
+  EXPECT_EQ(error_of(request, continuous), "");
+}
+
+TEST(FitRequest, WeightsComeFromAFileInTheOrderOfTheResponse) {
+  const test::TemporaryDirectory directory;
+  const std::filesystem::path path = directory / "w.h5";
+  std::vector<double> values = {0, 1, 2, 3, 4, 5, 6, 7};
+  {
+    Hdf5File file = Hdf5File::create(path);
+    file.write_reals("/weights", {4, 1, 2}, values.data());
+    file.write_reals("/other", {4, 2, 1}, values.data());
+    file.close();
+  }
+  FitRequest request;
+  request.weighting = path.string();
+  const FitSetup setup = make_fit_setup(request, measured());
+  EXPECT_EQ(setup.options.weighting, Weighting::user);
+  EXPECT_EQ((*setup.options.user_weights)(1, 0), 1.0);  // channel y <- b on the first line
+  EXPECT_EQ((*setup.options.user_weights)(0, 3), 6.0);
+  request.band_hz = {15.0, 35.0};  // of the whole response: those of the band are taken
+  const FitSetup band = make_fit_setup(request, measured());
+  ASSERT_EQ((*band.options.user_weights).cols(), 2);
+  EXPECT_EQ((*band.options.user_weights)(0, 0), 2.0);
+  EXPECT_EQ((*band.options.user_weights)(1, 1), 5.0);
+  EXPECT_THROW(make_fit_setup(request, select_band(measured(), 15.0, 45.0)), FormatError);
+  values[3] = -1.0;
+  {
+    Hdf5File file = Hdf5File::create(path);
+    file.write_reals("/weights", {4, 1, 2}, values.data());
+    file.close();
+  }
+  request.band_hz.reset();
+  EXPECT_THROW(make_fit_setup(request, measured()), IndefiniteWeights);
+}
+
+TEST(FitRequest, EveryWordThatIsNotOneIsRefused) {
+  const auto refused = [](auto member, const char* value) {
+    FitRequest request;
+    request.*member = value;
+    EXPECT_THROW(make_fit_setup(request, measured()), std::invalid_argument) << value;
+  };
+  refused(&FitRequest::hold, "zoh");
+  refused(&FitRequest::weighting, "user");
+  refused(&FitRequest::weighting, "noise");
+  refused(&FitRequest::delay, "inf");
+  refused(&FitRequest::modes, "-3");
+  refused(&FitRequest::modes, "12,-3");
+  refused(&FitRequest::rigid_body, "half");
+  refused(&FitRequest::damping, "viscous");
+  refused(&FitRequest::direct_term, "half");
+  refused(&FitRequest::method, "lm");
+}
+
+TEST(FitRequest, RanksAreWordsOrNumbers) {
+  FitRequest request;
+  EXPECT_EQ(make_fit_setup(request, measured()).options.residue_rank, 0);
+  request.rigid_body = "3";
+  request.residue_rank = "1";
+  const FitSetup setup = make_fit_setup(request, measured());
+  EXPECT_TRUE(setup.structure.common.rigid_body);
+  EXPECT_EQ(setup.options.rigid_body_rank, 3);
+  EXPECT_EQ(setup.options.residue_rank, 1);
+  EXPECT_NE(setup.request_json.find("\"residue_rank\":\"1\""), std::string::npos);
+}
+
+TEST(FitRequest, SubmodelsStandAloneUnlessMoreIsAsked) {
+  FitRequest request;
+  request.submodels = {parse_submodel("n=1,m=0,f=15")};
+  FitSetup setup = make_fit_setup(request, measured());
+  EXPECT_FALSE(setup.structure.common.rigid_body);
+  EXPECT_TRUE(setup.selection.keep_modes);
+  EXPECT_TRUE(setup.selection.modes.empty());
+  EXPECT_EQ(setup.structure.submodels.size(), 1U);
+  EXPECT_THAT(setup.request_json, HasSubstr("\"submodels\":[\"l=0,n=1,m=0,f=15\"]"));
+  EXPECT_THAT(setup.request_json, HasSubstr("\"modes\":\"none\","));
+  request.modes = "auto";
+  request.rigid_body = "full";
+  setup = make_fit_setup(request, measured());
+  EXPECT_TRUE(setup.structure.common.rigid_body);
+  EXPECT_FALSE(setup.selection.keep_modes);
+}
+
+TEST(FitRequest, ASuspensionStandsInsteadOfTheRigidBody) {
+  FitRequest request;
+  request.rigid_body = "suspension";
+  FitSetup setup = make_fit_setup(request, measured());
+  EXPECT_FALSE(setup.structure.common.rigid_body);
+  EXPECT_TRUE(setup.structure.suspension);
+  EXPECT_TRUE(setup.structure.suspension_hz.empty());
+  request.rigid_body = "suspension:0.4:0.5";
+  setup = make_fit_setup(request, measured());
+  EXPECT_EQ(setup.structure.suspension_hz, (std::vector<double>{0.4, 0.5}));
+}
+
+TEST(FitRequest, StructuresThatAreNoneAreRefusedByTheirFlag) {
+  const auto error_of = [](const FitRequest& request) -> std::string {
+    try {
+      make_fit_setup(request, measured());
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  FitRequest request;
+  for (const char* text : {"suspension:", "suspension:10", "suspension:0.4:", "suspension0.4"}) {
+    request.rigid_body = text;
+    EXPECT_THAT(error_of(request), HasSubstr("below the lowest line, 10 Hz")) << text;
+  }
+  request = {};
+  request.rigid_body = request.modes = "none";
+  EXPECT_THAT(error_of(request), HasSubstr("--modes: 'none'"));
+  request = {};
+  request.submodels = {parse_submodel("l=1,n=0")};
+  EXPECT_EQ(error_of(request), "");
+  request.rigid_body = "full";
+  EXPECT_THAT(error_of(request), HasSubstr("--submodel: 2 terms with integrators"));
+  request = {};
+  request.submodels = {parse_submodel("n=2,m=2")};
+  request.direct_term = "full";
+  EXPECT_THAT(error_of(request), HasSubstr("--submodel: 2 biproper"));
+  request = {};
+  request.submodels = {parse_submodel("n=2,f=600")};
+  EXPECT_THAT(error_of(request), HasSubstr("--submodel: 600 Hz is not below"));
+  request.submodels = {parse_submodel("n=4,m=3")};
+  request.residue_rank = "1";
+  EXPECT_THAT(error_of(request), HasSubstr("not for --submodel l=0,n=4,m=3"));
+  request.submodels = {parse_submodel("n=2,m=1"), parse_submodel("n=0")};
+  EXPECT_EQ(error_of(request), "");
+}
+
+TEST(FitRequest, TheRequestIsNamedWhole) {
+  FitRequest request;
+  request.threads = 1;
+  const std::string one = make_fit_setup(request, measured()).request_json;
+  request.threads = 2;
+  EXPECT_EQ(make_fit_setup(request, measured()).request_json, one);
+  request.method = "gn";
+  EXPECT_NE(make_fit_setup(request, measured()).request_json, one);
+  EXPECT_THAT(one, HasSubstr("\"hold\":\"exact\""));
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,146 @@
+// What stageid frf says of linearity and of periods, end to end.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "frf/file/frf_file.hpp"
+#include "tests/support/hdf5_surgery.hpp"
+#include "tests/tools/program_fixture.hpp"
+#include "tools/fit/frf_quality.hpp"
+#include "tools/steps/health_step.hpp"
+
+namespace stageid::test {
+namespace {
+
+using nlohmann::json;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class FrfQuality : public ProgramTest {};
+
+TEST_F(FrfQuality, TellsWhetherTheStageIsLinear) {
+  make_log();
+  const ProgramResult linear = succeed({"frf", name("run.slog"), "-o", name("f.h5"), "--json"});
+  EXPECT_THAT(linear.err, HasSubstr("nonlinear pairs"));
+  EXPECT_EQ(json::parse(linear.out)["nonlinearity"]["tested"], true);
+  const std::string config =
+      stage("cubic.yaml", "  plate:", "  cubic_stiffness_n_m3: 1.0e+16\n  plate:");
+  // A distorted stage needs longer to settle.
+  write_bytes(config, replaced(read_bytes(config), "transient_periods: 2", "transient_periods: 8"));
+  succeed({"run", config, "-o", name("cubic.slog")});
+  const ProgramResult cubic = succeed({"frf", name("cubic.slog"), "-o", name("c.h5"), "--json"});
+  const json found = json::parse(cubic.out)["nonlinearity"];
+  EXPECT_EQ(found["nonlinear"], true);
+  EXPECT_GT(found["bands"][0]["distortion"].get<double>(), 0.0);
+  EXPECT_THAT(cubic.err, HasSubstr("the plant is not linear: a linear plant shows "));
+  EXPECT_THAT(cubic.err, HasSubstr("but none as improbable as p = "));
+  EXPECT_THAT(linear.err, HasSubstr("no sign that the plant is not linear: a linear plant shows "));
+  EXPECT_LT(read_frf(at("c.h5")).nonlinearity.p_value.minCoeff(),
+            read_frf(at("f.h5")).nonlinearity.p_value.minCoeff());
+}
+
+TEST_F(FrfQuality, SaysWhereTheRecordsAreNotSettled) {
+  make_log();
+  succeed({"frf", name("run.slog"), "-o", name("f.h5")});
+  FrfEstimate frf = read_frf(at("f.h5"));
+  const Eigen::Index bands = frf.nonlinearity.band_hz.rows();
+  frf.nonlinearity.settled_p_value = Eigen::VectorXd::Ones(bands);
+  frf.nonlinearity.settled_p_value[0] = 1e-5;
+  EXPECT_THAT(linearity_lines(frf), Contains(HasSubstr("not settled")));
+  EXPECT_THAT(linearity_lines(frf), Contains(HasSubstr("linearity cannot be told")));
+  EXPECT_EQ(linearity_json(frf)["bands"][0]["settled"], false);
+  const std::vector<Finding> found = keep_health(frf, {});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].cause, Cause::unsettled);
+  EXPECT_EQ(health_of(frf.provenance_json).front().cause, Cause::unsettled);
+  frf.nonlinearity.settled_p_value.setConstant(1e-5);
+  EXPECT_THAT(linearity_lines(frf), testing::Not(Contains(HasSubstr("not linear"))));
+}
+
+TEST_F(FrfQuality, SaysWhyItWasNotTested) {
+  make_log();
+  const ProgramResult one =
+      succeed({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "1", "--json"});
+  EXPECT_THAT(one.err, HasSubstr("measure two realizations"));
+  EXPECT_EQ(json::parse(one.out)["nonlinearity"]["tested"], false);
+  const ProgramResult lpm =
+      succeed({"frf", name("run.slog"), "-o", name("f.h5"), "--method", "lpm"});
+  EXPECT_THAT(lpm.err, HasSubstr("estimate with 'periodic'"));
+}
+
+/// `signal` of the first runs is zero, on all its channels.
+void silence(const std::filesystem::path& file, const std::string& signal, hsize_t channels,
+             int runs) {
+  constexpr hsize_t kSamples = 2500;
+  Hdf5Surgery log(file);
+  for (int run = 0; run < runs; ++run)
+    log.reshape(fmt::format("/runs/{:04}/{}", run, signal), {kSamples, channels});
+}
+
+TEST_F(FrfQuality, ChannelsWithoutASignalAreNamed) {
+  make_log();
+  succeed({"log", "convert", name("run.slog"), "-o", name("sensors.h5")});
+  succeed({"log", "convert", name("run.slog"), "-o", name("actuators.h5")});
+  Hdf5Surgery(at("sensors.h5")).remove("/runs/0008");
+  silence(at("sensors.h5"), "sensors", 2, 8);
+  const ProgramResult dead = run({"frf", name("sensors.h5"), "-o", name("f.h5"), "--json"});
+  EXPECT_EQ(dead.exit_code, 3) << dead.err;
+  const json told = json::parse(dead.out);
+  EXPECT_EQ(told["health"][0]["cause"], "dead");
+  EXPECT_EQ(told["health"][0]["channel"], "s1");
+  // The last realization lacks an experiment.
+  EXPECT_EQ(told["left_out_realizations"][0]["realization"], 3);
+  EXPECT_THAT(dead.err, HasSubstr("no complete run of experiment 3"));
+  EXPECT_EQ(read_frf(at("f.h5")).left_out_realizations.size(), 1u);
+  EXPECT_EQ(read_frf(at("f.h5")).nonlinearity.distortion.maxCoeff(), 0.0);
+  silence(at("actuators.h5"), "actuators", 3, 9);
+  fail({"frf", name("actuators.h5"), "-o", name("g.h5")}, 2, "channel a1 shows one value");
+}
+
+TEST_F(FrfQuality, SmoothsTheCovariance) {
+  make_log();
+  succeed({"frf", name("run.slog"), "-o", name("one.h5")});
+  succeed({"frf", name("run.slog"), "-o", name("nine.h5"), "--smooth-covariance", "9"});
+  EXPECT_EQ(read_frf(at("nine.h5")).noise_dof, 9.0 * read_frf(at("one.h5")).noise_dof);
+  fail({"frf", name("run.slog"), "-o", name("two.h5"), "--smooth-covariance", "2"}, 2,
+       "odd number");
+  fail({"frf", name("run.slog"), "-o", name("two.h5"), "--periods", "some"}, 2, "--periods");
+}
+
+TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {
+  FrfEstimate frf;
+  frf.left_out_realizations = {{1, "run.slog:/runs/0003: no clean period"}};
+  frf.dropped_periods = {{0, 2, 4, "a glitch"}};
+  for (int period = 0; period < 30; ++period)
+    frf.dropped_periods.push_back({1, 0, period, "marked"});
+  EXPECT_THAT(
+      dropped_lines(frf),
+      ElementsAre(
+          "realization 2 left out, the others are used: run.slog:/runs/0003: no clean period",
+          "realization 1, experiment 3: period 5 left out: a glitch"));
+  EXPECT_EQ(left_out_json(frf),
+            json({{{"realization", 2}, {"reason", "run.slog:/runs/0003: no clean period"}}}));
+  frf.left_out_realizations.clear();
+  EXPECT_THAT(dropped_lines(frf), Contains("... and 21 more periods, see /dropped_periods"));
+}
+
+TEST(DroppedLines, SayThatTheTransientLasts) {
+  const auto told =
+      testing::StartsWith("the first measured period of every experiment was left out");
+  FrfEstimate frf;
+  frf.realizations = 2;
+  frf.experiments = 2;
+  EXPECT_THAT(dropped_lines(frf), testing::IsEmpty());
+  frf.dropped_periods = {{0, 0, 0, "unlike"}, {0, 1, 0, "unlike"}, {1, 0, 0, "unlike"}};
+  EXPECT_THAT(dropped_lines(frf), testing::Not(Contains(told)));
+  frf.dropped_periods.push_back({1, 1, 1, "a glitch"});
+  EXPECT_THAT(dropped_lines(frf), testing::Not(Contains(told)));
+  frf.dropped_periods.back().period = 0;
+  EXPECT_THAT(dropped_lines(frf), Contains(told));
+}
+
+}  // namespace
+}  // namespace stageid::test

@@ -1,0 +1,134 @@
+// Weights from a file: what is taken, and what is refused with the file's name.
+
+#include "tools/fit/weight_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <complex>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/hdf5_file.hpp"
+#include "estimation/problem/weight_matrices.hpp"
+#include "frf/file/frf_file.hpp"
+#include "tests/support/numbered_frf.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/tools/program_fixture.hpp"
+
+namespace stageid {
+namespace {
+
+using Complex = std::complex<double>;
+
+class WeightFile : public testing::Test {
+ protected:
+  void write_matrices(const std::vector<Complex>& values) {
+    Hdf5File file = Hdf5File::create(path_);
+    file.write_complex("/weight_matrices", {4, 6, 6}, values.data());
+    file.close();
+  }
+  /// 2 on the diagonal, one coupling on line 1 that tells rows from columns.
+  static std::vector<Complex> matrices() {
+    std::vector<Complex> values(4 * 36);
+    for (std::size_t k = 0; k < 4; ++k)
+      for (std::size_t c = 0; c < 6; ++c) values[36 * k + 7 * c] = 2.0;
+    values[36 + 6 * 1 + 4] = Complex(0.5, 0.25);
+    values[36 + 6 * 4 + 1] = Complex(0.5, -0.25);
+    return values;
+  }
+  template <typename Error = FormatError>
+  void expect_refused(const std::string& part) {
+    EXPECT_THAT([this] { read_weights(path_, frf_, options_); },
+                testing::ThrowsMessage<Error>(
+                    testing::AllOf(testing::HasSubstr("weights.h5"), testing::HasSubstr(part))));
+  }
+  FrfEstimate frf_ = test::numbered_frf();
+  test::TemporaryDirectory directory_;
+  std::filesystem::path path_ = directory_ / "weights.h5";
+  FitOptions options_;
+};
+
+TEST_F(WeightFile, DiagonalsAreRowsOfOutputs) {
+  std::vector<double> values(4 * 6);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<double>(i);
+  Hdf5File file = Hdf5File::create(path_);
+  file.write_reals("/weights", {4, 2, 3}, values.data());
+  file.close();
+  read_weights(path_, frf_, options_);
+  EXPECT_EQ((*options_.user_weights)(1 + 2 * 2, 3), 23.0);
+  EXPECT_EQ((*options_.user_weights)(0 + 2 * 1, 0), 1.0);
+  EXPECT_EQ(options_.user_weight_matrices.size(), 0);
+}
+
+TEST_F(WeightFile, MatricesKeepRowAndColumn) {
+  write_matrices(matrices());
+  read_weights(path_, frf_, options_);
+  EXPECT_EQ(options_.user_weight_matrices(1 + 6 * 4, 1), Complex(0.5, 0.25));
+  EXPECT_EQ(options_.user_weight_matrices(4 + 6 * 1, 1), Complex(0.5, -0.25));
+  EXPECT_EQ(options_.user_weight_matrices(7 * 5, 3), Complex(2.0, 0.0));
+}
+
+TEST_F(WeightFile, RefusesMatricesNamingTheLine) {
+  std::vector<Complex> values = matrices();
+  values[36 + 6 * 4 + 1] = 0.0;
+  write_matrices(values);
+  expect_refused("line 1 (2.5 Hz): not Hermitian");
+  values = matrices();
+  values[2 * 36] = -2.0;
+  write_matrices(values);
+  expect_refused<IndefiniteWeights>("line 2 (3 Hz): not positive semidefinite");
+}
+
+TEST_F(WeightFile, RefusesAnotherShapeAndBothKindsAtOnce) {
+  write_matrices(matrices());
+  frf_ = select_band(frf_, 1.0, 3.0);
+  expect_refused("is 4 x 6 x 6; must be 3 x 6 x 6");
+  Hdf5File file = Hdf5File::create(path_);
+  const std::vector<double> diagonals(4 * 6, 1.0);
+  file.write_reals("/weights", {4, 2, 3}, diagonals.data());
+  file.write_complex("/weight_matrices", {4, 6, 6}, matrices().data());
+  file.close();
+  expect_refused("one of the two");
+}
+
+TEST_F(WeightFile, RefusesNegativeWeights) {
+  std::vector<double> values(4 * 6, 1.0);
+  values[13] = -1.0;
+  Hdf5File file = Hdf5File::create(path_);
+  file.write_reals("/weights", {4, 2, 3}, values.data());
+  file.close();
+  expect_refused<IndefiniteWeights>("line 2: -1; weights are 0 or more");
+}
+
+TEST_F(WeightFile, RefusesWeightsThatAreAllZeroOrBeyondTheRangeOfSquares) {
+  for (const auto& [weight, part] : {std::pair{0.0, "every weight is 0"},
+                                     {1e-200, "only the ratios of weights matter"},
+                                     {1e200, "only the ratios of weights matter"}}) {
+    const std::vector<double> values(4 * 6, weight);
+    Hdf5File file = Hdf5File::create(path_);
+    file.write_reals("/weights", {4, 2, 3}, values.data());
+    file.close();
+    expect_refused(part);
+  }
+}
+
+class WeightsOfTheProgram : public test::ProgramTest {};
+
+TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
+  const FrfEstimate frf = test::numbered_frf();
+  write_frf(name("frf.h5"), frf);
+  std::vector<double> weights(static_cast<std::size_t>(frf.response.size()), 1.0);
+  weights[5] = -1.0;
+  Hdf5File file = Hdf5File::create(name("w.h5"));
+  file.write_reals("/weights",
+                   {static_cast<hsize_t>(frf.lines()), static_cast<hsize_t>(frf.n_outputs()),
+                    static_cast<hsize_t>(frf.n_inputs())},
+                   weights.data());
+  file.close();
+  fail({"fit", name("frf.h5"), "-o", name("model.json"), "--weighting", name("w.h5")}, 3,
+       "-1; weights are 0 or more");
+  EXPECT_FALSE(std::filesystem::exists(name("model.json")));
+}
+
+}  // namespace
+}  // namespace stageid

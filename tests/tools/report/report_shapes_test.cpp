@@ -1,0 +1,79 @@
+#include "tools/report/report_shapes.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "acquisition/files/file_error.hpp"
+#include "tests/tools/report/synthetic_report.hpp"
+
+namespace stageid {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+std::string text_of(const std::string& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+TEST(StageGeometry, IsWhatTheStageFileSays) {
+  const std::string file = STAGEID_SOURCE_DIR "/configs/stage/wafer_stage.yaml";
+  const StageGeometry geometry = stage_geometry(file, text_of(file));
+  EXPECT_EQ(geometry.stage, "wafer stage");
+  ASSERT_EQ(geometry.actuators.size(), 17u);
+  ASSERT_EQ(geometry.sensors.size(), 7u);
+  EXPECT_EQ(geometry.actuators[2].name, "z3");
+  EXPECT_EQ(geometry.actuators[2].position_m, Eigen::Vector3d(0.26, -0.21, 0.0));
+  EXPECT_EQ(geometry.actuators[13].direction, Eigen::Vector3d(1.0, 0.0, 0.0));
+  EXPECT_EQ(geometry.sensors[0].position_m, Eigen::Vector3d(-0.255, -0.258, 0.0));
+}
+
+TEST(StageGeometry, RefusesWhatIsNoStageFile) {
+  for (const char* text : {"", "[1, 2", "format: stageid-experiment\n", "format: stageid-stage\n",
+                           "format: stageid-stage\nactuators: 3\n"}) {
+    try {
+      stage_geometry("a.yaml", text);
+      FAIL() << text;
+    } catch (const FormatError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("a.yaml")) << text;
+    }
+  }
+}
+
+TEST(ReportShapes, FindPlacesByName) {
+  StageGeometry geometry;
+  geometry.sensors = {{"b", {1.0, 2.0, 3.0}, {0.0, 1.0, 0.0}}};
+  const ChannelList outputs{.names = {"a", "b"}, .units = {"m", "m"}};
+  const ChannelList inputs{.names = {"u"}, .units = {"N"}};
+  const json got = report::geometry_json(geometry, outputs, inputs);
+  EXPECT_TRUE(got["outputs"][0].is_null());
+  EXPECT_EQ(got["outputs"][1]["position_m"], json({1.0, 2.0, 3.0}));
+  EXPECT_EQ(got["outputs"][1]["direction"], json({0.0, 1.0, 0.0}));
+  EXPECT_TRUE(got["inputs"][0].is_null());
+  EXPECT_TRUE(report::geometry_json(geometry, inputs, inputs).is_null());
+}
+
+TEST(ReportShapes, ComeByFrequencyHoweverTheModelOrdersThem) {
+  ReportData data = test::synthetic_report({.outputs = 2, .inputs = 3, .lines = 10, .modes = 4});
+  const json rising = report::shapes_json(*data.model);
+  std::reverse(data.model->submodels.begin(), data.model->submodels.end());
+  EXPECT_EQ(report::shapes_json(*data.model), rising);
+  for (std::size_t i = 1; i < 4; ++i)
+    EXPECT_LT(rising["modes"][i - 1]["frequency_hz"].get<double>(),
+              rising["modes"][i]["frequency_hz"].get<double>());
+}
+
+TEST(ReportShapes, RoundAndLeaveOutWhatIsNoNumber) {
+  const Eigen::MatrixXd matrix{{0.123456, -2.0}, {std::numeric_limits<double>::quiet_NaN(), 1e-9}};
+  const json got = report::matrix_json(matrix, 3);
+  EXPECT_EQ(got, json({{0.123, -2.0}, {nullptr, 0.0}}));
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,139 @@
+#include "tools/report/report_verdict.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/tools/report/synthetic_report.hpp"
+
+namespace stageid {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using Level = Verdict::Level;
+
+ReportData sound() {
+  ReportData data = test::synthetic_report({.outputs = 2, .inputs = 2, .lines = 40, .modes = 4});
+  data.findings.clear();
+  return data;
+}
+
+void expect_doubt(const ReportData& data, const char* why) {
+  const Verdict verdict = judge(data);
+  EXPECT_EQ(verdict.level, Level::doubt);
+  EXPECT_THAT(verdict.reasons, ElementsAre(HasSubstr(why)));
+}
+
+void expect_bad(const ReportData& data, const char* why) {
+  const Verdict verdict = judge(data);
+  EXPECT_EQ(verdict.level, Level::bad);
+  EXPECT_THAT(verdict.reasons, ElementsAre(HasSubstr(why)));
+}
+
+TEST(Verdict, ASoundResultIsGood) {
+  const Verdict verdict = judge(sound());
+  EXPECT_EQ(verdict.level, Level::good);
+  EXPECT_THAT(verdict.reasons, ElementsAre());
+}
+
+TEST(Verdict, AFaultOfTheDataIsNotTrustedAndADoubtIsDoubted) {
+  using Severity = ReportMessage::Severity;
+  ReportData data = sound();
+  data.findings = {{Severity::note, "", "timing is not checked", "", "two periods"}};
+  EXPECT_EQ(judge(data).level, Level::good);
+  data.findings.push_back({Severity::warning, "", "hum", "12 dB", "look at the shield"});
+  expect_doubt(data, "hum (12 dB)");
+  data.findings.push_back({Severity::error, "a1 a2", "wired crosswise", "", "exchange them"});
+  const Verdict verdict = judge(data);
+  EXPECT_EQ(verdict.level, Level::bad);
+  EXPECT_THAT(verdict.reasons, ElementsAre("hum (12 dB)", "a1 a2: wired crosswise"));
+}
+
+// What `fit` ends with exit code 3 for is not trusted on the page either.
+TEST(Verdict, AFitThatEndedBadlyIsNotTrusted) {
+  for (const char* status : {"iteration_limit", "cost_stalled", "singular", "undetermined",
+                             "unexplained", "faulty_data"}) {
+    ReportData data = sound();
+    data.model->fit.status = status;
+    expect_bad(data, status);
+    data.model->fit.message = "the data have a reason";
+    expect_bad(data, "the data have a reason");
+  }
+}
+
+TEST(Verdict, AnErrorThatNoiseDoesNotExplainIsNotTrusted) {
+  ReportData data = sound();
+  data.validation->explained = false;
+  data.validation->reason = "the residual is 2.5 times what noise explains";
+  expect_bad(data, "2.5 times");
+}
+
+// The mean of F(2, 2 nu) is 2 for nu = 2: a chi-square of 2.02 is what noise gives.
+TEST(Verdict, AnErrorIsComparedWithItsExpectation) {
+  ReportData data = sound();
+  data.validation->chi_square_per_dof = 2.02;
+  data.validation->expected_chi_square = 2.0;
+  EXPECT_EQ(judge(data).level, Level::good);
+}
+
+TEST(Verdict, LostAndMarkedCyclesAreDoubtedLateOnesAreNot) {
+  ReportData data = sound();
+  data.runs[0].health.late = 7;
+  EXPECT_EQ(judge(data).level, Level::good);
+  data.runs[0].health.missing = 3;
+  expect_doubt(data, "3 cycles are missing");
+  data.runs[0].health.missing = 0;
+  data.runs[1].health.marked = 4;
+  expect_doubt(data, "4 cycles are marked");
+  data.runs[1].health.marked = 0;
+  data.runs[0].complete = false;
+  expect_doubt(data, "incomplete");
+}
+
+TEST(Verdict, AMissingModeIsDoubtedUnlessNoSensorSeesIt) {
+  ReportData data = sound();
+  data.true_modes.push_back({.natural_frequency_hz = 5.0, .damping_ratio = 0.01});
+  expect_doubt(data, "5.00 Hz was not identified");
+  data.true_modes.back().observable = false;
+  EXPECT_EQ(judge(data).level, Level::good);
+}
+
+TEST(Verdict, AModeThatThePlantDoesNotHaveIsDoubted) {
+  ReportData data = sound();
+  data.true_modes.erase(data.true_modes.begin());
+  expect_doubt(data, "that the plant does not have");
+}
+
+TEST(Verdict, AModeOffTheTruthIsDoubtedOnlyBeyondBothLimits) {
+  ReportData data = sound();
+  Submodel& mode = data.model->submodels[1];
+  const double f = mode.natural_frequency_hz();
+  data.true_modes[0].natural_frequency_hz = f * (1.0 + 5e-5);
+  mode.natural_frequency_std_hz = 1e-6 * f;  // 50 standard deviations, but 5e-5
+  EXPECT_EQ(judge(data).level, Level::good);
+  data.true_modes[0].natural_frequency_hz = f * (1.0 + 2e-4);
+  expect_doubt(data, "standard deviations off");
+  mode.natural_frequency_std_hz = 1e-4 * f;
+  EXPECT_EQ(judge(data).level, Level::good);
+}
+
+TEST(Verdict, AnErrorMessageIsWorseThanAnyDoubt) {
+  ReportData data = sound();
+  data.messages = {{ReportMessage::Severity::note, "just so"}};
+  EXPECT_EQ(judge(data).level, Level::good);
+  data.messages.push_back({ReportMessage::Severity::warning, "careful"});
+  expect_doubt(data, "careful");
+  data.messages.push_back({ReportMessage::Severity::error, "broken"});
+  const Verdict verdict = judge(data);
+  EXPECT_EQ(verdict.level, Level::bad);
+  EXPECT_THAT(verdict.reasons, ElementsAre("careful", "broken"));
+}
+
+TEST(Verdict, AMeasurementWithoutModelIsNotJudged) {
+  ReportData data;
+  data.frf = sound().frf;
+  EXPECT_EQ(judge(data).level, Level::none);
+}
+
+}  // namespace
+}  // namespace stageid

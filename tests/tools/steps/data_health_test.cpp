@@ -1,0 +1,198 @@
+#include "frf/health/data_health.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "frf/plant/plant_frf.hpp"
+#include "tests/support/faulty_log.hpp"
+#include "tests/support/planted_faults.hpp"
+#include "tests/support/wafer_stage.hpp"
+#include "tools/config/stage_expectation.hpp"
+#include "tools/steps/health_step.hpp"
+
+namespace stageid {
+namespace {
+
+using test::MemoryLog;
+
+test::FaultyLogRequest request_of(std::uint64_t seed) {
+  test::FaultyLogRequest request;
+  request.configured = test::wafer_stage_spec();
+  request.plant = test::random_wafer_stage(seed, request.configured);
+  request.seed = seed;
+  return request;
+}
+
+/// All findings that are not "not checked", one a line.
+std::string told(const std::vector<Finding>& findings) {
+  std::string text;
+  for (const std::string& note : health_notes(findings)) text += note + "\n";
+  return text;
+}
+
+/// Every kind of fault on one plant; 100 plants are in the study (docs/benchmarks.md).
+TEST(DataHealth, EveryPlantedFaultIsNamedAndNothingElse) {
+  const test::FaultyLogRequest request = request_of(3);
+  const auto nominal = std::optional(nominal_stage(request.configured));
+  const MemoryLog clean = test::simulate_faulty_log(request, {});
+  ASSERT_FALSE(clean.log_runs.empty());
+  for (const test::NamedFault& planted : test::faults_to_plant(3, clean)) {
+    MemoryLog log = clean;
+    if (planted.in_recording)
+      test::spoil_recording(planted.fault, log);
+    else
+      log = test::simulate_faulty_log(request, planted.fault);
+    if (log.log_runs.empty()) continue;  // the loop did not hold: nothing was measured
+    const auto findings = check_health(estimate_plant_frf_and_health({&log}).health, nominal);
+    const test::Judgement judgement = test::judge(planted, findings, log.log_info);
+    EXPECT_TRUE(judgement.named) << planted.name << " of " << planted.expected_channel << "\n"
+                                 << told(findings);
+    EXPECT_EQ(judgement.others, 0) << planted.name << "\n" << told(findings);
+  }
+}
+
+TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
+  test::FaultyLogRequest request = request_of(4);
+  request.axes = 3;
+  const MemoryLog log = test::simulate_faulty_log(request, {});
+  const auto findings = check_health(read_health_record({&log}, {}), std::nullopt);
+  int unchecked = 0;
+  for (const Finding& finding : findings) {
+    if (finding.severity != Severity::unchecked) continue;
+    ++unchecked;
+    EXPECT_NE(finding.remedy.find("--stage"), std::string::npos) << finding.remedy;
+  }
+  EXPECT_EQ(unchecked, 1);
+  EXPECT_EQ(findings.front().cause, Cause::unknown_stage);
+}
+
+// Whose record another one's nearly still record would stand for, if that other one's were not spoilt by it.
+TEST(DataHealth, AnActuatorThatMovesByItselfHasNotChangedPlacesWithOneThatStandsStill) {
+  for (const std::uint64_t seed : {2002U, 2004U}) {
+    const test::FaultyLogRequest request = request_of(seed);
+    const auto nominal = std::optional(nominal_stage(request.configured));
+    const MemoryLog clean = test::simulate_faulty_log(request, {});
+    for (const test::NamedFault& planted : test::faults_to_plant(seed, clean)) {
+      if (planted.fault.kind != test::PlantedFault::Kind::hidden_excitation) continue;
+      const MemoryLog log = test::simulate_faulty_log(request, planted.fault);
+      const auto findings = check_health(read_health_record({&log}, {}), nominal);
+      const test::Judgement judgement = test::judge(planted, findings, log.log_info);
+      EXPECT_TRUE(judgement.named && judgement.others == 0) << told(findings);
+    }
+  }
+}
+
+class RecordingFault : public ::testing::Test {
+ protected:
+  std::vector<Finding> findings() const {
+    return check_health(read_health_record({&log_}, {}), nominal_stage(request_.configured));
+  }
+
+  test::FaultyLogRequest request_ = request_of(6);
+  MemoryLog log_ = test::simulate_faulty_log(request_, {});
+};
+
+// Three that have changed places in a circle are no factor 1e5 of all actuators.
+TEST_F(RecordingFault, ThreeActuatorsInACircleAreNamedOneExchangeAfterTheOther) {
+  using Kind = test::PlantedFault::Kind;
+  test::spoil_recording({Kind::recorded_swap, false, 0, 1}, log_);
+  test::spoil_recording({Kind::recorded_swap, false, 1, 2}, log_);
+  const std::vector<Finding> found = findings();
+  ASSERT_EQ(health_notes(found).size(), 2U) << told(found);
+  for (int i = 0; i < 2; ++i)
+    EXPECT_EQ(found[static_cast<std::size_t>(i)].cause, Cause::swapped) << told(found);
+}
+
+TEST_F(RecordingFault, AnActuatorThatIsOneOrTwoSamplesLateIsSkewed) {
+  for (const double samples : {1.0, -1.0, 2.0}) {
+    MemoryLog log = log_;
+    test::spoil_recording({test::PlantedFault::Kind::recorded_skew, false, 4, 0,
+                           samples / log_.log_info.sample_rate_hz},
+                          log);
+    std::swap(log, log_);
+    const std::vector<Finding> found = findings();
+    std::swap(log, log_);
+    ASSERT_EQ(health_notes(found).size(), 1U) << samples << "\n" << told(found);
+    EXPECT_EQ(found.front().cause, Cause::skew) << told(found);
+    EXPECT_EQ(found.front().channel, log_.log_info.actuators.names[4]);
+  }
+}
+
+TEST_F(RecordingFault, AFactorOfThreePercentIsFound) {
+  for (const bool of_sensor : {true, false}) {
+    MemoryLog log = log_;
+    test::spoil_recording({test::PlantedFault::Kind::recorded_gain, of_sensor, 2, 0, 1.03}, log);
+    std::swap(log, log_);
+    const std::vector<Finding> found = findings();
+    std::swap(log, log_);
+    ASSERT_EQ(health_notes(found).size(), 1U) << of_sensor << "\n" << told(found);
+    EXPECT_EQ(found.front().cause, Cause::scale) << told(found);
+  }
+}
+
+// At a twentieth of the samples it stands still for longer than a sensor that is stuck, again and again.
+TEST_F(RecordingFault, ASensorThatIsClippedHardIsNotDead) {
+  const Eigen::VectorXd samples = log_.records.front().sensors.col(1).cwiseAbs();
+  std::vector<double> sorted(samples.begin(), samples.end());
+  const auto limit =
+      sorted.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(sorted.size()));
+  std::nth_element(sorted.begin(), limit, sorted.end());
+  test::spoil_recording({test::PlantedFault::Kind::saturation, true, 1, 0, *limit}, log_);
+  const std::vector<Finding> found = findings();
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found.front().cause, Cause::saturated) << told(found);
+}
+
+/// A limit that three samples of every period reach: 25 at one end would tell by themselves, so few do
+/// because u = r - C y fails.
+TEST(DataHealth, AFewClippedSamplesAreNotTakenForAnExcitationThatWasNotRecorded) {
+  test::FaultyLogRequest request = request_of(40);
+  request.seed = 1040;
+  constexpr int kActuator = 7;
+  const MemoryLog log = test::simulate_faulty_log(
+      request, {test::PlantedFault::Kind::saturation, false, kActuator, 0, 7.3});
+  const HealthRecord record = read_health_record({&log}, {});
+  const ChannelScan& scan = record.scan[static_cast<std::size_t>(record.n_y() + kActuator)];
+  EXPECT_LE(scan.high().count, 10U);
+  EXPECT_LE(scan.low().count, 10U);
+  const auto findings = check_health(record, nominal_stage(request.configured));
+  ASSERT_EQ(health_notes(findings).size(), 1U) << told(findings);
+  EXPECT_EQ(findings.front().cause, Cause::saturated) << told(findings);
+  EXPECT_EQ(findings.front().channel, "z8");
+}
+
+/// The loop moves the other ten: Y U^-1 of three is not the plant, and says nothing of the wiring.
+TEST(DataHealth, ActuatorsThatMoveUnexcitedAreNoFaultOfTheWiring) {
+  test::FaultyLogRequest request = request_of(5);
+  request.axes = 3;
+  const MemoryLog log = test::simulate_faulty_log(request, {});
+  const auto nominal = std::optional(nominal_stage(request.configured));
+  const auto findings = check_health(read_health_record({&log}, {}), nominal);
+  EXPECT_FALSE(any_fault(findings)) << told(findings);
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings.front().cause, Cause::excluded) << told(findings);
+  EXPECT_EQ(findings.back().cause, Cause::rigid_body);
+  EXPECT_EQ(findings.back().severity, Severity::unchecked);
+}
+
+TEST(DataHealth, FindingsSurviveTheProvenance) {
+  const std::vector<Finding> findings = {
+      {Severity::fault, Cause::swapped, "a1 a2", "wired crosswise", "exchanged", "exchange them"},
+      {Severity::unchecked, Cause::skew, "", "timing", "", "needs two periods"}};
+  FrfEstimate frf;
+  frf.provenance_json = "{\"version\": 1}";
+  EXPECT_EQ(keep_health(frf, findings).size(), 2U);
+  const std::vector<Finding> back = health_of(frf.provenance_json);
+  ASSERT_EQ(back.size(), 2U);
+  EXPECT_EQ(health_json(back), health_json(findings));
+  EXPECT_TRUE(any_fault(back));
+  EXPECT_TRUE(health_of("not JSON").empty());
+  EXPECT_TRUE(health_of("{\"health\": 3}").empty());
+}
+
+}  // namespace
+}  // namespace stageid

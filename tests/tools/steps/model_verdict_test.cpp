@@ -1,0 +1,60 @@
+#include "tools/steps/model_verdict.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace stageid {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+AdditiveModel fitted_to_drifting_data() {
+  AdditiveModel model;
+  model.fit.status = "gradient_small";
+  model.provenance_json = R"({"doubts": ["a mode drifts"]})";
+  return model;
+}
+
+Validation unexplained() {
+  Validation validation;
+  validation.explained = false;
+  validation.variance = ResidualVariance::noise;
+  validation.reason = "the residual is 50 times what noise explains";
+  return validation;
+}
+
+TEST(ModelVerdict, NamesTheCauseBeforeTheResidual) {
+  const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {}, unexplained());
+  EXPECT_FALSE(verdict.trustworthy);
+  EXPECT_THAT(verdict.reasons, ElementsAre("a mode drifts", HasSubstr("held back the residual")));
+}
+
+TEST(ModelVerdict, TrustsAModelWithDoubtsThatHolds) {
+  Validation validation;
+  validation.variance = ResidualVariance::noise;
+  const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {}, validation);
+  EXPECT_TRUE(verdict.trustworthy);
+  EXPECT_TRUE(verdict.validated);
+  EXPECT_THAT(verdict.reasons, ElementsAre("a mode drifts"));
+}
+
+TEST(ModelVerdict, SaysACauseOnceThatTheFitHasNamed) {
+  AdditiveModel model = fitted_to_drifting_data();
+  model.fit.status = "unexplained";
+  model.fit.message = "a mode drifts; the residual is 9 times what noise explains";
+  EXPECT_THAT(judge_model(model, {}, {}).reasons, ElementsAre(model.fit.message));
+}
+
+TEST(ModelVerdict, PutsFaultsOfOtherDataFirst) {
+  Finding dead;
+  dead.severity = Severity::fault;
+  dead.channel = "z1";
+  dead.what = "dead";
+  const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {dead}, unexplained());
+  ASSERT_EQ(verdict.reasons.size(), 3U);
+  EXPECT_THAT(verdict.reasons.front(), HasSubstr("z1: dead"));
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,123 @@
+#include "tools/steps/truth_comparison.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "estimation/modal/validation.hpp"
+#include "tests/support/wafer_stage.hpp"
+
+namespace stageid {
+namespace {
+
+Submodel mode(double frequency_hz, double damping, const Eigen::MatrixXd& B0) {
+  const double omega = 2.0 * std::numbers::pi * frequency_hz;
+  Submodel s;
+  s.denominator = {1.0, 2.0 * damping / omega, 1.0 / (omega * omega)};
+  s.numerator = {B0 / (omega * omega)};
+  return s;
+}
+
+/// The small stage of two actuators and one sensor as a model: every mode in its own submodel.
+AdditiveModel exact_model(const WaferStageSpec& stage) {
+  AdditiveModel model;
+  model.inputs = {{"a1", "a2"}, {"N", "N"}};
+  model.outputs = {{"s1"}, {"m"}};
+  model.sample_rate_hz = stage.info.sample_rate_hz;
+  model.hold = HoldModel::exact;
+  model.input_delay_s = Eigen::VectorXd::Constant(2, stage.delay_s);
+  model.output_delay_s = Eigen::VectorXd::Zero(1);
+  for (const PlantMode& m : wafer_stage_modes(stage))
+    model.submodels.push_back(mode(m.natural_frequency_hz, m.damping_ratio,
+                                   m.sensor_shape * m.actuator_shape.transpose()));
+  return model;
+}
+
+FrfEstimate lines(const AdditiveModel& model) {
+  FrfEstimate frf;
+  frf.inputs = model.inputs;
+  frf.outputs = model.outputs;
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(100, 4.0, 400.0);
+  frf.response = Eigen::MatrixXcd::Ones(2, 100);
+  frf.sample_rate_hz = model.sample_rate_hz;
+  frf.hold = Hold::zoh;
+  return frf;
+}
+
+WaferStageSpec small_stage() {
+  WaferStageSpec stage = test::small_stage_spec();
+  stage.delay_s = 0.4e-3;
+  return stage;
+}
+
+TEST(TruthComparison, TheExactModelHasNoError) {
+  const WaferStageSpec stage = small_stage();
+  const AdditiveModel model = exact_model(stage);
+  const TruthComparison truth = compare_with_truth(model, lines(model), stage);
+  // hal and estimation share no code: two ways to the same numbers, through sampled responses whose
+  // closed forms cancel by (f / f_mode)^2 at most, 400^2 here.
+  EXPECT_LT(truth.relative_rms_error, 1e-9);
+  EXPECT_LT(truth.normalized_error, 1e-9);
+  ASSERT_EQ(truth.modes.size(), 1U);
+  EXPECT_TRUE(truth.modes[0].found);
+  EXPECT_NEAR(truth.modes[0].frequency_hz, 80.0, 1e-9);
+}
+
+TEST(TruthComparison, CountsDeviationsInStandardDeviations) {
+  const WaferStageSpec stage = small_stage();
+  AdditiveModel model = exact_model(stage);
+  Submodel& flexible = model.submodels.at(6);
+  flexible = mode(80.4, 0.019, flexible.numerator[0]);
+  flexible.natural_frequency_std_hz = 0.2;
+  flexible.damping_ratio_std = 0.0005;
+  const TruthComparison truth = compare_with_truth(model, lines(model), stage);
+  EXPECT_NEAR(truth.modes.at(0).frequency_deviation(), 2.0, 1e-9);
+  EXPECT_NEAR(truth.modes.at(0).damping_deviation(), -2.0, 1e-9);
+  EXPECT_GT(truth.relative_rms_error, 1e-3);
+}
+
+// An actuator that moves nothing: the exact response is zero, the measured one noise.
+TEST(TruthComparison, WhatIsDecoupledDoesNotDecideTheRelativeError) {
+  WaferStageSpec stage = small_stage();
+  stage.info.actuators[1].direction[2] = 0.0;
+  stage.info.actuators[1].direction[0] = 1.0;
+  const AdditiveModel exact = exact_model(stage);
+  FrfEstimate frf = lines(exact);
+  frf.response = response_like(exact, frf);
+  frf.noise_variance = Eigen::MatrixXd::Constant(2, frf.lines(), 1e-30);
+  frf.noise_dof = 10.0;
+  frf.response.row(1).setConstant(1e-15);
+  AdditiveModel model = exact;
+  for (Submodel& s : model.submodels) s.numerator[0] *= 1.01;
+  const TruthComparison truth = compare_with_truth(model, frf, stage);
+  EXPECT_NEAR(truth.relative_rms_error, 0.01, 1e-6);
+  EXPECT_TRUE(truth_json(truth)["relative_rms_error"].is_number());
+}
+
+TEST(TruthComparison, MatchesOneToOneAndNamesTheRest) {
+  const WaferStageSpec stage = small_stage();
+  AdditiveModel model = exact_model(stage);
+  model.submodels.erase(model.submodels.begin(), model.submodels.begin() + 6);
+  model.submodels.push_back(mode(81.0, 0.02, model.submodels[0].numerator[0]));
+  model.submodels.push_back(mode(200.0, 0.02, model.submodels[0].numerator[0]));
+  const TruthComparison truth = compare_with_truth(model, lines(model), stage);
+  EXPECT_NEAR(truth.modes.at(0).frequency_hz, 80.0, 1e-9);
+  ASSERT_EQ(truth.extra_hz.size(), 2U);
+  EXPECT_NEAR(truth.extra_hz[0], 81.0, 1e-9);
+  const std::vector<std::string> table = truth_table(truth);
+  EXPECT_NE(table.back().find("200.0000 Hz"), std::string::npos);
+}
+
+TEST(TruthComparison, AModeThatIsMissingIsSaid) {
+  const WaferStageSpec stage = small_stage();
+  AdditiveModel model = exact_model(stage);
+  model.submodels.resize(6);
+  const TruthComparison truth = compare_with_truth(model, lines(model), stage);
+  EXPECT_FALSE(truth.modes.at(0).found);
+  EXPECT_NE(truth_table(truth).at(1).find("not found"), std::string::npos);
+  EXPECT_FALSE(truth_json(truth)["modes"][0]["found"].get<bool>());
+}
+
+}  // namespace
+}  // namespace stageid

@@ -1,0 +1,136 @@
+#include "tools/commands/config_command.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "hal/can/can_dbc.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/config/config_schema.hpp"
+#include "tools/config/strict_yaml.hpp"
+#include "tools/experiment/config_plan.hpp"
+#include "tools/experiment/experiment_config.hpp"
+#include "tools/experiment/loop_check.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/format_errors.hpp"
+
+namespace stageid {
+namespace {
+
+/// The value of `format`, which says what a file is.
+std::string format_of(const std::filesystem::path& file) {
+  const YamlDocument document = YamlDocument::read(file);
+  for (const YamlNode::Entry& entry : document.root().entries)
+    if (entry.key == "format") return document.node(entry.value).text;
+  document.fail(
+      document.root().mark,
+      "key 'format' is missing; write 'format: stageid-experiment' or 'format: stageid-stage'");
+}
+
+nlohmann::ordered_json schema_json(const std::vector<SchemaEntry>& entries) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const SchemaEntry& e : entries)
+    list.push_back({{"depth", e.depth},
+                    {"key", e.key},
+                    {"type", e.type},
+                    {"unit", e.unit},
+                    {"range", e.range},
+                    {"required", e.required},
+                    {"default", e.default_value},
+                    {"help", e.help}});
+  return list;
+}
+
+}  // namespace
+
+ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* config = add_command(app, "config", "What may stand in a configuration; check one");
+  config->require_subcommand(1);
+  CLI::App* schema_command =
+      add_command(*config, "schema", "Every key with type, unit, range, default");
+  schema_command->add_option("kind", kind_, "experiment | stage; default: both")
+      ->check(CLI::IsMember({"experiment", "stage"}));
+  schema_command->final_callback([this] { schema(); });
+  CLI::App* check_command = add_command(*config, "check", "Check experiment and stage files");
+  check_command->add_option("files", files_, "YAML files")->required();
+  check_command->final_callback([this] { check(); });
+  CLI::App* dbc_command = add_command(
+      *config, "dbc", "Write the CAN frames of a stage file as a database for can-utils, SavvyCAN");
+  dbc_command->add_option("stage", stage_file_, "stage file with a group 'can'")->required();
+  dbc_command->add_option("-o,--output", output_, "file to write (.dbc)")->required();
+  dbc_command->final_callback([this] { dbc(); });
+}
+
+void ConfigCommand::schema() const {
+  nlohmann::ordered_json json;
+  if (kind_ != "stage") {
+    const std::vector<SchemaEntry> entries = config_schema(describe_experiment_keys);
+    console_.result("# An experiment file. Units stand in the keys; SI.\n" + schema_text(entries));
+    json["experiment"] = schema_json(entries);
+  }
+  if (kind_ != "experiment") {
+    const std::vector<SchemaEntry> entries = config_schema(describe_stage_keys);
+    console_.result("# A stage file. Units stand in the keys; SI.\n" + schema_text(entries));
+    json["stage"] = schema_json(entries);
+  }
+  console_.result(json);
+}
+
+void ConfigCommand::check() const {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const std::filesystem::path& file : files_) {
+    nlohmann::ordered_json messages = nlohmann::ordered_json::array();
+    const auto tell = [&](const std::string& what) {
+      console_.warning(what);
+      messages.push_back(what);
+    };
+    try {
+      check(file);
+    } catch (const FormatErrors& errors) {
+      for (const FormatError& error : errors.all()) tell(error.what());
+    } catch (const FormatError& error) {
+      tell(error.what());
+    }
+    json.push_back({{"file", file.string()}, {"valid", messages.empty()}});
+    if (messages.empty()) continue;
+    json.back()["errors"] = messages;
+    console_.exit_code = kRequestWrong;
+  }
+  console_.result({{"files", json}});
+}
+
+void ConfigCommand::check(const std::filesystem::path& file) const {
+  if (format_of(file) == "stageid-stage") {
+    const StageConfig stage = load_stage_config(file);
+    require_stable_loop(stage, console_);
+    console_.result(fmt::format(
+        "{}: stage '{}', {}, {}, {} Hz", file.string(), stage.spec.info.name,
+        counted(stage.spec.info.actuators.size(), "actuator"),
+        counted(stage.spec.info.sensors.size(), "sensor"), stage.spec.info.sample_rate_hz));
+    return;
+  }
+  const ExperimentConfig experiment = load_experiment_config(file);
+  const ExperimentPlan plan = outline_plan(experiment);
+  if (!experiment.limits || std::filesystem::exists(experiment.limits->prior))
+    require_stable_loop(experiment, console_);
+  console_.result(fmt::format("{}: {}, {:.1f} min, {}", file.string(),
+                              counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
+                              counted(plan.grid().size(), "line")));
+}
+
+void ConfigCommand::dbc() const {
+  const StageConfig stage = load_stage_config(stage_file_);
+  if (!stage.can.present)
+    throw std::invalid_argument(
+        fmt::format("{}: has no group 'can'; see 'stageid config schema'", stage_file_.string()));
+  const StageInfo& info = stage.spec.info;
+  write_text_file(output_, can_dbc(can_layout(stage.can.spec, info), info));
+  console_.result(fmt::format("wrote {}", output_.string()));
+  console_.result({{"file", output_.string()}});
+}
+
+}  // namespace stageid

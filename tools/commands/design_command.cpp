@@ -1,0 +1,162 @@
+#include "tools/commands/design_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/experiment/config_plan.hpp"
+#include "tools/experiment/limited_plan.hpp"
+#include "tools/experiment/link_load.hpp"
+#include "tools/experiment/loop_check.hpp"
+#include "tools/measure/measurement.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string limit_text(const Eigen::VectorXd& limits, std::size_t index) {
+  return limits.size() == 0 ? "-" : fmt::format("{:.4g}", limits[static_cast<Eigen::Index>(index)]);
+}
+
+Json channel_json(const ChannelPrediction& channel) {
+  Json json = {
+      {"name", channel.name}, {"unit", channel.unit}, {"rms", channel.rms}, {"peak", channel.peak}};
+  if (channel.slew_per_s > 0.0) json["slew_per_s"] = channel.slew_per_s;
+  if (channel.thermal_rms > 0.0) json["thermal_rms"] = channel.thermal_rms;
+  return json;
+}
+
+Json design_json(const ExperimentConfig& config, const ExperimentPlan& plan,
+                 const DesignPrediction& prediction) {
+  Json json = {{"runs", plan.runs().size()},
+               {"duration_s", plan.duration_s()},
+               {"log_bytes", expected_log_bytes(plan, config.stage.spec.info)},
+               {"lines", plan.grid().size()},
+               {"resolution_hz", plan.grid().resolution_hz()},
+               {"crest_factors", prediction.crest_factor},
+               {"violations", prediction.violations()}};
+  for (const LinkLoad& link : link_loads(config.stage))
+    json["links"].push_back({{"link", link.link},
+                             {"load", link.load},
+                             {"cycle_s", link.cycle_s},
+                             {"highest_rate_hz", link.most_hz}});
+  for (const ChannelPrediction& channel : prediction.actuators)
+    json["actuators"].push_back(channel_json(channel));
+  for (const ChannelPrediction& channel : prediction.sensors)
+    json["sensors"].push_back(channel_json(channel));
+  return json;
+}
+
+}  // namespace
+
+std::vector<std::string> design_table(const ExperimentConfig& config, const ExperimentPlan& plan,
+                                      const DesignPrediction& prediction) {
+  const WaferStageSpec& stage = config.stage.spec;
+  const Eigen::VectorXd frequency_hz = plan.grid().frequency_hz();
+  std::vector<std::string> lines;
+  const auto [least, most] =
+      std::minmax_element(prediction.crest_factor.begin(), prediction.crest_factor.end());
+  lines.push_back(fmt::format(
+      "{} of {} + {} of {} s, {:.1f} min in all; log {:.1f} MB", counted(plan.runs().size(), "run"),
+      plan.spec().transient_periods, counted(plan.spec().periods, "period"), plan.grid().period_s(),
+      plan.duration_s() / 60.0, expected_log_bytes(plan, stage.info) / 1e6));
+  lines.push_back(fmt::format("{}, {} ... {} Hz; crest factors {:.2f} ... {:.2f}",
+                              counted(plan.grid().size(), "line"), frequency_hz[0],
+                              frequency_hz[frequency_hz.size() - 1], *least, *most));
+  for (const LinkLoad& link : link_loads(config.stage)) lines.push_back(to_string(link));
+  std::vector<std::vector<std::string>> rows = {
+      {"channel", "unit", "rms", "peak", "limit", "slew/s", "limit", "thermal rms", "limit", ""}};
+  for (std::size_t i = 0; i < prediction.actuators.size(); ++i) {
+    const ChannelPrediction& c = prediction.actuators[i];
+    rows.push_back({c.name, c.unit, fmt::format("{:.4g}", c.rms), fmt::format("{:.4g}", c.peak),
+                    limit_text(stage.limits.actuator_n, i), fmt::format("{:.4g}", c.slew_per_s),
+                    limit_text(stage.limits.slew_n_s, i), fmt::format("{:.4g}", c.thermal_rms),
+                    limit_text(stage.limits.thermal_rms_n, i),
+                    c.violations.empty() ? "" : "EXCEEDED"});
+  }
+  for (std::size_t i = 0; i < prediction.sensors.size(); ++i) {
+    const ChannelPrediction& c = prediction.sensors[i];
+    rows.push_back({c.name, c.unit, fmt::format("{:.4g}", c.rms), fmt::format("{:.4g}", c.peak),
+                    limit_text(stage.limits.position_window_m, i), "", "", "", "",
+                    c.violations.empty() ? "" : "EXCEEDED"});
+  }
+  for (std::string& line : table_lines(rows)) lines.push_back(std::move(line));
+  return lines;
+}
+
+void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction) {
+  const std::vector<std::string> violations = prediction.violations();
+  if (violations.empty()) return;
+  const std::string more =
+      violations.size() == 1 ? "" : fmt::format(" (and {} more)", violations.size() - 1);
+  throw FormatError(
+      config.file, "",
+      fmt::format("{}{}; lower the level, or insist with --force", violations.front(), more));
+}
+
+DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(
+      app, "design", "Draw the multisines; predict forces and motions against the limits");
+  command->add_option("config", config_, "experiment file (.yaml)")->required();
+  command->add_option("-o,--output", output_, "HDF5 file to write")->required();
+  command
+      ->add_option("--accuracy", accuracy_,
+                   "with level.limits: mean relative variance that is wanted, e.g. 1e-6 for 0.1 %; "
+                   "prints how many minutes reach it")
+      ->check(kPositive);
+  command->add_flag("--force", force_, "write even if a limit would be exceeded");
+  command->final_callback([this] { run(); });
+}
+
+void DesignCommand::run() const {
+  const ExperimentConfig config = load_experiment_config(config_);
+  require_writable(output_, {config_});
+  require_stable_loop(config, console_);
+  if (config.limits) {
+    const LimitedPlan limited = make_limited_plan(config);
+    write_limited(config, limited);
+    return;
+  }
+  if (accuracy_ > 0.0)
+    throw FormatError(
+        config.file, "",
+        "--accuracy: the noise is known from the prior of 'level: {limits: ...}' only; "
+        "use that level");
+  const ExperimentPlan plan = make_plan(config);
+  const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
+  const bool written = force_ || prediction.violations().empty();
+  if (written) write_experiment_plan(output_, plan);
+  for (const std::string& line : design_table(config, plan, prediction)) console_.result(line);
+  if (!written) require_within_limits(config, prediction);
+  for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
+  console_.result(fmt::format("wrote {}", output_.string()));
+  console_.result(design_json(config, plan, prediction));
+}
+
+void DesignCommand::write_limited(const ExperimentConfig& config,
+                                  const LimitedPlan& limited) const {
+  const ExperimentPlan& plan = limited.design.plan;
+  write_experiment_plan(output_, plan);
+  console_.result(fmt::format("{}, {:.1f} min in all; {}; prior {}",
+                              counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
+                              counted(plan.grid().size(), "line"), config.limits->prior.string()));
+  for (const LinkLoad& link : link_loads(config.stage)) console_.result(to_string(link));
+  for (const std::string& line : limited_table(limited, accuracy_)) console_.result(line);
+  console_.result(fmt::format("wrote {}", output_.string()));
+  Json json = {{"runs", plan.runs().size()},
+               {"duration_s", plan.duration_s()},
+               {"log_bytes", expected_log_bytes(plan, config.stage.spec.info)},
+               {"lines", plan.grid().size()}};
+  json.update(limited_json(limited, accuracy_));
+  console_.result(json);
+}
+
+}  // namespace stageid

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "tools/experiment/closed_loop_prediction.hpp"
+#include "tools/experiment/experiment_config.hpp"
+#include "tools/experiment/limited_plan.hpp"
+#include "tools/terminal/console.hpp"
+
+namespace stageid {
+
+/// stageid design CONFIG -o excitation.h5
+class DesignCommand {
+ public:
+  DesignCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  void write_limited(const ExperimentConfig& config, const LimitedPlan& limited) const;
+
+  Console& console_;
+  std::filesystem::path config_;
+  std::filesystem::path output_;
+  double accuracy_ = 0.0;
+  bool force_ = false;
+};
+
+/// What the plan asks and what it will do, as a table.
+std::vector<std::string> design_table(const ExperimentConfig& config, const ExperimentPlan& plan,
+                                      const DesignPrediction& prediction);
+
+/// @throws std::invalid_argument naming the first limit that would be exceeded, and how many more.
+void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction);
+
+}  // namespace stageid

@@ -1,0 +1,118 @@
+#include "tools/commands/export_command.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+#include "frf/file/frf_file.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/exchange/matlab/mat_option.hpp"
+#include "tools/exchange/model/model_export.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+/// Where no FRF says which lines: 1000 frequencies over the band of the fit, evenly in the logarithm.
+Eigen::VectorXd default_lines(const AdditiveModel& model) {
+  constexpr Eigen::Index kLines = 1000;
+  const auto [low_hz, high_hz] = model.fit.band_hz;
+  if (!(low_hz > 0.0) || !(high_hz > low_hz)) return {};
+  const Eigen::ArrayXd exponent =
+      Eigen::ArrayXd::LinSpaced(kLines, std::log(low_hz), std::log(high_hz));
+  return exponent.exp();
+}
+
+bool is_hdf5(const std::filesystem::path& file) {
+  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
+  std::array<char, 8> head = {};
+  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
+  return std::string_view(head.data(), head.size()) == kSignature;
+}
+
+Eigen::Index place_of(const std::string& name, const ChannelList& channels, const char* kind) {
+  const auto found = std::find(channels.names.begin(), channels.names.end(), name);
+  if (found == channels.names.end())
+    throw std::invalid_argument(
+        fmt::format("--driving-point: '{}' is no {} of the model; there are {}", name, kind,
+                    fmt::join(channels.names, ", ")));
+  return found - channels.names.begin();
+}
+
+}  // namespace
+
+ExportCommand::ExportCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "export",
+                                  "Write a model or a frequency response for other programs: state "
+                                  "space, mode shapes, response");
+  command->add_option("input", input_, "model.json or frf.h5")->required();
+  command
+      ->add_option("-o,--output", output_,
+                   "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); of a "
+                   "model also .json, .py, .m")
+      ->required();
+  command->add_option("--frf", frf_,
+                      "of a model: the response on the lines of this FRF within the fit's band");
+  command
+      ->add_option(
+          "--driving-point", driving_point_,
+          "OUTPUT INPUT, at one place in one direction; .h5, .mat, .npz: each mode's mass there")
+      ->expected(2);
+  add_mat_version(*command, mat_version_);
+  command->final_callback([this] { run(); });
+}
+
+void ExportCommand::export_from_model() const {
+  require_export_format(output_);
+  require_no_input(output_, {input_, frf_});
+  const AdditiveModel model = read_model(input_);
+  ExportedResponse exported;
+  exported.frequency_hz = default_lines(model);
+  if (!frf_.empty()) {
+    const FrfEstimate frf = read_frf(frf_);
+    const bool fitted_band = model.fit.band_hz[1] > model.fit.band_hz[0];
+    exported.frequency_hz =
+        fitted_band ? select_band(frf, model.fit.band_hz[0], model.fit.band_hz[1]).frequency_hz
+                    : frf.frequency_hz;
+  }
+  std::optional<DrivingPoint> driving_point;
+  if (!driving_point_.empty())
+    driving_point = {place_of(driving_point_[0], model.outputs, "output"),
+                     place_of(driving_point_[1], model.inputs, "input")};
+  export_model(output_, model, exported, driving_point, mat_version_);
+}
+
+void ExportCommand::export_from_frf() const {
+  if (!frf_.empty() || !driving_point_.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: is HDF5 and no model; --frf and --driving-point go with a model.json",
+                    input_.string()));
+  require_no_input(output_, {input_});
+  const FrfEstimate frf = read_frf(input_);
+  try {
+    require_frf_export_format(output_);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(
+        fmt::format("{}: holds a frequency response; {}", input_.string(), error.what()));
+  }
+  export_frf(output_, frf, mat_version_);
+}
+
+void ExportCommand::run() const {
+  if (is_hdf5(input_))
+    export_from_frf();
+  else
+    export_from_model();
+  console_.result(
+      fmt::format("wrote {}, {} bytes", output_.string(), std::filesystem::file_size(output_)));
+  console_.result({{"output", output_.string()}, {"bytes", std::filesystem::file_size(output_)}});
+}
+
+}  // namespace stageid

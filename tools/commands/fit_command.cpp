@@ -1,0 +1,157 @@
+#include "tools/commands/fit_command.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "acquisition/files/fingerprint.hpp"
+#include "estimation/problem/search_limit.hpp"
+#include "frf/file/frf_file.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/fit/submodel_text.hpp"
+#include "tools/steps/covariance_file.hpp"
+#include "tools/steps/fit_step.hpp"
+#include "tools/steps/health_step.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+ExitCode fit_exit_code(const FitResult& result, bool whole) {
+  if (result.status == FitStatus::interrupted) return kInterrupted;
+  return result.trustworthy() && whole ? kDone : kNotTrustworthy;
+}
+
+}  // namespace
+
+FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "fit", "Fit the additive model to an FRF");
+  command->add_option("frf", frf_, "frf.h5")->required();
+  command->add_option("-o,--output", output_, "model.json to write")->required();
+  command->add_option("--covariance", covariance_,
+                      "FILE.h5 to write: covariance of all parameters (sandwich and maximum "
+                      "likelihood) with their names and units, and the response of the model with "
+                      "its variance and 95 % radius");
+  command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: all lines")->expected(2);
+  command->add_option("--modes", request_.modes,
+                      "auto | none | how many | frequencies f1,f2,... in Hz | modes.json; default: "
+                      "auto, with --submodel none");
+  command->add_option(
+      "--weighting", request_.weighting,
+      "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
+      "FILE.h5 with /weights or /weight_matrices; default: by the variances in the FRF");
+  command->add_option("--hold", request_.hold, "none | phase | sinc | exact; default: by the FRF");
+  command->add_option("--delay", request_.delay,
+                      "SECONDS | estimate | per_channel; default: by the FRF");
+  command->add_option(
+      "--rigid-body", request_.rigid_body,
+      "none | full | RANK: the term B_0 / s^2 | suspension: a mode below the lines instead, for a "
+      "rigid body on weak springs | suspension:F1:F2: at these known frequencies, Hz | auto: full, "
+      "or "
+      "suspension where that is worth its parameters; default: auto; none with --submodel or where "
+      "the outputs are accelerations");
+  command->add_option(
+      "--direct-term", request_.direct_term,
+      "none | full: a constant, the compliance of modes above the band; default: none, "
+      "full where the outputs are accelerations");
+  command
+      ->add_option("--residue-rank", request_.residue_rank,
+                   "full | 1: residues phi psi^T of mechanical modes")
+      ->capture_default_str();
+  command
+      ->add_option("--submodel", submodels_,
+                   "(B_0 + ... + B_m s^m) / (s^l A), A of order n: l=0,n=4,m=3,f=120:180,"
+                   "zeta=0.01; repeatable. m: n + l - 1 unless given. f: Hz where the poles start, "
+                   "one a pair, last the real one of odd n; without it they are searched. n=auto: "
+                   "one denominator for all modes that a search finds")
+      ->allow_extra_args(false);
+  command->add_option(
+      "--damping", request_.damping,
+      "proportional | general: numerators B_0, or B_0 + B_1 s; default: proportional, "
+      "general where the outputs are accelerations");
+  command->add_option("--method", request_.method, "riv | gn | sk")->capture_default_str();
+  command->add_option("--max-iterations", request_.max_iterations, "of one fit")
+      ->capture_default_str();
+  command
+      ->add_option("--search-seconds", request_.search_seconds,
+                   "budget of a search for modes, in seconds of an ordinary core; counted in work, "
+                   "so the result does not depend on the machine; then the best model so far is "
+                   "written, exit code 3. 0: no end")
+      ->check(kNotNegative)
+      ->capture_default_str();
+  command->add_option("--seed", seed_, "accepted; nothing in a fit is random");
+  command
+      ->add_option("--threads", request_.threads, "0: all cores; the result does not depend on it")
+      ->check(kNotNegative)
+      ->capture_default_str();
+  command->final_callback([this] { run(); });
+}
+
+FitRequest FitCommand::checked_request() const {
+  FitRequest request = request_;
+  for (const std::string& text : submodels_) request.submodels.push_back(parse_submodel(text));
+  if (!band_hz_.empty()) request.band_hz = {band_hz_[0], band_hz_[1]};
+  return request;
+}
+
+void FitCommand::require_covariance_file() const {
+  if (covariance_.empty()) return;
+  require_ending(covariance_, "a covariance", {".h5"});
+  require_writable(covariance_, {frf_, output_});
+}
+
+void FitCommand::run() const {
+  const FitRequest request = checked_request();
+  require_writable(output_, {frf_});
+  require_model_ending(output_);
+  require_covariance_file();
+  FitSetup setup = make_fit_setup(request, read_frf(frf_));
+  setup.options.response_variance = false;  // that of the covariance is exact for all weights
+  setup.options.covariance = !covariance_.empty();
+  for (const std::string& doubt :
+       health_notes(health_of(setup.frf.provenance_json), Severity::doubt))
+    console_.warning(fmt::format("{}: {}", frf_.string(), doubt));
+  for (const std::string& warning : setup.warnings)
+    console_.warning(fmt::format("{}: {}", frf_.string(), warning));
+  const FitStep step =
+      fit_model(setup, frf_.filename().string(), fingerprint_of_file(frf_), console_);
+  const FitResult& result = step.result;
+  write_model(output_, result.model);
+  const bool told = result.covariance.sandwich.size() > 0;
+  if (told) write_covariance(covariance_, result, setup.frf.frequency_hz);
+
+  for (const std::string& line : result.decisions) console_.result(line);
+  console_.result(cost_line(result.cost));
+  for (const std::string& line : mode_table(result.model)) console_.result(line);
+  for (const std::string& line : delay_lines(result.model)) console_.result(line);
+  console_.result(fmt::format("{}: {}, {} ({})", output_.string(),
+                              relative_error_text(result.model.fit), to_string(result.status),
+                              result.message));
+  const bool whole = told || covariance_.empty();
+  console_.exit_code = fit_exit_code(result, whole);
+  console_.result({{"output", output_.string()},
+                   {"status", to_string(result.status)},
+                   {"message", result.message},
+                   {"trustworthy", result.trustworthy()},
+                   {"relative_rms_error", result.model.fit.relative_rms_error},
+                   {"cost", result.cost},
+                   {"decisions", result.decisions},
+                   {"findings", result.findings},
+                   {"modes", modes_json(result.model)},
+                   {"delays", delays_json(result.model)},
+                   {"seconds", step.seconds}});
+  for (const std::string& finding : result.findings)
+    if (result.trustworthy() || result.message.find(finding) == std::string::npos)
+      console_.warning(fmt::format("{}: {}", output_.string(), finding));
+  if (!whole)
+    console_.warning(fmt::format("{}: not written: {}", covariance_.string(),
+                                 result.decisions.empty() ? "" : result.decisions.back()));
+  if (!result.trustworthy())
+    console_.warning(fmt::format(
+        "{}: not to be trusted: {}. The model was written; do not use it until this is resolved.",
+        output_.string(), result.message));
+}
+
+}  // namespace stageid

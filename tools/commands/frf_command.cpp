@@ -1,0 +1,176 @@
+#include "tools/commands/frf_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <vector>
+
+#include "acquisition/files/json_members.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "frf/file/frf_file.hpp"
+#include "frf/response/hold_compensation.hpp"
+#include "frf/statistics/order_statistic.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/fit/frf_quality.hpp"
+#include "tools/steps/fft_wisdom_file.hpp"
+#include "tools/steps/health_step.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+/// The delay that a log of ours declares for its stage; 0 for others.
+double declared_delay_s(const std::filesystem::path& log) {
+  const auto json = nlohmann::json::parse(open_log(log)->info().metadata_json, nullptr, false);
+  return number_in(json, "transport_delay_s").value_or(0.0);
+}
+
+/// Of the responses that there are: an output that shows one value throughout has none.
+double median_relative_std(const FrfEstimate& frf, const Eigen::MatrixXd& variance) {
+  std::vector<double> ratio;
+  for (Eigen::Index i = 0; i < variance.size(); ++i)
+    if (const double power = std::norm(frf.response.data()[i]); power > 0.0)
+      ratio.push_back(std::sqrt(variance.data()[i] / power));
+  return ratio.empty() ? std::numeric_limits<double>::infinity() : order_statistic(ratio, 0.5);
+}
+
+nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
+                                const std::vector<std::string>& notes,
+                                const std::filesystem::path& output) {
+  nlohmann::ordered_json json = {{"output", output.string()},
+                                 {"inputs", frf.inputs.names},
+                                 {"outputs", frf.outputs.names},
+                                 {"lines", frf.lines()},
+                                 {"first_hz", frf.frequency_hz[0]},
+                                 {"last_hz", frf.frequency_hz[frf.lines() - 1]},
+                                 {"realizations", frf.realizations},
+                                 {"periods", frf.periods},
+                                 {"bytes_read", step.bytes},
+                                 {"seconds", step.seconds},
+                                 {"notes", notes}};
+  if (frf.noise_variance.size() > 0)
+    json["median_relative_noise_std"] = median_relative_std(frf, frf.noise_variance);
+  if (frf.total_variance.size() > 0)
+    json["median_relative_total_std"] = median_relative_std(frf, frf.total_variance);
+  json["nonlinearity"] = linearity_json(frf);
+  json["dropped_periods"] = dropped_json(frf);
+  json["left_out_realizations"] = left_out_json(frf);
+  return json;
+}
+
+}  // namespace
+
+FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "frf", "Estimate the plant's FRF from closed-loop logs");
+  command->add_option("logs", logs_, "logs (.slog or .h5)")->required();
+  command->add_option("-o,--output", output_, "HDF5 file to write")->required();
+  command->add_option("--inputs", inputs_, "actuators A,B,...; default: those that are excited")
+      ->delimiter(',');
+  command->add_option("--outputs", outputs_, "sensors C,D,...; default: all")->delimiter(',');
+  command->add_option("--realizations", realizations_, "1-based; default: all complete ones")
+      ->delimiter(',');
+  command->add_option("--transient-periods", transient_periods_,
+                      "dropped, instead of the log's own (lpm: of none)");
+  command->add_option("--method", method_, "periodic | lpm (whole records, transient modelled)")
+      ->check(CLI::IsMember({"periodic", "lpm"}))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--periods", periods_,
+          "consistent (glitches, bumps and transients left out; lpm: glitches) | unmarked (all)")
+      ->check(CLI::IsMember({"consistent", "unmarked"}))
+      ->capture_default_str();
+  command
+      ->add_option("--smooth-covariance", covariance_lines_,
+                   "of the noise: mean over LINES (odd) neighbouring lines, with their degrees "
+                   "of freedom")
+      ->type_name("LINES")
+      ->check(kPositive)
+      ->capture_default_str();
+  command->add_option("--covariance", covariance_, "diagonal | full")
+      ->check(CLI::IsMember({"diagonal", "full"}))
+      ->capture_default_str();
+  command->add_option("--compensate", compensate_, "take out: none | delay | hold (and delay)")
+      ->check(CLI::IsMember({"none", "delay", "hold"}))
+      ->capture_default_str();
+  command->add_option(
+      "--delay", delay_s_,
+      "with --compensate: delay beside the hold's half sample, s; default: the log's");
+  command->add_option("--stage", stage_,
+                      "stage file that the data's health is held against; default: the log's own");
+  command->add_flag("--no-health", no_health_, "do not look at the health of the data");
+  command
+      ->add_option("--fft-wisdom", fft_wisdom_,
+                   "keep FFT plans found by timing in FILE, and use those it holds")
+      ->type_name("FILE");
+  command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
+      ->check(kNotNegative)
+      ->capture_default_str();
+  command->final_callback([this] { run(); });
+}
+
+FrfStep FrfCommand::estimate(const FrfOptions& options) const {
+  const HealthRequest health{!no_health_, stage_};
+  if (fft_wisdom_.empty()) return estimate_frf(logs_, options, health, console_);
+  FftWisdomFile wisdom(fft_wisdom_);
+  FrfStep step = estimate_frf(logs_, options, health, console_);
+  note_fft_plans(step.frf, wisdom.save());
+  return step;
+}
+
+void FrfCommand::run() const {
+  FrfOptions options;
+  options.inputs = inputs_;
+  options.outputs = outputs_;
+  options.transient_periods = transient_periods_;
+  options.method = method_ == "lpm" ? FrfMethod::lpm : FrfMethod::periodic;
+  options.covariance = covariance_ == "full" ? CovarianceKind::full : CovarianceKind::diagonal;
+  options.periods = periods_ == "unmarked" ? PeriodChoice::unmarked : PeriodChoice::consistent;
+  options.covariance_lines = covariance_lines_;
+  options.threads = threads_;
+  for (const int realization : realizations_) {
+    if (realization < 1)
+      throw std::invalid_argument(
+          fmt::format("--realizations: {}; they are counted from 1", realization));
+    options.realizations.push_back(realization - 1);
+  }
+  if (delay_s_ && compensate_ == "none")
+    throw std::invalid_argument(
+        "--delay: nothing is taken out without --compensate; add --compensate delay or hold, or "
+        "leave --delay out");
+  require_writable(output_, logs_);
+  require_frf_ending(output_);
+  FrfStep step = estimate(options);
+  std::vector<std::string> notes = dropped_lines(step.frf);
+  if (compensate_ != "none") {
+    const double delay_s = delay_s_ ? *delay_s_ : declared_delay_s(logs_.front());
+    if (!delay_s_)
+      notes.push_back(fmt::format("--compensate: delay {} s, as the log declares", delay_s));
+    step.frf = compensate(
+        step.frf, compensate_ == "hold" ? Compensation::hold : Compensation::delay, delay_s);
+  }
+  write_frf(output_, step.frf);
+  const double rate = step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0;
+  console_.result(fmt::format("{}: {}", output_.string(), describe(step.frf)));
+  console_.result(fmt::format("{:.1f} MB of samples in {:.2f} s, {:.0f} MB/s", step.bytes / 1e6,
+                              step.seconds, rate));
+  if (step.frf.noise_variance.size() > 0)
+    console_.result(fmt::format("median relative standard deviation by noise: {:.2e}",
+                                median_relative_std(step.frf, step.frf.noise_variance)));
+  for (const std::string& line : linearity_lines(step.frf)) console_.message(line);
+  if (!no_health_)
+    for (const std::string& line : health_lines(step.findings)) console_.result(line);
+  if (any_fault(step.findings)) console_.exit_code = kNotTrustworthy;
+  for (const std::string& note : notes) console_.message("note: " + note);
+  nlohmann::ordered_json json = frf_json(step.frf, step, notes, output_);
+  if (!no_health_) json["health"] = health_json(step.findings);
+  console_.result(json);
+}
+
+}  // namespace stageid

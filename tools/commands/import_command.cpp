@@ -1,0 +1,171 @@
+#include "tools/commands/import_command.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fingerprint.hpp"
+#include "frf/file/frf_file.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/exchange/arrays/frf_arrays.hpp"
+#include "tools/exchange/arrays/frf_csv.hpp"
+#include "tools/exchange/arrays/touchstone_reader.hpp"
+#include "tools/exchange/import/foreign_arrays.hpp"
+#include "tools/exchange/import/import_frf.hpp"
+#include "tools/exchange/import/import_log.hpp"
+#include "tools/exchange/import/si_unit.hpp"
+#include "tools/exchange/model/mode_correlation.hpp"
+#include "tools/exchange/uff/uff_frf.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+[[noreturn]] void ask_for_map(const ArrayList& arrays) {
+  std::string shown;
+  constexpr std::size_t kMost = 6;
+  for (std::size_t k = 0; k < arrays.arrays.size() && k < kMost; ++k)
+    shown += (k == 0 ? "" : ", ") + arrays.arrays[k].name;
+  throw FormatError(
+      arrays.file, "",
+      fmt::format(
+          "does not say what its {} arrays ({}{}) are; write a map with kind: frf or "
+          "kind: log (docs/exchange.md) and give it with --map; 'stageid import {}' lists them",
+          arrays.arrays.size(), shown, arrays.arrays.size() > kMost ? ", ..." : "",
+          arrays.file.string()));
+}
+
+void require_frf_output(const std::filesystem::path& output) {
+  if (output.extension() != ".h5" && output.extension() != ".hdf5")
+    throw std::invalid_argument(
+        fmt::format("{}: a frequency response is imported as .h5, not as '{}'", output.string(),
+                    output.extension().string()));
+}
+
+FrfEstimate read_foreign_frf(const std::filesystem::path& file, const std::filesystem::path& output,
+                             std::vector<std::string>& notes) {
+  if (is_touchstone(file)) {
+    TouchstoneFrf touchstone = read_touchstone(file);
+    if (!touchstone.note.empty()) notes.push_back(touchstone.note);
+    return std::move(touchstone.frf);
+  }
+  if (is_frf_csv(file)) return read_frf_csv(file);
+  if (is_uff_name(file)) return frf_of_uff(file, read_uff(file));
+  const ArrayList arrays = read_foreign_arrays(file);
+  if (!holds_frf(arrays)) ask_for_map(arrays);
+  return frf_of_arrays(arrays, output);
+}
+
+}  // namespace
+
+namespace {
+
+/// What came with its history keeps it; else the foreign file is the history.
+ImportSummary write_imported(const std::filesystem::path& output, FrfEstimate frf,
+                             const std::filesystem::path& input, std::vector<std::string> notes) {
+  try {
+    take_si_units(frf, notes);
+  } catch (const std::invalid_argument& error) {
+    throw FormatError(input, "", error.what());
+  }
+  if (frf.provenance_json == "{}")
+    frf.provenance_json = nlohmann::ordered_json{
+        {"imported", input.filename().string()},
+        {"fingerprint", fingerprint_of_file(input)},
+        {"version",
+         STAGEID_VERSION}}.dump();
+  write_frf(output, frf);
+  return summary_of(frf, notes);
+}
+
+}  // namespace
+
+ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command =
+      add_command(app, "import", "Read a frequency response or a log that another program wrote");
+  command->add_option(
+      "file", input_,
+      "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone); of a log "
+      "also a pattern such as 'run_{realization}_{experiment}.mat'");
+  command->add_option("-o,--output", output_,
+                      "frf.h5, or of a log run.slog or run.h5, or of the modes of a universal file "
+                      "modes.json for 'fit --modes'; without it the file's arrays are listed, "
+                      "which is what a map is written from");
+  command->add_option("--map", map_,
+                      "YAML file that tells which arrays are what; needed where the file does not");
+  command->final_callback([this] { run(); });
+}
+
+void ImportCommand::list() const {
+  if (!map_.empty())
+    throw std::invalid_argument("--map: the file to write is missing; give it with -o");
+  std::vector<std::vector<std::string>> rows = {{"array", "size", "holds"}};
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  const ArrayList arrays = read_foreign_arrays(input_);
+  for (const NamedArray& array : arrays.arrays) {
+    const char* holds = array.is_text() ? "text" : array.is_complex() ? "complex" : "real";
+    rows.push_back({array.name, fmt::format("{}", fmt::join(array.shape, " x ")), holds});
+    json.push_back({{"name", array.name}, {"size", array.shape}, {"holds", holds}});
+  }
+  for (const UnreadVariable& variable : arrays.unread) {
+    rows.push_back({variable.name, "", variable.what});
+    json.push_back({{"name", variable.name},
+                    {"size", nlohmann::ordered_json::array()},
+                    {"holds", variable.what},
+                    {"remedy", variable.remedy}});
+  }
+  for (const std::string& line : table_lines(rows)) console_.result(line);
+  for (const UnreadVariable& variable : arrays.unread)
+    console_.result(
+        fmt::format("{}: {} cannot be read. {}", variable.name, variable.what, variable.remedy));
+  console_.result({{"arrays", json}});
+}
+
+ImportSummary ImportCommand::import_with_map() const {
+  const ImportMap map = read_import_map(map_);
+  if (map.kind == ImportMap::Kind::log) {
+    const std::vector<ForeignFile> files = foreign_files(input_, map);
+    for (const ForeignFile& file : files) require_no_input(output_, {file.path, map_});
+    return import_log(files, map, output_);
+  }
+  if (!map.files.empty())
+    throw FormatError(map_, "", "key files belongs to kind: log; name the file in the command");
+  require_input();
+  require_frf_output(output_);
+  return write_imported(output_, import_frf(read_foreign_arrays(input_), map), input_, {});
+}
+
+void ImportCommand::require_input() const {
+  if (input_.empty()) throw std::invalid_argument("FILE is missing; name the file to import");
+}
+
+void ImportCommand::run() const {
+  if (output_.empty()) {
+    require_input();
+    return list();
+  }
+  ImportSummary summary;
+  if (!map_.empty()) {
+    summary = import_with_map();
+  } else if (require_input(); is_uff_name(input_) && output_.extension() == ".json") {
+    require_no_input(output_, {input_});
+    write_modes(output_, candidates_of(input_, read_uff(input_)));
+  } else {
+    require_no_input(output_, {input_});
+    require_frf_output(output_);
+    std::vector<std::string> notes;
+    FrfEstimate frf = read_foreign_frf(input_, output_, notes);
+    summary = write_imported(output_, std::move(frf), input_, std::move(notes));
+  }
+  const auto bytes = std::filesystem::file_size(output_);
+  for (const std::string& line : summary.lines) console_.result(line);
+  console_.result(fmt::format("wrote {}, {} bytes", output_.string(), bytes));
+  nlohmann::ordered_json json = {{"output", output_.string()}, {"bytes", bytes}};
+  json.update(summary.json);
+  console_.result(json);
+}
+
+}  // namespace stageid

@@ -1,0 +1,231 @@
+#include "tools/commands/log_command.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/formats/convert_log.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "acquisition/slog/slog_recover.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/exchange/matlab/mat_log.hpp"
+#include "tools/exchange/matlab/mat_option.hpp"
+#include "tools/experiment/run_metadata.hpp"
+#include "tools/report/timing_json.hpp"
+#include "tools/steps/health_step.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/interrupt.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json counts_json(const RunHealth& health) {
+  return {{"cycles", health.cycles},
+          {"late", health.late},
+          {"missing", health.missing},
+          {"marked", health.marked},
+          {"largest_lateness_ns", health.largest_lateness_ns},
+          {"seconds", health.seconds}};
+}
+
+/// How the loop kept time over all runs; nothing in virtual time.
+std::vector<std::string> timing_lines(const LogReader& log) {
+  RunTiming timing;
+  for (const LogRun& run : log.runs()) timing += run.timing;
+  if (timing.empty()) return {};
+  const double period_s = wall_period_s(log.info());
+  const auto line = [&](const char* what, const TimingHistogram& histogram) {
+    const auto of = [&](double share) {
+      const double seconds = histogram.quantile_s(share);
+      const std::string part =
+          period_s > 0.0 ? fmt::format(" ({:.2g} %)", 100.0 * seconds / period_s) : "";
+      return fmt::format("{:.3g} us{}", 1e6 * seconds, part);
+    };
+    return fmt::format("{} median < {}, 99 % < {}, 99.9 % < {}, all < {}", what, of(0.5), of(0.99),
+                       of(0.999), of(1.0));
+  };
+  return {
+      line("execution ", timing.execution), line("lateness  ", timing.lateness),
+      fmt::format("skipped    {} of {:.4g} us", counted(timing.skipped, "period"), 1e6 * period_s)};
+}
+
+Json damage_json(const std::vector<LogDamage>& damage) {
+  Json list = Json::array();
+  for (const LogDamage& d : damage)
+    list.push_back({{"offset", d.offset}, {"bytes", d.bytes}, {"what", d.what}});
+  return list;
+}
+
+std::string damage_line(const LogDamage& damage) {
+  return fmt::format("damaged at byte {}, {}: {}", damage.offset, counted(damage.bytes, "byte"),
+                     damage.what);
+}
+
+Json info_json(const LogReader& log) {
+  const LogInfo& info = log.info();
+  Json json = {
+      {"file", log.path().string()},           {"sample_rate_hz", info.sample_rate_hz},
+      {"period_samples", info.period_samples}, {"transient_periods", info.transient_periods},
+      {"excitation", info.excitation.names},   {"actuators", info.actuators.names},
+      {"sensors", info.sensors.names},         {"runs", Json::array()}};
+  for (const LogRun& run : log.runs())
+    json["runs"].push_back({{"name", run.name},
+                            {"realization", run.realization},
+                            {"experiment", run.experiment},
+                            {"samples", run.samples},
+                            {"complete", run.complete},
+                            {"started_utc", run.started_utc},
+                            {"health", counts_json(run.health)},
+                            {"timing", timing_json(run.timing)}});
+  json["metadata"] = Json::parse(info.metadata_json, nullptr, false);
+  return json;
+}
+
+}  // namespace
+
+LogCommand::LogCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* log = add_command(app, "log", "Look at, check, repair or convert a log");
+  log->require_subcommand(1);
+  CLI::App* info_command = add_command(*log, "info", "What a log holds, run by run");
+  info_command->add_option("file", file_, "log (.slog or .h5)")->required();
+  info_command->add_flag("--health", health_, "read all samples and say what is wrong with them");
+  info_command->add_option(
+      "--stage", stage_, "with --health: the stage file to hold them against; default: the log's");
+  info_command->final_callback([this] { info(); });
+
+  CLI::App* verify_command = add_command(*log, "verify", "Read every byte and check it");
+  verify_command->add_option("file", file_, "log (.slog or .h5)")->required();
+  verify_command->final_callback([this] { verify(); });
+
+  CLI::App* recover_command = add_command(*log, "recover", "Save what is intact of a damaged log");
+  recover_command->add_option("file", file_, "damaged log (.slog)")->required();
+  recover_command->add_option("-o,--output", output_, "new log to write (.slog)")->required();
+  recover_command->final_callback([this] { recover(); });
+
+  CLI::App* convert_command =
+      add_command(*log, "convert", "Log to HDF5, CSV or MATLAB, HDF5 to native");
+  convert_command->add_option("file", file_, "log (.slog or .h5)")->required();
+  convert_command
+      ->add_option("-o,--output", output_, "file to write (.h5, .csv, .mat; of an HDF5 log .slog)")
+      ->required();
+  convert_command->add_flag("--complete-only", complete_only_,
+                            "leave out runs that were broken off");
+  add_mat_version(*convert_command, mat_version_);
+  convert_command->final_callback([this] { convert(); });
+}
+
+void LogCommand::info() const {
+  const std::unique_ptr<LogReader> log = open_log(file_);
+  const LogInfo& info = log->info();
+  console_.result(fmt::format("{}: {} Hz, period {} ({} s), {}", file_.string(),
+                              info.sample_rate_hz, counted(info.period_samples, "sample"),
+                              info.period_samples / info.sample_rate_hz,
+                              counted(info.transient_periods, "transient period")));
+  console_.result(fmt::format("excitation {}", fmt::join(info.excitation.names, " ")));
+  console_.result(fmt::format("actuators  {}", fmt::join(info.actuators.names, " ")));
+  console_.result(fmt::format("sensors    {}", fmt::join(info.sensors.names, " ")));
+  std::vector<std::vector<std::string>> rows = {
+      {"run", "realization", "experiment", "samples", "late", "missing", "marked", "", "started"}};
+  for (const LogRun& run : log->runs())
+    rows.push_back({run.name, fmt::format("{}", run.realization + 1),
+                    fmt::format("{}", run.experiment + 1), fmt::format("{}", run.samples),
+                    fmt::format("{}", run.health.late), fmt::format("{}", run.health.missing),
+                    fmt::format("{}", run.health.marked), run.complete ? "complete" : "INCOMPLETE",
+                    run.started_utc});
+  for (const std::string& line : table_lines(rows)) console_.result(line);
+  for (const std::string& line : timing_lines(*log)) console_.result(line);
+  Json json = info_json(*log);
+  if (health_) {
+    const std::vector<Finding> findings = examine_logs({file_}, {}, stage_, console_);
+    for (const std::string& line : health_lines(findings)) console_.result(line);
+    json["health"] = health_json(findings);
+    if (any_fault(findings)) console_.exit_code = kNotTrustworthy;
+  }
+  console_.result(json);
+}
+
+void LogCommand::verify() const {
+  const VerifyReport report = verify_log(file_);
+  throw_if_interrupted();
+  console_.result(fmt::format("{}: {:.1f} MB, {}, {} ({} marked), {} of {} complete",
+                              file_.string(), static_cast<double>(report.bytes) / 1e6,
+                              counted(report.blocks, "block"), counted(report.rows, "row"),
+                              report.marked_rows, report.complete_runs,
+                              counted(report.runs, "run")));
+  for (const LogDamage& damage : report.damage) console_.result(damage_line(damage));
+  if (report.closed && !report.exit_message.empty())
+    console_.result(fmt::format("ended with {}: {}", report.exit_code, report.exit_message));
+  console_.result({{"file", file_.string()},
+                   {"intact", report.intact()},
+                   {"closed", report.closed},
+                   {"bytes", report.bytes},
+                   {"blocks", report.blocks},
+                   {"rows", report.rows},
+                   {"marked_rows", report.marked_rows},
+                   {"runs", report.runs},
+                   {"complete_runs", report.complete_runs},
+                   {"damage", damage_json(report.damage)}});
+  if (report.intact()) {
+    console_.result("intact");
+    return;
+  }
+  const std::string what = !report.damage.empty()
+                               ? "damaged at " + counted(report.damage.size(), "place")
+                               : "was not closed: the experiment was cut off";
+  throw FormatError(file_, "",
+                    fmt::format("{}; save the rest with 'stageid log recover {} -o NEW.slog', "
+                                "or continue the experiment with --resume",
+                                what, file_.string()));
+}
+
+void LogCommand::recover() const {
+  if (std::filesystem::exists(output_))
+    throw std::invalid_argument(
+        fmt::format("{}: exists already; give the name of a new log", output_.string()));
+  const RecoverReport report = recover_log(file_, output_);
+  for (const LogDamage& damage : report.damage) console_.result(damage_line(damage));
+  console_.result(fmt::format(
+      "{}: {}, {}, {} of {} complete; lost: {}, {}, {}", output_.string(),
+      counted(report.blocks_kept, "block"), counted(report.rows_kept, "row"), report.complete_runs,
+      counted(report.runs, "run"), counted(report.blocks_lost, "block"),
+      counted(report.rows_lost, "row"), counted(report.bytes_lost, "byte")));
+  console_.result({{"output", output_.string()},
+                   {"blocks_kept", report.blocks_kept},
+                   {"blocks_lost", report.blocks_lost},
+                   {"rows_kept", report.rows_kept},
+                   {"rows_lost", report.rows_lost},
+                   {"bytes_lost", report.bytes_lost},
+                   {"runs", report.runs},
+                   {"complete_runs", report.complete_runs},
+                   {"damage", damage_json(report.damage)}});
+}
+
+void LogCommand::convert() const {
+  require_no_input(output_, {file_});
+  const std::unique_ptr<LogReader> log = open_log(file_);
+  Progress progress(console_, "convert", "rows");
+  ConvertOptions options;
+  options.incomplete_runs = !complete_only_;
+  options.progress = [&](std::uint64_t done, std::uint64_t total) {
+    throw_if_interrupted();
+    progress.update(static_cast<double>(done), static_cast<double>(total));
+  };
+  if (output_.extension() == ".mat")
+    write_mat_log(*log, output_, mat_version_, options);
+  else
+    convert_log(*log, output_, options);
+  console_.result(fmt::format("wrote {}, {:.1f} MB", output_.string(),
+                              static_cast<double>(std::filesystem::file_size(output_)) / 1e6));
+  console_.result({{"output", output_.string()}, {"bytes", std::filesystem::file_size(output_)}});
+}
+
+}  // namespace stageid

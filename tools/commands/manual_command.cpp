@@ -1,0 +1,50 @@
+#include "tools/commands/manual_command.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "acquisition/files/output_file.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/manual/bash_completion.hpp"
+#include "tools/manual/command_tree.hpp"
+#include "tools/manual/manual_pages.hpp"
+#include "tools/manual/zsh_completion.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+
+ManualCommand::ManualCommand(CLI::App& app, Console& console) : app_(app), console_(console) {
+  CLI::App* command = add_command(app, "manual", "Write man pages and completion for bash and zsh");
+  command
+      ->add_option(
+          "-o,--output", output_,
+          "directory as /usr/share or ~/.local/share: man/man1, bash-completion/completions and "
+          "zsh/vendor-completions are made in it")
+      ->required();
+  command->final_callback([this] { run(); });
+}
+
+void ManualCommand::run() const {
+  const CommandTree program = command_tree(app_);
+  const std::filesystem::path pages = output_ / "man" / "man1";
+  const std::filesystem::path completions = output_ / "bash-completion" / "completions";
+  require_directory(pages);
+  const std::filesystem::path functions = output_ / "zsh" / "vendor-completions";
+  require_directory(completions);
+  require_directory(functions);
+  nlohmann::ordered_json written = nlohmann::ordered_json::array();
+  const auto write = [&](const std::filesystem::path& file, const std::string& text) {
+    write_text_file(file, text);
+    written.push_back(file.string());
+  };
+  for (const ManualPage& page : manual_pages(program, STAGEID_VERSION))
+    write(pages / page.file, page.text);
+  write(completions / program.name, bash_completion(program));
+  write(functions / ("_" + program.name), zsh_completion(program));
+  console_.result(fmt::format("wrote {} files below {}", written.size(), output_.string()));
+  console_.result(nlohmann::ordered_json{{"written", written}});
+}
+
+}  // namespace stageid

@@ -1,0 +1,116 @@
+#include "tools/commands/plot_command.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+
+#include "estimation/model/cmif.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/fit/flag_values.hpp"
+#include "tools/plot/gnuplot.hpp"
+#include "tools/plot/response_pictures.hpp"
+#include "tools/report/report_input.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+const std::vector<std::string> kFigures = {"cmif", "bode", "entry"};
+
+/// Places of the named channels, in the order asked; of all if none is named.
+std::vector<Eigen::Index> places(const char* flag, const std::vector<std::string>& names,
+                                 const ChannelList& channels) {
+  std::vector<Eigen::Index> out(names.empty() ? channels.size() : names.size());
+  if (names.empty()) std::iota(out.begin(), out.end(), 0);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto found = std::ranges::find(channels.names, names[i]);
+    if (found == channels.names.end()) refuse_word(flag, names[i], channels.names);
+    out[i] = found - channels.names.begin();
+  }
+  return out;
+}
+
+/// The only channel that is asked for or that there is.
+Eigen::Index one_place(const char* flag, const std::vector<std::string>& names,
+                       const ChannelList& channels) {
+  const std::vector<Eigen::Index> all = places(flag, names, channels);
+  if (all.size() != 1)
+    throw std::invalid_argument(
+        fmt::format("{}: an entry has one; choose of {}", flag, fmt::join(channels.names, ", ")));
+  return all[0];
+}
+
+}  // namespace
+
+PlotCommand::PlotCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command =
+      add_command(app, "plot", "One figure of a response, for print (needs gnuplot)");
+  command
+      ->add_option(
+          "figure", figure_,
+          "cmif: mode indicator with the modes; bode: the matrix of magnitudes; entry: one "
+          "element with residual and standard deviation")
+      ->required();
+  command
+      ->add_option("inputs", inputs_,
+                   "directory of identify, or files: FRF, model, modes (for the rings of cmif)")
+      ->required();
+  command
+      ->add_option("--output-channel", output_channels_,
+                   "of entry: the output; of bode: outputs A,B,... (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command
+      ->add_option("--input-channel", input_channels_,
+                   "of entry: the input; of bode: inputs A,B,... (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", output_, "picture to write: .pdf, .svg or .png")->required();
+  command->final_callback([this] { run(); });
+}
+
+Picture PlotCommand::cmif(const ReportData& data) const {
+  if (!output_channels_.empty() || !input_channels_.empty())
+    throw std::invalid_argument(
+        "cmif: is of all channels; --output-channel and --input-channel go with bode and entry");
+  // What a fit would start with, where neither modes.json nor a model says more.
+  if (!data.chosen_modes.empty() || data.model) return cmif_picture(data);
+  ReportData with_modes = data;
+  with_modes.chosen_modes = pick_modes(*data.frf);
+  return cmif_picture(with_modes);
+}
+
+Picture PlotCommand::entry(const ReportData& data) const {
+  const Eigen::Index output = one_place("--output-channel", output_channels_, data.frf->outputs);
+  return entry_picture(data, output,
+                       one_place("--input-channel", input_channels_, data.frf->inputs));
+}
+
+Picture PlotCommand::picture(const ReportData& data) const {
+  if (figure_ == "cmif") return cmif(data);
+  if (figure_ == "entry") return entry(data);
+  return bode_picture(data, places("--output-channel", output_channels_, data.frf->outputs),
+                      places("--input-channel", input_channels_, data.frf->inputs));
+}
+
+void PlotCommand::run() const {
+  if (std::ranges::find(kFigures, figure_) == kFigures.end())
+    refuse_word("figure", figure_, kFigures);
+  static_cast<void>(picture_format(output_));
+  require_writable(output_, inputs_);
+  const ReportInput input = report_input(inputs_);
+  if (input.frf.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: holds no frequency response; add an FRF", inputs_.front().string()));
+  draw(picture(read_response_data(input)), output_);
+  console_.result(
+      fmt::format("wrote {}, {} bytes", output_.string(), std::filesystem::file_size(output_)));
+  console_.result({{"output", output_.string()},
+                   {"figure", figure_},
+                   {"bytes", std::filesystem::file_size(output_)}});
+}
+
+}  // namespace stageid

@@ -1,0 +1,208 @@
+#include "tools/commands/program.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/key_suggestion.hpp"
+#include "tools/commands/config_command.hpp"
+#include "tools/commands/design_command.hpp"
+#include "tools/commands/export_command.hpp"
+#include "tools/commands/fit_command.hpp"
+#include "tools/commands/frf_command.hpp"
+#include "tools/commands/help_command.hpp"
+#include "tools/commands/identify_command.hpp"
+#include "tools/commands/import_command.hpp"
+#include "tools/commands/log_command.hpp"
+#include "tools/commands/manual_command.hpp"
+#include "tools/commands/modes_command.hpp"
+#include "tools/commands/node_command.hpp"
+#include "tools/commands/plot_command.hpp"
+#include "tools/commands/report_command.hpp"
+#include "tools/commands/run_command.hpp"
+#include "tools/commands/validate_command.hpp"
+#include "tools/manual/command_tree.hpp"
+#include "tools/terminal/console.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/interrupt.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr const char* kWelcome =
+    R"(stageid measures and identifies multivariable motion stages in closed loop. Three things to try:
+
+  stageid identify configs/experiment/wafer_stage_quick.yaml -o first
+      the whole job on a simulated wafer stage, up to a model and first/report.html
+  stageid import YOUR_LOG.csv
+      what a log of another program holds (.mat, .h5, .npz too); docs/guide.md leads from there to a report
+  stageid config schema
+      everything that may stand in a configuration
+
+stageid help lists the commands, stageid help COMMAND their options.)";
+
+constexpr const char* kFooter =
+    R"(Exit codes: 0 done; 1 the world failed (file, link, interlock); 2 the request is wrong; 3 done but
+not to be trusted, the result says why; 4 stopped for safety; 130 interrupted, what was recorded is kept.)";
+
+/// Everything that CLI11 needs to know, and what the commands keep.
+class Program {
+ public:
+  Program()
+      : identify_(app_, console_),
+        design_(app_, console_),
+        run_(app_, console_),
+        log_(app_, console_),
+        frf_(app_, console_),
+        modes_(app_, console_),
+        fit_(app_, console_),
+        validate_(app_, console_),
+        export_(app_, console_),
+        import_(app_, console_),
+        report_(app_, console_),
+        plot_(app_, console_),
+        config_(app_, console_),
+        node_(app_, console_),
+        manual_(app_, console_),
+        help_(app_) {
+    app_.name("stageid");
+    app_.set_version_flag("--version", "stageid " STAGEID_VERSION);
+    app_.add_flag("--json", console_.json, "the result as one JSON object on stdout");
+    const std::vector<std::pair<std::string, Verbosity>> levels = {
+        {"quiet", Verbosity::quiet}, {"normal", Verbosity::normal}, {"debug", Verbosity::debug}};
+    app_.add_option("--verbosity", console_.verbosity, "quiet | normal | debug")
+        ->transform(CLI::CheckedTransformer(levels).description("{quiet,normal,debug}"));
+    app_.require_subcommand(0, 1);
+    app_.footer(kFooter);
+  }
+
+  int run(int argc, const char* const* argv) {
+    if (argc <= 1) {
+      fmt::print("{}\n", kWelcome);
+      return kDone;
+    }
+    refuse_unknown_command(argc, argv);
+    if (!parse(argc, argv)) return kDone;
+    if (app_.get_subcommands().empty())
+      throw std::invalid_argument("no command; 'stageid --help' lists them");
+    return console_.exit_code;
+  }
+
+ private:
+  void refuse_unknown_command(int argc, const char* const* argv) const {
+    const std::vector<std::string> names = names_of(command_tree(app_).commands);
+    int first = 1;
+    while (first < argc && argv[first][0] == '-')
+      first += std::string_view(argv[first]) == "--verbosity" ? 2 : 1;
+    if (first >= argc || std::find(names.begin(), names.end(), argv[first]) != names.end()) return;
+    const std::string nearest = nearest_word(argv[first], names);
+    throw std::invalid_argument(fmt::format("unknown command '{}'; {}", argv[first],
+                                            nearest.empty()
+                                                ? "'stageid --help' lists them"
+                                                : fmt::format("did you mean '{}'?", nearest)));
+  }
+
+  /// Behind CLI11's "FLAG: WORD not in {A,B}": which of them is near.
+  static std::string nearest_choice(const std::string& what) {
+    constexpr std::string_view kMiddle = " not in {";
+    const std::size_t middle = what.find(kMiddle);
+    const std::size_t word = what.find(": ");
+    if (middle == std::string::npos || word >= middle) return "";
+    std::istringstream list(what.substr(middle + kMiddle.size()));
+    std::vector<std::string> names;
+    for (std::string name; std::getline(list, name, ',');)
+      names.push_back(name.substr(0, name.find('}')));
+    const std::string nearest = nearest_word(what.substr(word + 2, middle - word - 2), names);
+    return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
+  }
+
+  /// CLI11 speaks its own exceptions, for help too; translated here, at its border.
+  /// @returns false if only help or the version was asked for.
+  bool parse(int argc, const char* const* argv) {
+    try {
+      app_.parse(argc, argv);
+    } catch (const CLI::Success& success) {
+      app_.exit(success);
+      return false;
+    } catch (const CLI::ParseError& error) {
+      throw std::invalid_argument(explained(error));
+    }
+    return true;
+  }
+
+  /// What CLI11 says, or the nearest word to one that it does not know; and where help is.
+  std::string explained(const CLI::ParseError& error) {
+    std::string path;
+    const CLI::App* innermost = &app_;
+    while (!innermost->get_subcommands().empty()) {
+      innermost = innermost->get_subcommands().front();
+      path += " " + innermost->get_name();
+    }
+    const CommandTree command = command_tree(*innermost);
+    std::vector<std::string> known = names_of(command.commands);
+    for (const CommandTree& tree : {command, command_tree(app_)})
+      for (const std::string& flag : flags_of(tree)) known.push_back(flag);
+    const std::vector<std::string> left_over = app_.remaining(true);
+    for (const std::string& unknown : left_over) {
+      const std::string nearest = nearest_word(unknown.substr(0, unknown.find('=')), known);
+      if (!nearest.empty())
+        return fmt::format("'{}' is unknown; did you mean '{}'? See 'stageid{} --help'", unknown,
+                           nearest, path);
+    }
+    if (innermost != &app_ && !command.commands.empty())
+      return fmt::format("{}: one of {}; see 'stageid{} --help'",
+                         left_over.empty()
+                             ? "a subcommand is missing"
+                             : fmt::format("'{}' is no subcommand", left_over.front()),
+                         fmt::join(names_of(command.commands), ", "), path);
+    std::string what = error.what();
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    what += nearest_choice(what);
+    if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) what += "; write a number";
+    return fmt::format("{}; see 'stageid{} --help'", what, path);
+  }
+
+  Console console_;
+  CLI::App app_{"Measures and identifies multivariable motion stages in closed loop"};
+  IdentifyCommand identify_;
+  DesignCommand design_;
+  RunCommand run_;
+  LogCommand log_;
+  FrfCommand frf_;
+  ModesCommand modes_;
+  FitCommand fit_;
+  ValidateCommand validate_;
+  ExportCommand export_;
+  ImportCommand import_;
+  ReportCommand report_;
+  PlotCommand plot_;
+  ConfigCommand config_;
+  NodeCommand node_;
+  ManualCommand manual_;
+  HelpCommand help_;
+};
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv) {
+  Program program;
+  const int exit_code = program.run(argc, argv);
+  // A full disk or a closed pipe behind stdout must not end in silence.
+  // A terminal that has closed is an interrupt, whose exit code stands.
+  const bool lost = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
+  if (lost && !interrupt_flag())
+    throw FileError(fmt::format("stdout: cannot be written: {}", std::strerror(errno)));
+  return exit_code;
+}
+
+}  // namespace stageid

@@ -1,0 +1,44 @@
+#include "tools/commands/report_command.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "tools/commands/command_line.hpp"
+#include "tools/report/report_input.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+
+ReportCommand::ReportCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "report", "One self-contained interactive page");
+  command
+      ->add_option("inputs", inputs_,
+                   "directory of identify, or files: FRF, held-back FRF, model, modes, log, "
+                   "stage file (for the positions)")
+      ->required();
+  command->add_option("--compare", compare_,
+                      "another day or model: directory of identify, or its FRF and model");
+  command->add_option("-o,--output", output_, "page to write (.html)")->required();
+  command->final_callback([this] { run(); });
+}
+
+void ReportCommand::run() const {
+  std::vector<std::filesystem::path> read = inputs_;
+  read.insert(read.end(), compare_.begin(), compare_.end());
+  require_writable(output_, read);
+  const std::string ending = output_.extension().string();
+  if (ending != ".html" && ending != ".htm")
+    throw std::invalid_argument(fmt::format(
+        "{}: the report is a page; write a name that ends in .html, and print it from a browser "
+        "for paper",
+        output_.string()));
+  ReportData data = read_report_data(report_input(inputs_));
+  if (!compare_.empty()) add_comparison(data, compare_);
+  write_report(output_, data);
+  console_.result(fmt::format("wrote {}", output_.string()));
+  console_.result({{"output", output_.string()}});
+}
+
+}  // namespace stageid

@@ -1,0 +1,173 @@
+#include "tools/commands/validate_command.hpp"
+#include "tools/steps/fit_step.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <memory>
+#include <utility>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "frf/file/frf_file.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/exchange/model/mode_correlation.hpp"
+#include "tools/steps/frf_step.hpp"
+#include "tools/steps/health_step.hpp"
+#include "tools/steps/model_verdict.hpp"
+#include "tools/steps/prediction_error.hpp"
+#include "tools/terminal/exit_code.hpp"
+
+namespace stageid {
+namespace {
+
+/// An FRF is HDF5 that says so; everything else is taken for a log.
+bool is_frf(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  char head[8] = {};
+  stream.read(head, sizeof head);
+  constexpr char kHdf5[8] = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
+  if (!std::equal(std::begin(head), std::end(head), std::begin(kHdf5))) return false;
+  const Hdf5File hdf5 = Hdf5File::open(file);
+  if (hdf5.has_attribute("/", "format"))
+    return hdf5.read_text_attribute("/", "format") == "stageid-frf";
+  return hdf5.exists("/response");
+}
+
+nlohmann::ordered_json prediction_json(const PredictionError& error) {
+  return {{"sensors", error.sensors},
+          {"error_rms", std::vector<double>(error.error_rms.begin(), error.error_rms.end())},
+          {"signal_rms", std::vector<double>(error.signal_rms.begin(), error.signal_rms.end())},
+          {"normalized", error.normalized()},
+          {"runs", error.runs},
+          {"band_hz", {error.band_hz[0], error.band_hz[1]}}};
+}
+
+std::vector<std::string> prediction_lines(const PredictionError& error) {
+  std::vector<std::vector<std::string>> rows = {{"sensor", "error rms", "signal rms", "ratio"}};
+  for (std::size_t i = 0; i < error.sensors.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    rows.push_back({error.sensors[i], fmt::format("{:.4g}", error.error_rms[k]),
+                    fmt::format("{:.4g}", error.signal_rms[k]),
+                    fmt::format("{:.3e}", error.error_rms[k] / error.signal_rms[k])});
+  }
+  std::vector<std::string> lines = {
+      fmt::format("prediction of the samples from the actuators, {}, {} "
+                  "... {} Hz:",
+                  counted(error.runs, "run"), error.band_hz[0], error.band_hz[1])};
+  for (std::string& line : table_lines(rows)) lines.push_back(std::move(line));
+  return lines;
+}
+
+}  // namespace
+
+std::vector<std::string> validation_lines(const Validation& v) {
+  std::vector<std::string> lines = {"no channel is above its noise: there is no relative error"};
+  if (std::isfinite(v.relative_rms_error))
+    lines[0] = fmt::format(
+        "relative error {:.4e} (over the channels that respond), {:.4e} (of the whole response)",
+        v.relative_rms_error, v.normalized_error);
+  if (v.chi_square_per_dof > 0.0) {
+    const std::string expected = v.expected_chi_square > 0.0
+                                     ? fmt::format("{:.3f}", v.expected_chi_square)
+                                     : "without a mean for variances this uncertain";
+    lines.push_back(fmt::format(
+        "chi-square per degree of freedom {:.3f}; of {} alone: {}", v.chi_square_per_dof,
+        v.variance == ResidualVariance::noise ? "noise" : "noise and distortion", expected));
+    lines.push_back(
+        fmt::format("residuals above their 95 % point: {:.1f} %; autocorrelation {:.4f}, 99 % "
+                    "limit {:.4f}",
+                    100.0 * v.whitened_above_95, v.whiteness, v.whiteness_limit));
+  } else {
+    lines.push_back("the data have no variances: nothing says whether the error is noise");
+  }
+  return lines;
+}
+
+nlohmann::ordered_json validation_json(const Validation& v) {
+  return {{"relative_rms_error", v.relative_rms_error},
+          {"normalized_error", v.normalized_error},
+          {"chi_square_per_dof", v.chi_square_per_dof},
+          {"expected_chi_square", v.expected_chi_square},
+          {"variance", to_string(v.variance)},
+          {"explained", v.explained},
+          {"reason", v.reason},
+          {"whitened_above_95", v.whitened_above_95},
+          {"whiteness", v.whiteness},
+          {"whiteness_limit", v.whiteness_limit},
+          {"channel_error", std::vector<double>(v.channel_error.begin(), v.channel_error.end())}};
+}
+
+ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(console) {
+  CLI::App* command = add_command(app, "validate", "Try a model on data that it was not fitted to");
+  command->add_option("model", model_, "model.json")->required();
+  command
+      ->add_option(
+          "data", data_,
+          "frf.h5, or a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
+      ->required();
+  command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: the band of the fit")
+      ->expected(2);
+  command->add_option("--stage", stage_,
+                      "stage file that the health of a log is held against; default: its own");
+  command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
+      ->check(kNotNegative)
+      ->capture_default_str();
+  command->final_callback([this] { run(); });
+}
+
+void ValidateCommand::run() const {
+  const AdditiveModel model = read_model(model_);
+  if (is_uff_name(data_)) {
+    const ModeCorrelation correlation = correlate_modes(model, data_, read_uff(data_));
+    for (const std::string& line : correlation_lines(correlation)) console_.result(line);
+    console_.result({{"model", model_.string()},
+                     {"data", data_.string()},
+                     {"modes", correlation_json(correlation)}});
+    return;
+  }
+  const bool from_frf = is_frf(data_);
+  FrfOptions options;
+  options.inputs = model.inputs.names;
+  options.outputs = model.outputs.names;
+  options.threads = threads_;
+  FrfStep step;
+  if (from_frf)
+    step.frf = read_frf(data_);
+  else
+    step = estimate_frf({data_}, options, {true, stage_}, console_);
+  const std::vector<Finding> health = health_of(step.frf.provenance_json);
+  FrfEstimate frf = select_channels(step.frf, model.inputs.names, model.outputs.names);
+  const bool fitted_band = model.fit.band_hz[1] > 0.0;
+  const double low_hz = !band_hz_.empty() ? band_hz_[0]
+                        : fitted_band     ? model.fit.band_hz[0]
+                                          : frf.frequency_hz[0];
+  const double high_hz = !band_hz_.empty() ? band_hz_[1]
+                         : fitted_band     ? model.fit.band_hz[1]
+                                           : frf.frequency_hz[frf.lines() - 1];
+  const Validation validation =
+      validate(model, select_band(std::move(frf), low_hz, high_hz), distortion_of(model));
+  for (const std::string& line : validation_lines(validation)) console_.result(line);
+  nlohmann::ordered_json json = {{"model", model_.string()},
+                                 {"data", data_.string()},
+                                 {"band_hz", {low_hz, high_hz}},
+                                 {"frequency_domain", validation_json(validation)}};
+  if (!from_frf) {
+    for (const std::string& line : health_lines(health)) console_.result(line);
+    json["health"] = health_json(health);
+    const PredictionError error = prediction_error(model, *open_log(data_), low_hz, high_hz);
+    for (const std::string& line : prediction_lines(error)) console_.result(line);
+    json["time_domain"] = prediction_json(error);
+  }
+  const ModelVerdict verdict = judge_model(model, health, validation);
+  console_.result(verdict_line(verdict));
+  json.update(verdict_json(verdict));
+  if (!verdict.trustworthy) console_.exit_code = kNotTrustworthy;
+  console_.result(json);
+}
+
+}  // namespace stageid

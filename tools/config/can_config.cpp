@@ -1,0 +1,107 @@
+#include "tools/config/can_config.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+namespace stageid {
+namespace {
+
+constexpr auto kRequired = Presence::required;
+constexpr auto kOptional = Presence::optional;
+constexpr double kRangePerLimit = 1.25;
+constexpr double kWatchdogSamples = 3.0;
+constexpr double kLeastWatchdog_s = 20e-3;
+
+void describe_bus(ConfigVisitor& v, std::vector<CanFile::Bus>& list) {
+  CanFile::Bus bus;
+  v.text("interface", bus.spec.interface, kRequired, "of the host and of the node, e.g. can0");
+  v.number("nominal_bit_rate_hz", bus.spec.nominal_bit_rate_hz, positive("bit/s"), kOptional,
+           "of the arbitration phase; for the load only, 'ip link' sets it");
+  v.number("data_bit_rate_hz", bus.spec.data_bit_rate_hz, positive("bit/s"), kOptional,
+           "of the data phase; for the load only");
+  v.texts("actuators", bus.actuators, {}, kOptional, "names; left out on an only bus: all");
+  v.texts("sensors", bus.sensors, {}, kOptional, "names; left out on an only bus: all");
+  list.push_back(std::move(bus));
+}
+
+std::vector<int> channel_numbers(const std::vector<std::string>& names,
+                                 const std::vector<Channel>& channels, bool all,
+                                 const std::string& interface) {
+  std::vector<int> numbers;
+  if (names.empty() && all) {
+    numbers.resize(channels.size());
+    std::iota(numbers.begin(), numbers.end(), 0);
+  }
+  for (const std::string& name : names) {
+    const int index = channel_index(channels, name);
+    if (index < 0)
+      throw std::invalid_argument(
+          fmt::format("can: bus {}: there is no channel '{}' of that kind; give a name above",
+                      interface, name));
+    numbers.push_back(index);
+  }
+  return numbers;
+}
+
+std::vector<double> ranges(const std::vector<double>& given, const Eigen::VectorXd& limits,
+                           std::size_t channels, const char* key) {
+  if (given.size() == channels) return given;
+  if (given.size() == 1) return std::vector<double>(channels, given.front());
+  if (!given.empty())
+    throw std::invalid_argument(fmt::format("can: {}: {} entries for {} channels; give one or {}",
+                                            key, given.size(), channels, channels));
+  if (limits.size() != static_cast<Eigen::Index>(channels) || !limits.allFinite())
+    throw std::invalid_argument(
+        fmt::format("can: {}: there is no limit to take a range from; write it", key));
+  const Eigen::VectorXd scaled = kRangePerLimit * limits;
+  return {scaled.begin(), scaled.end()};
+}
+
+}  // namespace
+
+void describe_can(ConfigVisitor& v, CanFile& f) {
+  CanSpec& spec = f.config.spec;
+  f.config.present = true;
+  choose(v, "mode", f.config.mode, {"streaming", "resident"}, kOptional,
+         "sample by sample, or played by the node in its own loop");
+  v.items(
+      "buses", [&](ConfigVisitor& bus) { describe_bus(bus, f.buses); }, {1, 16}, kRequired,
+      "CAN FD buses; the first also carries commands and transfers");
+  v.numbers("actuator_range_n", f.actuator_range_n, positive("N"), {}, kOptional,
+            "2^23 counts; one for all or one each; left out: 1.25 times limit_n");
+  v.numbers("sensor_range_m", f.sensor_range_m, positive("m"), {}, kOptional,
+            "2^23 counts; one for all or one each; left out: 1.25 times window_m");
+  v.number("reply_timeout_s", spec.reply_timeout_s, positive("s"), kOptional,
+           "the host waits so long for an answer");
+  v.number("watchdog_s", f.watchdog_s, not_negative("s"), kOptional,
+           "the node stops after so long without a setpoint; 0: 3 periods, 20 ms at least");
+  v.number("largest_load", spec.largest_load, {"", 0.0, 1.0, true}, kOptional,
+           "of a bus; an experiment that needs more is refused");
+}
+
+CanConfig complete_can(const CanFile& file, const StageInfo& info, const StageLimits& limits) {
+  CanConfig config = file.config;
+  CanSpec& spec = config.spec;
+  spec.watchdog_s = file.watchdog_s > 0.0
+                        ? file.watchdog_s
+                        : std::max(kLeastWatchdog_s, kWatchdogSamples / info.sample_rate_hz);
+  const bool only = file.buses.size() == 1;
+  for (const CanFile::Bus& bus : file.buses) {
+    CanBusSpec complete = bus.spec;
+    complete.actuators = channel_numbers(bus.actuators, info.actuators, only, bus.spec.interface);
+    complete.sensors = channel_numbers(bus.sensors, info.sensors, only, bus.spec.interface);
+    spec.buses.push_back(std::move(complete));
+  }
+  spec.actuator_range_n =
+      ranges(file.actuator_range_n, limits.actuator_n, info.actuators.size(), "actuator_range_n");
+  spec.sensor_range_m =
+      ranges(file.sensor_range_m, limits.position_window_m, info.sensors.size(), "sensor_range_m");
+  static_cast<void>(can_layout(spec, info));
+  return config;
+}
+
+}  // namespace stageid

@@ -1,0 +1,343 @@
+#include "tools/config/config_reader.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "acquisition/files/key_suggestion.hpp"
+#include "tools/config/number_range.hpp"
+#include "tools/terminal/format_errors.hpp"
+
+namespace stageid {
+namespace {
+
+std::string quoted(const YamlNode& node) {
+  switch (node.kind) {
+    case YamlNode::Kind::null:
+      return "nothing";
+    case YamlNode::Kind::sequence:
+      return "a list";
+    case YamlNode::Kind::map:
+      return "a map";
+    case YamlNode::Kind::scalar:
+      break;
+  }
+  constexpr std::size_t kLongest = 40;
+  if (node.text.size() <= kLongest) return fmt::format("'{}'", node.text);
+  // Cut between characters, never inside one.
+  std::size_t end = kLongest;
+  while (end > 0 && (static_cast<unsigned char>(node.text[end]) & 0xC0U) == 0x80U) --end;
+  return fmt::format("'{}...'", node.text.substr(0, end));
+}
+
+/// Reads the keys of one map.
+class MapReader final : public ConfigVisitor {
+ public:
+  MapReader(const YamlDocument& document, const YamlNode& map, std::string place,
+            FormatErrorList& errors)
+      : document_(document),
+        map_(map),
+        place_(std::move(place)),
+        errors_(errors),
+        errors_before_(errors.size()) {
+    if (map.kind != YamlNode::Kind::map)
+      document.fail(map.mark, fmt::format("{} is {}; write a map, 'key: value' lines",
+                                          place_.empty() ? "the file" : place_, quoted(map)));
+  }
+
+  /// What describe() did not ask for is unknown; only without such a key is it worth saying what is missing, which
+  /// may just be misspelt. Rules between values are for values that are right.
+  void finish() const {
+    bool unknown = false;
+    for (const YamlNode::Entry& entry : map_.entries) {
+      if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
+      unknown = true;
+      errors_.attempt([&] {
+        document_.fail(entry.mark, fmt::format("unknown key '{}'; {}", entry.key,
+                                               suggest_key(entry.key, known_)));
+      });
+    }
+    for (const auto& [key, help] : missing_)
+      if (!unknown)
+        errors_.attempt([&] {
+          document_.fail(map_.mark, fmt::format("key '{}' is missing{}; add it ({})", key,
+                                                place_.empty() ? "" : " in " + place_, help));
+        });
+    if (errors_.size() > errors_before_) return;
+    for (const auto& [mark, message] : broken_)
+      errors_.attempt([&] { document_.fail(mark, message); });
+  }
+
+  void number(const char* key, double& value, const NumberRule& rule, Presence presence,
+              const char* help) override {
+    errors_.attempt([&] {
+      if (const YamlNode* node = find(key, presence, help)) value = parse_number(key, *node, rule);
+    });
+  }
+  void numbers(const char* key, std::vector<double>& values, const NumberRule& rule,
+               CountRule count, Presence presence, const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      values.clear();
+      for (const std::size_t item : list(key, *node, count))
+        errors_.attempt([&] { values.push_back(parse_number(key, document_.node(item), rule)); });
+    });
+  }
+  void integer(const char* key, std::int64_t& value, std::int64_t low, std::int64_t high,
+               Presence presence, const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      const char* end = node->text.data() + node->text.size();
+      std::int64_t parsed = 0;
+      const auto [stop, error] = std::from_chars(node->text.data(), end, parsed);
+      if (node->kind != YamlNode::Kind::scalar || !node->plain || stop != end ||
+          error != std::errc{})
+        wrong(key, *node, "a whole number");
+      if (parsed < low || parsed > high)
+        document_.fail(node->mark, fmt::format("{}: {} is out of range; allowed is {}", key, parsed,
+                                               describe_range(low, high)));
+      value = parsed;
+    });
+  }
+  void text(const char* key, std::string& value, Presence presence, const char* help) override {
+    errors_.attempt([&] {
+      if (const YamlNode* node = find(key, presence, help)) value = parse_text(key, *node);
+    });
+  }
+  void texts(const char* key, std::vector<std::string>& values, CountRule count, Presence presence,
+             const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      values.clear();
+      for (const std::size_t item : list(key, *node, count))
+        errors_.attempt([&] {
+          values.push_back(parse_text(key, document_.node(item)));
+          if (std::count(values.begin(), values.end(), values.back()) > 1)
+            document_.fail(document_.node(item).mark,
+                           fmt::format("{}: '{}' stands here twice; keep one", key, values.back()));
+        });
+    });
+  }
+  void choice(const char* key, std::size_t& index, const std::vector<std::string>& names,
+              Presence presence, const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      const auto found = std::find(names.begin(), names.end(), node->text);
+      if (node->kind != YamlNode::Kind::scalar || found == names.end())
+        wrong_word(key, *node, names);
+      index = static_cast<std::size_t>(found - names.begin());
+    });
+  }
+  void flexible(const char* key, FlexibleValue& value, const FlexibleRule& rule, Presence presence,
+                const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      FlexibleValue
+          given;  // what is wrong leaves the default: the checks that follow go on with it
+      const std::size_t errors = errors_.size();
+      if (node->kind == YamlNode::Kind::sequence && (rule.list || rule.pairs)) {
+        given.is_list = true;
+        for (const std::size_t item : list(key, *node, {1}))
+          errors_.attempt([&] { read_item(key, document_.node(item), rule, given); });
+      } else if (node->kind == YamlNode::Kind::scalar && is_word(*node, rule)) {
+        given.word = node->text;
+      } else if (node->kind == YamlNode::Kind::scalar && rule.number && looks_numeric(*node)) {
+        given.numbers = {parse_number(key, *node, rule.rule)};
+      } else if (node->kind == YamlNode::Kind::scalar && rule.any_text && !node->text.empty()) {
+        given.word = node->text;
+      } else {
+        wrong(key, *node, describe_forms(rule) + nearest_of(*node, rule.words));
+      }
+      if (errors_.size() == errors) value = std::move(given);
+    });
+  }
+  void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,
+                     const NumberRule& rule, Presence presence, const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      if (node->kind != YamlNode::Kind::map) wrong(key, *node, "a map {name: number, ...}");
+      values.clear();
+      for (const YamlNode::Entry& entry : node->entries)
+        errors_.attempt([&] {
+          values.emplace_back(entry.key,
+                              parse_number(entry.key.c_str(), document_.node(entry.value), rule));
+        });
+    });
+  }
+  void named_texts(const char* key, std::vector<std::pair<std::string, std::string>>& values,
+                   Presence presence, const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      if (node->kind != YamlNode::Kind::map) wrong(key, *node, "a map {name: text, ...}");
+      values.clear();
+      for (const YamlNode::Entry& entry : node->entries)
+        errors_.attempt([&] {
+          const YamlNode& value = document_.node(entry.value);
+          if (value.kind != YamlNode::Kind::scalar) wrong(entry.key.c_str(), value, "a text");
+          values.emplace_back(entry.key, value.text);
+        });
+    });
+  }
+  void group(const char* key, const Describe& describe, Presence presence,
+             const char* help) override {
+    errors_.attempt([&] {
+      if (const YamlNode* node = find(key, presence, help)) read_map(key, *node, describe);
+    });
+  }
+  void items(const char* key, const Describe& describe_item, CountRule count, Presence presence,
+             const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      std::size_t index = 0;
+      for (const std::size_t item : list(key, *node, count))
+        read_map(fmt::format("{} {}", key, ++index), document_.node(item), describe_item);
+    });
+  }
+  void require(bool holds, const char* key, const std::string& message) override {
+    if (holds) return;
+    const YamlNode::Entry* entry = entry_of(key);
+    broken_.emplace_back(entry == nullptr ? map_.mark : document_.node(entry->value).mark, message);
+  }
+
+ private:
+  const YamlNode::Entry* entry_of(std::string_view key) const {
+    const auto found = std::find_if(map_.entries.begin(), map_.entries.end(),
+                                    [&](const YamlNode::Entry& entry) { return entry.key == key; });
+    return found == map_.entries.end() ? nullptr : &*found;
+  }
+  const YamlNode* find(const char* key, Presence presence, const char* help) {
+    known_.emplace_back(key);
+    if (const YamlNode::Entry* entry = entry_of(key)) return &document_.node(entry->value);
+    if (presence == Presence::required) missing_.emplace_back(key, help);
+    return nullptr;
+  }
+  void read_map(const std::string& name, const YamlNode& node, const Describe& describe) {
+    errors_.attempt([&] {
+      MapReader reader(document_, node, name, errors_);
+      describe(reader);
+      reader.finish();
+    });
+  }
+  const std::vector<std::size_t>& list(const char* key, const YamlNode& node,
+                                       CountRule count) const {
+    if (node.kind != YamlNode::Kind::sequence) wrong(key, node, "a list [..., ...]");
+    if (node.items.size() < count.least || node.items.size() > count.most)
+      document_.fail(node.mark, fmt::format("{}: {} entries; {} belong here", key,
+                                            node.items.size(), describe_count(count)));
+    return node.items;
+  }
+  double parse_number(const char* key, const YamlNode& node, const NumberRule& rule) const {
+    const std::optional<double> value = to_number(node);
+    if (!value) {
+      const std::string hint = unit_hint(node, rule);
+      wrong(key, node, hint.empty() ? fmt::format("a number{}", in_unit(rule)) : hint);
+    }
+    if (!std::isfinite(*value))
+      document_.fail(node.mark, fmt::format("{}: {} is not finite; write a number{}", key,
+                                            node.text, in_unit(rule)));
+    if (!in_range(*value, rule))
+      document_.fail(node.mark, fmt::format("{}: {} is out of range; allowed is {}", key, node.text,
+                                            describe_range(rule)));
+    return *value;
+  }
+  static std::optional<double> to_number(const YamlNode& node) {
+    if (node.kind != YamlNode::Kind::scalar || !node.plain || node.text.empty())
+      return std::nullopt;
+    std::string_view text = node.text;
+    const bool negative = text.front() == '-';
+    if (negative || text.front() == '+') text.remove_prefix(1);
+    for (const char* word : {".inf", ".Inf", ".INF"})
+      if (text == word) return std::numeric_limits<double>::infinity();
+    for (const char* word : {".nan", ".NaN", ".NAN"})
+      if (text == word) return std::numeric_limits<double>::quiet_NaN();
+    double value = 0.0;
+    const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (stop != text.data() + text.size() || text.front() == '-') return std::nullopt;
+    if (error == std::errc::result_out_of_range) return std::numeric_limits<double>::infinity();
+    if (error != std::errc{}) return std::nullopt;
+    return negative ? -value : value;
+  }
+  static std::string in_unit(const NumberRule& rule) {
+    return rule.unit.empty() ? "" : fmt::format(" in {}", rule.unit);
+  }
+  /// For "4 s" and the like.
+  static std::string unit_hint(const YamlNode& node, const NumberRule& rule) {
+    if (node.kind != YamlNode::Kind::scalar || rule.unit.empty()) return "";
+    if (!node.plain) return fmt::format("a number in {}, without quotes", rule.unit);
+    const bool digit_first =
+        !node.text.empty() && node.text.front() >= '0' && node.text.front() <= '9';
+    if (!digit_first) return "";
+    return fmt::format("the number alone, in {} (the unit stands in the key)", rule.unit);
+  }
+  std::string parse_text(const char* key, const YamlNode& node) const {
+    if (node.kind != YamlNode::Kind::scalar || node.text.empty()) wrong(key, node, "a text");
+    return node.text;
+  }
+  static bool looks_numeric(const YamlNode& node) {
+    return node.plain && !node.text.empty() &&
+           (to_number(node).has_value() || std::isdigit(static_cast<unsigned char>(node.text[0])));
+  }
+  static bool is_word(const YamlNode& node, const FlexibleRule& rule) {
+    return std::find(rule.words.begin(), rule.words.end(), node.text) != rule.words.end();
+  }
+  void read_item(const char* key, const YamlNode& item, const FlexibleRule& rule,
+                 FlexibleValue& value) const {
+    if (!rule.pairs) {
+      value.numbers.push_back(parse_number(key, item, rule.rule));
+      return;
+    }
+    const std::vector<std::size_t>& pair = list(key, item, {2, 2});
+    value.pairs.emplace_back(parse_number(key, document_.node(pair[0]), rule.rule),
+                             parse_number(key, document_.node(pair[1]), rule.rule));
+  }
+  [[noreturn]] void wrong(const char* key, const YamlNode& node, const std::string& right) const {
+    document_.fail(node.mark,
+                   fmt::format("{}: {} stands here; write {}", key, quoted(node), right));
+  }
+  [[noreturn]] void wrong_word(const char* key, const YamlNode& node,
+                               const std::vector<std::string>& names) const {
+    wrong(key, node,
+          fmt::format("{}{}{}", names.size() > 1 ? "one of " : "", fmt::join(names, ", "),
+                      nearest_of(node, names)));
+  }
+  static std::string nearest_of(const YamlNode& node, const std::vector<std::string>& words) {
+    const std::string nearest =
+        node.kind == YamlNode::Kind::scalar ? nearest_word(node.text, words) : "";
+    return nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest);
+  }
+
+  const YamlDocument& document_;
+  const YamlNode& map_;
+  std::string place_;
+  std::vector<std::string> known_;
+  std::vector<std::pair<std::string, std::string>> missing_;  // key, help
+  std::vector<std::pair<YamlMark, std::string>> broken_;
+  FormatErrorList& errors_;
+  std::size_t errors_before_ = 0;
+};
+
+}  // namespace
+
+void read_config(const YamlDocument& document, const ConfigVisitor::Describe& describe) {
+  FormatErrorList errors;
+  errors.attempt([&] {
+    MapReader reader(document, document.root(), "", errors);
+    describe(reader);
+    reader.finish();
+  });
+  errors.raise();
+}
+
+}  // namespace stageid

@@ -1,0 +1,123 @@
+#include "tools/config/config_schema.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "tools/config/number_range.hpp"
+
+namespace stageid {
+namespace {
+
+class SchemaCollector final : public ConfigVisitor {
+ public:
+  void number(const char* key, double& value, const NumberRule& rule, Presence presence,
+              const char* help) override {
+    add(key, "number", rule, fmt::format("{}", value), presence, help);
+  }
+  void numbers(const char* key, std::vector<double>& values, const NumberRule& rule,
+               CountRule count, Presence presence, const char* help) override {
+    add(key, fmt::format("list of numbers, {}", describe_count(count)), rule,
+        fmt::format("[{}]", fmt::join(values, ", ")), presence, help);
+  }
+  void integer(const char* key, std::int64_t& value, std::int64_t low, std::int64_t high,
+               Presence presence, const char* help) override {
+    add(key, "whole number", {}, fmt::format("{}", value), presence, help);
+    entries_.back().range = describe_range(low, high);
+  }
+  void text(const char* key, std::string& value, Presence presence, const char* help) override {
+    add(key, "text", {}, value, presence, help);
+    entries_.back().range.clear();
+  }
+  void texts(const char* key, std::vector<std::string>& values, CountRule count, Presence presence,
+             const char* help) override {
+    add(key, fmt::format("list of texts, {}", describe_count(count)), {},
+        fmt::format("[{}]", fmt::join(values, ", ")), presence, help);
+    entries_.back().range.clear();
+  }
+  void choice(const char* key, std::size_t& index, const std::vector<std::string>& names,
+              Presence presence, const char* help) override {
+    add(key, fmt::format("{}{}", names.size() > 1 ? "one of " : "", fmt::join(names, ", ")), {},
+        names.at(index), presence, help);
+    entries_.back().range.clear();
+  }
+  void flexible(const char* key, FlexibleValue& value, const FlexibleRule& rule, Presence presence,
+                const char* help) override {
+    const std::string numbers =
+        value.numbers.empty() ? "" : fmt::format("{}", value.numbers.front());
+    add(key, describe_forms(rule), rule.rule, value.word.empty() ? numbers : value.word, presence,
+        help);
+    entries_.back().range.clear();  // the form says it
+  }
+  void named_numbers(const char* key, std::vector<std::pair<std::string, double>>&,
+                     const NumberRule& rule, Presence presence, const char* help) override {
+    add(key, "map of name: number", rule, "{}", presence, help);
+  }
+  void named_texts(const char* key, std::vector<std::pair<std::string, std::string>>&,
+                   Presence presence, const char* help) override {
+    add(key, "map of name: text", {}, "{}", presence, help);
+  }
+  void group(const char* key, const Describe& describe, Presence presence,
+             const char* help) override {
+    add(key, "map", {}, "", presence, help);
+    descend(describe);
+  }
+  void items(const char* key, const Describe& describe_item, CountRule count, Presence presence,
+             const char* help) override {
+    add(key, fmt::format("list of maps, {}", describe_count(count)), {}, "[]", presence, help);
+    descend(describe_item);
+  }
+  void require(bool, const char*, const std::string&) override {}
+
+  std::vector<SchemaEntry> take() { return std::move(entries_); }
+
+ private:
+  void add(const char* key, std::string type, const NumberRule& rule, std::string default_value,
+           Presence presence, const char* help) {
+    SchemaEntry entry;
+    entry.depth = depth_;
+    entry.key = key;
+    entry.type = std::move(type);
+    entry.unit = std::string(rule.unit);
+    entry.range = describe_range(rule);
+    entry.required = presence == Presence::required;
+    if (!entry.required) entry.default_value = std::move(default_value);
+    entry.help = help;
+    entries_.push_back(std::move(entry));
+  }
+  void descend(const Describe& describe) {
+    entries_.back().range.clear();
+    ++depth_;
+    describe(*this);
+    --depth_;
+  }
+
+  int depth_ = 0;
+  std::vector<SchemaEntry> entries_;
+};
+
+}  // namespace
+
+std::vector<SchemaEntry> config_schema(const ConfigVisitor::Describe& describe) {
+  SchemaCollector collector;
+  describe(collector);
+  return collector.take();
+}
+
+std::string schema_text(const std::vector<SchemaEntry>& entries) {
+  std::string text;
+  for (const SchemaEntry& entry : entries) {
+    std::vector<std::string> notes = {entry.type};
+    if (!entry.range.empty()) notes.push_back(entry.range);
+    if (entry.required) notes.emplace_back("required");
+    if (!entry.default_value.empty())
+      notes.push_back(fmt::format("default {}", entry.default_value));
+    const std::string key =
+        std::string(static_cast<std::size_t>(2 * entry.depth), ' ') + entry.key + ":";
+    text += fmt::format("{:<28} # {}. {}\n", key, fmt::join(notes, "; "), entry.help);
+  }
+  return text;
+}
+
+}  // namespace stageid

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+
+#include "frf/wiring/nominal_stage.hpp"
+#include "tools/config/config_visitor.hpp"
+#include "tools/config/strict_yaml.hpp"
+
+namespace stageid {
+
+/// Whether `format:` says that this is a controller file.
+bool is_controller_file(const YamlDocument& document);
+
+/// The controller of a file of format "stageid-controller" (docs/formats.md): state space, transfer functions,
+/// or a measured response, with u = r - C y. Its `stage`, if it names one, gives the rigid body.
+/// @throws FileError, FormatError "FILE:LINE:COLUMN: what is wrong; what would be right".
+NominalStage read_controller_file(const YamlDocument& document);
+
+/// The keys of a controller file. Used by `stageid config schema`.
+void describe_controller_keys(ConfigVisitor& visitor);
+
+}  // namespace stageid

@@ -1,0 +1,208 @@
+#include "tools/config/stage_config.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "hal/simulator/rigid_body.hpp"
+#include "tools/config/config_reader.hpp"
+#include "tools/config/stage_keys.hpp"
+#include "tools/config/strict_yaml.hpp"
+
+namespace stageid {
+namespace {
+
+template <typename Member>
+Eigen::VectorXd limit_vector(const std::vector<ChannelConfig>& channels, Member member) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(channels.size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    values[i] = channels[static_cast<std::size_t>(i)].*member;
+  return values.array().isInf().all() ? Eigen::VectorXd() : values;
+}
+
+std::vector<Channel> channels_of(const std::vector<ChannelConfig>& configs) {
+  std::vector<Channel> channels;
+  for (const ChannelConfig& config : configs) {
+    Channel channel = config.channel;
+    std::copy_n(config.position_m.begin(), 3, channel.position_m);
+    std::copy_n(config.direction.begin(), 3, channel.direction);
+    channels.push_back(std::move(channel));
+  }
+  return channels;
+}
+
+int require_channel(const StageConfig& config, const std::vector<Channel>& channels,
+                    const std::string& name, const char* kind, const char* place) {
+  const int index = channel_index(channels, name);
+  if (index < 0)
+    throw FormatError(
+        config.file, "",
+        fmt::format("{}: there is no {} '{}'; give one of the names above", place, kind, name));
+  return index;
+}
+
+Eigen::VectorXd shape_vector(const StageConfig& config, const std::vector<Channel>& channels,
+                             const std::vector<std::pair<std::string, double>>& values,
+                             const char* kind) {
+  Eigen::VectorXd shape = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(channels.size()));
+  for (const auto& [name, value] : values)
+    shape[require_channel(config, channels, name, kind, "in_plane_modes")] = value;
+  return shape;
+}
+
+/// Entries that the file leaves out are `scale` times the window.
+Eigen::VectorXd by_window(const std::vector<ChannelConfig>& sensors, double ChannelConfig::*member,
+                          double scale) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(sensors.size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const ChannelConfig& sensor = sensors[static_cast<std::size_t>(i)];
+    values[i] = sensor.*member > 0.0 ? sensor.*member : scale * sensor.window_m;
+  }
+  return values;
+}
+
+void take_limits(const StageFile& file, WaferStageSpec& spec) {
+  spec.limits.actuator_n = limit_vector(file.actuators, &ChannelConfig::limit_n);
+  spec.limits.slew_n_s = limit_vector(file.actuators, &ChannelConfig::slew_n_s);
+  spec.limits.thermal_rms_n = limit_vector(file.actuators, &ChannelConfig::thermal_rms_n);
+  spec.limits.position_window_m = limit_vector(file.sensors, &ChannelConfig::window_m);
+  spec.limits.hard_window_m = by_window(file.sensors, &ChannelConfig::hard_window_m, 2.0);
+  spec.limits.deviation_m = by_window(file.sensors, &ChannelConfig::deviation_m, 0.5);
+  spec.limits.speed_m_s = limit_vector(file.sensors, &ChannelConfig::speed_m_s);
+  spec.limits.thermal_time_constant_s = file.thermal_time_constant_s;
+}
+
+void take_faults(const StageConfig& config, const StageFile& file, WaferStageSpec& spec) {
+  using Kind = WaferStageSpec::Fault::Kind;
+  for (const FaultConfig& fault : file.faults) {
+    spec.faults.push_back(fault.fault);
+    if (fault.channel.empty()) {
+      spec.faults.back().channel = -1;
+      continue;
+    }
+    const bool actuator =
+        fault.fault.kind == Kind::stuck_actuator || fault.fault.kind == Kind::actuator_gain;
+    spec.faults.back().channel =
+        require_channel(config, actuator ? spec.info.actuators : spec.info.sensors, fault.channel,
+                        actuator ? "actuator" : "sensor", "faults");
+  }
+}
+
+void complete_spec(StageConfig& config, const StageFile& file) {
+  WaferStageSpec& spec = config.spec;
+  spec = file.spec;
+  spec.info.backend = to_string(config.backend);
+  spec.info.maximum_rate_hz = spec.info.sample_rate_hz;
+  spec.info.transport_delay_s = spec.delay_s;
+  spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
+  spec.info.actuators = channels_of(file.actuators);
+  spec.info.sensors = channels_of(file.sensors);
+  std::copy_n(file.inertia_kg_m2.begin(), 3, spec.inertia_kg_m2);
+  std::copy_n(file.suspension_hz.begin(), 6, spec.suspension_hz);
+  for (const InPlaneModeConfig& mode : file.in_plane_modes)
+    spec.in_plane_modes.push_back(
+        {mode.natural_frequency_hz, mode.damping_ratio,
+         shape_vector(config, spec.info.actuators, mode.actuators, "actuator"),
+         shape_vector(config, spec.info.sensors, mode.sensors, "sensor")});
+  take_limits(file, spec);
+  take_faults(config, file, spec);
+  spec.controller = motion_controller_spec(
+      spec.info.sample_rate_hz, spec.info.actuators, spec.info.sensors, file.axes,
+      {spec.mass_kg, spec.mass_kg, spec.mass_kg, spec.inertia_kg_m2[0], spec.inertia_kg_m2[1],
+       spec.inertia_kg_m2[2]});
+  spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
+}
+
+}  // namespace
+
+const char* to_string(Backend backend) noexcept {
+  switch (backend) {
+    case Backend::sim:
+      return "sim";
+    case Backend::can:
+      return "can";
+    case Backend::modbus:
+      return "modbus";
+    case Backend::plugin:
+      return "plugin";
+    case Backend::replay:
+      return "replay";
+  }
+  return "unknown";
+}
+
+int actuator_of_axis(const StageInfo& stage, const std::string& axis) {
+  const int index = channel_index(stage.actuators, axis);
+  if (index < 0)
+    throw std::invalid_argument(fmt::format("axes: the stage has no actuator '{}'", axis));
+  return index;
+}
+
+void describe_stage_keys(ConfigVisitor& visitor) {
+  StageFile file;
+  describe_stage_file(visitor, file);
+}
+
+namespace {
+
+StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& document) {
+  StageFile file;
+  read_config(document, [&](ConfigVisitor& visitor) { describe_stage_file(visitor, file); });
+  StageConfig config;
+  config.file = path;
+  config.text = document.text();
+  config.backend = static_cast<Backend>(file.backend);
+  config.real_time = file.real_time;
+  config.ramp_s = file.ramp_s;
+  config.modbus = file.modbus.stage;
+  config.supervisor = file.modbus.supervisor;
+  config.plugin = file.plugin;
+  if (config.plugin) config.plugin->library = path.parent_path() / config.plugin->library;
+  // What the libraries refuse gets the file's name; the place is in their own words.
+  try {
+    complete_spec(config, file);
+    if (file.can.config.present)
+      config.can = complete_can(file.can, config.spec.info, config.spec.limits);
+    const LimitedStage stage(std::make_unique<SimulatedStage>(config.spec), config.spec.limits);
+    const MotionController controller(config.spec.controller);
+  } catch (const std::invalid_argument& error) {
+    throw FormatError(path, "", error.what());
+  }
+  return config;
+}
+
+}  // namespace
+
+StageConfig load_stage_config(const std::filesystem::path& path) {
+  return stage_config(path, YamlDocument::read(path));
+}
+
+StageConfig parse_stage_config(const std::filesystem::path& name, std::string text) {
+  return stage_config(name, YamlDocument::parse(name, std::move(text)));
+}
+
+std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
+                                           const std::vector<std::string>& actuators,
+                                           const std::vector<std::string>& sensors) {
+  const auto seen = [](const Eigen::VectorXd& shape, const std::vector<Channel>& channels,
+                       const std::vector<std::string>& names) {
+    const double largest = shape.cwiseAbs().maxCoeff();
+    return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+      const int index = channel_index(channels, name);
+      return index >= 0 && std::abs(shape[index]) > 1e-6 * largest;
+    });
+  };
+  const std::vector<PlantMode> all = wafer_stage_modes(spec);
+  std::vector<PlantMode> modes;
+  for (std::size_t i = kRigidAxes; i < all.size(); ++i)
+    if (seen(all[i].actuator_shape, spec.info.actuators, actuators) &&
+        seen(all[i].sensor_shape, spec.info.sensors, sensors))
+      modes.push_back(all[i]);
+  return modes;
+}
+
+}  // namespace stageid

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hal/plugin/plugin_stage.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "hal/stage/limited_stage.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "tools/config/can_config.hpp"
+#include "tools/config/config_visitor.hpp"
+#include "tools/config/modbus_config.hpp"
+#include "tools/config/real_time_keys.hpp"
+
+namespace stageid {
+
+enum class Backend : std::uint8_t { sim, can, modbus, plugin, replay };
+const char* to_string(Backend backend) noexcept;
+
+/// A stage file as it stands, before the geometry becomes a WaferStageSpec.
+struct StageConfig {
+  std::filesystem::path file;
+  std::string text;  ///< of the file, kept for the log
+  Backend backend = Backend::sim;
+  RealTimeKeys real_time;
+  double ramp_s = 0.1;  ///< of a stop, see LoopOptions
+  WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
+  CanConfig can;
+  std::optional<ModbusConfig> modbus;          ///< of the stage
+  std::optional<PluginSpec> plugin;            ///< a back end of others
+  std::optional<SupervisorConfig> supervisor;  ///< of what stands around it
+};
+
+/// Reads a stage file and checks it through to a simulated stage that could be started.
+/// @throws FileError, FormatError "FILE:LINE:COLUMN: what is wrong; what would be right".
+StageConfig load_stage_config(const std::filesystem::path& file);
+
+/// The same from a text, as a log carries it; `name` only names it in errors. @throws FormatError
+StageConfig parse_stage_config(const std::filesystem::path& name, std::string text);
+
+/// The keys of a stage file. Used by `stageid config schema`.
+void describe_stage_keys(ConfigVisitor& visitor);
+
+/// The modes that the identified sub-plant can show: out of plane and flexible, seen by at least one
+/// of `sensors` and driven by at least one of `actuators` (names).
+std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
+                                           const std::vector<std::string>& actuators,
+                                           const std::vector<std::string>& sensors);
+
+/// Index of the actuator that an axis of an experiment excites. @throws std::invalid_argument
+int actuator_of_axis(const StageInfo& stage, const std::string& axis);
+
+}  // namespace stageid

@@ -1,0 +1,288 @@
+#include "tools/config/stage_keys.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hal/can/can_frame.hpp"
+#include "tools/config/stage_config.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr auto kRequired = Presence::required;
+constexpr auto kOptional = Presence::optional;
+
+void describe_channel(ConfigVisitor& v, ChannelConfig& c, const char* unit) {
+  c.channel.unit = unit;
+  std::size_t only = 0;
+  v.text("name", c.channel.name, kRequired, "as it stands in logs and models");
+  v.choice("unit", only, {unit}, kOptional, "SI");
+  v.numbers("position_m", c.position_m, any_number("m"), {3, 3}, kRequired,
+            "x, y, z from the centre of mass");
+  v.numbers("direction", c.direction, any_number(""), {3, 3}, kOptional, "unit vector");
+  const double length =
+      c.direction.size() == 3 ? std::hypot(c.direction[0], c.direction[1], c.direction[2]) : 1.0;
+  v.require(std::abs(length - 1.0) < 1e-6, "direction",
+            fmt::format("direction: length {}; write a unit vector", length));
+}
+
+/// Adds one channel and refuses a name that is there already.
+void add_channel(ConfigVisitor& v, ChannelConfig channel, std::vector<ChannelConfig>& list) {
+  const bool twice = std::any_of(list.begin(), list.end(), [&](const ChannelConfig& other) {
+    return other.channel.name == channel.channel.name;
+  });
+  v.require(
+      !twice, "name",
+      fmt::format("name: '{}' stands twice; give every channel its own", channel.channel.name));
+  list.push_back(std::move(channel));
+}
+
+void describe_actuator(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
+  ChannelConfig c;
+  describe_channel(v, c, "N");
+  v.number("limit_n", c.limit_n, positive("N"), kRequired,
+           "largest |u|; past it the stage is stopped");
+  v.number("slew_n_s", c.slew_n_s, positive("N/s"), kOptional,
+           "largest change of u; inf: no limit");
+  v.number("thermal_rms_n", c.thermal_rms_n, positive("N"), kOptional,
+           "largest rms of u over the thermal time constant; inf: no limit");
+  add_channel(v, std::move(c), list);
+}
+
+void describe_sensor(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
+  ChannelConfig c;
+  describe_channel(v, c, "m");
+  v.number("window_m", c.window_m, positive("m"), kRequired,
+           "largest |y|; past it the stage is stopped");
+  v.number("hard_window_m", c.hard_window_m, not_negative("m"), kOptional,
+           "|y| at which forces are cut; 0: twice window_m");
+  v.number("deviation_m", c.deviation_m, not_negative("m"), kOptional,
+           "largest difference from the motion that the forces explain; past it the loop is opened "
+           "and the stage braked; 0: half of window_m");
+  v.number("speed_m_s", c.speed_m_s, positive("m/s"), kOptional,
+           "largest speed; past it the stage is braked; inf: what full force can stop");
+  v.require(
+      c.hard_window_m == 0.0 || c.hard_window_m >= c.window_m, "hard_window_m",
+      fmt::format("hard_window_m: {} m is inside window_m: {}; write a larger one, or leave it "
+                  "out",
+                  c.hard_window_m, c.window_m));
+  add_channel(v, std::move(c), list);
+}
+
+void describe_plate(ConfigVisitor& v, WaferStageSpec& s) {
+  v.number("length_x_m", s.length_x_m, positive("m"), kRequired, "of the plate");
+  v.number("length_y_m", s.length_y_m, positive("m"), kRequired, "of the plate");
+  v.number("first_mode_hz", s.first_mode_hz, positive("Hz"), kRequired,
+           "scales the stiffness of the plate");
+  v.number("poisson_ratio", s.poisson_ratio, {"", 0.0, 0.499}, kOptional, "of the plate");
+  count(v, "modes", s.flexible_modes, 0, 40, kRequired, "flexible modes that are kept");
+  v.numbers("damping", s.flexible_damping, {"", 0.0, 0.999}, {1}, kRequired,
+            "damping ratio of each mode, the last one repeats");
+}
+
+void describe_in_plane_mode(ConfigVisitor& v, std::vector<InPlaneModeConfig>& list) {
+  InPlaneModeConfig m;
+  v.number("natural_frequency_hz", m.natural_frequency_hz, positive("Hz"), kRequired, "undamped");
+  v.number("damping_ratio", m.damping_ratio, {"", 0.0, 0.999}, kRequired, "of critical");
+  v.named_numbers("actuators", m.actuators, any_number("kg^-1/2"), kRequired,
+                  "mass-normalized shape at the actuators that drive it");
+  v.named_numbers("sensors", m.sensors, any_number("kg^-1/2"), kRequired,
+                  "mass-normalized shape at the sensors that see it");
+  list.push_back(std::move(m));
+}
+
+void describe_plant(ConfigVisitor& v, StageFile& f) {
+  WaferStageSpec& s = f.spec;
+  v.number("mass_kg", s.mass_kg, positive("kg"), kRequired, "moving mass");
+  v.numbers("inertia_kg_m2", f.inertia_kg_m2, positive("kg m^2"), {3, 3}, kRequired,
+            "about x, y, z");
+  v.numbers("suspension_hz", f.suspension_hz, not_negative("Hz"), {6, 6}, kRequired,
+            "gravity compensators: x y z Rx Ry Rz; 0: free");
+  v.number("suspension_damping", s.suspension_damping, {"", 0.0, 0.999}, kOptional,
+           "damping ratio of the suspension");
+  v.group(
+      "plate", [&](ConfigVisitor& plate) { describe_plate(plate, s); }, kRequired,
+      "free rectangular plate: the flexible modes out of plane");
+  v.items(
+      "in_plane_modes",
+      [&](ConfigVisitor& mode) { describe_in_plane_mode(mode, f.in_plane_modes); }, {}, kOptional,
+      "flexible modes in plane");
+  v.number("cubic_stiffness_n_m3", s.cubic_stiffness_n_m3, not_negative("N/m^3"), kOptional,
+           "on the rigid z motion; 0: linear");
+  v.number("actuator_saturation_n", s.actuator_saturation_n, not_negative("N"), kOptional,
+           "0: off");
+}
+
+void describe_noise(ConfigVisitor& v, WaferStageSpec& s) {
+  v.number("sensor_m", s.sensor_noise_m, not_negative("m rms"), kOptional, "white sensor noise");
+  v.number("sensor_coloured_m", s.sensor_noise_coloured_m, not_negative("m rms"), kOptional,
+           "coloured floor of the sensors");
+  v.number("sensor_corner_hz", s.sensor_noise_corner_hz, positive("Hz"), kOptional,
+           "corner of the coloured floor");
+  v.number("force_n", s.force_noise_n, not_negative("N rms"), kOptional,
+           "white force disturbance at every actuator");
+  v.number("sensor_quantum_m", s.sensor_quantum_m, not_negative("m"), kOptional, "0: off");
+  v.number("actuator_quantum_n", s.actuator_quantum_n, not_negative("N"), kOptional, "0: off");
+  count(v, "seed", s.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
+        "same seed, same noise");
+}
+
+void describe_notch(ConfigVisitor& v, std::vector<AxisController::Notch>& list) {
+  AxisController::Notch n;
+  v.number("frequency_hz", n.frequency_hz, positive("Hz"), kRequired, "of the notch");
+  v.number("zero_damping", n.zero_damping, {"", 0.0, 1.0}, kRequired, "of the numerator");
+  v.number("pole_damping", n.pole_damping, {"", 0.0, 1.0, true}, kRequired, "of the denominator");
+  list.push_back(n);
+}
+
+void describe_axis(ConfigVisitor& v, AxisController& a) {
+  std::size_t emergency = a.brake ? 0 : 1;
+  v.number("crossover_hz", a.crossover_hz, positive("Hz"), kRequired, "of the open loop");
+  v.number("gain", a.gain, not_negative("N/m or N m/rad"), kOptional,
+           "0: from the crossover and the inertia");
+  v.number("integrator_hz", a.integrator_hz, not_negative("Hz"), kOptional, "0: none");
+  v.number("lead_zero_hz", a.lead_zero_hz, not_negative("Hz"), kOptional, "0: none");
+  v.number("lead_pole_hz", a.lead_pole_hz, not_negative("Hz"), kOptional, "0: none");
+  v.number("lowpass_hz", a.lowpass_hz, not_negative("Hz"), kOptional, "second order; 0: none");
+  v.number("lowpass_damping", a.lowpass_damping, {"", 0.0, 1.0, true}, kOptional,
+           "of the low pass");
+  v.items(
+      "notches", [&](ConfigVisitor& notch) { describe_notch(notch, a.notches); }, {}, kOptional,
+      "second-order notches");
+  v.choice("emergency", emergency, {"brake", "cut"}, kOptional,
+           "when the loop cannot be trusted: brake by what is known of the motion, or no force");
+  a.brake = emergency == 0;
+}
+
+void describe_controller(ConfigVisitor& v, StageFile& f) {
+  for (std::size_t i = 0; i < kRigidAxes; ++i)
+    v.group(
+        kRigidAxisNames[i], [&](ConfigVisitor& axis) { describe_axis(axis, f.axes[i]); }, kOptional,
+        "loop of this degree of freedom; left out: open");
+}
+
+void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
+  FaultConfig f;
+  using Kind = WaferStageSpec::Fault::Kind;
+  auto kind = static_cast<std::size_t>(Kind::dead_sensor) - 1;
+  v.choice("kind", kind,
+           {"dead_sensor", "nan_sensor", "missed_cycle", "interlock", "stuck_actuator",
+            "stuck_sensor", "sensor_offset", "sensor_drift", "actuator_gain", "extra_delay"},
+           kRequired, "what happens");
+  f.fault.kind = static_cast<Kind>(kind + 1);
+  v.text("channel", f.channel, kOptional,
+         "name of the sensor or actuator; left out of the last four: all");
+  const bool needs_channel =
+      f.fault.kind == Kind::dead_sensor || f.fault.kind == Kind::nan_sensor ||
+      f.fault.kind == Kind::stuck_actuator || f.fault.kind == Kind::stuck_sensor;
+  v.require(!needs_channel || !f.channel.empty(), "channel",
+            "a fault of this kind needs 'channel: NAME'");
+  count(v, "from_cycle", f.fault.from_cycle, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
+        "of the run, 0-based");
+  count(v, "cycles", f.fault.cycles, 1, std::numeric_limits<std::int64_t>::max(), kOptional,
+        "missed_cycle: how many");
+  v.number("value", f.fault.value, any_number(""), kOptional,
+           "sensor_offset: m; sensor_drift: m/s; actuator_gain: factor, -1 reversed, 0 dead; "
+           "extra_delay: samples");
+  v.require(f.fault.kind != Kind::extra_delay || f.fault.value >= 1.0, "value",
+            "value: extra_delay needs at least 1 sample");
+  count(v, "run", f.fault.run, -1, 1000000, kOptional, "0-based; -1: every run");
+  list.push_back(std::move(f));
+}
+
+void describe_plugin(ConfigVisitor& v, PluginSpec& plugin) {
+  std::string library = plugin.library.string();
+  v.text("library", library, kRequired,
+         "shared library with the interface of stageid_backend.h; seen from this file");
+  plugin.library = library;
+  v.named_texts("keys", plugin.keys, kOptional, "what the library wants to know");
+}
+
+/// A value inside its limits must fit on the wire: the encoder would saturate it.
+void require_range(ConfigVisitor& v, const char* key, const std::vector<double>& ranges,
+                   const std::vector<ChannelConfig>& channels, double ChannelConfig::*limit,
+                   const char* limit_key, const char* unit) {
+  if (ranges.size() != 1 && ranges.size() != channels.size()) return;  // refused elsewhere
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    const double range = ranges[std::min(i, ranges.size() - 1)];
+    const double wanted = channels[i].*limit;
+    if (!std::isfinite(wanted) || can_range_holds(range, wanted)) continue;
+    v.require(
+        false, key,
+        fmt::format("{}: {} {} cannot carry {}: {} {} of '{}'; write more than {}, or leave it "
+                    "out for 1.25 times {}",
+                    key, range, unit, limit_key, wanted, unit, channels[i].channel.name, wanted,
+                    limit_key));
+    return;
+  }
+}
+
+void require_ranges(ConfigVisitor& v, const StageFile& f) {
+  require_range(v, "actuator_range_n", f.can.actuator_range_n, f.actuators, &ChannelConfig::limit_n,
+                "limit_n", "N");
+  require_range(v, "sensor_range_m", f.can.sensor_range_m, f.sensors, &ChannelConfig::window_m,
+                "window_m", "m");
+}
+
+}  // namespace
+
+void describe_stage_file(ConfigVisitor& v, StageFile& f) {
+  WaferStageSpec& s = f.spec;
+  v.choice("format", f.format, {"stageid-stage"}, kRequired, "what this file is");
+  v.text("name", s.info.name, kRequired, "of the stage");
+  v.choice("backend", f.backend, {"sim", "can", "modbus", "plugin"}, kOptional,
+           "what stands behind the stage");
+  v.number("sample_rate_hz", s.info.sample_rate_hz, positive("Hz"), kRequired, "of the loop");
+  v.number("delay_s", s.delay_s, not_negative("s"), kOptional,
+           "from command computed to hold changed; any number of samples");
+  v.items(
+      "actuators", [&](ConfigVisitor& item) { describe_actuator(item, f.actuators); }, {1, 64},
+      kRequired, "in the order of the log");
+  v.items(
+      "sensors", [&](ConfigVisitor& item) { describe_sensor(item, f.sensors); }, {1, 64}, kRequired,
+      "in the order of the log");
+  v.number("stuck_sensor_s", s.limits.stuck_sensor_s, not_negative("s"), kOptional,
+           "a sensor may show one and the same value for so long, then the stage is stopped; 0: "
+           "for ever");
+  v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
+           "a stop takes the excitation to zero over this, in closed loop while it is sound");
+  v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
+           "of the thermal rms limit");
+  v.group(
+      "plant", [&](ConfigVisitor& plant) { describe_plant(plant, f); }, kRequired,
+      "the simulated stage");
+  v.group(
+      "noise", [&](ConfigVisitor& noise) { describe_noise(noise, s); }, kOptional,
+      "of the simulated stage");
+  v.group(
+      "controller", [&](ConfigVisitor& controller) { describe_controller(controller, f); },
+      kRequired, "one entry a degree of freedom that is closed: x y z Rx Ry Rz");
+  v.number("pace", s.pace, not_negative(""), kOptional,
+           "0: virtual time, as fast as possible; 1: wall clock");
+  v.group(
+      "realtime", [&](ConfigVisitor& keys) { describe_real_time(keys, f.real_time); }, kOptional,
+      "of the loop's thread; without meaning in virtual time");
+  describe_modbus_groups(v, f.backend == static_cast<std::size_t>(Backend::modbus), f.modbus);
+  v.group(
+      "plugin",
+      [&](ConfigVisitor& keys) {
+        f.plugin.emplace();
+        describe_plugin(keys, *f.plugin);
+      },
+      f.backend == static_cast<std::size_t>(Backend::plugin) ? kRequired : kOptional,
+      "a back end of your own, see docs/plugins.md");
+  v.items(
+      "faults", [&](ConfigVisitor& fault) { describe_fault(fault, f.faults); }, {}, kOptional,
+      "faults on request, to try the safety");
+  v.group(
+      "can",
+      [&](ConfigVisitor& can) {
+        describe_can(can, f.can);
+        require_ranges(can, f);
+      },
+      kOptional, "the stage behind CAN FD; needed by backend can and by 'stageid node --can'");
+}
+
+}  // namespace stageid

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hal/plugin/plugin_stage.hpp"
+#include "hal/simulator/rigid_body.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "tools/config/can_config.hpp"
+#include "tools/config/config_visitor.hpp"
+#include "tools/config/modbus_config.hpp"
+#include "tools/config/real_time_keys.hpp"
+
+namespace stageid {
+
+inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
+struct ChannelConfig {
+  Channel channel;
+  std::vector<double> position_m = {0.0, 0.0, 0.0};
+  std::vector<double> direction = {0.0, 0.0, 1.0};
+  double limit_n = kNoLimit;
+  double slew_n_s = kNoLimit;
+  double thermal_rms_n = kNoLimit;
+  double window_m = kNoLimit;
+  double hard_window_m = 0.0;  // 0: derived
+  double deviation_m = 0.0;    // 0: derived
+  double speed_m_s = kNoLimit;
+};
+
+struct InPlaneModeConfig {
+  double natural_frequency_hz = 0.0;
+  double damping_ratio = 0.0;
+  std::vector<std::pair<std::string, double>> actuators;
+  std::vector<std::pair<std::string, double>> sensors;
+};
+
+struct FaultConfig {
+  WaferStageSpec::Fault fault;
+  std::string channel;
+};
+
+/// What stands in the file, key by key.
+struct StageFile {
+  std::size_t format = 0;
+  std::size_t backend = 0;
+  double thermal_time_constant_s = 10.0;
+  double ramp_s = 0.1;
+  std::vector<ChannelConfig> actuators;
+  std::vector<ChannelConfig> sensors;
+  std::vector<double> inertia_kg_m2;
+  std::vector<double> suspension_hz;
+  std::vector<InPlaneModeConfig> in_plane_modes;
+  std::array<AxisController, kRigidAxes> axes;
+  std::vector<FaultConfig> faults;
+  RealTimeKeys real_time;
+  CanFile can;
+  ModbusGroups modbus;
+  std::optional<PluginSpec> plugin;
+  WaferStageSpec spec;
+};
+
+/// The keys of a stage file, each named once.
+void describe_stage_file(ConfigVisitor& v, StageFile& f);
+
+}  // namespace stageid

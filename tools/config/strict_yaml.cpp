@@ -1,0 +1,286 @@
+#include "tools/config/strict_yaml.hpp"
+
+#include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/parser.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <sstream>
+#include <system_error>
+#include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/file_kind.hpp"
+#include "acquisition/files/system_reason.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr std::size_t kLongestFile = 1U << 20;
+constexpr std::size_t kDeepestNesting = 20;
+/// Bounds the work of finding duplicate keys and of merging; no configuration has a tenth of either.
+constexpr std::size_t kMostKeys = 1000;
+constexpr std::size_t kMostMerged = 100000;
+
+/// Length of the valid UTF-8 sequence at the head of `text`; 0 if there is none.
+std::size_t utf8_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char head = byte(0);
+  if (head < 0x80) return 1;
+  const std::size_t length = head >= 0xF0 ? 4 : head >= 0xE0 ? 3 : 2;
+  if (head < 0xC2 || head > 0xF4 || text.size() < length) return 0;
+  for (std::size_t i = 1; i < length; ++i)
+    if ((byte(i) & 0xC0U) != 0x80U) return 0;
+  const bool overlong = (head == 0xE0 && byte(1) < 0xA0) || (head == 0xF0 && byte(1) < 0x90);
+  const bool surrogate = head == 0xED && byte(1) > 0x9F;
+  const bool beyond = head == 0xF4 && byte(1) > 0x8F;
+  return overlong || surrogate || beyond ? 0 : length;
+}
+
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+/// Turns yaml-cpp's events into nodes; yaml-cpp's own tree keeps no place of keys and forgives
+/// duplicates.
+class YamlTreeBuilder final : public YAML::EventHandler {
+ public:
+  explicit YamlTreeBuilder(YamlDocument& document) : document_(document) {}
+
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    document_.nodes_[add(YamlNode::Kind::null, mark, anchor)].mark = place_of_null(mark);
+  }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    const auto found = anchors_.find(anchor);
+    if (found == anchors_.end() || std::any_of(open_.begin(), open_.end(), [&](const Open& open) {
+          return open.node == found->second;
+        }))
+      document_.fail(place(mark), "this alias refers to itself; let it name an anchor above");
+    attach(found->second);
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                const std::string& value) override {
+    refuse_tag(mark, tag);
+    if (!open_.empty() && is_map(open_.back()) && !open_.back().has_key) {
+      take_key(mark, value);
+      return;
+    }
+    YamlNode& node = document_.nodes_[add(YamlNode::Kind::scalar, mark, anchor)];
+    node.text = value;
+    node.plain = tag != "!";
+    if (node.plain && (value == "~" || value == "null")) node.kind = YamlNode::Kind::null;
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
+    refuse_tag(mark, tag);
+    open(YamlNode::Kind::sequence, mark, anchor);
+  }
+  void OnSequenceEnd() override { open_.pop_back(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    refuse_tag(mark, tag);
+    open(YamlNode::Kind::map, mark, anchor);
+  }
+  void OnMapEnd() override {
+    merge(open_.back().node);
+    open_.pop_back();
+  }
+
+ private:
+  struct Open {
+    std::size_t node = 0;
+    bool has_key = false;
+  };
+
+  static YamlMark place(const YAML::Mark& mark) { return {mark.line + 1, mark.column + 1}; }
+  bool is_map(const Open& open) const {
+    return document_.nodes_[open.node].kind == YamlNode::Kind::map;
+  }
+  /// yaml-cpp puts a value that is not there where the next token is, lines further down; the user
+  /// has to write behind the key.
+  YamlMark place_of_null(const YAML::Mark& mark) const {
+    const YamlMark here = place(mark);
+    if (open_.empty() || !is_map(open_.back()) || !open_.back().has_key) return here;
+    const YamlNode::Entry& last = document_.nodes_[open_.back().node].entries.back();
+    if (last.mark.line == here.line) return here;
+    return {last.mark.line, last.mark.column + static_cast<int>(last.key.size()) + 1};
+  }
+  void refuse_tag(const YAML::Mark& mark, const std::string& tag) const {
+    if (tag != "" && tag != "!" && tag != "?")
+      document_.fail(place(mark),
+                     fmt::format("tag '{}'; tags are not used here, leave it out", tag));
+  }
+
+  std::size_t add(YamlNode::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
+    const std::size_t index = document_.nodes_.size();
+    YamlNode node;
+    node.kind = kind;
+    node.mark = place(mark);
+    if (!open_.empty() && is_map(open_.back()) && !open_.back().has_key)
+      document_.fail(node.mark, "a key must be a word; write 'key: value'");
+    document_.nodes_.push_back(std::move(node));
+    if (anchor != YAML::NullAnchor) anchors_[anchor] = index;
+    attach(index);
+    return index;
+  }
+  void open(YamlNode::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
+    if (open_.size() >= kDeepestNesting)
+      document_.fail(place(mark), fmt::format("nested deeper than {} levels; no configuration is",
+                                              kDeepestNesting));
+    open_.push_back({add(kind, mark, anchor), false});
+  }
+  /// Of a map whose keys became `keys`.
+  void refuse_too_many(const YamlMark& mark, std::size_t keys) const {
+    if (keys > kMostKeys)
+      document_.fail(
+          mark, fmt::format("more than {} keys in one map; split it or leave keys out", kMostKeys));
+  }
+  void take_key(const YAML::Mark& mark, const std::string& key) {
+    for (const YamlNode::Entry& entry : document_.nodes_[open_.back().node].entries)
+      if (entry.key == key)
+        document_.fail(place(mark),
+                       fmt::format("key '{}' stands here twice, first in line {}; keep one", key,
+                                   entry.mark.line));
+    std::vector<YamlNode::Entry>& entries = document_.nodes_[open_.back().node].entries;
+    entries.push_back({key, place(mark), 0});
+    refuse_too_many(place(mark), entries.size());
+    open_.back().has_key = true;
+  }
+  void attach(std::size_t index) {
+    if (open_.empty()) {
+      document_.root_ = index;
+      return;
+    }
+    YamlNode& parent = document_.nodes_[open_.back().node];
+    if (parent.kind == YamlNode::Kind::sequence) {
+      parent.items.push_back(index);
+      return;
+    }
+    if (!open_.back().has_key)
+      document_.fail(parent.mark, "an alias cannot be a key; write 'key: *alias'");
+    parent.entries.back().value = index;
+    open_.back().has_key = false;
+  }
+  void merge(std::size_t map) {
+    std::vector<YamlNode::Entry>& entries = document_.nodes_[map].entries;
+    const auto found = std::find_if(entries.begin(), entries.end(),
+                                    [](const YamlNode::Entry& entry) { return entry.key == "<<"; });
+    if (found == entries.end()) return;
+    const YamlNode& base = document_.nodes_[found->value];
+    if (base.kind != YamlNode::Kind::map)
+      document_.fail(found->mark, "'<<' merges a map; write '<<: *anchor_of_a_map'");
+    const std::vector<YamlNode::Entry> inherited = base.entries;
+    const YamlMark mark = found->mark;
+    merged_ += inherited.size();
+    if (merged_ > kMostMerged)
+      document_.fail(mark, fmt::format("'<<' has copied more than {} keys in this file; write the "
+                                       "keys that differ only",
+                                       kMostMerged));
+    entries.erase(found);
+    for (const YamlNode::Entry& entry : inherited)
+      if (std::none_of(entries.begin(), entries.end(),
+                       [&](const YamlNode::Entry& own) { return own.key == entry.key; }))
+        entries.push_back(entry);
+    refuse_too_many(mark, entries.size());
+  }
+
+  YamlDocument& document_;
+  std::size_t merged_ = 0;
+  std::vector<Open> open_;
+  std::map<YAML::anchor_t, std::size_t> anchors_;
+};
+
+namespace {
+
+void check_text(const YamlDocument& document) {
+  YamlMark mark;
+  std::string_view rest = document.text();
+  if (rest.substr(0, 3) == "\xEF\xBB\xBF") rest.remove_prefix(3);
+  while (!rest.empty()) {
+    const std::size_t length = utf8_length(rest);
+    const char head = rest.front();
+    if (length == 0)
+      document.fail(mark, fmt::format("byte 0x{:02X} is not UTF-8 text; save the file as UTF-8",
+                                      static_cast<unsigned char>(head)));
+    const bool control =
+        (static_cast<unsigned char>(head) < 0x20 && head != '\n' && head != '\t' && head != '\r') ||
+        head == 0x7F;
+    if (control)
+      document.fail(mark,
+                    fmt::format("byte 0x{:02X} is not text; a configuration is a YAML text file",
+                                static_cast<unsigned char>(head)));
+    rest.remove_prefix(length);
+    if (head == '\n') {
+      mark = {mark.line + 1, 1};
+    } else {
+      ++mark.column;
+    }
+  }
+}
+
+}  // namespace
+
+YamlDocument::YamlDocument(std::filesystem::path file, std::string text)
+    : file_(std::move(file)), text_(std::move(text)) {}
+
+void YamlDocument::fail(const YamlMark& mark, const std::string& message) const {
+  throw FormatError(file_, fmt::format("{}:{}", mark.line, mark.column), one_line(message));
+}
+
+YamlDocument YamlDocument::read(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file))
+    throw FileError(fmt::format("{}: is a directory; give a YAML file", file.string()));
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream)
+    throw FileError(fmt::format("{}: cannot be read: {}", file.string(), system_reason(errno)));
+  std::string text(kLongestFile + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (stream.bad())
+    throw FileError(fmt::format("{}: cannot be read; check the disk", file.string()));
+  if (text.starts_with('{') || text.find('\0') != std::string::npos)
+    if (const std::string other = other_kind(file, "a YAML file"); !other.empty())
+      throw FormatError(file, "", other);
+  return parse(file, std::move(text));
+}
+
+YamlDocument YamlDocument::parse(std::filesystem::path file, std::string text) {
+  YamlDocument document(std::move(file), std::move(text));
+  if (document.text_.size() > kLongestFile)
+    document.fail({}, "longer than 1 MiB; this is not a configuration");
+  check_text(document);
+  YamlTreeBuilder builder(document);
+  // yaml-cpp speaks its own exceptions; translated here, at its border.
+  try {
+    std::istringstream stream(document.text_);
+    YAML::Parser parser(stream);
+    if (!parser.HandleNextDocument(builder) || document.nodes_.empty())
+      document.fail({}, "the file is empty; 'stageid config schema' prints what stands in one");
+    const std::size_t first_nodes = document.nodes_.size();
+    const std::size_t root = document.root_;
+    YamlTreeBuilder second(document);
+    if (parser.HandleNextDocument(second) && document.nodes_.size() > first_nodes)
+      document.fail(document.nodes_[first_nodes].mark, "a second document; keep one in a file");
+    document.root_ = root;
+  } catch (const YAML::Exception& error) {
+    const YamlMark mark =
+        error.mark.is_null() ? YamlMark{} : YamlMark{error.mark.line + 1, error.mark.column + 1};
+    document.fail(
+        mark,
+        fmt::format("not YAML: {}; check brackets, quotes and indentation up to here", error.msg));
+  }
+  return document;
+}
+
+}  // namespace stageid

@@ -1,0 +1,201 @@
+#include "tools/dashboard/dashboard_server.hpp"
+
+#include <fmt/format.h>
+#include <httplib.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <thread>
+
+#include "hal/stage/stage.hpp"
+
+namespace stageid {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int kNice = 10;
+constexpr int kOtherThreads = 8;  // beside those of the streams: pages, responses, the abort
+constexpr auto kKeepAlive = 250ms;
+constexpr const char* kAbortHeader = "X-Stageid";
+
+/// Not httplib's own, which lets two programs share a port.
+void set_socket_options(int socket) {
+  const int yes = 1;
+  ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+}
+
+constexpr const char* kWholeAddress = "open the address that stageid printed, with its token";
+
+void refuse(httplib::Response& response, int status, const std::string& why) {
+  response.status = status;
+  response.set_content(why + "\n", "text/plain");
+}
+
+std::string host_in_url(const std::string& host) {
+  return host.find(':') == std::string::npos ? host : "[" + host + "]";
+}
+
+}  // namespace
+
+struct DashboardServer::State {
+  State(const DashboardAddress& asked, DashboardContent& shown)
+      : address(asked), content(shown), token(make_token()) {}
+
+  DashboardAddress address;
+  DashboardContent& content;
+  std::string token;
+  std::string url;
+  httplib::Server server;
+  std::thread thread;
+  std::atomic<int> watchers = 0;
+  std::atomic<bool> finishing = false;
+
+  bool has_token(const httplib::Request& request) const;
+  bool allowed(const httplib::Request& request) const;
+  void listen();
+  void route();
+  void stream(httplib::Response& response);
+  bool feed(std::uint64_t& seen, httplib::DataSink& sink);
+};
+
+bool DashboardServer::State::has_token(const httplib::Request& request) const {
+  return same_token(request.get_param_value("token"), token);
+}
+
+bool DashboardServer::State::allowed(const httplib::Request& request) const {
+  if (!address.is_loopback()) return has_token(request);
+  const std::string host = request.get_header_value("Host");
+  const std::string mine = fmt::format("{}:{}", host_in_url(address.host), address.port);
+  return host == mine || host == fmt::format("localhost:{}", address.port) ||
+         host == fmt::format("127.0.0.1:{}", address.port);
+}
+
+void DashboardServer::State::listen() {
+  server.set_socket_options(set_socket_options);
+  server.set_tcp_nodelay(true);
+  server.set_read_timeout(kPatience_s);
+  server.set_write_timeout(kPatience_s);
+  server.set_keep_alive_timeout(1);
+  server.set_payload_max_length(kLargestBody);
+  server.new_task_queue = [] { return new httplib::ThreadPool(kWatchers + kOtherThreads); };
+  errno = 0;
+  if (address.port == 0) {
+    address.port = server.bind_to_any_port(address.host);
+  } else if (!server.bind_to_port(address.host, address.port)) {
+    address.port = -1;
+  }
+  if (address.port > 0) return;
+  const std::string why = errno != 0 ? std::strerror(errno) : "no such address";
+  throw StageError(fmt::format(
+      "--dashboard: cannot listen on {} ({}); give another port, or 0 for any that is free",
+      address.host, why));
+}
+
+/// What is not allowed is answered before anything else is looked at.
+void DashboardServer::State::route() {
+  server.set_pre_routing_handler(
+      [this](const httplib::Request& request, httplib::Response& response) {
+        response.set_header("Cache-Control", "no-store");
+        response.set_header("X-Content-Type-Options", "nosniff");
+        response.set_header("Referrer-Policy", "no-referrer");
+        if (allowed(request)) return httplib::Server::HandlerResponse::Unhandled;
+        refuse(response, 403, kWholeAddress);
+        return httplib::Server::HandlerResponse::Handled;
+      });
+  server.set_error_handler([](const httplib::Request& request, httplib::Response& response) {
+    if (!response.body.empty()) return;
+    if (response.status == 404)
+      refuse(response, 404, fmt::format("{}: not found; open /", request.path));
+    else if (response.status == 413)
+      refuse(response, 413, fmt::format("body too large; {} bytes at most", kLargestBody));
+    else
+      refuse(response, response.status, "bad request; open the address that stageid printed");
+  });
+  server.Get("/", [this](const httplib::Request&, httplib::Response& response) {
+    response.set_content(content.page, "text/html; charset=utf-8");
+  });
+  server.Get("/events",
+             [this](const httplib::Request&, httplib::Response& response) { stream(response); });
+  server.Get("/response.json", [this](const httplib::Request&, httplib::Response& response) {
+    const LatestText::Edition edition = content.response.get();
+    if (edition.number == 0) {
+      refuse(response, 404, "no response yet; it follows the first realization");
+    } else {
+      response.set_content(*edition.text, "application/json");
+    }
+  });
+  server.Post("/abort", [this](const httplib::Request& request, httplib::Response& response) {
+    if (!has_token(request) || request.get_header_value(kAbortHeader) != "abort") {
+      refuse(response, 403, kWholeAddress);
+      return;
+    }
+    content.abort();
+    response.set_content("stopping\n", "text/plain");
+  });
+}
+
+void DashboardServer::State::stream(httplib::Response& response) {
+  if (watchers.fetch_add(1) >= kWatchers) {
+    watchers.fetch_sub(1);
+    refuse(response, 503, fmt::format("{} pages are open already; close one", kWatchers));
+    return;
+  }
+  content.watched();
+  response.set_chunked_content_provider(
+      "text/event-stream",
+      [this, seen = std::uint64_t{0}](std::size_t, httplib::DataSink& sink) mutable {
+        return feed(seen, sink);
+      },
+      [this](bool) { watchers.fetch_sub(1); });
+}
+
+/// One piece of the stream; false ends it.
+bool DashboardServer::State::feed(std::uint64_t& seen, httplib::DataSink& sink) {
+  const bool last = finishing;
+  const LatestText::Edition edition = content.state.wait(seen, last ? 0ms : kKeepAlive);
+  // A comment finds out whether anybody is still there.
+  std::string text = ":\n\n";
+  if (edition.number > seen) text = fmt::format("data: {}\n\n", *edition.text);
+  seen = edition.number;
+  if (!sink.write(text.data(), text.size())) return false;
+  if (last) sink.done();
+  return true;
+}
+
+DashboardServer::DashboardServer(const DashboardAddress& address, DashboardContent& content)
+    : state_(std::make_unique<State>(address, content)) {
+  State& state = *state_;
+  state.listen();
+  state.route();
+  state.url = fmt::format("http://{}:{}/?token={}", host_in_url(state.address.host),
+                          state.address.port, state.token);
+  state.thread = std::thread([&state] {
+    // Threads that it starts inherit this.
+    ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
+    state.server.listen_after_bind();
+  });
+  while (!state.server.is_running()) std::this_thread::yield();  // stop() before it would be lost
+}
+
+DashboardServer::~DashboardServer() {
+  state_->finishing = true;
+  state_->server.stop();
+  state_->thread.join();
+}
+
+const std::string& DashboardServer::url() const noexcept { return state_->url; }
+
+int DashboardServer::watchers() const noexcept { return state_->watchers; }
+
+void DashboardServer::finish(std::chrono::milliseconds longest) {
+  const auto until = std::chrono::steady_clock::now() + longest;
+  while (watchers() > 0 && std::chrono::steady_clock::now() < until)
+    std::this_thread::sleep_for(10ms);
+}
+
+}  // namespace stageid

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <mutex>
+#include <optional>
+
+#include "acquisition/loop/run_observer.hpp"
+
+namespace stageid {
+
+/// Levels of every channel, actuators then sensors, in SI.
+struct Levels {
+  Eigen::ArrayXd peak;          ///< largest magnitude since the last look
+  Eigen::ArrayXd rms;           ///< since the last look
+  Eigen::ArrayXd largest_peak;  ///< since the beginning
+  std::uint64_t rows = 0;       ///< since the last look
+};
+
+/// Watches the levels of all samples on their way into the log. The log's thread never waits here:
+/// if somebody looks at that very moment, it hands its numbers over with the next block.
+class LiveLevels final : public RunObserver {
+ public:
+  explicit LiveLevels(Eigen::Index channels);
+
+  void begin_run(const LogRun& run) noexcept override;
+  void rows(std::span<const double> rows) noexcept override;
+  void end_run(const LogRun& run) noexcept override;
+
+  /// The levels since the last call.
+  Levels take();
+  /// Sum over the runs that have ended, and the last of them.
+  struct Ended {
+    RunHealth health;
+    RunTiming timing;
+    int runs = 0;
+    LogRun last;
+  };
+  Ended ended() const;
+
+ private:
+  struct Sums {
+    explicit Sums(Eigen::Index channels);
+    void add(const Sums& other);
+    void clear();
+    Eigen::ArrayXd peak;
+    Eigen::ArrayXd squares;
+    std::uint64_t rows = 0;
+  };
+
+  Sums gathered_;  // the log thread's own
+  mutable std::mutex mutex_;
+  Sums handed_over_;
+  Eigen::ArrayXd largest_;
+  mutable std::mutex ended_mutex_;
+  Ended ended_;
+};
+
+}  // namespace stageid

@@ -1,0 +1,233 @@
+#include "tools/exchange/arrays/frf_csv.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string_view>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
+
+#include "tools/exchange/arrays/csv_table.hpp"
+#include "tools/terminal/text_lines.hpp"
+
+namespace stageid {
+namespace {
+
+/// The names of the columns of a channel.
+struct Titles {
+  std::string real, imaginary, noise_variance, total_variance;
+};
+
+Titles titles_of(const FrfEstimate& frf, std::size_t i, std::size_t j) {
+  const std::string channel = frf.outputs.names[i] + "/" + frf.inputs.names[j];
+  const std::string unit = frf.outputs.units[i] + "/" + frf.inputs.units[j];
+  const auto title = [&](const char* part, const std::string& of) {
+    return fmt::format("{} {} [{}]", part, channel, of);
+  };
+  const std::string square = fmt::format("({})^2", unit);
+  return {title("real", unit), title("imaginary", unit), title("noise_variance", square),
+          title("total_variance", square)};
+}
+
+std::string head_of(const FrfEstimate& frf) {
+  std::string text = "frequency_hz";
+  for (std::size_t j = 0; j < frf.inputs.size(); ++j)
+    for (std::size_t i = 0; i < frf.outputs.size(); ++i) {
+      const Titles titles = titles_of(frf, i, j);
+      text += fmt::format(",{},{}", csv_field(titles.real), csv_field(titles.imaginary));
+      if (frf.noise_variance.size() > 0)
+        text.append(1, ',').append(csv_field(titles.noise_variance));
+      if (frf.total_variance.size() > 0)
+        text.append(1, ',').append(csv_field(titles.total_variance));
+    }
+  return text;
+}
+
+const char* const kHolds[] = {"none", "zoh"};
+const char* const kCompensations[] = {"none", "delay", "hold"};
+
+/// What the columns do not tell, so that a table is read again without a map.
+std::string description_of(const FrfEstimate& frf) {
+  const nlohmann::ordered_json json = {
+      {"format", "stageid-frf"},
+      {"outputs", frf.outputs.names},
+      {"output_units", frf.outputs.units},
+      {"inputs", frf.inputs.names},
+      {"input_units", frf.inputs.units},
+      {"sample_rate_hz", frf.sample_rate_hz},
+      {"hold", kHolds[static_cast<int>(frf.hold)]},
+      {"compensated", kCompensations[static_cast<int>(frf.compensated)]},
+      {"delay_s", frf.delay_s},
+      {"realizations", frf.realizations},
+      {"periods", frf.periods},
+      {"experiments", frf.experiments},
+      {"noise_dof", frf.noise_dof},
+      {"total_dof", frf.total_dof},
+      {"correlated_lines", frf.correlated_lines}};
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+constexpr std::string_view kDescription = "# {\"format\":\"stageid-frf\"";
+
+/// Names and units from the columns of a table without a description: "real z1/a1 [m/N]". The unit of an input is
+/// taken for a single one, behind the last slash.
+bool channels_from_head(const ArrayList& arrays, FrfEstimate& frf) {
+  const auto add = [](ChannelList& list, const std::string& name, const std::string& unit) {
+    const auto found = std::find(list.names.begin(), list.names.end(), name);
+    if (found != list.names.end())
+      return list.units[static_cast<std::size_t>(found - list.names.begin())] == unit;
+    list.names.push_back(name);
+    list.units.push_back(unit);
+    return true;
+  };
+  bool plain = true;
+  for (const NamedArray& array : arrays.arrays) {
+    if (!array.name.starts_with("real ") || !array.name.ends_with("]")) continue;
+    const std::size_t bracket = array.name.rfind(" [");
+    if (bracket == std::string::npos || bracket < 5) return false;
+    const std::string channel = array.name.substr(5, bracket - 5);
+    const std::string unit = array.name.substr(bracket + 2, array.name.size() - bracket - 3);
+    const std::size_t slash = channel.find('/'), unit_slash = unit.rfind('/');
+    plain = plain && slash != std::string::npos && channel.rfind('/') == slash &&
+            unit_slash != std::string::npos &&
+            add(frf.outputs, channel.substr(0, slash), unit.substr(0, unit_slash)) &&
+            add(frf.inputs, channel.substr(slash + 1), unit.substr(unit_slash + 1));
+  }
+  return plain && frf.outputs.size() > 0;
+}
+
+template <typename Value>
+void take(const nlohmann::json& json, const char* key, Value& value) {
+  if (json.contains(key)) value = json.at(key).get<Value>();
+}
+
+/// @throws nlohmann::json::exception for other types
+void read_description(const nlohmann::json& json, FrfEstimate& frf) {
+  take(json, "outputs", frf.outputs.names);
+  take(json, "output_units", frf.outputs.units);
+  take(json, "inputs", frf.inputs.names);
+  take(json, "input_units", frf.inputs.units);
+  take(json, "sample_rate_hz", frf.sample_rate_hz);
+  take(json, "delay_s", frf.delay_s);
+  take(json, "realizations", frf.realizations);
+  take(json, "periods", frf.periods);
+  take(json, "experiments", frf.experiments);
+  take(json, "noise_dof", frf.noise_dof);
+  take(json, "total_dof", frf.total_dof);
+  take(json, "correlated_lines", frf.correlated_lines);
+  const std::string hold = json.value("hold", "none"), taken = json.value("compensated", "none");
+  frf.hold = hold == "zoh" ? Hold::zoh : Hold::none;
+  for (int k = 0; k < 3; ++k)
+    if (taken == kCompensations[k]) frf.compensated = static_cast<Compensation>(k);
+}
+
+/// The comment that describes the table; empty: there is none.
+std::string description_in(const std::filesystem::path& file) {
+  TextLines lines(file);
+  while (!lines.at_end()) {
+    const std::string_view line = lines.next();
+    if (line.starts_with(kDescription)) return std::string(line.substr(2));
+    if (!trimmed(line).empty() && !line.starts_with('#')) break;
+  }
+  return {};
+}
+
+void describe(const ArrayList& arrays, FrfEstimate& frf) {
+  const std::string text = description_in(arrays.file);
+  if (text.empty()) {
+    if (!channels_from_head(arrays, frf))
+      throw FormatError(
+          arrays.file, "",
+          "the names and units of its channels cannot be told apart by their slashes. "
+          "Write a map with kind: frf and channels (docs/exchange.md)");
+    return;
+  }
+  try {
+    read_description(nlohmann::json::parse(text), frf);
+  } catch (const nlohmann::json::exception&) {
+    throw FormatError(arrays.file, "",
+                      "its line '# {\"format\":...}' is damaged. Remove that line, or export the "
+                      "response again");
+  }
+  if (frf.outputs.units.size() != frf.outputs.size() ||
+      frf.inputs.units.size() != frf.inputs.size())
+    throw FormatError(arrays.file, "", "expected one unit per channel; export the response again");
+}
+
+}  // namespace
+
+bool is_frf_csv(const std::filesystem::path& file) {
+  if (file.extension() != ".csv") return false;
+  TextLines lines(file);
+  while (!lines.at_end()) {
+    const std::string_view line = lines.next();
+    if (trimmed(line).empty() || line.starts_with('#')) continue;
+    return line.starts_with("frequency_hz,") && line.find("real ") != std::string_view::npos &&
+           line.find("imaginary ") != std::string_view::npos;
+  }
+  return false;
+}
+
+FrfEstimate read_frf_csv(const std::filesystem::path& file) {
+  const ArrayList arrays = read_csv(file);
+  FrfEstimate frf;
+  describe(arrays, frf);
+  const auto column = [&](const std::string& name) {
+    const std::vector<double> values = real_values(arrays, arrays.at(name));
+    if (frf.lines() > 0 && static_cast<Eigen::Index>(values.size()) != frf.lines())
+      throw FormatError(file, name,
+                        fmt::format("has {}; there are {}", counted(values.size(), "value"),
+                                    counted(frf.lines(), "frequency", "frequencies")));
+    return Eigen::VectorXd(
+        Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));
+  };
+  frf.frequency_hz = column("frequency_hz");
+  const auto has = [&](const char* part) {
+    return std::any_of(arrays.arrays.begin(), arrays.arrays.end(), [part](const NamedArray& array) {
+      return array.name.starts_with(std::string(part) + " ");
+    });
+  };
+  const Eigen::Index channels = frf.n_outputs() * frf.n_inputs();
+  frf.response.resize(channels, frf.lines());
+  if (has("noise_variance")) frf.noise_variance.resize(channels, frf.lines());
+  if (has("total_variance")) frf.total_variance.resize(channels, frf.lines());
+  for (Eigen::Index c = 0; c < channels; ++c) {
+    const Titles titles = titles_of(frf, static_cast<std::size_t>(c % frf.n_outputs()),
+                                    static_cast<std::size_t>(c / frf.n_outputs()));
+    frf.response.row(c).real() = column(titles.real).transpose();
+    frf.response.row(c).imag() = column(titles.imaginary).transpose();
+    if (frf.noise_variance.size() > 0)
+      frf.noise_variance.row(c) = column(titles.noise_variance).transpose();
+    if (frf.total_variance.size() > 0)
+      frf.total_variance.row(c) = column(titles.total_variance).transpose();
+  }
+  try {
+    check(frf);
+  } catch (const std::invalid_argument& error) {
+    throw FormatError(file, "", error.what());
+  }
+  return frf;
+}
+
+std::string frf_csv(const FrfEstimate& frf) {
+  std::string text = fmt::format(
+      "# stageid-frf, written by stageid {}; sample rate {} Hz, realizations {}, periods {}\n"
+      "# of OUTPUT/INPUT, SI units; variances are E|error|^2 of the complex response\n# {}\n{}\n",
+      STAGEID_VERSION, frf.sample_rate_hz, frf.realizations, frf.periods, description_of(frf),
+      head_of(frf));
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    text += fmt::format("{}", frf.frequency_hz[k]);
+    for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
+      text += fmt::format(",{},{}", frf.response(c, k).real(), frf.response(c, k).imag());
+      for (const Eigen::MatrixXd* variance : {&frf.noise_variance, &frf.total_variance})
+        if (variance->size() > 0) text += fmt::format(",{}", (*variance)(c, k));
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+}  // namespace stageid

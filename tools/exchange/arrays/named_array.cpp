@@ -1,0 +1,123 @@
+#include "tools/exchange/arrays/named_array.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+
+namespace stageid {
+namespace {
+
+/// Source index of every element of the result, in the result's C order.
+std::vector<std::size_t> source_places(const std::vector<std::size_t>& shape,
+                                       const std::vector<std::size_t>& axes) {
+  const std::size_t rank = shape.size();
+  std::vector<std::size_t> stride(rank, 1);
+  for (std::size_t q = rank; q-- > 1;) stride[q - 1] = stride[q] * shape[q];
+  std::size_t count = 1;
+  for (const std::size_t extent : shape) count *= extent;
+  std::vector<std::size_t> places(count);
+  std::vector<std::size_t> index(rank, 0);
+  std::size_t place = 0;
+  for (std::size_t& out : places) {
+    out = place;
+    for (std::size_t q = rank; q-- > 0;) {
+      place += stride[axes[q]];
+      if (++index[q] < shape[axes[q]]) break;
+      place -= stride[axes[q]] * shape[axes[q]];
+      index[q] = 0;
+    }
+  }
+  return places;
+}
+
+[[noreturn]] void refuse(const ArrayList& list, const NamedArray& array, const char* holds,
+                         const char* wanted) {
+  throw FormatError(list.file, array.name,
+                    fmt::format("holds {}; {} must stand here", holds, wanted));
+}
+
+}  // namespace
+
+std::size_t NamedArray::size() const {
+  return std::visit([](const auto& list) { return list.size(); }, values);
+}
+
+const NamedArray* ArrayList::find(const std::string& name) const {
+  std::string wanted = name.starts_with('/') ? name.substr(1) : name;
+  const auto search = [&]() -> const NamedArray* {
+    const auto found = std::find_if(arrays.begin(), arrays.end(),
+                                    [&](const NamedArray& array) { return array.name == wanted; });
+    return found == arrays.end() ? nullptr : &*found;
+  };
+  if (const NamedArray* found = search()) return found;
+  std::replace(wanted.begin(), wanted.end(), '.', '/');
+  return search();
+}
+
+const NamedArray& ArrayList::at(const std::string& name) const {
+  if (const NamedArray* found = find(name)) return *found;
+  for (const UnreadVariable& variable : unread)
+    if (name == variable.name || name.starts_with(variable.name + ".") ||
+        name.starts_with(variable.name + "/"))
+      throw FormatError(file, variable.name,
+                        fmt::format("{} cannot be read. {}", variable.what, variable.remedy));
+  std::vector<std::string> names;
+  for (const NamedArray& array : arrays) names.push_back(array.name);
+  constexpr std::size_t kMostNames = 40;
+  const bool more = names.size() > kMostNames;
+  if (more) names.resize(kMostNames);
+  throw FormatError(file, "",
+                    fmt::format("has no '{}'; there are {}{}", name, fmt::join(names, ", "),
+                                more ? ", ..." : ""));
+}
+
+NamedArray permuted(const NamedArray& array, const std::vector<std::size_t>& axes) {
+  std::vector<std::size_t> sorted = axes;
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<std::size_t> all(array.shape.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  if (sorted != all)
+    throw std::invalid_argument(fmt::format("{}: {} are not the axes of an array with {} of them",
+                                            array.name, fmt::join(axes, ", "), all.size()));
+  NamedArray result{array.name, {}, array.values};
+  for (const std::size_t axis : axes) result.shape.push_back(array.shape[axis]);
+  if (axes.size() < 2) return result;
+  const std::vector<std::size_t> places = source_places(array.shape, axes);
+  std::visit(
+      [&](auto& to) {
+        const auto& from = std::get<std::decay_t<decltype(to)>>(array.values);
+        for (std::size_t k = 0; k < places.size(); ++k) to[k] = from[places[k]];
+      },
+      result.values);
+  return result;
+}
+
+NamedArray reversed(const NamedArray& array) {
+  std::vector<std::size_t> axes(array.shape.size());
+  std::iota(axes.rbegin(), axes.rend(), std::size_t{0});
+  return permuted(array, axes);
+}
+
+std::vector<double> real_values(const ArrayList& list, const NamedArray& array) {
+  if (array.is_text()) refuse(list, array, "text", "numbers");
+  if (array.is_complex()) refuse(list, array, "complex numbers", "real ones");
+  return std::get<0>(array.values);
+}
+
+std::vector<std::complex<double>> complex_values(const ArrayList& list, const NamedArray& array) {
+  if (array.is_complex()) return std::get<1>(array.values);
+  const std::vector<double> real = real_values(list, array);
+  return {real.begin(), real.end()};
+}
+
+std::vector<std::string> text_values(const ArrayList& list, const NamedArray& array) {
+  if (!array.is_text()) refuse(list, array, "numbers", "text");
+  return std::get<2>(array.values);
+}
+
+}  // namespace stageid

@@ -1,0 +1,120 @@
+#include <fmt/format.h>
+
+#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "tools/exchange/arrays/named_array.hpp"
+
+namespace stageid {
+namespace {
+
+/// Deeper is no file of ours, nor of people: a group that links to itself is without end.
+constexpr int kDeepest = 20;
+
+std::vector<std::size_t> sizes(const std::vector<hsize_t>& shape) {
+  return {shape.begin(), shape.end()};
+}
+
+void read_attributes(const Hdf5File& file, const std::string& object, ArrayList& list) {
+  for (const std::string& name : file.attributes(object)) {
+    const Hdf5Kind kind = file.attribute_kind(object, name);
+    NamedArray array{fmt::format("{}@{}", object.substr(1), name), {}, {}};
+    if (kind == Hdf5Kind::text)
+      array.values = file.read_texts_attribute(object, name);
+    else if (kind == Hdf5Kind::real || kind == Hdf5Kind::integer)
+      array.values = file.read_reals_attribute(object, name);
+    else
+      continue;
+    if (array.size() != 1) array.shape = {array.size()};
+    list.arrays.push_back(std::move(array));
+  }
+}
+
+void read_dataset(const Hdf5File& file, const std::string& dataset, ArrayList& list) {
+  NamedArray array{dataset.substr(1), sizes(file.shape(dataset)), {}};
+  switch (file.kind(dataset)) {
+    case Hdf5Kind::real:
+    case Hdf5Kind::integer:
+      array.values = file.read_reals(dataset);
+      break;
+    case Hdf5Kind::complex:
+      array.values = file.read_complex(dataset);
+      break;
+    case Hdf5Kind::text:
+      if (array.shape.size() != 1) return;
+      array.values = file.read_texts(dataset);
+      break;
+    case Hdf5Kind::other:
+      return;
+  }
+  list.arrays.push_back(std::move(array));
+}
+
+void read_object(const Hdf5File& file, const std::string& object, int depth, ArrayList& list) {
+  if (depth > kDeepest) return;
+  read_attributes(file, object, list);
+  if (!file.is_group(object)) {
+    read_dataset(file, object, list);
+    return;
+  }
+  for (const std::string& child : file.children(object))
+    if (const std::string name = fmt::format("{}/{}", object == "/" ? "" : object, child);
+        file.exists(name))
+      read_object(file, name, depth + 1, list);
+}
+
+void write_attribute(Hdf5File& file, const NamedArray& array, std::size_t at) {
+  const std::string object = fmt::format("/{}", array.name.substr(0, at));
+  const std::string name = array.name.substr(at + 1);
+  const bool single = array.shape.empty();
+  if (const auto* texts = std::get_if<std::vector<std::string>>(&array.values)) {
+    if (single)
+      file.write_attribute(object, name, texts->at(0));
+    else
+      file.write_attribute(object, name, *texts);
+  } else if (const auto* reals = std::get_if<std::vector<double>>(&array.values)) {
+    if (single)
+      file.write_attribute(object, name, reals->at(0));
+    else
+      file.write_attribute(object, name, *reals);
+  }
+}
+
+void write_dataset(Hdf5File& file, const NamedArray& array) {
+  for (std::size_t slash = array.name.find('/'); slash != std::string::npos;
+       slash = array.name.find('/', slash + 1))
+    if (const std::string group = fmt::format("/{}", array.name.substr(0, slash));
+        !file.exists(group))
+      file.create_group(group);
+  const std::string dataset = fmt::format("/{}", array.name);
+  const std::vector<hsize_t> shape(array.shape.begin(), array.shape.end());
+  if (const auto* reals = std::get_if<std::vector<double>>(&array.values))
+    file.write_reals(dataset, shape, reals->data());
+  else if (const auto* complex = std::get_if<std::vector<std::complex<double>>>(&array.values))
+    file.write_complex(dataset, shape, complex->data());
+  else
+    file.write_texts(dataset, std::get<std::vector<std::string>>(array.values));
+}
+
+}  // namespace
+
+ArrayList read_hdf5_arrays(const std::filesystem::path& path) {
+  const Hdf5File file = Hdf5File::open(path);
+  ArrayList list{path, {}};
+  read_object(file, "/", 0, list);
+  return list;
+}
+
+void write_hdf5_arrays(const std::filesystem::path& path, const ArrayList& list) {
+  OutputFile output(path);
+  Hdf5File file = Hdf5File::create(output.path(), path);
+  // Attributes need their object: datasets first.
+  for (const NamedArray& array : list.arrays)
+    if (array.name.find('@') == std::string::npos) write_dataset(file, array);
+  for (const NamedArray& array : list.arrays)
+    if (const std::size_t at = array.name.find('@'); at != std::string::npos)
+      write_attribute(file, array, at);
+  file.close();
+  output.commit();
+}
+
+}  // namespace stageid

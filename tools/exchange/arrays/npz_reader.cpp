@@ -1,0 +1,273 @@
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "acquisition/files/file_error.hpp"
+#include "tools/exchange/arrays/npz_file.hpp"
+#include "tools/terminal/output_paths.hpp"
+#include "tools/terminal/unicode.hpp"
+
+// Sources: as tools/exchange/arrays/npz_writer.cpp. What is read here comes from outside: every offset is checked.
+
+namespace stageid {
+namespace {
+
+/// A deflated stream is at most so many times as long when inflated.
+constexpr std::size_t kMostInflation = 1032;
+
+class Bytes {
+ public:
+  Bytes(const std::filesystem::path& file, std::string place, std::string_view data)
+      : file_(file), place_(std::move(place)), data_(data) {}
+
+  [[noreturn]] void fail(const std::string& what) const { throw FormatError(file_, place_, what); }
+  std::string_view piece(std::size_t at, std::size_t size) const {
+    if (at > data_.size() || size > data_.size() - at)
+      fail("ends before its data do; the file was cut short or is damaged");
+    return data_.substr(at, size);
+  }
+  template <typename Number>
+  Number number(std::size_t at) const {
+    Number value;
+    std::memcpy(&value, piece(at, sizeof(Number)).data(), sizeof(Number));
+    return value;
+  }
+  std::size_t size() const noexcept { return data_.size(); }
+
+ private:
+  const std::filesystem::path& file_;
+  std::string place_;
+  std::string_view data_;
+};
+
+struct Member {
+  std::string name;
+  unsigned method = 0;
+  std::uint32_t crc = 0;
+  std::size_t stored_bytes = 0;
+  std::size_t bytes = 0;
+  std::size_t offset = 0;
+};
+
+std::vector<Member> directory_of(const std::filesystem::path& file, std::string_view content) {
+  const Bytes zip(file, "", content);
+  const std::size_t end = content.rfind(std::string_view("PK\x05\x06", 4));
+  if (!content.starts_with("PK") || end == std::string_view::npos)
+    zip.fail("is no .npz file, or one that was cut short; numpy.savez() writes such files");
+  std::size_t at = zip.number<std::uint32_t>(end + 16);
+  std::vector<Member> members(zip.number<std::uint16_t>(end + 10));
+  for (Member& member : members) {
+    if (zip.piece(at, 4) != std::string_view("PK\x01\x02", 4)) zip.fail("its directory is damaged");
+    member.method = zip.number<std::uint16_t>(at + 10);
+    member.crc = zip.number<std::uint32_t>(at + 16);
+    member.stored_bytes = zip.number<std::uint32_t>(at + 20);
+    member.bytes = zip.number<std::uint32_t>(at + 24);
+    member.offset = zip.number<std::uint32_t>(at + 42);
+    const std::size_t name_bytes = zip.number<std::uint16_t>(at + 28);
+    member.name = zip.piece(at + 46, name_bytes);
+    at += 46 + name_bytes + zip.number<std::uint16_t>(at + 30) + zip.number<std::uint16_t>(at + 32);
+  }
+  return members;
+}
+
+std::string unpacked(const Bytes& zip, const Member& member) {
+  const std::size_t start = member.offset + 30 + zip.number<std::uint16_t>(member.offset + 26) +
+                            zip.number<std::uint16_t>(member.offset + 28);
+  const std::string_view stored = zip.piece(start, member.stored_bytes);
+  if (member.method == 0) return std::string(stored);
+  if (member.method != 8) zip.fail("is packed in a way that is not read; use numpy.savez()");
+  if (member.bytes > kMostInflation * (stored.size() + 1)) zip.fail("its size is damaged");
+  std::string inflated(member.bytes, '\0');
+  z_stream stream = {};
+  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
+  // zlib does not write to its input, but for lack of const in its interface.
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(stored.data()));
+  stream.avail_in = static_cast<uInt>(stored.size());
+  stream.next_out = reinterpret_cast<Bytef*>(inflated.data());
+  stream.avail_out = static_cast<uInt>(inflated.size());
+  const int status = inflate(&stream, Z_FINISH);
+  const bool whole = status == Z_STREAM_END && stream.avail_out == 0;
+  inflateEnd(&stream);
+  if (!whole) zip.fail("cannot be unpacked; the file is damaged");
+  return inflated;
+}
+
+std::string content_of(const std::filesystem::path& file, std::string_view content,
+                       const Member& member) {
+  const Bytes zip(file, member.name, content);
+  std::string bytes = unpacked(zip, member);
+  const uLong crc =
+      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<z_size_t>(bytes.size()));
+  if (crc != member.crc)
+    zip.fail("its checksum (CRC-32) does not match; the file is damaged. Copy or save it again");
+  return bytes;
+}
+
+/// What the header of a .npy member says.
+struct Layout {
+  char kind = 'f';
+  std::size_t width = 8;  ///< bytes an element; of U: characters
+  bool big_endian = false;
+  bool column_major = false;
+  std::vector<std::size_t> shape;
+  std::size_t count = 1;
+};
+
+std::string_view value_of(const Bytes& npy, std::string_view header, std::string_view key) {
+  const std::size_t at = header.find(fmt::format("'{}':", key));
+  if (at == std::string_view::npos) npy.fail(fmt::format("its header has no '{}'", key));
+  std::string_view value = header.substr(at + key.size() + 3);
+  value.remove_prefix(std::min(value.find_first_not_of(' '), value.size()));
+  return value;
+}
+
+std::size_t whole_number(const Bytes& npy, std::string_view digits) {
+  std::size_t value = 0;
+  for (const char c : digits) {
+    if (c < '0' || c > '9' || value > (std::size_t{1} << 48)) npy.fail("its header is damaged");
+    value = 10 * value + static_cast<std::size_t>(c - '0');
+  }
+  return value;
+}
+
+void read_shape(const Bytes& npy, std::string_view text, Layout& layout) {
+  const std::size_t close = text.find(')');
+  if (!text.starts_with('(') || close == std::string_view::npos) npy.fail("its shape is damaged");
+  text = text.substr(1, close - 1);
+  while (!text.empty()) {
+    const std::size_t comma = std::min(text.find(','), text.size());
+    std::string_view digits = text.substr(0, comma);
+    digits.remove_prefix(std::min(digits.find_first_not_of(' '), digits.size()));
+    if (!digits.empty()) layout.shape.push_back(whole_number(npy, digits));
+    text.remove_prefix(std::min(comma + 1, text.size()));
+  }
+  for (const std::size_t extent : layout.shape) {
+    layout.count *= extent;
+    if (layout.count > npy.size())
+      npy.fail("its shape is larger than the data; the file is damaged");
+  }
+}
+
+Layout layout_of(const Bytes& npy, std::string_view header) {
+  Layout layout;
+  const std::string_view type = value_of(npy, header, "descr");
+  const std::size_t quote = type.size() < 2 ? std::string_view::npos : type.find('\'', 1);
+  if (!type.starts_with('\'') || quote == std::string_view::npos || quote < 4)
+    npy.fail("holds records; save one array of numbers a name");
+  layout.big_endian = type[1] == '>';
+  layout.kind = type[2];
+  if (layout.kind == 'O') npy.fail("holds Python objects; save arrays of numbers or text");
+  layout.width = whole_number(npy, type.substr(3, quote - 3));
+  layout.column_major = value_of(npy, header, "fortran_order").starts_with("True");
+  read_shape(npy, value_of(npy, header, "shape"), layout);
+  return layout;
+}
+
+template <typename Number>
+double element(const char* at, bool big_endian) {
+  char raw[sizeof(Number)];
+  std::memcpy(raw, at, sizeof(raw));
+  if (big_endian) std::reverse(raw, raw + sizeof(raw));
+  Number value;
+  std::memcpy(&value, raw, sizeof(raw));
+  return static_cast<double>(value);
+}
+
+using ElementReader = double (*)(const char*, bool);
+
+/// Null if there is no such type.
+ElementReader reader_of(char kind, std::size_t width) {
+  if (kind == 'f') return width == 8 ? element<double> : width == 4 ? element<float> : nullptr;
+  if (kind == 'i')
+    return width == 8   ? element<std::int64_t>
+           : width == 4 ? element<std::int32_t>
+           : width == 2 ? element<std::int16_t>
+           : width == 1 ? element<std::int8_t>
+                        : nullptr;
+  if (kind == 'u' || kind == 'b')
+    return width == 8   ? element<std::uint64_t>
+           : width == 4 ? element<std::uint32_t>
+           : width == 2 ? element<std::uint16_t>
+           : width == 1 ? element<std::uint8_t>
+                        : nullptr;
+  return nullptr;
+}
+
+std::vector<std::string> texts_of(const Bytes& npy, const Layout& layout, std::string_view data) {
+  std::vector<std::string> texts;
+  const std::size_t step = layout.kind == 'U' ? 4 * layout.width : layout.width;
+  if (step != 0 && layout.count > data.size() / step) npy.fail("its data were cut short");
+  for (std::size_t k = 0; k < layout.count; ++k) {
+    const char* at = data.data() + k * step;
+    if (layout.kind == 'S') {
+      texts.emplace_back(at, strnlen(at, step));
+      continue;
+    }
+    std::u32string points;
+    for (std::size_t c = 0; c < layout.width; ++c)
+      points += static_cast<char32_t>(element<std::uint32_t>(at + 4 * c, layout.big_endian));
+    texts.push_back(utf8_of(points.substr(0, points.find(U'\0'))));
+  }
+  return texts;
+}
+
+NamedArray array_of(const std::filesystem::path& file, std::string name, std::string_view content) {
+  const Bytes npy(file, name, content);
+  if (npy.piece(0, 6) != std::string_view("\x93NUMPY", 6)) npy.fail("is no .npy array");
+  const bool short_header = npy.number<std::uint8_t>(6) == 1;
+  const std::size_t start = short_header ? 10 : 12;
+  const std::size_t header_bytes =
+      short_header ? npy.number<std::uint16_t>(8) : npy.number<std::uint32_t>(8);
+  const Layout layout = layout_of(npy, npy.piece(start, header_bytes));
+  const std::string_view data = content.substr(start + header_bytes);
+  NamedArray array{std::move(name), layout.shape, {}};
+  if (layout.column_major) std::reverse(array.shape.begin(), array.shape.end());
+  if (layout.kind == 'U' || layout.kind == 'S') {
+    array.values = texts_of(npy, layout, data);
+  } else {
+    const bool complex = layout.kind == 'c';
+    const std::size_t width = complex ? layout.width / 2 : layout.width;
+    const ElementReader read = reader_of(complex ? 'f' : layout.kind, width);
+    if (read == nullptr)
+      npy.fail(
+          fmt::format("numbers of type '{}{}' are not read; save float64, complex128 or integers",
+                      layout.kind, layout.width));
+    const std::size_t parts = complex ? 2 : 1;
+    if (layout.count > data.size() / (parts * width)) npy.fail("its data were cut short");
+    std::vector<double> numbers(parts * layout.count);
+    for (std::size_t k = 0; k < numbers.size(); ++k)
+      numbers[k] = read(data.data() + k * width, layout.big_endian);
+    if (complex) {
+      std::vector<std::complex<double>> values(layout.count);
+      for (std::size_t k = 0; k < values.size(); ++k)
+        values[k] = {numbers[2 * k], numbers[2 * k + 1]};
+      array.values = std::move(values);
+    } else {
+      array.values = std::move(numbers);
+    }
+  }
+  return layout.column_major ? reversed(array) : array;
+}
+
+}  // namespace
+
+ArrayList read_npz(const std::filesystem::path& file) {
+  require_readable(file);
+  std::ifstream stream(file, std::ios::binary);
+  const std::string content(std::istreambuf_iterator<char>(stream), {});
+  ArrayList list{file, {}};
+  for (const Member& member : directory_of(file, content)) {
+    std::string name = member.name;
+    if (name.ends_with(".npy")) name.resize(name.size() - 4);
+    list.arrays.push_back(array_of(file, name, content_of(file, content, member)));
+  }
+  return list;
+}
+
+}  // namespace stageid

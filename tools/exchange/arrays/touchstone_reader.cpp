@@ -1,0 +1,201 @@
+#include "tools/exchange/arrays/touchstone_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <sstream>
+
+#include "tools/terminal/text_lines.hpp"
+
+namespace stageid {
+namespace {
+
+enum class Form : unsigned char { real_imaginary, magnitude_angle, decibel_angle };
+
+struct Options {
+  double unit_hz = 1e9;
+  Form form = Form::magnitude_angle;
+  char parameters = 'S';
+  double reference_ohm = 50.0;
+};
+
+int ports_of(const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  if (ending.size() < 4 || ending.size() > 5 || std::tolower(ending[1]) != 's' ||
+      std::tolower(ending.back()) != 'p')
+    return 0;
+  const std::string digits = ending.substr(2, ending.size() - 3);
+  if (!std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c); }))
+    return 0;
+  return std::stoi(digits);
+}
+
+double read_reference(const TextLines& lines, std::istringstream& words) {
+  std::string word;
+  words >> word;
+  const std::optional<double> value = parse_number(word);
+  if (!value || !(*value > 0.0))
+    lines.fail(fmt::format("'{}' is not a reference resistance. Write for example R 50", word));
+  return *value;
+}
+
+Options read_options(const TextLines& lines, std::string_view line) {
+  static const std::map<std::string, double> kUnits = {
+      {"HZ", 1.0}, {"KHZ", 1e3}, {"MHZ", 1e6}, {"GHZ", 1e9}};
+  static const std::map<std::string, Form> kForms = {
+      {"RI", Form::real_imaginary}, {"MA", Form::magnitude_angle}, {"DB", Form::decibel_angle}};
+  Options options;
+  std::istringstream words{std::string(line.substr(1))};
+  for (std::string word; words >> word;) {
+    std::transform(word.begin(), word.end(), word.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    if (kUnits.contains(word))
+      options.unit_hz = kUnits.at(word);
+    else if (kForms.contains(word))
+      options.form = kForms.at(word);
+    else if (word == "R")
+      options.reference_ohm = read_reference(lines, words);
+    else if (word.size() == 1 && std::string("SYZGH").find(word) != std::string::npos)
+      options.parameters = word.front();
+    else
+      lines.fail(
+          fmt::format("unknown Touchstone option '{}'. Use HZ, KHZ, MHZ or GHZ, S, Y, Z, G "
+                      "or H, RI, MA or DB, and R with the reference resistance",
+                      word));
+  }
+  return options;
+}
+
+/// What the ports' outputs and inputs are, so that their ratio has the unit of the parameters.
+struct Quantities {
+  std::vector<std::string> outputs, inputs;  ///< V or A; S: 1
+
+  /// Version 1 divides an impedance by the reference resistance and multiplies an admittance with it.
+  int power_of_ohm(Eigen::Index output, Eigen::Index input) const {
+    const std::string& o = outputs.at(static_cast<std::size_t>(output));
+    const std::string& i = inputs.at(static_cast<std::size_t>(input));
+    return o == i ? 0 : o == "V" ? 1 : -1;
+  }
+};
+
+Quantities quantities_of(const TextLines& lines, char parameters, int ports) {
+  const auto all = [ports](const char* unit) {
+    return std::vector<std::string>(static_cast<std::size_t>(ports), unit);
+  };
+  const bool hybrid = parameters == 'H' || parameters == 'G';
+  if (hybrid && ports != 2)
+    lines.fail(fmt::format("{} parameters have two ports, not {}; name a two-port file .s2p",
+                           parameters, ports));
+  switch (parameters) {
+    case 'Z':
+      return {all("V"), all("A")};
+    case 'Y':
+      return {all("A"), all("V")};
+    case 'H':
+      return {{"V", "A"}, {"A", "V"}};
+    case 'G':
+      return {{"A", "V"}, {"V", "A"}};
+    default:
+      return {all("1"), all("1")};
+  }
+}
+
+std::string note_of(const Options& options) {
+  static const std::map<char, const char*> kTaken = {
+      {'Z', "multiplied by the reference resistance {} ohm: V/A (ohm)"},
+      {'Y', "divided by the reference resistance {} ohm: A/V (S)"},
+      {'H', "rescaled by the reference resistance {} ohm: h11 in V/A (ohm), h22 in A/V (S)"},
+      {'G', "rescaled by the reference resistance {} ohm: g11 in A/V (S), g22 in V/A (ohm)"}};
+  const auto found = kTaken.find(options.parameters);
+  if (found == kTaken.end()) return {};
+  return fmt::format("{} parameters {}", options.parameters,
+                     fmt::format(fmt::runtime(found->second), options.reference_ohm));
+}
+
+std::complex<double> value_of(double a, double b, Form form) {
+  if (form == Form::real_imaginary) return {a, b};
+  return std::polar(form == Form::decibel_angle ? std::pow(10.0, a / 20.0) : a,
+                    b * std::numbers::pi / 180.0);
+}
+
+void append_numbers(const TextLines& lines, std::string_view line, std::vector<double>& numbers) {
+  std::istringstream words{std::string(line)};
+  for (std::string word; words >> word;) {
+    const std::optional<double> value = parse_number(word);
+    if (!value) lines.fail(fmt::format("'{}' stands where a finite number belongs", word));
+    numbers.push_back(*value);
+  }
+}
+
+/// Frequency and 2 N^2 numbers a line; of two ports noise parameters may follow, from a lower frequency on.
+std::size_t lines_of(const TextLines& lines, const std::vector<double>& numbers, std::size_t step,
+                     int ports) {
+  std::size_t count = 0;
+  while ((count + 1) * step <= numbers.size() &&
+         (count == 0 || numbers[count * step] > numbers[(count - 1) * step]))
+    ++count;
+  const bool noise = ports == 2 && count > 0 && count * step < numbers.size() &&
+                     numbers[count * step] <= numbers[(count - 1) * step];
+  if (count == 0 || (count * step != numbers.size() && !noise))
+    lines.fail(
+        fmt::format("{} numbers are no whole lines of {} with rising frequency; is the ending "
+                    ".s{}p right?",
+                    numbers.size(), step, ports));
+  return count;
+}
+
+}  // namespace
+
+bool is_touchstone(const std::filesystem::path& file) { return ports_of(file) > 0; }
+
+TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
+  TextLines lines(file);
+  const int ports = ports_of(file);
+  bool seen = false;
+  if (ports < 1) lines.fail("the ending tells no number of ports; write .s1p, .s2p, ...");
+  Options options;
+  std::vector<double> numbers;
+  while (!lines.at_end()) {
+    std::string_view line = lines.next();
+    line = trimmed(line.substr(0, line.find('!')));
+    if (line.starts_with('[')) lines.fail("is Touchstone 2; write Touchstone 1 instead");
+    if (line.starts_with('#')) {
+      // Later option lines are ignored: specification, section "Option Line".
+      if (!seen) options = read_options(lines, line);
+      seen = true;
+    } else {
+      append_numbers(lines, line, numbers);
+    }
+  }
+  const Quantities quantities = quantities_of(lines, options.parameters, ports);
+  const auto n = static_cast<Eigen::Index>(ports);
+  const std::size_t step = 1 + 2 * static_cast<std::size_t>(n * n);
+  const std::size_t count = lines_of(lines, numbers, step, ports);
+  FrfEstimate frf;
+  for (int port = 1; port <= ports; ++port) {
+    frf.inputs.names.push_back(fmt::format("port{}", port));
+    frf.inputs.units.push_back(quantities.inputs.at(static_cast<std::size_t>(port - 1)));
+  }
+  frf.outputs = {frf.inputs.names, quantities.outputs};
+  frf.frequency_hz.resize(static_cast<Eigen::Index>(count));
+  frf.response.resize(n * n, static_cast<Eigen::Index>(count));
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto line = static_cast<Eigen::Index>(k);
+    frf.frequency_hz[line] = numbers[k * step] * options.unit_hz;
+    for (Eigen::Index q = 0; q < n * n; ++q) {
+      const std::size_t at = k * step + 1 + 2 * static_cast<std::size_t>(q);
+      // Row by row, but for two ports: 11, 21, 12, 22.
+      const Eigen::Index channel = ports == 2 ? q : q / n + n * (q % n);
+      frf.response(channel, line) =
+          value_of(numbers[at], numbers[at + 1], options.form) *
+          std::pow(options.reference_ohm, quantities.power_of_ohm(channel % n, channel / n));
+    }
+  }
+  return {std::move(frf), note_of(options)};
+}
+
+}  // namespace stageid

@@ -1,0 +1,235 @@
+#include "tools/exchange/import/import_frf.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "tools/exchange/import/import_rate.hpp"
+
+namespace stageid {
+namespace {
+
+using Complex = std::vector<std::complex<double>>;
+
+[[noreturn]] void fail(const ImportMap& map, const std::string& what) {
+  throw FormatError(map.file, "", what);
+}
+
+std::vector<std::size_t> without_ones(const std::vector<std::size_t>& shape) {
+  std::vector<std::size_t> kept;
+  std::copy_if(shape.begin(), shape.end(), std::back_inserter(kept),
+               [](std::size_t extent) { return extent != 1; });
+  return kept;
+}
+
+/// line, output, input: the place of each among the axes of the array.
+std::vector<std::size_t> axis_places(const ImportMap& map) {
+  std::vector<std::size_t> places;
+  for (const char* axis : {"line", "output", "input"}) {
+    const auto found = std::find(map.axes.begin(), map.axes.end(), axis);
+    if (found == map.axes.end())
+      fail(map, fmt::format("axes: {} are not line, output and input in some order",
+                            fmt::join(map.axes, ", ")));
+    places.push_back(static_cast<std::size_t>(found - map.axes.begin()));
+  }
+  return places;
+}
+
+/// As lines x outputs x inputs.
+NamedArray arranged(const ArrayList& arrays, const NamedArray& array, const ImportMap& map,
+                    std::size_t lines) {
+  NamedArray result = array;
+  if (map.axes.empty()) {
+    if (without_ones(array.shape).size() > 1 || array.size() != lines)
+      fail(map,
+           fmt::format("key 'axes' is missing; '{}' is {} with {} frequencies, write for example "
+                       "axes: [output, input, line]",
+                       array.name, fmt::join(array.shape, " x "), lines));
+    result.shape = {array.size(), 1, 1};
+    return result;
+  }
+  // MATLAB drops trailing axes of length one; a vector is one channel.
+  while (result.shape.size() < 3) result.shape.push_back(1);
+  if (result.shape.size() > 3)
+    throw FormatError(arrays.file, array.name,
+                      fmt::format("is {}; lines, outputs and inputs must stand here",
+                                  fmt::join(array.shape, " x ")));
+  result = permuted(result, axis_places(map));
+  if (result.shape[0] != lines)
+    throw FormatError(arrays.file, array.name,
+                      fmt::format("is {} with axes {}; there are {} frequencies",
+                                  fmt::join(array.shape, " x "), fmt::join(map.axes, ", "), lines));
+  return result;
+}
+
+std::vector<std::string> names_or(const ImportMap& map, const char* key,
+                                  const std::vector<std::string>& given, std::size_t count,
+                                  const char* prefix) {
+  std::vector<std::string> names = given;
+  for (std::size_t k = 0; k < count && given.empty(); ++k)
+    names.push_back(fmt::format("{}{}", prefix, k + 1));
+  if (names.size() != count)
+    fail(map, fmt::format("{}: {} names; the response has {}", key, names.size(), count));
+  return names;
+}
+
+template <typename Scalar>
+Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> vec_columns(
+    const std::vector<Scalar>& values, const std::vector<std::size_t>& shape) {
+  const auto N = static_cast<Eigen::Index>(shape[0]), n_y = static_cast<Eigen::Index>(shape[1]),
+             n_u = static_cast<Eigen::Index>(shape[2]);
+  Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> columns(n_y * n_u, N);
+  std::size_t at = 0;
+  for (Eigen::Index k = 0; k < N; ++k)
+    for (Eigen::Index i = 0; i < n_y; ++i)
+      for (Eigen::Index j = 0; j < n_u; ++j) columns(i + n_y * j, k) = values[at++];
+  return columns;
+}
+
+Complex complex_of(const ArrayList& arrays, const std::string& real, const std::string& imaginary) {
+  Complex values = complex_values(arrays, arrays.at(real));
+  if (imaginary.empty()) return values;
+  const std::vector<double> parts = real_values(arrays, arrays.at(imaginary));
+  if (parts.size() != values.size())
+    throw FormatError(arrays.file, imaginary,
+                      fmt::format("has {} values; '{}' has {}", parts.size(), real, values.size()));
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] = {values[k].real(), parts[k]};
+  return values;
+}
+
+Complex polar_of(const ArrayList& arrays, const ImportMap::Channel& channel) {
+  Complex values = complex_of(arrays, channel.magnitude, channel.phase_deg);
+  for (std::complex<double>& value : values)
+    value = std::polar(1.0, value.imag() * std::numbers::pi / 180.0) * value.real();
+  return values;
+}
+
+double scalar_of(const ArrayList& arrays, const ImportMap::Scalar& scalar) {
+  if (scalar.number) return *scalar.number;
+  const std::vector<double> values = real_values(arrays, arrays.at(scalar.variable));
+  if (values.size() != 1)
+    throw FormatError(arrays.file, scalar.variable,
+                      fmt::format("has {} values; expected one number", values.size()));
+  return values.front();
+}
+
+/// As many as the response has lines.
+std::vector<double> even_frequencies(const ArrayList& arrays, const ImportMap& map) {
+  const double first = scalar_of(arrays, map.first_hz), step = scalar_of(arrays, map.step_hz);
+  if (!(step > 0.0)) fail(map, fmt::format("step_hz: {} is not positive; correct it", step));
+  const ImportMap::Channel* channel = map.channels.empty() ? nullptr : &map.channels.front();
+  const NamedArray& array = arrays.at(channel == nullptr            ? map.response
+                                      : !channel->response.empty()  ? channel->response
+                                      : !channel->magnitude.empty() ? channel->magnitude
+                                                                    : channel->real);
+  std::size_t lines = array.size();
+  if (channel == nullptr && !map.axes.empty()) {
+    const std::size_t place = axis_places(map).front();
+    lines = place < array.shape.size() ? array.shape[place] : 1;
+  }
+  std::vector<double> frequency;
+  for (std::size_t k = 0; k < lines; ++k)
+    frequency.push_back(first + static_cast<double>(k) * step);
+  return frequency;
+}
+
+void read_whole_response(const ArrayList& arrays, const ImportMap& map, FrfEstimate& frf) {
+  const auto lines = static_cast<std::size_t>(frf.lines());
+  NamedArray array = arrays.at(map.response);
+  array.values = complex_of(arrays, map.response, map.response_imaginary);
+  array = arranged(arrays, array, map, lines);
+  frf.response = vec_columns(std::get<1>(array.values), array.shape);
+  frf.outputs.names = names_or(map, "outputs", map.outputs, array.shape[1], "y");
+  frf.inputs.names = names_or(map, "inputs", map.inputs, array.shape[2], "u");
+  const auto variance = [&](const std::string& name) -> Eigen::MatrixXd {
+    if (name.empty()) return {};
+    const NamedArray found = arranged(arrays, arrays.at(name), map, lines);
+    if (found.shape != array.shape)
+      throw FormatError(arrays.file, name,
+                        fmt::format("is not of the shape of '{}'", map.response));
+    return vec_columns(real_values(arrays, found), found.shape);
+  };
+  frf.noise_variance = variance(map.noise_variance);
+  frf.total_variance = variance(map.total_variance);
+}
+
+std::vector<std::string> appearing(const ImportMap& map, std::string ImportMap::Channel::*name) {
+  std::vector<std::string> names;
+  for (const ImportMap::Channel& channel : map.channels)
+    if (std::find(names.begin(), names.end(), channel.*name) == names.end())
+      names.push_back(channel.*name);
+  return names;
+}
+
+void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& frf) {
+  frf.outputs.names =
+      map.outputs.empty() ? appearing(map, &ImportMap::Channel::output) : map.outputs;
+  frf.inputs.names = map.inputs.empty() ? appearing(map, &ImportMap::Channel::input) : map.inputs;
+  frf.response =
+      Eigen::MatrixXcd::Constant(frf.n_outputs() * frf.n_inputs(), frf.lines(), std::nan(""));
+  if (!map.channels.front().noise_variance.empty()) frf.noise_variance = frf.response.real();
+  if (!map.channels.front().total_variance.empty()) frf.total_variance = frf.response.real();
+  const auto place = [&](const std::vector<std::string>& names, const std::string& name) {
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+      fail(map, fmt::format("channels: '{}' is none of {}", name, fmt::join(names, ", ")));
+    return found - names.begin();
+  };
+  for (const ImportMap::Channel& channel : map.channels) {
+    const std::string& real = channel.real.empty() ? channel.response : channel.real;
+    const Complex values = channel.magnitude.empty() ? complex_of(arrays, real, channel.imaginary)
+                                                     : polar_of(arrays, channel);
+    const Eigen::Index row = place(frf.outputs.names, channel.output) +
+                             frf.n_outputs() * place(frf.inputs.names, channel.input);
+    const auto put = [&](const auto& column, auto& matrix) {
+      if (static_cast<Eigen::Index>(column.size()) != frf.lines())
+        fail(map, fmt::format("channels: {} <- {} has {} values; there are {} frequencies",
+                              channel.output, channel.input, column.size(), frf.lines()));
+      for (Eigen::Index k = 0; k < frf.lines(); ++k)
+        matrix(row, k) = column[static_cast<std::size_t>(k)];
+    };
+    put(values, frf.response);
+    if (frf.noise_variance.size() > 0)
+      put(real_values(arrays, arrays.at(channel.noise_variance)), frf.noise_variance);
+    if (frf.total_variance.size() > 0)
+      put(real_values(arrays, arrays.at(channel.total_variance)), frf.total_variance);
+  }
+  if (map.channels.size() != frf.outputs.size() * frf.inputs.size())
+    fail(map, fmt::format("channels: {} of {} outputs and {} inputs; give every pair once",
+                          map.channels.size(), frf.outputs.size(), frf.inputs.size()));
+}
+
+}  // namespace
+
+FrfEstimate import_frf(const ArrayList& arrays, const ImportMap& map) {
+  FrfEstimate frf;
+  if (map.sample_rate_hz > 0.0) (void)sample_rate_of(arrays, map);  // the file's must agree
+  const std::vector<double> frequency = map.frequency.empty()
+                                            ? even_frequencies(arrays, map)
+                                            : real_values(arrays, arrays.at(map.frequency));
+  frf.frequency_hz = Eigen::Map<const Eigen::VectorXd>(frequency.data(),
+                                                       static_cast<Eigen::Index>(frequency.size()));
+  if (map.frequency_unit == ImportMap::FrequencyUnit::rad_s)
+    frf.frequency_hz /= 2.0 * std::numbers::pi;
+  if (map.channels.empty())
+    read_whole_response(arrays, map, frf);
+  else
+    read_channels(arrays, map, frf);
+  frf.outputs.units = units_of(map, "output_unit", map.output_unit, frf.outputs.size());
+  frf.inputs.units = units_of(map, "input_unit", map.input_unit, frf.inputs.size());
+  frf.sample_rate_hz = map.sample_rate_hz;
+  frf.hold = map.hold == ImportMap::FrfHold::zoh ? Hold::zoh : Hold::none;
+  try {
+    check(frf);
+  } catch (const std::invalid_argument& error) {
+    throw FormatError(arrays.file, "", error.what());
+  }
+  return frf;
+}
+
+}  // namespace stageid

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "frf/response/frf_estimate.hpp"
+#include "tools/exchange/arrays/named_array.hpp"
+#include "tools/exchange/import/import_map.hpp"
+
+namespace stageid {
+
+/// The frequency response that a map finds among the arrays of a foreign file.
+/// @throws FormatError naming the file and the array, or the map and the key that is missing or wrong.
+FrfEstimate import_frf(const ArrayList& arrays, const ImportMap& map);
+
+}  // namespace stageid

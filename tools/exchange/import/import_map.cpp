@@ -1,0 +1,204 @@
+#include "tools/exchange/import/import_map.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <set>
+#include <sstream>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
+#include "tools/config/config_reader.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Presence kOptional = Presence::optional;
+
+void describe_channel(ConfigVisitor& v, ImportMap::Channel& channel) {
+  v.text("output", channel.output, Presence::required, "name of the output");
+  v.text("input", channel.input, Presence::required, "name of the input");
+  v.text("response", channel.response, kOptional, "array of complex numbers");
+  v.text("real", channel.real, kOptional, "or array of real parts");
+  v.text("imaginary", channel.imaginary, kOptional, "and array of imaginary parts");
+  v.text("magnitude", channel.magnitude, kOptional, "or array of magnitudes");
+  v.text("phase_deg", channel.phase_deg, kOptional, "and array of phases in degrees");
+  v.text("noise_variance", channel.noise_variance, kOptional, "array, in every channel or in none");
+  v.text("total_variance", channel.total_variance, kOptional, "array, in every channel or in none");
+  const int forms = static_cast<int>(!channel.response.empty()) +
+                    static_cast<int>(!channel.real.empty()) +
+                    static_cast<int>(!channel.magnitude.empty());
+  v.require(forms == 1 && channel.real.empty() == channel.imaginary.empty() &&
+                channel.magnitude.empty() == channel.phase_deg.empty(),
+            "output", "a channel has response, or real and imaginary, or magnitude and phase_deg");
+}
+
+void describe_signals(ConfigVisitor& v, ImportMap::Signals& signals) {
+  v.texts("arrays", signals.arrays, {1}, Presence::required,
+          "arrays of samples, or of samples x channels");
+  v.texts("names", signals.names, {1}, kOptional,
+          "of the channels; those of the arrays if left out");
+  v.texts("axes", signals.axes, {1, 5}, kOptional,
+          "of the arrays in their order: sample, channel, realization, experiment, run");
+  static const std::set<std::string> kAxes = {"sample", "channel", "realization", "experiment",
+                                              "run"};
+  const std::set<std::string> axes(signals.axes.begin(), signals.axes.end());
+  v.require(axes.size() == signals.axes.size() && (axes.empty() || axes.contains("sample")) &&
+                std::includes(kAxes.begin(), kAxes.end(), axes.begin(), axes.end()) &&
+                !(axes.contains("run") && axes.contains("realization")) &&
+                !(axes.contains("run") && axes.contains("experiment")),
+            "arrays",
+            "axes name sample, and at most once each channel, realization and experiment or run; "
+            "write for example axes: [sample, channel, run]");
+  v.text("unit", signals.unit, kOptional, "one, or one a channel with blanks between");
+  v.numbers("scale", signals.scale, {}, {1}, kOptional,
+            "unit over number in the file, one a channel");
+}
+
+void describe_run(ConfigVisitor& v, ImportMap::Run& run) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 48;
+  v.integer("realization", run.realization, 0, 1'000'000, kOptional, "0-based");
+  v.integer("experiment", run.experiment, 0, 1'000'000, kOptional, "0-based");
+  v.integer("first_row", run.first_row, 0, kMost, kOptional, "0-based");
+  v.integer("rows", run.rows, 0, kMost, kOptional, "0: to the end");
+}
+
+/// That the run just read is none of those before it: they would be one run of two contents.
+void require_another_run(ConfigVisitor& v, const std::vector<ImportMap::Run>& runs) {
+  const ImportMap::Run& last = runs.back();
+  const auto same = std::find_if(runs.begin(), runs.end(), [&](const ImportMap::Run& run) {
+    return run.realization == last.realization && run.experiment == last.experiment;
+  });
+  const auto place = same - runs.begin();
+  const bool another = place + 1 == static_cast<std::ptrdiff_t>(runs.size());
+  v.require(another, "experiment",
+            fmt::format("entries {} and {} of runs are both realization: {}, experiment: {}; give "
+                        "each run its own",
+                        place + 1, runs.size(), last.realization, last.experiment));
+}
+
+void describe_scalar(ConfigVisitor& v, const char* key, ImportMap::Scalar& scalar,
+                     const char* help) {
+  FlexibleValue value;
+  value.word = scalar.variable;
+  FlexibleRule rule;
+  rule.number = true;
+  rule.any_text = true;
+  rule.text_meaning = "the name of a variable";
+  rule.rule = not_negative("Hz");
+  v.flexible(key, value, rule, kOptional, help);
+  scalar.variable = value.word;
+  if (!value.numbers.empty()) scalar.number = value.numbers.front();
+}
+
+void describe_frf(ConfigVisitor& v, ImportMap& map) {
+  v.text("frequency", map.frequency, kOptional, "array of frequencies");
+  describe_scalar(v, "first_hz", map.first_hz, "first frequency of an even axis, or its variable");
+  describe_scalar(v, "step_hz", map.step_hz, "its step, or the variable that holds it");
+  choose(v, "frequency_unit", map.frequency_unit, {"Hz", "rad/s"}, kOptional, "of the frequencies");
+  v.text("response", map.response, kOptional, "array of the response, complex or its real part");
+  v.text("response_imaginary", map.response_imaginary, kOptional, "array of its imaginary part");
+  v.texts("axes", map.axes, {3, 3}, kOptional,
+          "of the response: line, output, input in their order");
+  v.text("noise_variance", map.noise_variance, kOptional, "array, axes as the response");
+  v.text("total_variance", map.total_variance, kOptional, "array, axes as the response");
+  v.texts("inputs", map.inputs, {1}, kOptional, "names");
+  v.texts("outputs", map.outputs, {1}, kOptional, "names");
+  v.text("input_unit", map.input_unit, kOptional, "one, or one an input with blanks between");
+  v.text("output_unit", map.output_unit, kOptional, "one, or one an output with blanks between");
+  choose(v, "hold", map.hold, {"none", "zoh"}, kOptional,
+         "zoh: as a digital loop sees it, through a zero-order hold");
+  v.items(
+      "channels",
+      [&map](ConfigVisitor& item) { describe_channel(item, map.channels.emplace_back()); }, {1},
+      kOptional, "the response channel by channel");
+}
+
+void describe_log(ConfigVisitor& v, ImportMap& map) {
+  v.integer("period_samples", map.period_samples, 0, 1 << 27, kOptional, "samples of one period");
+  v.integer("transient_periods", map.transient_periods, 0, 1'000'000, kOptional,
+            "periods at the start of every run that are not used");
+  const auto signals = [&v](const char* key, ImportMap::Signals& group, const char* help) {
+    v.group(
+        key, [&group](ConfigVisitor& inner) { describe_signals(inner, group); }, kOptional, help);
+  };
+  signals("excitation", map.excitation, "what was added in the loop");
+  signals("actuators", map.actuators, "what went into the plant");
+  signals("sensors", map.sensors, "what came out of it");
+  choose(v, "excitation_period", map.excitation_period, {"repeats", "mean"}, kOptional,
+         "mean: the excitation was measured, take the mean of its periods behind the transient");
+  v.items(
+      "runs",
+      [&map](ConfigVisitor& item) {
+        describe_run(item, map.runs.emplace_back());
+        require_another_run(item, map.runs);
+      },
+      {1}, kOptional, "one run of all rows if left out");
+}
+
+void require_keys(ConfigVisitor& v, const ImportMap& map) {
+  if (map.kind == ImportMap::Kind::log) {
+    v.require(map.period_samples > 0, "kind", "a log needs period_samples; add it");
+    v.require(!map.excitation.arrays.empty(), "kind",
+              "a log needs excitation: {arrays: [...]}; add it");
+    v.require(!map.actuators.arrays.empty(), "kind",
+              "a log needs actuators: {arrays: [...]}; add it");
+    v.require(!map.sensors.arrays.empty(), "kind", "a log needs sensors: {arrays: [...]}; add it");
+    return;
+  }
+  const bool even = !map.first_hz.empty() || !map.step_hz.empty();
+  v.require(map.frequency.empty() == even, "kind",
+            map.frequency.empty()
+                ? "a frequency response needs frequency, or first_hz and step_hz; add it"
+                : "a frequency response has either frequency, or first_hz and step_hz; remove one");
+  v.require(!even || (!map.first_hz.empty() && !map.step_hz.empty()), "kind",
+            "first_hz and step_hz belong together; add the other one");
+  v.require(!even || map.frequency_unit == ImportMap::FrequencyUnit::hz, "kind",
+            "first_hz and step_hz are in Hz; remove frequency_unit");
+  v.require(map.response.empty() != map.channels.empty(), "kind",
+            "a frequency response needs either response or channels; add one of them");
+  for (const auto name : {&ImportMap::Channel::noise_variance, &ImportMap::Channel::total_variance})
+    v.require(std::all_of(map.channels.begin(), map.channels.end(),
+                          [&](const ImportMap::Channel& channel) {
+                            return (channel.*name).empty() == (map.channels.front().*name).empty();
+                          }),
+              "channels", "a variance stands in every channel or in none; add or remove it");
+}
+
+}  // namespace
+
+std::vector<std::string> units_of(const ImportMap& map, const char* key, const std::string& words,
+                                  std::size_t count) {
+  std::istringstream stream(words);
+  std::vector<std::string> units{std::istream_iterator<std::string>(stream), {}};
+  if (units.empty()) units = {"1"};
+  if (units.size() == 1) units.resize(count, units.front());
+  if (units.size() != count)
+    throw FormatError(map.file, "",
+                      fmt::format("{}: {} for {}; give one, or one a channel", key,
+                                  counted(units.size(), "unit"), counted(count, "channel")));
+  return units;
+}
+
+ImportMap read_import_map(const std::filesystem::path& file) {
+  ImportMap map;
+  map.file = file;
+  const YamlDocument document = YamlDocument::read(file);
+  read_config(document, [&map](ConfigVisitor& v) {
+    choose(v, "kind", map.kind, {"frf", "log"}, Presence::required, "what the file holds");
+    v.text("files", map.files, kOptional,
+           "pattern of the files of a log, such as run_{realization}_{experiment}.mat, from the "
+           "folder of the map");
+    v.number("sample_rate_hz", map.sample_rate_hz, {"Hz", 0.0}, kOptional,
+             "0: unknown; a log takes that of the file");
+    choose(v, "file_sample_rate", map.file_sample_rate, {"checked", "ignored"}, kOptional,
+           "ignored: the file's own sample rate or time axis is known to be wrong");
+    describe_frf(v, map);
+    describe_log(v, map);
+    require_keys(v, map);
+  });
+  return map;
+}
+
+}  // namespace stageid

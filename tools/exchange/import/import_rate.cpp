@@ -1,0 +1,134 @@
+#include "tools/exchange/import/import_rate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "acquisition/files/file_error.hpp"
+
+namespace stageid {
+namespace {
+
+/// A rate or a step that was rounded to four digits is wrong by at most this part.
+constexpr double kRounding = 5e-4;
+
+struct FileRate {
+  double hz = 0.0;
+  std::string told_by;
+};
+
+/// Last part of a path or the attribute's name, lower case without separators.
+std::string plain_name(const std::string& name) {
+  const std::size_t at = name.find_last_of("/@.");
+  std::string out;
+  for (const char c : at == std::string::npos ? name : name.substr(at + 1))
+    if (c != '_' && c != ' ' && c != '[' && c != ']' && c != '(' && c != ')')
+      out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return out;
+}
+
+std::optional<double> rate_of_scalar(const std::string& name, double value) {
+  static const std::set<std::string> kRates = {"samplerate",
+                                               "sampleratehz",
+                                               "samplingrate",
+                                               "samplingratehz",
+                                               "samplefrequency",
+                                               "samplefrequencyhz",
+                                               "samplingfrequency",
+                                               "samplingfrequencyhz",
+                                               "fs",
+                                               "fshz",
+                                               "fsample"};
+  static const std::set<std::string> kSteps = {
+      "dt",           "dts",         "ts",           "tsample",       "sampletime",
+      "samplingtime", "sampletimes", "sampleperiod", "sampleperiods", "wfincrement"};
+  if (!(value > 0.0)) return std::nullopt;
+  if (kRates.contains(name)) return value;
+  if (kSteps.contains(name)) return 1.0 / value;
+  return std::nullopt;
+}
+
+/// Of a rising axis in seconds; the median, as the axis may begin anew with every run.
+std::optional<double> rate_of_axis(const std::vector<double>& time_s) {
+  if (time_s.size() < 3) return std::nullopt;
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < time_s.size(); ++k) steps.push_back(time_s[k] - time_s[k - 1]);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  double step = *middle;
+  if (!(step > 0.0)) return std::nullopt;
+  // Digits of a long axis are few for one step: the whole axis has it better, if it is one.
+  const double mean = (time_s.back() - time_s.front()) / static_cast<double>(steps.size());
+  if (std::abs(mean - step) < 0.5 * step) step = mean;
+  return 1.0 / step;
+}
+
+std::vector<FileRate> rates_of(const ArrayList& arrays, const ImportMap& map) {
+  static const std::set<std::string> kAxes = {"t", "ts", "time", "times", "timeaxis"};
+  std::set<std::string> abscissas;
+  for (const ImportMap::Signals* group : {&map.excitation, &map.actuators, &map.sensors})
+    for (const std::string& name : group->arrays) abscissas.insert(name + "@abscissa");
+  std::vector<FileRate> rates;
+  for (const NamedArray& array : arrays.arrays) {
+    const auto* values = std::get_if<std::vector<double>>(&array.values);
+    if (values == nullptr || values->empty()) continue;
+    const bool axis = abscissas.contains(array.name) ||
+                      (values->size() > 1 && kAxes.contains(plain_name(array.name)));
+    const auto rate = axis ? rate_of_axis(*values)
+                      : values->size() == 1
+                          ? rate_of_scalar(plain_name(array.name), values->front())
+                          : std::nullopt;
+    if (rate) rates.push_back({*rate, array.name});
+  }
+  return rates;
+}
+
+/// The number of six digits that is meant where the digits of a time axis leave a little more.
+double snapped(double hz) {
+  const double unit = std::pow(10.0, std::floor(std::log10(hz)) - 5.0);
+  const double round = std::round(hz / unit) * unit;
+  return std::abs(round - hz) < 1e-7 * hz ? round : hz;
+}
+
+bool agree(double a, double b) { return std::abs(a - b) <= kRounding * std::max(a, b); }
+
+}  // namespace
+
+double sample_rate_of(const ArrayList& arrays, const ImportMap& map) {
+  if (map.file_sample_rate == ImportMap::FileSampleRate::ignored && map.sample_rate_hz > 0.0)
+    return map.sample_rate_hz;
+  const std::vector<FileRate> rates = rates_of(arrays, map);
+  if (map.sample_rate_hz > 0.0) {
+    const bool confirmed =
+        rates.empty() || std::any_of(rates.begin(), rates.end(), [&](const FileRate& rate) {
+          return agree(rate.hz, map.sample_rate_hz);
+        });
+    if (confirmed) return map.sample_rate_hz;
+    throw FormatError(
+        map.file, "",
+        fmt::format("sample_rate_hz: {} contradicts {} Hz, which '{}' of {} says. Correct "
+                    "sample_rate_hz, or write file_sample_rate: ignored if the file is wrong",
+                    map.sample_rate_hz, fmt::format("{:.6g}", rates.front().hz),
+                    rates.front().told_by, arrays.file.string()));
+  }
+  if (rates.empty())
+    throw FormatError(map.file, "",
+                      fmt::format("a log needs sample_rate_hz, and {} does not tell it; add it",
+                                  arrays.file.string()));
+  for (const FileRate& rate : rates)
+    if (!agree(rate.hz, rates.front().hz))
+      throw FormatError(map.file, "",
+                        fmt::format("a log needs sample_rate_hz: '{}' of {} says {:.6g} Hz, '{}' "
+                                    "{:.6g} Hz; add it",
+                                    rates.front().told_by, arrays.file.string(), rates.front().hz,
+                                    rate.told_by, rate.hz));
+  return snapped(rates.front().hz);
+}
+
+}  // namespace stageid

@@ -1,0 +1,235 @@
+#include "tools/exchange/import/import_signals.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
+#include "tools/exchange/import/si_unit.hpp"
+
+namespace stageid {
+namespace {
+
+[[noreturn]] void fail(const ImportMap& map, const std::string& what) {
+  throw FormatError(map.file, "", what);
+}
+
+std::vector<const ImportMap::Signals*> groups_of(const ImportMap& map) {
+  return {&map.excitation, &map.actuators, &map.sensors};
+}
+
+std::vector<std::string> names_in(const ArrayList& arrays) {
+  std::vector<std::string> names;
+  for (const NamedArray& array : arrays.arrays) names.push_back(array.name);
+  return names;
+}
+
+std::string with_slashes(std::string name) {
+  if (name.starts_with('/')) name.erase(0, 1);
+  return name;
+}
+
+/// The array of a name, which may be a pattern.
+const NamedArray& array_of(const ArrayList& arrays, const ImportMap& map, const std::string& name,
+                           const RunNumbers& wanted) {
+  if (!is_pattern(name)) return arrays.at(name);
+  for (const auto& [numbers, found] : matches_of(with_slashes(name), names_in(arrays))) {
+    // A name with one placeholder belongs to all runs of that number.
+    const bool same = (!numbers.realization || numbers.realization == wanted.realization) &&
+                      (!numbers.experiment || numbers.experiment == wanted.experiment);
+    if (same) return arrays.at(found);
+  }
+  const auto number = [](const char* key, const std::optional<long long>& value) {
+    return value ? fmt::format(" {} {}", key, *value) : std::string();
+  };
+  throw FormatError(arrays.file, "",
+                    fmt::format("has no '{}' of{}{}, which '{}' asks for. Add it, or correct the "
+                                "pattern in {}",
+                                name, number("realization", wanted.realization),
+                                number("experiment", wanted.experiment), name, map.file.string()));
+}
+
+const std::vector<double>& reals_of(const ArrayList& arrays, const NamedArray& array) {
+  if (array.is_text() || array.is_complex())
+    throw FormatError(arrays.file, array.name,
+                      fmt::format("holds {}; expected real numbers",
+                                  array.is_text() ? "text" : "complex numbers"));
+  return std::get<0>(array.values);
+}
+
+/// Extent and step of every declared axis.
+struct Axis {
+  std::size_t extent = 1, step = 0;
+};
+
+bool is_vector(const NamedArray& array) {
+  return std::count_if(array.shape.begin(), array.shape.end(),
+                       [](std::size_t extent) { return extent != 1; }) <= 1;
+}
+
+/// The axes of `array` in the order of the map's `axes`.
+std::vector<Axis> axes_of(const ArrayList& arrays, const NamedArray& array,
+                          const std::vector<std::string>& names) {
+  std::vector<std::size_t> shape = array.shape;
+  if (names.size() == 1 && is_vector(array)) shape = {array.size()};
+  while (shape.size() < names.size()) shape.push_back(1);  // MATLAB drops trailing ones
+  while (shape.size() > names.size() && shape.back() == 1) shape.pop_back();
+  if (shape.size() != names.size())
+    throw FormatError(
+        arrays.file, array.name,
+        fmt::format("is {}; axes: [{}] names {}. Name every axis", fmt::join(array.shape, " x "),
+                    fmt::join(names, ", "), counted(names.size(), "axis", "axes")));
+  std::vector<Axis> axes(shape.size());
+  std::size_t step = 1;
+  for (std::size_t q = shape.size(); q-- > 0; step *= shape[q]) axes[q] = {shape[q], step};
+  return axes;
+}
+
+/// Without `axes`: samples x channels, and MATLAB's rows and columns are both vectors.
+SampleRows plain_samples(const ArrayList& arrays, const NamedArray& array, const char* key) {
+  if (array.shape.size() > 2)
+    throw FormatError(
+        arrays.file, array.name,
+        fmt::format(
+            "is {}. Name its axes in the map: {}: {{arrays: [{}], axes: [sample, channel, "
+            "run]}}, in their order; there are sample, channel, realization, experiment and "
+            "run",
+            fmt::join(array.shape, " x "), key, array.name));
+  const std::vector<double>& values = reals_of(arrays, array);
+  const bool vector = array.shape.size() < 2 || array.shape[0] == 1;
+  const auto rows = static_cast<Eigen::Index>(vector ? values.size() : array.shape[0]);
+  if (rows == 0) throw FormatError(arrays.file, array.name, "is empty; expected samples");
+  return Eigen::Map<const SampleRows>(values.data(), rows,
+                                      static_cast<Eigen::Index>(values.size()) / rows);
+}
+
+SampleRows samples_of(const ArrayList& arrays, const NamedArray& array,
+                      const std::vector<std::string>& names, const char* key,
+                      const RunPlace& place) {
+  if (names.empty()) return plain_samples(arrays, array, key);
+  const std::vector<double>& values = reals_of(arrays, array);
+  const std::vector<Axis> axes = axes_of(arrays, array, names);
+  Axis sample, channel;
+  std::size_t first = 0;
+  for (std::size_t q = 0; q < names.size(); ++q) {
+    if (names[q] == "sample") sample = axes[q];
+    if (names[q] == "channel") channel = axes[q];
+    if (names[q] == "realization")
+      first += axes[q].step * static_cast<std::size_t>(place.realization);
+    if (names[q] == "experiment")
+      first += axes[q].step * static_cast<std::size_t>(place.experiment);
+    if (names[q] == "run") first += axes[q].step * static_cast<std::size_t>(place.run);
+  }
+  if (values.empty()) throw FormatError(arrays.file, array.name, "is empty; expected samples");
+  SampleRows out(sample.extent, channel.extent);
+  for (std::size_t n = 0; n < sample.extent; ++n)
+    for (std::size_t c = 0; c < channel.extent; ++c)
+      out(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(c)) =
+          values[first + n * sample.step + c * channel.step];
+  return out;
+}
+
+void name_channels(const ImportMap& map, const char* key, const ImportMap::Signals& group,
+                   SignalGroup& out, std::vector<std::string>& notes) {
+  const auto count = static_cast<std::size_t>(out.samples.cols());
+  if (!group.names.empty()) out.channels.names = group.names;
+  if (out.channels.names.size() != count)
+    fail(map, fmt::format("{}: {} for {}; give names: [...]", key,
+                          counted(out.channels.names.size(), "name"), counted(count, "channel")));
+  out.channels.units = units_of(map, key, group.unit, count);
+  if (!group.scale.empty() && group.scale.size() != count)
+    fail(map, fmt::format("{}: {} for {}; give one a channel", key,
+                          counted(group.scale.size(), "scale"), counted(count, "channel")));
+  std::vector<double> factors;
+  try {
+    factors = take_si_units(key, out.channels, notes);
+  } catch (const std::invalid_argument& error) {
+    fail(map, error.what());
+  }
+  for (std::size_t c = 0; c < count; ++c) {
+    const double factor = factors[c] * (group.scale.empty() ? 1.0 : group.scale[c]);
+    if (factor != 1.0) out.samples.col(static_cast<Eigen::Index>(c)) *= factor;
+  }
+}
+
+}  // namespace
+
+RunAxes run_axes_of(const ArrayList& arrays, const ImportMap& map) {
+  RunAxes out;
+  const auto take = [&](const NamedArray& array, const std::string& name, std::size_t extent,
+                        bool& has, Eigen::Index& count) {
+    const auto size = static_cast<Eigen::Index>(extent);
+    if (has && size != count)
+      throw FormatError(arrays.file, array.name,
+                        fmt::format("has {} along axis {}; another array has {}. All must have the "
+                                    "same",
+                                    size, name, count));
+    has = true;
+    count = size;
+  };
+  for (const ImportMap::Signals* group : groups_of(map))
+    for (const std::string& name : group->arrays) {
+      if (group->axes.empty()) break;
+      const RunNumbers first = name_numbers_of(arrays, map).front();
+      const NamedArray& array = array_of(arrays, map, name, first);
+      const std::vector<Axis> axes = axes_of(arrays, array, group->axes);
+      for (std::size_t q = 0; q < axes.size(); ++q) {
+        const std::string& axis = group->axes[q];
+        if (axis == "realization")
+          take(array, axis, axes[q].extent, out.has_realizations, out.realizations);
+        if (axis == "experiment")
+          take(array, axis, axes[q].extent, out.has_experiments, out.experiments);
+        if (axis == "run") take(array, axis, axes[q].extent, out.has_runs, out.runs);
+      }
+    }
+  return out;
+}
+
+std::vector<RunNumbers> name_numbers_of(const ArrayList& arrays, const ImportMap& map) {
+  std::set<RunNumbers> numbers;
+  bool patterns = false;
+  for (const ImportMap::Signals* group : {&map.sensors, &map.actuators})
+    for (const std::string& name : group->arrays) {
+      if (!is_pattern(name)) continue;
+      patterns = true;
+      const auto found = matches_of(with_slashes(name), names_in(arrays));
+      if (found.empty()) (void)arrays.at(name);  // says what there is
+      if (numbers.empty())
+        for (const auto& [run, text] : found) numbers.insert(run);
+    }
+  if (!patterns) return {RunNumbers{}};
+  return {numbers.begin(), numbers.end()};
+}
+
+SignalGroup read_signals(const ArrayList& arrays, const ImportMap& map, const char* key,
+                         const ImportMap::Signals& group, const RunPlace& place,
+                         std::vector<std::string>& notes) {
+  SignalGroup out;
+  for (const std::string& name : group.arrays) {
+    const NamedArray& array = array_of(arrays, map, name, place.names);
+    const SampleRows columns = samples_of(arrays, array, group.axes, key, place);
+    if (out.samples.cols() > 0 && columns.rows() != out.samples.rows())
+      throw FormatError(arrays.file, array.name,
+                        fmt::format("has {} samples; '{}' has {}", columns.rows(),
+                                    group.arrays.front(), out.samples.rows()));
+    const Eigen::Index first = out.samples.cols();
+    out.samples.conservativeResize(columns.rows(), first + columns.cols());
+    out.samples.rightCols(columns.cols()) = columns;
+    // Several channels in one array have no names of their own.
+    if (columns.cols() == 1 && !is_pattern(name)) out.channels.names.push_back(name);
+  }
+  for (Eigen::Index k = 0; k < out.samples.rows(); ++k)
+    if (!out.samples.row(k).allFinite())
+      throw FormatError(arrays.file, "",
+                        fmt::format("{}: sample {} is not finite. Correct it, or import the rows "
+                                    "beside it with runs: [{{first_row: ..., rows: ...}}]",
+                                    key, k));
+  name_channels(map, key, group, out, notes);
+  return out;
+}
+
+}  // namespace stageid

@@ -1,0 +1,164 @@
+#include "tools/exchange/import/import_summary.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "acquisition/files/counted.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// "400", "8 to 12".
+template <typename Number>
+std::string range_text(const std::vector<Number>& values) {
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  return *low == *high ? fmt::format("{}", *low) : fmt::format("{} to {}", *low, *high);
+}
+
+Json channels_json(const ChannelList& channels, const Eigen::VectorXd& rms) {
+  Json list = Json::array();
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    list.push_back({{"name", channels.names[c]},
+                    {"unit", channels.units[c]},
+                    {"rms", rms[static_cast<Eigen::Index>(c)]}});
+  return list;
+}
+
+std::string rms_line(const char* group, const ChannelList& channels, const Eigen::VectorXd& rms) {
+  std::vector<std::string> parts;
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    parts.push_back(fmt::format("{} {:.4g} {}", channels.names[c],
+                                rms[static_cast<Eigen::Index>(c)], channels.units[c]));
+  return fmt::format("rms of {}: {}", group, fmt::join(parts, ", "));
+}
+
+/// Channels whose name is the unit are dimensionless: "y1 [m], y2 [rad]".
+std::string named(const ChannelList& channels) {
+  std::vector<std::string> parts;
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    parts.push_back(fmt::format("{} [{}]", channels.names[c], channels.units[c]));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+}  // namespace
+
+void LogSummary::Power::add(const Eigen::Ref<const Eigen::MatrixXd>& columns) {
+  if (squares.size() == 0) squares.setZero(columns.cols());
+  squares += columns.colwise().squaredNorm().transpose();
+  samples += static_cast<double>(columns.rows());
+}
+
+Eigen::VectorXd LogSummary::Power::rms() const { return (squares / samples).cwiseSqrt(); }
+
+void LogSummary::add(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& period,
+                     const Eigen::Ref<const Eigen::MatrixXd>& actuators,
+                     const Eigen::Ref<const Eigen::MatrixXd>& sensors) {
+  runs_.emplace(run.realization, run.experiment);
+  samples_.push_back(static_cast<std::uint64_t>(actuators.rows()));
+  excitation_.add(period);
+  actuators_.add(actuators);
+  sensors_.add(sensors);
+  const auto experiment = static_cast<std::size_t>(run.experiment);
+  if (excited_.size() <= experiment) excited_.resize(experiment + 1);
+  for (Eigen::Index c = 0; c < period.cols(); ++c)
+    if (!period.col(c).isZero(0.0)) excited_[experiment].insert(c);
+}
+
+ImportSummary LogSummary::summary(const LogInfo& info,
+                                  const std::vector<std::string>& notes) const {
+  std::set<int> realizations, experiments;
+  for (const auto& [realization, experiment] : runs_) {
+    realizations.insert(realization);
+    experiments.insert(experiment);
+  }
+  std::vector<std::uint64_t> periods;
+  double duration_s = 0.0;
+  for (const std::uint64_t samples : samples_) {
+    periods.push_back(samples / static_cast<std::uint64_t>(info.period_samples));
+    duration_s += static_cast<double>(samples) / info.sample_rate_hz;
+  }
+  ImportSummary out;
+  out.lines = notes;
+  out.lines.push_back(
+      fmt::format("{}: {} of {}, {} periods each ({} transient), {} samples per period",
+                  counted(runs_.size(), "run"), counted(realizations.size(), "realization"),
+                  counted(experiments.size(), "experiment"), range_text(periods),
+                  info.transient_periods, info.period_samples));
+  out.lines.push_back(
+      fmt::format("sample rate {} Hz, duration {:.6g} s in all", info.sample_rate_hz, duration_s));
+  Json excited = Json::array();
+  for (std::size_t e = 0; e < excited_.size(); ++e) {
+    if (!experiments.contains(static_cast<int>(e))) continue;
+    std::vector<std::string> names;
+    for (const Eigen::Index c : excited_[e])
+      names.push_back(info.excitation.names[static_cast<std::size_t>(c)]);
+    out.lines.push_back(fmt::format("experiment {} excites {}", e + 1,
+                                    names.empty() ? std::string("nothing: the excitation is zero")
+                                                  : fmt::format("{}", fmt::join(names, ", "))));
+    excited.push_back({{"experiment", e + 1}, {"excites", names}});
+  }
+  out.lines.push_back(rms_line("excitation", info.excitation, excitation_.rms()));
+  out.lines.push_back(rms_line("actuators", info.actuators, actuators_.rms()));
+  out.lines.push_back(rms_line("sensors", info.sensors, sensors_.rms()));
+  out.json = {{"kind", "log"},
+              {"runs", runs_.size()},
+              {"realizations", realizations.size()},
+              {"experiments", experiments.size()},
+              {"periods", *std::min_element(periods.begin(), periods.end())},
+              {"transient_periods", info.transient_periods},
+              {"period_samples", info.period_samples},
+              {"sample_rate_hz", info.sample_rate_hz},
+              {"duration_s", duration_s},
+              {"excited", excited},
+              {"excitation", channels_json(info.excitation, excitation_.rms())},
+              {"actuators", channels_json(info.actuators, actuators_.rms())},
+              {"sensors", channels_json(info.sensors, sensors_.rms())},
+              {"notes", notes}};
+  return out;
+}
+
+ImportSummary summary_of(const FrfEstimate& frf, const std::vector<std::string>& notes) {
+  ImportSummary out;
+  out.lines = notes;
+  const double first = frf.lines() > 0 ? frf.frequency_hz[0] : 0.0;
+  const double last = frf.lines() > 0 ? frf.frequency_hz[frf.lines() - 1] : 0.0;
+  out.lines.push_back(fmt::format(
+      "{}, {:.6g} to {:.6g} Hz; sample rate {}, hold {}", counted(frf.lines(), "line"), first, last,
+      frf.sample_rate_hz > 0.0 ? fmt::format("{} Hz", frf.sample_rate_hz) : std::string("unknown"),
+      frf.hold == Hold::zoh ? "zoh" : "none"));
+  out.lines.push_back(fmt::format("outputs {}; inputs {}", named(frf.outputs), named(frf.inputs)));
+  const bool noise = frf.noise_variance.size() > 0;
+  const bool total = frf.total_variance.size() > 0;
+  out.lines.push_back(noise && total ? "noise variance and total variance"
+                      : noise        ? "noise variance, no total variance"
+                      : total        ? "total variance, no noise variance"
+                                     : "no variances: a fit weighs by the magnitude");
+  const Eigen::VectorXd rms = frf.response.cwiseAbs2().rowwise().mean().cwiseSqrt();
+  Json channels = Json::array();
+  for (Eigen::Index c = 0; c < frf.response.rows(); ++c)
+    channels.push_back(
+        {{"output", frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())]},
+         {"input", frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]},
+         {"rms", rms[c]}});
+  out.json = {{"kind", "frf"},
+              {"lines", frf.lines()},
+              {"band_hz", {first, last}},
+              {"sample_rate_hz", frf.sample_rate_hz},
+              {"hold", frf.hold == Hold::zoh ? "zoh" : "none"},
+              {"outputs", frf.outputs.names},
+              {"output_units", frf.outputs.units},
+              {"inputs", frf.inputs.names},
+              {"input_units", frf.inputs.units},
+              {"noise_variance", noise},
+              {"total_variance", total},
+              {"channels", channels},
+              {"notes", notes}};
+  return out;
+}
+
+}  // namespace stageid

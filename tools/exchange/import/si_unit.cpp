@@ -1,0 +1,175 @@
+#include "tools/exchange/import/si_unit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+namespace stageid {
+namespace {
+
+struct KnownUnit {
+  std::string_view text;
+  std::string_view si;
+  double factor;
+  bool takes_prefix;
+};
+
+constexpr KnownUnit kUnits[] = {{"1", "1", 1.0, false},
+                                {"m", "m", 1.0, true},
+                                {"s", "s", 1.0, true},
+                                {"A", "A", 1.0, true},
+                                {"K", "K", 1.0, true},
+                                {"kg", "kg", 1.0, false},
+                                {"rad", "rad", 1.0, true},
+                                {"Hz", "Hz", 1.0, true},
+                                {"N", "N", 1.0, true},
+                                {"Nm", "Nm", 1.0, true},
+                                {"Pa", "Pa", 1.0, true},
+                                {"J", "J", 1.0, true},
+                                {"W", "W", 1.0, true},
+                                {"C", "C", 1.0, true},
+                                {"V", "V", 1.0, true},
+                                {"F", "F", 1.0, true},
+                                {"T", "T", 1.0, true},
+                                {"H", "H", 1.0, true},
+                                {"Wb", "Wb", 1.0, true},
+                                {"ohm", "ohm", 1.0, true},
+                                {"Ohm", "ohm", 1.0, true},
+                                {"\u03a9", "ohm", 1.0, true},
+                                {"S", "S", 1.0, true},
+                                {"%", "1", 0.01, false},
+                                {"deg", "rad", std::numbers::pi / 180.0, false},
+                                {"\u00b0", "rad", std::numbers::pi / 180.0, false},
+                                {"arcsec", "rad", std::numbers::pi / 648000.0, false},
+                                {"min", "s", 60.0, false},
+                                {"in", "m", 0.0254, false},
+                                {"inch", "m", 0.0254, false},
+                                {"ft", "m", 0.3048, false},
+                                {"lbf", "N", 4.4482216152605, false},
+                                {"bar", "Pa", 1e5, true}};
+
+struct Prefix {
+  std::string_view text;
+  double factor;
+};
+
+constexpr Prefix kPrefixes[] = {{"f", 1e-15},     {"p", 1e-12},     {"n", 1e-9}, {"u", 1e-6},
+                                {"\u00b5", 1e-6}, {"\u03bc", 1e-6}, {"m", 1e-3}, {"c", 1e-2},
+                                {"d", 1e-1},      {"h", 1e2},       {"k", 1e3},  {"M", 1e6},
+                                {"G", 1e9}};
+
+std::optional<SiUnit> plain_unit(std::string_view text) {
+  for (const KnownUnit& unit : kUnits)
+    if (unit.text == text) return SiUnit{std::string(unit.si), unit.factor};
+  for (const Prefix& prefix : kPrefixes) {
+    if (!text.starts_with(prefix.text)) continue;
+    const std::string_view rest = text.substr(prefix.text.size());
+    for (const KnownUnit& unit : kUnits)
+      // Nobody counts kiloseconds, and Gs is a gauss.
+      if (unit.takes_prefix && unit.text == rest && !(rest == "s" && prefix.factor > 1.0))
+        return SiUnit{std::string(unit.si), prefix.factor * unit.factor};
+    if (rest == "g") return SiUnit{"kg", 1e-3 * prefix.factor};
+  }
+  return std::nullopt;
+}
+
+/// "s^2", "s2", "s\u00b2": unit and exponent.
+std::optional<SiUnit> powered_unit(std::string_view text) {
+  constexpr std::array<std::pair<std::string_view, int>, 2> kRaised = {
+      {{"\u00b2", 2}, {"\u00b3", 3}}};
+  std::string_view base = text;
+  int exponent = 1;
+  for (const auto& [raised, value] : kRaised)
+    if (text.ends_with(raised)) {
+      base = text.substr(0, text.size() - raised.size());
+      exponent = value;
+    }
+  if (base.size() > 1 && base.back() >= '2' && base.back() <= '4') {
+    exponent = base.back() - '0';
+    base.remove_suffix(1);
+    if (base.ends_with('^')) base.remove_suffix(1);
+  }
+  std::optional<SiUnit> unit = plain_unit(base);
+  if (!unit || exponent == 1) return unit;
+  return SiUnit{fmt::format("{}^{}", unit->unit, exponent), std::pow(unit->factor, exponent)};
+}
+
+}  // namespace
+
+SiUnit si_unit(const std::string& text) {
+  SiUnit out;
+  out.unit.clear();
+  bool divides = false;
+  std::size_t at = 0;
+  while (at <= text.size()) {
+    const std::size_t end = std::min(text.find_first_of("/*.", at), text.size());
+    const std::string word = text.substr(at, end - at);
+    if (word == "g")
+      throw std::invalid_argument(
+          fmt::format("unit '{}': 'g' is a gram or the acceleration of gravity. Write kg, or m/s^2 "
+                      "with scale: 9.80665 per channel",
+                      text));
+    const std::optional<SiUnit> unit = powered_unit(word);
+    if (!unit) return {text, 1.0};
+    out.unit += unit->unit;
+    out.factor *= divides ? 1.0 / unit->factor : unit->factor;
+    if (end == text.size()) break;
+    out.unit += text[end];
+    divides = text[end] == '/';
+    at = end + 1;
+  }
+  if (out.factor == 1.0) return {text, 1.0};  // as it was written
+  return out;
+}
+
+std::vector<double> take_si_units(const std::string& place, ChannelList& channels,
+                                  std::vector<std::string>& notes) {
+  std::vector<double> factors;
+  std::vector<std::string> converted;
+  for (std::string& unit : channels.units) {
+    SiUnit si;
+    try {
+      si = si_unit(unit);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("{}: {}", place, error.what()));
+    }
+    factors.push_back(si.factor);
+    if (si.unit == unit) continue;
+    std::string note =
+        fmt::format("{}: {} converted to {}, factor {:.10g}", place, unit, si.unit, si.factor);
+    if (std::find(notes.begin(), notes.end(), note) == notes.end())
+      notes.push_back(std::move(note));
+    unit = si.unit;
+  }
+  return factors;
+}
+
+void take_si_units(FrfEstimate& frf, std::vector<std::string>& notes) {
+  std::vector<std::string> own;
+  const std::vector<double> outputs = take_si_units("outputs", frf.outputs, own);
+  const std::vector<double> inputs = take_si_units("inputs", frf.inputs, own);
+  if (own.empty()) return;
+  if (frf.residual_covariance_re.size() > 0 || frf.covariance.size() > 0 ||
+      frf.input_factor.size() > 0 || frf.detection.frequency_hz.size() > 0 ||
+      frf.nonlinearity.band_hz.size() > 0)
+    throw std::invalid_argument(
+        fmt::format("{}; its covariances and its test for distortion cannot be converted. Estimate "
+                    "it again from a log in SI units",
+                    own.front()));
+  for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
+    const double factor = outputs[static_cast<std::size_t>(c % frf.n_outputs())] /
+                          inputs[static_cast<std::size_t>(c / frf.n_outputs())];
+    frf.response.row(c) *= factor;
+    if (frf.noise_variance.size() > 0) frf.noise_variance.row(c) *= factor * factor;
+    if (frf.total_variance.size() > 0) frf.total_variance.row(c) *= factor * factor;
+  }
+  notes.insert(notes.end(), own.begin(), own.end());
+}
+
+}  // namespace stageid

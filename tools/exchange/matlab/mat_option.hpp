@@ -1,0 +1,12 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "tools/exchange/matlab/mat_file.hpp"
+
+namespace stageid {
+
+/// --mat-version, of a .mat file that the command writes.
+void add_mat_version(CLI::App& command, MatVersion& version);
+
+}  // namespace stageid

@@ -1,0 +1,137 @@
+#include "tools/exchange/model/modal_hdf5.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <complex>
+#include <vector>
+
+#include "estimation/modal/modal_assurance.hpp"
+#include "estimation/modal/sampled_state_space.hpp"
+
+namespace stageid {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
+
+void write_matrix(Hdf5File& file, const std::string& dataset, const RowMajor& matrix) {
+  file.write_reals(dataset, {size_of(matrix.rows()), size_of(matrix.cols())}, matrix.data());
+}
+
+void write_vector(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values) {
+  file.write_reals(dataset, {size_of(values.size())}, values.data());
+}
+
+/// One shape a row: columns one after the other are the rows of a row-major array.
+void write_shapes(Hdf5File& file, const std::string& dataset, const Eigen::MatrixXcd& shapes,
+                  Eigen::Index channels) {
+  file.write_complex(dataset, {size_of(shapes.cols()), size_of(channels)}, shapes.data());
+}
+
+void write_modes_table(Hdf5File& file, const AdditiveModel& model) {
+  std::vector<double> frequency_hz, damping, frequency_std_hz, damping_std;
+  std::vector<long long> submodel;
+  for (std::size_t index = 0; index < model.submodels.size(); ++index) {
+    const Submodel& s = model.submodels[index];
+    if (!s.is_mode()) continue;
+    frequency_hz.push_back(s.natural_frequency_hz());
+    damping.push_back(s.damping_ratio());
+    frequency_std_hz.push_back(s.natural_frequency_std_hz.value_or(std::nan("")));
+    damping_std.push_back(s.damping_ratio_std.value_or(std::nan("")));
+    submodel.push_back(static_cast<long long>(index));
+  }
+  const std::vector<hsize_t> shape = {submodel.size()};
+  file.write_reals("/modes/natural_frequency_hz", shape, frequency_hz.data());
+  file.write_reals("/modes/damping_ratio", shape, damping.data());
+  file.write_reals("/modes/natural_frequency_std_hz", shape, frequency_std_hz.data());
+  file.write_reals("/modes/damping_ratio_std", shape, damping_std.data());
+  file.write_integers("/modes/submodel", shape, submodel.data());
+}
+
+void write_mode_shapes(Hdf5File& file, const AdditiveModel& model,
+                       const std::vector<ModeShape>& modes) {
+  const Eigen::MatrixXcd outputs = output_shapes(modes);
+  const Eigen::MatrixXcd inputs = input_shapes(modes);
+  std::vector<double> mass, not_rank_one;
+  for (const ModeShape& mode : modes) {
+    mass.push_back(mode.modal_mass);
+    not_rank_one.push_back(mode.not_rank_one);
+  }
+  write_shapes(file, "/modes/output_shape", outputs, model.n_outputs());
+  write_shapes(file, "/modes/input_shape", inputs, model.n_inputs());
+  file.write_reals("/modes/modal_mass", {modes.size()}, mass.data());
+  file.write_reals("/modes/not_rank_one", {modes.size()}, not_rank_one.data());
+  write_matrix(file, "/modes/output_mac", modal_assurance(outputs, outputs));
+  write_matrix(file, "/modes/input_mac", modal_assurance(inputs, inputs));
+}
+
+void write_driving_point(Hdf5File& file, const AdditiveModel& model, const DrivingPoint& point,
+                         const std::vector<ModeShape>& modes) {
+  const std::string dataset = "/modes/driving_point_mass";
+  std::vector<double> mass;
+  for (const ModeShape& mode : modes) mass.push_back(driving_point_mass(mode, point));
+  file.write_reals(dataset, {mass.size()}, mass.data());
+  file.write_attribute(dataset, "output",
+                       model.outputs.names.at(static_cast<std::size_t>(point.output)));
+  file.write_attribute(dataset, "input",
+                       model.inputs.names.at(static_cast<std::size_t>(point.input)));
+}
+
+void write_rigid_body(Hdf5File& file, const AdditiveModel& model) {
+  const RigidBody body = rigid_body(model);
+  file.create_group("/rigid_body");
+  write_vector(file, "/rigid_body/mass", body.mass);
+  write_matrix(file, "/rigid_body/output_shape", body.output_shape.transpose());
+  write_matrix(file, "/rigid_body/input_shape", body.input_shape.transpose());
+}
+
+/// A, B, C, D and, state by state, the pole (of a pair: first that with positive imaginary part in
+/// s) and the submodel.
+void write_system(Hdf5File& file, const std::string& group, const std::string& pole_name,
+                  const StateSpace& system) {
+  file.create_group(group);
+  write_matrix(file, group + "/A", system.A);
+  write_matrix(file, group + "/B", system.B);
+  write_matrix(file, group + "/C", system.C);
+  write_matrix(file, group + "/D", system.D);
+  std::vector<std::complex<double>> poles;
+  std::vector<long long> submodels;
+  for (const StateBlock& block : system.blocks) {
+    poles.push_back(block.pole);
+    if (block.size == 2) poles.push_back(std::conj(block.pole));
+    submodels.resize(poles.size(), block.submodel);
+  }
+  file.write_complex(group + "/" + pole_name, {poles.size()}, poles.data());
+  file.write_integers(group + "/submodel", {submodels.size()}, submodels.data());
+}
+
+}  // namespace
+
+void write_modal_form(Hdf5File& file, const AdditiveModel& model,
+                      const std::optional<DrivingPoint>& driving_point) {
+  const std::vector<ModeShape> modes = mode_shapes(model);
+  file.create_group("/modes");
+  write_modes_table(file, model);
+  write_mode_shapes(file, model, modes);
+  if (driving_point) write_driving_point(file, model, *driving_point, modes);
+  write_rigid_body(file, model);
+}
+
+void write_state_spaces(Hdf5File& file, const AdditiveModel& model) {
+  file.create_group("/state_space");
+  write_system(file, "/state_space/continuous", "pole_rad_s", state_space(model));
+  if (!(model.sample_rate_hz > 0.0)) return;
+  const std::string group = "/state_space/discrete";
+  const SampledStateSpace sampled = sampled_state_space(model);
+  write_system(file, group, "pole", sampled.system);
+  file.write_attribute(group, "sample_rate_hz", sampled.sample_rate_hz);
+  file.write_integers(group + "/input_delay_samples", {size_of(sampled.input_delay_samples.size())},
+                      sampled.input_delay_samples.data());
+  file.write_integers(group + "/output_delay_samples",
+                      {size_of(sampled.output_delay_samples.size())},
+                      sampled.output_delay_samples.data());
+}
+
+}  // namespace stageid

@@ -1,0 +1,36 @@
+#pragma once
+
+// Exported models and frequency responses, by the ending of the file; docs/exchange.md.
+//
+//   .json        the model                        .h5, .hdf5   tools/exchange/model/model_hdf5.hpp
+//   .csv         model_csv.hpp, frf_csv.hpp       .npz, .mat   the content of .h5 for numpy and MATLAB
+//   .unv, .uff   tools/exchange/uff/uff_frf.hpp, text and binary: response and modes
+//   .py, .m      tools/exchange/model/model_script.hpp
+
+#include <filesystem>
+#include <optional>
+
+#include "frf/response/frf_estimate.hpp"
+#include "tools/exchange/matlab/mat_file.hpp"
+#include "tools/exchange/model/model_hdf5.hpp"
+
+namespace stageid {
+
+/// @throws std::invalid_argument for another ending, listing those there are, and for a model that
+/// the format cannot hold (.csv: submodels that are no modes; state spaces: those that have none; .unv:
+/// names or units that are too long, no frequencies).
+/// @throws FileError
+void export_model(const std::filesystem::path& file, const AdditiveModel& model,
+                  const ExportedResponse& response,
+                  const std::optional<DrivingPoint>& driving_point = {},
+                  MatVersion mat_version = MatVersion::v5);
+
+/// .mat, .npz, .csv, .unv, .uff. @throws as export_model().
+void export_frf(const std::filesystem::path& file, const FrfEstimate& frf,
+                MatVersion mat_version = MatVersion::v5);
+
+/// @throws std::invalid_argument as export_model() and export_frf(), before any work is done.
+void require_export_format(const std::filesystem::path& file);
+void require_frf_export_format(const std::filesystem::path& file);
+
+}  // namespace stageid

@@ -1,0 +1,354 @@
+#include "tools/exchange/uff/uff_frf.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <sstream>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "tools/terminal/text_lines.hpp"
+#include "tools/terminal/unicode.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr const char* kFrequencies = "stageid frequency_hz";
+constexpr const char* kNoiseVariance = "stageid noise_variance";
+constexpr const char* kTotalVariance = "stageid total_variance";
+constexpr const char* kOutput = "output: ";
+constexpr const char* kInput = "input: ";
+constexpr const char* kSettings = "stageid-frf";
+constexpr long long kFirstInputNode = 1001;
+
+// Writing -----------------------------------------------------------------------------------------
+
+/// Specific data type of a unit.
+UffAxis axis_of(const std::string& unit) {
+  static const std::map<std::string, int> kTypes = {
+      {"m", 8}, {"m/s", 11}, {"m/s^2", 12}, {"N", 13}};
+  const auto found = kTypes.find(unit);
+  UffAxis axis;
+  axis.type = found == kTypes.end() ? 0 : found->second;
+  axis.unit = unit;
+  return axis;
+}
+
+std::string name_line(const char* head, const std::string& name) {
+  constexpr std::size_t kMost = 72;
+  if (name.size() > kMost)
+    throw std::invalid_argument(
+        fmt::format("channel '{}': a universal file holds names of {} characters", name, kMost));
+  return head + name;
+}
+
+/// The whole name stands in an id line.
+std::string entity_of(const std::string& name) {
+  std::string entity;
+  for (const char32_t point : code_points_of(name))
+    entity += point >= 0x20 && point <= 0x7E ? static_cast<char>(point) : '_';
+  return entity.substr(0, 10);
+}
+
+UffFunction channel_function(const FrfEstimate& frf, Eigen::Index i, Eigen::Index j) {
+  const auto output = static_cast<std::size_t>(i), input = static_cast<std::size_t>(j);
+  UffFunction f;
+  f.id[3] = name_line(kOutput, frf.outputs.names[output]);
+  f.id[4] = name_line(kInput, frf.inputs.names[input]);
+  f.response = {entity_of(frf.outputs.names[output]), i + 1,
+                uff_direction(frf.outputs.names[output])};
+  f.reference = {entity_of(frf.inputs.names[input]), kFirstInputNode + j,
+                 uff_direction(frf.inputs.names[input])};
+  f.abscissa_axis = {18, {0, 0, 0}, "Hz"};
+  f.ordinate_axis = axis_of(frf.outputs.units[output]);
+  f.denominator_axis = axis_of(frf.inputs.units[input]);
+  f.abscissa.assign(frf.frequency_hz.begin(), frf.frequency_hz.end());
+  return f;
+}
+
+UffFunction response_function(const FrfEstimate& frf, Eigen::Index i, Eigen::Index j) {
+  UffFunction f = channel_function(frf, i, j);
+  f.id[0] = fmt::format("FRF {} <- {}", f.id[3].substr(8), f.id[4].substr(7)).substr(0, 80);
+  f.type = 4;
+  f.complex = true;
+  const Eigen::VectorXcd values = frf.response.row(i + frf.n_outputs() * j);
+  f.ordinate.assign(values.begin(), values.end());
+  return f;
+}
+
+void add_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance, const char* title,
+                  UffContent& content) {
+  if (variance.size() == 0) return;
+  for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
+    for (Eigen::Index i = 0; i < frf.n_outputs(); ++i) {
+      UffFunction f = channel_function(frf, i, j);
+      f.id[0] = title;
+      const Eigen::VectorXd values = variance.row(i + frf.n_outputs() * j);
+      f.ordinate.assign(values.begin(), values.end());
+      content.functions.push_back(std::move(f));
+    }
+}
+
+UffFunction frequency_function(const FrfEstimate& frf) {
+  UffFunction f;
+  f.id[0] = kFrequencies;
+  f.ordinate_axis = {18, {0, 0, 0}, "Hz"};
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    f.abscissa.push_back(static_cast<double>(k));
+    f.ordinate.emplace_back(frf.frequency_hz[k], 0.0);
+  }
+  return f;
+}
+
+const char* const kCompensations[] = {"none", "delay", "hold"};
+
+// Reading -----------------------------------------------------------------------------------------
+
+std::string name_of(const UffFunction& f, const UffPoint& point, std::size_t id_line,
+                    const char* head) {
+  if (f.id[id_line].starts_with(head)) return f.id[id_line].substr(std::string(head).size());
+  if (!point.entity.empty() && point.entity != "NONE" && point.node == 0) return point.entity;
+  static constexpr const char* kAxes[] = {"", "X", "Y", "Z", "RX", "RY", "RZ"};
+  const int axis = std::abs(point.direction) <= 6 ? std::abs(point.direction) : 0;
+  return fmt::format("{}{}{}", point.node,
+                     axis == 0             ? ""
+                     : point.direction < 0 ? "-"
+                                           : "+",
+                     kAxes[axis]);
+}
+
+std::string output_name(const UffFunction& f) { return name_of(f, f.response, 3, kOutput); }
+std::string input_name(const UffFunction& f) { return name_of(f, f.reference, 4, kInput); }
+
+bool has_input(const UffFunction& f) {
+  return f.type == 4 || (f.type != 1 && (f.reference.node != 0 || f.reference.entity != "NONE"));
+}
+
+/// Of a function that has no input: many programs number no node and name the channel in the label of
+/// the ordinate or in the first id line.
+std::string channel_name(const UffFunction& f) {
+  if (f.response.node != 0 || f.response.entity != "NONE") return output_name(f);
+  for (const std::string* text : {&f.ordinate_axis.label, &f.id[0]})
+    if (!text->empty() && *text != "NONE") return *text;
+  return output_name(f);
+}
+
+/// File units in one SI unit, for a quantity of this axis; none: nobody knows.
+std::optional<double> factor_of(const UffAxis& axis, int direction, const UffUnits& units) {
+  if (units.length == 1.0 && units.force == 1.0) return 1.0;
+  const bool rotation = std::abs(direction) > 3;
+  switch (axis.type) {
+    case 8:
+    case 11:
+    case 12:
+      return rotation ? 1.0 : units.length;
+    case 13:
+      return rotation ? units.force * units.length : units.force;
+    case 1:
+      return std::pow(units.length, axis.exponents[0]) * std::pow(units.force, axis.exponents[1]);
+    default:
+      return std::nullopt;
+  }
+}
+
+std::string unit_of(const UffAxis& axis, int direction, bool other_units) {
+  if (axis.unit != "NONE" && !other_units) return axis.unit;
+  const bool rotation = std::abs(direction) > 3;
+  switch (axis.type) {
+    case 8:
+      return rotation ? "rad" : "m";
+    case 11:
+      return rotation ? "rad/s" : "m/s";
+    case 12:
+      return rotation ? "rad/s^2" : "m/s^2";
+    case 13:
+      return rotation ? "Nm" : "N";
+    default:
+      return "1";
+  }
+}
+
+Eigen::Index place_in(ChannelList& channels, const std::string& name, const std::string& unit) {
+  const auto found = std::find(channels.names.begin(), channels.names.end(), name);
+  if (found != channels.names.end()) return found - channels.names.begin();
+  channels.names.push_back(name);
+  channels.units.push_back(unit);
+  return static_cast<Eigen::Index>(channels.size()) - 1;
+}
+
+/// What stands in a file that has no frequency response, and what can be done with it.
+std::string other_content(const UffContent& content) {
+  static const std::map<int, const char*> kNames = {
+      {1, "time response"}, {2, "auto spectrum"},          {3, "cross spectrum"},
+      {6, "coherence"},     {9, "power spectral density"}, {12, "spectrum"}};
+  std::map<std::string, int> counts;
+  bool time = false;
+  for (const UffFunction& f : content.functions) {
+    const auto name = kNames.find(f.type);
+    ++counts[name != kNames.end() ? name->second : fmt::format("function of type {}", f.type)];
+    time = time || f.type == 1;
+  }
+  if (!content.modes.empty()) counts["mode shape"] = static_cast<int>(content.modes.size());
+  std::string text;
+  for (const auto& [name, count] : counts)
+    text += fmt::format("{}{} x {}", text.empty() ? " but " : ", ", count, name);
+  if (time) text += "; take time responses with a map (--map, 'kind: log', docs/exchange.md)";
+  if (!content.modes.empty())
+    text += "; take the modes with '-o modes.json', or compare them with 'validate MODEL FILE'";
+  if (!time && content.modes.empty()) text += "; export frequency responses from the other program";
+  return text;
+}
+
+[[noreturn]] void fail(const std::filesystem::path& file, const UffFunction& f,
+                       const std::string& what) {
+  throw FormatError(file, fmt::format("{}", f.line),
+                    fmt::format("{} <- {}: {}", output_name(f), input_name(f), what));
+}
+
+void read_settings(const std::string& description, FrfEstimate& frf) {
+  std::istringstream words(description);
+  std::string title, hold, compensated, rate, delay;
+  words >> title >> hold >> compensated >> rate >> delay;
+  if (title != kSettings) return;
+  frf.hold = hold == "zoh" ? Hold::zoh : Hold::none;
+  for (int k = 0; k < 3; ++k)
+    if (compensated == kCompensations[k]) frf.compensated = static_cast<Compensation>(k);
+  frf.sample_rate_hz = parse_number(rate).value_or(0.0);
+  frf.delay_s = parse_number(delay).value_or(0.0);
+}
+
+using Channel = std::pair<Eigen::Index, Eigen::Index>;
+
+/// The functions of one kind by channel; every pair must be there once.
+std::map<Channel, const UffFunction*> table_of(const std::filesystem::path& file,
+                                               const UffContent& content, FrfEstimate& frf,
+                                               const std::string& title) {
+  std::map<Channel, const UffFunction*> table;
+  const UffUnits units = content.units.value_or(UffUnits{});
+  const bool other_units = units.length != 1.0 || units.force != 1.0;
+  const UffFunction* first = nullptr;
+  for (const UffFunction& f : content.functions) {
+    if (title.empty() ? f.type != 4 : f.id[0] != title) continue;
+    const Channel channel = {
+        place_in(frf.outputs, output_name(f),
+                 unit_of(f.ordinate_axis, f.response.direction, other_units)),
+        place_in(frf.inputs, input_name(f),
+                 unit_of(f.denominator_axis, f.reference.direction, other_units))};
+    if (!table.emplace(channel, &f).second)
+      fail(file, f, "stands here for the second time; keep one frequency response a channel");
+    if (first == nullptr) first = &f;
+    if (f.abscissa != first->abscissa)
+      fail(file, f, "has other frequencies than the first channel");
+  }
+  if (first != nullptr && table.size() != frf.outputs.size() * frf.inputs.size())
+    throw FormatError(
+        file, "",
+        fmt::format("{} channels of {} outputs and {} inputs; each pair must be there",
+                    table.size(), frf.outputs.size(), frf.inputs.size()));
+  return table;
+}
+
+double scale_to_si(const std::filesystem::path& file, const UffFunction& f, const UffUnits& units) {
+  const std::optional<double> numerator = factor_of(f.ordinate_axis, f.response.direction, units);
+  const std::optional<double> denominator =
+      factor_of(f.denominator_axis, f.reference.direction, units);
+  if (!numerator || !denominator)
+    fail(file, f,
+         "the file's units are not SI and its data types are not told; convert it to SI first");
+  return *denominator / *numerator;
+}
+
+std::vector<double> frequencies_of(const UffContent& content, const UffFunction& first) {
+  for (const UffFunction& f : content.functions) {
+    if (f.id[0] != kFrequencies || f.ordinate.size() != first.abscissa.size()) continue;
+    std::vector<double> exact;
+    for (const std::complex<double>& value : f.ordinate) exact.push_back(value.real());
+    return exact;
+  }
+  return first.abscissa;
+}
+
+Eigen::MatrixXd variance_of(const std::filesystem::path& file, const UffContent& content,
+                            const FrfEstimate& frf, const char* title) {
+  FrfEstimate same = frf;
+  const auto table = table_of(file, content, same, title);
+  if (table.empty()) return {};
+  Eigen::MatrixXd variance(frf.response.rows(), frf.lines());
+  if (!(same.outputs == frf.outputs) || !(same.inputs == frf.inputs)) return {};
+  for (const auto& [channel, f] : table)
+    for (Eigen::Index k = 0; k < frf.lines(); ++k)
+      variance(channel.first + frf.n_outputs() * channel.second, k) =
+          f->ordinate.at(static_cast<std::size_t>(k)).real();
+  return variance;
+}
+
+}  // namespace
+
+int uff_direction(const std::string& name) {
+  const std::size_t place = std::string("xyz").find(static_cast<char>(name[0] | 0x20));
+  return place == std::string::npos ? 0 : static_cast<int>(place) + 1;
+}
+
+UffContent uff_of_frf(const FrfEstimate& frf) {
+  UffContent content;
+  content.model_name = "stageid frequency response";
+  content.description = fmt::format(
+      "{} {} {} {} {}", kSettings, frf.hold == Hold::zoh ? "zoh" : "none",
+      kCompensations[static_cast<int>(frf.compensated)], frf.sample_rate_hz, frf.delay_s);
+  content.program = "stageid " STAGEID_VERSION;
+  content.units = UffUnits{};
+  for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
+    for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
+      content.functions.push_back(response_function(frf, i, j));
+  content.functions.push_back(frequency_function(frf));
+  add_variance(frf, frf.noise_variance, kNoiseVariance, content);
+  add_variance(frf, frf.total_variance, kTotalVariance, content);
+  return content;
+}
+
+FrfEstimate frf_of_uff(const std::filesystem::path& file, const UffContent& content) {
+  FrfEstimate frf;
+  read_settings(content.description, frf);
+  const auto table = table_of(file, content, frf, "");
+  if (table.empty())
+    throw FormatError(
+        file, "",
+        "holds no frequency response (dataset 58, function type 4)" + other_content(content));
+  const UffFunction& first = *table.begin()->second;
+  const std::vector<double> frequency = frequencies_of(content, first);
+  const auto lines = static_cast<Eigen::Index>(frequency.size());
+  frf.frequency_hz = Eigen::Map<const Eigen::VectorXd>(frequency.data(), lines);
+  frf.response.resize(frf.n_outputs() * frf.n_inputs(), lines);
+  for (const auto& [channel, f] : table) {
+    const double scale = scale_to_si(file, *f, content.units.value_or(UffUnits{}));
+    frf.response.row(channel.first + frf.n_outputs() * channel.second) =
+        scale * Eigen::Map<const Eigen::RowVectorXcd>(f->ordinate.data(), lines);
+  }
+  frf.noise_variance = variance_of(file, content, frf, kNoiseVariance);
+  frf.total_variance = variance_of(file, content, frf, kTotalVariance);
+  return frf;
+}
+
+ArrayList arrays_of_uff(const std::filesystem::path& file, const UffContent& content) {
+  ArrayList list{file, {}};
+  std::map<std::string, int> seen;  // several measurements of one channel
+  for (const UffFunction& f : content.functions) {
+    const std::string channel =
+        has_input(f) ? fmt::format("{}<-{}", output_name(f), input_name(f)) : channel_name(f);
+    const int before = seen[channel]++;
+    const std::string name = before == 0 ? channel : fmt::format("{} ({})", channel, before + 1);
+    NamedArray array{name, {f.ordinate.size()}, f.ordinate};
+    if (!f.complex) {
+      std::vector<double> real;
+      for (const std::complex<double>& value : f.ordinate) real.push_back(value.real());
+      array.values = std::move(real);
+    }
+    list.arrays.push_back(std::move(array));
+    list.arrays.push_back({name + "@abscissa", {f.abscissa.size()}, f.abscissa});
+  }
+  return list;
+}
+
+}  // namespace stageid

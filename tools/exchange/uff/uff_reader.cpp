@@ -1,0 +1,333 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "acquisition/files/file_error.hpp"
+#include "tools/exchange/uff/uff_file.hpp"
+#include "tools/terminal/text_lines.hpp"
+#include "tools/terminal/unicode.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr std::string_view kEdge = "-1";
+
+/// Fields of fixed width of one record.
+class Record {
+ public:
+  Record(const TextLines& lines, std::string_view line) : lines_(lines), line_(line) {}
+
+  std::string text(std::size_t width) { return utf8_of_text(trimmed(take(width))); }
+  long long integer(std::size_t width) {
+    const std::string_view field = trimmed(take(width));
+    if (field.empty()) return 0;
+    const std::optional<double> value = parse_number(field);
+    if (!value || *value != std::trunc(*value) || std::abs(*value) > 1e15)
+      lines_.fail(fmt::format("'{}' stands where a whole number belongs", field));
+    return static_cast<long long>(*value);
+  }
+  double number(std::size_t width) {
+    const std::string_view field = trimmed(take(width));
+    if (field.empty()) return 0.0;
+    const std::optional<double> value = parse_number(field);
+    if (!value) lines_.fail(fmt::format("'{}' stands where a finite number belongs", field));
+    return *value;
+  }
+  bool at_end() const { return trimmed(line_).empty(); }
+
+ private:
+  std::string_view take(std::size_t width) {
+    const std::string_view field = line_.substr(0, width);
+    line_.remove_prefix(field.size());
+    return field;
+  }
+  const TextLines& lines_;
+  std::string_view line_;
+};
+
+struct BinaryForm {
+  bool big_endian = false;
+};
+
+struct DataForm {
+  bool double_precision = true;
+  bool complex = false;
+  bool even = true;
+  std::size_t count = 0;
+  double minimum = 0.0;
+  double step = 0.0;
+};
+
+UffPoint read_point(Record& record) {
+  UffPoint point;
+  point.entity = record.text(11);
+  point.node = record.integer(10);
+  point.direction = static_cast<int>(record.integer(4));
+  return point;
+}
+
+UffAxis read_axis(TextLines& lines) {
+  Record record(lines, lines.next());
+  UffAxis axis;
+  axis.type = static_cast<int>(record.integer(10));
+  for (int& exponent : axis.exponents) exponent = static_cast<int>(record.integer(5));
+  for (std::string* text : {&axis.label, &axis.unit}) {
+    *text = record.text(21);
+    if (text->empty()) *text = "NONE";
+  }
+  return axis;
+}
+
+DataForm read_form(TextLines& lines) {
+  Record record(lines, lines.next());
+  const long long type = record.integer(10);
+  const long long count = record.integer(10);
+  if (type != 2 && type != 4 && type != 5 && type != 6)
+    lines.fail(fmt::format("ordinate data type is {}; there are 2, 4, 5 and 6", type));
+  if (count < 1) lines.fail(fmt::format("{} values; at least 1 must stand here", count));
+  DataForm form;
+  form.double_precision = type == 4 || type == 6;
+  form.complex = type >= 5;
+  form.count = static_cast<std::size_t>(count);
+  form.even = record.integer(10) == 1;
+  form.minimum = record.number(13);
+  form.step = record.number(13);
+  if (form.count > lines.rest().size())
+    lines.fail(fmt::format("{} values are more than the file can hold; it was cut short", count));
+  return form;
+}
+
+/// Record 12 as text: the widths of the fields repeat along the values of a line.
+std::vector<double> text_values(TextLines& lines, const DataForm& form) {
+  const std::size_t width = form.double_precision ? 20 : 13;
+  const std::size_t ordinates = form.complex ? 2 : 1;
+  std::vector<std::size_t> widths(ordinates, width);
+  if (!form.even) widths.insert(widths.begin(), 13);
+  std::vector<double> values;
+  const std::size_t wanted = form.count * widths.size();
+  values.reserve(wanted);
+  while (values.size() < wanted) {
+    const std::string_view line = lines.next();
+    if (trimmed(line) == kEdge)
+      lines.fail(fmt::format("the data end after {} of {} numbers", values.size(), wanted));
+    Record record(lines, line);
+    while (values.size() < wanted && !record.at_end())
+      values.push_back(record.number(widths[values.size() % widths.size()]));
+  }
+  return values;
+}
+
+template <typename Number, typename Bits>
+double binary_number(const char* bytes, bool big_endian) {
+  char raw[sizeof(Number)];
+  std::memcpy(raw, bytes, sizeof(raw));
+  if (big_endian != (std::endian::native == std::endian::big)) std::reverse(raw, raw + sizeof(raw));
+  return static_cast<double>(std::bit_cast<Number>(std::bit_cast<Bits>(raw)));
+}
+
+struct FourBytes {
+  char raw[4];
+};
+struct EightBytes {
+  char raw[8];
+};
+
+/// True if the data end at `bytes`: there stands the edge, perhaps on a line of its own.
+bool ends_at(std::string_view rest, std::size_t bytes) {
+  if (bytes > rest.size()) return false;
+  const std::string_view behind = rest.substr(bytes, 10);
+  return trimmed(behind).starts_with(kEdge) && behind.find_first_not_of(" \r\n") >= 4;
+}
+
+/// Record 12 in bytes. Which width abscissas have is told by where the data end: the number of bytes in
+/// the head of the dataset is wrong in files of some programs.
+std::vector<double> binary_values(TextLines& lines, const DataForm& form,
+                                  const BinaryForm& binary) {
+  const std::string_view rest = lines.rest();
+  const std::size_t width = form.double_precision ? 8 : 4;
+  const std::size_t ordinates = form.complex ? 2 : 1;
+  std::vector<std::size_t> abscissa_widths = {0};
+  if (!form.even) abscissa_widths = {4, 8};
+  for (const std::size_t abscissa_width : abscissa_widths) {
+    const std::size_t step = abscissa_width + ordinates * width;
+    if (!ends_at(rest, form.count * step)) continue;
+    std::vector<double> values;
+    const char* at = rest.data();
+    const auto read = [&](std::size_t bytes) {
+      values.push_back(bytes == 4 ? binary_number<float, FourBytes>(at, binary.big_endian)
+                                  : binary_number<double, EightBytes>(at, binary.big_endian));
+      at += bytes;
+    };
+    for (std::size_t k = 0; k < form.count; ++k) {
+      if (abscissa_width > 0) read(abscissa_width);
+      for (std::size_t q = 0; q < ordinates; ++q) read(width);
+    }
+    lines.skip(form.count * step);
+    return values;
+  }
+  lines.fail(
+      fmt::format("{} values do not end where the dataset does; the file is damaged", form.count));
+}
+
+void distribute(const std::vector<double>& values, const DataForm& form, UffFunction& f) {
+  std::size_t at = 0;
+  for (std::size_t k = 0; k < form.count; ++k) {
+    f.abscissa.push_back(form.even ? form.minimum + static_cast<double>(k) * form.step
+                                   : values[at++]);
+    const double real = values[at++];
+    f.ordinate.emplace_back(real, form.complex ? values[at++] : 0.0);
+  }
+}
+
+UffFunction read_function(TextLines& lines, const std::optional<BinaryForm>& binary) {
+  UffFunction f;
+  f.line = lines.line_number();
+  for (std::string& id : f.id) id = utf8_of_text(trimmed(lines.next()));
+  Record record(lines, lines.next());
+  f.type = static_cast<int>(record.integer(5));
+  record.text(25);  // function id, version, load case
+  f.response = read_point(record);
+  f.reference = read_point(record);
+  const DataForm form = read_form(lines);
+  f.complex = form.complex;
+  f.abscissa_axis = read_axis(lines);
+  f.ordinate_axis = read_axis(lines);
+  f.denominator_axis = read_axis(lines);
+  read_axis(lines);
+  distribute(binary ? binary_values(lines, form, *binary) : text_values(lines, form), form, f);
+  for (std::size_t k = 0; k < f.abscissa.size(); ++k)
+    if (!std::isfinite(f.abscissa[k]) || !std::isfinite(std::abs(f.ordinate[k])))
+      lines.fail(fmt::format("value {} of the dataset is not finite", k));
+  return f;
+}
+
+std::vector<double> read_short_values(TextLines& lines, std::size_t count) {
+  std::vector<double> values;
+  while (values.size() < count) {
+    Record record(lines, lines.next());
+    if (record.at_end()) lines.fail("an empty line stands where numbers belong");
+    while (values.size() < count && !record.at_end()) values.push_back(record.number(13));
+  }
+  return values;
+}
+
+/// Modes only; other data at nodes are passed over.
+std::optional<UffMode> read_mode(TextLines& lines) {
+  UffMode mode;
+  for (std::string& id : mode.id) id = utf8_of_text(trimmed(lines.next()));
+  Record record(lines, lines.next());
+  record.integer(10);  // model type
+  const long long analysis = record.integer(10);
+  record.text(20);
+  mode.complex = record.integer(10) == 5;
+  const long long per_node = record.integer(10);
+  if ((analysis != 2 && analysis != 3 && analysis != 7) || per_node < 1 || per_node > 9)
+    return std::nullopt;
+  mode.values_per_node = static_cast<std::size_t>(per_node);
+  Record numbers(lines, lines.next());
+  const long long n_integers = numbers.integer(10), n_reals = numbers.integer(10);
+  if (n_integers < 2 || n_integers > 10 || n_reals < (analysis == 2 ? 3 : 4) || n_reals > 12)
+    lines.fail(
+        fmt::format("{} whole and {} real parameters do not tell a mode", n_integers, n_reals));
+  numbers.integer(10);
+  mode.number = static_cast<int>(numbers.integer(10));
+  const std::vector<double> reals = read_short_values(lines, static_cast<std::size_t>(n_reals));
+  if (analysis == 2) {
+    mode.frequency_hz = reals[0];
+    mode.modal_mass = reals[1];
+    mode.damping_ratio = reals[2];
+  } else {
+    mode.pole_rad_s = {reals[0], reals[1]};
+    mode.modal_a = {reals[2], reals[3]};
+  }
+  for (std::string_view line = lines.next(); trimmed(line) != kEdge; line = lines.next()) {
+    mode.nodes.push_back(Record(lines, line).integer(10));
+    const std::size_t parts = mode.complex ? 2 : 1;
+    const std::vector<double> values = read_short_values(lines, parts * mode.values_per_node);
+    for (std::size_t q = 0; q < values.size(); q += parts)
+      mode.values.emplace_back(values[q], mode.complex ? values[q + 1] : 0.0);
+  }
+  return mode;
+}
+
+UffUnits read_units(TextLines& lines) {
+  Record record(lines, lines.next());
+  UffUnits units;
+  units.code = static_cast<int>(record.integer(10));
+  units.description = record.text(20);
+  Record factors(lines, lines.next());
+  units.length = factors.number(25);
+  units.force = factors.number(25);
+  units.temperature = factors.number(25);
+  if (!(units.length > 0.0) || !(units.force > 0.0)) lines.fail("unit factors must be positive");
+  return units;
+}
+
+void read_header(TextLines& lines, UffContent& content) {
+  for (std::string* text : {&content.model_name, &content.description, &content.program})
+    *text = utf8_of_text(trimmed(lines.next()));
+}
+
+/// The form of the data if the dataset line says "58b".
+std::optional<BinaryForm> binary_form(const TextLines& lines, std::string_view line) {
+  if (line.size() < 7 || (line[6] != 'b' && line[6] != 'B')) return std::nullopt;
+  Record record(lines, line.substr(7));
+  const long long order = record.integer(6), format = record.integer(6);
+  if (order != 1 && order != 2)
+    lines.fail(fmt::format("byte order is {}; there are 1 (little endian) and 2", order));
+  if (format != 2)
+    lines.fail(fmt::format("floating-point format is {}; only 2, IEEE 754, is read", format));
+  return BinaryForm{order == 2};
+}
+
+void skip_to_edge(TextLines& lines) {
+  while (!lines.at_end())
+    if (trimmed(lines.next()) == kEdge) return;
+}
+
+void read_dataset(TextLines& lines, UffContent& content) {
+  const std::string_view line = lines.next();
+  const std::string number(trimmed(line.substr(0, 6)));
+  if (number == "58") {
+    content.functions.push_back(read_function(lines, binary_form(lines, line)));
+  } else if (number == "55") {
+    const std::optional<UffMode> mode = read_mode(lines);
+    if (mode) {
+      content.modes.push_back(*mode);
+      return;  // its end is read
+    }
+  } else if (number == "164") {
+    content.units = read_units(lines);
+  } else if (number == "151") {
+    read_header(lines, content);
+  } else if (!parse_number(number)) {
+    lines.fail(fmt::format("'{}' stands where the number of a dataset belongs", trimmed(line)));
+  }
+  skip_to_edge(lines);
+}
+
+}  // namespace
+
+bool is_uff_name(const std::filesystem::path& file) {
+  return file.extension() == ".unv" || file.extension() == ".uff";
+}
+
+UffContent read_uff(const std::filesystem::path& file) {
+  TextLines lines(file);
+  UffContent content;
+  while (!lines.at_end()) {
+    const std::string_view line = trimmed(lines.next());
+    if (line.empty()) continue;
+    if (line != kEdge)
+      lines.fail(
+          fmt::format("'{}' stands where '    -1' must begin a dataset; is this a universal file?",
+                      line.substr(0, 40)));
+    read_dataset(lines, content);
+  }
+  return content;
+}
+
+}  // namespace stageid

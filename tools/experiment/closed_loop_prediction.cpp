@@ -1,0 +1,166 @@
+#include "tools/experiment/closed_loop_prediction.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <stdexcept>
+
+#include "excitation/multisine/dft.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "tools/config/stage_config.hpp"
+
+namespace stageid {
+namespace {
+
+/// From the excited channels to u and to y, on every line: (channels x axes) matrices.
+struct ClosedLoop {
+  std::vector<Eigen::MatrixXcd> to_u;
+  std::vector<Eigen::MatrixXcd> to_y;
+};
+
+ClosedLoop closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) {
+  const StageInfo& info = stage.info;
+  const auto n_u = static_cast<Eigen::Index>(info.actuators.size());
+  Eigen::MatrixXd selection = Eigen::MatrixXd::Zero(n_u, plan.axes());
+  for (std::size_t axis = 0; axis < plan.spec().axes.size(); ++axis) {
+    const int index = actuator_of_axis(info, plan.spec().axes[axis].channel);
+    selection(index, static_cast<Eigen::Index>(axis)) = 1.0;
+  }
+  const std::vector<PlantMode> modes = wafer_stage_modes(stage);
+  const MotionController controller(stage.controller);
+  ClosedLoop loop;
+  for (const double frequency_hz : plan.grid().frequency_hz()) {
+    const Eigen::MatrixXcd G =
+        sampled_response(modes, stage.delay_s, info.sample_rate_hz, frequency_hz);
+    const Eigen::MatrixXcd K = controller.response(frequency_hz);
+    const Eigen::MatrixXcd return_difference = Eigen::MatrixXcd::Identity(n_u, n_u) - K * G;
+    loop.to_u.push_back(
+        return_difference.partialPivLu().solve(selection.cast<std::complex<double>>()));
+    loop.to_y.push_back(G * loop.to_u.back());
+  }
+  return loop;
+}
+
+/// Largest rms over an exponential window, in steady state.
+double thermal_rms(const Eigen::VectorXd& u, double rate_hz, double time_constant_s) {
+  const double a = std::exp(-1.0 / (rate_hz * time_constant_s));
+  double mean_square = u.squaredNorm() / static_cast<double>(u.size());
+  double largest = mean_square;
+  // One period to settle within a period's ripple, one to look.
+  for (int pass = 0; pass < 2; ++pass)
+    for (const double value : u) {
+      mean_square = a * mean_square + (1.0 - a) * value * value;
+      largest = std::max(largest, mean_square);
+    }
+  return std::sqrt(largest);
+}
+
+void compare(ChannelPrediction& channel, const char* what, double value,
+             const Eigen::VectorXd& limits, Eigen::Index index, const char* unit) {
+  if (limits.size() == 0 || !(value > limits[index])) return;
+  channel.violations.push_back(fmt::format("{}: {} would be {:.4g} {}, limit {:.4g} {}",
+                                           channel.name, what, value, unit, limits[index], unit));
+}
+
+class Predictor {
+ public:
+  Predictor(const ExperimentPlan& plan, const WaferStageSpec& stage)
+      : plan_(plan),
+        stage_(stage),
+        loop_(closed_loop(plan, stage)),
+        dft_(plan.grid().samples_per_period()) {
+    for (const Channel& channel : stage.info.actuators) add(result_.actuators, channel);
+    for (const Channel& channel : stage.info.sensors) add(result_.sensors, channel);
+    result_.crest_factor.assign(plan.spec().axes.size(), 0.0);
+  }
+
+  DesignPrediction predict() {
+    for (const RunId run : plan_.runs()) add_run(run);
+    for (std::size_t i = 0; i < result_.actuators.size(); ++i) judge_actuator(i);
+    for (std::size_t i = 0; i < result_.sensors.size(); ++i) {
+      ChannelPrediction& channel = result_.sensors[i];
+      compare(channel, "|y|", channel.peak, stage_.limits.position_window_m,
+              static_cast<Eigen::Index>(i), "m");
+    }
+    return std::move(result_);
+  }
+
+ private:
+  static void add(std::vector<ChannelPrediction>& list, const Channel& channel) {
+    ChannelPrediction prediction;
+    prediction.name = channel.name;
+    prediction.unit = channel.unit;
+    list.push_back(std::move(prediction));
+  }
+
+  void add_run(RunId run) {
+    const Eigen::MatrixXd r = plan_.excitation(run);
+    for (Eigen::Index axis = 0; axis < r.cols(); ++axis)
+      if (r.col(axis).squaredNorm() > 0.0) {
+        double& largest = result_.crest_factor[static_cast<std::size_t>(axis)];
+        largest = std::max(largest, crest_factor(r.col(axis)));
+      }
+    const Eigen::MatrixXcd R = plan_.spectrum(run);
+    for (std::size_t i = 0; i < result_.actuators.size(); ++i) {
+      const Eigen::VectorXd u = period(loop_.to_u, R, static_cast<Eigen::Index>(i));
+      ChannelPrediction& channel = result_.actuators[i];
+      add_period(channel, u);
+      double step = std::abs(u[0] - u[u.size() - 1]);
+      step = std::max(step, (u.tail(u.size() - 1) - u.head(u.size() - 1)).cwiseAbs().maxCoeff());
+      const double rate_hz = stage_.info.sample_rate_hz;
+      channel.slew_per_s = std::max(channel.slew_per_s, step * rate_hz);
+      channel.thermal_rms = std::max(
+          channel.thermal_rms, thermal_rms(u, rate_hz, stage_.limits.thermal_time_constant_s));
+    }
+    for (std::size_t i = 0; i < result_.sensors.size(); ++i)
+      add_period(result_.sensors[i], period(loop_.to_y, R, static_cast<Eigen::Index>(i)));
+  }
+
+  Eigen::VectorXd period(const std::vector<Eigen::MatrixXcd>& transfer, const Eigen::MatrixXcd& R,
+                         Eigen::Index channel) {
+    Eigen::VectorXcd half = Eigen::VectorXcd::Zero(dft_.half_size());
+    const std::vector<int>& lines = plan_.grid().lines();
+    for (std::size_t k = 0; k < lines.size(); ++k)
+      half[lines[k]] = transfer[k].row(channel) * R.col(static_cast<Eigen::Index>(k));
+    return dft_.inverse(half);
+  }
+
+  static void add_period(ChannelPrediction& channel, const Eigen::VectorXd& x) {
+    channel.rms = std::max(channel.rms, std::sqrt(x.squaredNorm() / static_cast<double>(x.size())));
+    channel.peak = std::max(channel.peak, x.cwiseAbs().maxCoeff());
+  }
+
+  void judge_actuator(std::size_t i) {
+    ChannelPrediction& channel = result_.actuators[i];
+    const StageLimits& limits = stage_.limits;
+    const auto index = static_cast<Eigen::Index>(i);
+    compare(channel, "|u|", channel.peak, limits.actuator_n, index, "N");
+    compare(channel, "slew", channel.slew_per_s, limits.slew_n_s, index, "N/s");
+    compare(channel, "thermal rms", channel.thermal_rms, limits.thermal_rms_n, index, "N");
+  }
+
+  const ExperimentPlan& plan_;
+  const WaferStageSpec& stage_;
+  ClosedLoop loop_;
+  RealDft dft_;
+  DesignPrediction result_;
+};
+
+}  // namespace
+
+std::vector<std::string> DesignPrediction::violations() const {
+  std::vector<std::string> all;
+  for (const auto* list : {&actuators, &sensors})
+    for (const ChannelPrediction& channel : *list)
+      all.insert(all.end(), channel.violations.begin(), channel.violations.end());
+  return all;
+}
+
+DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) {
+  return Predictor(plan, stage).predict();
+}
+
+}  // namespace stageid

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "excitation/plan/experiment_plan.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "hal/stage/limits.hpp"
+
+namespace stageid {
+
+/// What one channel will do, over all runs of a plan, in steady state and without noise.
+struct ChannelPrediction {
+  std::string name;
+  std::string unit;
+  double rms = 0.0;          ///< largest over the runs
+  double peak = 0.0;         ///< largest absolute sample
+  double slew_per_s = 0.0;   ///< actuators: largest change from sample to sample, times the rate
+  double thermal_rms = 0.0;  ///< actuators: largest rms over the exponential window of the limit
+  std::vector<std::string> violations;  ///< one line each; empty: within all limits
+};
+
+struct DesignPrediction {
+  std::vector<ChannelPrediction> actuators;
+  std::vector<ChannelPrediction> sensors;
+  std::vector<double> crest_factor;  ///< of the excitation of every axis, largest over the runs
+  std::vector<std::string> violations() const;
+};
+
+/// Predicts u and y of every run from the exact sampled plant and its controller:
+///   u = (I - K G)^-1 r,  y = G u,  with K the response from y to u,
+/// line by line, then sample by sample over one period.
+/// @throws std::invalid_argument if the plan excites a channel that the stage has not.
+DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage);
+
+}  // namespace stageid

@@ -1,0 +1,360 @@
+#include "tools/experiment/experiment_config.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/key_suggestion.hpp"
+#include "frf/plant/zippered_lines.hpp"
+#include "tools/config/config_reader.hpp"
+#include "tools/config/strict_yaml.hpp"
+#include "tools/experiment/config_plan.hpp"
+#include "tools/terminal/format_errors.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr auto kRequired = Presence::required;
+constexpr auto kOptional = Presence::optional;
+
+struct ExperimentFile {
+  std::size_t format = 0;
+  std::string stage;
+  std::vector<std::string> axes;
+  FlexibleValue rms_n;
+  FlexibleValue peak_n;
+  std::optional<LimitRequest> limits;
+  FlexibleValue shape = {"flat", {}, false, {}};
+  std::vector<double> band_hz;
+  double period_s = 0.0;
+  LineSpec lines;
+  ExperimentSpec spec;
+  FrfOptions frf;
+  FitRequest fit;
+  int validation_realization = 0;
+};
+
+bool is_set(const FlexibleValue& value) { return !value.numbers.empty(); }
+
+void describe_limits(ConfigVisitor& v, std::optional<LimitRequest>& limits) {
+  LimitRequest request;
+  std::string prior;
+  v.text("prior", prior, kRequired,
+         "frf.h5 of a pilot, or model.json, relative to this file: what the plant is known by");
+  v.number("safety", request.safety, {"", 0.0, 1.0, true}, kOptional,
+           "largest predicted use of any limit of the stage file");
+  v.number("velocity_m_s", request.velocity_m_s, positive("m/s"), kOptional,
+           "of every sensor; left out: no limit");
+  request.prior = prior;
+  limits = std::move(request);
+}
+
+void describe_level(ConfigVisitor& v, ExperimentFile& f) {
+  FlexibleRule rule;
+  rule.number = true;
+  rule.list = true;
+  rule.rule = positive("N");
+  v.flexible("rms_n", f.rms_n, rule, kOptional, "rms of each axis; a list gives one an axis");
+  v.flexible("peak_n", f.peak_n, rule, kOptional, "or its largest sample");
+  v.group(
+      "limits", [&](ConfigVisitor& limits) { describe_limits(limits, f.limits); }, kOptional,
+      "or as large as the limits allow, spread for the smallest mean relative variance");
+  const char* key = f.limits ? "limits" : is_set(f.rms_n) ? "rms_n" : "peak_n";
+  v.require(int{is_set(f.rms_n)} + int{is_set(f.peak_n)} + int{f.limits.has_value()} == 1, key,
+            "level: give one of 'rms_n: NUMBER', 'peak_n: NUMBER' and 'limits: {prior: FILE}'");
+  const std::size_t given = std::max(f.rms_n.numbers.size(), f.peak_n.numbers.size());
+  v.require(
+      given <= 1 || given == f.axes.size(), key,
+      fmt::format("level: {} numbers for {} axes; give one, or one an axis", given, f.axes.size()));
+}
+
+void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
+  choose(v, "lines", f.lines.selection, {"all", "odd", "odd_random"}, kOptional,
+         "which lines of the period are excited");
+  count(v, "group_size", f.lines.group_size, 2, 1000, kOptional,
+        "odd_random: one odd line of so many is left out");
+  v.numbers("band_hz", f.band_hz, positive("Hz"), {2, 2}, kRequired,
+            "lowest and highest frequency");
+  v.require(f.band_hz.size() != 2 || f.band_hz[0] < f.band_hz[1], "band_hz",
+            "band_hz: is empty; write [LOW, HIGH] with LOW < HIGH");
+  FlexibleRule shape;
+  shape.words = {"flat"};
+  shape.pairs = true;
+  shape.rule = positive("");
+  v.flexible(
+      "shape", f.shape, shape, kOptional,
+      "amplitude spectrum: flat, or [frequency_hz, relative amplitude] points, log-log between");
+  const bool increasing =
+      std::is_sorted(f.shape.pairs.begin(), f.shape.pairs.end(),
+                     [](const auto& a, const auto& b) { return a.first <= b.first; });
+  v.require(increasing, "shape", "shape: the frequencies must increase");
+}
+
+void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
+  v.texts("axes", f.axes, {1, 64}, kRequired, "actuators that are excited, by name");
+  choose(v, "scheme", f.spec.scheme,
+         {"single_axis", "orthogonal_dft", "orthogonal_hadamard", "zippered"}, kOptional,
+         "how the axes share the experiments");
+  v.group(
+      "level", [&](ConfigVisitor& level) { describe_level(level, f); }, kRequired,
+      "size of the excitation");
+  describe_lines(v, f);
+  v.number("period_s", f.period_s, positive("s"), kRequired, "of the multisine");
+  count(v, "transient_periods", f.spec.transient_periods, 0, 1000, kOptional,
+        "recorded before the measured ones and not used");
+  count(v, "periods", f.spec.periods, 1, 100000, kOptional, "measured periods of every run");
+  count(v, "realizations", f.spec.realizations, 1, 10000, kOptional, "of the random phases");
+  count(v, "crest_iterations", f.spec.crest_iterations, 0, 100000, kOptional,
+        "of crest-factor reduction; 0: phases stay random");
+  v.require(!f.limits || f.spec.crest_iterations > 0, "crest_iterations",
+            "crest_iterations: with 'limits' the phases are designed too; write 20");
+  v.require(!f.limits || f.shape.pairs.empty(), "shape",
+            "shape: with 'limits' the spectrum is designed; leave 'shape' out");
+  count(v, "seed", f.spec.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
+        "same seed, same experiment, on every machine");
+}
+
+void describe_frf(ConfigVisitor& v, FrfOptions& f) {
+  v.texts("inputs", f.inputs, {1}, kOptional,
+          "actuators of the response; left out: the excited ones");
+  v.texts("outputs", f.outputs, {1}, kOptional, "sensors of the response; left out: all");
+  choose(v, "covariance", f.covariance, {"diagonal", "full"}, kOptional, "of the response");
+  choose(v, "method", f.method, {"periodic", "lpm"}, kOptional, "of the estimate");
+  choose(v, "periods", f.periods, {"consistent", "unmarked"}, kOptional,
+         "consistent: periods with a glitch, a bump or a transient are left out; lpm: "
+         "with a glitch");
+  count(v, "smooth_covariance", f.covariance_lines, 1, 9999, kOptional,
+        "lines (odd) over which the noise covariance is averaged");
+  v.require(f.covariance_lines % 2 == 1, "smooth_covariance",
+            "smooth_covariance: must be odd, the line and as many neighbours on either side");
+}
+
+void describe(ConfigVisitor& v, ExperimentFile& f) {
+  v.choice("format", f.format, {"stageid-experiment"}, kRequired, "what this file is");
+  v.text("stage", f.stage, kRequired, "stage file, relative to this one");
+  v.group(
+      "experiment", [&](ConfigVisitor& e) { describe_experiment(e, f); }, kRequired,
+      "what is measured");
+  v.group(
+      "frf", [&](ConfigVisitor& frf) { describe_frf(frf, f.frf); }, kOptional,
+      "how the response is estimated");
+  v.group(
+      "fit", [&](ConfigVisitor& fit) { describe_fit_keys(fit, f.fit); }, kOptional,
+      "how the model is fitted");
+  v.group(
+      "validation",
+      [&](ConfigVisitor& validation) {
+        count(validation, "realization", f.validation_realization, 1, 10000, kRequired,
+              "1-based; held back from the fit");
+        validation.require(f.validation_realization <= f.spec.realizations, "realization",
+                           fmt::format("realization: {} of {}; hold back one that is measured",
+                                       f.validation_realization, f.spec.realizations));
+        validation.require(f.spec.realizations > 1, "realization",
+                           "realization: nothing is left to fit; measure 2 realizations or more");
+      },
+      kOptional, "left out: nothing is held back");
+}
+
+/// Relative amplitude at every line, log-log between the points, constant beyond them.
+Eigen::VectorXd shape_on(const FrequencyGrid& grid,
+                         const std::vector<std::pair<double, double>>& points) {
+  if (points.empty()) return {};
+  Eigen::VectorXd shape = grid.frequency_hz();
+  for (double& value : shape) {
+    const double f = value;
+    const auto above = std::find_if(points.begin(), points.end(),
+                                    [&](const auto& point) { return point.first >= f; });
+    if (above == points.begin() || above == points.end()) {
+      value = above == points.end() ? points.back().second : points.front().second;
+      continue;
+    }
+    const auto& below = *(above - 1);
+    const double t = std::log(f / below.first) / std::log(above->first / below.first);
+    value = below.second * std::pow(above->second / below.second, t);
+  }
+  return shape;
+}
+
+class ExperimentChecker {
+ public:
+  ExperimentChecker(const YamlDocument& document, const StageConfig& stage)
+      : document_(document), stage_(stage) {}
+
+  int samples_per_period(double period_s) const {
+    const double samples = period_s * stage_.spec.info.sample_rate_hz;
+    const double whole = std::round(samples);
+    if (std::abs(samples - whole) > 1e-9 * samples || whole < 4.0 || whole > 1e8)
+      fail("period_s",
+           fmt::format("period_s: {} s is {} samples at {} Hz; a period must be a whole "
+                       "number of samples, 4 to 1e8",
+                       period_s, samples, stage_.spec.info.sample_rate_hz));
+    return static_cast<int>(whole);
+  }
+  void check_band(const std::vector<double>& band_hz) const {
+    const double nyquist_hz = 0.5 * stage_.spec.info.sample_rate_hz;
+    if (band_hz[1] >= nyquist_hz)
+      fail("band_hz", fmt::format("band_hz: {} Hz is not below half the sample rate, {} Hz",
+                                  band_hz[1], nyquist_hz));
+  }
+  void check_names(const char* section, const char* key, const std::vector<std::string>& names,
+                   const std::vector<Channel>& channels, const char* kind,
+                   FormatErrorList& errors) const {
+    std::vector<std::string> known;
+    for (const Channel& channel : channels) known.push_back(channel.name);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (channel_index(channels, names[i]) >= 0) continue;
+      const YamlNode* list = find(section, key);
+      const YamlMark mark = list == nullptr ? YamlMark{} : document_.node(list->items.at(i)).mark;
+      errors.attempt([&] {
+        document_.fail(mark, fmt::format("{}: the stage has no {} '{}'; {}", key, kind, names[i],
+                                         suggest_key(names[i], known)));
+      });
+    }
+  }
+  [[noreturn]] void fail(const char* key, const std::string& message) const {
+    const YamlNode* node = find("experiment", key);
+    document_.fail(node == nullptr ? YamlMark{} : node->mark, message);
+  }
+
+ private:
+  const YamlNode* find(std::string_view section, std::string_view key) const {
+    const YamlNode* node = child(document_.root(), section);
+    return node == nullptr ? nullptr : child(*node, key);
+  }
+  const YamlNode* child(const YamlNode& node, std::string_view key) const {
+    for (const YamlNode::Entry& entry : node.entries)
+      if (entry.key == key) return &document_.node(entry.value);
+    return nullptr;
+  }
+  const YamlDocument& document_;
+  const StageConfig& stage_;
+};
+
+std::vector<ExcitationAxis> excitation_axes(const ExperimentFile& file, const FrequencyGrid& grid) {
+  const std::vector<double> designed = {1.0};
+  const std::vector<double>& levels = file.limits          ? designed
+                                      : is_set(file.rms_n) ? file.rms_n.numbers
+                                                           : file.peak_n.numbers;
+  const Eigen::VectorXd shape = shape_on(grid, file.shape.pairs);
+  std::vector<ExcitationAxis> axes;
+  for (std::size_t i = 0; i < file.axes.size(); ++i)
+    axes.push_back({file.axes[i], levels.size() == 1 ? levels.front() : levels[i], shape});
+  return axes;
+}
+
+/// Refused before it is measured: what frf could not make anything of.
+void require_zippered_lines(const ExperimentSpec& spec, const FrequencyGrid& grid) {
+  const auto n = static_cast<Eigen::Index>(spec.axes.size());
+  if (spec.scheme != ExcitationScheme::zippered || n < 2) return;
+  ZipperedLines lines{grid.lines(), {}, n};
+  for (Eigen::Index k = 0; k < grid.size(); ++k)
+    for (Eigen::Index p = 0; p < n; ++p)
+      if (has_line(spec.scheme, p, n, k)) lines.axis.push_back(p);
+  std::vector<std::string> names;
+  for (const ExcitationAxis& axis : spec.axes) names.push_back(axis.channel);
+  require_enough_lines(lines, names, "experiment");
+}
+
+/// What is measured follows from these numbers and the stage; not from how the data are used later.
+std::string measurement_id(const ExperimentFile& f, const StageConfig& stage) {
+  const ExperimentSpec& s = f.spec;
+  std::string text = fmt::format(
+      "scheme {} scaling {} lines {} group {} period {} transient {} periods {} realizations {} "
+      "crest {} seed {} band {} {}",
+      static_cast<int>(s.scheme), static_cast<int>(s.scaling), static_cast<int>(f.lines.selection),
+      f.lines.group_size, f.period_s, s.transient_periods, s.periods, s.realizations,
+      s.crest_iterations, s.seed, f.lines.low_hz, f.lines.high_hz);
+  for (const ExcitationAxis& axis : s.axes)
+    text += fmt::format(" axis {} {}", axis.channel, axis.level);
+  if (f.limits)
+    text +=
+        fmt::format(" limits {} {} {}", f.limits->safety, f.limits->velocity_m_s,
+                    std::filesystem::exists(f.limits->prior) ? fingerprint_of_file(f.limits->prior)
+                                                             : "not there yet");
+  for (const auto& [frequency_hz, amplitude] : f.shape.pairs)
+    text += fmt::format(" shape {} {}", frequency_hz, amplitude);
+  return fingerprint_of(text + "\n" + stage.text);
+}
+
+void complete(ExperimentConfig& config, ExperimentFile& file, const YamlDocument& document) {
+  const ExperimentChecker checker(document, config.stage);
+  const StageInfo& info = config.stage.spec.info;
+  FormatErrorList errors;
+  checker.check_names("experiment", "axes", file.axes, info.actuators, "actuator", errors);
+  checker.check_names("frf", "inputs", file.frf.inputs, info.actuators, "actuator", errors);
+  checker.check_names("frf", "outputs", file.frf.outputs, info.sensors, "sensor", errors);
+  errors.attempt([&] { checker.check_band(file.band_hz); });
+  errors.attempt([&] { config.samples_per_period = checker.samples_per_period(file.period_s); });
+  errors.raise();
+  file.lines.low_hz = file.band_hz[0];
+  file.lines.high_hz = file.band_hz[1];
+  file.lines.seed = file.spec.seed;
+  file.spec.scaling = is_set(file.peak_n) ? AmplitudeScaling::peak : AmplitudeScaling::rms;
+  // What the excitation library refuses gets the place of the section that asked for it.
+  try {
+    const auto grid =
+        FrequencyGrid::band(info.sample_rate_hz, config.samples_per_period, file.lines);
+    file.spec.axes = excitation_axes(file, grid);
+    config.lines = file.lines;
+    config.experiment = file.spec;
+    config.limits = file.limits;
+    outline_plan(config);
+    require_zippered_lines(file.spec, grid);
+  } catch (const std::invalid_argument& error) {
+    checker.fail("band_hz", error.what());
+  }
+  config.frf = file.frf;
+  config.fit = file.fit;
+  config.validation_realization = file.validation_realization - 1;
+  config.measurement_id = measurement_id(file, config.stage);
+}
+
+}  // namespace
+
+void describe_experiment_keys(ConfigVisitor& visitor) {
+  ExperimentFile file;
+  describe(visitor, file);
+}
+
+namespace {
+
+std::filesystem::path stage_file_of(const std::filesystem::path& path, const YamlDocument& document,
+                                    const std::string& stage) {
+  std::filesystem::path file = (path.parent_path() / stage).lexically_normal();
+  if (std::filesystem::exists(file)) return file;
+  for (const YamlNode::Entry& entry : document.root().entries)
+    if (entry.key == "stage")
+      document.fail(
+          document.node(entry.value).mark,
+          fmt::format("stage: there is no file {}; give the path of a stage file, relative "
+                      "to this one",
+                      file.string()));
+  return file;
+}
+
+}  // namespace
+
+ExperimentConfig load_experiment_config(const std::filesystem::path& path) {
+  const YamlDocument document = YamlDocument::read(path);
+  ExperimentFile file;
+  ExperimentConfig config;
+  config.file = path;
+  config.text = document.text();
+  FormatErrorList errors;
+  errors.attempt(
+      [&] { read_config(document, [&](ConfigVisitor& visitor) { describe(visitor, file); }); });
+  if (!file.stage.empty())
+    errors.attempt(
+        [&] { config.stage = load_stage_config(stage_file_of(path, document, file.stage)); });
+  errors.raise();
+  if (file.limits)
+    file.limits->prior = (path.parent_path() / file.limits->prior).lexically_normal();
+  complete(config, file, document);
+  return config;
+}
+
+}  // namespace stageid

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "excitation/plan/experiment_plan.hpp"
+#include "frf/plant/plant_frf.hpp"
+#include "tools/config/config_visitor.hpp"
+#include "tools/config/stage_config.hpp"
+#include "tools/fit/fit_request.hpp"
+
+namespace stageid {
+
+/// Level of the excitation as the limits allow it.
+struct LimitRequest {
+  std::filesystem::path prior;  ///< frf.h5 or model.json
+  double safety = 0.9;          ///< largest predicted use of any limit
+  double velocity_m_s = 0.0;    ///< of every sensor; 0: no limit
+};
+
+/// An experiment file and the stage file it names, checked through.
+struct ExperimentConfig {
+  std::filesystem::path file;
+  std::string text;  ///< of the file, kept for the log
+  StageConfig stage;
+  LineSpec lines;
+  int samples_per_period = 0;
+  ExperimentSpec experiment;           ///< with `limits`, levels are still to be designed
+  std::optional<LimitRequest> limits;  ///< level.limits
+  FrfOptions frf;
+  FitRequest fit;
+  int validation_realization = -1;  ///< 0-based; -1: none is held back
+  std::string measurement_id;       ///< fingerprint of all that decides what is measured
+};
+
+/// @throws FileError, FormatErrors of this file and the stage file.
+ExperimentConfig load_experiment_config(const std::filesystem::path& file);
+
+/// The keys of an experiment file. Used by `stageid config schema`.
+void describe_experiment_keys(ConfigVisitor& visitor);
+
+}  // namespace stageid

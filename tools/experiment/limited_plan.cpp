@@ -1,0 +1,140 @@
+#include "tools/experiment/limited_plan.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "tools/experiment/config_plan.hpp"
+#include "tools/terminal/console.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDoubtfulMisfit = 0.05;
+
+const char* quantity(SignalKind kind) {
+  switch (kind) {
+    case SignalKind::value:
+      return "value";
+    case SignalKind::difference:
+      return "slew";
+    case SignalKind::derivative:
+      return "velocity";
+  }
+  return "unknown";
+}
+
+std::string limit_text(double limit) {
+  return std::isinf(limit) ? "-" : fmt::format("{:.4g}", limit);
+}
+
+double realization_s(const ExperimentPlan& plan) {
+  return plan.duration_s() / plan.spec().realizations;
+}
+
+}  // namespace
+
+LimitedPlan make_limited_plan(const ExperimentConfig& config) {
+  const LimitRequest& request = config.limits.value();
+  const ExperimentPlan outline = outline_plan(config);
+  const WaferStageSpec& stage = config.stage.spec;
+  const PlantPrior prior = read_plant_prior(
+      request.prior, stage.info, outline.grid().frequency_hz(), below_band_hz(outline.grid()));
+  Eigen::VectorXd velocity_m_s;
+  if (request.velocity_m_s > 0.0)
+    velocity_m_s.setConstant(static_cast<Eigen::Index>(stage.info.sensors.size()),
+                             request.velocity_m_s);
+  try {
+    BoundedLoop loop = bounded_loop(outline.grid(), config.experiment, stage, prior,
+                                    config.frf.outputs, velocity_m_s);
+    LimitedDesign design = design_within_limits(
+        outline.grid(), {config.experiment, loop.cost, loop.signals, request.safety});
+    return {std::move(design), std::move(loop)};
+  } catch (const std::invalid_argument& error) {
+    throw FormatError(
+        config.file, "",
+        fmt::format("level.limits from {}: {}", request.prior.string(), error.what()));
+  }
+}
+
+double final_variance(const LimitedPlan& limited) {
+  const ExperimentPlan& plan = limited.design.plan;
+  return relative_variance(plan, limited.loop.cost) /
+         (static_cast<double>(plan.spec().realizations) * plan.spec().periods);
+}
+
+double duration_to_reach_s(const LimitedPlan& limited, double variance) {
+  if (!(variance > 0.0) || !std::isfinite(variance))
+    throw std::invalid_argument(fmt::format(
+        "accuracy: {} is no variance; it must be positive, e.g. 1e-6 for 0.1 %", variance));
+  const ExperimentPlan& plan = limited.design.plan;
+  const double one = relative_variance(plan, limited.loop.cost) / plan.spec().periods;
+  return std::ceil(one / variance) * realization_s(plan);
+}
+
+std::vector<std::string> limited_table(const LimitedPlan& limited, double accuracy) {
+  std::vector<std::vector<std::string>> rows = {
+      {"channel", "of", "unit", "peak", "from rest", "noise", "limit", "rms", "limit", "used"}};
+  for (std::size_t s = 0; s < limited.loop.signals.size(); ++s) {
+    const BoundedSignal& signal = limited.loop.signals[s];
+    const SignalPeak& peak = limited.design.peaks[s];
+    rows.push_back({signal.name, quantity(signal.kind), limited.loop.units[s],
+                    fmt::format("{:.4g}", peak.steady), fmt::format("{:.4g}", peak.from_rest),
+                    fmt::format("{:.2g}", signal.reserve), limit_text(signal.peak_limit),
+                    fmt::format("{:.4g}", peak.rms), limit_text(signal.rms_limit),
+                    fmt::format("{:.1f} %", 100.0 * limit_use(signal, peak))});
+  }
+  std::vector<std::string> lines = table_lines(rows);
+  if (!limited.loop.unknown.empty())
+    lines.push_back(fmt::format("not predicted, as the prior does not show them: {}",
+                                fmt::join(limited.loop.unknown, ", ")));
+  if (limited.loop.extrapolation_misfit > kDoubtfulMisfit)
+    lines.push_back(fmt::format(
+        "from rest in doubt: below {:.4g} Hz the prior shows nothing, and its lowest lines are no "
+        "rigid body (misfit {:.0f} %); measure a pilot from a lower frequency on",
+        limited.loop.extrapolated_below_hz, 100.0 * limited.loop.extrapolation_misfit));
+  if (!limited.loop.noise_known) {
+    lines.push_back("the prior does not tell the noise: no accuracy can be foretold");
+    return lines;
+  }
+  const double variance = final_variance(limited);
+  lines.push_back(fmt::format("expected after all runs: mean relative variance {:.3g} ({:.3g} %)",
+                              variance, 100.0 * std::sqrt(variance)));
+  if (accuracy > 0.0)
+    lines.push_back(fmt::format("a variance of {:.3g} ({:.3g} %) is reached after {:.1f} min",
+                                accuracy, 100.0 * std::sqrt(accuracy),
+                                duration_to_reach_s(limited, accuracy) / 60.0));
+  return lines;
+}
+
+Json limited_json(const LimitedPlan& limited, double accuracy) {
+  Json json = {{"signals", Json::array()}, {"not_predicted", limited.loop.unknown}};
+  for (std::size_t s = 0; s < limited.loop.signals.size(); ++s) {
+    const BoundedSignal& signal = limited.loop.signals[s];
+    const SignalPeak& peak = limited.design.peaks[s];
+    Json entry = {
+        {"name", signal.name}, {"of", quantity(signal.kind)},      {"unit", limited.loop.units[s]},
+        {"peak", peak.steady}, {"peak_from_rest", peak.from_rest}, {"reserve", signal.reserve},
+        {"rms", peak.rms},     {"used", limit_use(signal, peak)}};
+    if (std::isfinite(signal.peak_limit)) entry["peak_limit"] = signal.peak_limit;
+    if (std::isfinite(signal.rms_limit)) entry["rms_limit"] = signal.rms_limit;
+    json["signals"].push_back(std::move(entry));
+  }
+  if (limited.loop.extrapolated_below_hz > 0.0)
+    json["extrapolated"] = {{"below_hz", limited.loop.extrapolated_below_hz},
+                            {"misfit", limited.loop.extrapolation_misfit}};
+  if (!limited.loop.noise_known) return json;
+  json["relative_variance"] = final_variance(limited);
+  if (accuracy > 0.0) {
+    json["accuracy"] = accuracy;
+    json["seconds_to_accuracy"] = duration_to_reach_s(limited, accuracy);
+  }
+  return json;
+}
+
+}  // namespace stageid

@@ -1,0 +1,202 @@
+#include "tools/experiment/loop_check.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <filesystem>
+#include <numbers>
+#include <vector>
+
+#include "acquisition/files/file_error.hpp"
+#include "hal/simulator/loop_stability.hpp"
+#include "tools/experiment/config_plan.hpp"
+#include "tools/experiment/plant_prior.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::VectorXd;
+
+constexpr double kPi = std::numbers::pi;
+/// Modulus margin 1/3: a gain 1.5 times as large, or 19 degrees less phase, may make the loop unstable.
+constexpr double kPoorSensitivity = 3.0;
+/// Above this gain a loop can still turn around the critical point.
+constexpr double kNegligibleGain = 0.5;
+/// Between two lines; a turn further than this is not to be told from one the other way round.
+constexpr double kLargestTurn = 0.75 * kPi;
+
+constexpr const char* kRemedy =
+    "Lower crossover_hz, or correct the controller, the geometry or delay_s in the stage file";
+
+std::string poor_margin(double sensitivity, double frequency_hz) {
+  return fmt::format(
+      "the loop has little margin: its largest sensitivity is {:.2g} at {:.4g} Hz (above {} a gain "
+      "{} "
+      "times as large may make it unstable). Lower crossover_hz in the stage file",
+      sensitivity, frequency_hz, kPoorSensitivity, kPoorSensitivity / (kPoorSensitivity - 1.0));
+}
+
+/// The loop gain of a prior, frequency by frequency upwards.
+class PriorLoop {
+ public:
+  explicit PriorLoop(const ExperimentConfig& config) : axes_(config.stage.spec.controller) {
+    if (axes_.axes() == 0) return;
+    const ExperimentPlan outline = outline_plan(config);
+    const VectorXd band_hz = outline.grid().frequency_hz();
+    const VectorXd below_hz = frequencies_below(band_hz[0], config.stage.spec);
+    const PlantPrior prior =
+        read_plant_prior(config.limits->prior, config.stage.spec.info, band_hz, below_hz);
+    frequency_hz_.resize(below_hz.size() + band_hz.size());
+    frequency_hz_ << below_hz, band_hz;
+    plant_ = prior.below_band;
+    plant_.insert(plant_.end(), prior.response.begin(), prior.response.end());
+  }
+
+  LoopCheck check() const {
+    LoopCheck out;
+    if (axes_.axes() == 0) return out;
+    follow();
+    if (signs_ > 0 || (turns() > 0 && certain()))
+      out.problem = fmt::format(
+          "the controller does not hold the plant of the prior: {}. {}",
+          signs_ > 0
+              ? fmt::format("{} of {} axes have the wrong sign", signs_, axes_.axes())
+              : fmt::format("its loop gain goes {} times around the critical point", turns()),
+          kRemedy);
+    else if (!certain())
+      out.doubt = fmt::format(
+          "the prior does not tell whether the loop is stable: {}. Measure a pilot on a wider band "
+          "or with finer lines",
+          last_gain_ > kNegligibleGain
+              ? fmt::format("its loop gain at its last line, {:.4g} Hz, is still {:.2g}",
+                            frequency_hz_[frequency_hz_.size() - 1], last_gain_)
+              : fmt::format("between two lines near {:.4g} Hz its loop gain turns too far",
+                            largest_turn_hz_));
+    else if (sensitivity_ > kPoorSensitivity)
+      out.doubt = poor_margin(sensitivity_, sensitivity_hz_);
+    out.largest_sensitivity = sensitivity_;
+    return out;
+  }
+
+ private:
+  /// From where the loop gain is large and the plant is a free mass, above its suspension.
+  static VectorXd frequencies_below(double lowest_hz, const WaferStageSpec& stage) {
+    double from_hz = lowest_hz;
+    for (const AxisController& axis : stage.controller.axes)
+      if (axis.crossover_hz > 0.0) from_hz = std::min(from_hz, axis.crossover_hz);
+    from_hz /= 30.0;
+    for (const double suspension_hz : stage.suspension_hz)
+      from_hz = std::max(from_hz, 3.0 * suspension_hz);
+    if (!(from_hz < lowest_hz)) return {};
+    constexpr double kPerDecade = 100.0;
+    const auto count = static_cast<Index>(std::ceil(kPerDecade * std::log10(lowest_hz / from_hz)));
+    VectorXd out(count);
+    for (Index i = 0; i < count; ++i)
+      out[i] = from_hz *
+               std::pow(lowest_hz / from_hz, static_cast<double>(i) / static_cast<double>(count));
+    return out;
+  }
+
+  /// det(I + L) from low to high frequencies. With every pole of plant and controller inside the unit circle or at 1,
+  /// where a free mass has -pi and the controller adds its own phase, the angle ends at -pi per unstable pole of the
+  /// closed loop (argument principle on the upper half of the unit circle).
+  void follow() const {
+    std::complex<double> last = 0.0;
+    for (Index k = 0; k < frequency_hz_.size(); ++k) {
+      const double f = frequency_hz_[k];
+      const MatrixXcd plant = axes_.plant_of_axes(plant_[static_cast<std::size_t>(k)]);
+      const MatrixXcd L = plant * axes_.controllers(f).asDiagonal();
+      const std::complex<double> value =
+          (MatrixXcd::Identity(L.rows(), L.rows()) + L).partialPivLu().determinant();
+      if (k == 0) {
+        angle_ = start_angle(plant, axes_.controllers(f), value);
+      } else {
+        const double turn = std::arg(value / last);
+        angle_ += turn;
+        if (std::abs(turn) > largest_turn_) {
+          largest_turn_ = std::abs(turn);
+          largest_turn_hz_ = f;
+        }
+      }
+      last = value;
+      last_gain_ = L.norm();
+      const double size = largest_sensitivity(L);
+      if (size > sensitivity_) {
+        sensitivity_ = size;
+        sensitivity_hz_ = f;
+      }
+    }
+  }
+
+  double start_angle(const MatrixXcd& plant, const Eigen::VectorXcd& controllers,
+                     std::complex<double> value) const {
+    double expected = 0.0;
+    for (Index i = 0; i < axes_.axes(); ++i) {
+      expected += std::arg(controllers[i]) - kPi;
+      // A free mass is negative above its suspension; PI and lead are positive.
+      if (plant(i, i).real() * controllers[i].real() > 0.0) ++signs_;
+    }
+    return expected + std::remainder(std::arg(value) - expected, 2.0 * kPi);
+  }
+
+  int turns() const { return static_cast<int>(std::lround(std::abs(angle_) / (2.0 * kPi))); }
+  bool certain() const { return last_gain_ <= kNegligibleGain && largest_turn_ <= kLargestTurn; }
+
+  AxisLoop axes_;
+  VectorXd frequency_hz_;
+  std::vector<MatrixXcd> plant_;
+  mutable int signs_ = 0;
+  mutable double angle_ = 0.0;
+  mutable double largest_turn_ = 0.0;
+  mutable double largest_turn_hz_ = 0.0;
+  mutable double last_gain_ = 0.0;
+  mutable double sensitivity_ = 0.0;
+  mutable double sensitivity_hz_ = 0.0;
+};
+
+void judge(const std::filesystem::path& file, const LoopCheck& check, const Console& console) {
+  if (!check.problem.empty()) throw FormatError(file, "", check.problem);
+  if (!check.doubt.empty()) console.warning(fmt::format("{}: {}", file.string(), check.doubt));
+}
+
+}  // namespace
+
+LoopCheck check_loop(const WaferStageSpec& stage) {
+  const LoopStability loop = loop_stability(stage);
+  LoopCheck out;
+  if (!loop.tested) return out;
+  out.largest_sensitivity = loop.largest_sensitivity;
+  if (!loop.stable())
+    out.problem = fmt::format(
+        "the controller does not hold the plant: the closed loop is unstable at {:.4g} Hz and "
+        "grows "
+        "by {:.2g} % per sample. {}",
+        loop.pole_hz, 100.0 * (loop.largest_pole - 1.0), kRemedy);
+  else if (loop.largest_sensitivity > kPoorSensitivity)
+    out.doubt = poor_margin(loop.largest_sensitivity, loop.sensitivity_hz);
+  return out;
+}
+
+LoopCheck check_loop(const ExperimentConfig& config) {
+  return config.limits ? PriorLoop(config).check() : check_loop(config.stage.spec);
+}
+
+void require_stable_loop(const StageConfig& stage, const Console& console) {
+  judge(stage.file, check_loop(stage.spec), console);
+}
+
+void require_stable_loop(const ExperimentConfig& config, const Console& console) {
+  if (config.limits && !std::filesystem::exists(config.limits->prior))
+    throw FileError(fmt::format(
+        "{}: is not there; {} designs from it: measure a pilot, 'stageid run' and 'stageid frf -o' "
+        "to this name",
+        config.limits->prior.string(), config.file.string()));
+  judge(config.limits ? config.limits->prior : config.stage.file, check_loop(config), console);
+}
+
+}  // namespace stageid

@@ -1,0 +1,110 @@
+#include "tools/experiment/low_frequency_plant.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <vector>
+
+#include "frf/statistics/order_statistic.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr double kModelError = 0.02;  // of a row: what three terms leave of flexible modes
+constexpr double kGrowth = 1.5;
+constexpr double kBelowGrowth = 0.7;
+constexpr Index kFewestLines = 8;
+constexpr double kSmallestMotion = 1e-6;  // of the largest
+
+double omega_of(double frequency_hz) { return 2.0 * std::numbers::pi * frequency_hz; }
+
+/// Number of lines up to where flexible modes begin.
+Index rigid_lines(const FrfEstimate& frf) {
+  std::vector<double> sizes;
+  for (Index k = 0; k < frf.lines(); ++k) {
+    sizes.push_back(std::pow(frf.frequency_hz[k], 2) * frf.response.col(k).norm());
+    std::vector<double> sorted = sizes;
+    if (k + 1 < kFewestLines || sizes.back() <= kGrowth * order_statistic(sorted, 0.5)) continue;
+    const double* const begin = frf.frequency_hz.data();
+    const Index below =
+        std::lower_bound(begin, begin + k, kBelowGrowth * frf.frequency_hz[k]) - begin;
+    return std::clamp<Index>(below, kFewestLines, k + 1);
+  }
+  return frf.lines();
+}
+
+/// Onto the motions of the channels that a rigid body can make.
+MatrixXd rigid_motions(const std::vector<Channel>& channels, const std::vector<Index>& places) {
+  MatrixXd motions(static_cast<Index>(places.size()), 6);
+  for (Index i = 0; i < motions.rows(); ++i) {
+    const Channel& channel =
+        channels[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
+    const Eigen::Map<const Eigen::Vector3d> position(channel.position_m);
+    const Eigen::Map<const Eigen::Vector3d> direction(channel.direction);
+    motions.row(i).head<3>() = direction;
+    motions.row(i).tail<3>() = position.cross(direction);
+  }
+  Eigen::JacobiSVD<MatrixXd> svd(motions, Eigen::ComputeThinU);
+  svd.setThreshold(kSmallestMotion);
+  const MatrixXd U = svd.matrixU().leftCols(svd.rank());
+  return U * U.transpose();
+}
+
+}  // namespace
+
+LowFrequencyPlant::LowFrequencyPlant(const FrfEstimate& frf, const StageInfo& stage,
+                                     const std::vector<Index>& sensors,
+                                     const std::vector<Index>& actuators)
+    : delay_s_(stage.transport_delay_s + 0.5 / stage.sample_rate_hz) {
+  const Index K = rigid_lines(frf);
+  const Index n_y = frf.n_outputs();
+  const Index n_u = frf.n_inputs();
+  const Index terms = std::min<Index>(3, K);
+  scale_rad_s_ = omega_of(frf.frequency_hz[K - 1]);
+  Eigen::MatrixXcd G(n_y * n_u, K);
+  MatrixXd X(K, terms);
+  for (Index k = 0; k < K; ++k) {
+    const double omega = omega_of(frf.frequency_hz[k]);
+    const double x = -std::pow(omega / scale_rad_s_, 2);
+    G.col(k) = frf.response.col(k) * std::polar(1.0, omega * delay_s_);
+    for (Index t = 0; t < terms; ++t) X(k, t) = std::pow(x, static_cast<double>(t) - 1.0);
+  }
+  terms_.setZero(3, n_y * n_u);
+  for (Index c = 0; c < n_y * n_u; ++c) {
+    Eigen::VectorXd w(K);
+    for (Index k = 0; k < K; ++k) {
+      const Eigen::Map<const Eigen::MatrixXcd> whole(G.col(k).data(), n_y, n_u);
+      const double row = whole.row(c % n_y).squaredNorm() / static_cast<double>(n_u);
+      const double noise = frf.noise_variance.size() > 0 ? 0.5 * frf.noise_variance(c, k) : 0.0;
+      const double variance = noise + kModelError * kModelError * row;
+      w[k] = variance > 0.0 && std::isfinite(variance) ? 1.0 / std::sqrt(variance) : 0.0;
+    }
+    const Eigen::VectorXd target = w.cwiseProduct(G.row(c).real().transpose());
+    terms_.col(c).head(terms) = (w.asDiagonal() * X).colPivHouseholderQr().solve(target);
+  }
+  const Eigen::VectorXd constant = terms_.row(0);
+  const MatrixXd B = rigid_motions(stage.sensors, sensors) *
+                     Eigen::Map<const MatrixXd>(constant.data(), n_y, n_u) *
+                     rigid_motions(stage.actuators, actuators);
+  terms_.row(0) = B.reshaped().transpose();
+  double square = 0.0;
+  for (Index k = 0; k < K; ++k)
+    square += (response(frf.frequency_hz[k]) - frf.response.col(k)).squaredNorm() /
+              std::max(frf.response.col(k).squaredNorm(), std::numeric_limits<double>::min());
+  misfit_ = std::sqrt(square / static_cast<double>(K));
+}
+
+Eigen::VectorXcd LowFrequencyPlant::response(double frequency_hz) const {
+  const double omega = omega_of(frequency_hz);
+  const double x = -std::pow(omega / scale_rad_s_, 2);
+  const Eigen::RowVector3d powers(1.0 / x, 1.0, x);
+  return std::polar(1.0, -omega * delay_s_) *
+         (powers * terms_).transpose().cast<std::complex<double>>();
+}
+
+}  // namespace stageid

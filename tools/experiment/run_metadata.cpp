@@ -1,0 +1,40 @@
+#include "tools/experiment/run_metadata.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "acquisition/files/json_members.hpp"
+#include "acquisition/record/utc_time.hpp"
+
+namespace stageid {
+
+using Json = nlohmann::ordered_json;
+
+std::string run_metadata(const ExperimentConfig& config, Backend backend, const StageInfo& stage) {
+  Json json = {
+      {"program", "stageid"},
+      {"stageid_version", STAGEID_VERSION},
+      {"started_utc", utc_now()},
+      {"backend", to_string(backend)},
+      {"measurement_id", config.measurement_id},
+      {"seeds", {{"experiment", config.experiment.seed}, {"noise", config.stage.spec.seed}}},
+      {"transport_delay_s", config.stage.spec.info.transport_delay_s},
+      {"configuration_file", config.file.filename().string()},
+      {"configuration", config.text},
+      {"stage_file", config.stage.file.filename().string()},
+      {"stage", config.stage.text}};
+  // Virtual time has no pace, and its logs say nothing of one.
+  if (stage.clock == Clock::wall) json["pace"] = stage.pace;
+  return json.dump();
+}
+
+std::string measurement_id_of(const LogInfo& info) {
+  return text_in(Json::parse(info.metadata_json, nullptr, false), "measurement_id");
+}
+
+double wall_period_s(const LogInfo& info) {
+  const double pace =
+      number_in(Json::parse(info.metadata_json, nullptr, false), "pace").value_or(0.0);
+  return pace > 0.0 ? 1.0 / (info.sample_rate_hz * pace) : 0.0;
+}
+
+}  // namespace stageid

@@ -1,0 +1,395 @@
+#include "tools/fit/fit_request.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/key_suggestion.hpp"
+#include "frf/response/dc_line.hpp"
+#include "frf/response/distortion_variance.hpp"
+#include "frf/response/hold_compensation.hpp"
+#include "frf/response/line_scatter.hpp"
+#include "tools/fit/flag_values.hpp"
+#include "tools/fit/frf_quality.hpp"
+#include "tools/fit/structure_request.hpp"
+#include "tools/fit/submodel_text.hpp"
+#include "tools/fit/weight_file.hpp"
+
+namespace stageid {
+namespace {
+
+// The median of a linear plant's is 1 within a few percent, above where modes are narrow for the lines.
+constexpr double kDistorted = 2.0;
+
+const std::vector<std::string> kWeightings = {
+    "unit",           "inverse_magnitude", "relative", "noise_variance",
+    "total_variance", "likelihood",        "user"};
+const std::vector<std::string> kHolds = {"none", "phase", "sinc", "exact"};
+const std::vector<std::string> kMethods = {"riv", "gn", "sk"};
+
+/// What is said of channels whose weight is zero on all lines; empty: there is none.
+std::string channels_without_weight(const FrfEstimate& frf, const FitOptions& options) {
+  const Eigen::MatrixXd& W = options.user_weights;
+  std::vector<std::string> names;
+  for (Eigen::Index c = 0; c < W.rows(); ++c)
+    if (W.row(c).maxCoeff() == 0.0)
+      names.push_back(fmt::format("({}, {})",
+                                  frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())],
+                                  frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]));
+  if (names.empty()) return {};
+  return fmt::format(
+      "weighting: {} (output, input) {} no weight: free numerators there are not determined, and "
+      "stand as 0 with a standard deviation of null",
+      fmt::join(names, ", "), names.size() == 1 ? "has" : "have");
+}
+
+/// Sums up what the FRF decides where the request is silent.
+class FitDefaults {
+ public:
+  FitDefaults(const FitRequest& request, FitSetup& setup, WholeLines whole)
+      : request_(request), setup_(setup), whole_(whole) {}
+
+  /// What was taken out is put back and given to the model, which goes through hold, delay and
+  /// sampler exactly; the data keep the aliasing, and no compensation can divide it out.
+  void restore_as_measured() {
+    FrfEstimate& frf = setup_.frf;
+    const bool only_delay = frf.compensated == Compensation::delay;
+    const bool wanted = request_.hold.empty() || request_.hold == "exact" ||
+                        (only_delay && request_.hold != "none");
+    if (frf.compensated == Compensation::none || !(frf.sample_rate_hz > 0.0) || !wanted) return;
+    known_delay_s_ = frf.delay_s;
+    frf = as_measured(std::move(frf));
+    note(fmt::format(
+        "hold and delay: {} s was taken out of the response; it is put back and modelled",
+        *known_delay_s_));
+  }
+
+  void choose_hold() {
+    HoldModel& hold = setup_.options.hold;
+    if (!request_.hold.empty()) {
+      hold = pick<HoldModel>("--hold", request_.hold, kHolds);
+      return;
+    }
+    if (setup_.frf.hold == Hold::zoh) {
+      hold = HoldModel::exact;
+      note("hold: exact, the response was measured through a zero-order hold");
+    } else {
+      hold = HoldModel::none;
+      note("hold: none, the response is that of a continuous-time plant");
+    }
+  }
+
+  void choose_delay() {
+    FitOptions& options = setup_.options;
+    const FrfEstimate& frf = setup_.frf;
+    if (!request_.delay.empty()) {
+      parse_delay();
+      return;
+    }
+    if (known_delay_s_) {
+      options.delay_s = *known_delay_s_;
+      return;
+    }
+    if (frf.hold == Hold::zoh && options.hold != HoldModel::none) {
+      options.delay = DelayModel::estimate;
+      note("delay: estimated, one for the plant");
+      return;
+    }
+    options.delay = DelayModel::fixed;
+    note("delay: none");
+  }
+
+  void choose_weighting() {
+    FitOptions& options = setup_.options;
+    const FrfEstimate& frf = setup_.frf;
+    if (!request_.weighting.empty()) {
+      parse_weighting();
+      return;
+    }
+    if (weigh_by_scatter() || weigh_by_realizations()) return;
+    options.weighting = frf.noise_variance.size() > 0   ? Weighting::noise_variance
+                        : frf.total_variance.size() > 0 ? Weighting::total_variance
+                                                        : Weighting::relative;
+    note(fmt::format(
+        "weighting: {}{}", to_string(options.weighting),
+        options.weighting == Weighting::relative ? ", the response comes without variances" : ""));
+  }
+
+  /// Refused here: the fit would grow for hours towards a number that the lines cannot carry.
+  void require_affordable_modes() const {
+    const Eigen::Index lines = setup_.frf.lines();
+    const Eigen::Index most = most_modes(setup_.frf, setup_.structure.common);
+    if (setup_.selection.exactly > most)
+      throw std::invalid_argument(fmt::format(
+          "--modes: {}; {} lines carry no more than {}; ask for fewer or take a wider band",
+          setup_.selection.exactly, lines, most));
+  }
+
+  void choose_modes() {
+    ModeSelection& selection = setup_.selection;
+    const std::string text = requested_modes(request_);
+    if (text == "auto") return;
+    if (text == "none") {
+      selection.keep_modes = true;
+      return;
+    }
+    if (text.find(',') == std::string::npos) {
+      const std::optional<double> number = to_number(text);
+      if (number && text.find_first_of(".eE") == std::string::npos) {
+        if (*number < 1.0 || *number > 1000.0) refuse("--modes", text, "1 to 1000 modes");
+        selection.exactly = static_cast<int>(*number);
+        selection.most = std::max(selection.most, selection.exactly);
+        return;
+      }
+      if (!number && text.find_first_not_of("0123456789.eE+-") != std::string::npos) {
+        if (!std::filesystem::exists(text))
+          throw FileError(fmt::format(
+              "--modes: '{}': there is no such file; write auto, none, a number of modes, "
+              "frequencies in Hz 'f1,f2,...', or the name of a file",
+              text));
+        selection.modes = read_modes(text);
+        for (const ModeCandidate& mode : selection.modes)
+          require_below_nyquist("--modes", setup_, mode.frequency_hz);
+        selection.keep_modes = true;
+        return;
+      }
+    }
+    parse_frequencies(text);
+  }
+
+ private:
+  void note(std::string text) { setup_.notes.push_back(std::move(text)); }
+
+  void parse_delay() {
+    FitOptions& options = setup_.options;
+    if (request_.delay == "estimate" || request_.delay == "per_channel") {
+      options.delay = request_.delay == "estimate" ? DelayModel::estimate : DelayModel::per_channel;
+      return;
+    }
+    const std::optional<double> delay_s = to_number(request_.delay);
+    if (!delay_s) refuse("--delay", request_.delay, "a number in s, estimate or per_channel");
+    options.delay = DelayModel::fixed;
+    options.delay_s = *delay_s;
+    const Eigen::VectorXd& f = setup_.frf.frequency_hz;
+    if (f.size() < 2) return;
+    const double spacing_hz = (f.tail(f.size() - 1) - f.head(f.size() - 1)).minCoeff();
+    if (!(std::abs(*delay_s) * 2.0 * spacing_hz <= 1.0))
+      refuse("--delay", request_.delay,
+             fmt::format("at most {:.4g} s in size: lines {:.4g} Hz apart do not tell a longer one "
+                         "from a shorter one (1/(2 df))",
+                         0.5 / spacing_hz, spacing_hz));
+  }
+
+  /// With one realization the variance by the periods lacks what nonlinear distortion adds; weighed by it, the
+  /// distortion would look like modes. @returns true if the lines scatter by more than that variance.
+  bool weigh_by_scatter() {
+    FrfEstimate& frf = setup_.frf;
+    if (frf.noise_variance.size() == 0 || frf.realizations > 1) return false;
+    LineScatter scatter = line_scatter(frf, request_.threads);
+    if (!(scatter.over_noise > kDistorted)) return false;
+    if (lines_are_coarse(frf, scatter, request_.threads)) {
+      setup_.warnings.push_back(
+          "weighting: by the variance by the periods; the lines scatter by more, but they are too "
+          "coarse to tell distortion from response; lines twice as fine, or several realizations, "
+          "would");
+      note(setup_.warnings.back());
+      return false;
+    }
+    frf.total_variance = std::move(scatter.variance);
+    frf.total_dof = scatter.dof;
+    setup_.options.weighting = Weighting::total_variance;
+    setup_.warnings.push_back(
+        fmt::format("weighting: by the scatter of neighbouring lines, {:.3g} times the variance by "
+                    "the periods (median): the plant looks nonlinear, and with one realization "
+                    "nothing else tells how much; measure several",
+                    scatter.over_noise));
+    note(setup_.warnings.back());
+    return true;
+  }
+
+  /// Distortion moves an estimate from realization to realization as noise does; the periods do not show it. Nor do
+  /// they show a transient or a drift, where linearity cannot be told.
+  bool weigh_by_realizations() {
+    FrfEstimate& frf = setup_.frf;
+    if (!why_linearity_cannot_be_tested(frf).empty()) return false;
+    const bool differ = nonlinearity_test(frf).nonlinear();
+    frf.nonlinearity = linearity_of(frf);
+    const std::string nonlinear = nonlinearity_sentence(frf);
+    if (nonlinear.empty() && !differ) return false;
+    weigh_by_total_variance();
+    setup_.warnings.push_back(
+        "weighting: total_variance; " +
+        (nonlinear.empty() ? "realizations differ by more than their periods, by a transient or a "
+                             "drift: measure longer after the start, or more realizations"
+                           : nonlinear));
+    note(setup_.warnings.back());
+    return true;
+  }
+
+  void weigh_by_total_variance() {
+    FrfEstimate& frf = setup_.frf;
+    setup_.options.weighting = Weighting::total_variance;
+    if (frf.noise_variance.size() == 0 || !(frf.total_dof >= 1.0)) return;
+    DistortionVariance distorted = distortion_variance(frf);
+    setup_.distortion = std::move(distorted.distortion);
+    frf.total_variance = std::move(distorted.variance);
+    frf.total_dof = distorted.dof;
+  }
+
+  void parse_weighting() {
+    FitOptions& options = setup_.options;
+    const std::string& text = request_.weighting;
+    const bool named = text != "user" &&
+                       std::find(kWeightings.begin(), kWeightings.end(), text) != kWeightings.end();
+    if (named) {
+      options.weighting = pick<Weighting>("--weighting", text, kWeightings);
+      if (options.weighting == Weighting::total_variance) weigh_by_total_variance();
+      return;
+    }
+    if (text.find('.') == std::string::npos && text.find('/') == std::string::npos) {
+      const std::vector<std::string> offered(kWeightings.begin(), kWeightings.end() - 1);
+      const std::string nearest = nearest_word(text, offered);
+      refuse("--weighting", text,
+             fmt::format("{}, or the name of an HDF5 file with /weights or /weight_matrices{}",
+                         fmt::join(offered, ", "),
+                         nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
+    }
+    options.weighting = Weighting::user;
+    read_weights(text, setup_.frf, options, whole_);
+    const std::string missing = channels_without_weight(setup_.frf, options);
+    if (missing.empty()) return;
+    setup_.warnings.push_back(missing);
+    note(missing);
+  }
+
+  void parse_frequencies(const std::string& text) {
+    std::string_view rest = text;
+    while (!rest.empty()) {
+      const std::size_t comma = std::min(rest.find(','), rest.size());
+      const std::optional<double> frequency_hz = to_number(rest.substr(0, comma));
+      if (!frequency_hz || *frequency_hz <= 0.0)
+        refuse("--modes", text,
+               "auto, none, a number of modes, frequencies in Hz 'f1,f2,...', or a file");
+      require_below_nyquist("--modes", setup_, *frequency_hz);
+      setup_.selection.modes.push_back({*frequency_hz});
+      rest.remove_prefix(std::min(comma + 1, rest.size()));
+    }
+    std::sort(setup_.selection.modes.begin(), setup_.selection.modes.end(),
+              [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
+    setup_.selection.keep_modes = true;
+  }
+
+  const FitRequest& request_;
+  FitSetup& setup_;
+  WholeLines whole_;
+  std::optional<double> known_delay_s_;
+};
+
+bool is_acceleration(const std::string& unit) {
+  return unit == "g" || unit.ends_with("/s^2") || unit.ends_with("/s2") || unit.ends_with("/s²") ||
+         unit.ends_with(" s^-2");
+}
+
+/// The parts of the structure that are not asked for, by what the outputs are.
+FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
+                          std::vector<std::string>& notes) {
+  const std::vector<std::string>& units = frf.outputs.units;
+  const bool any_rank = request.residue_rank == "full" || request.residue_rank == "1";
+  const bool accelerations = !units.empty() &&
+                             std::all_of(units.begin(), units.end(), is_acceleration) &&
+                             request.submodels.empty() && any_rank;
+  const bool silent =
+      request.damping.empty() && request.direct_term.empty() && request.rigid_body.empty();
+  const bool chosen = accelerations && silent;
+  if (chosen)
+    notes.push_back(
+        fmt::format("structure: the outputs are accelerations [{}]: numerators B_0 + B_1 s, a "
+                    "direct term, no rigid body",
+                    units.front()));
+  if (request.damping.empty()) request.damping = chosen ? "general" : "proportional";
+  if (request.direct_term.empty()) request.direct_term = chosen ? "full" : "none";
+  if (chosen) request.rigid_body = "none";
+  return request;
+}
+
+std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
+  using Json = nlohmann::ordered_json;
+  const FitOptions& o = setup.options;
+  Json modes = requested_modes(request);
+  if (!setup.selection.modes.empty()) {
+    modes = Json::array();
+    for (const ModeCandidate& mode : setup.selection.modes) modes.push_back(mode.frequency_hz);
+  }
+  Json json = {
+      {"band_hz", {setup.frf.frequency_hz[0], setup.frf.frequency_hz[setup.frf.lines() - 1]}},
+      {"modes", modes},
+      {"weighting", to_string(o.weighting)},
+      {"hold", to_string(o.hold)},
+      {"delay", o.delay == DelayModel::estimate      ? Json("estimate")
+                : o.delay == DelayModel::per_channel ? Json("per_channel")
+                                                     : Json(o.delay_s)},
+      {"rigid_body", requested_rigid_body(request)},
+      {"residue_rank", request.residue_rank},
+      {"direct_term", request.direct_term},
+      {"damping", request.damping},
+      {"method", request.method},
+      {"max_iterations", o.max_iterations},
+      {"search_seconds", request.search_seconds}};
+  for (const SubmodelRequest& submodel : request.submodels)
+    json["submodels"].push_back(submodel_text(submodel));
+  if (o.weighting == Weighting::user) {
+    Fingerprint fingerprint;
+    const auto add = [&](const auto& matrix) {
+      const auto* bytes = reinterpret_cast<const std::byte*>(matrix.data());
+      fingerprint.add({bytes, static_cast<std::size_t>(matrix.size()) * sizeof(*matrix.data())});
+    };
+    add(*o.user_weights);
+    add(o.user_weight_matrices);
+    json["weights_fingerprint"] = fingerprint.hex();
+  }
+  return json.dump();
+}
+
+}  // namespace
+
+FitSetup make_fit_setup(const FitRequest& asked, FrfEstimate frf) {
+  FitSetup setup;
+  const FitRequest request = with_structure(asked, frf, setup.notes);
+  const Eigen::VectorXd whole_hz = frf.frequency_hz;
+  if (request.band_hz)
+    frf = select_band(std::move(frf), (*request.band_hz)[0], (*request.band_hz)[1]);
+  if (has_dc_line(frf)) {
+    setup.warnings.emplace_back(kDcLineLeftOut);
+    setup.notes.emplace_back(kDcLineLeftOut);
+    frf = without_dc_line(std::move(frf));
+  }
+  setup.frf = std::move(frf);
+  const auto before = (whole_hz.array() < setup.frf.frequency_hz[0]).count();
+  FitDefaults defaults(request, setup, {before, whole_hz.size()});
+  defaults.restore_as_measured();
+  defaults.choose_hold();
+  defaults.choose_delay();
+  defaults.choose_weighting();
+  defaults.choose_modes();
+  choose_structure(request, setup);
+  defaults.require_affordable_modes();
+  setup.options.method = pick<FitMethod>("--method", request.method, kMethods);
+  if (request.max_iterations < 1)
+    refuse("--max-iterations", fmt::format("{}", request.max_iterations), "1 or more");
+  setup.options.max_iterations = request.max_iterations;
+  if (!(request.search_seconds >= 0.0))
+    refuse("--search-seconds", fmt::format("{}", request.search_seconds), "0 or more");
+  setup.selection.search_seconds = request.search_seconds;
+  setup.options.threads = request.threads;
+  setup.request_json = provenance_of(request, setup);
+  return setup;
+}
+
+}  // namespace stageid

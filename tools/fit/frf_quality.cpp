@@ -1,0 +1,212 @@
+#include "tools/fit/frf_quality.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "frf/health/settling_check.hpp"
+#include "frf/response/nonlinearity.hpp"
+#include "tools/terminal/console.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostLines = 10;
+
+std::string decibels(double ratio) {
+  return ratio > 0.0 ? fmt::format("{:.0f} dB", 20.0 * std::log10(ratio)) : std::string("none");
+}
+
+/// The least probable verdict of a column.
+struct Verdict {
+  Eigen::Index at = 0;
+  double p_value = 1.0;
+};
+
+Verdict least(const Eigen::MatrixXd& p_value, Eigen::Index band) {
+  Verdict verdict;
+  verdict.p_value = p_value.col(band).minCoeff(&verdict.at);
+  return verdict;
+}
+
+std::string pair_name(const FrfEstimate& frf, Eigen::Index c) {
+  return fmt::format("{} <- {}", frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())],
+                     frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]);
+}
+
+std::string detected(const DetectedDistortion& found, Eigen::Index band) {
+  if (found.p_value.size() == 0) return "-";
+  const Verdict verdict = least(found.p_value, band);
+  if (verdict.p_value >= kNonlinearBelow / static_cast<double>(found.p_value.rows())) return "-";
+  return decibels(found.level(verdict.at, band));
+}
+
+Json detected_json(const DetectedDistortion& found, Eigen::Index band) {
+  if (found.p_value.size() == 0) return nullptr;
+  const Verdict verdict = least(found.p_value, band);
+  return {{"p_value", verdict.p_value}, {"level", found.level(verdict.at, band)}};
+}
+
+std::size_t unsettled_bands(const NonlinearityTest& test) {
+  std::size_t count = 0;
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) count += test.settled(b) ? 0 : 1;
+  return count;
+}
+
+std::string unsettled_line(const NonlinearityTest& test) {
+  return fmt::format(
+      "in {} of {} bands linearity cannot be told, for the records are not settled there: {}",
+      unsettled_bands(test), test.band_hz.rows(), kUnsettledRemedy);
+}
+
+std::string conclusion(const NonlinearityTest& test) {
+  const std::size_t tests = static_cast<std::size_t>(test.p_value.size()) -
+                            unsettled_bands(test) * static_cast<std::size_t>(test.p_value.rows());
+  const std::string chance =
+      fmt::format("a linear plant shows {:.1f} of {} pairs and bands as nonlinear by chance",
+                  kNonlinearBelow * static_cast<double>(tests), tests);
+  if (!test.nonlinear()) return "no sign that the plant is not linear: " + chance;
+  return fmt::format(
+      "the plant is not linear: {}, but none as improbable as p = {:.0e}, which is here", chance,
+      std::max(test.least_p_value(), 1e-300));
+}
+
+/// The channel pair and band whose distortion is largest among those that test nonlinear.
+std::string strongest_distortion(const FrfEstimate& frf, const NonlinearityTest& test) {
+  double largest = 0.0;
+  std::string text;
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b)
+    for (Eigen::Index c = 0; c < test.p_value.rows(); ++c) {
+      if (!(test.p_value(c, b) < kNonlinearBelow) || !(test.distortion(c, b) > largest)) continue;
+      largest = test.distortion(c, b);
+      text =
+          fmt::format(", most at {} between {:.4g} and {:.4g} Hz ({} of the response)",
+                      pair_name(frf, c), test.band_hz(b, 0), test.band_hz(b, 1), decibels(largest));
+    }
+  return text;
+}
+
+std::string why_not_tested(const FrfEstimate& frf) {
+  const std::string why = why_linearity_cannot_be_tested(frf);
+  return why.empty() ? "nonlinearity test: the file holds none; estimate again from the logs" : why;
+}
+
+/// Every experiment begins with a period that is unlike the others, and none has another such period.
+bool transient_lasts(const FrfEstimate& frf) {
+  const std::size_t experiments =
+      static_cast<std::size_t>(frf.realizations) * static_cast<std::size_t>(frf.experiments);
+  return experiments > 0 && frf.dropped_periods.size() == experiments &&
+         std::all_of(frf.dropped_periods.begin(), frf.dropped_periods.end(),
+                     [](const DroppedPeriod& period) { return period.period == 0; });
+}
+
+}  // namespace
+
+std::vector<std::string> linearity_lines(const FrfEstimate& frf) {
+  const NonlinearityTest& test = frf.nonlinearity;
+  if (test.band_hz.rows() == 0) return {why_not_tested(frf)};
+  std::vector<std::vector<std::string>> rows = {
+      {"band, Hz", "nonlinear pairs", "most", "distortion", "even lines", "odd lines"}};
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
+    const Verdict verdict = least(test.p_value, b);
+    const auto count = (test.p_value.col(b).array() < kNonlinearBelow).count();
+    const std::string band =
+        fmt::format("{:.4g} ... {:.4g}", test.band_hz(b, 0), test.band_hz(b, 1));
+    if (!test.settled(b)) {
+      rows.push_back({band, "not settled", "-", "-", "-", "-"});
+      continue;
+    }
+    rows.push_back({band, fmt::format("{} of {}", count, test.p_value.rows()),
+                    count > 0 ? pair_name(frf, verdict.at) : "-",
+                    count > 0 ? decibels(test.distortion(verdict.at, b)) : "-",
+                    detected(test.even, b), detected(test.odd, b)});
+  }
+  std::vector<std::string> lines = table_lines(rows);
+  const std::size_t unsettled = unsettled_bands(test);
+  if (unsettled > 0) lines.push_back(unsettled_line(test));
+  if (unsettled < static_cast<std::size_t>(test.band_hz.rows())) lines.push_back(conclusion(test));
+  return lines;
+}
+
+std::string nonlinearity_sentence(const FrfEstimate& frf) {
+  const NonlinearityTest test = linearity_of(frf);
+  if (!test.nonlinear()) return {};
+  return fmt::format("the plant is nonlinear: realizations differ by more than noise{}",
+                     strongest_distortion(frf, test));
+}
+
+Json linearity_json(const FrfEstimate& frf) {
+  const NonlinearityTest& test = frf.nonlinearity;
+  if (test.band_hz.rows() == 0) return {{"tested", false}, {"reason", why_not_tested(frf)}};
+  Json bands = Json::array();
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
+    const Verdict verdict = least(test.p_value, b);
+    bands.push_back(
+        {{"band_hz", {test.band_hz(b, 0), test.band_hz(b, 1)}},
+         {"settled", test.settled(b)},
+         {"tests", test.p_value.rows()},
+         {"nonlinear", (test.p_value.col(b).array() < kNonlinearBelow).count()},
+         {"output", frf.outputs.names[static_cast<std::size_t>(verdict.at % frf.n_outputs())]},
+         {"input", frf.inputs.names[static_cast<std::size_t>(verdict.at / frf.n_outputs())]},
+         {"p_value", verdict.p_value},
+         {"distortion", test.distortion(verdict.at, b)},
+         {"even", detected_json(test.even, b)},
+         {"odd", detected_json(test.odd, b)}});
+  }
+  return {{"tested", true},
+          {"nonlinear", test.nonlinear()},
+          {"false_alarm_rate", kNonlinearBelow},
+          {"bands", bands}};
+}
+
+std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
+  std::vector<std::string> lines;
+  std::set<int> left_out;
+  for (const LeftOutRealization& one : frf.left_out_realizations) {
+    left_out.insert(one.realization);
+    lines.push_back(fmt::format("realization {} left out, the others are used: {}",
+                                one.realization + 1, one.reason));
+  }
+  std::size_t told = 0;
+  std::size_t more = 0;
+  for (const DroppedPeriod& period : frf.dropped_periods) {
+    if (left_out.contains(period.realization)) continue;
+    if (++told > kMostLines) {
+      ++more;
+      continue;
+    }
+    lines.push_back(fmt::format("realization {}, experiment {}: period {} left out: {}",
+                                period.realization + 1, period.experiment + 1, period.period + 1,
+                                period.reason));
+  }
+  if (more > 0) lines.push_back(fmt::format("... and {} more periods, see /dropped_periods", more));
+  if (transient_lasts(frf))
+    lines.emplace_back(
+        "the first measured period of every experiment was left out: the transient was not over, "
+        "and what is left of it looks like distortion; give --transient-periods one more, or "
+        "--method lpm");
+  return lines;
+}
+
+Json left_out_json(const FrfEstimate& frf) {
+  Json list = Json::array();
+  for (const LeftOutRealization& one : frf.left_out_realizations)
+    list.push_back({{"realization", one.realization + 1}, {"reason", one.reason}});
+  return list;
+}
+
+Json dropped_json(const FrfEstimate& frf) {
+  Json list = Json::array();
+  for (const DroppedPeriod& period : frf.dropped_periods)
+    list.push_back({{"realization", period.realization + 1},
+                    {"experiment", period.experiment + 1},
+                    {"period", period.period + 1},
+                    {"reason", period.reason}});
+  return list;
+}
+
+}  // namespace stageid

@@ -1,0 +1,89 @@
+#include "tools/manual/command_tree.hpp"
+
+#include <algorithm>
+#include <regex>
+
+namespace stageid {
+namespace {
+
+/// What the parser checks against, "TEXT:{periodic,lpm}".
+std::vector<std::string> checked_words(const std::string& type) {
+  const std::size_t open = type.find('{');
+  const std::size_t close = type.find('}', open);
+  if (open == std::string::npos || close == std::string::npos) return {};
+  return CLI::detail::split(type.substr(open + 1, close - open - 1), ',');
+}
+
+/// What our help texts list, "auto | none | how many | modes.json; default: ...": the words of it.
+std::vector<std::string> listed_words(const std::string& help) {
+  static const std::regex word(R"(^([a-z][a-z_]*)( ?[(,:].*)?$)");
+  std::vector<std::string> words;
+  const std::string list = help.substr(0, help.find(';'));
+  if (list.find(" | ") == std::string::npos) return words;
+  for (std::string part : CLI::detail::split(list, '|')) {
+    std::smatch match;
+    CLI::detail::trim(part);
+    if (std::regex_match(part, match, word) &&
+        std::find(words.begin(), words.end(), match[1]) == words.end())
+      words.push_back(match[1]);
+  }
+  return words;
+}
+
+CommandOption option_of(const CLI::Option& option) {
+  CommandOption out;
+  for (const std::string& name : option.get_snames()) out.flags.push_back("-" + name);
+  for (const std::string& name : option.get_lnames()) out.flags.push_back("--" + name);
+  out.name = option.get_name(true);
+  out.help = option.get_description();
+  out.required = option.get_required();
+  out.default_value = option.get_default_str();
+  if (option.get_type_size() == 0) return out;
+  const std::string type = option.get_type_name();
+  out.value = type.substr(0, type.find(':'));
+  out.words = checked_words(type);
+  if (out.words.empty()) out.words = listed_words(out.help);
+  out.repeats = option.get_expected_max() == CLI::detail::expected_max_vector_size;
+  for (int k = 1; k < option.get_expected_min(); ++k)
+    out.value += " " + type.substr(0, type.find(':'));
+  return out;
+}
+
+}  // namespace
+
+CommandTree command_tree(const CLI::App& app) {
+  CommandTree tree{app.get_name(), app.get_description(), app.get_footer(), {}, {}, {}};
+  for (const CLI::Option* option : app.get_options()) {
+    CommandOption out = option_of(*option);
+    (option->nonpositional() ? tree.options : tree.arguments).push_back(std::move(out));
+  }
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    tree.commands.push_back(command_tree(*command));
+  return tree;
+}
+
+std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program) {
+  std::vector<CommandOption> options = command.options;
+  if (&command == &program) return options;
+  for (const CommandOption& option : program.options)
+    if (std::none_of(option.flags.begin(), option.flags.end(), [](const std::string& flag) {
+          return flag == "--help" || flag == "--version";
+        }))
+      options.push_back(option);
+  return options;
+}
+
+std::vector<std::string> flags_of(const CommandTree& command) {
+  std::vector<std::string> flags;
+  for (const CommandOption& option : command.options)
+    flags.insert(flags.end(), option.flags.begin(), option.flags.end());
+  return flags;
+}
+
+std::vector<std::string> names_of(const std::vector<CommandTree>& commands) {
+  std::vector<std::string> names;
+  for (const CommandTree& command : commands) names.push_back(command.name);
+  return names;
+}
+
+}  // namespace stageid

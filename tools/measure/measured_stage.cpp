@@ -1,0 +1,145 @@
+#include "tools/measure/measured_stage.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/loop/run_resident.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "hal/plugin/plugin_stage.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "hal/stage/replay_stage.hpp"
+#include "tools/measure/can_backend.hpp"
+#include "tools/measure/modbus_backend.hpp"
+#include "tools/measure/replay_log.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/interrupt.hpp"
+
+namespace stageid {
+namespace {
+
+/// The host closes the loop.
+class StreamedStage final : public MeasuredStage {
+ public:
+  StreamedStage(const ExperimentPlan& plan, std::unique_ptr<CyclicStage> stage,
+                const WaferStageSpec& spec)
+      : plan_(plan), stage_(std::move(stage), spec.limits), controller_(spec.controller) {}
+
+  const StageInfo& info() const noexcept override { return stage_.info(); }
+
+  ExperimentResult perform(RunWriter& log, const RunExperimentOptions& options) override {
+    return run_experiment(plan_, stage_, controller_, log, options);
+  }
+
+  void explain(MeasurementResult& result) const override {
+    add_trouble(result);
+    judge_replay(result);
+  }
+
+  LimitViolation violation() const noexcept override { return stage_.violation(); }
+
+ private:
+  void add_trouble(MeasurementResult& result) const {
+    const ExperimentEnd end = result.experiment.end;
+    const std::string trouble = stage_.trouble();
+    if (trouble.empty() || (end != ExperimentEnd::fault && end != ExperimentEnd::limit)) return;
+    // A limit that only the node saw is no violation on this side of the wires.
+    const bool node_only =
+        end == ExperimentEnd::limit && stage_.violation().kind == LimitKind::none;
+    result.message = node_only ? trouble : result.message + "; " + trouble;
+  }
+
+  /// The replay stage also compares: what it saw is part of the result.
+  void judge_replay(MeasurementResult& result) const {
+    const auto* replay = dynamic_cast<const ReplayStage*>(&stage_.inner());
+    if (replay == nullptr || replay->mismatches() == 0) return;
+    result.message += fmt::format("; {} commands differ from the recorded ones, by up to {:.3g} N",
+                                  replay->mismatches(), replay->largest_mismatch_n());
+    if (result.exit_code == kDone) result.exit_code = kNotTrustworthy;
+  }
+
+  const ExperimentPlan& plan_;
+  LimitedStage stage_;
+  MotionController controller_;
+};
+
+/// The stage closes the loop by itself.
+class PlayingStage final : public MeasuredStage {
+ public:
+  PlayingStage(const ExperimentPlan& plan, std::unique_ptr<ResidentStage> stage)
+      : plan_(plan), stage_(std::move(stage)) {}
+
+  const StageInfo& info() const noexcept override { return stage_->info(); }
+  ExperimentResult perform(RunWriter& log, const RunExperimentOptions& options) override {
+    return run_resident_experiment(plan_, *stage_, log, options);
+  }
+  void explain(MeasurementResult& /*result*/) const override {}
+  LimitViolation violation() const noexcept override { return {}; }
+
+ private:
+  const ExperimentPlan& plan_;
+  std::unique_ptr<ResidentStage> stage_;
+};
+
+std::unique_ptr<CyclicStage> replayed_stage(const ExperimentConfig& config,
+                                            const ExperimentPlan& plan,
+                                            const MeasurementRequest& request,
+                                            const std::vector<RunId>& skip) {
+  if (request.replay.empty())
+    throw std::invalid_argument("--backend replay: no log to play; add --replay LOG");
+  StageInfo info = config.stage.spec.info;
+  info.backend = "replay";
+  return std::make_unique<ReplayStage>(
+      std::move(info),
+      std::make_unique<ReplayLog>(open_log(request.replay), plan.runs_without(skip)),
+      request.replay_tolerance_n);
+}
+
+}  // namespace
+
+void require_backend(const ExperimentConfig& config, Backend backend) {
+  const bool there = backend == Backend::can      ? config.stage.can.present
+                     : backend == Backend::modbus ? config.stage.modbus.has_value()
+                     : backend == Backend::plugin ? config.stage.plugin.has_value()
+                                                  : true;
+  if (!there)
+    throw std::invalid_argument(
+        fmt::format("--backend {0}: {1} has no group '{0}'; see 'stageid config schema'",
+                    to_string(backend), config.stage.file.string()));
+}
+
+std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& config,
+                                                   const ExperimentPlan& plan,
+                                                   const MeasurementRequest& request,
+                                                   const std::vector<RunId>& skip) {
+  require_backend(config, request.backend);
+  WaferStageSpec spec = config.stage.spec;
+  if (request.pace >= 0.0) spec.pace = request.pace;
+  const auto streamed = [&](std::unique_ptr<CyclicStage> stage) {
+    return std::make_unique<StreamedStage>(plan, std::move(stage), spec);
+  };
+  // A played-back motion answers to other forces than these.
+  if (request.backend == Backend::replay) spec.limits.motion = {};
+  switch (request.backend) {
+    case Backend::sim:
+      spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
+      return streamed(std::make_unique<SimulatedStage>(spec));
+    case Backend::can: {
+      const CanHostOptions options{spec.pace, request.reset_fault,
+                                   [] { return interrupt_flag().load(); }};
+      if (config.stage.can.mode == CanMode::resident)
+        return std::make_unique<PlayingStage>(plan, make_can_resident_stage(config.stage, options));
+      return streamed(make_can_stage(config.stage, options));
+    }
+    case Backend::modbus:
+      return streamed(make_modbus_stage(config.stage, {spec.pace, request.reset_fault}));
+    case Backend::plugin:
+      return streamed(std::make_unique<PluginStage>(spec.info, *config.stage.plugin, spec.pace));
+    case Backend::replay:
+      break;
+  }
+  return streamed(replayed_stage(config, plan, request, skip));
+}
+
+}  // namespace stageid

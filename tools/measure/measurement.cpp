@@ -1,0 +1,253 @@
+#include "tools/measure/measurement.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/loop/event_recorder.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "acquisition/slog/slog_writer.hpp"
+#include "hal/stage/real_time.hpp"
+#include "tools/dashboard/dashboard.hpp"
+#include "tools/experiment/run_metadata.hpp"
+#include "tools/measure/measured_stage.hpp"
+#include "tools/measure/modbus_backend.hpp"
+#include "tools/measure/until_variance.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/interrupt.hpp"
+
+namespace stageid {
+namespace {
+
+/// The runs that a log holds completely, and the check that it is the log of this experiment.
+std::vector<RunId> complete_runs(const ExperimentConfig& config,
+                                 const std::filesystem::path& file) {
+  const std::unique_ptr<LogReader> log = open_log(file, false);
+  const std::string id = measurement_id_of(log->info());
+  if (!id.empty() && id != config.measurement_id)
+    throw std::invalid_argument(
+        fmt::format("{}: belongs to another experiment (stage, excitation or seed differ from {}); "
+                    "give another -o",
+                    file.string(), config.file.string()));
+  std::vector<RunId> runs;
+  for (const LogRun& run : log->runs())
+    if (run.complete) runs.push_back({run.realization, run.experiment});
+  return runs;
+}
+
+SlogWriter open_writer(const MeasurementRequest& request, const LogInfo& info, bool exists) {
+  return exists ? SlogWriter::resume(request.log, info) : SlogWriter::create(request.log, info);
+}
+
+int exit_code_of(const ExperimentResult& result) {
+  switch (result.end) {
+    case ExperimentEnd::complete:
+      return result.health.marked + result.health.missing > 0 ? kNotTrustworthy : kDone;
+    case ExperimentEnd::limit:
+      return kStoppedForSafety;
+    case ExperimentEnd::interrupted:
+      return kInterrupted;
+    case ExperimentEnd::fault:
+    case ExperimentEnd::log_failed:
+      break;
+  }
+  return kWorldFailed;
+}
+
+void conclude(const MeasuredStage& stage, MeasurementResult& result) {
+  result.message = result.experiment.message;
+  result.exit_code = exit_code_of(result.experiment);
+  const RunHealth& health = result.experiment.health;
+  if (result.exit_code == kNotTrustworthy)
+    result.message = fmt::format(
+        "{} missing, {} marked as not to be used: 'stageid log info' counts them by run, "
+        "'stageid frf' leaves out the periods they stand in",
+        counted(health.missing, "cycle is", "cycles are"),
+        counted(health.marked, "sample is", "samples are"));
+  stage.explain(result);
+}
+
+/// Brings up the plant around the stage, if the stage file tells of one, and lets it end the
+/// experiment. What is played back has no plant any more.
+std::unique_ptr<SupervisedPlant> supervise(const ExperimentConfig& config,
+                                           const MeasurementRequest& request,
+                                           RunExperimentOptions& options) {
+  const std::optional<SupervisorConfig>& supervisor = config.stage.supervisor;
+  if (!supervisor || request.backend == Backend::replay) return nullptr;
+  auto plant = std::make_unique<SupervisedPlant>(*supervisor, request.reset_fault);
+  options.plant_tripped = &plant->watch().tripped();
+  options.plant_reason = [&watch = plant->watch()] { return watch.reason(); };
+  return plant;
+}
+
+std::unique_ptr<Dashboard> make_dashboard(const ExperimentConfig& config,
+                                          const ExperimentPlan& plan,
+                                          const MeasurementRequest& request, const StageInfo& stage,
+                                          int runs_before, const Console& console) {
+  if (!request.dashboard) return nullptr;
+  auto dashboard = std::make_unique<Dashboard>(*request.dashboard, config, plan, stage, request.log,
+                                               runs_before);
+  console.warning("dashboard: " + dashboard->url());
+  return dashboard;
+}
+
+/// Refuses what is there and must not be. @returns whether there is a log to continue.
+bool check_log(const MeasurementRequest& request) {
+  // Killed before the first byte was written: nothing is lost by starting anew.
+  std::error_code no_size;
+  if (request.resume && std::filesystem::file_size(request.log, no_size) == 0 && !no_size)
+    std::filesystem::remove(request.log);
+  const bool exists = std::filesystem::exists(request.log);
+  if (exists && !request.resume)
+    throw std::invalid_argument(fmt::format(
+        "{}: exists already; continue it with --resume, or remove it", request.log.string()));
+  return exists;
+}
+
+/// What real time lacks here, before anything is written. @throws StageError if it is required.
+void warn_of_real_time(const RealTimeOptions& options, const Console& console) {
+  for (const std::string& missing : missing_for_real_time(options))
+    console.warning("realtime: " + missing);
+}
+
+void warn_of_until(const ExperimentPlan& plan, const FrfOptions& options, const Console& console) {
+  if (const std::string why = never_enough(plan.spec(), options); !why.empty())
+    console.warning("--until: " + why);
+}
+
+const char* name_of(RealTimePolicy policy) noexcept {
+  switch (policy) {
+    case RealTimePolicy::off:
+      return "off";
+    case RealTimePolicy::attempt:
+      return "try";
+    case RealTimePolicy::require:
+      return "require";
+  }
+  return "unknown";
+}
+
+void tell_begin(EventLog& events, const ExperimentConfig& config, const StageInfo& stage,
+                const MeasurementResult& result) {
+  const RealTimeOptions& real_time = config.stage.real_time.options;
+  events.write(result.runs_before > 0 ? "resume" : "start",
+               {{"stage", stage.name},
+                {"backend", stage.backend},
+                {"clock", std::string(stage.clock == Clock::wall ? "wall" : "virtual")},
+                {"measurement_id", config.measurement_id},
+                {"runs_before", std::int64_t{result.runs_before}},
+                {"runs_total", std::int64_t{result.runs_total}},
+                {"realtime", std::string(name_of(real_time.policy))}});
+}
+
+void tell_end(EventLog& events, const MeasuredStage& stage, const MeasurementResult& result) {
+  const LimitViolation hit = stage.violation();
+  if (result.exit_code == kStoppedForSafety && hit.kind != LimitKind::none) {
+    const auto& channels = hit.of_sensor ? stage.info().sensors : stage.info().actuators;
+    events.write("limit", {{"channel", channels[static_cast<std::size_t>(hit.channel)].name},
+                           {"value", hit.value},
+                           {"limit", hit.limit},
+                           {"cycle", static_cast<std::int64_t>(hit.cycle)},
+                           {"message", result.message}});
+  }
+  events.write("end", {{"exit_code", std::int64_t{result.exit_code}}, {"message", result.message}});
+}
+
+/// The variance that all of it leaves, where the plan ended before it was small enough too.
+void tell_reached(UntilVariance& until, MeasurementResult& result, const Console& console) {
+  const std::string reason = until.enough();
+  if (reason.empty() && until.reached())
+    result.message += fmt::format(
+        "; the plan is at its end with a mean relative variance of {:.3g}", *until.reached());
+  else if (!reason.empty() && result.message.find(reason) == std::string::npos)
+    result.message += "; " + reason;
+  if (!until.failure().empty()) console.warning("--until: " + until.failure());
+  result.variance = until.reached();
+}
+
+/// Who is told what while it is measured.
+void listen(RunExperimentOptions& options, EventLog& events, Progress& progress,
+            Dashboard* dashboard) {
+  options.interrupt = &interrupt_flag();
+  options.events = &events;
+  options.progress = [&progress, dashboard](const ExperimentProgress& p) {
+    progress.update(p.seconds_done, p.seconds_total,
+                    fmt::format("run {}/{}", p.runs_done + 1, p.runs_total));
+    if (dashboard != nullptr) dashboard->update(p);
+  };
+  if (dashboard == nullptr) return;
+  options.observers = dashboard->observers();
+  dashboard->watch(events);
+}
+
+}  // namespace
+
+std::string advice_behind(const MeasurementResult& result) {
+  if (result.exit_code == kInterrupted || result.exit_code == kWorldFailed)
+    return "; continue with --resume";
+  if (result.exit_code == kStoppedForSafety)
+    return "; the same run would be stopped again: lower the level, or check controller and limits";
+  return "";
+}
+
+double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage) {
+  const auto words = static_cast<double>(stage.actuators.size() + stage.sensors.size() + 1);
+  return static_cast<double>(plan.samples_per_run()) * static_cast<double>(plan.runs().size()) *
+         words * 8.0;
+}
+
+MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
+                          const MeasurementRequest& request, const Console& console) {
+  const bool exists = check_log(request);
+  RunExperimentOptions options;
+  if (exists) options.skip = complete_runs(config, request.log);
+  MeasurementResult result;
+  result.runs_total = static_cast<int>(plan.runs().size());
+  result.runs_before = static_cast<int>(options.skip.size());
+  const ControlledStop stops_in_order;
+  const std::unique_ptr<MeasuredStage> stage =
+      make_measured_stage(config, plan, request, options.skip);
+  const StageInfo& info = stage->info();
+  options.real_time = config.stage.real_time.options;
+  options.misses_allowed = config.stage.real_time.misses_allowed;
+  options.ramp_s = config.stage.ramp_s;
+  if (info.clock == Clock::wall) warn_of_real_time(options.real_time, console);
+  if (request.until) warn_of_until(plan, config.frf, console);
+  const std::unique_ptr<SupervisedPlant> plant = supervise(config, request, options);
+  std::optional<EventLog> events;  // outlives the dashboard, whose watchers write to it
+  const std::unique_ptr<Dashboard> dashboard =
+      make_dashboard(config, plan, request, info, result.runs_before, console);
+  if (dashboard && plant) dashboard->watch([&plant] { return plant->snapshot(); });
+  SlogWriter log = open_writer(
+      request, experiment_log_info(plan, info, run_metadata(config, request.backend, info)),
+      exists);
+  events.emplace(event_log_of(request.log));
+  tell_begin(*events, config, info, result);
+
+  std::optional<UntilVariance> until;
+  if (request.until) {
+    until.emplace(request.log, config.frf, *request.until);
+    options.enough = [&until] { return until->enough(); };
+  }
+  Progress progress(console, "run", "s of stage time");
+  listen(options, *events, progress, dashboard.get());
+  result.experiment = stage->perform(log, options);
+  result.seconds = progress.seconds();
+  conclude(*stage, result);
+  if (until && result.experiment.end == ExperimentEnd::complete)
+    tell_reached(*until, result, console);
+  if (result.experiment.end != ExperimentEnd::log_failed)
+    log.close(result.exit_code, result.message.c_str());
+  tell_end(*events, *stage, result);
+  if (dashboard) dashboard->finish(result.exit_code, result.message);
+  if (const std::string error = events->error(); !error.empty()) console.warning(error);
+  std::error_code no_log;  // a log that was removed is a failure that is told already
+  const std::uintmax_t bytes = std::filesystem::file_size(request.log, no_log);
+  if (!no_log) result.log_bytes = bytes;
+  return result;
+}
+
+}  // namespace stageid

@@ -1,0 +1,66 @@
+#include "tools/measure/until_variance.hpp"
+
+#include <fmt/format.h>
+#include <pthread.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <thread>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "frf/response/relative_variance.hpp"
+#include "tools/dashboard/live_response.hpp"
+
+namespace stageid {
+
+UntilVariance::UntilVariance(std::filesystem::path log, FrfOptions options, double variance)
+    : log_(std::move(log)), options_(std::move(options)), wanted_(variance) {
+  if (!(variance > 0.0) || !std::isfinite(variance))
+    throw std::invalid_argument(fmt::format(
+        "--until: {} is no variance; write a positive number, e.g. 1e-6 for 0.1 %", variance));
+  options_.realizations.clear();
+}
+
+std::string UntilVariance::enough() {
+  std::thread worker([this] {
+    const sched_param normal{};
+    static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
+    try {
+      look();
+    } catch (const std::exception& error) {  // nothing of it may end the measurement
+      failure_ = error.what();
+    }
+  });
+  worker.join();
+  if (!reached_ || *reached_ > wanted_) return "";
+  return fmt::format("mean relative variance {:.3g} after {}, {:.3g} was wanted", *reached_,
+                     counted(realizations_, "realization"), wanted_);
+}
+
+std::string never_enough(const ExperimentSpec& plan, const FrfOptions& options) {
+  if (plan.realizations > 1) return "";
+  const bool no_noise = plan.periods < 2 && options.method == FrfMethod::periodic;
+  return fmt::format("{}, so the experiment runs to its end; plan realizations: 2 or more",
+                     no_noise ? "one period of one realization tells no variance"
+                              : "looked at is every realization, and the plan has one");
+}
+
+void UntilVariance::look() {
+  reached_.reset();
+  failure_.clear();
+  const std::unique_ptr<LogReader> log = open_log(log_, false);
+  if (complete_realizations(*log) == 0) return;
+  const FrfEstimate frf = estimate_plant_frf({log.get()}, options_);
+  realizations_ = frf.realizations;
+  double variance = 0.0;
+  if (frf.noise_variance.size() > 0) variance = mean_relative_variance(frf, VarianceKind::noise);
+  if (frf.total_variance.size() > 0)
+    variance = std::max(variance, mean_relative_variance(frf, VarianceKind::total));
+  if (variance > 0.0) reached_ = variance;
+}
+
+}  // namespace stageid

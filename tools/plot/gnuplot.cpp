@@ -1,0 +1,209 @@
+#include "tools/plot/gnuplot.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "tools/terminal/interrupt.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kPngDotsPerInch = 300.0;
+constexpr double kSvgUnitsPerInch = 96.0;
+constexpr double kPointsPerInch = 72.0;
+
+/// Cairo takes a point of a font for 1/96 inch, SVG's reader takes it for what it is.
+double font_scale(PictureFormat format) {
+  return format == PictureFormat::svg ? 1.0 : kPointsPerInch / kSvgUnitsPerInch;
+}
+
+/// A directory that only this user can read, and that goes away with all it holds.
+class PrivateDirectory {
+ public:
+  PrivateDirectory() {
+    std::string name = (std::filesystem::temp_directory_path() / "stageid-plot-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr)
+      throw FileError(fmt::format("{}: cannot be made: {}; set TMPDIR to a directory with room",
+                                  name, std::strerror(errno)));
+    path_ = name;
+  }
+  ~PrivateDirectory() { remove(); }
+  void remove() const {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  PrivateDirectory(const PrivateDirectory&) = delete;
+  PrivateDirectory& operator=(const PrivateDirectory&) = delete;
+  const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// How large things are in the units of a terminal, such that all formats look alike. Names of files are ours and relative: nothing from outside
+/// but quoted() texts stands in the script.
+std::string preamble(const Picture& picture, PictureFormat format) {
+  const auto terminal = [&](const char* name, const char* unit, double per_inch, double line,
+                            double point) {
+    return fmt::format(
+        "set encoding utf8\nset terminal {} enhanced size {}{},{}{} font 'Helvetica,8' "
+        "fontscale {:.6g} linewidth {:.6g} dashlength {:.6g}\npoint = {:.6g}\n"
+        "set output 'picture'\n",
+        name, picture.width_in * per_inch, unit, picture.height_in * per_inch, unit,
+        point * font_scale(format), line, 2.0 * point, point);
+  };
+  switch (format) {
+    case PictureFormat::pdf:
+      return terminal("pdfcairo rounded", "in", 1.0, 1.25, 1.0);
+    case PictureFormat::svg:
+      return terminal("svg", "", kSvgUnitsPerInch, 1.0, kSvgUnitsPerInch / kPointsPerInch);
+    case PictureFormat::png:
+      return terminal("pngcairo rounded", "", kPngDotsPerInch, kPngDotsPerInch / kSvgUnitsPerInch,
+                      kPngDotsPerInch / kPointsPerInch);
+  }
+  return "";
+}
+
+/// What the environment says of language and time must not stand in the picture.
+std::vector<std::string> environment_of_gnuplot() {
+  std::vector<std::string> out = {"LC_ALL=C.UTF-8", "TZ=UTC"};
+  for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) {
+    const std::string_view text = *entry;
+    if (!text.starts_with("LC_ALL=") && !text.starts_with("TZ=")) out.emplace_back(text);
+  }
+  return out;
+}
+
+std::string read_whole(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+std::atomic<pid_t> running_gnuplot = -1;
+
+/// Runs `gnuplot -d script.gp` there, messages into a file. @returns the status that waitpid() gives.
+int run_gnuplot(const std::filesystem::path& directory) {
+  std::vector<std::string> environment = environment_of_gnuplot();
+  std::vector<char*> environment_pointers;
+  for (std::string& entry : environment) environment_pointers.push_back(entry.data());
+  environment_pointers.push_back(nullptr);
+  std::string words[] = {"gnuplot", "-d", "script.gp"};
+  char* const arguments[] = {words[0].data(), words[1].data(), words[2].data(), nullptr};
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addchdir_np(&actions, directory.c_str());
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "messages",
+                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none;
+  ::sigemptyset(&none);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  pid_t child = -1;
+  const int error = ::posix_spawnp(&child, words[0].c_str(), &actions, &attributes, arguments,
+                                   environment_pointers.data());
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error == ENOENT)
+    throw FileError("gnuplot: is not installed; install the Debian package gnuplot-nox");
+  if (error != 0)
+    throw FileError(fmt::format("gnuplot: cannot be started: {}", std::strerror(error)));
+  running_gnuplot = child;
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  running_gnuplot = -1;
+  return status;
+}
+
+/// The first line that is neither empty nor gnuplot's pointer into its script.
+std::string first_message(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    line.erase(0, line.find_first_not_of(" \t^"));
+    if (line.starts_with("\"script.gp\"")) return line;
+  }
+  return text.empty() ? "it says nothing" : text.substr(0, text.find('\n'));
+}
+
+/// Cairo does not tell when a disk is full; a whole picture ends as its format says.
+bool is_whole(const std::string& bytes, PictureFormat format) {
+  std::string_view text = bytes;
+  if (format == PictureFormat::svg)
+    while (text.ends_with("\n\n")) text.remove_suffix(1);
+  switch (format) {
+    case PictureFormat::pdf:
+      return text.ends_with("%%EOF\n");
+    case PictureFormat::svg:
+      return text.ends_with("</svg>\n");
+    case PictureFormat::png:
+      return text.ends_with("IEND\xae\x42\x60\x82");
+  }
+  return false;
+}
+
+/// PDF tells the time it was written; the same request gives the same bytes, so it becomes 1970.
+void forget_date(std::string& pdf) {
+  static constexpr std::string_view kKey = "/CreationDate (D:";
+  static constexpr std::string_view kDate = "19700101000000";
+  const std::size_t at = pdf.rfind(kKey);
+  if (at == std::string::npos || at + kKey.size() + kDate.size() > pdf.size()) return;
+  pdf.replace(at + kKey.size(), kDate.size(), kDate);
+}
+
+}  // namespace
+
+PictureFormat picture_format(const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  if (ending == ".pdf") return PictureFormat::pdf;
+  if (ending == ".svg") return PictureFormat::svg;
+  if (ending == ".png") return PictureFormat::png;
+  throw std::invalid_argument(fmt::format(
+      "{}: '{}' is no ending of a picture; write one of .pdf, .svg, .png", file.string(), ending));
+}
+
+void draw(const Picture& picture, const std::filesystem::path& file) {
+  const PictureFormat format = picture_format(file);
+  const PrivateDirectory directory;
+  const CleanedUpAtInterrupt clean_up([&directory] {
+    if (const pid_t child = running_gnuplot; child > 0) ::kill(child, SIGKILL);
+    directory.remove();
+  });
+  for (const Picture::Table& table : picture.tables)
+    write_text_file(directory.path() / table.name, table.text);
+  write_text_file(directory.path() / "script.gp",
+                  preamble(picture, format) + picture.script + "unset output\n");
+  const int status = run_gnuplot(directory.path());
+  throw_if_interrupted();
+  std::string bytes = read_whole(directory.path() / "picture");
+  if (status != 0 || !is_whole(bytes, format))
+    throw FileError(fmt::format("{}: gnuplot did not draw it: {}; is there room in {}?",
+                                file.string(),
+                                first_message(read_whole(directory.path() / "messages")),
+                                std::filesystem::temp_directory_path().string()));
+  if (format == PictureFormat::pdf) forget_date(bytes);
+  write_text_file(file, bytes);
+}
+
+}  // namespace stageid

@@ -1,0 +1,145 @@
+#include "tools/report/report_comparison.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "estimation/modal/modal_assurance.hpp"
+#include "tools/report/report_shapes.hpp"
+#include "tools/steps/fit_step.hpp"
+
+namespace stageid::report {
+namespace {
+
+using Json = nlohmann::json;
+
+/// Relative distance of two lines that are the same one.
+constexpr double kSameLine = 1e-9;
+constexpr int kMacDigits = 4;
+
+void check_channels(const ReportData& own, const std::string& title, const ChannelList& outputs,
+                    const ChannelList& inputs) {
+  const ChannelList& own_outputs = own.frf ? own.frf->outputs : own.model->outputs;
+  const ChannelList& own_inputs = own.frf ? own.frf->inputs : own.model->inputs;
+  if (outputs.names == own_outputs.names && inputs.names == own_inputs.names) return;
+  throw std::invalid_argument(fmt::format(
+      "{}: its channels are not those of the report ({} x {}, first {} <- {}); compare results of "
+      "the same channels",
+      title, own_outputs.size(), own_inputs.size(),
+      own_outputs.names.empty() ? "none" : own_outputs.names[0],
+      own_inputs.names.empty() ? "none" : own_inputs.names[0]));
+}
+
+/// The columns of other that are own's lines; 0 x 0 if one is missing.
+Eigen::MatrixXcd on_lines_of(const FrfEstimate& own, const FrfEstimate& other) {
+  Eigen::MatrixXcd out(other.response.rows(), own.lines());
+  Eigen::Index at = 0;
+  for (Eigen::Index k = 0; k < own.lines(); ++k) {
+    const double wanted = own.frequency_hz[k];
+    while (at < other.lines() && other.frequency_hz[at] < wanted * (1.0 - kSameLine)) ++at;
+    if (at == other.lines() || other.frequency_hz[at] > wanted * (1.0 + kSameLine)) return {};
+    out.col(k) = other.response.col(at);
+  }
+  return out;
+}
+
+void add_response(ReportComparison& comparison, ReportData& own, const FrfEstimate& frf) {
+  const auto leave_out = [&](const char* why) {
+    own.messages.push_back(
+        {ReportMessage::Severity::note,
+         fmt::format("{}: its response is not drawn: {}", comparison.title, why)});
+  };
+  if (!own.frf) return leave_out("the report itself has none whose lines it could share");
+  if (frf.compensated != own.frf->compensated || frf.hold != own.frf->hold ||
+      frf.delay_s != own.frf->delay_s)
+    return leave_out("hold or delay were compensated otherwise");
+  comparison.response = on_lines_of(*own.frf, frf);
+  if (comparison.response.size() == 0) return leave_out("it was measured on other lines");
+  if (comparison.response != own.frf->response) return;
+  comparison.response.resize(0, 0);
+  leave_out("it is the same response");
+}
+
+Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+const Submodel& submodel_of(const AdditiveModel& model, const ModeShape& mode) {
+  return model.submodels[mode.submodel];
+}
+
+Json modes_json(const AdditiveModel& model, const std::vector<ModeShape>& modes) {
+  Json out = Json::array();
+  for (const ModeShape& mode : modes) {
+    const Submodel& submodel = submodel_of(model, mode);
+    out.push_back({{"frequency_hz", mode.natural_frequency_hz},
+                   {"frequency_std_hz", number(submodel.natural_frequency_std_hz)},
+                   {"damping_ratio", mode.damping_ratio},
+                   {"damping_std", number(submodel.damping_ratio_std)}});
+  }
+  return out;
+}
+
+Json deviation(double difference, const std::optional<double>& first,
+               const std::optional<double>& second) {
+  if (!first || !second) return Json();
+  const double std = std::hypot(*first, *second);
+  return std > 0.0 ? Json(difference / std) : Json();
+}
+
+Json pair_json(const ModePair& pair, const ReportData& own, const std::vector<ModeShape>& ours,
+               const std::vector<ModeShape>& theirs) {
+  const ModeShape& first = ours[pair.first];
+  const ModeShape& second = theirs[pair.second];
+  const Submodel& a = submodel_of(*own.model, first);
+  const Submodel& b = submodel_of(*own.comparison->model, second);
+  const double shift_hz = second.natural_frequency_hz - first.natural_frequency_hz;
+  const double shift = second.damping_ratio - first.damping_ratio;
+  return {{"own", pair.first},
+          {"other", pair.second},
+          {"frequency_difference", pair.frequency_difference},
+          {"frequency_deviation",
+           deviation(shift_hz, a.natural_frequency_std_hz, b.natural_frequency_std_hz)},
+          {"damping_difference",
+           first.damping_ratio > 0.0 ? Json(shift / first.damping_ratio) : Json()},
+          {"damping_deviation", deviation(shift, a.damping_ratio_std, b.damping_ratio_std)},
+          {"output_mac", pair.output_mac},
+          {"input_mac", pair.input_mac}};
+}
+
+}  // namespace
+
+ReportComparison make_comparison(ReportData& own, std::string title,
+                                 std::optional<AdditiveModel> model,
+                                 const std::optional<FrfEstimate>& frf) {
+  if (!own.frf && !own.model)
+    throw std::invalid_argument(
+        "--compare: the report has neither response nor model; give one of them first");
+  if (frf) check_channels(own, title, frf->outputs, frf->inputs);
+  if (model) check_channels(own, title, model->outputs, model->inputs);
+  ReportComparison comparison;
+  comparison.title = std::move(title);
+  if (frf) add_response(comparison, own, *frf);
+  if (model && own.frf) comparison.model_response = response_like(*model, *own.frf);
+  comparison.model = std::move(model);
+  return comparison;
+}
+
+Json comparison_json(const ReportData& own) {
+  Json out = {{"title", own.comparison->title}};
+  if (!own.model || !own.comparison->model) return out;
+  const std::vector<ModeShape> ours = shapes_by_frequency(*own.model);
+  const std::vector<ModeShape> theirs = shapes_by_frequency(*own.comparison->model);
+  out["own"] = modes_json(*own.model, ours);
+  out["modes"] = modes_json(*own.comparison->model, theirs);
+  out["pairs"] = Json::array();
+  if (ours.empty() || theirs.empty()) return out;
+  for (const ModePair& pair : pair_modes(ours, theirs))
+    out["pairs"].push_back(pair_json(pair, own, ours, theirs));
+  out["output_mac"] =
+      matrix_json(modal_assurance(output_shapes(ours), output_shapes(theirs)), kMacDigits);
+  out["input_mac"] =
+      matrix_json(modal_assurance(input_shapes(ours), input_shapes(theirs)), kMacDigits);
+  return out;
+}
+
+}  // namespace stageid::report

@@ -1,0 +1,193 @@
+#include "tools/report/report_encoding.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <complex>
+#include <cstdint>
+#include <limits>
+
+#include "tools/report/report_packing.hpp"
+
+namespace stageid::report {
+namespace {
+
+template <typename T>
+std::string packed_planes(const std::vector<T>& values) {
+  return packed(byte_planes(values));
+}
+
+/// Expected values one after the other, and what turned out.
+class Extrapolation {
+ public:
+  explicit Extrapolation(const Expectation& expected) : expected_(expected) {}
+  std::complex<double> next(Eigen::Index row, Eigen::Index column) const {
+    const std::complex<double> base = base_at(row, column);
+    switch (expected_.order) {
+      case 0:
+        return base;
+      case 1:
+        return base + last_;
+      default:
+        return base + (2.0 * last_ - before_);
+    }
+  }
+  void turned_out(Eigen::Index row, Eigen::Index column, std::complex<double> value) {
+    before_ = last_;
+    last_ = value - base_at(row, column);
+  }
+
+ private:
+  std::complex<double> base_at(Eigen::Index row, Eigen::Index column) const {
+    return expected_.base != nullptr ? (*expected_.base)(row, column) : 0.0;
+  }
+  Expectation expected_;
+  std::complex<double> last_ = 0.0, before_ = 0.0;
+};
+
+float to_float(double value) {
+  constexpr double most = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(value, -most, most));
+}
+
+/// Place in the order of all float32, -0 just before 0.
+std::uint32_t place_of(float value) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  return (bits >> 31) != 0 ? ~bits : bits | 0x80000000u;
+}
+
+std::uint32_t sign_last(std::int32_t value) {
+  return (static_cast<std::uint32_t>(value) << 1) ^ static_cast<std::uint32_t>(value >> 31);
+}
+
+std::uint16_t sign_last(std::int16_t value) {
+  return static_cast<std::uint16_t>(sign_last(std::int32_t{value}));
+}
+
+/// One complex number as two mantissas under one exponent.
+struct Block16 {
+  std::int16_t re = 0;
+  std::int16_t im = 0;
+  std::int8_t exponent = 0;
+};
+
+Block16 to_block16(std::complex<double> value) {
+  const double largest = std::max(std::abs(value.real()), std::abs(value.imag()));
+  if (largest == 0.0) return {};
+  int exponent = 0;
+  std::frexp(largest, &exponent);  // largest = f 2^exponent, 0.5 <= f < 1
+  if (std::lround(std::ldexp(largest, 15 - exponent)) > std::numeric_limits<std::int16_t>::max())
+    ++exponent;  // 0.99999 would round to 32768
+  exponent = std::clamp(exponent, -127, 127);
+  const auto mantissa = [exponent](double part) {
+    const double scaled = std::clamp(std::ldexp(part, 15 - exponent), -32767.0, 32767.0);
+    return static_cast<std::int16_t>(std::lround(scaled));
+  };
+  return {mantissa(value.real()), mantissa(value.imag()), static_cast<std::int8_t>(exponent)};
+}
+
+std::complex<double> value_of(const Block16& block) {
+  const int power = block.exponent - 15;
+  return {std::ldexp(block.re, power), std::ldexp(block.im, power)};
+}
+
+/// The mantissa less the expected one, as the page rounds it: halves up.
+std::uint16_t mantissa_code(std::int16_t mantissa, double expected, int exponent) {
+  const double scaled = std::floor(std::ldexp(expected, 15 - exponent) + 0.5);
+  const auto guess = static_cast<std::int32_t>(std::clamp(scaled, -32767.0, 32767.0));
+  return sign_last(static_cast<std::int16_t>(mantissa - guess));
+}
+
+}  // namespace
+
+std::string encode_float64(const Eigen::Ref<const Eigen::VectorXd>& values) {
+  return packed_planes(std::vector<double>(values.begin(), values.end()));
+}
+
+std::string encode_float32(const Eigen::Ref<const Eigen::MatrixXd>& values) {
+  std::vector<float> out;
+  out.reserve(static_cast<std::size_t>(values.size()));
+  for (Eigen::Index row = 0; row < values.rows(); ++row)
+    for (const double value : values.row(row)) out.push_back(static_cast<float>(value));
+  return packed_planes(out);
+}
+
+ComplexCode encode_complex_float32(const Eigen::MatrixXcd& values, Expectation expected) {
+  ComplexCode out{"", Eigen::MatrixXcd(values.rows(), values.cols())};
+  Extrapolation extrapolation(expected);
+  std::vector<std::uint32_t> words;
+  words.reserve(2 * static_cast<std::size_t>(values.size()));
+  const auto add = [&words](float value, double guess) {
+    const std::uint32_t expected_place = place_of(to_float(guess + 0.0));  // -0 is expected as 0
+    words.push_back(sign_last(static_cast<std::int32_t>(place_of(value) - expected_place)));
+  };
+  for (Eigen::Index row = 0; row < values.rows(); ++row) {
+    for (Eigen::Index k = 0; k < values.cols(); ++k) {
+      const std::complex<double> guess = extrapolation.next(row, k);
+      const float re = to_float(values(row, k).real());
+      const float im = to_float(values(row, k).imag());
+      add(re, guess.real());
+      add(im, guess.imag());
+      out.decoded(row, k) = {re, im};
+      extrapolation.turned_out(row, k, out.decoded(row, k));
+    }
+  }
+  out.text = packed_planes(words);
+  return out;
+}
+
+ComplexCode encode_complex_block16(const Eigen::MatrixXcd& values, Expectation expected) {
+  ComplexCode out{"", Eigen::MatrixXcd(values.rows(), values.cols())};
+  Extrapolation extrapolation(expected);
+  std::vector<std::uint16_t> mantissas;
+  std::vector<std::uint8_t> exponents;
+  mantissas.reserve(2 * static_cast<std::size_t>(values.size()));
+  exponents.reserve(static_cast<std::size_t>(values.size()));
+  int before = 0;
+  for (Eigen::Index row = 0; row < values.rows(); ++row) {
+    for (Eigen::Index k = 0; k < values.cols(); ++k) {
+      const std::complex<double> guess = extrapolation.next(row, k);
+      const Block16 block = to_block16(values(row, k));
+      mantissas.push_back(mantissa_code(block.re, guess.real(), block.exponent));
+      mantissas.push_back(mantissa_code(block.im, guess.imag(), block.exponent));
+      exponents.push_back(static_cast<std::uint8_t>(block.exponent - before));
+      before = block.exponent;
+      out.decoded(row, k) = value_of(block);
+      extrapolation.turned_out(row, k, out.decoded(row, k));
+    }
+  }
+  std::vector<std::uint8_t> bytes = byte_planes(mantissas);
+  bytes.insert(bytes.end(), exponents.begin(), exponents.end());
+  out.text = packed(bytes);
+  return out;
+}
+
+LogBytes encode_log_bytes(const Eigen::Ref<const Eigen::MatrixXd>& values) {
+  LogBytes out;
+  std::vector<std::uint8_t> codes;
+  codes.reserve(static_cast<std::size_t>(values.size()));
+  std::uint8_t before = 0;
+  for (Eigen::Index row = 0; row < values.rows(); ++row) {
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (const double value : values.row(row)) {
+      if (value <= 0.0) continue;
+      low = std::min(low, std::log2(value));
+      high = std::max(high, std::log2(value));
+    }
+    if (low > high) low = high = 0.0;  // nothing positive in this row
+    const double step = (high - low) / 254.0;
+    for (const double value : values.row(row)) {
+      const double place = value > 0.0 && step > 0.0 ? (std::log2(value) - low) / step : 0.0;
+      const auto code = static_cast<std::uint8_t>(value > 0.0 ? 1 + std::lround(place) : 0);
+      codes.push_back(static_cast<std::uint8_t>(code - before));
+      before = code;
+    }
+    out.low.push_back(low);
+    out.step.push_back(step);
+  }
+  out.text = packed(codes);
+  return out;
+}
+
+}  // namespace stageid::report

@@ -1,0 +1,294 @@
+#include "tools/report/report_input.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/file_kind.hpp"
+#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/json_members.hpp"
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "estimation/modal/json_file.hpp"
+#include "frf/file/frf_file.hpp"
+#include "tools/exchange/model/model_hdf5.hpp"
+#include "tools/experiment/run_metadata.hpp"
+#include "tools/report/report_comparison.hpp"
+#include "tools/steps/fit_step.hpp"
+#include "tools/steps/health_step.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw FileError(fmt::format("{}: cannot be read; check the path", file.string()));
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// "stageid-frf", "stageid-log", ... as the file says itself; empty if it does not.
+std::string kind_of(const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  if (ending == ".slog") return "stageid-log";
+  if (ending == ".yaml" || ending == ".yml") return "stageid-stage";
+  if (ending == ".json") {
+    const Json json = Json::parse(read_text(file), nullptr, false);
+    if (json.is_discarded())
+      throw FormatError(file, "", "is not JSON, or cut short; copy it again or write it anew");
+    return text_in(json, "format");
+  }
+  if (ending != ".h5" && ending != ".hdf5") {
+    require_readable(file);
+    const std::string other = other_kind(file, "a file that the report shows");
+    throw FormatError(file, "",
+                      !other.empty()
+                          ? other
+                          : "is nothing that the report shows; give .slog, .h5, .json or .yaml");
+  }
+  const Hdf5File hdf5 = Hdf5File::open(file);
+  if (!hdf5.has_attribute("/", "format")) return hdf5.exists("/response") ? "stageid-frf" : "";
+  const std::string format = hdf5.read_text_attribute("/", "format");
+  return format == "stageid-model" ? "stageid-model-h5" : format;
+}
+
+void put(std::filesystem::path& place, const std::filesystem::path& file) {
+  if (!place.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: {} is one of the same kind; give one", file.string(), place.string()));
+  place = file;
+}
+
+void put_if_there(std::filesystem::path& place, const std::filesystem::path& file) {
+  if (std::filesystem::exists(file)) put(place, file);
+}
+
+void add_directory(ReportInput& input, const std::filesystem::path& directory) {
+  put_if_there(input.frf, directory / "frf.h5");
+  put_if_there(input.validation_frf, directory / "frf_validation.h5");
+  put_if_there(input.model, directory / "model.json");
+  put_if_there(input.model_h5, directory / "model.h5");
+  put_if_there(input.modes, directory / "modes.json");
+  put_if_there(input.log, directory / "run.slog");
+  put_if_there(input.summary, directory / "summary.json");
+  if (input.frf.empty() && input.model.empty() && input.log.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: holds no frf.h5, model.json or run.slog; give the directory of 'stageid "
+                    "identify' or files",
+                    directory.string()));
+}
+
+void add_file(ReportInput& input, const std::filesystem::path& file) {
+  const std::string kind = kind_of(file);
+  if (kind == "stageid-frf") {
+    put(input.frf.empty() ? input.frf : input.validation_frf, file);
+  } else if (kind == "stageid-model") {
+    put(input.model, file);
+  } else if (kind == "stageid-model-h5") {
+    put(input.model_h5, file);
+  } else if (kind == "stageid-modes") {
+    put(input.modes, file);
+  } else if (kind == "stageid-log") {
+    put(input.log, file);
+  } else if (kind == "stageid-summary") {
+    put(input.summary, file);
+  } else if (kind == "stageid-stage") {
+    put(input.stage, file);
+  } else {
+    throw std::invalid_argument(
+        fmt::format("{}: is no log, FRF, model, modes or summary of stageid and no stage file; "
+                    "leave it out",
+                    file.string()));
+  }
+}
+
+void add_response(ReportData& data, const ReportInput& input) {
+  const AdditiveModel& model = *data.model;
+  if (!data.frf) return;
+  if (model.fit.band_hz[1] > model.fit.band_hz[0]) {
+    data.frf = select_band(std::move(*data.frf), model.fit.band_hz[0], model.fit.band_hz[1]);
+    if (data.validation_frf)
+      data.validation_frf =
+          select_band(std::move(*data.validation_frf), model.fit.band_hz[0], model.fit.band_hz[1]);
+  }
+  data.model_response = response_like(model, *data.frf);
+  if (!input.model_h5.empty())
+    data.model_variance = read_response_variance(input.model_h5, data.frf->frequency_hz);
+  if (data.validation_frf)
+    data.validation = validate(model, *data.validation_frf, distortion_of(model));
+}
+
+/// All that delays the response, which no polynomial in z should have to imitate.
+double delay_in(const FrfEstimate& frf, const std::optional<AdditiveModel>& model) {
+  double delay_s = 0.0;
+  if (frf.hold == Hold::zoh && frf.compensated != Compensation::hold && frf.sample_rate_hz > 0.0)
+    delay_s += 0.5 / frf.sample_rate_hz;
+  if (model && frf.compensated == Compensation::none) delay_s += model->mean_delay_s();
+  return delay_s;
+}
+
+/// A fault of the data is an error of the page, a doubt a warning; what could not be checked is a note.
+ReportMessage::Severity severity_of(const Finding& finding) {
+  switch (finding.severity) {
+    case Severity::fault:
+      return ReportMessage::Severity::error;
+    case Severity::doubt:
+      return ReportMessage::Severity::warning;
+    case Severity::unchecked:
+      return ReportMessage::Severity::note;
+  }
+  return ReportMessage::Severity::note;
+}
+
+/// The verdicts that the file holds stand for all lines that were measured, whatever band was fitted.
+void add_checks(ReportData& data) {
+  const FrfEstimate& frf = *data.frf;
+  if (NonlinearityTest test = linearity_of(frf); test.band_hz.rows() > 0)
+    data.nonlinearity = std::move(test);
+  for (const Finding& finding : health_of(frf.provenance_json))
+    data.findings.push_back(
+        {severity_of(finding), finding.channel, finding.what, finding.figure, finding.remedy});
+}
+
+void add_stabilization(ReportData& data) {
+  const FrfEstimate& frf = *data.frf;
+  const StabilizationOptions options{.delay_s = delay_in(frf, data.model)};
+  if (frf.lines() > 2 * options.most_order) data.stabilization = stabilization(frf, options);
+}
+
+/// What only a summary knows: the truth of a simulated plant, and how long the steps took. Notes that stand
+/// in the table of findings are not told twice.
+void add_summary(ReportData& data, const std::filesystem::path& file) {
+  const JsonFile json(file, "stageid-summary");
+  const JsonNode summary = json.root();
+  if (summary.has("truth")) {
+    const JsonNode truth = summary.member("truth");
+    for (const JsonNode& mode : truth.elements_of("modes"))
+      data.true_modes.push_back({mode.member("true_frequency_hz").number(),
+                                 mode.member("true_damping_ratio").number(), true});
+    if (const std::optional<double> error = number_in(truth.raw(), "relative_rms_error"))
+      data.figures.push_back(
+          {"error against the exact plant", fmt::format("{:.3g} %", 100.0 * *error)});
+  }
+  for (const JsonNode& step : summary.elements_of("steps"))
+    data.steps.push_back(
+        {text_in(step.raw(), "name"), step.number_or("seconds", 0.0), text_in(step.raw(), "note")});
+  const std::vector<std::string> told =
+      data.frf ? health_notes(health_of(data.frf->provenance_json)) : std::vector<std::string>();
+  for (const JsonNode& note : summary.elements_of("notes"))
+    if (std::ranges::find(told, note.text()) == told.end())
+      data.messages.push_back({ReportMessage::Severity::warning, note.text()});
+}
+
+/// A log keeps the stage file as it was; one of another version may have keys that are unknown here,
+/// and the shapes do without.
+StageGeometry geometry_of_log(const std::filesystem::path& file, const Json& metadata) {
+  const std::string stage = text_in(metadata, "stage");
+  if (stage.empty()) return {};
+  try {
+    return stage_geometry(file, stage);
+  } catch (const FormatError&) {
+    return {};
+  }
+}
+
+void add_log(ReportData& data, const std::filesystem::path& file) {
+  const std::unique_ptr<LogReader> log = open_log(file, false);
+  data.runs = log->runs();
+  data.sample_rate_hz = log->info().sample_rate_hz;
+  const Json metadata = Json::parse(log->info().metadata_json, nullptr, false);
+  if (!metadata.is_object()) return;
+  data.period_s = wall_period_s(log->info());
+  data.geometry = geometry_of_log(file, metadata);
+  for (const char* name : {"configuration", "stage"})
+    if (const std::string text = text_in(metadata, name); !text.empty())
+      data.documents.push_back({name, text});
+}
+
+}  // namespace
+
+ReportInput report_input(const std::vector<std::filesystem::path>& files) {
+  ReportInput input;
+  for (auto at = files.begin(); at != files.end(); ++at) {
+    const std::filesystem::path& file = *at;
+    std::error_code none;
+    const auto same = [&](const auto& other) {
+      return std::filesystem::equivalent(file, other, none);
+    };
+    if (std::any_of(files.begin(), at, same))
+      throw std::invalid_argument(
+          fmt::format("{}: is given twice; what was held back is another file", file.string()));
+    if (!std::filesystem::exists(file))
+      throw FileError(fmt::format("{}: does not exist; check the path", file.string()));
+    if (std::filesystem::is_directory(file)) {
+      add_directory(input, file);
+    } else {
+      add_file(input, file);
+    }
+  }
+  return input;
+}
+
+ReportData read_response_data(const ReportInput& input) {
+  ReportData data;
+  if (!input.frf.empty()) data.frf = read_frf(input.frf);
+  if (!input.validation_frf.empty()) data.validation_frf = read_frf(input.validation_frf);
+  if (!input.model.empty()) {
+    data.model = read_model(input.model);
+    add_response(data, input);
+  }
+  if (data.frf) {
+    data.cmif_kind = PeakOptions().kind;
+    data.cmif_curves = cmif(*data.frf, data.cmif_kind);
+  }
+  if (!input.modes.empty()) data.chosen_modes = read_modes(input.modes);
+  return data;
+}
+
+ReportData read_report_data(const ReportInput& input) {
+  ReportData data = read_response_data(input);
+  data.version = STAGEID_VERSION;
+  data.title = "stageid";
+  if (data.model) {
+    data.cost = data.model->cost_history;
+    data.decisions = decisions_of(*data.model);
+  }
+  if (data.frf) {
+    add_checks(data);
+    add_stabilization(data);
+  }
+  if (!input.log.empty()) add_log(data, input.log);
+  if (!input.stage.empty()) data.geometry = stage_geometry(input.stage, read_text(input.stage));
+  if (!data.geometry.stage.empty()) data.title = data.geometry.stage;
+  if (!input.summary.empty()) add_summary(data, input.summary);
+  return data;
+}
+
+void add_comparison(ReportData& data, const std::vector<std::filesystem::path>& files) {
+  const ReportInput input = report_input(files);
+  if (input.frf.empty() && input.model.empty())
+    throw std::invalid_argument(fmt::format(
+        "--compare {}: holds no FRF and no model; give the directory of 'stageid identify', or an "
+        "FRF or model file",
+        files.at(0).string()));
+  std::optional<FrfEstimate> frf;
+  if (!input.frf.empty()) frf = read_frf(input.frf);
+  std::optional<AdditiveModel> model;
+  if (!input.model.empty()) model = read_model(input.model);
+  const std::filesystem::path first = std::filesystem::absolute(files.at(0)).lexically_normal();
+  const std::filesystem::path name =
+      first.has_filename() ? first.filename() : first.parent_path().filename();
+  data.comparison = report::make_comparison(data, name.string(), std::move(model), frf);
+}
+
+}  // namespace stageid

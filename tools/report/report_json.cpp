@@ -1,0 +1,355 @@
+#include "tools/report/report_json.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "estimation/model/cmif_deviation.hpp"
+#include "frf/response/confidence.hpp"
+#include "frf/response/responding_channels.hpp"
+#include "tools/report/page_template.hpp"
+#include "tools/report/report_comparison.hpp"
+#include "tools/report/report_diagrams.hpp"
+#include "tools/report/report_encoding.hpp"
+#include "tools/report/report_modes.hpp"
+#include "tools/report/report_shapes.hpp"
+#include "tools/report/report_uncertainty.hpp"
+#include "tools/report/report_verdict.hpp"
+#include "tools/report/timing_json.hpp"
+
+namespace stageid::report {
+namespace {
+
+using Json = nlohmann::json;
+
+Json optional_number(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+Json channels(const ChannelList& list) {
+  Json out = Json::array();
+  for (std::size_t i = 0; i < list.size(); ++i)
+    out.push_back({{"name", list.names[i]}, {"unit", i < list.units.size() ? list.units[i] : ""}});
+  return out;
+}
+
+const char* to_string(Compensation compensated) {
+  switch (compensated) {
+    case Compensation::none:
+      return "none";
+    case Compensation::delay:
+      return "delay";
+    case Compensation::hold:
+      return "delay and hold";
+  }
+  return "none";
+}
+
+const char* to_string(CmifKind kind) {
+  switch (kind) {
+    case CmifKind::response:
+      return "response";
+    case CmifKind::accelerance:
+      return "accelerance";
+    case CmifKind::whitened:
+      return "whitened";
+  }
+  return "response";
+}
+
+/// An array that is in the page already, as the page decodes it.
+struct Based {
+  const char* id = "";
+  const Eigen::MatrixXcd* values = nullptr;
+};
+
+/// Blocks and their descriptions, added together so that none is without the other.
+class Arrays {
+ public:
+  void add(const std::string& id, const char* type, std::string text, Json more = Json::object()) {
+    more["type"] = type;
+    description_[id] = std::move(more);
+    blocks_.push_back({id, std::move(text)});
+  }
+  /// Expected from the decoded numbers of `base` (none: 0), extrapolated by `order`. @returns the decoded
+  Eigen::MatrixXcd add_float32(const std::string& id, const Eigen::MatrixXcd& values, int order,
+                               const Based& base = {}) {
+    return add_complex(id, "c64", encode_complex_float32(values, {base.values, order}), order,
+                       base);
+  }
+  Eigen::MatrixXcd add_block16(const std::string& id, const Eigen::MatrixXcd& values, int order,
+                               const Based& base = {}) {
+    return add_complex(id, "c40", encode_complex_block16(values, {base.values, order}), order,
+                       base);
+  }
+  /// Square roots of variances. Each by std::sqrt: Eigen's own is an approximation on some
+  /// machines, and a page must not depend on the machine.
+  void add_deviation(const std::string& id, const Eigen::MatrixXd& variance) {
+    add_log_bytes(id, variance.unaryExpr([](double v) { return std::sqrt(v); }));
+  }
+  void add_log_bytes(const std::string& id, const Eigen::MatrixXd& values) {
+    LogBytes bytes = encode_log_bytes(values);
+    add(id, "log8", std::move(bytes.text), {{"low", bytes.low}, {"step", bytes.step}});
+  }
+  Json& description() { return description_; }
+  std::vector<Block>& blocks() { return blocks_; }
+
+ private:
+  Eigen::MatrixXcd add_complex(const std::string& id, const char* type, ComplexCode code, int order,
+                               const Based& base) {
+    Json more = {{"order", order}};
+    if (base.values != nullptr) more["base"] = base.id;
+    add(id, type, std::move(code.text), std::move(more));
+    return std::move(code.decoded);
+  }
+
+  Json description_ = Json::object();
+  std::vector<Block> blocks_;
+};
+
+/// The model travels as the residual: small errors of small numbers stay small in both.
+void add_measured(const ReportData& data, Arrays& arrays) {
+  const FrfEstimate& frf = *data.frf;
+  Eigen::MatrixXcd residual;
+  Based from_residual;
+  if (data.model_response.size() > 0) {
+    residual = arrays.add_block16("residual", frf.response - data.model_response, 0);
+    from_residual = {"residual", &residual};
+  }
+  // Measured less residual is the model, and that is smooth; noise is not, and twice differenced it grows.
+  const int order = from_residual.values != nullptr ? 2 : 1;
+  const Eigen::MatrixXcd response =
+      arrays.add_float32("response", frf.response, order, from_residual);
+  if (!data.comparison) return;
+  Eigen::MatrixXcd other_model;
+  Based like = {"response", &response};
+  if (data.comparison->model_response.size() > 0) {
+    other_model = arrays.add_block16("other_model", data.comparison->model_response, 2);
+    like = {"other_model", &other_model};
+  }
+  if (data.comparison->response.size() > 0)
+    arrays.add_block16("other_response", data.comparison->response, 0, like);
+}
+
+void add_response(const ReportData& data, Arrays& arrays) {
+  const FrfEstimate& frf = *data.frf;
+  arrays.add("frequency", "f64", encode_float64(frf.frequency_hz));
+  add_measured(data, arrays);
+  if (frf.interpolation_misfit.size() > 0)
+    arrays.add("interpolation_misfit", "f32", encode_float32(frf.interpolation_misfit.transpose()));
+  const Eigen::MatrixXd* const variance = uncertainty(frf).variance;
+  if (variance != nullptr) arrays.add_deviation("deviation", *variance);
+  if (data.cmif_curves.size() > 0) {
+    arrays.add("cmif", "f32", encode_float32(data.cmif_curves),
+               {{"curves", data.cmif_curves.rows()}});
+    if (variance != nullptr)
+      arrays.add_log_bytes("cmif_deviation", cmif_deviation(frf, data.cmif_kind, *variance));
+  }
+  if (data.model_response.size() == 0) return;
+  if (data.model_variance.size() > 0) arrays.add_deviation("model_deviation", data.model_variance);
+  if (data.validation_frf)
+    arrays.add_log_bytes("validation_residual",
+                         (data.validation_frf->response - data.model_response).cwiseAbs());
+}
+
+Json frf_json(const FrfEstimate& frf) {
+  Json excluded = Json::array();
+  for (std::size_t i = 0; i < frf.excluded_channels.size(); ++i) {
+    const auto index = static_cast<Eigen::Index>(i);
+    excluded.push_back(
+        {{"name", frf.excluded_channels[i]},
+         {"power", index < frf.excluded_power.size() ? Json(frf.excluded_power[index]) : Json()}});
+  }
+  const ChannelFlags responding = responding_channels(frf);
+  return {{"inputs", channels(frf.inputs)},
+          {"outputs", channels(frf.outputs)},
+          {"responds", std::vector<bool>(responding.begin(), responding.end())},
+          {"lines", frf.lines()},
+          {"band_hz", {frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1]}},
+          {"realizations", frf.realizations},
+          {"periods", frf.periods},
+          {"experiments", frf.experiments},
+          {"sample_rate_hz", frf.sample_rate_hz},
+          {"hold", frf.hold == Hold::zoh ? "zero-order hold" : "none"},
+          {"compensated", to_string(frf.compensated)},
+          {"delay_s", frf.delay_s},
+          {"deviation", uncertainty(frf).kind},
+          {"band_factor", std::sqrt(squared_error_quantile(0.95, uncertainty(frf).dof))},
+          {"noise_dof", frf.noise_dof},
+          {"correlated_lines", frf.correlated_lines},
+          {"total_dof", frf.total_dof},
+          {"worst_condition",
+           frf.input_condition.size() > 0 ? Json(frf.input_condition.maxCoeff()) : Json()},
+          {"excluded", excluded}};
+}
+
+Json model_json(const AdditiveModel& model) {
+  int modes = 0;
+  Json others = Json::array();
+  for (const Submodel& submodel : model.submodels) {
+    if (submodel.is_mode())
+      ++modes;
+    else
+      others.push_back({{"integrators", submodel.integrators},
+                        {"order", static_cast<int>(submodel.denominator.size()) - 1}});
+  }
+  return {{"modes", modes},
+          {"others", others},
+          {"hold", stageid::to_string(model.hold)},
+          {"delay_s",
+           {{"inputs", std::vector<double>(model.input_delay_s.begin(), model.input_delay_s.end())},
+            {"outputs",
+             std::vector<double>(model.output_delay_s.begin(), model.output_delay_s.end())}}},
+          {"cost", model.fit.cost},
+          {"weighting", model.fit.weighting},
+          {"iterations", model.fit.iterations},
+          {"status", model.fit.status},
+          {"relative_rms_error", model.fit.relative_rms_error},
+          {"band_hz", {model.fit.band_hz[0], model.fit.band_hz[1]}},
+          {"seconds", model.fit.seconds}};
+}
+
+Json modes_json(const ReportData& data) {
+  Json out = Json::array();
+  for (const ModeRow& row : mode_table(*data.model, data.true_modes)) {
+    Json truth;
+    if (row.truth)
+      truth = {{"frequency_hz", row.truth->natural_frequency_hz},
+               {"damping_ratio", row.truth->damping_ratio},
+               {"observable", row.truth->observable}};
+    out.push_back({{"frequency_hz", optional_number(row.frequency_hz)},
+                   {"frequency_std_hz", optional_number(row.frequency_std_hz)},
+                   {"damping_ratio", optional_number(row.damping_ratio)},
+                   {"damping_std", optional_number(row.damping_std)},
+                   {"truth", truth},
+                   {"frequency_deviation", optional_number(row.frequency_deviation())},
+                   {"damping_deviation", optional_number(row.damping_deviation())}});
+  }
+  return out;
+}
+
+Json validation_json(const Validation& validation) {
+  return {{"relative_rms_error", validation.relative_rms_error},
+          {"normalized_error", validation.normalized_error},
+          {"chi_square_per_dof", validation.chi_square_per_dof},
+          {"expected_chi_square", validation.expected_chi_square},
+          {"explained", validation.explained},
+          {"whitened_above_95", validation.whitened_above_95},
+          {"whiteness", validation.whiteness},
+          {"whiteness_limit", validation.whiteness_limit},
+          {"channel_error",
+           std::vector<double>(validation.channel_error.begin(), validation.channel_error.end())}};
+}
+
+Json run_json(const LogRun& run, double sample_rate_hz) {
+  const double recorded_s =
+      sample_rate_hz > 0.0 ? static_cast<double>(run.samples) / sample_rate_hz : 0.0;
+  return {{"name", run.name},
+          {"realization", run.realization},
+          {"experiment", run.experiment},
+          {"samples", run.samples},
+          {"complete", run.complete},
+          {"started_utc", run.started_utc},
+          {"cycles", run.health.cycles},
+          {"late", run.health.late},
+          {"missing", run.health.missing},
+          {"marked", run.health.marked},
+          {"largest_lateness_s", 1e-9 * static_cast<double>(run.health.largest_lateness_ns)},
+          {"seconds", run.health.seconds},
+          {"recorded_s", recorded_s}};
+}
+
+/// A provenance text as JSON where it is some, else as the text it is.
+Json provenance(const std::string& text) {
+  Json parsed = Json::parse(text, nullptr, false);
+  return parsed.is_discarded() ? Json(text) : parsed;
+}
+
+Json texts_json(const ReportData& data) {
+  std::vector<ReportMessage> sorted = data.messages;
+  std::ranges::stable_sort(sorted, std::ranges::greater{}, &ReportMessage::severity);
+  Json out;
+  out["messages"] = Json::array();
+  for (const ReportMessage& message : sorted)
+    out["messages"].push_back(
+        {{"severity", stageid::to_string(message.severity)}, {"text", message.text}});
+  out["figures"] = Json::array();
+  for (const ReportFigure& figure : data.figures)
+    out["figures"].push_back({{"label", figure.label}, {"value", figure.value}});
+  out["steps"] = Json::array();
+  for (const ReportStep& step : data.steps)
+    out["steps"].push_back({{"name", step.name}, {"seconds", step.seconds}, {"note", step.note}});
+  out["documents"] = Json::array();
+  for (const ReportDocument& document : data.documents)
+    out["documents"].push_back({{"name", document.name}, {"text", document.text}});
+  return out;
+}
+
+Json provenances_json(const ReportData& data) {
+  Json out = Json::array();
+  const auto add = [&out](const char* of, const std::string& text) {
+    Json content = provenance(text);
+    if (!content.empty()) out.push_back({{"of", of}, {"content", std::move(content)}});
+  };
+  add("job", data.provenance_json);
+  if (data.frf) add("frequency response", data.frf->provenance_json);
+  if (data.validation_frf) add("held-back response", data.validation_frf->provenance_json);
+  if (data.model) add("model", data.model->provenance_json);
+  return out;
+}
+
+Json candidates_json(const std::vector<ModeCandidate>& candidates) {
+  Json out = Json::array();
+  for (const ModeCandidate& mode : candidates)
+    out.push_back({{"frequency_hz", mode.frequency_hz}, {"curve", mode.cmif_curve}});
+  return out;
+}
+
+/// Valid UTF-8 whatever came in, and safe inside <script>.
+std::string text_of(const Json& json) {
+  return script_safe(json.dump(-1, ' ', true, Json::error_handler_t::replace));
+}
+
+}  // namespace
+
+PageContent page_content(const ReportData& data) {
+  Arrays arrays;
+  Json json = texts_json(data);
+  const Verdict verdict = judge(data);
+  json["verdict"] = {{"level", stageid::to_string(verdict.level)},
+                     {"text", verdict.text},
+                     {"reasons", verdict.reasons}};
+  json["title"] = data.title;
+  json["version"] = data.version;
+  json["decisions"] = data.decisions;
+  json["provenance"] = provenances_json(data);
+  json["cmif_kind"] = to_string(data.cmif_kind);
+  json["candidates"] = candidates_json(data.chosen_modes);
+  json["cost"] = data.cost.empty() && data.model ? data.model->cost_history : data.cost;
+  RunTiming timing;
+  for (const LogRun& run : data.runs) timing += run.timing;
+  json["timing"] = timing_json(timing);
+  json["period_s"] = data.period_s > 0.0 ? Json(data.period_s) : Json();
+  json["runs"] = Json::array();
+  for (const LogRun& run : data.runs) json["runs"].push_back(run_json(run, data.sample_rate_hz));
+  json["sample_rate_hz"] = data.sample_rate_hz;
+  if (data.frf) {
+    json["frf"] = frf_json(*data.frf);
+    add_response(data, arrays);
+  }
+  if (data.model) {
+    json["model"] = model_json(*data.model);
+    json["modes"] = modes_json(data);
+    json["shapes"] = shapes_json(*data.model);
+    json["shape_channels"] = {{"outputs", channels(data.model->outputs)},
+                              {"inputs", channels(data.model->inputs)}};
+    json["geometry"] = geometry_json(data.geometry, data.model->outputs, data.model->inputs);
+  }
+  json["findings"] = findings_json(data.findings);
+  if (!data.stabilization.empty()) json["stabilization"] = stabilization_json(data.stabilization);
+  if (data.nonlinearity) json["nonlinearity"] = nonlinearity_json(*data.nonlinearity);
+  if (data.comparison) json["comparison"] = comparison_json(data);
+  if (data.validation) json["validation"] = validation_json(*data.validation);
+  json["arrays"] = std::move(arrays.description());
+  return {text_of(json), std::move(arrays.blocks())};
+}
+
+}  // namespace stageid::report

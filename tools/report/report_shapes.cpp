@@ -1,0 +1,92 @@
+#include "tools/report/report_shapes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/modal/modal_assurance.hpp"
+
+namespace stageid::report {
+namespace {
+
+using Json = nlohmann::json;
+
+/// Of a shape of norm one: a pixel is a thousandth.
+constexpr int kShapeDigits = 5;
+constexpr int kMacDigits = 4;
+
+Json rounded(double value, int digits) {
+  if (!std::isfinite(value)) return Json();
+  const double scale = std::pow(10.0, digits);
+  return std::round(value * scale) / scale;
+}
+
+Json pairs(const Eigen::VectorXcd& shape) {
+  Json out = Json::array();
+  for (const std::complex<double> value : shape) {
+    out.push_back(rounded(value.real(), kShapeDigits));
+    out.push_back(rounded(value.imag(), kShapeDigits));
+  }
+  return out;
+}
+
+Json places(const std::vector<ChannelPlace>& places, const ChannelList& channels) {
+  Json out = Json::array();
+  for (const std::string& name : channels.names) {
+    const auto place = std::ranges::find(places, name, &ChannelPlace::name);
+    if (place == places.end()) {
+      out.push_back(nullptr);
+      continue;
+    }
+    out.push_back(
+        {{"position_m", std::vector<double>(place->position_m.begin(), place->position_m.end())},
+         {"direction", std::vector<double>(place->direction.begin(), place->direction.end())}});
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<ModeShape> shapes_by_frequency(const AdditiveModel& model) {
+  std::vector<ModeShape> modes = mode_shapes(model);
+  std::ranges::stable_sort(modes, {}, &ModeShape::natural_frequency_hz);
+  return modes;
+}
+
+Json matrix_json(const Eigen::MatrixXd& matrix, int digits) {
+  Json out = Json::array();
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    Json line = Json::array();
+    for (const double value : matrix.row(row)) line.push_back(rounded(value, digits));
+    out.push_back(std::move(line));
+  }
+  return out;
+}
+
+Json shapes_json(const AdditiveModel& model) {
+  const std::vector<ModeShape> modes = shapes_by_frequency(model);
+  Json list = Json::array();
+  for (const ModeShape& mode : modes)
+    list.push_back({{"frequency_hz", mode.natural_frequency_hz},
+                    {"damping_ratio", mode.damping_ratio},
+                    {"modal_mass", std::isfinite(mode.modal_mass) ? Json(mode.modal_mass) : Json()},
+                    {"not_rank_one", rounded(mode.not_rank_one, kShapeDigits)},
+                    {"outputs", pairs(mode.output_shape)},
+                    {"inputs", pairs(mode.input_shape)}});
+  const Eigen::MatrixXcd outputs = output_shapes(modes);
+  const Eigen::MatrixXcd inputs = input_shapes(modes);
+  return {{"modes", list},
+          {"output_mac", matrix_json(modal_assurance(outputs, outputs), kMacDigits)},
+          {"input_mac", matrix_json(modal_assurance(inputs, inputs), kMacDigits)}};
+}
+
+Json geometry_json(const StageGeometry& geometry, const ChannelList& outputs,
+                   const ChannelList& inputs) {
+  Json out = {{"outputs", places(geometry.sensors, outputs)},
+              {"inputs", places(geometry.actuators, inputs)}};
+  const auto known = [](const Json& list) {
+    return std::ranges::any_of(list, [](const Json& place) { return !place.is_null(); });
+  };
+  return known(out["outputs"]) || known(out["inputs"]) ? out : Json();
+}
+
+}  // namespace stageid::report

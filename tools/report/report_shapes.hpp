@@ -1,0 +1,26 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "estimation/modal/modal_form.hpp"
+#include "estimation/model/additive_model.hpp"
+#include "tools/config/stage_geometry.hpp"
+
+namespace stageid::report {
+
+/// The modes of a model with their shapes, by frequency: what the report animates and compares.
+std::vector<ModeShape> shapes_by_frequency(const AdditiveModel& model);
+
+/// {"modes": [{frequency_hz, damping_ratio, modal_mass, not_rank_one, outputs: [re, im, ...],
+/// inputs: [re, im, ...]}], "output_mac": [[...]], "input_mac": [[...]]}; the MACs modes x modes.
+nlohmann::json shapes_json(const AdditiveModel& model);
+
+/// {"outputs": [{position_m, direction} or null], "inputs": [...]} in the order of the model's
+/// channels, by name; null where no channel has a place.
+nlohmann::json geometry_json(const StageGeometry& geometry, const ChannelList& outputs,
+                             const ChannelList& inputs);
+
+/// Rows of a matrix, rounded to `digits` decimals; not finite numbers become null.
+nlohmann::json matrix_json(const Eigen::MatrixXd& matrix, int digits);
+
+}  // namespace stageid::report

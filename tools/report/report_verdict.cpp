@@ -1,0 +1,127 @@
+#include "tools/report/report_verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "acquisition/files/counted.hpp"
+#include "tools/report/report_modes.hpp"
+#include "tools/steps/model_verdict.hpp"
+
+namespace stageid {
+namespace {
+
+using Reasons = std::vector<std::string>;
+
+/// @returns whether the model is not to be trusted.
+bool judge_fit(const ReportData& data, Reasons& reasons) {
+  const ModelVerdict verdict = judge_model(*data.model, {}, data.validation);
+  for (const std::string& reason : verdict.reasons) {
+    // Doubts of the data stand among the findings already, without their remedy.
+    const auto said = [&](const std::string& other) { return reason.starts_with(other); };
+    if (std::ranges::none_of(reasons, said)) reasons.push_back(reason);
+  }
+  return !verdict.trustworthy;
+}
+
+void judge_modes(const ReportData& data, Reasons& reasons) {
+  if (data.true_modes.empty()) return;
+  for (const ModeRow& row : mode_table(*data.model, data.true_modes)) {
+    if (!row.truth) {
+      // Beside the band a mode stands for what the plant does there: suspension, modes above.
+      const auto& band_hz = data.model->fit.band_hz;
+      if (*row.frequency_hz < band_hz[0] || (*row.frequency_hz > band_hz[1] && band_hz[1] > 0.0))
+        continue;
+      reasons.push_back(
+          fmt::format("a mode at {:.2f} Hz that the plant does not have", *row.frequency_hz));
+    } else if (!row.frequency_hz) {
+      if (row.truth->observable)
+        reasons.push_back(fmt::format("the true mode at {:.2f} Hz was not identified",
+                                      row.truth->natural_frequency_hz));
+    } else if (std::abs(row.frequency_deviation().value_or(0.0)) > 3.0 &&
+               *row.relative_frequency_error() > 1e-4) {
+      reasons.push_back(
+          fmt::format("the mode at {:.2f} Hz is {:.1f} standard deviations off the truth",
+                      *row.frequency_hz, std::abs(*row.frequency_deviation())));
+    }
+  }
+}
+
+/// @returns whether one of them is an error.
+bool judge_findings(const ReportData& data, Reasons& reasons) {
+  bool error = false;
+  for (const ReportFinding& finding : data.findings) {
+    if (finding.severity == ReportMessage::Severity::note) continue;
+    error = error || finding.severity == ReportMessage::Severity::error;
+    reasons.push_back(fmt::format("{}{}{}{}", finding.channel, finding.channel.empty() ? "" : ": ",
+                                  finding.what,
+                                  finding.figure.empty() ? "" : " (" + finding.figure + ")"));
+  }
+  return error;
+}
+
+void judge_runs(const ReportData& data, Reasons& reasons) {
+  std::uint64_t missing = 0;
+  std::uint64_t marked = 0;
+  int incomplete = 0;
+  for (const LogRun& run : data.runs) {
+    missing += run.health.missing;
+    marked += run.health.marked;
+    incomplete += run.complete ? 0 : 1;
+  }
+  if (missing > 0) reasons.push_back(counted(missing, "cycle is", "cycles are") + " missing");
+  if (marked > 0)
+    reasons.push_back(counted(marked, "cycle is", "cycles are") + " marked as not to be used");
+  if (incomplete > 0) reasons.push_back(counted(incomplete, "run is", "runs are") + " incomplete");
+}
+
+}  // namespace
+
+const char* to_string(Verdict::Level level) noexcept {
+  switch (level) {
+    case Verdict::Level::none:
+      return "none";
+    case Verdict::Level::good:
+      return "good";
+    case Verdict::Level::doubt:
+      return "doubt";
+    case Verdict::Level::bad:
+      return "bad";
+  }
+  return "none";
+}
+
+Verdict judge(const ReportData& data) {
+  Verdict verdict;
+  bool error = judge_findings(data, verdict.reasons);
+  for (const ReportMessage& message : data.messages) {
+    if (message.severity == ReportMessage::Severity::note) continue;
+    error = error || message.severity == ReportMessage::Severity::error;
+    verdict.reasons.push_back(message.text);
+  }
+  judge_runs(data, verdict.reasons);
+  if (data.model) {
+    error = judge_fit(data, verdict.reasons) || error;
+    judge_modes(data, verdict.reasons);
+  }
+
+  if (error) {
+    verdict.level = Verdict::Level::bad;
+    verdict.text = "Not to be trusted";
+  } else if (!verdict.reasons.empty()) {
+    verdict.level = Verdict::Level::doubt;
+    verdict.text = data.model ? "Read this before you trust the model"
+                              : "Read this before you trust the measurement";
+  } else if (data.model) {
+    verdict.level = Verdict::Level::good;
+    verdict.text = data.validation && data.validation->chi_square_per_dof > 0.0
+                       ? "The fit converged, and the model holds on data it has not seen"
+                       : "The fit converged";
+  } else {
+    verdict.text = data.frf ? "Measured frequency response, no model" : "No model";
+  }
+  return verdict;
+}
+
+}  // namespace stageid

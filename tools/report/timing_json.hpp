@@ -1,0 +1,13 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "acquisition/record/run_timing.hpp"
+
+namespace stageid {
+
+/// For pages and --json: quantiles in seconds and the bins [[from_s, to_s, count], ...] of both
+/// histograms, and what was skipped; null if nothing was measured (virtual time).
+nlohmann::json timing_json(const RunTiming& timing);
+
+}  // namespace stageid

@@ -1,0 +1,75 @@
+#include "tools/steps/fft_wisdom_file.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/output_file.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr std::string_view kFormat = "stageid-fft-wisdom 1 ";
+constexpr std::size_t kFingerprintDigits = 32;
+constexpr std::uintmax_t kMostBytes = 16U << 20U;  // thousands of lengths
+constexpr const char* kRemedy = "remove it, or name another, to have plans timed anew";
+
+std::string read_bounded(const std::filesystem::path& file) {
+  const auto fail = [&file](const char* what) {
+    throw FileError(file.string() + ": " + what + "; give the name of a file to keep FFT plans in");
+  };
+  if (!std::filesystem::is_regular_file(file)) fail("is not a regular file");
+  if (std::filesystem::file_size(file) > kMostBytes)
+    throw FormatError(file, "", fmt::format("is too large for a file of FFT plans; {}", kRemedy));
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  if (!stream) fail("cannot be read");
+  return text.str();
+}
+
+/// What follows the first line. @throws FormatError
+std::string checked_plans(const std::filesystem::path& file) {
+  const std::string text = read_bounded(file);
+  const std::size_t line = kFormat.size() + kFingerprintDigits + 1;
+  if (!text.starts_with(kFormat) || text.size() < line)
+    throw FormatError(file, "", fmt::format("is not a file of FFT plans; {}", kRemedy));
+  std::string plans = text.substr(line);
+  if (text.substr(0, line) != fmt::format("{}{}\n", kFormat, fingerprint_of(plans)))
+    throw FormatError(file, "", fmt::format("is damaged; {}", kRemedy));
+  return plans;
+}
+
+}  // namespace
+
+FftWisdomFile::FftWisdomFile(std::filesystem::path file) : file_(std::move(file)) {
+  if (std::filesystem::exists(file_)) {
+    kept_ = checked_plans(file_);
+  } else {
+    const OutputFile can_be_made(file_);  // before the long work
+  }
+  try {
+    wisdom_ = std::make_unique<FftWisdom>(kept_);
+  } catch (const std::invalid_argument&) {
+    throw FormatError(
+        file_, "",
+        fmt::format("holds plans of another version of FFTW or kind of processor; {}", kRemedy));
+  }
+}
+
+std::string FftWisdomFile::save() {
+  std::string plans = wisdom_->text();
+  std::string fingerprint = fingerprint_of(plans);
+  if (plans != kept_) write_text_file(file_, fmt::format("{}{}\n{}", kFormat, fingerprint, plans));
+  kept_ = std::move(plans);
+  return fingerprint;
+}
+
+}  // namespace stageid

@@ -1,0 +1,225 @@
+#include "tools/steps/fit_step.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/json_members.hpp"
+#include "tools/fit/frf_quality.hpp"
+#include "tools/steps/health_step.hpp"
+#include "tools/terminal/interrupt.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json distortion_json(const Distortion& distortion) {
+  Json bands = Json::array();
+  for (Eigen::Index b = 0; b < distortion.band_hz.rows(); ++b) {
+    const auto level = distortion.level.col(b);
+    bands.push_back({{"band_hz", {distortion.band_hz(b, 0), distortion.band_hz(b, 1)}},
+                     {"level", std::vector<double>(level.begin(), level.end())}});
+  }
+  return bands;
+}
+
+std::string provenance(const FitSetup& setup, const FitResult& result, const std::string& frf_name,
+                       const std::string& frf_fingerprint, const std::vector<std::string>& doubts) {
+  Json json;
+  json["stageid_version"] = STAGEID_VERSION;
+  json["made_by"] = "fit";
+  json["request_id"] = fit_request_id(setup, frf_fingerprint);
+  json["inputs"] = {{{"file", frf_name}, {"fingerprint", frf_fingerprint}}};
+  json["options"] = Json::parse(setup.request_json);
+  json["decisions"] = result.decisions;
+  if (!doubts.empty()) json["doubts"] = doubts;
+  if (setup.distortion.band_hz.size() > 0) json["distortion"] = distortion_json(setup.distortion);
+  const Json frf = Json::parse(setup.frf.provenance_json, nullptr, false);
+  json["frf"] = frf.is_discarded() ? Json::object() : frf;
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string optional_number(const std::optional<double>& value) {
+  return value ? fmt::format("{:.2g}", *value) : "-";
+}
+
+/// Rounded to two digits of the deviation.
+std::string with_deviation(double value, double deviation) {
+  if (!(deviation > 0.0)) return fmt::format("{:.6g} +- 0", value);
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 12);
+  return fmt::format("{:.{}f} +- {:.{}f}", value, decimals, deviation, decimals);
+}
+
+Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+/// A mode as its own pole; other submodels' as the fit left them.
+std::vector<PoleEstimate> poles_of(const Submodel& s) {
+  if (!s.is_mode()) return s.poles;
+  return {{s.natural_frequency_hz(), s.damping_ratio(), s.natural_frequency_std_hz,
+           s.damping_ratio_std}};
+}
+
+/// What an FRF is known to suffer from, the causes before what follows from them: modes that imitate distortion.
+std::vector<std::string> doubts_about(const FrfEstimate& frf, const std::vector<Finding>& health) {
+  std::vector<std::string> doubts = health_notes(health, Severity::doubt);
+  if (std::string nonlinear = nonlinearity_sentence(frf); !nonlinear.empty())
+    doubts.push_back(std::move(nonlinear));
+  return doubts;
+}
+
+std::vector<std::string> texts_in(const Json& object, const char* key) {
+  std::vector<std::string> texts;
+  if (!object.is_object() || !object.contains(key) || !object[key].is_array()) return texts;
+  for (const Json& text : object[key])
+    if (text.is_string()) texts.push_back(text.get<std::string>());
+  return texts;
+}
+
+}  // namespace
+
+std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint) {
+  return fingerprint_of(
+      fmt::format("{} {} {}", STAGEID_VERSION, frf_fingerprint, setup.request_json));
+}
+
+FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
+                  const std::string& frf_fingerprint, const Console& console) {
+  FitStep step;
+  FitOptions options = setup.options;
+  Progress progress(console, "fit", "iterations");
+  throw_if_interrupted();
+  const ControlledStop keeps_the_best_model;
+  options.interrupted = [] { return interrupt_flag().load(); };
+  options.progress = [&](int iteration, double cost) {
+    progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));
+  };
+  step.result = structured_fit(setup.frf, setup.structure, setup.selection, options);
+  const std::vector<Finding> health = health_of(setup.frf.provenance_json);
+  const std::vector<std::string> doubts = doubts_about(setup.frf, health);
+  if (!doubts.empty() && !step.result.trustworthy()) {
+    step.result.message = fmt::format("{}; {}", fmt::join(doubts, "; "), step.result.message);
+    step.result.model.fit.message = step.result.message;
+  }
+  const std::vector<std::string> faults = health_notes(health, Severity::fault);
+  if (!faults.empty())
+    step.result.distrust(FitStatus::faulty_data, fmt::format("{}", fmt::join(faults, "; ")));
+  step.seconds = progress.seconds();
+  step.result.decisions.insert(step.result.decisions.begin(), setup.notes.begin(),
+                               setup.notes.end());
+  step.result.model.provenance_json =
+      provenance(setup, step.result, frf_name, frf_fingerprint, doubts);
+  return step;
+}
+
+Distortion distortion_of(const AdditiveModel& model) {
+  const Json json = Json::parse(model.provenance_json, nullptr, false);
+  const Eigen::Index channels = model.n_outputs() * model.n_inputs();
+  Distortion out;
+  if (!json.is_object() || !json.contains("distortion") || !json["distortion"].is_array())
+    return out;
+  const Json& bands = json["distortion"];
+  const auto count = static_cast<Eigen::Index>(bands.size());
+  out.band_hz.resize(count, 2);
+  out.level.resize(channels, count);
+  for (Eigen::Index b = 0; b < count; ++b) {
+    const Json& band = bands[static_cast<std::size_t>(b)];
+    const std::vector<double> edges = numbers_in(band, "band_hz");
+    const std::vector<double> level = numbers_in(band, "level");
+    if (edges.size() != 2 || static_cast<Eigen::Index>(level.size()) != channels) return {};
+    out.band_hz.row(b) << edges[0], edges[1];
+    out.level.col(b) = Eigen::Map<const Eigen::VectorXd>(level.data(), channels);
+  }
+  return out;
+}
+
+std::vector<std::string> decisions_of(const AdditiveModel& model) {
+  return texts_in(Json::parse(model.provenance_json, nullptr, false), "decisions");
+}
+
+std::vector<std::string> doubts_of(const AdditiveModel& model) {
+  return texts_in(Json::parse(model.provenance_json, nullptr, false), "doubts");
+}
+
+std::string relative_error_text(const FitRecord& fit) {
+  return std::isfinite(fit.relative_rms_error)
+             ? fmt::format("relative error {:.4g}", fit.relative_rms_error)
+             : "no channel above its noise";
+}
+
+std::vector<std::string> mode_table(const AdditiveModel& model) {
+  std::vector<std::vector<std::string>> rows = {
+      {"mode", "frequency/Hz", "std/Hz", "damping", "std"}};
+  for (const Submodel& s : model.submodels) {
+    for (const PoleEstimate& pole : poles_of(s))
+      rows.push_back(
+          {fmt::format("{}", rows.size()), fmt::format("{:.5f}", pole.natural_frequency_hz),
+           optional_number(pole.natural_frequency_std_hz),
+           fmt::format("{:.6f}", pole.damping_ratio), optional_number(pole.damping_ratio_std)});
+  }
+  return table_lines(rows);
+}
+
+std::vector<std::string> delay_lines(const AdditiveModel& model) {
+  const bool known = model.input_delay_std_s.size() > 0;
+  const Eigen::VectorXd inputs = model.input_delays_s();
+  const Eigen::VectorXd outputs = model.output_delays_s();
+  const auto line = [&](const std::string& of, double delay_s, const Eigen::VectorXd& std_s,
+                        Eigen::Index at) {
+    return known ? fmt::format("delay{} {} us", of, with_deviation(1e6 * delay_s, 1e6 * std_s[at]))
+                 : fmt::format("delay{} {:.6g} us", of, 1e6 * delay_s);
+  };
+  if (inputs.isConstant(inputs[0], 0.0) && outputs.isZero(0.0) &&
+      (!known || model.input_delay_std_s.isConstant(model.input_delay_std_s[0], 0.0))) {
+    if (!known && inputs[0] == 0.0) return {};
+    return {line("", inputs[0], model.input_delay_std_s, 0)};
+  }
+  std::vector<std::string> lines;
+  for (Eigen::Index u = 0; u < inputs.size(); ++u)
+    lines.push_back(
+        line(fmt::format(" of input {}", model.inputs.names[static_cast<std::size_t>(u)]),
+             inputs[u], model.input_delay_std_s, u));
+  for (Eigen::Index y = 0; y < outputs.size(); ++y) {
+    const std::string& name = model.outputs.names[static_cast<std::size_t>(y)];
+    if (y + 1 == outputs.size() && outputs[y] == 0.0)
+      lines.push_back(fmt::format("delay of output {} 0 us, the reference", name));
+    else
+      lines.push_back(line(" of output " + name, outputs[y], model.output_delay_std_s, y));
+  }
+  return lines;
+}
+
+nlohmann::ordered_json delays_json(const AdditiveModel& model) {
+  Json json = Json::object();
+  const auto add = [&json](const char* key, const Eigen::VectorXd& values) {
+    if (values.size() > 0) json[key] = std::vector<double>(values.begin(), values.end());
+  };
+  add("input_delay_s", model.input_delays_s());
+  add("output_delay_s", model.output_delays_s());
+  add("input_delay_std_s", model.input_delay_std_s);
+  add("output_delay_std_s", model.output_delay_std_s);
+  return json;
+}
+
+std::string cost_line(const std::vector<double>& cost) {
+  if (cost.empty()) return "cost: no iteration";
+  if (cost.size() == 1) return fmt::format("cost: {:.6g}", cost.front());
+  return fmt::format("cost: {:.6g} -> {:.6g} in {} iterations", cost.front(), cost.back(),
+                     cost.size() - 1);
+}
+
+nlohmann::ordered_json modes_json(const AdditiveModel& model) {
+  Json list = Json::array();
+  for (const Submodel& s : model.submodels)
+    if (s.is_mode())
+      list.push_back({{"natural_frequency_hz", s.natural_frequency_hz()},
+                      {"natural_frequency_std_hz", optional_json(s.natural_frequency_std_hz)},
+                      {"damping_ratio", s.damping_ratio()},
+                      {"damping_ratio_std", optional_json(s.damping_ratio_std)}});
+  return list;
+}
+
+}  // namespace stageid

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "estimation/search/fit_additive_model.hpp"
+#include "tools/fit/fit_request.hpp"
+#include "tools/terminal/console.hpp"
+
+namespace stageid {
+
+struct FitStep {
+  FitResult result;  ///< model with provenance; decisions begin with those of the setup
+  double seconds = 0.0;
+};
+
+/// Fits, shows progress, and completes the provenance of the model. A signal ends the fit with the best model so far,
+/// FitStatus::interrupted; before the first step there is none.
+/// @param frf_name, frf_fingerprint of the FRF that was fitted.
+/// @throws std::invalid_argument, Interrupted
+FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
+                  const std::string& frf_fingerprint, const Console& console);
+
+/// Names what is asked of a fit, see frf_request_id().
+std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint);
+
+/// The distortion that a model's provenance tells: what its fit knew of the plant.
+Distortion distortion_of(const AdditiveModel& model);
+
+/// The decisions that a model's provenance tells.
+std::vector<std::string> decisions_of(const AdditiveModel& model);
+/// What the data of the fit were known to suffer from: doubts of their health, nonlinearity.
+std::vector<std::string> doubts_of(const AdditiveModel& model);
+
+/// "relative error 0.012", or that no channel responds.
+std::string relative_error_text(const FitRecord& fit);
+
+/// For people: table of modes with standard deviations; cost history in one line.
+std::vector<std::string> mode_table(const AdditiveModel& model);
+std::string cost_line(const std::vector<double>& cost);
+/// The model's delays with the deviations of estimated ones: one line for a delay that all channels share,
+/// else one per channel; empty without a delay.
+std::vector<std::string> delay_lines(const AdditiveModel& model);
+/// The same for --json.
+nlohmann::ordered_json modes_json(const AdditiveModel& model);
+/// Keys as in model.json: input_delay_s, output_delay_s, and input_delay_std_s, output_delay_std_s if known.
+nlohmann::ordered_json delays_json(const AdditiveModel& model);
+
+}  // namespace stageid

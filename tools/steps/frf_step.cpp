@@ -1,0 +1,112 @@
+#include "tools/steps/frf_step.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/json_members.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "frf/health/data_health.hpp"
+#include "tools/config/stage_expectation.hpp"
+#include "tools/steps/health_step.hpp"
+#include "tools/steps/open_logs.hpp"
+#include "tools/terminal/interrupt.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kBytesPerMegabyte = 1e6;
+
+/// The lasting part of a log's metadata: all but times.
+Json lasting_metadata(const LogReader& log) {
+  Json metadata = Json::parse(log.info().metadata_json, nullptr, false);
+  if (!metadata.is_object()) return Json::object();
+  metadata.erase("started_utc");
+  return metadata;
+}
+
+Json options_json(const FrfOptions& options) {
+  return {{"inputs", options.inputs},
+          {"outputs", options.outputs},
+          {"transient_periods", options.transient_periods.value_or(-1)},
+          {"method", options.method == FrfMethod::lpm ? "lpm" : "periodic"},
+          {"covariance", options.covariance == CovarianceKind::full ? "full" : "diagonal"},
+          {"covariance_lines", options.covariance_lines},
+          {"periods", options.periods == PeriodChoice::consistent ? "consistent" : "unmarked"},
+          {"realizations", options.realizations}};
+}
+
+std::string complete_provenance(const FrfEstimate& frf, const std::vector<const LogReader*>& logs,
+                                const FrfOptions& options) {
+  Json provenance = Json::parse(frf.provenance_json, nullptr, false);
+  if (!provenance.is_object()) provenance = Json::object();
+  provenance["stageid_version"] = STAGEID_VERSION;
+  provenance["request_id"] = frf_request_id(logs, options);
+  provenance["realizations"] = options.realizations;
+  provenance["experiments"] = Json::array();
+  for (const LogReader* log : logs) provenance["experiments"].push_back(lasting_metadata(*log));
+  return provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint) {
+  Json provenance = Json::parse(frf.provenance_json);
+  provenance["fft_plans"] = fingerprint;
+  frf.provenance_json = provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options) {
+  Json request = {{"version", STAGEID_VERSION}, {"options", options_json(options)}};
+  for (const LogReader* log : logs) request["experiments"].push_back(lasting_metadata(*log));
+  return fingerprint_of(request.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+std::string request_id_of(const std::string& provenance_json) {
+  return text_in(Json::parse(provenance_json, nullptr, false), "request_id");
+}
+
+FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
+                     const HealthRequest& health, const Console& console) {
+  return estimate_frf(OpenLogs(files).logs(), options, health, console);
+}
+
+FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
+                     const HealthRequest& health, const Console& console) {
+  FrfStep step;
+  std::optional<NominalStage> nominal;  // before the long work: a stage file may be wrong
+  if (health.wanted) nominal = nominal_stage_of(logs.front()->info(), health.stage_file);
+  Progress progress(console, "frf", "MB", 1.0 / kBytesPerMegabyte);
+  options.progress = [&](double done, double total) {
+    throw_if_interrupted();
+    step.bytes = done;
+    progress.update(done, total);
+  };
+  if (health.wanted) {
+    FrfAndHealth both = estimate_plant_frf_and_health(logs, options);
+    step.frf = std::move(both.frf);
+    step.findings = examine(step.frf, std::move(both.health), nominal);
+  } else {
+    step.frf = estimate_plant_frf(logs, options);
+  }
+  step.seconds = progress.seconds();
+  step.frf.provenance_json = complete_provenance(step.frf, logs, options);
+  if (health.wanted) step.findings = keep_health(step.frf, std::move(step.findings));
+  return step;
+}
+
+std::string describe(const FrfEstimate& frf) {
+  return fmt::format("{} x {} on {}, {} ... {} Hz, {} x {}", frf.n_outputs(), frf.n_inputs(),
+                     counted(frf.lines(), "line"), frf.frequency_hz[0],
+                     frf.frequency_hz[frf.lines() - 1], counted(frf.realizations, "realization"),
+                     counted(frf.periods, "period"));
+}
+
+}  // namespace stageid

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "frf/periods/health_finding.hpp"
+#include "frf/plant/plant_frf.hpp"
+#include "tools/terminal/console.hpp"
+
+namespace stageid {
+
+struct FrfStep {
+  FrfEstimate frf;
+  double seconds = 0.0;
+  double bytes = 0.0;             ///< of samples that were read
+  std::vector<Finding> findings;  ///< on the data's health, if it was looked at
+};
+
+/// What the health of the data is held against.
+struct HealthRequest {
+  bool wanted = true;
+  std::filesystem::path stage_file;  ///< empty: the one that the log carries
+};
+
+/// Estimates, shows progress, and completes the provenance: configuration, seeds, the request's
+/// identity (frf_request_id()), and the findings on the data's health, which are looked for in the same
+/// reading. Nothing of it depends on directory, time or threads.
+/// @throws FileError, FormatError, std::invalid_argument, Interrupted
+FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
+                     const HealthRequest& health, const Console& console);
+/// The same of logs that it opens.
+FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
+                     const HealthRequest& health, const Console& console);
+
+/// Adds to the provenance which timed FFT plans were used ("fft_plans"): rounding depends on them.
+void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint);
+
+/// Names what is asked of the estimate: version, options and what the logs say of their experiment.
+/// Two estimates of equal identity from the same samples are equal.
+std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options);
+
+/// "request_id" of a provenance; empty if there is none.
+std::string request_id_of(const std::string& provenance_json);
+
+/// One line for people: "4 x 13 on 4000 lines, 0.25 ... 1999.75 Hz, 2 realizations x 3 periods".
+std::string describe(const FrfEstimate& frf);
+
+}  // namespace stageid

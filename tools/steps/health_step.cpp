@@ -1,0 +1,140 @@
+#include "tools/steps/health_step.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/json_members.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "frf/health/experiment_noise_check.hpp"
+#include "frf/health/interpolation_check.hpp"
+#include "frf/health/settling_check.hpp"
+#include "tools/config/stage_expectation.hpp"
+#include "tools/steps/open_logs.hpp"
+#include "tools/terminal/interrupt.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kBytesPerMegabyte = 1e6;
+constexpr Severity kSeverities[] = {Severity::fault, Severity::doubt, Severity::unchecked};
+
+/// The cause is for programs that read the table now; notes need severity and texts.
+Finding finding_of(const Json& object) {
+  Finding finding;
+  for (const Severity severity : kSeverities)
+    if (text_in(object, "severity") == to_string(severity)) finding.severity = severity;
+  if (const auto cause = cause_of(text_in(object, "cause"))) finding.cause = *cause;
+  finding.channel = text_in(object, "channel");
+  finding.what = text_in(object, "what");
+  finding.figure = text_in(object, "figure");
+  finding.remedy = text_in(object, "remedy");
+  return finding;
+}
+
+bool has(const std::vector<Finding>& findings, Cause cause) {
+  return std::any_of(findings.begin(), findings.end(),
+                     [&](const Finding& f) { return f.cause == cause; });
+}
+
+}  // namespace
+
+std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
+                                  FrfOptions options, const std::filesystem::path& stage_file,
+                                  const Console& console) {
+  const OpenLogs opened(files);
+  const auto nominal = nominal_stage_of(opened.logs().front()->info(), stage_file);
+  Progress progress(console, "health", "MB", 1.0 / kBytesPerMegabyte);
+  options.progress = [&](double done, double total) {
+    throw_if_interrupted();
+    progress.update(done, total);
+  };
+  std::optional<FrfAndHealth> both;
+  try {
+    both = estimate_plant_frf_and_health(opened.logs(), options);
+  } catch (const FormatError&) {
+    // What cannot be estimated may still be examined, and that says why.
+  } catch (const std::invalid_argument&) {
+  }
+  if (!both) return check_health(read_health_record(opened.logs(), options), nominal);
+  return keep_health(both->frf, examine(both->frf, std::move(both->health), nominal));
+}
+
+std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
+                             const std::optional<NominalStage>& nominal) {
+  const std::vector<NoisyRun> noisy = record.noisy_runs;
+  std::vector<Finding> findings = check_health(std::move(record), nominal);
+  if (!has(findings, Cause::drift))
+    for (Finding& finding : check_experiment_noise(frf, noisy))
+      findings.push_back(std::move(finding));
+  return findings;
+}
+
+std::vector<std::string> health_lines(const std::vector<Finding>& findings) {
+  std::vector<std::vector<std::string>> rows = {{"health", "channel", "what", "figure", "remedy"}};
+  bool fine = true;
+  for (const Finding& f : findings) {
+    fine = fine && f.severity == Severity::unchecked;
+    rows.push_back({to_string(f.severity), f.channel, f.what, f.figure, f.remedy});
+  }
+  std::vector<std::string> lines;
+  if (fine) lines.push_back("health of the data: nothing found");
+  if (rows.size() == 1) return lines;
+  for (std::string& line : table_lines(rows)) lines.push_back(std::move(line));
+  return lines;
+}
+
+Json health_json(const std::vector<Finding>& findings) {
+  Json list = Json::array();
+  for (const Finding& f : findings)
+    list.push_back({{"severity", to_string(f.severity)},
+                    {"cause", to_string(f.cause)},
+                    {"channel", f.channel},
+                    {"what", f.what},
+                    {"figure", f.figure},
+                    {"remedy", f.remedy}});
+  return list;
+}
+
+std::vector<std::string> health_notes(const std::vector<Finding>& findings,
+                                      std::optional<Severity> only) {
+  std::vector<std::string> notes;
+  for (const Finding& f : findings) {
+    if (f.severity == Severity::unchecked || f.severity != only.value_or(f.severity)) continue;
+    notes.push_back(fmt::format("{}{}{} ({}); {}", f.channel, f.channel.empty() ? "" : ": ", f.what,
+                                f.figure, f.remedy));
+  }
+  return notes;
+}
+
+std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings) {
+  for (Finding& finding : check_interpolation(frf)) findings.push_back(std::move(finding));
+  // A drift or a mode that rings is named already; the bands that it spoils say less.
+  if (!has(findings, Cause::drift) && !has(findings, Cause::unsettled))
+    for (Finding& finding : check_settling(frf)) findings.push_back(std::move(finding));
+  std::stable_sort(findings.begin(), findings.end(),
+                   [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });
+  Json provenance = Json::parse(frf.provenance_json, nullptr, false);
+  if (!provenance.is_object()) provenance = Json::object();
+  provenance["health"] = health_json(findings);
+  frf.provenance_json = provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return findings;
+}
+
+std::vector<Finding> health_of(const std::string& provenance_json) {
+  const Json provenance = Json::parse(provenance_json, nullptr, false);
+  std::vector<Finding> findings;
+  if (!provenance.is_object() || !provenance.contains("health") || !provenance["health"].is_array())
+    return findings;
+  for (const Json& object : provenance["health"])
+    if (object.is_object()) findings.push_back(finding_of(object));
+  return findings;
+}
+
+}  // namespace stageid

@@ -1,0 +1,70 @@
+#include "tools/terminal/output_paths.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <stdexcept>
+#include <system_error>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "acquisition/files/system_reason.hpp"
+
+namespace stageid {
+
+void require_no_input(const std::filesystem::path& file,
+                      const std::vector<std::filesystem::path>& inputs) {
+  for (const std::filesystem::path& input : inputs) {
+    std::error_code none;  // one of them is not there: they are not the same
+    if (std::filesystem::equivalent(file, input, none))
+      throw std::invalid_argument(fmt::format(
+          "{}: is an input, which the result would replace; give -o another name", file.string()));
+  }
+}
+
+void require_writable(const std::filesystem::path& file,
+                      const std::vector<std::filesystem::path>& inputs) {
+  require_no_input(file, inputs);
+  const OutputFile probe(file);
+}
+
+std::string named(const std::filesystem::path& file, const std::string& message) {
+  const std::string place = file.string() + ": ";
+  return message.starts_with(place) ? message : place + message;
+}
+
+void require_readable(const std::filesystem::path& file) {
+  errno = 0;
+  if (!std::ifstream(file, std::ios::binary) || std::filesystem::is_directory(file))
+    throw FileError(fmt::format("{}: cannot be read: {}", file.string(),
+                                system_reason(errno != 0 ? errno : EISDIR)));
+}
+
+void require_ending(const std::filesystem::path& file, const char* what,
+                    const std::vector<std::string>& endings) {
+  if (std::find(endings.begin(), endings.end(), file.extension().string()) != endings.end()) return;
+  throw std::invalid_argument(fmt::format("{}: {} is written as {}; give it such a name",
+                                          file.string(), what, fmt::join(endings, ", ")));
+}
+
+void require_model_ending(const std::filesystem::path& file) {
+  require_ending(file, "a model", {".json"});
+}
+
+void require_frf_ending(const std::filesystem::path& file) {
+  require_ending(file, "a frequency response", {".h5", ".hdf5"});
+}
+
+void require_directory(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (error || !std::filesystem::is_directory(directory))
+    throw FileError(fmt::format("{}: cannot be made a directory: {}; give another -o",
+                                directory.string(),
+                                error ? error.message() : "a file stands there"));
+}
+
+}  // namespace stageid

@@ -1,0 +1,64 @@
+#include "tools/terminal/text_lines.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+#include "acquisition/files/file_error.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // before UTF-8, from Windows
+
+}  // namespace
+
+TextLines::TextLines(const std::filesystem::path& file) : file_(file) {
+  require_readable(file);
+  std::ifstream stream(file, std::ios::binary);
+  if (stream) text_.assign(std::istreambuf_iterator<char>(stream), {});
+  if (text_.starts_with(kByteOrderMark)) at_ = kByteOrderMark.size();
+}
+
+std::string_view TextLines::next() {
+  if (at_end()) {
+    ++line_;
+    fail("the file ends here; it was cut short");
+  }
+  ++line_;
+  const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+  std::string_view line = std::string_view(text_).substr(at_, end - at_);
+  at_ = std::min(end + 1, text_.size());  // the last line may have no end
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return line;
+}
+
+void TextLines::fail(const std::string& message) const {
+  throw FormatError(file_, fmt::format("{}", line_), message);
+}
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
+}
+
+std::optional<double> parse_number(std::string_view text) {
+  std::string digits(trimmed(text));
+  std::replace_if(
+      digits.begin(), digits.end(), [](char c) { return c == 'D' || c == 'd'; }, 'e');
+  const char* first = digits.data() + (digits.starts_with('+') ? 1 : 0);
+  const char* last = digits.data() + digits.size();
+  double value = 0.0;
+  const auto [stop, error] = std::from_chars(first, last, value);
+  if (error == std::errc::result_out_of_range) return std::nullopt;
+  if (stop != last || error != std::errc{} || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+}  // namespace stageid
