@@ -11,7 +11,7 @@ namespace stageid {
 
 namespace {
 
-constexpr std::uint64_t kPieceRows = 16384;
+constexpr std::uint64_t kVerifiedRows = 16384;
 
 /// Reads all rows: what cannot be read is damage.
 void check_values(const LogReader& reader, VerifyReport& report) {
@@ -20,8 +20,8 @@ void check_values(const LogReader& reader, VerifyReport& report) {
     const std::uint64_t rows = reader.runs()[run].samples;
     try {
       if (reader.runs()[run].complete) static_cast<void>(reader.excitation(run));
-      for (std::uint64_t first = 0; first < rows; first += kPieceRows) {
-        const std::uint64_t count = std::min(kPieceRows, rows - first);
+      for (std::uint64_t first = 0; first < rows; first += kVerifiedRows) {
+        const std::uint64_t count = std::min(kVerifiedRows, rows - first);
         reader.read(run, first, count, samples);
         report.rows += count;
         report.marked_rows += static_cast<std::uint64_t>((samples.marked != 0).count());

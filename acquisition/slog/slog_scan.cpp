@@ -19,7 +19,7 @@ namespace stageid {
 
 namespace {
 
-constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
+constexpr std::size_t kScanBytes = std::size_t{1} << 18;
 
 /// Walks through one file and gathers what it finds.
 class Scanner {
@@ -118,17 +118,17 @@ class Scanner {
   std::uint64_t next_header(std::uint64_t from) const {
     const std::string_view magic(reinterpret_cast<const char*>(kSlogMagic.data()),
                                  kSlogMagic.size());
-    std::vector<char> piece(kPieceBytes);
+    std::vector<char> piece(kScanBytes);
     while (from + sizeof(SlogBlockHeader) <= source_.bytes()) {
       const auto size =
-          static_cast<std::size_t>(std::min<std::uint64_t>(kPieceBytes, source_.bytes() - from));
+          static_cast<std::size_t>(std::min<std::uint64_t>(kScanBytes, source_.bytes() - from));
       source_.read(from, piece.data(), size);
       const std::string_view text(piece.data(), size);
       for (std::size_t at = text.find(magic); at != text.npos; at = text.find(magic, at + 1)) {
         std::string ignored;
         if (block_at(from + at, ignored)) return from + at;
       }
-      if (size < kPieceBytes) break;
+      if (size < kScanBytes) break;
       from += size - (magic.size() - 1);  // a magic may straddle two pieces
     }
     return source_.bytes();
@@ -189,12 +189,11 @@ SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth) {
 
 bool payload_intact(const SlogSource& source, const SlogBlock& block) {
   std::uint64_t left = slog_padded(block.header.payload_bytes);
-  std::vector<std::byte> piece(
-      static_cast<std::size_t>(std::min<std::uint64_t>(left, kPieceBytes)));
+  std::vector<std::byte> piece(static_cast<std::size_t>(std::min<std::uint64_t>(left, kScanBytes)));
   std::uint64_t offset = block.payload_offset();
   std::uint32_t crc = 0;
   while (left > 0) {
-    const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(left, kPieceBytes));
+    const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(left, kScanBytes));
     source.read(offset, piece.data(), size);
     crc = crc32c(std::span(piece).first(size), crc);
     offset += size;

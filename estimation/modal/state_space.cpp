@@ -26,25 +26,25 @@ Factors<Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>> leading_factors(
 }
 
 /// One block with the rows of B and columns of C that belong to it.
-struct Part {
+struct BlockPart {
   StateBlock block;
   Eigen::MatrixXd A;
   Eigen::MatrixXd B;
   Eigen::MatrixXd C;
 };
 
-Part real_part(double pole, long long submodel, const Eigen::VectorXd& output,
-               const Eigen::VectorXd& input) {
+BlockPart real_part(double pole, long long submodel, const Eigen::VectorXd& output,
+                    const Eigen::VectorXd& input) {
   return {{0, 1, pole, submodel}, Eigen::MatrixXd::Constant(1, 1, pole), input.transpose(), output};
 }
 
 /// With the complex state z, z' = lambda z + psi^T u and y = 2 Re(phi z); x = [Re z; Im z].
-Part complex_part(Complex pole, long long submodel, const Eigen::VectorXcd& output,
-                  const Eigen::VectorXcd& input) {
-  Part part{{0, 2, pole, submodel},
-            Eigen::MatrixXd{{pole.real(), -pole.imag()}, {pole.imag(), pole.real()}},
-            Eigen::MatrixXd(2, input.size()),
-            Eigen::MatrixXd(output.size(), 2)};
+BlockPart complex_part(Complex pole, long long submodel, const Eigen::VectorXcd& output,
+                       const Eigen::VectorXcd& input) {
+  BlockPart part{{0, 2, pole, submodel},
+                 Eigen::MatrixXd{{pole.real(), -pole.imag()}, {pole.imag(), pole.real()}},
+                 Eigen::MatrixXd(2, input.size()),
+                 Eigen::MatrixXd(output.size(), 2)};
   part.B << input.real().transpose(), input.imag().transpose();
   part.C << 2.0 * output.real(), -2.0 * output.imag();
   return part;
@@ -63,7 +63,8 @@ struct Member {
   }
 };
 
-void add_poles(const Member& member, const SubmodelResidues& fractions, std::vector<Part>& parts) {
+void add_poles(const Member& member, const SubmodelResidues& fractions,
+               std::vector<BlockPart>& parts) {
   for (const PoleResidue& pole : fractions.poles) {
     if (pole.is_real()) {
       const auto f = member.factors(Eigen::MatrixXd(pole.residue.real()));
@@ -83,7 +84,7 @@ void add_poles(const Member& member, const SubmodelResidues& fractions, std::vec
 /// give Phi Psi^T/s^2 + (Phi B_1 + C_2 Psi^T)/s, which can be all of R_1 but its part outside the
 /// columns and rows of R_2: that part has integrators of its own.
 void add_integrators(const Member& member, const SubmodelResidues& fractions,
-                     std::vector<Part>& parts) {
+                     std::vector<BlockPart>& parts) {
   const Eigen::MatrixXd& R1 = fractions.integrator;
   const auto chain = member.factors(fractions.double_integrator);
   const Eigen::VectorXd inverse_norm =
@@ -93,10 +94,10 @@ void add_integrators(const Member& member, const SubmodelResidues& fractions,
   const Eigen::MatrixXd C2 = left * chain.input * inverse_norm.asDiagonal();
   const Eigen::MatrixXd rest = left - C2 * chain.input.transpose();
   for (Eigen::Index r = 0; r < chain.input.cols(); ++r) {
-    Part part{{0, 2, 0.0, member.id()},
-              Eigen::MatrixXd{{0.0, 1.0}, {0.0, 0.0}},
-              Eigen::MatrixXd(2, R1.cols()),
-              Eigen::MatrixXd(R1.rows(), 2)};
+    BlockPart part{{0, 2, 0.0, member.id()},
+                   Eigen::MatrixXd{{0.0, 1.0}, {0.0, 0.0}},
+                   Eigen::MatrixXd(2, R1.cols()),
+                   Eigen::MatrixXd(R1.rows(), 2)};
     part.B << B1.row(r), chain.input.col(r).transpose();
     part.C << chain.output.col(r), C2.col(r);
     parts.push_back(std::move(part));
@@ -113,7 +114,7 @@ void add_integrators(const Member& member, const SubmodelResidues& fractions,
 StateSpace state_space(const AdditiveModel& model) {
   StateSpace out;
   out.D = Eigen::MatrixXd::Zero(model.n_outputs(), model.n_inputs());
-  std::vector<Part> parts;
+  std::vector<BlockPart> parts;
   for (std::size_t i = 0; i < model.submodels.size(); ++i) {
     const Member member{model.submodels[i], i};
     const SubmodelResidues fractions = residues(member.submodel, i);
@@ -122,14 +123,14 @@ StateSpace state_space(const AdditiveModel& model) {
     add_poles(member, fractions, parts);
   }
   Eigen::Index order = 0;
-  for (Part& part : parts) {
+  for (BlockPart& part : parts) {
     part.block.first = order;
     order += part.block.size;
   }
   out.A = Eigen::MatrixXd::Zero(order, order);
   out.B.resize(order, model.n_inputs());
   out.C.resize(model.n_outputs(), order);
-  for (const Part& part : parts) {
+  for (const BlockPart& part : parts) {
     const auto [first, size, pole, submodel] = part.block;
     out.A.block(first, first, size, size) = part.A;
     out.B.middleRows(first, size) = part.B;

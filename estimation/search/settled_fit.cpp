@@ -24,7 +24,7 @@ constexpr double kLeastDoubt = 1.0;
 constexpr double kUndoubtedWidths = 0.1;
 
 // A model that costs so many times as much does not follow what the data show: better none that converged.
-constexpr double kDearest = 1.5;
+constexpr double kDearestMode = 1.5;
 
 struct OpenMode {
   std::size_t submodel = 0;
@@ -131,7 +131,7 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
     if (!fewer) break;
     const double cost = fit.model.fit.cost;
     fit = fit_additive_model(frf, fewer->model, options);
-    if (!(fit.model.fit.cost < kDearest * first.model.fit.cost)) return first;
+    if (!(fit.model.fit.cost < kDearestMode * first.model.fit.cost)) return first;
     given_up.push_back(
         fmt::format("{}: cost {:.6g} -> {:.6g}", fewer->reason, cost, fit.model.fit.cost));
   }

@@ -14,8 +14,8 @@
 namespace stageid {
 namespace {
 
-constexpr double kBroad = 0.1;          // a damping ratio: such a mode is no peak
-constexpr std::size_t kPairsTried = 4;  // each costs a fit
+constexpr double kBroad = 0.1;                 // a damping ratio: such a mode is no peak
+constexpr std::size_t kUndeterminedTried = 4;  // each costs a fit
 
 bool is_open(const Submodel& s) {
   return s.natural_frequency_std_hz.value_or(0.0) >= kOpenFrequency * s.natural_frequency_hz() ||
@@ -97,7 +97,7 @@ void judge_close_modes(const FrfEstimate& frf, const FitOptions& options, FitRes
   FitOptions plain = options;
   plain.uncertainty = plain.judge_modes = plain.covariance = false;
   const std::vector<std::pair<std::size_t, std::size_t>> pairs = overlapping_modes(fit.model);
-  for (std::size_t p = 0; p < std::min(pairs.size(), kPairsTried); ++p) {
+  for (std::size_t p = 0; p < std::min(pairs.size(), kUndeterminedTried); ++p) {
     const auto [i, j] = pairs[p];
     const Submodel& one = fit.model.submodels[i];
     const Submodel& other = fit.model.submodels[j];

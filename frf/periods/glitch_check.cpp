@@ -11,7 +11,7 @@ namespace {
 using Eigen::Index;
 
 constexpr Index kNeighbours = 128;
-constexpr double kLeastRatio = 8.0;
+constexpr double kLeastGlitch = 8.0;
 constexpr double kNormalMedian = 0.6745;  // of |x|, x standard normal
 
 /// |second difference| of x[n + N] - x[n], over the scatter of its neighbours; zeros at the ends.
@@ -41,7 +41,7 @@ Eigen::ArrayXd unevenness(const Eigen::Ref<const Eigen::VectorXd>& x, Index N) {
 std::vector<Glitch> find_glitches(const Eigen::MatrixXd& samples, Index channels, Index N,
                                   int periods) {
   if (periods < 3 || N < 2 * kNeighbours) return {};
-  const double least_ratio = std::max(kLeastRatio, std::sqrt(static_cast<double>(N)));
+  const double least_ratio = std::max(kLeastGlitch, std::sqrt(static_cast<double>(N)));
   std::vector<Glitch> worst(static_cast<std::size_t>(periods));
   for (Index c = 0; c < channels; ++c) {
     const Eigen::ArrayXd ratio = unevenness(samples.col(c).head(N * periods), N);

@@ -17,10 +17,10 @@ constexpr Index kBlocks = 64;
 constexpr Index kShortestBlock = 16;
 constexpr int kNear = 4;           // shifts that are always tried
 constexpr std::size_t kPeaks = 3;  // of the cross-correlation, beyond them
-constexpr double kLeastRatio = 1.5;
+constexpr double kLeastGain = 1.5;
 constexpr double kLeastRatioAlone = 10.0;
 constexpr double kDeviations = 8.0;
-constexpr double kRounding = 1e-24;  // of a channel's power
+constexpr double kSlipRounding = 1e-24;  // of a channel's power
 
 /// x[n] - r[(n + shift) mod N]
 ArrayXd difference(const MatrixXd& later, const MatrixXd& earlier, Index channel, Index shift) {
@@ -46,7 +46,7 @@ ArrayXd block_power(const ArrayXd& difference, Index blocks) {
 Index blocks_of(Index N) { return std::clamp<Index>(N / kShortestBlock, 1, kBlocks); }
 
 double floor_of(const MatrixXd& samples, Index channel) {
-  return kRounding * samples.col(channel).squaredNorm() + 1e-300;
+  return kSlipRounding * samples.col(channel).squaredNorm() + 1e-300;
 }
 
 /// Whether some block of one kind of channels resembles the earlier period shifted by a sample as much as the
@@ -137,7 +137,7 @@ double advantage(const Explained& of, const Change& change) {
   const double before = of.before.segment(change.first, rows).sum();
   const double after = of.after.segment(change.first, rows).sum();
   const double ratio = std::log(before / std::max(1e-300, after));
-  const double least = std::max(std::log(kLeastRatio), kDeviations * std::sqrt(4.0 / count));
+  const double least = std::max(std::log(kLeastGain), kDeviations * std::sqrt(4.0 / count));
   return std::abs(ratio) > least ? ratio : 0.0;
 }
 

@@ -8,7 +8,7 @@
 namespace stageid {
 namespace {
 
-constexpr double kRounding =
+constexpr double kTransientRounding =
     1e-24;  // of a sensor's power: what double precision leaves of no noise
 
 }  // namespace
@@ -55,7 +55,7 @@ RunStart StartRecorder::finish() {
     for (Eigen::Index k = 0; k < noise.cols(); ++k)
       values[static_cast<std::size_t>(k)] = noise(c, k);
     const double power = mean.row(c).squaredNorm() / static_cast<double>(mean.cols());
-    const double level = std::max(order_statistic(values, 0.5), kRounding * power);
+    const double level = std::max(order_statistic(values, 0.5), kTransientRounding * power);
     const double weight = level > 0.0 ? 1.0 / level : 0.0;
     if (c == 0) {
       run.along.setZero(noise.cols());
@@ -66,7 +66,8 @@ RunStart StartRecorder::finish() {
     run.first += weight * scale * W.row(c).cwiseAbs2().transpose();
     run.last += weight * scale * V.row(c).cwiseAbs2().transpose();
     // Rounding is noise, where there is no other.
-    run.noise.array() += weight * noise.row(c).transpose().array() + weight * kRounding * power;
+    run.noise.array() +=
+        weight * noise.row(c).transpose().array() + weight * kTransientRounding * power;
   }
   run.periods = count_;
   run.start_used = start_used_;

@@ -10,7 +10,8 @@
 namespace stageid {
 namespace {
 
-constexpr double kRounding = 1e-24;  // of the largest line's power: what double precision leaves
+constexpr double kAlignmentRounding =
+    1e-24;  // of the largest line's power: what double precision leaves
 
 }  // namespace
 
@@ -49,11 +50,11 @@ void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
     residual.col(l) = (Z.topRows(outputs_) - at * Z.bottomRows(at.cols())).reshaped();
   });
   for (Eigen::Index e = 0; e < E; ++e) {
-    const Eigen::VectorXd smallest = kRounding * spectra.run(static_cast<std::size_t>(e))
-                                                     .mean.topLeftCorner(outputs_, N)
-                                                     .cwiseAbs2()
-                                                     .rowwise()
-                                                     .maxCoeff();
+    const Eigen::VectorXd smallest = kAlignmentRounding * spectra.run(static_cast<std::size_t>(e))
+                                                              .mean.topLeftCorner(outputs_, N)
+                                                              .cwiseAbs2()
+                                                              .rowwise()
+                                                              .maxCoeff();
     add_run(residual.middleRows(outputs_ * e, outputs_), smallest);
   }
   first_ = false;

@@ -17,13 +17,13 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kWindow = 9;
-constexpr double kDeviations = 8.0;
+constexpr double kDriftDeviations = 8.0;
 constexpr double kLeastShare = 0.5;
 // Distortions differ from realization to realization, on as few lines as a resonance has: five complex numbers of equal
 // size lie along one direction by so much once in some thousand times.
 constexpr double kLeastShareOfRealizations = 0.8;
 constexpr double kLeastBias = 1.0;
-constexpr double kRounding = 1e-16;  // of the largest |G|^2 of a line
+constexpr double kDriftRounding = 1e-16;  // of the largest |G|^2 of a line
 
 /// A slope of G in time, and what it is per unit of noise_variance.
 struct Slope {
@@ -96,7 +96,7 @@ class DriftFit {
     const double along = along_.segment(first, kWindow).sum();
     const double length = length_.segment(first, kWindow).sum();
     const double deviation = std::sqrt(variance_.segment(first, kWindow).sum());
-    if (!(length > 0.0) || !(std::abs(along) > kDeviations * deviation)) return false;
+    if (!(length > 0.0) || !(std::abs(along) > kDriftDeviations * deviation)) return false;
     const double excess = excess_.segment(first, kWindow).sum();
     return along * along / length >= slope_.least_share * excess;
   }
@@ -106,7 +106,7 @@ class DriftFit {
     const Index n_u = frf_.n_inputs();
     const Eigen::VectorXcd X = derivative(frf_, k);
     const Eigen::VectorXcd D = slope_.values.col(k);
-    const double least = kRounding * frf_.response.col(k).cwiseAbs2().maxCoeff() + 1e-300;
+    const double least = kDriftRounding * frf_.response.col(k).cwiseAbs2().maxCoeff() + 1e-300;
     const Eigen::ArrayXd noise = about(frf_.noise_variance, k).array() + least;
     const Eigen::ArrayXd variance = slope_.variance * noise;
     const Eigen::VectorXcd weighted = X.array() / variance;

@@ -17,7 +17,7 @@ constexpr double kEpsilonOnePeriod = 5e-2;  // no scatter says what noise is
 constexpr double kRounding = 1e-9;          // of u: float32 records, and u - r of two large numbers
 constexpr double kDeviations = 6.0;
 constexpr double kLeastGain = 0.02;
-constexpr double kLeastSkew_s = 2e-6;
+constexpr double kLeastControllerSkew_s = 2e-6;
 constexpr double kLeastShare = 0.3;
 constexpr double kLeastMisfit = 0.05;
 constexpr double kSignificance = 1e-4;
@@ -202,7 +202,7 @@ void Search::try_direction(ChannelChange change, double cost, Index first, Index
   } else {
     change.value = d;
     change.deviation = deviation;
-    if (!noise_known_ || std::abs(d) < kLeastSkew_s) return;
+    if (!noise_known_ || std::abs(d) < kLeastControllerSkew_s) return;
   }
   candidates_.push_back({change, along * d, along * d / cost});
 }

@@ -15,9 +15,9 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kSignificance = 1e-4;
-constexpr double kLeastMisfit = 0.05;
-constexpr double kRounding = 1e-9;  // of u: float32 records, and u - r of two large numbers
+constexpr double kFeedbackSignificance = 1e-4;
+constexpr double kLeastFeedbackMisfit = 0.05;
+constexpr double kFeedbackRounding = 1e-9;  // of u: float32 records, and u - r of two large numbers
 
 std::string why_not(const HealthRecord& record, const std::vector<Index>& actuators) {
   for (const Index axis : record.axes)
@@ -44,7 +44,8 @@ FeedbackCheck check_feedback(const HealthRecord& record) {
   Eigen::VectorXd evidence = Eigen::VectorXd::Zero(n_u);
   for (const LineRecord& line : record.lines) {
     Eigen::MatrixXcd D = record.mean(line.Z.bottomRows(n_u));
-    const Eigen::VectorXd rounding = kRounding * kRounding * D.cwiseAbs2().rowwise().mean();
+    const Eigen::VectorXd rounding =
+        kFeedbackRounding * kFeedbackRounding * D.cwiseAbs2().rowwise().mean();
     for (const Index axis : record.axes)
       D.row(actuators[static_cast<std::size_t>(axis)]) -= line.R.row(axis);
     const Eigen::MatrixXcd Y = record.mean(line.Z.topRows(record.n_y()));
@@ -75,9 +76,9 @@ FeedbackCheck check_feedback(const HealthRecord& record) {
   check.relative = std::sqrt(misfit.sum() / fed_back.sum());
   for (Index a = 0; a < n_u; ++a) {
     const double relative = fed_back[a] > 0.0 ? std::sqrt(misfit[a] / fed_back[a]) : 0.0;
-    if (relative < kLeastMisfit ||
+    if (relative < kLeastFeedbackMisfit ||
         tail_of_evidence(evidence[a], static_cast<Index>(record.lines.size())) >
-            kSignificance / static_cast<double>(n_u))
+            kFeedbackSignificance / static_cast<double>(n_u))
       continue;
     check.inconsistent.push_back(a);
     check.worst = std::max(check.worst, relative);

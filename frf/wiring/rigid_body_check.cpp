@@ -19,11 +19,11 @@ constexpr double kTolerance = 0.1;       // of the rms of a row
 constexpr double kModelError = 0.02;     // of what the fit leaves of flexible modes
 constexpr double kLeastLogGain = 0.262;  // ln 1.3
 constexpr double kLeastExplained = 20.0;
-constexpr double kLeastShare = 0.3;
+constexpr double kLeastBodyShare = 0.3;
 constexpr double kGrowth = 1.5;
 constexpr double kBelowGrowth = 0.7;
 constexpr double kDead = 0.05;
-constexpr std::size_t kFewestLines = 8;
+constexpr std::size_t kFewestBodyLines = 8;
 
 /// The lines up to where flexible modes begin.
 std::vector<PlantLine> rigid_lines(const std::vector<PlantLine>& lines) {
@@ -32,7 +32,7 @@ std::vector<PlantLine> rigid_lines(const std::vector<PlantLine>& lines) {
     const double omega = lines[k].omega_rad_s;
     sizes.push_back(omega * omega * lines[k].G.norm());
     std::vector<double> sorted = sizes;
-    if (sizes.size() < kFewestLines || sizes.back() <= kGrowth * order_statistic(sorted, 0.5))
+    if (sizes.size() < kFewestBodyLines || sizes.back() <= kGrowth * order_statistic(sorted, 0.5))
       continue;
     std::vector<PlantLine> band;
     for (const PlantLine& line : lines)
@@ -87,7 +87,7 @@ Gains fit_gains(const std::vector<PlantLine>& lines) {
   return gains;
 }
 
-struct Candidate {
+struct BodyCandidate {
   ChannelChange change;
   double explained = 0.0;
 };
@@ -109,7 +109,7 @@ Eigen::MatrixXd undone(const ChannelChange& change, const Eigen::MatrixXd& A) {
 }
 
 void try_gain(ChannelChange change, const Gains& gains, const Eigen::MatrixXd& A,
-              std::vector<Candidate>& candidates) {
+              std::vector<BodyCandidate>& candidates) {
   // c A = A0 by least squares over the row, the column, or all.
   Eigen::MatrixXd part = Eigen::MatrixXd::Zero(A.rows(), A.cols());
   if (change.a < 0)
@@ -126,9 +126,9 @@ void try_gain(ChannelChange change, const Gains& gains, const Eigen::MatrixXd& A
   candidates.push_back({change, cost(A, gains) - cost(undone(change, A), gains)});
 }
 
-std::optional<Candidate> best_change(const Gains& gains, const Eigen::MatrixXd& A) {
+std::optional<BodyCandidate> best_change(const Gains& gains, const Eigen::MatrixXd& A) {
   using Kind = ChannelChange::Kind;
-  std::vector<Candidate> candidates;
+  std::vector<BodyCandidate> candidates;
   const double before = cost(A, gains);
   try_gain({Kind::gain, true}, gains, A, candidates);
   for (const bool of_sensors : {true, false}) {
@@ -141,12 +141,12 @@ std::optional<Candidate> best_change(const Gains& gains, const Eigen::MatrixXd& 
       }
     }
   }
-  const Candidate* most = nullptr;
-  for (const Candidate& candidate : candidates)
-    if (candidate.explained > std::max(kLeastExplained, kLeastShare * before) &&
+  const BodyCandidate* most = nullptr;
+  for (const BodyCandidate& candidate : candidates)
+    if (candidate.explained > std::max(kLeastExplained, kLeastBodyShare * before) &&
         (most == nullptr || candidate.explained > most->explained))
       most = &candidate;
-  return most != nullptr ? std::optional<Candidate>(*most) : std::nullopt;
+  return most != nullptr ? std::optional<BodyCandidate>(*most) : std::nullopt;
 }
 
 /// From positions in A to those in the log.
@@ -165,10 +165,10 @@ RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
                                 const std::vector<Index>& inputs) {
   RigidBodyCheck check;
   const std::vector<PlantLine> lines = rigid_lines(all);
-  if (lines.size() < kFewestLines) {
+  if (lines.size() < kFewestBodyLines) {
     check.unchecked =
         fmt::format("{} excited lines between suspension and flexible modes; {} are needed",
-                    lines.size(), kFewestLines);
+                    lines.size(), kFewestBodyLines);
     return check;
   }
   check.band_hz[0] = lines.front().omega_rad_s / (2.0 * std::numbers::pi);
@@ -181,7 +181,7 @@ RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
   }
   Eigen::MatrixXd A = gains.A;
   for (Index i = 0; i < A.rows() + A.cols(); ++i) {
-    const std::optional<Candidate> chosen = best_change(gains, A);
+    const std::optional<BodyCandidate> chosen = best_change(gains, A);
     if (!chosen) break;
     A = undone(chosen->change, A);
     check.changes.push_back(in_log(chosen->change, outputs, inputs));

@@ -18,9 +18,9 @@ using Index = Eigen::Index;
 
 constexpr int kBlocks = 20;
 constexpr int kIterations = 6;
-constexpr std::size_t kFewestLines = 100;
+constexpr std::size_t kFewestSkewLines = 100;
 constexpr Index kFewestChannels = 3;  // of a kind: of two, neither is the one that is late
-constexpr double kDeviations = 8.0;
+constexpr double kSkewDeviations = 8.0;
 constexpr double kNear = 0.3;  // ln of the ratio of two frequencies that see the same modes
 constexpr double kLeastDirection = 0.1;  // Im G beside the directions taken already, of |G|
 constexpr double kNoiseAllowed = 0.02;   // of |G|: above it a line's weight falls
@@ -198,7 +198,7 @@ SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Inde
   for (const ConnectedBlock& block : connected_blocks(lines)) {
     const auto n_y = static_cast<Index>(block.outputs.size());
     const auto n_u = static_cast<Index>(block.inputs.size());
-    if (lines.size() < kFewestLines || n_y < kFewestChannels || n_u < kFewestChannels) {
+    if (lines.size() < kFewestSkewLines || n_y < kFewestChannels || n_u < kFewestChannels) {
       all = false;
       continue;
     }
@@ -208,7 +208,7 @@ SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Inde
     const Eigen::VectorXd deviation = fit.deviations();
     check.largest_deviation_s = std::max(check.largest_deviation_s, deviation.maxCoeff());
     for (Index i = 0; i < n_y + n_u; ++i) {
-      if (!(std::abs(skew[i]) >= std::max(kLeastSkew_s, kDeviations * deviation[i]))) continue;
+      if (!(std::abs(skew[i]) >= std::max(kLeastSkew_s, kSkewDeviations * deviation[i]))) continue;
       const bool of_sensors = i < n_y;
       const Index in_log =
           of_sensors
@@ -222,9 +222,10 @@ SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Inde
     check.unchecked =
         "100 excited lines, and three sensors and three actuators that respond to each other "
         "above the noise";
-  else if (check.changes.empty() && kDeviations * check.largest_deviation_s > kWantedSkew_s)
-    check.unchecked = fmt::format("more power or lighter damping: {:.0f} deviations are {:.3g} us",
-                                  kDeviations, 1e6 * kDeviations * check.largest_deviation_s);
+  else if (check.changes.empty() && kSkewDeviations * check.largest_deviation_s > kWantedSkew_s)
+    check.unchecked =
+        fmt::format("more power or lighter damping: {:.0f} deviations are {:.3g} us",
+                    kSkewDeviations, 1e6 * kSkewDeviations * check.largest_deviation_s);
   else if (!all)
     check.unchecked = "three sensors and three actuators in each part that is decoupled";
   return check;

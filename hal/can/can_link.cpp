@@ -14,7 +14,6 @@ namespace {
 constexpr int kAttempts = 10;  // a bus that loses half of its frames is still a bus
 constexpr std::int64_t kAnswer_ns = 60'000'000;
 constexpr std::int64_t kSecondAnswer_ns = 10'000'000;  // a node answers within a millisecond
-constexpr std::size_t kInboxFrames = 64;
 
 // The low byte is the number of a transfer; 0 means no transfer, so it is never drawn.
 std::uint32_t draw_host() {
@@ -35,7 +34,7 @@ CanLink::CanLink(CanTransport& transport, std::uint32_t fingerprint,
       host_(draw_host()),
       // A host that was started anew must not go on with numbers the node remembers.
       sequence_(static_cast<std::uint16_t>(transport.now_ns() / 1000)),
-      inbox_(kInboxFrames),
+      inbox_(kCanInboxFrames),
       text_(kCanTextParts) {}
 
 /// Version 1 does not repeat the host's number: its answer still has to be heard to be refused.

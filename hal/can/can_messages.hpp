@@ -108,6 +108,11 @@ CanFrame encode_can_text(const std::string& text, std::size_t part, std::uint8_t
 
 /// A piece of a transfer, in either direction.
 inline constexpr std::size_t kCanChunkBytes = 56;
+inline constexpr std::size_t kCanFloatBytes = 4;
+/// Chunks that carry so many bytes.
+constexpr std::size_t can_chunks(std::size_t bytes) noexcept {
+  return (bytes + kCanChunkBytes - 1) / kCanChunkBytes;
+}
 struct CanChunk {
   std::uint32_t index = 0;  ///< 24 bits
   std::uint8_t token = 0;   ///< of the transfer

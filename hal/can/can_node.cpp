@@ -13,7 +13,6 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kInboxFrames = 64;
 constexpr auto kHeartbeat_ns = static_cast<std::int64_t>(1e9 / kCanHeartbeatRate_hz);
 
 std::uint16_t microseconds(std::int64_t now_ns) {
@@ -34,7 +33,7 @@ CanNode::CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transp
       boot_(std::random_device()() | 1U) {
   if (layout_.setpoints.size() > 64)
     throw std::invalid_argument("can: a node takes 64 setpoint frames at most");
-  inbox_.resize(kInboxFrames);
+  inbox_.resize(kCanInboxFrames);
   command_.assign(stage.info().actuators.size(), 0.0);
   y_.assign(stage.info().sensors.size(), 0.0);
   given_ = y_;

@@ -11,13 +11,10 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kFloatBytes = 4;
 constexpr std::int64_t kHostSilence_ns = 1'000'000'000;
 constexpr int kSamplesAtOnce = 256;  // then the bus is looked at again
 constexpr std::size_t kChunksAtOnce = 32;
 constexpr std::uint32_t kLargestDownload = 256;
-
-std::size_t chunks_of(std::size_t bytes) { return (bytes + kCanChunkBytes - 1) / kCanChunkBytes; }
 
 std::span<const std::uint8_t> chunk_of(const std::vector<std::uint8_t>& memory, std::size_t index) {
   const std::size_t from = index * kCanChunkBytes;
@@ -43,7 +40,7 @@ CanPlayer::CanPlayer(StageNode& stage, double pace)
       y_(stage.info().sensors.size()) {}
 
 std::size_t CanPlayer::row_bytes() const noexcept {
-  return kFloatBytes * (u_.size() + y_.size() + 1);
+  return kCanFloatBytes * (u_.size() + y_.size() + 1);
 }
 
 std::string CanPlayer::prepare(const CanCommand& command) {
@@ -56,7 +53,7 @@ std::string CanPlayer::prepare(const CanCommand& command) {
   if (channels == 0 || command.c == 0) return "an upload needs samples and actuators";
   if (r_.size() < 64 && (command.a >> r_.size()) != 0)
     return fmt::format("there are {} actuators only", r_.size());
-  const std::uint64_t bytes = std::uint64_t{command.c} * channels * kFloatBytes;
+  const std::uint64_t bytes = std::uint64_t{command.c} * channels * kCanFloatBytes;
   if (bytes > depth_bytes())
     return fmt::format("{} bytes of waveform, there is memory for {}", bytes, depth_bytes());
   mask_ = command.a;
@@ -66,7 +63,7 @@ std::string CanPlayer::prepare(const CanCommand& command) {
   for (std::size_t i = 0; i < r_.size(); ++i)
     if (((mask_ >> i) & 1U) != 0) columns_.push_back(i);
   waveform_.assign(bytes, 0);
-  received_.assign(chunks_of(bytes), false);
+  received_.assign(can_chunks(bytes), false);
   missing_from_ = 0;
   status_ = CanResident::idle;
   return "";
@@ -140,7 +137,7 @@ std::string CanPlayer::begin_download(const CanCommand& command) {
   const auto memory = static_cast<CanMemory>(command.b);
   if (command.b > static_cast<std::uint64_t>(CanMemory::trace)) return "there is no such memory";
   const std::size_t chunks =
-      chunks_of(memory == CanMemory::trace ? trace_.size() : waveform_.size());
+      can_chunks(memory == CanMemory::trace ? trace_.size() : waveform_.size());
   if (memory == CanMemory::trace && busy()) return "the trace is still being recorded";
   if (command.a >= chunks)
     return fmt::format("chunk {} asked for, there are {}", command.a, chunks);
@@ -181,7 +178,7 @@ void CanPlayer::play_sample(std::int64_t now_ns) {
   const std::size_t row = static_cast<std::size_t>(played_ % period_samples_) * columns_.size();
   for (std::size_t k = 0; k < columns_.size(); ++k) {
     float value = 0.0F;
-    std::memcpy(&value, waveform_.data() + kFloatBytes * (row + k), kFloatBytes);
+    std::memcpy(&value, waveform_.data() + kCanFloatBytes * (row + k), kCanFloatBytes);
     r_[columns_[k]] = gain * static_cast<double>(value);
   }
   measured_ = y_;  // y[n], which u[n] is computed from

@@ -15,7 +15,6 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kFloatBytes = 4;
 constexpr std::uint32_t kUploadWindow = 96;  // chunks between two looks at what is missing
 constexpr std::uint32_t kDownloadWindow = 128;
 constexpr std::int64_t kPause_ns = 1'000'000;
@@ -23,11 +22,9 @@ constexpr std::int64_t kSilence_ns = 50'000'000;  // then the rest of a window i
 constexpr std::int64_t kFull_ns = 1'000'000'000;  // then the rest is sent with the next window
 constexpr int kLargestTries = 20;                 // windows without any progress
 
-std::size_t chunks_of(std::size_t bytes) { return (bytes + kCanChunkBytes - 1) / kCanChunkBytes; }
-
 float float_at(const std::vector<std::uint8_t>& bytes, std::size_t at) {
   float value = 0.0F;
-  std::memcpy(&value, bytes.data() + at, kFloatBytes);
+  std::memcpy(&value, bytes.data() + at, kCanFloatBytes);
   return value;
 }
 
@@ -50,7 +47,7 @@ CanResidentStage::CanResidentStage(StageInfo info, const CanSpec& spec,
 }
 
 std::size_t CanResidentStage::row_bytes() const noexcept {
-  return kFloatBytes * (info_.actuators.size() + info_.sensors.size() + 1);
+  return kCanFloatBytes * (info_.actuators.size() + info_.sensors.size() + 1);
 }
 
 std::uint64_t CanResidentStage::depth_samples() const noexcept {
@@ -122,7 +119,7 @@ void CanResidentStage::send_missing(const std::vector<std::uint32_t>& chunks) {
 }
 
 void CanResidentStage::send_all() {
-  const auto total = static_cast<std::uint32_t>(chunks_of(waveform_.size()));
+  const auto total = static_cast<std::uint32_t>(can_chunks(waveform_.size()));
   std::uint32_t highest = 0;  // chunks below have been sent once
   std::uint32_t first = 0;
   for (int tries = 0; tries < kLargestTries;) {
@@ -205,7 +202,7 @@ JobProgress CanResidentStage::poll() {
 /// Fetches `bytes.size()` bytes, from chunk `chunks_done` on. @returns false if the node has fewer.
 bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
                             std::size_t& chunks_done) {
-  const std::size_t total = chunks_of(bytes.size());
+  const std::size_t total = can_chunks(bytes.size());
   std::vector<bool> have(total, false);
   for (std::size_t i = 0; i < chunks_done; ++i) have[i] = true;
   std::int64_t heard_ns = 0;
@@ -250,7 +247,7 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
   if (!read(CanMemory::trace, trace_, trace_chunks_))
     throw StageError(fmt::format(
         "can: {}: the download stopped after {} of {} chunks; call it again when the bus is well",
-        transport_->name(0), trace_chunks_, chunks_of(trace_.size())));
+        transport_->name(0), trace_chunks_, can_chunks(trace_.size())));
   const std::size_t columns = info_.actuators.size() + info_.sensors.size();
   std::vector<double> values;
   std::vector<Outcome> outcomes;
@@ -262,8 +259,8 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
     for (std::uint64_t row = rows_given_; row < end; ++row) {
       const std::size_t at = row * row_bytes();
       for (std::size_t i = 0; i < columns; ++i)
-        values.push_back(static_cast<double>(float_at(trace_, at + kFloatBytes * i)));
-      outcomes.push_back(outcome_of_code(trace_[at + kFloatBytes * columns]));
+        values.push_back(static_cast<double>(float_at(trace_, at + kCanFloatBytes * i)));
+      outcomes.push_back(outcome_of_code(trace_[at + kCanFloatBytes * columns]));
     }
     sink.rows(rows_given_, values, outcomes);
     rows_given_ = end;

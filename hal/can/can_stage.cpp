@@ -13,7 +13,6 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kInboxFrames = 64;
 constexpr int kRepeats = 3;
 constexpr int kStartAttempts = 3;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -39,7 +38,7 @@ CanStage::CanStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTrans
       reset_fault_(options.reset_fault),
       reply_timeout_ns_(std::llround(1e9 * spec.reply_timeout_s)),
       outbox_(layout_.setpoints.size()),
-      inbox_(kInboxFrames) {
+      inbox_(kCanInboxFrames) {
   info_ = info_of(std::move(info_), spec, layout_, options.pace);
   period_ns_ = std::llround(1e9 / (info_.sample_rate_hz * info_.pace));
   answers_.resize(layout_.sensors.size());

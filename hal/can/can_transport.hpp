@@ -20,6 +20,9 @@ struct CanBusHealth {
   std::uint64_t dropped = 0;       ///< frames that came faster than they were read
 };
 
+/// Frames that a receiver takes from the transport at once.
+inline constexpr std::size_t kCanInboxFrames = 64;
+
 /// One end of one or more CAN FD buses, and the clock that goes with them. Nothing here allocates,
 /// locks or throws after construction.
 class CanTransport {

@@ -7,20 +7,16 @@
 #include <stdexcept>
 
 namespace stageid {
-namespace {
-
-constexpr double kLargestCount = 2147483647.0;
-
-}  // namespace
+namespace {}  // namespace
 
 bool fits_counts(double value, double si_per_count) noexcept {
-  return std::abs(std::nearbyint(value / si_per_count)) <= kLargestCount;  // false for NaN
+  return std::abs(std::nearbyint(value / si_per_count)) <= kLargestModbusCount;  // false for NaN
 }
 
 std::int32_t to_counts(double value, double si_per_count) noexcept {
   if (std::isnan(value)) return 0;
   const double counts =
-      std::clamp(std::nearbyint(value / si_per_count), -kLargestCount, kLargestCount);
+      std::clamp(std::nearbyint(value / si_per_count), -kLargestModbusCount, kLargestModbusCount);
   return static_cast<std::int32_t>(counts);
 }
 
@@ -28,7 +24,7 @@ float count_scale(double range) {
   if (!(range >= 1e-20) || !(range <= 1e20))
     throw std::invalid_argument(
         fmt::format("modbus: a channel's range must be between 1e-20 and 1e20, not {}", range));
-  return static_cast<float>(std::exp2(std::ceil(std::log2(range / kLargestCount))));
+  return static_cast<float>(std::exp2(std::ceil(std::log2(range / kLargestModbusCount))));
 }
 
 }  // namespace stageid

@@ -6,6 +6,9 @@
 
 namespace stageid {
 
+/// Of a 32-bit setpoint or measurement.
+inline constexpr double kLargestModbusCount = 2147483647.0;
+
 // How numbers lie in Modbus registers: the more significant word first.
 //
 //   uint32 = r[0] 2^16 + r[1];   uint64 = uint32(r) 2^32 + uint32(r + 2)

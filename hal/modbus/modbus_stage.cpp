@@ -20,7 +20,6 @@ namespace {
 
 constexpr std::size_t kSetpointHead = map::kSetpoint - map::kRunKey;
 constexpr std::size_t kMeasurementHead = map::kMeasurement - map::kMeasurementBootId;
-constexpr double kLargestCount = 2147483647.0;
 
 std::span<const std::uint16_t, 2> pair_at(const std::vector<std::uint16_t>& block, int offset) {
   return std::span<const std::uint16_t>(block).subspan(static_cast<std::size_t>(offset)).first<2>();
@@ -221,7 +220,7 @@ PeerStatus ModbusStage::take_measurement(Inputs& inputs) noexcept {
   for (std::size_t i = 0; i < inputs.y.size(); ++i) {
     const std::int32_t count = get_i32(pair_at(reply_, static_cast<int>(kMeasurementHead + 2 * i)));
     inputs.y[i] = description_.sensor_scale[i] * count;
-    report.out_of_range |= std::abs(static_cast<double>(count)) >= kLargestCount;
+    report.out_of_range |= std::abs(static_cast<double>(count)) >= kLargestModbusCount;
   }
   const PeerStatus status = stageid::judge(report);
   if (status != PeerStatus::good) trouble_ = Trouble::node;

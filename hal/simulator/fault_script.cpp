@@ -15,7 +15,7 @@ namespace {
 using Fault = WaferStageSpec::Fault;
 using Kind = Fault::Kind;
 
-constexpr double kLongestDelay = 1000.0;  // samples
+constexpr double kLongestExtraDelay = 1000.0;  // samples
 
 bool of_sensor(Kind kind) {
   return kind == Kind::dead_sensor || kind == Kind::nan_sensor || kind == Kind::stuck_sensor ||
@@ -46,11 +46,12 @@ void check(const Fault& fault, std::size_t number, const StageInfo& info) {
         fmt::format("faults: entry {}: a missed_cycle needs cycles of at least 1", number));
   if (!std::isfinite(fault.value))
     throw std::invalid_argument(fmt::format("faults: entry {}: the value is not finite", number));
-  if (fault.kind == Kind::extra_delay && !(fault.value >= 1.0 && fault.value <= kLongestDelay &&
-                                           fault.value == std::floor(fault.value)))
+  if (fault.kind == Kind::extra_delay &&
+      !(fault.value >= 1.0 && fault.value <= kLongestExtraDelay &&
+        fault.value == std::floor(fault.value)))
     throw std::invalid_argument(
         fmt::format("faults: entry {}: extra_delay is {} samples; allowed: whole numbers 1 to {}",
-                    number, fault.value, kLongestDelay));
+                    number, fault.value, kLongestExtraDelay));
 }
 
 }  // namespace

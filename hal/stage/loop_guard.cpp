@@ -10,7 +10,7 @@
 namespace stageid {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 constexpr double kObserverPoles = 1.0 / 3.0;  // of the loop's bandwidth
 constexpr double kBrakeObserverPoles = 3.0;
 constexpr double kBrakeRate = 2.0;
@@ -46,7 +46,7 @@ LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
   const auto actuators = static_cast<Eigen::Index>(info.actuators.size());
   const RigidMotion& motion = limits.motion;
   model_known_ = motion.acceleration_per_n.size() > 0;
-  const Eigen::ArrayXd unlimited = Eigen::ArrayXd::Constant(sensors, kInfinity);
+  const Eigen::ArrayXd unlimited = Eigen::ArrayXd::Constant(sensors, kUnlimited);
   window_m_ = positive_or(limits.position_window_m, unlimited, "position_window_m");
   hard_window_m_ = positive_or(limits.hard_window_m, 2.0 * window_m_, "hard_window_m");
   deviation_m_ =
@@ -99,7 +99,7 @@ LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
   } else {
     acceleration_per_n_.setZero(sensors, actuators);
   }
-  room_m_ = (stopping_s2_m_ > 0.0).select(0.5 * (window_m_ + hard_window_m_), kInfinity);
+  room_m_ = (stopping_s2_m_ > 0.0).select(0.5 * (window_m_ + hard_window_m_), kUnlimited);
   gains_ = observer_gains(pole_rad_s, info.sample_rate_hz);
   forget_ = std::exp(-pole_rad_s / info.sample_rate_hz);
   weight_m2_ = (1.0 - forget_) / deviation_m_.square();

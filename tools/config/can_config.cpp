@@ -10,8 +10,6 @@
 namespace stageid {
 namespace {
 
-constexpr auto kRequired = Presence::required;
-constexpr auto kOptional = Presence::optional;
 constexpr double kRangePerLimit = 1.25;
 constexpr double kWatchdogSamples = 3.0;
 constexpr double kLeastWatchdog_s = 20e-3;

@@ -11,6 +11,8 @@
 namespace stageid {
 
 enum class Presence : std::uint8_t { optional, required };
+inline constexpr Presence kOptional = Presence::optional;
+inline constexpr Presence kRequired = Presence::required;
 
 /// Which numbers are allowed. All must be finite.
 struct NumberRule {

@@ -24,8 +24,6 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr auto kRequired = Presence::required;
-constexpr auto kOptional = Presence::optional;
 constexpr std::size_t kMostStates = 1000;
 constexpr double kMeasuredError = 0.02;  // a response between its lines, of C y
 

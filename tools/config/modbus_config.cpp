@@ -5,8 +5,6 @@
 namespace stageid {
 namespace {
 
-constexpr auto kRequired = Presence::required;
-constexpr auto kOptional = Presence::optional;
 constexpr double kStalePolls = 3.0;
 
 void describe_tcp(ConfigVisitor& v, ModbusAddress& a) {

@@ -3,7 +3,6 @@
 namespace stageid {
 
 void describe_real_time(ConfigVisitor& visitor, RealTimeKeys& keys) {
-  constexpr auto kOptional = Presence::optional;
   choose(visitor, "policy", keys.options.policy, {"off", "try", "require"}, kOptional,
          "try: warn of what is missing; require: exit 1 without rights or a PREEMPT_RT kernel");
   count(visitor, "priority", keys.options.priority, 1, 99, kOptional, "of SCHED_FIFO");

@@ -11,9 +11,6 @@
 namespace stageid {
 namespace {
 
-constexpr auto kRequired = Presence::required;
-constexpr auto kOptional = Presence::optional;
-
 void describe_channel(ConfigVisitor& v, ChannelConfig& c, const char* unit) {
   c.channel.unit = unit;
   std::size_t only = 0;

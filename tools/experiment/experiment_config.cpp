@@ -18,9 +18,6 @@
 namespace stageid {
 namespace {
 
-constexpr auto kRequired = Presence::required;
-constexpr auto kOptional = Presence::optional;
-
 struct ExperimentFile {
   std::size_t format = 0;
   std::string stage;

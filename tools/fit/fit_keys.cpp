@@ -14,7 +14,6 @@ namespace {
 
 /// One entry of `submodels`: what --submodel says in one line.
 void describe_submodel(ConfigVisitor& v, SubmodelRequest& r) {
-  constexpr auto kOptional = Presence::optional;
   FlexibleValue order = {"", {0.0}, false, {}};
   FlexibleRule rule;
   rule.words = {"auto"};
@@ -56,7 +55,6 @@ void describe_submodels(ConfigVisitor& v, FitRequest& f) {
 }  // namespace
 
 void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
-  constexpr auto kOptional = Presence::optional;
   std::vector<double> band_hz;
   v.numbers("band_hz", band_hz, positive("Hz"), {2, 2}, kOptional, "left out: all lines");
   if (band_hz.size() == 2) {

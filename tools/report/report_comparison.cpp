@@ -16,7 +16,6 @@ using Json = nlohmann::json;
 
 /// Relative distance of two lines that are the same one.
 constexpr double kSameLine = 1e-9;
-constexpr int kMacDigits = 4;
 
 void check_channels(const ReportData& own, const std::string& title, const ChannelList& outputs,
                     const ChannelList& inputs) {

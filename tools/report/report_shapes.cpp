@@ -12,7 +12,6 @@ using Json = nlohmann::json;
 
 /// Of a shape of norm one: a pixel is a thousandth.
 constexpr int kShapeDigits = 5;
-constexpr int kMacDigits = 4;
 
 Json rounded(double value, int digits) {
   if (!std::isfinite(value)) return Json();

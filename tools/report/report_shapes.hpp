@@ -20,6 +20,8 @@ nlohmann::json shapes_json(const AdditiveModel& model);
 nlohmann::json geometry_json(const StageGeometry& geometry, const ChannelList& outputs,
                              const ChannelList& inputs);
 
+inline constexpr int kMacDigits = 4;
+
 /// Rows of a matrix, rounded to `digits` decimals; not finite numbers become null.
 nlohmann::json matrix_json(const Eigen::MatrixXd& matrix, int digits);
 

@@ -16,10 +16,6 @@ namespace {
 
 using Complex = std::vector<std::complex<double>>;
 
-[[noreturn]] void fail(const ImportMap& map, const std::string& what) {
-  throw FormatError(map.file, "", what);
-}
-
 std::vector<std::size_t> without_ones(const std::vector<std::size_t>& shape) {
   std::vector<std::size_t> kept;
   std::copy_if(shape.begin(), shape.end(), std::back_inserter(kept),
@@ -33,8 +29,8 @@ std::vector<std::size_t> axis_places(const ImportMap& map) {
   for (const char* axis : {"line", "output", "input"}) {
     const auto found = std::find(map.axes.begin(), map.axes.end(), axis);
     if (found == map.axes.end())
-      fail(map, fmt::format("axes: {} are not line, output and input in some order",
-                            fmt::join(map.axes, ", ")));
+      refuse_map(map, fmt::format("axes: {} are not line, output and input in some order",
+                                  fmt::join(map.axes, ", ")));
     places.push_back(static_cast<std::size_t>(found - map.axes.begin()));
   }
   return places;
@@ -46,10 +42,11 @@ NamedArray arranged(const ArrayList& arrays, const NamedArray& array, const Impo
   NamedArray result = array;
   if (map.axes.empty()) {
     if (without_ones(array.shape).size() > 1 || array.size() != lines)
-      fail(map,
-           fmt::format("key 'axes' is missing; '{}' is {} with {} frequencies, write for example "
-                       "axes: [output, input, line]",
-                       array.name, fmt::join(array.shape, " x "), lines));
+      refuse_map(
+          map,
+          fmt::format("key 'axes' is missing; '{}' is {} with {} frequencies, write for example "
+                      "axes: [output, input, line]",
+                      array.name, fmt::join(array.shape, " x "), lines));
     result.shape = {array.size(), 1, 1};
     return result;
   }
@@ -74,7 +71,7 @@ std::vector<std::string> names_or(const ImportMap& map, const char* key,
   for (std::size_t k = 0; k < count && given.empty(); ++k)
     names.push_back(fmt::format("{}{}", prefix, k + 1));
   if (names.size() != count)
-    fail(map, fmt::format("{}: {} names; the response has {}", key, names.size(), count));
+    refuse_map(map, fmt::format("{}: {} names; the response has {}", key, names.size(), count));
   return names;
 }
 
@@ -121,7 +118,7 @@ double scalar_of(const ArrayList& arrays, const ImportMap::Scalar& scalar) {
 /// As many as the response has lines.
 std::vector<double> even_frequencies(const ArrayList& arrays, const ImportMap& map) {
   const double first = scalar_of(arrays, map.first_hz), step = scalar_of(arrays, map.step_hz);
-  if (!(step > 0.0)) fail(map, fmt::format("step_hz: {} is not positive; correct it", step));
+  if (!(step > 0.0)) refuse_map(map, fmt::format("step_hz: {} is not positive; correct it", step));
   const ImportMap::Channel* channel = map.channels.empty() ? nullptr : &map.channels.front();
   const NamedArray& array = arrays.at(channel == nullptr            ? map.response
                                       : !channel->response.empty()  ? channel->response
@@ -177,7 +174,7 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
   const auto place = [&](const std::vector<std::string>& names, const std::string& name) {
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-      fail(map, fmt::format("channels: '{}' is none of {}", name, fmt::join(names, ", ")));
+      refuse_map(map, fmt::format("channels: '{}' is none of {}", name, fmt::join(names, ", ")));
     return found - names.begin();
   };
   for (const ImportMap::Channel& channel : map.channels) {
@@ -188,8 +185,8 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
                              frf.n_outputs() * place(frf.inputs.names, channel.input);
     const auto put = [&](const auto& column, auto& matrix) {
       if (static_cast<Eigen::Index>(column.size()) != frf.lines())
-        fail(map, fmt::format("channels: {} <- {} has {} values; there are {} frequencies",
-                              channel.output, channel.input, column.size(), frf.lines()));
+        refuse_map(map, fmt::format("channels: {} <- {} has {} values; there are {} frequencies",
+                                    channel.output, channel.input, column.size(), frf.lines()));
       for (Eigen::Index k = 0; k < frf.lines(); ++k)
         matrix(row, k) = column[static_cast<std::size_t>(k)];
     };
@@ -200,8 +197,8 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
       put(real_values(arrays, arrays.at(channel.total_variance)), frf.total_variance);
   }
   if (map.channels.size() != frf.outputs.size() * frf.inputs.size())
-    fail(map, fmt::format("channels: {} of {} outputs and {} inputs; give every pair once",
-                          map.channels.size(), frf.outputs.size(), frf.inputs.size()));
+    refuse_map(map, fmt::format("channels: {} of {} outputs and {} inputs; give every pair once",
+                                map.channels.size(), frf.outputs.size(), frf.inputs.size()));
 }
 
 }  // namespace

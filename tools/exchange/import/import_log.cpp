@@ -22,10 +22,6 @@
 namespace stageid {
 namespace {
 
-[[noreturn]] void fail(const ImportMap& map, const std::string& what) {
-  throw FormatError(map.file, "", what);
-}
-
 LogInfo info_of(const ArrayList& arrays, const ImportMap& map, const SignalGroup& excitation,
                 const SignalGroup& actuators, const SignalGroup& sensors) {
   LogInfo info;
@@ -38,7 +34,7 @@ LogInfo info_of(const ArrayList& arrays, const ImportMap& map, const SignalGroup
   try {
     check_log_info(info);
   } catch (const std::invalid_argument& error) {
-    fail(map, error.what());
+    refuse_map(map, error.what());
   }
   return info;
 }
@@ -59,8 +55,8 @@ class LogImport {
     const SignalGroup actuators = read("actuators", map_.actuators);
     const SignalGroup sensors = read("sensors", map_.sensors);
     if (actuators.samples.rows() != sensors.samples.rows())
-      fail(map_, fmt::format("actuators have {} samples, sensors {}; all must have the same",
-                             actuators.samples.rows(), sensors.samples.rows()));
+      refuse_map(map_, fmt::format("actuators have {} samples, sensors {}; all must have the same",
+                                   actuators.samples.rows(), sensors.samples.rows()));
     const LogInfo info = info_of(arrays, map_, excitation, actuators, sensors);
     const RunRows rows = rows_of(arrays, map_, run.run, actuators.samples.rows());
     const Eigen::MatrixXd period = period_of(arrays, map_, excitation, rows);
@@ -97,10 +93,10 @@ class LogImport {
 
   void require_another(const ImportMap::Run& run) {
     if (!runs_.emplace(run.realization, run.experiment).second)
-      fail(map_,
-           fmt::format("two runs are both realization {}, experiment {} (counted from 1); tell "
-                       "them apart in the key runs, by an axis or by the pattern of the names",
-                       run.realization + 1, run.experiment + 1));
+      refuse_map(map_, fmt::format(
+                           "two runs are both realization {}, experiment {} (counted from 1); tell "
+                           "them apart in the key runs, by an axis or by the pattern of the names",
+                           run.realization + 1, run.experiment + 1));
   }
 
   /// A realization without one of its experiments cannot be used, and a run that is missing is found late.

@@ -14,8 +14,6 @@
 namespace stageid {
 namespace {
 
-constexpr Presence kOptional = Presence::optional;
-
 void describe_channel(ConfigVisitor& v, ImportMap::Channel& channel) {
   v.text("output", channel.output, Presence::required, "name of the output");
   v.text("input", channel.input, Presence::required, "name of the input");
@@ -199,6 +197,10 @@ ImportMap read_import_map(const std::filesystem::path& file) {
     require_keys(v, map);
   });
   return map;
+}
+
+void refuse_map(const ImportMap& map, const std::string& what) {
+  throw FormatError(map.file, "", what);
 }
 
 }  // namespace stageid

@@ -77,4 +77,7 @@ std::vector<std::string> units_of(const ImportMap& map, const char* key, const s
 /// @throws FileError, FormatError "FILE:LINE:COLUMN: ..."
 ImportMap read_import_map(const std::filesystem::path& file);
 
+/// @throws FormatError naming the map's file.
+[[noreturn]] void refuse_map(const ImportMap& map, const std::string& what);
+
 }  // namespace stageid

@@ -15,10 +15,6 @@ namespace {
 /// as the excitation leaves 1/2, and another excitation of N samples about 1 / sqrt(N).
 constexpr double kSameExcitation = 0.5;
 
-[[noreturn]] void fail(const ImportMap& map, const std::string& what) {
-  throw FormatError(map.file, "", what);
-}
-
 double correlation(const SampleRows& a, const SampleRows& b) {
   const double size = a.norm() * b.norm();
   if (size > 0.0) return a.cwiseProduct(b).sum() / size;
@@ -64,20 +60,22 @@ bool are_runs(const std::vector<RunRows>& pieces, Eigen::Index period) {
   const auto period = static_cast<Eigen::Index>(map.period_samples);
   const Eigen::Index row = rows.first + pieces[1].first;
   if (are_runs(pieces, period))
-    fail(map,
-         fmt::format("excitation: it changes at row {} and repeats from there on; {} follow one "
-                     "another. {} {}",
-                     row, counted(pieces.size(), "run"),
-                     map.runs.empty() ? "Add the key" : "Correct the key",
-                     runs_text(pieces, rows.first)));
+    refuse_map(map, fmt::format(
+                        "excitation: it changes at row {} and repeats from there on; {} follow one "
+                        "another. {} {}",
+                        row, counted(pieces.size(), "run"),
+                        map.runs.empty() ? "Add the key" : "Correct the key",
+                        runs_text(pieces, rows.first)));
   if (mean)
-    fail(map, fmt::format("excitation: the period at row {} is not that of row {}. Correct "
-                          "period_samples: {}, or list the runs by their rows in the key runs",
-                          row, rows.first, period));
-  fail(map, fmt::format("key 'excitation_period' is missing: the excitation does not repeat from "
-                        "row {} on; if it was measured write excitation_period: mean, else correct "
-                        "period_samples: {} or list the runs by their rows in the key runs",
-                        row, period));
+    refuse_map(map,
+               fmt::format("excitation: the period at row {} is not that of row {}. Correct "
+                           "period_samples: {}, or list the runs by their rows in the key runs",
+                           row, rows.first, period));
+  refuse_map(
+      map, fmt::format("key 'excitation_period' is missing: the excitation does not repeat from "
+                       "row {} on; if it was measured write excitation_period: mean, else correct "
+                       "period_samples: {} or list the runs by their rows in the key runs",
+                       row, period));
 }
 
 }  // namespace
@@ -87,26 +85,27 @@ RunRows rows_of(const ArrayList& arrays, const ImportMap& map, const ImportMap::
   const auto period = static_cast<Eigen::Index>(map.period_samples);
   RunRows rows{static_cast<Eigen::Index>(run.first_row), static_cast<Eigen::Index>(run.rows)};
   if (rows.first > samples || rows.count > samples - rows.first)
-    fail(map, fmt::format("runs: rows {} to {} are asked for; {} has {}", rows.first,
-                          rows.first + rows.count, arrays.file.string(), samples));
+    refuse_map(map, fmt::format("runs: rows {} to {} are asked for; {} has {}", rows.first,
+                                rows.first + rows.count, arrays.file.string(), samples));
   if (rows.count == 0) rows.count = samples - rows.first;
   const Eigen::Index periods = rows.count / period;
   const std::string where = map.runs.empty()
                                 ? fmt::format("{} has", arrays.file.string())
                                 : fmt::format("runs: the run at row {} has", rows.first);
   if (periods <= static_cast<Eigen::Index>(map.transient_periods))
-    fail(map, fmt::format("{} {}, {} of period_samples: {}; {} and at least one more are needed. "
-                          "Correct {}",
-                          where, counted(rows.count, "row"), counted(periods, "whole period"),
-                          period, counted(map.transient_periods, "transient period"),
-                          map.transient_periods > 0 ? "transient_periods or period_samples"
-                                                    : "period_samples"));
+    refuse_map(map,
+               fmt::format("{} {}, {} of period_samples: {}; {} and at least one more are needed. "
+                           "Correct {}",
+                           where, counted(rows.count, "row"), counted(periods, "whole period"),
+                           period, counted(map.transient_periods, "transient period"),
+                           map.transient_periods > 0 ? "transient_periods or period_samples"
+                                                     : "period_samples"));
   if (rows.count % period != 0)
-    fail(map, fmt::format("{} {}, which are not all whole periods of period_samples: {}. {} "
-                          "{{first_row: {}, rows: {}}} to take {}, or correct period_samples",
-                          where, counted(rows.count, "row"), period,
-                          map.runs.empty() ? "Add the key runs with" : "Write", rows.first,
-                          periods * period, counted(periods, "period")));
+    refuse_map(map, fmt::format("{} {}, which are not all whole periods of period_samples: {}. {} "
+                                "{{first_row: {}, rows: {}}} to take {}, or correct period_samples",
+                                where, counted(rows.count, "row"), period,
+                                map.runs.empty() ? "Add the key runs with" : "Write", rows.first,
+                                periods * period, counted(periods, "period")));
   return rows;
 }
 

@@ -14,10 +14,6 @@
 namespace stageid {
 namespace {
 
-[[noreturn]] void fail(const ImportMap& map, const std::string& what) {
-  throw FormatError(map.file, "", what);
-}
-
 std::vector<const ImportMap::Signals*> groups_of(const ImportMap& map) {
   return {&map.excitation, &map.actuators, &map.sensors};
 }
@@ -138,17 +134,18 @@ void name_channels(const ImportMap& map, const char* key, const ImportMap::Signa
   const auto count = static_cast<std::size_t>(out.samples.cols());
   if (!group.names.empty()) out.channels.names = group.names;
   if (out.channels.names.size() != count)
-    fail(map, fmt::format("{}: {} for {}; give names: [...]", key,
-                          counted(out.channels.names.size(), "name"), counted(count, "channel")));
+    refuse_map(map,
+               fmt::format("{}: {} for {}; give names: [...]", key,
+                           counted(out.channels.names.size(), "name"), counted(count, "channel")));
   out.channels.units = units_of(map, key, group.unit, count);
   if (!group.scale.empty() && group.scale.size() != count)
-    fail(map, fmt::format("{}: {} for {}; give one a channel", key,
-                          counted(group.scale.size(), "scale"), counted(count, "channel")));
+    refuse_map(map, fmt::format("{}: {} for {}; give one a channel", key,
+                                counted(group.scale.size(), "scale"), counted(count, "channel")));
   std::vector<double> factors;
   try {
     factors = take_si_units(key, out.channels, notes);
   } catch (const std::invalid_argument& error) {
-    fail(map, error.what());
+    refuse_map(map, error.what());
   }
   for (std::size_t c = 0; c < count; ++c) {
     const double factor = factors[c] * (group.scale.empty() ? 1.0 : group.scale[c]);

@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kHeadBytes = 128;
 constexpr std::uint32_t kMatrix = 14, kCompressed = 15;
 constexpr std::uint32_t kOpaqueClass = 17;
-constexpr int kDeepest = 20;
+constexpr int kDeepestObject = 20;
 
 std::uint32_t word_at(std::string_view bytes, std::size_t at, bool big_endian) {
   std::uint32_t word = 0;
@@ -97,7 +97,7 @@ std::string class_of(const Hdf5File& file, const std::string& object) {
 }
 
 void require_all_of(const Hdf5File& file, const std::string& group, int depth, ArrayList& list) {
-  if (depth > kDeepest) return;
+  if (depth > kDeepestObject) return;
   for (const std::string& child : file.children(group == "/" ? "/" : group)) {
     if (child.starts_with('#')) continue;  // what references point to, and the data of objects
     const std::string object = fmt::format("{}/{}", group == "/" ? "" : group, child);

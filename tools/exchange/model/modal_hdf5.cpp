@@ -14,8 +14,6 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
-
 void write_matrix(Hdf5File& file, const std::string& dataset, const RowMajor& matrix) {
   file.write_reals(dataset, {size_of(matrix.rows()), size_of(matrix.cols())}, matrix.data());
 }

@@ -14,8 +14,6 @@
 namespace stageid {
 namespace {
 
-hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
-
 void write_submodels(Hdf5File& file, const AdditiveModel& model) {
   file.create_group("/submodels");
   for (std::size_t index = 0; index < model.submodels.size(); ++index) {

@@ -13,7 +13,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "dataset 58b is written as byte order 1");
 
-constexpr const char* kEdge = "    -1\n";
+constexpr const char* kEdgeLine = "    -1\n";
 
 std::string text_line(const std::string& text) {
   if (text.size() > 80)
@@ -27,10 +27,10 @@ std::string dataset_line(int number) { return fmt::format("{:>6}{:74}\n", number
 std::string short_field(double value) { return fmt::format("{:13.5E}", value); }
 
 std::string header_text(const UffContent& content) {
-  return kEdge + dataset_line(151) + text_line(content.model_name) +
+  return kEdgeLine + dataset_line(151) + text_line(content.model_name) +
          text_line(content.description) + text_line(content.program) +
          fmt::format("{:20}{:>10}{:>10}{:>10}\n", "", 0, 0, 0) + fmt::format("{:20}\n", "") +
-         text_line(content.program) + fmt::format("{:20}\n", "") + kEdge;
+         text_line(content.program) + fmt::format("{:20}\n", "") + kEdgeLine;
 }
 
 std::string units_text(const UffUnits& units) {
@@ -40,10 +40,10 @@ std::string units_text(const UffUnits& units) {
     text[text.find('E')] = 'D';
     return text;
   };
-  return kEdge + dataset_line(164) +
+  return kEdgeLine + dataset_line(164) +
          fmt::format("{:>10}{:<20}{:>10}\n", units.code, units.description, 2) +
          factor(units.length) + factor(units.force) + factor(units.temperature) + "\n" +
-         factor(units.temperature_offset) + "\n" + kEdge;
+         factor(units.temperature_offset) + "\n" + kEdgeLine;
 }
 
 std::string axis_line(const UffAxis& axis) {
@@ -127,12 +127,13 @@ std::string binary_values(const UffFunction& f, bool even) {
 std::string function_text(const UffFunction& f, UffEncoding encoding) {
   const EvenAbscissa even = even_abscissa(f.abscissa);
   if (encoding == UffEncoding::text)
-    return kEdge + dataset_line(58) + function_head(f, even) + text_values(f, even.even) + kEdge;
+    return kEdgeLine + dataset_line(58) + function_head(f, even) + text_values(f, even.even) +
+           kEdgeLine;
   const std::string bytes = binary_values(f, even.even);
-  return kEdge +
+  return kEdgeLine +
          fmt::format("{:>6}b{:>6}{:>6}{:>12}{:>12}{:>6}{:>6}{:>12}{:>12}\n", 58, 1, 2, 11,
                      bytes.size(), 0, 0, 0, 0) +
-         function_head(f, even) + bytes + kEdge;
+         function_head(f, even) + bytes + kEdgeLine;
 }
 
 /// Fields of E13.5, six a line.
@@ -146,7 +147,7 @@ std::string short_lines(const std::vector<double>& values) {
 }
 
 std::string mode_text(const UffMode& mode) {
-  std::string text = kEdge + dataset_line(55);
+  std::string text = kEdgeLine + dataset_line(55);
   for (const std::string& id : mode.id) text += text_line(id);
   // Structural; displacement. A scalar a node, or X, Y and Z.
   text +=
@@ -167,7 +168,7 @@ std::string mode_text(const UffMode& mode) {
     }
     text += short_lines(values);
   }
-  return text + kEdge;
+  return text + kEdgeLine;
 }
 
 }  // namespace
