@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "acquisition/loop/event_log.hpp"
 #include "acquisition/loop/run_observer.hpp"
+#include "acquisition/record/event_log.hpp"
 #include "acquisition/slog/slog_format.hpp"
 
 namespace stageid {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/loop/event_log.hpp"
 #include "acquisition/loop/run_observer.hpp"
+#include "acquisition/record/event_log.hpp"
 #include "acquisition/record/run_writer.hpp"
 #include "excitation/plan/experiment_plan.hpp"
 #include "hal/stage/limited_stage.hpp"

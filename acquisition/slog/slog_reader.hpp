@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <vector>
 
-#include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "acquisition/slog/slog_index.hpp"
 

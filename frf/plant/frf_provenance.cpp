@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/version.hpp"
 
 namespace stageid {
 
@@ -40,7 +41,7 @@ std::string FrfProvenance::json() const {
       {"covariance", options_.covariance == CovarianceKind::full ? "full" : "diagonal"},
       {"covariance_lines", options_.covariance_lines},
       {"periods", options_.periods == PeriodChoice::consistent ? "consistent" : "unmarked"}};
-  return Json{{"stageid_version", STAGEID_VERSION},
+  return Json{{"stageid_version", version()},
               {"made_by", "estimate_plant_frf"},
               {"inputs", inputs},
               {"options", options}}

@@ -12,6 +12,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/output_file.hpp"
+#include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/file/frf_file.hpp"
@@ -252,7 +253,7 @@ Json Identification::summary() const {
   for (const Step& step : steps_)
     steps.push_back({{"name", step.name}, {"seconds", step.seconds}, {"note", step.note}});
   Json json = {{"format", "stageid-summary"},
-               {"stageid_version", STAGEID_VERSION},
+               {"stageid_version", version()},
                {"configuration", config_.file.filename().string()},
                {"configuration_fingerprint", fingerprint_of(config_.text)},
                {"stage_fingerprint", fingerprint_of(config_.stage.text)},

@@ -8,6 +8,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/version.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/exchange/arrays/frf_arrays.hpp"
@@ -76,7 +77,7 @@ ImportSummary write_imported(const std::filesystem::path& output, FrfEstimate fr
         {"imported", input.filename().string()},
         {"fingerprint", fingerprint_of_file(input)},
         {"version",
-         STAGEID_VERSION}}.dump();
+         version()}}.dump();
   write_frf(output, frf);
   return summary_of(frf, notes);
 }

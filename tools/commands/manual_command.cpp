@@ -6,6 +6,7 @@
 #include <string>
 
 #include "acquisition/files/output_file.hpp"
+#include "acquisition/files/version.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/manual/bash_completion.hpp"
 #include "tools/manual/command_tree.hpp"
@@ -39,7 +40,7 @@ void ManualCommand::run() const {
     write_text_file(file, text);
     written.push_back(file.string());
   };
-  for (const ManualPage& page : manual_pages(program, STAGEID_VERSION))
+  for (const ManualPage& page : manual_pages(program, std::string(version())))
     write(pages / page.file, page.text);
   write(completions / program.name, bash_completion(program));
   write(functions / ("_" + program.name), zsh_completion(program));

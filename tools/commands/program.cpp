@@ -15,6 +15,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/key_suggestion.hpp"
+#include "acquisition/files/version.hpp"
 #include "tools/commands/config_command.hpp"
 #include "tools/commands/design_command.hpp"
 #include "tools/commands/export_command.hpp"
@@ -76,7 +77,7 @@ class Program {
         manual_(app_, console_),
         help_(app_) {
     app_.name("stageid");
-    app_.set_version_flag("--version", "stageid " STAGEID_VERSION);
+    app_.set_version_flag("--version", fmt::format("stageid {}", version()));
     app_.add_flag("--json", console_.json, "the result as one JSON object on stdout");
     const std::vector<std::pair<std::string, Verbosity>> levels = {
         {"quiet", Verbosity::quiet}, {"normal", Verbosity::normal}, {"debug", Verbosity::debug}};

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/loop/event_log.hpp"
 #include "acquisition/loop/run_experiment.hpp"
+#include "acquisition/record/event_log.hpp"
 #include "hal/stage/supervisor.hpp"
 #include "tools/dashboard/dashboard_address.hpp"
 #include "tools/experiment/experiment_config.hpp"

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/version.hpp"
 #include "acquisition/record/utc_time.hpp"
 
 namespace stageid {
@@ -12,7 +13,7 @@ using Json = nlohmann::ordered_json;
 std::string run_metadata(const ExperimentConfig& config, Backend backend, const StageInfo& stage) {
   Json json = {
       {"program", "stageid"},
-      {"stageid_version", STAGEID_VERSION},
+      {"stageid_version", version()},
       {"started_utc", utc_now()},
       {"backend", to_string(backend)},
       {"measurement_id", config.measurement_id},

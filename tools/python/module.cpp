@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/files/version.hpp"
 #include "tools/commands/program.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/interruptible.hpp"
@@ -34,7 +35,7 @@ PYBIND11_MODULE(_native, module) {
   // Users see the package; this is where it is made.
   module.attr("__name__") = "stageid";
   module.doc() = "The compiled part of stageid.";
-  module.attr("__version__") = STAGEID_VERSION;
+  module.attr("__version__") = version();
   define_errors(module);
   define_excitation(module);
   define_logs(module);

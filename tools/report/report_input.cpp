@@ -13,6 +13,7 @@
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "estimation/modal/json_file.hpp"
@@ -257,7 +258,7 @@ ReportData read_response_data(const ReportInput& input) {
 
 ReportData read_report_data(const ReportInput& input) {
   ReportData data = read_response_data(input);
-  data.version = STAGEID_VERSION;
+  data.version = version();
   data.title = "stageid";
   if (data.model) {
     data.cost = data.model->cost_history;

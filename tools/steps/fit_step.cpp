@@ -8,6 +8,7 @@
 
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/version.hpp"
 #include "tools/fit/frf_quality.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/interrupt.hpp"
@@ -30,7 +31,7 @@ Json distortion_json(const Distortion& distortion) {
 std::string provenance(const FitSetup& setup, const FitResult& result, const std::string& frf_name,
                        const std::string& frf_fingerprint, const std::vector<std::string>& doubts) {
   Json json;
-  json["stageid_version"] = STAGEID_VERSION;
+  json["stageid_version"] = version();
   json["made_by"] = "fit";
   json["request_id"] = fit_request_id(setup, frf_fingerprint);
   json["inputs"] = {{{"file", frf_name}, {"fingerprint", frf_fingerprint}}};
@@ -82,8 +83,7 @@ std::vector<std::string> texts_in(const Json& object, const char* key) {
 }  // namespace
 
 std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint) {
-  return fingerprint_of(
-      fmt::format("{} {} {}", STAGEID_VERSION, frf_fingerprint, setup.request_json));
+  return fingerprint_of(fmt::format("{} {} {}", version(), frf_fingerprint, setup.request_json));
 }
 
 FitStep fit_model(const FitSetup& setup, const std::string& frf_name,

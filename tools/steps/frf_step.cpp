@@ -10,6 +10,7 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/version.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/health/data_health.hpp"
 #include "tools/config/stage_expectation.hpp"
@@ -47,7 +48,7 @@ std::string complete_provenance(const FrfEstimate& frf, const std::vector<const 
                                 const FrfOptions& options) {
   Json provenance = Json::parse(frf.provenance_json, nullptr, false);
   if (!provenance.is_object()) provenance = Json::object();
-  provenance["stageid_version"] = STAGEID_VERSION;
+  provenance["stageid_version"] = version();
   provenance["request_id"] = frf_request_id(logs, options);
   provenance["realizations"] = options.realizations;
   provenance["experiments"] = Json::array();
@@ -64,7 +65,7 @@ void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint) {
 }
 
 std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options) {
-  Json request = {{"version", STAGEID_VERSION}, {"options", options_json(options)}};
+  Json request = {{"version", version()}, {"options", options_json(options)}};
   for (const LogReader* log : logs) request["experiments"].push_back(lasting_metadata(*log));
   return fingerprint_of(request.dump(-1, ' ', false, Json::error_handler_t::replace));
 }

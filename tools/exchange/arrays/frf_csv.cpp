@@ -9,6 +9,7 @@
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/version.hpp"
 
 #include "tools/exchange/arrays/csv_table.hpp"
 #include "tools/terminal/text_lines.hpp"
@@ -216,7 +217,7 @@ std::string frf_csv(const FrfEstimate& frf) {
   std::string text = fmt::format(
       "# stageid-frf, written by stageid {}; sample rate {} Hz, realizations {}, periods {}\n"
       "# of OUTPUT/INPUT, SI units; variances are E|error|^2 of the complex response\n# {}\n{}\n",
-      STAGEID_VERSION, frf.sample_rate_hz, frf.realizations, frf.periods, description_of(frf),
+      version(), frf.sample_rate_hz, frf.realizations, frf.periods, description_of(frf),
       head_of(frf));
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     text += fmt::format("{}", frf.frequency_hz[k]);

@@ -17,7 +17,7 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kHeadBytes = 128;
+constexpr std::size_t kObjectHeadBytes = 128;
 constexpr std::uint32_t kMatrix = 14, kCompressed = 15;
 constexpr std::uint32_t kOpaqueClass = 17;
 constexpr int kDeepestObject = 20;
@@ -134,9 +134,9 @@ std::vector<UnreadVariable> objects_of_v5(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   const std::string content(std::istreambuf_iterator<char>(stream), {});
   std::vector<UnreadVariable> objects;
-  if (!content.starts_with("MATLAB 5.0") || content.size() < kHeadBytes) return objects;
+  if (!content.starts_with("MATLAB 5.0") || content.size() < kObjectHeadBytes) return objects;
   const bool big_endian = content[126] == 'M';
-  std::size_t at = kHeadBytes;
+  std::size_t at = kObjectHeadBytes;
   while (at + 8 <= content.size()) {
     const std::uint32_t type = word_at(content, at, big_endian);
     const std::size_t size = word_at(content, at + 4, big_endian);

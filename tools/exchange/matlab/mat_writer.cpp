@@ -13,6 +13,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/system_reason.hpp"
+#include "acquisition/files/version.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
 #include "tools/terminal/unicode.hpp"
 
@@ -173,7 +174,7 @@ MatWriter::MatWriter(const std::filesystem::path& file, MatVersion version)
   const bool v5 = version == MatVersion::v5;
   // The default header tells the time; ours is the same for the same content.
   const std::string header =
-      fmt::format("MATLAB {} MAT-file, written by stageid {}", v5 ? "5.0" : "7.3", STAGEID_VERSION);
+      fmt::format("MATLAB {} MAT-file, written by stageid {}", v5 ? "5.0" : "7.3", version());
   state_->file.reset(Mat_CreateVer(state_->output.path().c_str(), header.c_str(),
                                    v5 ? MAT_FT_MAT5 : MAT_FT_MAT73));
   if (!state_->file) state_->fail();

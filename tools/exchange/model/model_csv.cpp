@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "acquisition/files/version.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
 
 namespace stageid {
@@ -24,7 +25,7 @@ std::string model_csv(const AdditiveModel& model) {
       "# A(s) = 1 + 2 zeta s/omega + s^2/omega^2, or 1 where natural_frequency_hz is empty\n"
       "submodel,integrators,natural_frequency_hz,natural_frequency_std_hz,damping_ratio,"
       "damping_ratio_std,power_of_s,output,input,coefficient\n",
-      STAGEID_VERSION, to_string(model.hold), model.sample_rate_hz);
+      version(), to_string(model.hold), model.sample_rate_hz);
   for (std::size_t index = 0; index < model.submodels.size(); ++index) {
     const Submodel& s = model.submodels[index];
     if (s.denominator.size() > 1 && !s.is_mode())

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "acquisition/files/version.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
 
 namespace stageid {
@@ -264,9 +265,8 @@ std::string model_script(const AdditiveModel& model, ScriptLanguage language,
                          const std::string& function) {
   const Syntax syntax(language);
   const bool python = language == ScriptLanguage::python;
-  const std::string head =
-      fmt::format(fmt::runtime(python ? kPythonHead : kMatlabHead), model.n_outputs(),
-                  model.n_inputs(), STAGEID_VERSION, function);
+  const std::string head = fmt::format(fmt::runtime(python ? kPythonHead : kMatlabHead),
+                                       model.n_outputs(), model.n_inputs(), version(), function);
   return head + model_data(model, syntax) + (python ? kPythonTail : kMatlabTail);
 }
 

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/version.hpp"
 #include "tools/terminal/text_lines.hpp"
 #include "tools/terminal/unicode.hpp"
 
@@ -297,7 +298,7 @@ UffContent uff_of_frf(const FrfEstimate& frf) {
   content.description = fmt::format(
       "{} {} {} {} {}", kSettings, frf.hold == Hold::zoh ? "zoh" : "none",
       kCompensations[static_cast<int>(frf.compensated)], frf.sample_rate_hz, frf.delay_s);
-  content.program = "stageid " STAGEID_VERSION;
+  content.program = fmt::format("stageid {}", version());
   content.units = UffUnits{};
   for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
     for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)

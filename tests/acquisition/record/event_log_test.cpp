@@ -1,4 +1,4 @@
-#include "acquisition/loop/event_log.hpp"
+#include "acquisition/record/event_log.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
