@@ -17,6 +17,7 @@
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/overlapping_modes.hpp"
 #include "estimation/search/ranked_fit.hpp"
+#include "estimation/search/residue_rank_test.hpp"
 #include "estimation/search/search_advice.hpp"
 #include "estimation/start/pole_relocation.hpp"
 #include "estimation/start/residual_modes.hpp"

@@ -20,6 +20,7 @@
 #include "estimation/search/determinacy.hpp"
 #include "estimation/search/hidden_modes.hpp"
 #include "estimation/search/ranked_fit.hpp"
+#include "estimation/search/residue_rank_test.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
 
 namespace stageid {

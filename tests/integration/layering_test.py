@@ -218,11 +218,34 @@ def shape_faults(root):
                 yield f"{name}: the test of a source in {home} belongs in tests/{home}"
 
 
+def drawing_faults(root):
+    page = root / "docs/rooms.md"
+    if page.exists() and page.read_text() != drawing(root) + "\n":
+        yield "docs/rooms.md: out of date; tests/integration/layering_test.py . --draw > docs/rooms.md"
+
+
 def faults(root):
     tree = Tree(root)
     used = set()
     found = [fault for path, name in tree.sources() for fault in include_faults(tree, path, name, used)]
-    return found + list(room_faults(tree, used)) + list(link_faults(tree)) + sorted(set(shape_faults(tree.root)))
+    return found + list(room_faults(tree, used)) + list(link_faults(tree)) + sorted(set(shape_faults(tree.root))) + \
+        list(drawing_faults(tree.root))
+
+
+def reachable(tree, name):
+    found, open_rooms = set(), [name]
+    while open_rooms:
+        for other in tree.rooms[open_rooms.pop()].uses:
+            if other not in found:
+                found.add(other)
+                open_rooms.append(other)
+    return found
+
+
+def direct_uses(tree, name):
+    """Without those that another room in USES implies."""
+    uses = tree.rooms[name].uses
+    return [other for other in uses if not any(other in reachable(tree, via) for via in uses if via != other)]
 
 
 def drawing(root):
@@ -230,15 +253,15 @@ def drawing(root):
     tree = Tree(root)
     lines = ["# Rooms", "",
              "Made by `tests/integration/layering_test.py . --draw`, from the USES of each room; `integration.layering`",
-             "holds the sources to them. An arrow points to what a room uses.", ""]
+             "holds the sources to them. An arrow points to what a room uses; arrows that others imply are left out.", ""]
     for floor in FLOORS:
         rooms = {name: room for name, room in tree.rooms.items() if name.split("/")[0] == floor}
         lines += [f"## {floor}", "", "```mermaid", "graph BT"]
         short = {name: name[len(floor) + 1:].replace("/", "_") or floor for name in rooms}
         for name in rooms:
             lines.append(f"  {short[name]}[{name[len(floor) + 1:]}]")
-        for name, room in rooms.items():
-            lines += [f"  {short[name]} --> {short[other]}" for other in room.uses if other in rooms]
+        for name in rooms:
+            lines += [f"  {short[name]} --> {short[other]}" for other in direct_uses(tree, name) if other in rooms]
         lines += ["```", "", "| room | sources | of other floors |", "| --- | --- | --- |"]
         for name, room in rooms.items():
             others = " ".join(other for other in room.uses if other not in rooms)
@@ -311,6 +334,7 @@ class SelfTest(unittest.TestCase):
         "stageid_misfit: has no place":
             ("hal/CMakeLists.txt", "target_link_libraries(stageid_misfit PRIVATE fmt::fmt)"),
         "no folder 'utils'": ("hal/utils/notes.txt", ""),
+        "docs/rooms.md: out of date": ("docs/rooms.md", "# Rooms\n"),
     }
 
     def faults_of(self, files):
