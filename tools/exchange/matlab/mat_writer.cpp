@@ -173,8 +173,8 @@ MatWriter::MatWriter(const std::filesystem::path& file, MatVersion version)
     : state_(std::make_unique<State>(file, version)) {
   const bool v5 = version == MatVersion::v5;
   // The default header tells the time; ours is the same for the same content.
-  const std::string header =
-      fmt::format("MATLAB {} MAT-file, written by stageid {}", v5 ? "5.0" : "7.3", version());
+  const std::string header = fmt::format("MATLAB {} MAT-file, written by stageid {}",
+                                         v5 ? "5.0" : "7.3", stageid::version());
   state_->file.reset(Mat_CreateVer(state_->output.path().c_str(), header.c_str(),
                                    v5 ? MAT_FT_MAT5 : MAT_FT_MAT73));
   if (!state_->file) state_->fail();
