@@ -13,7 +13,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_file_kind {
 
 using testing::StartsWith;
 
@@ -91,5 +91,5 @@ TEST(Counted, OneHasNoS) {
   EXPECT_EQ(counted(1, "axis", "axes"), "1 axis");
 }
 
-}  // namespace
+}  // namespace test_file_kind
 }  // namespace stageid

@@ -9,7 +9,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_fingerprint {
 
 // Made with the XXH3_128bits() of libxxhash 0.8.1, called from Python.
 constexpr const char* kOfNothing = "99aa06d3014798d86001c324468d497f";
@@ -53,5 +53,5 @@ TEST(Fingerprint, SaysWhichFileCannotBeRead) {
   }
 }
 
-}  // namespace
+}  // namespace test_fingerprint
 }  // namespace stageid

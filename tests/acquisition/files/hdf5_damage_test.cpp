@@ -15,7 +15,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_hdf5_damage {
 
 namespace fs = std::filesystem;
 using test::expect_error;
@@ -180,5 +180,5 @@ TEST(DamagedHdf5, AHeapWhoseTextsOverlapIsRefused) {
   }
 }
 
-}  // namespace
+}  // namespace test_hdf5_damage
 }  // namespace stageid

@@ -20,7 +20,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_hdf5_file {
 
 namespace fs = std::filesystem;
 using test::expect_error;
@@ -275,5 +275,5 @@ TEST(Hdf5File, CloseTwiceIsOnce) {
   EXPECT_TRUE(Hdf5File::open(directory / "f.h5").exists("/"));
 }
 
-}  // namespace
+}  // namespace test_hdf5_file
 }  // namespace stageid

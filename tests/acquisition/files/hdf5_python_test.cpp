@@ -10,7 +10,7 @@
 
 /// Files that h5py writes are read, and ours are read by h5py.
 namespace stageid {
-namespace {
+namespace test_hdf5_python {
 
 using Hdf5Python = test::PythonScriptTest;
 
@@ -160,5 +160,5 @@ assert int(f.attrs['seed']) == 5
 )");
 }
 
-}  // namespace
+}  // namespace test_hdf5_python
 }  // namespace stageid

@@ -14,7 +14,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_output_file {
 
 namespace fs = std::filesystem;
 using test::TemporaryDirectory;
@@ -142,5 +142,5 @@ TEST(OutputFile, CommitSaysThatTheTemporaryFileIsGone) {
   expect_file_error([&] { output.commit(); }, directory / "out", std::strerror(ENOENT));
 }
 
-}  // namespace
+}  // namespace test_output_file
 }  // namespace stageid

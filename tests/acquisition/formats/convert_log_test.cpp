@@ -14,7 +14,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_convert_log {
 
 /// Two complete runs and one that was broken off.
 std::unique_ptr<LogReader> write_log(const std::filesystem::path& file) {
@@ -136,5 +136,5 @@ TEST(ConvertLog, LeavesNothingHalfWritten) {
   EXPECT_EQ(files, 1U) << "the log alone";
 }
 
-}  // namespace
+}  // namespace test_convert_log
 }  // namespace stageid

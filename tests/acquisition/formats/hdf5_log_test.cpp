@@ -13,7 +13,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_hdf5_log {
 
 using test::kPeriod;
 using testing::AllOf;
@@ -372,5 +372,5 @@ TEST(ForeignLog, IsRead) {
   EXPECT_EQ(reader->excitation(25).rows(), 10000);
 }
 
-}  // namespace
+}  // namespace test_hdf5_log
 }  // namespace stageid

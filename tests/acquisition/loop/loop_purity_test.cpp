@@ -24,7 +24,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_loop_purity {
 
 constexpr std::uint64_t kSamples = 2000;
 
@@ -142,5 +142,5 @@ TEST(LoopPurityControl, AMemoryMapWouldHaveBeenSeen) {
 
 INSTANTIATE_TEST_SUITE_P(VirtualAndWall, LoopPurity, testing::Values(0.0, 1.0));
 
-}  // namespace
+}  // namespace test_loop_purity
 }  // namespace stageid

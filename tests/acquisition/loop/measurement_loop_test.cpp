@@ -14,7 +14,7 @@
 #include "tests/support/analytic_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_measurement_loop {
 
 using namespace test::measurement_loop;
 using test::AnalyticStage;
@@ -398,5 +398,5 @@ TEST_F(MeasurementLoopTest, RefusesWhatDoesNotFit) {
   EXPECT_EQ(loop.step(), LoopStatus::ended);
 }
 
-}  // namespace
+}  // namespace test_measurement_loop
 }  // namespace stageid

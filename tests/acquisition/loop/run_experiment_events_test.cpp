@@ -11,7 +11,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_run_experiment_events {
 
 using test::AnalyticStage;
 using testing::HasSubstr;
@@ -145,5 +145,5 @@ TEST_F(RunExperimentEvents, RealTimeThatIsRequiredAndNotThereEndsBeforeTheFirstR
   EXPECT_TRUE(inner_->seeds().empty());
 }
 
-}  // namespace
+}  // namespace test_run_experiment_events
 }  // namespace stageid

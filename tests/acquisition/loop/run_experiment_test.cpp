@@ -16,7 +16,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_run_experiment {
 
 using test::AnalyticStage;
 using testing::HasSubstr;
@@ -371,5 +371,5 @@ TEST_F(RunExperiment, EndsCompleteBetweenRealizationsWhenItIsEnough) {
   EXPECT_EQ(SlogReader(directory_ / "enough.slog").runs().size(), 4U);
 }
 
-}  // namespace
+}  // namespace test_run_experiment
 }  // namespace stageid

@@ -14,7 +14,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_run_resident {
 
 using testing::HasSubstr;
 
@@ -178,5 +178,5 @@ TEST_F(RunResident, ALogOfAnotherPlanIsRefused) {
   EXPECT_THROW(run_resident_experiment(another, stage_, log, {}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_run_resident
 }  // namespace stageid

@@ -5,7 +5,7 @@
 #include <thread>
 
 namespace stageid {
-namespace {
+namespace test_sample_ring {
 
 TEST(SampleRing, GivesRowsBackInOrderAndSaysWhenFull) {
   SampleRing ring(3, 4);
@@ -76,5 +76,5 @@ TEST(SampleRing, TwoThreadsLoseNothing) {
   EXPECT_TRUE(ring.front(1).empty());
 }
 
-}  // namespace
+}  // namespace test_sample_ring
 }  // namespace stageid

@@ -13,7 +13,7 @@
 #include "tests/support/stop_case.hpp"
 
 namespace stageid {
-namespace {
+namespace test_stop_matrix {
 
 using Kind = WaferStageSpec::Fault::Kind;
 using testing::HasSubstr;
@@ -153,5 +153,5 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
-}  // namespace
+}  // namespace test_stop_matrix
 }  // namespace stageid

@@ -13,7 +13,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_event_log {
 
 using testing::HasSubstr;
 
@@ -117,5 +117,5 @@ TEST_F(EventLogTest, AStageThatFailsAllTheTimeDoesNotFillTheDisk) {
   EXPECT_THAT(lines.back(), HasSubstr(R"("misses_not_told":800)"));
 }
 
-}  // namespace
+}  // namespace test_event_log
 }  // namespace stageid

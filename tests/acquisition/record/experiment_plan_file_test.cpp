@@ -16,7 +16,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_experiment_plan_file {
 
 namespace fs = std::filesystem;
 using test::expect_error;
@@ -208,5 +208,5 @@ TEST(ExperimentPlanFile, RefusesOtherFiles) {
                             directory / "text.h5", "not an HDF5 file");
 }
 
-}  // namespace
+}  // namespace test_experiment_plan_file
 }  // namespace stageid

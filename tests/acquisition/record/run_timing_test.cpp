@@ -10,7 +10,7 @@
 #include "acquisition/slog/slog_json.hpp"
 
 namespace stageid {
-namespace {
+namespace test_run_timing {
 
 TEST(TimingHistogram, EveryNumberLiesInItsBinAndBinsAreNarrow) {
   std::mt19937_64 engine(3);
@@ -91,5 +91,5 @@ TEST(RunTiming, ABinThatIsNoneIsRefused) {
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("33 ns")));
 }
 
-}  // namespace
+}  // namespace test_run_timing
 }  // namespace stageid

@@ -6,7 +6,7 @@
 #include <ctime>
 
 namespace stageid {
-namespace {
+namespace test_utc_time {
 
 std::time_t parsed(const std::string& text) {
   std::tm time{};
@@ -34,5 +34,5 @@ TEST(UtcTime, IsTheSameInEveryTimeZone) {
   }
 }
 
-}  // namespace
+}  // namespace test_utc_time
 }  // namespace stageid

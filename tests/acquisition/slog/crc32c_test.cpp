@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace stageid {
-namespace {
+namespace test_crc32c {
 
 using Function = std::uint32_t (*)(std::span<const std::byte>, std::uint32_t) noexcept;
 
@@ -56,5 +56,5 @@ TEST_P(Crc32c, AgreesWithTheDefinitionBitByBitAtEveryLengthAndCut) {
 INSTANTIATE_TEST_SUITE_P(Both, Crc32c, testing::Values(&crc32c, &crc32c_portable),
                          [](const auto& which) { return which.index == 0 ? "Fast" : "Portable"; });
 
-}  // namespace
+}  // namespace test_crc32c
 }  // namespace stageid

@@ -11,7 +11,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_slog_damage {
 
 using test::TemporaryDirectory;
 
@@ -308,5 +308,5 @@ TEST_F(SlogRecover, VerifyCountsAndNamesTheDamage) {
   EXPECT_EQ(report.damage[0].bytes, slog_block_bytes(blocks_[damaged].header));
 }
 
-}  // namespace
+}  // namespace test_slog_damage
 }  // namespace stageid

@@ -16,7 +16,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_slog_kill {
 
 /// A counter that outlives the process that counts.
 class SharedCounter {
@@ -98,5 +98,5 @@ TEST(SlogKill, EveryAcknowledgedRowOutlivesTheProcess) {
   EXPECT_EQ(with_rows, 20);
 }
 
-}  // namespace
+}  // namespace test_slog_kill
 }  // namespace stageid

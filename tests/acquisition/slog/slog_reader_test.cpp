@@ -15,7 +15,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_slog_reader {
 
 using test::TemporaryDirectory;
 using testing::AllOf;
@@ -246,5 +246,5 @@ TEST(SlogFormat, TheNumpyLinesOfTheHeaderReadALog) {
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 
-}  // namespace
+}  // namespace test_slog_reader
 }  // namespace stageid

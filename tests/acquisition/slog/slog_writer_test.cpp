@@ -12,7 +12,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_slog_writer {
 
 using test::TemporaryDirectory;
 using testing::HasSubstr;
@@ -219,5 +219,5 @@ TEST(SlogWriter, ResumeDoesNotThrowIntactBlocksAway) {
   EXPECT_EQ(test::bytes_of(file), bytes);
 }
 
-}  // namespace
+}  // namespace test_slog_writer
 }  // namespace stageid

@@ -12,7 +12,7 @@
 #include "tests/estimation/disturbed_problem.hpp"
 
 namespace stageid {
-namespace {
+namespace test_arrow_system {
 
 using test::DenseProblem;
 using test::measure_and_disturb;
@@ -305,5 +305,5 @@ TEST(FitStep, TheArrowWithDelaysSolvesItsOwnDenseEquations) {
   EXPECT_NEAR(step.globals[3], dense[first[2] + 1], 1e-6 * std::abs(dense[first[2] + 1]));
 }
 
-}  // namespace
+}  // namespace test_arrow_system
 }  // namespace stageid

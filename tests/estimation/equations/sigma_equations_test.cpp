@@ -11,7 +11,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_sigma_equations {
 
 using Complex = std::complex<double>;
 
@@ -117,5 +117,5 @@ INSTANTIATE_TEST_SUITE_P(Axes, OnBothAxes, testing::Bool(), [](const auto& insta
   return instance.param ? "circle" : "imaginary";
 });
 
-}  // namespace
+}  // namespace test_sigma_equations
 }  // namespace stageid

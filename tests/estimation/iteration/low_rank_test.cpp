@@ -16,7 +16,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_low_rank {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -247,5 +247,5 @@ TEST(LowRankViscousFit, RecoversComplexShapes) {
         1e-7 * problem.model.submodels[i].numerator[1].norm());
 }
 
-}  // namespace
+}  // namespace test_low_rank
 }  // namespace stageid

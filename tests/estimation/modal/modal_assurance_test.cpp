@@ -8,7 +8,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modal_assurance {
 
 using Complex = std::complex<double>;
 
@@ -100,5 +100,5 @@ TEST(PairModes, RefusesWhatIsNoLimitAndOtherChannels) {
                std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_modal_assurance
 }  // namespace stageid

@@ -11,7 +11,7 @@
 #include "tests/support/model_reference.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modal_form {
 
 using Complex = std::complex<double>;
 
@@ -146,5 +146,5 @@ TEST(RigidBody, RefusesARankThatContradictsIt) {
   EXPECT_THROW(rigid_body(model), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_modal_form
 }  // namespace stageid

@@ -16,7 +16,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_model_file {
 
 using Json = nlohmann::ordered_json;
 using testing::AllOf;
@@ -352,5 +352,5 @@ TEST_F(ModelFile, NamesThatAreNotUtf8AreWrittenReadably) {
   EXPECT_NO_THROW((void)read_model(file_));
 }
 
-}  // namespace
+}  // namespace test_model_file
 }  // namespace stageid

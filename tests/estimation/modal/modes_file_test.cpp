@@ -9,7 +9,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modes_file {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -91,5 +91,5 @@ TEST_F(ModesFile, FilesThatCannotBeReadOrWritten) {
   EXPECT_THROW(write_modes(directory_ / "no" / "modes.json", {}), FileError);
 }
 
-}  // namespace
+}  // namespace test_modes_file
 }  // namespace stageid

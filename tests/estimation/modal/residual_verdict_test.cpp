@@ -9,7 +9,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_residual_verdict {
 
 using testing::HasSubstr;
 
@@ -126,5 +126,5 @@ TEST(ResidualVerdict, WithoutVariancesOrWeightsNothingIsJudged) {
   EXPECT_EQ(verdict.variance, ResidualVariance::none);
 }
 
-}  // namespace
+}  // namespace test_residual_verdict
 }  // namespace stageid

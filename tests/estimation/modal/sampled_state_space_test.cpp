@@ -19,7 +19,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_sampled_state_space {
 
 using Complex = std::complex<double>;
 using test::basis::kPeriod;
@@ -231,5 +231,5 @@ TEST(SampledStateSpace, RefusesWhatHasNoStateSpace) {
   EXPECT_THROW(sampled_state_space(model), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_sampled_state_space
 }  // namespace stageid

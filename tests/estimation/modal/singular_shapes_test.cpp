@@ -5,7 +5,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_singular_shapes {
 
 TEST(SingularShapes, SumUpToTheMatrix) {
   test::RandomNumbers random(3);
@@ -56,5 +56,5 @@ TEST(NumericalRank, CountsWhatIsAboveTheTolerance) {
   EXPECT_EQ(numerical_rank(Eigen::VectorXd::Zero(2), 0.0), 0);
 }
 
-}  // namespace
+}  // namespace test_singular_shapes
 }  // namespace stageid

@@ -13,7 +13,7 @@
 #include "tests/support/state_space_response.hpp"
 
 namespace stageid {
-namespace {
+namespace test_state_space {
 
 using Complex = std::complex<double>;
 using testing::AllOf;
@@ -191,5 +191,5 @@ TEST(StateSpace, RefusesARankThatContradictsTheNumerators) {
   EXPECT_THAT([&] { state_space(model); }, refuses("residue_rank is 1"));
 }
 
-}  // namespace
+}  // namespace test_state_space
 }  // namespace stageid

@@ -12,7 +12,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_validation {
 
 constexpr double kDelay = 1.37e-4;
 
@@ -334,5 +334,5 @@ TEST(Validation, OfAZeroResponseThereIsNoRelativeError) {
   EXPECT_TRUE(std::isnan(result.normalized_error));
 }
 
-}  // namespace
+}  // namespace test_validation
 }  // namespace stageid

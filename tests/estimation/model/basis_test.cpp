@@ -14,7 +14,7 @@
 #include "tests/support/model_reference.hpp"
 
 namespace stageid {
-namespace {
+namespace test_basis {
 
 using namespace test::basis;
 
@@ -388,5 +388,5 @@ TEST(Response, NeedsASampleRateForAHoldAndLinesBelowNyquist) {
   EXPECT_NO_THROW(evaluate_at(501.0, HoldModel::sinc)());
 }
 
-}  // namespace
+}  // namespace test_basis
 }  // namespace stageid

@@ -15,7 +15,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_cmif {
 
 using testing::ElementsAre;
 
@@ -215,5 +215,5 @@ TEST(PickModes, KeepsTheMostProminentWhereThereAreTooMany) {
   EXPECT_TRUE(pick_modes(frf, prominent).empty());
 }
 
-}  // namespace
+}  // namespace test_cmif
 }  // namespace stageid

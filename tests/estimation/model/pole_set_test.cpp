@@ -7,7 +7,7 @@
 #include <algorithm>
 
 namespace stageid {
-namespace {
+namespace test_pole_set {
 
 using Complex = std::complex<double>;
 
@@ -58,5 +58,5 @@ TEST(PoleSet, NothingBesideOneLeavesThePolesWhereTheyAre) {
     })) << p;
 }
 
-}  // namespace
+}  // namespace test_pole_set
 }  // namespace stageid

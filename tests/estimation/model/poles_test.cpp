@@ -9,7 +9,7 @@
 #include "estimation/model/basis.hpp"
 
 namespace stageid {
-namespace {
+namespace test_poles {
 
 using Complex = std::complex<double>;
 
@@ -64,5 +64,5 @@ TEST(Poles, DeviationsAreTheDifferencesOfTheRoots) {
   }
 }
 
-}  // namespace
+}  // namespace test_poles
 }  // namespace stageid

@@ -8,7 +8,7 @@
 #include "tests/estimation/submodel_cases.hpp"
 
 namespace stageid {
-namespace {
+namespace test_submodel_request {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -91,5 +91,5 @@ TEST(SubmodelRequest, TheFitRefusesWhatHasAFault) {
   refused(structure, "below the lowest line, 5 Hz");
 }
 
-}  // namespace
+}  // namespace test_submodel_request
 }  // namespace stageid

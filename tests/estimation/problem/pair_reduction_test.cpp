@@ -13,7 +13,7 @@
 #include "tests/estimation/disturbed_problem.hpp"
 
 namespace stageid {
-namespace {
+namespace test_pair_reduction {
 
 using test::RandomNumbers;
 
@@ -224,5 +224,5 @@ TEST_F(ReductionTest, WhatWouldCancelIsMultipliedOut) {
   EXPECT_FALSE(is_direct(3, 4));
 }
 
-}  // namespace
+}  // namespace test_pair_reduction
 }  // namespace stageid

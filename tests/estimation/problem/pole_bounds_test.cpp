@@ -8,7 +8,7 @@
 #include "tests/support/model_reference.hpp"
 
 namespace stageid {
-namespace {
+namespace test_pole_bounds {
 
 constexpr double kLowestLineHz = 20.0;
 
@@ -53,5 +53,5 @@ TEST(PoleBounds, AModeFarBelowTheLinesIsHeldThereWithoutADeviation) {
   EXPECT_NEAR(fit.model.submodels[2].natural_frequency_hz(), 301.0, 0.1);
 }
 
-}  // namespace
+}  // namespace test_pole_bounds
 }  // namespace stageid

@@ -13,7 +13,7 @@
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_search_limit {
 
 constexpr double kNoise = 0.002;
 constexpr double kTinyBudget_s = 1e-6;  // less than one evaluation
@@ -166,5 +166,5 @@ TEST(SearchLimit, AnInterruptKeepsTheBestModelSoFar) {
   }
 }
 
-}  // namespace
+}  // namespace test_search_limit
 }  // namespace stageid

@@ -12,7 +12,7 @@
 #include "tests/estimation/correlated_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_weight_matrices {
 
 using test::correlated_noise;
 using test::CorrelatedNoise;
@@ -221,5 +221,5 @@ TEST_F(WeightMatrixRefusal, UsersThatWouldNotFitInMemory) {
                   testing::AllOf(testing::HasSubstr("2.9 GiB"), testing::HasSubstr("likelihood"))));
 }
 
-}  // namespace
+}  // namespace test_weight_matrices
 }  // namespace stageid

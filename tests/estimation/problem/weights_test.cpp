@@ -9,7 +9,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_weights {
 
 FrfEstimate small_frf() {
   test::DenseProblem problem;
@@ -192,5 +192,5 @@ TEST_F(WeightRefusal, UsersWeightsOfAnotherShapeOrThatAreNone) {
   expect_refused("one positive");
 }
 
-}  // namespace
+}  // namespace test_weights
 }  // namespace stageid

@@ -14,7 +14,7 @@
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_line_sums {
 
 using test::DenseProblem;
 using test::measure_and_disturb;
@@ -206,5 +206,5 @@ TEST(WeightedProducts, SharesCoverEveryLineOfEveryChannelOnce) {
   }
 }
 
-}  // namespace
+}  // namespace test_line_sums
 }  // namespace stageid

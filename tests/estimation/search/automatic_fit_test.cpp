@@ -15,7 +15,7 @@
 #include "tests/support/model_reference.hpp"
 
 namespace stageid {
-namespace {
+namespace test_automatic_fit {
 
 /// The paper's stage on every third of its lines: quick, and the sharpest modes (0.2 % at 100 Hz)
 /// have hardly a line in their half-power width.
@@ -323,5 +323,5 @@ TEST_F(SmallStage, RefusesWeightsThatAreNotThere) {
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("total_variance")));
 }
 
-}  // namespace
+}  // namespace test_automatic_fit
 }  // namespace stageid

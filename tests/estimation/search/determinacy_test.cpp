@@ -10,7 +10,7 @@
 #include "tests/estimation/submodel_cases.hpp"
 
 namespace stageid {
-namespace {
+namespace test_determinacy {
 
 using testing::HasSubstr;
 
@@ -127,5 +127,5 @@ TEST(Determinacy, StartsAtRandomNeverEndUnstable) {
   }
 }
 
-}  // namespace
+}  // namespace test_determinacy
 }  // namespace stageid

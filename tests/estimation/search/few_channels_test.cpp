@@ -9,7 +9,7 @@
 #include "tests/support/model_fit_problem.hpp"
 
 namespace stageid {
-namespace {
+namespace test_few_channels {
 
 using test::DenseProblem;
 
@@ -91,5 +91,5 @@ TEST(HeldGlobals, HaveNoEquationsAndLeaveThoseOfTheOthers) {
   }
 }
 
-}  // namespace
+}  // namespace test_few_channels
 }  // namespace stageid

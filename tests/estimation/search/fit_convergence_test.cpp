@@ -16,7 +16,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_fit_convergence {
 
 using test::DenseProblem;
 using test::moved;
@@ -283,5 +283,5 @@ TEST(FitThreads, DoNotChangeABit) {
   }
 }
 
-}  // namespace
+}  // namespace test_fit_convergence
 }  // namespace stageid

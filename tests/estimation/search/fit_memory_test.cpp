@@ -10,7 +10,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_fit_memory {
 
 constexpr double kBeyond = 0.2;  // of the data
 
@@ -115,5 +115,5 @@ TEST_F(FitMemory, HoldsForTheWholeWayFromNothingWithTheDelayEstimated) {
   expect_little_beside(1.0, [&] { return structured_fit(frf_, {}, {}, options_); });
 }
 
-}  // namespace
+}  // namespace test_fit_memory
 }  // namespace stageid

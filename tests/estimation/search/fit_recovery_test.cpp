@@ -12,7 +12,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_fit_recovery {
 
 using test::DenseProblem;
 
@@ -285,5 +285,5 @@ TEST(FitRecovery, ConjugatedDataAndRadiansForHertzAreNotFittedByTheTruth) {
   EXPECT_GT(fit_additive_model(radians, problem.model, stay).model.fit.relative_rms_error, 0.1);
 }
 
-}  // namespace
+}  // namespace test_fit_recovery
 }  // namespace stageid

@@ -11,7 +11,7 @@
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_fit_refusal {
 
 using test::DenseProblem;
 using test::moved;
@@ -123,5 +123,5 @@ TEST_F(FitRefusal, WeightsThatAreNotThere) {
   expect_refused("noise_variance");
 }
 
-}  // namespace
+}  // namespace test_fit_refusal
 }  // namespace stageid

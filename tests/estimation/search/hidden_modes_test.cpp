@@ -11,7 +11,7 @@
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_hidden_modes {
 
 constexpr double kNoise = 1e-2;
 
@@ -131,5 +131,5 @@ TEST(HiddenModes, WithoutAHiddenModeNothingChanges) {
   EXPECT_TRUE(after.decisions.empty());
 }
 
-}  // namespace
+}  // namespace test_hidden_modes
 }  // namespace stageid

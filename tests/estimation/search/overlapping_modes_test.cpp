@@ -7,7 +7,7 @@
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_overlapping_modes {
 
 using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
@@ -40,5 +40,5 @@ TEST(OverlappingModes, OneOfTwoIsTheirGeometricMean) {
   EXPECT_NEAR(one.submodels[2].natural_frequency_hz(), 1500.0, 1e-9);
 }
 
-}  // namespace
+}  // namespace test_overlapping_modes
 }  // namespace stageid

@@ -16,7 +16,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_ranked_fit {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -207,5 +207,5 @@ TEST_F(CoincidentModes, ToFirstOrderTwoPlacesFollowFromTheNeighbourhoodOfOne) {
   for (const std::size_t i : {1U, 2U}) EXPECT_LT(second_share(apart->model.submodels[i]), 1e-9);
 }
 
-}  // namespace
+}  // namespace test_ranked_fit
 }  // namespace stageid

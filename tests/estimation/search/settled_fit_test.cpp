@@ -18,7 +18,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_settled_fit {
 
 using testing::HasSubstr;
 
@@ -193,5 +193,5 @@ TEST_F(SettledFit, WhereNothingHelpsTheFirstFitIsReturned) {
   EXPECT_TRUE(fit.decisions.empty());
 }
 
-}  // namespace
+}  // namespace test_settled_fit
 }  // namespace stageid

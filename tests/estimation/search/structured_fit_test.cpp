@@ -9,7 +9,7 @@
 #include "tests/estimation/submodel_cases.hpp"
 
 namespace stageid {
-namespace {
+namespace test_structured_fit {
 
 using test::DenseProblem;
 using test::Part;
@@ -157,5 +157,5 @@ TEST(StructuredFit, DoesNotDependOnTheNumberOfThreads) {
   }
 }
 
-}  // namespace
+}  // namespace test_structured_fit
 }  // namespace stageid

@@ -9,7 +9,7 @@
 #include "tests/estimation/submodel_cases.hpp"
 
 namespace stageid {
-namespace {
+namespace test_submodel_recovery {
 
 using test::DenseProblem;
 using test::joined;
@@ -110,5 +110,5 @@ TEST_P(SubmodelRecovery, UnderWeightMatrices) {
 INSTANTIATE_TEST_SUITE_P(Of, SubmodelRecovery, testing::ValuesIn(cases()),
                          [](const auto& each) { return each.param.name; });
 
-}  // namespace
+}  // namespace test_submodel_recovery
 }  // namespace stageid

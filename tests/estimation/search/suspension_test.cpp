@@ -8,7 +8,7 @@
 #include "tests/estimation/submodel_cases.hpp"
 
 namespace stageid {
-namespace {
+namespace test_suspension {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -112,5 +112,5 @@ TEST(Suspension, OfKnownFrequenciesKeepsThem) {
   EXPECT_LT(fit.model.fit.relative_rms_error, 1e-8);
 }
 
-}  // namespace
+}  // namespace test_suspension
 }  // namespace stageid

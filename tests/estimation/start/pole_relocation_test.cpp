@@ -8,7 +8,7 @@
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_pole_relocation {
 
 using test::DenseProblem;
 
@@ -96,5 +96,5 @@ TEST(PoleRelocationShares, NothingAskedForNothingFound) {
   EXPECT_TRUE(relocate(test::noisy_stage(HoldModel::none, 0.0), 0).empty());
 }
 
-}  // namespace
+}  // namespace test_pole_relocation
 }  // namespace stageid

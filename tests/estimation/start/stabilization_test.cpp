@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 namespace stageid {
-namespace {
+namespace test_stabilization {
 
 using Complex = std::complex<double>;
 constexpr double pi = std::numbers::pi;
@@ -117,5 +117,5 @@ TEST(Stabilization, RefusesOrdersThatTheLinesDoNotCarry) {
   EXPECT_NO_THROW(stabilization(frf, {.most_order = 198}));
 }
 
-}  // namespace
+}  // namespace test_stabilization
 }  // namespace stageid

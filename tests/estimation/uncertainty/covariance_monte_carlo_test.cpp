@@ -7,7 +7,7 @@
 #include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
-namespace {
+namespace test_covariance_monte_carlo {
 
 using test::covariance_stage;
 using test::DenseProblem;
@@ -103,5 +103,5 @@ TEST(CovarianceMonteCarlo, RelativeWeightsWithUnknownVariance) {
   expect_honest(Weighting::relative, 1e-5 * covariance_stage().G.cwiseAbs2(), false);
 }
 
-}  // namespace
+}  // namespace test_covariance_monte_carlo
 }  // namespace stageid

@@ -7,7 +7,7 @@
 #include "tests/support/random_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_cramer_rao {
 
 TEST(CramerRao, IsWhatMaximumLikelihoodReportsAtTheTruth) {
   test::RandomStageSpec spec;
@@ -41,5 +41,5 @@ TEST(CramerRao, IsWhatMaximumLikelihoodReportsAtTheTruth) {
   }
 }
 
-}  // namespace
+}  // namespace test_cramer_rao
 }  // namespace stageid

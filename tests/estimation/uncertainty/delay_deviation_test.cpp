@@ -7,7 +7,7 @@
 #include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
-namespace {
+namespace test_delay_deviation {
 
 using test::DenseProblem;
 
@@ -81,5 +81,5 @@ TEST(DelayDeviation, UnknownOfAGivenDelay) {
   EXPECT_EQ(fit.model.output_delay_std_s.size(), 0);
 }
 
-}  // namespace
+}  // namespace test_delay_deviation
 }  // namespace stageid

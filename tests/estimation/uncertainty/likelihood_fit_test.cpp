@@ -14,7 +14,7 @@
 #include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
-namespace {
+namespace test_likelihood_fit {
 
 using test::correlated_noise;
 using test::CorrelatedNoise;
@@ -300,5 +300,5 @@ TEST(LikelihoodFit, RefusesAMethodWithoutAMinimum) {
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("riv or gn")));
 }
 
-}  // namespace
+}  // namespace test_likelihood_fit
 }  // namespace stageid

@@ -9,7 +9,7 @@
 #include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
-namespace {
+namespace test_likelihood_monte_carlo {
 
 using test::Measurement;
 using test::options_with;
@@ -73,5 +73,5 @@ TEST(LikelihoodMonteCarlo, ScattersLessThanDiagonalWeightsAndAsMuchAsItSays) {
   }
 }
 
-}  // namespace
+}  // namespace test_likelihood_monte_carlo
 }  // namespace stageid

@@ -10,7 +10,7 @@
 #include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
-namespace {
+namespace test_low_rank_covariance {
 
 constexpr int kRuns = 150;
 // chi^2 of 149 degrees of freedom over its mean lies in here with 99.99 %.
@@ -143,5 +143,5 @@ TEST(LowRankCovariance, OfOtherWeightsWithoutCorrelationUsesTheKnownVariance) {
   EXPECT_NEAR(ratio.maxCoeff(), 2.0, 1e-9);
 }
 
-}  // namespace
+}  // namespace test_low_rank_covariance
 }  // namespace stageid

@@ -19,7 +19,7 @@
 #include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
-namespace {
+namespace test_mode_deviation {
 
 using test::covariance_stage;
 using test::DenseProblem;
@@ -256,5 +256,5 @@ TEST(DenseCovariance, SaysWhyThereIsNone) {
   EXPECT_NE(fit.decisions.back().find("no standard deviations"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_mode_deviation
 }  // namespace stageid

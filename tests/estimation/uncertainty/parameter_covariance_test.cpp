@@ -13,7 +13,7 @@
 #include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
-namespace {
+namespace test_parameter_covariance {
 
 using test::covariance_stage;
 using test::DenseProblem;
@@ -284,5 +284,5 @@ TEST(Covariance, IsNotComputedUnlessAsked) {
   EXPECT_FALSE(fit.model.submodels[1].natural_frequency_std_hz.has_value());
 }
 
-}  // namespace
+}  // namespace test_parameter_covariance
 }  // namespace stageid

@@ -4,7 +4,7 @@
 #include "tests/support/zippered_fits.hpp"
 
 namespace stageid {
-namespace {
+namespace test_zippered_deviation {
 
 constexpr double kSampleRateHz = 200.0;
 
@@ -25,5 +25,5 @@ TEST(ZipperedDeviation, IsThatOverSeeds) {
   EXPECT_GT(trials.correlated_lines, 4.0);
 }
 
-}  // namespace
+}  // namespace test_zippered_deviation
 }  // namespace stageid

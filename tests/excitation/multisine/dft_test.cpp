@@ -14,7 +14,7 @@
 #include "excitation/multisine/random_stream.hpp"
 
 namespace stageid {
-namespace {
+namespace test_dft {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -119,5 +119,5 @@ TEST(RealDft, RefusesImpossibleSizes) {
   EXPECT_THROW(dft.inverse(Eigen::VectorXcd::Zero(8)), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_dft
 }  // namespace stageid

@@ -12,7 +12,7 @@
 #include "tests/excitation/reference/multisine_reference.hpp"
 
 namespace stageid {
-namespace {
+namespace test_frequency_grid {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -135,5 +135,5 @@ TEST(FrequencyGrid, RefusesWhatBreaksItsInvariant) {
                std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_frequency_grid
 }  // namespace stageid

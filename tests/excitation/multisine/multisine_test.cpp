@@ -18,7 +18,7 @@
 #include "tests/excitation/reference/multisine_reference.hpp"
 
 namespace stageid {
-namespace {
+namespace test_multisine {
 
 namespace reference = test::reference;
 constexpr double kEps = std::numeric_limits<double>::epsilon();
@@ -255,5 +255,5 @@ TEST(LineSpectrum, RefusesMoreSamplesThanAnIntCounts) {
   EXPECT_THROW(LineSpectrum(grid, 4), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_multisine
 }  // namespace stageid

@@ -9,7 +9,7 @@
 #include "excitation/plan/experiment_plan.hpp"
 
 namespace stageid {
-namespace {
+namespace test_signal_peaks {
 
 using Eigen::Index;
 
@@ -197,5 +197,5 @@ TEST(SignalPeaks, APeriodThatCannotBeDoubledIsRefused) {
   EXPECT_THROW(SignalPredictor{grid}, std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_signal_peaks
 }  // namespace stageid

@@ -15,7 +15,7 @@
 #include "tests/excitation/reference/multisine_reference.hpp"
 
 namespace stageid {
-namespace {
+namespace test_experiment_plan {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -315,5 +315,5 @@ TEST(ExperimentPlan, RefusesRunsThatItDoesNotHave) {
   EXPECT_THROW(plan.phase_rad(3), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_experiment_plan
 }  // namespace stageid

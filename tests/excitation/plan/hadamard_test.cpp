@@ -6,7 +6,7 @@
 #include <string>
 
 namespace stageid {
-namespace {
+namespace test_hadamard {
 
 TEST(Hadamard, EverySizeItPromisesIsOrthogonal) {
   int sizes = 0;
@@ -42,5 +42,5 @@ TEST(Hadamard, NamesTheNearestSizes) {
   EXPECT_THROW(hadamard_matrix(0), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_hadamard
 }  // namespace stageid

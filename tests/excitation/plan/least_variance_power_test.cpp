@@ -8,7 +8,7 @@
 #include "tests/acquisition/files/expect_error.hpp"
 
 namespace stageid {
-namespace {
+namespace test_least_variance_power {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -87,5 +87,5 @@ TEST(LeastVariancePower, RefusesWhatHasNoAnswer) {
   refuse(c, open, "entry 1 is under no bound");
 }
 
-}  // namespace
+}  // namespace test_least_variance_power
 }  // namespace stageid

@@ -10,7 +10,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_limited_design {
 
 using Eigen::Index;
 
@@ -173,5 +173,5 @@ TEST(JointCrest, LowersAllSignalsTogetherAndKeepsTheAmplitudes) {
   EXPECT_EQ(reduce_joint_crest(easy, before, 200), before);
 }
 
-}  // namespace
+}  // namespace test_limited_design
 }  // namespace stageid

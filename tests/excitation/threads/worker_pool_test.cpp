@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace stageid {
-namespace {
+namespace test_worker_pool {
 
 TEST(WorkerPool, EveryTaskRunsOnce) {
   std::vector<int> count(1000, 0);
@@ -40,5 +40,5 @@ TEST(WorkerPool, TasksWithoutAWorkerRunOnceAndPassExceptionsOn) {
                std::runtime_error);
 }
 
-}  // namespace
+}  // namespace test_worker_pool
 }  // namespace stageid

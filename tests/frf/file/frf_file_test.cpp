@@ -15,7 +15,7 @@
 #include "tests/support/numbered_frf.hpp"
 
 namespace stageid {
-namespace {
+namespace test_frf_file {
 
 using test::numbered_frf;
 using testing::AllOf;
@@ -328,5 +328,5 @@ TEST_F(FrfFile, ARefusedEstimateLeavesNoFile) {
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 
-}  // namespace
+}  // namespace test_frf_file
 }  // namespace stageid

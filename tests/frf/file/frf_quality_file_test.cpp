@@ -14,7 +14,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_frf_quality_file {
 
 using testing::HasSubstr;
 
@@ -126,5 +126,5 @@ TEST_F(FrfQualityFile, SpoiltDatasetsAreNamed) {
   EXPECT_THROW(write_frf(file_, frf), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_frf_quality_file
 }  // namespace stageid

@@ -10,7 +10,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_settling {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -132,5 +132,5 @@ TEST(Settling, ADistortedPlantIsSettled) {
   }
 }
 
-}  // namespace
+}  // namespace test_settling
 }  // namespace stageid

@@ -8,7 +8,7 @@
 #include "tests/support/closed_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_octave_record {
 
 using Eigen::Index;
 
@@ -102,5 +102,5 @@ TEST(OctaveRecord, IsCutWhereAPeriodIsMissing) {
   }
 }
 
-}  // namespace
+}  // namespace test_octave_record
 }  // namespace stageid

@@ -12,7 +12,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_period_check {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -277,5 +277,5 @@ TEST(PeriodCheck, LongRunsAreComparedInGroups) {
   EXPECT_EQ(frf.dropped_periods[1].period, 19);
 }
 
-}  // namespace
+}  // namespace test_period_check
 }  // namespace stageid

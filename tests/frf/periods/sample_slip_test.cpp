@@ -14,7 +14,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_sample_slip {
 
 using Eigen::Index;
 using test::MemoryLog;
@@ -164,5 +164,5 @@ TEST(SampleSlip, IsTheSameForBothMethodsAndForTheRecordAlone) {
   EXPECT_LT(chi_square(lpm.frf, c), 1.6);
 }
 
-}  // namespace
+}  // namespace test_sample_slip
 }  // namespace stageid

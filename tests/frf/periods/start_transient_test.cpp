@@ -14,7 +14,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_start_transient {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -146,5 +146,5 @@ TEST_P(SettledNoise, IsNotCalledRinging) {
 INSTANTIATE_TEST_SUITE_P(OfAnyColour, SettledNoise,
                          testing::Values(Colour::white, Colour::low, Colour::modal, Colour::mixed));
 
-}  // namespace
+}  // namespace test_start_transient
 }  // namespace stageid

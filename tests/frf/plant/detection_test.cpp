@@ -10,7 +10,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_detection {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -169,5 +169,5 @@ TEST(Detection, SelectedOutputsKeepTheirRows) {
   EXPECT_EQ(part.nonlinearity.even.p_value.row(1), whole.nonlinearity.even.p_value.row(3));
 }
 
-}  // namespace
+}  // namespace test_detection
 }  // namespace stageid

@@ -13,7 +13,7 @@
 #include "tests/support/closed_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_experiment_noise {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -155,5 +155,5 @@ TEST(ExperimentNoise, IsToldAndNotSmoothed) {
   EXPECT_TRUE(check_experiment_noise(estimate(even)).empty());
 }
 
-}  // namespace
+}  // namespace test_experiment_noise
 }  // namespace stageid

@@ -5,7 +5,7 @@
 #include "tests/support/closed_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_frf_determinism {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -82,5 +82,5 @@ TEST(FrfDeterminism, ProvenanceNamesFileHashAndOptionsButNoPlaceOrThread) {
   EXPECT_EQ(before, estimate_plant_frf({&log}).provenance_json);
 }
 
-}  // namespace
+}  // namespace test_frf_determinism
 }  // namespace stageid

@@ -8,7 +8,7 @@
 #include "tests/support/closed_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_frf_uncertainty {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -265,5 +265,5 @@ TEST(FrfUncertainty, RunsOfUnequalLengthAreWeightedByTheirPeriods) {
   }
 }
 
-}  // namespace
+}  // namespace test_frf_uncertainty
 }  // namespace stageid

@@ -8,7 +8,7 @@
 #include "tests/support/error_message.hpp"
 
 namespace stageid {
-namespace {
+namespace test_left_out_realization {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -119,5 +119,5 @@ TEST(LeftOutRealization, OneAtLeastIsNeeded) {
   EXPECT_THAT(test::error_message<FormatError>([&] { read_health_record({&log}, {}); }), wanted);
 }
 
-}  // namespace
+}  // namespace test_left_out_realization
 }  // namespace stageid

@@ -9,7 +9,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_local_polynomial {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -188,5 +188,5 @@ TEST(LocalPolynomial, TheNumberOfThreadsDoesNotMatter) {
   EXPECT_NE(one.provenance_json.find(R"("method":"lpm")"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_local_polynomial
 }  // namespace stageid

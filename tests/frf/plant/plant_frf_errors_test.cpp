@@ -7,7 +7,7 @@
 #include "tests/support/error_message.hpp"
 
 namespace stageid {
-namespace {
+namespace test_plant_frf_errors {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -233,5 +233,5 @@ TEST(PlantFrfErrors, AFullCovarianceNeedsTwoPeriods) {
               HasSubstr("only one clean period"));
 }
 
-}  // namespace
+}  // namespace test_plant_frf_errors
 }  // namespace stageid

@@ -9,7 +9,7 @@
 #include "tests/support/closed_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_plant_frf {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -365,5 +365,5 @@ TEST(PlantFrf, ProgressReachesTheTotal) {
   EXPECT_EQ(calls, 18);
 }
 
-}  // namespace
+}  // namespace test_plant_frf
 }  // namespace stageid

@@ -12,7 +12,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_response_drift {
 
 using Eigen::Index;
 using test::MemoryLog;
@@ -112,5 +112,5 @@ TEST(ResponseDrift, NeitherATransientNorADistortionIsTakenForOne) {
   }
 }
 
-}  // namespace
+}  // namespace test_response_drift
 }  // namespace stageid

@@ -15,7 +15,7 @@
 #include "frf/plant/plant_frf.hpp"
 
 namespace stageid {
-namespace {
+namespace test_shared_data {
 
 namespace fs = std::filesystem;
 
@@ -143,5 +143,5 @@ TEST(SharedData, FrequencyResponsesOfOtherProgramsLoad) {
   EXPECT_GT(files, 0);
 }
 
-}  // namespace
+}  // namespace test_shared_data
 }  // namespace stageid

@@ -16,7 +16,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_zippered {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -351,5 +351,5 @@ TEST(Zippered, WhereTheInterpolationFailsIsSaid) {
   EXPECT_THAT(found[0].figure, HasSubstr("times the noise at 2"));
 }
 
-}  // namespace
+}  // namespace test_zippered
 }  // namespace stageid

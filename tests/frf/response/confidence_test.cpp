@@ -12,7 +12,7 @@
 #include "tests/support/error_message.hpp"
 
 namespace stageid {
-namespace {
+namespace test_confidence {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -102,5 +102,5 @@ TEST(ConfidenceRadius, OverSeedsItCoversWhatItSays) {
   EXPECT_LT(coverage(1, 3).asymptotic, 0.87);  // what the test is there to see
 }
 
-}  // namespace
+}  // namespace test_confidence
 }  // namespace stageid

@@ -12,7 +12,7 @@
 #include "tests/support/numbered_frf.hpp"
 
 namespace stageid {
-namespace {
+namespace test_covariance_smoothing {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -92,5 +92,5 @@ TEST(CovarianceSmoothing, OverSeedsDegreesOfFreedomAreWhatTheySay) {
   EXPECT_NEAR((squares - sum.square()).mean() * 7.0, 1.0, 0.15);
 }
 
-}  // namespace
+}  // namespace test_covariance_smoothing
 }  // namespace stageid

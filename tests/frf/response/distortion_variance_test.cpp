@@ -7,7 +7,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_distortion_variance {
 
 constexpr Eigen::Index kLines = 400;
 
@@ -84,5 +84,5 @@ TEST(DistortionVariance, AnOutputThatShowsNothingHasItsNoise) {
   EXPECT_GT(found.variance.minCoeff(), 0.0);
 }
 
-}  // namespace
+}  // namespace test_distortion_variance
 }  // namespace stageid

@@ -10,7 +10,7 @@
 #include "tests/support/numbered_frf.hpp"
 
 namespace stageid {
-namespace {
+namespace test_frf_estimate {
 
 using test::numbered_frf;
 using testing::AllOf;
@@ -191,5 +191,5 @@ INSTANTIATE_TEST_SUITE_P(
               "excluded_power: 2 values for 1 channels"}),
     [](const auto& fault) { return fault.param.name; });
 
-}  // namespace
+}  // namespace test_frf_estimate
 }  // namespace stageid

@@ -7,7 +7,7 @@
 #include <numbers>
 
 namespace stageid {
-namespace {
+namespace test_hold_compensation {
 
 using Complex = std::complex<double>;
 constexpr double kRate = 10000.0;
@@ -165,5 +165,5 @@ TEST(HoldCompensation, Errors) {
   EXPECT_THROW(compensate(frf, Compensation::hold, std::nan("")), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_hold_compensation
 }  // namespace stageid

@@ -8,7 +8,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_line_scatter {
 
 constexpr Eigen::Index kLines = 400;
 constexpr double kNoise = 1e-4;         // variance of the first channel
@@ -80,5 +80,5 @@ TEST(LineScatter, OfTooFewLinesNothingIsSaid) {
   EXPECT_EQ(scatter.over_noise, 0.0);
 }
 
-}  // namespace
+}  // namespace test_line_scatter
 }  // namespace stageid

@@ -12,7 +12,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_nonlinearity {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -132,5 +132,5 @@ TEST(Nonlinearity, WithoutNoiseEveryBandThatIsDistortedIsNonlinear) {
   }
 }
 
-}  // namespace
+}  // namespace test_nonlinearity
 }  // namespace stageid

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 namespace stageid {
-namespace {
+namespace test_relative_variance {
 
 /// Two outputs in different units, two inputs, two lines.
 FrfEstimate small_frf() {
@@ -47,5 +47,5 @@ TEST(RelativeVariance, RefusesWhatHasNone) {
   EXPECT_THROW(mean_relative_variance(frf, VarianceKind::noise), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_relative_variance
 }  // namespace stageid

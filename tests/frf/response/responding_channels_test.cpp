@@ -7,7 +7,7 @@
 #include <random>
 
 namespace stageid {
-namespace {
+namespace test_responding_channels {
 
 /// Two channels of one input: a response of `first` and one of `second` deviations, in noise of one deviation.
 FrfEstimate two_channels(double first, double second, std::uint64_t seed) {
@@ -55,5 +55,5 @@ TEST(RespondingChannels, ErrorsAreOverWhatIsFlaggedAndNotZero) {
   EXPECT_DOUBLE_EQ(relative_channel_error(error, power)[1], std::sqrt(1.25 / 2.0));
 }
 
-}  // namespace
+}  // namespace test_responding_channels
 }  // namespace stageid

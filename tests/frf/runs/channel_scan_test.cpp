@@ -10,7 +10,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_channel_scan {
 
 Eigen::VectorXd normal_samples(Eigen::Index n, std::uint64_t seed) {
   test::RandomNumbers random(seed);
@@ -100,5 +100,5 @@ TEST(ChannelScan, ClippedSamplesPileUpAndOthersDoNot) {
   }
 }
 
-}  // namespace
+}  // namespace test_channel_scan
 }  // namespace stageid

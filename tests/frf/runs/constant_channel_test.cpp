@@ -10,7 +10,7 @@
 #include "tests/support/error_message.hpp"
 
 namespace stageid {
-namespace {
+namespace test_constant_channel {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -70,5 +70,5 @@ TEST(ConstantActuator, IsNamed) {
                 named);
 }
 
-}  // namespace
+}  // namespace test_constant_channel
 }  // namespace stageid

@@ -7,7 +7,7 @@
 #include "tests/support/closed_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_excitation_spectrum {
 
 constexpr int kPeriod = 4000;
 
@@ -89,5 +89,5 @@ TEST(ExcitationSpectrum, ZeroIsNothing) {
   EXPECT_TRUE(found.channels.empty());
 }
 
-}  // namespace
+}  // namespace test_excitation_spectrum
 }  // namespace stageid

@@ -6,7 +6,7 @@
 #include "tests/support/closed_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_health_record {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -98,5 +98,5 @@ TEST(HealthRecord, HoldsAllChannelsWhateverIsEstimated) {
   expect_equal(estimate_plant_frf_and_health({&log}, lpm).health, alone);
 }
 
-}  // namespace
+}  // namespace test_health_record
 }  // namespace stageid

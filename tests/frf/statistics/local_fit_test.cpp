@@ -7,7 +7,7 @@
 #include "tests/support/closed_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_local_fit {
 
 using test::ComplexNoise;
 
@@ -153,5 +153,5 @@ TEST(LocalFit, VariancesOfAMeanOverPolesScatterAsTheirDegreesOfFreedomSay) {
   }
 }
 
-}  // namespace
+}  // namespace test_local_fit
 }  // namespace stageid

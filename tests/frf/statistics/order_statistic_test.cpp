@@ -8,7 +8,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_order_statistic {
 
 TEST(OrderStatistic, IsWhereSortingPutsIt) {
   test::RandomNumbers random(5);
@@ -28,5 +28,5 @@ TEST(OrderStatistic, IsWhereSortingPutsIt) {
   EXPECT_EQ(median(three), 2.0);
 }
 
-}  // namespace
+}  // namespace test_order_statistic
 }  // namespace stageid

@@ -6,7 +6,7 @@
 #include <limits>
 
 namespace stageid {
-namespace {
+namespace test_tail_probability {
 
 // scipy.stats.f.logsf(x, 2 a, 2 b); the second overflows unless it is scaled on the way.
 TEST(TailProbability, OfFIsThatOfScipy) {
@@ -55,5 +55,5 @@ TEST(TailProbability, StaysANumberHoweverCleanTheDataAre) {
   EXPECT_EQ(tail_of_evidence(1e300, 5), 0.0);
 }
 
-}  // namespace
+}  // namespace test_tail_probability
 }  // namespace stageid

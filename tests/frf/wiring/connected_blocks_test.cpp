@@ -12,7 +12,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_connected_blocks {
 
 using Index = Eigen::Index;
 
@@ -132,5 +132,5 @@ TEST(SkewOfBlocks, ABlockOfTwoSaysWhatItNeeds) {
   EXPECT_NE(one.unchecked.find("decoupled"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_connected_blocks
 }  // namespace stageid

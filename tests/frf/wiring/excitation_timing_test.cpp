@@ -11,7 +11,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_excitation_timing {
 
 using Eigen::Index;
 using test::MemoryLog;
@@ -106,5 +106,5 @@ TEST(ExcitationTiming, ActuatorsThatAreLateAreNotTakenForIt) {
   }
 }
 
-}  // namespace
+}  // namespace test_excitation_timing
 }  // namespace stageid

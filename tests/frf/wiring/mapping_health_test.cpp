@@ -13,7 +13,7 @@
 #include "tests/support/sampled_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_mapping_health {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -213,5 +213,5 @@ TEST(Feedback, SaysWhatItNeeds) {
               HasSubstr("more experiments than the 2 sensors"));
 }
 
-}  // namespace
+}  // namespace test_mapping_health
 }  // namespace stageid

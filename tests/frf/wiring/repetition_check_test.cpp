@@ -7,7 +7,7 @@
 #include "tests/support/closed_loop.hpp"
 
 namespace stageid {
-namespace {
+namespace test_repetition_check {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -82,5 +82,5 @@ TEST(Repetition, TheExcitationNeedNotBeAtTheActuators) {
   EXPECT_EQ(check_log(log).size(), 1U);
 }
 
-}  // namespace
+}  // namespace test_repetition_check
 }  // namespace stageid

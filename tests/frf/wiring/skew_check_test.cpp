@@ -10,7 +10,7 @@
 #include "tests/support/random_numbers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_skew_check {
 
 using Index = Eigen::Index;
 
@@ -151,5 +151,5 @@ TEST(SkewCheck, TooMuchNoiseIsNotCheckedRatherThanFine) {
   EXPECT_NE(check.unchecked.find("above the noise"), std::string::npos) << check.unchecked;
 }
 
-}  // namespace
+}  // namespace test_skew_check
 }  // namespace stageid

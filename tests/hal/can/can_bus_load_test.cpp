@@ -9,7 +9,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_can_bus_load {
 
 // Longest frames in microseconds, rounded, computed by a program that counts the bits of worst
 // cases one by one (11-bit identifiers, 1 Mbit/s nominal).
@@ -91,5 +91,5 @@ TEST(CanBusLoad, TransferTime) {
   EXPECT_NEAR(can_transfer_time_s(wafer_spec(info, 5e6), 56e6), 169.6 / 0.8, 1e-9);
 }
 
-}  // namespace
+}  // namespace test_can_bus_load
 }  // namespace stageid

@@ -10,7 +10,7 @@
 #include "tests/hal/can/can_rig.hpp"
 
 namespace stageid {
-namespace {
+namespace test_can_dbc {
 
 // Against the format itself: tests/vm/can_kernel_test.py reads recorded frames with this file alone.
 TEST(CanDbc, NamesEveryFrameAndChannel) {
@@ -59,5 +59,5 @@ TEST(CanTransport, TheWorstBusCounts) {
   EXPECT_STREQ(to_string(CanBusState::down), "interface down");
 }
 
-}  // namespace
+}  // namespace test_can_dbc
 }  // namespace stageid

@@ -11,7 +11,7 @@
 #include "tests/hal/can/can_host.hpp"
 
 namespace stageid {
-namespace {
+namespace test_can_fault {
 
 using test::all_ok;
 using test::CanRig;
@@ -124,5 +124,5 @@ TEST(CanFaults, AreReadOrRefused) {
     EXPECT_THROW(parse_can_fault(text), std::invalid_argument) << text;
 }
 
-}  // namespace
+}  // namespace test_can_fault
 }  // namespace stageid

@@ -12,7 +12,7 @@
 #include "tests/hal/can/can_host.hpp"
 
 namespace stageid {
-namespace {
+namespace test_can_flood {
 
 using test::CanRig;
 using Host = test::CanHost;
@@ -82,5 +82,5 @@ TEST(CanFlood, TheNodesWatchdogLooksAtTheTimeAllTheSame) {
   EXPECT_EQ(stage.cause(), FaultCause::watchdog);
 }
 
-}  // namespace
+}  // namespace test_can_flood
 }  // namespace stageid

@@ -11,7 +11,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_can_frame {
 
 CanFrame sealed(std::size_t payload_bytes) {
   CanFrame frame;
@@ -287,5 +287,5 @@ TEST(CanMessages, WhatIsOutOfRangeIsRefusedThoughItsCrcIsRight) {
   EXPECT_FALSE(decode_can_text(with_byte(encode_can_text("x", 0, 0), 4, 3), part, piece));
 }
 
-}  // namespace
+}  // namespace test_can_frame
 }  // namespace stageid

@@ -16,7 +16,7 @@
 #include "tests/hal/can/can_host.hpp"
 
 namespace stageid {
-namespace {
+namespace test_can_ownership {
 
 using test::CanRig;
 using Host = test::CanHost;
@@ -373,5 +373,5 @@ TEST(CanOwnership, AnArmedNodeWhoseHostFallsSilentIsFreeAgain) {
   EXPECT_EQ(host.exchange(), Outcome::ok);
 }
 
-}  // namespace
+}  // namespace test_can_ownership
 }  // namespace stageid

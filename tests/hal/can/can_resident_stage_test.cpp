@@ -13,7 +13,7 @@
 #include "tests/hal/can/can_rig.hpp"
 
 namespace stageid {
-namespace {
+namespace test_can_resident_stage {
 
 using test::CanRig;
 
@@ -249,5 +249,5 @@ TEST(CanResidentStage, RefusesWhatDoesNotFit) {
   EXPECT_NO_THROW(stage->stop());
 }
 
-}  // namespace
+}  // namespace test_can_resident_stage
 }  // namespace stageid

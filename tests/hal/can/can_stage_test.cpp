@@ -11,7 +11,7 @@
 #include "tests/hal/can/can_host.hpp"
 
 namespace stageid {
-namespace {
+namespace test_can_stage {
 
 using test::all_ok;
 using test::CanRig;
@@ -301,5 +301,5 @@ TEST(CanStage, GarbageDoesNoHarm) {
   EXPECT_EQ(rig.front().rejected(), 2000U);
 }
 
-}  // namespace
+}  // namespace test_can_stage
 }  // namespace stageid

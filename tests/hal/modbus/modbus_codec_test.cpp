@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 namespace stageid {
-namespace {
+namespace test_modbus_codec {
 
 TEST(ModbusCodec, TheMoreSignificantWordComesFirst) {
   std::array<std::uint16_t, 4> r{};
@@ -67,5 +67,5 @@ TEST(ModbusCodec, ARangeThatCannotBeScaledIsRefused) {
     EXPECT_THROW(static_cast<void>(count_scale(range)), std::invalid_argument) << range;
 }
 
-}  // namespace
+}  // namespace test_modbus_codec
 }  // namespace stageid

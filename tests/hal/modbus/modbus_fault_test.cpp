@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 namespace stageid {
-namespace {
+namespace test_modbus_fault {
 
 using Kind = ModbusFault::Kind;
 
@@ -56,5 +56,5 @@ TEST(ModbusFault, IsOnForItsRequests) {
   EXPECT_FALSE(script.mentions(Kind::gravity));
 }
 
-}  // namespace
+}  // namespace test_modbus_fault
 }  // namespace stageid

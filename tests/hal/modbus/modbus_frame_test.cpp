@@ -6,7 +6,7 @@
 #include <vector>
 
 namespace stageid {
-namespace {
+namespace test_modbus_frame {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -97,5 +97,5 @@ TEST(ModbusFrame, OnlyWhatMayBecomeARequestIsKept) {
   EXPECT_EQ(find_rtu_request(told, 1).bytes, told.size());
 }
 
-}  // namespace
+}  // namespace test_modbus_frame
 }  // namespace stageid

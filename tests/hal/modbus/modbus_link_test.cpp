@@ -12,7 +12,7 @@
 #include "tests/hal/modbus/numbered_registers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modbus_link {
 
 using Pair = std::array<std::uint16_t, 2>;
 using testing::HasSubstr;
@@ -122,5 +122,5 @@ TEST(ModbusLink, AddressesAndTimesThatMakeNoSenseAreRefused) {
   EXPECT_NO_THROW(ModbusLink({}, {0.2, 0.2, 1e-3}));
 }
 
-}  // namespace
+}  // namespace test_modbus_link
 }  // namespace stageid

@@ -9,7 +9,7 @@
 #include <utility>
 
 namespace stageid::modbus_map {
-namespace {
+namespace test_modbus_map {
 
 TEST(ModbusMap, EntriesLieInOrderWithoutOverlap) {
   int end = 0;
@@ -55,5 +55,5 @@ TEST(ModbusMap, TheChannelHashIsFnv1aOfNamesAndUnits) {
   EXPECT_NE(channel_hash(info), 0x8C02120DU);
 }
 
-}  // namespace
+}  // namespace test_modbus_map
 }  // namespace stageid::modbus_map

@@ -16,7 +16,7 @@
 #include "tests/hal/modbus/modbus_bench.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modbus_ownership {
 
 namespace map = modbus_map;
 using test::ModbusBench;
@@ -264,5 +264,5 @@ TEST(ModbusOwnership, ASecondHostIsRefusedAndTheFirstNoticesNothing) {
   EXPECT_EQ(bench.fake->commands.size(), 100U);
 }
 
-}  // namespace
+}  // namespace test_modbus_ownership
 }  // namespace stageid

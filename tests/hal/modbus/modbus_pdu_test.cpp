@@ -9,7 +9,7 @@
 #include "tests/hal/modbus/numbered_registers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modbus_pdu {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -80,5 +80,5 @@ TEST_F(ModbusPdu, GarbageGetsAReplyThatIsNoLongerThanAPdu) {
   }
 }
 
-}  // namespace
+}  // namespace test_modbus_pdu
 }  // namespace stageid

@@ -23,7 +23,7 @@
 #include "tests/hal/modbus/numbered_registers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modbus_server {
 
 using Pair = std::array<std::uint16_t, 2>;
 using Bytes = std::vector<std::uint8_t>;
@@ -271,5 +271,5 @@ TEST(ModbusServer, OtherUnitsOnASerialLineDoNotDeafenTheNode) {
   close(line);
 }
 
-}  // namespace
+}  // namespace test_modbus_server
 }  // namespace stageid

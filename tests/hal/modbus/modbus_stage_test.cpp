@@ -12,7 +12,7 @@
 #include "tests/hal/modbus/numbered_registers.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modbus_stage {
 
 namespace map = modbus_map;
 using test::ModbusBench;
@@ -213,5 +213,5 @@ TEST(ModbusNode, RefusesWhatTheMapCannotShow) {
                std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_modbus_stage
 }  // namespace stageid

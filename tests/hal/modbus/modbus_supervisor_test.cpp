@@ -13,7 +13,7 @@
 #include "tests/hal/modbus/modbus_bench.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modbus_supervisor {
 
 using test::ModbusBench;
 using testing::HasSubstr;
@@ -150,5 +150,5 @@ TEST(ModbusSupervisor, TimesThatMakeNoSenseAreRefused) {
   EXPECT_THROW(ModbusSupervisor({}, {}, {0.1, 6.0, 5.0}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_modbus_supervisor
 }  // namespace stageid

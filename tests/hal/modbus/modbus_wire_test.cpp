@@ -6,7 +6,7 @@
 #include "hal/modbus/modbus_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modbus_wire {
 
 ModbusAddress serial(int baud) {
   ModbusAddress address;
@@ -69,5 +69,5 @@ TEST(ModbusStageRate, MoreChannelsThanOneTransactionAreRefused) {
   EXPECT_THAT(refusal(info(10.0, 1, 57), {}), testing::HasSubstr("57 sensors"));
 }
 
-}  // namespace
+}  // namespace test_modbus_wire
 }  // namespace stageid

@@ -6,7 +6,7 @@
 #include <string>
 
 namespace stageid {
-namespace {
+namespace test_node_state_machine {
 
 using State = NodeState;
 using Command = SupervisorCommand;
@@ -152,5 +152,5 @@ TEST(NodeStateMachine, NamesEveryCauseDifferently) {
   EXPECT_STREQ(to_string(static_cast<FaultCause>(200)), "unknown");
 }
 
-}  // namespace
+}  // namespace test_node_state_machine
 }  // namespace stageid

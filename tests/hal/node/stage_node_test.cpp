@@ -13,7 +13,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_stage_node {
 
 constexpr double kRate_hz = 1e3;
 constexpr std::int64_t kMs_ns = 1'000'000;
@@ -280,5 +280,5 @@ TEST(StageNode, GivesTheSamplesOfTheStageItself) {
   }
 }
 
-}  // namespace
+}  // namespace test_stage_node
 }  // namespace stageid

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 namespace stageid {
-namespace {
+namespace test_plugin_stage {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -34,5 +34,5 @@ TEST(PluginStage, RefusesALibraryWithoutTheInterface) {
       ThrowsMessage<StageError>(HasSubstr("has no function stageid_get_backend()")));
 }
 
-}  // namespace
+}  // namespace test_plugin_stage
 }  // namespace stageid

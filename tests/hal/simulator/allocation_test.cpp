@@ -14,7 +14,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_allocation {
 
 using Kind = WaferStageSpec::Fault::Kind;
 
@@ -123,5 +123,5 @@ TEST_F(Allocation, AReplayedCycleHasNone) {
   EXPECT_EQ(counter.count(), 0U);
 }
 
-}  // namespace
+}  // namespace test_allocation
 }  // namespace stageid

@@ -19,7 +19,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_closed_loop {
 
 constexpr int kPeriod = 40000;  // 4 s at 10 kHz
 constexpr int kLines = 4000;    // odd ones, 0.25 to 1999.75 Hz
@@ -229,5 +229,5 @@ TEST_F(FrfNoise, LeavesEveryResonanceStandingOut) {
   }
 }
 
-}  // namespace
+}  // namespace test_closed_loop
 }  // namespace stageid

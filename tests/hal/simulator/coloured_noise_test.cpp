@@ -9,7 +9,7 @@
 #include <vector>
 
 namespace stageid {
-namespace {
+namespace test_coloured_noise {
 
 constexpr double kRateHz = 1000.0;
 
@@ -88,5 +88,5 @@ TEST(ColouredNoise, RefusesAReferenceAboveHalfTheRate) {
   EXPECT_THROW(ColouredNoise(spec_of(NoiseColour::drift, 500.0)), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_coloured_noise
 }  // namespace stageid

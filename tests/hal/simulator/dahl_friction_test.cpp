@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace stageid {
-namespace {
+namespace test_dahl_friction {
 
 TEST(DahlFriction, IsASpringForSmallMotion) {
   DahlFriction friction(2.0, 1e6);
@@ -47,5 +47,5 @@ TEST(DahlFriction, CostsTheHysteresisOfACycle) {
   EXPECT_NEAR(work / expected, 1.0, 1e-4);
 }
 
-}  // namespace
+}  // namespace test_dahl_friction
 }  // namespace stageid

@@ -11,7 +11,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_fault_script {
 
 using Kind = WaferStageSpec::Fault::Kind;
 using test::Bench;
@@ -176,5 +176,5 @@ TEST_F(FaultTest, ComesInTheAskedRunOnly) {
 
 // Counts and policies only: wall-clock figures are for benchmarks.
 
-}  // namespace
+}  // namespace test_fault_script
 }  // namespace stageid

@@ -9,7 +9,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_loop_stability {
 
 WaferStageSpec with_crossovers(double factor) {
   WaferStageSpec spec = test::silent_wafer_stage_spec();
@@ -66,5 +66,5 @@ TEST(LoopStability, SensitivityDoesNotDependOnUnits) {
   EXPECT_DOUBLE_EQ(largest_sensitivity(L.topLeftCorner(1, 1)), 2.0);
 }
 
-}  // namespace
+}  // namespace test_loop_stability
 }  // namespace stageid

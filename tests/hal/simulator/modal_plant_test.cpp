@@ -17,7 +17,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_modal_plant {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -314,5 +314,5 @@ TEST(ModalPlant, GoesOnFromItsStateWithARetunedMode) {
   EXPECT_EQ(retuned.coordinate(1), before);
 }
 
-}  // namespace
+}  // namespace test_modal_plant
 }  // namespace stageid

@@ -8,7 +8,7 @@
 #include <vector>
 
 namespace stageid {
-namespace {
+namespace test_noise {
 
 std::vector<double> numbers(std::uint64_t seed, std::uint64_t stream, std::size_t blocks) {
   NormalSource source(seed, stream);
@@ -138,5 +138,5 @@ TEST(StageNoise, CanBeSilent) {
   EXPECT_EQ(noise.sensor_m()[1], 0.0);
 }
 
-}  // namespace
+}  // namespace test_noise
 }  // namespace stageid

@@ -10,7 +10,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_plant_response {
 
 using Complex = std::complex<double>;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
@@ -149,5 +149,5 @@ TEST(PlantResponse, RefusesWhatHasNone) {
   EXPECT_THROW(sampled_response(modes, -1.0, 1e3, 1.0), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_plant_response
 }  // namespace stageid

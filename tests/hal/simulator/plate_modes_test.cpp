@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 namespace stageid {
-namespace {
+namespace test_plate_modes {
 
 // omega a^2 sqrt(rho h / D) of the completely free square plate, nu = 0.3: K. M. Liew, Y. Xiang and
 // S. Kitipornchai, J. Sound Vib. 163 (1993), and others, to the digits they agree on.
@@ -102,5 +102,5 @@ TEST(PlateModes, RefuseWhatIsNoPlate) {
   EXPECT_THROW(PlateModes({1.0, 1.0, 0.3}, PlateModes::max_count() + 1), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_plate_modes
 }  // namespace stageid

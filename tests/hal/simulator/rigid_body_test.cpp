@@ -10,7 +10,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_rigid_body {
 
 AxisController lead(double crossover_hz) {
   AxisController axis;
@@ -133,5 +133,5 @@ TEST_F(UncontrollableStage, IsRefusedWithImpossibleFrequencies) {
                std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_rigid_body
 }  // namespace stageid

@@ -17,7 +17,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_simulated_stage {
 
 using Kind = WaferStageSpec::Fault::Kind;
 
@@ -257,5 +257,5 @@ TEST(SimulatedStage, WantsRoomForEverySensor) {
   EXPECT_THROW(stage.start(0, inputs), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_simulated_stage
 }  // namespace stageid

@@ -14,7 +14,7 @@
 #include "tests/hal/stage/fake_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_limited_stage {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -322,5 +322,5 @@ TEST(LimitedStage, DescribesEveryKind) {
   EXPECT_STREQ(to_string(LimitKind::hard_position), "hard position");
 }
 
-}  // namespace
+}  // namespace test_limited_stage
 }  // namespace stageid

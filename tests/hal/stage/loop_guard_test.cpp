@@ -13,7 +13,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_loop_guard {
 
 using testing::HasSubstr;
 using Kind = WaferStageSpec::Fault::Kind;
@@ -179,5 +179,5 @@ TEST(LoopGuard, RefusesAMotionThatDoesNotFit) {
   EXPECT_THROW(make([](RigidMotion& m) { m.contradiction.setZero(2, 2); }), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_loop_guard
 }  // namespace stageid

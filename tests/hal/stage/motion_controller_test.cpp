@@ -12,7 +12,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_motion_controller {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
@@ -179,5 +179,5 @@ TEST(MotionController, RefusesWhatMakesNoSense) {
   EXPECT_THROW(MotionController{spec}, std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_motion_controller
 }  // namespace stageid

@@ -5,7 +5,7 @@
 #include <ctime>
 
 namespace stageid {
-namespace {
+namespace test_pacer {
 
 // A clock cannot be made to hold still: what is checked are order and phase, which hold however slow
 // the machine is.
@@ -65,5 +65,5 @@ TEST(Pacer, PaceIsStageTimeOverWallTime) {
   EXPECT_EQ(pacer.wait().sample_ns - origin, kPeriod_ns / 4);
 }
 
-}  // namespace
+}  // namespace test_pacer
 }  // namespace stageid

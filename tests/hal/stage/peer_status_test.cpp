@@ -20,7 +20,7 @@
 #include "tests/hal/modbus/modbus_bench.hpp"
 
 namespace stageid {
-namespace {
+namespace test_peer_status {
 
 namespace map = modbus_map;
 using test::CanRig;
@@ -335,5 +335,5 @@ INSTANTIATE_TEST_SUITE_P(
 // The rows that need more than one peer are in ownership_test.cpp, those of a bus in can_stage_test.cpp
 // and can_fault_test.cpp, those of a link in modbus_stage_test.cpp.
 
-}  // namespace
+}  // namespace test_peer_status
 }  // namespace stageid

@@ -11,7 +11,7 @@
 #include "hal/stage/pacer.hpp"
 
 namespace stageid {
-namespace {
+namespace test_plant_watch {
 
 using testing::HasSubstr;
 
@@ -174,5 +174,5 @@ TEST(PlantWatch, ConditionsThatNothingFulfilsAreRefused) {
   EXPECT_THROW(PlantWatch(supervisor, empty), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_plant_watch
 }  // namespace stageid

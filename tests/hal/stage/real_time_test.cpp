@@ -16,7 +16,7 @@
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_real_time {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -123,5 +123,5 @@ TEST(RealTime, RefusesWhatCannotBe) {
       ThrowsMessage<std::invalid_argument>(HasSubstr("100000")));
 }
 
-}  // namespace
+}  // namespace test_real_time
 }  // namespace stageid

@@ -9,7 +9,7 @@
 #include <vector>
 
 namespace stageid {
-namespace {
+namespace test_replay_stage {
 
 struct Recorded {
   Eigen::MatrixXd u, y;
@@ -160,5 +160,5 @@ TEST_F(ReplayTest, RefusesBadArguments) {
   EXPECT_THROW(replay.start(0, inputs_), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_replay_stage
 }  // namespace stageid

@@ -6,7 +6,7 @@
 #include <string>
 
 namespace stageid {
-namespace {
+namespace test_stage {
 
 TEST(Outcome, HasANameOfItsOwn) {
   std::set<std::string> names;
@@ -26,5 +26,5 @@ TEST(NodeState, HasANameOfItsOwn) {
   EXPECT_STREQ(to_string(static_cast<NodeState>(200)), "unknown state");
 }
 
-}  // namespace
+}  // namespace test_stage
 }  // namespace stageid

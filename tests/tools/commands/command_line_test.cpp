@@ -5,7 +5,7 @@
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_command_line {
 
 class CommandLine : public ProgramTest {};
 
@@ -54,5 +54,5 @@ TEST_F(CommandLine, WithoutArgumentsThereAreThreeThingsToTry) {
     EXPECT_THAT(shown.out, testing::HasSubstr(start));
 }
 
-}  // namespace
+}  // namespace test_command_line
 }  // namespace stageid::test

@@ -9,7 +9,7 @@
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_fft_plans_option {
 
 using testing::HasSubstr;
 
@@ -56,5 +56,5 @@ TEST_F(FftWisdomOption, TwoProgramsAtOnceLeaveAWholeFile) {
   EXPECT_TRUE(same_bytes(plans, read_bytes(at("plans"))));
 }
 
-}  // namespace
+}  // namespace test_fft_plans_option
 }  // namespace stageid::test

@@ -17,7 +17,7 @@
 #include "tools/experiment/experiment_config.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_workflow {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -350,5 +350,5 @@ TEST_F(Workflow, ACompensatedResponseGivesTheSameModes) {
   EXPECT_NEAR(first_flexible_mode("hold"), measured, 1e-3 * measured);
 }
 
-}  // namespace
+}  // namespace test_workflow
 }  // namespace stageid::test

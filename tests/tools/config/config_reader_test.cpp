@@ -12,7 +12,7 @@
 #include "tools/terminal/format_errors.hpp"
 
 namespace stageid {
-namespace {
+namespace test_config_reader {
 
 using testing::HasSubstr;
 
@@ -207,5 +207,5 @@ TEST(ConfigSchema, ListsEveryKeyThatTheReaderKnows) {
   EXPECT_THAT(schema_text(entries), HasSubstr("  rms_n:"));
 }
 
-}  // namespace
+}  // namespace test_config_reader
 }  // namespace stageid

@@ -14,7 +14,7 @@
 #include "tools/experiment/link_load.hpp"
 
 namespace stageid {
-namespace {
+namespace test_configs {
 
 const std::filesystem::path kConfigs = std::filesystem::path(STAGEID_SOURCE_DIR) / "configs";
 
@@ -154,5 +154,5 @@ TEST(Configs, TheMeasurementIsAnotherIfStageOrExcitationChange) {
   EXPECT_NE(quick.measurement_id, paper.measurement_id);
 }
 
-}  // namespace
+}  // namespace test_configs
 }  // namespace stageid

@@ -19,7 +19,7 @@
 #include "tools/config/stage_expectation.hpp"
 
 namespace stageid {
-namespace {
+namespace test_controller_file {
 
 using test::MemoryLog;
 using testing::AllOf;
@@ -175,5 +175,5 @@ TEST_F(ControllerFileTest, WhatIsWrongIsSaidWithItsPlace) {
                FileError);
 }
 
-}  // namespace
+}  // namespace test_controller_file
 }  // namespace stageid

@@ -7,7 +7,7 @@
 #include "tools/config/stage_config.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_real_time_keys {
 
 class RealTimeKeysTest : public ProgramTest {
  protected:
@@ -79,5 +79,5 @@ TEST_F(RealTimeKeysTest, EventsStandBesideTheLogAlsoOfAResumedOne) {
   EXPECT_THAT(read_bytes(at("run.events.jsonl")), testing::HasSubstr(R"("event":"resume")"));
 }
 
-}  // namespace
+}  // namespace test_real_time_keys
 }  // namespace stageid::test

@@ -8,7 +8,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_strict_yaml {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -138,5 +138,5 @@ TEST(StrictYaml, AFileOfMoreThanAMegabyteIsRefused) {
   EXPECT_THAT(error_of(std::string((1U << 20) + 1, ' ')), HasSubstr("longer than 1 MiB"));
 }
 
-}  // namespace
+}  // namespace test_strict_yaml
 }  // namespace stageid

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 namespace stageid {
-namespace {
+namespace test_dashboard_address {
 
 TEST(DashboardAddress, APortAloneIsThisMachineOnly) {
   const DashboardAddress address = parse_dashboard_address("8080");
@@ -43,5 +43,5 @@ TEST(DashboardToken, IsLongAndNeverTheSame) {
   EXPECT_FALSE(same_token("", token));
 }
 
-}  // namespace
+}  // namespace test_dashboard_address
 }  // namespace stageid

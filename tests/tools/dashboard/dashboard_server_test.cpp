@@ -16,7 +16,7 @@
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_dashboard_server {
 
 using namespace std::chrono_literals;
 
@@ -220,5 +220,5 @@ TEST_F(DashboardServerTest, FinishWaitsForNobodyForEver) {
   EXPECT_THAT(stays.read_until("0\r\n\r\n"), testing::HasSubstr("data: {}"));
 }
 
-}  // namespace
+}  // namespace test_dashboard_server
 }  // namespace stageid

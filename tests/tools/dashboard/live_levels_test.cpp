@@ -6,7 +6,7 @@
 #include <thread>
 
 namespace stageid {
-namespace {
+namespace test_live_levels {
 
 /// Rows of two channels and a status word.
 std::vector<double> rows_of(const std::vector<std::pair<double, double>>& values) {
@@ -64,5 +64,5 @@ TEST(LiveLevels, NothingIsLostToWhoeverLooksAllTheTime) {
   EXPECT_EQ(seen, kRows);
 }
 
-}  // namespace
+}  // namespace test_live_levels
 }  // namespace stageid

@@ -14,7 +14,7 @@
 #include "tools/experiment/config_plan.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_limited_plan {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -280,5 +280,5 @@ TEST_F(LimitedPlanTest, WithTheExactPlantThePredictionIsThatOfTheStage) {
                std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_limited_plan
 }  // namespace stageid::test

@@ -8,7 +8,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_loop_check {
 
 using testing::HasSubstr;
 
@@ -84,5 +84,5 @@ TEST_F(LoopCheckTest, ALittleMarginIsADoubt) {
   EXPECT_THAT(check_loop(stage).doubt, testing::IsEmpty());
 }
 
-}  // namespace
+}  // namespace test_loop_check
 }  // namespace stageid

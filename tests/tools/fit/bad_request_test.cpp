@@ -7,7 +7,7 @@
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_bad_request {
 
 class BadRequest : public ProgramTest {};
 
@@ -373,5 +373,5 @@ TEST_F(BadRequest, Fits) {
        "5 periods recorded, 9 transient");
 }
 
-}  // namespace
+}  // namespace test_bad_request
 }  // namespace stageid::test

@@ -15,7 +15,7 @@
 #include "tools/fit/submodel_text.hpp"
 
 namespace stageid {
-namespace {
+namespace test_fit_request {
 
 using testing::HasSubstr;
 
@@ -357,5 +357,5 @@ TEST(FitRequest, TheRequestIsNamedWhole) {
   EXPECT_THAT(one, HasSubstr("\"hold\":\"exact\""));
 }
 
-}  // namespace
+}  // namespace test_fit_request
 }  // namespace stageid

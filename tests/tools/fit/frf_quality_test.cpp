@@ -12,7 +12,7 @@
 #include "tools/steps/health_step.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_frf_quality {
 
 using nlohmann::json;
 using testing::Contains;
@@ -142,5 +142,5 @@ TEST(DroppedLines, SayThatTheTransientLasts) {
   EXPECT_THAT(dropped_lines(frf), Contains(told));
 }
 
-}  // namespace
+}  // namespace test_frf_quality
 }  // namespace stageid::test

@@ -8,7 +8,7 @@
 #include "tools/experiment/experiment_config.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_general_structure {
 
 using testing::HasSubstr;
 
@@ -76,5 +76,5 @@ TEST_F(GeneralStructure, KeysSayWhatFlagsSay) {
   EXPECT_EQ(config.fit.rigid_body, "suspension:0.4:0.5");
 }
 
-}  // namespace
+}  // namespace test_general_structure
 }  // namespace stageid::test

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace stageid {
-namespace {
+namespace test_submodel_text {
 
 using testing::HasSubstr;
 
@@ -53,5 +53,5 @@ TEST(SubmodelText, WhatIsWrongIsNamed) {
   wrong("n=4,f=120", "2 frequencies");
 }
 
-}  // namespace
+}  // namespace test_submodel_text
 }  // namespace stageid

@@ -16,7 +16,7 @@
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid {
-namespace {
+namespace test_weight_file {
 
 using Complex = std::complex<double>;
 
@@ -130,5 +130,5 @@ TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
   EXPECT_FALSE(std::filesystem::exists(name("model.json")));
 }
 
-}  // namespace
+}  // namespace test_weight_file
 }  // namespace stageid

@@ -7,7 +7,7 @@
 #include "tools/manual/zsh_completion.hpp"
 
 namespace stageid {
-namespace {
+namespace test_manual {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -74,5 +74,5 @@ TEST_F(Manual, ZshGetsDescriptionsAsText) {
   EXPECT_THAT(script, HasSubstr("next=('cut:Cuts '\\''it'\\'' at a\\b')"));
 }
 
-}  // namespace
+}  // namespace test_manual
 }  // namespace stageid

@@ -18,7 +18,7 @@
 #include "tools/report/report_input.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_plot {
 
 using testing::HasSubstr;
 
@@ -275,5 +275,5 @@ TEST(Pictures, AxesHoldTheDataAndLabelsThatFit) {
   EXPECT_EQ(magnitude_range(Eigen::VectorXd::Zero(3)), std::pair(1.0, 10.0));
 }
 
-}  // namespace
+}  // namespace test_plot
 }  // namespace stageid::test

@@ -9,7 +9,7 @@
 #include "tests/tools/report/synthetic_report.hpp"
 
 namespace stageid::report {
-namespace {
+namespace test_report_comparison {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -94,5 +94,5 @@ TEST(ReportComparison, PairsModesAndTellsChangesInDeviationsOfTheDifference) {
   EXPECT_FALSE(comparison_json(own).contains("pairs"));
 }
 
-}  // namespace
+}  // namespace test_report_comparison
 }  // namespace stageid::report

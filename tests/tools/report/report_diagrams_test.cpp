@@ -5,7 +5,7 @@
 #include <limits>
 
 namespace stageid::report {
-namespace {
+namespace test_report_diagrams {
 
 using nlohmann::json;
 
@@ -53,5 +53,5 @@ TEST(ReportDiagrams, TellTheGravestFindingFirst) {
   EXPECT_EQ(got[2]["channel"], "");
 }
 
-}  // namespace
+}  // namespace test_report_diagrams
 }  // namespace stageid::report

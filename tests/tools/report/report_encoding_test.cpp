@@ -12,7 +12,7 @@
 #include "tests/tools/report/packed_reader.hpp"
 
 namespace stageid::report {
-namespace {
+namespace test_report_encoding {
 
 using test::packed_numbers;
 using test::unpacked;
@@ -159,5 +159,5 @@ TEST(ReportEncoding, LogBytesKeepEveryRowToHalfItsStep) {
   }
 }
 
-}  // namespace
+}  // namespace test_report_encoding
 }  // namespace stageid::report

@@ -13,7 +13,7 @@
 #include "tools/steps/health_step.hpp"
 
 namespace stageid {
-namespace {
+namespace test_report_input {
 
 using testing::ElementsAre;
 using MessageSeverity = ReportMessage::Severity;
@@ -114,5 +114,5 @@ TEST_F(ReportInputTest, AFileWithoutVerdictsIsTestedWhereThatCanBe) {
   EXPECT_FALSE(read_back(frf).nonlinearity.has_value());
 }
 
-}  // namespace
+}  // namespace test_report_input
 }  // namespace stageid

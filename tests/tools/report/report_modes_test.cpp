@@ -6,7 +6,7 @@
 #include <numbers>
 
 namespace stageid {
-namespace {
+namespace test_report_modes {
 
 Submodel mode(double frequency_hz, double damping = 0.01, std::optional<double> std_hz = {}) {
   const double omega = 2.0 * std::numbers::pi * frequency_hz;
@@ -81,5 +81,5 @@ TEST(ModeTable, WithoutStandardDeviationNothingIsInStandardDeviations) {
   EXPECT_FALSE(rows[0].damping_deviation());
 }
 
-}  // namespace
+}  // namespace test_report_modes
 }  // namespace stageid

@@ -8,7 +8,7 @@
 #include "tests/tools/report/packed_reader.hpp"
 
 namespace stageid::report {
-namespace {
+namespace test_report_packing {
 
 std::vector<std::uint8_t> bytes(const std::string& text) { return {text.begin(), text.end()}; }
 
@@ -40,5 +40,5 @@ TEST(ReportPacking, BytesOfTheSamePlaceStandTogether) {
   EXPECT_EQ(test::numbers_of_planes<std::uint16_t>(byte_planes(numbers)), numbers);
 }
 
-}  // namespace
+}  // namespace test_report_packing
 }  // namespace stageid::report

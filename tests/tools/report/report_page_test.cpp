@@ -13,7 +13,7 @@
 #include "tools/report/report.hpp"
 
 namespace stageid {
-namespace {
+namespace test_report_page {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -283,5 +283,5 @@ TEST(Report, IsWrittenWholeOrNotAtAll) {
   std::filesystem::remove_all(directory);
 }
 
-}  // namespace
+}  // namespace test_report_page
 }  // namespace stageid

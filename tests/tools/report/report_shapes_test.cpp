@@ -11,7 +11,7 @@
 #include "tests/tools/report/synthetic_report.hpp"
 
 namespace stageid {
-namespace {
+namespace test_report_shapes {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -75,5 +75,5 @@ TEST(ReportShapes, RoundAndLeaveOutWhatIsNoNumber) {
   EXPECT_EQ(got, json({{0.123, -2.0}, {nullptr, 0.0}}));
 }
 
-}  // namespace
+}  // namespace test_report_shapes
 }  // namespace stageid

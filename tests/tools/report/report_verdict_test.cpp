@@ -6,7 +6,7 @@
 #include "tests/tools/report/synthetic_report.hpp"
 
 namespace stageid {
-namespace {
+namespace test_report_verdict {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -135,5 +135,5 @@ TEST(Verdict, AMeasurementWithoutModelIsNotJudged) {
   EXPECT_EQ(judge(data).level, Level::none);
 }
 
-}  // namespace
+}  // namespace test_report_verdict
 }  // namespace stageid

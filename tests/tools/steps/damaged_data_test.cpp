@@ -11,7 +11,7 @@
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid::test {
-namespace {
+namespace test_damaged_data {
 
 using Operation = std::function<void(Hdf5Surgery&)>;
 
@@ -179,5 +179,5 @@ TEST_F(DamagedData, FilesOfAnotherKind) {
   fail({"export", name("cut.json"), "-o", name("m.h5")}, 2, "cut.json");
 }
 
-}  // namespace
+}  // namespace test_damaged_data
 }  // namespace stageid::test

@@ -17,7 +17,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_fft_wisdom_file {
 
 using test::expect_error;
 
@@ -146,5 +146,5 @@ TEST_F(FftWisdomFileTest, AFolderThatTakesNoFileIsToldBeforeTheWork) {
   EXPECT_TRUE(std::filesystem::is_empty(directory_.path()));
 }
 
-}  // namespace
+}  // namespace test_fft_wisdom_file
 }  // namespace stageid

@@ -15,7 +15,7 @@
 #include "tools/steps/health_step.hpp"
 
 namespace stageid {
-namespace {
+namespace test_health_step {
 
 using test::MemoryLog;
 
@@ -194,5 +194,5 @@ TEST(DataHealth, FindingsSurviveTheProvenance) {
   EXPECT_TRUE(health_of("{\"health\": 3}").empty());
 }
 
-}  // namespace
+}  // namespace test_health_step
 }  // namespace stageid

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace stageid {
-namespace {
+namespace test_model_verdict {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -56,5 +56,5 @@ TEST(ModelVerdict, PutsFaultsOfOtherDataFirst) {
   EXPECT_THAT(verdict.reasons.front(), HasSubstr("z1: dead"));
 }
 
-}  // namespace
+}  // namespace test_model_verdict
 }  // namespace stageid

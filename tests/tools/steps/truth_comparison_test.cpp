@@ -9,7 +9,7 @@
 #include "tests/support/wafer_stage.hpp"
 
 namespace stageid {
-namespace {
+namespace test_truth_comparison {
 
 Submodel mode(double frequency_hz, double damping, const Eigen::MatrixXd& B0) {
   const double omega = 2.0 * std::numbers::pi * frequency_hz;
@@ -119,5 +119,5 @@ TEST(TruthComparison, AModeThatIsMissingIsSaid) {
   EXPECT_FALSE(truth_json(truth)["modes"][0]["found"].get<bool>());
 }
 
-}  // namespace
+}  // namespace test_truth_comparison
 }  // namespace stageid

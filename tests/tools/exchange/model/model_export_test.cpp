@@ -11,7 +11,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {
-namespace {
+namespace test_model_export {
 
 AdditiveModel small_model() {
   AdditiveModel model;
@@ -114,5 +114,5 @@ TEST(ModelExport, LeavesNothingBesideItsFile) {
   EXPECT_EQ(files, 1);
 }
 
-}  // namespace
+}  // namespace test_model_export
 }  // namespace stageid

@@ -13,7 +13,7 @@
 
 /// State space, modes and rigid body of an exported model, as another program reads them.
 namespace stageid {
-namespace {
+namespace test_model_hdf5 {
 
 /// 2 x 3: a rigid body of rank 2, a mode of rank one with shapes and mass as written here, one with
 /// free residues B_0 + B_1 s, and a compliance.
@@ -171,5 +171,5 @@ TEST(ModelHdf5Content, WhatHasNoStateSpaceIsRefusedAndLeavesNothing) {
   EXPECT_THROW(write_model_hdf5(directory / "none" / "m.h5", exported_model(), {}, {}), FileError);
 }
 
-}  // namespace
+}  // namespace test_model_hdf5
 }  // namespace stageid
