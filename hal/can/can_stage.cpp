@@ -267,6 +267,11 @@ std::string CanStage::trouble() const {
   const WorstBus worst = worst_bus(*transport_);
   if (worst.state >= CanBusState::passive)
     return fmt::format("{}: {}", transport_->name(worst.bus), to_string(worst.state));
+  // What this host could not send comes before what the node makes of it.
+  for (std::size_t bus = 0; bus < transport_->buses(); ++bus)
+    if (transport_->health(bus).send_refused > 0)
+      return fmt::format("{}: {} frames found no room in the queue: the bus is too slow",
+                         transport_->name(bus), transport_->health(bus).send_refused);
   const CanState& node = link_.state();
   const PeerMeaning& said = meaning(status_);
   const bool of_the_node = status_ <= PeerStatus::unknown_code;
@@ -275,10 +280,6 @@ std::string CanStage::trouble() const {
                        link_.text().empty() ? "" : ": " + link_.text());
   if (said.reaction == PeerReaction::stop || status_ == PeerStatus::setpoints_missed)
     return said.words;
-  for (std::size_t bus = 0; bus < transport_->buses(); ++bus)
-    if (transport_->health(bus).send_refused > 0)
-      return fmt::format("{}: {} frames found no room in the queue: the bus is too slow",
-                         transport_->name(bus), transport_->health(bus).send_refused);
   if (!complete())
     return fmt::format(
         "the node did not answer sample {} in time ({} damaged, {} old, {} foreign frames so far)",
