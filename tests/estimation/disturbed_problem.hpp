@@ -9,13 +9,6 @@
 
 namespace stageid::test {
 
-inline Eigen::MatrixXd random_matrix(RandomNumbers& random, Eigen::Index rows,
-                                     Eigen::Index columns) {
-  Eigen::MatrixXd out(rows, columns);
-  for (double& value : out.reshaped()) value = random.normal();
-  return out;
-}
-
 /// Fills the numerators at random, measures the model with noise, weighs arbitrarily, and then moves
 /// every parameter away: poles by 3 %, numerators by 30 %. Nothing is at an optimum.
 inline void measure_and_disturb(RandomNumbers& random, DenseProblem& problem, double time_scale_s) {

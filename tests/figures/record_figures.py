@@ -140,7 +140,7 @@ def commands(source, data):
         return
     yield "foreign log", ["frf", data / "foreign_log/log.h5", "-o", "{w}/foreign.h5"], ["foreign.h5"]
     for name, arguments in {
-            "iss1r_exact": ["--modes", "12"], "iss1r_noise60": [], "two_inertia_1x2": [], "wafer4x13": [],
+            "iss1r_exact": ["--modes", "12"], "iss1r_noise60": ["--modes", "12"], "two_inertia_1x2": [], "wafer4x13": [],
             "f16_1x3": ["--modes", "11"]}.items():
         yield f"fit {name}", ["fit", data / f"frf/{name}.h5", "-o", f"{{w}}/{name}.json", *arguments], [f"{name}.json"]
 

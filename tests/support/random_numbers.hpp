@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 #include <complex>
 #include <cstdint>
@@ -58,6 +59,13 @@ inline double RandomNumbers::chi_square_mean(double dof) {
   const double spread = 1.0 / (9.0 * dof);
   const double root = 1.0 - spread + normal() * std::sqrt(spread);
   return root * root * root;
+}
+
+inline Eigen::MatrixXd random_matrix(RandomNumbers& random, Eigen::Index rows,
+                                     Eigen::Index columns) {
+  Eigen::MatrixXd out(rows, columns);
+  for (double& value : out.reshaped()) value = random.normal();
+  return out;
 }
 
 }  // namespace stageid::test

@@ -16,7 +16,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
-#include "tests/acquisition/files/file_size_limit.hpp"
+#include "tests/support/file_size_limit.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "acquisition/files/file_error.hpp"
-#include "tests/acquisition/files/file_size_limit.hpp"
+#include "tests/support/file_size_limit.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {

@@ -12,7 +12,7 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "excitation/plan/experiment_plan.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
-#include "tests/acquisition/files/file_size_limit.hpp"
+#include "tests/support/file_size_limit.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace stageid {

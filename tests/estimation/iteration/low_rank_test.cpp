@@ -21,12 +21,6 @@ namespace test_low_rank {
 using testing::Contains;
 using testing::HasSubstr;
 
-Eigen::MatrixXd random_matrix(test::RandomNumbers& random, Eigen::Index rows, Eigen::Index cols) {
-  Eigen::MatrixXd out(rows, cols);
-  for (double& value : out.reshaped()) value = random.normal();
-  return out;
-}
-
 Eigen::VectorXd mode_a(double frequency_hz, double damping) {
   const double omega = 2.0 * std::numbers::pi * frequency_hz;
   return Eigen::Vector2d(2.0 * damping / omega, 1.0 / (omega * omega));

@@ -21,12 +21,6 @@ using testing::HasSubstr;
 using testing::Property;
 using testing::Throws;
 
-Eigen::MatrixXd random_matrix(test::RandomNumbers& random, Eigen::Index rows, Eigen::Index cols) {
-  Eigen::MatrixXd out(rows, cols);
-  for (double& value : out.reshaped()) value = random.normal();
-  return out;
-}
-
 /// One submodel with full numerators. Powers of s are scaled so that each matters at the poles.
 AdditiveModel model_of(const test::basis::Case& c, int degree) {
   test::RandomNumbers random(7);
