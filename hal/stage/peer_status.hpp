@@ -54,7 +54,7 @@ struct PeerMeaning {
   const char* modbus = "";        ///< and over Modbus
 };
 
-/// The one meaning of each status, by status. Both wires go by it, and so does docs/guide.md.
+/// The one meaning of each status, by status. docs/stops.md has the same table.
 std::span<const PeerMeaning> peer_meanings() noexcept;
 const PeerMeaning& meaning(PeerStatus status) noexcept;
 
@@ -78,7 +78,7 @@ Outcome outcome_of_code(std::uint8_t code) noexcept;
 /// @throws StageError "PLACE: WORDS DETAIL".
 [[noreturn]] void refuse(PeerStatus status, const std::string& place, const std::string& detail);
 
-/// The meanings as a Markdown table, as in docs/guide.md.
+/// The meanings as a Markdown table, as in docs/stops.md.
 std::string peer_meanings_table();
 
 }  // namespace stageid

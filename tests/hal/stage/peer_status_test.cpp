@@ -36,8 +36,8 @@ TEST(PeerStatus, HasOneMeaningEach) {
   EXPECT_EQ(number, static_cast<std::size_t>(PeerStatus::other_stage) + 1);
 }
 
-TEST(PeerStatus, TheGuideHoldsTheTable) {
-  const std::ifstream file(STAGEID_SOURCE_DIR "/docs/guide.md");
+TEST(PeerStatus, TheDocsHaveTheTable) {
+  const std::ifstream file(STAGEID_SOURCE_DIR "/docs/stops.md");
   std::ostringstream text;
   text << file.rdbuf();
   EXPECT_THAT(text.str(), testing::HasSubstr(peer_meanings_table()));
