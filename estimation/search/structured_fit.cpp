@@ -16,6 +16,7 @@
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/search_advice.hpp"
+#include "estimation/search/undetermined_modes.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
 #include "estimation/uncertainty/mode_deviation.hpp"
 
@@ -204,9 +205,12 @@ void continue_with(FitResult next, FitResult& result) {
   result = std::move(next);
 }
 
-void refit(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+void refit(const FrfEstimate& frf, const ModeSelection& selection, const FitOptions& options,
+           FitResult& result) {
   FitResult next = ranked_fit(frf, result.model, options, ModeNumber::given);
   sort_modes(next);
+  if (!selection.keep_modes && next.status != FitStatus::singular)
+    judge_undetermined_modes(frf, selection.exactly > 0, next);
   continue_with(std::move(next), result);
 }
 
@@ -247,7 +251,8 @@ void try_springs(const FrfEstimate& frf, const ModelStructure& structure,
 }
 
 /// Holds the frequencies of suspension modes that the lines do not determine, the worst first.
-void settle_suspension(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+void settle_suspension(const FrfEstimate& frf, const ModeSelection& selection,
+                       const FitOptions& options, FitResult& result) {
   for (std::size_t left = result.model.submodels.size(); left > 0; --left) {
     Submodel* worst = nullptr;
     double worst_deviation = kLargestDeviation;
@@ -273,7 +278,7 @@ void settle_suspension(const FrfEstimate& frf, const FitOptions& options, FitRes
             ? fmt::format(" (standard deviation {:.2g} Hz)",
                           worst_deviation * worst->natural_frequency_hz())
             : " (at its bound)"));
-    refit(frf, options, result);
+    refit(frf, selection, options, result);
   }
 }
 
@@ -343,7 +348,7 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   FitResult result = automatic_fit(frf, complete, selection, options);
   if (structure.springs_if_worth && structure.common.rigid_body)
     try_springs(frf, complete, selection, options, result);
-  settle_suspension(frf, options, result);
+  settle_suspension(frf, selection, options, result);
   result.decisions.insert(result.decisions.begin(), decisions.begin(), decisions.end());
   judge_explained(frf, options, result);
   if (options.uncertainty) fill_shape_deviations(frf, options, result);

@@ -99,6 +99,20 @@ TEST(Suspension, HasNoDeviationWhereTheLinesDoNotDetermineIt) {
   EXPECT_TRUE(fit.model.submodels[1].natural_frequency_std_hz);
 }
 
+TEST(Suspension, ThatIsHeldLeavesSurplusModesFlagged) {
+  FitOptions options;
+  options.weighting = Weighting::noise_variance;
+  RequestedStructure structure;
+  structure.common.rigid_body = false;
+  structure.suspension = true;
+  ModeSelection modes;
+  modes.exactly = 4;  // one is there
+  const FitResult fit =
+      structured_fit(test::noisy(suspended(0.05), 0.1, 6), structure, modes, options);
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("held")));
+  EXPECT_EQ(fit.status, FitStatus::undetermined) << fit.message;
+}
+
 TEST(Suspension, OfKnownFrequenciesKeepsThem) {
   test::DenseProblem problem = test::measured(
       {{0, mode_poles(0.3, 0.1), 0}, {0, mode_poles(0.8, 0.1), 0}, {0, mode_poles(300.0, 0.01), 0}},
