@@ -49,8 +49,9 @@ int main(int argc, char** argv) {
                   stageid::kWorldFailed);
   } catch (const std::exception&) {
     // Of a library: its words would help nobody.
-    return report(std::runtime_error("an unexpected error, which is a bug of stageid; report the "
-                                     "command with its input files"),
-                  stageid::kWorldFailed);
+    return report(
+        std::runtime_error(
+            "unexpected error, a bug in stageid; report the command with its input files"),
+        stageid::kWorldFailed);
   }
 }

@@ -48,18 +48,20 @@ nlohmann::ordered_json schema_json(const std::vector<SchemaEntry>& entries) {
 }  // namespace
 
 ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* config = add_command(app, "config", "What may stand in a configuration; check one");
+  CLI::App* config =
+      add_command(app, "config", "List the configuration keys; check configuration files");
   config->require_subcommand(1);
   CLI::App* schema_command =
-      add_command(*config, "schema", "Every key with type, unit, range, default");
+      add_command(*config, "schema", "List every key with type, unit, range and default");
   schema_command->add_option("kind", kind_, "experiment | stage; default: both")
       ->check(CLI::IsMember({"experiment", "stage"}));
   schema_command->final_callback([this] { schema(); });
   CLI::App* check_command = add_command(*config, "check", "Check experiment and stage files");
   check_command->add_option("files", files_, "YAML files")->required();
   check_command->final_callback([this] { check(); });
-  CLI::App* dbc_command = add_command(
-      *config, "dbc", "Write the CAN frames of a stage file as a database for can-utils, SavvyCAN");
+  CLI::App* dbc_command =
+      add_command(*config, "dbc",
+                  "Write the CAN frames of a stage file as a DBC database (can-utils, SavvyCAN)");
   dbc_command->add_option("stage", stage_file_, "stage file with a group 'can'")->required();
   dbc_command->add_option("-o,--output", output_, "file to write (.dbc)")->required();
   dbc_command->final_callback([this] { dbc(); });
@@ -69,12 +71,14 @@ void ConfigCommand::schema() const {
   nlohmann::ordered_json json;
   if (kind_ != "stage") {
     const std::vector<SchemaEntry> entries = config_schema(describe_experiment_keys);
-    console_.result("# An experiment file. Units stand in the keys; SI.\n" + schema_text(entries));
+    console_.result("# An experiment file. Units are SI and part of the key names.\n" +
+                    schema_text(entries));
     json["experiment"] = schema_json(entries);
   }
   if (kind_ != "experiment") {
     const std::vector<SchemaEntry> entries = config_schema(describe_stage_keys);
-    console_.result("# A stage file. Units stand in the keys; SI.\n" + schema_text(entries));
+    console_.result("# A stage file. Units are SI and part of the key names.\n" +
+                    schema_text(entries));
     json["stage"] = schema_json(entries);
   }
   console_.result(json);

@@ -64,10 +64,11 @@ std::vector<std::string> design_table(const ExperimentConfig& config, const Expe
   std::vector<std::string> lines;
   const auto [least, most] =
       std::minmax_element(prediction.crest_factor.begin(), prediction.crest_factor.end());
-  lines.push_back(fmt::format(
-      "{} of {} + {} of {} s, {:.1f} min in all; log {:.1f} MB", counted(plan.runs().size(), "run"),
-      plan.spec().transient_periods, counted(plan.spec().periods, "period"), plan.grid().period_s(),
-      plan.duration_s() / 60.0, expected_log_bytes(plan, stage.info) / 1e6));
+  lines.push_back(fmt::format("{} of {} + {} of {} s, {:.1f} min in total; log {:.1f} MB",
+                              counted(plan.runs().size(), "run"), plan.spec().transient_periods,
+                              counted(plan.spec().periods, "period"), plan.grid().period_s(),
+                              plan.duration_s() / 60.0,
+                              expected_log_bytes(plan, stage.info) / 1e6));
   lines.push_back(fmt::format("{}, {} ... {} Hz; crest factors {:.2f} ... {:.2f}",
                               counted(plan.grid().size(), "line"), frequency_hz[0],
                               frequency_hz[frequency_hz.size() - 1], *least, *most));
@@ -99,18 +100,19 @@ void require_within_limits(const ExperimentConfig& config, const DesignPredictio
       violations.size() == 1 ? "" : fmt::format(" (and {} more)", violations.size() - 1);
   throw FormatError(
       config.file, "",
-      fmt::format("{}{}; lower the level, or insist with --force", violations.front(), more));
+      fmt::format("{}{}; lower the level, or override with --force", violations.front(), more));
 }
 
 DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(
-      app, "design", "Draw the multisines; predict forces and motions against the limits");
+      app, "design",
+      "Design the multisines; check the predicted forces and motions against the limits");
   command->add_option("config", config_, "experiment file (.yaml)")->required();
   command->add_option("-o,--output", output_, "HDF5 file to write")->required();
   command
       ->add_option("--accuracy", accuracy_,
-                   "with level.limits: mean relative variance that is wanted, e.g. 1e-6 for 0.1 %; "
-                   "prints how many minutes reach it")
+                   "with level.limits: target mean relative variance, e.g. 1e-6 for 0.1 %; prints "
+                   "the measurement time needed to reach it")
       ->check(kPositive);
   command->add_flag("--force", force_, "write even if a limit would be exceeded");
   command->final_callback([this] { run(); });
@@ -126,10 +128,9 @@ void DesignCommand::run() const {
     return;
   }
   if (accuracy_ > 0.0)
-    throw FormatError(
-        config.file, "",
-        "--accuracy: the noise is known from the prior of 'level: {limits: ...}' only; "
-        "use that level");
+    throw FormatError(config.file, "",
+                      "--accuracy: needs the noise of a prior; set 'level: {limits: {prior: "
+                      "FILE}}' in the experiment file");
   const ExperimentPlan plan = make_plan(config);
   const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
   const bool written = force_ || prediction.violations().empty();
@@ -145,7 +146,7 @@ void DesignCommand::write_limited(const ExperimentConfig& config,
                                   const LimitedPlan& limited) const {
   const ExperimentPlan& plan = limited.design.plan;
   write_experiment_plan(output_, plan);
-  console_.result(fmt::format("{}, {:.1f} min in all; {}; prior {}",
+  console_.result(fmt::format("{}, {:.1f} min in total; {}; prior {}",
                               counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
                               counted(plan.grid().size(), "line"), config.limits->prior.string()));
   for (const LinkLoad& link : link_loads(config.stage)) console_.result(to_string(link));

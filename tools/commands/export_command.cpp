@@ -41,7 +41,7 @@ Eigen::Index place_of(const std::string& name, const ChannelList& channels, cons
   const auto found = std::find(channels.names.begin(), channels.names.end(), name);
   if (found == channels.names.end())
     throw std::invalid_argument(
-        fmt::format("--driving-point: '{}' is no {} of the model; there are {}", name, kind,
+        fmt::format("--driving-point: '{}' is not an {} of the model; use one of {}", name, kind,
                     fmt::join(channels.names, ", ")));
   return found - channels.names.begin();
 }
@@ -50,20 +50,21 @@ Eigen::Index place_of(const std::string& name, const ChannelList& channels, cons
 
 ExportCommand::ExportCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "export",
-                                  "Write a model or a frequency response for other programs: state "
+                                  "Export a model or a frequency response to other programs: state "
                                   "space, mode shapes, response");
   command->add_option("input", input_, "model.json or frf.h5")->required();
   command
       ->add_option("-o,--output", output_,
-                   "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); of a "
-                   "model also .json, .py, .m")
+                   "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); for "
+                   "a model also .json, .py, .m")
       ->required();
-  command->add_option("--frf", frf_,
-                      "of a model: the response on the lines of this FRF within the fit's band");
+  command->add_option(
+      "--frf", frf_,
+      "for a model: its response on the lines of this FRF within the band of the fit");
   command
-      ->add_option(
-          "--driving-point", driving_point_,
-          "OUTPUT INPUT, at one place in one direction; .h5, .mat, .npz: each mode's mass there")
+      ->add_option("--driving-point", driving_point_,
+                   "OUTPUT INPUT at the same point and in the same direction; .h5, .mat, .npz: "
+                   "adds the modal mass of each mode there")
       ->expected(2);
   add_mat_version(*command, mat_version_);
   command->final_callback([this] { run(); });
@@ -92,7 +93,7 @@ void ExportCommand::export_from_model() const {
 void ExportCommand::export_from_frf() const {
   if (!frf_.empty() || !driving_point_.empty())
     throw std::invalid_argument(
-        fmt::format("{}: is HDF5 and no model; --frf and --driving-point go with a model.json",
+        fmt::format("{}: is an HDF5 file, not a model; --frf and --driving-point need a model.json",
                     input_.string()));
   require_no_input(output_, {input_});
   const FrfEstimate frf = read_frf(input_);
@@ -100,7 +101,7 @@ void ExportCommand::export_from_frf() const {
     require_frf_export_format(output_);
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(
-        fmt::format("{}: holds a frequency response; {}", input_.string(), error.what()));
+        fmt::format("{}: contains a frequency response; {}", input_.string(), error.what()));
   }
   export_frf(output_, frf, mat_version_);
 }

@@ -30,58 +30,57 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "fit", "Fit the additive model to an FRF");
   command->add_option("frf", frf_, "frf.h5")->required();
   command->add_option("-o,--output", output_, "model.json to write")->required();
-  command->add_option("--covariance", covariance_,
-                      "FILE.h5 to write: covariance of all parameters (sandwich and maximum "
-                      "likelihood) with their names and units, and the response of the model with "
-                      "its variance and 95 % radius");
+  command->add_option(
+      "--covariance", covariance_,
+      "FILE.h5 to write: covariance of all parameters (sandwich and maximum likelihood) with names "
+      "and units, and the model response with its variance and 95 % radius");
   command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: all lines")->expected(2);
   command->add_option("--modes", request_.modes,
-                      "auto | none | how many | frequencies f1,f2,... in Hz | modes.json; default: "
-                      "auto, with --submodel none");
+                      "auto | none | COUNT | frequencies f1,f2,... in Hz | modes.json; default: "
+                      "auto, or none with --submodel");
   command->add_option(
       "--weighting", request_.weighting,
       "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
-      "FILE.h5 with /weights or /weight_matrices; default: by the variances in the FRF");
-  command->add_option("--hold", request_.hold, "none | phase | sinc | exact; default: by the FRF");
+      "FILE.h5 with /weights or /weight_matrices; default: from the variances in the FRF");
+  command->add_option("--hold", request_.hold,
+                      "none | phase | sinc | exact; default: from the FRF");
   command->add_option("--delay", request_.delay,
-                      "SECONDS | estimate | per_channel; default: by the FRF");
+                      "SECONDS | estimate | per_channel; default: from the FRF");
   command->add_option(
       "--rigid-body", request_.rigid_body,
       "none | full | RANK: the term B_0 / s^2 | suspension: a mode below the lines instead, for a "
       "rigid body on weak springs | suspension:F1:F2: at these known frequencies, Hz | auto: full, "
-      "or "
-      "suspension where that is worth its parameters; default: auto; none with --submodel or where "
-      "the outputs are accelerations");
-  command->add_option(
-      "--direct-term", request_.direct_term,
-      "none | full: a constant, the compliance of modes above the band; default: none, "
-      "full where the outputs are accelerations");
+      "or suspension if the fit improves enough; default: auto, or none with --submodel or if the "
+      "outputs are accelerations");
+  command->add_option("--direct-term", request_.direct_term,
+                      "none | full: a constant, the compliance of modes above the band; default: "
+                      "none, or full if the outputs are accelerations");
   command
       ->add_option("--residue-rank", request_.residue_rank,
                    "full | 1: residues phi psi^T of mechanical modes")
       ->capture_default_str();
   command
-      ->add_option("--submodel", submodels_,
-                   "(B_0 + ... + B_m s^m) / (s^l A), A of order n: l=0,n=4,m=3,f=120:180,"
-                   "zeta=0.01; repeatable. m: n + l - 1 unless given. f: Hz where the poles start, "
-                   "one a pair, last the real one of odd n; without it they are searched. n=auto: "
-                   "one denominator for all modes that a search finds")
+      ->add_option(
+          "--submodel", submodels_,
+          "(B_0 + ... + B_m s^m) / (s^l A), A of order n: l=0,n=4,m=3,f=120:180,zeta=0.01; "
+          "repeatable. Default of m: n + l - 1. f: starting frequencies of the poles in Hz, one "
+          "per pair, the real pole of an odd n last; default: a search. n=auto: one denominator "
+          "for all modes that a search finds")
       ->allow_extra_args(false);
-  command->add_option(
-      "--damping", request_.damping,
-      "proportional | general: numerators B_0, or B_0 + B_1 s; default: proportional, "
-      "general where the outputs are accelerations");
+  command->add_option("--damping", request_.damping,
+                      "proportional | general: numerators B_0, or B_0 + B_1 s; default: "
+                      "proportional, or general if the outputs are accelerations");
   command->add_option("--method", request_.method, "riv | gn | sk")->capture_default_str();
-  command->add_option("--max-iterations", request_.max_iterations, "of one fit")
+  command->add_option("--max-iterations", request_.max_iterations, "iterations per fit")
       ->capture_default_str();
   command
       ->add_option("--search-seconds", request_.search_seconds,
-                   "budget of a search for modes, in seconds of an ordinary core; counted in work, "
-                   "so the result does not depend on the machine; then the best model so far is "
-                   "written, exit code 3. 0: no end")
+                   "budget of the mode search, in seconds of a typical core; counted in work, so "
+                   "the result does not depend on the machine. When it is used up, the best model "
+                   "so far is written and the exit code is 3. 0: unlimited")
       ->check(kNotNegative)
       ->capture_default_str();
-  command->add_option("--seed", seed_, "accepted; nothing in a fit is random");
+  command->add_option("--seed", seed_, "ignored: the fit is deterministic");
   command
       ->add_option("--threads", request_.threads, "0: all cores; the result does not depend on it")
       ->check(kNotNegative)

@@ -70,44 +70,48 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "frf", "Estimate the plant's FRF from closed-loop logs");
   command->add_option("logs", logs_, "logs (.slog or .h5)")->required();
   command->add_option("-o,--output", output_, "HDF5 file to write")->required();
-  command->add_option("--inputs", inputs_, "actuators A,B,...; default: those that are excited")
+  command->add_option("--inputs", inputs_, "actuators A,B,...; default: the excited ones")
       ->delimiter(',');
   command->add_option("--outputs", outputs_, "sensors C,D,...; default: all")->delimiter(',');
   command->add_option("--realizations", realizations_, "1-based; default: all complete ones")
       ->delimiter(',');
-  command->add_option("--transient-periods", transient_periods_,
-                      "dropped, instead of the log's own (lpm: of none)");
+  command->add_option(
+      "--transient-periods", transient_periods_,
+      "periods to discard at the start of each run; default: as declared in the log (lpm: 0)");
   command->add_option("--method", method_, "periodic | lpm (whole records, transient modelled)")
       ->check(CLI::IsMember({"periodic", "lpm"}))
       ->capture_default_str();
   command
-      ->add_option(
-          "--periods", periods_,
-          "consistent (glitches, bumps and transients left out; lpm: glitches) | unmarked (all)")
+      ->add_option("--periods", periods_,
+                   "consistent (without glitches, bumps and transients; lpm: without glitches) | "
+                   "unmarked (all)")
       ->check(CLI::IsMember({"consistent", "unmarked"}))
       ->capture_default_str();
   command
       ->add_option("--smooth-covariance", covariance_lines_,
-                   "of the noise: mean over LINES (odd) neighbouring lines, with their degrees "
-                   "of freedom")
+                   "average the noise covariance over LINES (odd) neighbouring lines; raises its "
+                   "degrees of freedom")
       ->type_name("LINES")
       ->check(kPositive)
       ->capture_default_str();
   command->add_option("--covariance", covariance_, "diagonal | full")
       ->check(CLI::IsMember({"diagonal", "full"}))
       ->capture_default_str();
-  command->add_option("--compensate", compensate_, "take out: none | delay | hold (and delay)")
+  command
+      ->add_option("--compensate", compensate_,
+                   "remove from the response: none | delay | hold (and delay)")
       ->check(CLI::IsMember({"none", "delay", "hold"}))
       ->capture_default_str();
+  command->add_option("--delay", delay_s_,
+                      "with --compensate: delay in addition to the half sample of the hold, s; "
+                      "default: as declared in the log");
   command->add_option(
-      "--delay", delay_s_,
-      "with --compensate: delay beside the hold's half sample, s; default: the log's");
-  command->add_option("--stage", stage_,
-                      "stage file that the data's health is held against; default: the log's own");
-  command->add_flag("--no-health", no_health_, "do not look at the health of the data");
+      "--stage", stage_,
+      "stage file for the health checks of the data; default: the one stored in the log");
+  command->add_flag("--no-health", no_health_, "skip the health checks of the data");
   command
       ->add_option("--fft-wisdom", fft_wisdom_,
-                   "keep FFT plans found by timing in FILE, and use those it holds")
+                   "store FFT plans found by timing in FILE and reuse those already there")
       ->type_name("FILE");
   command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
       ->check(kNotNegative)
@@ -136,14 +140,14 @@ void FrfCommand::run() const {
   options.threads = threads_;
   for (const int realization : realizations_) {
     if (realization < 1)
-      throw std::invalid_argument(
-          fmt::format("--realizations: {}; they are counted from 1", realization));
+      throw std::invalid_argument(fmt::format(
+          "--realizations: {} is out of range; realizations are counted from 1", realization));
     options.realizations.push_back(realization - 1);
   }
   if (delay_s_ && compensate_ == "none")
     throw std::invalid_argument(
-        "--delay: nothing is taken out without --compensate; add --compensate delay or hold, or "
-        "leave --delay out");
+        "--delay: has no effect without --compensate; add --compensate delay or hold, or omit "
+        "--delay");
   require_writable(output_, logs_);
   require_frf_ending(output_);
   FrfStep step = estimate(options);
@@ -151,7 +155,7 @@ void FrfCommand::run() const {
   if (compensate_ != "none") {
     const double delay_s = delay_s_ ? *delay_s_ : declared_delay_s(logs_.front());
     if (!delay_s_)
-      notes.push_back(fmt::format("--compensate: delay {} s, as the log declares", delay_s));
+      notes.push_back(fmt::format("--compensate: delay {} s, as declared in the log", delay_s));
     step.frf = compensate(
         step.frf, compensate_ == "hold" ? Compensation::hold : Compensation::delay, delay_s);
   }
@@ -161,7 +165,7 @@ void FrfCommand::run() const {
   console_.result(fmt::format("{:.1f} MB of samples in {:.2f} s, {:.0f} MB/s", step.bytes / 1e6,
                               step.seconds, rate));
   if (step.frf.noise_variance.size() > 0)
-    console_.result(fmt::format("median relative standard deviation by noise: {:.2e}",
+    console_.result(fmt::format("median relative standard deviation from noise: {:.2e}",
                                 median_relative_std(step.frf, step.frf.noise_variance)));
   for (const std::string& line : linearity_lines(step.frf)) console_.message(line);
   if (!no_health_)

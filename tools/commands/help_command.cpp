@@ -14,8 +14,9 @@ namespace stageid {
 
 HelpCommand::HelpCommand(CLI::App& app) : app_(app) {
   const std::vector<std::string> names = names_of(command_tree(app).commands);
-  CLI::App* command = add_command(app, "help", "What a command does and its options");
-  command->add_option("command", words_, "as it is called: 'frf', 'log info'; without it all")
+  CLI::App* command = add_command(app, "help", "Describe a command and its options");
+  command
+      ->add_option("command", words_, "name of the command: 'frf', 'log info'; default: list all")
       ->type_name(fmt::format("TEXT:{{{}}}", fmt::join(names, ",")));
   command->final_callback([this] { run(); });
 }
@@ -27,7 +28,7 @@ void HelpCommand::run() const {
     const std::vector<std::string> names = names_of(command_tree(*command).commands);
     if (std::find(names.begin(), names.end(), word) == names.end())
       throw std::invalid_argument(fmt::format(
-          "help: '{}' is no command{}; {}", word, path.empty() ? "" : " of" + path,
+          "help: unknown command '{}'{}; {}", word, path.empty() ? "" : " of" + path,
           names.empty() ? fmt::format("write 'stageid help{}'", path) : suggest_key(word, names)));
     command = command->get_subcommand(word);
     path += " " + word;

@@ -125,8 +125,8 @@ int Identification::measure_all() {
   const double stage_s =
       static_cast<double>(result.experiment.health.cycles) / plan_.grid().sample_rate_hz();
   finish_step("run", result.seconds,
-              fmt::format("{:.0f} s of stage time, {:.0f} times real time, {:.0f} MB", stage_s,
-                          result.seconds > 0.0 ? stage_s / result.seconds : 0.0,
+              fmt::format("{:.0f} s of stage time, {:.0f} times real-time speed, {:.0f} MB",
+                          stage_s, result.seconds > 0.0 ? stage_s / result.seconds : 0.0,
                           static_cast<double>(result.log_bytes) / 1e6));
   if (exit_code_ != kDone && exit_code_ != kNotTrustworthy)
     console_.warning(fmt::format("{}; {} of {} runs are kept{}", named(request.log, result.message),
@@ -283,7 +283,7 @@ void Identification::print_summary() const {
     console_.result(truth_error_line(*truth_));
   }
   if (validation_) {
-    console_.result("on the realization that was held back:");
+    console_.result("on the held-back realization:");
     for (const std::string& line : validation_lines(*validation_)) console_.result("  " + line);
   }
   for (const std::string& note : notes_) console_.warning(note);

@@ -11,11 +11,13 @@
 namespace stageid {
 
 IdentifyCommand::IdentifyCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(
-      app, "identify", "All of it: design, run, frf, modes, fit, validate, export, report");
+  CLI::App* command = add_command(app, "identify",
+                                  "Perform the complete identification: design, run, frf, modes, "
+                                  "fit, validate, export, report");
   command->add_option("config", config_, "experiment file (.yaml)")->required();
-  command->add_option("-o,--output", output_, "directory for everything")->required();
-  command->add_flag("--resume", resume_, "continue an interrupted one; what is up to date stays");
+  command->add_option("-o,--output", output_, "directory for all results")->required();
+  command->add_flag("--resume", resume_,
+                    "continue an interrupted identification; steps that are up to date are kept");
   command->add_flag("--force", force_, "measure even if a limit would be exceeded");
   command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
       ->check(kNotNegative)
@@ -27,7 +29,8 @@ void IdentifyCommand::run() const {
   const ExperimentConfig config = load_experiment_config(config_);
   if (!resume_ && std::filesystem::exists(output_ / "run.slog"))
     throw std::invalid_argument(
-        fmt::format("{}: holds a run already; continue it with --resume, or give another -o",
+        fmt::format("{}: already contains a run; continue it with --resume, or choose another "
+                    "directory with -o",
                     output_.string()));
   require_stable_loop(config, console_);
   Identification identification(config, {output_, resume_, force_, threads_}, console_);

@@ -33,8 +33,8 @@ namespace {
   throw FormatError(
       arrays.file, "",
       fmt::format(
-          "does not say what its {} arrays ({}{}) are; write a map with kind: frf or "
-          "kind: log (docs/exchange.md) and give it with --map; 'stageid import {}' lists them",
+          "the meaning of its {} arrays ({}{}) is unknown; write a map with kind: frf or kind: log "
+          "(docs/exchange.md) and pass it with --map; 'stageid import {}' lists the arrays",
           arrays.arrays.size(), shown, arrays.arrays.size() > kMost ? ", ..." : "",
           arrays.file.string()));
 }
@@ -42,8 +42,8 @@ namespace {
 void require_frf_output(const std::filesystem::path& output) {
   if (output.extension() != ".h5" && output.extension() != ".hdf5")
     throw std::invalid_argument(
-        fmt::format("{}: a frequency response is imported as .h5, not as '{}'", output.string(),
-                    output.extension().string()));
+        fmt::format("{}: a frequency response is written as .h5; '{}' is unsupported",
+                    output.string(), output.extension().string()));
 }
 
 FrfEstimate read_foreign_frf(const std::filesystem::path& file, const std::filesystem::path& output,
@@ -86,23 +86,22 @@ ImportSummary write_imported(const std::filesystem::path& output, FrfEstimate fr
 
 ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command =
-      add_command(app, "import", "Read a frequency response or a log that another program wrote");
+      add_command(app, "import", "Import a frequency response or a log written by another program");
+  command->add_option("file", input_,
+                      "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone); for a "
+                      "log also a pattern such as 'run_{realization}_{experiment}.mat'");
   command->add_option(
-      "file", input_,
-      "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone); of a log "
-      "also a pattern such as 'run_{realization}_{experiment}.mat'");
-  command->add_option("-o,--output", output_,
-                      "frf.h5, or of a log run.slog or run.h5, or of the modes of a universal file "
-                      "modes.json for 'fit --modes'; without it the file's arrays are listed, "
-                      "which is what a map is written from");
-  command->add_option("--map", map_,
-                      "YAML file that tells which arrays are what; needed where the file does not");
+      "-o,--output", output_,
+      "frf.h5; for a log run.slog or run.h5; for the modes of a universal file modes.json, for "
+      "'fit --modes'; without -o the arrays of the file are listed, as a help to write a map");
+  command->add_option(
+      "--map", map_,
+      "YAML file with the meaning of the arrays; needed if the format does not define it");
   command->final_callback([this] { run(); });
 }
 
 void ImportCommand::list() const {
-  if (!map_.empty())
-    throw std::invalid_argument("--map: the file to write is missing; give it with -o");
+  if (!map_.empty()) throw std::invalid_argument("--map: needs an output file; add -o FILE");
   std::vector<std::vector<std::string>> rows = {{"array", "size", "holds"}};
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   const ArrayList arrays = read_foreign_arrays(input_);
@@ -133,14 +132,15 @@ ImportSummary ImportCommand::import_with_map() const {
     return import_log(files, map, output_);
   }
   if (!map.files.empty())
-    throw FormatError(map_, "", "key files belongs to kind: log; name the file in the command");
+    throw FormatError(map_, "",
+                      "key 'files' is for kind: log only; give the file on the command line");
   require_input();
   require_frf_output(output_);
   return write_imported(output_, import_frf(read_foreign_arrays(input_), map), input_, {});
 }
 
 void ImportCommand::require_input() const {
-  if (input_.empty()) throw std::invalid_argument("FILE is missing; name the file to import");
+  if (input_.empty()) throw std::invalid_argument("FILE is missing; give the file to import");
 }
 
 void ImportCommand::run() const {

@@ -93,32 +93,34 @@ Json info_json(const LogReader& log) {
 }  // namespace
 
 LogCommand::LogCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* log = add_command(app, "log", "Look at, check, repair or convert a log");
+  CLI::App* log = add_command(app, "log", "Inspect, verify, recover or convert a log");
   log->require_subcommand(1);
-  CLI::App* info_command = add_command(*log, "info", "What a log holds, run by run");
+  CLI::App* info_command = add_command(*log, "info", "List the contents of a log, run by run");
   info_command->add_option("file", file_, "log (.slog or .h5)")->required();
-  info_command->add_flag("--health", health_, "read all samples and say what is wrong with them");
+  info_command->add_flag("--health", health_, "read all samples and report health findings");
   info_command->add_option(
-      "--stage", stage_, "with --health: the stage file to hold them against; default: the log's");
+      "--stage", stage_,
+      "with --health: stage file for the checks; default: the one stored in the log");
   info_command->final_callback([this] { info(); });
 
-  CLI::App* verify_command = add_command(*log, "verify", "Read every byte and check it");
+  CLI::App* verify_command =
+      add_command(*log, "verify", "Read every byte and verify the checksums");
   verify_command->add_option("file", file_, "log (.slog or .h5)")->required();
   verify_command->final_callback([this] { verify(); });
 
-  CLI::App* recover_command = add_command(*log, "recover", "Save what is intact of a damaged log");
+  CLI::App* recover_command = add_command(*log, "recover", "Save the intact part of a damaged log");
   recover_command->add_option("file", file_, "damaged log (.slog)")->required();
   recover_command->add_option("-o,--output", output_, "new log to write (.slog)")->required();
   recover_command->final_callback([this] { recover(); });
 
   CLI::App* convert_command =
-      add_command(*log, "convert", "Log to HDF5, CSV or MATLAB, HDF5 to native");
+      add_command(*log, "convert", "Convert a log to HDF5, CSV or MATLAB, or an HDF5 log to .slog");
   convert_command->add_option("file", file_, "log (.slog or .h5)")->required();
   convert_command
-      ->add_option("-o,--output", output_, "file to write (.h5, .csv, .mat; of an HDF5 log .slog)")
+      ->add_option("-o,--output", output_,
+                   "file to write (.h5, .csv, .mat; from an HDF5 log also .slog)")
       ->required();
-  convert_command->add_flag("--complete-only", complete_only_,
-                            "leave out runs that were broken off");
+  convert_command->add_flag("--complete-only", complete_only_, "skip incomplete runs");
   add_mat_version(*convert_command, mat_version_);
   convert_command->final_callback([this] { convert(); });
 }
@@ -182,15 +184,15 @@ void LogCommand::verify() const {
                                ? "damaged at " + counted(report.damage.size(), "place")
                                : "was not closed: the experiment was cut off";
   throw FormatError(file_, "",
-                    fmt::format("{}; save the rest with 'stageid log recover {} -o NEW.slog', "
-                                "or continue the experiment with --resume",
+                    fmt::format("{}; save the intact part with 'stageid log recover {} -o "
+                                "NEW.slog', or continue the experiment with --resume",
                                 what, file_.string()));
 }
 
 void LogCommand::recover() const {
   if (std::filesystem::exists(output_))
     throw std::invalid_argument(
-        fmt::format("{}: exists already; give the name of a new log", output_.string()));
+        fmt::format("{}: already exists; choose another name with -o", output_.string()));
   const RecoverReport report = recover_log(file_, output_);
   for (const LogDamage& damage : report.damage) console_.result(damage_line(damage));
   console_.result(fmt::format(

@@ -17,12 +17,12 @@
 namespace stageid {
 
 ManualCommand::ManualCommand(CLI::App& app, Console& console) : app_(app), console_(console) {
-  CLI::App* command = add_command(app, "manual", "Write man pages and completion for bash and zsh");
+  CLI::App* command =
+      add_command(app, "manual", "Write man pages and completions for bash and zsh");
   command
-      ->add_option(
-          "-o,--output", output_,
-          "directory as /usr/share or ~/.local/share: man/man1, bash-completion/completions and "
-          "zsh/vendor-completions are made in it")
+      ->add_option("-o,--output", output_,
+                   "directory such as /usr/share or ~/.local/share; the files go to man/man1, "
+                   "bash-completion/completions and zsh/vendor-completions in it")
       ->required();
   command->final_callback([this] { run(); });
 }

@@ -15,14 +15,15 @@
 namespace stageid {
 
 ModesCommand::ModesCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(app, "modes", "Mode indicator and candidate modes of an FRF");
+  CLI::App* command =
+      add_command(app, "modes", "Find candidate modes of an FRF with a mode indicator function");
   command->add_option("frf", frf_, "frf.h5")->required();
   command->add_option("-o,--output", output_, "modes.json to write");
   command->add_option("--band", band_hz_, "LOW HIGH, Hz")->expected(2);
   command->add_option("--kind", kind_, "response | accelerance | whitened (by the variances)")
       ->check(CLI::IsMember({"response", "accelerance", "whitened"}))
       ->capture_default_str();
-  command->add_option("--prominence", prominence_db_, "of a peak, dB")
+  command->add_option("--prominence", prominence_db_, "least prominence of a peak, dB")
       ->check(kNotNegative)
       ->capture_default_str();
   command->final_callback([this] { run(); });

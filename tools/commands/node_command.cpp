@@ -82,33 +82,34 @@ void come_to_rest(StageNode& node, Serve serve) {
 
 NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(
-      app, "node", "Serve the simulated stage of a stage file to others, until SIGINT or SIGTERM");
+      app, "node",
+      "Serve the simulated stage of a stage file over CAN or Modbus, until SIGINT or SIGTERM");
   command->add_option("config", config_, "stage file (.yaml)")->required();
   command
       ->add_option("--can", can_interfaces_,
-                   "CAN FD interfaces, one for every bus of the file, in its order: can0,can1")
+                   "CAN FD interfaces, one per bus of the stage file, in the same order: can0,can1")
       ->delimiter(',');
   command
       ->add_option("--can-fault", can_faults_,
-                   "spoil measurement frames: lost@100x3, repeated@, swapped@, late@100:0.004, "
+                   "corrupt measurement frames: lost@100x3, repeated@, swapped@, late@100:0.004, "
                    "corrupt@, shortened@, foreign@ (KIND@FRAME[xCOUNT][:SECONDS])")
       ->delimiter(',');
   command
       ->add_option("--pace", pace_,
-                   "of resident experiments; 0: as fast as possible, 1: wall clock")
+                   "speed of resident experiments; 0: as fast as possible, 1: wall clock")
       ->check(kNotNegative)
       ->capture_default_str();
   command
-      ->add_option("--hold", hold_s_,
-                   "seconds that the node holds the stage in its own loop before it cuts the power")
+      ->add_option(
+          "--hold", hold_s_,
+          "seconds for which the node holds the stage in its own loop before it cuts the power")
       ->check(CLI::Range(0.0, 60.0))
       ->capture_default_str();
   modbus_.add_options(*command);
   command
-      ->add_option(
-          "--watchdog", watchdog_s_,
-          "seconds that a measuring host may be silent before the node stops by itself; 0: "
-          "3 samples; default: of the group can, otherwise 0")
+      ->add_option("--watchdog", watchdog_s_,
+                   "the node stops if a measuring host is silent for this many seconds; 0: 3 "
+                   "samples; default: from the group 'can', otherwise 0")
       ->check(CLI::Range(0.0, 3600.0));
   command->final_callback([this] { run(); });
 }

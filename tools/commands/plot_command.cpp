@@ -39,7 +39,8 @@ Eigen::Index one_place(const char* flag, const std::vector<std::string>& names,
   const std::vector<Eigen::Index> all = places(flag, names, channels);
   if (all.size() != 1)
     throw std::invalid_argument(
-        fmt::format("{}: an entry has one; choose of {}", flag, fmt::join(channels.names, ", ")));
+        fmt::format("{}: the figure 'entry' needs exactly one channel; choose from {}", flag,
+                    fmt::join(channels.names, ", ")));
   return all[0];
 }
 
@@ -47,25 +48,25 @@ Eigen::Index one_place(const char* flag, const std::vector<std::string>& names,
 
 PlotCommand::PlotCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command =
-      add_command(app, "plot", "One figure of a response, for print (needs gnuplot)");
+      add_command(app, "plot", "Draw one figure of a response for print (needs gnuplot)");
   command
-      ->add_option(
-          "figure", figure_,
-          "cmif: mode indicator with the modes; bode: the matrix of magnitudes; entry: one "
-          "element with residual and standard deviation")
+      ->add_option("figure", figure_,
+                   "cmif: mode indicator function with the modes; bode: matrix of magnitudes; "
+                   "entry: one element with residual and standard deviation")
       ->required();
   command
       ->add_option("inputs", inputs_,
-                   "directory of identify, or files: FRF, model, modes (for the rings of cmif)")
+                   "output directory of 'stageid identify', or files: FRF, model, modes "
+                   "(candidates in cmif)")
       ->required();
   command
       ->add_option("--output-channel", output_channels_,
-                   "of entry: the output; of bode: outputs A,B,... (default: all)")
+                   "entry: the output; bode: outputs A,B,... (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command
       ->add_option("--input-channel", input_channels_,
-                   "of entry: the input; of bode: inputs A,B,... (default: all)")
+                   "entry: the input; bode: inputs A,B,... (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("-o,--output", output_, "picture to write: .pdf, .svg or .png")->required();
@@ -75,7 +76,8 @@ PlotCommand::PlotCommand(CLI::App& app, Console& console) : console_(console) {
 Picture PlotCommand::cmif(const ReportData& data) const {
   if (!output_channels_.empty() || !input_channels_.empty())
     throw std::invalid_argument(
-        "cmif: is of all channels; --output-channel and --input-channel go with bode and entry");
+        "cmif: always uses all channels; --output-channel and --input-channel are for bode and "
+        "entry");
   // What a fit would start with, where neither modes.json nor a model says more.
   if (!data.chosen_modes.empty() || data.model) return cmif_picture(data);
   ReportData with_modes = data;
@@ -103,8 +105,8 @@ void PlotCommand::run() const {
   require_writable(output_, inputs_);
   const ReportInput input = report_input(inputs_);
   if (input.frf.empty())
-    throw std::invalid_argument(
-        fmt::format("{}: holds no frequency response; add an FRF", inputs_.front().string()));
+    throw std::invalid_argument(fmt::format("{}: contains no frequency response; add an FRF file",
+                                            inputs_.front().string()));
   draw(picture(read_response_data(input)), output_);
   console_.result(
       fmt::format("wrote {}, {} bytes", output_.string(), std::filesystem::file_size(output_)));

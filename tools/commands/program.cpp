@@ -46,15 +46,15 @@ constexpr const char* kWelcome =
   stageid identify configs/experiment/wafer_stage_quick.yaml -o first
       the whole job on a simulated wafer stage, up to a model and first/report.html
   stageid import YOUR_LOG.csv
-      what a log of another program holds (.mat, .h5, .npz too); docs/guide.md leads from there to a report
+      the contents of a log of another program (also .mat, .h5, .npz); docs/guide.md continues to a report
   stageid config schema
-      everything that may stand in a configuration
+      all keys of a configuration
 
-stageid help lists the commands, stageid help COMMAND their options.)";
+'stageid help' lists the commands, 'stageid help COMMAND' the options of one.)";
 
 constexpr const char* kFooter =
-    R"(Exit codes: 0 done; 1 the world failed (file, link, interlock); 2 the request is wrong; 3 done but
-not to be trusted, the result says why; 4 stopped for safety; 130 interrupted, what was recorded is kept.)";
+    R"(Exit codes: 0 done; 1 file, link or interlock failed; 2 invalid request; 3 done but
+not to be trusted, the result contains the reason; 4 stopped for safety; 130 interrupted, recorded data are kept.)";
 
 /// Everything that CLI11 needs to know, and what the commands keep.
 class Program {
@@ -78,7 +78,7 @@ class Program {
         help_(app_) {
     app_.name("stageid");
     app_.set_version_flag("--version", fmt::format("stageid {}", version()));
-    app_.add_flag("--json", console_.json, "the result as one JSON object on stdout");
+    app_.add_flag("--json", console_.json, "print the result as one JSON object on stdout");
     const std::vector<std::pair<std::string, Verbosity>> levels = {
         {"quiet", Verbosity::quiet}, {"normal", Verbosity::normal}, {"debug", Verbosity::debug}};
     app_.add_option("--verbosity", console_.verbosity, "quiet | normal | debug")
@@ -95,7 +95,7 @@ class Program {
     refuse_unknown_command(argc, argv);
     if (!parse(argc, argv)) return kDone;
     if (app_.get_subcommands().empty())
-      throw std::invalid_argument("no command; 'stageid --help' lists them");
+      throw std::invalid_argument("no command given; 'stageid --help' lists the commands");
     return console_.exit_code;
   }
 
@@ -157,14 +157,14 @@ class Program {
     for (const std::string& unknown : left_over) {
       const std::string nearest = nearest_word(unknown.substr(0, unknown.find('=')), known);
       if (!nearest.empty())
-        return fmt::format("'{}' is unknown; did you mean '{}'? See 'stageid{} --help'", unknown,
-                           nearest, path);
+        return fmt::format("unknown argument '{}'; did you mean '{}'? See 'stageid{} --help'",
+                           unknown, nearest, path);
     }
     if (innermost != &app_ && !command.commands.empty())
-      return fmt::format("{}: one of {}; see 'stageid{} --help'",
+      return fmt::format("{}; use one of {}; see 'stageid{} --help'",
                          left_over.empty()
                              ? "a subcommand is missing"
-                             : fmt::format("'{}' is no subcommand", left_over.front()),
+                             : fmt::format("unknown subcommand '{}'", left_over.front()),
                          fmt::join(names_of(command.commands), ", "), path);
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');

@@ -12,14 +12,15 @@
 namespace stageid {
 
 ReportCommand::ReportCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(app, "report", "One self-contained interactive page");
+  CLI::App* command = add_command(app, "report", "Write a self-contained interactive HTML page");
   command
       ->add_option("inputs", inputs_,
-                   "directory of identify, or files: FRF, held-back FRF, model, modes, log, "
-                   "stage file (for the positions)")
+                   "output directory of 'stageid identify', or files: FRF, held-back FRF, model, "
+                   "modes, log, stage file (channel positions)")
       ->required();
   command->add_option("--compare", compare_,
-                      "another day or model: directory of identify, or its FRF and model");
+                      "results to compare with: another output directory of 'stageid identify', or "
+                      "its FRF and model");
   command->add_option("-o,--output", output_, "page to write (.html)")->required();
   command->final_callback([this] { run(); });
 }
@@ -31,8 +32,7 @@ void ReportCommand::run() const {
   const std::string ending = output_.extension().string();
   if (ending != ".html" && ending != ".htm")
     throw std::invalid_argument(fmt::format(
-        "{}: the report is a page; write a name that ends in .html, and print it from a browser "
-        "for paper",
+        "{}: the report is an HTML page; use a name ending in .html. To print it, use a browser",
         output_.string()));
   ReportData data = read_report_data(report_input(inputs_));
   if (!compare_.empty()) add_comparison(data, compare_);

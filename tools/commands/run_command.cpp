@@ -23,8 +23,8 @@ Backend backend_of(const std::string& name, Backend configured) {
   for (const Backend backend :
        {Backend::sim, Backend::can, Backend::modbus, Backend::plugin, Backend::replay})
     if (name == to_string(backend)) return backend;
-  throw std::invalid_argument(
-      fmt::format("--backend: '{}'; write one of sim, can, modbus, plugin, replay", name));
+  throw std::invalid_argument(fmt::format(
+      "--backend: unknown back end '{}'; use sim, can, modbus, plugin or replay", name));
 }
 
 }  // namespace
@@ -34,29 +34,30 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("config", config_, "experiment file (.yaml)")->required();
   command->add_option("-o,--output", output_, "log to write (.slog)")->required();
   command->add_option("--backend", backend_,
-                      "sim | can | modbus | plugin | replay, instead of the stage file's");
-  command->add_option("--replay", replay_, "backend replay: the log that is played");
-  command
-      ->add_option("--replay-tolerance", replay_tolerance_n_,
-                   "backend replay: largest difference of a command from the recorded one, N")
-      ->capture_default_str();
-  command->add_option("--pace", pace_, "0: as fast as possible; 1: wall clock; default: stage file")
-      ->check(kNotNegative);
-  command->add_option("--excitation", excitation_,
-                      "excitation.h5 of 'stageid design': play it instead of designing again");
+                      "sim | can | modbus | plugin | replay; default: from the stage file");
+  command->add_option("--replay", replay_, "backend replay: the log to replay");
   command
       ->add_option(
-          "--until", until_,
-          "VARIANCE: end as soon as the mean relative variance of the response is as small, "
-          "e.g. 1e-6 for 0.1 %; asked after every realization")
+          "--replay-tolerance", replay_tolerance_n_,
+          "backend replay: largest allowed difference between a command and the recorded one, N")
+      ->capture_default_str();
+  command
+      ->add_option("--pace", pace_,
+                   "0: as fast as possible; 1: wall clock; default: from the stage file")
+      ->check(kNotNegative);
+  command->add_option("--excitation", excitation_,
+                      "excitation.h5 of 'stageid design': use it instead of a new design");
+  command
+      ->add_option("--until", until_,
+                   "VARIANCE: stop as soon as the mean relative variance of the response is at "
+                   "most this, e.g. 1e-6 for 0.1 %; checked after every realization")
       ->check(kPositive);
   command->add_flag("--resume", resume_,
                     "continue an interrupted log: complete runs are not repeated");
-  command->add_option(
-      "--dashboard", dashboard_,
-      "PORT: show the experiment in a browser on this machine (0: any free port); "
-      "HOST:PORT: on others too, who need the token in the address it prints; so does "
-      "stopping the run, everywhere");
+  command->add_option("--dashboard", dashboard_,
+                      "PORT: show the experiment in a browser on this machine (0: any free port); "
+                      "HOST:PORT: also on other machines, which need the token in the printed "
+                      "address; stopping the run always needs the token");
   command->add_flag("--reset-fault", reset_fault_,
                     "clear a fault of the node or plant before the first run");
   command->final_callback([this] { run(); });
@@ -65,10 +66,10 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
 void RunCommand::run() const {
   const std::string ending = output_.extension().string();
   if (ending == ".h5" || ending == ".hdf5" || ending == ".csv")
-    throw std::invalid_argument(fmt::format(
-        "{}: what is measured is written as .slog, which survives a crash; 'stageid log "
-        "convert' makes {} of it",
-        output_.string(), ending));
+    throw std::invalid_argument(
+        fmt::format("{}: a measurement is recorded as .slog, which survives a crash; use a name "
+                    "ending in .slog and 'stageid log convert' to obtain {}",
+                    output_.string(), ending));
   require_ending(output_, "a log", {".slog"});
   const ExperimentConfig config = load_experiment_config(config_);
   const Backend backend = backend_of(backend_, config.stage.backend);

@@ -56,8 +56,7 @@ std::vector<std::string> prediction_lines(const PredictionError& error) {
                     fmt::format("{:.3e}", error.error_rms[k] / error.signal_rms[k])});
   }
   std::vector<std::string> lines = {
-      fmt::format("prediction of the samples from the actuators, {}, {} "
-                  "... {} Hz:",
+      fmt::format("prediction of the sensor samples from the actuators, {}, {} ... {} Hz:",
                   counted(error.runs, "run"), error.band_hz[0], error.band_hz[1])};
   for (std::string& line : table_lines(rows)) lines.push_back(std::move(line));
   return lines;
@@ -66,24 +65,24 @@ std::vector<std::string> prediction_lines(const PredictionError& error) {
 }  // namespace
 
 std::vector<std::string> validation_lines(const Validation& v) {
-  std::vector<std::string> lines = {"no channel is above its noise: there is no relative error"};
+  std::vector<std::string> lines = {
+      "no channel exceeds its noise, so a relative error is undefined"};
   if (std::isfinite(v.relative_rms_error))
-    lines[0] = fmt::format(
-        "relative error {:.4e} (over the channels that respond), {:.4e} (of the whole response)",
-        v.relative_rms_error, v.normalized_error);
+    lines[0] = fmt::format("relative error {:.4e} (channels that respond), {:.4e} (whole response)",
+                           v.relative_rms_error, v.normalized_error);
   if (v.chi_square_per_dof > 0.0) {
     const std::string expected = v.expected_chi_square > 0.0
                                      ? fmt::format("{:.3f}", v.expected_chi_square)
-                                     : "without a mean for variances this uncertain";
+                                     : "undefined, the variances are too uncertain";
     lines.push_back(fmt::format(
-        "chi-square per degree of freedom {:.3f}; of {} alone: {}", v.chi_square_per_dof,
+        "chi-square per degree of freedom {:.3f}; expected from {} alone: {}", v.chi_square_per_dof,
         v.variance == ResidualVariance::noise ? "noise" : "noise and distortion", expected));
     lines.push_back(
         fmt::format("residuals above their 95 % point: {:.1f} %; autocorrelation {:.4f}, 99 % "
                     "limit {:.4f}",
                     100.0 * v.whitened_above_95, v.whiteness, v.whiteness_limit));
   } else {
-    lines.push_back("the data have no variances: nothing says whether the error is noise");
+    lines.push_back("the data have no variances, so the error cannot be compared with noise");
   }
   return lines;
 }
@@ -103,17 +102,18 @@ nlohmann::ordered_json validation_json(const Validation& v) {
 }
 
 ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(app, "validate", "Try a model on data that it was not fitted to");
+  CLI::App* command =
+      add_command(app, "validate", "Validate a model on data that it was not fitted to");
   command->add_option("model", model_, "model.json")->required();
   command
-      ->add_option(
-          "data", data_,
-          "frf.h5, or a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
+      ->add_option("data", data_,
+                   "frf.h5, a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
       ->required();
   command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: the band of the fit")
       ->expected(2);
-  command->add_option("--stage", stage_,
-                      "stage file that the health of a log is held against; default: its own");
+  command->add_option(
+      "--stage", stage_,
+      "stage file for the health checks of a log; default: the one stored in the log");
   command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
       ->check(kNotNegative)
       ->capture_default_str();

@@ -20,8 +20,9 @@ void require_no_input(const std::filesystem::path& file,
   for (const std::filesystem::path& input : inputs) {
     std::error_code none;  // one of them is not there: they are not the same
     if (std::filesystem::equivalent(file, input, none))
-      throw std::invalid_argument(fmt::format(
-          "{}: is an input, which the result would replace; give -o another name", file.string()));
+      throw std::invalid_argument(
+          fmt::format("{}: is an input file and would be overwritten; choose another name with -o",
+                      file.string()));
   }
 }
 
@@ -46,7 +47,7 @@ void require_readable(const std::filesystem::path& file) {
 void require_ending(const std::filesystem::path& file, const char* what,
                     const std::vector<std::string>& endings) {
   if (std::find(endings.begin(), endings.end(), file.extension().string()) != endings.end()) return;
-  throw std::invalid_argument(fmt::format("{}: {} is written as {}; give it such a name",
+  throw std::invalid_argument(fmt::format("{}: {} is written as {}; use a name with that ending",
                                           file.string(), what, fmt::join(endings, ", ")));
 }
 
@@ -62,9 +63,9 @@ void require_directory(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error || !std::filesystem::is_directory(directory))
-    throw FileError(fmt::format("{}: cannot be made a directory: {}; give another -o",
+    throw FileError(fmt::format("{}: cannot create the directory: {}; choose another with -o",
                                 directory.string(),
-                                error ? error.message() : "a file stands there"));
+                                error ? error.message() : "a file of that name exists"));
 }
 
 }  // namespace stageid

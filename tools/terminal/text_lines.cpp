@@ -28,7 +28,7 @@ TextLines::TextLines(const std::filesystem::path& file) : file_(file) {
 std::string_view TextLines::next() {
   if (at_end()) {
     ++line_;
-    fail("the file ends here; it was cut short");
+    fail("unexpected end of file; the file is truncated");
   }
   ++line_;
   const std::size_t end = std::min(text_.find('\n', at_), text_.size());

@@ -20,13 +20,14 @@ TEST_F(CommandLine, Usage) {
   fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads: '-1' is not 0 or more");
   fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
   fail({"log"}, 2, "a subcommand is missing: one of info, verify, recover, convert; see");
-  fail({"log", "inf", "a.slog"}, 2, "'inf' is unknown; did you mean 'info'?");
-  fail({"log", "conv", "a.slog"}, 2, "'conv' is unknown; did you mean 'convert'?");
-  fail({"log", "a.slog"}, 2, "'a.slog' is no subcommand: one of info, verify, recover, convert");
+  fail({"log", "inf", "a.slog"}, 2, "unknown argument 'inf'; did you mean 'info'?");
+  fail({"log", "conv", "a.slog"}, 2, "unknown argument 'conv'; did you mean 'convert'?");
+  fail({"log", "a.slog"}, 2,
+       "unknown subcommand 'a.slog'; use one of info, verify, recover, convert");
   fail({"frf", "a.slog", "-o", "b.h5", "--methd=lpm"}, 2, "did you mean '--method'?");
   fail({"frf", "a.slog", "-o", "b.h5", "--jsn"}, 2, "did you mean '--json'? See 'stageid frf");
-  fail({"manual", "-o", config_}, 1, "cannot be made a directory");
-  fail({"import", "x.csv", "--map", "m.yaml"}, 2, "the file to write is missing; give it with -o");
+  fail({"manual", "-o", config_}, 1, "cannot create the directory");
+  fail({"import", "x.csv", "--map", "m.yaml"}, 2, "--map: needs an output file");
   fail({"run", config_, "-o", name("x.slog"), "--backend", "simulator"}, 2, "--backend");
 }
 
@@ -41,9 +42,9 @@ TEST_F(CommandLine, HelpIsThatOfTheCommand) {
   EXPECT_EQ(run({"help"}).out, run({"--help"}).out);
   EXPECT_EQ(run({"help", "frf"}).out, run({"frf", "--help"}).out);
   EXPECT_EQ(run({"help", "log", "info"}).out, run({"log", "info", "--help"}).out);
-  fail({"help", "frff"}, 2, "help: 'frff' is no command; did you mean 'frf'?");
-  fail({"help", "log", "inf"}, 2, "help: 'inf' is no command of log; did you mean 'info'?");
-  fail({"help", "frf", "x"}, 2, "help: 'x' is no command of frf; write 'stageid help frf'");
+  fail({"help", "frff"}, 2, "help: unknown command 'frff'; did you mean 'frf'?");
+  fail({"help", "log", "inf"}, 2, "help: unknown command 'inf' of log; did you mean 'info'?");
+  fail({"help", "frf", "x"}, 2, "help: unknown command 'x' of frf; write 'stageid help frf'");
 }
 
 TEST_F(CommandLine, WithoutArgumentsThereAreThreeThingsToTry) {

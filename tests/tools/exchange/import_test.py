@@ -368,7 +368,7 @@ class Damaged(Case):
             self.refuse("none." + ending, "import", "none." + ending, "-o", "n.h5", code=1)
         (WORK / "x.doc").write_text("")
         self.refuse("'.doc' is not imported", "import", "x.doc", "-o", "n.h5")
-        self.refuse("is imported as .h5", "import", "text.unv", "-o", "n.csv")
+        self.refuse("a frequency response is written as .h5", "import", "text.unv", "-o", "n.csv")
         frf = self.frf()
         self.refuse("are not exported as '.h5'", "export", frf, "-o", "n.h5")
         self.refuse("--mat-version", "export", frf, "-o", "n.mat", "--mat-version", "6")

@@ -192,7 +192,8 @@ TEST_F(LimitedPlanTest, UntilWarnsOfAPlanThatCannotEndEarly) {
 
 TEST_F(LimitedPlanTest, RequestsThatAreWrong) {
   fail({"design", limits_, "-o", name("e.h5")}, 1, "small_stage_pilot_frf.h5: is not there");
-  fail({"design", config_, "-o", name("e.h5"), "--accuracy", "1e-6"}, 2, "--accuracy: the noise");
+  fail({"design", config_, "-o", name("e.h5"), "--accuracy", "1e-6"}, 2,
+       "--accuracy: needs the noise of a prior");
   fail({"run", config_, "-o", name("x.slog"), "--until", "-1"}, 2, "--until");
   const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
     fail({"design", variant(from, to), "-o", name("e.h5")}, 2, text);

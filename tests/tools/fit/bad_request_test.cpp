@@ -19,7 +19,7 @@ TEST_F(BadRequest, WhatAModelHasNot) {
   write_model(at("model.json"), model);
   const std::string file = name("model.json");
   fail({"export", file, "-o", name("m.h5"), "--driving-point", "z3", "a1"}, 2,
-       "--driving-point: 'z3' is no output of the model; there are z1, z2");
+       "--driving-point: 'z3' is not an output of the model; use one of z1, z2");
   fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1", "z1"}, 2, "'z1' is no input");
   fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1"}, 2, "--driving-point");
   fail({"export", file, "-o", name("m.h5")}, 2, "submodel 0: its poles");
@@ -32,7 +32,7 @@ TEST_F(BadRequest, SubmodelsThatAreNone) {
 }
 
 TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
-  fail({"run", config_, "-o", name("run.h5")}, 2, "'stageid log convert' makes .h5 of it");
+  fail({"run", config_, "-o", name("run.h5")}, 2, "'stageid log convert' to obtain .h5");
   make_log();
   fail({"frf", config_, "-o", name("x.h5")}, 2,
        "is an experiment file, not a log; 'stageid identify'");
@@ -274,7 +274,7 @@ TEST_F(BadRequest, AResultThatWouldReplaceWhatItIsMadeOf) {
   make_log();
   make_frf();
   const auto refused = [&](const std::vector<std::string>& words) {
-    fail(words, 2, "is an input, which the result would replace; give -o another name");
+    fail(words, 2, "is an input file and would be overwritten");
   };
   const std::string log = name("run.slog");
   const std::string frf = name("frf.h5");
@@ -302,7 +302,7 @@ TEST_F(BadRequest, Reports) {
   make_frf();
   const std::string frf = name("frf.h5");
   fail({"report", frf, "-o", name("r.pdf")}, 2,
-       "r.pdf: the report is a page; write a name that ends in .html");
+       "r.pdf: the report is an HTML page; use a name ending in .html");
   fail({"report", frf, frf, "-o", name("r.html")}, 2, "frf.h5: is given twice");
   write_bytes(at("cut.json"), "{\"format\": \"stageid-mo");
   fail({"report", frf, name("cut.json"), "-o", name("r.html")}, 2,

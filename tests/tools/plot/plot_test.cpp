@@ -219,18 +219,19 @@ TEST_F(Plot, RequestsThatAreWrong) {
   wrong({"cmif", frf, "-o", name("p")}, "p: '' is no ending of a picture");
   wrong({"cmif", frf}, "--output");
   wrong({"cmif", "-o", out}, "inputs");
-  wrong({"cmif", name("model.json"), "-o", out}, "model.json: holds no frequency response");
-  wrong({"cmif", frf, "--input-channel", "a1", "-o", out}, "go with bode and entry");
+  wrong({"cmif", name("model.json"), "-o", out}, "model.json: contains no frequency response");
+  wrong({"cmif", frf, "--input-channel", "a1", "-o", out}, "are for bode and entry");
   wrong({"bode", frf, "--input-channel", "b1", "-o", out},
         "--input-channel: 'b1'; write one of a1, a2, a3");
   wrong({"bode", frf, "--input-chanel", "a1", "-o", out}, "did you mean '--input-channel'?");
-  wrong({"entry", frf, "-o", out}, "--output-channel: an entry has one; choose of s1, s2");
+  wrong({"entry", frf, "-o", out},
+        "--output-channel: the figure 'entry' needs exactly one channel; choose from s1, s2");
   wrong({"entry", frf, "--output-channel", "s1", "--input-channel", "a1,a2", "-o", out},
-        "--input-channel: an entry has one");
+        "--input-channel: the figure 'entry' needs exactly one channel");
   wrong({"entry", frf, frf, "-o", out}, "is given twice");
   for (const char* copy : {"b.h5", "c.h5"}) std::filesystem::copy_file(frf, at(copy));
   wrong({"entry", frf, name("b.h5"), name("c.h5"), "-o", out}, "one of the same kind");
-  wrong({"cmif", config_, "-o", out}, "holds no frequency response");
+  wrong({"cmif", config_, "-o", out}, "contains no frequency response");
   fail({"plot", "cmif", name("none.h5"), "-o", out}, 1, "none.h5: does not exist");
   fail({"plot", "cmif", frf, "-o", name("no/p.pdf")}, 1, "no/p.pdf");
   std::filesystem::create_directory(at("folder.pdf"));
