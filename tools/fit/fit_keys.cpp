@@ -20,22 +20,22 @@ void describe_submodel(ConfigVisitor& v, SubmodelRequest& r) {
   rule.number = true;
   rule.rule = not_negative("");
   v.flexible("n", order, rule, kOptional,
-             "order of the denominator; auto: twice the number of modes that a search finds");
+             "order of the denominator; auto: twice the number of modes found by a search");
   r.order_by_search = order.word == "auto";
   const double n = order.numbers.empty() ? 0.0 : order.numbers.front();
   v.require(std::floor(n) == n && n <= kLargestOrder, "n",
-            fmt::format("n: an order is a whole number from 0 to {}", kLargestOrder));
+            fmt::format("n: expected a whole number from 0 to {}, or auto", kLargestOrder));
   r.shape.order = static_cast<int>(std::min(n, 1e6));
-  count(v, "l", r.shape.integrators, 0, 2, kOptional, "integrators: a power of 1/s");
+  count(v, "l", r.shape.integrators, 0, 2, kOptional, "number of integrators: the power of 1/s");
   r.shape.numerator_degree = -1;
   count(v, "m", r.shape.numerator_degree, -1, 1000, kOptional,
         "degree of the numerator; -1: n + l - 1, strictly proper");
   if (r.shape.numerator_degree < 0) r.shape.numerator_degree = strictly_proper_degree(r);
   v.numbers("frequency_hz", r.frequency_hz, positive("Hz"), {}, kOptional,
-            "where its poles start: one a conjugate pair, and last the real pole's if n is odd; "
-            "left out: searched");
+            "starting frequencies of the poles: one per conjugate pair, and that of the real pole "
+            "last if n is odd; omitted: found by a search");
   v.numbers("damping_ratio", r.damping_ratio, {"", 0.0, 0.9, true}, {}, kOptional,
-            "where they start: one a pair, or one for all; left out: 0.01");
+            "starting damping ratios: one per pair, or one for all; omitted: 0.01");
   const std::string fault = fault_of(r);
   v.require(fault.empty(), r.order_by_search ? "n" : "m", fault);
 }
@@ -49,17 +49,17 @@ void describe_submodels(ConfigVisitor& v, FitRequest& f) {
         f.submodels.push_back(std::move(request));
       },
       {}, Presence::optional,
-      "(B_0 + ... + B_m s^m) / (s^l (1 + a_1 s + ... + a_n s^n)), as fit --submodel");
+      "(B_0 + ... + B_m s^m) / (s^l (1 + a_1 s + ... + a_n s^n)), as in fit --submodel");
 }
 
 }  // namespace
 
 void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   std::vector<double> band_hz;
-  v.numbers("band_hz", band_hz, positive("Hz"), {2, 2}, kOptional, "left out: all lines");
+  v.numbers("band_hz", band_hz, positive("Hz"), {2, 2}, kOptional, "omitted: all lines");
   if (band_hz.size() == 2) {
     v.require(band_hz[0] < band_hz[1], "band_hz",
-              "band_hz: is empty; write [LOW, HIGH] with LOW < HIGH");
+              "band_hz: the band is empty; write [LOW, HIGH] with LOW < HIGH");
     f.band_hz = {band_hz[0], band_hz[1]};
   }
 
@@ -71,11 +71,12 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   modes_rule.list = true;
   modes_rule.rule = positive("");
   v.flexible("modes", modes, modes_rule, kOptional,
-             "auto, none, how many, or a list of frequencies in Hz; by_submodels: none where "
+             "auto, none, a number of modes, or a list of frequencies in Hz; by_submodels: none if "
              "submodels are listed, else auto");
   v.require(
       modes.is_list || modes.numbers.empty() || std::floor(modes.numbers[0]) == modes.numbers[0],
-      "modes", "modes: a number says how many and is whole; write frequencies as a list [...]");
+      "modes",
+      "modes: the number of modes must be a whole number; write frequencies as a list [...]");
   // A list of one frequency would read as a count without the comma.
   f.modes = modes.word.empty()
                 ? fmt::format("{}{}", fmt::join(modes.numbers, ","), modes.is_list ? "," : "")
@@ -92,10 +93,10 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   word("weighting", f.weighting,
        {"unit", "inverse_magnitude", "relative", "noise_variance", "total_variance", "likelihood",
         "by_frf"},
-       "of the cost; by_frf: noise variance if known, else total variance, else relative; of one "
-       "realization that is distorted the scatter of its lines");
+       "weighting of the cost; by_frf: noise variance if known, else total variance, else "
+       "relative; a single distorted realization is weighted by the scatter of its lines");
   word("hold", f.hold, {"none", "phase", "sinc", "exact", "by_frf"},
-       "how the model meets sampled data; by_frf: exact unless it was taken out");
+       "hold model; by_frf: exact unless the FRF is already hold-compensated");
 
   const auto rank = [&](const char* key, std::string& value, std::vector<std::string> words,
                         const char* help) {
@@ -106,7 +107,7 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
     rule.rule = positive("");
     v.flexible(key, given, rule, kOptional, help);
     v.require(given.numbers.empty() || std::floor(given.numbers[0]) == given.numbers[0], key,
-              fmt::format("{}: a rank is a whole number", key));
+              fmt::format("{}: the rank must be a whole number", key));
     value = given.word.empty() ? fmt::format("{}", given.numbers.front()) : given.word;
   };
 
@@ -116,34 +117,35 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   delay_rule.number = true;
   delay_rule.rule = any_number("s");
   v.flexible("delay_s", delay, delay_rule, kOptional,
-             "a number, one for the plant, or one a channel");
+             "a number in s, estimate: one delay for the plant, per_channel: one per channel");
   f.delay = delay.word.empty() ? fmt::format("{}", delay.numbers.front())
                                : (delay.word == "by_frf" ? "" : delay.word);
 
   if (f.rigid_body.empty()) f.rigid_body = "by_submodels";
-  rank(
-      "rigid_body", f.rigid_body, {"auto", "none", "full", "suspension", "by_submodels"},
-      "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); suspension: a "
-      "mode below the lines instead; auto: full, or suspension where that is worth its parameters; "
-      "by_submodels: none where submodels are listed, else auto");
+  rank("rigid_body", f.rigid_body, {"auto", "none", "full", "suspension", "by_submodels"},
+       "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); suspension: a "
+       "mode below the lines instead; auto: full, or suspension if the fit improves enough; "
+       "by_submodels: none if submodels are listed, else auto");
   std::vector<double> suspension_hz;
   v.numbers("suspension_hz", suspension_hz, positive("Hz"), {}, kOptional,
-            "with rigid_body: suspension, its frequencies where they are known; left out: fitted");
+            "with rigid_body: suspension, its known frequencies; omitted: fitted");
   v.require(suspension_hz.empty() || f.rigid_body == "suspension", "suspension_hz",
-            "suspension_hz: goes with rigid_body: suspension");
+            "suspension_hz: requires rigid_body: suspension");
   if (!suspension_hz.empty()) f.rigid_body += fmt::format(":{}", fmt::join(suspension_hz, ":"));
   if (f.rigid_body == "by_submodels") f.rigid_body.clear();
-  rank("residue_rank", f.residue_rank, {"full"}, "of a mode: full, or 1 for mechanical modes");
+  rank("residue_rank", f.residue_rank, {"full"},
+       "rank of the residues: full, or 1 for mechanical modes");
   word("direct_term", f.direct_term, {"none", "full", "by_frf"},
-       "a constant: the compliance of modes above the band; by_frf: full where the outputs are "
+       "a constant: the compliance of modes above the band; by_frf: full if the outputs are "
        "accelerations, else none");
   word("damping", f.damping, {"proportional", "general", "by_frf"},
-       "numerators B_0, or B_0 + B_1 s; by_frf: general where the outputs are accelerations");
-  word("method", f.method, {"riv", "gn", "sk"}, "of the iteration");
-  count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "of one fit");
+       "numerators B_0, or B_0 + B_1 s; by_frf: general if the outputs are accelerations, else "
+       "proportional");
+  word("method", f.method, {"riv", "gn", "sk"}, "iteration method");
+  count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "iterations per fit");
   v.number("search_seconds", f.search_seconds, not_negative("s"), kOptional,
-           "budget of a search for modes, in seconds of an ordinary core; counted in work, so the "
-           "result does not depend on the machine; 0: no end");
+           "budget of the mode search, in seconds of a typical core; counted in work, so the "
+           "result does not depend on the machine; 0: unlimited");
 }
 
 }  // namespace stageid

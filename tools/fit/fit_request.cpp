@@ -45,8 +45,8 @@ std::string channels_without_weight(const FrfEstimate& frf, const FitOptions& op
                                   frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]));
   if (names.empty()) return {};
   return fmt::format(
-      "weighting: {} (output, input) {} no weight: free numerators there are not determined, and "
-      "stand as 0 with a standard deviation of null",
+      "weighting: {} (output, input) {} zero weight: free numerators there are undetermined; they "
+      "are written as 0 with a standard deviation of null",
       fmt::join(names, ", "), names.size() == 1 ? "has" : "have");
 }
 
@@ -66,9 +66,10 @@ class FitDefaults {
     if (frf.compensated == Compensation::none || !(frf.sample_rate_hz > 0.0) || !wanted) return;
     known_delay_s_ = frf.delay_s;
     frf = as_measured(std::move(frf));
-    note(fmt::format(
-        "hold and delay: {} s was taken out of the response; it is put back and modelled",
-        *known_delay_s_));
+    note(
+        fmt::format("hold and delay: the response was compensated for a delay of {} s; the "
+                    "compensation is undone and the delay modelled",
+                    *known_delay_s_));
   }
 
   void choose_hold() {
@@ -119,7 +120,7 @@ class FitDefaults {
                                                         : Weighting::relative;
     note(fmt::format(
         "weighting: {}{}", to_string(options.weighting),
-        options.weighting == Weighting::relative ? ", the response comes without variances" : ""));
+        options.weighting == Weighting::relative ? ", the response has no variances" : ""));
   }
 
   /// Refused here: the fit would grow for hours towards a number that the lines cannot carry.
@@ -128,7 +129,7 @@ class FitDefaults {
     const Eigen::Index most = most_modes(setup_.frf, setup_.structure.common);
     if (setup_.selection.exactly > most)
       throw std::invalid_argument(fmt::format(
-          "--modes: {}; {} lines carry no more than {}; ask for fewer or take a wider band",
+          "--modes: {} is too many; {} lines support at most {}; use fewer or a wider band",
           setup_.selection.exactly, lines, most));
   }
 
@@ -150,10 +151,10 @@ class FitDefaults {
       }
       if (!number && text.find_first_not_of("0123456789.eE+-") != std::string::npos) {
         if (!std::filesystem::exists(text))
-          throw FileError(fmt::format(
-              "--modes: '{}': there is no such file; write auto, none, a number of modes, "
-              "frequencies in Hz 'f1,f2,...', or the name of a file",
-              text));
+          throw FileError(
+              fmt::format("--modes: '{}': no such file; use auto, none, a number of modes, "
+                          "frequencies in Hz 'f1,f2,...', or the name of an existing file",
+                          text));
         selection.modes = read_modes(text);
         for (const ModeCandidate& mode : selection.modes)
           require_below_nyquist("--modes", setup_, mode.frequency_hz);
@@ -182,8 +183,8 @@ class FitDefaults {
     const double spacing_hz = (f.tail(f.size() - 1) - f.head(f.size() - 1)).minCoeff();
     if (!(std::abs(*delay_s) * 2.0 * spacing_hz <= 1.0))
       refuse("--delay", request_.delay,
-             fmt::format("at most {:.4g} s in size: lines {:.4g} Hz apart do not tell a longer one "
-                         "from a shorter one (1/(2 df))",
+             fmt::format("a magnitude of at most {:.4g} s: lines {:.4g} Hz apart cannot resolve a "
+                         "longer delay (1/(2 df))",
                          0.5 / spacing_hz, spacing_hz));
   }
 
@@ -196,20 +197,20 @@ class FitDefaults {
     if (!(scatter.over_noise > kDistorted)) return false;
     if (lines_are_coarse(frf, scatter, request_.threads)) {
       setup_.warnings.push_back(
-          "weighting: by the variance by the periods; the lines scatter by more, but they are too "
-          "coarse to tell distortion from response; lines twice as fine, or several realizations, "
-          "would");
+          "weighting by period-to-period variance. The line-to-line scatter is larger, but the "
+          "lines are too coarse to separate distortion from resonances: halve the spacing or "
+          "measure several realizations");
       note(setup_.warnings.back());
       return false;
     }
     frf.total_variance = std::move(scatter.variance);
     frf.total_dof = scatter.dof;
     setup_.options.weighting = Weighting::total_variance;
-    setup_.warnings.push_back(
-        fmt::format("weighting: by the scatter of neighbouring lines, {:.3g} times the variance by "
-                    "the periods (median): the plant looks nonlinear, and with one realization "
-                    "nothing else tells how much; measure several",
-                    scatter.over_noise));
+    setup_.warnings.push_back(fmt::format(
+        "weighting by the scatter of neighbouring lines, {:.3g} times the period-to-period "
+        "variance (median): the plant appears nonlinear, and one realization is too few to measure "
+        "the distortion; measure several realizations",
+        scatter.over_noise));
     note(setup_.warnings.back());
     return true;
   }
@@ -226,8 +227,8 @@ class FitDefaults {
     weigh_by_total_variance();
     setup_.warnings.push_back(
         "weighting: total_variance; " +
-        (nonlinear.empty() ? "realizations differ by more than their periods, by a transient or a "
-                             "drift: measure longer after the start, or more realizations"
+        (nonlinear.empty() ? "realizations differ by more than their periods, because of a "
+                             "transient or a drift: increase transient_periods or realizations"
                            : nonlinear));
     note(setup_.warnings.back());
     return true;
@@ -310,8 +311,8 @@ FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
   const bool chosen = accelerations && silent;
   if (chosen)
     notes.push_back(
-        fmt::format("structure: the outputs are accelerations [{}]: numerators B_0 + B_1 s, a "
-                    "direct term, no rigid body",
+        fmt::format("structure: numerators B_0 + B_1 s, a direct term and no rigid body, because "
+                    "the outputs are accelerations [{}]",
                     units.front()));
   if (request.damping.empty()) request.damping = chosen ? "general" : "proportional";
   if (request.direct_term.empty()) request.direct_term = chosen ? "full" : "none";

@@ -20,7 +20,7 @@ std::optional<double> to_number(std::string_view text) {
 }
 
 void refuse(const char* flag, const std::string& given, const std::string& right) {
-  throw std::invalid_argument(fmt::format("{}: '{}'; write {}", flag, given, right));
+  throw std::invalid_argument(fmt::format("{}: got '{}'; expected {}", flag, given, right));
 }
 
 void refuse_word(const char* flag, const std::string& word, const std::vector<std::string>& names) {

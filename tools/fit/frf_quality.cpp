@@ -59,7 +59,7 @@ std::size_t unsettled_bands(const NonlinearityTest& test) {
 
 std::string unsettled_line(const NonlinearityTest& test) {
   return fmt::format(
-      "in {} of {} bands linearity cannot be told, for the records are not settled there: {}",
+      "linearity cannot be tested in {} of {} bands, because the records are not settled there: {}",
       unsettled_bands(test), test.band_hz.rows(), kUnsettledRemedy);
 }
 
@@ -67,12 +67,11 @@ std::string conclusion(const NonlinearityTest& test) {
   const std::size_t tests = static_cast<std::size_t>(test.p_value.size()) -
                             unsettled_bands(test) * static_cast<std::size_t>(test.p_value.rows());
   const std::string chance =
-      fmt::format("a linear plant shows {:.1f} of {} pairs and bands as nonlinear by chance",
+      fmt::format("of a linear plant {:.1f} of {} pairs and bands appear nonlinear by chance",
                   kNonlinearBelow * static_cast<double>(tests), tests);
-  if (!test.nonlinear()) return "no sign that the plant is not linear: " + chance;
-  return fmt::format(
-      "the plant is not linear: {}, but none as improbable as p = {:.0e}, which is here", chance,
-      std::max(test.least_p_value(), 1e-300));
+  if (!test.nonlinear()) return "no evidence of nonlinearity: " + chance;
+  return fmt::format("the plant is nonlinear: {}, but the smallest p value here is {:.0e}", chance,
+                     std::max(test.least_p_value(), 1e-300));
 }
 
 /// The channel pair and band whose distortion is largest among those that test nonlinear.
@@ -92,7 +91,9 @@ std::string strongest_distortion(const FrfEstimate& frf, const NonlinearityTest&
 
 std::string why_not_tested(const FrfEstimate& frf) {
   const std::string why = why_linearity_cannot_be_tested(frf);
-  return why.empty() ? "nonlinearity test: the file holds none; estimate again from the logs" : why;
+  return why.empty()
+             ? "nonlinearity test: the file contains none; estimate the FRF again from the logs"
+             : why;
 }
 
 /// Every experiment begins with a period that is unlike the others, and none has another such period.
@@ -168,7 +169,7 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
   std::set<int> left_out;
   for (const LeftOutRealization& one : frf.left_out_realizations) {
     left_out.insert(one.realization);
-    lines.push_back(fmt::format("realization {} left out, the others are used: {}",
+    lines.push_back(fmt::format("realization {} discarded, the others are used: {}",
                                 one.realization + 1, one.reason));
   }
   std::size_t told = 0;
@@ -179,15 +180,16 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
       ++more;
       continue;
     }
-    lines.push_back(fmt::format("realization {}, experiment {}: period {} left out: {}",
+    lines.push_back(fmt::format("realization {}, experiment {}: period {} discarded: {}",
                                 period.realization + 1, period.experiment + 1, period.period + 1,
                                 period.reason));
   }
-  if (more > 0) lines.push_back(fmt::format("... and {} more periods, see /dropped_periods", more));
+  if (more > 0)
+    lines.push_back(fmt::format("... and {} more periods, listed in /dropped_periods", more));
   if (transient_lasts(frf))
     lines.emplace_back(
-        "the first measured period of every experiment was left out: the transient was not over, "
-        "and what is left of it looks like distortion; give --transient-periods one more, or "
+        "the first measured period of every experiment was discarded: the transient was not over, "
+        "and its remainder resembles distortion; increase --transient-periods by one, or use "
         "--method lpm");
   return lines;
 }

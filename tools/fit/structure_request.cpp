@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view kSuspension = "suspension";
 constexpr const char* kRigidBodies =
-    "auto, none, full or a rank of 1 or more, or suspension, or suspension:F1:F2 (Hz)";
+    "auto, none, full, a rank of 1 or more, suspension, or suspension:F1:F2 (Hz)";
 
 int rank(const char* flag, const std::string& text, const char* allowed) {
   const std::optional<double> number = to_number(text);
@@ -66,7 +66,7 @@ void choose_submodels(const FitRequest& request, FitSetup& setup) {
   const bool nothing = structure.submodels.empty() && !structure.suspension &&
                        !structure.common.rigid_body && !structure.common.direct_term;
   if (requested_modes(request) == "none" && nothing)
-    refuse("--modes", "none", "modes, a rigid body, a direct term or a submodel: one of them");
+    refuse("--modes", "none", "at least one of modes, a rigid body, a direct term and a submodel");
 }
 
 void choose_rigid_body(const FitRequest& request, FitSetup& setup) {
@@ -99,8 +99,8 @@ void choose_residue_rank(const FitRequest& request, FitSetup& setup) {
   for (const SubmodelRequest& submodel : request.submodels)
     if (!takes_rank(submodel, setup.options.residue_rank))
       refuse("--residue-rank", request.residue_rank,
-             fmt::format("full: a rank is for modes (n=2 with m=0, or m=1 and rank 1), not for "
-                         "--submodel {}",
+             fmt::format("full: a rank applies to modes only (n=2 with m=0, or m=1 and rank 1), "
+                         "not to --submodel {}",
                          submodel_text(submodel)));
 }
 
@@ -135,7 +135,7 @@ void require_below_nyquist(const char* flag, const FitSetup& setup, double frequ
   const double nyquist_hz = 0.5 * setup.frf.sample_rate_hz;
   if (nyquist_hz > 0.0 && setup.options.hold != HoldModel::none && frequency_hz >= nyquist_hz)
     throw std::invalid_argument(
-        fmt::format("{}: {} Hz is not below half the sample rate, {} Hz; write lower frequencies",
+        fmt::format("{}: {} Hz is not below half the sample rate, {} Hz; use lower frequencies",
                     flag, frequency_hz, nyquist_hz));
 }
 

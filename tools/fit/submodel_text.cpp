@@ -14,7 +14,7 @@
 namespace stageid {
 namespace {
 
-constexpr const char* kExample = "write for example n=4,m=3,f=120:180,zeta=0.01";
+constexpr const char* kExample = "for example n=4,m=3,f=120:180,zeta=0.01";
 
 class SubmodelParser {
  public:
@@ -27,9 +27,9 @@ class SubmodelParser {
       take(rest.substr(0, comma));
       rest.remove_prefix(std::min(comma + 1, rest.size()));
     } while (!rest.empty());
-    if (!has("n") && !has("l")) fail(fmt::format("without an order n; {}", kExample));
+    if (!has("n") && !has("l")) fail(fmt::format("the order n is missing; {}", kExample));
     if (!has("m")) request_.shape.numerator_degree = strictly_proper_degree(request_);
-    if (has("m") && request_.order_by_search) fail("with n=auto m follows; leave it out");
+    if (has("m") && request_.order_by_search) fail("m is determined by n=auto; omit m");
     if (const std::string fault = fault_of(request_); !fault.empty()) fail(fault);
     return std::move(request_);
   }
@@ -38,10 +38,10 @@ class SubmodelParser {
   void take(std::string_view pair) {
     const std::size_t sign = pair.find('=');
     if (sign == std::string_view::npos)
-      fail(fmt::format("'{}' is no key=value; {}", pair, kExample));
+      fail(fmt::format("expected key=value, got '{}'; {}", pair, kExample));
     const std::string key(pair.substr(0, sign));
     const std::string_view value = pair.substr(sign + 1);
-    if (has(key)) fail(fmt::format("{} stands there twice; write it once", key));
+    if (has(key)) fail(fmt::format("duplicate key '{}'; write it once", key));
     seen_.push_back(key);
     if (key == "n" && value == "auto")
       request_.order_by_search = true;
@@ -56,7 +56,7 @@ class SubmodelParser {
     else if (key == "zeta")
       request_.damping_ratio = numbers(key, value);
     else
-      fail(fmt::format("unknown key '{}'; write l, n, m, f or zeta", key));
+      fail(fmt::format("unknown key '{}'; use l, n, m, f or zeta", key));
   }
 
   bool has(std::string_view key) const {
@@ -67,7 +67,7 @@ class SubmodelParser {
     int number = 0;
     const auto [stop, error] = std::from_chars(value.data(), value.data() + value.size(), number);
     if (error != std::errc{} || stop != value.data() + value.size())
-      fail(fmt::format("{}='{}' is no whole number{}", key, value,
+      fail(fmt::format("{}='{}' is not a whole number{}", key, value,
                        key == "n" ? "; write one, or auto" : "; write one"));
     return number;
   }
@@ -81,7 +81,7 @@ class SubmodelParser {
       double number = 0.0;
       const auto [stop, error] = std::from_chars(one.data(), one.data() + one.size(), number);
       if (error != std::errc{} || stop != one.data() + one.size() || !std::isfinite(number))
-        fail(fmt::format("{}='{}' holds no numbers with colons between them; {}", key, value,
+        fail(fmt::format("{}='{}' is not a list of numbers separated by colons; {}", key, value,
                          kExample));
       out.push_back(number);
       rest.remove_prefix(std::min(colon + 1, rest.size()));

@@ -29,7 +29,7 @@ std::size_t first_line(const Hdf5File& file, const char* dataset,
   of_whole[0] = static_cast<hsize_t>(whole.count);
   if (shape == of_whole) return static_cast<std::size_t>(whole.first);
   throw FormatError(file.path(), dataset,
-                    fmt::format("is {}; must be {}, as the response in the band",
+                    fmt::format("has the shape {}; expected {}, as the response in the band",
                                 fmt::join(shape, " x "), fmt::join(wanted, " x ")));
 }
 
@@ -52,16 +52,14 @@ void read_diagonals(const Hdf5File& file, const FrfEstimate& frf, WholeLines who
       for (Eigen::Index j = 0; j < frf.n_inputs(); ++j, ++at) {
         if (!std::isfinite(values[at]))
           throw FormatError(file.path(), kDiagonals,
-                            fmt::format("line {}: {}; weights are finite", k, values[at]));
+                            fmt::format("line {}: {}; weights must be finite", k, values[at]));
         if (values[at] < 0.0)
           throw indefinite(file, kDiagonals,
-                           fmt::format("line {}: {}; weights are 0 or more", k, values[at]));
+                           fmt::format("line {}: {}; weights must be 0 or more", k, values[at]));
         weights(i + frf.n_outputs() * j, k) = values[at];
       }
   if (!(weights.maxCoeff() > 0.0))
-    throw FormatError(
-        file.path(), kDiagonals,
-        "every weight is 0, so that nothing is fitted; one at least must be positive");
+    throw FormatError(file.path(), kDiagonals, "all weights are 0; at least one must be positive");
   // Of numbers beyond, squares leave the range of doubles.
   const double power = (weights.array() * frf.response.cwiseAbs2().array()).sum();
   if (power > 0.0 && !(power > kLeastPower && power < 1.0 / kLeastPower))
@@ -108,7 +106,7 @@ void read_weights(const std::filesystem::path& path, const FrfEstimate& frf, Fit
     return;
   }
   if (file.exists(kDiagonals))
-    throw FormatError(path, kMatrices, "stands beside /weights; give one of the two");
+    throw FormatError(path, kMatrices, "cannot be combined with /weights; keep one of the two");
   read_matrices(file, frf, whole, options.user_weight_matrices);
 }
 

@@ -19,15 +19,15 @@ namespace {
 constexpr std::string_view kFormat = "stageid-fft-wisdom 1 ";
 constexpr std::size_t kFingerprintDigits = 32;
 constexpr std::uintmax_t kMostBytes = 16U << 20U;  // thousands of lengths
-constexpr const char* kRemedy = "remove it, or name another, to have plans timed anew";
+constexpr const char* kRemedy = "remove it or use another file to time new plans";
 
 std::string read_bounded(const std::filesystem::path& file) {
   const auto fail = [&file](const char* what) {
-    throw FileError(file.string() + ": " + what + "; give the name of a file to keep FFT plans in");
+    throw FileError(file.string() + ": " + what + "; use a file that can store FFT plans");
   };
   if (!std::filesystem::is_regular_file(file)) fail("is not a regular file");
   if (std::filesystem::file_size(file) > kMostBytes)
-    throw FormatError(file, "", fmt::format("is too large for a file of FFT plans; {}", kRemedy));
+    throw FormatError(file, "", fmt::format("too large for a file of FFT plans; {}", kRemedy));
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   text << stream.rdbuf();
@@ -60,7 +60,7 @@ FftWisdomFile::FftWisdomFile(std::filesystem::path file) : file_(std::move(file)
   } catch (const std::invalid_argument&) {
     throw FormatError(
         file_, "",
-        fmt::format("holds plans of another version of FFTW or kind of processor; {}", kRemedy));
+        fmt::format("contains plans for another FFTW version or processor type; {}", kRemedy));
   }
 }
 

@@ -147,7 +147,7 @@ std::vector<std::string> doubts_of(const AdditiveModel& model) {
 std::string relative_error_text(const FitRecord& fit) {
   return std::isfinite(fit.relative_rms_error)
              ? fmt::format("relative error {:.4g}", fit.relative_rms_error)
-             : "no channel above its noise";
+             : "no channel exceeds its noise";
 }
 
 std::vector<std::string> mode_table(const AdditiveModel& model) {

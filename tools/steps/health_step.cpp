@@ -84,7 +84,7 @@ std::vector<std::string> health_lines(const std::vector<Finding>& findings) {
     rows.push_back({to_string(f.severity), f.channel, f.what, f.figure, f.remedy});
   }
   std::vector<std::string> lines;
-  if (fine) lines.push_back("health of the data: nothing found");
+  if (fine) lines.push_back("data health: no findings");
   if (rows.size() == 1) return lines;
   for (std::string& line : table_lines(rows)) lines.push_back(std::move(line));
   return lines;

@@ -36,8 +36,7 @@ ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>&
   // Before the residual: where that is too large they are the cause.
   for (std::string& doubt : doubts_of(model)) add(std::move(doubt));
   for (std::string& doubt : health_notes(health, Severity::doubt)) add(std::move(doubt));
-  if (validation && !validation->explained)
-    distrust("on data that were held back " + validation->reason);
+  if (validation && !validation->explained) distrust("on held-back data " + validation->reason);
   verdict.validated = validation && validation->variance != ResidualVariance::none;
   return verdict;
 }
@@ -47,11 +46,9 @@ std::string verdict_line(const ModelVerdict& verdict) {
     return fmt::format("verdict: not to be trusted: {}", fmt::join(verdict.reasons, "; "));
   return fmt::format(
       "verdict: trustworthy{}{}",
-      verdict.validated
-          ? "; noise and known distortion explain the error on data that were held back"
-          : "; not validated: no data with variances were held back",
-      verdict.reasons.empty() ? ""
-                              : fmt::format(". Look at: {}", fmt::join(verdict.reasons, "; ")));
+      verdict.validated ? "; noise and known distortion explain the error on held-back data"
+                        : "; not validated: no held-back data with variances",
+      verdict.reasons.empty() ? "" : fmt::format(". Check: {}", fmt::join(verdict.reasons, "; ")));
 }
 
 nlohmann::ordered_json verdict_json(const ModelVerdict& verdict) {

@@ -19,7 +19,9 @@ std::vector<Eigen::Index> indices_of(const std::vector<std::string>& wanted,
     const auto found = std::find(there.names.begin(), there.names.end(), name);
     if (found == there.names.end())
       throw std::invalid_argument(
-          fmt::format("{}: has no channel '{}' that the model needs", log.path().string(), name));
+          fmt::format("{}: has no channel '{}', which the model needs; use a log with all channels "
+                      "of the model",
+                      log.path().string(), name));
     indices.push_back(found - there.names.begin());
   }
   return indices;
@@ -39,7 +41,7 @@ class Predictor {
         std::floor(std::min(high_hz, nyquist_hz * (1.0 - 1e-9)) / resolution_hz + 1e-9));
     if (last < first_)
       throw std::invalid_argument(
-          fmt::format("{}: has no line between {} and {} Hz; give another --band",
+          fmt::format("{}: has no line between {} and {} Hz; use another --band",
                       log.path().string(), low_hz, high_hz));
     const Eigen::VectorXd frequency_hz =
         Eigen::VectorXd::LinSpaced(last - first_ + 1, static_cast<double>(first_),
@@ -64,7 +66,8 @@ class Predictor {
     }
     if (periods == 0.0)
       throw std::invalid_argument(
-          fmt::format("{}: no complete run has a measured period", log_.path().string()));
+          fmt::format("{}: no complete run has a measured period; use a log with a complete run",
+                      log_.path().string()));
     result_.error_rms = (result_.error_rms / periods).cwiseSqrt();
     result_.signal_rms = (result_.signal_rms / periods).cwiseSqrt();
     return std::move(result_);

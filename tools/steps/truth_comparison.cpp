@@ -134,19 +134,17 @@ std::vector<std::string> truth_table(const TruthComparison& comparison) {
   for (const double hz : comparison.extra_hz)
     lines.push_back(fmt::format("also estimated, but not a mode of the plant: {:.4f} Hz", hz));
   if (!comparison.outside_hz.empty())
-    lines.push_back(
-        fmt::format("beside the band, standing for what the plant does there: {:.5g} Hz",
-                    fmt::join(comparison.outside_hz, ", ")));
+    lines.push_back(fmt::format("outside the band, representing the dynamics there: {:.5g} Hz",
+                                fmt::join(comparison.outside_hz, ", ")));
   return lines;
 }
 
 std::string truth_error_line(const TruthComparison& comparison) {
   const std::string relative =
       std::isfinite(comparison.relative_rms_error)
-          ? fmt::format("{:.3e} (relative, over the channels that respond), ",
-                        comparison.relative_rms_error)
+          ? fmt::format("{:.3e} (relative, channels that respond), ", comparison.relative_rms_error)
           : "";
-  return fmt::format("error of the model against the exact plant: {}{:.3e} (of the whole response)",
+  return fmt::format("error of the model against the exact plant: {}{:.3e} (whole response)",
                      relative, comparison.normalized_error);
 }
 

@@ -27,7 +27,7 @@ TEST_F(BadRequest, WhatAModelHasNot) {
 
 TEST_F(BadRequest, SubmodelsThatAreNone) {
   fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "2,0,0"}, 2,
-       "--submodel: '2,0,0': '2' is no key=value; write for example n=4,m=3");
+       "--submodel: '2,0,0': expected key=value, got '2'; for example n=4,m=3");
   fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "n=2,m=3"}, 2, "write at most 2");
 }
 
@@ -56,7 +56,7 @@ TEST_F(BadRequest, MissingFiles) {
   fail({"report", name("none"), "-o", name("r.html")}, 1, "does not exist");
   fail({"log", "info", name("none.slog")}, 1, "none.slog");
   fail({"import", name("none.csv")}, 1, "none.csv: cannot be read: No such file or directory;");
-  fail({"import", name(".")}, 1, "cannot be read: Is a directory; give the name of a file");
+  fail({"import", name(".")}, 1, "cannot be read: Is a directory; use a file");
 }
 
 TEST_F(BadRequest, WhatIsNoTableAndNoReport) {
@@ -81,7 +81,7 @@ TEST_F(BadRequest, Configurations) {
   wrong("period_s: 0.25", "period_s: .nan", "is not finite");
   wrong("period_s: 0.25", "period_s: 0.00025", "must be a whole number of samples");
   wrong("period_s: 0.25", "periods: 3\n  period_s: 0.25", "stands here twice");
-  wrong("band_hz: [16, 800]", "band_hz: [800, 16]", "band_hz: is empty");
+  wrong("band_hz: [16, 800]", "band_hz: [800, 16]", "band_hz: the band is empty");
   wrong("band_hz: [16, 800]", "band_hz: [16, 1000]", "is not below half the sample rate");
   wrong("band_hz: [16, 800]", "band_hz: [16.5, 17]",
         "bad.yaml:10:12: frequency band: no line lies in 16.5 to 17 Hz");
@@ -96,10 +96,11 @@ TEST_F(BadRequest, Configurations) {
   wrong("direct_term: full", "hold: perfect", "write one of none, phase, sinc, exact, by_frf");
   wrong("direct_term: full", "submodels: [{n: 2, m: 3}]", "m=3 is above n + l = 2");
   wrong("direct_term: full", "submodels: [{order: 2}]", "unknown key 'order'");
-  wrong("direct_term: full", "submodels: [{n: 17}]", "n: an order is a whole number from 0 to 16");
+  wrong("direct_term: full", "submodels: [{n: 17}]", "n: expected a whole number from 0 to 16");
   wrong("direct_term: full", "submodels: [{n: many}]", "n: ");
   wrong("direct_term: full", "submodels: [{n: 2, damping_ratio: [2]}]", "damping_ratio");
-  wrong("rigid_body: suspension", "rigid_body: full", "goes with rigid_body: suspension");
+  wrong("rigid_body: suspension", "rigid_body: full",
+        "suspension_hz: requires rigid_body: suspension");
   wrong("suspension_hz: [0.4, 0.5]", "suspension_hz: [0.4, -1]", "suspension_hz");
   write_bytes(at("cut.yaml"), read_bytes(config_).substr(0, 320));
   fail({"design", name("cut.yaml"), "-o", name("e.h5")}, 2, "cut.yaml:");
@@ -345,15 +346,15 @@ TEST_F(BadRequest, Fits) {
   wrong({"--band", "900", "950"},
         "no line lies in it; the frequency response has lines from 16 to 800 Hz");
   wrong({"--band", "500", "100"}, "write the lower frequency first");
-  wrong({"--rigid-body", "half"}, "--rigid-body: 'half'; write auto, none, full or a rank");
+  wrong({"--rigid-body", "half"}, "--rigid-body: got 'half'; expected auto, none, full, a rank");
   wrong({"--rigid-body", "suspention"}, "or suspension:F1:F2 (Hz) (did you mean 'suspension'?)");
-  wrong({"--residue-rank", "0"}, "--residue-rank: '0'; write full or a rank");
+  wrong({"--residue-rank", "0"}, "--residue-rank: got '0'; expected full or a rank");
   wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with --damping general");
-  wrong({"--modes", "500"}, "--modes: 500; 197 lines carry no more than 65;");
+  wrong({"--modes", "500"}, "--modes: 500 is too many; 197 lines support at most 65;");
   wrong({"--modes", "0"}, "--modes");
   wrong({"--modes", "12,x"}, "--modes");
   fail({"fit", name("frf.h5"), "-o", name("m.json"), "--modes", "many"}, 1,
-       "--modes: 'many': there is no such file; write auto");
+       "--modes: 'many': no such file; use auto");
   wrong({"--modes", "100,5000"}, "--modes: 5000 Hz is not below half the sample rate, 1000 Hz");
   wrong({"--weighting", "relativ"}, "did you mean 'relative'?");
   wrong({"--hold", "exakt"}, "did you mean 'exact'?");

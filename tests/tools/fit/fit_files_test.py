@@ -240,9 +240,9 @@ class WeightOfZero(unittest.TestCase):
 
     def test_the_rest_keeps_its_deviations(self):
         done = fit("frf.h5", "-o", "model.json", "--modes", "120,250", "--weighting", "w.h5")
-        self.assertIn("(o1, i0) (output, input) has no weight", done.stderr)
+        self.assertIn("(o1, i0) (output, input) has zero weight", done.stderr)
         m = model()
-        self.assertTrue(any("has no weight" in d for d in m["provenance"]["decisions"]))
+        self.assertTrue(any("has zero weight" in d for d in m["provenance"]["decisions"]))
         for s in m["submodels"]:
             std = s["numerator_std"][0]
             self.assertIsNone(std[1][0])

@@ -203,12 +203,12 @@ TEST(FitRequest, ModesThatTheLinesCannotTellAreRefused) {
   FitRequest request;
   request.modes = "2";
   EXPECT_EQ(error_of(request, measured()),
-            "--modes: 2; 4 lines carry no more than 1; ask for fewer or take a wider band");
+            "--modes: 2 is too many; 4 lines support at most 1; use fewer or a wider band");
   request.modes = "499.9";
   EXPECT_EQ(error_of(request, measured()), "");
   request.modes = "12,500";
   EXPECT_EQ(error_of(request, measured()),
-            "--modes: 500 Hz is not below half the sample rate, 500 Hz; write lower frequencies");
+            "--modes: 500 Hz is not below half the sample rate, 500 Hz; use lower frequencies");
   const test::TemporaryDirectory directory;
   write_modes(directory / "modes.json", {{12.0, 0.02, 1}, {500.0, 0.03, 2}});
   FitRequest by_file;

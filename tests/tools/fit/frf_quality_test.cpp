@@ -35,9 +35,9 @@ TEST_F(FrfQuality, TellsWhetherTheStageIsLinear) {
   const json found = json::parse(cubic.out)["nonlinearity"];
   EXPECT_EQ(found["nonlinear"], true);
   EXPECT_GT(found["bands"][0]["distortion"].get<double>(), 0.0);
-  EXPECT_THAT(cubic.err, HasSubstr("the plant is not linear: a linear plant shows "));
-  EXPECT_THAT(cubic.err, HasSubstr("but none as improbable as p = "));
-  EXPECT_THAT(linear.err, HasSubstr("no sign that the plant is not linear: a linear plant shows "));
+  EXPECT_THAT(cubic.err, HasSubstr("the plant is nonlinear: of a linear plant "));
+  EXPECT_THAT(cubic.err, HasSubstr("but the smallest p value here is "));
+  EXPECT_THAT(linear.err, HasSubstr("no evidence of nonlinearity: of a linear plant "));
   EXPECT_LT(read_frf(at("c.h5")).nonlinearity.p_value.minCoeff(),
             read_frf(at("f.h5")).nonlinearity.p_value.minCoeff());
 }
@@ -50,14 +50,14 @@ TEST_F(FrfQuality, SaysWhereTheRecordsAreNotSettled) {
   frf.nonlinearity.settled_p_value = Eigen::VectorXd::Ones(bands);
   frf.nonlinearity.settled_p_value[0] = 1e-5;
   EXPECT_THAT(linearity_lines(frf), Contains(HasSubstr("not settled")));
-  EXPECT_THAT(linearity_lines(frf), Contains(HasSubstr("linearity cannot be told")));
+  EXPECT_THAT(linearity_lines(frf), Contains(HasSubstr("linearity cannot be tested")));
   EXPECT_EQ(linearity_json(frf)["bands"][0]["settled"], false);
   const std::vector<Finding> found = keep_health(frf, {});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].cause, Cause::unsettled);
   EXPECT_EQ(health_of(frf.provenance_json).front().cause, Cause::unsettled);
   frf.nonlinearity.settled_p_value.setConstant(1e-5);
-  EXPECT_THAT(linearity_lines(frf), testing::Not(Contains(HasSubstr("not linear"))));
+  EXPECT_THAT(linearity_lines(frf), testing::Not(Contains(HasSubstr("the plant is nonlinear"))));
 }
 
 TEST_F(FrfQuality, SaysWhyItWasNotTested) {
@@ -119,17 +119,17 @@ TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {
   EXPECT_THAT(
       dropped_lines(frf),
       ElementsAre(
-          "realization 2 left out, the others are used: run.slog:/runs/0003: no clean period",
-          "realization 1, experiment 3: period 5 left out: a glitch"));
+          "realization 2 discarded, the others are used: run.slog:/runs/0003: no clean period",
+          "realization 1, experiment 3: period 5 discarded: a glitch"));
   EXPECT_EQ(left_out_json(frf),
             json({{{"realization", 2}, {"reason", "run.slog:/runs/0003: no clean period"}}}));
   frf.left_out_realizations.clear();
-  EXPECT_THAT(dropped_lines(frf), Contains("... and 21 more periods, see /dropped_periods"));
+  EXPECT_THAT(dropped_lines(frf), Contains("... and 21 more periods, listed in /dropped_periods"));
 }
 
 TEST(DroppedLines, SayThatTheTransientLasts) {
   const auto told =
-      testing::StartsWith("the first measured period of every experiment was left out");
+      testing::StartsWith("the first measured period of every experiment was discarded");
   FrfEstimate frf;
   frf.realizations = 2;
   frf.experiments = 2;

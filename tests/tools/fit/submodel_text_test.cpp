@@ -38,17 +38,17 @@ TEST(SubmodelText, WhatIsWrongIsNamed) {
                     testing::AllOf(HasSubstr("--submodel: '"), HasSubstr(part))))
         << text;
   };
-  wrong("", "no key=value");
-  wrong("2,0,0", "'2' is no key=value");
-  wrong("m=1", "without an order");
-  wrong("n=2.5", "no whole number");
+  wrong("", "expected key=value");
+  wrong("2,0,0", "expected key=value, got '2'");
+  wrong("m=1", "the order n is missing");
+  wrong("n=2.5", "not a whole number");
   wrong("n=", "or auto");
-  wrong("n=2,n=4", "twice");
+  wrong("n=2,n=4", "duplicate key 'n'");
   wrong("n=2,order=3", "unknown key 'order'");
-  wrong("n=2,f=abc", "no numbers with colons");
-  wrong("n=2,f=", "no numbers with colons");
-  wrong("n=2,f=1e999", "no numbers with colons");
-  wrong("n=auto,m=2", "m follows");
+  wrong("n=2,f=abc", "not a list of numbers separated by colons");
+  wrong("n=2,f=", "not a list of numbers separated by colons");
+  wrong("n=2,f=1e999", "not a list of numbers separated by colons");
+  wrong("n=auto,m=2", "m is determined by n=auto");
   wrong("n=2,m=3", "improper");
   wrong("n=4,f=120", "2 frequencies");
 }

@@ -82,7 +82,7 @@ TEST_F(WeightFile, RefusesMatricesNamingTheLine) {
 TEST_F(WeightFile, RefusesAnotherShapeAndBothKindsAtOnce) {
   write_matrices(matrices());
   frf_ = select_band(frf_, 1.0, 3.0);
-  expect_refused("is 4 x 6 x 6; must be 3 x 6 x 6");
+  expect_refused("has the shape 4 x 6 x 6; expected 3 x 6 x 6");
   Hdf5File file = Hdf5File::create(path_);
   const std::vector<double> diagonals(4 * 6, 1.0);
   file.write_reals("/weights", {4, 2, 3}, diagonals.data());
@@ -97,11 +97,11 @@ TEST_F(WeightFile, RefusesNegativeWeights) {
   Hdf5File file = Hdf5File::create(path_);
   file.write_reals("/weights", {4, 2, 3}, values.data());
   file.close();
-  expect_refused<IndefiniteWeights>("line 2: -1; weights are 0 or more");
+  expect_refused<IndefiniteWeights>("line 2: -1; weights must be 0 or more");
 }
 
 TEST_F(WeightFile, RefusesWeightsThatAreAllZeroOrBeyondTheRangeOfSquares) {
-  for (const auto& [weight, part] : {std::pair{0.0, "every weight is 0"},
+  for (const auto& [weight, part] : {std::pair{0.0, "all weights are 0"},
                                      {1e-200, "only the ratios of weights matter"},
                                      {1e200, "only the ratios of weights matter"}}) {
     const std::vector<double> values(4 * 6, weight);
@@ -126,7 +126,7 @@ TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
                    weights.data());
   file.close();
   fail({"fit", name("frf.h5"), "-o", name("model.json"), "--weighting", name("w.h5")}, 3,
-       "-1; weights are 0 or more");
+       "-1; weights must be 0 or more");
   EXPECT_FALSE(std::filesystem::exists(name("model.json")));
 }
 

@@ -213,7 +213,8 @@ TEST_F(Plot, RequestsThatAreWrong) {
   };
   const std::string frf = name("frf.h5");
   const std::string out = name("p.pdf");
-  wrong({"cmfi", frf, "-o", out}, "figure: 'cmfi'; write one of cmif, bode, entry (did you mean");
+  wrong({"cmfi", frf, "-o", out},
+        "figure: got 'cmfi'; expected one of cmif, bode, entry (did you mean");
   wrong({"cmif", frf, "-o", name("p.jpg")},
         "p.jpg: '.jpg' is no ending of a picture; write one of");
   wrong({"cmif", frf, "-o", name("p")}, "p: '' is no ending of a picture");
@@ -222,7 +223,7 @@ TEST_F(Plot, RequestsThatAreWrong) {
   wrong({"cmif", name("model.json"), "-o", out}, "model.json: contains no frequency response");
   wrong({"cmif", frf, "--input-channel", "a1", "-o", out}, "are for bode and entry");
   wrong({"bode", frf, "--input-channel", "b1", "-o", out},
-        "--input-channel: 'b1'; write one of a1, a2, a3");
+        "--input-channel: got 'b1'; expected one of a1, a2, a3");
   wrong({"bode", frf, "--input-chanel", "a1", "-o", out}, "did you mean '--input-channel'?");
   wrong({"entry", frf, "-o", out},
         "--output-channel: the figure 'entry' needs exactly one channel; choose from s1, s2");

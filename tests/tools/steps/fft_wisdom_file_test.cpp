@@ -131,7 +131,7 @@ TEST_F(FftWisdomFileTest, PlansOfAnotherFftwAreToldApartFromDamage) {
   wisdom.replace(wisdom.find("fftw-"), 6, "fftw-9");
   write(file_, with_fingerprint(wisdom));
   expect_error<FormatError>([&] { const FftWisdomFile refused(file_); }, file_.string() + ": ",
-                            "another version of FFTW or kind of processor; remove it");
+                            "another FFTW version or processor type; remove it");
   const std::string garbage = "(fftw-3.3 (((((";
   write(file_, with_fingerprint(garbage));
   EXPECT_THROW(FftWisdomFile{file_}, FormatError);

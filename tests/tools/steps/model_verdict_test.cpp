@@ -27,7 +27,8 @@ Validation unexplained() {
 TEST(ModelVerdict, NamesTheCauseBeforeTheResidual) {
   const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {}, unexplained());
   EXPECT_FALSE(verdict.trustworthy);
-  EXPECT_THAT(verdict.reasons, ElementsAre("a mode drifts", HasSubstr("held back the residual")));
+  EXPECT_THAT(verdict.reasons,
+              ElementsAre("a mode drifts", HasSubstr("on held-back data the residual")));
 }
 
 TEST(ModelVerdict, TrustsAModelWithDoubtsThatHolds) {
