@@ -28,12 +28,12 @@ void use_rule() {
 FftWisdom::FftWisdom(const std::string& plans) {
   const std::lock_guard guard(fft_planner().lock);
   if (fft_planner().flags != FFTW_ESTIMATE)
-    throw std::logic_error("FFT wisdom: there is one already; one program has one set of plans");
+    throw std::logic_error("FFT plans: already loaded; a program can load only one set of plans");
   fftw_forget_wisdom();
   if (!plans.empty() && fftw_import_wisdom_from_string(plans.c_str()) == 0) {
     use_rule();
     throw std::invalid_argument(
-        "the FFT plans are for another version of FFTW or kind of processor");
+        "the FFT plans belong to a different FFTW version or processor type");
   }
   fft_planner().flags = FFTW_MEASURE;
 }

@@ -19,18 +19,18 @@ int highest_line(int samples_per_period) { return (samples_per_period + 1) / 2 -
 void check_rate_and_period(double sample_rate_hz, int samples_per_period) {
   if (!(sample_rate_hz > 0.0) || !std::isfinite(sample_rate_hz)) {
     throw std::invalid_argument(fmt::format(
-        "frequency grid: the sample rate must be positive and finite, not {} Hz", sample_rate_hz));
+        "frequency grid: the sample rate must be positive and finite; got {} Hz", sample_rate_hz));
   }
   if (samples_per_period < 3) {
     throw std::invalid_argument(fmt::format(
-        "frequency grid: a period must have at least 3 samples, not {}", samples_per_period));
+        "frequency grid: a period must have at least 3 samples; got {}", samples_per_period));
   }
 }
 
 void check_band(double sample_rate_hz, const LineSpec& spec) {
   if (!std::isfinite(spec.low_hz) || !std::isfinite(spec.high_hz) || spec.low_hz < 0.0) {
     throw std::invalid_argument(fmt::format(
-        "frequency band: {} to {} Hz is not a band; both ends must be finite and not negative",
+        "frequency band: invalid limits {} to {} Hz; both must be finite and nonnegative",
         spec.low_hz, spec.high_hz));
   }
   if (spec.low_hz > spec.high_hz) {
@@ -40,12 +40,12 @@ void check_band(double sample_rate_hz, const LineSpec& spec) {
   }
   if (spec.high_hz >= sample_rate_hz / 2.0) {
     throw std::invalid_argument(fmt::format(
-        "frequency band: {} Hz reaches half the sample rate; high_hz must be below {} Hz",
+        "frequency band: {} Hz is at or above half the sample rate; high_hz must be below {} Hz",
         spec.high_hz, sample_rate_hz / 2.0));
   }
   if (spec.selection == LineSelection::odd_random && spec.group_size < 2) {
     throw std::invalid_argument(fmt::format(
-        "frequency band: a group must have at least 2 odd lines, not {}", spec.group_size));
+        "frequency band: a group must have at least 2 odd lines; got {}", spec.group_size));
   }
 }
 
@@ -83,15 +83,14 @@ FrequencyGrid::FrequencyGrid(double sample_rate_hz, int samples_per_period, std:
       samples_per_period_(samples_per_period),
       lines_(std::move(lines)) {
   check_rate_and_period(sample_rate_hz, samples_per_period);
-  if (lines_.empty())
-    throw std::invalid_argument("frequency grid: there must be at least one line");
+  if (lines_.empty()) throw std::invalid_argument("frequency grid: at least one line is required");
   if (std::adjacent_find(lines_.begin(), lines_.end(), std::greater_equal<>()) != lines_.end()) {
     throw std::invalid_argument("frequency grid: the lines must be strictly increasing");
   }
   if (lines_.front() < 1 || lines_.back() > highest_line(samples_per_period)) {
     throw std::invalid_argument(fmt::format(
-        "frequency grid: lines {} to {} do not lie in 1 to {} (neither zero frequency nor "
-        "half the sample rate) of a period of {} samples",
+        "frequency grid: lines {} to {} are out of range; use 1 to {} (zero frequency and half the "
+        "sample rate are excluded) for a period of {} samples",
         lines_.front(), lines_.back(), highest_line(samples_per_period), samples_per_period));
   }
 }
@@ -118,7 +117,8 @@ FrequencyGrid FrequencyGrid::band(double sample_rate_hz, int samples_per_period,
   }
   if (lines.empty()) {
     throw std::invalid_argument(
-        fmt::format("frequency band: no {}line lies in {} to {} Hz; lines are {} Hz apart",
+        fmt::format("frequency band: no {}line between {} and {} Hz; the line spacing is {} Hz. "
+                    "Widen the band or lengthen the period",
                     odd_only ? "odd " : "", spec.low_hz, spec.high_hz, 1.0 / lines_per_hz));
   }
   if (spec.selection == LineSelection::odd_random) lines = leave_out_at_random(lines, spec);

@@ -10,7 +10,7 @@ namespace {
 
 int dense_length(const FrequencyGrid& grid, int oversampling) {
   if (grid.samples_per_period() > std::numeric_limits<int>::max() / oversampling) {
-    throw std::invalid_argument("multisine: the period is too long to be oversampled");
+    throw std::invalid_argument("multisine: the period is too long for oversampling; shorten it");
   }
   return oversampling * grid.samples_per_period();
 }

@@ -14,23 +14,24 @@ namespace {
 void check(const FrequencyGrid& grid, const MultisineSpec& spec) {
   if (!(spec.level > 0.0) || !std::isfinite(spec.level)) {
     throw std::invalid_argument(
-        fmt::format("multisine: level must be positive and finite, not {}", spec.level));
+        fmt::format("multisine: level must be positive and finite; got {}", spec.level));
   }
   if (spec.crest_iterations < 0) {
-    throw std::invalid_argument(fmt::format(
-        "multisine: crest_iterations must not be negative, not {}", spec.crest_iterations));
+    throw std::invalid_argument(fmt::format("multisine: crest_iterations must be 0 or more; got {}",
+                                            spec.crest_iterations));
   }
   if (spec.shape.size() == 0) return;
   if (spec.shape.size() != grid.size()) {
     throw std::invalid_argument(
-        fmt::format("multisine: shape has {} entries; one for each of the {} lines is needed",
+        fmt::format("multisine: shape has {} entries; expected one per line ({})",
                     spec.shape.size(), grid.size()));
   }
   if (!spec.shape.allFinite() || (spec.shape.array() < 0.0).any()) {
-    throw std::invalid_argument("multisine: shape must be finite and not negative on every line");
+    throw std::invalid_argument("multisine: shape must be finite and nonnegative on every line");
   }
   if ((spec.shape.array() == 0.0).all()) {
-    throw std::invalid_argument("multisine: shape is zero on every line; one must be positive");
+    throw std::invalid_argument(
+        "multisine: shape is zero on every line; at least one entry must be positive");
   }
 }
 
@@ -54,7 +55,7 @@ Multisine random_phase_multisine(const FrequencyGrid& grid, const MultisineSpec&
 double crest_factor(const Eigen::Ref<const Eigen::VectorXd>& samples) {
   const double peak = samples.size() == 0 ? 0.0 : samples.lpNorm<Eigen::Infinity>();
   if (!(peak > 0.0)) {
-    throw std::invalid_argument("crest factor: there must be at least one sample that is not zero");
+    throw std::invalid_argument("crest factor: all samples are zero; at least one must be nonzero");
   }
   return peak * std::sqrt(static_cast<double>(samples.size())) / samples.stableNorm();
 }

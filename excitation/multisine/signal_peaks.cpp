@@ -16,7 +16,8 @@ using Eigen::Index;
 
 int twice(int samples) {
   if (samples > std::numeric_limits<int>::max() / 2)
-    throw std::invalid_argument("excitation: the period is too long to be predicted from rest");
+    throw std::invalid_argument(
+        "excitation: the period is too long to predict the response from rest; shorten it");
   return 2 * samples;
 }
 

@@ -25,15 +25,15 @@ using Eigen::MatrixXd;
 void check_axis(const FrequencyGrid& grid, const ExperimentSpec& spec, std::size_t number) {
   const ExcitationAxis& axis = spec.axes[number];
   const std::string place = fmt::format("experiment: axes[{}]", number);
-  if (axis.channel.empty()) throw std::invalid_argument(place + ".channel: a name is needed");
+  if (axis.channel.empty()) throw std::invalid_argument(place + ".channel: missing name");
   if (!(axis.level > 0.0) || !std::isfinite(axis.level)) {
-    throw std::invalid_argument(fmt::format("{}.level ({}): must be positive and finite, not {}",
+    throw std::invalid_argument(fmt::format("{}.level ({}): must be positive and finite; got {}",
                                             place, axis.channel, axis.level));
   }
   if (axis.shape.size() == 0) return;
   if (axis.shape.size() != grid.size()) {
     throw std::invalid_argument(
-        fmt::format("{}.shape ({}): has {} entries; one for each of the {} lines is needed", place,
+        fmt::format("{}.shape ({}): has {} entries; expected one per line ({})", place,
                     axis.channel, axis.shape.size(), grid.size()));
   }
   for (Index k = 0; k < grid.size(); ++k) {
@@ -52,27 +52,28 @@ void check(const FrequencyGrid& grid, const ExperimentSpec& spec) {
   const auto at_least = [](const char* field, int value, int least) {
     if (value < least) {
       throw std::invalid_argument(
-          fmt::format("experiment: {} must be at least {}, not {}", field, least, value));
+          fmt::format("experiment: {} must be at least {}; got {}", field, least, value));
     }
   };
   at_least("realizations", spec.realizations, 1);
   at_least("periods", spec.periods, 1);
   at_least("transient_periods", spec.transient_periods, 0);
   at_least("crest_iterations", spec.crest_iterations, 0);
-  if (spec.axes.empty()) throw std::invalid_argument("experiment: axes: at least one is needed");
+  if (spec.axes.empty())
+    throw std::invalid_argument("experiment: axes: at least one axis is required");
   if (spec.scheme == ExcitationScheme::zippered &&
       grid.size() < static_cast<Index>(spec.axes.size())) {
     throw std::invalid_argument(
-        fmt::format("experiment: scheme zippered shares {} lines among {} axes; each needs some: "
-                    "lengthen the period or widen the band",
+        fmt::format("experiment: scheme zippered distributes {} lines over {} axes, which is too "
+                    "few. Lengthen the period or widen the band",
                     grid.size(), spec.axes.size()));
   }
   std::set<std::string> channels;
   for (std::size_t p = 0; p < spec.axes.size(); ++p) {
     check_axis(grid, spec, p);
     if (!channels.insert(spec.axes[p].channel).second) {
-      throw std::invalid_argument(fmt::format("experiment: axes[{}].channel: '{}' is excited twice",
-                                              p, spec.axes[p].channel));
+      throw std::invalid_argument(fmt::format(
+          "experiment: axes[{}].channel: duplicate channel '{}'", p, spec.axes[p].channel));
     }
   }
 }
@@ -86,8 +87,8 @@ MatrixXcd mixing_matrix(ExcitationScheme scheme, int n) {
       return hadamard_matrix(n).cast<std::complex<double>>();
     } catch (const std::invalid_argument& e) {
       throw std::invalid_argument(
-          fmt::format("experiment: scheme orthogonal_hadamard with {} axes: {}; orthogonal_dft "
-                      "takes any number",
+          fmt::format("experiment: scheme orthogonal_hadamard with {} axes: {}. Use "
+                      "orthogonal_dft, which supports any number",
                       n, e.what()));
     }
   }
@@ -177,7 +178,7 @@ void ExperimentPlan::check_run(RunId run) const {
   if (run.realization < 0 || run.realization >= spec_.realizations || run.experiment < 0 ||
       run.experiment >= experiments()) {
     throw std::invalid_argument(fmt::format(
-        "experiment: no realization {}, experiment {}; realizations: {}, experiments: {}",
+        "experiment: unknown realization {}, experiment {}; realizations: {}, experiments: {}",
         run.realization, run.experiment, spec_.realizations, experiments()));
   }
 }

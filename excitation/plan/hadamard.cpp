@@ -88,11 +88,13 @@ bool has_hadamard_matrix(int size) {
 }
 
 MatrixXd hadamard_matrix(int size) {
-  if (size < 1) throw std::invalid_argument(fmt::format("Hadamard matrix: no size {}", size));
-  if (!has_hadamard_matrix(size)) {
+  if (size < 1)
     throw std::invalid_argument(
-        fmt::format("Hadamard matrix: none of size {} can be made; the nearest sizes are {} and {}",
-                    size, nearest(size, -1), nearest(size, +1)));
+        fmt::format("Hadamard matrix: size must be positive; got {}", size));
+  if (!has_hadamard_matrix(size)) {
+    throw std::invalid_argument(fmt::format(
+        "Hadamard matrix: unsupported size {}; the nearest supported sizes are {} and {}", size,
+        nearest(size, -1), nearest(size, +1)));
   }
   MatrixXd H = construct(size);
   // Negating rows and columns keeps H H^T = size I.

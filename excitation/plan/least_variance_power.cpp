@@ -21,18 +21,18 @@ constexpr double kSmallestCost = 1e-12;
 void check(const Eigen::Ref<const Eigen::VectorXd>& cost,
            const Eigen::Ref<const Eigen::MatrixXd>& bounds) {
   if (cost.size() != bounds.cols() || cost.size() == 0 || bounds.rows() == 0)
-    throw std::invalid_argument(
-        fmt::format("excitation power: {} costs and {} x {} bounds; one column a cost is needed",
-                    cost.size(), bounds.rows(), bounds.cols()));
+    throw std::invalid_argument(fmt::format(
+        "excitation power: {} costs and {} x {} bounds; the bounds must have one column per cost",
+        cost.size(), bounds.rows(), bounds.cols()));
   if (!cost.allFinite() || !(cost.minCoeff() >= 0.0) || !(cost.maxCoeff() > 0.0))
     throw std::invalid_argument(
-        "excitation power: the costs must be finite, not negative, and one of them positive");
+        "excitation power: the costs must be finite and nonnegative, and at least one must be "
+        "positive");
   if (!bounds.allFinite() || !(bounds.minCoeff() >= 0.0))
-    throw std::invalid_argument("excitation power: the bounds must be finite and not negative");
+    throw std::invalid_argument("excitation power: the bounds must be finite and nonnegative");
   for (Eigen::Index i = 0; i < cost.size(); ++i)
     if (!(bounds.col(i).maxCoeff() > 0.0))
-      throw std::invalid_argument(
-          fmt::format("excitation power: entry {} is under no bound; its amplitude has no end", i));
+      throw std::invalid_argument(fmt::format("excitation power: entry {} is unbounded", i));
 }
 
 }  // namespace

@@ -31,21 +31,22 @@ void check(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
   };
   const auto axes = static_cast<Index>(spec.experiment.axes.size());
   if (spec.cost.rows() != axes || spec.cost.cols() != grid.size())
-    fail(fmt::format("cost is {} x {}; {} axes x {} lines are needed", spec.cost.rows(),
+    fail(fmt::format("cost is {} x {}; expected {} axes x {} lines", spec.cost.rows(),
                      spec.cost.cols(), axes, grid.size()));
   if (!(spec.safety > 0.0 && spec.safety <= 1.0))
     fail(fmt::format("safety is {}; it must be in (0, 1]", spec.safety));
   if (spec.experiment.crest_iterations < 1)
-    fail("crest_iterations must be 1 or more: the phases are part of the design");
+    fail("crest_iterations must be 1 or more, because the design includes the phases");
   for (const BoundedSignal& s : spec.signals) {
     if (s.transfer.rows() != axes || s.transfer.cols() != grid.size() || !s.transfer.allFinite())
       fail(fmt::format("{}: transfer must be {} axes x {} lines and finite", s.name, axes,
                        grid.size()));
     if (!(s.peak_limit > 0.0) || !(s.rms_limit > 0.0) || !(s.reserve >= 0.0))
-      fail(fmt::format("{}: limits must be positive and the reserve not negative", s.name));
+      fail(fmt::format("{}: limits must be positive and the reserve nonnegative", s.name));
     if (!(s.reserve < spec.safety * s.peak_limit))
-      fail(fmt::format("{}: the reserve {:.4g} leaves nothing of the limit {:.4g}", s.name,
-                       s.reserve, s.peak_limit));
+      fail(fmt::format(
+          "{}: the reserve {:.4g} uses up the limit {:.4g}; lower the reserve or raise the limit",
+          s.name, s.reserve, s.peak_limit));
   }
 }
 

@@ -280,7 +280,7 @@ TEST(ExperimentPlan, NamesTheFieldThatIsWrong) {
   expect_refused([](auto& s) { s.crest_iterations = -1; }, "crest_iterations");
   expect_refused([](auto& s) { s.axes.clear(); }, "axes");
   expect_refused([](auto& s) { s.axes[1].channel = ""; }, "axes[1].channel");
-  expect_refused([](auto& s) { s.axes[2].channel = "z1"; }, "'z1' is excited twice");
+  expect_refused([](auto& s) { s.axes[2].channel = "z1"; }, "duplicate channel 'z1'");
   expect_refused([](auto& s) { s.axes[2].level = 0.0; }, "axes[2].level (z3)");
   expect_refused([nan](auto& s) { s.axes[0].level = nan; }, "axes[0].level");
   expect_refused([&](auto& s) { s.axes[0].shape.setOnes(lines - 1); }, "axes[0].shape");
@@ -293,7 +293,7 @@ TEST(ExperimentPlan, NamesTheFieldThatIsWrong) {
       "at line 3");
   expect_refused([](auto& s) { s.scheme = ExcitationScheme::orthogonal_hadamard; }, "2 and 4");
   expect_refused([](auto& s) { s = spec_of(100, ExcitationScheme::zippered); },
-                 "shares 30 lines among 100 axes");
+                 "distributes 30 lines over 100 axes");
 }
 
 TEST(ExperimentPlan, LeavesOutWhatIsDone) {

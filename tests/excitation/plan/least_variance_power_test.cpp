@@ -78,13 +78,13 @@ TEST(LeastVariancePower, RefusesWhatHasNoAnswer) {
     test::expect_error<std::invalid_argument>([&] { least_variance_power(cost, b); },
                                               "excitation power: ", text);
   };
-  refuse(VectorXd::Ones(2), bounds, "one column a cost");
-  refuse(-c, bounds, "not negative");
-  refuse(VectorXd::Zero(3), bounds, "one of them positive");
-  refuse(c, -bounds, "bounds must be finite and not negative");
+  refuse(VectorXd::Ones(2), bounds, "one column per cost");
+  refuse(-c, bounds, "nonnegative");
+  refuse(VectorXd::Zero(3), bounds, "at least one must be positive");
+  refuse(c, -bounds, "bounds must be finite and nonnegative");
   MatrixXd open = bounds;
   open(0, 1) = 0.0;
-  refuse(c, open, "entry 1 is under no bound");
+  refuse(c, open, "entry 1 is unbounded");
 }
 
 }  // namespace test_least_variance_power

@@ -146,7 +146,7 @@ TEST(LimitedDesign, RefusesWhatCannotBeDesigned) {
   refuse([](auto& s) { s.signals[0].transfer.conservativeResize(1, 80); }, "a: transfer");
   refuse([](auto& s) { s.signals[0].transfer(0, 0) = NAN; }, "finite");
   refuse([](auto& s) { s.signals[0].peak_limit = 0.0; }, "a: limits must be positive");
-  refuse([](auto& s) { s.signals[0].reserve = 9.5; }, "leaves nothing");
+  refuse([](auto& s) { s.signals[0].reserve = 9.5; }, "uses up the limit");
   refuse([](auto& s) { s.signals.clear(); }, "excitation power");
 }
 

@@ -204,7 +204,7 @@ TEST_F(LimitedPlanTest, RequestsThatAreWrong) {
   wrong("velocity_m_s: 0.05", "velocity_m_s: 0.05, safety: 1.5", "safety: 1.5 is out of range");
   make_pilot();
   wrong("[16, 800]", "[16, 900]", "do not reach over the band");
-  wrong("velocity_m_s: 0.05", "velocity_m_s: 1e-9", "leaves nothing of the limit");
+  wrong("velocity_m_s: 0.05", "velocity_m_s: 1e-9", "uses up the limit");
   succeed({"design", limits_, "-o", name("e.h5")});
   fail({"run", config_, "--excitation", name("e.h5"), "-o", name("x.slog")}, 2,
        "the scheme is not that of");

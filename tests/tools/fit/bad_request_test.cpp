@@ -84,7 +84,7 @@ TEST_F(BadRequest, Configurations) {
   wrong("band_hz: [16, 800]", "band_hz: [800, 16]", "band_hz: the band is empty");
   wrong("band_hz: [16, 800]", "band_hz: [16, 1000]", "is not below half the sample rate");
   wrong("band_hz: [16, 800]", "band_hz: [16.5, 17]",
-        "bad.yaml:10:12: frequency band: no line lies in 16.5 to 17 Hz");
+        "bad.yaml:10:12: frequency band: no line between 16.5 and 17 Hz");
   wrong("axes: [a1, a2, a3]", "axes: [a1, a2, z3]",
         "bad.yaml:7:18: axes: the stage has no actuator 'z3'");
   wrong("axes: [a1, a2, a3]", "axes: [a1, a1]", "stands here twice");
