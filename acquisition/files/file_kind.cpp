@@ -17,37 +17,39 @@ struct FileKind {
   std::string_view taken_by;
 };
 
-constexpr std::string_view kTakesLogs = "'stageid frf', 'validate', 'report' and 'log' take it";
+constexpr std::string_view kTakesLogs = "use it with 'stageid frf', 'validate', 'report' or 'log'";
 constexpr std::string_view kTakesConfigurations =
-    "'stageid identify', 'design', 'run' and 'config check' take it";
+    "use it with 'stageid identify', 'design', 'run' or 'config check'";
 
 /// By the format that a file of ours names.
 constexpr std::array kOurs = {
     FileKind{"stageid-log.h5", "a log in HDF5", kTakesLogs},
     FileKind{"stageid-frf.h5", "a frequency response",
-             "'stageid modes', 'fit', 'validate', 'export', 'report' and 'plot' take it"},
+             "use it with 'stageid modes', 'fit', 'validate', 'export', 'report' or 'plot'"},
     FileKind{"stageid-excitation.h5", "a designed excitation",
-             "'stageid run --excitation' takes it"},
+             "use it with 'stageid run --excitation'"},
     FileKind{"stageid-model.h5", "an exported model, for other programs",
-             "'stageid report' takes it beside the model.json it was made of"},
+             "give its model.json to 'stageid report' as well"},
     FileKind{"stageid-model", "a model",
-             "'stageid validate', 'export', 'report' and 'plot' take a model.json"},
+             "use a model.json with 'stageid validate', 'export', 'report' or 'plot'"},
     FileKind{"stageid-modes", "a list of modes",
-             "'stageid fit --modes', 'report' and 'plot' take it"},
-    FileKind{"stageid-summary", "a summary of 'stageid identify'", "'stageid report' takes it"},
+             "use it with 'stageid fit --modes', 'report' or 'plot'"},
+    FileKind{"stageid-summary", "a summary of 'stageid identify'", "use it with 'stageid report'"},
     FileKind{"stageid-experiment", "an experiment file", kTakesConfigurations},
-    FileKind{"stageid-stage", "a stage file", "'stageid config check' and 'node' take it"}};
+    FileKind{"stageid-stage", "a stage file", "use it with 'stageid config check' or 'node'"}};
 
 /// By the first bytes.
 constexpr std::array kByHead = {
     FileKind{"\x89SLOG", "a native log", kTakesLogs},
-    FileKind{"\x89HDF\r\n\x1a\n", "an HDF5 file of another program", "'stageid import' reads it"},
-    FileKind{"MATLAB", "a MATLAB file", "'stageid import' reads it"},
-    FileKind{"PK\x03\x04", "an archive, as .npz is", "'stageid import' reads .npz"},
-    FileKind{"    -1\n", "a universal file", "'stageid import' reads it"},
-    FileKind{"    -1\r\n", "a universal file", "'stageid import' reads it"},
-    FileKind{"<!DOCTYPE html", "a page", "a browser shows it"},
-    FileKind{"{", "JSON", "a model or a list of modes would name its format"}};
+    FileKind{"\x89HDF\r\n\x1a\n", "an HDF5 file of another program",
+             "convert it with 'stageid import'"},
+    FileKind{"MATLAB", "a MATLAB file", "convert it with 'stageid import'"},
+    FileKind{"PK\x03\x04", "a ZIP archive (possibly .npz)",
+             "convert .npz files with 'stageid import'"},
+    FileKind{"    -1\n", "a universal file", "convert it with 'stageid import'"},
+    FileKind{"    -1\r\n", "a universal file", "convert it with 'stageid import'"},
+    FileKind{"<!DOCTYPE html", "an HTML page", "open it in a browser"},
+    FileKind{"{", "JSON", "a model or a list of modes has the key \"format\""}};
 
 std::string sentence(const FileKind& kind, const std::string& wanted) {
   return std::string("is ").append(kind.name) + ", not " + wanted + "; " +

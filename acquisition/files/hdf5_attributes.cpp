@@ -32,11 +32,10 @@ struct Attribute {
     throw FormatError(file.path(), object, "attribute '" + name + "' " + what);
   }
   void expect_one(const std::string& wanted) const {
-    if (count != 1)
-      fail("has " + std::to_string(count) + " values; " + wanted + " must stand here");
+    if (count != 1) fail("has " + std::to_string(count) + " values; expected " + wanted);
   }
   void expect(bool matches, const std::string& wanted) const {
-    if (!matches) fail("holds " + hdf5::name_of(kind) + "; " + wanted + " must stand here");
+    if (!matches) fail("contains " + hdf5::name_of(kind) + "; expected " + wanted);
   }
   bool is_number() const { return kind == Hdf5Kind::real || kind == Hdf5Kind::integer; }
   void read(hid_t memory_type, void* buffer) const {
@@ -54,7 +53,7 @@ struct Attribute {
 };
 
 std::vector<std::string> read_texts_of(const Attribute& attribute) {
-  attribute.expect(attribute.kind == Hdf5Kind::text, "text");
+  attribute.expect(attribute.kind == Hdf5Kind::text, "strings");
   std::vector<std::string> texts;
   const auto read = [&attribute](hid_t memory_type, void* buffer) {
     return H5Aread(attribute.handle.get(), memory_type, buffer) >= 0;
@@ -140,7 +139,7 @@ long long Hdf5File::read_integer_attribute(const std::string& object,
   attribute.read(H5T_NATIVE_DOUBLE, &value);
   constexpr double kLimit = 0x1p53;  // above it a double does not tell integers apart
   if (!(std::abs(value) <= kLimit) || value != std::trunc(value)) {
-    attribute.fail("is " + std::to_string(value) + "; an integer must stand here");
+    attribute.fail("is " + std::to_string(value) + "; expected an integer");
   }
   return static_cast<long long>(value);
 }
@@ -148,8 +147,8 @@ long long Hdf5File::read_integer_attribute(const std::string& object,
 std::string Hdf5File::read_text_attribute(const std::string& object,
                                           const std::string& name) const {
   const Attribute attribute(*this, object, name);
-  attribute.expect(attribute.kind == Hdf5Kind::text, "text");
-  attribute.expect_one("one text");
+  attribute.expect(attribute.kind == Hdf5Kind::text, "a string");
+  attribute.expect_one("one string");
   return read_texts_of(attribute).front();
 }
 

@@ -37,7 +37,8 @@ void check_can_be_opened(const std::filesystem::path& file) {
   struct stat status {};
   const bool regular = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
   ::close(descriptor);
-  if (!regular) throw FileError(file.string() + ": is not a file; give the name of an HDF5 file");
+  if (!regular)
+    throw FileError(file.string() + ": is not a regular file; give the name of an HDF5 file");
 }
 
 bool begins_as_hdf5(const std::filesystem::path& file) {
@@ -78,14 +79,14 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
     throw FormatError(file, "",
                       !other.empty()
                           ? other
-                          : "is not an HDF5 file, or its beginning is damaged; give an HDF5 file");
+                          : "is not an HDF5 file, or its header is damaged; give an HDF5 file");
   }
   hdf5::check_global_heaps(file);
   Hdf5Handle handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!handle) {
     throw FormatError(file, "",
-                      "the HDF5 file is cut short, damaged or still being written (" +
-                          hdf5::take_reason() + "); copy it again or write it anew");
+                      "the HDF5 file is truncated, damaged or still being written (" +
+                          hdf5::take_reason() + "); copy it again or recreate it");
   }
   return {file, std::move(handle)};
 }
@@ -140,11 +141,11 @@ bool Hdf5File::is_group(const std::string& object) const {
 
 std::vector<std::string> Hdf5File::children(const std::string& group) const {
   const auto fail = [&](const std::string& what) { throw FormatError(path_, group, what); };
-  if (!exists(group)) fail("is missing; a group must stand here");
+  if (!exists(group)) fail("is missing; expected a group");
   const Hdf5Handle handle(H5Gopen2(file_.get(), group.c_str(), H5P_DEFAULT), H5Gclose);
   if (!handle) {
     hdf5::take_reason();
-    fail("is not a group; a group must stand here");
+    fail("is not a group; expected a group");
   }
   const auto collect = [](hid_t, const char* name, const H5L_info_t*, void* names) -> herr_t {
     static_cast<std::vector<std::string>*>(names)->emplace_back(name);
@@ -161,7 +162,7 @@ hid_t Hdf5File::open_dataset(const std::string& dataset) const {
   for (const OpenDatasets::Entry& entry : open_datasets_->entries) {
     if (entry.handle && entry.name == dataset) return entry.handle.get();
   }
-  if (!exists(dataset)) throw FormatError(path_, dataset, "is missing; a dataset must stand here");
+  if (!exists(dataset)) throw FormatError(path_, dataset, "is missing; expected a dataset");
   // Room for a chunk across all columns of the usual logs; the default of 1 MiB holds few of them.
   constexpr std::size_t kChunkCacheBytes = std::size_t{1} << 24;
   constexpr std::size_t kChunkCacheSlots = 12421;  // a prime, as HDF5 advises
@@ -171,7 +172,7 @@ hid_t Hdf5File::open_dataset(const std::string& dataset) const {
   if (!handle) {
     throw FormatError(
         path_, dataset,
-        "is not a dataset, or damaged (" + hdf5::take_reason() + "); a dataset must stand here");
+        "is not a dataset, or is damaged (" + hdf5::take_reason() + "); expected a dataset");
   }
   OpenDatasets::Entry& entry = open_datasets_->entries[open_datasets_->oldest];
   open_datasets_->oldest = (open_datasets_->oldest + 1) % OpenDatasets::kEntries;

@@ -54,11 +54,10 @@ void check_window(const std::filesystem::path& file, std::string_view window, st
     const bool whole = size <= window.size() - at;
     const bool fits = size >= kHeader && size <= file_bytes - offset - at;
     if (!fits || (whole && !objects_fit(window.substr(at, static_cast<std::size_t>(size))))) {
-      throw FormatError(
-          file, "",
-          fmt::format("the HDF5 file is damaged: the texts stored at byte {} overlap; "
-                      "copy it again or write it anew",
-                      offset + at));
+      throw FormatError(file, "",
+                        fmt::format("the HDF5 file is damaged: the strings stored at byte {} "
+                                    "overlap; copy it again or recreate it",
+                                    offset + at));
     }
   }
 }

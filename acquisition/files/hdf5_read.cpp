@@ -26,7 +26,7 @@ struct DatasetInfo {
     throw FormatError(file.path(), name, what);
   }
   void expect(bool matches, const std::string& wanted) const {
-    if (!matches) fail("holds " + hdf5::name_of(kind) + "; " + wanted + " must stand here");
+    if (!matches) fail("contains " + hdf5::name_of(kind) + "; expected " + wanted);
   }
   bool is_number() const { return kind == Hdf5Kind::real || kind == Hdf5Kind::integer; }
 
@@ -38,7 +38,7 @@ struct DatasetInfo {
   /// @throws FormatError with HDF5's reason if `status` tells a failure.
   void check_read(herr_t status) const {
     if (status < 0) {
-      fail("cannot be read (" + hdf5::take_reason() + "); the file is cut short or damaged");
+      fail("cannot be read (" + hdf5::take_reason() + "); the file is truncated or damaged");
     }
   }
 
@@ -60,7 +60,7 @@ std::vector<Value> read_all(const DatasetInfo& info, hid_t memory_type) {
     }
     return values;
   } catch (const std::bad_alloc&) {
-    info.fail("has the size " + hdf5::text_of(info.shape) + ", which does not fit into memory");
+    info.fail("has the size " + hdf5::text_of(info.shape) + ", which exceeds the available memory");
   }
 }
 
@@ -84,16 +84,17 @@ std::vector<double> Hdf5File::read_reals(const std::string& dataset) const {
 
 std::vector<std::complex<double>> Hdf5File::read_complex(const std::string& dataset) const {
   const DatasetInfo info(*this, dataset, open_dataset(dataset));
-  info.expect(info.kind == Hdf5Kind::complex, "complex numbers (compound of floats r and i)");
+  info.expect(info.kind == Hdf5Kind::complex,
+              "complex numbers (compound type with float members r and i)");
   const Hdf5Handle type = hdf5::complex_type(H5T_NATIVE_DOUBLE);
   return read_all<std::complex<double>>(info, type.get());
 }
 
 std::vector<std::string> Hdf5File::read_texts(const std::string& dataset) const {
   const DatasetInfo info(*this, dataset, open_dataset(dataset));
-  info.expect(info.kind == Hdf5Kind::text, "a list of texts");
+  info.expect(info.kind == Hdf5Kind::text, "a list of strings");
   if (info.shape.size() != 1) {
-    info.fail("has the shape " + hdf5::text_of(info.shape) + "; a list of texts must stand here");
+    info.fail("has the shape " + hdf5::text_of(info.shape) + "; expected a list of strings");
   }
   std::vector<std::string> texts;
   const auto read = [&info](hid_t memory_type, void* buffer) {
@@ -111,7 +112,7 @@ void Hdf5File::read_rows(const std::string& dataset, hsize_t first, hsize_t coun
   info.expect(info.is_number(), "real numbers");
   const std::size_t rank = info.shape.size();
   if (rank != 1 && rank != 2) {
-    info.fail("has the shape " + hdf5::text_of(info.shape) + "; rows x columns must stand here");
+    info.fail("has the shape " + hdf5::text_of(info.shape) + "; expected rows x columns");
   }
   if (first > info.shape[0] || count > info.shape[0] - first) {
     info.fail("has " + std::to_string(info.shape[0]) + " rows, fewer than the " +

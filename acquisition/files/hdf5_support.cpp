@@ -25,7 +25,7 @@ std::string on_one_line(std::string reason) {
   }
   std::replace_if(
       reason.begin(), reason.end(), [](unsigned char c) { return c < ' '; }, ' ');
-  return reason.empty() ? "reason unknown" : reason;
+  return reason.empty() ? "unknown reason" : reason;
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ std::string name_of(Hdf5Kind kind) {
     case Hdf5Kind::other:
       break;
   }
-  return "data of a type that is not understood";
+  return "data of an unsupported type";
 }
 
 std::vector<hsize_t> shape_of(hid_t space) {
@@ -122,9 +122,9 @@ std::size_t plausible_count(const std::filesystem::path& file, const std::string
   std::size_t count = 1;
   for (const hsize_t extent : shape) {
     if (extent > limit / bytes) {
-      throw FormatError(
-          file, place,
-          "has the size " + text_of(shape) + ", more than this file can hold; the file is damaged");
+      throw FormatError(file, place,
+                        "has the size " + text_of(shape) +
+                            ", which exceeds the size of the file; the file is damaged");
     }
     bytes *= extent;
     count *= static_cast<std::size_t>(extent);

@@ -79,11 +79,11 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
 std::string suggest_key(const std::string& unknown, const std::vector<std::string>& allowed) {
   for (const std::string& key : allowed)
     if (stem(key) == stem(unknown) && key != unknown && stem(key) != key)
-      return fmt::format("the unit stands in the key: write '{}'", key);
+      return fmt::format("the key includes the unit; write '{}'", key);
   const std::string nearest = nearest_word(unknown, allowed);
   if (!nearest.empty()) return fmt::format("did you mean '{}'?", nearest);
-  if (allowed.empty()) return "nothing may stand here";
-  return fmt::format("allowed are {}", fmt::join(allowed, ", "));
+  if (allowed.empty()) return "no keys are allowed here";
+  return fmt::format("allowed keys: {}", fmt::join(allowed, ", "));
 }
 
 }  // namespace stageid

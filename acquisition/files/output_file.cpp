@@ -129,7 +129,7 @@ OutputFile::OutputFile(const std::filesystem::path& target)
       ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
   if (!descriptor)
     fail(target_, "cannot create a file in this directory", errno,
-         errno == ENOENT ? "make it first" : "");
+         errno == ENOENT ? "create the directory first" : "");
   unfinished().files.insert(temporary_);
 }
 
@@ -145,7 +145,7 @@ void OutputFile::commit() {
   {
     const std::lock_guard lock(unfinished().mutex);
     if (::rename(temporary_.c_str(), target_.c_str()) != 0)
-      fail(target_, "cannot be put in its place", errno);
+      fail(target_, "cannot be moved into place", errno);
     unfinished().files.erase(temporary_);
   }
   committed_ = true;

@@ -16,7 +16,7 @@ constexpr std::array kRemedies = {Remedy{ENOSPC, "free some space, or write else
                                   Remedy{EDQUOT, "free some space, or write elsewhere"},
                                   Remedy{EFBIG, "raise the limit (ulimit -f), or write elsewhere"},
                                   Remedy{EROFS, "write elsewhere"},
-                                  Remedy{EACCES, "check the rights"},
+                                  Remedy{EACCES, "check the permissions"},
                                   Remedy{ENOENT, "check the path"},
                                   Remedy{ENOTDIR, "check the path"},
                                   Remedy{EISDIR, "give the name of a file"}};

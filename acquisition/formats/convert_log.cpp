@@ -281,13 +281,14 @@ void convert_log(const LogReader& reader, const std::filesystem::path& to,
   const bool hdf5 = extension == ".h5" || extension == ".hdf5";
   const bool native = extension == ".slog";
   if (!hdf5 && !native && extension != ".csv") {
-    throw std::invalid_argument(fmt::format(
-        "{}: unknown extension; give .h5 or .hdf5 (HDF5), .csv (text), .mat (MATLAB) or .slog",
-        to.string()));
+    throw std::invalid_argument(
+        fmt::format("{}: unsupported file extension; use .h5 or .hdf5 (HDF5), .csv (text), .mat "
+                    "(MATLAB) or .slog",
+                    to.string()));
   }
   if (native && dynamic_cast<const SlogReader*>(&reader) != nullptr)
     throw std::invalid_argument(fmt::format(
-        "{}: is a native log already; 'stageid log recover' makes a new one of what is intact",
+        "{}: is already a native log; use 'stageid log recover' to copy its intact parts",
         reader.path().string()));
   OutputFile output(to);
   if (hdf5) {

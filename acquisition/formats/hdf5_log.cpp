@@ -24,7 +24,7 @@ int read_int(const Hdf5File& file, const std::string& object, const std::string&
   const long long value = file.read_integer_attribute(object, name);
   if (value < std::numeric_limits<int>::min() || value > std::numeric_limits<int>::max()) {
     throw FormatError(file.path(), object,
-                      fmt::format("attribute {} is {}; that is out of range", name, value));
+                      fmt::format("attribute {} is out of range: {}", name, value));
   }
   return static_cast<int>(value);
 }
@@ -41,7 +41,7 @@ ChannelList read_channel_list(const Hdf5File& file, const std::string& dataset) 
   if (channels.units.size() != channels.size()) {
     throw FormatError(
         file.path(), dataset,
-        fmt::format("has {} and {}; give one unit, or one a channel",
+        fmt::format("has {} and {}; give one unit, or one per channel",
                     counted(channels.size(), "channel"), counted(channels.units.size(), "unit")));
   }
   return channels;
@@ -53,7 +53,7 @@ std::vector<double> read_column_values(const Hdf5File& file, const std::string& 
   std::vector<double> values = file.read_reals_attribute(dataset, name);
   if (values.size() != 1 && values.size() != size) {
     throw FormatError(file.path(), dataset,
-                      fmt::format("attribute {} has {}; it must have 1 or {}", name,
+                      fmt::format("attribute {} has {}; expected 1 or {}", name,
                                   counted(values.size(), "value"), size));
   }
   if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) {
@@ -79,16 +79,17 @@ Hdf5LogReader::Hdf5LogReader(const std::filesystem::path& file) : path_(file) {
     throw FormatError(
         path_, "/",
         !other.empty() ? other
-                       : fmt::format("attribute format is '{}'; a log has 'stageid-log'", format));
+                       : fmt::format("attribute format is '{}'; expected 'stageid-log'", format));
   }
   const long long version = file_->read_integer_attribute("/", "format_version");
   if (version != 1) {
     throw FormatError(
-        path_, "/", fmt::format("is of format version {}; this program reads version 1", version));
+        path_, "/",
+        fmt::format("has unsupported format version {}; this program reads version 1", version));
   }
   read_channels();
   if (!file_->exists("/runs")) {
-    throw FormatError(path_, "/runs", "is missing; runs are groups /runs/0000, /runs/0001, ...");
+    throw FormatError(path_, "/runs", "is missing; expected groups /runs/0000, /runs/0001, ...");
   }
   for (const std::string& name : file_->children("/runs")) read_run(name);
   check_runs(path_, info_, runs_);
@@ -134,9 +135,10 @@ void Hdf5LogReader::read_run(const std::string& name) {
   place.sensors = open_dataset(group + "/sensors", info_.sensors.size());
   run.samples = place.sensors.rows;
   if (place.actuators.rows != run.samples) {
-    throw FormatError(path_, group,
-                      fmt::format("actuators have {} rows, sensors {}; both must have the same",
-                                  place.actuators.rows, run.samples));
+    throw FormatError(
+        path_, group,
+        fmt::format("actuators have {} rows, sensors {}; both must have the same number",
+                    place.actuators.rows, run.samples));
   }
   check_excitation_length(run, place.excitation);
   if (file_->exists(group + "/marked")) {
@@ -144,7 +146,7 @@ void Hdf5LogReader::read_run(const std::string& name) {
     const std::vector<hsize_t> shape = file_->shape(place.marked);
     if (shape.size() != 1 || shape[0] != run.samples) {
       throw FormatError(path_, place.marked,
-                        fmt::format("must be a vector of {} numbers, one a sample", run.samples));
+                        fmt::format("must be a vector of {} numbers, one per sample", run.samples));
     }
   }
   run.health.cycles = run.samples;
@@ -157,8 +159,7 @@ Hdf5LogReader::Dataset Hdf5LogReader::open_dataset(const std::string& name,
   const std::vector<hsize_t> shape = file_->shape(name);
   if (shape.size() != 2 || shape[1] != columns) {
     throw FormatError(path_, name,
-                      fmt::format("has shape [{}]; it must have two dimensions, samples x {} "
-                                  "channels",
+                      fmt::format("has shape [{}]; expected two dimensions, samples x {} channels",
                                   fmt::join(shape, " x "), columns));
   }
   return {name, read_scaling(name, columns), shape[0]};
@@ -183,8 +184,7 @@ void Hdf5LogReader::check_excitation_length(const LogRun& run, const Dataset& ex
     return;
   }
   throw FormatError(path_, excitation.name,
-                    fmt::format("has {}; it must have one period ({}) or as many as the run "
-                                "({})",
+                    fmt::format("has {}; expected one period ({}) or the length of the run ({})",
                                 counted(excitation.rows, "row"), period, run.samples));
 }
 
@@ -255,7 +255,7 @@ Eigen::MatrixXd Hdf5LogReader::excitation(std::size_t run) const {
   Eigen::MatrixXd period(info_.period_samples, static_cast<Eigen::Index>(info_.excitation.size()));
   read_columns(dataset, 0, period);
   if (!period.allFinite()) {
-    throw FormatError(path_, dataset.name, "holds a value that is not a finite number");
+    throw FormatError(path_, dataset.name, "contains a non-finite value");
   }
   // A run that was broken off has ramped its excitation down: nothing is to be expected of it.
   if (dataset.rows > static_cast<std::uint64_t>(info_.period_samples) && which.complete) {
@@ -270,8 +270,8 @@ void Hdf5LogReader::check_repetition(const LogRun& run, const Dataset& dataset,
   const auto rows = static_cast<std::uint64_t>(period.rows());
   if (dataset.rows % rows != 0) {
     throw FormatError(path_, dataset.name,
-                      fmt::format("run {}: its {} rows are not whole periods of {}", run.name,
-                                  dataset.rows, rows));
+                      fmt::format("run {}: {} rows are not a whole number of periods of {}",
+                                  run.name, dataset.rows, rows));
   }
   if (period.size() == 0) return;
   const double peak = period.cwiseAbs().maxCoeff();
@@ -295,13 +295,12 @@ void Hdf5LogReader::check_repetition(const LogRun& run, const Dataset& dataset,
     Eigen::Index column = 0;
     const double largest =
         (later.row(row) - row_of(period, row, ahead)).cwiseAbs().maxCoeff(&column);
-    throw FormatError(
-        path_, dataset.name,
-        fmt::format("does not repeat: row {} of '{}' differs from the first period by {:.3g} (peak "
-                    "{:.3g}); period_samples ({}) may be wrong",
-                    first + static_cast<std::uint64_t>(row),
-                    info_.excitation.names[static_cast<std::size_t>(column)], largest, peak,
-                    info_.period_samples));
+    throw FormatError(path_, dataset.name,
+                      fmt::format("is not periodic: row {} of '{}' differs from the first period "
+                                  "by {:.3g} (peak {:.3g}); check period_samples ({})",
+                                  first + static_cast<std::uint64_t>(row),
+                                  info_.excitation.names[static_cast<std::size_t>(column)], largest,
+                                  peak, info_.period_samples));
   }
 }
 

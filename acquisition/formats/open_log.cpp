@@ -33,8 +33,8 @@ std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool dama
     throw FormatError(file, "", other);
   throw FormatError(
       file, "",
-      "is neither a native log (.slog) nor an HDF5 file; another program's is read with "
-      "'stageid import', a damaged native log with 'stageid log recover'");
+      "is neither a native log (.slog) nor an HDF5 file. Convert files of other programs with "
+      "'stageid import'; repair a damaged native log with 'stageid log recover'");
 }
 
 }  // namespace stageid

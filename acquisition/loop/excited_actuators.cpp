@@ -12,7 +12,7 @@ std::vector<int> excited_actuators(const ExperimentPlan& plan, const StageInfo& 
     const int index = channel_index(stage.actuators, axis.channel);
     if (index < 0)
       throw std::invalid_argument(fmt::format(
-          "experiment: axis '{}' is no actuator of the stage '{}'", axis.channel, stage.name));
+          "experiment: axis '{}' is not an actuator of stage '{}'", axis.channel, stage.name));
     indices.push_back(index);
   }
   return indices;

@@ -70,7 +70,7 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
   }
   if (ring.row_words() != actuators + sensors + 1 || sensors > 64) {
     throw std::invalid_argument(fmt::format(
-        "loop: a row of {} words for {} actuators, {} sensors (64 at most) and a status word",
+        "loop: a row has {} words for {} actuators, {} sensors (at most 64) and a status word",
         ring.row_words(), actuators, sensors));
   }
   ramp_samples_ = static_cast<std::uint64_t>(std::llround(options.ramp_s * info.sample_rate_hz));
@@ -88,14 +88,15 @@ void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excita
   if (period.rows() == 0 || excitation.samples == 0 || !period.allFinite() ||
       period.cols() != static_cast<Eigen::Index>(excitation.actuators.size())) {
     throw std::invalid_argument(
-        "loop: the excitation must have samples, one actuator a column, and be finite");
+        "loop: the excitation must be finite, with at least one sample and one column per "
+        "actuator");
   }
   excited_.clear();
   std::vector<Eigen::Index> columns;
   for (Eigen::Index c = 0; c < period.cols(); ++c) {
     const int actuator = excitation.actuators[static_cast<std::size_t>(c)];
     if (actuator < 0 || static_cast<std::size_t>(actuator) >= u_.size()) {
-      throw std::invalid_argument(fmt::format("loop: there is no actuator number {}", actuator));
+      throw std::invalid_argument(fmt::format("loop: unknown actuator number {}", actuator));
     }
     if (period.col(c).isZero(0.0)) continue;
     excited_.push_back(static_cast<std::size_t>(actuator));

@@ -245,8 +245,9 @@ class Experiment {
         return;
       case StopReason::misses:
         result_.end = ExperimentEnd::fault;
-        result_.message = fmt::format("stage '{}': too many bad cycles in a row, the last: {}",
-                                      info.name, to_string(loop_.last_trouble()));
+        result_.message =
+            fmt::format("stage '{}': too many consecutive bad cycles; the last one: {}", info.name,
+                        to_string(loop_.last_trouble()));
         return;
       case StopReason::plant:
         result_.end = ExperimentEnd::fault;
@@ -254,11 +255,13 @@ class Experiment {
         return;
       case StopReason::interrupt:
         result_.end = ExperimentEnd::interrupted;
-        result_.message = "interrupted; what was measured is kept";
+        result_.message = "interrupted; the measured data are kept";
         return;
       case StopReason::log:
         result_.end = ExperimentEnd::log_failed;
-        result_.message = "the log could not be written as fast as the stage was measured";
+        result_.message =
+            "the log could not be written fast enough; write to a faster disk or lower the sample "
+            "rate";
         return;
     }
   }
@@ -321,12 +324,15 @@ LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
                             std::string metadata_json) {
   const double rate_hz = plan.grid().sample_rate_hz();
   if (std::abs(rate_hz - stage.sample_rate_hz) > 1e-9 * stage.sample_rate_hz) {
-    throw std::invalid_argument(fmt::format(
-        "experiment: designed for {} Hz, the stage runs at {} Hz", rate_hz, stage.sample_rate_hz));
+    throw std::invalid_argument(
+        fmt::format("experiment: designed for {} Hz, but the stage runs at {} Hz; give both the "
+                    "same sample_rate_hz",
+                    rate_hz, stage.sample_rate_hz));
   }
   if (stage.maximum_rate_hz > 0.0 && rate_hz > stage.maximum_rate_hz) {
-    throw std::invalid_argument(fmt::format("experiment: {} Hz, but the stage can do {} Hz at most",
-                                            rate_hz, stage.maximum_rate_hz));
+    throw std::invalid_argument(fmt::format(
+        "experiment: {} Hz exceeds the stage's maximum sample rate of {} Hz; lower sample_rate_hz",
+        rate_hz, stage.maximum_rate_hz));
   }
   LogInfo info;
   info.sample_rate_hz = rate_hz;
@@ -367,7 +373,7 @@ ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
                                 const RunExperimentOptions& options) {
   if (!same_measurement(log.info(), experiment_log_info(plan, stage.info()))) {
     throw std::invalid_argument(
-        "experiment: the log was made for another plan or stage; make it with "
+        "experiment: the log was created for a different plan or stage; create it with "
         "experiment_log_info()");
   }
   return Experiment(plan, stage, controller, log, options).perform();

@@ -80,7 +80,7 @@ class ResidentExperiment {
       result_.message = fmt::format("{}{}{} measured", enough, enough.empty() ? "" : "; ",
                                     counted(result_.runs_done, "run"));
     if (result_.end == ExperimentEnd::interrupted)
-      result_.message = "interrupted; what was measured is kept";
+      result_.message = "interrupted; the measured data are kept";
     return std::move(result_);
   }
 
@@ -187,13 +187,14 @@ ExperimentResult run_resident_experiment(const ExperimentPlan& plan, ResidentSta
                                          RunWriter& log, const RunExperimentOptions& options) {
   if (!same_measurement(log.info(), experiment_log_info(plan, stage.info())))
     throw std::invalid_argument(
-        "experiment: the log was made for another plan or stage; make it with "
+        "experiment: the log was created for a different plan or stage; create it with "
         "experiment_log_info()");
   const auto samples = static_cast<std::uint64_t>(plan.samples_per_run());
   if (samples > stage.depth_samples())
-    throw std::invalid_argument(fmt::format(
-        "experiment: {} samples a run, the stage '{}' records {} at most; fewer periods", samples,
-        stage.info().name, stage.depth_samples()));
+    throw std::invalid_argument(
+        fmt::format("experiment: {} samples per run, but stage '{}' records at most {}; lower the "
+                    "number of periods",
+                    samples, stage.info().name, stage.depth_samples()));
   return ResidentExperiment(plan, stage, log, options).perform();
 }
 

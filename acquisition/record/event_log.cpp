@@ -53,8 +53,8 @@ void EventLog::append(std::string line) {
   if (std::fwrite(line.data(), 1, line.size(), file_.get()) == line.size() &&
       std::fflush(file_.get()) == 0)
     return;
-  error_ = fmt::format("{}: cannot be written: {}; later events are missing in it", path_.string(),
-                       std::strerror(errno));
+  error_ = fmt::format("{}: cannot be written: {}; later events are missing from it",
+                       path_.string(), std::strerror(errno));
 }
 
 std::vector<std::string> EventLog::latest(std::size_t most) const {

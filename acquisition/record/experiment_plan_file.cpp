@@ -141,14 +141,14 @@ class PlanReader {
   int integer(const char* name, int least) const {
     const long long value = file_.read_integer_attribute("/", name);
     if (value < least || value > std::numeric_limits<int>::max()) {
-      fail("/", fmt::format("attribute '{}' is {}; it must be at least {}", name, value, least));
+      fail("/", fmt::format("attribute '{}' is {}; must be at least {}", name, value, least));
     }
     return static_cast<int>(value);
   }
   void expect_shape(const std::string& dataset, const std::vector<hsize_t>& wanted) const {
     const std::vector<hsize_t> shape = file_.shape(dataset);
     if (shape != wanted) {
-      fail(dataset, fmt::format("has the shape {}; it must be {}", fmt::join(shape, " x "),
+      fail(dataset, fmt::format("has the shape {}; expected {}", fmt::join(shape, " x "),
                                 fmt::join(wanted, " x ")));
     }
   }
@@ -184,13 +184,14 @@ void PlanReader::check_format() const {
   if (format != kFormat) {
     const std::string other = other_hdf5_kind(format, "a designed excitation");
     fail("/", other.empty()
-                  ? fmt::format("attribute 'format' is '{}'; it must be '{}'", format, kFormat)
+                  ? fmt::format("attribute 'format' is '{}'; expected '{}'", format, kFormat)
                   : other);
   }
   const long long version = file_.read_integer_attribute("/", "format_version");
   if (version != kVersion) {
-    fail("/",
-         fmt::format("attribute 'format_version' is {}; this program reads {}", version, kVersion));
+    fail("/", fmt::format(
+                  "attribute 'format_version' is {}, which is unsupported; this program reads {}",
+                  version, kVersion));
   }
 }
 
@@ -200,7 +201,7 @@ FrequencyGrid PlanReader::grid() const {
   for (const double number : numbers) {
     if (!(number >= 1.0 && number <= std::numeric_limits<int>::max()) ||
         number != std::floor(number)) {
-      fail("/lines", fmt::format("holds {}; positive integers must stand here", number));
+      fail("/lines", fmt::format("contains {}; expected positive integers", number));
     }
     lines.push_back(static_cast<int>(number));
   }
@@ -214,7 +215,7 @@ ExcitationScheme PlanReader::scheme() const {
     if (name == entry.name) return entry.scheme;
   }
   fail("/", "attribute 'scheme' is '" + name +
-                "'; it must be single_axis, orthogonal_dft, orthogonal_hadamard or zippered");
+                "'; must be single_axis, orthogonal_dft, orthogonal_hadamard or zippered");
 }
 
 std::uint64_t PlanReader::seed() const {
@@ -222,7 +223,7 @@ std::uint64_t PlanReader::seed() const {
   std::uint64_t seed = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
   if (error != std::errc() || end != text.data() + text.size()) {
-    fail("/", "attribute 'seed' is '" + text + "'; an unsigned decimal number must stand here");
+    fail("/", "attribute 'seed' is '" + text + "'; expected an unsigned decimal number");
   }
   return seed;
 }
@@ -246,7 +247,7 @@ std::vector<ExcitationAxis> PlanReader::axes(const FrequencyGrid& grid) const {
 ExperimentSpec PlanReader::spec(const FrequencyGrid& grid) const {
   const std::string scaling = file_.read_text_attribute("/", "scaling");
   if (scaling != "rms" && scaling != "peak") {
-    fail("/", "attribute 'scaling' is '" + scaling + "'; it must be rms or peak");
+    fail("/", "attribute 'scaling' is '" + scaling + "'; must be rms or peak");
   }
   ExperimentSpec spec;
   spec.scheme = scheme();
@@ -259,8 +260,9 @@ ExperimentSpec PlanReader::spec(const FrequencyGrid& grid) const {
   spec.seed = seed();
   const std::size_t stored = file_.children("/realizations").size();
   if (stored != static_cast<std::size_t>(spec.realizations)) {
-    fail("/realizations", fmt::format("holds {} realizations; attribute 'realizations' promises {}",
-                                      stored, spec.realizations));
+    fail("/realizations",
+         fmt::format("contains {} realizations; expected {} according to attribute 'realizations'",
+                     stored, spec.realizations));
   }
   return spec;
 }
@@ -275,7 +277,8 @@ std::vector<MatrixXd> PlanReader::phases(const ExperimentSpec& spec,
     phases.push_back(reals(dataset, axes, grid.size()));
     const auto values = phases.back().array();
     if (!(values >= 0.0 && values < kTurn).all()) {
-      fail(dataset, "holds phases outside 0 to 2 pi, or NaN; write the file anew");
+      fail(dataset,
+           "contains phases that are out of range (0 to 2 pi) or NaN; run 'stageid design' again");
     }
   }
   return phases;
@@ -289,8 +292,8 @@ void PlanReader::check_agrees(const ExperimentPlan& plan) const {
     const double difference = (stored - wanted).cwiseAbs().maxCoeff();
     if (!stored.allFinite() || !(difference <= kTolerance * largest)) {
       fail(dataset,
-           "does not follow from the seed and the other fields of this file; "
-           "it was altered or is damaged: design the experiment anew");
+           "does not match the seed and the other fields of this file, which was altered or is "
+           "damaged; run 'stageid design' again");
     }
   };
   const Index axes = plan.axes();
@@ -340,7 +343,7 @@ ExperimentPlan read_experiment_plan(const std::filesystem::path& file) {
     reader.check_agrees(plan);
     return plan;
   } catch (const std::invalid_argument& e) {
-    throw FormatError(file, "", std::string(e.what()) + "; design the experiment anew");
+    throw FormatError(file, "", std::string(e.what()) + "; run 'stageid design' again");
   }
 }
 

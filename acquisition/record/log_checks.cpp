@@ -22,21 +22,22 @@ void check_runs(const std::filesystem::path& file, const LogInfo& info,
     if (run.samples % period != 0 || run.samples / period <= transient) {
       throw FormatError(
           file, place,
-          fmt::format("has {}; {} and one or more further periods of {} each are wanted",
+          fmt::format("has {}; expected {} and at least one further period of {} each",
                       counted(run.samples, "sample"), counted(transient, "transient period"),
                       counted(period, "sample")));
     }
     if (run.realization < 0 || run.experiment < 0) {
       throw FormatError(file, place,
-                        fmt::format("is realization {}, experiment {}; both count from 0",
+                        fmt::format("is realization {}, experiment {}; both must be 0 or more",
                                     run.realization, run.experiment));
     }
     const auto [other, is_new] = seen.insert({{run.realization, run.experiment}, run.name});
     if (!is_new) {
-      throw FormatError(file, place,
-                        fmt::format("is realization {}, experiment {}, as is run {}; each may be "
-                                    "there once",
-                                    run.realization, run.experiment, other->second));
+      throw FormatError(
+          file, place,
+          fmt::format(
+              "duplicate realization {}, experiment {}, also in run {}; keep one of the two",
+              run.realization, run.experiment, other->second));
     }
   }
 }
@@ -44,16 +45,17 @@ void check_runs(const std::filesystem::path& file, const LogInfo& info,
 void check_run_index(const std::filesystem::path& file, const std::vector<LogRun>& runs,
                      std::size_t run) {
   if (run < runs.size()) return;
-  throw std::invalid_argument(fmt::format(
-      "{}: run number {} was asked for; there are {}, from 0 on", file.string(), run, runs.size()));
+  throw std::invalid_argument(
+      fmt::format("{}: run {} is out of range; the log has {} runs, counted from 0", file.string(),
+                  run, runs.size()));
 }
 
 void check_row_range(const std::filesystem::path& file, const LogRun& run, std::uint64_t first,
                      std::uint64_t count) {
   if (first <= run.samples && count <= run.samples - first) return;
   throw std::invalid_argument(
-      fmt::format("{}: {} rows from row {} of run {} were asked for; it has {}", file.string(),
-                  count, first, run.name, run.samples));
+      fmt::format("{}: {} rows from row {} of run {} are out of range; the run has {} rows",
+                  file.string(), count, first, run.name, run.samples));
 }
 
 void resize_samples(const LogInfo& info, std::uint64_t count, LogSamples& out) {
@@ -69,10 +71,10 @@ void throw_not_finite(const std::filesystem::path& file, const LogInfo& info, co
   const bool is_actuator = channel < actuators;
   const std::string& name =
       is_actuator ? info.actuators.names[channel] : info.sensors.names[channel - actuators];
-  throw FormatError(file, "/runs/" + run.name,
-                    fmt::format("row {} of {} '{}' is not a finite number; mark or repair the "
-                                "sample, or leave the run out",
-                                row, is_actuator ? "actuator" : "sensor", name));
+  throw FormatError(
+      file, "/runs/" + run.name,
+      fmt::format("row {} of {} '{}' is not finite; mark or repair the sample, or exclude the run",
+                  row, is_actuator ? "actuator" : "sensor", name));
 }
 
 }  // namespace stageid

@@ -16,7 +16,7 @@ constexpr std::uint64_t kLargestPeriodBytes = std::uint64_t{1} << 30;
 
 void check_channels(const ChannelList& channels, const char* group) {
   if (channels.units.size() != channels.names.size()) {
-    throw std::invalid_argument(fmt::format("log: {} has {} and {}; one unit a name", group,
+    throw std::invalid_argument(fmt::format("log: {} has {} and {}; give one unit per name", group,
                                             counted(channels.names.size(), "name"),
                                             counted(channels.units.size(), "unit")));
   }
@@ -24,7 +24,7 @@ void check_channels(const ChannelList& channels, const char* group) {
   std::sort(sorted.begin(), sorted.end());
   const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
   if (twice != sorted.end()) {
-    throw std::invalid_argument(fmt::format("log: {} has channel '{}' twice", group, *twice));
+    throw std::invalid_argument(fmt::format("log: {}: duplicate channel name '{}'", group, *twice));
   }
 }
 
@@ -32,29 +32,30 @@ void check_channels(const ChannelList& channels, const char* group) {
 
 void check_log_info(const LogInfo& info) {
   if (!(info.sample_rate_hz > 0.0) || !std::isfinite(info.sample_rate_hz)) {
-    throw std::invalid_argument(fmt::format(
-        "log: sample_rate_hz is {}; it must be positive and finite", info.sample_rate_hz));
+    throw std::invalid_argument(
+        fmt::format("log: sample_rate_hz is {}; must be positive and finite", info.sample_rate_hz));
   }
   if (info.period_samples <= 0) {
     throw std::invalid_argument(
-        fmt::format("log: period_samples is {}; it must be positive", info.period_samples));
+        fmt::format("log: period_samples is {}; must be positive", info.period_samples));
   }
   const std::uint64_t period_bytes =
       static_cast<std::uint64_t>(info.period_samples) * sizeof(double) * info.excitation.size();
   if (period_bytes > kLargestPeriodBytes) {
-    throw std::invalid_argument(fmt::format(
-        "log: period_samples is {}: one period of the excitation would take {} bytes; {} at most",
-        info.period_samples, period_bytes, kLargestPeriodBytes));
+    throw std::invalid_argument(
+        fmt::format("log: period_samples is {}: one period of the excitation would need {} bytes; "
+                    "the maximum is {}",
+                    info.period_samples, period_bytes, kLargestPeriodBytes));
   }
   if (info.transient_periods < 0) {
     throw std::invalid_argument(
-        fmt::format("log: transient_periods is {}; it must be 0 or more", info.transient_periods));
+        fmt::format("log: transient_periods is {}; must be 0 or more", info.transient_periods));
   }
   check_channels(info.excitation, "excitation");
   check_channels(info.actuators, "actuators");
   check_channels(info.sensors, "sensors");
   if (info.actuators.size() == 0 || info.sensors.size() == 0) {
-    throw std::invalid_argument("log: there must be at least one actuator and one sensor");
+    throw std::invalid_argument("log: at least one actuator and one sensor are required");
   }
 }
 

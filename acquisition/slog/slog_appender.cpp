@@ -30,8 +30,8 @@ constexpr std::array<std::byte, kSlogAlignment> kZeros{};
 
 void lock(const FileDescriptor& file, const std::filesystem::path& path) {
   if (::flock(file.get(), LOCK_EX | LOCK_NB) == 0) return;
-  throw FileError(
-      fmt::format("{}: another process is writing this log; wait for it to end", path.string()));
+  throw FileError(fmt::format("{}: another process is writing this log; wait until it has ended",
+                              path.string()));
 }
 
 /// Makes the name of a new file as durable as its content. A file system that cannot is no error.
@@ -73,7 +73,8 @@ SlogAppender SlogAppender::create(const std::filesystem::path& file) {
     const int error = errno;
     throw FileError(
         error == EEXIST
-            ? fmt::format("{}: exists already; give another name, or --resume it", file.string())
+            ? fmt::format("{}: already exists; give another name, or continue it with --resume",
+                          file.string())
             : fmt::format("{}: cannot be created: {}", shown_name(file).string(),
                           system_reason(error)));
   }
@@ -95,8 +96,8 @@ SlogAppender SlogAppender::open_existing(const std::filesystem::path& file) {
 void SlogAppender::continue_at(std::uint64_t bytes, std::uint32_t log_id,
                                std::uint64_t next_sequence) {
   if (::ftruncate(file_.get(), static_cast<off_t>(bytes)) != 0) {
-    throw FileError(fmt::format("{}: cannot be cut to its intact {} bytes: {}", path_.string(),
-                                bytes, system_reason(errno)));
+    throw FileError(fmt::format("{}: cannot be truncated to its intact {} bytes: {}",
+                                path_.string(), bytes, system_reason(errno)));
   }
   bytes_ = written_back_ = bytes;
   log_id_ = log_id;
@@ -106,7 +107,7 @@ void SlogAppender::continue_at(std::uint64_t bytes, std::uint32_t log_id,
 void SlogAppender::append(SlogBlockHeader header, std::span<const std::byte> payload) {
   if (payload.size() > kSlogLargestPayload) {
     throw std::invalid_argument(fmt::format(
-        "{}: a {} block of {} bytes; {} at most", path_.string(),
+        "{}: a {} block of {} bytes exceeds the maximum of {} bytes", path_.string(),
         to_string(static_cast<SlogBlockType>(header.type)), payload.size(), kSlogLargestPayload));
   }
   const std::size_t padding = slog_padded(payload.size()) - payload.size();
@@ -164,10 +165,11 @@ void SlogAppender::fail(int error) {
   error_ = error;
   // A partial block would be taken for damage by every reader.
   const bool cut = is_open() && ::ftruncate(file_.get(), static_cast<off_t>(bytes_)) == 0;
-  throw FileError(fmt::format(
-      "{}: cannot be written: {}; {} ({} bytes) written before {} kept{}",
-      shown_name(path_).string(), system_reason(error), counted(next_sequence_, "block"), bytes_,
-      next_sequence_ == 1 ? "is" : "are", cut ? "" : ", behind them may stand a part of one more"));
+  throw FileError(fmt::format("{}: cannot be written: {}; {} ({} bytes) written earlier {} kept{}",
+                              shown_name(path_).string(), system_reason(error),
+                              counted(next_sequence_, "block"), bytes_,
+                              next_sequence_ == 1 ? "is" : "are",
+                              cut ? "" : ", possibly followed by part of another block"));
 }
 
 // Rows written to a file that was removed are lost.
@@ -176,8 +178,8 @@ void SlogAppender::require_name() {
   if (::fstat(file_.get(), &status) != 0 || status.st_nlink > 0) return;
   error_ = ENOENT;
   throw FileError(
-      fmt::format("{}: was removed, or its directory, while it was being written; nothing of it is "
-                  "left. Measure again, and keep the directory until the run has ended",
+      fmt::format("{}: the file or its directory was removed during the run; the data are lost. "
+                  "Measure again, and keep the directory until the run has ended",
                   path_.string()));
 }
 
@@ -186,10 +188,9 @@ void SlogAppender::synchronize() {
   if (::fdatasync(file_.get()) == 0 || errno == EINVAL || errno == EROFS) return;
   const int error = errno;
   error_ = error;
-  throw FileError(
-      fmt::format("{}: cannot be brought to the disk: {}; what was written since the "
-                  "last synchronization may be lost",
-                  path_.string(), system_reason(error)));
+  throw FileError(fmt::format(
+      "{}: cannot be flushed to disk: {}; data written since the last flush may be lost",
+      path_.string(), system_reason(error)));
 }
 
 void SlogAppender::close() {

@@ -62,7 +62,7 @@
 namespace stageid {
 
 static_assert(std::endian::native == std::endian::little,
-              "native logs are little-endian and are mapped to memory as they stand");
+              "native logs are little-endian and are mapped to memory unchanged");
 
 enum class SlogBlockType : std::uint16_t { log = 1, run_begin, excitation, samples, run_end, end };
 const char* to_string(SlogBlockType type) noexcept;

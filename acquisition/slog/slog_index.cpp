@@ -56,7 +56,8 @@ class Indexer {
       }
     }
     throw FormatError(source_.path(), "",
-                      "no description of the log (channels, rate) is left; nothing can be read");
+                      "the description of the log (channels, sample rate) is missing or damaged; "
+                      "the log cannot be read");
   }
 
   std::string json(const SlogBlock& block) const {
@@ -89,7 +90,8 @@ class Indexer {
     switch (static_cast<SlogBlockType>(block.header.type)) {
       case SlogBlockType::log:
         if (!same_measurement(parse_log_info(json(block)), index_.info)) {
-          throw std::invalid_argument("describes another measurement than the first one");
+          throw std::invalid_argument(
+              "describes a different measurement than the first description");
         }
         return;
       case SlogBlockType::run_begin:
@@ -105,7 +107,7 @@ class Indexer {
         index_.end = parse_end(json(block));
         return;
     }
-    throw std::invalid_argument(fmt::format("is of the unknown type {}", block.header.type));
+    throw std::invalid_argument(fmt::format("has the unknown type {}", block.header.type));
   }
 
   void begin_run(const SlogBlock& block) {
@@ -117,11 +119,11 @@ class Indexer {
     if (!increasing ||
         (!columns.empty() && (columns.front() < 0 || static_cast<std::size_t>(columns.back()) >=
                                                          index_.info.excitation.size()))) {
-      throw std::invalid_argument("names excitation channels that the log does not have");
+      throw std::invalid_argument("contains unknown excitation channels");
     }
     if (block.header.run < index_.runs.size()) {
       throw std::invalid_argument(
-          fmt::format("starts run {} a second time", slog_run_name(block.header.run)));
+          fmt::format("is a duplicate start of run {}", slog_run_name(block.header.run)));
     }
     SlogRunIndex run;
     run.run.name = slog_run_name(block.header.run);
@@ -150,7 +152,7 @@ class Indexer {
         header.rows != static_cast<std::uint32_t>(index_.info.period_samples) ||
         header.cols != run.excitation_columns.size() ||
         header.payload_bytes != std::uint64_t{8} * header.rows * header.cols) {
-      throw std::invalid_argument("does not fit the run's start");
+      throw std::invalid_argument("does not match the start of the run");
     }
     run.excitation = block;
   }
@@ -160,11 +162,12 @@ class Indexer {
     const SlogBlockHeader& header = block.header;
     if (header.cols != slog_row_words(index_.info) || header.rows == 0 ||
         header.payload_bytes != std::uint64_t{8} * header.rows * header.cols) {
-      throw std::invalid_argument("has another number of words a row than the log has channels");
+      throw std::invalid_argument(
+          "has a different number of words per row than the log has channels");
     }
     if (header.first_row != run.run.samples) {
-      throw std::invalid_argument(fmt::format("starts with row {} where row {} should follow",
-                                              header.first_row, run.run.samples));
+      throw std::invalid_argument(
+          fmt::format("starts with row {}; expected row {}", header.first_row, run.run.samples));
     }
     run.run.samples += header.rows;
     run.samples.push_back(block);
@@ -176,7 +179,7 @@ class Indexer {
     if (end.samples != run.run.samples || end.realization != run.run.realization ||
         end.experiment != run.run.experiment) {
       throw std::invalid_argument(
-          fmt::format("ends {} rows where {} were written", end.samples, run.run.samples));
+          fmt::format("ends a run of {} rows; {} were written", end.samples, run.run.samples));
     }
     if (end.complete && !run.excitation && !run.excitation_columns.empty()) {
       throw std::invalid_argument("the run's excitation is missing");
@@ -215,7 +218,7 @@ Eigen::MatrixXd read_slog_excitation(const SlogSource& source, const LogInfo& in
   if (!run.excitation && !run.excitation_columns.empty()) {
     throw FormatError(
         source.path(), "",
-        fmt::format("the excitation of run {} is missing; leave this run out", run.run.name));
+        fmt::format("the excitation of run {} is missing; exclude this run", run.run.name));
   }
   Eigen::MatrixXd excitation =
       Eigen::MatrixXd::Zero(info.period_samples, static_cast<Eigen::Index>(info.excitation.size()));
@@ -229,7 +232,7 @@ Eigen::MatrixXd read_slog_excitation(const SlogSource& source, const LogInfo& in
   if (!excitation.allFinite()) {
     throw FormatError(
         source.path(), "",
-        fmt::format("the excitation of run {} holds a value that is not finite", run.run.name));
+        fmt::format("the excitation of run {} contains a non-finite value", run.run.name));
   }
   return excitation;
 }

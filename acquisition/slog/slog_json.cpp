@@ -15,7 +15,7 @@ std::string text_of(const Json& json) {
   try {
     return json.dump();
   } catch (const Json::exception&) {
-    throw std::invalid_argument("log: a name, unit or message is not UTF-8 text");
+    throw std::invalid_argument("log: a name, unit or message is not valid UTF-8");
   }
 }
 
@@ -25,7 +25,7 @@ auto parse(std::string_view text, const char* what, Read read) {
   try {
     return read(Json::parse(text));
   } catch (const Json::exception&) {
-    throw std::invalid_argument(fmt::format("the {} is not as stageid writes it", what));
+    throw std::invalid_argument(fmt::format("the {} is invalid", what));
   }
 }
 
@@ -55,7 +55,7 @@ TimingHistogram histogram_of(const Json& json) {
     if (lower > 0xFFFF'FFFF || TimingHistogram::lower_ns(TimingHistogram::bin_of(
                                    static_cast<std::uint32_t>(lower))) != lower)
       throw std::invalid_argument(
-          fmt::format("end of a run: no bin of a timing histogram begins at {} ns", lower));
+          fmt::format("end of a run: invalid bin edge of a timing histogram: {} ns", lower));
     histogram.add_bin(TimingHistogram::bin_of(static_cast<std::uint32_t>(lower)),
                       bin.at(2).get<std::uint64_t>());
   }

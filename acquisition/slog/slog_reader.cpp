@@ -35,15 +35,15 @@ SlogReader::SlogReader(const std::filesystem::path& file, bool damaged_is_error,
   index_ = index_slog(source_, scan_slog(source_, depth));
   if (damaged_is_error && !index_.damage.empty()) {
     const LogDamage& first = index_.damage.front();
-    throw FormatError(file, "",
-                      fmt::format("damaged at byte {}: {}; 'stageid log recover' gives back what "
-                                  "is intact",
-                                  first.offset, first.what));
+    throw FormatError(
+        file, "",
+        fmt::format("damaged at byte {}: {}; use 'stageid log recover' to copy the intact parts",
+                    first.offset, first.what));
   }
   if (damaged_is_error && !index_.end) {
     throw FormatError(file, "",
-                      "was not closed: its writer died or is still writing; continue it with "
-                      "--resume, or 'stageid log recover' it");
+                      "was not closed because its writer crashed or is still running; continue it "
+                      "with --resume, or use 'stageid log recover'");
   }
   for (const SlogRunIndex& run : index_.runs) runs_.push_back(run.run);
   check_runs(file, index_.info, runs_);
@@ -118,8 +118,8 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
   }
   if (done < padded || crc != block.header.payload_crc) {
     throw FormatError(path(), "",
-                      fmt::format("run {}, rows {} to {}: the payload of {} is damaged; 'stageid "
-                                  "log recover' gives back what is intact",
+                      fmt::format("run {}, rows {} to {}: the payload of {} is damaged; use "
+                                  "'stageid log recover' to copy the intact parts",
                                   run.run.name, block.header.first_row,
                                   block.header.first_row + block.header.rows - 1, describe(block)));
   }

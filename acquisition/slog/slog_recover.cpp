@@ -195,8 +195,8 @@ class Recovery {
 
   void lose(const SlogBlock& block) {
     --report_.blocks_kept;
-    report_.damage.push_back(
-        {block.offset, slog_block_bytes(block.header), describe(block) + " fits nowhere"});
+    report_.damage.push_back({block.offset, slog_block_bytes(block.header),
+                              describe(block) + " does not belong to this log"});
   }
 
   void count_losses() {
@@ -225,8 +225,9 @@ class Recovery {
 RecoverReport recover_log(const std::filesystem::path& from, const std::filesystem::path& to) {
   std::error_code ignored;
   if (std::filesystem::equivalent(from, to, ignored)) {
-    throw std::invalid_argument(
-        fmt::format("{}: recover to another file; the damaged log stays as it is", from.string()));
+    throw std::invalid_argument(fmt::format(
+        "{}: input and output are the same file; write the recovered log to another file",
+        from.string()));
   }
   const SlogSource source(from);
   OutputFile output(to);

@@ -41,9 +41,9 @@ class Scanner {
       }
     }
     if (scan_.blocks.empty()) {
-      throw FormatError(source_.path(), "",
-                        "holds no intact block of a native log (.slog); give a log written by "
-                        "'stageid run'");
+      throw FormatError(
+          source_.path(), "",
+          "contains no intact block of a native log (.slog); give a log written by 'stageid run'");
     }
     return std::move(scan_);
   }
@@ -53,26 +53,27 @@ class Scanner {
   std::optional<SlogBlock> block_at(std::uint64_t offset, std::string& wrong) const {
     SlogBlock block{offset, {}};
     if (source_.bytes() - offset < sizeof block.header) {
-      wrong = "the file ends inside the header of a block";
+      wrong = "the file ends within a block header";
       return std::nullopt;
     }
     source_.read(offset, &block.header, sizeof block.header);
     if (!slog_header_intact(block.header)) {
-      wrong = "the header of a block is damaged";
+      wrong = "a block header is damaged";
       return std::nullopt;
     }
     if (block.header.version != kSlogVersion) {
-      throw FormatError(source_.path(), "",
-                        fmt::format("is of format version {}; this program reads version {}",
-                                    block.header.version, kSlogVersion));
+      throw FormatError(
+          source_.path(), "",
+          fmt::format("has unsupported format version {}; this program reads version {}",
+                      block.header.version, kSlogVersion));
     }
     if (!scan_.blocks.empty() && block.header.log_id != scan_.log_id) {
-      wrong = "a block of another log";
+      wrong = "a block belongs to another log";
       return std::nullopt;
     }
     if (block.header.payload_bytes > kSlogLargestPayload ||
         source_.bytes() - offset < slog_block_bytes(block.header)) {
-      wrong = "the file ends inside " + describe(block);
+      wrong = "the file ends within " + describe(block);
       return std::nullopt;
     }
     return block;
@@ -161,10 +162,10 @@ void SlogSource::read(std::uint64_t offset, void* to, std::size_t size) const {
     const ssize_t count = ::pread(file_.get(), at, size, static_cast<off_t>(offset));
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) {
-      throw FileError(
-          fmt::format("{}: cannot be read at byte {}: {}", path_.string(), offset,
-                      count < 0 ? std::error_code(errno, std::generic_category()).message()
-                                : std::string("the file has become shorter while it was read")));
+      throw FileError(fmt::format("{}: cannot be read at byte {}: {}", path_.string(), offset,
+                                  count < 0
+                                      ? std::error_code(errno, std::generic_category()).message()
+                                      : std::string("the file was truncated while it was read")));
     }
     at += count;
     offset += static_cast<std::uint64_t>(count);
@@ -208,7 +209,7 @@ std::vector<std::byte> read_payload(const SlogSource& source, const SlogBlock& b
   if (crc32c(payload) != block.header.payload_crc) {
     throw FormatError(source.path(), "",
                       "the payload of " + describe(block) +
-                          " is damaged; 'stageid log recover' gives back what is intact");
+                          " is damaged; use 'stageid log recover' to copy the intact parts");
   }
   payload.resize(block.header.payload_bytes);
   return payload;

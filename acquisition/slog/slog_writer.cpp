@@ -49,7 +49,7 @@ std::filesystem::path save_tail(const SlogSource& source, std::uint64_t offset) 
     offset += size;
   }
   if (::fsync(out.get()) != 0) {
-    throw FileError(fmt::format("{}: cannot be brought to the disk", saved.string()));
+    throw FileError(fmt::format("{}: cannot be flushed to disk; check the disk", saved.string()));
   }
   return saved;
 }
@@ -60,8 +60,8 @@ std::uint64_t intact_bytes(const SlogSource& source, const SlogScan& scan, const
   const bool only_tail = index.damage.empty() || index.damage.front().offset >= end;
   if (only_tail) return end;
   throw FormatError(source.path(), "",
-                    fmt::format("damaged at byte {} and intact behind it: {}; first 'stageid log "
-                                "recover' it to a new file, then resume that",
+                    fmt::format("damaged at byte {} but intact after it: {}; run 'stageid log "
+                                "recover' to write a new file, then resume that file",
                                 index.damage.front().offset, index.damage.front().what));
 }
 
@@ -113,8 +113,8 @@ SlogWriter SlogWriter::resume(const std::filesystem::path& file, const LogInfo& 
   const SlogIndex index = index_slog(source, scan);
   if (!same_measurement(index.info, info)) {
     throw FormatError(file, "",
-                      "was written for another experiment (rate, period or channels differ); "
-                      "resume with the configuration it was started with, or write a new log");
+                      "was written for a different experiment (sample rate, period or channels); "
+                      "resume with the original configuration, or write a new log");
   }
   const std::uint64_t end = intact_bytes(source, scan, index);
   if (end < source.bytes()) save_tail(source, end);
@@ -133,11 +133,10 @@ void SlogWriter::begin_run(const LogRun& run, const Eigen::Ref<const Eigen::Matr
   if (excitation.rows() != state.info.period_samples ||
       excitation.cols() != static_cast<Eigen::Index>(state.info.excitation.size()) ||
       !excitation.allFinite()) {
-    throw std::invalid_argument(
-        fmt::format("SlogWriter: the excitation is {} x {}; it must be one period, {} x {}, of "
-                    "finite numbers",
-                    excitation.rows(), excitation.cols(), state.info.period_samples,
-                    state.info.excitation.size()));
+    throw std::invalid_argument(fmt::format(
+        "SlogWriter: the excitation is {} x {}; expected one period, {} x {}, of finite numbers",
+        excitation.rows(), excitation.cols(), state.info.period_samples,
+        state.info.excitation.size()));
   }
   SlogRunBegin begin{run.realization, run.experiment, run.started_utc, {}};
   std::vector<double> stored;
@@ -163,8 +162,9 @@ void SlogWriter::write(std::span<const double> rows) {
   LogRun& run = state.run("write");
   if (rows.empty()) return;
   if (rows.size() % state.row_words() != 0) {
-    throw std::invalid_argument(fmt::format("SlogWriter: {} words are not whole rows of {}",
-                                            rows.size(), state.row_words()));
+    throw std::invalid_argument(
+        fmt::format("SlogWriter: {} words are not a whole number of rows of {}", rows.size(),
+                    state.row_words()));
   }
   SlogBlockHeader header = state.header(SlogBlockType::samples);
   header.cols = state.row_words();

@@ -158,7 +158,7 @@ class InterruptTest(unittest.TestCase):
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=120)
         self.assertEqual(process.returncode, 130, error)
-        self.assertIn("what was measured is kept", error)  # the loop's own words: it came to its end
+        self.assertIn("the measured data are kept", error)  # the loop's own words: it came to its end
         # The ramp is in the log: 0.1 s of stage time, marked.
         code, error = run("log", "verify", log.name)
         self.assertEqual(code, 0, error)

@@ -34,11 +34,11 @@ class FrameFaults(CanTest):
         ("foreign", "foreign@3000x2", 0, ""),
         ("four lost", "lost@3000x4", 3, "1 cycle is missing, 2 samples are marked"),
         ("four corrupt", "corrupt@3000x4", 3, "1 cycle is missing, 2 samples are marked"),
-        ("all lost", "lost@3000" + FOREVER, 1, "too many bad cycles in a row, the last: stale"),
-        ("all corrupt", "corrupt@3000" + FOREVER, 1, "the last: corrupt"),
-        ("all short", "shortened@3000" + FOREVER, 1, "the last: corrupt"),
-        ("all foreign", "foreign@3000" + FOREVER, 1, "the last: stale"),
-        ("all late", "late@3000" + FOREVER + ":0.5", 1, "the last: stale"),
+        ("all lost", "lost@3000" + FOREVER, 1, "too many consecutive bad cycles; the last one: stale"),
+        ("all corrupt", "corrupt@3000" + FOREVER, 1, "the last one: corrupt"),
+        ("all short", "shortened@3000" + FOREVER, 1, "the last one: corrupt"),
+        ("all foreign", "foreign@3000" + FOREVER, 1, "the last one: stale"),
+        ("all late", "late@3000" + FOREVER + ":0.5", 1, "the last one: stale"),
     ]
 
     def test_rows(self):
@@ -76,7 +76,7 @@ class Interventions(CanTest):
         with self.machine.node(self.name) as node:
             process = self.begin()
             node.kill()
-            self.ends(process, 1, "too many bad cycles in a row, the last: stale", "did not answer")
+            self.ends(process, 1, "too many consecutive bad cycles; the last one: stale", "did not answer")
 
     def test_node_frozen(self):
         with self.machine.node(self.name) as node:
@@ -121,7 +121,7 @@ class Interventions(CanTest):
             with self.subTest(number.name), self.machine.node(self.name):
                 process = self.begin()
                 process.send_signal(number)
-                self.ends(process, 130, "interrupted; what was measured is kept")
+                self.ends(process, 130, "interrupted; the measured data are kept")
                 wait_for_state("switch on disabled")
 
     def test_bus_off(self):
@@ -135,7 +135,7 @@ class Interventions(CanTest):
         with self.machine.node(self.name):
             process = self.begin()
             send_error("vcan0", ERROR_CONTROLLER, TX_PASSIVE)
-            self.ends(process, 1, "the last: bus passive", "vcan0: error passive")
+            self.ends(process, 1, "the last one: bus passive", "vcan0: error passive")
             self.assertIn(wait_for_rest(), ("switch on disabled", "fault"))
 
     def test_interface_down(self):
@@ -168,8 +168,8 @@ class StageFaults(CanTest):
         ("sensor no number", "kind: nan_sensor, channel: s1", 4,
          "sensor s1: the measurement is not finite"),
         ("sensor stuck", "kind: stuck_sensor, channel: s1", 4, "sensor s1: has shown"),
-        ("sensor dead", "kind: dead_sensor, channel: s2", 1, "the last: incomplete"),
-        ("samples missed", "kind: missed_cycle, cycles: 100", 1, "the last: stale"),
+        ("sensor dead", "kind: dead_sensor, channel: s2", 1, "the last one: incomplete"),
+        ("samples missed", "kind: missed_cycle, cycles: 100", 1, "the last one: stale"),
         ("interlock", "kind: interlock", 1, "the stage reported a fault"),
         # No wire tells that a force stays as it was: only the FRF does.
         ("actuator stuck", "kind: stuck_actuator, channel: a1", 0, ""),
@@ -237,7 +237,7 @@ class Resident(CanTest):
             process = self.machine.start(self.name)
             wait_for_state("measuring")
             process.send_signal(signal.SIGTERM)
-            self.ends(process, 130, "interrupted; what was measured is kept")
+            self.ends(process, 130, "interrupted; the measured data are kept")
             wait_for_state("switch on disabled")
 
 
@@ -266,13 +266,13 @@ class Netem(CanTest):
         self.assertEqual(counts(out)["marked"], 0)
 
     def test_loss_of_half_ends_a_run_by_the_wall_clock(self):
-        self.disturbed("loss 50%", 1, "too many bad cycles in a row", arguments=("--pace", "0.1"))
+        self.disturbed("loss 50%", 1, "too many consecutive bad cycles", arguments=("--pace", "0.1"))
 
     def test_delay_is_nothing_in_virtual_time(self):
         self.disturbed("delay 1ms", 0)
 
     def test_delay_of_many_samples_ends_a_run_by_the_wall_clock(self):
-        self.disturbed("delay 20ms", 1, "too many bad cycles in a row", arguments=("--pace", "1"))
+        self.disturbed("delay 20ms", 1, "too many consecutive bad cycles", arguments=("--pace", "1"))
 
     def test_a_bus_that_is_too_slow(self):
         self.disturbed("rate 200kbit limit 2", 1, "the bus is too slow", arguments=("--pace", "1"))

@@ -30,12 +30,12 @@ class FileKind : public testing::Test {
 TEST_F(FileKind, IsToldByTheFirstBytes) {
   using std::string_view_literals::operator""sv;
   EXPECT_EQ(kind_of("\x89SLOG\r\n\x1a\0"sv),
-            "is a native log, not a cat; 'stageid frf', 'validate', 'report' and 'log' take it");
+            "is a native log, not a cat; use it with 'stageid frf', 'validate', 'report' or 'log'");
   EXPECT_THAT(kind_of("MATLAB 5.0 MAT-file"),
-              StartsWith("is a MATLAB file, not a cat; 'stageid im"));
-  EXPECT_THAT(kind_of("PK\x03\x04..."), StartsWith("is an archive, as .npz is, not a cat;"));
+              StartsWith("is a MATLAB file, not a cat; convert it with 'stageid im"));
+  EXPECT_THAT(kind_of("PK\x03\x04..."), StartsWith("is a ZIP archive (possibly .npz), not a cat;"));
   EXPECT_THAT(kind_of("    -1\n   151\n"), StartsWith("is a universal file, not a cat;"));
-  EXPECT_THAT(kind_of("<!DOCTYPE html>"), StartsWith("is a page, not a cat;"));
+  EXPECT_THAT(kind_of("<!DOCTYPE html>"), StartsWith("is an HTML page, not a cat;"));
   EXPECT_THAT(kind_of("{}"), StartsWith("is JSON, not a cat;"));
   // A damaged HDF5 file still begins as one.
   EXPECT_THAT(kind_of("\x89HDF\r\n\x1a\n..."), StartsWith("is an HDF5 file of another program,"));
@@ -71,7 +71,7 @@ TEST_F(FileKind, IsWhatAFileOfOursSays) {
 TEST(SystemReason, SaysWhatToDo) {
   EXPECT_EQ(system_reason(ENOSPC), "No space left on device; free some space, or write elsewhere");
   EXPECT_EQ(with_remedy("unable to write: Permission denied"),
-            "unable to write: Permission denied; check the rights");
+            "unable to write: Permission denied; check the permissions");
   EXPECT_EQ(with_remedy("file signature not found"), "file signature not found");
 }
 

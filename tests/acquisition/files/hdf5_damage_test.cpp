@@ -74,7 +74,7 @@ TEST(DamagedHdf5, IsToldFromMissingAndForeignFiles) {
   expect_error<FileError>([&] { Hdf5File::open(directory / "absent.h5"); }, directory / "absent.h5",
                           std::strerror(ENOENT));
   expect_error<FileError>([&] { Hdf5File::open(directory.path()); }, directory.path(),
-                          "is not a file");
+                          "is not a regular file");
   write_bytes(directory / "text.h5", "this is not HDF5\n");
   expect_error<FormatError>([&] { Hdf5File::open(directory / "text.h5"); }, directory / "text.h5",
                             "not an HDF5 file");
@@ -93,7 +93,7 @@ TEST(DamagedHdf5, CutShortAnywhereIsAFormatError) {
   }
   write_bytes(directory / "cut.h5", healthy.substr(0, healthy.size() - 1));
   expect_error<FormatError>([&] { read_everything(directory / "cut.h5"); }, directory / "cut.h5",
-                            "cut short");
+                            "truncated");
 }
 
 TEST(DamagedHdf5, AHugeSizeDoesNotAskForAllTheMemory) {

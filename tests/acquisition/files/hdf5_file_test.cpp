@@ -192,27 +192,30 @@ TEST(Hdf5File, NamesFilePlaceAndRemedyOfWhatIsWrong) {
     expect_error<FormatError>(action, path + ":" + place + ": ", word);
   };
   wrong([&] { file.read_reals("/absent"); }, "/absent", "missing");
-  wrong([&] { file.read_reals("/runs"); }, "/runs", "a dataset must stand here");
-  wrong([&] { file.read_reals("/texts"); }, "/texts", "holds text; real numbers must");
-  wrong([&] { file.read_reals("/complex"); }, "/complex", "holds complex numbers");
-  wrong([&] { file.read_complex("/table"); }, "/table", "holds real numbers; complex");
-  wrong([&] { file.read_texts("/table"); }, "/table", "a list of texts");
+  wrong([&] { file.read_reals("/runs"); }, "/runs", "expected a dataset");
+  wrong([&] { file.read_reals("/texts"); }, "/texts", "contains text; expected real numbers");
+  wrong([&] { file.read_reals("/complex"); }, "/complex", "contains complex numbers");
+  wrong([&] { file.read_complex("/table"); }, "/table", "contains real numbers; expected complex");
+  wrong([&] { file.read_texts("/table"); }, "/table", "a list of strings");
   wrong([&] { file.read_rows("/table", 13, 3, sink); }, "/table", "has 15 rows");
   wrong([&] { file.read_rows("/table", ~hsize_t{0}, 1, sink); }, "/table", "has 15 rows");
   wrong([&] { file.read_rows("/complex", 0, 1, sink); }, "/complex", "real numbers");
   wrong([&] { file.shape("/absent"); }, "/absent", "missing");
   wrong([&] { file.kind("/absent"); }, "/absent", "missing");
   wrong([&] { file.children("/absent"); }, "/absent", "missing");
-  wrong([&] { file.children("/table"); }, "/table", "a group must stand here");
+  wrong([&] { file.children("/table"); }, "/table", "expected a group");
   wrong([&] { file.read_real_attribute("/", "absent"); }, "/", "'absent' is missing");
   wrong([&] { file.read_real_attribute("/absent", "x"); }, "/absent", "missing");
-  wrong([&] { file.read_real_attribute("/", "title"); }, "/", "'title' holds text; a number");
+  wrong([&] { file.read_real_attribute("/", "title"); }, "/",
+        "'title' contains text; expected a number");
   wrong([&] { file.read_real_attribute("/", "scale"); }, "/", "'scale' has 2 values");
-  wrong([&] { file.read_integer_attribute("/", "title"); }, "/", "an integer must");
-  wrong([&] { file.read_text_attribute("/", "rate"); }, "/", "holds real numbers; text");
+  wrong([&] { file.read_integer_attribute("/", "title"); }, "/", "expected an integer");
+  wrong([&] { file.read_text_attribute("/", "rate"); }, "/",
+        "contains real numbers; expected a string");
   wrong([&] { file.read_text_attribute("/", "units"); }, "/", "'units' has 3 values");
-  wrong([&] { file.read_texts_attribute("/", "rate"); }, "/", "holds real numbers; text");
-  wrong([&] { file.read_reals_attribute("/", "units"); }, "/", "holds text; numbers");
+  wrong([&] { file.read_texts_attribute("/", "rate"); }, "/",
+        "contains real numbers; expected strings");
+  wrong([&] { file.read_reals_attribute("/", "units"); }, "/", "contains text; expected numbers");
 }
 
 TEST(Hdf5File, SaysThatWritingIsImpossible) {

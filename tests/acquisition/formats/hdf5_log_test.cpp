@@ -151,7 +151,7 @@ TEST_F(Hdf5Log, AWholeExcitationMustRepeat) {
   EXPECT_EQ(with_error(0.5e-9 * peak), test::excitation_of(2));
   EXPECT_THAT([&] { with_error(2e-9 * peak); },
               ThrowsMessage<FormatError>(
-                  AllOf(HasSubstr("does not repeat"), HasSubstr("row 30"), HasSubstr("z3"))));
+                  AllOf(HasSubstr("is not periodic"), HasSubstr("row 30"), HasSubstr("z3"))));
   EXPECT_THROW(with_error(std::numeric_limits<double>::quiet_NaN()), FormatError);
 }
 

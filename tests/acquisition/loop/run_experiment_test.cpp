@@ -268,7 +268,7 @@ TEST_F(RunExperiment, ALogThatIsRemovedEndsInAControlledStop) {
   std::filesystem::remove(directory_ / "a.slog");
   const ExperimentResult result = measure(log);
   EXPECT_EQ(result.end, ExperimentEnd::log_failed);
-  EXPECT_THAT(result.message, HasSubstr("a.slog: was removed"));
+  EXPECT_THAT(result.message, HasSubstr("its directory was removed"));
   EXPECT_EQ(result.runs_done, 0);
 }
 

@@ -153,7 +153,7 @@ std::function<void(hid_t)> without(const std::string& name) {
 
 TEST(ExperimentPlanFile, NoticesNumbersThatDoNotAgree) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const std::string word = "does not follow from the seed";
+  const std::string word = "does not match the seed";
   for (const double value : {1e-3, nan}) {
     for (const int crest : {0, 5}) {
       expect_spoilt(crest, "/amplitude", word, with_first("/amplitude", value));
@@ -169,9 +169,9 @@ TEST(ExperimentPlanFile, NoticesNumbersThatDoNotAgree) {
   expect_spoilt(0, "", word, [](hid_t file) { set_text(file, "seed", "1"); });
   expect_spoilt(0, "", word, [](hid_t file) { set_text(file, "scaling", "rms"); });
   // With reduced phases the file is the authority on phases: but not on nonsense.
-  expect_spoilt(5, "/realizations/0002/phase_rad", "outside 0 to 2 pi",
+  expect_spoilt(5, "/realizations/0002/phase_rad", "out of range (0 to 2 pi)",
                 with_first("/realizations/0002/phase_rad", nan));
-  expect_spoilt(5, "/realizations/0002/phase_rad", "outside 0 to 2 pi",
+  expect_spoilt(5, "/realizations/0002/phase_rad", "out of range (0 to 2 pi)",
                 with_first("/realizations/0002/phase_rad", 7.0));
 }
 
@@ -180,7 +180,7 @@ TEST(ExperimentPlanFile, NamesWhatIsMissingOrOfTheWrongKind) {
                            "/realizations/0002/spectrum", "/realizations/0002/phase_rad"}) {
     expect_spoilt(0, name, "missing", without(name));
   }
-  expect_spoilt(0, "/realizations", "holds 2 realizations", without("/realizations/0001"));
+  expect_spoilt(0, "/realizations", "contains 2 realizations", without("/realizations/0001"));
   expect_spoilt(0, "/", "'format' is ''", [](hid_t file) { H5Adelete(file, "format"); });
   expect_spoilt(0, "/", "'format' is 'other'", [](hid_t f) { set_text(f, "format", "other"); });
   expect_spoilt(0, "/", "this program reads 1",

@@ -156,7 +156,7 @@ TEST(SlogReader, RefusesTheSameCompleteRunTwice) {
   test::write_run(log, 1);
   log.close(0, "");
   EXPECT_THAT([&] { SlogReader reader(directory / "a.slog"); },
-              ThrowsMessage<FormatError>(HasSubstr("may be there once")));
+              ThrowsMessage<FormatError>(HasSubstr("duplicate realization")));
 }
 
 TEST(SlogReader, SaysThatALogWasNotClosed) {

@@ -61,7 +61,7 @@ TEST(SlogWriter, RefusesAnExistingFileAndLeavesItAlone) {
   const TemporaryDirectory directory;
   test::write_bytes(directory / "a.slog", "precious");
   EXPECT_THAT([&] { SlogWriter::create(directory / "a.slog", test::small_info()); },
-              ThrowsMessage<FileError>(HasSubstr("exists already")));
+              ThrowsMessage<FileError>(HasSubstr("already exists")));
   EXPECT_EQ(test::bytes_of(directory / "a.slog"), "precious");
   EXPECT_THROW(SlogWriter::create(directory / "none/a.slog", test::small_info()), FileError);
   EXPECT_THROW(SlogWriter::resume(directory / "none.slog", test::small_info()), FileError);
@@ -168,7 +168,7 @@ TEST(SlogWriter, ResumeRefusesAnotherExperiment) {
   LogInfo other = test::small_info();
   other.period_samples = 24;
   EXPECT_THAT([&] { SlogWriter::resume(file, other); },
-              ThrowsMessage<FormatError>(HasSubstr("another experiment")));
+              ThrowsMessage<FormatError>(HasSubstr("a different experiment")));
   other = test::small_info();
   other.sensors.names[0] = "s9";
   EXPECT_THROW(SlogWriter::resume(file, other), FormatError);

@@ -323,7 +323,7 @@ class Logs(Case):
     def test_native_and_back_to_the_bit(self):
         self.succeed("log", "convert", "log.h5", "-o", "log.slog")
         self.succeed("log", "verify", "log.slog")
-        self.refuse("is a native log already", "log", "convert", "log.slog", "-o", "twice.slog")
+        self.refuse("is already a native log", "log", "convert", "log.slog", "-o", "twice.slog")
         self.succeed("log", "convert", "log.slog", "-o", "again.h5")
         with h5py.File(WORK / "again.h5") as f:
             for m in range(2):
@@ -338,7 +338,7 @@ class Logs(Case):
 class Damaged(Case):
     def test_files_of_another_kind_are_named(self):
         (WORK / "run.slog").write_bytes(b"\x89SLOG\r\n\x1a" + bytes(100))
-        self.refuse("is a native log, not an HDF5 file; 'stageid frf'", "fit", "run.slog", "-o", "n.json")
+        self.refuse("is a native log, not an HDF5 file; use it with 'stageid frf'", "fit", "run.slog", "-o", "n.json")
         (WORK / "model.json").write_text("{}")
         self.refuse("is JSON, not an HDF5 file", "fit", "model.json", "-o", "n.json")
         (WORK / "run.txt").write_text("words")

@@ -74,7 +74,7 @@ TEST_F(BadRequest, Configurations) {
     fail({"design", experiment("bad.yaml", from, to), "-o", name("e.h5")}, 2, text);
   };
   wrong("seed: 7", "sead: 7", "bad.yaml:15:3: unknown key 'sead'; did you mean 'seed'?");
-  wrong("rms_n", "rms_v", "unknown key 'rms_v'; the unit stands in the key: write 'rms_n'");
+  wrong("rms_n", "rms_v", "unknown key 'rms_v'; the key includes the unit; write 'rms_n'");
   wrong("period_s: 0.25", "period_ms: 250", "write 'period_s'");
   wrong("period_s: 0.25", "period_s: 250 ms", "the number alone, in s");
   wrong("period_s: 0.25", "period_s: -1", "period_s: -1 is out of range; allowed is > 0 s");
@@ -119,7 +119,7 @@ TEST_F(BadRequest, StageFiles) {
   };
   wrong("mass_kg: 8", "mass_kg: 0",
         "stage_bad.yaml:19:12: mass_kg: 0 is out of range; allowed is > 0 kg");
-  wrong("mass_kg: 8", "mass_g: 8000", "the unit stands in the key: write 'mass_kg'");
+  wrong("mass_kg: 8", "mass_g: 8000", "the key includes the unit; write 'mass_kg'");
   wrong("limit_n: 40", "limit_v: 40", "write 'limit_n'");
   wrong("direction: [0, 0, 1], limit_n", "direction: [0, 0, 2], limit_n", "write a unit vector");
   wrong("name: a2", "name: a1", "stands twice");
@@ -312,7 +312,7 @@ TEST_F(BadRequest, Reports) {
   fail({"report", frf, name("new.json"), "-o", name("r.html")}, 2,
        "format_version: is 9 and must be 1");
   fail({"report", frf, "-o", name("nowhere/r.html")}, 1,
-       "No such file or directory; make it first");
+       "No such file or directory; create the directory first");
   fail({"report", frf, "-o", name("r.html"), "--compare", name("none")}, 1,
        "none: does not exist; check the path");
 }
