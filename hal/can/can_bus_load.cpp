@@ -43,11 +43,11 @@ std::vector<CanBusLoad> can_bus_load(const CanSpec& spec, const CanLayout& layou
 void require_bus_carries(const CanSpec& spec, const CanLayout& layout, double sample_rate_hz) {
   for (const CanBusLoad& load : can_bus_load(spec, layout, sample_rate_hz)) {
     if (load.load <= spec.largest_load) continue;
-    throw std::invalid_argument(fmt::format(
-        "can: {} would be loaded to {:.0f} % at {:g} Hz ({:.0f} us a cycle), {:.0f} % are allowed; "
-        "at most {:.0f} Hz, or more buses, or mode: resident",
-        load.interface, 100.0 * load.load, sample_rate_hz, 1e6 * load.cycle_s,
-        100.0 * spec.largest_load, load.highest_rate_hz));
+    throw std::invalid_argument(
+        fmt::format("can: {} would have a load of {:.0f} % at {:g} Hz ({:.0f} us per cycle); the "
+                    "limit is {:.0f} %. Use at most {:.0f} Hz, more buses, or mode: resident",
+                    load.interface, 100.0 * load.load, sample_rate_hz, 1e6 * load.cycle_s,
+                    100.0 * spec.largest_load, load.highest_rate_hz));
   }
 }
 

@@ -15,24 +15,25 @@ constexpr std::size_t kLargestFrameCount = 128;  // identifiers between 0x100 an
 bool is_positive(double value) { return value > 0.0 && std::isfinite(value); }
 
 void check_bus(const CanBusSpec& bus) {
-  if (bus.interface.empty()) throw std::invalid_argument("can: a bus without an interface");
+  if (bus.interface.empty())
+    throw std::invalid_argument("can: a bus has no interface; set its interface");
   if (!is_positive(bus.nominal_bit_rate_hz) || !is_positive(bus.data_bit_rate_hz))
     throw std::invalid_argument(
         fmt::format("can: bus {}: the bit rates must be positive", bus.interface));
 }
 
 void check_times(const CanSpec& spec) {
-  if (spec.buses.empty()) throw std::invalid_argument("can: there is no bus");
+  if (spec.buses.empty()) throw std::invalid_argument("can: at least one bus is required");
   std::set<std::string> interfaces;
   for (const CanBusSpec& bus : spec.buses) {
     check_bus(bus);
     if (!interfaces.insert(bus.interface).second)
-      throw std::invalid_argument(fmt::format("can: interface {} stands twice", bus.interface));
+      throw std::invalid_argument(fmt::format("can: duplicate interface {}", bus.interface));
   }
   if (!is_positive(spec.reply_timeout_s) || !is_positive(spec.watchdog_s))
     throw std::invalid_argument("can: reply_timeout_s and watchdog_s must be positive");
   if (!(spec.largest_load > 0.0 && spec.largest_load <= 1.0))
-    throw std::invalid_argument("can: largest_load must lie in 0 ... 1");
+    throw std::invalid_argument("can: largest_load must be between 0 and 1");
 }
 
 void check_once(const CanSpec& spec, const std::vector<Channel>& channels,
@@ -42,30 +43,31 @@ void check_once(const CanSpec& spec, const std::vector<Channel>& channels,
     for (const int channel : bus.*of_bus) {
       if (channel < 0 || static_cast<std::size_t>(channel) >= channels.size())
         throw std::invalid_argument(
-            fmt::format("can: bus {}: there is no channel number {}", bus.interface, channel));
+            fmt::format("can: bus {}: unknown channel number {}", bus.interface, channel));
       std::string& known = place[static_cast<std::size_t>(channel)];
       if (!known.empty())
         throw std::invalid_argument(
-            fmt::format("can: channel '{}' stands on {} and on {}; one bus each",
+            fmt::format("can: channel '{}' is assigned to both {} and {}; assign it to one bus",
                         channels[static_cast<std::size_t>(channel)].name, known, bus.interface));
       known = bus.interface;
     }
   for (std::size_t i = 0; i < place.size(); ++i)
     if (place[i].empty())
       throw std::invalid_argument(
-          fmt::format("can: channel '{}' stands on no bus", channels[i].name));
+          fmt::format("can: channel '{}' is not assigned to a bus", channels[i].name));
 }
 
 std::vector<CanScale> scales(const std::vector<double>& ranges,
                              const std::vector<Channel>& channels) {
   if (ranges.size() != channels.size())
     throw std::invalid_argument(
-        fmt::format("can: {} ranges for {} channels", ranges.size(), channels.size()));
+        fmt::format("can: {} ranges for {} channels; give one range per channel", ranges.size(),
+                    channels.size()));
   std::vector<CanScale> list;
   for (std::size_t i = 0; i < ranges.size(); ++i) {
     if (!is_positive(ranges[i]))
       throw std::invalid_argument(fmt::format(
-          "can: channel '{}': the range must be positive, not {}", channels[i].name, ranges[i]));
+          "can: channel '{}': the range must be positive; got {}", channels[i].name, ranges[i]));
     list.push_back({ranges[i] / kCanCountsOfRange});
   }
   return list;
@@ -78,7 +80,8 @@ std::vector<CanValueFrame> frames(const CanSpec& spec, std::vector<int> CanBusSp
     const std::vector<int>& channels = spec.buses[bus].*of_bus;
     for (std::size_t at = 0; at < channels.size(); at += kCanValuesOfFrame) {
       if (list.size() == kLargestFrameCount)
-        throw std::invalid_argument("can: more frames than identifiers; use fewer buses");
+        throw std::invalid_argument(
+            "can: too many frames for the available identifiers; use fewer buses");
       const auto from = channels.begin() + static_cast<std::ptrdiff_t>(at);
       const auto count = std::min(kCanValuesOfFrame, channels.size() - at);
       list.push_back({static_cast<std::uint16_t>(first_id + list.size()),

@@ -118,20 +118,20 @@ CanState CanLink::command(CanCommand command, const Other& other) {
     if (interrupted()) throw StageError(fmt::format("can: {}: interrupted", bus));
     const WorstBus worst = worst_bus(transport_);
     if (worst.state >= CanBusState::passive)
-      throw StageError(fmt::format(
-          "can: {}: {}; look at the cable and at 'ip -details link show {}'",
-          transport_.name(worst.bus), to_string(worst.state), transport_.name(worst.bus)));
+      throw StageError(fmt::format("can: {}: {}; check the cable and 'ip -details link show {}'",
+                                   transport_.name(worst.bus), to_string(worst.state),
+                                   transport_.name(worst.bus)));
     throw StageError(
-        fmt::format("can: {}: no node answers within {} ms; start 'stageid node', look at cable, "
-                    "interface and bit rates",
+        fmt::format("can: {}: no node answered within {} ms; start 'stageid node', and check the "
+                    "cable, interface and bit rates",
                     bus, kAttempts * kAnswer_ns / 1'000'000));
   }
   if (answer_.version != kCanProtocolVersion)
-    refuse(
-        PeerStatus::other_version, fmt::format("can: {}", bus),
-        fmt::format(" ({}, not {}); update the older side", answer_.version, kCanProtocolVersion));
+    refuse(PeerStatus::other_version, fmt::format("can: {}", bus),
+           fmt::format(" ({}; expected {}); update the older program", answer_.version,
+                       kCanProtocolVersion));
   if (answer_.answer != CanAnswer::accepted)
-    throw StageError(fmt::format("can: {}: the node refuses: {}", bus, text()));
+    throw StageError(fmt::format("can: {}: the node refused the command: {}", bus, text()));
   return answer_;
 }
 
@@ -167,10 +167,12 @@ CanState CanLink::greet(bool reset_fault) {
   CanState state = command({CanCommandCode::hello});
   listen_for_a_second_node();
   if (other_node_)
-    refuse(PeerStatus::two_nodes, place, "; give each bus one node with these identifiers");
+    refuse(PeerStatus::two_nodes, place,
+           "; connect only one node with these identifiers to each bus");
   if (state.fingerprint != fingerprint_)
-    refuse(PeerStatus::other_stage, place,
-           " (rate, channels, buses or ranges differ); give both the same");
+    refuse(
+        PeerStatus::other_stage, place,
+        " (sample rate, channels, buses or ranges differ); use the same stage file on both sides");
   if (reset_fault && state.state == NodeState::fault)
     state = command({CanCommandCode::reset_fault});
   if (state.state == NodeState::fault || state.state == NodeState::fault_reaction)

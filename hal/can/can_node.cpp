@@ -32,7 +32,7 @@ CanNode::CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transp
       player_(stage, pace),
       boot_(std::random_device()() | 1U) {
   if (layout_.setpoints.size() > 64)
-    throw std::invalid_argument("can: a node takes 64 setpoint frames at most");
+    throw std::invalid_argument("can: a node supports at most 64 setpoint frames");
   inbox_.resize(kCanInboxFrames);
   command_.assign(stage.info().actuators.size(), 0.0);
   y_.assign(stage.info().sensors.size(), 0.0);
@@ -140,7 +140,7 @@ void CanNode::put_answer() { outbox_.insert(outbox_.end(), answer_.begin(), answ
 std::string CanNode::admit(const CanCommand& command) const {
   using Code = CanCommandCode;
   if (command.version != kCanProtocolVersion)
-    return fmt::format("{} ({}, not {}); update the older side",
+    return fmt::format("{} ({}; expected {}); update the older program",
                        meaning(PeerStatus::other_version).words, kCanProtocolVersion,
                        command.version);
   if (command.code == Code::hello || command.code == Code::missing ||

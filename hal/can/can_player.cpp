@@ -50,12 +50,13 @@ std::string CanPlayer::prepare(const CanCommand& command) {
       !waveform_.empty())
     return "";
   const auto channels = static_cast<std::size_t>(std::popcount(command.a));
-  if (channels == 0 || command.c == 0) return "an upload needs samples and actuators";
+  if (channels == 0 || command.c == 0)
+    return "an upload needs at least one sample and one actuator";
   if (r_.size() < 64 && (command.a >> r_.size()) != 0)
-    return fmt::format("there are {} actuators only", r_.size());
+    return fmt::format("actuator out of range; the node has {}", r_.size());
   const std::uint64_t bytes = std::uint64_t{command.c} * channels * kCanFloatBytes;
   if (bytes > depth_bytes())
-    return fmt::format("{} bytes of waveform, there is memory for {}", bytes, depth_bytes());
+    return fmt::format("waveform of {} bytes exceeds the memory of {} bytes", bytes, depth_bytes());
   mask_ = command.a;
   digest_ = command.b;
   period_samples_ = command.c;
@@ -95,11 +96,11 @@ CanMissing CanPlayer::missing() const noexcept {
 std::string CanPlayer::arm(const CanCommand& command) {
   if (busy()) return "a resident experiment is running; stop it first";
   if (waveform_.empty() || missing_from_ < received_.size())
-    return "the waveform is not there completely; upload it first";
+    return "the waveform is incomplete; upload it first";
   if (can_digest(waveform_) != digest_ || static_cast<std::uint32_t>(digest_) != command.d)
-    return "the waveform in memory is another one; upload it again";
+    return "the memory contains a different waveform; upload it again";
   if (command.b == 0 || command.b > depth_bytes() / row_bytes())
-    return fmt::format("{} samples, the trace has room for {}", command.b,
+    return fmt::format("{} samples exceed the trace memory of {}", command.b,
                        depth_bytes() / row_bytes());
   const SupervisorReply reply = stage_.request(SupervisorCommand::enable);
   if (!reply.accepted) return reply.message;
@@ -135,12 +136,12 @@ std::string CanPlayer::trigger(const CanCommand& command, std::int64_t now_ns) {
 
 std::string CanPlayer::begin_download(const CanCommand& command) {
   const auto memory = static_cast<CanMemory>(command.b);
-  if (command.b > static_cast<std::uint64_t>(CanMemory::trace)) return "there is no such memory";
+  if (command.b > static_cast<std::uint64_t>(CanMemory::trace)) return "unknown memory";
   const std::size_t chunks =
       can_chunks(memory == CanMemory::trace ? trace_.size() : waveform_.size());
   if (memory == CanMemory::trace && busy()) return "the trace is still being recorded";
   if (command.a >= chunks)
-    return fmt::format("chunk {} asked for, there are {}", command.a, chunks);
+    return fmt::format("chunk {} is out of range; there are {}", command.a, chunks);
   token_ = static_cast<std::uint8_t>(command.host);
   download_of_ = memory;
   download_next_ = command.a;

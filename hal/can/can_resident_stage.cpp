@@ -41,7 +41,7 @@ CanResidentStage::CanResidentStage(StageInfo info, const CanSpec& spec,
       reset_fault_(options.reset_fault),
       token_(static_cast<std::uint8_t>(link_.host())) {
   if (info_.actuators.size() > 64)
-    throw std::invalid_argument("can: resident experiments have 64 actuators at most");
+    throw std::invalid_argument("can: resident experiments support at most 64 actuators");
   info_.backend = "can";
   info_.clock = Clock::virtual_time;  // nobody on this side waits for samples
 }
@@ -76,7 +76,8 @@ void CanResidentStage::pack(const Waveforms& waveforms) {
   if (samples.cols() != static_cast<Eigen::Index>(info_.actuators.size()) || samples.rows() == 0 ||
       !samples.allFinite() || waveforms.periods < 1 || waveforms.transient_periods < 0)
     throw std::invalid_argument(
-        "can: waveforms need samples, a column for every actuator, finite values and periods");
+        "can: waveforms must be finite, with at least one sample, one period and one column per "
+        "actuator");
   std::vector<Eigen::Index> columns;
   mask_ = 0;
   for (Eigen::Index column = 0; column < samples.cols(); ++column) {
@@ -84,14 +85,15 @@ void CanResidentStage::pack(const Waveforms& waveforms) {
     columns.push_back(column);
     mask_ |= std::uint64_t{1} << column;
   }
-  if (columns.empty()) throw std::invalid_argument("can: the waveforms are zero");
+  if (columns.empty())
+    throw std::invalid_argument("can: all waveforms are zero; excite at least one actuator");
   period_samples_ = static_cast<std::uint32_t>(samples.rows());
   samples_ = std::uint64_t{period_samples_} *
              static_cast<std::uint64_t>(waveforms.periods + waveforms.transient_periods);
   if (samples_ > depth_samples())
-    throw std::invalid_argument(
-        fmt::format("can: {} samples a run, the node records {} at most; fewer periods", samples_,
-                    depth_samples()));
+    throw std::invalid_argument(fmt::format(
+        "can: {} samples per run, but the node records at most {}; lower the number of periods",
+        samples_, depth_samples()));
   waveform_.clear();
   for (Eigen::Index n = 0; n < samples.rows(); ++n)
     for (const Eigen::Index column : columns) {
@@ -140,10 +142,9 @@ void CanResidentStage::send_all() {
     if (!chunks.empty()) highest = std::max(highest, chunks.back() + 1);
     send_missing(chunks);
   }
-  throw StageError(
-      fmt::format("can: {}: the upload does not get on at chunk {} of {}; call it again "
-                  "when the bus is well",
-                  transport_->name(0), first, total));
+  throw StageError(fmt::format(
+      "can: {}: the upload stopped at chunk {} of {}; repeat it when the bus works again",
+      transport_->name(0), first, total));
 }
 
 JobProgress CanResidentStage::upload(const Waveforms& waveforms) {
@@ -155,9 +156,9 @@ JobProgress CanResidentStage::upload(const Waveforms& waveforms) {
   std::size_t chunks = 0;
   back.resize(waveform_.size());
   if (!read(CanMemory::waveform, back, chunks) || back != waveform_)
-    throw StageError(fmt::format(
-        "can: {}: the waveform read back differs from the one that was sent; upload it again",
-        transport_->name(0)));
+    throw StageError(
+        fmt::format("can: {}: the waveform in the node differs from the one sent; upload it again",
+                    transport_->name(0)));
   trace_.clear();
   trace_chunks_ = 0;
   rows_given_ = 0;
@@ -169,7 +170,7 @@ JobProgress CanResidentStage::arm(const Trigger& trigger) {
   const double ramp = std::round(trigger.ramp_s * info_.sample_rate_hz);
   if (!(ramp >= 0.0 && ramp < 1e9))
     throw std::invalid_argument(
-        fmt::format("can: ramp_s must not be negative: {}", trigger.ramp_s));
+        fmt::format("can: ramp_s must be 0 or more; got {}", trigger.ramp_s));
   command(CanCommandCode::arm, trigger.run_seed, samples_, static_cast<std::uint32_t>(ramp),
           static_cast<std::uint32_t>(digest_));
   while (transport_->now_ns() < trigger.t_start_ns) transport_->wait(trigger.t_start_ns);
@@ -246,7 +247,7 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
   trace_.resize(rows * row_bytes());
   if (!read(CanMemory::trace, trace_, trace_chunks_))
     throw StageError(fmt::format(
-        "can: {}: the download stopped after {} of {} chunks; call it again when the bus is well",
+        "can: {}: the download stopped after {} of {} chunks; repeat it when the bus works again",
         transport_->name(0), trace_chunks_, can_chunks(trace_.size())));
   const std::size_t columns = info_.actuators.size() + info_.sensors.size();
   std::vector<double> values;

@@ -33,8 +33,9 @@ bool is_down(int error) { return error == ENETDOWN || error == ENXIO || error ==
 int open_socket(const std::string& interface) {
   const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
   if (fd < 0)
-    refuse(interface, fmt::format("no CAN socket ({}); load the modules can and can_raw",
-                                  std::strerror(errno)));
+    refuse(interface,
+           fmt::format("cannot open a CAN socket ({}); load the kernel modules can and can_raw",
+                       std::strerror(errno)));
   return fd;
 }
 
@@ -42,15 +43,16 @@ void bind_to(int fd, const std::string& interface) {
   ifreq request{};
   std::strncpy(request.ifr_name, interface.c_str(), IFNAMSIZ - 1);
   if (ioctl(fd, SIOCGIFINDEX, &request) != 0)
-    refuse(interface, "there is no such interface; 'ip link' lists them");
+    refuse(interface, "unknown interface; 'ip link' lists all interfaces");
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = request.ifr_ifindex;
   if (ioctl(fd, SIOCGIFMTU, &request) == 0 && request.ifr_mtu < static_cast<int>(CANFD_MTU))
-    refuse(interface, fmt::format("no CAN FD (mtu {}); 'ip link set {} mtu 72', or 'fd on'",
+    refuse(interface, fmt::format("the interface does not support CAN FD (mtu {}); run 'ip link "
+                                  "set {} mtu 72', or set 'fd on'",
                                   request.ifr_mtu, interface));
   if (ioctl(fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP) == 0)
-    refuse(interface, fmt::format("the interface is down; 'ip link set {} up'", interface));
+    refuse(interface, fmt::format("the interface is down; run 'ip link set {} up'", interface));
   if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
     refuse(interface, fmt::format("cannot be bound: {}", std::strerror(errno)));
 }
@@ -104,8 +106,8 @@ struct SocketCan::Bus {
 SocketCan::SocketCan(const std::vector<std::string>& interfaces,
                      const std::vector<std::uint16_t>& identifiers) {
   if (interfaces.empty() || interfaces.size() > kLargestBusCount)
-    throw StageError(
-        fmt::format("can: {} interfaces; give 1 ... {}", interfaces.size(), kLargestBusCount));
+    throw StageError(fmt::format("can: {} interfaces are unsupported; give 1 to {}",
+                                 interfaces.size(), kLargestBusCount));
   for (const std::string& interface : interfaces) {
     buses_.push_back(std::make_unique<Bus>(interface));
     configure(buses_.back()->fd, interface, identifiers);

@@ -70,13 +70,13 @@ void CanStage::start(std::uint64_t run_seed, Inputs& first) {
   if (!complete()) {
     stop();
     throw StageError(fmt::format(
-        "can: {}: the node starts but its measurements do not arrive; look at every bus",
+        "can: {}: the node started, but its measurements do not arrive; check all buses",
         transport_->name(0)));
   }
   if ((first.valid & all_sensors()) != all_sensors()) {
     stop();
     refuse(PeerStatus::first_sample_missing, fmt::format("can: {}", transport_->name(0)),
-           fmt::format("; look at sensor '{}'",
+           fmt::format("; check sensor '{}'",
                        info_.sensors[static_cast<std::size_t>(std::countr_one(first.valid))].name));
   }
   running_ = true;
@@ -262,16 +262,16 @@ void CanStage::stop() noexcept {
 
 std::string CanStage::trouble() const {
   if (!running_) return trouble_at_stop_;
-  if (not_carried_)
-    return "a command is not finite or beyond the range of the wire (actuator_range_n)";
+  if (not_carried_) return "a command is not finite or exceeds actuator_range_n";
   const WorstBus worst = worst_bus(*transport_);
   if (worst.state >= CanBusState::passive)
     return fmt::format("{}: {}", transport_->name(worst.bus), to_string(worst.state));
   // What this host could not send comes before what the node makes of it.
   for (std::size_t bus = 0; bus < transport_->buses(); ++bus)
     if (transport_->health(bus).send_refused > 0)
-      return fmt::format("{}: {} frames found no room in the queue: the bus is too slow",
-                         transport_->name(bus), transport_->health(bus).send_refused);
+      return fmt::format(
+          "{}: {} frames were dropped because the send queue is full; the bus is too slow",
+          transport_->name(bus), transport_->health(bus).send_refused);
   const CanState& node = link_.state();
   const PeerMeaning& said = meaning(status_);
   const bool of_the_node = status_ <= PeerStatus::unknown_code;

@@ -59,8 +59,9 @@ CanFault parse_can_fault(const std::string& text) {
     return formed && part[1].str() == to_string(known);
   });
   if (kind == kKinds.end())
-    throw std::invalid_argument(fmt::format(
-        "'{}': write KIND@FRAME[xCOUNT][:SECONDS] with KIND one of {}", text, names_of_kinds()));
+    throw std::invalid_argument(
+        fmt::format("'{}': expected KIND@FRAME[xCOUNT][:SECONDS], where KIND is one of {}", text,
+                    names_of_kinds()));
   CanFault fault;
   fault.kind = *kind;
   fault.from_frame = std::stoull(part[2]);
@@ -70,12 +71,12 @@ CanFault parse_can_fault(const std::string& text) {
       fault.delay_s = std::stod(part[6]);
     } catch (const std::exception&) {
       throw std::invalid_argument(
-          fmt::format("'{}': '{}' is no number of seconds", text, part[6].str()));
+          fmt::format("'{}': '{}' is not a valid time in seconds", text, part[6].str()));
     }
   }
   if (fault.kind == CanFaultKind::late && !(fault.delay_s > 0.0 && fault.delay_s <= 60.0))
     throw std::invalid_argument(
-        fmt::format("'{}': late needs a time of 0 ... 60 s, as in late@100:0.004", text));
+        fmt::format("'{}': late needs a time of 0 to 60 s, for example late@100:0.004", text));
   return fault;
 }
 

@@ -29,7 +29,7 @@ ModbusContext make_modbus_context(const ModbusAddress& address) {
   ModbusContext context;
   if (address.serial()) {
     if (std::find(kBaudRates.begin(), kBaudRates.end(), address.baud) == kBaudRates.end())
-      throw std::invalid_argument(fmt::format("{}: no such baud rate; write one of {}",
+      throw std::invalid_argument(fmt::format("{}: unsupported baud rate; use one of {}",
                                               to_string(address), fmt::join(kBaudRates, ", ")));
     context.reset(modbus_new_rtu(address.device.c_str(), address.baud, address.parity, 8,
                                  address.parity == 'N' ? 2 : 1));
@@ -41,7 +41,7 @@ ModbusContext make_modbus_context(const ModbusAddress& address) {
         fmt::format("{}: refused: {}", to_string(address), modbus_strerror(errno)));
   if (modbus_set_slave(context.get(), address.unit) != 0)
     throw std::invalid_argument(
-        fmt::format("{}: there is no such unit; give 1 to 247", to_string(address)));
+        fmt::format("{}: unit out of range; give 1 to 247", to_string(address)));
   modbus_set_error_recovery(context.get(), MODBUS_ERROR_RECOVERY_NONE);
   return context;
 }

@@ -33,7 +33,7 @@ constexpr std::array<KindRule, 9> kRules = {{{"late_reply", false, true},
 
 [[noreturn]] void refuse(std::string_view text, const std::string& what) {
   throw std::invalid_argument(
-      fmt::format("fault '{}': {}; write KIND[@REQUEST][xCOUNT][:VALUE]", text, what));
+      fmt::format("fault '{}': {}; expected KIND[@REQUEST][xCOUNT][:VALUE]", text, what));
 }
 
 /// Cuts off what stands behind `separator`, if it is there.
@@ -50,7 +50,7 @@ Number parse(std::string_view whole, std::string_view text, const char* name) {
   Number value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size())
-    refuse(whole, fmt::format("{} '{}' is no number", name, text));
+    refuse(whole, fmt::format("{} '{}' is not a number", name, text));
   return value;
 }
 
@@ -59,15 +59,15 @@ std::size_t kind_index(std::string_view whole, std::string_view name) {
     if (kRules[i].name == name) return i;
   std::vector<std::string_view> names;
   for (const KindRule& rule : kRules) names.push_back(rule.name);
-  refuse(whole, fmt::format("there is no kind '{}', but {}", name, fmt::join(names, ", ")));
+  refuse(whole, fmt::format("unknown kind '{}', allowed are {}", name, fmt::join(names, ", ")));
 }
 
 void check_value(std::string_view whole, const ModbusFault& fault) {
   if (!std::isfinite(fault.value)) refuse(whole, "VALUE must be finite");
   if (fault.kind == Kind::late_reply && !(fault.value > 0.0 && fault.value <= 60.0))
-    refuse(whole, "a reply can be more than 0 and up to 60 s late");
+    refuse(whole, "VALUE must be above 0 and at most 60 s");
   if (fault.kind == Kind::exception && !(fault.value >= 1.0 && fault.value <= 11.0))
-    refuse(whole, "exception codes are 1 to 11");
+    refuse(whole, "VALUE must be an exception code from 1 to 11");
 }
 
 }  // namespace
@@ -84,10 +84,10 @@ ModbusFault parse_modbus_fault(std::string_view text) {
   fault.kind = static_cast<Kind>(kind);
   fault.count = kRules[kind].lasting ? 0 : 1;
   if (has_place) fault.from = parse<std::uint64_t>(text, place, "REQUEST");
-  if (fault.from == 0) refuse(text, "requests are counted from 1");
+  if (fault.from == 0) refuse(text, "REQUEST must be 1 or more");
   if (!count.empty()) fault.count = parse<std::uint64_t>(text, count, "COUNT");
   if (has_value != kRules[kind].needs_value)
-    refuse(text, has_value ? "this kind takes no VALUE" : "this kind needs a VALUE");
+    refuse(text, has_value ? "this kind has no VALUE" : "this kind needs a VALUE");
   if (has_value) fault.value = parse<double>(text, value, "VALUE");
   check_value(text, fault);
   return fault;

@@ -37,8 +37,8 @@ ModbusLink::ModbusLink(const ModbusAddress& address, const ModbusTiming& timing)
                      timing.worst_reply_s <= 3600.0;
   if (!sound)
     throw std::invalid_argument(
-        fmt::format("modbus: response time-out {} s, worst reply {} s; write at least 0.001 s, and "
-                    "the worst reply not below the time-out",
+        fmt::format("modbus: invalid response_s {} s or worst_reply_s {} s; response_s must be at "
+                    "least 0.001 s, and worst_reply_s at least response_s",
                     timing.response_s, timing.worst_reply_s));
   const Duration response = duration(timing.response_s);
   modbus_set_response_timeout(context_.get(), response.seconds, response.microseconds);
@@ -129,18 +129,20 @@ std::string ModbusLink::describe(const Trouble& trouble) const {
   };
   switch (trouble.status) {
     case LinkStatus::ok:
-      return line("no trouble");
+      return line("no error");
     case LinkStatus::timeout:
-      return line(fmt::format("no reply within {:.4g} s; is it running, and the unit right?",
-                              timing_.response_s));
+      return line(fmt::format(
+          "no reply within {:.4g} s; check that the server is running and that the unit is correct",
+          timing_.response_s));
     case LinkStatus::corrupt:
-      return line(fmt::format("a reply failed its check: {}", modbus_strerror(trouble.error)));
+      return line(fmt::format("a reply was corrupt: {}", modbus_strerror(trouble.error)));
     case LinkStatus::refused:
       return line(fmt::format("refused: {}", modbus_strerror(trouble.error)));
     case LinkStatus::disconnected:
-      return line(fmt::format("not connected: {}; is it running?", modbus_strerror(trouble.error)));
+      return line(fmt::format("not connected: {}; check that the server is running",
+                              modbus_strerror(trouble.error)));
   }
-  return line("unknown trouble");
+  return line("unknown error");
 }
 
 }  // namespace stageid

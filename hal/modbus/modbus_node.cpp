@@ -31,14 +31,15 @@ std::span<std::uint16_t, 2> pair_at(std::span<std::uint16_t> registers, int addr
 void check_sizes(const StageNode& node) {
   const StageInfo& info = node.info();
   if (info.actuators.size() > map::kMostChannels || info.sensors.size() > map::kMostChannels)
-    throw std::invalid_argument(
-        fmt::format("modbus: {} actuators and {} sensors; one transaction carries {} of each",
-                    info.actuators.size(), info.sensors.size(), map::kMostChannels));
+    throw std::invalid_argument(fmt::format(
+        "modbus: {} actuators and {} sensors; one transaction carries at most {} of each",
+        info.actuators.size(), info.sensors.size(), map::kMostChannels));
   const NodePanel panel = node.panel();
   if (panel.gravity_compensator_n.size() > map::kMostPanelValues ||
       panel.temperature_k.size() > map::kMostPanelValues)
     throw std::invalid_argument(fmt::format(
-        "modbus: {} gravity compensators and {} temperatures; the map holds {} of each",
+        "modbus: {} gravity compensators and {} temperatures; the register map has at most {} of "
+        "each",
         panel.gravity_compensator_n.size(), panel.temperature_k.size(), map::kMostPanelValues));
 }
 
@@ -46,9 +47,9 @@ void check_faults(const ModbusFaultScript* faults, const NodePanel& panel) {
   using Kind = ModbusFault::Kind;
   if (faults == nullptr) return;
   if (faults->mentions(Kind::temperature) && panel.temperature_k.empty())
-    throw std::invalid_argument("fault 'temperature': the panel has no temperature");
+    throw std::invalid_argument("fault 'temperature': the stage file has no temperature");
   if (faults->mentions(Kind::gravity) && panel.gravity_compensator_n.empty())
-    throw std::invalid_argument("fault 'gravity': the panel has no gravity compensator");
+    throw std::invalid_argument("fault 'gravity': the stage file has no gravity compensator");
 }
 
 }  // namespace
@@ -56,8 +57,8 @@ void check_faults(const ModbusFaultScript* faults, const NodePanel& panel) {
 std::vector<float> modbus_scales(const Eigen::VectorXd& limits, std::size_t channels,
                                  const char* what) {
   if (static_cast<std::size_t>(limits.size()) != channels)
-    throw std::invalid_argument(
-        fmt::format("modbus: every {} needs a limit; its range on the wire follows from it", what));
+    throw std::invalid_argument(fmt::format(
+        "modbus: every {} needs a limit, because the limit sets its range in the registers", what));
   std::vector<float> scales;
   for (const double limit : limits) scales.push_back(count_scale(kHeadroom * limit));
   return scales;

@@ -90,7 +90,7 @@ void ModbusServer::open() {
   }
   listener_ = modbus_tcp_listen(modbus, kBacklog);
   if (listener_ < 0)
-    throw StageError(fmt::format("{}: cannot listen: {}; give another port", to_string(address_),
+    throw StageError(fmt::format("{}: cannot listen: {}; use another port", to_string(address_),
                                  std::strerror(errno)));
   fcntl(listener_, F_SETFL, fcntl(listener_, F_GETFL) | O_NONBLOCK);
   // Its connections inherit this: what a client does not take is noticed early and costs little.

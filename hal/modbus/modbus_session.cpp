@@ -59,13 +59,14 @@ bool sound(const std::vector<double>& scales) {
 
 void check_map(ModbusLink& link, const Block& status) {
   if (status[map::kMagic] != map::kMagicValue)
-    refuse(link, fmt::format("register {} does not hold {:#010x}: no stage is there, or another "
-                             "unit",
-                             map::kMagic, map::kMagicValue));
+    refuse(
+        link,
+        fmt::format("register {} does not contain {:#010x}, so this is not a stage; check the unit",
+                    map::kMagic, map::kMagicValue));
   if (status[map::kVersion] != map::kVersionValue)
     refuse(link, PeerStatus::other_version,
-           fmt::format(" (register map {}, not {}); update the older side", status[map::kVersion],
-                       map::kVersionValue));
+           fmt::format(" (register map {}; expected {}); update the older program",
+                       status[map::kVersion], map::kVersionValue));
 }
 
 /// Sends the same request again if no good answer came.
@@ -105,21 +106,22 @@ ModbusDescription read_description(ModbusLink& link, const StageInfo& expected) 
       block[map::kSensorCount] != expected.sensors.size() ||
       block[map::kChannelHash] != map::channel_hash(expected))
     refuse(link, PeerStatus::other_stage,
-           fmt::format(": {} actuators and {} sensors there, {} and {} here, or other names; give "
-                       "both the same",
+           fmt::format(": the node has {} actuators and {} sensors, the host {} and {}, or the "
+                       "names differ; use the same stage file on both sides",
                        block[map::kActuatorCount], block[map::kSensorCount],
                        expected.actuators.size(), expected.sensors.size()));
   const auto rate_hz = static_cast<double>(std::bit_cast<float>(block[map::kSampleRate]));
   if (!(std::abs(rate_hz - expected.sample_rate_hz) <= 1e-6 * expected.sample_rate_hz))
     refuse(link, PeerStatus::other_stage,
-           fmt::format(": the stage runs at {} Hz, the stage file says {} Hz; give both the same",
+           fmt::format(": the node runs at {} Hz, the stage file has {} Hz; use the same stage "
+                       "file on both sides",
                        rate_hz, expected.sample_rate_hz));
   ModbusDescription description;
   description.boot_id = status[map::kBootId];
   description.actuator_scale = block.scales(map::kActuatorScale, expected.actuators.size());
   description.sensor_scale = block.scales(map::kSensorScale, expected.sensors.size());
   if (!sound(description.actuator_scale) || !sound(description.sensor_scale))
-    refuse(link, "a channel's scale is not positive");
+    refuse(link, "the scale of a channel is not positive; correct it in the node");
   return description;
 }
 
@@ -171,7 +173,7 @@ void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
   transact(link, map::kCommand, request, map::kCommandEcho, reply,
            [&] { return get_u32(replied.first<2>()) == sequence; });
   if (get_u32(replied.last<2>()) == map::kReplyAccepted) return;
-  throw StageError(fmt::format("{}: the command is refused: {}", to_string(link.address()),
+  throw StageError(fmt::format("{}: the command was refused: {}", to_string(link.address()),
                                describe(read_state(link))));
 }
 
@@ -184,7 +186,8 @@ std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
   }
   const std::string place = to_string(link.address());
   if (link.refused_as_busy()) refuse(PeerStatus::held, place, "; wait until it has ended");
-  throw StageError(fmt::format("{}: no run begins: {}", place, describe(read_state(link))));
+  throw StageError(
+      fmt::format("{}: the node does not start a run: {}", place, describe(read_state(link))));
 }
 
 void end_run(ModbusLink& link, std::uint32_t session, std::vector<std::uint16_t>& reply) {

@@ -43,17 +43,17 @@ Exchange exchange_of(const StageInfo& info) {
 double checked_rate_hz(const StageInfo& info, const ModbusAddress& address,
                        const ModbusTiming& timing) {
   if (info.actuators.size() > map::kMostChannels || info.sensors.size() > map::kMostChannels)
-    throw std::invalid_argument(
-        fmt::format("modbus: {} actuators and {} sensors; one transaction carries {} of each",
-                    info.actuators.size(), info.sensors.size(), map::kMostChannels));
+    throw std::invalid_argument(fmt::format(
+        "modbus: {} actuators and {} sensors; one transaction carries at most {} of each",
+        info.actuators.size(), info.sensors.size(), map::kMostChannels));
   const double longest_hz = 1.0 / modbus_exchange_s(address, timing, info);
   const auto [written, read] = exchange_of(info);
   if (info.sample_rate_hz > longest_hz)
-    throw std::invalid_argument(fmt::format(
-        "modbus: {:.6g} Hz is faster than the link: one transaction takes {}, so {:.3g} "
-        "Hz at most; lower sample_rate_hz or take a faster link",
-        info.sample_rate_hz, describe_transaction(address, timing, written, read),
-        std::floor(longest_hz)));
+    throw std::invalid_argument(
+        fmt::format("modbus: {:.6g} Hz is too fast for the link: one transaction takes {}, so the "
+                    "maximum is {:.3g} Hz. Lower sample_rate_hz or use a faster link",
+                    info.sample_rate_hz, describe_transaction(address, timing, written, read),
+                    std::floor(longest_hz)));
   return longest_hz;
 }
 
@@ -85,7 +85,7 @@ std::uint32_t ModbusStage::measured(int address) const noexcept {
 
 void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
   if (first.y.size() != info_.sensors.size())
-    throw std::invalid_argument("modbus stage: Inputs::y must have one entry a sensor");
+    throw std::invalid_argument("modbus stage: Inputs::y must have one entry per sensor");
   trouble_ = Trouble::none;
   if (!link_.connected()) {
     link_.connect();
@@ -117,7 +117,7 @@ void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
   stop();
   const bool missing = status == PeerStatus::incomplete || status == PeerStatus::nothing_new;
   refuse(missing ? PeerStatus::first_sample_missing : status, to_string(link_.address()),
-         "; look at the node");
+         "; check the node");
 }
 
 bool ModbusStage::write_setpoint(const Outputs& outputs) noexcept {
@@ -254,14 +254,16 @@ std::string ModbusStage::trouble() const {
     case Trouble::link:
       return link_.describe(link_trouble_);
     case Trouble::foreign_reply:
-      return fmt::format("{}: replies do not belong to the setpoints: another unit or program",
-                         to_string(link_.address()));
+      return fmt::format(
+          "{}: replies do not match the setpoints; check that only one program uses the link, and "
+          "check the unit",
+          to_string(link_.address()));
     case Trouble::node:
       return fmt::format("{}: {} (state {}, cause: {})", to_string(link_.address()),
                          meaning(status_).words, to_string(state_of(node_status_)),
                          to_string(cause_of(node_status_)));
     case Trouble::not_carried:
-      return "a command is not finite or beyond the range of the wire (the node's actuator scale)";
+      return "a command is not finite or exceeds the range of the node's actuator scale";
   }
   return "";
 }

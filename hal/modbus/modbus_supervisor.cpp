@@ -54,11 +54,10 @@ PlantSnapshot parse(Status status) {
 /// Empty: it is our map.
 std::string map_trouble(Status status) {
   if (u32(status, map::kMagic) != map::kMagicValue)
-    return fmt::format(
-        "register {} holds {:#010x}, not {:#010x}: no stage is there, or another unit", map::kMagic,
-        u32(status, map::kMagic), map::kMagicValue);
+    return fmt::format("register {} contains {:#010x}; expected {:#010x}. Check the unit",
+                       map::kMagic, u32(status, map::kMagic), map::kMagicValue);
   if (u32(status, map::kVersion) != map::kVersionValue)
-    return fmt::format("{} (register map {}, not {}); update the older side",
+    return fmt::format("{} (register map {}; expected {}); update the older program",
                        meaning(PeerStatus::other_version).words, u32(status, map::kVersion),
                        map::kVersionValue);
   return "";
@@ -70,7 +69,7 @@ void check(const ModbusSupervisorOptions& o) {
                      o.backoff_longest_s <= 3600.0;
   if (!sound)
     throw std::invalid_argument(
-        fmt::format("supervisor: poll period {} s (0.001 to 60), back-off {} to {} s",
+        fmt::format("supervisor: invalid poll period {} s (0.001 to 60) or back-off {} to {} s",
                     o.poll_period_s, o.backoff_first_s, o.backoff_longest_s));
 }
 
@@ -202,7 +201,7 @@ bool ModbusSupervisor::take_status(std::span<const std::uint16_t> status) {
   std::string wrong = map_trouble(status);
   const std::uint32_t age = heartbeat_ - u32(status, map::kHeartbeatEcho);
   if (wrong.empty() && age > kEchoPolls)
-    wrong = fmt::format("the heartbeat stands still at {}: the program behind the server hangs",
+    wrong = fmt::format("the heartbeat stopped at {}: the program behind the server hangs",
                         u32(status, map::kHeartbeatEcho));
   const std::lock_guard lock(mutex_);
   if (!wrong.empty()) {

@@ -7,11 +7,11 @@ const char* to_string(FaultCause cause) noexcept {
     case FaultCause::none:
       return "none";
     case FaultCause::watchdog:
-      return "the host fell silent";
+      return "the host stopped sending";
     case FaultCause::limit:
-      return "a limit was hit";
+      return "a limit was exceeded";
     case FaultCause::not_finite:
-      return "a value was no number";
+      return "a value was not finite";
     case FaultCause::interlock:
       return "the interlock opened";
     case FaultCause::amplifier:
@@ -23,7 +23,7 @@ const char* to_string(FaultCause cause) noexcept {
     case FaultCause::bus_off:
       return "the bus is off";
     case FaultCause::host_heartbeat:
-      return "the supervisor's heartbeat stands still";
+      return "the supervisor's heartbeat stopped";
   }
   return "unknown";
 }

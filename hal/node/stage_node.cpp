@@ -16,7 +16,7 @@ constexpr double kWatchdogSamples = 3.0;
 
 std::int64_t nanoseconds(double seconds, const char* name) {
   if (!(seconds >= 0.0) || !std::isfinite(seconds))
-    throw std::invalid_argument(fmt::format("node: {} must not be negative: {}", name, seconds));
+    throw std::invalid_argument(fmt::format("node: {} must be 0 or more; got {}", name, seconds));
   return std::llround(1e9 * seconds);
 }
 
@@ -32,13 +32,13 @@ PanelTrouble trouble_of(const NodePanel& panel) {
     // Written so that NaN is out of range.
     if (!(force_n >= panel.gravity_low_n && force_n <= panel.gravity_high_n))
       return {FaultCause::gravity,
-              fmt::format("gravity compensator {}: {:.4g} N is not within {:.4g} ... {:.4g} N",
+              fmt::format("gravity compensator {}: {:.4g} N is out of range ({:.4g} to {:.4g} N)",
                           i + 1, force_n, panel.gravity_low_n, panel.gravity_high_n)};
   }
   for (std::size_t i = 0; i < panel.temperature_k.size(); ++i)
     if (!(panel.temperature_k[i] <= panel.temperature_high_k))
       return {FaultCause::temperature,
-              fmt::format("temperature {}: {:.4g} K is above {:.4g} K", i + 1,
+              fmt::format("temperature {}: {:.4g} K is out of range (at most {:.4g} K)", i + 1,
                           panel.temperature_k[i], panel.temperature_high_k)};
   return {};
 }
@@ -170,9 +170,10 @@ std::uint32_t StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, 
   if (holder() != 0 && (session != holder() || running_))
     refuse(PeerStatus::held, "node", "; wait until it has ended");
   if (machine_.state() != NodeState::operation_enabled)
-    throw StageError(fmt::format("node: no measurement in state {}; enable it first",
+    throw StageError(fmt::format("node: cannot measure in state {}; enable it first",
                                  to_string(machine_.state())));
-  if (first.y.size() != y_.size()) throw StageError("node: Inputs::y must have one entry a sensor");
+  if (first.y.size() != y_.size())
+    throw StageError("node: Inputs::y must have one entry per sensor");
   stage_.start(run_seed, first);
   if (holder() == 0) session_ = draw_key();
   static_cast<void>(machine_.begin_measuring());

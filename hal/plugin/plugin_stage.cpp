@@ -60,17 +60,17 @@ struct PluginStage::Library {
     using Entry = const struct stageid_backend* (*)();
     const auto entry = reinterpret_cast<Entry>(::dlsym(handle.get(), "stageid_get_backend"));
     if (entry == nullptr)
-      fail("has no function stageid_get_backend(); write one as in stageid_backend.h");
+      fail("has no function stageid_get_backend(); add it as described in stageid_backend.h");
     calls = entry();
     if (calls == nullptr || calls->version != STAGEID_BACKEND_VERSION)
       fail(
-          fmt::format("is of interface version {}, this program of {}; build it with this "
+          fmt::format("has interface version {}, this program has {}; rebuild it with this "
                       "program's stageid_backend.h",
                       calls == nullptr ? 0 : calls->version, STAGEID_BACKEND_VERSION));
     if (calls->size < sizeof(struct stageid_backend) || calls->open == nullptr ||
         calls->describe == nullptr || calls->start == nullptr || calls->exchange == nullptr ||
         calls->stop == nullptr || calls->trouble == nullptr || calls->close == nullptr)
-      fail("lacks functions; all of struct stageid_backend must be there, and size its size");
+      fail("is incomplete; set every function of struct stageid_backend, and set size to its size");
   }
   Library(const Library&) = delete;
   Library& operator=(const Library&) = delete;
@@ -115,8 +115,9 @@ PluginStage::PluginStage(StageInfo info, const PluginSpec& spec, double pace)
   stageid_description description{};
   library_->calls->describe(library_->stage, &description);
   if (description.maximum_rate_hz > 0.0 && description.maximum_rate_hz < info_.sample_rate_hz)
-    library_->fail(fmt::format("carries {} Hz at most; the stage file asks for {} Hz",
-                               description.maximum_rate_hz, info_.sample_rate_hz));
+    library_->fail(
+        fmt::format("supports at most {} Hz, but the stage file has {} Hz; lower sample_rate_hz",
+                    description.maximum_rate_hz, info_.sample_rate_hz));
   info_.backend = "plugin";
   if (description.maximum_rate_hz > 0.0) info_.maximum_rate_hz = description.maximum_rate_hz;
   if (description.transport_delay_s > 0.0) info_.transport_delay_s = description.transport_delay_s;

@@ -38,9 +38,8 @@ ColouredNoise::ColouredNoise(const ColouredNoiseSpec& spec) : spec_(spec) {
   if (!(rate > 0.0) || !(spec.reference_hz > 0.0) || !(2.0 * spec.reference_hz < rate) ||
       !(spec.density >= 0.0) || !(spec.damping_ratio > 0.0 && spec.damping_ratio < 1.0))
     throw std::invalid_argument(
-        "coloured noise: needs a positive rate, a reference below half of it, a density of 0 or "
-        "more and a damping "
-        "ratio between 0 and 1");
+        "coloured noise: the sample rate must be positive, the reference below half of it, the "
+        "density 0 or more and the damping ratio between 0 and 1");
   const Eigen::Index states = states_of(spec);
   constexpr auto kBlock = static_cast<Eigen::Index>(NormalSource::kBlock);
   const Eigen::Index count = spec.channels * std::max<Eigen::Index>(states, 1);

@@ -37,13 +37,13 @@ void check(const Fault& fault, std::size_t number, const StageInfo& info) {
       throw std::invalid_argument(
           fmt::format("faults: entry {}: channel {} is negative", number, fault.channel));
     if (static_cast<std::size_t>(fault.channel) >= channels)
-      throw std::invalid_argument(fmt::format("faults: entry {}: channel {}, but there are {} {}",
-                                              number, fault.channel, channels,
-                                              of_sensor(fault.kind) ? "sensors" : "actuators"));
+      throw std::invalid_argument(
+          fmt::format("faults: entry {}: channel {} is out of range; there are {} {}", number,
+                      fault.channel, channels, of_sensor(fault.kind) ? "sensors" : "actuators"));
   }
   if (fault.kind == Kind::missed_cycle && fault.cycles == 0)
     throw std::invalid_argument(
-        fmt::format("faults: entry {}: a missed_cycle needs cycles of at least 1", number));
+        fmt::format("faults: entry {}: missed_cycle needs cycles of at least 1", number));
   if (!std::isfinite(fault.value))
     throw std::invalid_argument(fmt::format("faults: entry {}: the value is not finite", number));
   if (fault.kind == Kind::extra_delay &&

@@ -21,26 +21,26 @@ void check(const std::vector<PlantMode>& modes, double delay_s, double sample_ra
   if (modes.empty()) throw std::invalid_argument("plant: at least one mode is needed");
   if (!(sample_rate_hz > 0.0) || !std::isfinite(sample_rate_hz))
     throw std::invalid_argument(
-        fmt::format("plant: the sample rate must be positive, not {} Hz", sample_rate_hz));
+        fmt::format("plant: the sample rate must be positive; got {} Hz", sample_rate_hz));
   if (!(delay_s >= 0.0) || !std::isfinite(delay_s))
     throw std::invalid_argument(
-        fmt::format("plant: the delay must not be negative: {} s", delay_s));
+        fmt::format("plant: the delay must be 0 or more; got {} s", delay_s));
   if (delay_s * sample_rate_hz > kLongestDelay)
     throw std::invalid_argument(
-        fmt::format("plant: a delay of {} s is {:.0f} samples; at most {:.0f}", delay_s,
+        fmt::format("plant: a delay of {} s is {:.0f} samples; the maximum is {:.0f}", delay_s,
                     delay_s * sample_rate_hz, kLongestDelay));
   for (std::size_t i = 0; i < modes.size(); ++i) {
     const PlantMode& mode = modes[i];
     if (!(mode.natural_frequency_hz >= 0.0) || !std::isfinite(mode.natural_frequency_hz))
-      throw std::invalid_argument(fmt::format("plant: mode {}: natural_frequency_hz is {}", i + 1,
-                                              mode.natural_frequency_hz));
+      throw std::invalid_argument(fmt::format("plant: mode {}: invalid natural_frequency_hz {}",
+                                              i + 1, mode.natural_frequency_hz));
     if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0))
       throw std::invalid_argument(fmt::format(
-          "plant: mode {}: damping_ratio must be in [0, 1), not {}", i + 1, mode.damping_ratio));
+          "plant: mode {}: damping_ratio must be in [0, 1); got {}", i + 1, mode.damping_ratio));
     if (mode.actuator_shape.size() != modes[0].actuator_shape.size() ||
         mode.sensor_shape.size() != modes[0].sensor_shape.size())
-      throw std::invalid_argument(
-          fmt::format("plant: mode {}: its shapes differ in size from those of mode 1", i + 1));
+      throw std::invalid_argument(fmt::format(
+          "plant: mode {}: the shapes have a different size than those of mode 1", i + 1));
     if (!mode.actuator_shape.allFinite() || !mode.sensor_shape.allFinite())
       throw std::invalid_argument(fmt::format("plant: mode {}: a shape is not finite", i + 1));
   }

@@ -80,7 +80,7 @@ Eigen::MatrixXcd sum_of_modes(const std::vector<PlantMode>& modes, ModalResponse
   for (const PlantMode& mode : modes) {
     if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0)) {
       throw std::invalid_argument(fmt::format(
-          "plant response: damping_ratio must be in [0, 1), not {}", mode.damping_ratio));
+          "plant response: damping_ratio must be in [0, 1); got {}", mode.damping_ratio));
     }
     sum += response(mode) * (mode.sensor_shape * mode.actuator_shape.transpose());
   }
@@ -102,7 +102,7 @@ Eigen::MatrixXcd sampled_response(const std::vector<PlantMode>& modes, double de
                                   double sample_rate_hz, double frequency_hz) {
   if (!(sample_rate_hz > 0.0) || !(delay_s >= 0.0)) {
     throw std::invalid_argument(
-        fmt::format("plant response: needs a positive sample rate and a delay of at least 0, not "
+        fmt::format("plant response: the sample rate must be positive and the delay 0 or more; got "
                     "{} Hz and {} s",
                     sample_rate_hz, delay_s));
   }

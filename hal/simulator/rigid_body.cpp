@@ -26,10 +26,10 @@ void require_independent(const Jacobian& jacobian, const Eigen::MatrixXd& invers
   Eigen::RowVectorXd row = inverse.row(axis) * jacobian;
   row[axis] -= 1.0;
   if (row.cwiseAbs().maxCoeff() > kTolerance) {
-    throw std::invalid_argument(fmt::format(
-        "controller: axis {} is closed, but the {} do not reach it independently of the "
-        "other axes; add {} or leave the axis open",
-        kRigidAxisNames[static_cast<std::size_t>(axis)], what, what));
+    throw std::invalid_argument(
+        fmt::format("controller: axis {} is closed, but the {} cannot control it independently of "
+                    "the other axes; add {} or leave the axis open",
+                    kRigidAxisNames[static_cast<std::size_t>(axis)], what, what));
   }
 }
 
@@ -37,7 +37,7 @@ void require_independent(const Jacobian& jacobian, const Eigen::MatrixXd& invers
 double unit_crossover_gain(AxisController axis, double inertia, const char* name) {
   if (!(inertia > 0.0) || !std::isfinite(inertia)) {
     throw std::invalid_argument(fmt::format(
-        "controller: axis {} has gain 0 (automatic), which needs a positive inertia, not {}", name,
+        "controller: axis {} has gain 0 (automatic), which needs a positive inertia; got {}", name,
         inertia));
   }
   axis.gain = 1.0;

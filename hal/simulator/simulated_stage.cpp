@@ -143,7 +143,7 @@ void SimulatedStage::displacement(std::span<double> y_m) const noexcept {
 void SimulatedStage::start(std::uint64_t run_seed, Inputs& first) {
   State& s = *state_;
   if (first.y.size() != s.info.sensors.size())
-    throw std::invalid_argument("simulated stage: Inputs::y must have one entry a sensor");
+    throw std::invalid_argument("simulated stage: Inputs::y must have one entry per sensor");
   ++s.run;
   s.faults.start_run(s.run);
   s.cycle = 0;

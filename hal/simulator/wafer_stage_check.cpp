@@ -36,8 +36,8 @@ void check_channels(const char* kind, const std::vector<Channel>& channels,
     const double* d = channel.direction;
     if (std::abs(std::hypot(d[0], d[1], d[2]) - 1.0) > 1e-6)
       throw std::invalid_argument(
-          fmt::format("stage: {} {}: direction [{}, {}, {}] is no unit vector", kind, channel.name,
-                      d[0], d[1], d[2]));
+          fmt::format("stage: {} {}: direction [{}, {}, {}] is not a unit vector", kind,
+                      channel.name, d[0], d[1], d[2]));
     // Written so that NaN fails too.
     const bool on_plate = std::abs(p[0]) <= 0.5 * spec.length_x_m * (1.0 + 1e-9) &&
                           std::abs(p[1]) <= 0.5 * spec.length_y_m * (1.0 + 1e-9) &&
@@ -72,7 +72,7 @@ void check_plant(const WaferStageSpec& spec) {
     if (mode.actuator_shape.size() != static_cast<Eigen::Index>(spec.info.actuators.size()) ||
         mode.sensor_shape.size() != static_cast<Eigen::Index>(spec.info.sensors.size()))
       throw std::invalid_argument(
-          "stage: in_plane_modes: a shape must have one entry an actuator, and one a sensor");
+          "stage: in_plane_modes: a shape must have one entry per actuator and one per sensor");
   }
 }
 

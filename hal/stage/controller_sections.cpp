@@ -58,7 +58,7 @@ void check(const AxisController& axis, double nyquist_hz) {
   check_frequency("lead_pole_hz", axis.lead_pole_hz, nyquist_hz, true);
   check_frequency("lowpass_hz", axis.lowpass_hz, nyquist_hz, true);
   if (axis.lead_zero_hz > 0.0 && axis.lead_pole_hz == 0.0)
-    refuse("lead_pole_hz", 0.0, "positive where there is a lead_zero_hz");
+    refuse("lead_pole_hz", 0.0, "positive if lead_zero_hz is set");
   if (axis.lowpass_hz > 0.0 && !(axis.lowpass_damping > 0.0 && std::isfinite(axis.lowpass_damping)))
     refuse("lowpass_damping", axis.lowpass_damping, "positive");
   for (const auto& notch : axis.notches) {

@@ -27,9 +27,9 @@ Eigen::ArrayXd limit_vector(const Eigen::VectorXd& given, std::size_t channels, 
 }
 
 std::unique_ptr<CyclicStage> checked(std::unique_ptr<CyclicStage> stage) {
-  if (!stage) throw std::invalid_argument("limits: there is no stage to put them on");
+  if (!stage) throw std::invalid_argument("limits: a stage is required");
   if (!(stage->info().sample_rate_hz > 0.0))
-    throw std::invalid_argument("limits: the stage tells no sample rate");
+    throw std::invalid_argument("limits: the stage has no sample rate; set sample_rate_hz");
   return stage;
 }
 
@@ -50,7 +50,7 @@ LimitedStage::LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limit
   mean_square_limit_n2_ = limit_vector(limits_.thermal_rms_n, actuators, "thermal_rms_n").square();
   if (!(limits_.thermal_time_constant_s > 0.0) || !std::isfinite(limits_.thermal_time_constant_s))
     throw std::invalid_argument(
-        fmt::format("limits: thermal_time_constant_s must be positive, not {}",
+        fmt::format("limits: thermal_time_constant_s must be positive; got {}",
                     limits_.thermal_time_constant_s));
   decay_ = std::exp(-1.0 / (info.sample_rate_hz * limits_.thermal_time_constant_s));
   wanted_.setZero(largest_n_.size());
@@ -71,7 +71,7 @@ void LimitedStage::start(std::uint64_t run_seed, Inputs& first) {
   if (finding.violation.kind != LimitKind::none) {
     violation_ = finding.violation;
     stage_->stop();
-    throw StageError(describe(violation_, info()) + "; bring the stage into its window first");
+    throw StageError(describe(violation_, info()) + "; move the stage into its window first");
   }
 }
 
@@ -196,7 +196,7 @@ void LimitedStage::report_command(const LimitViolation& violation) noexcept {
 }
 
 std::string describe(const LimitViolation& violation, const StageInfo& info) {
-  if (violation.kind == LimitKind::none) return "no limit was hit";
+  if (violation.kind == LimitKind::none) return "no limit was exceeded";
   const std::vector<Channel>& channels = violation.of_sensor ? info.sensors : info.actuators;
   const auto index = static_cast<std::size_t>(violation.channel);
   std::string who = fmt::format(
@@ -221,20 +221,20 @@ std::string describe(const LimitViolation& violation, const StageInfo& info) {
       return fmt::format("{}: {} is not finite (cycle {})", who,
                          violation.of_sensor ? "the measurement" : "the command", violation.cycle);
     case LimitKind::stuck_sensor:
-      return fmt::format("{}: has shown {:.6g} m and nothing else for {:.4g} s (cycle {})", who,
+      return fmt::format("{}: has repeated the value {:.6g} m for {:.4g} s (cycle {})", who,
                          violation.value, violation.limit, violation.cycle);
     case LimitKind::sensor_jump:
-      return line("jumped away from the predicted motion by", "m");
+      return line("jumped from the predicted motion by", "m");
     case LimitKind::deviation:
       return line("deviation from the predicted motion is", "m");
     case LimitKind::contradiction:
-      return line("differs from the rigid motion that all sensors show by", "m");
+      return line("differs from the rigid motion of all sensors by", "m");
     case LimitKind::speed:
       return line("speed is", "m/s");
     case LimitKind::stopping_distance:
-      return line("half of all forces could stop the stage only at", "m");
+      return line("the stopping position with half of the forces is", "m");
     case LimitKind::hard_position:
-      return line("|y| is", "m").insert(who.size() + 1, " past the hard window,");
+      return line("|y| is", "m").insert(who.size() + 1, " beyond the hard window:");
   }
   return who;
 }
@@ -249,9 +249,9 @@ std::string describe_stop(const LimitedStage& stage) {
     text += "; then " + describe(cause, stage.info());
   text += "; the loop was opened";
   if (std::abs(emergency.response - 1.0) > 0.1)
-    text += fmt::format(", the stage answering {:.2g} times as expected", emergency.response);
+    text += fmt::format(", the response was {:.2g} times the expected one", emergency.response);
   return text + fmt::format("; {}, {:.2g} m/s when the forces were cut",
-                            emergency.braked ? "braked" : "no brake", emergency.speed_m_s);
+                            emergency.braked ? "braked" : "not braked", emergency.speed_m_s);
 }
 
 }  // namespace stageid

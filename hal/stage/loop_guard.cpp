@@ -55,13 +55,13 @@ LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
   for (Eigen::Index i = 0; i < sensors; ++i)
     if (!(hard_window_m_[i] >= window_m_[i]))
       throw std::invalid_argument(
-          fmt::format("limits: hard_window_m, entry {}: {} is inside the window of {}", i + 1,
+          fmt::format("limits: hard_window_m, entry {}: {} is below window_m, {}", i + 1,
                       hard_window_m_[i], window_m_[i]));
 
   const double repeats = limits.stuck_sensor_s * info.sample_rate_hz;
   if (!(repeats >= 0.0 && repeats < 1e9) || (repeats > 0.0 && repeats < 2.0))
     throw std::invalid_argument(
-        fmt::format("limits: stuck_sensor_s is {} s at {} Hz; allowed: 0, or two samples and more",
+        fmt::format("limits: stuck_sensor_s is {} s at {} Hz; must be 0 or at least two samples",
                     limits.stuck_sensor_s, info.sample_rate_hz));
   repeats_allowed_ = static_cast<std::uint32_t>(std::llround(repeats));
 

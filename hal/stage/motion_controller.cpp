@@ -19,16 +19,16 @@ Eigen::Index padded(Eigen::Index n) { return (n + kLanes - 1) / kLanes * kLanes;
 void check(const MotionControllerSpec& spec) {
   if (!(spec.sample_rate_hz > 0.0) || !std::isfinite(spec.sample_rate_hz))
     throw std::invalid_argument(fmt::format(
-        "controller: the sample rate must be positive, not {} Hz", spec.sample_rate_hz));
+        "controller: the sample rate must be positive; got {} Hz", spec.sample_rate_hz));
   const auto axes = static_cast<Eigen::Index>(spec.axes.size());
   if (axes == 0 || spec.sensor_decoupling.rows() != axes ||
       spec.actuator_decoupling.cols() != axes || spec.sensor_decoupling.cols() == 0 ||
       spec.actuator_decoupling.rows() == 0)
-    throw std::invalid_argument(fmt::format(
-        "controller: {} axes need a sensor decoupling of {} rows and an actuator decoupling of {} "
-        "columns, not {} x {} and {} x {}",
-        axes, axes, axes, spec.sensor_decoupling.rows(), spec.sensor_decoupling.cols(),
-        spec.actuator_decoupling.rows(), spec.actuator_decoupling.cols()));
+    throw std::invalid_argument(
+        fmt::format("controller: {} axes need a sensor decoupling with {} rows and an actuator "
+                    "decoupling with {} columns; got {} x {} and {} x {}",
+                    axes, axes, axes, spec.sensor_decoupling.rows(), spec.sensor_decoupling.cols(),
+                    spec.actuator_decoupling.rows(), spec.actuator_decoupling.cols()));
   if (!spec.sensor_decoupling.allFinite() || !spec.actuator_decoupling.allFinite())
     throw std::invalid_argument("controller: a decoupling matrix is not finite");
 }

@@ -22,7 +22,7 @@ void check(const PlantConditions& c) {
                      c.temperature_low_k <= c.temperature_high_k;
   if (!sound)
     throw std::invalid_argument(
-        "supervisor: times must be positive, and ranges [low, high] with low <= high");
+        "supervisor: times must be positive, and ranges [low, high] must have low <= high");
 }
 
 /// "gravity compensator 2: 12 N is not within 40 ... 60 N"; empty if all are. NaN is not.
@@ -30,7 +30,7 @@ std::string range_trouble(const std::vector<double>& values, double low, double 
                           const char* what, const char* unit) {
   for (std::size_t i = 0; i < values.size(); ++i)
     if (!(values[i] >= low && values[i] <= high))
-      return fmt::format("{} {}: {:.4g} {} is not within {:.4g} ... {:.4g} {}", what, i + 1,
+      return fmt::format("{} {}: {:.4g} {} is out of range ({:.4g} to {:.4g} {})", what, i + 1,
                          values[i], unit, low, high, unit);
   return "";
 }
@@ -48,7 +48,7 @@ std::string trouble_of(const Supervisor& supervisor, const PlantConditions& cond
     return of_link ? fmt::format("{}; {}", trouble, link) : trouble;
   }
   if (enabled && !snapshot.enabled)
-    return fmt::format("the plant is not enabled any more (state {})", to_string(snapshot.state));
+    return fmt::format("the plant is not enabled (state {})", to_string(snapshot.state));
   return "";
 }
 
@@ -56,10 +56,10 @@ std::string trouble_of(const Supervisor& supervisor, const PlantConditions& cond
 
 std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& conditions,
                           std::int64_t now_ns) {
-  if (snapshot.t_ns == 0) return "supervisor: no status was read yet";
+  if (snapshot.t_ns == 0) return "supervisor: no status has been read yet";
   const double age_s = 1e-9 * static_cast<double>(now_ns - snapshot.t_ns);
   if (age_s > conditions.stale_s)
-    return fmt::format("supervisor: no fresh status for more than {:.3g} s", conditions.stale_s);
+    return fmt::format("supervisor: the status is older than {:.3g} s", conditions.stale_s);
   if (!snapshot.interlock_closed) return "the interlock is open; close it";
   const std::string gravity =
       range_trouble(snapshot.gravity_compensator_n, conditions.gravity_low_n,

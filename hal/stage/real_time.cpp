@@ -24,12 +24,12 @@ namespace {
 void check(const RealTimeOptions& options) {
   if (options.priority < 1 || options.priority > 99)
     throw std::invalid_argument(
-        fmt::format("realtime: priority {}; give 1 to 99", options.priority));
+        fmt::format("realtime: priority {} is out of range; give 1 to 99", options.priority));
   const long processors = ::sysconf(_SC_NPROCESSORS_CONF);
   if (options.cpu < -1 || options.cpu >= processors)
     throw std::invalid_argument(
-        fmt::format("realtime: cpu {}; this machine has 0 to {}, and -1 is none in particular",
-                    options.cpu, processors - 1));
+        fmt::format("realtime: cpu {} is out of range; give 0 to {}, or -1 for any", options.cpu,
+                    processors - 1));
 }
 
 bool kernel_is_preempt_rt() {
@@ -60,15 +60,16 @@ std::string pin(int cpu) {
   const int error = ::pthread_setaffinity_np(::pthread_self(), sizeof set, &set);
   if (error == 0) return "";
   return fmt::format(
-      "the loop could not be pinned to processor {} ({}); give one that this process may use", cpu,
-      std::strerror(error));
+      "the loop could not be pinned to processor {} ({}); choose a processor that this process may "
+      "use",
+      cpu, std::strerror(error));
 }
 
 std::string lock_memory() {
   if (::mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return "";
   return fmt::format(
-      "memory could not be locked ({}); run as root, or give the user 'memlock unlimited' in "
-      "/etc/security/limits.conf, or write lock_memory: false",
+      "memory could not be locked ({}); run as root, give the user 'memlock unlimited' in "
+      "/etc/security/limits.conf, or set lock_memory: false",
       std::strerror(errno));
 }
 
@@ -87,8 +88,8 @@ RealTime::RealTime(const RealTimeOptions& options) {
   };
   if (!kernel_is_preempt_rt())
     note(
-        "the kernel is not a PREEMPT_RT one: cycles can be late by milliseconds; boot one "
-        "(Debian: linux-image-rt-amd64)");
+        "the kernel does not have PREEMPT_RT, so cycles can be late by milliseconds; install a "
+        "real-time kernel (Debian: linux-image-rt-amd64)");
   note(pin(options.cpu));
   note(take_priority(options.priority));
   // Of use where the priority was refused: a plain thread is woken up to 50 us late on purpose.
@@ -101,7 +102,7 @@ RealTime::RealTime(const RealTimeOptions& options) {
   if (options.policy == RealTimePolicy::require && !missing_.empty()) {
     if (locked_) ::munlockall();
     throw StageError(
-        fmt::format("realtime: {}; or write policy: try", fmt::join(missing_, "; and ")));
+        fmt::format("realtime: {}; or set policy: try", fmt::join(missing_, "; and ")));
   }
 }
 

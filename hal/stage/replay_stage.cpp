@@ -11,13 +11,13 @@ namespace stageid {
 
 ReplayStage::ReplayStage(StageInfo info, std::unique_ptr<ReplaySource> source, double tolerance_n)
     : info_(std::move(info)), source_(std::move(source)), tolerance_n_(tolerance_n) {
-  if (!source_) throw std::invalid_argument("replay: there is no source");
+  if (!source_) throw std::invalid_argument("replay: a source is required");
   if (!(tolerance_n >= 0.0) || !std::isfinite(tolerance_n))
     throw std::invalid_argument(
-        fmt::format("replay: the tolerance must be 0 N or more, not {}", tolerance_n));
+        fmt::format("replay: the tolerance must be 0 N or more; got {}", tolerance_n));
   if (info_.sensors.empty() || info_.sensors.size() > 64)
     throw std::invalid_argument(
-        fmt::format("replay: {} sensors; must be 1 to 64", info_.sensors.size()));
+        fmt::format("replay: {} sensors are unsupported; must be 1 to 64", info_.sensors.size()));
   if (!(info_.sample_rate_hz > 0.0))
     throw std::invalid_argument("replay: the sample rate must be positive");
 }
@@ -25,22 +25,21 @@ ReplayStage::ReplayStage(StageInfo info, std::unique_ptr<ReplaySource> source, d
 void ReplayStage::start(std::uint64_t /*run_seed*/, Inputs& first) {
   const int run = run_ + 1;
   if (run >= source_->runs())
-    throw StageError(
-        fmt::format("replay: run {} was asked for, but the log has {}; record it anew or "
-                    "replay fewer runs",
-                    run + 1, source_->runs()));
+    throw StageError(fmt::format(
+        "replay: run {} is out of range; the log has {}. Record a longer log or replay fewer runs",
+        run + 1, source_->runs()));
   source_->load(run, u_, y_, marked_);
   const Eigen::Index samples = u_.cols();
   if (u_.rows() != static_cast<Eigen::Index>(info_.actuators.size()) ||
       y_.rows() != static_cast<Eigen::Index>(info_.sensors.size()) || y_.cols() != samples ||
       samples == 0 || (marked_.size() != 0 && marked_.size() != samples))
     throw StageError(
-        fmt::format("replay: run {} has u {} x {}, y {} x {} and {} marks; wanted are {} "
-                    "actuators and {} sensors, and equally many samples",
+        fmt::format("replay: run {} has u {} x {}, y {} x {} and {} marks; expected {} actuators, "
+                    "{} sensors and equal numbers of samples",
                     run + 1, u_.rows(), u_.cols(), y_.rows(), y_.cols(), marked_.size(),
                     info_.actuators.size(), info_.sensors.size()));
   if (first.y.size() != info_.sensors.size())
-    throw std::invalid_argument("replay: Inputs::y must have one entry a sensor");
+    throw std::invalid_argument("replay: Inputs::y must have one entry per sensor");
   run_ = run;
   cycle_ = 0;
   give(first, 0);

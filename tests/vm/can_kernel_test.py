@@ -112,7 +112,7 @@ class Interventions(CanTest):
             self.assertEqual(wait_for_state("fault"), ("fault", "watchdog"))
             code, _, err = self.machine.run(self.name)
             self.assertEqual(code, 1)
-            self.assertIn("in fault (the host fell silent); remove the cause and add --reset-fault",
+            self.assertIn("in fault (the host stopped sending); remove the cause and add --reset-fault",
                           err)
             self.ends(self.machine.start(self.name, "run", "--reset-fault"), 0)
 
@@ -167,7 +167,7 @@ class StageFaults(CanTest):
     ROWS = [
         ("sensor no number", "kind: nan_sensor, channel: s1", 4,
          "sensor s1: the measurement is not finite"),
-        ("sensor stuck", "kind: stuck_sensor, channel: s1", 4, "sensor s1: has shown"),
+        ("sensor stuck", "kind: stuck_sensor, channel: s1", 4, "sensor s1: has repeated"),
         ("sensor dead", "kind: dead_sensor, channel: s2", 1, "the last one: incomplete"),
         ("samples missed", "kind: missed_cycle, cycles: 100", 1, "the last one: stale"),
         ("interlock", "kind: interlock", 1, "the stage reported a fault"),
@@ -195,14 +195,14 @@ class StageFaults(CanTest):
         name = self.machine.configure("alone")
         code, _, err = self.machine.run(name)
         self.assertEqual(code, 1)
-        self.assertIn("can: vcan0: no node answers", err)
+        self.assertIn("can: vcan0: no node answered", err)
         self.assertFalse((self.machine.at / "run.slog").exists(), "nothing was measured: no log")
 
     def test_no_interface(self):
         name = self.machine.configure("nowhere", interfaces=("vcan9",))
         code, _, err = self.machine.run(name)
         self.assertEqual(code, 1)
-        self.assertIn("can: vcan9: there is no such interface", err)
+        self.assertIn("can: vcan9: unknown interface", err)
 
     def test_another_stage_file(self):
         self.machine.configure("mine")
@@ -210,7 +210,7 @@ class StageFaults(CanTest):
         with self.machine.node("yours"):
             code, _, err = self.machine.run("mine")
         self.assertEqual(code, 1)
-        self.assertIn("started with another stage file", err)
+        self.assertIn("started with a different stage file", err)
 
 
 class Resident(CanTest):
@@ -222,7 +222,7 @@ class Resident(CanTest):
             process = self.machine.start(self.name)
             self.machine.wait_until_running(process)
             node.kill()
-            self.ends(process, 1, "no node answers")
+            self.ends(process, 1, "no node answered")
 
     def test_host_killed(self):
         with self.machine.node(self.name, "--pace", "0.2"):

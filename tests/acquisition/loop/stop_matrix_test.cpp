@@ -124,12 +124,12 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Case{"healthy"},
         Case{"sign flip of the plant", Kind::actuator_gain, -1.0, 1.0, "deviation"},
-        Case{"sign of the controller wrong", Kind::none, 0.0, -1.0, "could stop the stage only"},
+        Case{"sign of the controller wrong", Kind::none, 0.0, -1.0, "stopping position"},
         Case{"sensor jumps by 300 um", Kind::sensor_offset, 300e-6, 1.0, "jumped"},
         Case{"sensor jumps by 100 um", Kind::sensor_offset, 100e-6, 1.0, "|u| would be"},
         Case{"sensor jumps by 50 um", Kind::sensor_offset, 50e-6},
         Case{"sensor shows NaN", Kind::nan_sensor, 0.0, 1.0, "not finite"},
-        Case{"sensor stuck", Kind::stuck_sensor, 0.0, 1.0, "nothing else"},
+        Case{"sensor stuck", Kind::stuck_sensor, 0.0, 1.0, "has repeated"},
         Case{"gain x3", Kind::actuator_gain, 3.0},
         Case{"gain x10", Kind::actuator_gain, 10.0, 1.0, "deviation", 2.0 * kStopWindow, 0.1},
         Case{"delay +3 samples", Kind::extra_delay, 3.0},
@@ -138,7 +138,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"controller gain x5", Kind::none, 0.0, 5.0, "|u| would be"},
         Case{"controller gain x30", Kind::none, 0.0, 30.0, "|u| would be"},
         // With the only actuator dead nothing can brake: the stage coasts at the speed it had.
-        Case{"actuator dead", Kind::actuator_gain, 0.0, 1.0, "no brake", 2.0 * kStopWindow, 2e-3},
+        Case{"actuator dead", Kind::actuator_gain, 0.0, 1.0, "not braked", 2.0 * kStopWindow, 2e-3},
         // The stage goes on at the speed it had, about 1 mm/s.
         Case{"amplifiers off (interlock)", Kind::interlock, 0.0, 1.0, "no limit", 2.0 * kStopWindow,
              2e-3, StopReason::fault},

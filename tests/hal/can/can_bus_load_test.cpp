@@ -67,9 +67,10 @@ TEST(CanBusLoad, WhatABusCannotCarryIsRefusedWithTheLoad) {
     FAIL() << "10 kHz do not fit";
   } catch (const std::invalid_argument& error) {
     // (34 + 678 / 5) + (34 + 358 / 5) us
-    EXPECT_STREQ(error.what(),
-                 "can: can0 would be loaded to 275 % at 10000 Hz (275 us a cycle), 80 % are "
-                 "allowed; at most 2902 Hz, or more buses, or mode: resident");
+    EXPECT_STREQ(
+        error.what(),
+        "can: can0 would have a load of 275 % at 10000 Hz (275 us per cycle); the limit is "
+        "80 %. Use at most 2902 Hz, more buses, or mode: resident");
   }
 }
 

@@ -188,7 +188,7 @@ TEST(CanOwnership, AHostOfVersionOneIsToldToBeUpdated) {
   }
   EXPECT_EQ(answer.answer, CanAnswer::refused);
   EXPECT_EQ(answer.version, 2);
-  EXPECT_THAT(text, HasSubstr("another version of the protocol (2, not 1)"));
+  EXPECT_THAT(text, HasSubstr("a different protocol version (2; expected 1)"));
   EXPECT_EQ(rig.node().state(), NodeState::switch_on_disabled);
 }
 
@@ -282,7 +282,7 @@ TEST(CanOwnership, ANodeThatJoinsARunEndsIt) {
   Outcome outcome = Outcome::ok;
   for (int n = 0; n < 5 && outcome == Outcome::ok; ++n) outcome = host.exchange();
   EXPECT_EQ(outcome, Outcome::fault);
-  EXPECT_THAT(host.stage().trouble(), HasSubstr("or a second node answers in its place"));
+  EXPECT_THAT(host.stage().trouble(), HasSubstr("or a second node answers instead"));
   EXPECT_EQ(b.stage.sample(), 0U) << "the second stage moved";
 }
 

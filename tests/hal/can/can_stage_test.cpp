@@ -133,7 +133,7 @@ TEST(CanStage, AHostThatFallsSilentIsStoppedWithinTheWatchdog) {
   rig.serve_ms(2);
   EXPECT_EQ(rig.node().state(), NodeState::fault_reaction);
   EXPECT_EQ(host.exchange(), Outcome::fault);
-  EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the host fell silent"));
+  EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the host stopped sending"));
   rig.serve_ms(110);
   EXPECT_EQ(rig.node().state(), NodeState::fault);
 }
@@ -148,9 +148,10 @@ TEST(CanStage, AFaultIsLeftByAnExplicitResetOnly) {
     Host(rig).start();
     FAIL() << "in fault";
   } catch (const StageError& error) {
-    EXPECT_STREQ(error.what(),
-                 "can: pair0: the node is in fault (the host fell silent); remove the cause and "
-                 "add --reset-fault");
+    EXPECT_STREQ(
+        error.what(),
+        "can: pair0: the node is in fault (the host stopped sending); remove the cause and "
+        "add --reset-fault");
   }
   Host resetting(rig, {0.0, true});
   resetting.start();
@@ -213,7 +214,7 @@ TEST(CanStage, StartRefusesInWords) {
     Host(rig).start();
     FAIL() << "nobody there";
   } catch (const StageError& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("can: pair0: no node answers within 600 ms"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("can: pair0: no node answered within 600 ms"));
   }
   rig.pair().set_state(0, CanBusState::off);
   try {
@@ -274,7 +275,7 @@ TEST(CanStage, WhatTheWireCannotCarryStopsTheRun) {
   EXPECT_EQ(stage->exchange({0, 0, large}, inputs, {}), Outcome::fault);
   EXPECT_EQ(stage->counts().saturated, 1U);
   EXPECT_EQ(rig.node().sample(), 0U) << "no other value instead";
-  EXPECT_THAT(stage->trouble(), testing::HasSubstr("beyond the range of the wire"));
+  EXPECT_THAT(stage->trouble(), testing::HasSubstr("exceeds actuator_range_n"));
 }
 
 TEST(CanStage, GarbageDoesNoHarm) {

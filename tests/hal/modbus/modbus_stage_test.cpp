@@ -102,8 +102,8 @@ INSTANTIATE_TEST_SUITE_P(
                     FaultCase{"exception#:6", false, Outcome::late, 3, ""},
                     FaultCase{"half_frame#x2", false, Outcome::link_down, 2, "no reply within"},
                     FaultCase{"half_frame#x2", true, Outcome::link_down, 2, "no reply within"},
-                    FaultCase{"wrong_unit#x2", false, Outcome::corrupt, 2, "do not belong"},
-                    FaultCase{"wrong_unit#x2", true, Outcome::corrupt, 2, "failed its check"},
+                    FaultCase{"wrong_unit#x2", false, Outcome::corrupt, 2, "do not match"},
+                    FaultCase{"wrong_unit#x2", true, Outcome::corrupt, 2, "was corrupt"},
                     FaultCase{"exception#x2:4", false, Outcome::fault, 1, "refused"},
                     FaultCase{"dead_server#", false, Outcome::link_down, 1, "not connected"},
                     FaultCase{"interlock#", false, Outcome::fault, 1, "interlock"}));
@@ -115,7 +115,7 @@ TEST(ModbusStage, ACommandThatIsNoNumberIsNotSent) {
   EXPECT_EQ(host.exchange(std::numeric_limits<double>::quiet_NaN()), Outcome::fault);
   EXPECT_THAT(host.stage.trouble(), HasSubstr("not finite"));
   EXPECT_EQ(host.exchange(1e9), Outcome::fault);
-  EXPECT_THAT(host.stage.trouble(), HasSubstr("beyond the range of the wire"));
+  EXPECT_THAT(host.stage.trouble(), HasSubstr("exceeds the range"));
   host.stage.stop();
   bench.stop();
   EXPECT_TRUE(bench.fake->commands.empty());
@@ -147,10 +147,10 @@ TEST(ModbusStage, StartsOnNothingButItsOwnStage) {
   const ModbusBench bench;
   StageInfo info = ModbusBench::info();
   info.sample_rate_hz = 51.0;
-  EXPECT_THAT(refusal(bench, info), HasSubstr("50 Hz, the stage file says 51 Hz"));
+  EXPECT_THAT(refusal(bench, info), HasSubstr("50 Hz, the stage file has 51 Hz"));
   info = ModbusBench::info();
   std::swap(info.actuators[0], info.actuators[1]);
-  EXPECT_THAT(refusal(bench, info), HasSubstr("another stage"));
+  EXPECT_THAT(refusal(bench, info), HasSubstr("different stage file"));
   Inputs wrong_size;
   ModbusStage stage(ModbusBench::info(), bench.address(), test::kQuickTiming);
   EXPECT_THROW(stage.start(1, wrong_size), std::invalid_argument);

@@ -67,7 +67,7 @@ TEST(ModbusSupervisor, AHeartbeatThatStandsStillMakesNoFreshSnapshot) {
   const ModbusSupervisor supervisor(bench.address(), test::kQuickTiming, kQuick);
   ASSERT_TRUE(comes([&] { return fresh(supervisor); }));
   ASSERT_TRUE(comes([&] { return !supervisor.trouble().empty(); }));
-  EXPECT_THAT(supervisor.trouble(), HasSubstr("the heartbeat stands still"));
+  EXPECT_THAT(supervisor.trouble(), HasSubstr("the heartbeat stopped"));
   const std::int64_t last_ns = supervisor.snapshot().t_ns;
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_EQ(supervisor.snapshot().t_ns, last_ns);
@@ -124,8 +124,8 @@ TEST(ModbusSupervisor, AnotherDeviceOrMapIsNamed) {
     registers.version = version;
     const test::ServerThread server(registers, nullptr);
     const ModbusSupervisor supervisor(server.address(), test::kQuickTiming, kQuick);
-    const char* wanted = version == 0 ? "no stage is there"
-                                      : "another version of the protocol (register map 1, not 2)";
+    const char* wanted =
+        version == 0 ? "Check the unit" : "different protocol version (register map 1; expected 2)";
     EXPECT_TRUE(comes([&] { return supervisor.trouble().find(wanted) != std::string::npos; }))
         << supervisor.trouble();
     EXPECT_EQ(supervisor.snapshot().t_ns, 0);

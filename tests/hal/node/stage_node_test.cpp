@@ -111,7 +111,7 @@ TEST_F(StageNodeTest, AHostThatFallsSilentLeadsToASafeStop) {
   tick_for(1);
   EXPECT_EQ(node_->state(), NodeState::fault_reaction);
   EXPECT_EQ(node_->cause(), FaultCause::watchdog);
-  EXPECT_EQ(node_->trouble(), "the host fell silent");
+  EXPECT_EQ(node_->trouble(), "the host stopped sending");
   tick_for(50);
   EXPECT_EQ(fake_->stops, 0) << "held in closed loop meanwhile";
   EXPECT_EQ(fake_->commands.size(), 51U) << "a sample a millisecond";
@@ -165,7 +165,7 @@ TEST_F(StageNodeTest, DoesNotHoldOnASensorThatFailed) {
   EXPECT_EQ(node_->state(), NodeState::fault) << "no motion is known: there is nothing to hold by";
   EXPECT_EQ(fake_->stops, 1);
   EXPECT_EQ(fake_->commands.back()[0], 0.0);
-  EXPECT_THAT(node_->trouble(), testing::HasSubstr("the loop was opened; no brake"));
+  EXPECT_THAT(node_->trouble(), testing::HasSubstr("the loop was opened; not braked"));
 }
 
 TEST_F(StageNodeTest, AMeasurementThatIsNoNumberStopsTheNode) {
@@ -211,9 +211,9 @@ TEST_F(StageNodeTest, ThePanelMustBeInRange) {
   refused([](NodePanel& p) { p.interlock_closed = false; }, FaultCause::interlock,
           "the interlock is open; close it");
   refused([](NodePanel& p) { p.gravity_compensator_n[1] = 61.0; }, FaultCause::gravity,
-          "gravity compensator 2: 61 N is not within 40 ... 60 N");
+          "gravity compensator 2: 61 N is out of range (40 to 60 N)");
   refused([](NodePanel& p) { p.temperature_k[0] = 321.0; }, FaultCause::temperature,
-          "temperature 1: 321 K is above 320 K");
+          "temperature 1: 321 K is out of range (at most 320 K)");
   EXPECT_TRUE(node_->panel().interlock_closed);
 }
 

@@ -78,7 +78,7 @@ TEST_F(LimitedStageTest, PastTheHardWindowTheForcesAreCut) {
   EXPECT_THAT(reached(), testing::ElementsAre(0.0, 0.0));
   EXPECT_EQ(stage_->violation().kind, LimitKind::position);
   EXPECT_EQ(stage_->emergency().cause.kind, LimitKind::hard_position);
-  EXPECT_THAT(describe_stop(*stage_), testing::HasSubstr("past the hard window"));
+  EXPECT_THAT(describe_stop(*stage_), testing::HasSubstr("beyond the hard window"));
 }
 
 TEST_F(LimitedStageTest, ClampsAndSaysWhichActuatorWhereAndWhen) {
@@ -240,7 +240,7 @@ TEST_F(StuckSensorTest, IsReportedAfterItsTime) {
   EXPECT_EQ(show(4e-5, 2e-5, 4e-5), Outcome::ok);  // shown four times: repeated three times
   EXPECT_EQ(show(5e-5, 2e-5, 5e-5), Outcome::opened);
   EXPECT_EQ(describe(stage_->violation(), stage_->info()),
-            "sensor t: has shown 2e-05 m and nothing else for 0.004 s (cycle 5)");
+            "sensor t: has repeated the value 2e-05 m for 0.004 s (cycle 5)");
 }
 
 TEST_F(StuckSensorTest, AChangeBeginsAnew) {
@@ -306,7 +306,7 @@ TEST(LimitedStage, RefusesLimitsThatDoNotFit) {
 }
 
 TEST(LimitedStage, DescribesEveryKind) {
-  EXPECT_EQ(describe({}, {}), "no limit was hit");
+  EXPECT_EQ(describe({}, {}), "no limit was exceeded");
   EXPECT_STREQ(to_string(LimitKind::none), "none");
   EXPECT_STREQ(to_string(LimitKind::actuator), "actuator");
   EXPECT_STREQ(to_string(LimitKind::slew), "slew");

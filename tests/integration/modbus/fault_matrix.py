@@ -65,13 +65,13 @@ ROWS = repeated_rows('tcp', '') + repeated_rows('rtu', ', RTU') + [
     Row('interlock opens', FAILED, 'interlock is open', fault('interlock@15'), line='plant', pace=1),
     Row('over-temperature', FAILED, '400 K', fault('temperature@15:400'), line='plant', pace=1),
     Row('gravity compensator fails', FAILED, '5 N', fault('gravity@15:5'), line='plant', pace=1),
-    Row('heartbeat stands still', FAILED, 'heartbeat stands still', fault('heartbeat@15'), line='plant', pace=1),
-    Row('supervisor frozen', FAILED, 'no fresh status', line='plant', pace=1, disturb='freeze'),
-    Row('supervisor killed', FAILED, 'no fresh status', line='plant', pace=1, disturb='kill', state=()),
+    Row('heartbeat stands still', FAILED, 'heartbeat stopped', fault('heartbeat@15'), line='plant', pace=1),
+    Row('supervisor frozen', FAILED, 'the status is older', line='plant', pace=1, disturb='freeze'),
+    Row('supervisor killed', FAILED, 'the status is older', line='plant', pace=1, disturb='kill', state=()),
     Row('supervisor late once', DONE, '', fault('late_reply@2:0.12'), line='plant'),
     Row('interlock open from the start', FAILED, 'interlock is open', fault('interlock'), line='plant', log=False,
         state=()),
-    Row('heartbeat never echoed', FAILED, 'heartbeat stands still', fault('heartbeat'), line='plant', log=False),
+    Row('heartbeat never echoed', FAILED, 'heartbeat stopped', fault('heartbeat'), line='plant', log=False),
 ]
 
 

@@ -184,7 +184,7 @@ TEST_F(Workflow, AStuckSensorStopsTheRunWithCodeFour) {
             "noise:", "faults: [{kind: stuck_sensor, channel: s1, from_cycle: 1700}]\nnoise:");
   const ProgramResult result = run({"run", config, "-o", name("stuck.slog")});
   EXPECT_EQ(result.exit_code, 4) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("sensor s1: has shown"));
+  EXPECT_THAT(result.err, HasSubstr("sensor s1: has repeated"));
 }
 
 TEST_F(Workflow, AFaultThatOpensTheLoopEndsWithCodeFourAndItsCause) {

@@ -165,7 +165,7 @@ TEST_F(BadRequest, NodesThatCannotBeServed) {
        "--modbus-fault: fault 'late'");
   fail({"node", file, "--modbus-rtu", "/dev/there-is-none"}, 1, "cannot be opened");
   fail({"node", file, "--modbus-rtu", "/dev/null", "--modbus-baud", "9601"}, 2,
-       "no such baud rate");
+       "unsupported baud rate");
 }
 
 TEST_F(BadRequest, BackEndsOfTheStageFile) {
@@ -182,16 +182,17 @@ TEST_F(BadRequest, WhatACanBusCannotCarry) {
   fail({"run", behind_can("buses: [{interface: can0, data_bit_rate_hz: 500e3}]"), "-o",
         name("x.slog")},
        2,
-       "can: can0 would be loaded to 187 % at 2000 Hz (930 us a cycle), 80 % are allowed; at most "
+       "can: can0 would have a load of 187 % at 2000 Hz (930 us per cycle); the limit is 80 %. Use "
+       "at most "
        "849 Hz");
   const auto wrong = [&](const std::string& group, const std::string& text) {
     fail({"run", behind_can(group), "-o", name("x.slog")}, 2, text);
   };
   wrong("mode: resident", "'buses'");
   wrong("buses: []", "buses");
-  wrong("buses: [{interface: can0, actuators: [a1]}]", "channel 'a2' stands on no bus");
+  wrong("buses: [{interface: can0, actuators: [a1]}]", "channel 'a2' is not assigned to a bus");
   wrong("buses: [{interface: can0, actuators: [a9]}]", "there is no channel 'a9'");
-  wrong("buses: [{interface: can0}, {interface: can0}]", "interface can0 stands twice");
+  wrong("buses: [{interface: can0}, {interface: can0}]", "duplicate interface can0");
   wrong("actuator_range_n: [1, 2], buses: [{interface: can0}]", "2 entries for 3 channels");
   wrong("buses: [{interface: can0}], actuator_range_n: [1]",
         "actuator_range_n: 1 N cannot carry limit_n: 40 N of 'a1'; write more than 40, or leave it "
