@@ -9,7 +9,6 @@
 #include "estimation/problem/search_limit.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
-#include "tools/fit/submodel_text.hpp"
 #include "tools/steps/covariance_file.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/health_step.hpp"
@@ -35,42 +34,41 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
       "FILE.h5 to write: covariance of all parameters (sandwich and maximum likelihood) with names "
       "and units, and the model response with its variance and 95 % radius");
   command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: all lines")->expected(2);
-  command->add_option("--modes", request_.modes,
+  command->add_option("--modes", flags_.modes,
                       "auto | none | COUNT | frequencies f1,f2,... in Hz | modes.json; default: "
                       "auto, or none with --submodel");
   command->add_option(
-      "--weighting", request_.weighting,
+      "--weighting", flags_.weighting,
       "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
       "FILE.h5 with /weights or /weight_matrices; default: from the variances in the FRF");
-  command->add_option("--hold", request_.hold,
-                      "none | phase | sinc | exact; default: from the FRF");
-  command->add_option("--delay", request_.delay,
+  command->add_option("--hold", flags_.hold, "none | phase | sinc | exact; default: from the FRF");
+  command->add_option("--delay", flags_.delay,
                       "SECONDS | estimate | per_channel; default: from the FRF");
   command->add_option(
-      "--rigid-body", request_.rigid_body,
+      "--rigid-body", flags_.rigid_body,
       "none | full | RANK: the term B_0 / s^2 | suspension: a mode below the lines instead, for a "
       "rigid body on weak springs | suspension:F1:F2: at these known frequencies, Hz | auto: full, "
       "or suspension if the fit improves enough; default: auto, or none with --submodel or if the "
       "outputs are accelerations");
-  command->add_option("--direct-term", request_.direct_term,
+  command->add_option("--direct-term", flags_.direct_term,
                       "none | full: a constant, the compliance of modes above the band; default: "
                       "none, or full if the outputs are accelerations");
   command
-      ->add_option("--residue-rank", request_.residue_rank,
+      ->add_option("--residue-rank", flags_.residue_rank,
                    "full | 1: residues phi psi^T of mechanical modes")
       ->capture_default_str();
   command
       ->add_option(
-          "--submodel", submodels_,
+          "--submodel", flags_.submodels,
           "(B_0 + ... + B_m s^m) / (s^l A), A of order n: l=0,n=4,m=3,f=120:180,zeta=0.01; "
           "repeatable. Default of m: n + l - 1. f: starting frequencies of the poles in Hz, one "
           "per pair, the real pole of an odd n last; default: a search. n=auto: one denominator "
           "for all modes that a search finds")
       ->allow_extra_args(false);
-  command->add_option("--damping", request_.damping,
+  command->add_option("--damping", flags_.damping,
                       "proportional | general: numerators B_0, or B_0 + B_1 s; default: "
                       "proportional, or general if the outputs are accelerations");
-  command->add_option("--method", request_.method, "riv | gn | sk")->capture_default_str();
+  command->add_option("--method", flags_.method, "riv | gn | sk")->capture_default_str();
   command->add_option("--max-iterations", request_.max_iterations, "iterations per fit")
       ->capture_default_str();
   command
@@ -90,7 +88,7 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
 
 FitRequest FitCommand::checked_request() const {
   FitRequest request = request_;
-  for (const std::string& text : submodels_) request.submodels.push_back(parse_submodel(text));
+  parse_fit_flags(flags_, request);
   if (!band_hz_.empty()) request.band_hz = {band_hz_[0], band_hz_[1]};
   return request;
 }
@@ -115,7 +113,7 @@ void FitCommand::run() const {
   for (const std::string& warning : setup.warnings)
     console_.warning(fmt::format("{}: {}", frf_.string(), warning));
   const FitStep step =
-      fit_model(setup, frf_.filename().string(), fingerprint_of_file(frf_), console_);
+      fit_with_progress(setup, frf_.filename().string(), fingerprint_of_file(frf_), console_);
   const FitResult& result = step.result;
   write_model(output_, result.model);
   const bool told = result.covariance.sandwich.size() > 0;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/fit/fit_request.hpp"
+#include "tools/fit/fit_flags.hpp"
 #include "tools/terminal/console.hpp"
 
 namespace stageid {
@@ -25,9 +25,9 @@ class FitCommand {
   std::filesystem::path frf_;
   std::filesystem::path output_;
   std::filesystem::path covariance_;  ///< empty: not asked for
-  FitRequest request_;
+  FitFlags flags_;
+  FitRequest request_;  ///< its numbers
   std::vector<double> band_hz_;
-  std::vector<std::string> submodels_;
   std::uint64_t seed_ = 0;
 };
 

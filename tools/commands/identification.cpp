@@ -206,7 +206,7 @@ void Identification::fit() {
     finish_step("fit", 0.0, "up to date");
     return;
   }
-  FitStep step = fit_model(*setup_, "frf.h5", fingerprint, console_);
+  FitStep step = fit_with_progress(*setup_, "frf.h5", fingerprint, console_);
   model_ = step.result.model;
   model_variance_ = std::move(step.result.response_variance);
   std::copy_if(step.result.findings.begin(), step.result.findings.end(), std::back_inserter(notes_),

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "estimation/modal/validation.hpp"
+#include "estimation/request/fit_request.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "frf/periods/health_finding.hpp"
 #include "tools/experiment/experiment_config.hpp"
-#include "tools/fit/fit_request.hpp"
 #include "tools/steps/model_verdict.hpp"
 #include "tools/steps/truth_comparison.hpp"
 #include "tools/terminal/console.hpp"

@@ -13,6 +13,7 @@
 #include "tools/config/config_reader.hpp"
 #include "tools/config/strict_yaml.hpp"
 #include "tools/experiment/config_plan.hpp"
+#include "tools/fit/fit_flags.hpp"
 #include "tools/terminal/format_errors.hpp"
 
 namespace stageid {

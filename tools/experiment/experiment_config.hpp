@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
+#include "estimation/request/fit_request.hpp"
 #include "excitation/plan/experiment_plan.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "tools/config/config_visitor.hpp"
 #include "tools/config/stage_config.hpp"
-#include "tools/fit/fit_request.hpp"
 
 namespace stageid {
 

@@ -3,10 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
+#include <type_traits>
 
+#include "estimation/request/submodel_text.hpp"
 #include "tools/config/number_range.hpp"
-#include "tools/fit/fit_request.hpp"
-#include "tools/fit/submodel_text.hpp"
+#include "tools/fit/fit_flags.hpp"
+#include "tools/fit/flag_values.hpp"
 
 namespace stageid {
 
@@ -77,71 +81,90 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
       modes.is_list || modes.numbers.empty() || std::floor(modes.numbers[0]) == modes.numbers[0],
       "modes",
       "modes: the number of modes must be a whole number; write frequencies as a list [...]");
-  // A list of one frequency would read as a count without the comma.
-  f.modes = modes.word.empty()
-                ? fmt::format("{}{}", fmt::join(modes.numbers, ","), modes.is_list ? "," : "")
-                : (modes.word == "by_submodels" ? "" : modes.word);
+  using Modes = ModesRequest::Kind;
+  if (modes.is_list) {
+    f.modes = {Modes::given, 0, {}};
+    std::sort(modes.numbers.begin(), modes.numbers.end());
+    for (const double frequency_hz : modes.numbers) f.modes.given.push_back({frequency_hz});
+  } else if (!modes.numbers.empty()) {
+    f.modes = {Modes::count, static_cast<int>(std::min(modes.numbers.front(), 1e6)), {}};
+  } else if (modes.word != "by_submodels") {
+    f.modes.kind = modes.word == "none" ? Modes::none : Modes::search;
+  }
 
-  const auto word = [&](const char* key, std::string& value, std::vector<std::string> names,
+  // The last word leaves the choice to the FRF.
+  const auto word = [&](const char* key, auto& value, std::vector<std::string> names,
                         const char* help) {
-    std::size_t index = names.size() - 1;
-    for (std::size_t i = 0; i < names.size(); ++i)
-      if (names[i] == value) index = i;
+    using Value = typename std::remove_reference_t<decltype(value)>::value_type;
+    names.emplace_back("by_frf");
+    std::size_t index = value ? static_cast<std::size_t>(*value) : names.size() - 1;
     v.choice(key, index, names, kOptional, help);
-    value = names[index] == "by_frf" ? "" : names[index];
+    value =
+        index + 1 < names.size() ? std::optional<Value>(static_cast<Value>(index)) : std::nullopt;
   };
-  word("weighting", f.weighting,
-       {"unit", "inverse_magnitude", "relative", "noise_variance", "total_variance", "likelihood",
-        "by_frf"},
+  word("weighting", f.weighting, words_before(Weighting::user),
        "weighting of the cost; by_frf: noise variance if known, else total variance, else "
        "relative; a single distorted realization is weighted by the scatter of its lines");
-  word("hold", f.hold, {"none", "phase", "sinc", "exact", "by_frf"},
+  word("hold", f.hold, words_to(HoldModel::exact),
        "hold model; by_frf: exact unless the FRF is already hold-compensated");
 
-  const auto rank = [&](const char* key, std::string& value, std::vector<std::string> words,
+  /// A word, or a rank, which is returned; 0: a word.
+  const auto rank = [&](const char* key, std::string& word_given, std::vector<std::string> words,
                         const char* help) {
-    FlexibleValue given = {value, {}, false, {}};
+    FlexibleValue given = {word_given, {}, false, {}};
     FlexibleRule rule;
     rule.words = std::move(words);
     rule.number = true;
     rule.rule = positive("");
     v.flexible(key, given, rule, kOptional, help);
-    v.require(given.numbers.empty() || std::floor(given.numbers[0]) == given.numbers[0], key,
-              fmt::format("{}: the rank must be a whole number", key));
-    value = given.word.empty() ? fmt::format("{}", given.numbers.front()) : given.word;
+    word_given = given.word;
+    if (given.numbers.empty()) return 0;
+    const double number = given.numbers.front();
+    v.require(std::floor(number) == number && number <= 1000.0, key,
+              fmt::format("{}: the rank must be a whole number, at most 1000", key));
+    return static_cast<int>(std::min(number, 1000.0));
   };
 
-  FlexibleValue delay = {f.delay.empty() ? "by_frf" : f.delay, {}, false, {}};
+  FlexibleValue delay = {"by_frf", {}, false, {}};
   FlexibleRule delay_rule;
   delay_rule.words = {"estimate", "per_channel", "by_frf"};
   delay_rule.number = true;
   delay_rule.rule = any_number("s");
   v.flexible("delay_s", delay, delay_rule, kOptional,
              "a number in s, estimate: one delay for the plant, per_channel: one per channel");
-  f.delay = delay.word.empty() ? fmt::format("{}", delay.numbers.front())
-                               : (delay.word == "by_frf" ? "" : delay.word);
+  if (!delay.numbers.empty()) f.delay = {DelayModel::fixed, delay.numbers.front()};
+  if (delay.word == "estimate") f.delay = {DelayModel::estimate, 0.0};
+  if (delay.word == "per_channel") f.delay = {DelayModel::per_channel, 0.0};
 
-  if (f.rigid_body.empty()) f.rigid_body = "by_submodels";
-  rank("rigid_body", f.rigid_body, {"auto", "none", "full", "suspension", "by_submodels"},
-       "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); suspension: a "
-       "mode below the lines instead; auto: full, or suspension if the fit improves enough; "
-       "by_submodels: none if submodels are listed, else auto");
-  std::vector<double> suspension_hz;
-  v.numbers("suspension_hz", suspension_hz, positive("Hz"), {}, kOptional,
+  using Body = RigidBodyRequest::Kind;
+  const std::map<std::string, Body> bodies = {{"auto", Body::automatic},
+                                              {"none", Body::none},
+                                              {"full", Body::free},
+                                              {"suspension", Body::suspension},
+                                              {"by_submodels", Body::by_submodels}};
+  std::string body = "by_submodels";
+  f.rigid_body.rank =
+      rank("rigid_body", body, {"auto", "none", "full", "suspension", "by_submodels"},
+           "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); "
+           "suspension: a mode below the lines instead; auto: full, or suspension if the fit "
+           "improves enough; by_submodels: none if submodels are listed, else auto");
+  f.rigid_body.kind = body.empty() ? Body::free : bodies.at(body);
+  v.numbers("suspension_hz", f.rigid_body.suspension_hz, positive("Hz"), {}, kOptional,
             "with rigid_body: suspension, its known frequencies; omitted: fitted");
-  v.require(suspension_hz.empty() || f.rigid_body == "suspension", "suspension_hz",
-            "suspension_hz: requires rigid_body: suspension");
-  if (!suspension_hz.empty()) f.rigid_body += fmt::format(":{}", fmt::join(suspension_hz, ":"));
-  if (f.rigid_body == "by_submodels") f.rigid_body.clear();
-  rank("residue_rank", f.residue_rank, {"full"},
-       "rank of the residues: full, or 1 for mechanical modes");
-  word("direct_term", f.direct_term, {"none", "full", "by_frf"},
+  v.require(f.rigid_body.suspension_hz.empty() || f.rigid_body.kind == Body::suspension,
+            "suspension_hz", "suspension_hz: requires rigid_body: suspension");
+  std::string full = "full";
+  f.residue_rank =
+      rank("residue_rank", full, {"full"}, "rank of the residues: full, or 1 for mechanical modes");
+  word("direct_term", f.direct_term, {"none", "full"},
        "a constant: the compliance of modes above the band; by_frf: full if the outputs are "
        "accelerations, else none");
-  word("damping", f.damping, {"proportional", "general", "by_frf"},
+  word("damping", f.general_damping, {"proportional", "general"},
        "numerators B_0, or B_0 + B_1 s; by_frf: general if the outputs are accelerations, else "
        "proportional");
-  word("method", f.method, {"riv", "gn", "sk"}, "iteration method");
+  auto method = static_cast<std::size_t>(f.method);
+  v.choice("method", method, words_to(FitMethod::sk), kOptional, "iteration method");
+  f.method = static_cast<FitMethod>(method);
   count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "iterations per fit");
   v.number("search_seconds", f.search_seconds, not_negative("s"), kOptional,
            "budget of the mode search, in seconds of a typical core; counted in work, so the "

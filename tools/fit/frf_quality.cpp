@@ -8,6 +8,7 @@
 
 #include "frf/health/settling_check.hpp"
 #include "frf/response/nonlinearity.hpp"
+#include "frf/response/nonlinearity_sentence.hpp"
 #include "tools/terminal/console.hpp"
 
 namespace stageid {
@@ -16,10 +17,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostLines = 10;
-
-std::string decibels(double ratio) {
-  return ratio > 0.0 ? fmt::format("{:.0f} dB", 20.0 * std::log10(ratio)) : std::string("none");
-}
 
 /// The least probable verdict of a column.
 struct Verdict {
@@ -31,11 +28,6 @@ Verdict least(const Eigen::MatrixXd& p_value, Eigen::Index band) {
   Verdict verdict;
   verdict.p_value = p_value.col(band).minCoeff(&verdict.at);
   return verdict;
-}
-
-std::string pair_name(const FrfEstimate& frf, Eigen::Index c) {
-  return fmt::format("{} <- {}", frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())],
-                     frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]);
 }
 
 std::string detected(const DetectedDistortion& found, Eigen::Index band) {
@@ -72,21 +64,6 @@ std::string conclusion(const NonlinearityTest& test) {
   if (!test.nonlinear()) return "no evidence of nonlinearity: " + chance;
   return fmt::format("the plant is nonlinear: {}, but the smallest p value here is {:.0e}", chance,
                      std::max(test.least_p_value(), 1e-300));
-}
-
-/// The channel pair and band whose distortion is largest among those that test nonlinear.
-std::string strongest_distortion(const FrfEstimate& frf, const NonlinearityTest& test) {
-  double largest = 0.0;
-  std::string text;
-  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b)
-    for (Eigen::Index c = 0; c < test.p_value.rows(); ++c) {
-      if (!(test.p_value(c, b) < kNonlinearBelow) || !(test.distortion(c, b) > largest)) continue;
-      largest = test.distortion(c, b);
-      text =
-          fmt::format(", most at {} between {:.4g} and {:.4g} Hz ({} of the response)",
-                      pair_name(frf, c), test.band_hz(b, 0), test.band_hz(b, 1), decibels(largest));
-    }
-  return text;
 }
 
 std::string why_not_tested(const FrfEstimate& frf) {
@@ -131,13 +108,6 @@ std::vector<std::string> linearity_lines(const FrfEstimate& frf) {
   if (unsettled > 0) lines.push_back(unsettled_line(test));
   if (unsettled < static_cast<std::size_t>(test.band_hz.rows())) lines.push_back(conclusion(test));
   return lines;
-}
-
-std::string nonlinearity_sentence(const FrfEstimate& frf) {
-  const NonlinearityTest test = linearity_of(frf);
-  if (!test.nonlinear()) return {};
-  return fmt::format("the plant is nonlinear: realizations differ by more than noise{}",
-                     strongest_distortion(frf, test));
 }
 
 Json linearity_json(const FrfEstimate& frf) {

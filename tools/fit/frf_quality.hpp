@@ -14,9 +14,6 @@ namespace stageid {
 /// reason if it could not be tested.
 std::vector<std::string> linearity_lines(const FrfEstimate& frf);
 
-/// One sentence if the plant is nonlinear: where most, and by how much; else empty.
-std::string nonlinearity_sentence(const FrfEstimate& frf);
-
 /// {"tested": false, "reason": ...}, or "nonlinear" (any verdict, counting how many there are),
 /// "false_alarm_rate" of one verdict, and "bands": band_hz, tests, nonlinear, output, input,
 /// p_value, distortion of the pair of least probability; even and odd: p_value and level where least

@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "tools/fit/submodel_text.hpp"
+#include "tools/fit/fit_flags.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/interruptible.hpp"
@@ -50,18 +50,20 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
               const std::string& damping, const std::string& direct_term,
               const std::vector<std::string>& submodels, const std::string& method,
               int max_iterations, double search_seconds, int threads, bool covariance) {
+  FitFlags flags;
+  flags.modes = flag_text(modes);
+  flags.weighting = flag_text(weighting);
+  flags.hold = hold;
+  flags.delay = flag_text(delay);
+  flags.rigid_body = flag_text(rigid_body);
+  flags.residue_rank = flag_text(residue_rank);
+  flags.damping = damping;
+  flags.direct_term = direct_term;
+  flags.submodels = submodels;
+  flags.method = method;
   FitRequest request;
   request.band_hz = band_hz;
-  request.modes = flag_text(modes);
-  request.weighting = flag_text(weighting);
-  request.hold = hold;
-  request.delay = flag_text(delay);
-  request.rigid_body = flag_text(rigid_body);
-  request.residue_rank = flag_text(residue_rank);
-  request.damping = damping;
-  request.direct_term = direct_term;
-  for (const std::string& text : submodels) request.submodels.push_back(parse_submodel(text));
-  request.method = method;
+  parse_fit_flags(flags, request);
   request.max_iterations = max_iterations;
   request.search_seconds = search_seconds;
   request.threads = threads;
@@ -73,7 +75,7 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
         of->fingerprint.empty() ? fingerprint_of_content(of->frf) : of->fingerprint;
     FitSetup setup = make_fit_setup(request, of->frf);
     setup.options.covariance = covariance;
-    return fit_model(setup, of->name, fingerprint, silent).result;
+    return fit_with_progress(setup, of->name, fingerprint, silent).result;
   });
 }
 

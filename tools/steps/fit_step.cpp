@@ -9,6 +9,7 @@
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/version.hpp"
+#include "frf/response/nonlinearity_sentence.hpp"
 #include "tools/fit/frf_quality.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/interrupt.hpp"
@@ -86,8 +87,8 @@ std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerp
   return fingerprint_of(fmt::format("{} {} {}", version(), frf_fingerprint, setup.request_json));
 }
 
-FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
-                  const std::string& frf_fingerprint, const Console& console) {
+FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
+                          const std::string& frf_fingerprint, const Console& console) {
   FitStep step;
   FitOptions options = setup.options;
   Progress progress(console, "fit", "iterations");

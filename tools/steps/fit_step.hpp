@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "estimation/request/fit_request.hpp"
 #include "estimation/search/fit_additive_model.hpp"
-#include "tools/fit/fit_request.hpp"
 #include "tools/terminal/console.hpp"
 
 namespace stageid {
@@ -19,8 +19,8 @@ struct FitStep {
 /// FitStatus::interrupted; before the first step there is none.
 /// @param frf_name, frf_fingerprint of the FRF that was fitted.
 /// @throws std::invalid_argument, Interrupted
-FitStep fit_model(const FitSetup& setup, const std::string& frf_name,
-                  const std::string& frf_fingerprint, const Console& console);
+FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
+                          const std::string& frf_fingerprint, const Console& console);
 
 /// Names what is asked of a fit, see frf_request_id().
 std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint);

@@ -1,4 +1,4 @@
-#include "tools/fit/fit_request.hpp"
+#include "estimation/request/fit_request.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,30 +9,21 @@
 #include <stdexcept>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/fingerprint.hpp"
-#include "acquisition/files/key_suggestion.hpp"
+#include "estimation/request/structure_request.hpp"
+#include "estimation/request/submodel_text.hpp"
+#include "estimation/request/weight_file.hpp"
 #include "frf/response/dc_line.hpp"
-#include "frf/response/distortion_variance.hpp"
 #include "frf/response/hold_compensation.hpp"
 #include "frf/response/line_scatter.hpp"
-#include "tools/fit/flag_values.hpp"
-#include "tools/fit/frf_quality.hpp"
-#include "tools/fit/structure_request.hpp"
-#include "tools/fit/submodel_text.hpp"
-#include "tools/fit/weight_file.hpp"
+#include "frf/response/nonlinearity.hpp"
+#include "frf/response/nonlinearity_sentence.hpp"
 
 namespace stageid {
 namespace {
 
 // The median of a linear plant's is 1 within a few percent, above where modes are narrow for the lines.
 constexpr double kDistorted = 2.0;
-
-const std::vector<std::string> kWeightings = {
-    "unit",           "inverse_magnitude", "relative", "noise_variance",
-    "total_variance", "likelihood",        "user"};
-const std::vector<std::string> kHolds = {"none", "phase", "sinc", "exact"};
-const std::vector<std::string> kMethods = {"riv", "gn", "sk"};
 
 /// What is said of channels whose weight is zero on all lines; empty: there is none.
 std::string channels_without_weight(const FrfEstimate& frf, const FitOptions& options) {
@@ -61,8 +52,8 @@ class FitDefaults {
   void restore_as_measured() {
     FrfEstimate& frf = setup_.frf;
     const bool only_delay = frf.compensated == Compensation::delay;
-    const bool wanted = request_.hold.empty() || request_.hold == "exact" ||
-                        (only_delay && request_.hold != "none");
+    const HoldModel hold = request_.hold.value_or(HoldModel::exact);
+    const bool wanted = hold == HoldModel::exact || (only_delay && hold != HoldModel::none);
     if (frf.compensated == Compensation::none || !(frf.sample_rate_hz > 0.0) || !wanted) return;
     known_delay_s_ = frf.delay_s;
     frf = as_measured(std::move(frf));
@@ -74,8 +65,8 @@ class FitDefaults {
 
   void choose_hold() {
     HoldModel& hold = setup_.options.hold;
-    if (!request_.hold.empty()) {
-      hold = pick<HoldModel>("--hold", request_.hold, kHolds);
+    if (request_.hold) {
+      hold = *request_.hold;
       return;
     }
     if (setup_.frf.hold == Hold::zoh) {
@@ -90,8 +81,8 @@ class FitDefaults {
   void choose_delay() {
     FitOptions& options = setup_.options;
     const FrfEstimate& frf = setup_.frf;
-    if (!request_.delay.empty()) {
-      parse_delay();
+    if (request_.delay) {
+      take_delay(*request_.delay);
       return;
     }
     if (known_delay_s_) {
@@ -110,8 +101,8 @@ class FitDefaults {
   void choose_weighting() {
     FitOptions& options = setup_.options;
     const FrfEstimate& frf = setup_.frf;
-    if (!request_.weighting.empty()) {
-      parse_weighting();
+    if (request_.weighting) {
+      take_weighting(*request_.weighting);
       return;
     }
     if (weigh_by_scatter() || weigh_by_realizations()) return;
@@ -129,63 +120,55 @@ class FitDefaults {
     const Eigen::Index most = most_modes(setup_.frf, setup_.structure.common);
     if (setup_.selection.exactly > most)
       throw std::invalid_argument(fmt::format(
-          "--modes: {} is too many; {} lines support at most {}; use fewer or a wider band",
+          "modes: {} is too many; {} lines support at most {}; use fewer or a wider band",
           setup_.selection.exactly, lines, most));
   }
 
   void choose_modes() {
+    using Kind = ModesRequest::Kind;
     ModeSelection& selection = setup_.selection;
-    const std::string text = requested_modes(request_);
-    if (text == "auto") return;
-    if (text == "none") {
-      selection.keep_modes = true;
-      return;
-    }
-    if (text.find(',') == std::string::npos) {
-      const std::optional<double> number = to_number(text);
-      if (number && text.find_first_of(".eE") == std::string::npos) {
-        if (*number < 1.0 || *number > 1000.0) refuse("--modes", text, "1 to 1000 modes");
-        selection.exactly = static_cast<int>(*number);
-        selection.most = std::max(selection.most, selection.exactly);
-        return;
-      }
-      if (!number && text.find_first_not_of("0123456789.eE+-") != std::string::npos) {
-        if (!std::filesystem::exists(text))
-          throw FileError(
-              fmt::format("--modes: '{}': no such file; use auto, none, a number of modes, "
-                          "frequencies in Hz 'f1,f2,...', or the name of an existing file",
-                          text));
-        selection.modes = read_modes(text);
-        for (const ModeCandidate& mode : selection.modes)
-          require_below_nyquist("--modes", setup_, mode.frequency_hz);
+    switch (modes_kind(request_)) {
+      case Kind::none:
         selection.keep_modes = true;
         return;
-      }
+      case Kind::count:
+        if (request_.modes.count < 1 || request_.modes.count > 1000)
+          throw std::invalid_argument(
+              fmt::format("modes: got {}; expected 1 to 1000 modes", request_.modes.count));
+        selection.exactly = request_.modes.count;
+        selection.most = std::max(selection.most, selection.exactly);
+        return;
+      case Kind::given:
+        for (const ModeCandidate& mode : request_.modes.given) {
+          if (!(mode.frequency_hz > 0.0))
+            throw std::invalid_argument(
+                fmt::format("modes: got {} Hz; expected positive frequencies", mode.frequency_hz));
+          require_below_nyquist("modes", setup_, mode.frequency_hz);
+        }
+        selection.modes = request_.modes.given;
+        selection.keep_modes = true;
+        return;
+      default:
+        return;
     }
-    parse_frequencies(text);
   }
 
  private:
   void note(std::string text) { setup_.notes.push_back(std::move(text)); }
 
-  void parse_delay() {
+  void take_delay(const DelayRequest& delay) {
     FitOptions& options = setup_.options;
-    if (request_.delay == "estimate" || request_.delay == "per_channel") {
-      options.delay = request_.delay == "estimate" ? DelayModel::estimate : DelayModel::per_channel;
-      return;
-    }
-    const std::optional<double> delay_s = to_number(request_.delay);
-    if (!delay_s) refuse("--delay", request_.delay, "a number in s, estimate or per_channel");
-    options.delay = DelayModel::fixed;
-    options.delay_s = *delay_s;
+    options.delay = delay.model;
+    if (delay.model != DelayModel::fixed) return;
+    options.delay_s = delay.delay_s;
     const Eigen::VectorXd& f = setup_.frf.frequency_hz;
     if (f.size() < 2) return;
     const double spacing_hz = (f.tail(f.size() - 1) - f.head(f.size() - 1)).minCoeff();
-    if (!(std::abs(*delay_s) * 2.0 * spacing_hz <= 1.0))
-      refuse("--delay", request_.delay,
-             fmt::format("a magnitude of at most {:.4g} s: lines {:.4g} Hz apart cannot resolve a "
-                         "longer delay (1/(2 df))",
-                         0.5 / spacing_hz, spacing_hz));
+    if (!(std::abs(delay.delay_s) * 2.0 * spacing_hz <= 1.0))
+      throw std::invalid_argument(
+          fmt::format("delay: got {} s; expected a magnitude of at most {:.4g} s: lines {:.4g} Hz "
+                      "apart cannot resolve a longer delay (1/(2 df))",
+                      delay.delay_s, 0.5 / spacing_hz, spacing_hz));
   }
 
   /// With one realization the variance by the periods lacks what nonlinear distortion adds; weighed by it, the
@@ -244,47 +227,16 @@ class FitDefaults {
     frf.total_dof = distorted.dof;
   }
 
-  void parse_weighting() {
+  void take_weighting(Weighting weighting) {
     FitOptions& options = setup_.options;
-    const std::string& text = request_.weighting;
-    const bool named = text != "user" &&
-                       std::find(kWeightings.begin(), kWeightings.end(), text) != kWeightings.end();
-    if (named) {
-      options.weighting = pick<Weighting>("--weighting", text, kWeightings);
-      if (options.weighting == Weighting::total_variance) weigh_by_total_variance();
-      return;
-    }
-    if (text.find('.') == std::string::npos && text.find('/') == std::string::npos) {
-      const std::vector<std::string> offered(kWeightings.begin(), kWeightings.end() - 1);
-      const std::string nearest = nearest_word(text, offered);
-      refuse("--weighting", text,
-             fmt::format("{}, or the name of an HDF5 file with /weights or /weight_matrices{}",
-                         fmt::join(offered, ", "),
-                         nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
-    }
-    options.weighting = Weighting::user;
-    read_weights(text, setup_.frf, options, whole_);
+    options.weighting = weighting;
+    if (weighting == Weighting::total_variance) weigh_by_total_variance();
+    if (weighting != Weighting::user) return;
+    read_weights(request_.weight_file, setup_.frf, options, whole_);
     const std::string missing = channels_without_weight(setup_.frf, options);
     if (missing.empty()) return;
     setup_.warnings.push_back(missing);
     note(missing);
-  }
-
-  void parse_frequencies(const std::string& text) {
-    std::string_view rest = text;
-    while (!rest.empty()) {
-      const std::size_t comma = std::min(rest.find(','), rest.size());
-      const std::optional<double> frequency_hz = to_number(rest.substr(0, comma));
-      if (!frequency_hz || *frequency_hz <= 0.0)
-        refuse("--modes", text,
-               "auto, none, a number of modes, frequencies in Hz 'f1,f2,...', or a file");
-      require_below_nyquist("--modes", setup_, *frequency_hz);
-      setup_.selection.modes.push_back({*frequency_hz});
-      rest.remove_prefix(std::min(comma + 1, rest.size()));
-    }
-    std::sort(setup_.selection.modes.begin(), setup_.selection.modes.end(),
-              [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
-    setup_.selection.keep_modes = true;
   }
 
   const FitRequest& request_;
@@ -302,28 +254,30 @@ bool is_acceleration(const std::string& unit) {
 FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
                           std::vector<std::string>& notes) {
   const std::vector<std::string>& units = frf.outputs.units;
-  const bool any_rank = request.residue_rank == "full" || request.residue_rank == "1";
+  const bool any_rank = request.residue_rank <= 1;
   const bool accelerations = !units.empty() &&
                              std::all_of(units.begin(), units.end(), is_acceleration) &&
                              request.submodels.empty() && any_rank;
-  const bool silent =
-      request.damping.empty() && request.direct_term.empty() && request.rigid_body.empty();
+  const bool silent = !request.general_damping && !request.direct_term &&
+                      request.rigid_body.kind == RigidBodyRequest::Kind::by_submodels;
   const bool chosen = accelerations && silent;
   if (chosen)
     notes.push_back(
         fmt::format("structure: numerators B_0 + B_1 s, a direct term and no rigid body, because "
                     "the outputs are accelerations [{}]",
                     units.front()));
-  if (request.damping.empty()) request.damping = chosen ? "general" : "proportional";
-  if (request.direct_term.empty()) request.direct_term = chosen ? "full" : "none";
-  if (chosen) request.rigid_body = "none";
+  if (!request.general_damping) request.general_damping = chosen;
+  if (!request.direct_term) request.direct_term = chosen;
+  if (chosen) request.rigid_body.kind = RigidBodyRequest::Kind::none;
   return request;
 }
 
+/// Keys and words as on the command line: model.json shows the request.
 std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
   using Json = nlohmann::ordered_json;
   const FitOptions& o = setup.options;
-  Json modes = requested_modes(request);
+  Json modes = modes_kind(request) == ModesRequest::Kind::none ? "none" : "auto";
+  if (setup.selection.exactly > 0) modes = fmt::format("{}", setup.selection.exactly);
   if (!setup.selection.modes.empty()) {
     modes = Json::array();
     for (const ModeCandidate& mode : setup.selection.modes) modes.push_back(mode.frequency_hz);
@@ -336,11 +290,12 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
       {"delay", o.delay == DelayModel::estimate      ? Json("estimate")
                 : o.delay == DelayModel::per_channel ? Json("per_channel")
                                                      : Json(o.delay_s)},
-      {"rigid_body", requested_rigid_body(request)},
-      {"residue_rank", request.residue_rank},
-      {"direct_term", request.direct_term},
-      {"damping", request.damping},
-      {"method", request.method},
+      {"rigid_body", rigid_body_text(request)},
+      {"residue_rank",
+       request.residue_rank == 0 ? "full" : fmt::format("{}", request.residue_rank)},
+      {"direct_term", request.direct_term.value_or(false) ? "full" : "none"},
+      {"damping", request.general_damping.value_or(false) ? "general" : "proportional"},
+      {"method", to_string(request.method)},
       {"max_iterations", o.max_iterations},
       {"search_seconds", request.search_seconds}};
   for (const SubmodelRequest& submodel : request.submodels)
@@ -381,16 +336,25 @@ FitSetup make_fit_setup(const FitRequest& asked, FrfEstimate frf) {
   defaults.choose_modes();
   choose_structure(request, setup);
   defaults.require_affordable_modes();
-  setup.options.method = pick<FitMethod>("--method", request.method, kMethods);
+  setup.options.method = request.method;
   if (request.max_iterations < 1)
-    refuse("--max-iterations", fmt::format("{}", request.max_iterations), "1 or more");
+    throw std::invalid_argument(
+        fmt::format("max_iterations: got {}; expected 1 or more", request.max_iterations));
   setup.options.max_iterations = request.max_iterations;
   if (!(request.search_seconds >= 0.0))
-    refuse("--search-seconds", fmt::format("{}", request.search_seconds), "0 or more");
+    throw std::invalid_argument(
+        fmt::format("search_seconds: got {}; expected 0 or more", request.search_seconds));
   setup.selection.search_seconds = request.search_seconds;
   setup.options.threads = request.threads;
   setup.request_json = provenance_of(request, setup);
   return setup;
+}
+
+FitResult fit_model(FrfEstimate frf, const FitRequest& request) {
+  const FitSetup setup = make_fit_setup(request, std::move(frf));
+  FitResult result = structured_fit(setup.frf, setup.structure, setup.selection, setup.options);
+  result.decisions.insert(result.decisions.begin(), setup.notes.begin(), setup.notes.end());
+  return result;
 }
 
 }  // namespace stageid

@@ -1,6 +1,6 @@
 // Weights from a file: what is taken, and what is refused with the file's name.
 
-#include "tools/fit/weight_file.hpp"
+#include "estimation/request/weight_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid {
-namespace test_weight_file {
+namespace test_weight_flag {
 
 using Complex = std::complex<double>;
 
@@ -130,5 +130,5 @@ TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
   EXPECT_FALSE(std::filesystem::exists(name("model.json")));
 }
 
-}  // namespace test_weight_file
+}  // namespace test_weight_flag
 }  // namespace stageid

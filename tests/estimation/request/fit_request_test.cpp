@@ -1,4 +1,4 @@
-#include "tools/fit/fit_request.hpp"
+#include "estimation/request/fit_request.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,9 +10,9 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "estimation/model/cmif.hpp"
 #include "estimation/problem/weight_matrices.hpp"
+#include "estimation/request/submodel_text.hpp"
 #include "frf/response/hold_compensation.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tools/fit/submodel_text.hpp"
 
 namespace stageid {
 namespace test_fit_request {
@@ -88,7 +88,7 @@ TEST(FitRequest, OneRealizationOfADistortedPlantIsWeighedByTheScatterOfItsLines)
   EXPECT_THAT(setup.notes, testing::Contains(HasSubstr("scatter of neighbouring lines")));
   EXPECT_THAT(setup.warnings, testing::ElementsAre(HasSubstr("scatter of neighbouring lines")));
   FitRequest asked;
-  asked.weighting = "noise_variance";
+  asked.weighting = Weighting::noise_variance;
   EXPECT_EQ(make_fit_setup(asked, scattered(2.0)).options.weighting, Weighting::noise_variance);
 }
 
@@ -110,7 +110,7 @@ TEST(FitRequest, AccelerationsGetTheStructureThatTheyHave) {
     EXPECT_THAT(setup.notes.front(), HasSubstr("accelerations"));
   }
   FitRequest asked;  // whoever says one of the three is taken at his word
-  asked.damping = "proportional";
+  asked.general_damping = false;
   const ModelStructure own = make_fit_setup(asked, frf).structure.common;
   EXPECT_FALSE(own.general_damping);
   EXPECT_FALSE(own.direct_term);
@@ -121,15 +121,15 @@ TEST(FitRequest, AccelerationsGetTheStructureThatTheyHave) {
 
 TEST(FitRequest, RefusesADelayThatTheLinesCannotTellFromItsAlias) {
   FitRequest request;
-  for (const char* delay : {"0.05", "-0.05"}) {  // 1/(2 df) of lines 10 Hz apart
-    request.delay = delay;
-    EXPECT_NO_THROW((void)make_fit_setup(request, measured())) << delay;
+  for (const double delay_s : {0.05, -0.05}) {  // 1/(2 df) of lines 10 Hz apart
+    request.delay = {DelayModel::fixed, delay_s};
+    EXPECT_NO_THROW((void)make_fit_setup(request, measured())) << delay_s;
   }
-  for (const char* delay : {"0.051", "-0.051", "1e9"}) {
-    request.delay = delay;
+  for (const double delay_s : {0.051, -0.051, 1e9}) {
+    request.delay = {DelayModel::fixed, delay_s};
     EXPECT_THAT([&] { (void)make_fit_setup(request, measured()); },
                 testing::ThrowsMessage<std::invalid_argument>(testing::AllOf(
-                    HasSubstr("--delay"), HasSubstr("at most 0.05 s"), HasSubstr("10 Hz apart"))));
+                    HasSubstr("delay"), HasSubstr("at most 0.05 s"), HasSubstr("10 Hz apart"))));
   }
 }
 
@@ -147,7 +147,7 @@ TEST(FitRequest, ADelayThatWasTakenOutIsPutBackAndModelled) {
 TEST(FitRequest, WithHoldNoneACompensatedResponseStaysAsItIs) {
   const FrfEstimate compensated = compensate(measured(), Compensation::delay, 1.3e-3);
   FitRequest request;
-  request.hold = "none";
+  request.hold = HoldModel::none;
   const FitSetup setup = make_fit_setup(request, compensated);
   EXPECT_EQ(setup.frf.response, compensated.response);
   EXPECT_EQ(setup.options.delay_s, 0.0);
@@ -162,31 +162,9 @@ TEST(FitRequest, AHoldThatWasTakenOutIsPutBackUnlessNoHoldIsAsked) {
   EXPECT_EQ(setup.options.hold, HoldModel::exact);
   EXPECT_EQ(setup.options.delay_s, 1.3e-3);
   FitRequest request;
-  request.hold = "none";
+  request.hold = HoldModel::none;
   EXPECT_EQ(make_fit_setup(request, compensated).frf.response, compensated.response);
   EXPECT_EQ(make_fit_setup(request, compensated).options.delay_s, 0.0);
-}
-
-TEST(FitRequest, ModesAreACountFrequenciesOrAFile) {
-  const test::TemporaryDirectory directory;
-  write_modes(directory / "modes.json", {{12.0, 0.02, 1}, {34.0, 0.03, 2}});
-  FitRequest request;
-  request.modes = "1";
-  EXPECT_EQ(make_fit_setup(request, measured()).selection.exactly, 1);
-  request.modes = "30.5,12";
-  FitSetup setup = make_fit_setup(request, measured());
-  ASSERT_EQ(setup.selection.modes.size(), 2U);
-  EXPECT_EQ(setup.selection.modes[0].frequency_hz, 12.0);
-  EXPECT_TRUE(setup.selection.keep_modes);
-  request.modes = "76.2";  // a point makes it a frequency
-  EXPECT_EQ(make_fit_setup(request, measured()).selection.modes.at(0).frequency_hz, 76.2);
-  request.modes = "76,";  // so does a comma
-  EXPECT_EQ(make_fit_setup(request, measured()).selection.modes.at(0).frequency_hz, 76.0);
-  request.modes = (directory / "modes.json").string();
-  setup = make_fit_setup(request, measured());
-  ASSERT_EQ(setup.selection.modes.size(), 2U);
-  EXPECT_EQ(setup.selection.modes[1].damping_ratio, 0.03);
-  EXPECT_TRUE(setup.selection.keep_modes);
 }
 
 TEST(FitRequest, ModesThatTheLinesCannotTellAreRefused) {
@@ -201,19 +179,14 @@ TEST(FitRequest, ModesThatTheLinesCannotTellAreRefused) {
   // As the automatic fit counts: two functions for four lines, one of them the rigid body's. One mode
   // is always granted.
   FitRequest request;
-  request.modes = "2";
+  request.modes = {ModesRequest::Kind::count, 2, {}};
   EXPECT_EQ(error_of(request, measured()),
-            "--modes: 2 is too many; 4 lines support at most 1; use fewer or a wider band");
-  request.modes = "499.9";
+            "modes: 2 is too many; 4 lines support at most 1; use fewer or a wider band");
+  request.modes = {ModesRequest::Kind::given, 0, {{499.9}}};
   EXPECT_EQ(error_of(request, measured()), "");
-  request.modes = "12,500";
+  request.modes = {ModesRequest::Kind::given, 0, {{12.0}, {500.0}}};
   EXPECT_EQ(error_of(request, measured()),
-            "--modes: 500 Hz is not below half the sample rate, 500 Hz; use lower frequencies");
-  const test::TemporaryDirectory directory;
-  write_modes(directory / "modes.json", {{12.0, 0.02, 1}, {500.0, 0.03, 2}});
-  FitRequest by_file;
-  by_file.modes = (directory / "modes.json").string();
-  EXPECT_THAT(error_of(by_file, measured()), HasSubstr("500 Hz is not below"));
+            "modes: 500 Hz is not below half the sample rate, 500 Hz; use lower frequencies");
   FrfEstimate continuous = measured();
   continuous.hold = Hold::none;
   EXPECT_EQ(error_of(request, continuous), "");
@@ -230,7 +203,8 @@ TEST(FitRequest, WeightsComeFromAFileInTheOrderOfTheResponse) {
     file.close();
   }
   FitRequest request;
-  request.weighting = path.string();
+  request.weighting = Weighting::user;
+  request.weight_file = path;
   const FitSetup setup = make_fit_setup(request, measured());
   EXPECT_EQ(setup.options.weighting, Weighting::user);
   EXPECT_EQ((*setup.options.user_weights)(1, 0), 1.0);  // channel y <- b on the first line
@@ -251,29 +225,11 @@ TEST(FitRequest, WeightsComeFromAFileInTheOrderOfTheResponse) {
   EXPECT_THROW(make_fit_setup(request, measured()), IndefiniteWeights);
 }
 
-TEST(FitRequest, EveryWordThatIsNotOneIsRefused) {
-  const auto refused = [](auto member, const char* value) {
-    FitRequest request;
-    request.*member = value;
-    EXPECT_THROW(make_fit_setup(request, measured()), std::invalid_argument) << value;
-  };
-  refused(&FitRequest::hold, "zoh");
-  refused(&FitRequest::weighting, "user");
-  refused(&FitRequest::weighting, "noise");
-  refused(&FitRequest::delay, "inf");
-  refused(&FitRequest::modes, "-3");
-  refused(&FitRequest::modes, "12,-3");
-  refused(&FitRequest::rigid_body, "half");
-  refused(&FitRequest::damping, "viscous");
-  refused(&FitRequest::direct_term, "half");
-  refused(&FitRequest::method, "lm");
-}
-
-TEST(FitRequest, RanksAreWordsOrNumbers) {
+TEST(FitRequest, RanksArePassedOn) {
   FitRequest request;
   EXPECT_EQ(make_fit_setup(request, measured()).options.residue_rank, 0);
-  request.rigid_body = "3";
-  request.residue_rank = "1";
+  request.rigid_body = {RigidBodyRequest::Kind::free, 3};
+  request.residue_rank = 1;
   const FitSetup setup = make_fit_setup(request, measured());
   EXPECT_TRUE(setup.structure.common.rigid_body);
   EXPECT_EQ(setup.options.rigid_body_rank, 3);
@@ -291,8 +247,8 @@ TEST(FitRequest, SubmodelsStandAloneUnlessMoreIsAsked) {
   EXPECT_EQ(setup.structure.submodels.size(), 1U);
   EXPECT_THAT(setup.request_json, HasSubstr("\"submodels\":[\"l=0,n=1,m=0,f=15\"]"));
   EXPECT_THAT(setup.request_json, HasSubstr("\"modes\":\"none\","));
-  request.modes = "auto";
-  request.rigid_body = "full";
+  request.modes.kind = ModesRequest::Kind::search;
+  request.rigid_body.kind = RigidBodyRequest::Kind::free;
   setup = make_fit_setup(request, measured());
   EXPECT_TRUE(setup.structure.common.rigid_body);
   EXPECT_FALSE(setup.selection.keep_modes);
@@ -300,17 +256,18 @@ TEST(FitRequest, SubmodelsStandAloneUnlessMoreIsAsked) {
 
 TEST(FitRequest, ASuspensionStandsInsteadOfTheRigidBody) {
   FitRequest request;
-  request.rigid_body = "suspension";
+  request.rigid_body.kind = RigidBodyRequest::Kind::suspension;
   FitSetup setup = make_fit_setup(request, measured());
   EXPECT_FALSE(setup.structure.common.rigid_body);
   EXPECT_TRUE(setup.structure.suspension);
   EXPECT_TRUE(setup.structure.suspension_hz.empty());
-  request.rigid_body = "suspension:0.4:0.5";
+  request.rigid_body.suspension_hz = {0.4, 0.5};
   setup = make_fit_setup(request, measured());
   EXPECT_EQ(setup.structure.suspension_hz, (std::vector<double>{0.4, 0.5}));
+  EXPECT_THAT(setup.request_json, HasSubstr("\"rigid_body\":\"suspension:0.4:0.5\""));
 }
 
-TEST(FitRequest, StructuresThatAreNoneAreRefusedByTheirFlag) {
+TEST(FitRequest, ContradictingStructuresAreRefusedByName) {
   const auto error_of = [](const FitRequest& request) -> std::string {
     try {
       make_fit_setup(request, measured());
@@ -320,28 +277,27 @@ TEST(FitRequest, StructuresThatAreNoneAreRefusedByTheirFlag) {
     return "";
   };
   FitRequest request;
-  for (const char* text : {"suspension:", "suspension:10", "suspension:0.4:", "suspension0.4"}) {
-    request.rigid_body = text;
-    EXPECT_THAT(error_of(request), HasSubstr("below the lowest line, 10 Hz")) << text;
-  }
+  request.rigid_body = {RigidBodyRequest::Kind::suspension, 0, {10.0}};
+  EXPECT_THAT(error_of(request), HasSubstr("below the lowest line, 10 Hz"));
   request = {};
-  request.rigid_body = request.modes = "none";
-  EXPECT_THAT(error_of(request), HasSubstr("--modes: 'none'"));
+  request.rigid_body.kind = RigidBodyRequest::Kind::none;
+  request.modes.kind = ModesRequest::Kind::none;
+  EXPECT_THAT(error_of(request), HasSubstr("modes: got none"));
   request = {};
   request.submodels = {parse_submodel("l=1,n=0")};
   EXPECT_EQ(error_of(request), "");
-  request.rigid_body = "full";
-  EXPECT_THAT(error_of(request), HasSubstr("--submodel: 2 terms with integrators"));
+  request.rigid_body.kind = RigidBodyRequest::Kind::free;
+  EXPECT_THAT(error_of(request), HasSubstr("submodel: 2 terms with integrators"));
   request = {};
   request.submodels = {parse_submodel("n=2,m=2")};
-  request.direct_term = "full";
-  EXPECT_THAT(error_of(request), HasSubstr("--submodel: 2 biproper"));
+  request.direct_term = true;
+  EXPECT_THAT(error_of(request), HasSubstr("submodel: 2 biproper"));
   request = {};
   request.submodels = {parse_submodel("n=2,f=600")};
-  EXPECT_THAT(error_of(request), HasSubstr("--submodel: 600 Hz is not below"));
+  EXPECT_THAT(error_of(request), HasSubstr("submodel: 600 Hz is not below"));
   request.submodels = {parse_submodel("n=4,m=3")};
-  request.residue_rank = "1";
-  EXPECT_THAT(error_of(request), HasSubstr("not for --submodel l=0,n=4,m=3"));
+  request.residue_rank = 1;
+  EXPECT_THAT(error_of(request), HasSubstr("not to submodel l=0,n=4,m=3"));
   request.submodels = {parse_submodel("n=2,m=1"), parse_submodel("n=0")};
   EXPECT_EQ(error_of(request), "");
 }
@@ -352,7 +308,7 @@ TEST(FitRequest, TheRequestIsNamedWhole) {
   const std::string one = make_fit_setup(request, measured()).request_json;
   request.threads = 2;
   EXPECT_EQ(make_fit_setup(request, measured()).request_json, one);
-  request.method = "gn";
+  request.method = FitMethod::gn;
   EXPECT_NE(make_fit_setup(request, measured()).request_json, one);
   EXPECT_THAT(one, HasSubstr("\"hold\":\"exact\""));
 }

@@ -1,4 +1,4 @@
-#include "tools/fit/weight_file.hpp"
+#include "estimation/request/weight_file.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,4 +1,4 @@
-#include "tools/fit/submodel_text.hpp"
+#include "estimation/request/submodel_text.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,4 +1,4 @@
-#include "tools/fit/submodel_text.hpp"
+#include "estimation/request/submodel_text.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

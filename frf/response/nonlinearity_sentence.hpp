@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "frf/response/frf_estimate.hpp"
+
+namespace stageid {
+
+/// One sentence if the plant is nonlinear: where most, and by how much; else empty.
+std::string nonlinearity_sentence(const FrfEstimate& frf);
+
+/// "20 dB"; "none" for a ratio of 0.
+std::string decibels(double ratio);
+
+/// "output <- input" of a channel, the rows of FrfEstimate::response.
+std::string pair_name(const FrfEstimate& frf, Eigen::Index channel);
+
+}  // namespace stageid

@@ -1,0 +1,106 @@
+#include "tools/fit/fit_flags.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "acquisition/files/file_error.hpp"
+#include "estimation/model/cmif.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace stageid {
+namespace test_fit_flags {
+
+using Modes = ModesRequest::Kind;
+using Body = RigidBodyRequest::Kind;
+
+FitRequest parsed(const FitFlags& flags) {
+  FitRequest request;
+  parse_fit_flags(flags, request);
+  return request;
+}
+
+FitRequest with(std::string FitFlags::*flag, const std::string& text) {
+  FitFlags flags;
+  flags.*flag = text;
+  return parsed(flags);
+}
+
+TEST(FitFlags, WithoutFlagsTheRequestIsTheDefault) {
+  const FitRequest request = parsed({});
+  EXPECT_EQ(request.modes.kind, Modes::by_submodels);
+  EXPECT_EQ(request.rigid_body.kind, Body::by_submodels);
+  EXPECT_FALSE(request.weighting || request.hold || request.delay);
+  EXPECT_FALSE(request.general_damping || request.direct_term);
+  EXPECT_EQ(request.residue_rank, 0);
+  EXPECT_EQ(request.method, FitMethod::riv);
+}
+
+TEST(FitFlags, ModesAreACountFrequenciesOrAFile) {
+  const test::TemporaryDirectory directory;
+  write_modes(directory / "modes.json", {{12.0, 0.02, 1}, {34.0, 0.03, 2}});
+  const auto modes = [](const std::string& text) { return with(&FitFlags::modes, text).modes; };
+  EXPECT_EQ(modes("1").kind, Modes::count);
+  EXPECT_EQ(modes("1").count, 1);
+  EXPECT_EQ(modes("auto").kind, Modes::search);
+  EXPECT_EQ(modes("none").kind, Modes::none);
+  ASSERT_EQ(modes("30.5,12").given.size(), 2U);
+  EXPECT_EQ(modes("30.5,12").given[0].frequency_hz, 12.0);
+  EXPECT_EQ(modes("76.2").given.at(0).frequency_hz, 76.2);  // a point makes it a frequency
+  EXPECT_EQ(modes("76,").given.at(0).frequency_hz, 76.0);   // so does a comma
+  const ModesRequest by_file = modes((directory / "modes.json").string());
+  ASSERT_EQ(by_file.given.size(), 2U);
+  EXPECT_EQ(by_file.kind, Modes::given);
+  EXPECT_EQ(by_file.given[1].damping_ratio, 0.03);
+  EXPECT_THROW(modes("missing.json"), FileError);
+}
+
+TEST(FitFlags, TheRigidBodyIsAWordARankOrASuspension) {
+  const auto body = [](const std::string& text) {
+    return with(&FitFlags::rigid_body, text).rigid_body;
+  };
+  EXPECT_EQ(body("auto").kind, Body::automatic);
+  EXPECT_EQ(body("full").kind, Body::free);
+  EXPECT_EQ(body("full").rank, 0);
+  EXPECT_EQ(body("3").rank, 3);
+  EXPECT_EQ(body("suspension").kind, Body::suspension);
+  EXPECT_EQ(body("suspension:0.4:0.5").suspension_hz, (std::vector<double>{0.4, 0.5}));
+  for (const char* text : {"suspension:", "suspension:0.4:", "suspension0.4", "suspension:-1"})
+    EXPECT_THAT([&] { body(text); },
+                testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("--rigid-body")))
+        << text;
+}
+
+TEST(FitFlags, WordsBecomeValues) {
+  EXPECT_EQ(with(&FitFlags::weighting, "total_variance").weighting, Weighting::total_variance);
+  EXPECT_EQ(with(&FitFlags::weighting, "w.h5").weighting, Weighting::user);
+  EXPECT_EQ(with(&FitFlags::weighting, "w.h5").weight_file, "w.h5");
+  EXPECT_EQ(with(&FitFlags::hold, "sinc").hold, HoldModel::sinc);
+  EXPECT_EQ(with(&FitFlags::delay, "per_channel").delay->model, DelayModel::per_channel);
+  EXPECT_EQ(with(&FitFlags::delay, "-1e-4").delay->delay_s, -1e-4);
+  EXPECT_EQ(with(&FitFlags::damping, "general").general_damping, true);
+  EXPECT_EQ(with(&FitFlags::direct_term, "none").direct_term, false);
+  EXPECT_EQ(with(&FitFlags::method, "sk").method, FitMethod::sk);
+  EXPECT_EQ(with(&FitFlags::residue_rank, "2").residue_rank, 2);
+}
+
+TEST(FitFlags, EveryWordThatIsNotOneIsRefused) {
+  const auto refused = [](auto member, const char* value) {
+    FitFlags flags;
+    FitRequest request;
+    flags.*member = value;
+    EXPECT_THROW(parse_fit_flags(flags, request), std::invalid_argument) << value;
+  };
+  refused(&FitFlags::hold, "zoh");
+  refused(&FitFlags::weighting, "user");
+  refused(&FitFlags::weighting, "noise");
+  refused(&FitFlags::delay, "inf");
+  refused(&FitFlags::modes, "-3");
+  refused(&FitFlags::modes, "12,-3");
+  refused(&FitFlags::rigid_body, "half");
+  refused(&FitFlags::damping, "viscous");
+  refused(&FitFlags::direct_term, "half");
+  refused(&FitFlags::method, "lm");
+}
+
+}  // namespace test_fit_flags
+}  // namespace stageid
