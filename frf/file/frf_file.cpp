@@ -137,7 +137,7 @@ int integer_or_zero(const Hdf5File& file, const std::string& name) {
   const long long value = file.read_integer_attribute("/", name);
   if (value < 0 || value > 1'000'000'000) {
     throw FormatError(file.path(), "/",
-                      fmt::format("attribute {} is {}; a count belongs there", name, value));
+                      fmt::format("attribute {} is {}; expected a count", name, value));
   }
   return static_cast<int>(value);
 }
@@ -148,24 +148,22 @@ std::string text_or_none(const Hdf5File& file, const std::string& name) {
 
 void require_format(const Hdf5File& file) {
   if (!file.has_attribute("/", "format")) {
-    throw FormatError(
-        file.path(), "/",
-        fmt::format("attribute format is missing; a frequency response says '{}'", kFormat));
+    throw FormatError(file.path(), "/",
+                      fmt::format("attribute format is missing; expected '{}'", kFormat));
   }
   const std::string format = file.read_text_attribute("/", "format");
   if (format != kFormat) {
     const std::string other = other_hdf5_kind(format, "a frequency response");
-    throw FormatError(file.path(), "/",
-                      !other.empty() ? other
-                                     : fmt::format("format is '{}'; a frequency response says '{}'",
-                                                   format, kFormat));
+    throw FormatError(
+        file.path(), "/",
+        !other.empty() ? other : fmt::format("format is '{}'; expected '{}'", format, kFormat));
   }
   if (!file.has_attribute("/", "format_version")) return;
   const long long version = file.read_integer_attribute("/", "format_version");
   if (version != kFormatVersion) {
-    throw FormatError(
-        file.path(), "/",
-        fmt::format("format_version is {}; this program reads {}", version, kFormatVersion));
+    throw FormatError(file.path(), "/",
+                      fmt::format("unsupported format_version {}; this program reads {}", version,
+                                  kFormatVersion));
   }
 }
 
@@ -173,8 +171,7 @@ Hold read_hold(const Hdf5File& file) {
   const std::string text = text_or_none(file, "hold");
   if (text == "zoh") return Hold::zoh;
   if (text == "none") return Hold::none;
-  throw FormatError(file.path(), "/",
-                    fmt::format("hold is '{}'; 'zoh' or 'none' belongs there", text));
+  throw FormatError(file.path(), "/", fmt::format("hold is '{}'; expected 'zoh' or 'none'", text));
 }
 
 Compensation read_compensation(const Hdf5File& file) {
@@ -182,9 +179,8 @@ Compensation read_compensation(const Hdf5File& file) {
   for (const Compensation kind : {Compensation::none, Compensation::delay, Compensation::hold}) {
     if (text == text_of(kind)) return kind;
   }
-  throw FormatError(
-      file.path(), "/",
-      fmt::format("compensated is '{}'; 'none', 'delay' or 'hold' belongs there", text));
+  throw FormatError(file.path(), "/",
+                    fmt::format("compensated is '{}'; expected 'none', 'delay' or 'hold'", text));
 }
 
 FrfMethod read_method(const Hdf5File& file) {
@@ -194,14 +190,14 @@ FrfMethod read_method(const Hdf5File& file) {
     if (text == text_of(method)) return method;
   }
   throw FormatError(file.path(), "/",
-                    fmt::format("method is '{}'; 'periodic' or 'lpm' belongs there", text));
+                    fmt::format("method is '{}'; expected 'periodic' or 'lpm'", text));
 }
 
 ChannelList read_channels(const Hdf5File& file, const std::string& dataset) {
   ChannelList channels;
   channels.names = file.read_texts(dataset);
   if (channels.names.empty())
-    throw FormatError(file.path(), dataset, "no channel; name at least one");
+    throw FormatError(file.path(), dataset, "no channels; name at least one");
   if (file.has_attribute(dataset, "unit"))
     channels.units = file.read_texts_attribute(dataset, "unit");
   if (channels.units.empty()) channels.units = {"1"};
@@ -309,9 +305,8 @@ FrfEstimate read_frf(const std::filesystem::path& path) {
   frf.outputs = read_channels(file, "/outputs");
   const std::vector<hsize_t> lines = file.shape("/frequency_hz");
   if (lines.size() != 1 || lines[0] == 0) {
-    throw FormatError(
-        path, "/frequency_hz",
-        fmt::format("shape is {}; one number a line belongs there", join_shape(lines)));
+    throw FormatError(path, "/frequency_hz",
+                      fmt::format("shape is {}; expected one number per line", join_shape(lines)));
   }
   const std::vector<double> frequency = file.read_reals("/frequency_hz");
   frf.frequency_hz = Eigen::Map<const Eigen::VectorXd>(frequency.data(),

@@ -13,9 +13,8 @@ constexpr double kLargestCount = 1e8;
 Eigen::VectorXd read_vector(const Hdf5File& file, const std::string& dataset) {
   const std::vector<hsize_t> shape = file.shape(dataset);
   if (shape.size() != 1) {
-    throw FormatError(
-        file.path(), dataset,
-        fmt::format("shape is {}; a list of numbers belongs there", join_shape(shape)));
+    throw FormatError(file.path(), dataset,
+                      fmt::format("shape is {}; expected a list of numbers", join_shape(shape)));
   }
   const std::vector<double> values = file.read_reals(dataset);
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
@@ -61,11 +60,11 @@ void read_detection(const Hdf5File& file, FrfEstimate& frf) {
   require_shape(file, "/detection_line", {size_of(D)});
   const Eigen::VectorXd line = read_vector(file, "/detection_line");
   if (!((line.array() >= 0.0).all() && (line.array() <= 1e9).all()))
-    throw FormatError(file.path(), "/detection_line", "a line of the DFT is a count");
+    throw FormatError(file.path(), "/detection_line", "DFT lines must be counts (0, 1, 2, ...)");
   lines.line = line.cast<int>();
   lines.groups = file.read_texts("/detection_groups");
   const auto n_g = static_cast<Eigen::Index>(lines.groups.size());
-  if (n_g == 0) throw FormatError(file.path(), "/detection_groups", "no group; name at least one");
+  if (n_g == 0) throw FormatError(file.path(), "/detection_groups", "no groups; name at least one");
   lines.runs = read_vector(file, "/detection_runs");
   require_shape(file, "/detection_power", {size_of(D), size_of(n_y), size_of(n_g)});
   lines.power = from_c_order(file.read_reals("/detection_power"), n_y, n_g);
@@ -98,7 +97,7 @@ void read_nonlinearity(const Hdf5File& file, FrfEstimate& frf) {
   if (shape.size() != 2 || shape[0] == 0 || shape[1] != 2) {
     throw FormatError(
         file.path(), "/nonlinearity_band_hz",
-        fmt::format("shape is {}; two frequencies a band belong there", join_shape(shape)));
+        fmt::format("shape is {}; expected two frequencies per band", join_shape(shape)));
   }
   test.band_hz = from_c_order(file.read_reals("/nonlinearity_band_hz"), 1, 2).transpose();
   const Eigen::Index bands = test.band_hz.rows();

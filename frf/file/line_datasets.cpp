@@ -17,7 +17,7 @@ void require_shape(const Hdf5File& file, const std::string& dataset,
   if (shape != wanted) {
     throw FormatError(
         file.path(), dataset,
-        fmt::format("shape is {}; {} belongs there", join_shape(shape), join_shape(wanted)));
+        fmt::format("shape is {}; expected {}", join_shape(shape), join_shape(wanted)));
   }
 }
 

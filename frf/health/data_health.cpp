@@ -59,14 +59,15 @@ std::vector<Index> Examination::excited_actuators() const {
 void Examination::check_cycles() {
   const RunHealth& health = record_.health;
   if (health.marked + health.missing > 0)
-    find(Severity::doubt, Cause::marked, "", "samples are marked as not to be used",
+    find(Severity::doubt, Cause::marked, "", "samples are marked as unusable",
          fmt::format("{} of {} cycles", health.marked + health.missing, health.cycles),
-         "their periods are left out; repeat the runs if there are many");
+         "their periods are discarded; repeat the runs if there are many");
   if (health.late > 0)
-    find(Severity::doubt, Cause::late, "", "cycles were late: the loop's phase is not the model's",
+    find(Severity::doubt, Cause::late, "",
+         "cycles were late, so the phase of the loop differs from the model",
          fmt::format("{} of {}, the latest by {:.3g} us", health.late, health.cycles,
                      1e-3 * static_cast<double>(health.largest_lateness_ns)),
-         "give the loop a core of its own (realtime: in the stage file)");
+         "reserve a processor core for the loop ('realtime' in the stage file)");
 }
 
 void Examination::check_samples() {
@@ -87,9 +88,9 @@ void Examination::check_samples() {
           sensor ? expected_to_respond(c, known) || !known
                  : std::find(excited.begin(), excited.end(), c - record_.n_y()) != excited.end();
       if (!driven) continue;
-      find(Severity::fault, Cause::dead, name(c), "dead: shows one value for long",
+      find(Severity::fault, Cause::dead, name(c), "dead: repeats one value",
            fmt::format("{:.3g} s", stuck / record_.info.sample_rate_hz),
-           "look at its cable and its amplifier; measure again");
+           "check its cable and amplifier, then measure again");
       spoilt_.push_back(c);
       continue;
     }
@@ -106,7 +107,7 @@ void Examination::find_clipped(Index c, double log_p) {
   const std::string& unit = (sensor ? record_.info.sensors : record_.info.actuators)
                                 .units[static_cast<std::size_t>(sensor ? c : c - record_.n_y())];
   find(Severity::fault, Cause::saturated, name(c),
-       "clipped: samples pile up at the end of its range",
+       "clipped: samples accumulate at the end of its range",
        fmt::format("{} at {:.4g} {}",
                    counted((high ? scan.high().count : 0) + (low ? scan.low().count : 0), "sample"),
                    high ? scan.high().value : scan.low().value, unit),
@@ -135,11 +136,11 @@ void Examination::check_responses() {
   for (Index s = 0; s < record_.n_y(); ++s) any = any || responds(record_, s);
   if (!any && spoilt_.empty()) {
     find(Severity::fault, Cause::incoherent, "",
-         "no sensor shows a motion that repeats with the excitation: something else moves the "
-         "stage, or the excitation does not reach it",
-         fmt::format("no line of {} above its noise",
+         "no sensor signal repeats with the excitation: a disturbance moves the stage, or the "
+         "excitation does not reach it",
+         fmt::format("no line of {} is above the noise",
                      counted(static_cast<std::size_t>(record_.n_y()), "sensor")),
-         "hold the setpoint still, raise the level, or look at the injection; measure again");
+         "keep the setpoint constant, raise the level or check the injection, then measure again");
     return;
   }
   for (Index s = 0; s < record_.n_y(); ++s) {
@@ -149,11 +150,12 @@ void Examination::check_responses() {
     if (!responds(record_, s)) {
       if (known && !expected) continue;
       find(known ? Severity::fault : Severity::doubt, Cause::dead, name(s),
-           known ? "dead: noise only, where the rigid body moves it"
-                 : "no response to the excitation: dead, or it does not see these axes",
-           "no line above its noise",
-           known ? "look at its cable and its supply; measure again"
-                 : "leave it out with --outputs, or look at its cable");
+           known
+               ? "dead: only noise, although the rigid body moves it"
+               : "no response to the excitation: the sensor is dead, or these axes do not move it",
+           "no line above the noise",
+           known ? "check its cable and power supply, then measure again"
+                 : "exclude it with --outputs, or check its cable");
       spoilt_.push_back(s);
       continue;
     }
@@ -161,7 +163,7 @@ void Examination::check_responses() {
     // A dead sensor in the loop disturbs the others.
     if (expected && spoilt_.empty() && coherence < kLeastCoherence)
       find(Severity::doubt, Cause::incoherent, name(s),
-           "little of its motion repeats from period to period",
+           "most of its signal does not repeat from period to period",
            fmt::format("median coherence {:.2f}", coherence),
            "raise the level, or measure more periods");
   }
@@ -200,8 +202,9 @@ void Examination::check_arrival() {
     find(Severity::fault, Cause::excitation,
          record_.info.excitation
              .names[static_cast<std::size_t>(record_.axes[static_cast<std::size_t>(a)])],
-         "its excitation does not arrive: no channel moves with it", "no line above its noise",
-         "look at the injection of this axis and measure again, or leave it out with --inputs");
+         "the excitation does not reach the stage: no channel responds to it",
+         "no line above the noise",
+         "check the injection of this axis and measure again, or exclude it with --inputs");
   }
 }
 
@@ -222,15 +225,17 @@ void Examination::check_excitation() {
          fmt::format("{} for {}",
                      counted(static_cast<std::size_t>(record_.experiments()), "experiment"),
                      counted(record_.axes.size(), "axis", "axes")),
-         "one experiment per axis, or an orthogonal scheme");
+         "use one experiment per axis, or an orthogonal scheme");
   else if (!std::isfinite(worst))
-    find(Severity::fault, Cause::excitation, "", "an axis is not excited on a line that others are",
+    find(Severity::fault, Cause::excitation, "",
+         "an axis is not excited on a line on which other axes are",
          fmt::format("at {:.4g} Hz", record_.frequency_hz[at]),
          "excite all axes on the same lines");
   else if (worst > kWorstExcitation)
-    find(Severity::fault, Cause::excitation, "", "the experiments excite the axes almost alike",
+    find(Severity::fault, Cause::excitation, "",
+         "the experiments excite the axes almost identically",
          fmt::format("cond(R) {:.3g} at {:.4g} Hz", worst, record_.frequency_hz[at]),
-         "one experiment per axis, or an orthogonal scheme");
+         "use one experiment per axis, or an orthogonal scheme");
 }
 
 /// After the recording's channels are put right.
@@ -248,9 +253,9 @@ void Examination::check_inputs() {
   if (conditions.empty()) return;
   const double median = order_statistic(conditions, 0.5);
   if (std::isfinite(median) && median > kWorstInputs)  // else an input without power, named already
-    find(Severity::doubt, Cause::inputs, "", "the loop makes the inputs almost alike",
+    find(Severity::doubt, Cause::inputs, "", "the loop makes the inputs almost linearly dependent",
          fmt::format("median cond(U) {:.3g} above {:.4g} Hz", median, 0.5 * last_hz),
-         "more power on the weak directions; shape the excitation by the sensitivity");
+         "put more power on the weak directions: shape the excitation by the sensitivity");
 }
 
 void Examination::check_excluded() {
@@ -272,8 +277,10 @@ void Examination::check_excluded() {
     const double share = power(a) / inputs;
     if (share > kExcludedPower && responds(record_, c))
       find(Severity::doubt, Cause::excluded, name(c),
-           "is not part of the sub-plant but moves on the excited lines: it biases the response",
-           fmt::format("{:.2g} of the inputs' power", share), "excite it too, or open its loop");
+           "is not an input of the sub-plant but moves on the excited lines, which biases the "
+           "response",
+           fmt::format("{:.2g} of the power of the inputs", share),
+           "excite it as well, or open its loop");
   }
 }
 

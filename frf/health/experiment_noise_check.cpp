@@ -34,14 +34,14 @@ std::vector<Finding> check_experiment_noise(const FrfEstimate& frf,
   finding.severity = Severity::doubt;
   finding.cause = Cause::uneven_noise;
   finding.what =
-      "the noise differs between the experiments: each has its own variance, with fewer degrees of "
-      "freedom than a common one";
+      "the noise level differs between the experiments: each has its own variance, with fewer "
+      "degrees of freedom than a common variance";
   finding.figure =
-      named(runs) + fmt::format("up to {:.2g} times the power; {:.2g} degrees of freedom are left",
+      named(runs) + fmt::format("up to {:.2g} times the power; {:.2g} degrees of freedom remain",
                                 frf.experiment_noise_ratio, frf.noise_dof);
   finding.remedy =
-      "look for what ran during some of them; 'fit --weighting likelihood' takes the nearest "
-      "covariance that is common to all";
+      "find out what disturbed these experiments; 'fit --weighting likelihood' uses the nearest "
+      "common covariance";
   return {finding};
 }
 

@@ -61,11 +61,12 @@ std::vector<Finding> check_interpolation(const FrfEstimate& frf) {
   finding.figure = figure;
   if (static_cast<double>(lines) > kEverywhere * static_cast<double>(frf.lines())) {
     finding.what =
-        "between the zippered lines more is left than noise: distortions, or too few lines";
+        "the residual between the zippered lines exceeds the noise, because of distortion or too "
+        "few lines";
     finding.remedy = "lower the level, lengthen the period, or measure with orthogonal_dft";
   } else {
     finding.what =
-        "resonances too narrow for the zippered lines: the response there is off by more than its "
+        "resonances are too narrow for the zippered lines: the error of the response exceeds its "
         "variance";
     finding.remedy = "lengthen the period, or measure with orthogonal_dft";
   }

@@ -19,10 +19,9 @@ std::vector<Finding> check_settling(const FrfEstimate& frf) {
   Finding finding;
   finding.severity = Severity::doubt;
   finding.cause = Cause::unsettled;
-  finding.what =
-      "the records are not settled: a transient, a drift or slow noise, smooth over the lines";
+  finding.what = "the records are not settled: they contain a transient, a drift or slow noise";
   finding.figure = figure;
-  finding.remedy = fmt::format("{}; linearity cannot be told there", kUnsettledRemedy);
+  finding.remedy = fmt::format("{}; linearity cannot be tested in these bands", kUnsettledRemedy);
   return {finding};
 }
 

@@ -9,8 +9,8 @@
 namespace stageid {
 
 inline constexpr std::string_view kUnsettledRemedy =
-    "a transient: pass over more periods (--transient-periods); a drift or slow noise: longer "
-    "periods, or --method lpm";
+    "for a transient, discard more periods (--transient-periods); for a drift or slow noise, use "
+    "longer periods or --method lpm";
 
 /// Where the records are not settled (NonlinearityTest::settled_p_value): a transient that is left after
 /// the periods passed over, or a drift. It adds to the response what no variance holds, and would pass

@@ -198,10 +198,12 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
   Finding finding;
   finding.severity = Severity::doubt;
   finding.cause = Cause::unsettled;
-  finding.what = fmt::format("not settled: the start of the runs still rings at {} Hz after {}",
-                             names, periods_text(evidence.transient_periods));
-  finding.figure = fmt::format("shifts a mode by up to {:.2g} deviations; a period leaves {:.2g} %",
-                               largest, 100.0 * of_largest);
+  finding.what =
+      fmt::format("not settled: the transient of the start still rings at {} Hz after {}", names,
+                  periods_text(evidence.transient_periods));
+  finding.figure = fmt::format(
+      "shifts a mode by up to {:.2g} standard deviations; {:.2g} % remains after one more period",
+      largest, 100.0 * of_largest);
   const int recorded = evidence.transient_periods + evidence.periods;
   finding.remedy =
       needed <= recorded - 2

@@ -32,8 +32,8 @@ Finding to_finding(const SampleSlip& slip) {
   finding.figure =
       fmt::format("realization {}, experiment {}", slip.realization + 1, slip.experiment + 1);
   finding.remedy =
-      slip.spoilt ? "its period is left out and the later ones are realigned; look at the recorder"
-                  : "the later periods are realigned; look at the recorder";
+      slip.spoilt ? "its period is discarded and the later ones are realigned; check the recorder"
+                  : "the later periods are realigned; check the recorder";
   return finding;
 }
 

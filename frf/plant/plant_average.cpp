@@ -34,14 +34,14 @@ double lines_that_share(const RealizationSpectra& spectra) {
                                         realization + 1, line, frequency_hz);
   if (status == LineStatus::singular_excitation) {
     throw std::invalid_argument(
-        fmt::format("singular excitation in {}: the axes are not excited independently of each "
-                    "other; excite one axis an experiment, or all with orthogonal phases",
+        fmt::format("singular excitation in {}: the axes are not excited independently. Excite one "
+                    "axis per experiment, or all axes with orthogonal phases",
                     where));
   }
-  throw std::invalid_argument(fmt::format(
-      "singular inputs in {}: the selected actuators do not move independently of each other; "
-      "select other inputs, or excite at the actuators",
-      where));
+  throw std::invalid_argument(
+      fmt::format("singular inputs in {}: the selected actuators do not move independently. Select "
+                  "other inputs, or excite at the actuators",
+                  where));
 }
 
 }  // namespace
@@ -194,8 +194,8 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
   if (!noise_known()) {
     if (covariance_kind_ == CovarianceKind::full) {
       throw std::invalid_argument(
-          "covariance: the full covariance comes from the scatter over periods, and there is only "
-          "one clean period; measure two, or ask for the diagonal");
+          "covariance: the full covariance needs two clean periods, but there is only one. Measure "
+          "more periods, or use the diagonal covariance");
     }
     return;
   }

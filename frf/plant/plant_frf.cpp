@@ -120,10 +120,9 @@ ExcitedPart PlantEstimation::excited_part(const RealizationRuns& realization,
                                           const std::vector<RunExcitation>& excitation) const {
   ExcitedPart part{excitation.front().spectrum.lines, {}};
   if (part.lines.empty()) {
-    throw std::invalid_argument(
-        fmt::format("{}/excitation: nothing is excited; the indirect method needs "
-                    "the signal that was added in the loop",
-                    realization.runs.front().place()));
+    throw std::invalid_argument(fmt::format(
+        "{}/excitation: nothing is excited; record the signal that is added in the loop",
+        realization.runs.front().place()));
   }
   for (const RunExcitation& run : excitation) {
     part.axes.insert(part.axes.end(), run.spectrum.channels.begin(), run.spectrum.channels.end());
@@ -143,9 +142,8 @@ void PlantEstimation::check_excitation(const RealizationRuns& realization,
     const std::string place = realization.runs[e].place() + "/excitation";
     if (spectrum.lines.empty())
       throw std::invalid_argument(
-          fmt::format("{}: nothing is excited in this run, but {} lines are in {}. Leave its axis "
-                      "out, --inputs with the "
-                      "others, or measure the run again",
+          fmt::format("{}: nothing is excited in this run, but {} lines are in {}. Exclude its "
+                      "axis (--inputs with the other axes), or measure the run again",
                       place, excited_.lines.size(), realizations_.front().runs.front().place()));
     if (spectrum.lines != excited_.lines) {
       std::vector<int> differing;
@@ -153,24 +151,24 @@ void PlantEstimation::check_excitation(const RealizationRuns& realization,
                                     excited_.lines.begin(), excited_.lines.end(),
                                     std::back_inserter(differing));
       const double resolution_hz = info_.sample_rate_hz / info_.period_samples;
-      throw std::invalid_argument(fmt::format(
-          "{}: {} lines are excited here and {} in {}, line {} ({} Hz) in one only; all runs must "
-          "excite the same lines",
-          place, spectrum.lines.size(), excited_.lines.size(),
-          realizations_.front().runs.front().place(), differing.front(),
-          differing.front() * resolution_hz));
+      throw std::invalid_argument(
+          fmt::format("{}: {} lines are excited here and {} in {}; line {} ({} Hz) is in only one "
+                      "of them. All runs must excite the same lines",
+                      place, spectrum.lines.size(), excited_.lines.size(),
+                      realizations_.front().runs.front().place(), differing.front(),
+                      differing.front() * resolution_hz));
     }
     if (!excited_.only.empty() && spectrum.only != excited_.only) {
       throw std::invalid_argument(
-          fmt::format("{}: the axes have other lines than in {}; all realizations of a zippered "
-                      "experiment must give an axis the same lines",
+          fmt::format("{}: the axes have different lines than in {}; in a zippered experiment an "
+                      "axis must have the same lines in all realizations",
                       place, realizations_.front().runs.front().place()));
     }
     for (const Eigen::Index axis : spectrum.channels) {
       if (std::binary_search(excited_.axes.begin(), excited_.axes.end(), axis)) continue;
       throw std::invalid_argument(
-          fmt::format("{}: channel {} is excited here and never in realization {} (counted from "
-                      "1); all realizations must excite the same axes",
+          fmt::format("{}: channel {} is excited here but not in realization {} (counted from 1); "
+                      "all realizations must excite the same axes",
                       place, info_.excitation.names[static_cast<std::size_t>(axis)],
                       realizations_.front().realization + 1));
     }
@@ -333,10 +331,10 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
     if (!average_) prepare(realization, excitation);
     check_excitation(realization, excitation);
     if (!zippered_ && realization.runs.size() < excited_.axes.size()) {
-      throw std::invalid_argument(fmt::format(
-          "{} but only {} in realization {} (counted from 1); leave this realization out",
-          counted(excited_.axes.size(), "excited axis", "excited axes"),
-          counted(realization.runs.size(), "experiment"), realization.realization + 1));
+      throw std::invalid_argument(
+          fmt::format("{} but only {} in realization {} (counted from 1); exclude this realization",
+                      counted(excited_.axes.size(), "excited axis", "excited axes"),
+                      counted(realization.runs.size(), "experiment"), realization.realization + 1));
     }
     if (health != nullptr && !health->complete()) health->excite(m, excitation);
     std::vector<Eigen::MatrixXcd> R;

@@ -193,16 +193,14 @@ Finding to_finding(const ModeDrift& drift) {
       "the "
       "first run to the last{}",
       drift.frequency_hz, 100.0 * drift.change,
-      drift.in_total ? "" : "; the stated deviations do not contain it");
-  finding.figure =
-      fmt::format("{:+.2g} +- {:.1g} %; the response is off by up to {:.2g} of its deviations",
-                  100.0 * drift.change, 100.0 * drift.deviation, drift.bias);
-  finding.remedy =
-      drift.in_total
-          ? "warm the stage up, or measure for a shorter time; the total variance contains the "
-            "drift"
-          : "warm the stage up, or measure for a shorter time; with several realizations the total "
-            "variance contains the drift";
+      drift.in_total ? "" : "; the standard deviations do not include it");
+  finding.figure = fmt::format(
+      "{:+.2g} +- {:.1g} %; the error of the response is up to {:.2g} standard deviations",
+      100.0 * drift.change, 100.0 * drift.deviation, drift.bias);
+  finding.remedy = drift.in_total ? "let the stage warm up, or measure for a shorter time; the "
+                                    "total variance includes the drift"
+                                  : "let the stage warm up, or measure for a shorter time; with "
+                                    "several realizations the total variance includes the drift";
   return finding;
 }
 

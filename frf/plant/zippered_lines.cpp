@@ -50,9 +50,9 @@ void require_enough_lines(const ZipperedLines& lines, const std::vector<std::str
     const std::size_t there = lines.of(p).size();
     if (there >= needed) continue;
     throw std::invalid_argument(fmt::format(
-        "{}: zippered lines: {} is excited on {} of the {} lines, and {} of its own are needed to "
-        "tell its responses between them; lengthen the period, widen the band, or excite all axes "
-        "on all lines in {} experiments (orthogonal_dft)",
+        "{}: zippered lines: {} is excited on {} of the {} lines, but {} are required to "
+        "interpolate its responses. Lengthen the period, widen the band, or excite all axes on all "
+        "lines in {} experiments (orthogonal_dft)",
         place, names[static_cast<std::size_t>(p)], there, lines.lines.size(), needed, lines.axes));
   }
 }

@@ -22,14 +22,14 @@ std::vector<Eigen::Index> channel_positions(const ChannelList& channels,
       const std::string nearest = nearest_word(name, names);
       throw std::invalid_argument(fmt::format(
           "{}: unknown {} '{}'; {} {}", option, kind, name,
-          nearest.empty() ? "there are" : fmt::format("did you mean '{}'? There are", nearest),
+          nearest.empty() ? "available:" : fmt::format("did you mean '{}'? Available:", nearest),
           fmt::join(names, ", ")));
     }
     found.push_back(at - names.begin());
   }
   if (std::set<Eigen::Index>(found.begin(), found.end()).size() != found.size())
     throw std::invalid_argument(
-        fmt::format("{}: a channel is named twice; name each once", option));
+        fmt::format("{}: duplicate channel; name each channel once", option));
   return found;
 }
 

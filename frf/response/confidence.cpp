@@ -15,8 +15,8 @@ double squared_error_quantile(double level, double dof) {
 
 Eigen::MatrixXd confidence_radius(const FrfEstimate& frf, double level, VarianceKind kind) {
   if (!(level > 0.0 && level < 1.0)) {
-    throw std::invalid_argument(
-        fmt::format("confidence level: {}; a probability between 0 and 1 belongs there", level));
+    throw std::invalid_argument(fmt::format(
+        "confidence level: {} is out of range; give a probability between 0 and 1", level));
   }
   const bool total = kind == VarianceKind::total;
   const Eigen::MatrixXd& variance = total ? frf.total_variance : frf.noise_variance;

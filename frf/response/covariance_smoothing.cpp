@@ -13,20 +13,22 @@ void require_smoothable(const FrfEstimate& frf, int lines) {
     throw std::invalid_argument("smooth covariance: " + why);
   };
   if (lines < 1 || lines % 2 == 0)
-    refuse(
-        fmt::format("{} lines; an odd number belongs there, the line and its neighbours", lines));
+    refuse(fmt::format("{} lines; give an odd number (the line and its neighbours)", lines));
   if (lines > frf.lines())
-    refuse(fmt::format("{} lines of {}; at most so many can be averaged", lines, frf.lines()));
+    refuse(fmt::format("{} lines of {} were requested; lower the number of lines", lines,
+                       frf.lines()));
   if (frf.residual_covariance_re.size() == 0 || frf.input_factor.size() == 0)
     refuse("the noise covariance is unknown; measure two periods");
   if (frf.method == FrfMethod::lpm)
-    refuse("method 'lpm' takes it from neighbouring bins already; estimate with 'periodic'");
+    refuse("method 'lpm' already estimates it from neighbouring bins; estimate with 'periodic'");
   if (frf.correlated_lines != 1.0)
-    refuse("zippered lines take it from their neighbours already; leave the smoothing out");
+    refuse("zippered lines already estimate it from their neighbours; omit the smoothing");
   if (frf.experiment_noise_ratio != 1.0)
-    refuse("the noise differs between the experiments, so that no single C_E is common to them");
+    refuse(
+        "the noise level differs between the experiments, so they have no common C_E; omit the "
+        "smoothing");
   if (frf.covariance_lines != 1)
-    refuse(fmt::format("it is the mean of {} lines already; start from the logs",
+    refuse(fmt::format("it is already the mean of {} lines; estimate again from the logs",
                        frf.covariance_lines));
 }
 

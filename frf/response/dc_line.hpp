@@ -15,7 +15,7 @@ FrfEstimate without_dc_line(FrfEstimate frf);
 
 /// What is said where it was left out.
 constexpr const char* kDcLineLeftOut =
-    "the line at 0 Hz is left out: a rigid body has no response there, and its noise is not that "
-    "of the other lines";
+    "the line at 0 Hz is ignored: a rigid body has no response there, and its noise differs from "
+    "that of the other lines";
 
 }  // namespace stageid

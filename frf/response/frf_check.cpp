@@ -17,31 +17,31 @@ namespace {
 }
 
 void check_names(const char* place, const ChannelList& channels) {
-  if (channels.names.empty()) refuse(place, "no channel; name at least one");
+  if (channels.names.empty()) refuse(place, "no channels; name at least one");
   if (channels.units.size() != channels.names.size()) {
     refuse(place,
-           fmt::format("{} for {}; give one a channel", counted(channels.units.size(), "unit"),
+           fmt::format("{} for {}; give one per channel", counted(channels.units.size(), "unit"),
                        counted(channels.names.size(), "channel")));
   }
   std::set<std::string> seen;
   for (const std::string& name : channels.names) {
     if (!seen.insert(name).second) {
-      refuse(place, fmt::format("'{}' stands there twice; channel names must differ", name));
+      refuse(place, fmt::format("duplicate channel name '{}'", name));
     }
   }
 }
 
 void check_frequencies(const FrfEstimate& frf) {
   const Eigen::VectorXd& f = frf.frequency_hz;
-  if (f.size() == 0) refuse("frequency_hz", "no line; give at least one");
+  if (f.size() == 0) refuse("frequency_hz", "no lines; give at least one");
   for (Eigen::Index k = 0; k < f.size(); ++k) {
     const std::string place = fmt::format("frequency_hz[line {}]", k);
     if (!std::isfinite(f[k]) || f[k] < 0.0) {
-      refuse(place, "not a finite number >= 0");
+      refuse(place, "must be finite and at least 0");
     }
     if (k > 0 && !(f[k] > f[k - 1])) {
-      refuse(place,
-             fmt::format("{} Hz after {} Hz; frequencies must increase strictly", f[k], f[k - 1]));
+      refuse(place, fmt::format("{} Hz after {} Hz; frequencies must be strictly increasing", f[k],
+                                f[k - 1]));
     }
   }
   const double last = f[f.size() - 1];
@@ -66,7 +66,7 @@ std::string entry_place(const char* dataset, const FrfEstimate& frf, Eigen::Inde
 template <typename Matrix>
 void check_shape(const char* dataset, const Matrix& matrix, Eigen::Index rows, Eigen::Index lines) {
   if (matrix.rows() != rows || matrix.cols() != lines) {
-    refuse(dataset, fmt::format("{} values on {} lines; {} on {} belong there", matrix.rows(),
+    refuse(dataset, fmt::format("{} values on {} lines; expected {} on {}", matrix.rows(),
                                 matrix.cols(), rows, lines));
   }
 }
@@ -78,7 +78,7 @@ void check_variance(const char* dataset, const FrfEstimate& frf, const Eigen::Ma
     for (Eigen::Index c = 0; c < variance.rows(); ++c) {
       if (!is_finite(variance(c, k))) refuse(entry_place(dataset, frf, c, k), "not finite");
       if (variance(c, k) < 0.0)
-        refuse(entry_place(dataset, frf, c, k), "a variance is not negative");
+        refuse(entry_place(dataset, frf, c, k), "a variance must be 0 or more");
     }
   }
 }
@@ -98,16 +98,16 @@ void check_optional(const char* dataset, const Matrix& matrix, Eigen::Index rows
 
 void check_scalars(const FrfEstimate& frf) {
   if (!std::isfinite(frf.sample_rate_hz) || frf.sample_rate_hz < 0.0) {
-    refuse("sample_rate_hz", "not a finite number >= 0; 0 means unknown");
+    refuse("sample_rate_hz", "must be finite and at least 0 (0: unknown)");
   }
   if (!std::isfinite(frf.delay_s)) refuse("delay_s", "not finite");
   if (!std::isfinite(frf.experiment_noise_ratio) || frf.experiment_noise_ratio < 1.0)
-    refuse("experiment_noise_ratio", "not a finite number >= 1");
+    refuse("experiment_noise_ratio", "must be finite and at least 1");
   if (!std::isfinite(frf.correlated_lines) || frf.correlated_lines < 1.0)
-    refuse("correlated_lines", "not a finite number >= 1");
+    refuse("correlated_lines", "must be finite and at least 1");
   for (const double dof : {frf.noise_dof, frf.total_dof}) {
     if (!std::isfinite(dof) || dof < 0.0)
-      refuse("noise_dof, total_dof", "not a finite number >= 0");
+      refuse("noise_dof, total_dof", "must be finite and at least 0");
   }
 }
 
@@ -115,13 +115,14 @@ void check_detection(const FrfEstimate& frf) {
   const DetectionLines& lines = frf.detection;
   const Eigen::Index D = lines.frequency_hz.size();
   const Eigen::Index rows = frf.n_outputs() * static_cast<Eigen::Index>(lines.groups.size());
-  if (lines.line.size() != D) refuse("detection_line", "as many as frequencies belong there");
+  if (lines.line.size() != D)
+    refuse("detection_line", "must have as many values as there are frequencies");
   if (D == 0) return;
   if (lines.runs.size() != static_cast<Eigen::Index>(lines.groups.size()))
-    refuse("detection_runs",
-           fmt::format("{} values for {} groups", lines.runs.size(), lines.groups.size()));
+    refuse("detection_runs", fmt::format("{} values for {} groups; give one per group",
+                                         lines.runs.size(), lines.groups.size()));
   if (!lines.runs.allFinite() || !lines.frequency_hz.allFinite() || !std::isfinite(lines.noise_dof))
-    refuse("detection_frequency_hz", "this, detection_runs and the dof must be finite");
+    refuse("detection_frequency_hz", "the frequencies, detection_runs and the dof must be finite");
   check_shape("detection_power", lines.power, rows, D);
   check_optional("detection_power", lines.power, rows, D);
   check_shape("detection_noise", lines.noise, frf.n_outputs(), D);
@@ -134,7 +135,7 @@ void check_nonlinearity(const FrfEstimate& frf) {
   const Eigen::Index bands = test.band_hz.rows();
   if (bands == 0) return;
   if (test.band_hz.cols() != 2 || !test.band_hz.allFinite())
-    refuse("nonlinearity_band_hz", "two finite frequencies a band belong there");
+    refuse("nonlinearity_band_hz", "expected two finite frequencies per band");
   const Eigen::Index n_c = frf.n_outputs() * frf.n_inputs();
   check_shape("nonlinearity_p_value", test.p_value, n_c, bands);
   check_optional("nonlinearity_p_value", test.p_value, n_c, bands);
@@ -142,7 +143,7 @@ void check_nonlinearity(const FrfEstimate& frf) {
   check_optional("nonlinearity_distortion", test.distortion, n_c, bands);
   if (test.settled_p_value.size() > 0 &&
       (test.settled_p_value.size() != bands || !test.settled_p_value.allFinite()))
-    refuse("nonlinearity_settled_p_value", "a probability a band belongs there");
+    refuse("nonlinearity_settled_p_value", "expected one probability per band");
   const Eigen::Index rows =
       frf.n_outputs() * static_cast<Eigen::Index>(frf.detection.groups.size());
   for (const DetectedDistortion* kind : {&test.even, &test.odd}) {
@@ -173,7 +174,7 @@ void check(const FrfEstimate& frf) {
   check_optional("residual_covariance", frf.residual_covariance_re, n_residuals, frf.lines());
   check_optional("residual_covariance", frf.residual_covariance_im, n_residuals, frf.lines());
   if (frf.residual_covariance_re.size() != frf.residual_covariance_im.size()) {
-    refuse("residual_covariance", "real and imaginary part differ in size");
+    refuse("residual_covariance", "the real and imaginary parts differ in size");
   }
   check_optional("input_factor", frf.input_factor, frf.n_inputs() * frf.n_inputs(), frf.lines());
   check_optional("covariance", frf.covariance, n_channels * n_channels, frf.lines());
@@ -188,8 +189,8 @@ void check(const FrfEstimate& frf) {
   check_detection(frf);
   check_nonlinearity(frf);
   if (frf.excluded_power.size() != static_cast<Eigen::Index>(frf.excluded_channels.size())) {
-    refuse("excluded_power", fmt::format("{} values for {} channels", frf.excluded_power.size(),
-                                         frf.excluded_channels.size()));
+    refuse("excluded_power", fmt::format("{} values for {} channels; give one per channel",
+                                         frf.excluded_power.size(), frf.excluded_channels.size()));
   }
   if (!frf.excluded_power.allFinite()) refuse("excluded_power", "not finite");
 }

@@ -18,8 +18,7 @@ using Indices = std::vector<Eigen::Index>;
 Indices positions(const ChannelList& channels, const std::vector<std::string>& wanted,
                   const char* option, const char* kind) {
   if (wanted.empty())
-    throw std::invalid_argument(
-        fmt::format("select_channels: no {} asked for; name at least one", kind));
+    throw std::invalid_argument(fmt::format("no {} selected; name at least one", kind));
   return channel_positions(channels, wanted, option, kind);
 }
 
@@ -81,9 +80,8 @@ Eigen::Map<const Eigen::MatrixXcd> FrfEstimate::at(Eigen::Index k) const {
 
 FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
   if (low_hz > high_hz)
-    throw std::invalid_argument(
-        fmt::format("band {} to {} Hz: ends below its beginning; write the lower frequency first",
-                    low_hz, high_hz));
+    throw std::invalid_argument(fmt::format(
+        "band {} to {} Hz is reversed; write the lower frequency first", low_hz, high_hz));
   const auto* const begin = frf.frequency_hz.data();
   const auto* const end = begin + frf.lines();
   const Eigen::Index first = std::lower_bound(begin, end, low_hz) - begin;
@@ -95,7 +93,7 @@ FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
                                   : fmt::format("lines from {} to {} Hz", frf.frequency_hz[0],
                                                 frf.frequency_hz[frf.lines() - 1]);
     throw std::invalid_argument(
-        fmt::format("band {} to {} Hz: no line lies in it; the frequency response has {}", low_hz,
+        fmt::format("band {} to {} Hz contains no lines; the frequency response has {}", low_hz,
                     high_hz, range));
   }
   keep_columns(frf.response, first, kept);

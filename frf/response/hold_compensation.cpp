@@ -14,17 +14,17 @@ double sinc(double x) { return x == 0.0 ? 1.0 : std::sin(x) / x; }
 void check_request(const FrfEstimate& frf, double delay_s) {
   if (frf.compensated != Compensation::none) {
     throw std::invalid_argument(
-        "compensate: the response was compensated already; start from the one as measured");
+        "compensate: the response is already compensated; start from the measured one");
   }
   if (!(frf.sample_rate_hz > 0.0) || !std::isfinite(frf.sample_rate_hz)) {
     throw std::invalid_argument(
-        "compensate: the sample rate is unknown; the hold lasts one sample, so give "
-        "sample_rate_hz");
+        "compensate: the sample rate is unknown; set sample_rate_hz, because the hold lasts one "
+        "sample");
   }
   if (frf.hold == Hold::none) {
     throw std::invalid_argument(
-        "compensate: the response has no zero-order hold (hold = none); there is nothing to take "
-        "out");
+        "compensate: the response has no zero-order hold (hold = none), so there is nothing to "
+        "compensate");
   }
   if (!std::isfinite(delay_s)) {
     throw std::invalid_argument("compensate: delay_s must be a finite number of seconds");
@@ -69,10 +69,10 @@ FrfEstimate compensate(const FrfEstimate& frf, Compensation kind, double delay_s
 
 FrfEstimate as_measured(FrfEstimate frf) {
   if (frf.compensated == Compensation::none)
-    throw std::invalid_argument("the response was not compensated: it is as measured already");
+    throw std::invalid_argument("the response is not compensated; use it as it is");
   if (!(frf.sample_rate_hz > 0.0) || !std::isfinite(frf.sample_rate_hz))
     throw std::invalid_argument(
-        "the sample rate is unknown: what the compensation took out cannot be put back");
+        "the sample rate is unknown, so the compensation cannot be undone; set sample_rate_hz");
   const double T = 1.0 / frf.sample_rate_hz;
   multiply(frf, [&](double omega) { return taken_out(frf.compensated, frf.delay_s, T, omega); });
   frf.hold = Hold::zoh;

@@ -137,13 +137,13 @@ std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
     return "nonlinearity test: neighbouring lines of a zippered experiment share their data; "
            "measure with 'orthogonal_dft' or 'single_axis'";
   if (frf.covariance_lines > 1)
-    return "nonlinearity test: neighbouring lines share their smoothed noise; estimate without "
-           "smoothing";
+    return "nonlinearity test: neighbouring lines share their smoothed noise variance; estimate "
+           "without smoothing";
   if (frf.noise_variance.size() == 0 || !(frf.noise_dof > 0.0))
     return "nonlinearity test: the noise variance or its noise_dof is unknown; measure two periods";
   if (frf.total_variance.size() == 0 || !(frf.total_dof >= 1.0) ||
       frf.total_dof != std::floor(frf.total_dof))
-    return "nonlinearity test: the total variance or its total_dof, realizations - 1, is unknown; "
+    return "nonlinearity test: the total variance or its total_dof (realizations - 1) is unknown; "
            "measure two realizations";
   return "";
 }

@@ -20,8 +20,10 @@ double mean_relative_variance(const FrfEstimate& frf, VarianceKind kind) {
                                                  frf.n_inputs());
     const Eigen::VectorXd size = frf.at(k).rowwise().squaredNorm();
     if (!(size.minCoeff() > 0.0))
-      throw std::invalid_argument(fmt::format(
-          "relative variance: the response of an output is zero at {} Hz", frf.frequency_hz[k]));
+      throw std::invalid_argument(
+          fmt::format("relative variance: the response of an output is zero at {} Hz; exclude this "
+                      "line or output",
+                      frf.frequency_hz[k]));
     sum += (line.rowwise().sum().array() / size.array()).mean();
   }
   return sum / static_cast<double>(frf.lines());

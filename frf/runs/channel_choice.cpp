@@ -47,27 +47,27 @@ void check_counts(const LogInfo& info, const Indices& excited, std::size_t input
   const std::string axes = fmt::format("{}", fmt::join(names_of(info.excitation, excited), ", "));
   if (inputs > experiments) {
     throw std::invalid_argument(
-        fmt::format("{} but only {} in realization {} (counted from 1); measure one experiment "
-                    "for each input, or select at most {}",
+        fmt::format("{} but only {} in realization {} (counted from 1); measure one experiment per "
+                    "input, or select at most {}",
                     counted(inputs, "input"), counted(experiments, "experiment"), realization + 1,
                     counted(experiments, "input")));
   }
   if (inputs > excited.size()) {
     throw std::invalid_argument(fmt::format(
-        "{} but only {} ({}); excite one axis for each input, or select {}",
-        counted(inputs, "input"), counted(excited.size(), "excited axis", "excited axes"), axes,
+        "{} but only {} ({}); excite one axis per input, or select {}", counted(inputs, "input"),
+        counted(excited.size(), "excited axis", "excited axes"), axes,
         counted(excited.size(), "input")));
   }
   if (inputs < excited.size()) {
     throw std::invalid_argument(
-        fmt::format("{} but {} excited axes ({}): what the others do would be taken for the "
-                    "selected inputs' work; select {} inputs",
+        fmt::format("{} but {} excited axes ({}): the effect of the other axes would be attributed "
+                    "to the selected inputs; select {} inputs",
                     counted(inputs, "input"), excited.size(), axes, excited.size()));
   }
   if (experiments < excited.size()) {
     throw std::invalid_argument(
-        fmt::format("{} but only {} in realization {} (counted from 1); leave it out, or measure "
-                    "one experiment for each axis",
+        fmt::format("{} but only {} in realization {} (counted from 1); exclude it, or measure one "
+                    "experiment per axis",
                     counted(excited.size(), "excited axis", "excited axes"),
                     counted(experiments, "experiment"), realization + 1));
   }

@@ -27,8 +27,8 @@ void refuse_constant_inputs(const RealizationRuns& realization, const Realizatio
     const UsedRun& run = realization.runs.front();
     const auto channel = static_cast<std::size_t>(channels.estimated[i]);
     throw std::invalid_argument(fmt::format(
-        "{}/actuators: channel {} shows one value throughout realization {} (counted from 1), and "
-        "without it no response can be told; look at its cable and at what is recorded for it",
+        "{}/actuators: channel {} is constant throughout realization {} (counted from 1), so the "
+        "response cannot be estimated. Check its cable and which signal is recorded",
         run.place(), run.log->info().actuators.names[channel], realization.realization + 1));
   }
 }

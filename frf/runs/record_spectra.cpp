@@ -106,7 +106,7 @@ class RecordMeasurement {
       for (const Glitch& glitch : glitches) {
         settle(part(begin, glitch.period));
         run_.drop(segment_.first + glitch.period,
-                  fmt::format("a glitch: {} is off by {:.3g} times the noise about it",
+                  fmt::format("a glitch: {} deviates by {:.3g} times the surrounding noise",
                               channel_name(glitch.channel), glitch.ratio));
         begin = glitch.period + 1;
       }
@@ -130,7 +130,7 @@ class RecordMeasurement {
   }
 
   void drop_alone(const Segment& segment) {
-    run_.drop(segment.first, "between marked periods, too short for a record");
+    run_.drop(segment.first, "too short for a record between marked periods");
   }
 
   void include(const Segment& segment) {

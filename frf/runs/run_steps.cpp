@@ -12,9 +12,8 @@ namespace stageid {
 RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft) {
   RunExcitation excitation{run.log->excitation(run.index), {}};
   if (excitation.period.rows() != dft.length()) {
-    throw std::invalid_argument(
-        fmt::format("{}/excitation: {} samples; one period of {} belongs there", run.place(),
-                    excitation.period.rows(), dft.length()));
+    throw std::invalid_argument(fmt::format("{}/excitation: {} samples; expected one period of {}",
+                                            run.place(), excitation.period.rows(), dft.length()));
   }
   excitation.spectrum = excitation_spectrum(excitation.period, dft);
   return excitation;
@@ -85,9 +84,8 @@ std::string no_clean_period(const UsedRun& run) {
 }
 
 void refuse_marked_runs(const UsedRun& run) {
-  throw FormatError(
-      run.log->path(), fmt::format("/runs/{}", run.run().name),
-      no_clean_period(run) + ", and no realization is without such a run; measure again");
+  throw FormatError(run.log->path(), fmt::format("/runs/{}", run.run().name),
+                    no_clean_period(run) + ", and every realization has such a run; measure again");
 }
 
 }  // namespace stageid

@@ -24,9 +24,8 @@ void check_log(const LogReader& log) {
     throw FormatError(log.path(), "/", "sample_rate_hz must be positive and finite");
   }
   if (info.period_samples < 4) {
-    throw FormatError(
-        log.path(), "/",
-        fmt::format("period_samples is {}; at least 4 are needed", info.period_samples));
+    throw FormatError(log.path(), "/",
+                      fmt::format("period_samples is {}; must be at least 4", info.period_samples));
   }
 }
 
@@ -41,7 +40,7 @@ void check_same_setup(const LogReader& first, const LogReader& other) {
   if (!(a.sensors == b.sensors)) differs = "sensor channels";
   if (differs != nullptr) {
     throw std::invalid_argument(
-        fmt::format("{}: other {} than in {}; logs used together must have the same",
+        fmt::format("{}: different {} than in {}; logs that are used together must have the same",
                     other.path().string(), differs, first.path().string()));
   }
 }
@@ -53,16 +52,17 @@ UsedRun measured_part(const LogReader& log, std::size_t index, const FrfOptions&
   const auto period = static_cast<std::uint64_t>(info.period_samples);
   const std::uint64_t samples = used.run().samples;
   if (samples == 0 || samples % period != 0) {
-    throw FormatError(log.path(), place,
-                      fmt::format("{} are not a whole number of periods of {}; correct "
-                                  "period_samples or cut the record",
-                                  counted(samples, "sample"), counted(period, "sample")));
+    throw FormatError(
+        log.path(), place,
+        fmt::format(
+            "{} are not a whole number of periods of {}; correct period_samples or trim the record",
+            counted(samples, "sample"), counted(period, "sample")));
   }
   used.periods = static_cast<int>(samples / period) - used.transient_periods;
   if (used.periods < 1) {
     throw FormatError(log.path(), place,
-                      fmt::format("{} recorded, {} transient: none is left; measure "
-                                  "longer or give fewer transient periods",
+                      fmt::format("{} recorded, {} transient: no period remains. Measure longer or "
+                                  "lower transient_periods",
                                   counted(samples / period, "period"), used.transient_periods));
   }
   return used;
@@ -113,7 +113,7 @@ void check_realizations_asked_for(const RunsByRealization& table, const FrfOptio
   for (const int realization : options.realizations) {
     if (!table.contains(realization)) {
       throw std::invalid_argument(fmt::format(
-          "{}: realization {} has no complete run; counted from 1, those that have one are {}", log,
+          "{}: realization {} has no complete run; those with one are {} (counted from 1)", log,
           realization + 1, fmt::join(complete, ", ")));
     }
   }
@@ -130,10 +130,10 @@ std::size_t needed_experiments(const RunsByRealization& table, std::size_t begun
   });
   const std::size_t most = best->second.size();
   if (most < begun && options.inputs.empty()) {
-    throw std::invalid_argument(fmt::format(
-        "{}: no realization is complete, realization {} (counted from 1) has {} of {}; resume "
-        "the experiment, or name the inputs",
-        log, best->first + 1, most, counted(begun, "experiment")));
+    throw std::invalid_argument(
+        fmt::format("{}: no realization is complete; realization {} (counted from 1) has {} of {}. "
+                    "Resume the experiment, or name the inputs",
+                    log, best->first + 1, most, counted(begun, "experiment")));
   }
   return most;
 }
@@ -150,10 +150,9 @@ std::string UsedRun::place() const {
 }
 
 ChosenRuns choose_runs(const std::vector<const LogReader*>& logs, const FrfOptions& options) {
-  if (logs.empty())
-    throw std::invalid_argument("estimate_plant_frf: no log given; give at least one");
+  if (logs.empty()) throw std::invalid_argument("no log given; give at least one");
   if (options.transient_periods.value_or(0) < 0) {
-    throw std::invalid_argument("transient_periods: must not be negative");
+    throw std::invalid_argument("transient_periods: must be 0 or more");
   }
   for (const LogReader* log : logs) {
     check_log(*log);

@@ -55,10 +55,10 @@ TransientModel::TransientModel(int period_samples, int periods,
   const auto last = taken.begin() + static_cast<Eigen::Index>(excitation.lines.back());
   if (periods == 1 && 2 * std::count(first, last, char{0}) + 1 <
                           static_cast<Eigen::Index>(excitation.lines.size())) {
-    throw std::invalid_argument(fmt::format(
-        "{}: method 'lpm' tells the transient of a single period on lines that are left empty, and "
-        "here hardly any are; excite odd lines only, or measure two periods",
-        place));
+    throw std::invalid_argument(
+        fmt::format("{}: with a single period, method 'lpm' estimates the transient from unexcited "
+                    "lines, but there are too few. Excite only odd lines, or measure two periods",
+                    place));
   }
   for (Eigen::Index b = 0; b < bins_; ++b) {
     if (taken[static_cast<std::size_t>(b)] == 0) usable_.push_back(b);
@@ -66,8 +66,8 @@ TransientModel::TransientModel(int period_samples, int periods,
   window_ = kOrder + 1 + kResidualDof;
   if (static_cast<Eigen::Index>(usable_.size()) < window_) {
     throw std::invalid_argument(
-        fmt::format("{}: method 'lpm' needs {} bins beside the lines, this record of {} has {}; "
-                    "measure more periods",
+        fmt::format("{}: method 'lpm' needs {} bins between the lines, but this record of {} has "
+                    "{}; measure more periods",
                     place, window_, counted(periods, "period"), usable_.size()));
   }
 }

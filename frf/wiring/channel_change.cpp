@@ -21,10 +21,11 @@ Finding swap_finding(bool in_recording, bool of_sensors) {
   Finding finding;
   finding.cause = Cause::swapped;
   if (in_recording) {
-    finding.what = "recorded under each other's name: u = r - C y holds with the two exchanged";
-    finding.remedy = "exchange the two names in the recorder's channel list";
+    finding.what =
+        "recorded under each other's name: u = r - C y is satisfied if the two are exchanged";
+    finding.remedy = "exchange the two names in the channel list of the recorder";
   } else {
-    finding.what = "wired crosswise: the rigid body fits with the two exchanged";
+    finding.what = "cables exchanged: the rigid body fits if the two are exchanged";
     finding.remedy =
         of_sensors ? "exchange the two sensors' cables, or their positions in the stage file"
                    : "exchange the two amplifiers' cables, or their positions in the stage file";
@@ -42,14 +43,14 @@ Finding gain_finding(const ChannelChange& change, bool in_recording) {
   if (sign_only) {
     finding.what = fmt::format("sign flipped {}", where);
     finding.remedy = in_recording
-                         ? "change the channel's sign in the recorder's scaling"
-                         : "change the channel's polarity, or its direction in the stage file";
+                         ? "change the sign of the channel in the scaling of the recorder"
+                         : "change the polarity of the channel, or its direction in the stage file";
   } else {
     finding.what =
         fmt::format("{} {}", change.value < 0.0 ? "sign and scale wrong" : "scale wrong", where);
     finding.remedy = fmt::format(
-        "divide the channel by the factor: look at its unit and {}",
-        in_recording ? "the recorder's scaling" : "its gain, or the mass in the stage file");
+        "divide the channel by the factor; check its unit and {}",
+        in_recording ? "the scaling of the recorder" : "its gain, or the mass in the stage file");
   }
   finding.figure = fmt::format("factor {}", with_deviation(change.value, change.deviation));
   return finding;
@@ -64,8 +65,8 @@ Finding skew_finding(const ChannelChange& change, bool in_recording) {
   finding.figure = fmt::format("{} us", with_deviation(kMicroseconds * std::abs(change.value),
                                                        kMicroseconds * change.deviation));
   finding.remedy = in_recording
-                       ? "sample all channels at one instant, or shift this one back"
-                       : "sample all channels at one instant, or fit with --delay per_channel";
+                       ? "sample all channels simultaneously, or shift this one back"
+                       : "sample all channels simultaneously, or fit with --delay per_channel";
   return finding;
 }
 

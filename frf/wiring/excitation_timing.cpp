@@ -165,18 +165,17 @@ Finding to_finding(const ExcitationDelay& delay) {
   finding.cause = Cause::excitation_timing;
   finding.channel = "excitation";
   if (delay.certain) {
-    finding.what =
-        fmt::format("the excitation was recorded {} {}; the FRF does not depend on it and is right",
-                    samples, late ? "late" : "early");
-    finding.remedy = "correct the time at which the excitation is recorded";
+    finding.what = fmt::format("the excitation was recorded {} {}; the FRF is unaffected", samples,
+                               late ? "late" : "early");
+    finding.remedy = "correct the recording time of the excitation";
   } else {
     finding.what = fmt::format(
-        "the excitation was recorded {} {} than all actuators; if it alone is, the FRF is "
-        "unaffected",
+        "the excitation was recorded {} {} than all actuators; if only the excitation is affected, "
+        "the FRF is correct",
         samples, late ? "later" : "earlier");
-    finding.remedy = "give the stage file of this log, whose controller can tell: --stage";
+    finding.remedy = "give the stage file of this log (--stage), whose controller resolves this";
   }
-  finding.figure = fmt::format("u follows it {:.2g} times better when shifted", delay.misfit);
+  finding.figure = fmt::format("u matches it {:.2g} times better when shifted", delay.misfit);
   return finding;
 }
 

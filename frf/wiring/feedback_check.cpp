@@ -22,11 +22,11 @@ constexpr double kFeedbackRounding = 1e-9;  // of u: float32 records, and u - r 
 std::string why_not(const HealthRecord& record, const std::vector<Index>& actuators) {
   for (const Index axis : record.axes)
     if (actuators[static_cast<std::size_t>(axis)] < 0)
-      return "an excitation that is added at the actuators, under their names";
+      return "an excitation that is added at the actuators and has their names";
   if (record.n_y() == 0 || record.lines.empty()) return "sensors and excited lines";
   if (record.experiments() <= record.n_y())
     return fmt::format("more experiments than the {} sensors of the log", record.n_y());
-  if (record.scatter_dof() == 0) return "two periods a run";
+  if (record.scatter_dof() == 0) return "two periods per run";
   return "";
 }
 
@@ -70,7 +70,7 @@ FeedbackCheck check_feedback(const HealthRecord& record) {
     }
   }
   if (!(fed_back.sum() > 0.0)) {
-    check.unchecked = "a closed loop: here u is r";
+    check.unchecked = "a closed loop; here u equals r";
     return check;
   }
   check.relative = std::sqrt(misfit.sum() / fed_back.sum());

@@ -82,7 +82,7 @@ std::vector<Finding> check_repetition(const HealthRecord& record) {
   finding.severity = Severity::fault;
   finding.cause = Cause::aperiodic;
   finding.what =
-      "the inputs do not repeat with the period: period_samples or the excitation is not that of "
+      "the inputs do not repeat with the period: period_samples or the excitation does not match "
       "the records";
   finding.figure = fmt::format("{:.0f} % of the lines, period of {} samples", 100.0 * least,
                                record.info.period_samples);

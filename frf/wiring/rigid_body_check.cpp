@@ -167,7 +167,7 @@ RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
   const std::vector<PlantLine> lines = rigid_lines(all);
   if (lines.size() < kFewestBodyLines) {
     check.unchecked =
-        fmt::format("{} excited lines between suspension and flexible modes; {} are needed",
+        fmt::format("only {} excited lines between suspension and flexible modes; {} are required",
                     lines.size(), kFewestBodyLines);
     return check;
   }

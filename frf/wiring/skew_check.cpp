@@ -224,10 +224,10 @@ SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Inde
         "above the noise";
   else if (check.changes.empty() && kSkewDeviations * check.largest_deviation_s > kWantedSkew_s)
     check.unchecked =
-        fmt::format("more power or lighter damping: {:.0f} deviations are {:.3g} us",
+        fmt::format("more power or lighter damping ({:.0f} standard deviations are {:.3g} us)",
                     kSkewDeviations, 1e6 * kSkewDeviations * check.largest_deviation_s);
   else if (!all)
-    check.unchecked = "three sensors and three actuators in each part that is decoupled";
+    check.unchecked = "three sensors and three actuators in each decoupled part";
   return check;
 }
 

@@ -42,13 +42,13 @@ bool Examination::expected_to_respond(Index sensor, bool& known) const {
 
 std::string Examination::why_no_nominal(bool all_sensors) const {
   if (excited_actuators().empty())
-    return "an excitation that is added at the actuators, under their names";
+    return "an excitation that is added at the actuators and has their names";
   std::string missing;
   if (positions_in(nominal_->actuators, record_.info.actuators.names, missing).empty() ||
       positions_in(nominal_->sensors, record_.info.sensors.names, missing).empty())
-    return fmt::format("a stage file that knows channel {}", missing);
+    return fmt::format("a stage file that contains channel {}", missing);
   if (all_sensors && positions_in(record_.info.sensors.names, nominal_->sensors, missing).empty())
-    return fmt::format("the record of sensor {}, which the controller sees", missing);
+    return fmt::format("the record of sensor {}, which the controller uses", missing);
   return "";
 }
 
@@ -70,12 +70,12 @@ void Examination::check_injection() {
                                    : fmt::format("factor {:.6g}", m.factor);
     if (known || mapped.size() < all) {
       find(Severity::fault, Cause::injection, name(record_.n_y() + m.actuator),
-           fmt::format("equals the excitation {}: nothing of the loop is in it", excitation),
-           figure, "map the plant input (after the injection sum)");
+           fmt::format("equals the excitation {}: it contains no feedback", excitation), figure,
+           "map the plant input (after the summation point)");
     } else {
       find(Severity::doubt, Cause::injection, name(record_.n_y() + m.actuator),
-           fmt::format("equals the excitation {}: right in open loop only", excitation), figure,
-           "in a closed loop, map the plant input (after the injection sum)");
+           fmt::format("equals the excitation {}, which is correct only in open loop", excitation),
+           figure, "in a closed loop, map the plant input (after the summation point)");
     }
     spoilt_.push_back(record_.n_y() + m.actuator);
   }
@@ -107,19 +107,18 @@ void Examination::check_without_stage() {
   const FeedbackCheck check = check_feedback(record_);
   const bool tells = check.unchecked.empty() && spoilt_.empty();
   find(Severity::unchecked, Cause::unknown_stage, "",
-       "names, signs, scales and timing of the channels and their wiring: the log's stage is "
-       "unknown",
+       "names, signs, scales, timing and wiring of the channels: the stage of this log is unknown",
        tells ? fmt::format("u - r is linear in y to {:.1g} over {} experiments", check.relative,
                            check.experiments)
              : "",
-       "--stage FILE: a stage file, or a controller file for the recording alone");
+       "--stage FILE: a stage file, or a controller file to check only the recording");
   if (!tells || check.inconsistent.empty()) return;
   const bool one = check.inconsistent.size() == 1;
   find(Severity::doubt, Cause::controller,
        one ? name(record_.n_y() + check.inconsistent.front()) : "",
        "u - r is not one linear function of the recorded sensors in all experiments",
-       fmt::format("{:.2g} of u - r is not", check.worst),
-       "record all that the controller sees and adds; keep it the same in all experiments");
+       fmt::format("{:.2g} of u - r is unexplained", check.worst),
+       "record all inputs and outputs of the controller, and keep it the same in all experiments");
 }
 
 void Examination::check_recording() {
@@ -134,7 +133,7 @@ void Examination::check_recording() {
   }
   if (!spoilt_.empty()) {
     find(Severity::unchecked, Cause::controller, "", what, "",
-         fmt::format("needs channel {} in order", name(spoilt_.front())));
+         fmt::format("needs channel {} without faults", name(spoilt_.front())));
     return;
   }
   const ControllerCheck check = check_controller(record_, *nominal_);
@@ -143,7 +142,7 @@ void Examination::check_recording() {
   if (!check.misfits.empty() && check.misfits.front().of_all) {
     if (find_suspected(0, record_.n_y())) return;
     find(Severity::doubt, Cause::controller, "",
-         "the loop was closed by another controller than the configuration's",
+         "the loop was closed by a different controller than the configured one",
          fmt::format("u - r + C y is {:.2g} of C y", check.misfits.front().relative),
          "give the stage file of this log: --stage");
     return;
@@ -154,19 +153,19 @@ void Examination::check_recording() {
     const bool is_input =
         std::find(excited.begin(), excited.end(), misfit.actuator) != excited.end();
     find(Severity::fault, Cause::unrecorded, name(record_.n_y() + misfit.actuator),
-         is_input ? "moves by more than r - C y: an excitation that was not recorded"
-                  : "moves by itself beside the sub-plant: it is excited and that was not recorded",
+         is_input ? "moves more than r - C y: an excitation was not recorded"
+                  : "moves independently of the sub-plant: its excitation was not recorded",
          fmt::format("u - r + C y is {:.2g} of {}", misfit.relative,
                      misfit.controlled ? "C y" : "u; C y is zero"),
-         "switch off what drives it, or record it as excitation");
+         "switch off the source that drives it, or record it as excitation");
   }
   if (record_.scatter_dof() == 0)
     find(Severity::unchecked, Cause::skew, "", "timing skew of the recorded channels", "",
-         "needs two periods a run");
+         "needs two periods per run");
 }
 
 void Examination::check_stage() {
-  const char* what = "wiring behind the recording (rigid body against geometry and mass)";
+  const char* what = "wiring between recorder and stage (rigid body against geometry and mass)";
   if (!nominal_) return;  // said already
   std::string why = why_no_nominal(false);
   if (why.empty() && !nominal_->rigid_body)
@@ -180,20 +179,22 @@ void Examination::check_stage() {
   }
   const std::vector<Index> inputs = excited_actuators();
   if (!why.empty() || outputs.empty()) {
-    find(Severity::unchecked, Cause::rigid_body, "", what, "",
-         "needs " + (why.empty() ? std::string("a sensor that sees the excited axes") : why));
+    find(
+        Severity::unchecked, Cause::rigid_body, "", what, "",
+        "needs " + (why.empty() ? std::string("a sensor that responds to the excited axes") : why));
     return;
   }
   for (const Index a : inputs)
     if (spoilt(record_.n_y() + a)) return;
   if (found(Cause::excluded)) {
     find(Severity::unchecked, Cause::rigid_body, "", what, "",
-         "needs every actuator that moves excited: Y U^-1 is not the plant without");
+         "needs an excitation of every actuator that moves; otherwise Y U^-1 differs from the "
+         "plant");
     return;
   }
   if (record_.zippered) {
     find(Severity::unchecked, Cause::rigid_body, "", what, "",
-         "needs all axes on one line: a scheme other than zippered");
+         "needs all axes excited on the same lines; use a scheme other than zippered");
     return;
   }
   const std::vector<PlantLine> lines = plant_lines(record_, *nominal_, outputs, inputs);
@@ -203,21 +204,21 @@ void Examination::check_stage() {
     return;
   }
   for (const Index a : check.dead_actuators)
-    find(Severity::fault, Cause::dead, name(record_.n_y() + a), "dead: its force moves nothing",
-         "less than 5 % of the rigid body's motion", "look at its amplifier and its cable");
+    find(Severity::fault, Cause::dead, name(record_.n_y() + a), "dead: its force has no effect",
+         "less than 5 % of the motion of the rigid body", "check its amplifier and cable");
   for (const ChannelChange& change : check.changes)
     findings_.push_back(to_finding(change, record_.info, false));
   if (check.deviation > kLargestRigidDeviation)
-    find(Severity::doubt, Cause::rigid_body, "", "the rigid body is not that of the configuration",
-         fmt::format("{:.0f} % off, {:.3g} ... {:.3g} Hz", 100.0 * check.deviation,
-                     check.band_hz[0], check.band_hz[1]),
+    find(Severity::doubt, Cause::rigid_body, "", "the rigid body differs from the configuration",
+         fmt::format("by {:.0f} %, {:.3g} ... {:.3g} Hz", 100.0 * check.deviation, check.band_hz[0],
+                     check.band_hz[1]),
          "correct mass, inertia or positions in the stage file");
   if (!check.dead_actuators.empty()) return;  // noise has no phase
   const SkewCheck skew = check_skew(lines, outputs, inputs);
   for (const ChannelChange& change : skew.changes)
     findings_.push_back(to_finding(change, record_.info, false));
   if (!skew.unchecked.empty())
-    find(Severity::unchecked, Cause::skew, "", "timing skew behind the recording", "",
+    find(Severity::unchecked, Cause::skew, "", "timing skew between recorder and stage", "",
          "needs " + skew.unchecked + "; fit --delay per_channel estimates it");
 }
 

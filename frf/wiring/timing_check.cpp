@@ -24,7 +24,7 @@ std::optional<Finding> wrong_period(const HealthRecord& record) {
           Severity::fault,
           Cause::aperiodic,
           "",
-          "the records are displaced again and again: period_samples is not their period",
+          "the records are shifted repeatedly: period_samples does not match their period",
           fmt::format("by {} samples in run {}, period of {} samples", one.lost, one.run,
                       record.info.period_samples),
           "correct period_samples and the excitation of the log"};

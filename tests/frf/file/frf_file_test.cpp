@@ -219,7 +219,7 @@ const Damage kDamages[] = {
        f.write_attribute("/", "format", std::string("stageid-frf"));
        f.write_attribute("/", "format_version", 2LL);
      },
-     "format_version is 2; this program reads 1"},
+     "unsupported format_version 2; this program reads 1"},
     {"Hold",
      [](Hdf5File& f) {
        f.write_attribute("/", "format", std::string("stageid-frf"));
@@ -279,7 +279,7 @@ const Damage kDamages[] = {
        const double variance[] = {1.0, -2.0};
        f.write_reals("/total_variance", {2, 1, 1}, variance);
      },
-     ":/total_variance[line 1, z1 <- a1]: a variance is not negative"},
+     ":/total_variance[line 1, z1 <- a1]: a variance must be 0 or more"},
     {"Units",
      [](Hdf5File& f) {
        f.write_attribute("/", "format", std::string("stageid-frf"));

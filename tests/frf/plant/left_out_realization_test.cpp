@@ -113,8 +113,7 @@ TEST(LeftOutRealization, HealthLooksAtTheNextOne) {
 
 TEST(LeftOutRealization, OneAtLeastIsNeeded) {
   const MemoryLog log = log_with_marked_runs({1, 2, 4, 5});
-  const auto wanted =
-      AllOf(HasSubstr("/runs/0001"), HasSubstr("no realization is without such a run"));
+  const auto wanted = AllOf(HasSubstr("/runs/0001"), HasSubstr("every realization has such a run"));
   EXPECT_THAT(test::error_message<FormatError>([&] { estimate_plant_frf({&log}, {}); }), wanted);
   EXPECT_THAT(test::error_message<FormatError>([&] { read_health_record({&log}, {}); }), wanted);
 }

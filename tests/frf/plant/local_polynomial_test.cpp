@@ -86,7 +86,7 @@ TEST(LocalPolynomial, LeavesPeriodsWithAGlitchOut) {
     int glitches = 0;
     for (const DroppedPeriod& dropped : frf.dropped_periods) {
       EXPECT_EQ(dropped.experiment, 0);
-      if (dropped.reason.find("a glitch: z2 is off") == std::string::npos) continue;
+      if (dropped.reason.find("a glitch: z2 deviates") == std::string::npos) continue;
       EXPECT_EQ(dropped.period, period);
       ++glitches;
     }

@@ -31,7 +31,7 @@ TEST(PlantFrfErrors, OnePeriodWithoutEmptyLinesHidesTheTransient) {
   const MemoryLog log = small_log({.lines = {1, 2, 3, 4, 5, 6, 8}, .periods = 1});
   EXPECT_THAT(
       message_of<std::invalid_argument>({&log}, {.transient_periods = 1, .method = FrfMethod::lpm}),
-      AllOf(HasSubstr("memory.slog:/runs/0000"), HasSubstr("excite odd lines")));
+      AllOf(HasSubstr("memory.slog:/runs/0000"), HasSubstr("Excite only odd lines")));
 }
 
 TEST(PlantFrfErrors, TooShortForALocalModel) {
@@ -48,7 +48,7 @@ TEST(PlantFrfErrors, UnknownChannels) {
   EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.outputs = {"q"}}),
               AllOf(HasSubstr("unknown sensor 'q'"), HasSubstr("z1, z2")));
   EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.outputs = {"z1", "z1"}}),
-              HasSubstr("named twice"));
+              HasSubstr("duplicate channel"));
 }
 
 TEST(PlantFrfErrors, NoRealizationIsComplete) {
@@ -71,7 +71,7 @@ TEST(PlantFrfErrors, MoreInputsThanExperiments) {
   log.log_info.excitation = test::channels("d", 3, "N");
   EXPECT_THAT(message_of<std::invalid_argument>({&log}),
               HasSubstr("3 inputs but only 2 experiments in realization 1 (counted from 1); "
-                        "measure one experiment for each input, or select at most 2 inputs"));
+                        "measure one experiment per input, or select at most 2 inputs"));
 }
 
 TEST(PlantFrfErrors, MoreInputsThanExcitedAxes) {
@@ -102,9 +102,8 @@ TEST(PlantFrfErrors, AnIncompleteRealizationAskedFor) {
   log.log_runs[5].complete = false;
   EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.realizations = {0, 1}}),
               HasSubstr("3 excited axes but only 2 experiments in realization 2 (counted from 1)"));
-  EXPECT_THAT(
-      message_of<std::invalid_argument>({&log}, {.realizations = {0, 7}}),
-      HasSubstr("realization 8 has no complete run; counted from 1, those that have one are 1, 2"));
+  EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.realizations = {0, 7}}),
+              HasSubstr("realization 8 has no complete run; those with one are 1, 2"));
 }
 
 TEST(PlantFrfErrors, NothingComplete) {
@@ -124,9 +123,9 @@ TEST(PlantFrfErrors, APeriodThatDoesNotDivideTheRecord) {
 TEST(PlantFrfErrors, NoPeriodLeft) {
   const MemoryLog log = small_log();
   EXPECT_THAT(message_of<FormatError>({&log}, {.transient_periods = 3}),
-              HasSubstr("3 periods recorded, 3 transient: none is left"));
+              HasSubstr("3 periods recorded, 3 transient: no period remains"));
   EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.transient_periods = -1}),
-              HasSubstr("must not be negative"));
+              HasSubstr("must be 0 or more"));
 }
 
 TEST(PlantFrfErrors, AllPeriodsMarked) {
@@ -230,7 +229,7 @@ TEST(PlantFrfErrors, AnExcitationOfAnotherLength) {
 TEST(PlantFrfErrors, AFullCovarianceNeedsTwoPeriods) {
   const MemoryLog log = small_log({.periods = 1});
   EXPECT_THAT(message_of<std::invalid_argument>({&log}, {.covariance = CovarianceKind::full}),
-              HasSubstr("only one clean period"));
+              HasSubstr("needs two clean periods"));
 }
 
 }  // namespace test_plant_frf_errors

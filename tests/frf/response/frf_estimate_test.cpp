@@ -58,7 +58,7 @@ TEST(SelectBand, RefusesAnEmptyBand) {
   };
   EXPECT_THAT(message(20.0, 30.0),
               AllOf(HasSubstr("20 to 30 Hz"), HasSubstr("lines from 1 to 10 Hz")));
-  EXPECT_THAT(message(3.0, 2.5), HasSubstr("ends below its beginning"));
+  EXPECT_THAT(message(3.0, 2.5), HasSubstr("is reversed"));
   EXPECT_THAT(message(kNan, 2.5), HasSubstr("no line"));
 }
 
@@ -147,7 +147,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"lines", [](FrfEstimate& f) { f.noise_variance.conservativeResize(6, 3); },
               "noise_variance: 6 values on 3 lines"},
         Fault{"negative", [](FrfEstimate& f) { f.total_variance(0, 1) = -1e-9; },
-              "total_variance[line 1, z1 <- a1]: a variance is not negative"},
+              "total_variance[line 1, z1 <- a1]: a variance must be 0 or more"},
         Fault{"variance_nan", [](FrfEstimate& f) { f.noise_variance(5, 3) = kNan; },
               "noise_variance[line 3, z2 <- a3]: not finite"},
         Fault{"frequency_order", [](FrfEstimate& f) { f.frequency_hz[2] = 2.5; },
@@ -175,7 +175,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"residual", [](FrfEstimate& f) { f.residual_covariance_im(0, 3) = kNan; },
               "residual_covariance[line 3]: not finite"},
         Fault{"residual_part", [](FrfEstimate& f) { f.residual_covariance_im.resize(0, 0); },
-              "residual_covariance: real and imaginary part differ"},
+              "residual_covariance: the real and imaginary parts differ"},
         Fault{"input_factor", [](FrfEstimate& f) { f.input_factor(2, 1) = kNan; },
               "input_factor[line 1]: not finite"},
         Fault{"covariance",

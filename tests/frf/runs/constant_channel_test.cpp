@@ -63,7 +63,7 @@ TEST(ConstantSensor, GivesAResponseOfZeroByWholeRecordsToo) {
 TEST(ConstantActuator, IsNamed) {
   MemoryLog log = noisy_log();
   for (LogSamples& record : log.records) record.actuators.col(2).setConstant(0.1);
-  const auto named = AllOf(HasSubstr("/runs/0000/actuators"), HasSubstr("channel a3 shows one"));
+  const auto named = AllOf(HasSubstr("/runs/0000/actuators"), HasSubstr("channel a3 is constant"));
   for (const FrfMethod method : {FrfMethod::periodic, FrfMethod::lpm})
     EXPECT_THAT(test::error_message<std::invalid_argument>(
                     [&] { estimate_plant_frf({&log}, {.method = method}); }),

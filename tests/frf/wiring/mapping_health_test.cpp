@@ -70,7 +70,7 @@ TEST(MappedExcitation, IsNamedAndNotCalledDead) {
       EXPECT_EQ(finding->severity, Severity::fault);
       EXPECT_EQ(finding->channel, "a1");
       EXPECT_THAT(finding->what, HasSubstr("equals the excitation a1"));
-      EXPECT_THAT(finding->remedy, HasSubstr("after the injection sum"));
+      EXPECT_THAT(finding->remedy, HasSubstr("after the summation point"));
       EXPECT_EQ(first_with(found, Cause::dead), nullptr);
       EXPECT_EQ(std::count_if(found.begin(), found.end(),
                               [](const Finding& f) { return f.severity == Severity::fault; }),
@@ -149,7 +149,7 @@ TEST(SilentAxis, IsNamedThoughItsExcitationIsRecorded) {
   ASSERT_NE(finding, nullptr);
   EXPECT_EQ(finding->severity, Severity::fault);
   EXPECT_EQ(finding->channel, "a2");
-  EXPECT_THAT(finding->what, HasSubstr("does not arrive"));
+  EXPECT_THAT(finding->what, HasSubstr("does not reach the stage"));
 }
 
 TEST(SilentStage, IsNoCaseOfDeadSensors) {

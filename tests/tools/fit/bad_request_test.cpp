@@ -321,7 +321,7 @@ TEST_F(BadRequest, Reports) {
 TEST_F(BadRequest, NamesThatAreNearOnes) {
   make_log();
   fail({"frf", name("run.slog"), "-o", name("x.h5"), "--inputs", "a1,A2,a3"}, 2,
-       "inputs: unknown actuator 'A2'; did you mean 'a2'? There are a1, a2, a3");
+       "inputs: unknown actuator 'A2'; did you mean 'a2'? Available: a1, a2, a3");
   fail(
       {"config", "check", experiment("e.yaml", "rigid_body: suspension", "rigid_body: suspention")},
       2, "(did you mean 'suspension'?)");
@@ -345,7 +345,7 @@ TEST_F(BadRequest, Fits) {
     fail(flags, 2, text);
   };
   wrong({"--band", "900", "950"},
-        "no line lies in it; the frequency response has lines from 16 to 800 Hz");
+        "contains no lines; the frequency response has lines from 16 to 800 Hz");
   wrong({"--band", "500", "100"}, "write the lower frequency first");
   wrong({"--rigid-body", "half"}, "--rigid-body: got 'half'; expected auto, none, full, a rank");
   wrong({"--rigid-body", "suspention"}, "or suspension:F1:F2 (Hz) (did you mean 'suspension'?)");
@@ -365,12 +365,12 @@ TEST_F(BadRequest, Fits) {
   wrong({"--method", "sgd"}, "--method");
   wrong({"--max-iterations", "0"}, "--max-iterations");
   fail({"fit", name("frf.h5"), "-o", name("m.json"), "--weighting", name("none.h5")}, 1, "none.h5");
-  fail({"modes", name("frf.h5"), "--band", "900", "950"}, 2, "no line lies in it");
+  fail({"modes", name("frf.h5"), "--band", "900", "950"}, 2, "contains no lines");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--inputs", "a9"}, 2, "a9");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--outputs", "s9"}, 2, "s9");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "0"}, 2, "counted from 1");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--realizations", "9"}, 2,
-       "realization 9 has no complete run; counted from 1, those that have one are 1, 2, 3");
+       "realization 9 has no complete run; those with one are 1, 2, 3");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--transient-periods", "9"}, 2,
        "5 periods recorded, 9 transient");
 }

@@ -202,21 +202,21 @@ class LineAtZero(unittest.TestCase):
         for structure in ((), ("--rigid-body", "none")):
             done = fit("dc.h5", "-o", "dc.json", "--modes", "120,250", *structure, code=program(
                 "fit", "ac.h5", "-o", "ac.json", "--modes", "120,250", *structure).returncode)
-            self.assertIn("dc.h5: the line at 0 Hz is left out", done.stderr)
+            self.assertIn("dc.h5: the line at 0 Hz is ignored", done.stderr)
             dc, ac = model("dc.json"), model("ac.json")
             self.assertEqual(dc["submodels"], ac["submodels"])
-            self.assertTrue(any("0 Hz is left out" in d for d in dc["provenance"]["decisions"]))
+            self.assertTrue(any("0 Hz is ignored" in d for d in dc["provenance"]["decisions"]))
 
     def test_modes_are_those_of_the_other_lines(self):
         with_dc = program("modes", "dc.h5")
         self.assertEqual(with_dc.stdout, program("modes", "ac.h5").stdout)
-        self.assertIn("0 Hz is left out", with_dc.stderr)
+        self.assertIn("0 Hz is ignored", with_dc.stderr)
 
     def test_nothing_but_it_is_refused(self):
         for command in (("fit", "dc.h5", "-o", "n.json"), ("modes", "dc.h5")):
             done = program(*command, "--band", "0", "0.5")
             self.assertEqual(done.returncode, 2)
-            self.assertIn("take a wider --band", done.stderr)
+            self.assertIn("use a wider --band", done.stderr)
 
     def test_weights_of_the_whole_response_are_taken(self):
         W = 1 / abs(self.G) ** 2

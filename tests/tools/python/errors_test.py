@@ -83,7 +83,7 @@ class Refused(unittest.TestCase):
         self.refuses(stageid.RequestError, "level", stageid.multisine, 1000.0, 500, 10.0, 100.0, -1.0, 7)
         self.refuses(stageid.RequestError, "", frf.select, band_hz=(900.0, 950.0))
         self.refuses(stageid.RequestError, "inputs: unknown input 'A1'; did you mean 'a1'", frf.select, inputs=["A1"])
-        self.refuses(stageid.RequestError, "outputs: unknown output 'velocity'; there are", frf.select,
+        self.refuses(stageid.RequestError, "outputs: unknown output 'velocity'; available:", frf.select,
                      outputs=["velocity"])
         self.refuses(stageid.RequestError,
                      r"realizations: 8 has no complete run in .*run.slog; there are 0, 1, 2.* count from 0 in Python",

@@ -113,7 +113,7 @@ TEST_F(DamagedData, AnAxisThatIsNeverExcitedIsRefusedOrLeftOut) {
   // Where nobody asks for it, it is left out, and the health of the data says so.
   const ProgramResult without = succeed({"frf", two_axes, "-o", name("f.h5")});
   EXPECT_THAT(without.out,
-              testing::ContainsRegex("doubt +a2 +is not part of the sub-plant but moves"));
+              testing::ContainsRegex("doubt +a2 +is not an input of the sub-plant but moves"));
 }
 
 TEST_F(DamagedData, ThreeExperimentsOfRankTwoAreSingular) {
