@@ -71,8 +71,8 @@ ResidueForm::ResidueForm(const SubmodelShape& shape, int rank, Eigen::Index n_ou
     rho_size_ = 2 * (n_y_ + n_u_ - 1);
   } else {
     throw std::invalid_argument(
-        "a residue's rank can be given for submodels with one numerator coefficient and, rank 1, "
-        "for modes with two");
+        "a residue rank is supported only for submodels with one numerator coefficient, and rank 1 "
+        "also for modes with two");
   }
 }
 

@@ -98,7 +98,7 @@ class Iteration {
     if ((!solved || nearly_exact()) && all_digits()) solved = solve();
     if (!solved)
       return end(FitStatus::singular,
-                 "the start's numerators are not determined: two modes coincide or the data do not "
+                 "the numerators of the start are singular: two modes coincide, or the data do not "
                  "excite them");
     result_.cost.push_back(cost_);
     return true;
@@ -144,7 +144,8 @@ class Iteration {
     gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
     if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance) {
       end(FitStatus::gradient_small,
-          fmt::format("the first-order condition holds: scaled gradient {:.2g}", gradient_));
+          fmt::format("converged: the first-order condition is satisfied, scaled gradient {:.2g}",
+                      gradient_));
       return true;
     }
     // Newton decrement: the distance to the stationary point in standard deviations of the noise that the
@@ -155,14 +156,13 @@ class Iteration {
         std::abs(system.solve_globals(0.0, frozen_).dot(system.schur_gradient())) * data / squares);
     if (deviations_ < options_.deviation_tolerance) {
       end(FitStatus::gradient_small,
-          fmt::format(
-              "the first-order condition holds: within {:.1g} standard deviations of it, scaled "
-              "gradient {:.2g}",
-              deviations_, gradient_));
+          fmt::format("converged: within {:.1g} standard deviations of the first-order condition, "
+                      "scaled gradient {:.2g}",
+                      deviations_, gradient_));
       return true;
     }
     if (cost_ < 1e-28 * signal_cost_) {
-      end(FitStatus::gradient_small, "the residual has reached rounding");
+      end(FitStatus::gradient_small, "converged: the residual is at rounding level");
       return true;
     }
     return false;
@@ -179,7 +179,7 @@ class Iteration {
     const ArrowSystem system(problem_, beta_, groups, method, kGlobalsOnly);
     if (!system.regular())
       return all_digits() ||
-             end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+             end(FitStatus::singular, "the numerators are singular: two modes coincide");
     if (at_optimum(system)) return false;
     const double before = cost_;
     const int tries = at_rounding() ? kTriesAtRounding : kTries;
@@ -202,11 +202,11 @@ class Iteration {
     }
     if (at_rounding())
       return end(FitStatus::step_small,
-                 "the residual has reached rounding: no step lowers the cost any further");
+                 "converged: the residual is at rounding level and no step lowers the cost");
     if (deviations_ < kRoundingDeviations)
       return end(FitStatus::step_small,
-                 fmt::format("the cost is at rounding, within {:.1g} standard deviations of the "
-                             "first-order condition; scaled gradient {:.2g}",
+                 fmt::format("converged: the cost is at rounding level, within {:.1g} standard "
+                             "deviations of the first-order condition; scaled gradient {:.2g}",
                              deviations_, gradient_));
     return end(FitStatus::cost_stalled,
                fmt::format("no step lowers the cost; scaled gradient {:.2g}", gradient_));
@@ -242,7 +242,7 @@ class Iteration {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
     if (!system.regular())
-      return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+      return end(FitStatus::singular, "the numerators are singular: two modes coincide");
     frozen_ = bounds_.leaning(beta_, system.schur_gradient());
     gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
     Eigen::VectorXd step = system.solve_globals(0.0, frozen_);
@@ -255,9 +255,9 @@ class Iteration {
     accept(std::move(*trial));
     if (cost_ < best_.cost) best_ = Trial{beta_, cost_};
     if (step_size_ < std::max(options_.step_tolerance, 1e-9))
-      return end_at_best(FitStatus::step_small,
-                         "the fixed point of Sanathanan and Koerner is reached; it is not the "
-                         "minimum of the cost");
+      return end_at_best(
+          FitStatus::step_small,
+          "reached the Sanathanan-Koerner fixed point, which is not the minimum of the cost");
     if (result_.iterations >= options_.max_iterations)
       return end_at_best(FitStatus::iteration_limit,
                          fmt::format("stopped after {} iterations", result_.iterations));

@@ -59,7 +59,7 @@ class JointIteration {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const JointEquations equations(problem_, weights_, beta_, groups, E_);
     if (!equations.regular())
-      return end(FitStatus::singular, "the numerators are not determined: two modes coincide");
+      return end(FitStatus::singular, "the numerators are singular: two modes coincide");
     const Eigen::VectorXd step = free_step(equations);
     if (at_optimum(equations.gradient().dot(step))) return false;
     if (result_.iterations >= options_.max_iterations)
@@ -70,11 +70,11 @@ class JointIteration {
     if (descend(equations, step)) return true;
     if (E_.cost < kNothingLeft * signal_cost_)
       return end(FitStatus::step_small,
-                 "the residual has reached rounding: no step lowers the cost any further");
+                 "converged: the residual is at rounding level and no step lowers the cost");
     if (deviations_ < kRoundingDeviations)
       return end(FitStatus::step_small,
-                 fmt::format("the cost is at rounding, within {:.1g} standard deviations of the "
-                             "first-order condition",
+                 fmt::format("converged: the cost is at rounding level, within {:.1g} standard "
+                             "deviations of the first-order condition",
                              deviations_));
     return end(FitStatus::cost_stalled, fmt::format("no step lowers the cost, {:.2g} standard "
                                                     "deviations from the first-order condition",
@@ -97,13 +97,13 @@ class JointIteration {
     const double gradient = std::sqrt(std::max(decrement, 0.0) / std::max(squares, 1e-300));
     deviations_ = gradient * std::sqrt(static_cast<double>(problem_.size() * problem_.channels()));
     if (E_.cost < 1e-28 * signal_cost_) {
-      end(FitStatus::gradient_small, "the residual has reached rounding");
+      end(FitStatus::gradient_small, "converged: the residual is at rounding level");
       return true;
     }
     if (gradient >= options_.gradient_tolerance && deviations_ >= options_.deviation_tolerance)
       return false;
     end(FitStatus::gradient_small,
-        fmt::format("the first-order condition holds: within {:.1g} standard deviations of it",
+        fmt::format("converged: within {:.1g} standard deviations of the first-order condition",
                     deviations_));
     return true;
   }

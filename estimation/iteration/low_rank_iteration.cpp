@@ -88,7 +88,7 @@ class LowRankIteration {
                              ChannelEquationsUse::only_kept);
     N_ = factors_.reduced_matrix(beta_, system);
     g_ = factors_.reduced_gradient(beta_, system);
-    if (!N_.allFinite()) return end(FitStatus::singular, "the residue factors are not determined");
+    if (!N_.allFinite()) return end(FitStatus::singular, "the residue factors are singular");
     frozen_ = bounds_.leaning(beta_, g_.head(problem_.globals()));
     const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.end_cost;
     gradient_ = 0.0;
@@ -106,8 +106,8 @@ class LowRankIteration {
     if (attempt()) return true;
     if (deviations < kRoundingDeviations)
       return end(FitStatus::step_small,
-                 fmt::format("residues of given rank: the cost is at rounding, within {:.1g} "
-                             "standard deviations of the first-order condition",
+                 fmt::format("residues of given rank: converged: the cost is at rounding level, "
+                             "within {:.1g} standard deviations of the first-order condition",
                              deviations));
     return end(
         FitStatus::cost_stalled,

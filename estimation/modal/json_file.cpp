@@ -40,7 +40,7 @@ double JsonNode::number() const {
 
 double JsonNode::positive() const {
   const double value = number();
-  if (!(value > 0.0)) fail("must be above zero");
+  if (!(value > 0.0)) fail("must be positive");
   return value;
 }
 
@@ -52,7 +52,7 @@ long long JsonNode::integer(long long lowest, long long highest) const {
   if (!value_.is_number_integer()) fail("must be a whole number");
   const auto number = value_.get<long long>();
   if (number < lowest || number > highest)
-    fail("is " + std::to_string(number) + " and must be " +
+    fail("is " + std::to_string(number) + "; must be " +
          (lowest == highest ? std::to_string(lowest)
                             : "a whole number from " + std::to_string(lowest) + " to " +
                                   std::to_string(highest)));
@@ -60,7 +60,7 @@ long long JsonNode::integer(long long lowest, long long highest) const {
 }
 
 std::string JsonNode::text() const {
-  if (!value_.is_string()) fail("must be text in quotes");
+  if (!value_.is_string()) fail("must be a string in quotes");
   return value_.get<std::string>();
 }
 
@@ -91,7 +91,7 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
   std::stringstream text;
   text << stream.rdbuf();
   if (text.str().empty())
-    throw FormatError(file_, "", "is empty; a JSON file of format " + format + " is wanted");
+    throw FormatError(file_, "", "is empty; expected a JSON file of format " + format);
   const std::string wanted =
       format == "stageid-model" ? "a model (.json)" : "a " + format + " file (.json)";
   const auto refuse_other_kind = [&] {
@@ -105,7 +105,7 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
     const std::string what = error.what();  // ... number overflow parsing '1e999'
     const std::size_t start = what.find('\'');
     throw FormatError(file_, "",
-                      "holds a number beyond double precision" +
+                      "contains a number out of range for double precision" +
                           (start == std::string::npos ? "" : ": " + what.substr(start)));
   } catch (const nlohmann::ordered_json::parse_error& error) {
     // The library's own text names line and column behind its error number.

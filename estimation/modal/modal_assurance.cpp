@@ -66,7 +66,7 @@ std::vector<ModePair> pair_modes(const std::vector<ModeShape>& first,
                                  const std::vector<ModeShape>& second,
                                  const PairingOptions& options) {
   if (!is_share(options.most_frequency_difference) || !is_share(options.least_mac))
-    throw std::invalid_argument("pairing of modes: its limits must be above 0 and at most 1");
+    throw std::invalid_argument("pairing of modes: the limits must be above 0 and at most 1");
   if (first.empty() || second.empty()) return {};
   std::vector<Candidate> sorted = candidates(first, second, options);
   std::stable_sort(sorted.begin(), sorted.end(),

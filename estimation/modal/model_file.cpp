@@ -86,11 +86,12 @@ Eigen::MatrixXd matrix_from_json(const JsonNode& node, std::size_t rows, std::si
                                  bool or_null = false) {
   Eigen::MatrixXd out(rows, columns);
   const std::vector<JsonNode> lines = node.elements();
-  if (lines.size() != rows) node.fail("must have " + std::to_string(rows) + " rows, one an output");
+  if (lines.size() != rows)
+    node.fail("must have " + std::to_string(rows) + " rows, one per output");
   for (std::size_t y = 0; y < rows; ++y) {
     const std::vector<double> values = or_null ? lines[y].numbers_or_null() : lines[y].numbers();
     if (values.size() != columns)
-      lines[y].fail("must have " + std::to_string(columns) + " numbers, one an input");
+      lines[y].fail("must have " + std::to_string(columns) + " numbers, one per input");
     for (std::size_t u = 0; u < columns; ++u)
       out(static_cast<Eigen::Index>(y), static_cast<Eigen::Index>(u)) = values[u];
   }
@@ -117,9 +118,9 @@ std::vector<Eigen::MatrixXd> deviations_from_json(const JsonNode& node,
     out.push_back(matrix_from_json(matrix, static_cast<std::size_t>(numerator[0].rows()),
                                    static_cast<std::size_t>(numerator[0].cols()), true));
     if ((out.back().array() < 0.0).any())
-      matrix.fail("must not hold a negative standard deviation");
+      matrix.fail("must not contain a negative standard deviation");
   }
-  if (out.size() != numerator.size()) list.fail("must have as many matrices as numerator");
+  if (out.size() != numerator.size()) list.fail("must have as many matrices as \"numerator\"");
   return out;
 }
 
@@ -129,9 +130,9 @@ Eigen::VectorXcd shape_deviation_from_json(const JsonNode& node, const std::stri
   const auto read = [&](const std::string& key) {
     const std::vector<double> values = node.member(key).numbers();
     if (static_cast<Eigen::Index>(values.size()) != size)
-      node.member(key).fail("must have " + std::to_string(size) + " numbers, one a channel");
+      node.member(key).fail("must have " + std::to_string(size) + " numbers, one per channel");
     if (*std::min_element(values.begin(), values.end()) < 0.0)
-      node.member(key).fail("must not hold a negative standard deviation");
+      node.member(key).fail("must not contain a negative standard deviation");
     return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(values.data(), size));
   };
   out.real() = read(name + "_std");
@@ -158,7 +159,7 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
     node.member("denominator").fail("must not end with 0");
   for (const JsonNode& matrix : node.member("numerator").elements())
     s.numerator.push_back(matrix_from_json(matrix, n_outputs, n_inputs));
-  if (s.numerator.empty()) node.member("numerator").fail("must hold at least one matrix");
+  if (s.numerator.empty()) node.member("numerator").fail("must contain at least one matrix");
   if (s.numerator.size() > s.denominator.size() + static_cast<std::size_t>(s.integrators))
     node.member("numerator")
         .fail("has a higher degree than the denominator: the submodel is improper");
@@ -188,7 +189,7 @@ Eigen::VectorXd delays_from_json(const JsonNode& root, const std::string& key, s
   if (!root.has(key)) return Eigen::VectorXd::Zero(static_cast<Eigen::Index>(size));
   const std::vector<double> values = root.member(key).numbers();
   if (values.size() != size)
-    root.member(key).fail("must have " + std::to_string(size) + " numbers, one a channel");
+    root.member(key).fail("must have " + std::to_string(size) + " numbers, one per channel");
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(size));
 }
 
@@ -197,7 +198,7 @@ Eigen::VectorXd delay_deviations_from_json(const JsonNode& root, const std::stri
                                            std::size_t size) {
   if (!root.has(key)) return {};
   Eigen::VectorXd out = delays_from_json(root, key, size);
-  if (out.minCoeff() < 0.0) root.member(key).fail("must not hold a negative standard deviation");
+  if (out.minCoeff() < 0.0) root.member(key).fail("must not contain a negative standard deviation");
   return out;
 }
 
@@ -274,7 +275,7 @@ AdditiveModel read_model(const std::filesystem::path& file) {
   model.outputs = channels_from_json(root, "outputs");
   model.sample_rate_hz = root.number_or("sample_rate_hz", 0.0);
   if (model.sample_rate_hz < 0.0)
-    root.member("sample_rate_hz").fail("must not be negative (0: unknown)");
+    root.member("sample_rate_hz").fail("must be 0 or more (0: unknown)");
   model.hold = root.has("hold") ? hold_from_text(root.member("hold")) : HoldModel::none;
   model.input_delay_s = delays_from_json(root, "input_delay_s", model.inputs.size());
   model.output_delay_s = delays_from_json(root, "output_delay_s", model.outputs.size());

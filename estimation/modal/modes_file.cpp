@@ -30,7 +30,7 @@ std::vector<ModeCandidate> read_modes(const std::filesystem::path& file) {
     mode.cmif_curve =
         node.has("cmif_curve") ? static_cast<int>(node.member("cmif_curve").integer(1, 1000)) : 1;
     if (mode.damping_ratio >= 1.0)
-      node.member("damping_ratio").fail("must be below 1 (1 is critical)");
+      node.member("damping_ratio").fail("must be below 1 (1 is critical damping)");
     modes.push_back(mode);
   }
   return modes;

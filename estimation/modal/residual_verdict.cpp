@@ -172,7 +172,7 @@ ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse&
                                const Distortion& known) {
   if (weights.size() > 0 &&
       (weights.rows() != frf.response.rows() || weights.cols() != frf.response.cols()))
-    throw std::invalid_argument("judge_residual: weights and response differ in shape");
+    throw std::invalid_argument("residual: the weights must have the shape of the response");
   const auto judge_with = [&](ResidualVariance kind, const Eigen::MatrixXd& variance, double dof) {
     ResidualVerdict verdict;
     verdict.variance = kind;

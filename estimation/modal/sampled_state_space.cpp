@@ -146,7 +146,8 @@ void append_delay_states(const Eigen::MatrixXd& late, StateSpace& system) {
 SampledStateSpace sampled_state_space(const AdditiveModel& model) {
   if (!(model.sample_rate_hz > 0.0))
     throw std::invalid_argument(
-        "model: a sampled state space needs the sample rate, and the model has none");
+        "model: a sampled state space needs a sample rate, but the model has none; set "
+        "sample_rate_hz");
   const StateSpace continuous = state_space(model);
   const double period_s = 1.0 / model.sample_rate_hz;
   const DividedDelays delays = divide(model, period_s);

@@ -33,7 +33,7 @@ void require_distinct(const std::vector<Complex>& poles, std::size_t index) {
       if (std::abs(poles[i] - poles[j]) <= kClosest * std::abs(poles[i]))
         throw std::invalid_argument(
             fmt::format("model: submodel {}: its poles {:.6g}{:+.6g}j and {:.6g}{:+.6g}j rad/s "
-                        "coincide; a state space needs poles that are distinct within a submodel",
+                        "coincide; a state space needs distinct poles within a submodel",
                         index, poles[j].real(), poles[j].imag(), poles[i].real(), poles[i].imag()));
 }
 
@@ -61,10 +61,10 @@ SubmodelResidues residues(const Submodel& submodel, std::size_t index) {
   const auto& B = submodel.numerator;
   if (l < 0 || l > 2)
     throw std::invalid_argument(
-        fmt::format("model: submodel {}: it must have 0, 1 or 2 integrators", index));
+        fmt::format("model: submodel {}: must have 0, 1 or 2 integrators", index));
   if (B.empty() || B.size() > order + 1)
-    throw std::invalid_argument(fmt::format(
-        "model: submodel {}: it needs one numerator at least and must not be improper", index));
+    throw std::invalid_argument(
+        fmt::format("model: submodel {}: must be proper and have at least one numerator", index));
   const std::vector<Complex> representatives = pole_representatives(submodel);
   const std::vector<Complex> poles = all_poles(representatives);
   require_distinct(poles, index);
@@ -96,10 +96,10 @@ Eigen::Index residue_rank(const Submodel& submodel, std::size_t index,
   const Eigen::Index held = *submodel.residue_rank;
   const double excess = singular_values[held] / singular_values[0];
   if (excess > kContradiction)
-    throw std::invalid_argument(fmt::format(
-        "model: submodel {}: residue_rank is {}, but singular value {} of its residue is {:.1e} of "
-        "the first; correct residue_rank or leave it out",
-        index, held, held + 1, excess));
+    throw std::invalid_argument(
+        fmt::format("model: submodel {}: residue_rank is {}, but singular value {} of its residue "
+                    "is {:.1e} of the first; correct residue_rank or omit it",
+                    index, held, held + 1, excess));
   return held;
 }
 

@@ -65,11 +65,11 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
                           const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold) {
   if (hold != HoldModel::none && !(model.sample_rate_hz > 0.0))
     throw std::invalid_argument(
-        "model: a hold needs the sample rate, and the model has none; use hold none");
+        "model: a hold needs a sample rate, but the model has none; use hold none");
   if (hold == HoldModel::exact && frequency_hz.size() > 0 &&
       frequency_hz.maxCoeff() > 0.5 * model.sample_rate_hz * (1.0 + 1e-9))
     throw std::invalid_argument(
-        "model: a frequency lies above half the sample rate; leave it out or use hold none");
+        "model: a frequency is above half the sample rate; omit it or use hold none");
   const ModelLines lines{2.0 * std::numbers::pi * frequency_hz,
                          model.sample_rate_hz > 0.0 ? 1.0 / model.sample_rate_hz : 0.0, hold};
   const Eigen::Index channels = model.n_outputs() * model.n_inputs();

@@ -24,7 +24,7 @@ Eigen::MatrixXcd weighted_response(const FrfEstimate& frf, CmifKind kind, Eigen:
         frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
     if (variance.size() == 0)
       throw std::invalid_argument(
-          "CMIF: whitening needs variances, and the FRF has none; use accelerance");
+          "CMIF: whitening needs variances, but the FRF has none; use accelerance");
     G.reshaped() =
         G.reshaped().cwiseQuotient(variance.col(k).cwiseSqrt().cast<std::complex<double>>());
   }

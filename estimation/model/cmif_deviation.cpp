@@ -19,7 +19,7 @@ Eigen::MatrixXd element_weights(const FrfEstimate& frf, CmifKind kind, Eigen::In
         frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
     if (noise.size() == 0)
       throw std::invalid_argument(
-          "CMIF: whitening needs variances, and the FRF has none; use accelerance");
+          "CMIF: whitening needs variances, but the FRF has none; use accelerance");
     weights.reshaped() = noise.col(k).cwiseSqrt().cwiseInverse();
   }
   return weights;

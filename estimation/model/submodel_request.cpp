@@ -20,26 +20,27 @@ std::string fault_of_start(const SubmodelRequest& request) {
   const std::vector<double>& f = request.frequency_hz;
   const std::vector<double>& zeta = request.damping_ratio;
   if (request.order_by_search && !(f.empty() && zeta.empty()))
-    return "with n=auto the poles are searched; leave frequencies and damping ratios out";
+    return "n=auto searches the poles; omit frequencies and damping ratios";
   if (!f.empty() && f.size() != poles)
-    return fmt::format("n={} starts from {}{}; {} given", request.shape.order,
+    return fmt::format("n={} needs {}{}; {} given", request.shape.order,
                        counted(poles, "frequency", "frequencies"),
-                       request.has_real_pole() && pairs > 0 ? ", the last of the real pole" : "",
+                       request.has_real_pole() && pairs > 0 ? ", the last for the real pole" : "",
                        f.size());
   if (!std::all_of(f.begin(), f.end(), [](double x) { return std::isfinite(x) && x > 0.0; }))
-    return "a frequency is above 0 Hz";
+    return "frequencies must be above 0 Hz";
   if (!zeta.empty() && f.empty())
-    return "a damping ratio without a frequency; give both, or neither and they are searched";
+    return "a damping ratio needs a frequency; give both, or neither to search for them";
   if (zeta.size() > 1 && zeta.size() != pairs)
-    return fmt::format("n={} takes one damping ratio or {}; {} given", request.shape.order, pairs,
+    return fmt::format("n={} needs one damping ratio or {}; {} given", request.shape.order, pairs,
                        zeta.size());
-  if (!zeta.empty() && pairs == 0) return "a real pole has no damping ratio; leave it out";
+  if (!zeta.empty() && pairs == 0) return "a real pole has no damping ratio; omit it";
   if (!std::all_of(zeta.begin(), zeta.end(), [](double x) { return x > 0.0 && x <= 0.9; }))
-    return "a damping ratio is above 0 and at most 0.9";
+    return "damping ratios must be above 0 and at most 0.9";
   for (auto at = f.begin();
        at != f.begin() + static_cast<std::ptrdiff_t>(std::min(pairs, f.size())); ++at)
     if (std::find(f.begin(), at, *at) != at)
-      return fmt::format("two poles start at {} Hz and could not be told apart; move one", *at);
+      return fmt::format("two poles start at {} Hz, where they are indistinguishable; move one",
+                         *at);
   return {};
 }
 
@@ -47,15 +48,16 @@ std::string fault_of_start(const SubmodelRequest& request) {
 
 std::string fault_of(const SubmodelRequest& request) {
   const auto [l, n, m] = request.shape;
-  if (request.order_by_search && l > 0) return "n=auto goes without integrators; leave l out";
-  if (l < 0 || l > 2) return fmt::format("l={}; write 0, 1 or 2 integrators", l);
+  if (request.order_by_search && l > 0) return "n=auto does not support integrators; omit l";
+  if (l < 0 || l > 2) return fmt::format("l={} is out of range; give 0, 1 or 2 integrators", l);
   if (n < 0 || n > kLargestOrder)
-    return fmt::format("n={}; write an order from 0 to {}, larger ones as several submodels", n,
+    return fmt::format("n={} is out of range; give an order from 0 to {}, or several submodels", n,
                        kLargestOrder);
-  if (m < 0) return fmt::format("m={}; a numerator's degree is 0 or more", m);
+  if (m < 0)
+    return fmt::format("m={} is out of range; the degree of the numerator must be 0 or more", m);
   if (!request.order_by_search && m > n + l)
-    return fmt::format("m={} is above n + l = {}, which is improper; write at most {}", m, n + l,
-                       n + l);
+    return fmt::format("m={} is above n + l = {}, so the submodel is improper; give at most {}", m,
+                       n + l, n + l);
   return fault_of_start(request);
 }
 
@@ -67,17 +69,15 @@ std::string fault_of(const std::vector<SubmodelRequest>& requests, bool rigid_bo
   const auto integrating = count([](const SubmodelRequest& r) { return r.shape.integrators > 0; }) +
                            (rigid_body ? 1 : 0);
   if (integrating > 1)
-    return fmt::format(
-        "{} terms with integrators (l > 0{}), which the data cannot tell apart; keep one",
-        integrating, rigid_body ? ", the rigid body is one" : "");
+    return fmt::format("{} terms with integrators (l > 0{}) are indistinguishable; keep one",
+                       integrating, rigid_body ? ", including the rigid body" : "");
   const auto biproper =
       count([](const SubmodelRequest& r) { return r.biproper(); }) + (direct_term ? 1 : 0);
   if (biproper > 1)
-    return fmt::format(
-        "{} biproper terms (m = n + l{}), which the data cannot tell apart; keep one", biproper,
-        direct_term ? ", the direct term is one" : "");
+    return fmt::format("{} biproper terms (m = n + l{}) are indistinguishable; keep one", biproper,
+                       direct_term ? ", including the direct term" : "");
   if (requests.size() > 1 && count([](const SubmodelRequest& r) { return r.order_by_search; }) > 0)
-    return "n=auto takes all modes into one denominator; let it be the only submodel";
+    return "n=auto puts all modes into one denominator, so it must be the only submodel";
   return {};
 }
 

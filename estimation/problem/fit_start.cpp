@@ -26,7 +26,7 @@ void check_structure(const FrfEstimate& frf, const AdditiveModel& start) {
     const auto m = static_cast<int>(s.numerator.size()) - 1;
     require(n >= 0 && s.denominator[0] == 1.0, "fit: a denominator must start with 1");
     require(s.integrators >= 0 && s.integrators <= 2,
-            "fit: a submodel may have 0, 1 or 2 integrators");
+            "fit: a submodel must have 0, 1 or 2 integrators");
     require(std::all_of(s.denominator.begin(), s.denominator.end(),
                         [](double a) { return std::isfinite(a); }) &&
                 s.denominator.back() != 0.0,
@@ -37,11 +37,12 @@ void check_structure(const FrfEstimate& frf, const AdditiveModel& start) {
     integrating += s.integrators > 0 ? 1 : 0;
     for (const Eigen::MatrixXd& B : s.numerator)
       require(B.rows() == frf.n_outputs() && B.cols() == frf.n_inputs(),
-              "fit: a numerator's shape is not outputs x inputs");
+              "fit: the shape of a numerator must be outputs x inputs");
   }
-  require(biproper <= 1, "fit: at most one submodel may be biproper, or the model is not unique");
+  require(biproper <= 1,
+          "fit: at most one submodel may be biproper; otherwise the model is not unique");
   require(integrating <= 1,
-          "fit: at most one submodel may have integrators, or the model is not unique");
+          "fit: at most one submodel may have integrators; otherwise the model is not unique");
 }
 
 /// a_2 of the modes whose frequency is held.
@@ -62,24 +63,24 @@ void check_start(const FrfEstimate& frf, const AdditiveModel& start, const FitOp
   check(frf);
   require(!start.submodels.empty(),
           "fit: the start has no submodel; give at least one mode or the rigid body");
-  require(options.max_iterations >= 0, "fit: max_iterations must not be negative");
+  require(options.max_iterations >= 0, "fit: max_iterations must be 0 or more");
   require(std::isfinite(options.delay_s), "fit: the delay must be finite");
-  require(!has_dc_line(frf), "fit: a line lies at 0 Hz; leave it out (without_dc_line)");
+  require(!has_dc_line(frf), "fit: a line is at 0 Hz; remove it (without_dc_line)");
   if (options.hold != HoldModel::none)
     require(frf.sample_rate_hz > 0.0,
-            fmt::format("fit: hold {} needs the sample rate, and the FRF has none; use hold none",
+            fmt::format("fit: hold {} needs a sample rate, but the FRF has none; use hold none",
                         to_string(options.hold)));
   if (options.hold == HoldModel::exact)
     require(frf.frequency_hz.maxCoeff() < 0.5 * frf.sample_rate_hz,
-            "fit: a line lies at or above half the sample rate; choose a smaller band");
+            "fit: a line is at or above half the sample rate; choose a smaller band");
   const bool matrices =
       options.weighting == Weighting::likelihood ||
       (options.weighting == Weighting::user && options.user_weight_matrices.size() > 0);
-  require(!matrices || (options.residue_rank == 0 && options.rigid_body_rank == 0),
-          "fit: residues of given rank are fitted with one weight a channel; use --weighting "
-          "noise_variance");
+  require(
+      !matrices || (options.residue_rank == 0 && options.rigid_body_rank == 0),
+      "fit: residues of given rank need one weight per channel; use --weighting noise_variance");
   require(!matrices || options.method != FitMethod::sk,
-          "fit: method sk takes diagonal weights only; use riv or gn");
+          "fit: method sk supports only diagonal weights; use riv or gn");
   check_structure(frf, start);
 }
 
@@ -104,8 +105,7 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
   require(
       2 * problem.size() >= per_channel && 2 * problem.size() * problem.channels() >=
                                                problem.globals() + per_channel * problem.channels(),
-      fmt::format("fit: {} of {} cannot carry {} parameters; choose fewer modes or "
-                  "a wider band",
+      fmt::format("fit: {} of {} are too few for {} parameters; choose fewer modes or a wider band",
                   counted(problem.size(), "line"), counted(problem.channels(), "channel"),
                   problem.globals() + per_channel * problem.channels()));
   return problem;

@@ -35,7 +35,7 @@ FitStatus SearchLimit::status() const {
 
 const char* SearchLimit::message() const {
   return was_interrupted() ? "interrupted: this is the best model so far"
-                           : "the search has used its budget: this is the best model so far";
+                           : "the search reached its budget: this is the best model so far";
 }
 
 bool ended_by_limit(const FitResult& fit) noexcept {

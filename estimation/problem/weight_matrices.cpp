@@ -58,18 +58,17 @@ void require_factors(const FrfEstimate& frf) {
        {std::pair{frf.residual_covariance_re.size(), "residual_covariance"},
         std::pair{frf.input_factor.size(), "input_factor"}})
     if (size == 0)
-      refuse(
-          fmt::format("weighting likelihood needs /{0} in the FRF; it has none (estimate it again "
-                      "from the log, two periods or more, with this version's 'stageid frf'; or "
-                      "use noise_variance)",
-                      name));
+      refuse(fmt::format(
+          "weighting likelihood needs /{0} in the FRF, which is missing. Estimate the FRF again "
+          "with 'stageid frf' from at least two periods, or use noise_variance",
+          name));
   const Eigen::Index n_y = frf.n_outputs();
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
     for (Eigen::Index y = 0; y < n_y; ++y)
       if (!(frf.residual_covariance_re(y * (n_y + 1), k) > 0.0))
         refuse_indefinite(
             fmt::format("weighting likelihood: residual_covariance of {} on {} is not positive; "
-                        "leave the output out",
+                        "exclude the output",
                         frf.outputs.names[static_cast<std::size_t>(y)], line_name(frf, k)));
 }
 
@@ -96,11 +95,10 @@ WeightMatrices WeightMatrices::likelihood(const FrfEstimate& frf) {
   const SmoothedCovariance C = smoothed_residual_covariance(frf);
   const double free = C.dof - static_cast<double>(n_y);
   if (C.dof > 0.0 && free < 2.0)
-    refuse(
-        fmt::format("weighting likelihood: the residual covariance of {} outputs has {} degrees of "
-                    "freedom over all lines and needs {}; measure more periods or realizations, or "
-                    "use noise_variance",
-                    n_y, C.dof, n_y + 2));
+    refuse(fmt::format(
+        "weighting likelihood: the residual covariance of {} outputs has {} degrees of freedom "
+        "over all lines but needs {}; measure more periods or realizations, or use noise_variance",
+        n_y, C.dof, n_y + 2));
   const double wishart = C.dof > 0.0 ? free / C.dof : 1.0;
   const double one_output = C.dof > 0.0 ? (C.dof - 1.0) / C.dof : 1.0;
 
@@ -115,11 +113,11 @@ WeightMatrices WeightMatrices::likelihood(const FrfEstimate& frf) {
     const Eigen::MatrixXcd S = frf.input_factor.col(k).reshaped(n_u, n_u);
     out.outputs_.col(k) =
         wishart * inverse_or_refuse(frf, C_E, k, "residual_covariance",
-                                    "two outputs depend on each other: leave one of them out")
+                                    "two outputs are linearly dependent: exclude one of them")
                       .reshaped();
     out.inputs_.col(k) =
         Eigen::MatrixXcd(inverse_or_refuse(frf, S, k, "input_factor",
-                                           "two inputs depend on each other: leave one of them out")
+                                           "two inputs are linearly dependent: exclude one of them")
                              .transpose())
             .reshaped();
     const Eigen::VectorXd y = C_E.diagonal().real();
@@ -132,32 +130,31 @@ WeightMatrices WeightMatrices::likelihood(const FrfEstimate& frf) {
 WeightMatrices WeightMatrices::user(const FrfEstimate& frf, const Eigen::MatrixXcd& W) {
   const Eigen::Index n_c = frf.response.rows();
   if (W.rows() != n_c * n_c || W.cols() != frf.lines())
-    refuse("weight matrices: the shape differs from that of the response in the band");
+    refuse("weight matrices: the shape must be that of the response in the band");
   require_memory_for_weight_matrices(n_c, frf.lines());
   WeightMatrices out;
   out.whole_ = W;
   out.marginal_.resize(n_c, frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     const Eigen::MatrixXcd W_k = W.col(k).reshaped(n_c, n_c);
-    if (!W_k.allFinite()) refuse(fmt::format("weight matrix of {}: not finite", line_name(frf, k)));
+    if (!W_k.allFinite())
+      refuse(fmt::format("weight matrix of {}: is not finite", line_name(frf, k)));
     if (!is_hermitian(W_k))
-      refuse(
-          fmt::format("weight matrix of {}: not Hermitian; element [c, d] must be the conjugate of "
-                      "[d, c]",
-                      line_name(frf, k)));
+      refuse(fmt::format(
+          "weight matrix of {}: is not Hermitian; element [c, d] must be the conjugate of [d, c]",
+          line_name(frf, k)));
     const Eigen::MatrixXcd inverse = definite_inverse(W_k);
     if (inverse.size() == 0 && !is_semidefinite(W_k))
-      refuse_indefinite(
-          fmt::format("weight matrix of {}: not positive semidefinite; the cost would have no "
-                      "minimum",
-                      line_name(frf, k)));
+      refuse_indefinite(fmt::format(
+          "weight matrix of {}: is not positive semidefinite, so the cost would have no minimum",
+          line_name(frf, k)));
     if (inverse.size() > 0)
       out.marginal_.col(k) = inverse.diagonal().real().cwiseInverse();
     else
       out.marginal_.col(k) = W_k.diagonal().real().cwiseMax(0.0);
   }
   if (!(out.marginal_.maxCoeff() > 0.0))
-    refuse("weight matrices: every one is zero; at least one must not be");
+    refuse("weight matrices: all are zero; at least one must be nonzero");
   return out;
 }
 
@@ -214,11 +211,11 @@ void require_memory_for_weight_matrices(Eigen::Index channels, Eigen::Index line
   const double bytes = 16.0 * static_cast<double>(channels) * static_cast<double>(channels) *
                        static_cast<double>(lines);
   if (bytes <= kLargestBytes) return;
-  refuse(fmt::format(
-      "weight matrices: {} x {} on {} lines need {:.1f} GiB of memory, more than the "
-      "{:.0f} GiB that are taken; choose fewer channels or a smaller band, or weighting "
-      "likelihood, which needs two small factors a line",
-      channels, channels, lines, bytes / 1073741824.0, kLargestBytes / 1073741824.0));
+  refuse(
+      fmt::format("weight matrices: {} x {} on {} lines need {:.1f} GiB of memory, more than the "
+                  "limit of {:.0f} GiB. Choose fewer channels, a smaller band, or weighting "
+                  "likelihood, which needs less memory",
+                  channels, channels, lines, bytes / 1073741824.0, kLargestBytes / 1073741824.0));
 }
 
 }  // namespace stageid

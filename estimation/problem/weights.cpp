@@ -103,13 +103,13 @@ Eigen::MatrixXd inverse_variance(const FrfEstimate& frf, const Eigen::MatrixXd& 
   if (variance.size() == 0)
     throw std::invalid_argument(
         std::string("weighting ") + name + " needs /" + name +
-        " in the FRF; it has none (use relative, or measure more periods or realizations)");
+        " in the FRF, which is missing; use relative, or measure more periods or realizations");
   for (Eigen::Index k = 0; k < variance.cols(); ++k)
     for (Eigen::Index c = 0; c < variance.rows(); ++c)
       if (!(variance(c, k) > 0.0) || !std::isfinite(variance(c, k)))
         throw std::invalid_argument(
             std::string(name) + " of " + channel_name(frf, c, k) +
-            " is zero or not finite; every variance must be positive to weigh with it");
+            " is zero or not finite; with this weighting every variance must be positive");
   return smoothed_inverse(frf, variance, dof);
 }
 
@@ -119,16 +119,15 @@ Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
     for (Eigen::Index c = 0; c < W.rows(); ++c) {
       const double magnitude = std::abs(frf.response(c, k));
       if (!(magnitude > 0.0))
-        throw std::invalid_argument(
-            "response of " + channel_name(frf, c, k) +
-            " is zero: no relative error exists there; leave the channel or line out, or use "
-            "weighting unit");
+        throw std::invalid_argument("response of " + channel_name(frf, c, k) +
+                                    " is zero, so its relative error is undefined; exclude the "
+                                    "channel or line, or use weighting unit");
       W(c, k) = std::pow(magnitude, -exponent);
       if (!std::isnormal(W(c, k)))
-        throw std::invalid_argument(fmt::format(
-            "response of {} is {:.2g}: its weight leaves the range of numbers; convert to units "
-            "that fit the plant",
-            channel_name(frf, c, k), magnitude));
+        throw std::invalid_argument(
+            fmt::format("response of {} is {:.2g}: its weight is out of range for double "
+                        "precision; use units that suit the plant",
+                        channel_name(frf, c, k), magnitude));
     }
   return W;
 }
@@ -202,12 +201,13 @@ SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOpti
   }
   const Eigen::MatrixXd& W = options.user_weights;
   if (W.rows() != frf.response.rows() || W.cols() != frf.response.cols())
-    throw std::invalid_argument(
-        "user weights: the shape differs from that of the response in the band");
+    throw std::invalid_argument("user weights: the shape must be that of the response in the band");
   if (W.allFinite() && W.minCoeff() < 0.0)
-    throw IndefiniteWeights("user weights: one is negative; the cost would have no minimum");
+    throw IndefiniteWeights(
+        "user weights: a weight is negative, so the cost would have no minimum");
   if (!W.allFinite() || !(W.maxCoeff() > 0.0))
-    throw std::invalid_argument("user weights: every weight must be finite, and one positive");
+    throw std::invalid_argument(
+        "user weights: all weights must be finite, and at least one positive");
   return options.user_weights;
 }
 

@@ -98,7 +98,7 @@ class AutomaticFit {
       quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
       adopt(fit_additive_model(frf_, best_.model, quick_));
     }
-    say("{}, by way of {}: cost {:.6g}", counted(count_modes(best_.model), "mode"), target_,
+    say("{}, reached by way of {}: cost {:.6g}", counted(count_modes(best_.model), "mode"), target_,
         best_.model.fit.cost);
   }
 
@@ -155,7 +155,7 @@ class AutomaticFit {
     while_free.max_iterations = std::min(kIterationsOfMany, options_.max_iterations);
     FitResult fit = fit_additive_model(frf_, model, while_free);
     const int hidden = hold_hidden_modes(fit, frf_.response.rows(), frf_.lines(), fit.model);
-    say("{} of them stand out of the noise; the poles of the other {} are held after {} iterations",
+    say("{} of them exceed the noise; the poles of the other {} are held after {} iterations",
         count_modes(fit.model) - hidden, hidden, fit.cost.size() - 1);
     adopt(std::move(fit));
   }
@@ -227,8 +227,8 @@ class AutomaticFit {
     if (trial.status == FitStatus::singular) return false;
     if (!demanded && !(worth_.criterion(trial) < worth_.criterion(best_))) return false;
     for (const ResidualMode& candidate : clear)
-      say("added {:.6g} Hz, one of {} together: cost {:.6g} -> {:.6g}", candidate.mode.frequency_hz,
-          clear.size(), best_.model.fit.cost, trial.model.fit.cost);
+      say("added {:.6g} Hz, one of {} added together: cost {:.6g} -> {:.6g}",
+          candidate.mode.frequency_hz, clear.size(), best_.model.fit.cost, trial.model.fit.cost);
     adopt(std::move(trial));
     return true;
   }
@@ -256,13 +256,14 @@ class AutomaticFit {
       if (worth_.criterion(best_trial) < worth_.criterion(best_) || limit_reached()) break;
     }
     if (!found) {
-      say("no further mode: nothing in the weighted residual is worth a mode's parameters (BIC)");
+      say("no further mode: no candidate in the weighted residual justifies the parameters of a "
+          "mode (BIC)");
       return false;
     }
     const Submodel& added = best_trial.model.submodels.back();
     if (selection_.exactly == 0 && !(worth_.criterion(best_trial) < worth_.criterion(best_))) {
-      say("no further mode: the best, {:.6g} Hz, would lower the cost by {:.2g} % and is not worth "
-          "its parameters (BIC)",
+      say("no further mode: the best candidate, {:.6g} Hz, would lower the cost by {:.2g} %, which "
+          "does not justify its parameters (BIC)",
           added.natural_frequency_hz(),
           100.0 * (1.0 - best_trial.model.fit.cost / best_.model.fit.cost));
       return false;
@@ -369,7 +370,7 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
   const Eigen::Index most = most_modes(frf, structure);
   if (selection.exactly > most || selection.modes.size() > static_cast<std::size_t>(most))
     throw std::invalid_argument(fmt::format(
-        "fit: {} lines cannot carry {} modes; ask for at most {}", frf.lines(),
+        "fit: {} lines are too few for {} modes; request at most {}", frf.lines(),
         std::max<std::size_t>(static_cast<std::size_t>(selection.exactly), selection.modes.size()),
         most));
   FitOptions options = asked;

@@ -69,7 +69,7 @@ std::string too_small(const FitProblem& problem, const FitParameters& beta, doub
   own.B = beta.B.middleCols(first, problem.shapes[i].functions());
   const WeightedPower power = weighted_power(alone, evaluate_groups(alone, own, false), own.B);
   if (std::min(power.model, removal_cost) < kRoundingPower * power.data)
-    return "its response is rounding";
+    return "its response is at rounding level";
   const Eigen::Index parameters = own.B.size() + own.a[0].size();
   const double noise = residual_per_degree(problem, cost, problem.parameters());
   if (removal_cost < noise * static_cast<double>(parameters))
@@ -117,7 +117,7 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
       names.push_back(submodel_name(problem, beta, i));
     first += functions;
   }
-  return fmt::format("the data do not determine the numerators of {}", fmt::join(names, " and "));
+  return fmt::format("the data do not support the numerators of {}", fmt::join(names, " and "));
 }
 
 std::string undetermined_poles(const FitProblem& problem, const FitParameters& beta, double cost,
@@ -133,15 +133,15 @@ std::string undetermined_poles(const FitProblem& problem, const FitParameters& b
     if (is_judged(problem, i, first, judge_modes)) {
       std::string reason;
       if (std::find(held.begin(), held.end(), i) != held.end())
-        reason = "a pole stands at a bound, where the lines do not see it";
+        reason = "a pole is at a bound, where the lines contain no information on it";
       else if (!(shares.segment(first, n).minCoeff() > kSmallestShare))
-        reason = "a change of its denominator is imitated by the rest of the model";
+        reason = "the rest of the model can compensate a change of its denominator";
       else
         reason = too_small(problem, beta, cost, removal_cost[i], i);
       if (reason.empty() && covariance.size() > 0)
         reason = too_uncertain(problem, beta, covariance, i, first);
       if (!reason.empty())
-        return fmt::format("the data do not determine {}: {}", submodel_name(problem, beta, i),
+        return fmt::format("the data do not support {}: {}", submodel_name(problem, beta, i),
                            reason);
     }
     first += n;

@@ -95,8 +95,8 @@ void use_covariance(const FitProblem& problem, ParameterCovariance& covariance, 
   if (covariance.numerator_variance.size() == 0) return;
   if (!covariance.globals.allFinite() || !weighted_are_finite(problem, covariance)) {
     result.decisions.emplace_back(
-        "no standard deviations: the covariance of the parameters is not finite; some of them are "
-        "not in the data");
+        "no standard deviations: the covariance of the parameters is not finite, because the data "
+        "do not support some of them");
     return;
   }
   fill_deviations(problem, covariance, result.model);
@@ -189,8 +189,7 @@ void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResu
       removal_costs(problem, groups, beta.B);  // of what solves the convex problem
   shrink_hidden_modes(problem, groups, hidden, result.removal_cost, beta.B, cost);
   result.decisions.push_back(
-      fmt::format("residues of {} that noise hides, shrunk as James and Stein do: cost "
-                  "{:.6g} -> {:.6g}",
+      fmt::format("residues of {} below the noise, James-Stein shrinkage: cost {:.6g} -> {:.6g}",
                   counted(hidden.size(), "mode"), iteration.end_cost, cost));
   iteration.end_cost = cost;
   iteration.cost.push_back(cost);
@@ -297,10 +296,9 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   IterationResult iteration;
   if (options.mode_ranks.empty()) iteration = iterate(problem, beta, options);
   if (matrices && iteration.status != FitStatus::singular) {
-    result.decisions.push_back(
-        fmt::format("weight matrices: started from their best diagonal, {} "
-                    "iterations ({})",
-                    iteration.iterations, to_string(iteration.status)));
+    result.decisions.push_back(fmt::format(
+        "weight matrices: started from their best diagonal approximation, {} iterations ({})",
+        iteration.iterations, to_string(iteration.status)));
     iteration = iterate(problem, *matrices, beta, options);
   }
   ParameterCovariance covariance;

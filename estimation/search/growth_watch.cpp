@@ -75,10 +75,9 @@ bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const 
     return true;
   if (spurious_in_a_row_ < kMostSpurious) return false;
   finding_ = fmt::format(
-      "the search for modes ended: nothing that its last {} steps added is a resonance, cost "
-      "{:.6g} "
-      "-> {:.6g}; it is left out. The variances may be too small, or the plant has what modes do "
-      "not describe: try --damping general, --direct-term full or --delay estimate",
+      "the search for modes ended: its last {} steps added no resonance, cost {:.6g} -> {:.6g}; "
+      "these modes were discarded. The variances may be too small, or modes alone cannot describe "
+      "the plant: try --damping general, --direct-term full or --delay estimate",
       spurious_in_a_row_, back_to_.model.fit.cost, now.model.fit.cost);
   return true;
 }
@@ -105,9 +104,8 @@ bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions
   by_delay_ = true;
   back_to_ = std::move(first_);
   finding_ = fmt::format(
-      "the search for modes ended: a delay of {:.4g} s instead of {:.4g} s explains more (cost "
-      "{:.6g}) than the {} modes that it added (cost {:.6g}), which are left out; take --delay "
-      "estimate",
+      "the search for modes ended: a delay of {:.4g} s instead of {:.4g} s fits better (cost "
+      "{:.6g}) than the {} added modes (cost {:.6g}), which were discarded; use --delay estimate",
       trial.model.mean_delay_s(), searched.delay_s, trial.model.fit.cost,
       count_modes(now.model) - count_modes(back_to_.model), now.model.fit.cost);
   return true;

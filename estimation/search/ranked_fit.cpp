@@ -102,11 +102,11 @@ class RankedFit {
     for (const ResidueRankTest& test : free_.residue_ranks)
       if (test.rank > std::max(raised.ranks[test.submodel], 1)) {
         raised.ranks[test.submodel] = test.rank;
-        said.push_back(fmt::format(
-            "{:.6g} Hz counts as {} of rank one: chi-square {:.4g} for the {} parameters of its "
-            "residue beyond one shape",
-            test.natural_frequency_hz, counted(test.rank, "mode"), test.chi_square,
-            test.parameters));
+        said.push_back(
+            fmt::format("{:.6g} Hz counts as {} of rank one: chi-square {:.4g} for the {} residue "
+                        "parameters beyond one shape",
+                        test.natural_frequency_hz, counted(test.rank, "mode"), test.chi_square,
+                        test.parameters));
       }
     if (said.empty() || !adopt(raised, constrained(raised))) return;
     decisions_.insert(decisions_.end(), said.begin(), said.end());
@@ -128,10 +128,10 @@ class RankedFit {
           const auto apart = with_parted(frf_, {trial.model, tied.ranks}, i, options_);
           return apart && adopt(*apart, constrained(*apart));
         }
-        decisions_.push_back(fmt::format(
-            "modes of {:.7g} and {:.7g} Hz at one place, where the data do not tell them apart: "
-            "cost {:.6g} -> {:.6g}",
-            one_hz, other_hz, cost, best_.model.fit.cost));
+        decisions_.push_back(
+            fmt::format("modes of {:.7g} and {:.7g} Hz are indistinguishable and now share one "
+                        "frequency: cost {:.6g} -> {:.6g}",
+                        one_hz, other_hz, cost, best_.model.fit.cost));
         return true;
       };
       if (!std::any_of(
@@ -183,7 +183,7 @@ class RankedFit {
       const double cost = best_.model.fit.cost;
       if (!apart || !adopt(*apart, constrained(*apart))) continue;
       decisions_.push_back(fmt::format(
-          "modes of {:.7g} and {:.7g} Hz, which the data tell apart: cost {:.6g} -> {:.6g}",
+          "modes of {:.7g} and {:.7g} Hz are distinguishable: cost {:.6g} -> {:.6g}",
           best_.model.submodels[i].natural_frequency_hz(),
           best_.model.submodels[i + 1].natural_frequency_hz(), cost, best_.model.fit.cost));
     }
@@ -199,7 +199,7 @@ class RankedFit {
         ++i;
         continue;
       }
-      decisions_.push_back(fmt::format("one mode less at {:.6g} Hz: cost {:.6g} -> {:.6g}",
+      decisions_.push_back(fmt::format("one mode fewer at {:.6g} Hz: cost {:.6g} -> {:.6g}",
                                        best_.model.submodels[i].natural_frequency_hz(), cost,
                                        best_.model.fit.cost));
     }
@@ -218,12 +218,12 @@ class RankedFit {
                               test.natural_frequency_hz, test.rank);
     if (places.empty()) return;
     const bool of_any_rank = may_tie() || options_.residue_rank > 1;
-    best_.findings.push_back(fmt::format(
-        "rank {} does not suffice for the residues at {}, it costs {:.3g} times what free residues "
-        "do; take --residue-rank {}{}",
-        options_.residue_rank, places, best_.model.fit.cost / free_.model.fit.cost,
-        of_any_rank ? fmt::format("{}", options_.residue_rank + 1) : "full",
-        number_ == ModeNumber::chosen ? "" : ", or one more mode there for each shape"));
+    best_.findings.push_back(
+        fmt::format("rank {} is too low for the residues at {}: the cost is {:.3g} times that of "
+                    "free residues; use --residue-rank {}{}",
+                    options_.residue_rank, places, best_.model.fit.cost / free_.model.fit.cost,
+                    of_any_rank ? fmt::format("{}", options_.residue_rank + 1) : "full",
+                    number_ == ModeNumber::chosen ? "" : ", or add one mode there per shape"));
   }
 
   bool is_raised(const ResidueRankTest& test) const {
@@ -286,11 +286,12 @@ std::string rank_decision(double free_cost, double cost, double cost_to_squares,
   if (!likelihood) return text;
   // Twice the rise of sum W |E|^2 is chi-square distributed where the ranks are right.
   const double rise = 2.0 * cost_to_squares * (cost - free_cost);
-  return text + fmt::format(", chi-square {:.4g} for {} parameters given up: {}", rise, given_up,
-                            sigmas_above(rise, given_up) < kClearly
-                                ? "what noise explains"
-                                : "more than noise explains, the ranks are too low or the "
-                                  "variances too small");
+  return text +
+         fmt::format(
+             ", chi-square {:.4g} for {} parameters removed: {}", rise, given_up,
+             sigmas_above(rise, given_up) < kClearly
+                 ? "consistent with noise"
+                 : "more than noise explains; the ranks are too low or the variances too small");
 }
 
 }  // namespace stageid

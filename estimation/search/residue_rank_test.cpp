@@ -116,10 +116,10 @@ std::string describe(const std::vector<ResidueRankTest>& tests) {
                                    test.parameters));
     }
   }
-  std::string text = "ranks that the data ask of the residues: ";
+  std::string text = "residue ranks that the data require: ";
   if (of_one > 0) {
-    text += fmt::format("1 for {} (the least probable deviation from it has p = {:.2g})",
-                        counted(of_one, "mode"), least);
+    text += fmt::format("1 for {} (least probable deviation: p = {:.2g})", counted(of_one, "mode"),
+                        least);
     if (!higher.empty()) text += "; ";
   }
   const std::size_t shown = std::min(higher.size(), kMostShown);

@@ -56,7 +56,7 @@ std::string without_silent_channels(const FrfEstimate& frf) {
     for (const std::string& name : (inputs ? frf.inputs : frf.outputs).names)
       if (std::find(silent.begin(), silent.end(), name) == silent.end()) rest.push_back(name);
     return fmt::format(
-        "The response of {} is below its noise on most lines: leave it out, 'frf {} {}'",
+        "The response of {} is below its noise on most lines: exclude it with 'frf {} {}'",
         fmt::join(silent, ", "), inputs ? "--inputs" : "--outputs", fmt::join(rest, ","));
   }
   return {};
@@ -172,7 +172,7 @@ std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
     const double criterion = information_criterion(frf, fit);
     if (fit.status == FitStatus::singular || !(criterion < least)) continue;
     least = criterion;
-    advice = fmt::format("Try {}: one refit takes the cost from {:.6g} to {:.6g}", other.flag,
+    advice = fmt::format("Try {}: one refit lowers the cost from {:.6g} to {:.6g}", other.flag,
                          same.model.fit.cost, fit.model.fit.cost);
   }
   return advice;
@@ -190,7 +190,7 @@ std::string better_band(const FrfEstimate& frf, const FitOptions& trial, const F
   if (end < 1) return {};
   const auto advice = [&](double low_hz, double high_hz, const char* which) {
     return fmt::format(
-        "The {} quarter of the lines holds most of the cost: try --band {:.6g} {:.6g}", which,
+        "The {} quarter of the lines causes most of the cost: try --band {:.6g} {:.6g}", which,
         low_hz, high_hz);
   };
   if (squares.head(end).sum() > most)
@@ -212,7 +212,7 @@ std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const 
   advice = better_structure(frf, options, trial, same, cut_short);
   if (advice.empty()) advice = better_band(frf, trial, same);
   if (!advice.empty()) return advice;
-  return "No other structure fits better: name the number of modes, --modes N";
+  return "No other structure fits better: give the number of modes with --modes N";
 }
 
 std::string budget_message(const FrfEstimate& frf, const FitOptions& options,
@@ -221,7 +221,7 @@ std::string budget_message(const FrfEstimate& frf, const FitOptions& options,
   const int modes = count_modes(fit.model);
   const double budget_s = options.limit->budget_s();
   return fmt::format(
-      "the search used its budget of {:.6g} s, at {}. {}; --search-seconds {:.6g} goes on",
+      "the search reached its budget of {:.6g} s at {}. {}; continue with --search-seconds {:.6g}",
       budget_s, counted(modes, "mode"), advice, kMoreBudget * budget_s);
 }
 

@@ -72,20 +72,19 @@ struct Simpler {
 std::optional<Simpler> simpler(const AdditiveModel& model) {
   if (const auto pair = coalesced(model)) {
     const auto [i, j] = *pair;
-    return Simpler{with_one_of(model, i, j),
-                   fmt::format("made one mode of {:.6g} and {:.6g} Hz, which ran into each other; "
-                               "the data do not tell them apart and they kept the fit from "
-                               "converging",
-                               model.submodels[i].natural_frequency_hz(),
-                               model.submodels[j].natural_frequency_hz())};
+    return Simpler{
+        with_one_of(model, i, j),
+        fmt::format(
+            "merged {:.6g} and {:.6g} Hz, which coincided and prevented the fit from converging",
+            model.submodels[i].natural_frequency_hz(), model.submodels[j].natural_frequency_hz())};
   }
   const std::optional<OpenMode> open = most_open(model);
   if (!open) return std::nullopt;
   Simpler out{model, {}};
   const auto place = out.model.submodels.begin() + static_cast<std::ptrdiff_t>(open->submodel);
   out.reason = fmt::format(
-      "left out {:.6g} Hz, which the data do not determine (standard deviation {:.2g} "
-      "times its size) and which kept the fit from converging",
+      "removed {:.6g} Hz, which the data do not support (standard deviation {:.2g} times its "
+      "value) and which prevented the fit from converging",
       place->natural_frequency_hz(), open->doubt);
   out.model.submodels.erase(place);
   return out;
@@ -106,8 +105,8 @@ void leave_out_undetermined(const FrfEstimate& frf, const FitOptions& options, F
         !(information_criterion(frf, trial) < information_criterion(frf, fit)))
       return false;
     left_out.push_back(fmt::format(
-        "left out {:.6g} Hz (damping {:.3g}), which the data do not determine and which is not "
-        "worth its parameters: cost {:.6g} -> {:.6g}",
+        "removed {:.6g} Hz (damping {:.3g}), which the data do not support and which does not "
+        "justify its parameters (BIC): cost {:.6g} -> {:.6g}",
         fit.model.submodels[i].natural_frequency_hz(), fit.model.submodels[i].damping_ratio(),
         fit.model.fit.cost, trial.model.fit.cost));
     fit = std::move(trial);

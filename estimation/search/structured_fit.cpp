@@ -112,13 +112,13 @@ class PoleSearch {
     for (const Submodel& s : found_.model.submodels)
       if (is_searched_mode(s)) out.push_back(&s);
     if (static_cast<int>(out.size()) < pairs)
-      throw std::invalid_argument(
-          fmt::format("fit: the submodels need {} of poles, {} found; give their frequencies",
-                      counted(pairs, "pair"), out.size()));
+      throw std::invalid_argument(fmt::format(
+          "fit: the submodels need {} of poles, but {} were found; give their frequencies",
+          counted(pairs, "pair"), out.size()));
     if (pairs == 0 && static_cast<int>(2 * out.size()) > kLargestOrder)
       throw std::invalid_argument(
-          fmt::format("fit: n=auto finds {} modes and one denominator carries {}; take a narrower "
-                      "band, or several submodels",
+          fmt::format("fit: n=auto found {} modes, but one denominator supports at most {}; use a "
+                      "narrower band or several submodels",
                       out.size(), kLargestOrder / 2));
     return out;
   }
@@ -235,7 +235,7 @@ void try_springs(const FrfEstimate& frf, const ModelStructure& structure,
       !(information_criterion(frf, trial) < information_criterion(frf, result)))
     return;
   result.decisions.push_back(
-      fmt::format("rigid body on weak springs instead of a free one: cost {:.6g} -> {:.6g}",
+      fmt::format("rigid body on weak springs instead of a free rigid body: cost {:.6g} -> {:.6g}",
                   result.model.fit.cost, trial.model.fit.cost));
   ModelStructure with_springs = structure;
   with_springs.rigid_body = false;
@@ -270,14 +270,14 @@ void settle_suspension(const FrfEstimate& frf, const ModeSelection& selection,
     }
     if (worst == nullptr || result.status == FitStatus::singular) return;
     worst->frequency_held = true;
-    result.decisions.push_back(fmt::format(
-        "suspension: the lines do not determine the frequency of its mode at {:.4g} Hz{}; held "
-        "there, without a standard deviation",
-        worst->natural_frequency_hz(),
-        std::isfinite(worst_deviation)
-            ? fmt::format(" (standard deviation {:.2g} Hz)",
-                          worst_deviation * worst->natural_frequency_hz())
-            : " (at its bound)"));
+    result.decisions.push_back(
+        fmt::format("suspension: the data do not support an estimate of the frequency of its mode "
+                    "at {:.4g} Hz{}; the frequency is held, without a standard deviation",
+                    worst->natural_frequency_hz(),
+                    std::isfinite(worst_deviation)
+                        ? fmt::format(" (standard deviation {:.2g} Hz)",
+                                      worst_deviation * worst->natural_frequency_hz())
+                        : " (at its bound)"));
     refit(frf, selection, options, result);
   }
 }
@@ -290,13 +290,13 @@ void check_requests(const FrfEstimate& frf, const RequestedStructure& structure)
   require_faultless(
       fault_of(structure.submodels, structure.common.rigid_body, structure.common.direct_term));
   if (structure.suspension && structure.common.rigid_body)
-    throw std::invalid_argument("fit: a suspension stands instead of the rigid body; ask for one");
+    throw std::invalid_argument(
+        "fit: a suspension replaces the rigid body; request only one of them");
   for (const double frequency_hz : structure.suspension_hz)
     if (!(frequency_hz > 0.0 && frequency_hz < frf.frequency_hz[0]))
-      throw std::invalid_argument(
-          fmt::format("fit: a suspension at {} Hz does not lie below the lowest line, {} Hz; "
-                      "give it as a mode",
-                      frequency_hz, frf.frequency_hz[0]));
+      throw std::invalid_argument(fmt::format(
+          "fit: a suspension at {} Hz is not below the lowest line, {} Hz; give it as a mode",
+          frequency_hz, frf.frequency_hz[0]));
 }
 
 /// A fit that leaves clearly more than noise and known distortion is not to be trusted.
@@ -313,9 +313,8 @@ void judge_explained(const FrfEstimate& frf, const FitOptions& options, FitResul
                            options.weighting != Weighting::likelihood);
   if (verdict.explained && by_weights) return;
   const std::string finding =
-      verdict.explained
-          ? "the noise that weighs the fit does not explain the residual, the scatter of the "
-            "realizations does: use --weighting total_variance"
+      verdict.explained ? "the residual is explained by the scatter of the realizations, but not "
+                          "by the noise used as weight: use --weighting total_variance"
       : ended_by_limit(result)
           ? verdict.reason + ": the model does not explain the data"
           : fmt::format("{}: the model does not explain the data. {}", verdict.reason,
@@ -331,7 +330,7 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
                          const ModeSelection& selection, const FitOptions& asked) {
   check(frf);
   if (frf.response.isZero(0.0))
-    throw std::invalid_argument("fit: the response is zero on all lines; there is nothing to fit");
+    throw std::invalid_argument("fit: the response is zero on all lines; check the FRF");
   check_requests(frf, structure);
   std::vector<std::string> decisions;
   ModelStructure complete = structure.common;

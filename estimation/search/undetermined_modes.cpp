@@ -50,13 +50,13 @@ std::string doubt_of(const FrfEstimate& frf, bool number_asked, const FitResult&
   if (is_between_lines(s, fit.model.fit, number_asked)) {
     if (is_at_bound(fit, i))
       return s.damping_ratio() < kBroad
-                 ? "at its bound: sharper than the lines show, undamped, or growing"
+                 ? "at its bound: narrower than the line spacing, undamped or unstable"
                  : "at its bound";
-    if (is_open(s)) return "its deviation as large";
+    if (is_open(s)) return "with a standard deviation as large";
   }
   if (number_asked && i < fit.removal_cost.size() &&
       fit.removal_cost[i] < price_of_mode(frf, fit, parameters_of(s)))
-    return "not worth its parameters (BIC)";
+    return "does not justify its parameters (BIC)";
   return {};
 }
 
@@ -86,10 +86,9 @@ void judge_undetermined_modes(const FrfEstimate& frf, bool number_asked, FitResu
                                  s.damping_ratio(), doubt));
   }
   if (places.empty()) return;
-  tell(fmt::format(
-           "the data do not determine the modes at {}: they lower the cost as noise, or what "
-           "the model lacks, lets any mode do; do not read them as resonances",
-           fmt::join(places, ", ")),
+  tell(fmt::format("the data do not support the modes at {}: a mode placed anywhere would lower "
+                   "the cost as much; do not interpret them as resonances",
+                   fmt::join(places, ", ")),
        fit);
 }
 
@@ -107,8 +106,8 @@ void judge_close_modes(const FrfEstimate& frf, const FitOptions& options, FitRes
     if (single.status == FitStatus::singular ||
         !(rise < price_of_mode(frf, fit, parameters_of(one))))
       continue;
-    tell(fmt::format("the data do not tell the modes at {:.6g} and {:.6g} Hz apart: one does as "
-                     "well (BIC), cost {:.6g} -> {:.6g}; ask for fewer modes",
+    tell(fmt::format("the data do not distinguish the modes at {:.6g} and {:.6g} Hz: one mode fits "
+                     "as well (BIC), cost {:.6g} -> {:.6g}; request fewer modes",
                      one.natural_frequency_hz(), other.natural_frequency_hz(), fit.model.fit.cost,
                      single.model.fit.cost),
          fit);

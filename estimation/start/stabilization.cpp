@@ -106,7 +106,8 @@ std::vector<StabilizationPole> stabilization(const FrfEstimate& frf,
                                              const StabilizationOptions& options) {
   if (options.most_order < 2 || 2 * options.most_order >= frf.lines())
     throw std::invalid_argument(
-        fmt::format("stabilization: most_order is {} with {} lines; 2 to less than half the lines",
+        fmt::format("stabilization: most_order {} is out of range for {} lines; give 2 to less "
+                    "than half of the lines",
                     options.most_order, frf.lines()));
   const NormalMatrix normal(frf, options);
   std::vector<StabilizationPole> all;

@@ -265,10 +265,10 @@ void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResul
   std::vector<DenseCovariance> all =
       covariances_of(frf, fit, result, options, {all_functions(result.model)});
   if (all.empty()) {
-    result.decisions.push_back(fmt::format(
-        "no covariance: the fit has more than {} parameters, or they cannot be told apart; take "
-        "fewer channels or modes",
-        kMostParameters));
+    result.decisions.push_back(
+        fmt::format("no covariance: the fit has more than {} parameters, or they are not "
+                    "identifiable; use fewer channels or modes",
+                    kMostParameters));
     return;
   }
   result.covariance.sandwich = std::move(all.front().sandwich);

@@ -140,7 +140,7 @@ TEST_F(LowRankFit, ComesCloserToTheTruthAndSaysThatNoiseExplainsTheRest) {
     }
   EXPECT_LT(error_to_truth(fit), error_to_truth(free));
   EXPECT_GT(fit.model.fit.cost, free.model.fit.cost);
-  EXPECT_THAT(fit.decisions, Contains(HasSubstr("what noise explains")));
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("consistent with noise")));
   // 7 modes: the mean square of their normalized errors is chi-square of 7 over 7, 0.18 to 2.9 in
   // 99 of 100 cases.
   double sum = 0.0;

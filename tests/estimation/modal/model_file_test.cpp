@@ -281,7 +281,7 @@ TEST_F(ModelFile, MissingKeys) {
 
 TEST_F(ModelFile, AnotherVersion) {
   expect_format_error([](Json& root) { root["format_version"] = 2; }, "/format_version",
-                      "is 2 and must be 1");
+                      "is 2; must be 1");
   expect_format_error([](Json& root) { root["format_version"] = "1"; }, "/format_version",
                       "whole number");
 }

@@ -75,13 +75,13 @@ TEST_F(ModesFile, Refusals) {
   expect_format_error(modes("7"), "/modes", "list");
   expect_format_error(modes("[7]"), "/modes/0", "object");
   expect_format_error(modes("[{}]"), "/modes/0", "frequency_hz");
-  expect_format_error(modes(R"([{"frequency_hz": 0}])"), "/modes/0/frequency_hz", "above zero");
+  expect_format_error(modes(R"([{"frequency_hz": 0}])"), "/modes/0/frequency_hz", "positive");
   expect_format_error(modes(R"([{"frequency_hz": null}])"), "/modes/0/frequency_hz", "number");
   expect_format_error(modes(R"([{"frequency_hz": 1e999}])"), "", "");
   expect_format_error(modes(R"([{"frequency_hz": 1, "damping_ratio": 1}])"),
                       "/modes/0/damping_ratio", "below 1");
   expect_format_error(modes(R"([{"frequency_hz": 1, "damping_ratio": -0.1}])"),
-                      "/modes/0/damping_ratio", "above zero");
+                      "/modes/0/damping_ratio", "positive");
   expect_format_error(modes(R"([{"frequency_hz": 1, "cmif_curve": 0}])"), "/modes/0/cmif_curve",
                       "whole number");
 }

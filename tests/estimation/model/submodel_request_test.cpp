@@ -32,17 +32,17 @@ TEST(SubmodelRequest, EveryFaultSaysWhatWouldBeRight) {
   EXPECT_THAT(fault(request({0, 17, 0})), HasSubstr("from 0 to 16"));
   EXPECT_THAT(fault(request({0, -1, 0})), HasSubstr("from 0 to 16"));
   EXPECT_THAT(fault(request({0, 2, -1})), HasSubstr("0 or more"));
-  EXPECT_THAT(fault(request({1, 2, 4})), HasSubstr("write at most 3"));
-  EXPECT_THAT(fault(request({0, 4, 3}, {120.0})), HasSubstr("from 2 frequencies"));
-  EXPECT_THAT(fault(request({0, 3, 0}, {120.0})), HasSubstr("the last of the real pole"));
+  EXPECT_THAT(fault(request({1, 2, 4})), HasSubstr("give at most 3"));
+  EXPECT_THAT(fault(request({0, 4, 3}, {120.0})), HasSubstr("needs 2 frequencies"));
+  EXPECT_THAT(fault(request({0, 3, 0}, {120.0})), HasSubstr("the last for the real pole"));
   EXPECT_THAT(fault(request({0, 2, 0}, {0.0})), HasSubstr("above 0 Hz"));
-  EXPECT_THAT(fault(request({0, 2, 0}, {}, {0.01})), HasSubstr("without a frequency"));
+  EXPECT_THAT(fault(request({0, 2, 0}, {}, {0.01})), HasSubstr("needs a frequency"));
   EXPECT_THAT(fault(request({0, 6, 0}, {1.0, 2.0, 3.0}, {0.01, 0.02})), HasSubstr("one damping"));
   EXPECT_THAT(fault(request({0, 1, 0}, {30.0}, {0.01})), HasSubstr("no damping ratio"));
   EXPECT_THAT(fault(request({0, 2, 0}, {30.0}, {1.0})), HasSubstr("at most 0.9"));
-  EXPECT_THAT(fault(request({0, 4, 0}, {30.0, 30.0})), HasSubstr("could not be told apart"));
-  EXPECT_THAT(fault({{}, true, {30.0}, {}}), HasSubstr("leave frequencies"));
-  EXPECT_THAT(fault({{1, 0, 0}, true, {}, {}}), HasSubstr("leave l out"));
+  EXPECT_THAT(fault(request({0, 4, 0}, {30.0, 30.0})), HasSubstr("indistinguishable"));
+  EXPECT_THAT(fault({{}, true, {30.0}, {}}), HasSubstr("omit frequencies"));
+  EXPECT_THAT(fault({{1, 0, 0}, true, {}, {}}), HasSubstr("omit l"));
 }
 
 TEST(SubmodelRequest, TogetherAtMostOneIntegratesAndOneIsBiproper) {
@@ -50,9 +50,9 @@ TEST(SubmodelRequest, TogetherAtMostOneIntegratesAndOneIsBiproper) {
   const SubmodelRequest constant = request({0, 0, 0});
   const SubmodelRequest mode = request({0, 2, 1});
   EXPECT_THAT(fault_of({integrator, constant, mode, mode}, false, false), IsEmpty());
-  EXPECT_THAT(fault_of({integrator, mode}, true, false), HasSubstr("the rigid body is one"));
+  EXPECT_THAT(fault_of({integrator, mode}, true, false), HasSubstr("including the rigid body"));
   EXPECT_THAT(fault_of({integrator, request({2, 0, 0})}, false, false), HasSubstr("2 terms"));
-  EXPECT_THAT(fault_of({constant}, false, true), HasSubstr("the direct term is one"));
+  EXPECT_THAT(fault_of({constant}, false, true), HasSubstr("including the direct term"));
   EXPECT_THAT(fault_of({constant, request({0, 2, 2})}, false, false), HasSubstr("2 biproper"));
   EXPECT_THAT(fault_of({{{}, true, {}, {}}, mode}, false, false), HasSubstr("only submodel"));
 }
@@ -82,10 +82,10 @@ TEST(SubmodelRequest, TheFitRefusesWhatHasAFault) {
   structure.submodels = {request({0, 2, 3})};
   refused(structure, "improper");
   structure.submodels = {request({1, 0, 0})};
-  refused(structure, "the rigid body is one");
+  refused(structure, "including the rigid body");
   structure.submodels.clear();
   structure.suspension = true;
-  refused(structure, "instead of the rigid body");
+  refused(structure, "replaces the rigid body");
   structure.common.rigid_body = false;
   structure.suspension_hz = {7.0};
   refused(structure, "below the lowest line, 5 Hz");

@@ -169,12 +169,12 @@ TEST_F(WeightMatrixRefusal, AnOutputWithoutNoise) {
 TEST_F(WeightMatrixRefusal, OutputsThatDependOnEachOther) {
   frf_.residual_covariance_re.col(9).setOnes();
   frf_.residual_covariance_im.col(9).setZero();
-  expect_refused("residual_covariance of line 9", "leave one of them out");
+  expect_refused("residual_covariance of line 9", "exclude one of them");
 }
 TEST_F(WeightMatrixRefusal, InputsThatDependOnEachOtherOrAFactorThatIsNotHermitian) {
   const Eigen::MatrixXcd before = frf_.input_factor;
   frf_.input_factor.col(11).setOnes();
-  expect_refused("input_factor of line 11", "leave one of them out");
+  expect_refused("input_factor of line 11", "exclude one of them");
   frf_.input_factor = before;
   frf_.input_factor(1, 12) *= 2.0;
   expect_refused("input_factor of line 12", "Hermitian");
@@ -212,7 +212,7 @@ TEST_F(WeightMatrixRefusal, UsersThatAreNotPositive) {
 TEST_F(WeightMatrixRefusal, UsersThatAreAllZero) {
   ask_for_matrices();
   options_.user_weight_matrices.setZero();
-  expect_refused("every one is zero");
+  expect_refused("all are zero");
 }
 TEST_F(WeightMatrixRefusal, UsersThatWouldNotFitInMemory) {
   EXPECT_NO_THROW(require_memory_for_weight_matrices(52, 4000));

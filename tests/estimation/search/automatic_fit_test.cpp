@@ -136,7 +136,7 @@ TEST_F(SmallStage, FitsSoManyModesAsAsked) {
 // dropping the least worthy finds it.
 TEST_F(SmallStage, TriesMoreThanOneWayToTheNumberAsked) {
   const FitResult fit = automatic_fit(frf_, {}, {.modes = {}, .exactly = 2}, {});
-  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("2 modes, by way of ")));
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("2 modes, reached by way of ")));
   double best = HUGE_VAL;  // of every pair of the three true modes
   for (const auto& pair : {std::pair{120.0, 390.0}, {120.0, 640.0}, {390.0, 640.0}}) {
     const FitResult two = automatic_fit(
@@ -200,7 +200,7 @@ TEST_F(SmallStage, ADelayThatIsDeniedEndsTheSearchAndIsNamed) {
     EXPECT_THAT(fit.findings,
                 testing::ElementsAre(testing::AllOf(
                     testing::ContainsRegex("a delay of (9\\.99|0\\.0001).* s instead of"),
-                    testing::HasSubstr("take --delay estimate"))));
+                    testing::HasSubstr("use --delay estimate"))));
     EXPECT_LE(frequencies(fit.model).size(), 6U);
     if (denied_s != 0.0) continue;  // such a fit need not converge
     EXPECT_EQ(fit.status, FitStatus::unexplained) << fit.message;
@@ -310,7 +310,7 @@ TEST_F(SmallStage, RefusesNumbersOfModesThatAreNone) {
 TEST_F(SmallStage, RefusesMoreModesThanTheLinesCarryBeforeItTries) {
   const FrfEstimate few = select_band(frf_, 100.0, 140.0);  // 21 lines
   const auto message = testing::ThrowsMessage<std::invalid_argument>(
-      testing::HasSubstr("cannot carry 60 modes; ask for at most"));
+      testing::HasSubstr("too few for 60 modes; request at most"));
   EXPECT_THAT([&] { (void)automatic_fit(few, {}, {.modes = {}, .exactly = 60}, {}); }, message);
   const std::vector<ModeCandidate> modes(60, {120.0, 0.01, 1});
   EXPECT_THAT([&] { (void)automatic_fit(few, {}, {.modes = modes}, {}); }, message);

@@ -155,7 +155,7 @@ TEST_F(CoincidentModes, ARankThatDoesNotSufficeIsAFinding) {
   options_.residue_rank = 1;
   const FitResult fit = automatic_fit(measured(), {}, {.modes = {}, .exactly = 1}, options_);
   EXPECT_GT(fit.model.fit.cost, 10.0 * kNoiseCost);
-  EXPECT_THAT(fit.findings, Contains(HasSubstr("rank 1 does not suffice for the residues at 150")));
+  EXPECT_THAT(fit.findings, Contains(HasSubstr("rank 1 is too low for the residues at 150")));
   EXPECT_THAT(fit.findings, Contains(HasSubstr("--residue-rank 2")));
 }
 
@@ -174,7 +174,7 @@ TEST_F(CoincidentModes, ACloseRankOnePairIsTakenApart) {
   std::sort(f.begin(), f.end());
   EXPECT_NEAR(f[0], kPlace_hz, 0.03);
   EXPECT_NEAR(f[1], kPlace_hz + 0.15, 0.03);
-  EXPECT_THAT(fit.decisions, Contains(HasSubstr("which the data tell apart")));
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("are distinguishable")));
 }
 
 TEST_F(CoincidentModes, AShapeThatIsNotWorthItsParametersIsTakenBack) {
@@ -186,7 +186,7 @@ TEST_F(CoincidentModes, AShapeThatIsNotWorthItsParametersIsTakenBack) {
   const FitResult fit = ranked_fit(measured(), start, options_, ModeNumber::chosen);
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   EXPECT_EQ(modes(fit).size(), 2U);
-  EXPECT_THAT(fit.decisions, Contains(HasSubstr("one mode less at 80")));
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("one mode fewer at 80")));
 }
 
 TEST_F(CoincidentModes, ToFirstOrderTwoPlacesFollowFromTheNeighbourhoodOfOne) {

@@ -69,7 +69,7 @@ TEST_F(SettledFit, AModeThatTheDataLeaveOpenIsLeftOut) {
   for (std::size_t i = 0; i < 2; ++i)
     EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
   ASSERT_FALSE(fit.decisions.empty());
-  EXPECT_THAT(fit.decisions.front(), HasSubstr("left out 25"));
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("removed 25"));
 }
 
 // The data have a double pole: nothing that two modes with numerators B_0 reach, though the nearer they come the better
@@ -91,7 +91,7 @@ TEST_F(SettledFit, TwoModesThatRunIntoEachOtherBecomeOne) {
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   EXPECT_EQ(count_modes(fit.model), 3);
   ASSERT_FALSE(fit.decisions.empty());
-  EXPECT_THAT(fit.decisions.front(), HasSubstr("made one mode of"));
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("merged"));
 }
 
 // A mode so broad that its damping ratio ends at the bound converges; it is worth nothing.
@@ -105,7 +105,7 @@ TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   EXPECT_EQ(count_modes(fit.model), 2);
   ASSERT_FALSE(fit.decisions.empty());
-  EXPECT_THAT(fit.decisions.front(), HasSubstr("which the data do not determine"));
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("which the data do not support"));
 }
 
 // Where a number of modes is asked for they stay, and such a fit is not to be trusted.
@@ -119,7 +119,7 @@ TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined
   fit.model.submodels[0].damping_ratio_std = 2.0 * fit.model.submodels[0].damping_ratio();
   judge_undetermined_modes(frf_, false, fit);
   ASSERT_EQ(fit.findings.size(), 1U);
-  EXPECT_THAT(fit.findings[0], HasSubstr(", its deviation as large), 390.0"));
+  EXPECT_THAT(fit.findings[0], HasSubstr(", with a standard deviation as large), 390.0"));
   EXPECT_THAT(fit.findings[0], HasSubstr("at its bound"));
   EXPECT_EQ(fit.status, FitStatus::undetermined);
   EXPECT_EQ(fit.message, fit.findings[0]);
@@ -149,7 +149,7 @@ TEST_F(SettledFit, AModeThatIsAskedForAndNotWorthItsParametersIsUndetermined) {
   EXPECT_TRUE(two.findings.empty());
   const FitResult three = asked(3);
   EXPECT_EQ(three.status, FitStatus::undetermined) << three.message;
-  EXPECT_THAT(three.message, HasSubstr("do not read them as resonances"));
+  EXPECT_THAT(three.message, HasSubstr("do not interpret them as resonances"));
   for (const bool number_asked : {false, true}) {
     FitResult weak = two;
     weak.removal_cost[1] = 0.9 * price_of_mode(frf_, two, 3.0);  // a pole and one residue
@@ -171,7 +171,7 @@ TEST_F(SettledFit, TwoModesOfWhichOneDoesAsWellAreUndetermined) {
   fit.status = FitStatus::gradient_small;
   judge_close_modes(frf_, options_, fit);
   EXPECT_EQ(fit.status, FitStatus::undetermined);
-  EXPECT_THAT(fit.message, HasSubstr("one does as well"));
+  EXPECT_THAT(fit.message, HasSubstr("one mode fits as well"));
   FitResult sound = fit_additive_model(frf_, true_, options_);
   judge_close_modes(frf_, options_, sound);
   EXPECT_TRUE(sound.trustworthy()) << sound.message;

@@ -94,7 +94,7 @@ TEST(Suspension, HasNoDeviationWhereTheLinesDoNotDetermineIt) {
   const FitResult fit = fit_suspended(test::noisy(suspended(0.05), 0.1, 6), {}, options);
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   EXPECT_FALSE(fit.model.submodels[0].natural_frequency_std_hz);
-  EXPECT_THAT(fit.decisions, Contains(HasSubstr("do not determine the frequency")));
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("do not support an estimate of the frequency")));
   EXPECT_THAT(fit.held, Contains(0U));
   EXPECT_TRUE(fit.model.submodels[1].natural_frequency_std_hz);
 }

@@ -28,7 +28,7 @@ TEST_F(BadRequest, WhatAModelHasNot) {
 TEST_F(BadRequest, SubmodelsThatAreNone) {
   fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "2,0,0"}, 2,
        "--submodel: '2,0,0': expected key=value, got '2'; for example n=4,m=3");
-  fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "n=2,m=3"}, 2, "write at most 2");
+  fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "n=2,m=3"}, 2, "give at most 2");
 }
 
 TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
@@ -311,7 +311,7 @@ TEST_F(BadRequest, Reports) {
        "cut.json: is not JSON, or cut short");
   write_bytes(at("new.json"), "{\"format\": \"stageid-model\", \"format_version\": 9}");
   fail({"report", frf, name("new.json"), "-o", name("r.html")}, 2,
-       "format_version: is 9 and must be 1");
+       "format_version: is 9; must be 1");
   fail({"report", frf, "-o", name("nowhere/r.html")}, 1,
        "No such file or directory; create the directory first");
   fail({"report", frf, "-o", name("r.html"), "--compare", name("none")}, 1,

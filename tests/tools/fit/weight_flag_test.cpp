@@ -76,7 +76,7 @@ TEST_F(WeightFile, RefusesMatricesNamingTheLine) {
   values = matrices();
   values[2 * 36] = -2.0;
   write_matrices(values);
-  expect_refused<IndefiniteWeights>("line 2 (3 Hz): not positive semidefinite");
+  expect_refused<IndefiniteWeights>("line 2 (3 Hz): is not positive semidefinite");
 }
 
 TEST_F(WeightFile, RefusesAnotherShapeAndBothKindsAtOnce) {
