@@ -73,12 +73,12 @@ ArrayLog::ArrayLog(std::filesystem::path name, LogInfo info, ExperimentArrays ar
 
 void ArrayLog::check_shapes() const {
   const ExperimentArrays& a = arrays_;
-  constexpr const char* kAxes = "[realizations x experiments x samples x channels] must stand here";
+  constexpr const char* kAxes = "expected [realizations x experiments x samples x channels]";
   require_axes("excitation", a.excitation, 4, kAxes);
   require_axes("actuators", a.actuators, 4, kAxes);
   require_axes("sensors", a.sensors, 4, kAxes);
   require(a.sensors.shape(0) > 0 && a.sensors.shape(1) > 0, "sensors", a.sensors,
-          "a log has one realization and one experiment at least");
+          "a log needs at least one realization and one experiment");
   const auto same_runs = [&](const char* name, const py::array& array) {
     require(array.shape(0) == a.sensors.shape(0) && array.shape(1) == a.sensors.shape(1), name,
             array,
@@ -94,15 +94,15 @@ void ArrayLog::check_shapes() const {
   same_samples("actuators", a.actuators);
   const auto channels = [](const char* name, const py::array& array, const ChannelList& list) {
     require(array.shape(3) == static_cast<py::ssize_t>(list.size()), name, array,
-            fmt::format("{} stand for its last axis", counted(list.size(), "name")));
+            fmt::format("expected {} for its last axis", counted(list.size(), "name")));
   };
   channels("excitation", a.excitation, info_.excitation);
   channels("actuators", a.actuators, info_.actuators);
   channels("sensors", a.sensors, info_.sensors);
   require(a.excitation.shape(2) == info_.period_samples, "excitation", a.excitation,
-          fmt::format("one period of {} samples must stand here", info_.period_samples));
+          fmt::format("expected one period of {} samples", info_.period_samples));
   if (!a.marked) return;
-  require_axes("marked", *a.marked, 3, "[realizations x experiments x samples] must stand here");
+  require_axes("marked", *a.marked, 3, "expected [realizations x experiments x samples]");
   same_runs("marked", *a.marked);
   same_samples("marked", *a.marked);
 }
@@ -129,7 +129,7 @@ void ArrayLog::locate_runs() {
       sensors_.push_back(rows_of(a.sensors, m, e));
       if (!period_of(a.excitation, m, e).allFinite())
         throw std::invalid_argument(fmt::format(
-            "excitation: realization {}, experiment {} is not finite; numbers must stand here", m,
+            "excitation: realization {}, experiment {} is not finite; remove NaN and infinity", m,
             e));
       auto& marked = marked_.emplace_back();
       marked.setZero(a.sensors.shape(2));

@@ -62,16 +62,18 @@ void translate(std::exception_ptr thrown) {
 }  // namespace
 
 void define_errors(py::module_& module) {
-  PyObject* base = new_error(module, "StageidError", "Everything that stageid itself refuses.",
+  PyObject* base = new_error(module, "StageidError", "Base class of all errors of stageid.",
                              PyExc_Exception, nullptr);
-  request_error = new_error(module, "RequestError", "The request is wrong (exit code 2).", base,
+  request_error = new_error(module, "RequestError", "An invalid request (exit code 2).", base,
                             PyExc_ValueError);
-  format_error = new_error(module, "FormatError", "A file is not what it should be (exit code 2).",
-                           base, PyExc_ValueError);
+  format_error =
+      new_error(module, "FormatError", "A file has an invalid format or content (exit code 2).",
+                base, PyExc_ValueError);
   file_error = new_error(module, "FileError", "A file cannot be read or written (exit code 1).",
                          base, PyExc_OSError);
-  stage_error = new_error(module, "StageError", "The stage or its link failed (exit codes 1, 4).",
-                          base, PyExc_RuntimeError);
+  stage_error =
+      new_error(module, "StageError", "The stage or its link failed (exit codes 1 and 4).", base,
+                PyExc_RuntimeError);
   py::register_local_exception_translator(&translate);
 }
 

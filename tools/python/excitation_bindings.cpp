@@ -33,14 +33,13 @@ constexpr const char* kMultisine =
 
 sample_rate_hz, low_hz, high_hz   Hz; the band is inclusive
 period_samples                    N
-rms                               of the samples, in the unit that the result shall have
+rms                               RMS value of the samples, in the unit of the result
 seed                              the same seed gives the same signal on every machine
 lines                             'all', 'odd' or 'odd_random'
-shape [lines]                     relative amplitude of every line; None: flat
-crest_iterations                  clipping iterations that lower the crest factor; 0: none
+shape [lines]                     relative amplitude per line; None: flat
+crest_iterations                  number of clipping iterations that lower the crest factor; 0: none
 
-Returns float64 [period_samples], not copied.
-Raises RequestError.)";
+Returns float64 [period_samples], not copied. Raises RequestError.)";
 
 }  // namespace
 

@@ -40,7 +40,7 @@ std::shared_ptr<FrfHandle> frf_of(const py::object& given) {
   try {
     return std::make_shared<FrfHandle>(read_frf_handle(given.cast<std::filesystem::path>()));
   } catch (const py::cast_error&) {
-    throw py::type_error("frf: an Frf or the name of a file must stand here");
+    throw py::type_error("frf: expected an Frf or a file name");
   }
 }
 
@@ -80,26 +80,27 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
 }
 
 constexpr const char* kFitDoc =
-    R"(Fits the additive model P(s) = sum of modes and rigid body to a frequency response, as `stageid fit`.
+    R"(Fits the additive model P(s) = sum of modes and rigid body to a frequency response, like `stageid fit`.
 
-frf               Frf, or the name of a file
+frf               an Frf or a file name
 band_hz           (low, high) in Hz; None: all lines
-modes             'auto', 'none', how many, a list of frequencies in Hz, or the name of a modes.json
+modes             'auto', 'none', the number of modes, a list of frequencies in Hz, or the name of a modes.json
 weighting         'unit', 'inverse_magnitude', 'relative', 'noise_variance', 'total_variance', 'likelihood',
-                  or the name of an HDF5 file with /weights; None: by the variances of the response
-hold              'none', 'phase', 'sinc', 'exact'; '': by the response
-delay             s, 'estimate' or 'per_channel'; None: by the response
-rigid_body        'none', 'full', a rank, 'suspension' or 'suspension:F1:F2' (Hz); None: by the unit of the outputs, full
-residue_rank      of the modes: 'full', or 1
-damping           'proportional' (B_0) or 'general' (B_0 + B_1 s); '': by the unit of the outputs
-direct_term       'none' or 'full'; '': by the unit of the outputs
-submodels         further ones as --submodel takes them, 'n=4,m=3,f=120:180'
-method            'riv', 'gn' or 'sk'; max_iterations of one fit
-search_seconds    budget of a search for modes in seconds of an ordinary core, counted in work; 0: no end
+                  or the name of an HDF5 file with /weights; None: according to the variances of the response
+hold              'none', 'phase', 'sinc', 'exact'; '': according to the response
+delay             in s, 'estimate' or 'per_channel'; None: according to the response
+rigid_body        'none', 'full', a rank, 'suspension' or 'suspension:F1:F2' (Hz);
+                  None: according to the unit of the outputs, full by default
+residue_rank      residue rank of the modes: 'full' or 1
+damping           'proportional' (B_0) or 'general' (B_0 + B_1 s); '': according to the unit of the outputs
+direct_term       'none' or 'full'; '': according to the unit of the outputs
+submodels         additional submodels in the form of --submodel, e.g. 'n=4,m=3,f=120:180'
+method            'riv', 'gn' or 'sk'; max_iterations is the limit per fit
+search_seconds    budget of the search for modes, in seconds of a typical core (counted as work); 0: unlimited
 threads           0: all cores; the result does not depend on it
-covariance        True: also Fit.covariance, at most 4000 parameters
+covariance        True: also compute Fit.covariance (at most 4000 parameters)
 
-Returns Fit. Not converging is no error: look at trustworthy. Other Python threads run meanwhile; Ctrl-C ends it.
+Returns a Fit. A fit that does not converge raises no error: check trustworthy. Releases the GIL; Ctrl-C interrupts it.
 Raises RequestError, FormatError, FileError.)";
 
 py::object covariance_of(const py::object& self) {
@@ -120,9 +121,10 @@ py::object covariance_of(const py::object& self) {
 }
 
 constexpr const char* kCovarianceDoc =
-    R"(A dict: name, unit and value of all p parameters; sandwich and likelihood, their covariance [p, p];
-response_variance and confidence_radius (95 %) of the model on the fitted lines, float64 [N, n_y, n_u]. What
-stageid fit --covariance writes. None unless asked for by fit(..., covariance=True).)";
+    R"(A dict: name, unit and value of all p parameters; sandwich and likelihood, two estimates of their covariance
+[p, p];
+response_variance and confidence_radius (95 %) of the model on the fitted lines, float64 [N, n_y, n_u]. The
+same as `stageid fit --covariance` writes. None unless requested with fit(..., covariance=True).)";
 
 constexpr const char* kVarianceDoc =
     R"(E|dP|^2 of the model's response on the fitted lines, float64 [N, n_y, n_u]; None without variances.
@@ -133,21 +135,23 @@ A read-only view, not copied.)";
 
 void define_fit(py::module_& module) {
   py::class_<FitResult, std::shared_ptr<FitResult>>(
-      module, "Fit", "The result of a fit: the model, how it was reached, and whether to trust it.")
+      module, "Fit",
+      "The result of a fit: the model, the decisions on the way, and whether it is trustworthy.")
       .def_property_readonly(
-          "model", [](const FitResult& r) { return r.model; }, "Model, a copy")
+          "model", [](const FitResult& r) { return r.model; }, "The fitted Model (a copy)")
       .def_property_readonly(
           "trustworthy", [](const FitResult& r) { return r.trustworthy(); },
-          "False where the program ends with exit code 3")
+          "False if `stageid fit` would end with exit code 3")
       .def_property_readonly(
           "status", [](const FitResult& r) { return to_string(r.status); },
-          "'gradient_small', 'step_small', or why it is not to be trusted")
-      .def_readonly("message", &FitResult::message, "One line on how it ended")
+          "'gradient_small', 'step_small', or the reason why the fit is not trustworthy")
+      .def_readonly("message", &FitResult::message, "How the fit ended, in one line")
       .def_readonly("cost", &FitResult::cost,
-                    "1/(2N) sum vec(E)^H W vec(E), one an iterate, the start first")
-      .def_readonly("decisions", &FitResult::decisions, "What was chosen and why, one line each")
+                    "Cost 1/(2N) sum vec(E)^H W vec(E) per iteration, from the start on")
+      .def_readonly("decisions", &FitResult::decisions,
+                    "What was chosen and why, one line per decision")
       .def_readonly("removal_cost", &FitResult::removal_cost,
-                    "By how much sum W |E|^2 would rise without each submodel")
+                    "Increase of sum W |E|^2 without each submodel")
       .def_property_readonly(
           "response_variance",
           [](const py::object& self) {

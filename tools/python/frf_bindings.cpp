@@ -89,7 +89,7 @@ std::vector<std::shared_ptr<LogReader>> logs_of(const py::object& given) {
     try {
       logs.push_back(open_log(log.cast<std::filesystem::path>()));
     } catch (const py::cast_error&) {
-      throw py::type_error("logs: a Log, the name of a file, or a list of these must stand here");
+      throw py::type_error("logs: expected a Log, a file name, or a list of these");
     }
   }
   return logs;
@@ -105,8 +105,8 @@ void require_realizations(const std::vector<const LogReader*>& logs,
   for (const int realization : realizations)
     if (!complete.contains(realization))
       throw std::invalid_argument(fmt::format(
-          "realizations: {} has no complete run in {}; there are {}. They count from 0 in Python, "
-          "as log[i]['realization'] does, and from 1 in the program",
+          "realizations: {} has no complete run in {}; there are {}. Realizations count from 0 in "
+          "Python, as log[i]['realization'] does, and from 1 in the program",
           realization, logs.front()->path().string(), fmt::join(complete, ", ")));
 }
 
@@ -190,7 +190,8 @@ void define_properties(Class& c) {
   c.def_property_readonly(
       "frequency_hz",
       [](const FrfHandle& h) -> const Eigen::VectorXd& { return h.frf.frequency_hz; },
-      py::return_value_policy::reference_internal, "Hz, [N], rising; a view, not copied");
+      py::return_value_policy::reference_internal,
+      "Frequencies in Hz, [N], increasing; a view, not copied");
   property(
       "inputs", [](const FrfEstimate& f) { return f.inputs.names; }, "Names [n_u]");
   property(
@@ -205,13 +206,13 @@ void define_properties(Class& c) {
       "sample_rate_hz", [](const FrfEstimate& f) { return f.sample_rate_hz; }, "Hz; 0: unknown");
   property(
       "hold", [](const FrfEstimate& f) { return kHolds[static_cast<std::size_t>(f.hold)]; },
-      "'zoh' as a digital loop measures, 'none' for a continuous-time plant");
+      "'zoh' if a digital loop measured it, 'none' for a continuous-time plant");
   property(
       "compensated",
       [](const FrfEstimate& f) { return kCompensations[static_cast<std::size_t>(f.compensated)]; },
-      "What was taken out of the response: 'none', 'delay' or 'hold'");
+      "What the response is compensated for: 'none', 'delay' or 'hold'");
   property(
-      "delay_s", [](const FrfEstimate& f) { return f.delay_s; }, "s, that was taken out");
+      "delay_s", [](const FrfEstimate& f) { return f.delay_s; }, "Compensated delay in s");
   property(
       "noise_dof", [](const FrfEstimate& f) { return f.noise_dof; },
       "Complex degrees of freedom of noise_variance");
@@ -220,10 +221,10 @@ void define_properties(Class& c) {
       "Complex degrees of freedom of total_variance");
   property(
       "correlated_lines", [](const FrfEstimate& f) { return f.correlated_lines; },
-      "Zippered experiments: of so many lines one is independent; else 1");
+      "Zippered experiments: number of lines per independent line; else 1");
   property(
       "provenance_json", [](const FrfEstimate& f) { return f.provenance_json; },
-      "Inputs with their hash, options, versions; JSON");
+      "Input files with their hashes, options and versions, as JSON");
   property("health", &health, kHealthDoc);
 }
 

@@ -36,7 +36,7 @@ ChannelList channels(const char* group, py::ssize_t count, const char* prefix, c
       list.names.push_back(fmt::format("{}{}", prefix, c + 1));
   list.units = units ? *units : std::vector<std::string>(list.size());
   if (list.units.size() != list.size())
-    throw std::invalid_argument(fmt::format("{}: {} for {}; give one a channel", group,
+    throw std::invalid_argument(fmt::format("{}: {} for {}; give one per channel", group,
                                             counted(list.units.size(), "unit"),
                                             counted(list.size(), "channel")));
   return list;
@@ -120,7 +120,7 @@ std::shared_ptr<LogReader> simulate(const std::filesystem::path& config) {
 py::dict run_at(const LogReader& log, py::ssize_t index) {
   const auto count = static_cast<py::ssize_t>(log.runs().size());
   if (index < -count || index >= count)
-    throw py::index_error(fmt::format("run {} of {}", index, count));
+    throw py::index_error(fmt::format("run {} is out of range; the log has {} runs", index, count));
   const auto run = static_cast<std::size_t>(index < 0 ? index + count : index);
   const LogRun& about = log.runs()[run];
   LogSamples samples;
@@ -155,8 +155,8 @@ std::vector<std::size_t> full_experiment(const LogReader& log, py::ssize_t& M, p
                      });
   if (!equal)
     throw std::invalid_argument(
-        fmt::format("{}: its complete runs are not {} of {} of one length; "
-                    "take them one by one, log[i]",
+        fmt::format("{}: the complete runs are not {} of {} with equal lengths; read them one by "
+                    "one with log[i]",
                     log.path().string(), counted(M, "realization"), counted(E, "experiment")));
   return order;
 }
@@ -201,20 +201,22 @@ void define_properties(Class& log) {
         name, [get](const LogReader& l) { return get(l.info()); }, doc);
   };
   property(
-      "sample_rate_hz", [](const LogInfo& i) { return i.sample_rate_hz; }, "Hz, of the loop");
+      "sample_rate_hz", [](const LogInfo& i) { return i.sample_rate_hz; },
+      "Sample rate of the loop in Hz");
   property(
       "period_samples", [](const LogInfo& i) { return i.period_samples; },
-      "Samples of one period of the excitation");
+      "Samples per period of the excitation");
   property(
       "transient_periods", [](const LogInfo& i) { return i.transient_periods; },
-      "Periods at the beginning of every run that an estimate leaves out");
+      "Periods at the beginning of every run that an estimate discards");
   property(
       "excitation", [](const LogInfo& i) { return i.excitation.names; },
       "Names of the excited channels [n_r]");
   property(
-      "actuators", [](const LogInfo& i) { return i.actuators.names; }, "Their names [n_u]");
+      "actuators", [](const LogInfo& i) { return i.actuators.names; },
+      "Names of the actuators [n_u]");
   property(
-      "sensors", [](const LogInfo& i) { return i.sensors.names; }, "Their names [n_y]");
+      "sensors", [](const LogInfo& i) { return i.sensors.names; }, "Names of the sensors [n_y]");
   property(
       "actuator_units", [](const LogInfo& i) { return i.actuators.units; },
       "Units of the actuators [n_u]");
@@ -235,13 +237,14 @@ void define_logs(py::module_& module) {
   log.def(py::pickle([](const LogReader& of) { return state_of(of); }, &log_of_state));
   define_properties(log);
   log.def(
-      "__len__", [](const LogReader& l) { return l.runs().size(); }, "Runs, incomplete ones too");
+      "__len__", [](const LogReader& l) { return l.runs().size(); },
+      "Number of runs, including incomplete ones");
   log.def(
       "__iter__",
       [](const py::object& self) {
         return py::reinterpret_steal<py::object>(PySeqIter_New(self.ptr()));
       },
-      "Run after run");
+      "Iterates over the runs");
   log.def("__getitem__", &run_at, py::arg("run"), kRunDoc);
   log.def("arrays", &arrays, kArraysDoc);
   module.def("read_log", &read_log, py::arg("file"), kReadLogDoc);

@@ -80,9 +80,7 @@ py::dict fit_of(const AdditiveModel& model) {
 
 py::object response_of(const AdditiveModel& model, const py::object& given) {
   const Eigen::VectorXd frequency_hz = real_vector(given, "frequency_hz");
-  if (!frequency_hz.allFinite())
-    throw std::invalid_argument(
-        "frequency_hz: holds what is not finite; numbers in Hz must stand here");
+  if (!frequency_hz.allFinite()) throw std::invalid_argument("frequency_hz: must be finite, in Hz");
   if (frequency_hz.size() == 0)
     return py::array_t<std::complex<double>>(
         {Eigen::Index{0}, model.n_outputs(), model.n_inputs()});
@@ -140,33 +138,35 @@ py::list pairs_of(const AdditiveModel& first, const AdditiveModel& second) {
 }
 
 constexpr const char* kResponseDoc =
-    R"(P(j omega) through the model's hold and delays, complex128 [N, n_y, n_u], unit of output over input.
+    R"(P(j omega) including hold and delays of the model, complex128 [N, n_y, n_u], unit of output over unit of input.
 
-frequency_hz [N] in Hz, or one number (N = 1). The result is not copied.
-Raises RequestError where a frequency is not finite, or above Nyquist behind a hold.)";
+frequency_hz is an array [N] in Hz, or one number (N = 1). The result is not copied.
+Raises RequestError if a frequency is not finite, or above the Nyquist frequency of a model with a hold.)";
 
 constexpr const char* kModesDoc =
     R"(A list of dicts: natural_frequency_hz and damping_ratio with natural_frequency_std_hz (Hz) and
 damping_ratio_std (None if unknown), modal_mass (kg for N and m), output_shape [n_y], input_shape [n_u], and
-modal_mass_std, output_shape_std, input_shape_std: of the real parts, and of the imaginary parts; None if unknown.)";
+modal_mass_std, output_shape_std, input_shape_std (real part: deviation of the real parts, imaginary part: of the
+imaginary parts; None if unknown).)";
 
 constexpr const char* kSubmodelsDoc =
     R"(A list of dicts: integrators, denominator [1, a_1, ...], numerator [B_0, B_1, ...] of [n_y, n_u] each, and
 numerator_std; SI units, s in rad/s.)";
 
 constexpr const char* kSampledDoc =
-    R"(A, B, C, D behind a zero-order hold at sample_rate_hz, and the whole samples of delay that stand beside
-them: of inputs [n_u], of outputs [n_y] (int64).
+    R"(A, B, C, D with a zero-order hold at sample_rate_hz, and the additional delays of the inputs [n_u] and
+outputs [n_y] in whole samples (int64).
 
 Raises RequestError if the model has no sample rate.)";
 
 constexpr const char* kValidateDoc =
-    R"(Tries the model on a response that it was not fitted to, in band_hz (Hz); None: the band of its fit.
+    R"(Validates the model on a response to which it was not fitted, in band_hz (Hz); None: the band of the fit.
 
 Returns a dict: relative_rms_error, normalized_error, chi_square_per_dof (0: unknown),
-expected_chi_square (of noise alone: 1 for exact variances), variance that they compare with ('none', 'noise', 'total'
-or 'scatter'), explained (False: clearly more than noise and known distortion) and reason, whitened_above_95 (0.05 is right), whiteness and whiteness_limit, channel_error [n_y, n_u].
-Raises RequestError where channels do not match by name.)";
+expected_chi_square (for noise alone; 1 for exact variances), variance (the reference: 'none', 'noise', 'total' or
+'scatter'), explained (False: clearly more than noise and known distortion) and reason, whitened_above_95 (ideally
+0.05), whiteness and whiteness_limit, channel_error [n_y, n_u].
+Raises RequestError if the channel names differ.)";
 
 constexpr const char* kPairsDoc =
     R"(Pairs the modes of two models with the same channels by frequency and shape.
@@ -178,7 +178,8 @@ output_mac, input_mac (0 to 1). Raises RequestError if the numbers of channels d
 
 void define_model(py::module_& module) {
   using Model = AdditiveModel;
-  py::class_<Model>(module, "Model", "P(s) = sum of submodels, with delays: what model.json holds.")
+  py::class_<Model>(module, "Model",
+                    "The model P(s) = sum of submodels, with delays: the content of model.json.")
       .def_property_readonly(
           "inputs", [](const Model& m) { return m.inputs.names; }, "Names [n_u]")
       .def_property_readonly(
@@ -192,18 +193,18 @@ void define_model(py::module_& module) {
       .def_property_readonly(
           "input_delay_std_s",
           [](const Model& m) { return deviation_or_none(m.input_delay_std_s); },
-          "Standard deviation, s, [n_u]; None: given, or unknown")
+          "Standard deviation in s, [n_u]; None if the delay was given, or if unknown")
       .def_property_readonly(
           "output_delay_std_s",
           [](const Model& m) { return deviation_or_none(m.output_delay_std_s); },
-          "Standard deviation, s, [n_y]; of delays per channel the last is the reference, 0; None: "
-          "given, or unknown")
+          "Standard deviation in s, [n_y]; None if the delay was given, or if unknown. With delays "
+          "per channel the last output is the reference, 0")
       .def_property_readonly("submodels", &submodels_of, kSubmodelsDoc)
-      .def_property_readonly("fit", &fit_of,
-                             "How the fit ended, a dict: cost, weighting, iterations, status, "
-                             "relative_rms_error, band_hz")
+      .def_property_readonly(
+          "fit", &fit_of,
+          "The fit, a dict: cost, weighting, iterations, status, relative_rms_error, band_hz")
       .def_readonly("provenance_json", &Model::provenance_json,
-                    "Inputs with their hash, options, versions; JSON")
+                    "Input files with their hashes, options and versions, as JSON")
       .def(py::pickle([](const Model& m) { return state_of(m); }, &model_of_state))
       .def("response", &response_of, py::arg("frequency_hz"), kResponseDoc)
       .def("modes", &modes_of, kModesDoc)
@@ -217,10 +218,9 @@ void define_model(py::module_& module) {
             write_model(file, m);
           },
           py::arg("file"),
-          "Writes model.json, whole or not at all. Raises FileError, RequestError for another "
-          "ending.");
+          "Writes model.json atomically. Raises FileError, RequestError for another ending.");
   module.def("read_model", &read_model, py::arg("file"),
-             "model.json as Model. Raises FileError, FormatError.");
+             "Reads model.json and returns a Model. Raises FileError, FormatError.");
   module.def("validate", &validate_on, py::arg("model"), py::arg("frf"), py::kw_only(),
              py::arg("band_hz") = py::none(), kValidateDoc);
   module.def("pair_modes", &pairs_of, py::arg("first"), py::arg("second"), kPairsDoc);

@@ -52,23 +52,23 @@ py::list poles_over_orders(const FrfHandle& of, int most_order, double delay_s) 
 }
 
 constexpr const char* kModesDoc =
-    R"(Candidate modes: prominent peaks of the mode indicator that are no crossing of curves, by frequency.
+    R"(Candidate modes in order of frequency: prominent peaks of the mode indicator, without crossings of its curves.
 
-kind            what the indicator is of: 'accelerance', 'response', 'whitened' (by the variances)
-prominence_db   of a peak, dB
+kind            basis of the indicator: 'accelerance', 'response' or 'whitened' (by the variances)
+prominence_db   least prominence of a peak, in dB
 
 Returns a list of dicts: frequency_hz, damping_ratio, cmif_curve (from 1). Raises RequestError.)";
 
 constexpr const char* kCmifDoc =
     R"(Complex mode indicator function: squared singular values of G(j omega_k), float64 [min(n_y, n_u), N].
 
-kind: 'response', 'accelerance' (omega^2 G), 'whitened'. Unit of the response squared, largest first.
-Raises RequestError if 'whitened' is asked of a response without variances.)";
+kind is 'response', 'accelerance' (omega^2 G) or 'whitened'. The unit is that of the response squared; the largest
+value is first. Raises RequestError for 'whitened' if the response has no variances.)";
 
 constexpr const char* kStabilizationDoc =
-    R"(Poles over orders 2, 4, ... most_order by least squares in the z plane: a second opinion on modes.
+    R"(Poles for the orders 2, 4, ... most_order by least squares in the z plane: an independent check of the modes.
 
-delay_s in s is taken out first. Returns a list of dicts: order, frequency_hz, damping_ratio,
+delay_s, in s, is compensated first. Returns a list of dicts: order, frequency_hz, damping_ratio,
 stable_frequency, stable_damping. Raises RequestError if there are too few lines.)";
 
 }  // namespace

@@ -26,8 +26,8 @@ int call(const py::args& arguments) {
 constexpr const char* kCall =
     R"(Runs a command of the program in this process: call('fit', 'frf.h5', '-o', 'model.json').
 
-Returns its exit code: 0 done, 3 done but not to be trusted, 4 stopped for safety, 1 the stage ended it.
-Raises RequestError, FormatError, FileError, StageError for all that the program refuses.)";
+Returns its exit code: 0 done, 3 done but the result is not trustworthy, 4 stopped for safety, 1 ended by the stage.
+Raises RequestError, FormatError, FileError or StageError if the program reports an error.)";
 
 }  // namespace
 

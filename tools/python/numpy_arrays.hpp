@@ -43,7 +43,7 @@ Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> columns_of(
     const pybind11::array_t<Scalar, pybind11::array::forcecast>& array, const char* name) {
   if (array.ndim() != 3)
     throw std::invalid_argument(std::string(name) + ": has " + std::to_string(array.ndim()) +
-                                " axes; [lines x outputs x inputs] must stand here");
+                                " axes; expected [lines x outputs x inputs]");
   const auto in = array.template unchecked<3>();
   Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> columns(in.shape(1) * in.shape(2),
                                                                 in.shape(0));

@@ -12,7 +12,7 @@ namespace {
 namespace py = pybind11;
 
 [[noreturn]] void refuse_type(const char* name) {
-  throw py::type_error(fmt::format("{}: an array of numbers must stand here", name));
+  throw py::type_error(fmt::format("{}: expected an array of numbers", name));
 }
 
 py::array number_array(const py::object& given, const char* name) {
@@ -28,10 +28,9 @@ py::array number_array(const py::object& given, const char* name) {
 RealArray real_array(const py::object& given, const char* name) {
   const py::array array = number_array(given, name);
   if (array.dtype().kind() == 'c')
-    throw std::invalid_argument(
-        fmt::format("{}: holds complex numbers; real ones must stand here, give their real part if "
-                    "that is what is meant",
-                    name));
+    throw std::invalid_argument(fmt::format(
+        "{}: contains complex numbers; expected real numbers. Give the real part if intended",
+        name));
   RealArray reals = RealArray::ensure(array);
   if (!reals) refuse_type(name);
   return reals;
@@ -41,8 +40,7 @@ Eigen::VectorXd real_vector(const py::object& given, const char* name) {
   const RealArray array = real_array(given, name);
   const bool column = array.ndim() == 2 && array.shape(1) == 1;
   if (array.ndim() > 1 && !column)
-    throw std::invalid_argument(
-        fmt::format("{}: has {} axes; one must stand here", name, array.ndim()));
+    throw std::invalid_argument(fmt::format("{}: has {} axes; expected one", name, array.ndim()));
   const auto in_order = py::array_t<double, py::array::c_style | py::array::forcecast>(array);
   return Eigen::Map<const Eigen::VectorXd>(in_order.data(), in_order.size());
 }

@@ -1,6 +1,6 @@
 """Measures and identifies multivariable motion stages in closed loop; SI units throughout.
 
-The numbers are those of the program `stageid`, to the bit: the same compiled functions give both.
+Results are identical to those of the program `stageid`, because both use the same compiled functions.
 """
 
 from stageid._native import (
