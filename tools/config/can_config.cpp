@@ -16,11 +16,12 @@ constexpr double kLeastWatchdog_s = 20e-3;
 
 void describe_bus(ConfigVisitor& v, std::vector<CanFile::Bus>& list) {
   CanFile::Bus bus;
-  v.text("interface", bus.spec.interface, kRequired, "of the host and of the node, e.g. can0");
+  v.text("interface", bus.spec.interface, kRequired,
+         "interface name on the host and the node, e.g. can0");
   v.number("nominal_bit_rate_hz", bus.spec.nominal_bit_rate_hz, positive("bit/s"), kOptional,
-           "of the arbitration phase; for the load only, 'ip link' sets it");
+           "of the arbitration phase; used for the bus load only, 'ip link' sets it");
   v.number("data_bit_rate_hz", bus.spec.data_bit_rate_hz, positive("bit/s"), kOptional,
-           "of the data phase; for the load only");
+           "of the data phase; used for the bus load only");
   v.texts("actuators", bus.actuators, {}, kOptional, "names; left out on an only bus: all");
   v.texts("sensors", bus.sensors, {}, kOptional, "names; left out on an only bus: all");
   list.push_back(std::move(bus));
@@ -37,9 +38,8 @@ std::vector<int> channel_numbers(const std::vector<std::string>& names,
   for (const std::string& name : names) {
     const int index = channel_index(channels, name);
     if (index < 0)
-      throw std::invalid_argument(
-          fmt::format("can: bus {}: there is no channel '{}' of that kind; give a name above",
-                      interface, name));
+      throw std::invalid_argument(fmt::format(
+          "can: bus {}: unknown channel '{}'; use a channel name of this file", interface, name));
     numbers.push_back(index);
   }
   return numbers;
@@ -50,11 +50,12 @@ std::vector<double> ranges(const std::vector<double>& given, const Eigen::Vector
   if (given.size() == channels) return given;
   if (given.size() == 1) return std::vector<double>(channels, given.front());
   if (!given.empty())
-    throw std::invalid_argument(fmt::format("can: {}: {} entries for {} channels; give one or {}",
-                                            key, given.size(), channels, channels));
-  if (limits.size() != static_cast<Eigen::Index>(channels) || !limits.allFinite())
     throw std::invalid_argument(
-        fmt::format("can: {}: there is no limit to take a range from; write it", key));
+        fmt::format("can: {}: got {} entries for {} channels; write 1 or {}", key, given.size(),
+                    channels, channels));
+  if (limits.size() != static_cast<Eigen::Index>(channels) || !limits.allFinite())
+    throw std::invalid_argument(fmt::format(
+        "can: {}: no default, because a limit is missing or infinite; add the key", key));
   const Eigen::VectorXd scaled = kRangePerLimit * limits;
   return {scaled.begin(), scaled.end()};
 }
@@ -65,20 +66,20 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
   CanSpec& spec = f.config.spec;
   f.config.present = true;
   choose(v, "mode", f.config.mode, {"streaming", "resident"}, kOptional,
-         "sample by sample, or played by the node in its own loop");
+         "streaming: sample by sample; resident: the node runs the experiment in its own loop");
   v.items(
       "buses", [&](ConfigVisitor& bus) { describe_bus(bus, f.buses); }, {1, 16}, kRequired,
-      "CAN FD buses; the first also carries commands and transfers");
+      "CAN FD buses; the first one also carries commands and transfers");
   v.numbers("actuator_range_n", f.actuator_range_n, positive("N"), {}, kOptional,
             "2^23 counts; one for all or one each; left out: 1.25 times limit_n");
   v.numbers("sensor_range_m", f.sensor_range_m, positive("m"), {}, kOptional,
             "2^23 counts; one for all or one each; left out: 1.25 times window_m");
   v.number("reply_timeout_s", spec.reply_timeout_s, positive("s"), kOptional,
-           "the host waits so long for an answer");
+           "the host waits this long for a reply");
   v.number("watchdog_s", f.watchdog_s, not_negative("s"), kOptional,
-           "the node stops after so long without a setpoint; 0: 3 periods, 20 ms at least");
+           "the node stops if it receives no setpoint for this long; 0: 3 periods, at least 20 ms");
   v.number("largest_load", spec.largest_load, {"", 0.0, 1.0, true}, kOptional,
-           "of a bus; an experiment that needs more is refused");
+           "largest load of a bus; experiments that need more are refused");
 }
 
 CanConfig complete_can(const CanFile& file, const StageInfo& info, const StageLimits& limits) {

@@ -100,7 +100,7 @@ class MapReader final : public ConfigVisitor {
           error != std::errc{})
         wrong(key, *node, "a whole number");
       if (parsed < low || parsed > high)
-        document_.fail(node->mark, fmt::format("{}: {} is out of range; allowed is {}", key, parsed,
+        document_.fail(node->mark, fmt::format("{}: {} is out of range; expected {}", key, parsed,
                                                describe_range(low, high)));
       value = parsed;
     });
@@ -121,7 +121,7 @@ class MapReader final : public ConfigVisitor {
           values.push_back(parse_text(key, document_.node(item)));
           if (std::count(values.begin(), values.end(), values.back()) > 1)
             document_.fail(document_.node(item).mark,
-                           fmt::format("{}: '{}' stands here twice; keep one", key, values.back()));
+                           fmt::format("{}: duplicate entry '{}'; keep one", key, values.back()));
         });
     });
   }
@@ -234,7 +234,7 @@ class MapReader final : public ConfigVisitor {
                                        CountRule count) const {
     if (node.kind != YamlNode::Kind::sequence) wrong(key, node, "a list [..., ...]");
     if (node.items.size() < count.least || node.items.size() > count.most)
-      document_.fail(node.mark, fmt::format("{}: {} entries; {} belong here", key,
+      document_.fail(node.mark, fmt::format("{}: got {} entries; expected {}", key,
                                             node.items.size(), describe_count(count)));
     return node.items;
   }
@@ -248,7 +248,7 @@ class MapReader final : public ConfigVisitor {
       document_.fail(node.mark, fmt::format("{}: {} is not finite; write a number{}", key,
                                             node.text, in_unit(rule)));
     if (!in_range(*value, rule))
-      document_.fail(node.mark, fmt::format("{}: {} is out of range; allowed is {}", key, node.text,
+      document_.fail(node.mark, fmt::format("{}: {} is out of range; expected {}", key, node.text,
                                             describe_range(rule)));
     return *value;
   }
@@ -279,7 +279,7 @@ class MapReader final : public ConfigVisitor {
     const bool digit_first =
         !node.text.empty() && node.text.front() >= '0' && node.text.front() <= '9';
     if (!digit_first) return "";
-    return fmt::format("the number alone, in {} (the unit stands in the key)", rule.unit);
+    return fmt::format("the number alone, in {} (the unit is part of the key)", rule.unit);
   }
   std::string parse_text(const char* key, const YamlNode& node) const {
     if (node.kind != YamlNode::Kind::scalar || node.text.empty()) wrong(key, node, "a text");
@@ -303,8 +303,7 @@ class MapReader final : public ConfigVisitor {
                              parse_number(key, document_.node(pair[1]), rule.rule));
   }
   [[noreturn]] void wrong(const char* key, const YamlNode& node, const std::string& right) const {
-    document_.fail(node.mark,
-                   fmt::format("{}: {} stands here; write {}", key, quoted(node), right));
+    document_.fail(node.mark, fmt::format("{}: got {}; expected {}", key, quoted(node), right));
   }
   [[noreturn]] void wrong_word(const char* key, const YamlNode& node,
                                const std::vector<std::string>& names) const {

@@ -69,14 +69,14 @@ void describe_state_space(ConfigVisitor& v, ControllerFile& f) {
   const std::size_t n_u = f.actuators.size();
   const auto check = [&](const char* key, std::size_t have, std::size_t rows, std::size_t columns) {
     v.require(have == rows * columns, key,
-              fmt::format("{}: {}; a matrix of {} x {} has {}, row by row", key,
+              fmt::format("{}: got {}; expected a matrix of {} x {}, {} numbers, row by row", key,
                           counted(have, "number"), rows, columns, rows * columns));
   };
   check("a", s.a.size(), n, n);
   check("b", s.b.size(), n, n_y);
   check("c", s.c.size(), n_u, n);
   if (!s.d.empty()) check("d", s.d.size(), n_u, n_y);
-  v.require(n > 0 || !s.d.empty(), "d", "d: a controller without states needs it");
+  v.require(n > 0 || !s.d.empty(), "d", "d: required for a controller without states");
 }
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
@@ -85,8 +85,8 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 
 void describe_transfer(ConfigVisitor& v, ControllerFile& f) {
   Transfer t;
-  v.text("actuator", t.actuator, kRequired, "that it acts on");
-  v.text("sensor", t.sensor, kRequired, "that it sees");
+  v.text("actuator", t.actuator, kRequired, "actuator that it drives");
+  v.text("sensor", t.sensor, kRequired, "sensor that it reads");
   v.numbers("numerator", t.numerator, any_number(""), {1, kMostStates}, kRequired,
             "coefficients of falling powers of z or s");
   v.numbers("denominator", t.denominator, any_number(""), {1, kMostStates}, kRequired,
@@ -97,19 +97,20 @@ void describe_transfer(ConfigVisitor& v, ControllerFile& f) {
             fmt::format("sensor: '{}' is not in the list 'sensors'", t.sensor));
   v.require(
       std::any_of(t.denominator.begin(), t.denominator.end(), [](double x) { return x != 0.0; }),
-      "denominator", "denominator: is zero; give a coefficient that is not");
+      "denominator",
+      "denominator: all coefficients are zero; write at least one nonzero coefficient");
   const bool twice = std::any_of(f.transfer.begin(), f.transfer.end(), [&](const Transfer& other) {
     return other.actuator == t.actuator && other.sensor == t.sensor;
   });
   v.require(!twice, "sensor",
-            fmt::format("sensor: a second transfer function from '{}' to '{}'; give their sum",
+            fmt::format("sensor: duplicate transfer function from '{}' to '{}'; write their sum",
                         t.sensor, t.actuator));
   f.transfer.push_back(std::move(t));
 }
 
 void require_unique(ConfigVisitor& v, const char* key, const std::vector<std::string>& names) {
   v.require(std::set<std::string>(names.begin(), names.end()).size() == names.size(), key,
-            fmt::format("{}: duplicate channel name; name each channel once", key));
+            fmt::format("{}: duplicate channel name; list each channel once", key));
 }
 
 void describe(ConfigVisitor& v, ControllerFile& f) {
@@ -117,11 +118,12 @@ void describe(ConfigVisitor& v, ControllerFile& f) {
   v.text("stage", f.stage, kOptional,
          "stage file with geometry and mass, relative to this one; left out: the wiring is not "
          "checked");
-  v.texts("sensors", f.sensors, {0, 64}, kOptional, "what the controller sees, in its order");
-  v.texts("actuators", f.actuators, {0, 64}, kOptional, "what it acts on, in its order");
+  v.texts("sensors", f.sensors, {0, 64}, kOptional, "inputs of the controller, in its order");
+  v.texts("actuators", f.actuators, {0, 64}, kOptional, "outputs of the controller, in its order");
   require_unique(v, "sensors", f.sensors);
   require_unique(v, "actuators", f.actuators);
-  choose(v, "time", f.time, {"discrete", "continuous"}, kOptional, "of matrices and coefficients");
+  choose(v, "time", f.time, {"discrete", "continuous"}, kOptional,
+         "time domain of matrices and coefficients");
   v.number("sample_rate_hz", f.sample_rate_hz, positive("Hz"), kOptional,
            "of a discrete controller");
   v.group(
@@ -131,15 +133,15 @@ void describe(ConfigVisitor& v, ControllerFile& f) {
       "transfer", [&](ConfigVisitor& item) { describe_transfer(item, f); }, {}, kOptional,
       "transfer functions from y to C y, u = r - C y; a pair left out: zero");
   v.text("measured", f.measured, kOptional,
-         "or a response in HDF5 as frf.h5, relative to this file: inputs are the sensors, outputs "
-         "the actuators");
+         "or a frequency response in HDF5, laid out as frf.h5, relative to this file: its inputs "
+         "are the sensors, its outputs the actuators");
   const int forms = int{f.has_state_space} + int{!f.transfer.empty()} + int{!f.measured.empty()};
-  v.require(forms == 1, "format", "give the controller once: state_space, transfer or measured");
+  v.require(forms == 1, "format", "write exactly one of state_space, transfer and measured");
   const bool matrices = f.measured.empty();
   v.require(!matrices || (!f.sensors.empty() && !f.actuators.empty()), "format",
-            "sensors, actuators: name the channels of the matrices, in their order");
+            "sensors, actuators: missing; list the channels of the matrices, in their order");
   v.require(!matrices || f.time == Time::continuous || f.sample_rate_hz > 0.0, "format",
-            "sample_rate_hz: a discrete controller needs it");
+            "sample_rate_hz: required for a discrete controller");
 }
 
 Eigen::MatrixXd matrix_of(const std::vector<double>& values, Index rows, Index columns) {

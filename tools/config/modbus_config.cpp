@@ -9,7 +9,7 @@ constexpr double kStalePolls = 3.0;
 
 void describe_tcp(ConfigVisitor& v, ModbusAddress& a) {
   v.text("host", a.host, kOptional, "IPv4 address");
-  count(v, "port", a.port, 1, 65535, kOptional, "Modbus: 502");
+  count(v, "port", a.port, 1, 65535, kOptional, "TCP port; the standard port of Modbus is 502");
 }
 
 void describe_rtu(ConfigVisitor& v, ModbusAddress& a) {
@@ -49,30 +49,30 @@ void describe_modbus(ConfigVisitor& v, ModbusConfig& c) {
         describe_rtu(keys, c.address);
       },
       kOptional, "Modbus RTU; this or tcp");
-  v.require(tcp != rtu, tcp ? "tcp" : "unit", "modbus: write one of tcp and rtu");
-  count(v, "unit", c.address.unit, 1, 247, kOptional, "of the server");
+  v.require(tcp != rtu, tcp ? "tcp" : "unit", "modbus: write exactly one of tcp and rtu");
+  count(v, "unit", c.address.unit, 1, 247, kOptional, "unit of the server");
   v.number("response_s", c.timing.response_s, {"s", 0.001, 60.0}, kOptional,
-           "a reply that is not there by then is missing");
+           "a reply later than this counts as missing");
   v.number("worst_reply_s", c.timing.worst_reply_s, {"s", 0.001, 3600.0}, kOptional,
-           "a reply that is not there by then never comes");
+           "after this time a reply is no longer expected");
   v.number("device_s", c.timing.device_s, {"s", 1e-5, 60.0}, kOptional,
-           "what the server needs for a reply; limits the sample rate");
+           "time the server needs for a reply; limits the sample rate");
   v.require(c.timing.worst_reply_s >= c.timing.response_s, "worst_reply_s",
-            "worst_reply_s: below response_s; write at least as much");
+            "worst_reply_s: less than response_s; write at least response_s");
 }
 
 void describe_supervisor(ConfigVisitor& v, SupervisorConfig& c) {
   v.group(
       "modbus", [&](ConfigVisitor& keys) { describe_modbus(keys, c.link); }, kRequired,
-      "where the supervisor is");
+      "address of the supervisor");
   v.number("poll_period_s", c.options.poll_period_s, {"s", 0.001, 60.0}, kOptional,
-           "three of it without a good status end the run");
+           "the run ends after three periods without a good status");
   describe_range(v, "gravity_compensator_n", c.conditions.gravity_low_n,
                  c.conditions.gravity_high_n, "N", "[low, high] of every gravity compensator");
   describe_range(v, "temperature_k", c.conditions.temperature_low_k,
                  c.conditions.temperature_high_k, "K", "[low, high] of every temperature");
   v.number("enable_s", c.conditions.enable_s, positive("s"), kOptional,
-           "the plant may take so long to answer and to come up");
+           "time allowed for the plant to answer and to start up");
   c.conditions.stale_s = kStalePolls * c.options.poll_period_s;
 }
 
@@ -81,17 +81,17 @@ void describe_supervisor(ConfigVisitor& v, SupervisorConfig& c) {
 void describe_modbus_groups(ConfigVisitor& v, bool behind_modbus, ModbusGroups& g) {
   v.group(
       "modbus", [&](ConfigVisitor& keys) { describe_modbus(keys, g.stage.emplace()); }, kOptional,
-      "backend modbus: where the stage is");
+      "backend modbus: address of the stage");
   v.require(!behind_modbus || g.stage.has_value(), "backend",
-            "backend: modbus needs a group 'modbus:' that says where the stage is");
+            "backend: modbus needs the group 'modbus'; add it with the address of the stage");
   v.group(
       "supervisor", [&](ConfigVisitor& keys) { describe_supervisor(keys, g.supervisor.emplace()); },
-      kOptional, "enable chain, gravity compensators, temperatures and interlocks, behind Modbus");
+      kOptional, "enable chain, gravity compensators, temperatures and interlocks, over Modbus");
   const bool one_line = g.stage && g.supervisor && g.stage->address.serial() &&
                         g.stage->address.device == g.supervisor->link.address.device;
   v.require(!one_line, "supervisor",
-            "supervisor: a serial line carries one conversation; give the stage another line, or "
-            "take tcp");
+            "supervisor: the stage uses the same serial line, which supports one link only; use "
+            "another line, or tcp");
 }
 
 }  // namespace stageid

@@ -41,7 +41,7 @@ int require_channel(const StageConfig& config, const std::vector<Channel>& chann
   if (index < 0)
     throw FormatError(
         config.file, "",
-        fmt::format("{}: there is no {} '{}'; give one of the names above", place, kind, name));
+        fmt::format("{}: unknown {} '{}'; use one of the names in this file", place, kind, name));
   return index;
 }
 
@@ -138,7 +138,8 @@ const char* to_string(Backend backend) noexcept {
 int actuator_of_axis(const StageInfo& stage, const std::string& axis) {
   const int index = channel_index(stage.actuators, axis);
   if (index < 0)
-    throw std::invalid_argument(fmt::format("axes: the stage has no actuator '{}'", axis));
+    throw std::invalid_argument(
+        fmt::format("axes: unknown actuator '{}'; use an actuator of the stage file", axis));
   return index;
 }
 

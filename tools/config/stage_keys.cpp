@@ -14,7 +14,7 @@ namespace {
 void describe_channel(ConfigVisitor& v, ChannelConfig& c, const char* unit) {
   c.channel.unit = unit;
   std::size_t only = 0;
-  v.text("name", c.channel.name, kRequired, "as it stands in logs and models");
+  v.text("name", c.channel.name, kRequired, "name used in logs and models");
   v.choice("unit", only, {unit}, kOptional, "SI");
   v.numbers("position_m", c.position_m, any_number("m"), {3, 3}, kRequired,
             "x, y, z from the centre of mass");
@@ -22,7 +22,7 @@ void describe_channel(ConfigVisitor& v, ChannelConfig& c, const char* unit) {
   const double length =
       c.direction.size() == 3 ? std::hypot(c.direction[0], c.direction[1], c.direction[2]) : 1.0;
   v.require(std::abs(length - 1.0) < 1e-6, "direction",
-            fmt::format("direction: length {}; write a unit vector", length));
+            fmt::format("direction: the length is {}; write a unit vector", length));
 }
 
 /// Adds one channel and refuses a name that is there already.
@@ -32,7 +32,7 @@ void add_channel(ConfigVisitor& v, ChannelConfig channel, std::vector<ChannelCon
   });
   v.require(
       !twice, "name",
-      fmt::format("name: '{}' stands twice; give every channel its own", channel.channel.name));
+      fmt::format("duplicate channel name '{}'; channel names must differ", channel.channel.name));
   list.push_back(std::move(channel));
 }
 
@@ -40,7 +40,7 @@ void describe_actuator(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
   ChannelConfig c;
   describe_channel(v, c, "N");
   v.number("limit_n", c.limit_n, positive("N"), kRequired,
-           "largest |u|; past it the stage is stopped");
+           "largest |u|; the stage is stopped if it is exceeded");
   v.number("slew_n_s", c.slew_n_s, positive("N/s"), kOptional,
            "largest change of u; inf: no limit");
   v.number("thermal_rms_n", c.thermal_rms_n, positive("N"), kOptional,
@@ -52,19 +52,20 @@ void describe_sensor(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
   ChannelConfig c;
   describe_channel(v, c, "m");
   v.number("window_m", c.window_m, positive("m"), kRequired,
-           "largest |y|; past it the stage is stopped");
+           "largest |y|; the stage is stopped if it is exceeded");
   v.number("hard_window_m", c.hard_window_m, not_negative("m"), kOptional,
            "|y| at which forces are cut; 0: twice window_m");
   v.number("deviation_m", c.deviation_m, not_negative("m"), kOptional,
-           "largest difference from the motion that the forces explain; past it the loop is opened "
-           "and the stage braked; 0: half of window_m");
+           "largest difference from the motion predicted from the forces; if exceeded, the loop is "
+           "opened and the stage braked; 0: half of window_m");
   v.number("speed_m_s", c.speed_m_s, positive("m/s"), kOptional,
-           "largest speed; past it the stage is braked; inf: what full force can stop");
+           "largest speed; the stage is braked if it is exceeded; inf: the speed that full force "
+           "can stop");
   v.require(
       c.hard_window_m == 0.0 || c.hard_window_m >= c.window_m, "hard_window_m",
-      fmt::format("hard_window_m: {} m is inside window_m: {}; write a larger one, or leave it "
-                  "out",
-                  c.hard_window_m, c.window_m));
+      fmt::format(
+          "hard_window_m: {} m is less than window_m: {}; write a larger value, or omit the key",
+          c.hard_window_m, c.window_m));
   add_channel(v, std::move(c), list);
 }
 
@@ -74,19 +75,20 @@ void describe_plate(ConfigVisitor& v, WaferStageSpec& s) {
   v.number("first_mode_hz", s.first_mode_hz, positive("Hz"), kRequired,
            "scales the stiffness of the plate");
   v.number("poisson_ratio", s.poisson_ratio, {"", 0.0, 0.499}, kOptional, "of the plate");
-  count(v, "modes", s.flexible_modes, 0, 40, kRequired, "flexible modes that are kept");
+  count(v, "modes", s.flexible_modes, 0, 40, kRequired, "number of flexible modes");
   v.numbers("damping", s.flexible_damping, {"", 0.0, 0.999}, {1}, kRequired,
-            "damping ratio of each mode, the last one repeats");
+            "damping ratio of each mode; the last one repeats");
 }
 
 void describe_in_plane_mode(ConfigVisitor& v, std::vector<InPlaneModeConfig>& list) {
   InPlaneModeConfig m;
   v.number("natural_frequency_hz", m.natural_frequency_hz, positive("Hz"), kRequired, "undamped");
-  v.number("damping_ratio", m.damping_ratio, {"", 0.0, 0.999}, kRequired, "of critical");
+  v.number("damping_ratio", m.damping_ratio, {"", 0.0, 0.999}, kRequired,
+           "fraction of critical damping");
   v.named_numbers("actuators", m.actuators, any_number("kg^-1/2"), kRequired,
-                  "mass-normalized shape at the actuators that drive it");
+                  "mass-normalized shape at the actuators that drive this mode");
   v.named_numbers("sensors", m.sensors, any_number("kg^-1/2"), kRequired,
-                  "mass-normalized shape at the sensors that see it");
+                  "mass-normalized shape at the sensors that measure this mode");
   list.push_back(std::move(m));
 }
 
@@ -96,7 +98,7 @@ void describe_plant(ConfigVisitor& v, StageFile& f) {
   v.numbers("inertia_kg_m2", f.inertia_kg_m2, positive("kg m^2"), {3, 3}, kRequired,
             "about x, y, z");
   v.numbers("suspension_hz", f.suspension_hz, not_negative("Hz"), {6, 6}, kRequired,
-            "gravity compensators: x y z Rx Ry Rz; 0: free");
+            "suspension by the gravity compensators: x y z Rx Ry Rz; 0: free");
   v.number("suspension_damping", s.suspension_damping, {"", 0.0, 0.999}, kOptional,
            "damping ratio of the suspension");
   v.group(
@@ -123,7 +125,7 @@ void describe_noise(ConfigVisitor& v, WaferStageSpec& s) {
   v.number("sensor_quantum_m", s.sensor_quantum_m, not_negative("m"), kOptional, "0: off");
   v.number("actuator_quantum_n", s.actuator_quantum_n, not_negative("N"), kOptional, "0: off");
   count(v, "seed", s.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
-        "same seed, same noise");
+        "the same seed gives the same noise");
 }
 
 void describe_notch(ConfigVisitor& v, std::vector<AxisController::Notch>& list) {
@@ -144,12 +146,12 @@ void describe_axis(ConfigVisitor& v, AxisController& a) {
   v.number("lead_pole_hz", a.lead_pole_hz, not_negative("Hz"), kOptional, "0: none");
   v.number("lowpass_hz", a.lowpass_hz, not_negative("Hz"), kOptional, "second order; 0: none");
   v.number("lowpass_damping", a.lowpass_damping, {"", 0.0, 1.0, true}, kOptional,
-           "of the low pass");
+           "damping ratio of the low pass");
   v.items(
       "notches", [&](ConfigVisitor& notch) { describe_notch(notch, a.notches); }, {}, kOptional,
       "second-order notches");
   v.choice("emergency", emergency, {"brake", "cut"}, kOptional,
-           "when the loop cannot be trusted: brake by what is known of the motion, or no force");
+           "action if the loop is faulty: brake: brake the known motion; cut: zero force");
   a.brake = emergency == 0;
 }
 
@@ -157,7 +159,7 @@ void describe_controller(ConfigVisitor& v, StageFile& f) {
   for (std::size_t i = 0; i < kRigidAxes; ++i)
     v.group(
         kRigidAxisNames[i], [&](ConfigVisitor& axis) { describe_axis(axis, f.axes[i]); }, kOptional,
-        "loop of this degree of freedom; left out: open");
+        "loop of this degree of freedom; omitted: open");
 }
 
 void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
@@ -167,19 +169,19 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
   v.choice("kind", kind,
            {"dead_sensor", "nan_sensor", "missed_cycle", "interlock", "stuck_actuator",
             "stuck_sensor", "sensor_offset", "sensor_drift", "actuator_gain", "extra_delay"},
-           kRequired, "what happens");
+           kRequired, "kind of the fault");
   f.fault.kind = static_cast<Kind>(kind + 1);
   v.text("channel", f.channel, kOptional,
-         "name of the sensor or actuator; left out of the last four: all");
+         "name of the sensor or actuator; the last four kinds without a name: all");
   const bool needs_channel =
       f.fault.kind == Kind::dead_sensor || f.fault.kind == Kind::nan_sensor ||
       f.fault.kind == Kind::stuck_actuator || f.fault.kind == Kind::stuck_sensor;
   v.require(!needs_channel || !f.channel.empty(), "channel",
             "a fault of this kind needs 'channel: NAME'");
   count(v, "from_cycle", f.fault.from_cycle, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
-        "of the run, 0-based");
+        "cycle of the run, 0-based");
   count(v, "cycles", f.fault.cycles, 1, std::numeric_limits<std::int64_t>::max(), kOptional,
-        "missed_cycle: how many");
+        "missed_cycle: number of cycles");
   v.number("value", f.fault.value, any_number(""), kOptional,
            "sensor_offset: m; sensor_drift: m/s; actuator_gain: factor, -1 reversed, 0 dead; "
            "extra_delay: samples");
@@ -192,9 +194,9 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
 void describe_plugin(ConfigVisitor& v, PluginSpec& plugin) {
   std::string library = plugin.library.string();
   v.text("library", library, kRequired,
-         "shared library with the interface of stageid_backend.h; seen from this file");
+         "shared library with the interface of stageid_backend.h; relative to this file");
   plugin.library = library;
-  v.named_texts("keys", plugin.keys, kOptional, "what the library wants to know");
+  v.named_texts("keys", plugin.keys, kOptional, "settings passed to the library");
 }
 
 /// A value inside its limits must fit on the wire: the encoder would saturate it.
@@ -206,12 +208,11 @@ void require_range(ConfigVisitor& v, const char* key, const std::vector<double>&
     const double range = ranges[std::min(i, ranges.size() - 1)];
     const double wanted = channels[i].*limit;
     if (!std::isfinite(wanted) || can_range_holds(range, wanted)) continue;
-    v.require(
-        false, key,
-        fmt::format("{}: {} {} cannot carry {}: {} {} of '{}'; write more than {}, or leave it "
-                    "out for 1.25 times {}",
-                    key, range, unit, limit_key, wanted, unit, channels[i].channel.name, wanted,
-                    limit_key));
+    v.require(false, key,
+              fmt::format("{}: {} {} cannot represent {}: {} {} of '{}'; write more than {}, or "
+                          "omit the key for 1.25 times {}",
+                          key, range, unit, limit_key, wanted, unit, channels[i].channel.name,
+                          wanted, limit_key));
     return;
   }
 }
@@ -227,13 +228,14 @@ void require_ranges(ConfigVisitor& v, const StageFile& f) {
 
 void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   WaferStageSpec& s = f.spec;
-  v.choice("format", f.format, {"stageid-stage"}, kRequired, "what this file is");
-  v.text("name", s.info.name, kRequired, "of the stage");
+  v.choice("format", f.format, {"stageid-stage"}, kRequired, "file type");
+  v.text("name", s.info.name, kRequired, "name of the stage");
   v.choice("backend", f.backend, {"sim", "can", "modbus", "plugin"}, kOptional,
-           "what stands behind the stage");
-  v.number("sample_rate_hz", s.info.sample_rate_hz, positive("Hz"), kRequired, "of the loop");
+           "back end of the stage");
+  v.number("sample_rate_hz", s.info.sample_rate_hz, positive("Hz"), kRequired,
+           "sample rate of the loop");
   v.number("delay_s", s.delay_s, not_negative("s"), kOptional,
-           "from command computed to hold changed; any number of samples");
+           "delay from the computed command to the change of the hold; any number of samples");
   v.items(
       "actuators", [&](ConfigVisitor& item) { describe_actuator(item, f.actuators); }, {1, 64},
       kRequired, "in the order of the log");
@@ -241,10 +243,9 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
       "sensors", [&](ConfigVisitor& item) { describe_sensor(item, f.sensors); }, {1, 64}, kRequired,
       "in the order of the log");
   v.number("stuck_sensor_s", s.limits.stuck_sensor_s, not_negative("s"), kOptional,
-           "a sensor may show one and the same value for so long, then the stage is stopped; 0: "
-           "for ever");
+           "stop if a sensor repeats one value for this long; 0 disables the check");
   v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
-           "a stop takes the excitation to zero over this, in closed loop while it is sound");
+           "time in which a stop ramps the excitation to zero, in closed loop if it is healthy");
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
            "of the thermal rms limit");
   v.group(
@@ -255,12 +256,12 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
       "of the simulated stage");
   v.group(
       "controller", [&](ConfigVisitor& controller) { describe_controller(controller, f); },
-      kRequired, "one entry a degree of freedom that is closed: x y z Rx Ry Rz");
+      kRequired, "one entry per closed degree of freedom: x y z Rx Ry Rz");
   v.number("pace", s.pace, not_negative(""), kOptional,
            "0: virtual time, as fast as possible; 1: wall clock");
   v.group(
       "realtime", [&](ConfigVisitor& keys) { describe_real_time(keys, f.real_time); }, kOptional,
-      "of the loop's thread; without meaning in virtual time");
+      "settings of the loop thread; ignored in virtual time");
   describe_modbus_groups(v, f.backend == static_cast<std::size_t>(Backend::modbus), f.modbus);
   v.group(
       "plugin",
@@ -269,17 +270,18 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
         describe_plugin(keys, *f.plugin);
       },
       f.backend == static_cast<std::size_t>(Backend::plugin) ? kRequired : kOptional,
-      "a back end of your own, see docs/plugins.md");
+      "a user-written back end, see docs/plugins.md");
   v.items(
       "faults", [&](ConfigVisitor& fault) { describe_fault(fault, f.faults); }, {}, kOptional,
-      "faults on request, to try the safety");
+      "injected faults, to test the safety functions");
   v.group(
       "can",
       [&](ConfigVisitor& can) {
         describe_can(can, f.can);
         require_ranges(can, f);
       },
-      kOptional, "the stage behind CAN FD; needed by backend can and by 'stageid node --can'");
+      kOptional,
+      "connection of the stage over CAN FD; needed by backend can and by 'stageid node --can'");
 }
 
 }  // namespace stageid

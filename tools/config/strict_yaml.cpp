@@ -66,7 +66,7 @@ class YamlTreeBuilder final : public YAML::EventHandler {
     if (found == anchors_.end() || std::any_of(open_.begin(), open_.end(), [&](const Open& open) {
           return open.node == found->second;
         }))
-      document_.fail(place(mark), "this alias refers to itself; let it name an anchor above");
+      document_.fail(place(mark), "this alias refers to itself; use an anchor defined above it");
     attach(found->second);
   }
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
@@ -118,8 +118,7 @@ class YamlTreeBuilder final : public YAML::EventHandler {
   }
   void refuse_tag(const YAML::Mark& mark, const std::string& tag) const {
     if (tag != "" && tag != "!" && tag != "?")
-      document_.fail(place(mark),
-                     fmt::format("tag '{}'; tags are not used here, leave it out", tag));
+      document_.fail(place(mark), fmt::format("unsupported tag '{}'; remove it", tag));
   }
 
   std::size_t add(YamlNode::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
@@ -136,22 +135,22 @@ class YamlTreeBuilder final : public YAML::EventHandler {
   }
   void open(YamlNode::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
     if (open_.size() >= kDeepestNesting)
-      document_.fail(place(mark), fmt::format("nested deeper than {} levels; no configuration is",
-                                              kDeepestNesting));
+      document_.fail(
+          place(mark),
+          fmt::format("nested deeper than {} levels; configurations need fewer", kDeepestNesting));
     open_.push_back({add(kind, mark, anchor), false});
   }
   /// Of a map whose keys became `keys`.
   void refuse_too_many(const YamlMark& mark, std::size_t keys) const {
     if (keys > kMostKeys)
       document_.fail(
-          mark, fmt::format("more than {} keys in one map; split it or leave keys out", kMostKeys));
+          mark, fmt::format("more than {} keys in one map; split it or remove keys", kMostKeys));
   }
   void take_key(const YAML::Mark& mark, const std::string& key) {
     for (const YamlNode::Entry& entry : document_.nodes_[open_.back().node].entries)
       if (entry.key == key)
-        document_.fail(place(mark),
-                       fmt::format("key '{}' stands here twice, first in line {}; keep one", key,
-                                   entry.mark.line));
+        document_.fail(place(mark), fmt::format("duplicate key '{}', first in line {}; keep one",
+                                                key, entry.mark.line));
     std::vector<YamlNode::Entry>& entries = document_.nodes_[open_.back().node].entries;
     entries.push_back({key, place(mark), 0});
     refuse_too_many(place(mark), entries.size());
@@ -179,14 +178,15 @@ class YamlTreeBuilder final : public YAML::EventHandler {
     if (found == entries.end()) return;
     const YamlNode& base = document_.nodes_[found->value];
     if (base.kind != YamlNode::Kind::map)
-      document_.fail(found->mark, "'<<' merges a map; write '<<: *anchor_of_a_map'");
+      document_.fail(found->mark, "'<<' needs a map; write '<<: *anchor_of_a_map'");
     const std::vector<YamlNode::Entry> inherited = base.entries;
     const YamlMark mark = found->mark;
     merged_ += inherited.size();
     if (merged_ > kMostMerged)
-      document_.fail(mark, fmt::format("'<<' has copied more than {} keys in this file; write the "
-                                       "keys that differ only",
-                                       kMostMerged));
+      document_.fail(
+          mark,
+          fmt::format("'<<' copied more than {} keys in this file; write only the keys that differ",
+                      kMostMerged));
     entries.erase(found);
     for (const YamlNode::Entry& entry : inherited)
       if (std::none_of(entries.begin(), entries.end(),
@@ -217,9 +217,9 @@ void check_text(const YamlDocument& document) {
         (static_cast<unsigned char>(head) < 0x20 && head != '\n' && head != '\t' && head != '\r') ||
         head == 0x7F;
     if (control)
-      document.fail(mark,
-                    fmt::format("byte 0x{:02X} is not text; a configuration is a YAML text file",
-                                static_cast<unsigned char>(head)));
+      document.fail(
+          mark, fmt::format("byte 0x{:02X} is not text; save the configuration as a YAML text file",
+                            static_cast<unsigned char>(head)));
     rest.remove_prefix(length);
     if (head == '\n') {
       mark = {mark.line + 1, 1};
@@ -240,7 +240,7 @@ void YamlDocument::fail(const YamlMark& mark, const std::string& message) const 
 
 YamlDocument YamlDocument::read(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(file))
-    throw FileError(fmt::format("{}: is a directory; give a YAML file", file.string()));
+    throw FileError(fmt::format("{}: is a directory; use a YAML file", file.string()));
   std::ifstream stream(file, std::ios::binary);
   if (!stream)
     throw FileError(fmt::format("{}: cannot be read: {}", file.string(), system_reason(errno)));
@@ -258,7 +258,7 @@ YamlDocument YamlDocument::read(const std::filesystem::path& file) {
 YamlDocument YamlDocument::parse(std::filesystem::path file, std::string text) {
   YamlDocument document(std::move(file), std::move(text));
   if (document.text_.size() > kLongestFile)
-    document.fail({}, "longer than 1 MiB; this is not a configuration");
+    document.fail({}, "longer than 1 MiB, too long for a configuration; check the file");
   check_text(document);
   YamlTreeBuilder builder(document);
   // yaml-cpp speaks its own exceptions; translated here, at its border.
@@ -266,12 +266,12 @@ YamlDocument YamlDocument::parse(std::filesystem::path file, std::string text) {
     std::istringstream stream(document.text_);
     YAML::Parser parser(stream);
     if (!parser.HandleNextDocument(builder) || document.nodes_.empty())
-      document.fail({}, "the file is empty; 'stageid config schema' prints what stands in one");
+      document.fail({}, "the file is empty; 'stageid config schema' prints all keys");
     const std::size_t first_nodes = document.nodes_.size();
     const std::size_t root = document.root_;
     YamlTreeBuilder second(document);
     if (parser.HandleNextDocument(second) && document.nodes_.size() > first_nodes)
-      document.fail(document.nodes_[first_nodes].mark, "a second document; keep one in a file");
+      document.fail(document.nodes_[first_nodes].mark, "a second YAML document; keep one per file");
     document.root_ = root;
   } catch (const YAML::Exception& error) {
     const YamlMark mark =

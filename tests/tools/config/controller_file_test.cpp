@@ -154,18 +154,19 @@ TEST_F(ControllerFileTest, FindsWhatIsRecordedUnderAWrongNameOrSign) {
 
 TEST_F(ControllerFileTest, WhatIsWrongIsSaidWithItsPlace) {
   EXPECT_THAT(error_of(head("state_space: {a: [1, 2, 3], b: [1], c: [1]}\nsample_rate_hz: 1\n")),
-              AllOf(HasSubstr("c.yaml:4:"), HasSubstr("a: 3 numbers"), HasSubstr("row by row")));
+              AllOf(HasSubstr("c.yaml:4:"), HasSubstr("a: got 3 numbers"), HasSubstr("row by row")));
   EXPECT_THAT(error_of(head("state_space: {d: [1, 2, 3, 4, 5, 6]}\n")),
-              HasSubstr("a discrete controller needs it"));
-  EXPECT_THAT(error_of(head("sample_rate_hz: 1000\n")), HasSubstr("give the controller once"));
+              HasSubstr("required for a discrete controller"));
+  EXPECT_THAT(error_of(head("sample_rate_hz: 1000\n")),
+              HasSubstr("write exactly one of state_space, transfer and measured"));
   EXPECT_THAT(error_of(head("measured: c.h5\nstate_space: {d: [1, 2, 3, 4, 5, 6]}\n")),
-              HasSubstr("give the controller once"));
+              HasSubstr("write exactly one of state_space, transfer and measured"));
   EXPECT_THAT(error_of(head("time: continuous\ntransfer: [{actuator: a9, sensor: z1, numerator: "
                             "[1], denominator: [1]}]\n")),
               HasSubstr("'a9' is not in the list"));
   EXPECT_THAT(error_of(head("time: continuous\ntransfer: [{actuator: a1, sensor: z1, numerator: "
                             "[1], denominator: [0, 0]}]\n")),
-              HasSubstr("denominator: is zero"));
+              HasSubstr("denominator: all coefficients are zero"));
   EXPECT_THAT(error_of(head("time: continuous\nstate_spaces: {}\n")),
               HasSubstr("unknown key 'state_spaces'"));
   EXPECT_THAT(error_of("format: stageid-controller\ntime: continuous\nstate_space: {d: [1]}\n"),

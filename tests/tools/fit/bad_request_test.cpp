@@ -20,7 +20,8 @@ TEST_F(BadRequest, WhatAModelHasNot) {
   const std::string file = name("model.json");
   fail({"export", file, "-o", name("m.h5"), "--driving-point", "z3", "a1"}, 2,
        "--driving-point: 'z3' is not an output of the model; use one of z1, z2");
-  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1", "z1"}, 2, "'z1' is no input");
+  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1", "z1"}, 2,
+       "'z1' is not an input");
   fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1"}, 2, "--driving-point");
   fail({"export", file, "-o", name("m.h5")}, 2, "submodel 0: its poles");
 }
@@ -77,23 +78,22 @@ TEST_F(BadRequest, Configurations) {
   wrong("rms_n", "rms_v", "unknown key 'rms_v'; the key includes the unit; write 'rms_n'");
   wrong("period_s: 0.25", "period_ms: 250", "write 'period_s'");
   wrong("period_s: 0.25", "period_s: 250 ms", "the number alone, in s");
-  wrong("period_s: 0.25", "period_s: -1", "period_s: -1 is out of range; allowed is > 0 s");
+  wrong("period_s: 0.25", "period_s: -1", "period_s: -1 is out of range; expected > 0 s");
   wrong("period_s: 0.25", "period_s: .nan", "is not finite");
   wrong("period_s: 0.25", "period_s: 0.00025", "must be a whole number of samples");
-  wrong("period_s: 0.25", "periods: 3\n  period_s: 0.25", "stands here twice");
+  wrong("period_s: 0.25", "periods: 3\n  period_s: 0.25", "duplicate key 'period_s'");
   wrong("band_hz: [16, 800]", "band_hz: [800, 16]", "band_hz: the band is empty");
   wrong("band_hz: [16, 800]", "band_hz: [16, 1000]", "is not below half the sample rate");
   wrong("band_hz: [16, 800]", "band_hz: [16.5, 17]",
         "bad.yaml:10:12: frequency band: no line between 16.5 and 17 Hz");
-  wrong("axes: [a1, a2, a3]", "axes: [a1, a2, z3]",
-        "bad.yaml:7:18: axes: the stage has no actuator 'z3'");
-  wrong("axes: [a1, a2, a3]", "axes: [a1, a1]", "stands here twice");
+  wrong("axes: [a1, a2, a3]", "axes: [a1, a2, z3]", "bad.yaml:7:18: axes: unknown actuator 'z3'");
+  wrong("axes: [a1, a2, a3]", "axes: [a1, a1]", "duplicate entry 'a1'");
   wrong("{rms_n: 1.0}", "{rms_n: [1, 2]}", "2 numbers for 3 axes");
   wrong("{rms_n: 1.0}", "{rms_n: 1, peak_n: 2}", "one of");
-  wrong("lines: all", "lines: every", "write one of all, odd, odd_random");
+  wrong("lines: all", "lines: every", "expected one of all, odd, odd_random");
   wrong("realization: 3 ", "realization: 4 ", "hold back one that is measured");
   wrong("stage: small_stage.yaml", "stage: nowhere.yaml", "bad.yaml:4:8: stage: there is no file");
-  wrong("direct_term: full", "hold: perfect", "write one of none, phase, sinc, exact, by_frf");
+  wrong("direct_term: full", "hold: perfect", "expected one of none, phase, sinc, exact, by_frf");
   wrong("direct_term: full", "submodels: [{n: 2, m: 3}]", "m=3 is above n + l = 2");
   wrong("direct_term: full", "submodels: [{order: 2}]", "unknown key 'order'");
   wrong("direct_term: full", "submodels: [{n: 17}]", "n: expected a whole number from 0 to 16");
@@ -118,17 +118,17 @@ TEST_F(BadRequest, StageFiles) {
     fail({"design", stage("bad.yaml", from, to), "-o", name("e.h5")}, 2, text);
   };
   wrong("mass_kg: 8", "mass_kg: 0",
-        "stage_bad.yaml:19:12: mass_kg: 0 is out of range; allowed is > 0 kg");
+        "stage_bad.yaml:19:12: mass_kg: 0 is out of range; expected > 0 kg");
   wrong("mass_kg: 8", "mass_g: 8000", "the key includes the unit; write 'mass_kg'");
   wrong("limit_n: 40", "limit_v: 40", "write 'limit_n'");
   wrong("direction: [0, 0, 1], limit_n", "direction: [0, 0, 2], limit_n", "write a unit vector");
-  wrong("name: a2", "name: a1", "stands twice");
+  wrong("name: a2", "name: a1", "duplicate channel name 'a1'");
   wrong("backend: sim", "backend: cann", "did you mean 'can'?");
   wrong("Ry: *loop", "Rx: *loop", "stage_bad.yaml: ");  // no sensor sees Rx
   wrong("[-0.26, 0, 0]", "[-2.6, 0, 0]", "is not on the plate");
-  wrong("noise:", "faults: [{kind: dead_sensor, channel: s9}]\nnoise:", "there is no sensor 's9'");
+  wrong("noise:", "faults: [{kind: dead_sensor, channel: s9}]\nnoise:", "unknown sensor 's9'");
   wrong("noise:", "faults: [{kind: extra_delay}]\nnoise:", "extra_delay needs at least 1 sample");
-  wrong("window_m: 1e-3}", "window_m: 1e-3, hard_window_m: 9e-4}", "is inside window_m");
+  wrong("window_m: 1e-3}", "window_m: 1e-3, hard_window_m: 9e-4}", "is less than window_m");
   wrong("crossover_hz: 20,", "crossover_hz: 20, emergency: stop,", "emergency");
 }
 
@@ -136,12 +136,12 @@ TEST_F(BadRequest, Modbus) {
   const auto wrong = [&](const std::string& group, const std::string& text) {
     fail({"design", stage("bad.yaml", "noise:", group + "\nnoise:"), "-o", name("e.h5")}, 2, text);
   };
-  wrong("modbus: {unit: 1}", "modbus: write one of tcp and rtu");
-  wrong("modbus: {tcp: {port: 1}, rtu: {device: x}}", "modbus: write one of tcp and rtu");
+  wrong("modbus: {unit: 1}", "modbus: write exactly one of tcp and rtu");
+  wrong("modbus: {tcp: {port: 1}, rtu: {device: x}}", "modbus: write exactly one of tcp and rtu");
   wrong("modbus: {tcp: {port: 0}}", "port: 0 is out of range");
   wrong("modbus: {rtu: {baud: 9600}}", "key 'device' is missing in rtu");
-  wrong("modbus: {rtu: {device: x, parity: S}}", "parity: 'S' stands here; write one of N, E, O");
-  wrong("modbus: {tcp: {port: 1}, response_s: 2}", "worst_reply_s: below response_s");
+  wrong("modbus: {rtu: {device: x, parity: S}}", "parity: got 'S'; expected one of N, E, O");
+  wrong("modbus: {tcp: {port: 1}, response_s: 2}", "worst_reply_s: less than response_s");
   wrong("supervisor: {modbus: {tcp: {port: 1}}, temperature_k: [1, 2]}",
         "key 'gravity_compensator_n' is missing in supervisor");
   wrong(
@@ -151,9 +151,9 @@ TEST_F(BadRequest, Modbus) {
   wrong(
       "modbus: {rtu: {device: x}}\nsupervisor: {modbus: {rtu: {device: x}}, temperature_k: [1, 2], "
       "gravity_compensator_n: [1, 2]}",
-      "a serial line carries one conversation");
+      "uses the same serial line");
   fail({"design", stage("bad.yaml", "backend: sim", "backend: modbus"), "-o", name("e.h5")}, 2,
-       "backend: modbus needs a group 'modbus:'");
+       "backend: modbus needs the group 'modbus'");
   fail({"run", config_, "-o", name("x.slog"), "--backend", "modbus"}, 2, "has no group 'modbus'");
 }
 
@@ -191,15 +191,15 @@ TEST_F(BadRequest, WhatACanBusCannotCarry) {
   wrong("mode: resident", "'buses'");
   wrong("buses: []", "buses");
   wrong("buses: [{interface: can0, actuators: [a1]}]", "channel 'a2' is not assigned to a bus");
-  wrong("buses: [{interface: can0, actuators: [a9]}]", "there is no channel 'a9'");
+  wrong("buses: [{interface: can0, actuators: [a9]}]", "no channel 'a9'");
   wrong("buses: [{interface: can0}, {interface: can0}]", "duplicate interface can0");
   wrong("actuator_range_n: [1, 2], buses: [{interface: can0}]", "2 entries for 3 channels");
   wrong("buses: [{interface: can0}], actuator_range_n: [1]",
-        "actuator_range_n: 1 N cannot carry limit_n: 40 N of 'a1'; write more than 40, or leave it "
-        "out for 1.25 times limit_n");
-  wrong("buses: [{interface: can0}], actuator_range_n: [40]", "cannot carry limit_n: 40 N");
+        "actuator_range_n: 1 N cannot represent limit_n: 40 N of 'a1'; write more than 40, or "
+        "omit the key for 1.25 times limit_n");
+  wrong("buses: [{interface: can0}], actuator_range_n: [40]", "cannot represent limit_n: 40 N");
   wrong("buses: [{interface: can0}], sensor_range_m: [1e-4]",
-        "0.0001 m cannot carry window_m: 0.001 m of 's1'");
+        "0.0001 m cannot represent window_m: 0.001 m of 's1'");
   wrong("buses: [{interface: can0, data_bit_rate: 5e6}]", "unknown key 'data_bit_rate'");
   wrong("mode: residential, buses: [{interface: can0}]", "did you mean 'resident'?");
 }
