@@ -43,7 +43,7 @@ ExperimentPlan read_plan_of(const ExperimentConfig& config, const std::filesyste
   }
   if (differs != nullptr)
     throw FormatError(file, "",
-                      fmt::format("{} is not that of {}; design the experiment anew", differs,
+                      fmt::format("differs in {} from {}; design the experiment again", differs,
                                   config.file.string()));
   return plan;
 }

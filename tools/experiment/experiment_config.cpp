@@ -42,11 +42,11 @@ void describe_limits(ConfigVisitor& v, std::optional<LimitRequest>& limits) {
   LimitRequest request;
   std::string prior;
   v.text("prior", prior, kRequired,
-         "frf.h5 of a pilot, or model.json, relative to this file: what the plant is known by");
+         "plant data: frf.h5 of a pilot, or model.json, relative to this file");
   v.number("safety", request.safety, {"", 0.0, 1.0, true}, kOptional,
            "largest predicted use of any limit of the stage file");
   v.number("velocity_m_s", request.velocity_m_s, positive("m/s"), kOptional,
-           "of every sensor; left out: no limit");
+           "velocity limit of every sensor; omitted: no limit");
   request.prior = prior;
   limits = std::move(request);
 }
@@ -56,105 +56,111 @@ void describe_level(ConfigVisitor& v, ExperimentFile& f) {
   rule.number = true;
   rule.list = true;
   rule.rule = positive("N");
-  v.flexible("rms_n", f.rms_n, rule, kOptional, "rms of each axis; a list gives one an axis");
-  v.flexible("peak_n", f.peak_n, rule, kOptional, "or its largest sample");
+  v.flexible("rms_n", f.rms_n, rule, kOptional, "rms of each axis; a list: one per axis");
+  v.flexible("peak_n", f.peak_n, rule, kOptional, "or largest sample of each axis");
   v.group(
       "limits", [&](ConfigVisitor& limits) { describe_limits(limits, f.limits); }, kOptional,
-      "or as large as the limits allow, spread for the smallest mean relative variance");
+      "or as large as the limits allow, distributed for the smallest mean relative variance");
   const char* key = f.limits ? "limits" : is_set(f.rms_n) ? "rms_n" : "peak_n";
-  v.require(int{is_set(f.rms_n)} + int{is_set(f.peak_n)} + int{f.limits.has_value()} == 1, key,
-            "level: give one of 'rms_n: NUMBER', 'peak_n: NUMBER' and 'limits: {prior: FILE}'");
-  const std::size_t given = std::max(f.rms_n.numbers.size(), f.peak_n.numbers.size());
   v.require(
-      given <= 1 || given == f.axes.size(), key,
-      fmt::format("level: {} numbers for {} axes; give one, or one an axis", given, f.axes.size()));
+      int{is_set(f.rms_n)} + int{is_set(f.peak_n)} + int{f.limits.has_value()} == 1, key,
+      "level: write exactly one of 'rms_n: NUMBER', 'peak_n: NUMBER' and 'limits: {prior: FILE}'");
+  const std::size_t given = std::max(f.rms_n.numbers.size(), f.peak_n.numbers.size());
+  v.require(given <= 1 || given == f.axes.size(), key,
+            fmt::format("level: got {} numbers for {} axes; write one, or one per axis", given,
+                        f.axes.size()));
 }
 
 void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
   choose(v, "lines", f.lines.selection, {"all", "odd", "odd_random"}, kOptional,
          "which lines of the period are excited");
   count(v, "group_size", f.lines.group_size, 2, 1000, kOptional,
-        "odd_random: one odd line of so many is left out");
+        "odd_random: one odd line in this many is not excited");
   v.numbers("band_hz", f.band_hz, positive("Hz"), {2, 2}, kRequired,
             "lowest and highest frequency");
   v.require(f.band_hz.size() != 2 || f.band_hz[0] < f.band_hz[1], "band_hz",
-            "band_hz: is empty; write [LOW, HIGH] with LOW < HIGH");
+            "band_hz: the band is empty; write [LOW, HIGH] with LOW < HIGH");
   FlexibleRule shape;
   shape.words = {"flat"};
   shape.pairs = true;
   shape.rule = positive("");
-  v.flexible(
-      "shape", f.shape, shape, kOptional,
-      "amplitude spectrum: flat, or [frequency_hz, relative amplitude] points, log-log between");
+  v.flexible("shape", f.shape, shape, kOptional,
+             "amplitude spectrum: flat, or [frequency_hz, relative amplitude] points, log-log "
+             "interpolation");
   const bool increasing =
       std::is_sorted(f.shape.pairs.begin(), f.shape.pairs.end(),
                      [](const auto& a, const auto& b) { return a.first <= b.first; });
-  v.require(increasing, "shape", "shape: the frequencies must increase");
+  v.require(increasing, "shape", "shape: the frequencies must increase; sort the points");
 }
 
 void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
-  v.texts("axes", f.axes, {1, 64}, kRequired, "actuators that are excited, by name");
+  v.texts("axes", f.axes, {1, 64}, kRequired, "names of the excited actuators");
   choose(v, "scheme", f.spec.scheme,
          {"single_axis", "orthogonal_dft", "orthogonal_hadamard", "zippered"}, kOptional,
-         "how the axes share the experiments");
+         "distribution of the axes over the experiments");
   v.group(
       "level", [&](ConfigVisitor& level) { describe_level(level, f); }, kRequired,
       "size of the excitation");
   describe_lines(v, f);
-  v.number("period_s", f.period_s, positive("s"), kRequired, "of the multisine");
+  v.number("period_s", f.period_s, positive("s"), kRequired, "period of the multisine");
   count(v, "transient_periods", f.spec.transient_periods, 0, 1000, kOptional,
-        "recorded before the measured ones and not used");
-  count(v, "periods", f.spec.periods, 1, 100000, kOptional, "measured periods of every run");
-  count(v, "realizations", f.spec.realizations, 1, 10000, kOptional, "of the random phases");
+        "number of periods recorded before the measured ones and not used");
+  count(v, "periods", f.spec.periods, 1, 100000, kOptional, "measured periods per run");
+  count(v, "realizations", f.spec.realizations, 1, 10000, kOptional,
+        "number of realizations of the random phases");
   count(v, "crest_iterations", f.spec.crest_iterations, 0, 100000, kOptional,
-        "of crest-factor reduction; 0: phases stay random");
+        "iterations of the crest-factor reduction; 0: phases stay random");
   v.require(!f.limits || f.spec.crest_iterations > 0, "crest_iterations",
-            "crest_iterations: with 'limits' the phases are designed too; write 20");
+            "crest_iterations: 'limits' also optimizes the phases; write 20");
   v.require(!f.limits || f.shape.pairs.empty(), "shape",
-            "shape: with 'limits' the spectrum is designed; leave 'shape' out");
+            "shape: 'limits' designs the spectrum; remove 'shape'");
   count(v, "seed", f.spec.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
-        "same seed, same experiment, on every machine");
+        "the same seed gives the same experiment on every machine");
 }
 
 void describe_frf(ConfigVisitor& v, FrfOptions& f) {
   v.texts("inputs", f.inputs, {1}, kOptional,
-          "actuators of the response; left out: the excited ones");
-  v.texts("outputs", f.outputs, {1}, kOptional, "sensors of the response; left out: all");
-  choose(v, "covariance", f.covariance, {"diagonal", "full"}, kOptional, "of the response");
-  choose(v, "method", f.method, {"periodic", "lpm"}, kOptional, "of the estimate");
+          "actuators of the response; omitted: the excited ones");
+  v.texts("outputs", f.outputs, {1}, kOptional, "sensors of the response; omitted: all");
+  choose(v, "covariance", f.covariance, {"diagonal", "full"}, kOptional,
+         "covariance of the response");
+  choose(v, "method", f.method, {"periodic", "lpm"}, kOptional, "estimation method");
   choose(v, "periods", f.periods, {"consistent", "unmarked"}, kOptional,
-         "consistent: periods with a glitch, a bump or a transient are left out; lpm: "
-         "with a glitch");
+         "consistent: periods with a glitch, a bump or a transient are discarded; lpm: those with "
+         "a glitch");
   count(v, "smooth_covariance", f.covariance_lines, 1, 9999, kOptional,
-        "lines (odd) over which the noise covariance is averaged");
-  v.require(f.covariance_lines % 2 == 1, "smooth_covariance",
-            "smooth_covariance: must be odd, the line and as many neighbours on either side");
+        "number of lines (odd) over which the noise covariance is averaged");
+  v.require(
+      f.covariance_lines % 2 == 1, "smooth_covariance",
+      "smooth_covariance: must be odd: the line and the same number of neighbours on both sides");
 }
 
 void describe(ConfigVisitor& v, ExperimentFile& f) {
-  v.choice("format", f.format, {"stageid-experiment"}, kRequired, "what this file is");
+  v.choice("format", f.format, {"stageid-experiment"}, kRequired, "file type");
   v.text("stage", f.stage, kRequired, "stage file, relative to this one");
   v.group(
       "experiment", [&](ConfigVisitor& e) { describe_experiment(e, f); }, kRequired,
-      "what is measured");
+      "the measurement");
   v.group(
       "frf", [&](ConfigVisitor& frf) { describe_frf(frf, f.frf); }, kOptional,
-      "how the response is estimated");
+      "estimation of the frequency response");
   v.group(
       "fit", [&](ConfigVisitor& fit) { describe_fit_keys(fit, f.fit); }, kOptional,
-      "how the model is fitted");
+      "fit of the model");
   v.group(
       "validation",
       [&](ConfigVisitor& validation) {
         count(validation, "realization", f.validation_realization, 1, 10000, kRequired,
-              "1-based; held back from the fit");
-        validation.require(f.validation_realization <= f.spec.realizations, "realization",
-                           fmt::format("realization: {} of {}; hold back one that is measured",
-                                       f.validation_realization, f.spec.realizations));
-        validation.require(f.spec.realizations > 1, "realization",
-                           "realization: nothing is left to fit; measure 2 realizations or more");
+              "realization held back from the fit, 1-based");
+        validation.require(
+            f.validation_realization <= f.spec.realizations, "realization",
+            fmt::format("realization: {} is out of range, {} are measured; hold back one of these",
+                        f.validation_realization, f.spec.realizations));
+        validation.require(
+            f.spec.realizations > 1, "realization",
+            "realization: no realization remains for the fit; set realizations to 2 or more");
       },
-      kOptional, "left out: nothing is held back");
+      kOptional, "omitted: no realization is held back");
 }
 
 /// Relative amplitude at every line, log-log between the points, constant beyond them.
@@ -186,17 +192,17 @@ class ExperimentChecker {
     const double samples = period_s * stage_.spec.info.sample_rate_hz;
     const double whole = std::round(samples);
     if (std::abs(samples - whole) > 1e-9 * samples || whole < 4.0 || whole > 1e8)
-      fail("period_s",
-           fmt::format("period_s: {} s is {} samples at {} Hz; a period must be a whole "
-                       "number of samples, 4 to 1e8",
-                       period_s, samples, stage_.spec.info.sample_rate_hz));
+      fail("period_s", fmt::format("period_s: {} s is {} samples at {} Hz; a period must be a "
+                                   "whole number of samples, 4 to 1e8",
+                                   period_s, samples, stage_.spec.info.sample_rate_hz));
     return static_cast<int>(whole);
   }
   void check_band(const std::vector<double>& band_hz) const {
     const double nyquist_hz = 0.5 * stage_.spec.info.sample_rate_hz;
     if (band_hz[1] >= nyquist_hz)
-      fail("band_hz", fmt::format("band_hz: {} Hz is not below half the sample rate, {} Hz",
-                                  band_hz[1], nyquist_hz));
+      fail("band_hz",
+           fmt::format("band_hz: {} Hz is not below half the sample rate, {} Hz; lower it",
+                       band_hz[1], nyquist_hz));
   }
   void check_names(const char* section, const char* key, const std::vector<std::string>& names,
                    const std::vector<Channel>& channels, const char* kind,
@@ -208,7 +214,7 @@ class ExperimentChecker {
       const YamlNode* list = find(section, key);
       const YamlMark mark = list == nullptr ? YamlMark{} : document_.node(list->items.at(i)).mark;
       errors.attempt([&] {
-        document_.fail(mark, fmt::format("{}: the stage has no {} '{}'; {}", key, kind, names[i],
+        document_.fail(mark, fmt::format("{}: unknown {} '{}'; {}", key, kind, names[i],
                                          suggest_key(names[i], known)));
       });
     }
@@ -328,9 +334,9 @@ std::filesystem::path stage_file_of(const std::filesystem::path& path, const Yam
     if (entry.key == "stage")
       document.fail(
           document.node(entry.value).mark,
-          fmt::format("stage: there is no file {}; give the path of a stage file, relative "
-                      "to this one",
-                      file.string()));
+          fmt::format(
+              "stage: no such file: {}; write the path of a stage file, relative to this one",
+              file.string()));
   return file;
 }
 

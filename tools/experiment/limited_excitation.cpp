@@ -32,7 +32,7 @@ std::vector<Index> actuators_of(const ExperimentSpec& experiment, const StageInf
     const int index = actuator_of_axis(stage, axis.channel);
     if (!prior.actuator_known[static_cast<std::size_t>(index)])
       throw std::invalid_argument(fmt::format(
-          "prior: does not know the axis '{}'; measure a pilot with all axes", axis.channel));
+          "prior: does not contain the axis '{}'; measure a pilot with all axes", axis.channel));
     indices.push_back(index);
   }
   return indices;
@@ -47,7 +47,7 @@ std::vector<Index> outputs_of(const std::vector<std::string>& names, const Stage
     const int index = channel_index(stage.sensors, name);
     if (index < 0 || !prior.sensor_known[static_cast<std::size_t>(index)])
       throw std::invalid_argument(fmt::format(
-          "prior: does not know the output '{}'; measure a pilot with all outputs", name));
+          "prior: does not contain the output '{}'; measure a pilot with all outputs", name));
     indices.push_back(index);
   }
   return indices;

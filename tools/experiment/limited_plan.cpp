@@ -71,7 +71,7 @@ double final_variance(const LimitedPlan& limited) {
 double duration_to_reach_s(const LimitedPlan& limited, double variance) {
   if (!(variance > 0.0) || !std::isfinite(variance))
     throw std::invalid_argument(fmt::format(
-        "accuracy: {} is no variance; it must be positive, e.g. 1e-6 for 0.1 %", variance));
+        "accuracy: {} is not a variance; write a positive number, e.g. 1e-6 for 0.1 %", variance));
   const ExperimentPlan& plan = limited.design.plan;
   const double one = relative_variance(plan, limited.loop.cost) / plan.spec().periods;
   return std::ceil(one / variance) * realization_s(plan);
@@ -91,15 +91,16 @@ std::vector<std::string> limited_table(const LimitedPlan& limited, double accura
   }
   std::vector<std::string> lines = table_lines(rows);
   if (!limited.loop.unknown.empty())
-    lines.push_back(fmt::format("not predicted, as the prior does not show them: {}",
+    lines.push_back(fmt::format("not predicted, because the prior does not contain them: {}",
                                 fmt::join(limited.loop.unknown, ", ")));
   if (limited.loop.extrapolation_misfit > kDoubtfulMisfit)
-    lines.push_back(fmt::format(
-        "from rest in doubt: below {:.4g} Hz the prior shows nothing, and its lowest lines are no "
-        "rigid body (misfit {:.0f} %); measure a pilot from a lower frequency on",
-        limited.loop.extrapolated_below_hz, 100.0 * limited.loop.extrapolation_misfit));
+    lines.push_back(
+        fmt::format("the peak from rest is uncertain: the prior has no data below {:.4g} Hz, and "
+                    "its lowest lines do not match a rigid body (misfit {:.0f} %); measure a pilot "
+                    "from a lower frequency on",
+                    limited.loop.extrapolated_below_hz, 100.0 * limited.loop.extrapolation_misfit));
   if (!limited.loop.noise_known) {
-    lines.push_back("the prior does not tell the noise: no accuracy can be foretold");
+    lines.push_back("the prior has no noise estimate, so accuracy cannot be predicted");
     return lines;
   }
   const double variance = final_variance(limited);

@@ -25,7 +25,7 @@ std::vector<LinkLoad> link_loads(const StageConfig& config) {
 }
 
 std::string to_string(const LinkLoad& load) {
-  return fmt::format("{}: {:.3g} % ({:.3g} ms a sample; {:.4g} Hz at most)", load.link,
+  return fmt::format("{}: {:.3g} % ({:.3g} ms per sample; at most {:.4g} Hz)", load.link,
                      100.0 * load.load, 1e3 * load.cycle_s, load.most_hz);
 }
 

@@ -63,20 +63,20 @@ class PriorLoop {
     follow();
     if (signs_ > 0 || (turns() > 0 && certain()))
       out.problem = fmt::format(
-          "the controller does not hold the plant of the prior: {}. {}",
-          signs_ > 0
-              ? fmt::format("{} of {} axes have the wrong sign", signs_, axes_.axes())
-              : fmt::format("its loop gain goes {} times around the critical point", turns()),
+          "the controller does not stabilize the plant of the prior: {}. {}",
+          signs_ > 0 ? fmt::format("{} of {} axes have the wrong sign", signs_, axes_.axes())
+                     : fmt::format("the loop gain encircles the critical point {} times", turns()),
           kRemedy);
     else if (!certain())
       out.doubt = fmt::format(
-          "the prior does not tell whether the loop is stable: {}. Measure a pilot on a wider band "
-          "or with finer lines",
+          "stability of the loop cannot be determined from the prior: {}. Measure a pilot on a "
+          "wider band or with finer lines",
           last_gain_ > kNegligibleGain
-              ? fmt::format("its loop gain at its last line, {:.4g} Hz, is still {:.2g}",
+              ? fmt::format("the loop gain at its last line, {:.4g} Hz, is still {:.2g}",
                             frequency_hz_[frequency_hz_.size() - 1], last_gain_)
-              : fmt::format("between two lines near {:.4g} Hz its loop gain turns too far",
-                            largest_turn_hz_));
+              : fmt::format(
+                    "the phase of the loop gain changes too much between two lines near {:.4g} Hz",
+                    largest_turn_hz_));
     else if (sensitivity_ > kPoorSensitivity)
       out.doubt = poor_margin(sensitivity_, sensitivity_hz_);
     out.largest_sensitivity = sensitivity_;
@@ -173,9 +173,8 @@ LoopCheck check_loop(const WaferStageSpec& stage) {
   out.largest_sensitivity = loop.largest_sensitivity;
   if (!loop.stable())
     out.problem = fmt::format(
-        "the controller does not hold the plant: the closed loop is unstable at {:.4g} Hz and "
-        "grows "
-        "by {:.2g} % per sample. {}",
+        "the controller does not stabilize the plant: the closed loop is unstable at {:.4g} Hz and "
+        "grows by {:.2g} % per sample. {}",
         loop.pole_hz, 100.0 * (loop.largest_pole - 1.0), kRemedy);
   else if (loop.largest_sensitivity > kPoorSensitivity)
     out.doubt = poor_margin(loop.largest_sensitivity, loop.sensitivity_hz);
@@ -192,10 +191,10 @@ void require_stable_loop(const StageConfig& stage, const Console& console) {
 
 void require_stable_loop(const ExperimentConfig& config, const Console& console) {
   if (config.limits && !std::filesystem::exists(config.limits->prior))
-    throw FileError(fmt::format(
-        "{}: is not there; {} designs from it: measure a pilot, 'stageid run' and 'stageid frf -o' "
-        "to this name",
-        config.limits->prior.string(), config.file.string()));
+    throw FileError(
+        fmt::format("{}: no such file; {} designs from it. Measure a pilot with 'stageid run' and "
+                    "write this file with 'stageid frf -o'",
+                    config.limits->prior.string(), config.file.string()));
   judge(config.limits ? config.limits->prior : config.stage.file, check_loop(config), console);
 }
 

@@ -34,9 +34,8 @@ std::vector<Index> places(const std::filesystem::path& file, const ChannelList& 
     if (index < 0)
       throw FormatError(
           file, "",
-          fmt::format("has the {0} '{1}', which the stage lacks; give a prior of this "
-                      "stage",
-                      kind, name));
+          fmt::format("has the {0} '{1}', which the stage lacks; use a prior of this stage", kind,
+                      name));
     indices.push_back(index);
   }
   return indices;
@@ -64,20 +63,20 @@ FrfEstimate prior_of_frf(const std::filesystem::path& file, const StageInfo& sta
   FrfEstimate frf = read_frf(file);
   if (frf.compensated != Compensation::none) frf = as_measured(std::move(frf));
   if (frf.hold != Hold::zoh || frf.sample_rate_hz != stage.sample_rate_hz)
-    throw FormatError(
-        file, "",
-        fmt::format("a response through the hold at {} Hz is needed, not {} at {} Hz; "
-                    "measure a pilot of this stage",
-                    stage.sample_rate_hz, frf.hold == Hold::zoh ? "one" : "without",
-                    frf.sample_rate_hz));
+    throw FormatError(file, "",
+                      fmt::format("expected a response through the hold at {} Hz, got {} at {} Hz; "
+                                  "measure a pilot of this stage",
+                                  stage.sample_rate_hz,
+                                  frf.hold == Hold::zoh ? "one with hold" : "one without hold",
+                                  frf.sample_rate_hz));
   const double low_hz = frequency_hz[0];
   const double high_hz = frequency_hz[frequency_hz.size() - 1];
   if (low_hz < 0.5 * frf.frequency_hz[0] || high_hz > 1.02 * frf.frequency_hz[frf.lines() - 1])
     throw FormatError(
         file, "/frequency_hz",
-        fmt::format("{} ... {} Hz do not reach over the band of {} ... {} Hz; measure "
-                    "a pilot on all of it",
-                    frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1], low_hz, high_hz));
+        fmt::format(
+            "{} ... {} Hz do not cover the band of {} ... {} Hz; measure a pilot on the whole band",
+            frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1], low_hz, high_hz));
   return frf;
 }
 

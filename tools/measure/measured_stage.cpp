@@ -87,7 +87,7 @@ std::unique_ptr<CyclicStage> replayed_stage(const ExperimentConfig& config,
                                             const MeasurementRequest& request,
                                             const std::vector<RunId>& skip) {
   if (request.replay.empty())
-    throw std::invalid_argument("--backend replay: no log to play; add --replay LOG");
+    throw std::invalid_argument("--backend replay: no log given; add --replay LOG");
   StageInfo info = config.stage.spec.info;
   info.backend = "replay";
   return std::make_unique<ReplayStage>(

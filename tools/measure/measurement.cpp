@@ -30,7 +30,7 @@ std::vector<RunId> complete_runs(const ExperimentConfig& config,
   if (!id.empty() && id != config.measurement_id)
     throw std::invalid_argument(
         fmt::format("{}: belongs to another experiment (stage, excitation or seed differ from {}); "
-                    "give another -o",
+                    "choose another name with -o",
                     file.string(), config.file.string()));
   std::vector<RunId> runs;
   for (const LogRun& run : log->runs())
@@ -63,8 +63,8 @@ void conclude(const MeasuredStage& stage, MeasurementResult& result) {
   const RunHealth& health = result.experiment.health;
   if (result.exit_code == kNotTrustworthy)
     result.message = fmt::format(
-        "{} missing, {} marked as not to be used: 'stageid log info' counts them by run, "
-        "'stageid frf' leaves out the periods they stand in",
+        "{} missing, {} marked as invalid: 'stageid log info' counts them per run, 'stageid frf' "
+        "discards the periods that contain them",
         counted(health.missing, "cycle is", "cycles are"),
         counted(health.marked, "sample is", "samples are"));
   stage.explain(result);
@@ -103,7 +103,7 @@ bool check_log(const MeasurementRequest& request) {
   const bool exists = std::filesystem::exists(request.log);
   if (exists && !request.resume)
     throw std::invalid_argument(fmt::format(
-        "{}: exists already; continue it with --resume, or remove it", request.log.string()));
+        "{}: already exists; continue it with --resume, or remove it", request.log.string()));
   return exists;
 }
 
@@ -160,8 +160,8 @@ void tell_end(EventLog& events, const MeasuredStage& stage, const MeasurementRes
 void tell_reached(UntilVariance& until, MeasurementResult& result, const Console& console) {
   const std::string reason = until.enough();
   if (reason.empty() && until.reached())
-    result.message += fmt::format(
-        "; the plan is at its end with a mean relative variance of {:.3g}", *until.reached());
+    result.message +=
+        fmt::format("; the plan ended with a mean relative variance of {:.3g}", *until.reached());
   else if (!reason.empty() && result.message.find(reason) == std::string::npos)
     result.message += "; " + reason;
   if (!until.failure().empty()) console.warning("--until: " + until.failure());
@@ -189,7 +189,8 @@ std::string advice_behind(const MeasurementResult& result) {
   if (result.exit_code == kInterrupted || result.exit_code == kWorldFailed)
     return "; continue with --resume";
   if (result.exit_code == kStoppedForSafety)
-    return "; the same run would be stopped again: lower the level, or check controller and limits";
+    return "; resuming would stop the same run again: lower the level, or check the controller and "
+           "the limits";
   return "";
 }
 

@@ -29,11 +29,11 @@ void ModbusFront::add_options(CLI::App& command) {
                   "Modbus TCP port on the loopback interface; 0: a free one")
       ->check(CLI::Range(0, 65535));
   command.add_option("--modbus-rtu", rtu_device_, "Modbus RTU on this serial line");
-  command.add_option("--modbus-baud", baud_, "of the serial line")->capture_default_str();
+  command.add_option("--modbus-baud", baud_, "baud rate of the serial line")->capture_default_str();
   command.add_option("--modbus-parity", parity_, "N | E | O")
       ->check(CLI::IsMember({"N", "E", "O"}))
       ->capture_default_str();
-  command.add_option("--modbus-unit", unit_, "unit that answers")
+  command.add_option("--modbus-unit", unit_, "unit identifier of the node")
       ->check(CLI::Range(1, 247))
       ->capture_default_str();
   command.add_option(

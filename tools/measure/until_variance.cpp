@@ -21,7 +21,7 @@ UntilVariance::UntilVariance(std::filesystem::path log, FrfOptions options, doub
     : log_(std::move(log)), options_(std::move(options)), wanted_(variance) {
   if (!(variance > 0.0) || !std::isfinite(variance))
     throw std::invalid_argument(fmt::format(
-        "--until: {} is no variance; write a positive number, e.g. 1e-6 for 0.1 %", variance));
+        "--until: {} is not a variance; write a positive number, e.g. 1e-6 for 0.1 %", variance));
   options_.realizations.clear();
 }
 
@@ -37,16 +37,17 @@ std::string UntilVariance::enough() {
   });
   worker.join();
   if (!reached_ || *reached_ > wanted_) return "";
-  return fmt::format("mean relative variance {:.3g} after {}, {:.3g} was wanted", *reached_,
+  return fmt::format("mean relative variance {:.3g} after {}, target {:.3g}", *reached_,
                      counted(realizations_, "realization"), wanted_);
 }
 
 std::string never_enough(const ExperimentSpec& plan, const FrfOptions& options) {
   if (plan.realizations > 1) return "";
   const bool no_noise = plan.periods < 2 && options.method == FrfMethod::periodic;
-  return fmt::format("{}, so the experiment runs to its end; plan realizations: 2 or more",
-                     no_noise ? "one period of one realization tells no variance"
-                              : "looked at is every realization, and the plan has one");
+  return fmt::format(
+      "{}, so the experiment will not end early; set realizations to 2 or more",
+      no_noise ? "one period of one realization has no variance estimate"
+               : "the variance is checked after every realization, and the plan has only one");
 }
 
 void UntilVariance::look() {

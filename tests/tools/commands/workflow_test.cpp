@@ -224,9 +224,8 @@ TEST_F(Workflow, AMissedCycleIsMarkedAndSaid) {
       "miss.yaml", "noise:", "faults: [{kind: missed_cycle, from_cycle: 1700, run: 2}]\nnoise:");
   const ProgramResult result = run({"run", config, "-o", name("miss.slog")});
   EXPECT_EQ(result.exit_code, 3) << result.err;
-  EXPECT_THAT(
-      result.err,
-      HasSubstr("1 cycle is missing, 2 samples are marked as not to be used: 'stageid log info'"));
+  EXPECT_THAT(result.err,
+              HasSubstr("1 cycle is missing, 2 samples are marked as invalid: 'stageid log info'"));
   succeed({"frf", name("miss.slog"), "-o", name("f.h5")});
 }
 

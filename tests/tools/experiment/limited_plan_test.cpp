@@ -154,7 +154,7 @@ TEST_F(LimitedPlanTest, RunEndsWhenTheVarianceIsReachedAndGoesOnWithResume) {
       Json::parse(succeed({"run", limits_, "-o", log, "--until", "2e-6", "--json"}).out);
   EXPECT_EQ(first["runs_complete"], 6);
   EXPECT_LE(first["relative_variance"].get<double>(), 2e-6);
-  EXPECT_THAT(first["message"].get<std::string>(), HasSubstr("2e-06 was wanted"));
+  EXPECT_THAT(first["message"].get<std::string>(), HasSubstr("target 2e-06"));
   EXPECT_EQ(first["exit_code"], 0);
   succeed({"log", "verify", log});
   const Json same = Json::parse(
@@ -163,7 +163,7 @@ TEST_F(LimitedPlanTest, RunEndsWhenTheVarianceIsReachedAndGoesOnWithResume) {
   const Json rest = Json::parse(
       succeed({"run", limits_, "-o", log, "--until", "1e-12", "--resume", "--json"}).out);
   EXPECT_EQ(rest["runs_complete"], 9);
-  EXPECT_THAT(rest["message"].get<std::string>(), HasSubstr("the plan is at its end"));
+  EXPECT_THAT(rest["message"].get<std::string>(), HasSubstr("the plan ended"));
   // What was stopped and resumed is what would have been measured in one go.
   succeed({"run", limits_, "-o", name("whole.slog")});
   succeed({"frf", log, "-o", name("a.h5")});
@@ -182,34 +182,34 @@ TEST_F(LimitedPlanTest, UntilWarnsOfAPlanThatCannotEndEarly) {
   };
   const std::string plan = "  periods: 3\n  realizations: 3";
   EXPECT_THAT(warning(plan, "  periods: 1\n  realizations: 1"),
-              AllOf(HasSubstr("--until: one period of one realization tells no variance"),
-                    HasSubstr("plan realizations: 2 or more")));
+              AllOf(HasSubstr("--until: one period of one realization has no variance estimate"),
+                    HasSubstr("set realizations to 2 or more")));
   std::filesystem::remove(at("short.slog"));
-  EXPECT_THAT(warning(plan, "  periods: 3\n  realizations: 1"), HasSubstr("the plan has one"));
+  EXPECT_THAT(warning(plan, "  periods: 3\n  realizations: 1"), HasSubstr("the plan has only one"));
   std::filesystem::remove(at("short.slog"));
   EXPECT_THAT(warning(plan, "  periods: 1\n  realizations: 2"), Not(HasSubstr("--until")));
 }
 
 TEST_F(LimitedPlanTest, RequestsThatAreWrong) {
-  fail({"design", limits_, "-o", name("e.h5")}, 1, "small_stage_pilot_frf.h5: is not there");
+  fail({"design", limits_, "-o", name("e.h5")}, 1, "small_stage_pilot_frf.h5: no such file");
   fail({"design", config_, "-o", name("e.h5"), "--accuracy", "1e-6"}, 2,
        "--accuracy: needs the noise of a prior");
   fail({"run", config_, "-o", name("x.slog"), "--until", "-1"}, 2, "--until");
   const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
     fail({"design", variant(from, to), "-o", name("e.h5")}, 2, text);
   };
-  wrong("  level:\n", "  level:\n    rms_n: 1\n", "level: give one of");
-  wrong("crest_iterations: 20", "crest_iterations: 0", "the phases are designed too");
-  wrong("  lines: all", "  shape: [[1, 1], [10, 2]]\n  lines: all", "leave 'shape' out");
+  wrong("  level:\n", "  level:\n    rms_n: 1\n", "level: write exactly one of");
+  wrong("crest_iterations: 20", "crest_iterations: 0", "'limits' also optimizes the phases");
+  wrong("  lines: all", "  shape: [[1, 1], [10, 2]]\n  lines: all", "remove 'shape'");
   wrong("velocity_m_s: 0.05", "velocity_m_s: 0.05, safety: 1.5", "safety: 1.5 is out of range");
   make_pilot();
-  wrong("[16, 800]", "[16, 900]", "do not reach over the band");
+  wrong("[16, 800]", "[16, 900]", "do not cover the band");
   wrong("velocity_m_s: 0.05", "velocity_m_s: 1e-9", "uses up the limit");
   succeed({"design", limits_, "-o", name("e.h5")});
   fail({"run", config_, "--excitation", name("e.h5"), "-o", name("x.slog")}, 2,
-       "the scheme is not that of");
+       "differs in the scheme from");
   fail({"run", variant("seed: 7", "seed: 8"), "--excitation", name("e.h5"), "-o", name("x.slog")},
-       2, "the seed is not that of");
+       2, "differs in the seed from");
   fail({"run", limits_, "--excitation", prior(), "-o", name("x.slog")}, 2,
        "is a frequency response, not a designed excitation;");
 }
@@ -236,7 +236,7 @@ TEST_F(LimitedPlanTest, APriorOfAnotherStageIsRefused) {
   EXPECT_EQ(good.sensor_known, std::vector<bool>({true, false}));
   EXPECT_EQ(good.noise_density.size(), 0);
   frf.sample_rate_hz = 1000.0;
-  refused("a response through the hold at 2000 Hz is needed");
+  refused("expected a response through the hold at 2000 Hz");
   frf.sample_rate_hz = stage.sample_rate_hz;
   frf.inputs.names[0] = "z1";
   refused("has the actuator 'z1', which the stage lacks");

@@ -88,11 +88,11 @@ TEST_F(BadRequest, Configurations) {
         "bad.yaml:10:12: frequency band: no line between 16.5 and 17 Hz");
   wrong("axes: [a1, a2, a3]", "axes: [a1, a2, z3]", "bad.yaml:7:18: axes: unknown actuator 'z3'");
   wrong("axes: [a1, a2, a3]", "axes: [a1, a1]", "duplicate entry 'a1'");
-  wrong("{rms_n: 1.0}", "{rms_n: [1, 2]}", "2 numbers for 3 axes");
+  wrong("{rms_n: 1.0}", "{rms_n: [1, 2]}", "got 2 numbers for 3 axes");
   wrong("{rms_n: 1.0}", "{rms_n: 1, peak_n: 2}", "one of");
   wrong("lines: all", "lines: every", "expected one of all, odd, odd_random");
-  wrong("realization: 3 ", "realization: 4 ", "hold back one that is measured");
-  wrong("stage: small_stage.yaml", "stage: nowhere.yaml", "bad.yaml:4:8: stage: there is no file");
+  wrong("realization: 3 ", "realization: 4 ", "hold back one of these");
+  wrong("stage: small_stage.yaml", "stage: nowhere.yaml", "bad.yaml:4:8: stage: no such file");
   wrong("direct_term: full", "hold: perfect", "expected one of none, phase, sinc, exact, by_frf");
   wrong("direct_term: full", "submodels: [{n: 2, m: 3}]", "m=3 is above n + l = 2");
   wrong("direct_term: full", "submodels: [{order: 2}]", "unknown key 'order'");
@@ -191,7 +191,7 @@ TEST_F(BadRequest, WhatACanBusCannotCarry) {
   wrong("mode: resident", "'buses'");
   wrong("buses: []", "buses");
   wrong("buses: [{interface: can0, actuators: [a1]}]", "channel 'a2' is not assigned to a bus");
-  wrong("buses: [{interface: can0, actuators: [a9]}]", "no channel 'a9'");
+  wrong("buses: [{interface: can0, actuators: [a9]}]", "unknown channel 'a9'");
   wrong("buses: [{interface: can0}, {interface: can0}]", "duplicate interface can0");
   wrong("actuator_range_n: [1, 2], buses: [{interface: can0}]", "2 entries for 3 channels");
   wrong("buses: [{interface: can0}], actuator_range_n: [1]",
@@ -222,7 +222,7 @@ TEST_F(BadRequest, AnExperimentPastTheLimitsIsNotDesigned) {
 
 TEST_F(BadRequest, AnExistingLogIsNotOverwritten) {
   make_log();
-  fail({"run", config_, "-o", name("run.slog")}, 2, "exists already; continue it with --resume");
+  fail({"run", config_, "-o", name("run.slog")}, 2, "already exists; continue it with --resume");
   const std::string other = experiment("other.yaml", "seed: 7", "seed: 8");
   fail({"run", other, "-o", name("run.slog"), "--resume"}, 2, "belongs to another experiment");
 }
@@ -330,7 +330,8 @@ TEST_F(BadRequest, NamesThatAreNearOnes) {
 TEST_F(BadRequest, AControllerThatDoesNotHoldThePlant) {
   write_bytes(at("small_stage.yaml"), replaced(read_bytes(at("small_stage.yaml")),
                                                "crossover_hz: 20,", "crossover_hz: 200,"));
-  const std::string text = "the controller does not hold the plant: the closed loop is unstable at";
+  const std::string text =
+      "the controller does not stabilize the plant: the closed loop is unstable at";
   fail({"design", config_, "-o", name("e.h5")}, 2, text);
   fail({"run", config_, "-o", name("r.slog")}, 2, text);
   fail({"identify", config_, "-o", name("all")}, 2, text);

@@ -60,7 +60,7 @@ TEST_F(DamagedData, RecoverSavesWhatIsLeft) {
   const ProgramResult recover =
       succeed({"log", "recover", name("cut.slog"), "-o", name("saved.slog"), "--json"});
   EXPECT_THAT(recover.out, testing::HasSubstr("\"complete_runs\": 5"));
-  fail({"log", "recover", name("cut.slog"), "-o", name("saved.slog")}, 2, "exists already");
+  fail({"log", "recover", name("cut.slog"), "-o", name("saved.slog")}, 2, "already exists");
   succeed({"log", "verify", name("saved.slog")});
   succeed({"frf", name("saved.slog"), "-o", name("f.h5"), "--realizations", "1"});
 }
