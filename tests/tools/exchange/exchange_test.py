@@ -345,12 +345,12 @@ class Models(Case):
 
     def test_mode_shapes_that_do_not_fit_are_refused(self):
         self.write_shapes("fe.unv", [(2, [51.0, 1.0, 0.0], {5: (1.0, 0, 0)})])
-        self.refuse("have no value for any output (z1, z'2)", "validate", "model.json", "fe.unv")
+        self.refuse("contain no output of the model (z1, z'2)", "validate", "model.json", "fe.unv")
         self.write_shapes("rigid.unv", [(2, [0.0, 1.0, 0.0], {5: (1.0, 0, 0)})])
-        self.refuse("none of its modes has a frequency above zero", "import", "rigid.unv", "-o", "modes.json")
+        self.refuse("contains no mode with a frequency above zero", "import", "rigid.unv", "-o", "modes.json")
         self.succeed("export", self.frf(), "-o", "response.unv")
-        self.refuse("holds no mode shapes (dataset 55)", "validate", "model.json", "response.unv")
-        self.refuse("holds no mode shapes (dataset 55)", "import", "response.unv", "-o", "modes.json")
+        self.refuse("contains no mode shapes (dataset 55)", "validate", "model.json", "response.unv")
+        self.refuse("contains no mode shapes (dataset 55)", "import", "response.unv", "-o", "modes.json")
 
     @staticmethod
     def write_shapes(name, modes):

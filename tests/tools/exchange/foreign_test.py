@@ -200,7 +200,7 @@ class Touchstone(Case):
         with h5py.File(WORK / "back.h5") as f:
             np.testing.assert_array_equal(f["response"][:, 0, 0], [100, 100])
         (WORK / "x.s1p").write_text("# HZ H RI\n1 2 0\n")
-        self.refuse("H parameters have two ports, not 1", "import", "x.s1p", "-o", "n.h5")
+        self.refuse("H parameters need two ports, the file name declares 1", "import", "x.s1p", "-o", "n.h5")
         (WORK / "x.s1p").write_text("# HZ Z RI R 0\n1 2 0\n")
         self.refuse("'0' is not a reference resistance", "import", "x.s1p", "-o", "n.h5")
 
@@ -239,7 +239,7 @@ class Tables(Case):
             self.assertEqual(list(b["outputs"].attrs["unit"]), ["m/s^2", "rad"])
         head = lines[3].replace("real z1/", "real z/1/")
         (WORK / "f.csv").write_text("".join([head] + lines[4:]))
-        self.refuse("cannot be told apart by their slashes. Write a map", "import", "f.csv", "-o", "n.h5")
+        self.refuse("contain slashes and cannot be separated. Write a map", "import", "f.csv", "-o", "n.h5")
         (WORK / "f.csv").write_text("".join(lines[:2] + [lines[2][:-8] + "\n"] + lines[3:]))
         self.refuse("is damaged", "import", "f.csv", "-o", "n.h5")
         (WORK / "f.csv").write_text("".join(lines[:3] + [lines[3].replace("imaginary z1/", "imaginary q1/", 1)] + lines[4:]))

@@ -86,7 +86,7 @@ class ByThemselves(Case):
                                      + channel("NONE", "NONE") + channel("NONE", "NONE"))
         listed = json.loads(self.succeed("import", "x.uff", "--json").stdout)["arrays"]
         self.assertEqual([array["name"] for array in listed[::2]], ["z\u00b5", "1x : m", "0", "0 (2)"])
-        self.refuse("4 x time response; take time responses with a map", "import", "x.uff", "-o", "n.h5")
+        self.refuse("4 x time response; import time responses with a map", "import", "x.uff", "-o", "n.h5")
         (WORK / "x.uff").write_bytes(uff_function(abs(G[:, 0, 0]), (0, 0), (0, 0), kind=9))
         self.refuse("1 x power spectral density; export frequency responses", "import", "x.uff", "-o", "n.h5")
 
@@ -127,7 +127,7 @@ class ByThemselves(Case):
             np.testing.assert_allclose(g, s, rtol=1e-13)
         self.refuse("Touchstone 2", "import", self.text("y.s1p", "[Version] 2.0\n"),
                     "-o", "n.h5")
-        self.refuse("whole lines", "import", self.text("y.s3p", "# Hz S RI\n1 2 3\n"), "-o", "n.h5")
+        self.refuse("are not complete lines of", "import", self.text("y.s3p", "# Hz S RI\n1 2 3\n"), "-o", "n.h5")
         self.refuse("'x'", "import", self.text("y.s1p", "1 2 x\n"), "-o", "n.h5")
 
     def text(self, name, content):
@@ -159,7 +159,7 @@ class WithAMap(Case):
         write_map("kind: frf\nfrequency: w\nresponse: G\n")
         self.refuse("key 'axes' is missing", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
         write_map("kind: frf\nfrequency: v\nresponse: G\n")
-        self.refuse("has no 'v'; there are w, G", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        self.refuse("has no 'v'; it contains w, G", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
         write_map("kind: frf\nfrequency: w\n")
         self.refuse("map.yaml:1:", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
 
@@ -178,11 +178,11 @@ class WithAMap(Case):
         np.testing.assert_allclose(g[:, 0, 0], y, rtol=1e-14)
         np.testing.assert_array_equal(g[:, 0, 1], y)
         (WORK / "x.csv").write_text(text.replace(";deg;", ";mag;"))
-        self.refuse("x.csv:1: two columns", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
+        self.refuse("x.csv:1: duplicate column name", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
         (WORK / "x.csv").write_text(text + "1;2;nonsense;4;5;\n")
-        self.refuse("'nonsense' stands in column 3", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
+        self.refuse("got 'nonsense' in column 3", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
         (WORK / "x.csv").write_text(text + "1;2;" + "nonsense" * 9 + ";4;5;\n")
-        self.refuse("'" + ("nonsense" * 9)[:37] + "...' stands in column 3",
+        self.refuse("'" + ("nonsense" * 9)[:37] + "...' in column 3",
                     "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
 
     def test_names_that_hold_what_stands_between_fields(self):
@@ -228,7 +228,7 @@ class WithAMap(Case):
                 np.testing.assert_array_equal(f[name][:], values)
         del channels[2]["noise_variance"]
         write_map(f"kind: frf\nfrequency: frequency_hz\nchannels: {json.dumps(channels)}\n")
-        self.refuse("in every channel or in none", "import", "f.csv", "-o", "n.h5", "--map", "map.yaml")
+        self.refuse("for all channels or for none", "import", "f.csv", "-o", "n.h5", "--map", "map.yaml")
 
     def test_a_log(self):
         g = np.random.default_rng(4)
@@ -249,11 +249,11 @@ class WithAMap(Case):
             np.testing.assert_array_equal(run["sensors"][()], y * [0.001, 1])
             self.assertEqual(list(h5["channels/sensors"].asstr()), ["y1", "y2"])
         write_map(text.replace("names: [y1, y2], ", ""))
-        self.refuse("give names", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+        self.refuse("write names", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
         write_map(text.replace("sample_rate_hz: 100\n", ""))
         self.refuse("needs sample_rate_hz", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
         write_map(text.replace("period_samples: 50", "period_samples: 60"))
-        self.refuse("all whole", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+        self.refuse("not a multiple of period_samples", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
         scipy.io.savemat(WORK / "x.mat", {"r": r + 1e-3 * g.normal(size=r.shape), "u": u, "y": y})
         write_map(text)
         self.refuse("excitation_period: mean", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
@@ -367,14 +367,14 @@ class Damaged(Case):
             self.refuse("text." + ending, "import", "text." + ending, "-o", "n.h5")
             self.refuse("none." + ending, "import", "none." + ending, "-o", "n.h5", code=1)
         (WORK / "x.doc").write_text("")
-        self.refuse("'.doc' is not imported", "import", "x.doc", "-o", "n.h5")
+        self.refuse("unsupported file type '.doc'", "import", "x.doc", "-o", "n.h5")
         self.refuse("a frequency response is written as .h5", "import", "text.unv", "-o", "n.csv")
         frf = self.frf()
-        self.refuse("are not exported as '.h5'", "export", frf, "-o", "n.h5")
+        self.refuse("cannot be exported as '.h5'", "export", frf, "-o", "n.h5")
         self.refuse("--mat-version", "export", frf, "-o", "n.mat", "--mat-version", "6")
 
     def test_what_a_universal_file_cannot_hold(self):
-        for name, unit, text in (("y" * 73, "m", "names of 72 characters"), ("y", "m" * 21, "20 characters")):
+        for name, unit, text in (("y" * 73, "m", "at most 72 characters"), ("y", "m" * 21, "20 characters")):
             with h5py.File(WORK / "long.h5", "w") as f:
                 f.attrs["format"] = "stageid-frf"
                 f["frequency_hz"], f["response"] = [1.0], np.ones((1, 1, 1), complex)
@@ -384,9 +384,9 @@ class Damaged(Case):
 
     def test_channels_that_do_not_match(self):
         one = uff_function(G[:, 0, 0], (1, 3), (1, 3))
-        for data, text in ((one + one, "second time"),
-                           (one + uff_function(G[:, 0, 0], (2, 3), (2, 3)), "each pair"),
-                           (one + uff_function(G[:, 0, 0], (2, 3), (1, 3), FREQUENCY_HZ + 1), "other frequencies"),
+        for data, text in ((one + one, "duplicate frequency response"),
+                           (one + uff_function(G[:, 0, 0], (2, 3), (2, 3)), "every pair"),
+                           (one + uff_function(G[:, 0, 0], (2, 3), (1, 3), FREQUENCY_HZ + 1), "its frequencies differ"),
                            (one.replace(b"         6        23", b"         7        23"), "ordinate data type"),
                            (one.replace(b"    4         1", b"    1         1"), "no frequency response"),
                            (one.replace(b"e-0", b"x-0", 3), "finite number")):

@@ -105,7 +105,7 @@ class SeveralRuns(Case):
         log_map("ruy", more="files: run_{realization}_{experiment}.mat\n")
         self.succeed("import", "-o", "run.h5", "--map", "map.yaml")
         self.expect(r, u, y)
-        self.refuse("leave FILE or the key files out", "import", "run_1_01.mat", "-o", "n.h5", "--map", "map.yaml")
+        self.refuse("omit FILE or the key files", "import", "run_1_01.mat", "-o", "n.h5", "--map", "map.yaml")
         (WORK / "run_3_02.mat").unlink()
         shown = self.succeed("import", "-o", "run.h5", "--map", "map.yaml").stdout
         self.assertIn("missing: realization 3, experiment 2 (counted from 1)", shown)
@@ -123,7 +123,7 @@ class SeveralRuns(Case):
         self.succeed("import", "day{realization}/all.npz", "-o", "run.h5", "--map", "map.yaml")
         self.expect(r, u, y)
         log_map("ruy", ["realization, sample, channel"] * 3)
-        self.refuse("told by the name of its file and by axis realization; keep one",
+        self.refuse("given by the name of its file and by axis realization; keep one",
                     "import", "day{realization}/all.npz", "-o", "n.h5", "--map", "map.yaml")
 
     def test_an_array_per_run(self):
@@ -145,13 +145,13 @@ class SeveralRuns(Case):
         r, u, y = signals(experiments=1)
         np.savez(WORK / "x.npz", r=r[0, 0], u=u[:, 0], y=y[:, 0])
         log_map("ruy")
-        self.refuse("u: is 3 x 200 x 2. Name its axes in the map: actuators: {arrays: [u], axes: [sample, channel, run]}",
+        self.refuse("u: has the shape 3 x 200 x 2. List its axes in the map: actuators: {arrays: [u], axes: [",
                     "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
         for axes in ("sample, wurst", "channel, run", "sample, run, realization"):
             log_map("ruy", ["", axes, ""])
             self.refuse("write for example axes: [sample, channel, run]", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
         log_map("ruy", ["", "run, sample, channel", "run, sample"])
-        self.refuse("is 3 x 200 x 3; axes: [run, sample] names 2 axes", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        self.refuse("3 x 200 x 3; axes: [run, sample] lists 2 axes", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
 
 
 class Advice(Case):
@@ -163,7 +163,7 @@ class Advice(Case):
         np.savez(WORK / "x.npz", **dict(zip("ruy", whole)))
         for more in ("", "excitation_period: mean\n"):
             log_map("ruy", more=more)
-            error = self.refuse("excitation: it changes at row 200 and repeats from there on; 6 runs follow one another. "
+            error = self.refuse("changes at row 200 and repeats from there on; the file contains 6 runs in sequence. "
                                 "Add the key runs: [{realization: ..., experiment: ..., first_row: 0, rows: 200}, "
                                 "{realization: ..., experiment: ..., first_row: 200, rows: 200}",
                                 "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
@@ -178,10 +178,10 @@ class Advice(Case):
         r, u, y = signals()
         np.savez(WORK / "x.npz", r=r[0, 0], u=u[0, 0, :170], y=y[0, 0, :170])
         log_map("ruy")
-        self.refuse("170 rows, which are not all whole periods of period_samples: 50. Add the key runs with "
-                    "{first_row: 0, rows: 150} to take 3 periods", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        self.refuse("170 rows, not a multiple of period_samples: 50. Add the key runs with "
+                    "{first_row: 0, rows: 150} to use 3 periods", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
         np.savez(WORK / "x.npz", r=r[0, 0], u=u[0, 0, :50], y=y[0, 0, :50])
-        error = self.refuse("1 whole period of period_samples: 50; 1 transient period and at least one more are needed. "
+        error = self.refuse("1 whole period of period_samples: 50; expected 1 transient period and at least one more. "
                             "Correct transient_periods or period_samples",
                             "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
         self.assertNotIn("runs", error)
@@ -216,7 +216,7 @@ class Units(Case):
             with h5py.File(WORK / "run.h5") as f:
                 self.assertEqual(f["channels/sensors"].attrs["unit"], unit)
         self.one(("N", "N", "g"))
-        self.refuse("sensors: unit 'g': 'g' is a gram or the acceleration of gravity. Write kg, or m/s^2",
+        self.refuse("sensors: unit 'g': 'g' is ambiguous: gram or acceleration of gravity. Write kg, or m/s^2",
                     "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
 
     def test_of_a_frequency_response(self):
@@ -241,7 +241,7 @@ class Units(Case):
         for name, value in (("fs", 65536.0), ("dt", 1 / 65536), ("sample_rate_hz", 65536.0), ("time", np.arange(200) / 65536)):
             with self.subTest(name):
                 self.one(rate="sample_rate_hz: 1000\n", **{name: value})
-                self.refuse(f"sample_rate_hz: 1000 contradicts 65536 Hz, which '{name}' of x.npz says. Correct "
+                self.refuse(f"sample_rate_hz: 1000 contradicts 65536 Hz, from '{name}' of x.npz. Correct "
                             "sample_rate_hz, or write file_sample_rate: ignored",
                             "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
                 self.one(rate="sample_rate_hz: 1000\nfile_sample_rate: ignored\n", **{name: value})
@@ -274,7 +274,7 @@ class Summaries(Case):
         log_map("ruy", ["realization, experiment, sample, channel"] * 3)
         shown = self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml").stdout
         for text in ("6 runs: 3 realizations of 2 experiments, 4 periods each (1 transient), 50 samples per period",
-                     "sample rate 100 Hz, duration 12 s in all", "experiment 1 excites r1", "experiment 2 excites r2",
+                     "sample rate 100 Hz, total duration 12 s", "experiment 1 excites r1", "experiment 2 excites r2",
                      f"a2 {np.sqrt(np.mean(u[..., 1] ** 2)):.4g} N", "wrote run.h5"):
             self.assertIn(text, shown)
         told = json.loads(self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml", "--json").stdout)
@@ -308,7 +308,7 @@ class Frequencies(Case):
         self.succeed("import", "x.csv", "-o", "back.h5", "--map", "map.yaml")
         with h5py.File(WORK / "back.h5") as f:
             np.testing.assert_array_equal(f["frequency_hz"][()], [1, 3, 5])
-        for keys, text in (("first_hz: 1\n", "belong together"), ("", "frequency, or first_hz and step_hz; add it"),
+        for keys, text in (("first_hz: 1\n", "only valid together"), ("", "frequency, or first_hz and step_hz; add it"),
                            ("frequency: f\nfirst_hz: 1\nstep_hz: 1\n", "remove one"),
                            ("first_hz: 1\nstep_hz: 0\n", "is not positive"), ("first_hz: none\nstep_hz: 1\n", "has no 'none'")):
             write_map(f"kind: frf\n{keys}response: G\naxes: [output, input, line]\n")

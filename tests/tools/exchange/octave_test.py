@@ -78,8 +78,8 @@ class Octave(Case):
             with h5py.File(frf) as a, h5py.File(WORK / "back.h5") as b:
                 np.testing.assert_array_equal(b["response"][()], a["response"][()])
                 np.testing.assert_array_equal(b["frequency_hz"][()], a["frequency_hz"][()])
-        self.refuse("own.mat: is in Octave's own format; write it in Octave with 'save -v7", "import", "own.mat")
-        self.refuse("h5.mat: is HDF5, not of MATLAB; write it in Octave with 'save -v7", "import", "h5.mat")
+        self.refuse("own.mat: is in the native Octave format; write it in Octave with 'save -v7", "import", "own.mat")
+        self.refuse("h5.mat: is HDF5, but not a MATLAB file; write it in Octave with 'save -v7", "import", "h5.mat")
 
 
 if __name__ == "__main__":

@@ -62,9 +62,9 @@ TEST_F(BadRequest, MissingFiles) {
 
 TEST_F(BadRequest, WhatIsNoTableAndNoReport) {
   write_bytes(at("empty.csv"), "");
-  fail({"import", name("empty.csv")}, 2, "empty.csv: holds no table;");
+  fail({"import", name("empty.csv")}, 2, "empty.csv: contains no table;");
   write_bytes(at("head.csv"), "u,y\n");
-  fail({"import", name("head.csv")}, 2, "head.csv: holds names of columns and no row of numbers;");
+  fail({"import", name("head.csv")}, 2, "head.csv: contains column names but no row of numbers;");
   fail({"report", name("head.csv"), "-o", name("r.html")}, 2, "is nothing that the report shows");
   fail({"import", config_}, 2, "is an experiment file, not a file of another program;");
   fail({"run", config_, "-o", name("x.txt")}, 2, "x.txt: a log is written as .slog;");

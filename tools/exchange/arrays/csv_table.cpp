@@ -49,7 +49,7 @@ std::vector<std::string> split(const TextLines& lines, std::string_view line, ch
     else if (quoted || c != separator)
       fields.back() += c;
   }
-  if (quoted) lines.fail("a quote is not closed");
+  if (quoted) lines.fail("unterminated quote; close it");
   if (separator == ' ' && fields.back().empty()) fields.pop_back();
   return fields;
 }
@@ -71,8 +71,7 @@ std::vector<std::string> names_of(const TextLines& lines, const std::vector<std:
   for (const std::string& field : fields) {
     names.push_back(utf8_of_text(trimmed(field)));
     if (!names.back().empty() && std::count(names.begin(), names.end(), names.back()) > 1)
-      lines.fail(
-          fmt::format("two columns are called '{}'; give each a name of its own", names.back()));
+      lines.fail(fmt::format("duplicate column name '{}'; rename one", names.back()));
   }
   return names;
 }
@@ -80,15 +79,16 @@ std::vector<std::string> names_of(const TextLines& lines, const std::vector<std:
 void append_row(const TextLines& lines, const std::vector<std::string>& fields, char separator,
                 std::size_t row, std::vector<std::vector<double>>& columns) {
   if (fields.size() > columns.size())
-    lines.fail(fmt::format("{} fields; the head has {}", fields.size(), columns.size()));
+    lines.fail(fmt::format("got {} fields; the header has {}", fields.size(), columns.size()));
   for (std::size_t c = 0; c < fields.size(); ++c) {
     if (trimmed(fields[c]).empty()) continue;
     const std::optional<double> value = number_of(fields[c], separator);
     if (!value)
-      lines.fail(fmt::format("'{}' stands in column {} where a finite number belongs",
+      lines.fail(fmt::format("got '{}' in column {}; expected a finite number",
                              shortened(fields[c]), c + 1));
     if (columns[c].size() != row)
-      lines.fail(fmt::format("column {} goes on after an empty field; fill or remove it", c + 1));
+      lines.fail(
+          fmt::format("column {} continues after an empty field; fill or remove the field", c + 1));
     columns[c].push_back(*value);
   }
 }
@@ -118,8 +118,8 @@ ArrayList read_csv(const std::filesystem::path& file) {
   if (row == 0)
     throw FormatError(file, "",
                       columns.empty()
-                          ? "holds no table; the file is empty, or cut short"
-                          : "holds names of columns and no row of numbers; the file is cut short");
+                          ? "contains no table; the file is empty or truncated"
+                          : "contains column names but no row of numbers; the file is truncated");
   ArrayList list{file, {}};
   for (std::size_t c = 0; c < columns.size(); ++c)
     if (!names[c].empty())

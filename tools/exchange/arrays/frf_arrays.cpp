@@ -82,9 +82,9 @@ bool from_matlab(const ArrayList& list) { return list.find("@format") == nullptr
 NamedArray with_axes(const ArrayList& list, NamedArray array, const Dataset& dataset, bool matlab) {
   array.name = dataset.name;
   if (array.is_text() != (dataset.axes == 0))
-    throw FormatError(list.file, dataset.name,
-                      array.is_text() ? "holds text; numbers must stand here"
-                                      : "holds numbers; text must stand here");
+    throw FormatError(
+        list.file, dataset.name,
+        array.is_text() ? "contains text; expected numbers" : "contains numbers; expected text");
   if (dataset.axes <= 1) {
     array.shape = {array.size()};
   } else if (matlab && dataset.axes == 3) {

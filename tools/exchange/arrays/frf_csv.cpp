@@ -140,10 +140,9 @@ void describe(const ArrayList& arrays, FrfEstimate& frf) {
   const std::string text = description_in(arrays.file);
   if (text.empty()) {
     if (!channels_from_head(arrays, frf))
-      throw FormatError(
-          arrays.file, "",
-          "the names and units of its channels cannot be told apart by their slashes. "
-          "Write a map with kind: frf and channels (docs/exchange.md)");
+      throw FormatError(arrays.file, "",
+                        "names and units of its channels contain slashes and cannot be separated. "
+                        "Write a map with kind: frf and channels (docs/exchange.md)");
     return;
   }
   try {
@@ -180,7 +179,7 @@ FrfEstimate read_frf_csv(const std::filesystem::path& file) {
     const std::vector<double> values = real_values(arrays, arrays.at(name));
     if (frf.lines() > 0 && static_cast<Eigen::Index>(values.size()) != frf.lines())
       throw FormatError(file, name,
-                        fmt::format("has {}; there are {}", counted(values.size(), "value"),
+                        fmt::format("got {}; expected {}", counted(values.size(), "value"),
                                     counted(frf.lines(), "frequency", "frequencies")));
     return Eigen::VectorXd(
         Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));

@@ -37,8 +37,7 @@ std::vector<std::size_t> source_places(const std::vector<std::size_t>& shape,
 
 [[noreturn]] void refuse(const ArrayList& list, const NamedArray& array, const char* holds,
                          const char* wanted) {
-  throw FormatError(list.file, array.name,
-                    fmt::format("holds {}; {} must stand here", holds, wanted));
+  throw FormatError(list.file, array.name, fmt::format("contains {}; expected {}", holds, wanted));
 }
 
 }  // namespace
@@ -72,7 +71,7 @@ const NamedArray& ArrayList::at(const std::string& name) const {
   const bool more = names.size() > kMostNames;
   if (more) names.resize(kMostNames);
   throw FormatError(file, "",
-                    fmt::format("has no '{}'; there are {}{}", name, fmt::join(names, ", "),
+                    fmt::format("has no '{}'; it contains {}{}", name, fmt::join(names, ", "),
                                 more ? ", ..." : ""));
 }
 
@@ -82,8 +81,9 @@ NamedArray permuted(const NamedArray& array, const std::vector<std::size_t>& axe
   std::vector<std::size_t> all(array.shape.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   if (sorted != all)
-    throw std::invalid_argument(fmt::format("{}: {} are not the axes of an array with {} of them",
-                                            array.name, fmt::join(axes, ", "), all.size()));
+    throw std::invalid_argument(
+        fmt::format("{}: {} are not a permutation of the {} axes of the array", array.name,
+                    fmt::join(axes, ", "), all.size()));
   NamedArray result{array.name, {}, array.values};
   for (const std::size_t axis : axes) result.shape.push_back(array.shape[axis]);
   if (axes.size() < 2) return result;

@@ -29,7 +29,7 @@ class Bytes {
   [[noreturn]] void fail(const std::string& what) const { throw FormatError(file_, place_, what); }
   std::string_view piece(std::size_t at, std::size_t size) const {
     if (at > data_.size() || size > data_.size() - at)
-      fail("ends before its data do; the file was cut short or is damaged");
+      fail("unexpected end of file; the file is truncated or damaged");
     return data_.substr(at, size);
   }
   template <typename Number>
@@ -59,7 +59,7 @@ std::vector<Member> directory_of(const std::filesystem::path& file, std::string_
   const Bytes zip(file, "", content);
   const std::size_t end = content.rfind(std::string_view("PK\x05\x06", 4));
   if (!content.starts_with("PK") || end == std::string_view::npos)
-    zip.fail("is no .npz file, or one that was cut short; numpy.savez() writes such files");
+    zip.fail("is not an .npz file, or is truncated; write it with numpy.savez()");
   std::size_t at = zip.number<std::uint32_t>(end + 16);
   std::vector<Member> members(zip.number<std::uint16_t>(end + 10));
   for (Member& member : members) {
@@ -81,7 +81,7 @@ std::string unpacked(const Bytes& zip, const Member& member) {
                             zip.number<std::uint16_t>(member.offset + 28);
   const std::string_view stored = zip.piece(start, member.stored_bytes);
   if (member.method == 0) return std::string(stored);
-  if (member.method != 8) zip.fail("is packed in a way that is not read; use numpy.savez()");
+  if (member.method != 8) zip.fail("unsupported compression method; use numpy.savez()");
   if (member.bytes > kMostInflation * (stored.size() + 1)) zip.fail("its size is damaged");
   std::string inflated(member.bytes, '\0');
   z_stream stream = {};
@@ -94,7 +94,7 @@ std::string unpacked(const Bytes& zip, const Member& member) {
   const int status = inflate(&stream, Z_FINISH);
   const bool whole = status == Z_STREAM_END && stream.avail_out == 0;
   inflateEnd(&stream);
-  if (!whole) zip.fail("cannot be unpacked; the file is damaged");
+  if (!whole) zip.fail("cannot be decompressed; the file is damaged");
   return inflated;
 }
 
@@ -159,10 +159,10 @@ Layout layout_of(const Bytes& npy, std::string_view header) {
   const std::string_view type = value_of(npy, header, "descr");
   const std::size_t quote = type.size() < 2 ? std::string_view::npos : type.find('\'', 1);
   if (!type.starts_with('\'') || quote == std::string_view::npos || quote < 4)
-    npy.fail("holds records; save one array of numbers a name");
+    npy.fail("contains records; save one array of numbers per name");
   layout.big_endian = type[1] == '>';
   layout.kind = type[2];
-  if (layout.kind == 'O') npy.fail("holds Python objects; save arrays of numbers or text");
+  if (layout.kind == 'O') npy.fail("contains Python objects; save arrays of numbers or text");
   layout.width = whole_number(npy, type.substr(3, quote - 3));
   layout.column_major = value_of(npy, header, "fortran_order").starts_with("True");
   read_shape(npy, value_of(npy, header, "shape"), layout);
@@ -202,7 +202,7 @@ ElementReader reader_of(char kind, std::size_t width) {
 std::vector<std::string> texts_of(const Bytes& npy, const Layout& layout, std::string_view data) {
   std::vector<std::string> texts;
   const std::size_t step = layout.kind == 'U' ? 4 * layout.width : layout.width;
-  if (step != 0 && layout.count > data.size() / step) npy.fail("its data were cut short");
+  if (step != 0 && layout.count > data.size() / step) npy.fail("its data are truncated");
   for (std::size_t k = 0; k < layout.count; ++k) {
     const char* at = data.data() + k * step;
     if (layout.kind == 'S') {
@@ -219,7 +219,7 @@ std::vector<std::string> texts_of(const Bytes& npy, const Layout& layout, std::s
 
 NamedArray array_of(const std::filesystem::path& file, std::string name, std::string_view content) {
   const Bytes npy(file, name, content);
-  if (npy.piece(0, 6) != std::string_view("\x93NUMPY", 6)) npy.fail("is no .npy array");
+  if (npy.piece(0, 6) != std::string_view("\x93NUMPY", 6)) npy.fail("is not an .npy array");
   const bool short_header = npy.number<std::uint8_t>(6) == 1;
   const std::size_t start = short_header ? 10 : 12;
   const std::size_t header_bytes =
@@ -235,11 +235,10 @@ NamedArray array_of(const std::filesystem::path& file, std::string name, std::st
     const std::size_t width = complex ? layout.width / 2 : layout.width;
     const ElementReader read = reader_of(complex ? 'f' : layout.kind, width);
     if (read == nullptr)
-      npy.fail(
-          fmt::format("numbers of type '{}{}' are not read; save float64, complex128 or integers",
-                      layout.kind, layout.width));
+      npy.fail(fmt::format("unsupported number type '{}{}'; save float64, complex128 or integers",
+                           layout.kind, layout.width));
     const std::size_t parts = complex ? 2 : 1;
-    if (layout.count > data.size() / (parts * width)) npy.fail("its data were cut short");
+    if (layout.count > data.size() / (parts * width)) npy.fail("its data are truncated");
     std::vector<double> numbers(parts * layout.count);
     for (std::size_t k = 0; k < numbers.size(); ++k)
       numbers[k] = read(data.data() + k * width, layout.big_endian);

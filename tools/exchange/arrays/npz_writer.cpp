@@ -73,7 +73,7 @@ std::string npy_of(const NamedArray& array) {
   const std::size_t bytes = array.size() * width;
   if (bytes >= kMostBytes)
     throw std::invalid_argument(
-        fmt::format("'{}' has 4 GiB or more, which .npz files do not hold; write .h5", array.name));
+        fmt::format("'{}' has 4 GiB or more, too large for .npz files; write .h5", array.name));
   return npy(
       array.is_complex() ? "<c16" : "<f8", array.shape,
       bytes == 0 ? std::string_view() : std::string_view(static_cast<const char*>(data), bytes));
@@ -115,8 +115,8 @@ void write_npz(const std::filesystem::path& path, const ArrayList& list) {
     directory += directory_entry(name, head, bytes.size());
     bytes.append("PK\x03\x04").append(head).append(name).append(content);
     if (bytes.size() >= kMostBytes)
-      throw std::invalid_argument(
-          fmt::format("{}: would have 4 GiB or more; write .h5", path.string()));
+      throw std::invalid_argument(fmt::format(
+          "{}: would have 4 GiB or more, too large for an .npz file; write .h5", path.string()));
   }
   const std::size_t offset = bytes.size();
   bytes += directory;

@@ -88,8 +88,9 @@ Quantities quantities_of(const TextLines& lines, char parameters, int ports) {
   };
   const bool hybrid = parameters == 'H' || parameters == 'G';
   if (hybrid && ports != 2)
-    lines.fail(fmt::format("{} parameters have two ports, not {}; name a two-port file .s2p",
-                           parameters, ports));
+    lines.fail(fmt::format(
+        "{} parameters need two ports, the file name declares {}; name a two-port file .s2p",
+        parameters, ports));
   switch (parameters) {
     case 'Z':
       return {all("V"), all("A")};
@@ -126,7 +127,7 @@ void append_numbers(const TextLines& lines, std::string_view line, std::vector<d
   std::istringstream words{std::string(line)};
   for (std::string word; words >> word;) {
     const std::optional<double> value = parse_number(word);
-    if (!value) lines.fail(fmt::format("'{}' stands where a finite number belongs", word));
+    if (!value) lines.fail(fmt::format("got '{}'; expected a finite number", word));
     numbers.push_back(*value);
   }
 }
@@ -141,10 +142,9 @@ std::size_t lines_of(const TextLines& lines, const std::vector<double>& numbers,
   const bool noise = ports == 2 && count > 0 && count * step < numbers.size() &&
                      numbers[count * step] <= numbers[(count - 1) * step];
   if (count == 0 || (count * step != numbers.size() && !noise))
-    lines.fail(
-        fmt::format("{} numbers are no whole lines of {} with rising frequency; is the ending "
-                    ".s{}p right?",
-                    numbers.size(), step, ports));
+    lines.fail(fmt::format(
+        "{} numbers are not complete lines of {} with rising frequency; check the ending .s{}p",
+        numbers.size(), step, ports));
   return count;
 }
 
@@ -156,13 +156,13 @@ TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
   TextLines lines(file);
   const int ports = ports_of(file);
   bool seen = false;
-  if (ports < 1) lines.fail("the ending tells no number of ports; write .s1p, .s2p, ...");
+  if (ports < 1) lines.fail("the ending does not contain the number of ports; use .s1p, .s2p, ...");
   Options options;
   std::vector<double> numbers;
   while (!lines.at_end()) {
     std::string_view line = lines.next();
     line = trimmed(line.substr(0, line.find('!')));
-    if (line.starts_with('[')) lines.fail("is Touchstone 2; write Touchstone 1 instead");
+    if (line.starts_with('[')) lines.fail("unsupported format Touchstone 2; use Touchstone 1");
     if (line.starts_with('#')) {
       // Later option lines are ignored: specification, section "Option Line".
       if (!seen) options = read_options(lines, line);

@@ -24,10 +24,9 @@ ArrayList read_foreign_arrays(const std::filesystem::path& file) {
   require_readable(file);
   if (const std::string other = other_kind(file, "a file of another program"); !other.empty())
     throw FormatError(file, "", other);
-  throw std::invalid_argument(
-      fmt::format("{}: '{}' is not imported; there are .unv, .uff, .mat, .csv, .h5, .npz and .sNp "
-                  "(Touchstone)",
-                  file.string(), ending));
+  throw std::invalid_argument(fmt::format(
+      "{}: unsupported file type '{}'; use .unv, .uff, .mat, .csv, .h5, .npz or .sNp (Touchstone)",
+      file.string(), ending));
 }
 
 }  // namespace stageid

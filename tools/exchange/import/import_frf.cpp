@@ -29,7 +29,7 @@ std::vector<std::size_t> axis_places(const ImportMap& map) {
   for (const char* axis : {"line", "output", "input"}) {
     const auto found = std::find(map.axes.begin(), map.axes.end(), axis);
     if (found == map.axes.end())
-      refuse_map(map, fmt::format("axes: {} are not line, output and input in some order",
+      refuse_map(map, fmt::format("axes: got {}; expected line, output and input in any order",
                                   fmt::join(map.axes, ", ")));
     places.push_back(static_cast<std::size_t>(found - map.axes.begin()));
   }
@@ -42,11 +42,10 @@ NamedArray arranged(const ArrayList& arrays, const NamedArray& array, const Impo
   NamedArray result = array;
   if (map.axes.empty()) {
     if (without_ones(array.shape).size() > 1 || array.size() != lines)
-      refuse_map(
-          map,
-          fmt::format("key 'axes' is missing; '{}' is {} with {} frequencies, write for example "
-                      "axes: [output, input, line]",
-                      array.name, fmt::join(array.shape, " x "), lines));
+      refuse_map(map,
+                 fmt::format("key 'axes' is missing; '{}' has the shape {} with {} frequencies, "
+                             "write for example axes: [output, input, line]",
+                             array.name, fmt::join(array.shape, " x "), lines));
     result.shape = {array.size(), 1, 1};
     return result;
   }
@@ -54,12 +53,12 @@ NamedArray arranged(const ArrayList& arrays, const NamedArray& array, const Impo
   while (result.shape.size() < 3) result.shape.push_back(1);
   if (result.shape.size() > 3)
     throw FormatError(arrays.file, array.name,
-                      fmt::format("is {}; lines, outputs and inputs must stand here",
+                      fmt::format("has the shape {}; expected lines, outputs and inputs",
                                   fmt::join(array.shape, " x ")));
   result = permuted(result, axis_places(map));
   if (result.shape[0] != lines)
     throw FormatError(arrays.file, array.name,
-                      fmt::format("is {} with axes {}; there are {} frequencies",
+                      fmt::format("has the shape {} with axes {}; expected {} frequencies",
                                   fmt::join(array.shape, " x "), fmt::join(map.axes, ", "), lines));
   return result;
 }
@@ -71,7 +70,7 @@ std::vector<std::string> names_or(const ImportMap& map, const char* key,
   for (std::size_t k = 0; k < count && given.empty(); ++k)
     names.push_back(fmt::format("{}{}", prefix, k + 1));
   if (names.size() != count)
-    refuse_map(map, fmt::format("{}: {} names; the response has {}", key, names.size(), count));
+    refuse_map(map, fmt::format("{}: got {} names; the response has {}", key, names.size(), count));
   return names;
 }
 
@@ -118,7 +117,8 @@ double scalar_of(const ArrayList& arrays, const ImportMap::Scalar& scalar) {
 /// As many as the response has lines.
 std::vector<double> even_frequencies(const ArrayList& arrays, const ImportMap& map) {
   const double first = scalar_of(arrays, map.first_hz), step = scalar_of(arrays, map.step_hz);
-  if (!(step > 0.0)) refuse_map(map, fmt::format("step_hz: {} is not positive; correct it", step));
+  if (!(step > 0.0))
+    refuse_map(map, fmt::format("step_hz: {} is not positive; write a positive number", step));
   const ImportMap::Channel* channel = map.channels.empty() ? nullptr : &map.channels.front();
   const NamedArray& array = arrays.at(channel == nullptr            ? map.response
                                       : !channel->response.empty()  ? channel->response
@@ -148,7 +148,7 @@ void read_whole_response(const ArrayList& arrays, const ImportMap& map, FrfEstim
     const NamedArray found = arranged(arrays, arrays.at(name), map, lines);
     if (found.shape != array.shape)
       throw FormatError(arrays.file, name,
-                        fmt::format("is not of the shape of '{}'", map.response));
+                        fmt::format("does not have the shape of '{}'", map.response));
     return vec_columns(real_values(arrays, found), found.shape);
   };
   frf.noise_variance = variance(map.noise_variance);
@@ -174,7 +174,8 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
   const auto place = [&](const std::vector<std::string>& names, const std::string& name) {
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-      refuse_map(map, fmt::format("channels: '{}' is none of {}", name, fmt::join(names, ", ")));
+      refuse_map(map, fmt::format("channels: unknown name '{}'; use one of {}", name,
+                                  fmt::join(names, ", ")));
     return found - names.begin();
   };
   for (const ImportMap::Channel& channel : map.channels) {
@@ -185,8 +186,9 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
                              frf.n_outputs() * place(frf.inputs.names, channel.input);
     const auto put = [&](const auto& column, auto& matrix) {
       if (static_cast<Eigen::Index>(column.size()) != frf.lines())
-        refuse_map(map, fmt::format("channels: {} <- {} has {} values; there are {} frequencies",
-                                    channel.output, channel.input, column.size(), frf.lines()));
+        refuse_map(map,
+                   fmt::format("channels: {} <- {} has {} values; expected {}, one per frequency",
+                               channel.output, channel.input, column.size(), frf.lines()));
       for (Eigen::Index k = 0; k < frf.lines(); ++k)
         matrix(row, k) = column[static_cast<std::size_t>(k)];
     };
@@ -197,8 +199,9 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
       put(real_values(arrays, arrays.at(channel.total_variance)), frf.total_variance);
   }
   if (map.channels.size() != frf.outputs.size() * frf.inputs.size())
-    refuse_map(map, fmt::format("channels: {} of {} outputs and {} inputs; give every pair once",
-                                map.channels.size(), frf.outputs.size(), frf.inputs.size()));
+    refuse_map(map,
+               fmt::format("channels: got {} for {} outputs and {} inputs; write every pair once",
+                           map.channels.size(), frf.outputs.size(), frf.inputs.size()));
 }
 
 }  // namespace

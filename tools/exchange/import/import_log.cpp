@@ -55,8 +55,9 @@ class LogImport {
     const SignalGroup actuators = read("actuators", map_.actuators);
     const SignalGroup sensors = read("sensors", map_.sensors);
     if (actuators.samples.rows() != sensors.samples.rows())
-      refuse_map(map_, fmt::format("actuators have {} samples, sensors {}; all must have the same",
-                                   actuators.samples.rows(), sensors.samples.rows()));
+      refuse_map(map_,
+                 fmt::format("actuators have {} samples, sensors {}; the numbers must be equal",
+                             actuators.samples.rows(), sensors.samples.rows()));
     const LogInfo info = info_of(arrays, map_, excitation, actuators, sensors);
     const RunRows rows = rows_of(arrays, map_, run.run, actuators.samples.rows());
     const Eigen::MatrixXd period = period_of(arrays, map_, excitation, rows);
@@ -86,17 +87,18 @@ class LogImport {
     if (!same_measurement(info, info_))
       throw FormatError(arrays.file, "",
                         fmt::format("has {} excitation, {} actuator and {} sensor channels at {} "
-                                    "Hz; the runs before it have others. Import it on its own",
+                                    "Hz; the previous runs differ. Import this file separately",
                                     info.excitation.size(), info.actuators.size(),
                                     info.sensors.size(), info.sample_rate_hz));
   }
 
   void require_another(const ImportMap::Run& run) {
     if (!runs_.emplace(run.realization, run.experiment).second)
-      refuse_map(map_, fmt::format(
-                           "two runs are both realization {}, experiment {} (counted from 1); tell "
-                           "them apart in the key runs, by an axis or by the pattern of the names",
-                           run.realization + 1, run.experiment + 1));
+      refuse_map(
+          map_,
+          fmt::format("duplicate run: realization {}, experiment {} (counted from 1); separate "
+                      "the runs with the key runs, an axis or the pattern of the names",
+                      run.realization + 1, run.experiment + 1));
   }
 
   /// A realization without one of its experiments cannot be used, and a run that is missing is found late.
@@ -115,7 +117,7 @@ class LogImport {
     const std::size_t count = missing.size();
     if (count > kMost) missing.resize(kMost);
     notes_.push_back(
-        fmt::format("missing: {}{} (counted from 1); 'frf' leaves such realizations out",
+        fmt::format("missing: {}{} (counted from 1); 'frf' skips incomplete realizations",
                     fmt::join(missing, "; "), count > kMost ? "; ..." : ""));
   }
 
@@ -154,8 +156,8 @@ ImportSummary import_log(const std::vector<ForeignFile>& files, const ImportMap&
                          const std::filesystem::path& output) {
   const std::string ending = output.extension().string();
   if (ending != ".slog" && ending != ".h5" && ending != ".hdf5")
-    throw std::invalid_argument(fmt::format(
-        "{}: logs are not imported as '{}'; there are .slog and .h5", output.string(), ending));
+    throw std::invalid_argument(
+        fmt::format("{}: unsupported log format '{}'; use .slog or .h5", output.string(), ending));
   LogImport log(map, output);
   for (const ForeignFile& file : files) {
     const ArrayList arrays = read_foreign_arrays(file.path);

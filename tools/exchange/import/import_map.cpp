@@ -27,18 +27,20 @@ void describe_channel(ConfigVisitor& v, ImportMap::Channel& channel) {
   const int forms = static_cast<int>(!channel.response.empty()) +
                     static_cast<int>(!channel.real.empty()) +
                     static_cast<int>(!channel.magnitude.empty());
-  v.require(forms == 1 && channel.real.empty() == channel.imaginary.empty() &&
-                channel.magnitude.empty() == channel.phase_deg.empty(),
-            "output", "a channel has response, or real and imaginary, or magnitude and phase_deg");
+  v.require(
+      forms == 1 && channel.real.empty() == channel.imaginary.empty() &&
+          channel.magnitude.empty() == channel.phase_deg.empty(),
+      "output",
+      "a channel needs exactly one of: response; real and imaginary; magnitude and phase_deg");
 }
 
 void describe_signals(ConfigVisitor& v, ImportMap::Signals& signals) {
   v.texts("arrays", signals.arrays, {1}, Presence::required,
           "arrays of samples, or of samples x channels");
   v.texts("names", signals.names, {1}, kOptional,
-          "of the channels; those of the arrays if left out");
+          "names of the channels; omitted: those of the arrays");
   v.texts("axes", signals.axes, {1, 5}, kOptional,
-          "of the arrays in their order: sample, channel, realization, experiment, run");
+          "axes of the arrays in their order: sample, channel, realization, experiment, run");
   static const std::set<std::string> kAxes = {"sample", "channel", "realization", "experiment",
                                               "run"};
   const std::set<std::string> axes(signals.axes.begin(), signals.axes.end());
@@ -47,11 +49,11 @@ void describe_signals(ConfigVisitor& v, ImportMap::Signals& signals) {
                 !(axes.contains("run") && axes.contains("realization")) &&
                 !(axes.contains("run") && axes.contains("experiment")),
             "arrays",
-            "axes name sample, and at most once each channel, realization and experiment or run; "
-            "write for example axes: [sample, channel, run]");
-  v.text("unit", signals.unit, kOptional, "one, or one a channel with blanks between");
+            "axes must contain sample, and at most once each of channel, realization and "
+            "experiment or run; write for example axes: [sample, channel, run]");
+  v.text("unit", signals.unit, kOptional, "one, or one per channel separated by blanks");
   v.numbers("scale", signals.scale, {}, {1}, kOptional,
-            "unit over number in the file, one a channel");
+            "physical unit per number in the file, one per channel");
 }
 
 void describe_run(ConfigVisitor& v, ImportMap::Run& run) {
@@ -71,8 +73,8 @@ void require_another_run(ConfigVisitor& v, const std::vector<ImportMap::Run>& ru
   const auto place = same - runs.begin();
   const bool another = place + 1 == static_cast<std::ptrdiff_t>(runs.size());
   v.require(another, "experiment",
-            fmt::format("entries {} and {} of runs are both realization: {}, experiment: {}; give "
-                        "each run its own",
+            fmt::format("entries {} and {} of runs are both realization: {}, experiment: {}; make "
+                        "each run unique",
                         place + 1, runs.size(), last.realization, last.experiment));
 }
 
@@ -92,52 +94,54 @@ void describe_scalar(ConfigVisitor& v, const char* key, ImportMap::Scalar& scala
 
 void describe_frf(ConfigVisitor& v, ImportMap& map) {
   v.text("frequency", map.frequency, kOptional, "array of frequencies");
-  describe_scalar(v, "first_hz", map.first_hz, "first frequency of an even axis, or its variable");
-  describe_scalar(v, "step_hz", map.step_hz, "its step, or the variable that holds it");
-  choose(v, "frequency_unit", map.frequency_unit, {"Hz", "rad/s"}, kOptional, "of the frequencies");
+  describe_scalar(v, "first_hz", map.first_hz,
+                  "first frequency of an equidistant axis, or the variable that contains it");
+  describe_scalar(v, "step_hz", map.step_hz, "frequency step, or the variable that contains it");
+  choose(v, "frequency_unit", map.frequency_unit, {"Hz", "rad/s"}, kOptional,
+         "unit of the frequencies");
   v.text("response", map.response, kOptional, "array of the response, complex or its real part");
   v.text("response_imaginary", map.response_imaginary, kOptional, "array of its imaginary part");
   v.texts("axes", map.axes, {3, 3}, kOptional,
-          "of the response: line, output, input in their order");
+          "axes of the response: line, output, input in their order");
   v.text("noise_variance", map.noise_variance, kOptional, "array, axes as the response");
   v.text("total_variance", map.total_variance, kOptional, "array, axes as the response");
   v.texts("inputs", map.inputs, {1}, kOptional, "names");
   v.texts("outputs", map.outputs, {1}, kOptional, "names");
-  v.text("input_unit", map.input_unit, kOptional, "one, or one an input with blanks between");
-  v.text("output_unit", map.output_unit, kOptional, "one, or one an output with blanks between");
+  v.text("input_unit", map.input_unit, kOptional, "one, or one per input separated by blanks");
+  v.text("output_unit", map.output_unit, kOptional, "one, or one per output separated by blanks");
   choose(v, "hold", map.hold, {"none", "zoh"}, kOptional,
-         "zoh: as a digital loop sees it, through a zero-order hold");
+         "zoh: measured through a zero-order hold, as in a digital loop");
   v.items(
       "channels",
       [&map](ConfigVisitor& item) { describe_channel(item, map.channels.emplace_back()); }, {1},
-      kOptional, "the response channel by channel");
+      kOptional, "the response, channel by channel");
 }
 
 void describe_log(ConfigVisitor& v, ImportMap& map) {
   v.integer("period_samples", map.period_samples, 0, 1 << 27, kOptional, "samples of one period");
   v.integer("transient_periods", map.transient_periods, 0, 1'000'000, kOptional,
-            "periods at the start of every run that are not used");
+            "unused periods at the start of every run");
   const auto signals = [&v](const char* key, ImportMap::Signals& group, const char* help) {
     v.group(
         key, [&group](ConfigVisitor& inner) { describe_signals(inner, group); }, kOptional, help);
   };
-  signals("excitation", map.excitation, "what was added in the loop");
-  signals("actuators", map.actuators, "what went into the plant");
-  signals("sensors", map.sensors, "what came out of it");
+  signals("excitation", map.excitation, "signals added in the loop");
+  signals("actuators", map.actuators, "inputs of the plant");
+  signals("sensors", map.sensors, "outputs of the plant");
   choose(v, "excitation_period", map.excitation_period, {"repeats", "mean"}, kOptional,
-         "mean: the excitation was measured, take the mean of its periods behind the transient");
+         "mean: the excitation was measured; use the mean of its periods after the transient");
   v.items(
       "runs",
       [&map](ConfigVisitor& item) {
         describe_run(item, map.runs.emplace_back());
         require_another_run(item, map.runs);
       },
-      {1}, kOptional, "one run of all rows if left out");
+      {1}, kOptional, "omitted: one run with all rows");
 }
 
 void require_keys(ConfigVisitor& v, const ImportMap& map) {
   if (map.kind == ImportMap::Kind::log) {
-    v.require(map.period_samples > 0, "kind", "a log needs period_samples; add it");
+    v.require(map.period_samples > 0, "kind", "a log needs period_samples; add the key");
     v.require(!map.excitation.arrays.empty(), "kind",
               "a log needs excitation: {arrays: [...]}; add it");
     v.require(!map.actuators.arrays.empty(), "kind",
@@ -149,9 +153,10 @@ void require_keys(ConfigVisitor& v, const ImportMap& map) {
   v.require(map.frequency.empty() == even, "kind",
             map.frequency.empty()
                 ? "a frequency response needs frequency, or first_hz and step_hz; add it"
-                : "a frequency response has either frequency, or first_hz and step_hz; remove one");
+                : "a frequency response cannot have both frequency and first_hz with step_hz; "
+                  "remove one");
   v.require(!even || (!map.first_hz.empty() && !map.step_hz.empty()), "kind",
-            "first_hz and step_hz belong together; add the other one");
+            "first_hz and step_hz are only valid together; add the missing key");
   v.require(!even || map.frequency_unit == ImportMap::FrequencyUnit::hz, "kind",
             "first_hz and step_hz are in Hz; remove frequency_unit");
   v.require(map.response.empty() != map.channels.empty(), "kind",
@@ -161,7 +166,8 @@ void require_keys(ConfigVisitor& v, const ImportMap& map) {
                           [&](const ImportMap::Channel& channel) {
                             return (channel.*name).empty() == (map.channels.front().*name).empty();
                           }),
-              "channels", "a variance stands in every channel or in none; add or remove it");
+              "channels",
+              "a variance must be given for all channels or for none; add or remove it");
 }
 
 }  // namespace
@@ -174,7 +180,7 @@ std::vector<std::string> units_of(const ImportMap& map, const char* key, const s
   if (units.size() == 1) units.resize(count, units.front());
   if (units.size() != count)
     throw FormatError(map.file, "",
-                      fmt::format("{}: {} for {}; give one, or one a channel", key,
+                      fmt::format("{}: got {} for {}; write one, or one per channel", key,
                                   counted(units.size(), "unit"), counted(count, "channel")));
   return units;
 }
@@ -184,12 +190,12 @@ ImportMap read_import_map(const std::filesystem::path& file) {
   map.file = file;
   const YamlDocument document = YamlDocument::read(file);
   read_config(document, [&map](ConfigVisitor& v) {
-    choose(v, "kind", map.kind, {"frf", "log"}, Presence::required, "what the file holds");
+    choose(v, "kind", map.kind, {"frf", "log"}, Presence::required, "content of the file");
     v.text("files", map.files, kOptional,
-           "pattern of the files of a log, such as run_{realization}_{experiment}.mat, from the "
-           "folder of the map");
+           "pattern of the files of a log, such as run_{realization}_{experiment}.mat, relative to "
+           "this map");
     v.number("sample_rate_hz", map.sample_rate_hz, {"Hz", 0.0}, kOptional,
-             "0: unknown; a log takes that of the file");
+             "0: unknown; a log uses that of the file");
     choose(v, "file_sample_rate", map.file_sample_rate, {"checked", "ignored"}, kOptional,
            "ignored: the file's own sample rate or time axis is known to be wrong");
     describe_frf(v, map);

@@ -112,20 +112,21 @@ double sample_rate_of(const ArrayList& arrays, const ImportMap& map) {
     if (confirmed) return map.sample_rate_hz;
     throw FormatError(
         map.file, "",
-        fmt::format("sample_rate_hz: {} contradicts {} Hz, which '{}' of {} says. Correct "
+        fmt::format("sample_rate_hz: {} contradicts {} Hz, from '{}' of {}. Correct "
                     "sample_rate_hz, or write file_sample_rate: ignored if the file is wrong",
                     map.sample_rate_hz, fmt::format("{:.6g}", rates.front().hz),
                     rates.front().told_by, arrays.file.string()));
   }
   if (rates.empty())
-    throw FormatError(map.file, "",
-                      fmt::format("a log needs sample_rate_hz, and {} does not tell it; add it",
-                                  arrays.file.string()));
+    throw FormatError(
+        map.file, "",
+        fmt::format("a log needs sample_rate_hz, which {} does not contain; add the key",
+                    arrays.file.string()));
   for (const FileRate& rate : rates)
     if (!agree(rate.hz, rates.front().hz))
       throw FormatError(map.file, "",
-                        fmt::format("a log needs sample_rate_hz: '{}' of {} says {:.6g} Hz, '{}' "
-                                    "{:.6g} Hz; add it",
+                        fmt::format("a log needs sample_rate_hz: '{}' of {} is {:.6g} Hz, but '{}' "
+                                    "is {:.6g} Hz; add the key",
                                     rates.front().told_by, arrays.file.string(), rates.front().hz,
                                     rate.told_by, rate.hz));
   return snapped(rates.front().hz);

@@ -30,7 +30,7 @@ class Source {
   void take(const char* from, std::int64_t value) {
     if (from_ != nullptr)
       throw FormatError(map_.file, "",
-                        fmt::format("the {} of a run is told by {} and by {}; keep one of them",
+                        fmt::format("the {} of a run is given by {} and by {}; keep one of them",
                                     what_, from_, from));
     from_ = from;
     value_ = value;
@@ -61,11 +61,11 @@ std::vector<ImportMap::Run> entries_of(const ImportMap& map, const RunAxes& axes
 std::vector<ForeignFile> foreign_files(const std::filesystem::path& file, const ImportMap& map) {
   if (file.empty() && map.files.empty())
     throw std::invalid_argument(
-        "no file to import; name it, or write its pattern in the map: files: "
+        "no file to import; give FILE, or write its pattern in the map: files: "
         "run_{realization}_{experiment}.mat");
   if (!file.empty() && !map.files.empty())
     throw std::invalid_argument(
-        fmt::format("{}: the map {} names the files {} itself; leave FILE or the key files out",
+        fmt::format("{}: the map {} already lists the files {}; omit FILE or the key files",
                     file.string(), map.file.string(), map.files));
   const std::filesystem::path pattern = file.empty() ? map.file.parent_path() / map.files : file;
   if (!is_pattern(pattern.string())) return {{pattern, {}}};

@@ -42,17 +42,17 @@ const NamedArray& array_of(const ArrayList& arrays, const ImportMap& map, const 
   const auto number = [](const char* key, const std::optional<long long>& value) {
     return value ? fmt::format(" {} {}", key, *value) : std::string();
   };
-  throw FormatError(arrays.file, "",
-                    fmt::format("has no '{}' of{}{}, which '{}' asks for. Add it, or correct the "
-                                "pattern in {}",
-                                name, number("realization", wanted.realization),
-                                number("experiment", wanted.experiment), name, map.file.string()));
+  throw FormatError(
+      arrays.file, "",
+      fmt::format("has no '{}' of{}{}, which '{}' requires. Add it, or correct the pattern in {}",
+                  name, number("realization", wanted.realization),
+                  number("experiment", wanted.experiment), name, map.file.string()));
 }
 
 const std::vector<double>& reals_of(const ArrayList& arrays, const NamedArray& array) {
   if (array.is_text() || array.is_complex())
     throw FormatError(arrays.file, array.name,
-                      fmt::format("holds {}; expected real numbers",
+                      fmt::format("contains {}; expected real numbers",
                                   array.is_text() ? "text" : "complex numbers"));
   return std::get<0>(array.values);
 }
@@ -75,10 +75,10 @@ std::vector<Axis> axes_of(const ArrayList& arrays, const NamedArray& array,
   while (shape.size() < names.size()) shape.push_back(1);  // MATLAB drops trailing ones
   while (shape.size() > names.size() && shape.back() == 1) shape.pop_back();
   if (shape.size() != names.size())
-    throw FormatError(
-        arrays.file, array.name,
-        fmt::format("is {}; axes: [{}] names {}. Name every axis", fmt::join(array.shape, " x "),
-                    fmt::join(names, ", "), counted(names.size(), "axis", "axes")));
+    throw FormatError(arrays.file, array.name,
+                      fmt::format("has the shape {}; axes: [{}] lists {}. List every axis",
+                                  fmt::join(array.shape, " x "), fmt::join(names, ", "),
+                                  counted(names.size(), "axis", "axes")));
   std::vector<Axis> axes(shape.size());
   std::size_t step = 1;
   for (std::size_t q = shape.size(); q-- > 0; step *= shape[q]) axes[q] = {shape[q], step};
@@ -88,13 +88,11 @@ std::vector<Axis> axes_of(const ArrayList& arrays, const NamedArray& array,
 /// Without `axes`: samples x channels, and MATLAB's rows and columns are both vectors.
 SampleRows plain_samples(const ArrayList& arrays, const NamedArray& array, const char* key) {
   if (array.shape.size() > 2)
-    throw FormatError(
-        arrays.file, array.name,
-        fmt::format(
-            "is {}. Name its axes in the map: {}: {{arrays: [{}], axes: [sample, channel, "
-            "run]}}, in their order; there are sample, channel, realization, experiment and "
-            "run",
-            fmt::join(array.shape, " x "), key, array.name));
+    throw FormatError(arrays.file, array.name,
+                      fmt::format("has the shape {}. List its axes in the map: {}: {{arrays: [{}], "
+                                  "axes: [sample, channel, run]}}, in their order; allowed are "
+                                  "sample, channel, realization, experiment and run",
+                                  fmt::join(array.shape, " x "), key, array.name));
   const std::vector<double>& values = reals_of(arrays, array);
   const bool vector = array.shape.size() < 2 || array.shape[0] == 1;
   const auto rows = static_cast<Eigen::Index>(vector ? values.size() : array.shape[0]);
@@ -135,11 +133,11 @@ void name_channels(const ImportMap& map, const char* key, const ImportMap::Signa
   if (!group.names.empty()) out.channels.names = group.names;
   if (out.channels.names.size() != count)
     refuse_map(map,
-               fmt::format("{}: {} for {}; give names: [...]", key,
+               fmt::format("{}: got {} for {}; write names: [...]", key,
                            counted(out.channels.names.size(), "name"), counted(count, "channel")));
   out.channels.units = units_of(map, key, group.unit, count);
   if (!group.scale.empty() && group.scale.size() != count)
-    refuse_map(map, fmt::format("{}: {} for {}; give one a channel", key,
+    refuse_map(map, fmt::format("{}: got {} for {}; write one per channel", key,
                                 counted(group.scale.size(), "scale"), counted(count, "channel")));
   std::vector<double> factors;
   try {
@@ -161,10 +159,10 @@ RunAxes run_axes_of(const ArrayList& arrays, const ImportMap& map) {
                         bool& has, Eigen::Index& count) {
     const auto size = static_cast<Eigen::Index>(extent);
     if (has && size != count)
-      throw FormatError(arrays.file, array.name,
-                        fmt::format("has {} along axis {}; another array has {}. All must have the "
-                                    "same",
-                                    size, name, count));
+      throw FormatError(
+          arrays.file, array.name,
+          fmt::format("has {} along axis {}; another array has {}. The numbers must be equal", size,
+                      name, count));
     has = true;
     count = size;
   };
@@ -222,8 +220,8 @@ SignalGroup read_signals(const ArrayList& arrays, const ImportMap& map, const ch
   for (Eigen::Index k = 0; k < out.samples.rows(); ++k)
     if (!out.samples.row(k).allFinite())
       throw FormatError(arrays.file, "",
-                        fmt::format("{}: sample {} is not finite. Correct it, or import the rows "
-                                    "beside it with runs: [{{first_row: ..., rows: ...}}]",
+                        fmt::format("{}: sample {} is not finite. Correct it, or import the other "
+                                    "rows with runs: [{{first_row: ..., rows: ...}}]",
                                     key, k));
   name_channels(map, key, group, out, notes);
   return out;

@@ -90,7 +90,7 @@ ImportSummary LogSummary::summary(const LogInfo& info,
                   counted(experiments.size(), "experiment"), range_text(periods),
                   info.transient_periods, info.period_samples));
   out.lines.push_back(
-      fmt::format("sample rate {} Hz, duration {:.6g} s in all", info.sample_rate_hz, duration_s));
+      fmt::format("sample rate {} Hz, total duration {:.6g} s", info.sample_rate_hz, duration_s));
   Json excited = Json::array();
   for (std::size_t e = 0; e < excited_.size(); ++e) {
     if (!experiments.contains(static_cast<int>(e))) continue;
@@ -137,7 +137,7 @@ ImportSummary summary_of(const FrfEstimate& frf, const std::vector<std::string>&
   out.lines.push_back(noise && total ? "noise variance and total variance"
                       : noise        ? "noise variance, no total variance"
                       : total        ? "total variance, no noise variance"
-                                     : "no variances: a fit weighs by the magnitude");
+                                     : "no variances: 'fit' weights by the magnitude");
   const Eigen::VectorXd rms = frf.response.cwiseAbs2().rowwise().mean().cwiseSqrt();
   Json channels = Json::array();
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c)

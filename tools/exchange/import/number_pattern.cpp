@@ -28,7 +28,7 @@ Expression expression_of(const std::string& pattern) {
     const bool experiment = pattern.compare(at, std::string(kExperiment).size(), kExperiment) == 0;
     if (realization || experiment) {
       if (std::count(out.is_realization.begin(), out.is_realization.end(), realization) > 0)
-        throw std::invalid_argument(fmt::format("'{}' has {} twice; name it once", pattern,
+        throw std::invalid_argument(fmt::format("'{}' contains {} twice; keep one", pattern,
                                                 realization ? kRealization : kExperiment));
       out.is_realization.push_back(realization);
       text += "([0-9]{1,18})";

@@ -112,8 +112,8 @@ SiUnit si_unit(const std::string& text) {
     const std::string word = text.substr(at, end - at);
     if (word == "g")
       throw std::invalid_argument(
-          fmt::format("unit '{}': 'g' is a gram or the acceleration of gravity. Write kg, or m/s^2 "
-                      "with scale: 9.80665 per channel",
+          fmt::format("unit '{}': 'g' is ambiguous: gram or acceleration of gravity. Write kg, or "
+                      "m/s^2 with scale: 9.80665 per channel",
                       text));
     const std::optional<SiUnit> unit = powered_unit(word);
     if (!unit) return {text, 1.0};
@@ -159,8 +159,8 @@ void take_si_units(FrfEstimate& frf, std::vector<std::string>& notes) {
       frf.input_factor.size() > 0 || frf.detection.frequency_hz.size() > 0 ||
       frf.nonlinearity.band_hz.size() > 0)
     throw std::invalid_argument(
-        fmt::format("{}; its covariances and its test for distortion cannot be converted. Estimate "
-                    "it again from a log in SI units",
+        fmt::format("{}; its covariances and nonlinearity test cannot be converted. Estimate it "
+                    "again from a log in SI units",
                     own.front()));
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
     const double factor = outputs[static_cast<std::size_t>(c % frf.n_outputs())] /

@@ -11,7 +11,7 @@ void add_mat_version(CLI::App& command, MatVersion& version) {
           [&version](const std::string& text) {
             version = text == "5" ? MatVersion::v5 : MatVersion::v73;
           },
-          "of a .mat file: 5 or 7.3 (HDF5)")
+          "version of a .mat file: 5 or 7.3 (HDF5)")
       ->check(CLI::IsMember({"5", "7.3"}))
       ->default_str("5");
 }

@@ -183,7 +183,7 @@ class Reader {
     if (columns > 0 && rows > kMostFullNumbers / columns)
       throw FormatError(list_.file, name,
                         fmt::format("is a sparse matrix of {} x {}, too large for a full one. Save "
-                                    "the part that is needed with full()",
+                                    "the needed part with full()",
                                     rows, columns));
     const std::size_t count = sparse->ndata;
     std::vector<double> real, imaginary;
@@ -225,7 +225,7 @@ void require_plausible(const std::filesystem::path& path, const matvar_t& variab
   for (int q = 0; q < variable.rank; ++q) bytes *= static_cast<double>(variable.dims[q]);
   if (bytes > kMostInflation * static_cast<double>(file_bytes))
     throw FormatError(path, variable.name == nullptr ? "" : variable.name,
-                      "is said to be larger than the file can hold; the file is damaged");
+                      "its declared size exceeds the file; the file is damaged");
 }
 
 /// libmatio takes the end of a file that was cut short for that of its variables. In v5 files the elements
@@ -248,8 +248,7 @@ void require_whole(const std::filesystem::path& path, std::uintmax_t file_bytes)
     at += sizeof(tag) + bytes;
   }
   if (at != file_bytes)
-    throw FormatError(path, "",
-                      "ends before its variables do; the file was cut short or is damaged");
+    throw FormatError(path, "", "unexpected end of file; the file is truncated or damaged");
 }
 
 /// Octave's `save` writes a format of its own unless told not to, whatever the name.
@@ -258,11 +257,11 @@ std::string no_matlab_file(const std::filesystem::path& path) {
   std::ifstream(path, std::ios::binary).read(head, sizeof(head));
   const std::string_view begin(head, sizeof(head));
   if (begin.starts_with("# Created by Octave") || begin.starts_with("Octave-1-"))
-    return "is in Octave's own format; write it in Octave with 'save -v7 FILE VARIABLES'";
+    return "is in the native Octave format; write it in Octave with 'save -v7 FILE VARIABLES'";
   if (begin.starts_with("\x89HDF"))
-    return "is HDF5, not of MATLAB; write it in Octave with 'save -v7 FILE VARIABLES', or name it "
-           ".h5";
-  return "is no MATLAB file, or a damaged one; a .mat file must stand here";
+    return "is HDF5, but not a MATLAB file; write it in Octave with 'save -v7 FILE VARIABLES', or "
+           "rename it to .h5";
+  return "is not a MATLAB file, or is damaged; use a .mat file";
 }
 
 }  // namespace
@@ -290,7 +289,7 @@ ArrayList read_mat(const std::filesystem::path& path) {
   else
     for (UnreadVariable& object : objects_of_v5(path)) list.unread.push_back(std::move(object));
   if (list.arrays.empty() && list.unread.empty())
-    throw FormatError(path, "", "holds no variables; the file is empty or damaged");
+    throw FormatError(path, "", "contains no variables; the file is empty or damaged");
   return list;
 }
 

@@ -147,9 +147,10 @@ void require_room(const ArrayList& list) {
     std::size_t& sum = bytes[path_of(array.name).front()];
     sum += array.size() * (array.is_complex() ? 16 : 8);
     if (sum >= kMostBytes)
-      throw std::invalid_argument(fmt::format(
-          "{}: '{}' has 2 GiB or more; MATLAB v5 files hold less a variable, write v7.3",
-          list.file.string(), path_of(array.name).front()));
+      throw std::invalid_argument(
+          fmt::format("{}: '{}' has 2 GiB or more, too large for a variable of a MATLAB v5 file; "
+                      "add --mat-version 7.3",
+                      list.file.string(), path_of(array.name).front()));
   }
 }
 

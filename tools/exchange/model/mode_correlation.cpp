@@ -22,8 +22,8 @@ constexpr double kLeastDamping = 1e-4;  // finite-element models have none
 void require_modes(const std::filesystem::path& file, const UffContent& content) {
   if (content.modes.empty())
     throw FormatError(file, "",
-                      "holds no mode shapes (dataset 55); a frequency response is compared after "
-                      "'stageid import'");
+                      "contains no mode shapes (dataset 55); to compare a frequency response, "
+                      "convert it with 'stageid import' first");
 }
 
 /// Where an output stands in a universal file.
@@ -110,11 +110,11 @@ ModeCorrelation correlate_modes(const AdditiveModel& model, const std::filesyste
     out.outputs.push_back(model.outputs.names[i]);
   }
   if (places.empty())
-    throw FormatError(file, "",
-                      fmt::format("its mode shapes have no value for any output ({}); outputs are "
-                                  "nodes 1, 2, ... in order, "
-                                  "or named by node and direction, '12+Z'",
-                                  fmt::join(model.outputs.names, ", ")));
+    throw FormatError(
+        file, "",
+        fmt::format("its mode shapes contain no output of the model ({}); outputs are matched to "
+                    "nodes 1, 2, ... in order, or by node and direction, '12+Z'",
+                    fmt::join(model.outputs.names, ", ")));
   const Eigen::VectorXcd alike = Eigen::VectorXcd::Ones(1);  // the file says nothing of inputs
   for (const ModeShape& mode : mode_shapes(model)) {
     out.own.push_back(mode);
@@ -142,7 +142,7 @@ std::vector<ModeCandidate> candidates_of(const std::filesystem::path& file,
     if (!(mode.natural_frequency_hz > 0.0)) continue;  // a rigid body of a finite-element model
     out.push_back({mode.natural_frequency_hz, std::clamp(mode.damping_ratio, kLeastDamping, 1.0)});
   }
-  if (out.empty()) throw FormatError(file, "", "none of its modes has a frequency above zero");
+  if (out.empty()) throw FormatError(file, "", "contains no mode with a frequency above zero");
   std::stable_sort(out.begin(), out.end(), [](const ModeCandidate& a, const ModeCandidate& b) {
     return a.frequency_hz < b.frequency_hz;
   });

@@ -29,10 +29,10 @@ std::string model_csv(const AdditiveModel& model) {
   for (std::size_t index = 0; index < model.submodels.size(); ++index) {
     const Submodel& s = model.submodels[index];
     if (s.denominator.size() > 1 && !s.is_mode())
-      throw std::invalid_argument(fmt::format(
-          "submodel {} is no mode and no integrator; the .csv table cannot hold it, export "
-          "as .json or .h5",
-          index));
+      throw std::invalid_argument(
+          fmt::format("submodel {} is neither a mode nor an integrator; the .csv table cannot "
+                      "represent it, export as .json or .h5",
+                      index));
     const std::string head =
         s.is_mode()
             ? fmt::format("{},{},{},{},{},{}", index, s.integrators, s.natural_frequency_hz(),

@@ -28,7 +28,7 @@ void require_ending(const std::filesystem::path& file, const std::vector<std::st
                     const char* what) {
   const std::string ending = file.extension().string();
   if (std::find(endings.begin(), endings.end(), ending) != endings.end()) return;
-  throw std::invalid_argument(fmt::format("{}: {} are not exported as '{}'; there are {}",
+  throw std::invalid_argument(fmt::format("{}: {} cannot be exported as '{}'; use one of {}",
                                           file.string(), what, ending, fmt::join(endings, ", ")));
 }
 
@@ -57,7 +57,7 @@ UffContent uff_of_model(const std::filesystem::path& file, const AdditiveModel& 
                         const Eigen::VectorXd& frequency_hz) {
   if (frequency_hz.size() == 0)
     throw std::invalid_argument(fmt::format(
-        "{}: the model does not tell its band; name the lines of the response with --frf FRF",
+        "{}: the model does not contain its band; define the lines of the response with --frf FRF",
         file.string()));
   FrfEstimate frf;
   frf.frequency_hz = frequency_hz;

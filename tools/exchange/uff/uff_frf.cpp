@@ -40,8 +40,9 @@ UffAxis axis_of(const std::string& unit) {
 std::string name_line(const char* head, const std::string& name) {
   constexpr std::size_t kMost = 72;
   if (name.size() > kMost)
-    throw std::invalid_argument(
-        fmt::format("channel '{}': a universal file holds names of {} characters", name, kMost));
+    throw std::invalid_argument(fmt::format(
+        "channel '{}': names in a universal file have at most {} characters; shorten it", name,
+        kMost));
   return head + name;
 }
 
@@ -195,9 +196,9 @@ std::string other_content(const UffContent& content) {
   std::string text;
   for (const auto& [name, count] : counts)
     text += fmt::format("{}{} x {}", text.empty() ? " but " : ", ", count, name);
-  if (time) text += "; take time responses with a map (--map, 'kind: log', docs/exchange.md)";
+  if (time) text += "; import time responses with a map (--map, 'kind: log', docs/exchange.md)";
   if (!content.modes.empty())
-    text += "; take the modes with '-o modes.json', or compare them with 'validate MODEL FILE'";
+    text += "; import the modes with '-o modes.json', or compare them with 'validate MODEL FILE'";
   if (!time && content.modes.empty()) text += "; export frequency responses from the other program";
   return text;
 }
@@ -238,15 +239,15 @@ std::map<Channel, const UffFunction*> table_of(const std::filesystem::path& file
         place_in(frf.inputs, input_name(f),
                  unit_of(f.denominator_axis, f.reference.direction, other_units))};
     if (!table.emplace(channel, &f).second)
-      fail(file, f, "stands here for the second time; keep one frequency response a channel");
+      fail(file, f, "duplicate frequency response; keep one per channel");
     if (first == nullptr) first = &f;
     if (f.abscissa != first->abscissa)
-      fail(file, f, "has other frequencies than the first channel");
+      fail(file, f, "its frequencies differ from those of the first channel");
   }
   if (first != nullptr && table.size() != frf.outputs.size() * frf.inputs.size())
     throw FormatError(
         file, "",
-        fmt::format("{} channels of {} outputs and {} inputs; each pair must be there",
+        fmt::format("got {} channels for {} outputs and {} inputs; every pair is required",
                     table.size(), frf.outputs.size(), frf.inputs.size()));
   return table;
 }
@@ -257,7 +258,7 @@ double scale_to_si(const std::filesystem::path& file, const UffFunction& f, cons
       factor_of(f.denominator_axis, f.reference.direction, units);
   if (!numerator || !denominator)
     fail(file, f,
-         "the file's units are not SI and its data types are not told; convert it to SI first");
+         "the units are not SI and the data types are unspecified; convert the file to SI first");
   return *denominator / *numerator;
 }
 
@@ -316,7 +317,7 @@ FrfEstimate frf_of_uff(const std::filesystem::path& file, const UffContent& cont
   if (table.empty())
     throw FormatError(
         file, "",
-        "holds no frequency response (dataset 58, function type 4)" + other_content(content));
+        "contains no frequency response (dataset 58, function type 4)" + other_content(content));
   const UffFunction& first = *table.begin()->second;
   const std::vector<double> frequency = frequencies_of(content, first);
   const auto lines = static_cast<Eigen::Index>(frequency.size());

@@ -26,14 +26,14 @@ class Record {
     if (field.empty()) return 0;
     const std::optional<double> value = parse_number(field);
     if (!value || *value != std::trunc(*value) || std::abs(*value) > 1e15)
-      lines_.fail(fmt::format("'{}' stands where a whole number belongs", field));
+      lines_.fail(fmt::format("got '{}'; expected a whole number", field));
     return static_cast<long long>(*value);
   }
   double number(std::size_t width) {
     const std::string_view field = trimmed(take(width));
     if (field.empty()) return 0.0;
     const std::optional<double> value = parse_number(field);
-    if (!value) lines_.fail(fmt::format("'{}' stands where a finite number belongs", field));
+    if (!value) lines_.fail(fmt::format("got '{}'; expected a finite number", field));
     return *value;
   }
   bool at_end() const { return trimmed(line_).empty(); }
@@ -86,8 +86,8 @@ DataForm read_form(TextLines& lines) {
   const long long type = record.integer(10);
   const long long count = record.integer(10);
   if (type != 2 && type != 4 && type != 5 && type != 6)
-    lines.fail(fmt::format("ordinate data type is {}; there are 2, 4, 5 and 6", type));
-  if (count < 1) lines.fail(fmt::format("{} values; at least 1 must stand here", count));
+    lines.fail(fmt::format("unsupported ordinate data type {}; expected 2, 4, 5 or 6", type));
+  if (count < 1) lines.fail(fmt::format("got {} values; expected at least 1", count));
   DataForm form;
   form.double_precision = type == 4 || type == 6;
   form.complex = type >= 5;
@@ -96,7 +96,7 @@ DataForm read_form(TextLines& lines) {
   form.minimum = record.number(13);
   form.step = record.number(13);
   if (form.count > lines.rest().size())
-    lines.fail(fmt::format("{} values are more than the file can hold; it was cut short", count));
+    lines.fail(fmt::format("{} values exceed the file size; the file is truncated", count));
   return form;
 }
 
@@ -112,7 +112,8 @@ std::vector<double> text_values(TextLines& lines, const DataForm& form) {
   while (values.size() < wanted) {
     const std::string_view line = lines.next();
     if (trimmed(line) == kEdge)
-      lines.fail(fmt::format("the data end after {} of {} numbers", values.size(), wanted));
+      lines.fail(fmt::format("the data end after {} of {} numbers; the file is truncated",
+                             values.size(), wanted));
     Record record(lines, line);
     while (values.size() < wanted && !record.at_end())
       values.push_back(record.number(widths[values.size() % widths.size()]));
@@ -168,8 +169,8 @@ std::vector<double> binary_values(TextLines& lines, const DataForm& form,
     lines.skip(form.count * step);
     return values;
   }
-  lines.fail(
-      fmt::format("{} values do not end where the dataset does; the file is damaged", form.count));
+  lines.fail(fmt::format("{} values do not match the end of the dataset; the file is damaged",
+                         form.count));
 }
 
 void distribute(const std::vector<double>& values, const DataForm& form, UffFunction& f) {
@@ -208,7 +209,7 @@ std::vector<double> read_short_values(TextLines& lines, std::size_t count) {
   std::vector<double> values;
   while (values.size() < count) {
     Record record(lines, lines.next());
-    if (record.at_end()) lines.fail("an empty line stands where numbers belong");
+    if (record.at_end()) lines.fail("empty line; expected numbers");
     while (values.size() < count && !record.at_end()) values.push_back(record.number(13));
   }
   return values;
@@ -231,7 +232,7 @@ std::optional<UffMode> read_mode(TextLines& lines) {
   const long long n_integers = numbers.integer(10), n_reals = numbers.integer(10);
   if (n_integers < 2 || n_integers > 10 || n_reals < (analysis == 2 ? 3 : 4) || n_reals > 12)
     lines.fail(
-        fmt::format("{} whole and {} real parameters do not tell a mode", n_integers, n_reals));
+        fmt::format("{} integer and {} real parameters do not define a mode", n_integers, n_reals));
   numbers.integer(10);
   mode.number = static_cast<int>(numbers.integer(10));
   const std::vector<double> reals = read_short_values(lines, static_cast<std::size_t>(n_reals));
@@ -277,9 +278,9 @@ std::optional<BinaryForm> binary_form(const TextLines& lines, std::string_view l
   Record record(lines, line.substr(7));
   const long long order = record.integer(6), format = record.integer(6);
   if (order != 1 && order != 2)
-    lines.fail(fmt::format("byte order is {}; there are 1 (little endian) and 2", order));
+    lines.fail(fmt::format("unsupported byte order {}; expected 1 (little endian) or 2", order));
   if (format != 2)
-    lines.fail(fmt::format("floating-point format is {}; only 2, IEEE 754, is read", format));
+    lines.fail(fmt::format("unsupported floating-point format {}; expected 2 (IEEE 754)", format));
   return BinaryForm{order == 2};
 }
 
@@ -304,7 +305,7 @@ void read_dataset(TextLines& lines, UffContent& content) {
   } else if (number == "151") {
     read_header(lines, content);
   } else if (!parse_number(number)) {
-    lines.fail(fmt::format("'{}' stands where the number of a dataset belongs", trimmed(line)));
+    lines.fail(fmt::format("got '{}'; expected the number of a dataset", trimmed(line)));
   }
   skip_to_edge(lines);
 }
@@ -323,7 +324,8 @@ UffContent read_uff(const std::filesystem::path& file) {
     if (line.empty()) continue;
     if (line != kEdge)
       lines.fail(
-          fmt::format("'{}' stands where '    -1' must begin a dataset; is this a universal file?",
+          fmt::format("got '{}'; expected '    -1' at the start of a dataset. Check that this is a "
+                      "universal file",
                       line.substr(0, 40)));
     read_dataset(lines, content);
   }

@@ -17,8 +17,8 @@ constexpr const char* kEdgeLine = "    -1\n";
 
 std::string text_line(const std::string& text) {
   if (text.size() > 80)
-    throw std::invalid_argument(
-        fmt::format("'{}' is longer than the 80 characters of a line of a universal file", text));
+    throw std::invalid_argument(fmt::format(
+        "'{}' is longer than the 80 characters of a line of a universal file; shorten it", text));
   return fmt::format("{:<80}\n", text.empty() ? "NONE" : text);
 }
 
@@ -48,8 +48,8 @@ std::string units_text(const UffUnits& units) {
 
 std::string axis_line(const UffAxis& axis) {
   if (axis.unit.size() > 20)
-    throw std::invalid_argument(
-        fmt::format("unit '{}' is longer than the 20 characters of a universal file", axis.unit));
+    throw std::invalid_argument(fmt::format(
+        "unit '{}' is longer than the 20 characters of a universal file; shorten it", axis.unit));
   return fmt::format("{:>10}{:>5}{:>5}{:>5} {:<20.20} {:<20}\n", axis.type, axis.exponents[0],
                      axis.exponents[1], axis.exponents[2], axis.label,
                      axis.unit.empty() ? "NONE" : axis.unit);
