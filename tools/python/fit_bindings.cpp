@@ -122,8 +122,7 @@ py::object covariance_of(const py::object& self) {
 
 constexpr const char* kCovarianceDoc =
     R"(A dict: name, unit and value of all p parameters; sandwich and likelihood, two estimates of their covariance
-[p, p];
-response_variance and confidence_radius (95 %) of the model on the fitted lines, float64 [N, n_y, n_u]. The
+[p, p]; response_variance and confidence_radius (95 %) of the model on the fitted lines, float64 [N, n_y, n_u]. The
 same as `stageid fit --covariance` writes. None unless requested with fit(..., covariance=True).)";
 
 constexpr const char* kVarianceDoc =

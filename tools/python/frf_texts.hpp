@@ -35,9 +35,9 @@ inline constexpr const char* kHealthDoc =
 remedy. With a fault, the program ends with exit code 3.)";
 
 inline constexpr const char* kSelectDoc =
-    R"(Selects the lines in band_hz = (low, high) in Hz and the named inputs and outputs, in the given order, as a new Frf.
+    R"(Selects the lines in band_hz = (low, high), in Hz, and the named inputs and outputs in the given order.
 
-Raises RequestError if no line remains or a name is unknown.)";
+Returns a new Frf. Raises RequestError if no line remains or a name is unknown.)";
 
 inline constexpr const char* kCompensateDoc =
     R"(Compensates 'delay' (including the half sample of the hold) or 'hold' (and the delay). Returns a new Frf.
