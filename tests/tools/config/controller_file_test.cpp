@@ -153,8 +153,9 @@ TEST_F(ControllerFileTest, FindsWhatIsRecordedUnderAWrongNameOrSign) {
 }
 
 TEST_F(ControllerFileTest, WhatIsWrongIsSaidWithItsPlace) {
-  EXPECT_THAT(error_of(head("state_space: {a: [1, 2, 3], b: [1], c: [1]}\nsample_rate_hz: 1\n")),
-              AllOf(HasSubstr("c.yaml:4:"), HasSubstr("a: got 3 numbers"), HasSubstr("row by row")));
+  EXPECT_THAT(
+      error_of(head("state_space: {a: [1, 2, 3], b: [1], c: [1]}\nsample_rate_hz: 1\n")),
+      AllOf(HasSubstr("c.yaml:4:"), HasSubstr("a: got 3 numbers"), HasSubstr("row by row")));
   EXPECT_THAT(error_of(head("state_space: {d: [1, 2, 3, 4, 5, 6]}\n")),
               HasSubstr("required for a discrete controller"));
   EXPECT_THAT(error_of(head("sample_rate_hz: 1000\n")),
