@@ -16,9 +16,10 @@ template <typename Matrix>
 void check_shape(const char* name, const Matrix& matrix, Eigen::Index rows, Eigen::Index columns) {
   if (matrix.size() == 0) return;
   if (matrix.rows() != rows || matrix.cols() != columns)
-    throw std::invalid_argument(fmt::format("{}: {} x {}, but the response needs {} x {}", name,
-                                            matrix.rows(), matrix.cols(), rows, columns));
-  if (!matrix.allFinite()) throw std::invalid_argument(fmt::format("{}: not finite", name));
+    throw std::invalid_argument(fmt::format("{}: got {} x {}; expected {} x {}, as the response",
+                                            name, matrix.rows(), matrix.cols(), rows, columns));
+  if (!matrix.allFinite())
+    throw std::invalid_argument(fmt::format("{}: contains values that are not finite", name));
 }
 
 void check_variance(const char* name, const Eigen::MatrixXd& variance, Eigen::Index rows,
@@ -36,7 +37,7 @@ void check_data(const ReportData& data) {
         data.validation_frf || other)
       throw std::invalid_argument(
           "report: model_response, cmif_curves, validation_frf, nonlinearity and the responses of "
-          "a comparison need the frf whose lines they are on");
+          "a comparison need an frf with the same lines");
     return;
   }
   const FrfEstimate& frf = *data.frf;
@@ -66,7 +67,7 @@ void check_data(const ReportData& data) {
   check(*data.validation_frf);
   check_shape("validation_frf", data.validation_frf->response, channels, frf.lines());
   if (data.validation_frf->frequency_hz != frf.frequency_hz)
-    throw std::invalid_argument("validation_frf: its lines are not those of frf");
+    throw std::invalid_argument("validation_frf: its lines differ from those of frf");
 }
 
 std::string block_elements(const std::vector<report::Block>& blocks) {

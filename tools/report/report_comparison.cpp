@@ -22,12 +22,12 @@ void check_channels(const ReportData& own, const std::string& title, const Chann
   const ChannelList& own_outputs = own.frf ? own.frf->outputs : own.model->outputs;
   const ChannelList& own_inputs = own.frf ? own.frf->inputs : own.model->inputs;
   if (outputs.names == own_outputs.names && inputs.names == own_inputs.names) return;
-  throw std::invalid_argument(fmt::format(
-      "{}: its channels are not those of the report ({} x {}, first {} <- {}); compare results of "
-      "the same channels",
-      title, own_outputs.size(), own_inputs.size(),
-      own_outputs.names.empty() ? "none" : own_outputs.names[0],
-      own_inputs.names.empty() ? "none" : own_inputs.names[0]));
+  throw std::invalid_argument(
+      fmt::format("{}: its channels differ from those of the report ({} x {}, first {} <- {}); "
+                  "compare results with the same channels",
+                  title, own_outputs.size(), own_inputs.size(),
+                  own_outputs.names.empty() ? "none" : own_outputs.names[0],
+                  own_inputs.names.empty() ? "none" : own_inputs.names[0]));
 }
 
 /// The columns of other that are own's lines; 0 x 0 if one is missing.
@@ -45,19 +45,18 @@ Eigen::MatrixXcd on_lines_of(const FrfEstimate& own, const FrfEstimate& other) {
 
 void add_response(ReportComparison& comparison, ReportData& own, const FrfEstimate& frf) {
   const auto leave_out = [&](const char* why) {
-    own.messages.push_back(
-        {ReportMessage::Severity::note,
-         fmt::format("{}: its response is not drawn: {}", comparison.title, why)});
+    own.messages.push_back({ReportMessage::Severity::note,
+                            fmt::format("{}: response not shown: {}", comparison.title, why)});
   };
-  if (!own.frf) return leave_out("the report itself has none whose lines it could share");
+  if (!own.frf) return leave_out("the report contains no response to compare with");
   if (frf.compensated != own.frf->compensated || frf.hold != own.frf->hold ||
       frf.delay_s != own.frf->delay_s)
-    return leave_out("hold or delay were compensated otherwise");
+    return leave_out("its hold or delay compensation differs");
   comparison.response = on_lines_of(*own.frf, frf);
-  if (comparison.response.size() == 0) return leave_out("it was measured on other lines");
+  if (comparison.response.size() == 0) return leave_out("its lines differ");
   if (comparison.response != own.frf->response) return;
   comparison.response.resize(0, 0);
-  leave_out("it is the same response");
+  leave_out("identical response");
 }
 
 Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
@@ -112,7 +111,7 @@ ReportComparison make_comparison(ReportData& own, std::string title,
                                  const std::optional<FrfEstimate>& frf) {
   if (!own.frf && !own.model)
     throw std::invalid_argument(
-        "--compare: the report has neither response nor model; give one of them first");
+        "--compare: the report has neither a response nor a model; add one to its inputs");
   if (frf) check_channels(own, title, frf->outputs, frf->inputs);
   if (model) check_channels(own, title, model->outputs, model->inputs);
   ReportComparison comparison;

@@ -46,16 +46,15 @@ std::string kind_of(const std::filesystem::path& file) {
   if (ending == ".json") {
     const Json json = Json::parse(read_text(file), nullptr, false);
     if (json.is_discarded())
-      throw FormatError(file, "", "is not JSON, or cut short; copy it again or write it anew");
+      throw FormatError(file, "", "is not JSON, or is truncated; copy it again or write it again");
     return text_in(json, "format");
   }
   if (ending != ".h5" && ending != ".hdf5") {
     require_readable(file);
     const std::string other = other_kind(file, "a file that the report shows");
-    throw FormatError(file, "",
-                      !other.empty()
-                          ? other
-                          : "is nothing that the report shows; give .slog, .h5, .json or .yaml");
+    throw FormatError(
+        file, "",
+        !other.empty() ? other : "cannot be shown in a report; use .slog, .h5, .json or .yaml");
   }
   const Hdf5File hdf5 = Hdf5File::open(file);
   if (!hdf5.has_attribute("/", "format")) return hdf5.exists("/response") ? "stageid-frf" : "";
@@ -66,7 +65,7 @@ std::string kind_of(const std::filesystem::path& file) {
 void put(std::filesystem::path& place, const std::filesystem::path& file) {
   if (!place.empty())
     throw std::invalid_argument(
-        fmt::format("{}: {} is one of the same kind; give one", file.string(), place.string()));
+        fmt::format("{}: {} is of the same kind; keep one", file.string(), place.string()));
   place = file;
 }
 
@@ -84,8 +83,8 @@ void add_directory(ReportInput& input, const std::filesystem::path& directory) {
   put_if_there(input.summary, directory / "summary.json");
   if (input.frf.empty() && input.model.empty() && input.log.empty())
     throw std::invalid_argument(
-        fmt::format("{}: holds no frf.h5, model.json or run.slog; give the directory of 'stageid "
-                    "identify' or files",
+        fmt::format("{}: contains no frf.h5, model.json or run.slog; use the output directory of "
+                    "'stageid identify', or files",
                     directory.string()));
 }
 
@@ -107,8 +106,8 @@ void add_file(ReportInput& input, const std::filesystem::path& file) {
     put(input.stage, file);
   } else {
     throw std::invalid_argument(
-        fmt::format("{}: is no log, FRF, model, modes or summary of stageid and no stage file; "
-                    "leave it out",
+        fmt::format("{}: cannot be shown in a report; remove it, or use a log, FRF, model, modes, "
+                    "summary or stage file of stageid",
                     file.string()));
   }
 }
@@ -227,8 +226,8 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files) {
       return std::filesystem::equivalent(file, other, none);
     };
     if (std::any_of(files.begin(), at, same))
-      throw std::invalid_argument(
-          fmt::format("{}: is given twice; what was held back is another file", file.string()));
+      throw std::invalid_argument(fmt::format(
+          "{}: duplicate file; the held-back data are a different file", file.string()));
     if (!std::filesystem::exists(file))
       throw FileError(fmt::format("{}: does not exist; check the path", file.string()));
     if (std::filesystem::is_directory(file)) {
@@ -278,10 +277,10 @@ ReportData read_report_data(const ReportInput& input) {
 void add_comparison(ReportData& data, const std::vector<std::filesystem::path>& files) {
   const ReportInput input = report_input(files);
   if (input.frf.empty() && input.model.empty())
-    throw std::invalid_argument(fmt::format(
-        "--compare {}: holds no FRF and no model; give the directory of 'stageid identify', or an "
-        "FRF or model file",
-        files.at(0).string()));
+    throw std::invalid_argument(
+        fmt::format("--compare {}: contains neither an FRF nor a model; use the output directory "
+                    "of 'stageid identify', or an FRF or model file",
+                    files.at(0).string()));
   std::optional<FrfEstimate> frf;
   if (!input.frf.empty()) frf = read_frf(input.frf);
   std::optional<AdditiveModel> model;

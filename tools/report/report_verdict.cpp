@@ -34,16 +34,16 @@ void judge_modes(const ReportData& data, Reasons& reasons) {
       if (*row.frequency_hz < band_hz[0] || (*row.frequency_hz > band_hz[1] && band_hz[1] > 0.0))
         continue;
       reasons.push_back(
-          fmt::format("a mode at {:.2f} Hz that the plant does not have", *row.frequency_hz));
+          fmt::format("the mode at {:.2f} Hz does not exist in the plant", *row.frequency_hz));
     } else if (!row.frequency_hz) {
       if (row.truth->observable)
         reasons.push_back(fmt::format("the true mode at {:.2f} Hz was not identified",
                                       row.truth->natural_frequency_hz));
     } else if (std::abs(row.frequency_deviation().value_or(0.0)) > 3.0 &&
                *row.relative_frequency_error() > 1e-4) {
-      reasons.push_back(
-          fmt::format("the mode at {:.2f} Hz is {:.1f} standard deviations off the truth",
-                      *row.frequency_hz, std::abs(*row.frequency_deviation())));
+      reasons.push_back(fmt::format(
+          "the mode at {:.2f} Hz deviates from the true one by {:.1f} standard deviations",
+          *row.frequency_hz, std::abs(*row.frequency_deviation())));
     }
   }
 }
@@ -72,7 +72,7 @@ void judge_runs(const ReportData& data, Reasons& reasons) {
   }
   if (missing > 0) reasons.push_back(counted(missing, "cycle is", "cycles are") + " missing");
   if (marked > 0)
-    reasons.push_back(counted(marked, "cycle is", "cycles are") + " marked as not to be used");
+    reasons.push_back(counted(marked, "cycle is", "cycles are") + " marked as invalid");
   if (incomplete > 0) reasons.push_back(counted(incomplete, "run is", "runs are") + " incomplete");
 }
 
@@ -111,12 +111,12 @@ Verdict judge(const ReportData& data) {
     verdict.text = "Not to be trusted";
   } else if (!verdict.reasons.empty()) {
     verdict.level = Verdict::Level::doubt;
-    verdict.text = data.model ? "Read this before you trust the model"
-                              : "Read this before you trust the measurement";
+    verdict.text = data.model ? "Review these findings before using the model"
+                              : "Review these findings before using the measurement";
   } else if (data.model) {
     verdict.level = Verdict::Level::good;
     verdict.text = data.validation && data.validation->chi_square_per_dof > 0.0
-                       ? "The fit converged, and the model holds on data it has not seen"
+                       ? "The fit converged, and the model agrees with held-back data"
                        : "The fit converged";
   } else {
     verdict.text = data.frf ? "Measured frequency response, no model" : "No model";

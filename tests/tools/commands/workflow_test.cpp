@@ -282,9 +282,9 @@ TEST_F(Workflow, AReportComparesWithAnotherDay) {
   succeed({"report", name("frf.h5"), name("model.json"), "--compare", name("frf.h5"),
            name("model.json"), "-o", name("r.html")});
   EXPECT_THAT(read_bytes(at("r.html")), HasSubstr(R"("comparison":{)"));
-  EXPECT_THAT(read_bytes(at("r.html")), HasSubstr("it is the same response"));
+  EXPECT_THAT(read_bytes(at("r.html")), HasSubstr("identical response"));
   fail({"report", name("frf.h5"), "--compare", name("run.slog"), "-o", name("no.html")}, 2,
-       "run.slog: holds no FRF and no model");
+       "run.slog: contains neither an FRF nor a model");
 }
 
 TEST_F(Workflow, EveryCommandSpeaksOneJsonObject) {

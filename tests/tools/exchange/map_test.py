@@ -151,7 +151,7 @@ class SeveralRuns(Case):
             log_map("ruy", ["", axes, ""])
             self.refuse("write for example axes: [sample, channel, run]", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
         log_map("ruy", ["", "run, sample, channel", "run, sample"])
-        self.refuse("3 x 200 x 3; axes: [run, sample] lists 2 axes", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        self.refuse("x 200 x 3; axes: [run, sample] lists 2 axes", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
 
 
 class Advice(Case):

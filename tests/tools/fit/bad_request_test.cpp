@@ -65,7 +65,7 @@ TEST_F(BadRequest, WhatIsNoTableAndNoReport) {
   fail({"import", name("empty.csv")}, 2, "empty.csv: contains no table;");
   write_bytes(at("head.csv"), "u,y\n");
   fail({"import", name("head.csv")}, 2, "head.csv: contains column names but no row of numbers;");
-  fail({"report", name("head.csv"), "-o", name("r.html")}, 2, "is nothing that the report shows");
+  fail({"report", name("head.csv"), "-o", name("r.html")}, 2, "cannot be shown in a report");
   fail({"import", config_}, 2, "is an experiment file, not a file of another program;");
   fail({"run", config_, "-o", name("x.txt")}, 2, "x.txt: a log is written as .slog;");
 }
@@ -305,10 +305,10 @@ TEST_F(BadRequest, Reports) {
   const std::string frf = name("frf.h5");
   fail({"report", frf, "-o", name("r.pdf")}, 2,
        "r.pdf: the report is an HTML page; use a name ending in .html");
-  fail({"report", frf, frf, "-o", name("r.html")}, 2, "frf.h5: is given twice");
+  fail({"report", frf, frf, "-o", name("r.html")}, 2, "frf.h5: duplicate file");
   write_bytes(at("cut.json"), "{\"format\": \"stageid-mo");
   fail({"report", frf, name("cut.json"), "-o", name("r.html")}, 2,
-       "cut.json: is not JSON, or cut short");
+       "cut.json: is not JSON, or is truncated");
   write_bytes(at("new.json"), "{\"format\": \"stageid-model\", \"format_version\": 9}");
   fail({"report", frf, name("new.json"), "-o", name("r.html")}, 2,
        "format_version: is 9; must be 1");

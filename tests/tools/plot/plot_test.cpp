@@ -229,9 +229,9 @@ TEST_F(Plot, RequestsThatAreWrong) {
         "--output-channel: the figure 'entry' needs exactly one channel; choose from s1, s2");
   wrong({"entry", frf, "--output-channel", "s1", "--input-channel", "a1,a2", "-o", out},
         "--input-channel: the figure 'entry' needs exactly one channel");
-  wrong({"entry", frf, frf, "-o", out}, "is given twice");
+  wrong({"entry", frf, frf, "-o", out}, "duplicate file");
   for (const char* copy : {"b.h5", "c.h5"}) std::filesystem::copy_file(frf, at(copy));
-  wrong({"entry", frf, name("b.h5"), name("c.h5"), "-o", out}, "one of the same kind");
+  wrong({"entry", frf, name("b.h5"), name("c.h5"), "-o", out}, "is of the same kind");
   wrong({"cmif", config_, "-o", out}, "contains no frequency response");
   fail({"plot", "cmif", name("none.h5"), "-o", out}, 1, "none.h5: does not exist");
   fail({"plot", "cmif", frf, "-o", name("no/p.pdf")}, 1, "no/p.pdf");

@@ -204,7 +204,7 @@ def check_correlated(text, want, lines):
     if want is None:
         expect("independent" not in text and "local model" not in text, f"of no zippered experiment: {text}")
         return
-    for part in (f"{lines} lines tell a smooth model as much as {want['independent']} independent ones", "The standard deviations count that",
+    for part in (f"{lines} lines constrain a smooth model as much as {want['independent']} independent ones", "The standard deviations include this",
                  f"{want['independent']} of {lines}", f"largest {want['largest']:.3g} at {want['at_hz']:.4g}"):
         expect(part in text.replace("\u00a0", " "), f"not said: {part!r}, but {text!r}")
 
@@ -219,7 +219,7 @@ def check_diagrams(found, expected):
     expect(found["stabilization"]["drawn"] == stable, f"{found['stabilization']['drawn']} stable poles drawn instead of {stable}")
     expect(found["distorted"] == expected["distorted"], f"{found['distorted']} coloured bars instead of {expected['distorted']}")
     if expected["distorted"]:
-        expect(found["distortion_text"].startswith(f"1 of {2 * expected['panels']} pairs and bands scatter more than noise does")
+        expect(found["distortion_text"].startswith(f"1 of {2 * expected['panels']} pairs and bands scatter by more than noise")
                and found["distortion_text"].endswith("in 1 of 3 bands the records are not settled"), found["distortion_text"])  # fmt: skip
     expect(found["findings"] == expected["findings"], f"{found['findings']} findings instead of {expected['findings']}")
     if found["findings"]:

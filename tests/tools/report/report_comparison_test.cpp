@@ -32,7 +32,7 @@ TEST(ReportComparison, RefusesOtherChannelsAndAReportOfNothing) {
   const ReportData own = small();
   AdditiveModel model = *own.model;
   model.inputs.names[1] = "elsewhere";
-  EXPECT_THAT(refusal(own, model, {}), HasSubstr("Tuesday: its channels are not those"));
+  EXPECT_THAT(refusal(own, model, {}), HasSubstr("Tuesday: its channels differ from those"));
   FrfEstimate frf = *own.frf;
   std::swap(frf.outputs.names[0], frf.outputs.names[1]);
   EXPECT_THAT(refusal(own, {}, frf), HasSubstr("Tuesday"));
@@ -56,18 +56,18 @@ TEST(ReportComparison, DrawsAResponseOnlyOnTheLinesOfTheReport) {
   made = make_comparison(own, "Tuesday", {}, other);
   EXPECT_EQ(made.response.size(), 0);
   ASSERT_EQ(own.messages.size(), 1u);
-  EXPECT_THAT(own.messages[0].text, HasSubstr("other lines"));
+  EXPECT_THAT(own.messages[0].text, HasSubstr("its lines differ"));
 }
 
 TEST(ReportComparison, LeavesOutWhatIsTheSameOrCompensatedOtherwise) {
   ReportData own = small();
   EXPECT_EQ(make_comparison(own, "a", {}, own.frf).response.size(), 0);
-  EXPECT_THAT(own.messages.back().text, HasSubstr("the same response"));
+  EXPECT_THAT(own.messages.back().text, HasSubstr("identical response"));
   FrfEstimate other = *own.frf;
   other.response *= 1.01;
   other.compensated = Compensation::delay;
   EXPECT_EQ(make_comparison(own, "b", {}, other).response.size(), 0);
-  EXPECT_THAT(own.messages.back().text, HasSubstr("compensated otherwise"));
+  EXPECT_THAT(own.messages.back().text, HasSubstr("hold or delay compensation differs"));
 }
 
 TEST(ReportComparison, PairsModesAndTellsChangesInDeviationsOfTheDifference) {

@@ -242,20 +242,20 @@ TEST(Report, StaysBelowFiveMegabytesWhereNothingIsButNoise) {
 
 TEST(Report, RefusesShapesThatDoNotAgree) {
   EXPECT_THAT(refusal([](ReportData& d) { d.model_response.conservativeResize(5, 50); }),
-              HasSubstr("model_response: 5 x 50, but the response needs 6 x 50"));
+              HasSubstr("model_response: got 5 x 50; expected 6 x 50"));
   EXPECT_THAT(refusal([](ReportData& d) { d.model_variance.conservativeResize(6, 49); }),
-              HasSubstr("model_variance: 6 x 49"));
+              HasSubstr("model_variance: got 6 x 49"));
   EXPECT_THAT(refusal([](ReportData& d) { d.model_variance(1, 1) = -1.0; }),
               HasSubstr("model_variance: negative"));
   EXPECT_THAT(refusal([](ReportData& d) { d.cmif_curves.conservativeResize(3, 50); }),
-              HasSubstr("cmif_curves: 3 x 50, but the response needs 2 x 50"));
+              HasSubstr("cmif_curves: got 3 x 50; expected 2 x 50"));
   EXPECT_THAT(refusal([](ReportData& d) { d.model_response(0, 0) = std::nan(""); }),
-              HasSubstr("model_response: not finite"));
+              HasSubstr("model_response: contains values that are not finite"));
   EXPECT_THAT(refusal([](ReportData& d) { d.validation->channel_error.resize(4); }),
               HasSubstr("validation.channel_error"));
   EXPECT_THAT(refusal([](ReportData& d) { d.validation_frf->frequency_hz[3] += 1e-3; }),
               HasSubstr("validation_frf: its lines"));
-  EXPECT_THAT(refusal([](ReportData& d) { d.frf.reset(); }), HasSubstr("need the frf"));
+  EXPECT_THAT(refusal([](ReportData& d) { d.frf.reset(); }), HasSubstr("need an frf"));
   EXPECT_THAT(refusal([](ReportData& d) { d.frf->response(0, 0) = std::nan(""); }),
               HasSubstr("not finite"));
   EXPECT_EQ(refusal([](ReportData&) {}), "");

@@ -106,7 +106,7 @@ function bandBar() {
   const button = (text, name, act) => element('button', { type: 'button', class: 'plain small', 'aria-label': name, title: name, onclick: act }, text);
   const text = element('output', { class: 'band-text', 'aria-live': 'polite' }, bandText());
   band.texts.push(text);
-  return element('div', { class: 'band-bar', role: 'group', 'aria-label': 'Part of the band, for all plots' },
+  return element('div', { class: 'band-bar', role: 'group', 'aria-label': 'Visible band of all plots' },
     button('\u25c2', 'To lower frequencies', () => moveBand(1, -0.5)), button('\u25b8', 'To higher frequencies', () => moveBand(1, 0.5)),
     button('+', 'Zoom in', () => moveBand(0.5, 0)), button('\u2212', 'Zoom out', () => moveBand(2, 0)),
     element('button', { type: 'button', class: 'plain small', onclick: resetBand }, 'Whole band'), text);

@@ -4,8 +4,8 @@ const cmif = { graph: null };
 
 const cmifNames = {
   response: 'squared singular values of G',
-  accelerance: 'squared singular values of \u03c9\u00b2G: without the slope of the rigid body',
-  whitened: 'squared singular values of G, every channel over its standard deviation: the noise floor is 1',
+  accelerance: 'squared singular values of \u03c9\u00b2G, which removes the slope of the rigid body',
+  whitened: 'squared singular values of G, every channel divided by its standard deviation: the noise floor is 1',
 };
 
 function buildCmif() {
@@ -13,7 +13,7 @@ function buildCmif() {
   const body = section('cmif', 'CMIF', 'Complex mode indicator function', 'The ' + cmifNames[content.cmif_kind] + '.');
   const legend = element('div', { class: 'legend' });
   for (let i = 0; i < curves; ++i) legend.append(element('span', { class: 'swatch', style: '--colour:var(--curve-' + (i % 6) + ')' }, 'curve ' + (i + 1)));
-  if (content.candidates.length) legend.append(element('span', { class: 'mark ring' }, 'chosen as start (' + content.candidates.length + ')'));
+  if (content.candidates.length) legend.append(element('span', { class: 'mark ring' }, 'starting value (' + content.candidates.length + ')'));
   if (identifiedModes().length) legend.append(element('span', { class: 'mark line' }, 'identified mode (' + identifiedModes().length + ')'));
   legend.append(saveButtons('CMIF', savedCmif));
   const plot = element('div', { class: 'plot tall', id: 'cmif-plot', role: 'img', 'aria-labelledby': 'cmif-title', tabindex: '0' });
@@ -21,7 +21,7 @@ function buildCmif() {
   followBand(() => showBandIn(cmif.graph));
   body.append(legend, plot,
     element('p', { class: 'axis-title' }, 'Frequency [Hz]'),
-    content.arrays.cmif_deviation ? element('p', { class: 'quiet' }, 'The shaded bands hold the true values with 95 %, to first order in the errors of the elements.') : null);
+    content.arrays.cmif_deviation ? element('p', { class: 'quiet' }, 'The shaded bands contain the true values with 95 % probability, to first order in the errors of the elements.') : null);
   afterFirstPaint(drawCmif);
   onColours(() => cmif.graph && cmif.graph.updateOptions({ ...plotColours(), series: cmifSeries() }));
 }
@@ -29,7 +29,7 @@ function buildCmif() {
 function savedCmif() {
   const { curves } = palette();
   const legend = Array.from({ length: content.arrays.cmif.curves }, (_, i) => ['curve ' + (i + 1), curves[i % curves.length]]);
-  return { title: 'Complex mode indicator function', legend, panels: [graphPanel(cmif.graph, 'Over frequency in Hz')] };
+  return { title: 'Complex mode indicator function', legend, panels: [graphPanel(cmif.graph, 'Frequency in Hz')] };
 }
 
 function identifiedModes() {

@@ -4,16 +4,16 @@ function buildComparison() {
   const { comparison } = content;
   const overlay = content.arrays.other_response || content.arrays.other_model;
   const body = section('comparison', 'Comparison', 'Compared with ' + comparison.title, 'Differences are ' + comparison.title +
-    ' less this report; deviations in standard deviations of the difference of two independent estimates.' +
-    (overlay ? ' Its curves are drawn in the matrix and the element plots.' : ''));
+    ' minus this report; deviations are in standard deviations of the difference of two independent estimates.' +
+    (overlay ? ' Its curves are shown in the matrix and the element plots.' : ''));
   if (!comparison.pairs) {
-    body.append(element('p', null, 'Modes cannot be compared: ' + (content.model ? 'the other has no model.' : 'this report has no model.')));
+    body.append(element('p', null, 'Modes cannot be compared: ' + (content.model ? 'the other result has no model.' : 'this report has no model.')));
     return;
   }
   const { pairs, own, modes } = comparison;
   body.append(comparedFigures(), element('div', { class: 'compared' },
-    element('div', null, pairs.length ? sortableTable(pairColumns(), pairs) : element('p', null, 'No mode of one is a mode of the other.'),
-      unpaired('Only here', own, pairs.map((pair) => pair.own)), unpaired('Only in ' + comparison.title, modes, pairs.map((pair) => pair.other))),
+    element('div', null, pairs.length ? sortableTable(pairColumns(), pairs) : element('p', null, 'No modes match.'),
+      unpaired('Only in this report', own, pairs.map((pair) => pair.own)), unpaired('Only in ' + comparison.title, modes, pairs.map((pair) => pair.other))),
     comparison.output_mac ? buildMac('compare-mac', 'Cross-MAC', crossMac) : null));
 }
 
@@ -23,7 +23,7 @@ function comparedFigures() {
   const most = pairs.reduce((a, b) => (Math.abs(b.frequency_difference) > Math.abs(a) ? b.frequency_difference : a), 0);
   const least = pairs.reduce((a, b) => Math.min(a, b.output_mac * b.input_mac), 1);
   const figures = [['modes in both', pairs.length + ' of ' + own.length + ' and ' + modes.length]];
-  if (pairs.length) figures.push(['largest change of a frequency', signedPercent(most)], ['least MAC of a pair', least.toFixed(3)]);
+  if (pairs.length) figures.push(['largest frequency change', signedPercent(most)], ['smallest MAC of a pair', least.toFixed(3)]);
   if (pairs.some((pair) => isNumber(pair.frequency_deviation))) figures.push(['pairs that differ by more than 3 \u03c3', String(far)]);
   return figureList(figures);
 }

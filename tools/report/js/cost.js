@@ -3,8 +3,8 @@
 const cost = { graph: null };
 
 function buildCost() {
-  const body = section('cost', 'Cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines. It never rises while one set of modes is fitted; ' +
-    'it may where the automatic fit takes another set.');
+  const body = section('cost', 'Cost', 'Cost over the iterations', 'Half the mean weighted squared error over the lines. It cannot increase while one set of modes is fitted; ' +
+    'it may increase when the automatic fit changes the set of modes.');
   body.append(element('div', { class: 'plot-head' }, element('p', { class: 'plot-title' }, 'Cost'),
     saveButtons('cost', () => ({ title: 'Cost over the iterations', panels: [graphPanel(cost.graph)] }))),
     element('div', { class: 'plot', id: 'cost-plot', role: 'img', 'aria-labelledby': 'cost-title' }),

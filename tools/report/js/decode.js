@@ -29,7 +29,7 @@ async function unpack(base64) {
 // Blocks by name, packed -> unpacked.
 async function unpackAll(blocks) {
   if (typeof DecompressionStream === 'undefined')
-    throw new Error('This browser is too old for the plots: it cannot unpack their numbers. Open the page with Chrome or Edge 80, Firefox 113, Safari 16.4 or later.');
+    throw new Error('This browser is too old to decompress the plot data. Open the page with Chrome or Edge 80, Firefox 113, Safari 16.4 or later.');
   const names = Object.keys(blocks);
   const unpacked = await Promise.all(names.map((name) => unpack(blocks[name])));
   return Object.fromEntries(names.map((name, i) => [name, unpacked[i]]));

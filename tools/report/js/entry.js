@@ -48,10 +48,10 @@ function entryPlot(id, kind, title) {
 
 function entryHelp() {
   const kind = content.frf.deviation;
-  const known = kind ? 'The shaded band holds the true value with 95 % (from the ' + (kind === 'total'
+  const known = kind ? 'The shaded band contains the true value with 95 % probability (from the ' + (kind === 'total'
     ? 'total variance: noise and nonlinear distortions' : 'noise variance') + '; circular complex Gaussian). ' : '';
-  return known + 'Drag to zoom, with Shift to pan, double-click for the whole band; all plots of the page move together. ' +
-    'The names above switch traces on and off.';
+  return known + 'Drag to zoom, Shift-drag to pan, double-click for the whole band; all plots of the page move together. ' +
+    'Click a name above to show or hide its trace.';
 }
 
 function recolourEntry() {

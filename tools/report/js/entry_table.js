@@ -6,7 +6,7 @@ const mostRows = 200;  // a zoom shows the rest
 
 function buildEntryTable() {
   entryTable.body = element('div');
-  entryTable.details = element('details', { id: 'entry-table', ontoggle: fillEntryTable }, element('summary', null, 'Numbers of the band shown'), entryTable.body);
+  entryTable.details = element('details', { id: 'entry-table', ontoggle: fillEntryTable }, element('summary', null, 'Values in the visible band'), entryTable.body);
   return entryTable.details;
 }
 
@@ -17,7 +17,7 @@ function fillEntryTable() {
   const rows = Array.from({ length: Math.min(mostRows, last - first + 1) }, (_, i) => element('tr', null, ...row(first + i).map((text) => element('td', null, text))));
   const left = last - first + 1 - rows.length;
   entryTable.body.replaceChildren(element('div', { class: 'table-scroll' }, element('table', null,
-    element('caption', null, channelName(entry.channel) + ', ' + bandText() + (left > 0 ? '; zoom in for the other ' + plural(left, 'line') : '')),
+    element('caption', null, channelName(entry.channel) + ', ' + bandText() + (left > 0 ? '; zoom in to see the other ' + plural(left, 'line') : '')),
     element('thead', null, element('tr', null, ...columns.map((title) => element('th', { scope: 'col' }, title)))), element('tbody', null, ...rows))));
 }
 

@@ -4,7 +4,7 @@ const runTotals = { cycles: 0, late: 0, missing: 0, marked: 0, seconds: 0, recor
 for (const run of content.runs) for (const key of Object.keys(runTotals)) runTotals[key] += run[key];
 
 function buildHealth() {
-  const body = section('health', 'Health', 'Timing and health of the run');
+  const body = section('health', 'Health', 'Timing and data health');
   if (content.findings.length) body.append(findingTable());
   if (content.runs.length) {
     const incomplete = content.runs.filter((run) => !run.complete).length;
@@ -26,10 +26,10 @@ function buildHealth() {
 // What the checks of the data found; words beside the colours.
 function findingTable() {
   const grave = { error: 2, warning: 1, note: 0 };
-  const heads = ['severity', 'channel', 'what', 'figure', 'remedy'].map((title) => element('th', { scope: 'col' }, title));
+  const heads = ['severity', 'channel', 'finding', 'figure', 'remedy'].map((title) => element('th', { scope: 'col' }, title));
   const rows = content.findings.map((finding) => element('tr', null, element('td', null, element('span', { class: 'severity level-' + grave[finding.severity] }, finding.severity)),
     element('td', { class: 'name' }, finding.channel || 'all'), element('td', null, finding.what), element('td', null, finding.figure || '\u2013'), element('td', null, finding.remedy || '\u2013')));
-  return element('div', { class: 'table-scroll' }, element('table', { class: 'findings' }, element('caption', null, 'Findings of the checks of the data, the gravest first'),
+  return element('div', { class: 'table-scroll' }, element('table', { class: 'findings' }, element('caption', null, 'Findings of the data checks, most severe first'),
     element('thead', null, element('tr', null, ...heads)), element('tbody', null, ...rows)));
 }
 
@@ -46,7 +46,7 @@ function stepBars() {
       element('span', { class: 'step-bar' }, element('span', { style: 'width:' + (100 * step.seconds / longest).toFixed(1) + '%' })),
       element('span', { class: 'step-time' }, duration(step.seconds)), element('span', { class: 'quiet' }, step.note)));
   }
-  return element('div', null, element('h3', null, 'Where the ' + duration(total) + ' went'), list);
+  return element('div', null, element('h3', null, 'Time per step, ' + duration(total) + ' in total'), list);
 }
 
 function runTable() {

@@ -11,18 +11,18 @@ function isZippered() {
 function correlationText() {
   if (!isZippered()) return null;
   const { lines, correlated_lines: each } = content.frf;
-  return 'Zippered experiment: between the lines of each axis its response is a local model, so errors of neighbouring lines are correlated. ' +
-    'The ' + count(lines) + ' lines tell a smooth model as much as ' + count(Math.round(lines / each)) + ' independent ones (correlated_lines: ' + number(each) + ').';
+  return 'Zippered experiment: between the lines of an axis its response is interpolated by a local model, so errors of neighbouring lines are correlated. ' +
+    'The ' + count(lines) + ' lines constrain a smooth model as much as ' + count(Math.round(lines / each)) + ' independent ones (correlated_lines: ' + number(each) + ').';
 }
 
 function buildInterpolation() {
-  const body = section('interpolation', 'Interpolation', 'Between the lines of each axis', correlationText());
+  const body = section('interpolation', 'Interpolation', 'Interpolation between the lines of each axis', correlationText());
   if (!content.arrays.interpolation_misfit) {
-    body.append(element('p', null, 'Whether the local models hold was not checked: the noise is taken from what they leave, as no second period tells it.'));
+    body.append(element('p', null, 'The local models were not checked: with one period the noise is estimated from their residual.'));
     return;
   }
   body.append(element('div', { class: 'plot-head' }, element('p', null, misfitText()), saveButtons('interpolation', () => ({
-    title: 'What the local models leave, over noise', panels: [graphPanel(interpolation.graph, 'Misfit over frequency in Hz')],
+    title: 'Residual of the local models relative to noise', panels: [graphPanel(interpolation.graph, 'Misfit over frequency in Hz')],
   }))), element('div', { class: 'plot', id: 'interpolation-plot', role: 'img', 'aria-label': misfitText(), tabindex: '0', onkeydown: bandKey }),
     element('p', { class: 'axis-title' }, 'Frequency [Hz]'));
   afterFirstPaint(drawInterpolation);
@@ -35,8 +35,8 @@ function misfitText() {
   const f = array('frequency');
   const most = misfit.reduce((best, v, k) => (v > misfit[best] ? k : best), 0);
   const sorted = Array.from(misfit).sort((a, b) => a - b);
-  return 'What the local models leave, over what noise would: about 1 where they hold, more where a resonance is too narrow for the distance of the lines ' +
-    'or the plant is not linear; there the response is off by more than its deviation tells. Median ' + number(sorted[sorted.length >> 1]) +
+  return 'Residual of the local models relative to noise: about 1 where they are valid, larger where a resonance is too narrow for the line spacing ' +
+    'or the plant is nonlinear; there the error of the response exceeds its standard deviation. Median ' + number(sorted[sorted.length >> 1]) +
     ', largest ' + number(misfit[most]) + ' at ' + hertz(f[most]) + '.';
 }
 

@@ -37,8 +37,8 @@ function buildMatrix() {
   const { inputs, outputs } = content.frf;
   const hasModel = Boolean(content.arrays.residual);
   const body = section('response', 'Response', 'Frequency response, element by element',
-    'Each panel is one sensor over one actuator, as the edges name them: magnitude over frequency, both logarithmic, ' +
-    'all on one scale. Choose a panel to see it large, drag across one to zoom them all; the arrow keys move between panels, ' +
+    'Each panel is one sensor over one actuator, named at the edges: magnitude over frequency, both logarithmic, ' +
+    'with a common scale. Select a panel to enlarge it, drag across one to zoom all; the arrow keys move between panels, ' +
     '+ and \u2212 zoom, Page Up and Page Down pan, Home shows the whole band.');
   const legend = element('div', { class: 'legend' }, swatch('measured', 'measured'),
     hasModel ? swatch('model', 'model') : null, hasModel ? swatch('residual', 'residual') : null,

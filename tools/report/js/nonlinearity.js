@@ -4,17 +4,17 @@ const distortion = { figure: null, text: null };
 
 function buildNonlinearity() {
   const { bands, chance, settled } = content.nonlinearity;
-  const body = section('nonlinearity', 'Nonlinearity', 'Nonlinear distortions', 'Each cell is one sensor over one actuator, as the edges name them, each bar one octave from low to high; ' +
+  const body = section('nonlinearity', 'Nonlinearity', 'Nonlinear distortions', 'Each cell is one sensor over one actuator, named at the edges; each bar is one octave, from low to high; ' +
     'the height is the distortion of one realization over |G| on a logarithmic scale from 0.01\u00a0% to 100\u00a0%. ' +
-    'Coloured: more than noise (p\u00a0<\u00a0' + chance + ' of the F test); grey: within the noise' +
-    (settled.every(Boolean) ? '.' : '; outlined: not to be told, the records hold a transient or a drift there.'));
+    'Coloured: above noise (p\u00a0<\u00a0' + chance + ' of the F test); grey: within the noise' +
+    (settled.every(Boolean) ? '.' : '; outlined: undetermined, the records contain a transient or a drift there.'));
   distortion.text = element('output', { class: 'values' });
   distortion.figure = canvasFigure('nonlinearity-plot', distortionSummary(), drawNonlinearity, 'tall');
   distortion.figure.node.addEventListener('pointermove', tellDistortion);
   distortion.figure.node.addEventListener('pointerleave', () => { distortion.text.textContent = ''; });
   body.append(element('div', { class: 'plot-head' }, element('p', null, distortionSummary() + '.'), saveButtons('nonlinear distortions', savedNonlinearity)),
     distortion.figure.node, element('p', { class: 'plot-title' }, distortion.text),
-    folded('Bands and pairs that are more than noise, as a table', '', distortionTable(bands)));
+    folded('Table of the bands and pairs above noise', '', distortionTable(bands)));
 }
 
 // [{channel, band, p, level, settled}] of every pair and band.
@@ -35,7 +35,7 @@ function isDistorted(test) {
 function distortionSummary() {
   const tests = distortionTests();
   const found = tests.filter(isDistorted).length;
-  return count(found) + ' of ' + count(tests.length) + ' pairs and bands scatter more than noise does; a linear plant would show about ' +
+  return count(found) + ' of ' + count(tests.length) + ' pairs and bands scatter by more than noise; expected for a linear plant: about ' +
     number(content.nonlinearity.chance * tests.length, 2) + unsettledSummary();
 }
 

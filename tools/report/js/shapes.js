@@ -8,9 +8,9 @@ const cycleMs = 1800;  // of the animation; the true one is told beside it
 function buildShapes() {
   const { modes } = content.shapes;
   const body = section('shapes', 'Shapes', 'Mode shapes', content.geometry
-    ? 'Real part over one cycle, slowed down; actuators and sensors each to the same rms, as their ratio is not known. ' +
-      'The surface only leads the eye between the channels. Drag or use the arrow keys to turn it.'
-    : 'Real part over one cycle, slowed down. No positions are known: give the stage file, or the log that holds it, to see them on the stage.');
+    ? 'Real part over one cycle, slowed down. Actuators and sensors are scaled to the same rms, because their ratio is unknown. ' +
+      'The surface is a guide to the eye between the channels. Drag or use the arrow keys to rotate it.'
+    : 'Real part over one cycle, slowed down. Positions are unknown: add the stage file, or the log that contains it, to the report to show the shapes on the stage.');
   const pick = element('select', { id: 'shape-mode', onchange: (event) => showShape(Number(event.target.value)) },
     ...modes.map((mode, i) => element('option', { value: i }, (i + 1) + ': ' + fixed(mode.frequency_hz) + ' Hz')));
   const button = (text, name, act) => element('button', { type: 'button', class: 'plain small', 'aria-label': name, title: name, onclick: act }, text);
@@ -57,7 +57,7 @@ function showShape(index) {
   const mass = isNumber(mode.modal_mass) ? '; modal mass ' + number(mode.modal_mass, 4) + ' (shapes of norm one)' : '';
   shapes.text.textContent = 'Mode ' + (index + 1) + ': ' + fixed(mode.frequency_hz) + ' Hz, \u03b6 ' + hundred(mode.damping_ratio) + ' %' + mass +
     (mode.not_rank_one > 0.01 ? '; second singular value ' + percent(mode.not_rank_one) + ' of the first' : '');
-  shapes.figure.node.setAttribute('aria-label', shapes.text.textContent + '. The table below holds its numbers.');
+  shapes.figure.node.setAttribute('aria-label', shapes.text.textContent + '. The table below lists the values.');
   shapes.table.replaceChildren(shapeTable(mode));
   if (!shapes.playing) shapes.phase = 0;
   shapes.figure.redraw();

@@ -7,8 +7,8 @@ const poleKinds = ['new', 'stable frequency', 'stable frequency and damping'];
 function buildStabilization() {
   const poles = content.stabilization;
   const body = section('stabilization', 'Stabilization', 'Stabilization diagram',
-    'Poles of a common-denominator fit of rising order, independent of the model. A pole is stable if it stands within 1\u00a0% in frequency, ' +
-    'and 5\u00a0% in damping, of one of the order before. Behind them the first curve of the CMIF and the identified modes.');
+    'Poles of a common-denominator fit of increasing order, independent of the model. A pole is stable if it is within 1\u00a0% in frequency ' +
+    'and 5\u00a0% in damping of a pole of the previous order. Background: the first curve of the CMIF and the identified modes.');
   const legend = element('div', { class: 'legend' }, ...poleKinds.map((kind, i) => element('span', { class: 'pole-mark kind-' + i }, kind)),
     saveButtons('stabilization diagram', savedStabilization));
   stability.figure = canvasFigure('stabilization-plot', stabilizationSummary(), drawStabilization, 'tall');

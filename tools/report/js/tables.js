@@ -62,8 +62,8 @@ function buildModes() {
   const known = content.modes.some((mode) => mode.truth);
   const uncertain = content.modes.some((mode) => isNumber(mode.frequency_std_hz));
   const body = section('modes', 'Modes', 'Modes', known
-    ? 'Identified modes beside the true ones of the simulated plant. Deviations are in standard deviations.' : null);
-  if (uncertain && isZippered()) body.append(element('p', { class: 'lead correlated' }, correlationText() + ' The standard deviations count that.'));
+    ? 'Identified modes and true modes of the simulated plant. Deviations are in standard deviations.' : null);
+  if (uncertain && isZippered()) body.append(element('p', { class: 'lead correlated' }, correlationText() + ' The standard deviations include this.'));
   const rows = content.modes.map((mode, i) => ({ ...mode, place: i + 1, rowClass: isNumber(mode.frequency_hz) ? null : 'absent' }));
   const deviation = (key) => (row) => element('span', { class: Math.abs(row[key]) > 3 ? 'far' : null }, deviations(row[key]));
   const columns = [
@@ -83,7 +83,7 @@ function buildModes() {
   const others = content.model.others.map((other) => other.integrators
     ? 'rigid body (1/s' + (other.integrators === 1 ? '' : superscripts[other.integrators] || '^' + other.integrators) + ')'
     : other.order === 0 ? 'direct term' : 'submodel of order ' + other.order);
-  if (others.length) body.append(element('p', { class: 'quiet' }, 'Beside the modes: ' + others.join(', ') + '.'));
+  if (others.length) body.append(element('p', { class: 'quiet' }, 'Other terms: ' + others.join(', ') + '.'));
   body.append(fitFacts());
 }
 
@@ -109,7 +109,7 @@ function shapeCell(row) {
 
 function frequencyCell(row) {
   if (!isNumber(row.frequency_hz)) {
-    return row.truth && !row.truth.observable ? 'no sensor sees it' : 'not identified';
+    return row.truth && !row.truth.observable ? 'not observable' : 'not identified';
   }
   if (!content.frf) return fixed(row.frequency_hz);
   const half = Math.max(0.03, 12 * (row.damping_ratio || 0.01));
@@ -139,11 +139,11 @@ function fitFacts() {
 
 function buildValidation() {
   const v = content.validation;
-  const body = section('validation', 'Validation', 'Validation', 'On data that the fit has not seen.');
+  const body = section('validation', 'Validation', 'Validation', 'On data not used in the fit.');
   body.append(facts([
     ['relative rms error', percent(v.relative_rms_error, 3)], ['normalized error', percent(v.normalized_error, 3)],
-    ['chi-square per degree of freedom', v.chi_square_per_dof > 0 ? number(v.chi_square_per_dof) + ' (of noise alone: ' + (v.expected_chi_square > 0 ? number(v.expected_chi_square) : 'unknown') + ')' : 'unknown: no variances'],
-    ['whitened error above its 95 % point', v.chi_square_per_dof > 0 ? percent(v.whitened_above_95) + ' (5 % is right)' : null],
+    ['chi-square per degree of freedom', v.chi_square_per_dof > 0 ? number(v.chi_square_per_dof) + ' (expected from noise alone: ' + (v.expected_chi_square > 0 ? number(v.expected_chi_square) : 'unknown') + ')' : 'unknown: no variances'],
+    ['whitened error above its 95 % point', v.chi_square_per_dof > 0 ? percent(v.whitened_above_95) + ' (expected: 5 %)' : null],
     ['largest autocorrelation over lines', v.whiteness_limit > 0 ? number(v.whiteness) + ' (99 % limit ' + number(v.whiteness_limit) + ')' : null],
   ]));
   if (content.frf && v.channel_error.length === channelCount()) body.append(channelErrors(v.channel_error));
@@ -173,19 +173,19 @@ function buildDecisions() {
 }
 
 function buildProvenance() {
-  const body = section('provenance', 'Provenance', 'Where it came from');
+  const body = section('provenance', 'Provenance', 'Provenance');
   const frf = content.frf;
   if (frf) {
     body.append(facts([
-      ['realizations', frf.realizations || null], ['experiments each', frf.experiments || null], ['periods used', frf.periods || null],
+      ['realizations', frf.realizations || null], ['experiments per realization', frf.experiments || null], ['periods used', frf.periods || null],
       ['sample rate', frf.sample_rate_hz > 0 ? hertz(frf.sample_rate_hz) : null], ['hold in the data', frf.hold],
       ['compensated', frf.compensated + (frf.compensated === 'none' ? '' : ', ' + duration(frf.delay_s))],
       ['standard deviation from', frf.deviation ? frf.deviation + ' variance' : 'unknown'],
       ['degrees of freedom', frf.deviation ? number(frf.deviation === 'total' ? frf.total_dof : frf.noise_dof) : null],
-      ['lines as good as independent', isZippered() ? count(Math.round(frf.lines / frf.correlated_lines)) + ' of ' + count(frf.lines) : null],
-      ['worst condition of the inputs', isNumber(frf.worst_condition) ? number(frf.worst_condition) : null],
+      ['equivalent independent lines', isZippered() ? count(Math.round(frf.lines / frf.correlated_lines)) + ' of ' + count(frf.lines) : null],
+      ['largest condition number of the inputs', isNumber(frf.worst_condition) ? number(frf.worst_condition) : null],
     ]));
-    if (frf.excluded.length) body.append(element('p', null, 'Actuators outside the identified part, with their power over that of the inputs: ' +
+    if (frf.excluded.length) body.append(element('p', null, 'Actuators outside the identified part, with their power relative to the inputs: ' +
       frf.excluded.map((channel) => channel.name + ' (' + (isNumber(channel.power) ? number(channel.power) : 'unknown') + ')').join(', ') + '.'));
   }
   for (const { of, content: what } of content.provenance) {

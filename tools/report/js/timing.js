@@ -31,8 +31,8 @@ function histogramBars(title, histogram, period) {
 
 function timingBars(timing, period) {
   const both = element('div', { class: 'histograms' },
-    histogramBars('Execution time of a cycle', timing.execution, period),
-    histogramBars('Lateness of a cycle', timing.lateness, period));
-  return element('div', null, both, element('p', { class: 'quiet' }, 'Cycles by time, the bars logarithmic in their number' +
-      (timing.skipped > 0 ? '; ' + plural(timing.skipped, 'period') + ' left out behind late cycles, to keep the phase.' : '; no period was left out.')));
+    histogramBars('Execution time per cycle', timing.execution, period),
+    histogramBars('Lateness per cycle', timing.lateness, period));
+  return element('div', null, both, element('p', { class: 'quiet' }, 'Number of cycles by time, on a logarithmic scale' +
+      (timing.skipped > 0 ? '; ' + plural(timing.skipped, 'period') + ' skipped after late cycles, to keep the phase.' : '; no period was skipped.')));
 }
