@@ -10,9 +10,10 @@ namespace stageid {
 namespace {
 
 [[noreturn]] void refuse(const std::string& text) {
-  throw std::invalid_argument(fmt::format(
-      "--dashboard: '{}'; write PORT (this machine only) or HOST:PORT, a port from 0 to 65535",
-      text));
+  throw std::invalid_argument(
+      fmt::format("--dashboard: got '{}'; expected PORT (this machine only) or HOST:PORT, with a "
+                  "port from 0 to 65535",
+                  text));
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ void set_socket_options(int socket) {
   ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
 }
 
-constexpr const char* kWholeAddress = "open the address that stageid printed, with its token";
+constexpr const char* kWholeAddress = "open the address printed by stageid, with its token";
 
 void refuse(httplib::Response& response, int status, const std::string& why) {
   response.status = status;
@@ -91,9 +91,9 @@ void DashboardServer::State::listen() {
   }
   if (address.port > 0) return;
   const std::string why = errno != 0 ? std::strerror(errno) : "no such address";
-  throw StageError(fmt::format(
-      "--dashboard: cannot listen on {} ({}); give another port, or 0 for any that is free",
-      address.host, why));
+  throw StageError(
+      fmt::format("--dashboard: cannot listen on {} ({}); use another port, or 0 for any free one",
+                  address.host, why));
 }
 
 /// What is not allowed is answered before anything else is looked at.
@@ -112,9 +112,9 @@ void DashboardServer::State::route() {
     if (response.status == 404)
       refuse(response, 404, fmt::format("{}: not found; open /", request.path));
     else if (response.status == 413)
-      refuse(response, 413, fmt::format("body too large; {} bytes at most", kLargestBody));
+      refuse(response, 413, fmt::format("body too large; at most {} bytes", kLargestBody));
     else
-      refuse(response, response.status, "bad request; open the address that stageid printed");
+      refuse(response, response.status, "bad request; open the address printed by stageid");
   });
   server.Get("/", [this](const httplib::Request&, httplib::Response& response) {
     response.set_content(content.page, "text/html; charset=utf-8");
@@ -124,7 +124,7 @@ void DashboardServer::State::route() {
   server.Get("/response.json", [this](const httplib::Request&, httplib::Response& response) {
     const LatestText::Edition edition = content.response.get();
     if (edition.number == 0) {
-      refuse(response, 404, "no response yet; it follows the first realization");
+      refuse(response, 404, "no response yet; wait for the first complete realization");
     } else {
       response.set_content(*edition.text, "application/json");
     }
@@ -142,7 +142,7 @@ void DashboardServer::State::route() {
 void DashboardServer::State::stream(httplib::Response& response) {
   if (watchers.fetch_add(1) >= kWatchers) {
     watchers.fetch_sub(1);
-    refuse(response, 503, fmt::format("{} pages are open already; close one", kWatchers));
+    refuse(response, 503, fmt::format("{} pages are already open; close one", kWatchers));
     return;
   }
   content.watched();

@@ -29,7 +29,7 @@ const char* axis_title(CmifKind kind) {
     case CmifKind::accelerance:
       return "CMIF of ω²G";
     case CmifKind::whitened:
-      return "CMIF of G over its noise";
+      return "CMIF of G relative to noise";
   }
   return "";
 }
@@ -93,7 +93,7 @@ std::pair<std::string, int> mode_lines(const ReportData& data) {
 
 Picture cmif_picture(const ReportData& data) {
   if (!data.frf || data.cmif_curves.size() == 0)
-    throw std::invalid_argument("cmif: a frequency response is needed");
+    throw std::invalid_argument("cmif: needs a frequency response");
   const FrfEstimate& frf = *data.frf;
   std::vector<std::pair<std::string, Eigen::VectorXd>> columns = {
       {"frequency_hz", frf.frequency_hz}};

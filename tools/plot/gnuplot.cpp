@@ -38,8 +38,9 @@ class PrivateDirectory {
   PrivateDirectory() {
     std::string name = (std::filesystem::temp_directory_path() / "stageid-plot-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr)
-      throw FileError(fmt::format("{}: cannot be made: {}; set TMPDIR to a directory with room",
-                                  name, std::strerror(errno)));
+      throw FileError(
+          fmt::format("{}: cannot be created: {}; set TMPDIR to a directory with free space", name,
+                      std::strerror(errno)));
     path_ = name;
   }
   ~PrivateDirectory() { remove(); }
@@ -126,7 +127,7 @@ int run_gnuplot(const std::filesystem::path& directory) {
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (error == ENOENT)
-    throw FileError("gnuplot: is not installed; install the Debian package gnuplot-nox");
+    throw FileError("gnuplot: not installed; install the Debian package gnuplot-nox");
   if (error != 0)
     throw FileError(fmt::format("gnuplot: cannot be started: {}", std::strerror(error)));
   running_gnuplot = child;
@@ -144,7 +145,7 @@ std::string first_message(const std::string& text) {
     line.erase(0, line.find_first_not_of(" \t^"));
     if (line.starts_with("\"script.gp\"")) return line;
   }
-  return text.empty() ? "it says nothing" : text.substr(0, text.find('\n'));
+  return text.empty() ? "no message" : text.substr(0, text.find('\n'));
 }
 
 /// Cairo does not tell when a disk is full; a whole picture ends as its format says.
@@ -180,7 +181,7 @@ PictureFormat picture_format(const std::filesystem::path& file) {
   if (ending == ".svg") return PictureFormat::svg;
   if (ending == ".png") return PictureFormat::png;
   throw std::invalid_argument(fmt::format(
-      "{}: '{}' is no ending of a picture; write one of .pdf, .svg, .png", file.string(), ending));
+      "{}: unsupported picture format '{}'; use .pdf, .svg or .png", file.string(), ending));
 }
 
 void draw(const Picture& picture, const std::filesystem::path& file) {
@@ -198,8 +199,7 @@ void draw(const Picture& picture, const std::filesystem::path& file) {
   throw_if_interrupted();
   std::string bytes = read_whole(directory.path() / "picture");
   if (status != 0 || !is_whole(bytes, format))
-    throw FileError(fmt::format("{}: gnuplot did not draw it: {}; is there room in {}?",
-                                file.string(),
+    throw FileError(fmt::format("{}: gnuplot failed: {}; check the free space in {}", file.string(),
                                 first_message(read_whole(directory.path() / "messages")),
                                 std::filesystem::temp_directory_path().string()));
   if (format == PictureFormat::pdf) forget_date(bytes);

@@ -52,8 +52,8 @@ std::string table_text(const std::vector<std::pair<std::string, Eigen::VectorXd>
   for (const auto& [name, values] : columns) {
     text += " " + name;
     if (values.size() != columns[0].second.size())
-      throw std::invalid_argument(fmt::format("table: column '{}' has {} rows; {} belong there",
-                                              name, values.size(), columns[0].second.size()));
+      throw std::invalid_argument(fmt::format("table: column '{}' has {} rows; expected {}", name,
+                                              values.size(), columns[0].second.size()));
   }
   text += "\n";
   for (Eigen::Index k = 0; !columns.empty() && k < columns[0].second.size(); ++k)

@@ -22,8 +22,7 @@ constexpr double kPage_in = 7.16;
 constexpr Eigen::Index kMostRowsOrColumns = 40;
 
 const FrfEstimate& response_of(const ReportData& data, const char* figure) {
-  if (!data.frf)
-    throw std::invalid_argument(fmt::format("{}: a frequency response is needed", figure));
+  if (!data.frf) throw std::invalid_argument(fmt::format("{}: needs a frequency response", figure));
   return *data.frf;
 }
 
@@ -146,7 +145,7 @@ std::string bode_panel(const Picture& picture, const Grid& grid, std::size_t row
 void check_count(std::size_t count, const char* kind, const char* flag) {
   if (count == 0 || count > static_cast<std::size_t>(kMostRowsOrColumns))
     throw std::invalid_argument(
-        fmt::format("bode: {} {} do not fit beside each other; choose 1 to {} with {}", count, kind,
+        fmt::format("bode: {} {} do not fit in one figure; choose 1 to {} with {}", count, kind,
                     kMostRowsOrColumns, flag));
 }
 

@@ -141,7 +141,7 @@ TEST_F(DashboardServerTest, RefusesLargeBodiesAndSaysWhatItRefuses) {
   EXPECT_EQ(aborts_, 0);
   EXPECT_EQ(client().Get("/other")->body, "/other: not found; open /\n");
   EXPECT_EQ(client().Get("/response.json")->body,
-            "no response yet; it follows the first realization\n");
+            "no response yet; wait for the first complete realization\n");
 }
 
 TEST_F(DashboardServerTest, OnLoopbackAnotherNameOfThisMachineIsRefused) {

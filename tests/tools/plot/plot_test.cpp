@@ -189,7 +189,7 @@ TEST_F(Plot, NothingIsLeftInTheTemporaryDirectory) {
   full.largest_file_bytes = 20000;  // the tables fit, the picture does not
   fail({"plot", "entry", name("frf.h5"), "--output-channel", "s1", "--input-channel", "a1", "-o",
         name("full.png")},
-       1, "full.png: gnuplot did not draw it", full);
+       1, "full.png: gnuplot failed", full);
   ::setenv("TMPDIR", name("no_such").c_str(), 1);
   fail({"plot", "cmif", name("frf.h5"), "-o", name("d.pdf")}, 1, "");
   old == nullptr ? ::unsetenv("TMPDIR") : ::setenv("TMPDIR", kept.c_str(), 1);
@@ -201,7 +201,7 @@ TEST_F(Plot, AMissingGnuplotNamesItsPackage) {
   const std::string path = std::getenv("PATH");
   ::setenv("PATH", name("nowhere").c_str(), 1);
   fail({"plot", "cmif", name("frf.h5"), "-o", name("c.pdf")}, 1,
-       "gnuplot: is not installed; install the Debian package gnuplot-nox");
+       "gnuplot: not installed; install the Debian package gnuplot-nox");
   ::setenv("PATH", path.c_str(), 1);
 }
 
@@ -215,9 +215,8 @@ TEST_F(Plot, RequestsThatAreWrong) {
   const std::string out = name("p.pdf");
   wrong({"cmfi", frf, "-o", out},
         "figure: got 'cmfi'; expected one of cmif, bode, entry (did you mean");
-  wrong({"cmif", frf, "-o", name("p.jpg")},
-        "p.jpg: '.jpg' is no ending of a picture; write one of");
-  wrong({"cmif", frf, "-o", name("p")}, "p: '' is no ending of a picture");
+  wrong({"cmif", frf, "-o", name("p.jpg")}, "p.jpg: unsupported picture format '.jpg'; use");
+  wrong({"cmif", frf, "-o", name("p")}, "p: unsupported picture format ''");
   wrong({"cmif", frf}, "--output");
   wrong({"cmif", "-o", out}, "inputs");
   wrong({"cmif", name("model.json"), "-o", out}, "model.json: contains no frequency response");

@@ -204,8 +204,9 @@ def check_correlated(text, want, lines):
     if want is None:
         expect("independent" not in text and "local model" not in text, f"of no zippered experiment: {text}")
         return
-    for part in (f"{lines} lines constrain a smooth model as much as {want['independent']} independent ones", "The standard deviations include this",
-                 f"{want['independent']} of {lines}", f"largest {want['largest']:.3g} at {want['at_hz']:.4g}"):
+    for part in (f"{lines} lines constrain a smooth model as much as {want['independent']} independent ones",
+                 "The standard deviations include this", f"{want['independent']} of {lines}",
+                 f"largest {want['largest']:.3g} at {want['at_hz']:.4g}"):
         expect(part in text.replace("\u00a0", " "), f"not said: {part!r}, but {text!r}")
 
 

@@ -5,7 +5,7 @@ const side = {};
 function buildTiming() {
   if (!shown.period_s) return;
   side.timing = element('div');
-  section('timing', 'Timing', 'How the loop keeps time').append(side.timing);
+  section('timing', 'Timing', 'Timing of the loop').append(side.timing);
 }
 
 function showTiming(state) {
@@ -25,7 +25,7 @@ function showSupervisor(state) {
 
 function buildEvents() {
   side.events = element('tbody');
-  section('events', 'Events', 'Events', 'The newest first. All of them stand in the event log beside the log.').append(
+  section('events', 'Events', 'Events', 'Newest first. The event log next to the log contains all of them.').append(
     element('div', { class: 'table-scroll' }, element('table', { class: 'events' }, side.events)));
 }
 

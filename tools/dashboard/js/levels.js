@@ -4,7 +4,7 @@ const levels = { rows: [], largest: [] };
 
 function buildLevels() {
   const body = section('levels', 'Levels', 'Levels against limits',
-    'Bar: largest magnitude since the last look, a few times a second; thick line: largest so far; thin line: rms. A full bar is at the limit.');
+    'Bar: largest magnitude since the last update, a few times per second; thick line: largest so far; thin line: rms. A full bar is at the limit.');
   const group = (title, list, limits, first) => {
     body.append(element('h3', null, title));
     const grid = element('div', { class: 'levels' });

@@ -29,7 +29,7 @@ stream.onmessage = (message) => showState(JSON.parse(message.data));
 stream.onerror = () => {
   if (ended) return;
   head.verdict.className = 'verdict doubt';
-  head.text.textContent = 'no connection to the program; trying again';
+  head.text.textContent = 'connection to the program lost; reconnecting';
 };
 window.addEventListener('pagehide', () => stream.close());
 Object.assign(window.stageidDashboard, { shown, array, channelCurves, content: () => content, edition: () => link.edition });

@@ -19,7 +19,7 @@ function buildProgress() {
 }
 
 const stateWords = { starting: 'starting', running: 'measuring', stopping: 'stopping: the excitation is ramped down in closed loop',
-  estimating: 'measured; the last response is being estimated' };
+  estimating: 'measured; estimating the last response' };
 
 function endOf(state) {
   if (state.exit_code === 0) return ['good', 'done'];
@@ -38,7 +38,7 @@ function showProgress(state) {
   head.bar.style.width = (100 * share).toFixed(2) + '%';
   head.track.setAttribute('aria-valuenow', Math.round(100 * share));
   head.figures.replaceChildren(...figures(state).map(([label, value]) => element('div', null, element('dt', null, label), element('dd', null, value))));
-  const now = 'Run now: realization ' + (state.run.realization + 1) + ' of ' + shown.realizations + ', experiment ' + (state.run.experiment + 1) + '. ';
+  const now = 'Current run: realization ' + (state.run.realization + 1) + ' of ' + shown.realizations + ', experiment ' + (state.run.experiment + 1) + '. ';
   head.note.textContent = (state.state === 'running' ? now : '') + 'Response: ' + state.response.status + '.';
 }
 
@@ -71,8 +71,8 @@ function pressAbort() {
   disarm();
   head.abort.disabled = true;
   fetch('abort' + link.search, { method: 'POST', headers: { 'X-Stageid': 'abort' } }).then((answer) => {
-    if (!answer.ok) head.text.textContent = 'the program did not take the order to stop (' + answer.status + ')';
-  }, () => { head.text.textContent = 'the program does not answer; stop it with Ctrl-C'; });
+    if (!answer.ok) head.text.textContent = 'the program rejected the stop request (' + answer.status + ')';
+  }, () => { head.text.textContent = 'the program does not respond; stop it with Ctrl-C'; });
 }
 
 function disarm() {
