@@ -45,8 +45,9 @@ int main(int argc, char** argv) {
   } catch (const std::invalid_argument& error) {
     return report(error, stageid::kRequestWrong);
   } catch (const std::bad_alloc&) {
-    return report(std::runtime_error("out of memory; ask for fewer lines, channels or modes"),
-                  stageid::kWorldFailed);
+    return report(
+        std::runtime_error("out of memory; reduce the number of lines, channels or modes"),
+        stageid::kWorldFailed);
   } catch (const std::exception&) {
     // Of a library: its words would help nobody.
     return report(

@@ -22,8 +22,8 @@ void describe_bus(ConfigVisitor& v, std::vector<CanFile::Bus>& list) {
            "of the arbitration phase; used for the bus load only, 'ip link' sets it");
   v.number("data_bit_rate_hz", bus.spec.data_bit_rate_hz, positive("bit/s"), kOptional,
            "of the data phase; used for the bus load only");
-  v.texts("actuators", bus.actuators, {}, kOptional, "names; left out on an only bus: all");
-  v.texts("sensors", bus.sensors, {}, kOptional, "names; left out on an only bus: all");
+  v.texts("actuators", bus.actuators, {}, kOptional, "names; omitted with a single bus: all");
+  v.texts("sensors", bus.sensors, {}, kOptional, "names; omitted with a single bus: all");
   list.push_back(std::move(bus));
 }
 
@@ -70,10 +70,12 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
   v.items(
       "buses", [&](ConfigVisitor& bus) { describe_bus(bus, f.buses); }, {1, 16}, kRequired,
       "CAN FD buses; the first one also carries commands and transfers");
-  v.numbers("actuator_range_n", f.actuator_range_n, positive("N"), {}, kOptional,
-            "2^23 counts; one for all or one each; left out: 1.25 times limit_n");
-  v.numbers("sensor_range_m", f.sensor_range_m, positive("m"), {}, kOptional,
-            "2^23 counts; one for all or one each; left out: 1.25 times window_m");
+  v.numbers(
+      "actuator_range_n", f.actuator_range_n, positive("N"), {}, kOptional,
+      "full scale of 2^23 counts; one for all or one per actuator; omitted: 1.25 times limit_n");
+  v.numbers(
+      "sensor_range_m", f.sensor_range_m, positive("m"), {}, kOptional,
+      "full scale of 2^23 counts; one for all or one per sensor; omitted: 1.25 times window_m");
   v.number("reply_timeout_s", spec.reply_timeout_s, positive("s"), kOptional,
            "the host waits this long for a reply");
   v.number("watchdog_s", f.watchdog_s, not_negative("s"), kOptional,

@@ -60,10 +60,10 @@ void describe_matrix(ConfigVisitor& v, const char* key, std::vector<double>& val
 void describe_state_space(ConfigVisitor& v, ControllerFile& f) {
   StateSpace& s = f.state_space;
   f.has_state_space = true;
-  describe_matrix(v, "a", s.a, kOptional, "states x states, row by row; left out: no states");
+  describe_matrix(v, "a", s.a, kOptional, "states x states, row by row; omitted: no states");
   describe_matrix(v, "b", s.b, kOptional, "states x sensors, row by row");
   describe_matrix(v, "c", s.c, kOptional, "actuators x states, row by row");
-  describe_matrix(v, "d", s.d, kOptional, "actuators x sensors, row by row; left out: zero");
+  describe_matrix(v, "d", s.d, kOptional, "actuators x sensors, row by row; omitted: zero");
   const auto n = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(s.a.size()))));
   const std::size_t n_y = f.sensors.size();
   const std::size_t n_u = f.actuators.size();
@@ -116,7 +116,7 @@ void require_unique(ConfigVisitor& v, const char* key, const std::vector<std::st
 void describe(ConfigVisitor& v, ControllerFile& f) {
   v.choice("format", f.format, {"stageid-controller"}, kRequired, "what this file is");
   v.text("stage", f.stage, kOptional,
-         "stage file with geometry and mass, relative to this one; left out: the wiring is not "
+         "stage file with geometry and mass, relative to this one; omitted: the wiring is not "
          "checked");
   v.texts("sensors", f.sensors, {0, 64}, kOptional, "inputs of the controller, in its order");
   v.texts("actuators", f.actuators, {0, 64}, kOptional, "outputs of the controller, in its order");
@@ -131,7 +131,7 @@ void describe(ConfigVisitor& v, ControllerFile& f) {
       "matrices from y to C y, u = r - C y");
   v.items(
       "transfer", [&](ConfigVisitor& item) { describe_transfer(item, f); }, {}, kOptional,
-      "transfer functions from y to C y, u = r - C y; a pair left out: zero");
+      "transfer functions from y to C y, u = r - C y; omitted pairs: zero");
   v.text("measured", f.measured, kOptional,
          "or a frequency response in HDF5, laid out as frf.h5, relative to this file: its inputs "
          "are the sensors, its outputs the actuators");
