@@ -14,6 +14,21 @@ run(${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${WORK_DIR}/build -G Ninja -DCMAKE_BU
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
 run(${WORK_DIR}/build/consumer)
 
+# The program of docs/cpp.md, on a log that the installed program wrote.
+run(${WORK_DIR}/prefix/bin/stageid run ${WORK_DIR}/prefix/share/stageid/configs/experiment/small_stage.yaml
+  -o ${WORK_DIR}/run.slog)
+execute_process(COMMAND ${WORK_DIR}/build/hello WORKING_DIRECTORY ${WORK_DIR}
+  OUTPUT_VARIABLE modes COMMAND_ERROR_IS_FATAL ANY)
+if(NOT modes MATCHES "Hz, damping ratio")
+  message(FATAL_ERROR "hello printed no mode: ${modes}")
+endif()
+file(READ ${CONSUMER_DIR}/hello.cpp hello)
+file(READ ${CONSUMER_DIR}/../../docs/cpp.md page)
+string(FIND "${page}" "${hello}" at)
+if(at EQUAL -1)
+  message(FATAL_ERROR "docs/cpp.md does not show tests/consumer/hello.cpp")
+endif()
+
 # The program and what it needs are installed with it.
 run(${WORK_DIR}/prefix/bin/stageid --version)
 file(GLOB configs ${WORK_DIR}/prefix/share/stageid/configs/*/*.yaml)

@@ -107,7 +107,8 @@ def folder_of(name):
 def include_faults(tree, path, name, used):
     text = path.read_text()
     room = tree.rooms.get(folder_of(name))
-    above = name.startswith(NO_ROOM)
+    face = name in {f"{floor}/{floor}.hpp" for floor in FLOORS}  # what a floor's users include: above its rooms
+    above = face or name.startswith(NO_ROOM)
     if room is None and not above:
         yield f"{name}: its folder is not a room (stageid_room() in its CMakeLists.txt)"
         return
@@ -115,7 +116,7 @@ def include_faults(tree, path, name, used):
         yield f"{name}: not listed in {folder_of(name)}/CMakeLists.txt"
     if path.suffix == ".hpp" and "#pragma once" not in text:
         yield f"{name}: no #pragma once"
-    library = "tools" if above else room.library
+    library = name.split("/")[0] if face else "tools" if above else room.library
     for match in INCLUDE.finditer(text):
         place = f"{name}:{text.count(chr(10), 0, match.start()) + 1}"
         quoted, target = match.group(1) == '"', match.group(2)
@@ -134,6 +135,9 @@ def include_faults(tree, path, name, used):
 
 def own_include_faults(tree, place, target, name, room, used):
     floor = target.split("/")[0]
+    if name == f"{name.split('/')[0]}/{name.split('/')[0]}.hpp" and target not in tree.installed and \
+            target != f"{floor}/{floor}.hpp":
+        yield f"{place}: installed, but {target} is not"
     if floor == "tests":
         yield f"{place}: {target}: the product does not include its tests"
     elif floor not in FLOORS or not (tree.root / target).is_file():
