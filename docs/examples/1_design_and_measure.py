@@ -16,8 +16,8 @@ CONFIG = pathlib.Path("configs/experiment/small_stage.yaml")
 
 # %% [markdown]
 # ## A multisine
-# One period on the odd lines of a band. Random phases, or phases that keep its peak low: with the same
-# rms, the same information at less peak force.
+# One period on the odd lines of a band, with random phases or with phases that reduce the crest factor. At the same
+# rms, a lower crest factor gives the same information with a lower peak force.
 
 # %%
 draw = functools.partial(stageid.multisine, sample_rate_hz=2000.0, period_samples=500, low_hz=16.0, high_hz=800.0,
@@ -30,8 +30,8 @@ lines = np.flatnonzero(np.abs(np.fft.rfft(plain)) > 1e-9)
 print(f"{lines.size} lines, {lines[0] * 4.0} to {lines[-1] * 4.0} Hz, every second of 4 Hz")
 
 # %% [markdown]
-# ## The experiment file against the limits of the stage
-# What an experiment will do to the stage is computed before it is measured; it is the program's own table.
+# ## Check the experiment against the limits of the stage
+# `stageid design` predicts forces and motions before the measurement and prints a table.
 
 # %%
 with tempfile.TemporaryDirectory() as folder:
@@ -39,7 +39,8 @@ with tempfile.TemporaryDirectory() as folder:
 
 # %% [markdown]
 # ## The measurement
-# In virtual time and in memory. M realizations of E experiments: arrays [M, E, S, channels]; r is one period.
+# The simulation runs in virtual time and in memory. The arrays are [M, E, S, channels], for M realizations of E
+# experiments. `r` is one period.
 
 # %%
 log = stageid.simulate(CONFIG)
@@ -51,11 +52,11 @@ for m, e in np.ndindex(*r.shape[:2]):
           f"u rms {np.sqrt(np.mean(u[m, e] ** 2)):.2f} N, y peak {1e6 * np.abs(y[m, e]).max():.2f} um")
 
 # %% [markdown]
-# What is periodic repeats; what does not is transient and noise.
+# The change between consecutive periods is transient and noise.
 
 # %%
 P = log.period_samples
 periods = y[0, 0].reshape(-1, P, y.shape[3])
 for before, after in zip(periods, periods[1:]):
-    print(f"change from a period to the next: {1e9 * np.sqrt(np.mean((after - before) ** 2)):8.3f} nm rms")
+    print(f"change from one period to the next: {1e9 * np.sqrt(np.mean((after - before) ** 2)):8.3f} nm rms")
 assert np.std(periods[-1] - periods[-2]) < np.std(periods[1] - periods[0])

@@ -1,5 +1,5 @@
 # %% [markdown]
-# # A frequency response and what is known of its error
+# # A frequency response and its uncertainty
 #
 # Run from the root of the repository, as a script or cell by cell.
 
@@ -12,7 +12,7 @@ log = stageid.simulate("configs/experiment/small_stage.yaml")
 
 # %% [markdown]
 # ## Estimate
-# In closed loop, from the excitation: G = (mean Y) (mean U)^-1 line by line.
+# The estimate uses the excitation, so it is valid in closed loop: G = (mean Y) (mean U)^-1, line by line.
 
 # %%
 frf = stageid.frf(log)
@@ -22,20 +22,20 @@ print(f"noise variance with {frf.noise_dof:g} degrees of freedom, total variance
 
 # %% [markdown]
 # ## Two variances
-# From periods: what repeating the same excitation would give. From realizations: noise, and what a nonlinear stage
-# does to each excitation in another way. This stage is linear: they agree within their scatter.
+# The noise variance is the scatter of periods: the error if the same excitation is repeated. The total variance is the
+# scatter of realizations: noise and nonlinear distortion. This stage is linear, so both agree within their scatter.
 
 # %%
-assert frf.total_variance is not None and frf.noise_variance is not None  # there are realizations, and periods
+assert frf.total_variance is not None and frf.noise_variance is not None  # several realizations and periods
 ratio = np.median(frf.total_variance / frf.noise_variance)
 print(f"median of total over noise variance: {ratio:.2f}")
 relative = np.sqrt(frf.noise_variance) / np.abs(frf.response)
 print(f"relative standard deviation: median {np.median(relative):.1e}, largest {relative.max():.1e}")
 
 # %% [markdown]
-# ## Does the region hold what it promises?
-# Two estimates from other realizations differ by noise alone. The difference of two has the sum of their variances;
-# circles of 95 % shall hold 95 % of the differences.
+# ## Check the confidence circles
+# Two estimates from different realizations differ by noise alone. The variance of their difference is the sum of their
+# variances. 95 % circles should contain 95 % of the differences.
 
 # %%
 first, second = (stageid.frf(log, realizations=[m]) for m in (0, 1))
@@ -44,17 +44,17 @@ difference = np.abs(first.response - second.response) ** 2
 nu = first.noise_dof + second.noise_dof
 variance = first.noise_variance + second.noise_variance
 inside = np.mean(difference < variance * nu * (0.05 ** (-1 / nu) - 1))
-print(f"{100 * inside:.1f} % of {difference.size} differences lie within their circle")
-# Binomial scatter of as many differences, were they independent, is 0.6 %; channels of one output share noise.
+print(f"{100 * inside:.1f} % of {difference.size} differences are within their circle")
+# The binomial scatter would be 0.6 % for independent differences, but channels of one output have common noise.
 assert 0.91 < inside < 0.99
 
 # %% [markdown]
 # ## Fewer samples
-# The local polynomial method needs no waiting for the transient: whole records, the same response.
+# The local polynomial method models the transient. It uses whole records and gives the same response.
 
 # %%
 whole = stageid.frf(log, method="lpm")
 assert whole.noise_variance is not None
 distance = np.abs(whole.response - frf.response) / np.sqrt(whole.noise_variance + frf.noise_variance)
-print(f"lpm from {log.period_samples * 5} samples a run: {np.median(distance):.2f} standard deviations away (median)")
+print(f"lpm from {log.period_samples * 5} samples per run: {np.median(distance):.2f} standard deviations away (median)")
 assert np.median(distance) < 2

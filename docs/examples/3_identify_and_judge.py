@@ -1,5 +1,5 @@
 # %% [markdown]
-# # Identify a modal model and judge it
+# # Identify a modal model and validate it
 #
 # Run from the root of the repository, as a script or cell by cell.
 
@@ -14,7 +14,7 @@ held_back = stageid.frf(log, realizations=[2])
 
 # %% [markdown]
 # ## Candidates
-# Peaks of the mode indicator; a second opinion from poles that stay while the order rises.
+# Candidates are peaks of the mode indicator. Poles that are stable over increasing orders are a second opinion.
 
 # %%
 for peak in stageid.modes(frf.select(band_hz=(120, 800))):
@@ -24,8 +24,8 @@ print(f"{len(stable)} stable poles over 20 orders")
 
 # %% [markdown]
 # ## Fit
-# P(s) = sum of modes, a suspension with known frequencies, and the compliance of what lies above the band; through
-# hold, delay and sampler. Every decision is told.
+# P(s) is the sum of modes, a suspension with known frequencies, and the compliance of modes above the band. It
+# includes hold, delay and sampler. `fit.decisions` lists every decision.
 
 # %%
 fit = stageid.fit(frf, rigid_body="suspension:0.4:0.5", direct_term="full")
@@ -40,9 +40,9 @@ for found in fit.model.modes():
               f"shape at the sensors {np.round(found['output_shape'].real, 2)}")
 
 # %% [markdown]
-# ## Judge
-# On a realization that the fit has not seen. Where the error is noise, chi-square per degree of freedom is what
-# variances of so few periods let one expect.
+# ## Validate
+# Validation uses a realization that was not fitted. If the error is noise, chi-square per degree of freedom is close to
+# its expected value, which depends on the number of periods.
 
 # %%
 figures = stageid.validate(fit.model, held_back)
@@ -50,7 +50,7 @@ print(f"relative error {figures['relative_rms_error']:.2e}, chi-square {figures[
       f"(of noise alone {figures['expected_chi_square']:.2f}), "
       f"residuals above their 95 % point {100 * figures['whitened_above_95']:.1f} %")
 
-# Too few modes: the same figures tell.
+# The same figures detect a model with too few modes.
 poor = stageid.fit(frf, modes=1, rigid_body="suspension:0.4:0.5", direct_term="full").model
 too_few = stageid.validate(poor, held_back)
 print(f"with one mode: relative error {too_few['relative_rms_error']:.2e}, "
@@ -58,7 +58,7 @@ print(f"with one mode: relative error {too_few['relative_rms_error']:.2e}, "
 assert too_few["chi_square_per_dof"] > 100 * figures["chi_square_per_dof"]
 
 # %% [markdown]
-# The model knows its own uncertainty: below that of the data, for it has fewer parameters than they have numbers.
+# The standard deviation of the model is smaller than that of the data, because the model has fewer parameters.
 
 # %%
 assert frf.noise_variance is not None and fit.response_variance is not None

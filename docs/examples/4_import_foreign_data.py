@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Data from other programs
 #
-# Run from the root of the repository, as a script or cell by cell. The files are made here, as a bench might have
-# written them; the numbers come from the simulator.
+# Run from the root of the repository, as a script or cell by cell. The script creates the files itself, in the form of
+# typical test bench files, with data from the simulator.
 
 # %%
 import pathlib
@@ -20,11 +20,11 @@ reference = stageid.frf(ours)
 
 # %% [markdown]
 # ## Samples in arrays
-# A data acquisition system that counts: integers and a scale for every channel, one matrix for each run. Stack the
-# runs as [realizations, experiments, samples, channels] and give the excitation's period; that is a log.
+# A data acquisition system often stores integer counts, one scale per channel and one matrix per run. Stack the runs
+# as [realizations, experiments, samples, channels], and add one period of the excitation.
 
 # %%
-scale = np.array([2e-9, 2e-9])  # m a count
+scale = np.array([2e-9, 2e-9])  # m per count
 counts = np.round(y / scale).astype(np.int32)
 np.savez(folder / "bench.npz", force=u, counts=counts, scale=scale, excitation=r)
 
@@ -38,8 +38,8 @@ print(f"from counts of 2 nm: relative difference {np.median(error):.1e} (median)
 assert np.median(error) < 0.1
 
 # %% [markdown]
-# ## Samples in a file of MATLAB
-# Several runs behind each other in one matrix: a map tells what is what, as `stageid import` wants it.
+# ## Samples in a MATLAB file
+# Several runs are stored one after the other in one matrix. A map for `stageid import` assigns the arrays.
 
 # %%
 M, E, S, n_u = u.shape
@@ -61,7 +61,7 @@ assert np.array_equal(stageid.frf(folder / "bench.slog").response, reference.res
 
 # %% [markdown]
 # ## A response alone
-# Frequencies and complex numbers are enough for a fit. Here hold and delay were divided out by the other program.
+# Frequencies and a complex response are enough for a fit. Here the other program has divided out hold and delay.
 
 # %%
 plain = reference.compensate("hold", 600e-6)

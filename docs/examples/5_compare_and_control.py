@@ -1,5 +1,5 @@
 # %% [markdown]
-# # Two days, and a controller from the model
+# # Compare two days, and design a controller
 #
 # Run from the root of the repository, as a script or cell by cell.
 
@@ -29,7 +29,7 @@ def identify(name: str, stage: str) -> stageid.Model:
 
 # %% [markdown]
 # ## Two days
-# On the second day the plate is a little softer.
+# On the second day the plate is slightly softer.
 
 # %%
 stage = (configs / "stage/small_stage.yaml").read_text()
@@ -49,13 +49,13 @@ for pair in stageid.pair_modes(monday, tuesday):
     changes.append(100 * pair["frequency_difference"])
     print(f"{a['natural_frequency_hz']:8.2f} Hz moved by {moved:6.2f} Hz, {abs(moved) / std:6.1f} standard "
           f"deviations; MAC {pair['output_mac']:.3f}")
-# All frequencies of a plate fall in proportion: 1 / 170 = 0.588 %.
-print(f"the best known mode moved by {changes[0]:.3f} %")
+# All frequencies of a plate change in proportion: 1 / 170 = 0.588 %.
+print(f"the first mode moved by {changes[0]:.3f} %")
 assert abs(changes[0] + 100 / 170) < 0.05
 
 # %% [markdown]
 # ## A regulator
-# The sampled state space is exact at the samples; whole samples of delay stand beside it and become states.
+# The sampled state space is exact at the samples. Whole samples of delay are separate; here they become states.
 
 # %%
 A, B, C, D, input_delay, output_delay = monday.sampled_state_space()
@@ -63,7 +63,7 @@ n, n_u = B.shape
 delay = int(input_delay.max() + output_delay.max())
 print(f"order {n}, {delay} whole samples of delay")
 
-# x[n+1] = A x + B v_1,  v_1 = u delayed: a chain of registers.
+# x[n+1] = A x + B v_1, with v_1 the delayed u: a chain of registers.
 size = n + delay * n_u
 Ad, Bd = np.zeros((size, size)), np.zeros((size, n_u))
 Ad[:n, :n] = A
@@ -75,7 +75,7 @@ if delay:
 else:
     Bd[:n] = B
 
-# Penalize positions (1 um as much as 10 N), then see where the loop's poles are.
+# Penalize positions (1 um as much as 10 N), then compute the poles of the loop.
 Cd = np.hstack([C, np.zeros((C.shape[0], size - n))])
 Q = Cd.T @ Cd / 1e-6**2 + 1e-12 * np.eye(size)
 R = np.eye(n_u) / 10.0**2

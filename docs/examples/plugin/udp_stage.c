@@ -1,5 +1,5 @@
-/* A stage behind UDP, as a back end for stageid. One datagram each way a sample:
- *   to the stage:   uint64 cycle (~0: start a run, seed behind it), then the commands as doubles
+/* A stage connected by UDP, as a back end for stageid. One datagram per sample in each direction:
+ *   to the stage:   uint64 cycle (~0: start a run, followed by the seed), then the commands as doubles
  *   from the stage: uint64 cycle of the measurement, then the measurements as doubles
  * Build: cc -O2 -shared -fPIC -o udp_stage.so udp_stage.c   (stageid_backend.h is installed with stageid) */
 #include <arpa/inet.h>
@@ -50,10 +50,10 @@ static void* open_stage(const struct stageid_request* request, char* error, size
 
 static void describe(void* self, struct stageid_description* description) {
   (void)self;
-  description->virtual_time = 1; /* the peer answers when asked: its sample counter is the clock */
+  description->virtual_time = 1; /* the sample counter of the peer is the clock */
 }
 
-/* Sends one datagram and waits for the measurement of cycle `wanted`; older ones are passed over. */
+/* Sends one datagram and waits for the measurement of cycle `wanted`; older ones are discarded. */
 static int ask(struct udp_stage* stage, struct datagram* out, uint32_t values, uint64_t wanted,
                struct stageid_sample* sample) {
   struct datagram in;
@@ -72,7 +72,7 @@ static int start(void* self, uint64_t run_seed, struct stageid_sample* first, ch
   struct datagram out = {.cycle = ~(uint64_t)0};
   memcpy(out.values, &run_seed, sizeof run_seed);
   if (ask(self, &out, 1, 0, first) == STAGEID_OK) return 0;
-  snprintf(error, error_size, "the stage does not answer; is it switched on, and the port right?");
+  snprintf(error, error_size, "the stage does not answer; check its power supply and the port");
   return 1;
 }
 
@@ -84,7 +84,7 @@ static int exchange(void* self, uint64_t cycle, const double* u, int64_t deadlin
   return ask(stage, &out, stage->actuators, cycle + 1, next);
 }
 
-static void stop(void* self) { /* a datagram without commands: force to zero */
+static void stop(void* self) { /* a datagram without commands sets the force to zero */
   const uint64_t cycle = 0;
   (void)!send(((struct udp_stage*)self)->socket, &cycle, sizeof cycle, 0);
 }
