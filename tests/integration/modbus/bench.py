@@ -84,7 +84,7 @@ class Bench:
         return process, int(found.group(1)) if found else None
 
     def stage(self, name, backend='modbus', door='tcp: {port: 1502}', supervisor=None, unit=1):
-        text = re.sub(r'# What stands.*?(?=actuators:)', '', self.stage_text, flags=re.S)
+        text = re.sub(r'# The supervisor.*?(?=actuators:)', '', self.stage_text, flags=re.S)
         text = re.sub(r'modbus:\n(  .*\n)+', '', text)
         line = RTU if door.startswith('rtu') else TCP
         group = (f'modbus: {{{door}, unit: {unit}, response_s: {line.response_s}, '
