@@ -6,5 +6,6 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/loop/run_experiment.hpp"
 #include "acquisition/loop/run_resident.hpp"
+#include "acquisition/record/experiment_plan_file.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"

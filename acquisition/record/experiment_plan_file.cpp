@@ -33,8 +33,8 @@
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/output_file.hpp"
+#include "acquisition/record/experiment_plan_file.hpp"
 #include "excitation/multisine/multisine_lines.hpp"
-#include "excitation/plan/experiment_plan.hpp"
 
 namespace stageid {
 namespace {

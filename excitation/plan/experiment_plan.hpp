@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -109,10 +108,5 @@ class ExperimentPlan {
   /// because drawing again is cheaper than keeping.
   std::vector<Eigen::MatrixXd> reduced_phase_rad_;
 };
-
-/// Writes / reads excitation.h5 (docs/formats.md).
-/// @throws FileError, FormatError
-void write_experiment_plan(const std::filesystem::path& file, const ExperimentPlan& plan);
-ExperimentPlan read_experiment_plan(const std::filesystem::path& file);
 
 }  // namespace stageid

@@ -9,6 +9,7 @@
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/record/experiment_plan_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/limited_plan.hpp"

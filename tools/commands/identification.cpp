@@ -14,6 +14,7 @@
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/experiment_plan_file.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/design_command.hpp"

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/record/experiment_plan_file.hpp"
 #include "tools/experiment/limited_plan.hpp"
 
 namespace stageid {

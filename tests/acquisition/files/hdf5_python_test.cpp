@@ -5,6 +5,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/record/experiment_plan_file.hpp"
 #include "excitation/plan/experiment_plan.hpp"
 #include "tests/support/python_script.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
-#include "excitation/plan/experiment_plan.hpp"
+#include "acquisition/record/experiment_plan_file.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
 #include "tests/support/file_size_limit.hpp"
 #include "tests/support/temporary_directory.hpp"

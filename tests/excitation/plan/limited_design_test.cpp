@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 
+#include "acquisition/record/experiment_plan_file.hpp"
 #include "excitation/plan/joint_crest_reduction.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
 #include "tests/support/temporary_directory.hpp"
