@@ -245,9 +245,8 @@ class Experiment {
         return;
       case StopReason::misses:
         result_.end = ExperimentEnd::fault;
-        result_.message =
-            fmt::format("stage '{}': too many consecutive bad cycles; the last one: {}", info.name,
-                        to_string(loop_.last_trouble()));
+        result_.message = fmt::format("stage '{}': too many bad cycles; the last one: {}",
+                                      info.name, to_string(loop_.last_trouble()));
         return;
       case StopReason::plant:
         result_.end = ExperimentEnd::fault;

@@ -135,7 +135,7 @@ std::string undetermined_poles(const FitProblem& problem, const FitParameters& b
       if (std::find(held.begin(), held.end(), i) != held.end())
         reason = "a pole is at a bound, where the lines contain no information on it";
       else if (!(shares.segment(first, n).minCoeff() > kSmallestShare))
-        reason = "the rest of the model can compensate a change of its denominator";
+        reason = "the rest of the model can compensate for a change of its denominator";
       else
         reason = too_small(problem, beta, cost, removal_cost[i], i);
       if (reason.empty() && covariance.size() > 0)

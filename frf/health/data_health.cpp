@@ -227,8 +227,7 @@ void Examination::check_excitation() {
                      counted(record_.axes.size(), "axis", "axes")),
          "use one experiment per axis, or an orthogonal scheme");
   else if (!std::isfinite(worst))
-    find(Severity::fault, Cause::excitation, "",
-         "an axis is not excited on a line on which other axes are",
+    find(Severity::fault, Cause::excitation, "", "some lines excite only some of the axes",
          fmt::format("at {:.4g} Hz", record_.frequency_hz[at]),
          "excite all axes on the same lines");
   else if (worst > kWorstExcitation)
@@ -255,7 +254,7 @@ void Examination::check_inputs() {
   if (std::isfinite(median) && median > kWorstInputs)  // else an input without power, named already
     find(Severity::doubt, Cause::inputs, "", "the loop makes the inputs almost linearly dependent",
          fmt::format("median cond(U) {:.3g} above {:.4g} Hz", median, 0.5 * last_hz),
-         "put more power on the weak directions: shape the excitation by the sensitivity");
+         "put more power into the weak directions: shape the excitation by the sensitivity");
 }
 
 void Examination::check_excluded() {

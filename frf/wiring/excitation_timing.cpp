@@ -167,7 +167,7 @@ Finding to_finding(const ExcitationDelay& delay) {
   if (delay.certain) {
     finding.what = fmt::format("the excitation was recorded {} {}; the FRF is unaffected", samples,
                                late ? "late" : "early");
-    finding.remedy = "correct the recording time of the excitation";
+    finding.remedy = "correct the time stamps of the excitation";
   } else {
     finding.what = fmt::format(
         "the excitation was recorded {} {} than all actuators; if only the excitation is affected, "

@@ -60,7 +60,7 @@ ExportCommand::ExportCommand(CLI::App& app, Console& console) : console_(console
       ->required();
   command->add_option(
       "--frf", frf_,
-      "for a model: its response on the lines of this FRF within the band of the fit");
+      "for a model: evaluate the response at the lines of this FRF, within the band of the fit");
   command
       ->add_option("--driving-point", driving_point_,
                    "OUTPUT INPUT at the same point and in the same direction; .h5, .mat, .npz: "

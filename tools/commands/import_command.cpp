@@ -93,7 +93,7 @@ ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console
   command->add_option(
       "-o,--output", output_,
       "frf.h5; for a log run.slog or run.h5; for the modes of a universal file modes.json, for "
-      "'fit --modes'; without -o the arrays of the file are listed, as a help to write a map");
+      "'fit --modes'; without -o the arrays of the file are listed, to help you write a map");
   command->add_option(
       "--map", map_,
       "YAML file with the meaning of the arrays; needed if the format does not define it");

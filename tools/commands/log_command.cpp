@@ -182,7 +182,7 @@ void LogCommand::verify() const {
   }
   const std::string what = !report.damage.empty()
                                ? "damaged at " + counted(report.damage.size(), "place")
-                               : "was not closed: the experiment was cut off";
+                               : "was not closed: the experiment was interrupted";
   throw FormatError(file_, "",
                     fmt::format("{}; save the intact part with 'stageid log recover {} -o "
                                 "NEW.slog', or continue the experiment with --resume",

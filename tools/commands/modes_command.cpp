@@ -23,7 +23,7 @@ ModesCommand::ModesCommand(CLI::App& app, Console& console) : console_(console) 
   command->add_option("--kind", kind_, "response | accelerance | whitened (by the variances)")
       ->check(CLI::IsMember({"response", "accelerance", "whitened"}))
       ->capture_default_str();
-  command->add_option("--prominence", prominence_db_, "least prominence of a peak, dB")
+  command->add_option("--prominence", prominence_db_, "minimum prominence of a peak, dB")
       ->check(kNotNegative)
       ->capture_default_str();
   command->final_callback([this] { run(); });

@@ -44,9 +44,9 @@ constexpr const char* kWelcome =
     R"(stageid measures and identifies multivariable motion stages in closed loop. Three things to try:
 
   stageid identify configs/experiment/wafer_stage_quick.yaml -o first
-      the whole job on a simulated wafer stage, up to a model and first/report.html
+      identify a simulated wafer stage; writes a model and first/report.html
   stageid import YOUR_LOG.csv
-      the contents of a log of another program (also .mat, .h5, .npz); docs/guide.md continues to a report
+      the contents of a log from another program (also .mat, .h5, .npz); docs/guide.md describes the next steps
   stageid config schema
       all keys of a configuration
 

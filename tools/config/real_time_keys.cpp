@@ -14,7 +14,7 @@ void describe_real_time(ConfigVisitor& visitor, RealTimeKeys& keys) {
                  "lock the memory so that it is never swapped");
   keys.options.lock_memory = lock == 1;
   count(visitor, "misses_allowed", keys.misses_allowed, 0, 1'000'000, kOptional,
-        "leaky bucket: +2 per late cycle, -1 per cycle in time; above this a controlled stop");
+        "leaky bucket: +2 per bad cycle, -1 per good one; above this value the run is stopped");
 }
 
 }  // namespace stageid

@@ -245,7 +245,8 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   v.number("stuck_sensor_s", s.limits.stuck_sensor_s, not_negative("s"), kOptional,
            "stop if a sensor repeats one value for this long; 0 disables the check");
   v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
-           "time in which a stop ramps the excitation to zero, in closed loop if it is healthy");
+           "time in which a stop ramps the excitation to zero, in closed loop if the loop can be "
+           "trusted");
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
            "of the thermal rms limit");
   v.group(
