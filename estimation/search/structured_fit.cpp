@@ -18,7 +18,7 @@
 #include "estimation/search/search_advice.hpp"
 #include "estimation/search/undetermined_modes.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
-#include "estimation/uncertainty/mode_deviation.hpp"
+#include "estimation/uncertainty/mode_shape_deviation.hpp"
 
 namespace stageid {
 namespace {

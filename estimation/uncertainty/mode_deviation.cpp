@@ -1,159 +1,57 @@
 #include "estimation/uncertainty/mode_deviation.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <vector>
 
-#include "estimation/modal/modal_form.hpp"
-#include "estimation/modal/singular_shapes.hpp"
-#include "estimation/modal/submodel_residues.hpp"
-#include "estimation/uncertainty/dense_covariance.hpp"
+#include "estimation/model/poles.hpp"
 
 namespace stageid {
 namespace {
 
-using Complex = std::complex<double>;
-
-/// M = B(lambda) / a_2 as mode_shapes() decomposes it.
-class ModeResidue {
- public:
-  explicit ModeResidue(const Submodel& mode)
-      : mode_(mode),
-        lambda_(described_pole(mode)),
-        M_(numerator_at(mode, lambda_) / mode.denominator[2]),
-        svd_(M_, Eigen::ComputeFullU | Eigen::ComputeFullV) {
-    const ModeShape shape = mode_shape(mode, 0);
-    if (!(svd_.singularValues()[0] > 0.0)) return;
-    // The shapes are the first singular vectors, turned together.
-    const Complex turn = svd_.matrixU().col(0).dot(shape.output_shape);
-    u_ = turn * svd_.matrixU();
-    v_ = turn * svd_.matrixV();
-    const Eigen::ArrayXd size = shape.output_shape.cwiseAbs();
-    while (size[leading_] < kLeadingComponent * size.maxCoeff()) ++leading_;
-  }
-
-  Eigen::Index parameters() const {
-    return 2 + M_.size() * static_cast<Eigen::Index>(mode_.numerator.size());
-  }
-
-  /// dM / da_q, q = 1, 2: through the pole and through 1 / a_2.
-  Eigen::MatrixXcd denominator_slope(Eigen::Index q) const {
-    const double a1 = mode_.denominator[1];
-    const double a2 = mode_.denominator[2];
-    const Complex dlambda = -std::pow(lambda_, static_cast<int>(q)) / (a1 + 2.0 * a2 * lambda_);
-    Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(M_.rows(), M_.cols());
-    if (mode_.numerator.size() > 1) out = mode_.numerator[1] * (dlambda / a2);
-    if (q == 2) out -= M_ / a2;
-    return out;
-  }
-  /// dM(c) / dB_m(c).
-  Complex numerator_slope(std::size_t m) const {
-    return (m == 0 ? Complex(1.0) : lambda_) / mode_.denominator[2];
-  }
-
-  /// What parameter p moves, which moves M by dM.
-  void slope(const Eigen::MatrixXcd& dM, Eigen::Index p, ModeShapeSlopes& out) const {
-    const Eigen::VectorXd& s = svd_.singularValues();
-    const Eigen::VectorXcd left = u_.adjoint() * (dM * v_.col(0));             // u_r^H dM v_1
-    const Eigen::VectorXcd right = v_.adjoint() * (dM.adjoint() * u_.col(0));  // v_r^H dM^H u_1
-    Eigen::VectorXcd along_u = left / s[0];
-    Eigen::VectorXcd along_v = right / s[0];
-    for (Eigen::Index r = 1; r < s.size(); ++r) {
-      const double gap = s[0] * s[0] - s[r] * s[r];
-      along_u[r] = (s[0] * left[r] + s[r] * right[r]) / gap;
-      along_v[r] = (s[0] * right[r] + s[r] * left[r]) / gap;
-    }
-    along_u[0] = Complex(0.0, left[0].imag() / s[0]);
-    along_v[0] = 0.0;
-    Eigen::VectorXcd du = u_ * along_u;
-    Eigen::VectorXcd dv = v_ * along_v;
-    const Complex turn(0.0, -du[leading_].imag() / u_(leading_, 0).real());
-    du += turn * u_.col(0);
-    dv += turn * v_.col(0);
-    out.output_shape.col(p) = du;
-    out.input_shape.col(p) = dv.conjugate();
-    out.modal_mass[p] = -left[0].real() / (s[0] * s[0]);
-  }
-
- private:
-  const Submodel& mode_;
-  Complex lambda_;
-  Eigen::MatrixXcd M_;
-  Eigen::JacobiSVD<Eigen::MatrixXcd> svd_;
-  Eigen::MatrixXcd u_;
-  Eigen::MatrixXcd v_;
-  Eigen::Index leading_ = 0;
-};
-
-/// sqrt of the diagonal of J C J^T.
-Eigen::VectorXd deviations(const Eigen::MatrixXd& J, const Eigen::MatrixXd& C) {
-  return (J * C).cwiseProduct(J).rowwise().sum().cwiseMax(0.0).cwiseSqrt();
-}
-
-Eigen::VectorXcd deviations(const Eigen::MatrixXcd& J, const Eigen::MatrixXd& C) {
-  Eigen::VectorXcd out(J.rows());
-  out.real() = deviations(Eigen::MatrixXd(J.real()), C);
-  out.imag() = deviations(Eigen::MatrixXd(J.imag()), C);
-  return out;
+/// Free delays are the last globals; one delay of the plant is that of every input.
+void fill_delay_deviations(const FitProblem& problem, const Eigen::MatrixXd& globals,
+                           AdditiveModel& model) {
+  if (problem.delays() == 0) return;
+  const Eigen::VectorXd deviation =
+      globals.diagonal().tail(problem.delays()).cwiseMax(0.0).cwiseSqrt();
+  const bool common = problem.delay == DelayModel::estimate;
+  model.input_delay_std_s.setConstant(problem.n_inputs, deviation[0]);
+  model.output_delay_std_s.setZero(problem.n_outputs);
+  if (common) return;
+  model.input_delay_std_s = deviation.head(problem.n_inputs);
+  model.output_delay_std_s.head(problem.n_outputs - 1) = deviation.tail(problem.n_outputs - 1);
 }
 
 }  // namespace
 
-ModeShapeSlopes mode_shape_slopes(const Submodel& mode) {
-  const ModeResidue residue(mode);
-  const Eigen::Index n_y = mode.numerator[0].rows();
-  const Eigen::Index n_u = mode.numerator[0].cols();
-  ModeShapeSlopes out;
-  out.output_shape.resize(n_y, residue.parameters());
-  out.input_shape.resize(n_u, residue.parameters());
-  out.modal_mass.resize(residue.parameters());
-  Eigen::Index p = 0;
-  for (const Eigen::Index q : {1, 2}) residue.slope(residue.denominator_slope(q), p++, out);
-  Eigen::MatrixXcd dM = Eigen::MatrixXcd::Zero(n_y, n_u);
-  for (std::size_t m = 0; m < mode.numerator.size(); ++m)
-    for (Eigen::Index c = 0; c < dM.size(); ++c) {
-      dM.reshaped()[c] = residue.numerator_slope(m);
-      residue.slope(dM, p++, out);
-      dM.reshaped()[c] = 0.0;
+void fill_deviations(const FitProblem& problem, const ParameterCovariance& covariance,
+                     AdditiveModel& model) {
+  fill_delay_deviations(problem, covariance.globals, model);
+  Eigen::Index first = 0;
+  Eigen::Index f = 0;
+  for (Submodel& s : model.submodels) {
+    const auto order = static_cast<Eigen::Index>(s.denominator.size()) - 1;
+    if (s.is_mode()) {
+      const Eigen::Matrix2d C = covariance.globals.block<2, 2>(first, first);
+      const double a1 = s.denominator[1];
+      const double a2 = s.denominator[2];
+      const Eigen::Vector2d df(0.0, -0.5 * s.natural_frequency_hz() / a2);
+      const Eigen::Vector2d dz = s.damping_ratio() * Eigen::Vector2d(1.0 / a1, -0.5 / a2);
+      // Zero: the mode is at a bound, so the data do not determine its frequency or damping.
+      if (C(1, 1) > 0.0) s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
+      if (C(1, 1) > 0.0 && C(0, 0) > 0.0)
+        s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
+    } else if (order > 0) {
+      const Eigen::MatrixXd C = covariance.globals.block(first, first, order, order);
+      if (C.diagonal().minCoeff() > 0.0)
+        s.poles = pole_estimates(Eigen::Map<const Eigen::VectorXd>(&s.denominator[1], order), C);
     }
-  return out;
-}
-
-std::optional<ModeShapeDeviation> mode_shape_deviation(const Submodel& mode,
-                                                       const Eigen::MatrixXd& covariance) {
-  const ModeShapeSlopes slopes = mode_shape_slopes(mode);
-  const ModeShapeDeviation out = {deviations(slopes.output_shape, covariance),
-                                  deviations(slopes.input_shape, covariance),
-                                  deviations(Eigen::MatrixXd(slopes.modal_mass), covariance)[0]};
-  if (!out.output_shape.allFinite() || !out.input_shape.allFinite() ||
-      !std::isfinite(out.modal_mass))
-    return std::nullopt;
-  return out;
-}
-
-void fill_shape_deviations(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
-  std::vector<FunctionSet> sets;
-  std::vector<std::size_t> modes;
-  for (std::size_t i = 0; i < result.model.submodels.size(); ++i)
-    if (result.model.submodels[i].is_mode()) {
-      modes.push_back(i);
-      sets.push_back(functions_of(result.model, i));
-    }
-  if (modes.empty()) return;
-  const std::vector<DenseCovariance> covariances = dense_covariances(frf, result, options, sets);
-  for (std::size_t m = 0; m < covariances.size(); ++m) {
-    Submodel& mode = result.model.submodels[modes[m]];
-    Eigen::Index first = 0;
-    for (std::size_t i = 0; i < modes[m]; ++i)
-      first += static_cast<Eigen::Index>(result.model.submodels[i].denominator.size()) - 1;
-    const Eigen::MatrixXd& C = covariances[m].sandwich;
-    const Eigen::Index numerators =
-        mode.numerator[0].size() * static_cast<Eigen::Index>(mode.numerator.size());
-    std::vector<Eigen::Index> places = {first, first + 1};
-    for (Eigen::Index b = C.rows() - numerators; b < C.rows(); ++b) places.push_back(b);
-    mode.shape_std = mode_shape_deviation(mode, C(places, places));
+    first += order;
+    for (const Eigen::MatrixXd& B : s.numerator)
+      s.numerator_std.emplace_back(
+          covariance.numerator_variance.col(f++)
+              .unaryExpr([](double v) { return v < 0.0 ? 0.0 : std::sqrt(v); })
+              .reshaped(B.rows(), B.cols()));
   }
 }
 

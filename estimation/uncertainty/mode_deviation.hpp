@@ -1,31 +1,15 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <optional>
-
-#include "estimation/problem/fit_options.hpp"
-#include "frf/response/frf_estimate.hpp"
+#include "estimation/problem/fit_problem.hpp"
+#include "estimation/uncertainty/parameter_covariance.hpp"
 
 namespace stageid {
 
-/// Derivatives of a mode's shapes and mass (see mode_shapes()) to a_1, a_2, vec B_0 and, with general
-/// damping, vec B_1: a column each. Singular vectors move as
-///   du_1 = sum_r u_r (s_1 u_r^H dM v_1 + s_r (u_1^H dM v_r)^*) / (s_1^2 - s_r^2) + (the rest of dM v_1) / s_1,
-/// both shapes then turn so that the leading component stays real.
-/// Source: J. R. Magnus and H. Neudecker, Matrix Differential Calculus, 3rd ed. (2007), chapter 8.
-struct ModeShapeSlopes {
-  Eigen::MatrixXcd output_shape;  ///< n_y x parameters
-  Eigen::MatrixXcd input_shape;   ///< n_u x parameters
-  Eigen::RowVectorXd modal_mass;
-};
-ModeShapeSlopes mode_shape_slopes(const Submodel& mode);
-
-/// Their standard deviations. @param covariance of those parameters
-/// @returns nothing where a deviation is not finite: the mode has no shape, or two poles that are equal
-std::optional<ModeShapeDeviation> mode_shape_deviation(const Submodel& mode,
-                                                       const Eigen::MatrixXd& covariance);
-
-/// Fills Submodel::shape_std of every mode; no mode where the covariances would be too large.
-void fill_shape_deviations(const FrfEstimate& frf, const FitOptions& options, FitResult& result);
+/// Standard deviations of the model's natural frequencies, damping ratios, other poles, delays and numerators, from the
+/// covariance of the parameters. Delta method:
+///   df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
+/// A parameter at a bound has none.
+void fill_deviations(const FitProblem& problem, const ParameterCovariance& covariance,
+                     AdditiveModel& model);
 
 }  // namespace stageid

@@ -72,8 +72,9 @@ TEST_F(GeneralStructure, KeysSayWhatFlagsSay) {
   EXPECT_EQ(config.fit.submodels[0].frequency_hz, (std::vector<double>{120.0, 180.0}));
   EXPECT_EQ(config.fit.submodels[0].damping_ratio, (std::vector<double>{0.01}));
   EXPECT_EQ(config.fit.submodels[1].shape.numerator_degree, 0);
-  EXPECT_EQ(config.fit.modes, "auto");
-  EXPECT_EQ(config.fit.rigid_body, "suspension:0.4:0.5");
+  EXPECT_EQ(config.fit.modes.kind, ModesRequest::Kind::search);
+  EXPECT_EQ(config.fit.rigid_body.kind, RigidBodyRequest::Kind::suspension);
+  EXPECT_EQ(config.fit.rigid_body.suspension_hz, (std::vector<double>{0.4, 0.5}));
 }
 
 }  // namespace test_general_structure

@@ -1,7 +1,7 @@
 // Standard deviations of mode shapes and masses, covariance of all parameters and circles around P, against
 // differences, dense matrices and what happens when the measurement is repeated.
 
-#include "estimation/uncertainty/mode_deviation.hpp"
+#include "estimation/uncertainty/mode_shape_deviation.hpp"
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@
 #include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid {
-namespace test_mode_deviation {
+namespace test_mode_shape_deviation {
 
 using test::covariance_stage;
 using test::DenseProblem;
@@ -256,5 +256,5 @@ TEST(DenseCovariance, SaysWhyThereIsNone) {
   EXPECT_NE(fit.decisions.back().find("no standard deviations"), std::string::npos);
 }
 
-}  // namespace test_mode_deviation
+}  // namespace test_mode_shape_deviation
 }  // namespace stageid

@@ -1,0 +1,47 @@
+#include "tools/exchange/import/foreign_frf.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "tools/exchange/arrays/frf_arrays.hpp"
+#include "tools/exchange/arrays/frf_csv.hpp"
+#include "tools/exchange/arrays/touchstone_reader.hpp"
+#include "tools/exchange/import/foreign_arrays.hpp"
+#include "tools/exchange/uff/uff_frf.hpp"
+
+namespace stageid {
+namespace {
+
+[[noreturn]] void ask_for_map(const ArrayList& arrays) {
+  std::string shown;
+  constexpr std::size_t kMost = 6;
+  for (std::size_t k = 0; k < arrays.arrays.size() && k < kMost; ++k)
+    shown += (k == 0 ? "" : ", ") + arrays.arrays[k].name;
+  throw FormatError(
+      arrays.file, "",
+      fmt::format(
+          "the meaning of its {} arrays ({}{}) is unknown; write a map with kind: frf or kind: log "
+          "(docs/exchange.md) and pass it with --map; 'stageid import {}' lists the arrays",
+          arrays.arrays.size(), shown, arrays.arrays.size() > kMost ? ", ..." : "",
+          arrays.file.string()));
+}
+
+}  // namespace
+
+FrfEstimate read_foreign_frf(const std::filesystem::path& file, const std::filesystem::path& output,
+                             std::vector<std::string>& notes) {
+  if (is_touchstone(file)) {
+    TouchstoneFrf touchstone = read_touchstone(file);
+    if (!touchstone.note.empty()) notes.push_back(touchstone.note);
+    return std::move(touchstone.frf);
+  }
+  if (is_frf_csv(file)) return read_frf_csv(file);
+  if (is_uff_name(file)) return frf_of_uff(file, read_uff(file));
+  const ArrayList arrays = read_foreign_arrays(file);
+  if (!holds_frf(arrays)) ask_for_map(arrays);
+  return frf_of_arrays(arrays, output);
+}
+
+}  // namespace stageid
