@@ -275,7 +275,7 @@ TEST_F(Hdf5Log, RefusesWrongShapes) {
 }
 
 TEST_F(Hdf5Log, RefusesRunsThatCannotBe) {
-  expect_refused({.ids = {{0, 0}, {0, 0}}}, "/runs/0001", "once");
+  expect_refused({.ids = {{0, 0}, {0, 0}}}, "/runs/0001", "duplicate");
   expect_refused({.ids = {{0, 0}, {-1, 0}}}, "/runs/0001", "realization -1");
   expect_refused({.ids = {{0, 0}, {0, -2}}}, "/runs/0001", "experiment -2");
   expect_refused({.ids = {{0, 0}, {1LL << 33, 0}}}, "/runs/0001", "out of range");

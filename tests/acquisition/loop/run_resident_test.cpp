@@ -148,7 +148,7 @@ TEST_F(RunResident, AStageLostInADownloadKeepsItsRows) {
   stage_.loses_download = 1;
   const ExperimentResult result = measure();
   EXPECT_EQ(result.end, ExperimentEnd::fault);
-  EXPECT_THAT(result.message, HasSubstr("the host stopped sending"));
+  EXPECT_THAT(result.message, HasSubstr("the node fell silent"));
   EXPECT_THAT(samples_of_runs(), testing::ElementsAre(kSamples, kSamples / 2));
   EXPECT_TRUE(complete(0));
   EXPECT_FALSE(complete(1));

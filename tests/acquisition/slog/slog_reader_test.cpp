@@ -225,7 +225,7 @@ TEST(SlogFormat, TheNumpyLinesOfTheHeaderReadALog) {
   }
   const TemporaryDirectory directory;
   test::write_small_log(directory / "run.slog", 2, 10);
-  std::ifstream header(std::string(STAGEID_SOURCE_DIR) + "/acquisition/slog_format.hpp");
+  std::ifstream header(std::string(STAGEID_SOURCE_DIR) + "/acquisition/slog/slog_format.hpp");
   std::ofstream script(directory / "read.py");
   for (std::string line; std::getline(header, line);) {
     if (line.rfind("//   import numpy", 0) == 0) {

@@ -225,7 +225,7 @@ TEST_F(ModelFile, DeviationsThatDoNotBelongToTheNumerators) {
     return [change](Json& root) { change(root["submodels"][1]["numerator_std"]); };
   };
   expect_format_error(changed([](Json& std) { std.erase(1); }), "numerator_std",
-                      "as many matrices as numerator");
+                      "as many matrices as");
   expect_format_error([](Json& root) { root["output_delay_std_s"][1] = -1e-6; },
                       "output_delay_std_s", "negative standard deviation");
   expect_format_error(changed([](Json& std) { std[0][1][2] = -1.0; }), "numerator_std",
@@ -296,7 +296,7 @@ TEST_F(ModelFile, NumbersThatAreNone) {
   expect_format_error([&](Json& root) { root["input_delay_s"][0] = "fast"; }, "/input_delay_s/0",
                       "number");
   expect_format_error([&](Json& root) { root["sample_rate_hz"] = -1.0; }, "/sample_rate_hz",
-                      "negative");
+                      "must be 0 or more");
   expect_format_error([&](Json& root) { root["fit"]["cost"] = "low"; }, "/fit/cost", "number");
   expect_format_error([&](Json& root) { root["cost_history"][1] = nothing; }, "/cost_history/1",
                       "number");
@@ -318,7 +318,7 @@ TEST_F(ModelFile, WrongShapes) {
                       "2 numbers");
   expect_format_error([](Json& root) { root["inputs"] = Json::array(); }, "/inputs",
                       "at least one");
-  expect_format_error([](Json& root) { root["inputs"][1] = 7; }, "/inputs/1", "text");
+  expect_format_error([](Json& root) { root["inputs"][1] = 7; }, "/inputs/1", "string");
   expect_format_error([](Json& root) { root["fit"]["band_hz"] = Json::array({1.0}); },
                       "/fit/band_hz", "two");
 }

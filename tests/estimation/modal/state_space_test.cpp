@@ -173,7 +173,7 @@ TEST(StateSpace, RefusesWhatHasNoneInThisForm) {
   EXPECT_THAT([] { state_space(lag_model({2.0, 1.0}, 0, 1)); }, refuses("coincide"));
   EXPECT_THAT([] { state_space(lag_model({2.2, 1.4, 0.2}, 0, 1)); }, refuses("coincide"));
   EXPECT_THAT([] { state_space(lag_model({}, 3, 1)); }, refuses("integrators"));
-  EXPECT_THAT([] { state_space(lag_model({1.0}, 0, 3)); }, refuses("improper"));
+  EXPECT_THAT([] { state_space(lag_model({1.0}, 0, 3)); }, refuses("must be proper"));
   EXPECT_THAT([] { state_space(lag_model({1.0}, 0, 0)); }, refuses("numerator"));
 }
 

@@ -246,8 +246,7 @@ TEST_F(SmallStage, RoundsInARowThatOnlyModelColourEndTheSearch) {
   EXPECT_TRUE(watch.ended());
   EXPECT_FALSE(watch.by_delay());
   EXPECT_EQ(watch.model().model.submodels.size(), kept);
-  EXPECT_THAT(watch.finding(),
-              testing::HasSubstr("nothing that its last 6 steps added is a resonance"));
+  EXPECT_THAT(watch.finding(), testing::HasSubstr("its last 6 steps added no resonance"));
 }
 
 /// Whether six rounds that each went from `before` to `now` end a search.

@@ -244,7 +244,7 @@ const Damage kDamages[] = {
        write_good(f);
        f.write_complex("/response", {2, 2, 1}, kTwo);
      },
-     "/response: shape is [2 x 2 x 1]; [2 x 1 x 1] belongs there"},
+     "/response: shape is [2 x 2 x 1]; expected [2 x 1 x 1]"},
     {"VarianceShape",
      [](Hdf5File& f) {
        f.write_attribute("/", "format", std::string("stageid-frf"));

@@ -207,7 +207,8 @@ TEST(PlantFrfErrors, LogsOfDifferentStages) {
       AllOf(HasSubstr("other.slog"), HasSubstr("sensor channels"), HasSubstr("memory.slog")));
   second = small_log();
   second.log_info.sample_rate_hz = 2000.0;
-  EXPECT_THAT(message_of<std::invalid_argument>({&first, &second}), HasSubstr("other sample rate"));
+  EXPECT_THAT(message_of<std::invalid_argument>({&first, &second}),
+              HasSubstr("different sample rate"));
 }
 
 TEST(PlantFrfErrors, ALogWithoutRateOrPeriod) {

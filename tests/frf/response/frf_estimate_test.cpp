@@ -106,7 +106,7 @@ TEST(SelectChannels, NamesTheUnknownChannelAndThoseThereAre) {
   EXPECT_THAT(message({"a1"}, {"a1"}),
               AllOf(HasSubstr("unknown output 'a1'"), HasSubstr("z1, z2")));
   EXPECT_THAT(message({}, {"z1"}), HasSubstr("no input"));
-  EXPECT_THAT(message({"a1", "a1"}, {"z1"}), HasSubstr("twice"));
+  EXPECT_THAT(message({"a1", "a1"}, {"z1"}), HasSubstr("duplicate"));
 }
 
 struct Fault {
@@ -168,7 +168,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"units", [](FrfEstimate& f) { f.outputs.units.pop_back(); },
               "outputs: 1 unit for 2 channels"},
         Fault{"same_name", [](FrfEstimate& f) { f.inputs.names[2] = "a1"; },
-              "inputs: 'a1' stands there twice"},
+              "inputs: duplicate channel name 'a1'"},
         Fault{"rate", [](FrfEstimate& f) { f.sample_rate_hz = -1.0; }, "sample_rate_hz"},
         Fault{"delay", [](FrfEstimate& f) { f.delay_s = kNan; }, "delay_s"},
         Fault{"dof", [](FrfEstimate& f) { f.noise_dof = -1.0; }, "noise_dof"},

@@ -236,7 +236,8 @@ TEST(CanStage, StartRefusesInWords) {
     Host(rig).start();
     FAIL() << "interlock";
   } catch (const StageError& error) {
-    EXPECT_STREQ(error.what(), "can: pair0: the node refuses: the interlock is open; close it");
+    EXPECT_STREQ(error.what(),
+                 "can: pair0: the node refused the command: the interlock is open; close it");
   }
 }
 

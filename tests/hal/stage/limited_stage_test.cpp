@@ -188,7 +188,7 @@ TEST_F(LimitedStageTest, HoldsTheLastMeasurementInPlaceOfNan) {
   stage_->stop();
   EXPECT_EQ(
       describe_stop(*stage_),
-      "sensor u: the measurement is not finite (cycle 2); the loop was opened; no brake, 0.0055 "
+      "sensor u: the measurement is not finite (cycle 2); the loop was opened; not braked, 0.0055 "
       "m/s when the forces were cut");
 }
 

@@ -107,7 +107,7 @@ TEST(LoopGuard, LearnsThatTheStageAnswersTheOtherWayRound) {
   EXPECT_LT(loop.stage->emergency().response, -0.5);
   EXPECT_LT(loop.watch->largest_m, 2.0 * test::kStopWindow);
   EXPECT_LT(loop.watch->speed_m_s(), 1e-3);
-  EXPECT_THAT(describe_stop(*loop.stage), HasSubstr("times as expected; braked"));
+  EXPECT_THAT(describe_stop(*loop.stage), HasSubstr("times the expected one; braked"));
 }
 
 TEST(LoopGuard, ASpeedLimitBrakes) {

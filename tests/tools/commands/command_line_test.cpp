@@ -19,7 +19,7 @@ TEST_F(CommandLine, Usage) {
   fail({"config", "schema", "stge"}, 2, "; did you mean 'stage'?");
   fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads: '-1' is not 0 or more");
   fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
-  fail({"log"}, 2, "a subcommand is missing: one of info, verify, recover, convert; see");
+  fail({"log"}, 2, "a subcommand is missing; use one of info, verify, recover, convert; see");
   fail({"log", "inf", "a.slog"}, 2, "unknown argument 'inf'; did you mean 'info'?");
   fail({"log", "conv", "a.slog"}, 2, "unknown argument 'conv'; did you mean 'convert'?");
   fail({"log", "a.slog"}, 2,

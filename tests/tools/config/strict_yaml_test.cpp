@@ -66,7 +66,7 @@ TEST(StrictYaml, RefusesWhatIsNotOneTextDocument) {
   EXPECT_THAT(error_of(""), HasSubstr("f.yaml:1:1: the file is empty"));
   EXPECT_THAT(error_of("# only a comment\n"), HasSubstr("is empty"));
   EXPECT_THAT(error_of("a: 1\n---\nb: 2\n"), HasSubstr("a second YAML document"));
-  EXPECT_THAT(error_of("a: !!int 3\n"), HasSubstr("f.yaml:1:4: tag"));
+  EXPECT_THAT(error_of("a: !!int 3\n"), HasSubstr("f.yaml:1:4: unsupported tag"));
   EXPECT_THAT(error_of("? [a, b]\n: 1\n"), HasSubstr("a key must be a word"));
   EXPECT_THAT(error_of("a: *missing\n"), HasSubstr("f.yaml:1:"));
   EXPECT_THAT(error_of("a: &x [1, *x]\n"), HasSubstr("refers to itself"));

@@ -36,10 +36,10 @@ TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
   fail({"run", config_, "-o", name("run.h5")}, 2, "'stageid log convert' to obtain .h5");
   make_log();
   fail({"frf", config_, "-o", name("x.h5")}, 2,
-       "is an experiment file, not a log; 'stageid identify'");
+       "is an experiment file, not a log; use it with 'stageid identify'");
   succeed({"log", "convert", name("run.slog"), "-o", name("run.h5")});
   fail({"fit", name("run.h5"), "-o", name("m.json")}, 2,
-       "is a log in HDF5, not a frequency response; 'stageid frf', 'validate'");
+       "is a log in HDF5, not a frequency response; use it with 'stageid frf', 'validate'");
   const std::string log = name("run.slog");
   fail({"export", log, "-o", name("m.mat")}, 2, "run.slog: is a native log, not a model (.json);");
   fail({"validate", log, name("frf.h5")}, 2, "run.slog: is a native log, not a model (.json);");
@@ -57,7 +57,7 @@ TEST_F(BadRequest, MissingFiles) {
   fail({"report", name("none"), "-o", name("r.html")}, 1, "does not exist");
   fail({"log", "info", name("none.slog")}, 1, "none.slog");
   fail({"import", name("none.csv")}, 1, "none.csv: cannot be read: No such file or directory;");
-  fail({"import", name(".")}, 1, "cannot be read: Is a directory; use a file");
+  fail({"import", name(".")}, 1, "cannot be read: Is a directory; give the name of a file");
 }
 
 TEST_F(BadRequest, WhatIsNoTableAndNoReport) {
@@ -81,7 +81,7 @@ TEST_F(BadRequest, Configurations) {
   wrong("period_s: 0.25", "period_s: -1", "period_s: -1 is out of range; expected > 0 s");
   wrong("period_s: 0.25", "period_s: .nan", "is not finite");
   wrong("period_s: 0.25", "period_s: 0.00025", "must be a whole number of samples");
-  wrong("period_s: 0.25", "periods: 3\n  period_s: 0.25", "duplicate key 'period_s'");
+  wrong("period_s: 0.25", "periods: 3\n  period_s: 0.25", "duplicate key 'periods'");
   wrong("band_hz: [16, 800]", "band_hz: [800, 16]", "band_hz: the band is empty");
   wrong("band_hz: [16, 800]", "band_hz: [16, 1000]", "is not below half the sample rate");
   wrong("band_hz: [16, 800]", "band_hz: [16.5, 17]",
@@ -351,20 +351,20 @@ TEST_F(BadRequest, Fits) {
   wrong({"--rigid-body", "half"}, "--rigid-body: got 'half'; expected auto, none, full, a rank");
   wrong({"--rigid-body", "suspention"}, "or suspension:F1:F2 (Hz) (did you mean 'suspension'?)");
   wrong({"--residue-rank", "0"}, "--residue-rank: got '0'; expected full or a rank");
-  wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with --damping general");
-  wrong({"--modes", "500"}, "--modes: 500 is too many; 197 lines support at most 65;");
+  wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with general damping");
+  wrong({"--modes", "500"}, "modes: 500 is too many; 197 lines support at most 65;");
   wrong({"--modes", "0"}, "--modes");
   wrong({"--modes", "12,x"}, "--modes");
   fail({"fit", name("frf.h5"), "-o", name("m.json"), "--modes", "many"}, 1,
        "--modes: 'many': no such file; use auto");
-  wrong({"--modes", "100,5000"}, "--modes: 5000 Hz is not below half the sample rate, 1000 Hz");
+  wrong({"--modes", "100,5000"}, "modes: 5000 Hz is not below half the sample rate, 1000 Hz");
   wrong({"--weighting", "relativ"}, "did you mean 'relative'?");
   wrong({"--hold", "exakt"}, "did you mean 'exact'?");
   wrong({"--delay", "soon"}, "--delay");
   wrong({"--delay", "nan"}, "--delay");
   wrong({"--damping", "viscous"}, "--damping");
   wrong({"--method", "sgd"}, "--method");
-  wrong({"--max-iterations", "0"}, "--max-iterations");
+  wrong({"--max-iterations", "0"}, "max_iterations");
   fail({"fit", name("frf.h5"), "-o", name("m.json"), "--weighting", name("none.h5")}, 1, "none.h5");
   fail({"modes", name("frf.h5"), "--band", "900", "950"}, 2, "contains no lines");
   fail({"frf", name("run.slog"), "-o", name("f.h5"), "--inputs", "a9"}, 2, "a9");

@@ -72,7 +72,7 @@ TEST_F(WeightFile, RefusesMatricesNamingTheLine) {
   std::vector<Complex> values = matrices();
   values[36 + 6 * 4 + 1] = 0.0;
   write_matrices(values);
-  expect_refused("line 1 (2.5 Hz): not Hermitian");
+  expect_refused("line 1 (2.5 Hz): is not Hermitian");
   values = matrices();
   values[2 * 36] = -2.0;
   write_matrices(values);

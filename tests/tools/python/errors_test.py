@@ -92,7 +92,7 @@ class Refused(unittest.TestCase):
                      realizations=[0, -1])
         self.refuses(stageid.RequestError, "covariance_lines|odd", stageid.frf, WORK / "run.slog", covariance_lines=2)
         self.refuses(stageid.FileError, "no.yaml", stageid.frf, WORK / "run.slog", stage=WORK / "no.yaml")
-        self.refuses(stageid.RequestError, "max-iterations", stageid.fit, frf, max_iterations=0)
+        self.refuses(stageid.RequestError, "max_iterations", stageid.fit, frf, max_iterations=0)
         self.refuses(stageid.RequestError, "", stageid.stabilization, frf, most_order=1000)
         self.refuses(stageid.RequestError, "", frf.compensate("delay", 0.0).compensate, "delay", 0.0)
         model = stageid.read_model(WORK / "model.json")
