@@ -60,7 +60,7 @@ TEST(ModbusStageRate, AFasterStageThanTheLinkIsRefusedWithTheFigures) {
   EXPECT_THAT(refusal(info(27.0, 1, 1), serial(19200)),
               testing::AllOf(testing::HasSubstr("27 Hz"),
                              testing::HasSubstr("38.2 ms (25 + 33 bytes at 19200 baud)"),
-                             testing::HasSubstr("26 Hz at most")));
+                             testing::HasSubstr("the maximum is 26 Hz")));
 }
 
 TEST(ModbusStageRate, MoreChannelsThanOneTransactionAreRefused) {

@@ -137,7 +137,7 @@ TEST_F(DashboardServerTest, RefusesLargeBodiesAndSaysWhatItRefuses) {
   const auto answer =
       client().Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, large, "text/plain");
   EXPECT_EQ(answer->status, 413);
-  EXPECT_EQ(answer->body, "body too large; 1024 bytes at most\n");
+  EXPECT_EQ(answer->body, "body too large; at most 1024 bytes\n");
   EXPECT_EQ(aborts_, 0);
   EXPECT_EQ(client().Get("/other")->body, "/other: not found; open /\n");
   EXPECT_EQ(client().Get("/response.json")->body,
