@@ -40,7 +40,7 @@ Eigen::MatrixXcd wide_response(const FrfEstimate& frf, CmifKind kind, Eigen::Ind
 
 /// Left singular vectors of a line: of all lines they would be as large as the response.
 Eigen::MatrixXcd shapes(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
-  return Eigen::BDCSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k), Eigen::ComputeThinU)
+  return Eigen::JacobiSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k), Eigen::ComputeThinU)
       .matrixU();
 }
 
@@ -132,7 +132,7 @@ bool above_scatter(const Eigen::RowVectorXd& curve_db, Eigen::Index peak) {
 Eigen::MatrixXd cmif(const FrfEstimate& frf, CmifKind kind) {
   Eigen::MatrixXd curves(std::min(frf.n_outputs(), frf.n_inputs()), frf.lines());
   for_each_line(worker_count(0), frf.lines(), [&](Eigen::Index k) {
-    curves.col(k) = Eigen::BDCSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k))
+    curves.col(k) = Eigen::JacobiSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k))
                         .singularValues()
                         .head(curves.rows())
                         .cwiseAbs2();
