@@ -352,7 +352,11 @@ FitSetup make_fit_setup(const FitRequest& asked, FrfEstimate frf) {
 
 FitResult fit_model(FrfEstimate frf, const FitRequest& request) {
   const FitSetup setup = make_fit_setup(request, std::move(frf));
-  FitResult result = structured_fit(setup.frf, setup.structure, setup.selection, setup.options);
+  return fit_model(setup, setup.options);
+}
+
+FitResult fit_model(const FitSetup& setup, const FitOptions& options) {
+  FitResult result = structured_fit(setup.frf, setup.structure, setup.selection, options);
   result.decisions.insert(result.decisions.begin(), setup.notes.begin(), setup.notes.end());
   return result;
 }

@@ -30,16 +30,18 @@ struct ModesRequest {
 /// The term B_0 / s^2, or what replaces it.
 struct RigidBodyRequest {
   enum class Kind : std::uint8_t {
-    by_submodels,  ///< none if submodels are requested, else automatic
-    automatic,     ///< free, or a suspension if that is worth its parameters
+    automatic,  ///< free, or a suspension if that is worth its parameters
     none,
-    free,       ///< B_0 / s^2; `rank` of B_0
-    suspension  ///< modes below the lowest line
+    free,         ///< B_0 / s^2; `rank` of B_0
+    suspension,   ///< modes below the lowest line
+    by_submodels  ///< none if submodels are requested, else automatic
   };
   Kind kind = Kind::by_submodels;
   int rank = 0;                         ///< degrees of freedom; 0: full
   std::vector<double> suspension_hz{};  ///< known frequencies; empty: fitted
 };
+
+const char* to_string(RigidBodyRequest::Kind kind) noexcept;
 
 struct DelayRequest {
   DelayModel model = DelayModel::fixed;
@@ -98,5 +100,8 @@ FitSetup make_fit_setup(const FitRequest& request, FrfEstimate frf);
 /// Source: method.md sections 5 to 7.
 /// @throws what make_fit_setup() and structured_fit() throw
 FitResult fit_model(FrfEstimate frf, const FitRequest& request = {});
+/// The same with a setup that is made.
+/// @param options those of the setup, with callbacks of the caller
+FitResult fit_model(const FitSetup& setup, const FitOptions& options);
 
 }  // namespace stageid

@@ -89,20 +89,27 @@ RigidBodyRequest::Kind rigid_body_kind(const FitRequest& request) noexcept {
 }
 
 std::string rigid_body_text(const FitRequest& request) {
-  using Kind = RigidBodyRequest::Kind;
   const RigidBodyRequest& body = request.rigid_body;
-  switch (rigid_body_kind(request)) {
-    case Kind::none:
-      return "none";
-    case Kind::free:
-      return body.rank == 0 ? "full" : fmt::format("{}", body.rank);
-    case Kind::suspension:
-      return body.suspension_hz.empty()
-                 ? "suspension"
-                 : fmt::format("suspension:{}", fmt::join(body.suspension_hz, ":"));
-    default:
+  if (body.rank > 0) return fmt::format("{}", body.rank);
+  std::string text = to_string(rigid_body_kind(request));
+  for (const double frequency_hz : body.suspension_hz) text += fmt::format(":{}", frequency_hz);
+  return text;
+}
+
+const char* to_string(RigidBodyRequest::Kind kind) noexcept {
+  switch (kind) {
+    case RigidBodyRequest::Kind::automatic:
       return "auto";
+    case RigidBodyRequest::Kind::none:
+      return "none";
+    case RigidBodyRequest::Kind::free:
+      return "full";
+    case RigidBodyRequest::Kind::suspension:
+      return "suspension";
+    case RigidBodyRequest::Kind::by_submodels:
+      break;
   }
+  return "by_submodels";
 }
 
 void choose_structure(const FitRequest& request, FitSetup& setup) {

@@ -10,11 +10,11 @@
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
+#include "estimation/search/undetermined_modes.hpp"
 
 namespace stageid {
 namespace {
 
-constexpr double kBroadGrowth = 0.1;  // a damping ratio: such a mode is no peak
 // In a row: a measured aircraft, which is nonlinear, comes to five before it converges.
 constexpr int kMostSpurious = 6;
 
@@ -24,7 +24,7 @@ bool overlaps_another(const AdditiveModel& model, std::size_t i) {
   const double f = one.natural_frequency_hz();
   for (std::size_t o = 0; o < model.submodels.size(); ++o) {
     const Submodel& other = model.submodels[o];
-    if (o == i || !is_searched_mode(other) || other.damping_ratio() > kBroadGrowth) continue;
+    if (o == i || !is_searched_mode(other) || other.damping_ratio() > kBroad) continue;
     const double width = 2.0 * f * std::max(one.damping_ratio(), other.damping_ratio());
     if (std::abs(other.natural_frequency_hz() - f) < width) return true;
   }
@@ -34,7 +34,7 @@ bool overlaps_another(const AdditiveModel& model, std::size_t i) {
 bool is_coloured(const AdditiveModel& model, std::size_t i) {
   const Submodel& s = model.submodels[i];
   const double f = s.natural_frequency_hz();
-  return f < model.fit.band_hz[0] || f > model.fit.band_hz[1] || s.damping_ratio() > kBroadGrowth ||
+  return f < model.fit.band_hz[0] || f > model.fit.band_hz[1] || s.damping_ratio() > kBroad ||
          overlaps_another(model, i);
 }
 

@@ -14,7 +14,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kBroad = 0.1;                 // a damping ratio: such a mode is no peak
 constexpr std::size_t kUndeterminedTried = 4;  // each costs a fit
 
 bool is_open(const Submodel& s) {

@@ -12,6 +12,8 @@ namespace stageid {
 /// Of a natural frequency, and of a damping ratio: a standard deviation as large says that the data leave it open.
 inline constexpr double kOpenFrequency = 0.5;
 inline constexpr double kOpenDamping = 1.0;
+/// A mode of this damping ratio or more has no peak of its own.
+inline constexpr double kBroad = 0.1;
 
 /// The searched modes between the lines that the data leave open: at a bound, or with standard deviations as large as
 /// that. Beside the lines a mode stands for whatever the plant does there, and is none of them.

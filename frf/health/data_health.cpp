@@ -22,7 +22,6 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kSignificance = 1e-4;    // of a check, over all channels
 constexpr double kSuspicion = 0.05;       // of clipping, where u = r - C y fails
 constexpr double kStuckShare = 0.02;      // of a run's samples that show one value
 constexpr double kExcludedPower = 1e-4;   // of the inputs' power

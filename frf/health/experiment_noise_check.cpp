@@ -9,8 +9,6 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kMostNamed = 4;
-
 /// "realization 1, experiment 2: 9.8 times ...; ", the one that differs most first.
 std::string named(std::vector<NoisyRun> runs) {
   std::stable_sort(runs.begin(), runs.end(), [](const NoisyRun& a, const NoisyRun& b) {

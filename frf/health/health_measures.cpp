@@ -13,7 +13,6 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kMeasureSignificance = 1e-4;
 constexpr double kRounding = 1e-24;  // of a line's power: what double precision leaves of no noise
 
 }  // namespace
@@ -32,7 +31,7 @@ bool responds(const HealthRecord& record, Index channel) {
     else if (mean_square > 0.0)
       return true;
   }
-  return tail_of_evidence(evidence, static_cast<Index>(record.lines.size())) < kMeasureSignificance;
+  return tail_of_evidence(evidence, static_cast<Index>(record.lines.size())) < kSignificance;
 }
 
 double median_coherence(const HealthRecord& record, Index channel) {

@@ -6,6 +6,9 @@
 
 namespace stageid {
 
+/// Significance of a check over all channels.
+inline constexpr double kSignificance = 1e-4;
+
 /// Does the channel (of [sensors; actuators]) move with the excitation? F tests of the mean over periods
 /// against its scatter, one a line, over the experiments; Fisher's sum over the lines; 1e-4. True
 /// if one period is all there is: nothing says what noise is.

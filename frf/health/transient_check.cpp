@@ -20,7 +20,6 @@ constexpr double kFalseAlarms = 0.005;  // a log
 constexpr Index kReach = 2;             // lines on either side of a maximum
 constexpr double kMemory = 0.6;         // see the header
 constexpr double kLargestShift = 0.5;   // deviations
-constexpr int kMostTransientsNamed = 4;
 
 /// Noise of one period on each line, and what the start has over it.
 struct Lines {
@@ -190,10 +189,10 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
   }
   if (frequencies.empty()) return {};
   std::string names;
-  for (std::size_t i = 0; i < frequencies.size() && i < kMostTransientsNamed; ++i)
+  for (std::size_t i = 0; i < frequencies.size() && i < kMostNamed; ++i)
     names += fmt::format("{}{:.4g}", i > 0 ? ", " : "", frequencies[i]);
-  if (frequencies.size() > kMostTransientsNamed)
-    names += fmt::format(" and {} more", frequencies.size() - kMostTransientsNamed);
+  if (frequencies.size() > kMostNamed)
+    names += fmt::format(" and {} more", frequencies.size() - kMostNamed);
   const int needed = evidence.transient_periods + std::max(1, more);
   Finding finding;
   finding.severity = Severity::doubt;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -46,6 +47,9 @@ enum class Cause : std::uint8_t {
 const char* to_string(Cause cause) noexcept;
 /// The cause of that name; nothing if there is none.
 std::optional<Cause> cause_of(std::string_view name) noexcept;
+
+/// Runs, frequencies or channels that a finding lists by name; it counts the rest.
+inline constexpr std::size_t kMostNamed = 4;
 
 /// One line of the table of health: one cause.
 struct Finding {

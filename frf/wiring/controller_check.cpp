@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "frf/statistics/tail_probability.hpp"
+#include "frf/wiring/feedback_check.hpp"
 
 namespace stageid {
 namespace {
@@ -14,13 +15,10 @@ namespace {
 using Index = Eigen::Index;
 
 constexpr double kEpsilonOnePeriod = 5e-2;  // no scatter says what noise is
-constexpr double kRounding = 1e-9;          // of u: float32 records, and u - r of two large numbers
 constexpr double kDeviations = 6.0;
 constexpr double kLeastGain = 0.02;
 constexpr double kLeastControllerSkew_s = 2e-6;
 constexpr double kLeastShare = 0.3;
-constexpr double kLeastMisfit = 0.05;
-constexpr double kSignificance = 1e-4;
 constexpr int kMostChanges = 40;
 constexpr double kOfAnother =
     0.05;  // of a row's misfit: what another's record leaves, if it is that
@@ -129,7 +127,7 @@ void Search::refresh() {
       return Eigen::VectorXd(X.rowwise().squaredNorm() / static_cast<double>(X.cols()));
     };
     line.weight = (line.variance + epsilon_ * epsilon_ * squares(line.F * line.Y) +
-                   kRounding * kRounding * (squares(line.U) + squares(R_[k])))
+                   kFeedbackRounding * kFeedbackRounding * (squares(line.U) + squares(R_[k])))
                       .cwiseMax(1e-300)
                       .cwiseInverse();
     if (!line.known) {  // says nothing
@@ -360,7 +358,7 @@ bool Search::significant(Index row) const {
       evidence += 1e3;
   }
   return tail_of_evidence(evidence, static_cast<Index>(lines_.size())) <
-         kSignificance / static_cast<double>(record_.n_u());
+         kFeedbackSignificance / static_cast<double>(record_.n_u());
 }
 
 std::vector<ControllerMisfit> Search::misfits() const {
@@ -376,7 +374,7 @@ std::vector<ControllerMisfit> Search::misfits() const {
       moved += line.U.row(a).squaredNorm();
     }
     if (controlled > 0.0) ++driven;
-    const bool is_controlled = controlled > kRounding * kRounding * moved;
+    const bool is_controlled = controlled > kFeedbackRounding * kFeedbackRounding * moved;
     const double whole = is_controlled ? controlled : moved;
     const double relative = std::sqrt(misfit / std::max(whole, 1e-300));
     if (relative > kLeastMisfit && significant(a))

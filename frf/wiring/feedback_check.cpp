@@ -15,10 +15,6 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kFeedbackSignificance = 1e-4;
-constexpr double kLeastFeedbackMisfit = 0.05;
-constexpr double kFeedbackRounding = 1e-9;  // of u: float32 records, and u - r of two large numbers
-
 std::string why_not(const HealthRecord& record, const std::vector<Index>& actuators) {
   for (const Index axis : record.axes)
     if (actuators[static_cast<std::size_t>(axis)] < 0)
@@ -76,7 +72,7 @@ FeedbackCheck check_feedback(const HealthRecord& record) {
   check.relative = std::sqrt(misfit.sum() / fed_back.sum());
   for (Index a = 0; a < n_u; ++a) {
     const double relative = fed_back[a] > 0.0 ? std::sqrt(misfit[a] / fed_back[a]) : 0.0;
-    if (relative < kLeastFeedbackMisfit ||
+    if (relative < kLeastMisfit ||
         tail_of_evidence(evidence[a], static_cast<Index>(record.lines.size())) >
             kFeedbackSignificance / static_cast<double>(n_u))
       continue;

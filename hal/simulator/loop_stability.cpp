@@ -15,7 +15,6 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 /// Rounding of the eigenvalues of a balanced matrix of some hundred rows stays far below.
 constexpr double kRounding = 1e-8;
 /// Some seconds of computation.

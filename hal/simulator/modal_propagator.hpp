@@ -1,8 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <numbers>
 
 namespace stageid {
+
+/// rad per cycle.
+inline constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 /// Exact motion of one mode, q'' + 2 zeta omega q' + omega^2 q = f, over `duration_s` with f
 /// constant: [q; q'] <- transition [q; q'] + input f.

@@ -11,13 +11,13 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "hal/simulator/modal_propagator.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 
 namespace stageid {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double kRadPerCycle = 2.0 * std::numbers::pi;
 
 // e^z - 1 without cancellation for small z: e^x cos y - 1 = expm1(x) cos y - 2 sin^2(y/2).
 Complex expm1(Complex z) {
@@ -37,8 +37,8 @@ struct Sampling {
 Sampling sampling(double delay_s, double sample_rate_hz, double frequency_hz) {
   const double whole = std::floor(delay_s * sample_rate_hz);
   const double turns = frequency_hz / sample_rate_hz;
-  return {1.0 / sample_rate_hz, kRadPerCycle * frequency_hz, delay_s * sample_rate_hz - whole,
-          std::polar(1.0, -kRadPerCycle * turns), std::polar(1.0, -kRadPerCycle * turns * whole)};
+  return {1.0 / sample_rate_hz, kTwoPi * frequency_hz, delay_s * sample_rate_hz - whole,
+          std::polar(1.0, -kTwoPi * turns), std::polar(1.0, -kTwoPi * turns * whole)};
 }
 
 // 1 / (s - p), sampled. z - e^(pT) = e^(pT) (e^((j omega - p) T) - 1) keeps its digits near the
@@ -65,7 +65,7 @@ Complex sampled_double_integrator(const Sampling& at) {
 
 Complex sampled_mode(const PlantMode& mode, const Sampling& at) {
   if (mode.natural_frequency_hz == 0.0) return sampled_double_integrator(at);
-  const double omega = kRadPerCycle * mode.natural_frequency_hz;
+  const double omega = kTwoPi * mode.natural_frequency_hz;
   const double zeta = mode.damping_ratio;
   const Complex pole(-zeta * omega, omega * std::sqrt(1.0 - zeta * zeta));
   return (sampled_first_order(pole, at) - sampled_first_order(std::conj(pole), at)) /
@@ -90,9 +90,9 @@ Eigen::MatrixXcd sum_of_modes(const std::vector<PlantMode>& modes, ModalResponse
 }  // namespace
 
 Eigen::MatrixXcd continuous_response(const std::vector<PlantMode>& modes, double frequency_hz) {
-  const double omega = kRadPerCycle * frequency_hz;
+  const double omega = kTwoPi * frequency_hz;
   return sum_of_modes(modes, [omega](const PlantMode& mode) {
-    const double omega_0 = kRadPerCycle * mode.natural_frequency_hz;
+    const double omega_0 = kTwoPi * mode.natural_frequency_hz;
     return 1.0 / Complex((omega_0 - omega) * (omega_0 + omega),
                          2.0 * mode.damping_ratio * omega_0 * omega);
   });

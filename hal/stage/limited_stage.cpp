@@ -11,11 +11,9 @@
 namespace stageid {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 Eigen::ArrayXd limit_vector(const Eigen::VectorXd& given, std::size_t channels, const char* name) {
   const auto size = static_cast<Eigen::Index>(channels);
-  if (given.size() == 0) return Eigen::ArrayXd::Constant(size, kInfinity);
+  if (given.size() == 0) return Eigen::ArrayXd::Constant(size, kUnlimited);
   if (given.size() != size)
     throw std::invalid_argument(
         fmt::format("limits: {} has {} entries for {} channels", name, given.size(), channels));

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 
 namespace stageid {
 
@@ -13,6 +14,9 @@ struct RigidMotion {
   Eigen::MatrixXd contradiction;           ///< sensors x sensors: what no rigid motion shows
   double bandwidth_rad_s = 0.0;            ///< of the slowest axis
 };
+
+/// The bound of what has no limit.
+inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 /// Limits that are enforced behind every back end. Vectors: one entry a channel; an empty vector
 /// means no limit of that kind.

@@ -10,7 +10,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 constexpr double kObserverPoles = 1.0 / 3.0;  // of the loop's bandwidth
 constexpr double kBrakeObserverPoles = 3.0;
 constexpr double kBrakeRate = 2.0;

@@ -12,7 +12,7 @@
 #include "acquisition/slog/crc32c.hpp"
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace {

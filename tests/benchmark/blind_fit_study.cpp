@@ -13,7 +13,7 @@
 #include <cstring>
 #include <vector>
 
-#include "tests/support/model_blind_fit.hpp"
+#include "tests/support/models/model_blind_fit.hpp"
 
 int main(int argc, char** argv) {
   const int stages = argc > 1 ? std::atoi(argv[1]) : 40;

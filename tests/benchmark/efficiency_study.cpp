@@ -19,9 +19,9 @@
 #include <vector>
 
 #include "estimation/search/fit_additive_model.hpp"
-#include "tests/support/cramer_rao_bound.hpp"
-#include "tests/support/model_blind_fit.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/models/cramer_rao_bound.hpp"
+#include "tests/support/models/model_blind_fit.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace {
 

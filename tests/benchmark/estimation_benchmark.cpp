@@ -12,7 +12,7 @@
 #include "estimation/problem/freed_memory.hpp"
 #include "estimation/products/channel_equations.hpp"
 #include "estimation/search/automatic_fit.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace {
 

@@ -26,7 +26,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "frf/response/relative_variance.hpp"
 #include "hal/simulator/simulated_stage.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/experiment/limited_excitation.hpp"
 

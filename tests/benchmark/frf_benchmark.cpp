@@ -13,8 +13,8 @@
 
 #include "frf/plant/plant_frf.hpp"
 #include "frf/runs/run_steps.hpp"
-#include "tests/support/closed_loop.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 #include "tools/steps/fft_wisdom_file.hpp"
 
 namespace stageid {

@@ -17,7 +17,7 @@
 
 #include "frf/plant/plant_frf.hpp"
 #include "frf/response/confidence.hpp"
-#include "tests/support/closed_loop.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace {
 

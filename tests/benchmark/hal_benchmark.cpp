@@ -8,7 +8,7 @@
 #include "hal/simulator/noise.hpp"
 #include "hal/stage/limited_stage.hpp"
 #include "hal/stage/motion_controller.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace {
 

@@ -22,9 +22,9 @@
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/faulty_log.hpp"
-#include "tests/support/planted_faults.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/logs/faulty_log.hpp"
+#include "tests/support/logs/planted_faults.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 #include "tools/config/stage_expectation.hpp"
 
 namespace {

@@ -28,7 +28,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/support/judgement_case.hpp"
+#include "tests/support/judgement/judgement_case.hpp"
 
 namespace {
 

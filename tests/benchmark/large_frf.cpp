@@ -9,7 +9,7 @@
 
 #include "estimation/model/cmif.hpp"
 #include "frf/file/frf_file.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 int main(int argc, char** argv) {
   using namespace stageid;

@@ -10,7 +10,7 @@
 
 #include <cstdlib>
 
-#include "tests/support/estimate_trials.hpp"
+#include "tests/support/models/estimate_trials.hpp"
 
 namespace {
 

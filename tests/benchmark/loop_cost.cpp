@@ -10,8 +10,8 @@
 #include "acquisition/loop/run_experiment.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "hal/simulator/simulated_stage.hpp"
-#include "tests/support/temporary_directory.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace {

@@ -16,7 +16,7 @@
 #include <string>
 
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/closed_loop.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace {
 

@@ -13,7 +13,7 @@
 #include <numbers>
 #include <vector>
 
-#include "tests/support/zippered_fits.hpp"
+#include "tests/support/models/zippered_fits.hpp"
 
 namespace {
 

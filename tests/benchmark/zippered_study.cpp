@@ -26,7 +26,7 @@
 #include <vector>
 
 #include "frf/health/interpolation_check.hpp"
-#include "tests/support/estimate_trials.hpp"
+#include "tests/support/models/estimate_trials.hpp"
 
 namespace {
 

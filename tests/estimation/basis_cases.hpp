@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "estimation/model/basis.hpp"
-#include "tests/support/model_reference.hpp"
+#include "tests/support/models/model_reference.hpp"
 
 // Submodels of every kind, the lines they are evaluated on, and how far rounding may take them.
 namespace stageid::test::basis {

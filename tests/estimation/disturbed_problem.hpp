@@ -3,9 +3,9 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid::test {
 

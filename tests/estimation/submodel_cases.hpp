@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "estimation/model/poles.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 // Plants of any submodels, two inputs and two outputs, 400 lines from 5 to 999 Hz.
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/run_program.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/run_program.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test {
 

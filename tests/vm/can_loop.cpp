@@ -21,7 +21,7 @@
 #include "hal/can/can_node.hpp"
 #include "hal/can/can_socket.hpp"
 #include "hal/can/can_stage.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace {
 

@@ -110,12 +110,11 @@ std::vector<double> parse_suspension(const std::string& text) {
 RigidBodyRequest parse_rigid_body(const std::string& text) {
   using Kind = RigidBodyRequest::Kind;
   if (text.empty()) return {};
-  if (text == "auto") return {Kind::automatic};
-  if (text == "none") return {Kind::none};
-  if (text == "full") return {Kind::free};
   if (text.starts_with(kSuspension)) return {Kind::suspension, 0, parse_suspension(text)};
-  const std::string nearest = nearest_word(text.substr(0, text.find(':')),
-                                           {"auto", "none", "full", std::string(kSuspension)});
+  const std::vector<std::string> words = words_to(Kind::suspension);
+  if (const auto word = std::find(words.begin(), words.end(), text); word != words.end())
+    return {static_cast<Kind>(word - words.begin())};
+  const std::string nearest = nearest_word(text.substr(0, text.find(':')), words);
   if (!to_number(text) && !nearest.empty())
     refuse("--rigid-body", text, fmt::format("{} (did you mean '{}'?)", kRigidBodies, nearest));
   return {Kind::free, parse_rank("--rigid-body", text, kRigidBodies)};

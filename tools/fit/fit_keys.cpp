@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <type_traits>
 
@@ -137,18 +136,17 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   if (delay.word == "per_channel") f.delay = {DelayModel::per_channel, 0.0};
 
   using Body = RigidBodyRequest::Kind;
-  const std::map<std::string, Body> bodies = {{"auto", Body::automatic},
-                                              {"none", Body::none},
-                                              {"full", Body::free},
-                                              {"suspension", Body::suspension},
-                                              {"by_submodels", Body::by_submodels}};
-  std::string body = "by_submodels";
+  const std::vector<std::string> bodies = words_to(Body::by_submodels);
+  std::string body = to_string(f.rigid_body.kind);
   f.rigid_body.rank =
-      rank("rigid_body", body, {"auto", "none", "full", "suspension", "by_submodels"},
+      rank("rigid_body", body, bodies,
            "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); "
            "suspension: a mode below the lines instead; auto: full, or suspension if the fit "
            "improves enough; by_submodels: none if submodels are listed, else auto");
-  f.rigid_body.kind = body.empty() ? Body::free : bodies.at(body);
+  f.rigid_body.kind =
+      body.empty()
+          ? Body::free
+          : static_cast<Body>(std::find(bodies.begin(), bodies.end(), body) - bodies.begin());
   v.numbers("suspension_hz", f.rigid_body.suspension_hz, positive("Hz"), {}, kOptional,
             "with rigid_body: suspension, its known frequencies; omitted: fitted");
   v.require(f.rigid_body.suspension_hz.empty() || f.rigid_body.kind == Body::suspension,

@@ -23,9 +23,8 @@ void add_values(const std::string& path, const CommandTree& command, Cases& case
   }
 }
 
-/// @param path the words that lead to the command: "", "log", "log info"
-void add_command_cases(const std::string& path, const CommandTree& command,
-                       const CommandTree& program, Cases& cases) {
+void add_command(const std::string& path, const CommandTree& command, const CommandTree& program,
+                 Cases& cases) {
   std::vector<std::string> flags;
   for (const CommandOption& option : options_taken(command, program))
     flags.insert(flags.end(), option.flags.begin(), option.flags.end());
@@ -35,18 +34,18 @@ void add_command_cases(const std::string& path, const CommandTree& command,
   if (!path.empty()) add_values(fmt::format("'{}'", path), command, cases);
   cases.words += fmt::format("    '{}') words='{}' flags='{}' ;;\n", path, fmt::join(words, " "),
                              fmt::join(flags, " "));
-  for (const CommandTree& sub : command.commands) {
-    const std::string below = path.empty() ? sub.name : path + " " + sub.name;
-    cases.paths += fmt::format("      '{} {}') path='{}' ;;\n", path, sub.name, below);
-    add_command_cases(below, sub, program, cases);
-  }
+  for (const CommandTree& sub : command.commands)
+    cases.paths +=
+        fmt::format("      '{} {}') path='{}' ;;\n", path, sub.name, path_below(path, sub));
 }
 
 }  // namespace
 
 std::string bash_completion(const CommandTree& program) {
   Cases cases;
-  add_command_cases("", program, program, cases);
+  for_each_command(program, [&](const std::string& path, const CommandTree& command) {
+    add_command(path, command, program, cases);
+  });
   add_values("*", program, cases);
   return fmt::format(R"(# Completion of {0} for bash, written by '{0} manual'.
 _{0}() {{

@@ -62,6 +62,20 @@ CommandTree command_tree(const CLI::App& app) {
   return tree;
 }
 
+void for_each_command(const CommandTree& program,
+                      const std::function<void(const std::string&, const CommandTree&)>& visit) {
+  const auto walk = [&visit](const auto& self, const std::string& path,
+                             const CommandTree& command) -> void {
+    visit(path, command);
+    for (const CommandTree& sub : command.commands) self(self, path_below(path, sub), sub);
+  };
+  walk(walk, "", program);
+}
+
+std::string path_below(const std::string& path, const CommandTree& sub) {
+  return path.empty() ? sub.name : path + " " + sub.name;
+}
+
 std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program) {
   std::vector<CommandOption> options = command.options;
   if (&command == &program) return options;

@@ -23,13 +23,13 @@ std::string described(const std::string& name, const std::string& help) {
 }
 
 /// The parts of the script that grow with the commands.
-struct ZshCases {
+struct ZshParts {
   std::string paths;   ///< what makes the next word a command
   std::string offers;  ///< what may come, by command
   std::string values;
 };
 
-void add_zsh_values(const std::string& path, const CommandTree& command, ZshCases& cases) {
+void add_zsh_values(const std::string& path, const CommandTree& command, ZshParts& cases) {
   for (const CommandOption& option : command.options) {
     if (option.words.empty()) continue;
     for (const std::string& flag : option.flags)
@@ -38,8 +38,8 @@ void add_zsh_values(const std::string& path, const CommandTree& command, ZshCase
   }
 }
 
-void add_zsh_cases(const std::string& path, const CommandTree& command, const CommandTree& program,
-                   ZshCases& cases) {
+void add_zsh_command(const std::string& path, const CommandTree& command,
+                     const CommandTree& program, ZshParts& cases) {
   std::vector<std::string> flags;
   for (const CommandOption& option : options_taken(command, program))
     for (const std::string& flag : option.flags) flags.push_back(described(flag, option.help));
@@ -50,19 +50,18 @@ void add_zsh_cases(const std::string& path, const CommandTree& command, const Co
   cases.offers += fmt::format("    {}) next=({})\n      flags=({}) ;;\n", quoted(path),
                               fmt::join(next, " "), fmt::join(flags, " "));
   if (!path.empty()) add_zsh_values(quoted(path), command, cases);
-  for (const CommandTree& sub : command.commands) {
-    const std::string below = path.empty() ? sub.name : path + " " + sub.name;
-    cases.paths +=
-        fmt::format("      {}) place={} ;;\n", quoted(path + " " + sub.name), quoted(below));
-    add_zsh_cases(below, sub, program, cases);
-  }
+  for (const CommandTree& sub : command.commands)
+    cases.paths += fmt::format("      {}) place={} ;;\n", quoted(path + " " + sub.name),
+                               quoted(path_below(path, sub)));
 }
 
 }  // namespace
 
 std::string zsh_completion(const CommandTree& program) {
-  ZshCases cases;
-  add_zsh_cases("", program, program, cases);
+  ZshParts cases;
+  for_each_command(program, [&](const std::string& path, const CommandTree& command) {
+    add_zsh_command(path, command, program, cases);
+  });
   add_zsh_values("*", program, cases);
   return fmt::format(R"(#compdef {0}
 # Completion of {0} for zsh, written by '{0} manual'.

@@ -98,7 +98,7 @@ FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
   options.progress = [&](int iteration, double cost) {
     progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));
   };
-  step.result = structured_fit(setup.frf, setup.structure, setup.selection, options);
+  step.result = fit_model(setup, options);
   const std::vector<Finding> health = health_of(setup.frf.provenance_json);
   const std::vector<std::string> doubts = doubts_about(setup.frf, health);
   if (!doubts.empty() && !step.result.trustworthy()) {
@@ -109,8 +109,6 @@ FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
   if (!faults.empty())
     step.result.distrust(FitStatus::faulty_data, fmt::format("{}", fmt::join(faults, "; ")));
   step.seconds = progress.seconds();
-  step.result.decisions.insert(step.result.decisions.begin(), setup.notes.begin(),
-                               setup.notes.end());
   step.result.model.provenance_json =
       provenance(setup, step.result, frf_name, frf_fingerprint, doubts);
   return step;

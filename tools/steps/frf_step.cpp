@@ -23,8 +23,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kBytesPerMegabyte = 1e6;
-
 /// The lasting part of a log's metadata: all but times.
 Json lasting_metadata(const LogReader& log) {
   Json metadata = Json::parse(log.info().metadata_json, nullptr, false);

@@ -22,7 +22,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kLogBytesPerMegabyte = 1e6;
 constexpr Severity kSeverities[] = {Severity::fault, Severity::doubt, Severity::unchecked};
 
 /// The cause is for programs that read the table now; notes need severity and texts.
@@ -50,7 +49,7 @@ std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& file
                                   const Console& console) {
   const OpenLogs opened(files);
   const auto nominal = nominal_stage_of(opened.logs().front()->info(), stage_file);
-  Progress progress(console, "health", "MB", 1.0 / kLogBytesPerMegabyte);
+  Progress progress(console, "health", "MB", 1.0 / kBytesPerMegabyte);
   options.progress = [&](double done, double total) {
     throw_if_interrupted();
     progress.update(done, total);

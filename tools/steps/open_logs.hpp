@@ -9,6 +9,9 @@
 
 namespace stageid {
 
+/// Progress of reading logs is shown in megabytes.
+inline constexpr double kBytesPerMegabyte = 1e6;
+
 /// Several logs that are read together. @throws what open_log() throws
 class OpenLogs {
  public:

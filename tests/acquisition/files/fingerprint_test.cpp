@@ -6,7 +6,7 @@
 #include <string>
 
 #include "acquisition/files/file_error.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_fingerprint {

@@ -16,8 +16,8 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
-#include "tests/support/file_size_limit.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/file_size_limit.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_hdf5_file {

@@ -7,7 +7,7 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "excitation/plan/experiment_plan.hpp"
-#include "tests/support/python_script.hpp"
+#include "tests/support/process/python_script.hpp"
 
 /// Files that h5py writes are read, and ours are read by h5py.
 namespace stageid {

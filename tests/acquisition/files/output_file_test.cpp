@@ -10,8 +10,8 @@
 #include <string>
 
 #include "acquisition/files/file_error.hpp"
-#include "tests/support/file_size_limit.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/file_size_limit.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_output_file {

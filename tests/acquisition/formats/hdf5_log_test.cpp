@@ -10,7 +10,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "tests/acquisition/record/foreign_log.hpp"
 #include "tests/acquisition/record/small_log.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_hdf5_log {

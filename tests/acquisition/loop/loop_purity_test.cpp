@@ -19,9 +19,9 @@
 #include "acquisition/loop/measurement_loop.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limited_stage.hpp"
-#include "tests/support/allocation_counter.hpp"
-#include "tests/support/lock_counter.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/process/allocation_counter.hpp"
+#include "tests/support/process/lock_counter.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_loop_purity {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "acquisition/loop/measurement_loop.hpp"
-#include "tests/support/analytic_stage.hpp"
+#include "tests/support/stages/analytic_stage.hpp"
 
 // A small stage in closed loop, the loop's excitation, and its rows taken apart.
 namespace stageid::test::measurement_loop {

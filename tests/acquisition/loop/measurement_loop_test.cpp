@@ -10,8 +10,8 @@
 #include <string>
 
 #include "tests/acquisition/loop/measurement_loop_fixture.hpp"
-#include "tests/support/allocation_counter.hpp"
-#include "tests/support/analytic_stage.hpp"
+#include "tests/support/process/allocation_counter.hpp"
+#include "tests/support/stages/analytic_stage.hpp"
 
 namespace stageid {
 namespace test_measurement_loop {

@@ -7,7 +7,7 @@
 
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/resident_stage.hpp"
-#include "tests/support/analytic_stage.hpp"
+#include "tests/support/stages/analytic_stage.hpp"
 
 namespace stageid::test {
 

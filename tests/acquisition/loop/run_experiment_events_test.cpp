@@ -7,8 +7,8 @@
 #include "acquisition/loop/run_experiment.hpp"
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
-#include "tests/support/analytic_stage.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/analytic_stage.hpp"
 
 namespace stageid {
 namespace test_run_experiment_events {

@@ -11,9 +11,9 @@
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "tests/acquisition/record/small_log.hpp"
-#include "tests/support/analytic_stage.hpp"
-#include "tests/support/file_size_limit.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/file_size_limit.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/analytic_stage.hpp"
 
 namespace stageid {
 namespace test_run_experiment {

@@ -11,7 +11,7 @@
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "tests/acquisition/loop/playing_stage.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_run_resident {

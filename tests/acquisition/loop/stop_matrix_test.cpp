@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "acquisition/loop/measurement_loop.hpp"
-#include "tests/support/stop_case.hpp"
+#include "tests/support/stages/stop_case.hpp"
 
 namespace stageid {
 namespace test_stop_matrix {

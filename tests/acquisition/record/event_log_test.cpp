@@ -9,8 +9,8 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/loop/event_recorder.hpp"
 #include "hal/stage/stage.hpp"
-#include "tests/support/file_size_limit.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/file_size_limit.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_event_log {

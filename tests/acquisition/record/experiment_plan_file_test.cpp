@@ -12,8 +12,8 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
-#include "tests/support/file_size_limit.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/file_size_limit.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_experiment_plan_file {

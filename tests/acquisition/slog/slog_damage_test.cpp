@@ -8,7 +8,7 @@
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_recover.hpp"
 #include "tests/acquisition/record/small_log.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_slog_damage {

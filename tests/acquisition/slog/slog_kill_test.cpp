@@ -13,7 +13,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/slog/slog_reader.hpp"
 #include "tests/acquisition/record/small_log.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_slog_kill {

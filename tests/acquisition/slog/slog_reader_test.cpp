@@ -12,7 +12,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/row_transpose.hpp"
 #include "tests/acquisition/record/small_log.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_slog_reader {

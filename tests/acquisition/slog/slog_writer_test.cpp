@@ -8,8 +8,8 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/slog/slog_reader.hpp"
 #include "tests/acquisition/record/small_log.hpp"
-#include "tests/support/file_size_limit.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/file_size_limit.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_slog_writer {

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "estimation/products/fraction_gram.hpp"
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
 namespace test_sigma_equations {

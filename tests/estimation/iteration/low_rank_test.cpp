@@ -11,9 +11,9 @@
 
 #include "estimation/equations/residue_form.hpp"
 #include "estimation/search/fit_additive_model.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid {
 namespace test_low_rank {

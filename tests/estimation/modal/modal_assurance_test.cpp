@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "tests/support/random_stage.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid {
 namespace test_modal_assurance {

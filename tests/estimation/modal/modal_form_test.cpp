@@ -7,8 +7,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
 
 namespace stageid {
 namespace test_modal_form {

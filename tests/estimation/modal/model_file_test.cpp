@@ -11,9 +11,9 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "estimation/model/additive_model.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/random_stage.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid {
 namespace test_model_file {

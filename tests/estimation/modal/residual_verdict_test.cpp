@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
 namespace test_residual_verdict {

@@ -7,10 +7,10 @@
 #include <stdexcept>
 
 #include "tests/estimation/basis_cases.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
-#include "tests/support/random_stage.hpp"
-#include "tests/support/state_space_response.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
+#include "tests/support/stages/random_stage.hpp"
+#include "tests/support/stages/state_space_response.hpp"
 
 namespace stageid {
 namespace test_state_space {

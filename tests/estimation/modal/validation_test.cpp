@@ -7,9 +7,9 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid {
 namespace test_validation {

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "tests/estimation/basis_cases.hpp"
-#include "tests/support/model_reference.hpp"
+#include "tests/support/models/model_reference.hpp"
 
 namespace stageid {
 namespace test_basis {

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "estimation/search/fit_additive_model.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
 
 namespace stageid {
 namespace test_pole_bounds {

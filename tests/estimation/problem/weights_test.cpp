@@ -5,8 +5,8 @@
 #include <stdexcept>
 
 #include "estimation/problem/fit_problem.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid {
 namespace test_weights {

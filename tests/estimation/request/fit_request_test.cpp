@@ -12,7 +12,7 @@
 #include "estimation/problem/weight_matrices.hpp"
 #include "estimation/request/submodel_text.hpp"
 #include "frf/response/hold_compensation.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_fit_request {

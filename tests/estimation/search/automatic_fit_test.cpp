@@ -10,9 +10,9 @@
 #include <stdexcept>
 
 #include "estimation/search/growth_watch.hpp"
-#include "tests/support/model_blind_fit.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
+#include "tests/support/models/model_blind_fit.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
 
 namespace stageid {
 namespace test_automatic_fit {

@@ -6,7 +6,7 @@
 #include "estimation/equations/arrow_system.hpp"
 #include "estimation/iteration/fit_iteration.hpp"
 #include "tests/estimation/disturbed_problem.hpp"
-#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
 
 namespace stageid {
 namespace test_few_channels {

@@ -6,8 +6,8 @@
 
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/structured_fit.hpp"
-#include "tests/support/heap_peak.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/process/heap_peak.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid {
 namespace test_fit_memory {

@@ -11,9 +11,9 @@
 #include "estimation/search/automatic_fit.hpp"
 #include "estimation/search/coincident_modes.hpp"
 #include "estimation/search/fit_additive_model.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
 namespace test_ranked_fit {

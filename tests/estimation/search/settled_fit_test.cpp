@@ -13,9 +13,9 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/undetermined_modes.hpp"
-#include "tests/support/model_fit_problem.hpp"
-#include "tests/support/model_reference.hpp"
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
 namespace test_settled_fit {

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "estimation/search/fit_additive_model.hpp"
-#include "tests/support/cramer_rao_bound.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/models/cramer_rao_bound.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid {
 namespace test_cramer_rao {

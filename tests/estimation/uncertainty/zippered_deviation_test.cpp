@@ -1,7 +1,7 @@
 // Standard deviations of a fit to a zippered experiment, whose lines share their data.
 #include <gtest/gtest.h>
 
-#include "tests/support/zippered_fits.hpp"
+#include "tests/support/models/zippered_fits.hpp"
 
 namespace stageid {
 namespace test_zippered_deviation {

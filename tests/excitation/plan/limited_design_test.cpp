@@ -8,7 +8,7 @@
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "excitation/plan/joint_crest_reduction.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_limited_design {

@@ -12,7 +12,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
-#include "tests/support/numbered_frf.hpp"
+#include "tests/support/models/numbered_frf.hpp"
 
 namespace stageid {
 namespace test_frf_file {

@@ -8,10 +8,10 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "frf/file/frf_file.hpp"
-#include "tests/support/error_message.hpp"
-#include "tests/support/hdf5_surgery.hpp"
-#include "tests/support/numbered_frf.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/logs/hdf5_surgery.hpp"
+#include "tests/support/models/numbered_frf.hpp"
+#include "tests/support/process/error_message.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_frf_quality_file {

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/sampled_loop.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
 namespace test_settling {

@@ -9,7 +9,7 @@
 
 #include "excitation/multisine/dft.hpp"
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/sampled_loop.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
 namespace test_period_check {

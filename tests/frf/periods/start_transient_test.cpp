@@ -10,8 +10,8 @@
 
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/random_numbers.hpp"
-#include "tests/support/sampled_loop.hpp"
+#include "tests/support/process/random_numbers.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
 namespace test_start_transient {

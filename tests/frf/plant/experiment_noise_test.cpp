@@ -10,7 +10,7 @@
 #include "frf/health/experiment_noise_check.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "frf/response/covariance_smoothing.hpp"
-#include "tests/support/closed_loop.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
 namespace test_experiment_noise {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/closed_loop.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
 namespace test_frf_determinism {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/closed_loop.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
 namespace test_frf_uncertainty {

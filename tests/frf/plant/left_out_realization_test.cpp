@@ -4,8 +4,8 @@
 #include "acquisition/files/file_error.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "frf/runs/health_record.hpp"
-#include "tests/support/closed_loop.hpp"
-#include "tests/support/error_message.hpp"
+#include "tests/support/process/error_message.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
 namespace test_left_out_realization {

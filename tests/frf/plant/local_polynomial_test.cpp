@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/estimate_trials.hpp"
-#include "tests/support/sampled_loop.hpp"
+#include "tests/support/models/estimate_trials.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
 namespace test_local_polynomial {

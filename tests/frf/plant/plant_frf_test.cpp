@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/support/closed_loop.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
 namespace test_plant_frf {

@@ -11,9 +11,9 @@
 #include "frf/health/interpolation_check.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "frf/plant/zippered_lines.hpp"
-#include "tests/support/estimate_trials.hpp"
-#include "tests/support/sampled_loop.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/models/estimate_trials.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
 namespace test_zippered {

@@ -7,9 +7,9 @@
 
 #include "frf/plant/plant_frf.hpp"
 #include "frf/response/confidence.hpp"
-#include "tests/support/closed_loop.hpp"
-#include "tests/support/error_message.hpp"
-#include "tests/support/numbered_frf.hpp"
+#include "tests/support/models/numbered_frf.hpp"
+#include "tests/support/process/error_message.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
 namespace test_covariance_smoothing {

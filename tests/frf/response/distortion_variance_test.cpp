@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
 namespace test_distortion_variance {

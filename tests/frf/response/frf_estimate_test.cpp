@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "tests/support/numbered_frf.hpp"
+#include "tests/support/models/numbered_frf.hpp"
 
 namespace stageid {
 namespace test_frf_estimate {

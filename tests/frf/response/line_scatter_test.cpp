@@ -5,7 +5,7 @@
 #include <cmath>
 #include <complex>
 
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
 namespace test_line_scatter {

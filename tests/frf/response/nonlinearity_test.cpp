@@ -8,8 +8,8 @@
 #include <string>
 
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/error_message.hpp"
-#include "tests/support/sampled_loop.hpp"
+#include "tests/support/process/error_message.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
 namespace test_nonlinearity {

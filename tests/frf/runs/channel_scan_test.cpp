@@ -7,7 +7,7 @@
 #include <iterator>
 #include <map>
 
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
 namespace test_channel_scan {

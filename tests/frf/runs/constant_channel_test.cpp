@@ -6,8 +6,8 @@
 
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/closed_loop.hpp"
-#include "tests/support/error_message.hpp"
+#include "tests/support/process/error_message.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
 namespace test_constant_channel {

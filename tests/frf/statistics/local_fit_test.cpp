@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "tests/support/closed_loop.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
 namespace test_local_fit {

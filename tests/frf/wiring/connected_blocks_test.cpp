@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "frf/wiring/skew_check.hpp"
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
 namespace test_connected_blocks {

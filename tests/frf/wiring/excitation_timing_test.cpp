@@ -8,7 +8,7 @@
 
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/sampled_loop.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
 namespace test_excitation_timing {

@@ -8,9 +8,9 @@
 #include "frf/health/data_health.hpp"
 #include "frf/wiring/feedback_check.hpp"
 #include "frf/wiring/injection_check.hpp"
-#include "tests/support/closed_loop.hpp"
-#include "tests/support/random_numbers.hpp"
-#include "tests/support/sampled_loop.hpp"
+#include "tests/support/process/random_numbers.hpp"
+#include "tests/support/stages/closed_loop.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
 namespace test_mapping_health {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "frf/health/data_health.hpp"
-#include "tests/support/closed_loop.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
 namespace test_repetition_check {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
 namespace test_skew_check {

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_can_bus_load {

@@ -8,7 +8,7 @@
 
 #include "hal/can/can_layout.hpp"
 #include "hal/can/can_messages.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_can_frame {

@@ -10,7 +10,7 @@
 #include "hal/can/can_stage.hpp"
 #include "hal/can/faulty_can.hpp"
 #include "hal/node/stage_node.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid::test {
 

@@ -13,7 +13,7 @@
 #include "hal/node/stage_node.hpp"
 #include "tests/hal/node/small_node.hpp"
 #include "tests/hal/stage/fake_stage.hpp"
-#include "tests/support/pty_pair.hpp"
+#include "tests/support/process/pty_pair.hpp"
 
 namespace stageid::test {
 

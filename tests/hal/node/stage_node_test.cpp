@@ -10,7 +10,7 @@
 
 #include "tests/hal/node/small_node.hpp"
 #include "tests/hal/stage/fake_stage.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_stage_node {

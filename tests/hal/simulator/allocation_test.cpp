@@ -10,8 +10,8 @@
 #include "hal/stage/limited_stage.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/replay_stage.hpp"
-#include "tests/support/allocation_counter.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/process/allocation_counter.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_allocation {

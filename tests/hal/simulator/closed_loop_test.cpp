@@ -16,7 +16,7 @@
 #include "hal/stage/limited_stage.hpp"
 #include "tests/hal/simulator/closed_loop_model.hpp"
 #include "tests/hal/simulator/multisine_signal.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_closed_loop {

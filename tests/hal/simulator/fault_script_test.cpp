@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "tests/hal/stage_bench.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_fault_script {

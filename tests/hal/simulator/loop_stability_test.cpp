@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "tests/hal/simulator/closed_loop_model.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_loop_stability {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "hal/simulator/modal_propagator.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_modal_plant {

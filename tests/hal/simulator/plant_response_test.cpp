@@ -7,7 +7,7 @@
 
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/simulator/simulated_stage.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_plant_response {

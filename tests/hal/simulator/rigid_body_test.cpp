@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_rigid_body {

@@ -14,7 +14,7 @@
 #include "hal/simulator/modal_plant.hpp"
 #include "tests/hal/simulator/closed_loop.hpp"
 #include "tests/hal/stage_bench.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_simulated_stage {

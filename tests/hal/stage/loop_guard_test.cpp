@@ -9,8 +9,8 @@
 #include <stdexcept>
 
 #include "hal/stage/motion_controller.hpp"
-#include "tests/support/stop_case.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/stop_case.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_loop_guard {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "hal/simulator/rigid_body.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_motion_controller {

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "hal/can/can_dbc.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/experiment/closed_loop_prediction.hpp"
 #include "tools/experiment/config_plan.hpp"

@@ -14,8 +14,8 @@
 #include "acquisition/files/file_error.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/health/data_health.hpp"
-#include "tests/support/closed_loop.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 #include "tools/config/stage_expectation.hpp"
 
 namespace stageid {

@@ -5,7 +5,7 @@
 
 #include "frf/file/frf_file.hpp"
 #include "hal/simulator/loop_stability.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_loop_check {

@@ -5,7 +5,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "estimation/model/cmif.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_fit_flags {

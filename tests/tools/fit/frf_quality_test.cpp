@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "frf/file/frf_file.hpp"
-#include "tests/support/hdf5_surgery.hpp"
+#include "tests/support/logs/hdf5_surgery.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tools/fit/frf_quality.hpp"
 #include "tools/steps/health_step.hpp"

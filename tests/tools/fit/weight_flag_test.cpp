@@ -11,8 +11,8 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "estimation/problem/weight_matrices.hpp"
 #include "frf/file/frf_file.hpp"
-#include "tests/support/numbered_frf.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/models/numbered_frf.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid {

@@ -8,7 +8,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "frf/file/frf_file.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 #include "tests/tools/report/synthetic_report.hpp"
 #include "tools/steps/health_step.hpp"
 

@@ -7,7 +7,7 @@
 #include <functional>
 #include <limits>
 
-#include "tests/support/hdf5_surgery.hpp"
+#include "tests/support/logs/hdf5_surgery.hpp"
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid::test {

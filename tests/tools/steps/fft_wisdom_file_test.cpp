@@ -14,7 +14,7 @@
 #include "excitation/multisine/dft.hpp"
 #include "excitation/multisine/random_stream.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_fft_wisdom_file {

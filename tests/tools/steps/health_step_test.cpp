@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/faulty_log.hpp"
-#include "tests/support/planted_faults.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/logs/faulty_log.hpp"
+#include "tests/support/logs/planted_faults.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 #include "tools/config/stage_expectation.hpp"
 #include "tools/steps/health_step.hpp"
 

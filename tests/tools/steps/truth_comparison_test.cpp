@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "estimation/modal/validation.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_truth_comparison {

@@ -17,10 +17,8 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kObjectHeadBytes = 128;
 constexpr std::uint32_t kMatrix = 14, kCompressed = 15;
 constexpr std::uint32_t kOpaqueClass = 17;
-constexpr int kDeepestObject = 20;
 
 std::uint32_t word_at(std::string_view bytes, std::size_t at, bool big_endian) {
   std::uint32_t word = 0;
@@ -97,7 +95,7 @@ std::string class_of(const Hdf5File& file, const std::string& object) {
 }
 
 void require_all_of(const Hdf5File& file, const std::string& group, int depth, ArrayList& list) {
-  if (depth > kDeepestObject) return;
+  if (depth > kDeepest) return;
   for (const std::string& child : file.children(group == "/" ? "/" : group)) {
     if (child.starts_with('#')) continue;  // what references point to, and the data of objects
     const std::string object = fmt::format("{}/{}", group == "/" ? "" : group, child);
@@ -134,9 +132,9 @@ std::vector<UnreadVariable> objects_of_v5(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   const std::string content(std::istreambuf_iterator<char>(stream), {});
   std::vector<UnreadVariable> objects;
-  if (!content.starts_with("MATLAB 5.0") || content.size() < kObjectHeadBytes) return objects;
+  if (!content.starts_with("MATLAB 5.0") || content.size() < kHeadBytes) return objects;
   const bool big_endian = content[126] == 'M';
-  std::size_t at = kObjectHeadBytes;
+  std::size_t at = kHeadBytes;
   while (at + 8 <= content.size()) {
     const std::uint32_t type = word_at(content, at, big_endian);
     const std::size_t size = word_at(content, at + 4, big_endian);

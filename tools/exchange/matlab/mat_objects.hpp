@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -7,6 +8,11 @@
 #include "tools/exchange/arrays/named_array.hpp"
 
 namespace stageid {
+
+/// Text in front of the variables of a version 5 file.
+inline constexpr std::size_t kHeadBytes = 128;
+/// Structures, cells and objects nested deeper are not followed.
+inline constexpr int kDeepest = 20;
 
 /// A MATLAB object (table, timetable, datetime, string, ...) of this class; "" if that is unknown.
 UnreadVariable unread_object(const std::string& name, const std::string& object_class);

@@ -22,7 +22,6 @@ using MatFile = std::unique_ptr<mat_t, int (*)(mat_t*)>;
 using Variable = std::unique_ptr<matvar_t, void (*)(matvar_t*)>;
 
 /// Structs in structs deeper than this are no data of people.
-constexpr int kDeepest = 20;
 
 /// 1 GiB of real numbers: what a full matrix made of a sparse one may take.
 constexpr std::size_t kMostFullNumbers = std::size_t{1} << 27;
@@ -231,7 +230,6 @@ void require_plausible(const std::filesystem::path& path, const matvar_t& variab
 /// libmatio takes the end of a file that was cut short for that of its variables. In v5 files the elements
 /// behind the head of 128 bytes, each with type and size in front, end where the file does.
 void require_whole(const std::filesystem::path& path, std::uintmax_t file_bytes) {
-  constexpr std::uintmax_t kHeadBytes = 128;
   std::ifstream stream(path, std::ios::binary);
   char head[kHeadBytes] = {};
   if (!stream.read(head, sizeof(head)) || !std::string_view(head, 10).starts_with("MATLAB 5.0"))

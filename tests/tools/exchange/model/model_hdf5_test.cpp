@@ -9,7 +9,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
-#include "tests/support/python_script.hpp"
+#include "tests/support/process/python_script.hpp"
 
 /// State space, modes and rigid body of an exported model, as another program reads them.
 namespace stageid {

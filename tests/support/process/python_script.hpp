@@ -7,7 +7,7 @@
 #include <iterator>
 #include <string>
 
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test {
 

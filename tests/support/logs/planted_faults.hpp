@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "frf/periods/health_finding.hpp"
-#include "tests/support/faulty_log.hpp"
-#include "tests/support/random_numbers.hpp"
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/logs/faulty_log.hpp"
+#include "tests/support/process/random_numbers.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid::test {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "hal/simulator/simulated_stage.hpp"
-#include "tests/support/memory_log.hpp"
+#include "tests/support/logs/memory_log.hpp"
 
 /// Logs of random stages with faults planted: the loop is closed here, sample by sample, around hal's
 /// modal plant and motion controller, so that faults can stand before and behind the recording.

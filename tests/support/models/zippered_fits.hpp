@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "estimation/search/fit_additive_model.hpp"
-#include "tests/support/estimate_trials.hpp"
+#include "tests/support/models/estimate_trials.hpp"
 
 /// Fits of one loop, measured from rest again and again with other noise.
 namespace stageid::test {

@@ -11,8 +11,8 @@
 #include "hal/simulator/noise.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/stage/motion_controller.hpp"
-#include "tests/support/faulty_log.hpp"
-#include "tests/support/judgement_trouble.hpp"
+#include "tests/support/judgement/judgement_trouble.hpp"
+#include "tests/support/logs/faulty_log.hpp"
 
 namespace stageid::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/support/run_program.hpp"
+#include "tests/support/process/run_program.hpp"
 
 #include <fcntl.h>
 #include <sys/resource.h>
@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test {
 namespace {

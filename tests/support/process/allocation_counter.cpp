@@ -1,10 +1,10 @@
-#include "tests/support/allocation_counter.hpp"
+#include "tests/support/process/allocation_counter.hpp"
 
 #include <cerrno>
 #include <cstddef>
 #include <cstdlib>
 
-#include "tests/support/own_malloc.hpp"
+#include "tests/support/process/own_malloc.hpp"
 
 namespace {
 

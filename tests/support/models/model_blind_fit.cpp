@@ -1,4 +1,4 @@
-#include "tests/support/model_blind_fit.hpp"
+#include "tests/support/models/model_blind_fit.hpp"
 
 #include <fmt/format.h>
 

@@ -1,10 +1,10 @@
-#include "tests/support/cramer_rao_bound.hpp"
+#include "tests/support/models/cramer_rao_bound.hpp"
 
 #include <Eigen/QR>
 #include <cmath>
 #include <functional>
 
-#include "tests/support/model_reference.hpp"
+#include "tests/support/models/model_reference.hpp"
 
 namespace stageid::test {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "estimation/search/fit_additive_model.hpp"
-#include "tests/support/random_stage.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid::test {
 

@@ -1,4 +1,4 @@
-#include "tests/support/judgement_stage.hpp"
+#include "tests/support/judgement/judgement_stage.hpp"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 
 #include "hal/simulator/modal_plant.hpp"
 #include "hal/simulator/rigid_body.hpp"
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/support/wafer_stage.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 #include <initializer_list>
 #include <string>

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "excitation/multisine/dft.hpp"
-#include "tests/support/memory_log.hpp"
+#include "tests/support/logs/memory_log.hpp"
 
 /// Closed-loop records solved line by line from u = r - C y, y = G u + v, so that no discretization
 /// error stands between an estimate and the truth.

@@ -1,10 +1,10 @@
-#include "tests/support/judgement_trouble.hpp"
+#include "tests/support/judgement/judgement_trouble.hpp"
 
 #include <array>
 #include <cmath>
 #include <numbers>
 
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/support/faulty_log.hpp"
+#include "tests/support/logs/faulty_log.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "excitation/multisine/multisine.hpp"
 #include "hal/simulator/modal_plant.hpp"
 #include "hal/stage/motion_controller.hpp"
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test {
 namespace {

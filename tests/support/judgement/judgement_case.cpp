@@ -1,4 +1,4 @@
-#include "tests/support/judgement_case.hpp"
+#include "tests/support/judgement/judgement_case.hpp"
 
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -15,8 +15,8 @@
 #include "estimation/modal/validation.hpp"
 #include "frf/file/frf_file.hpp"
 #include "hal/simulator/rigid_body.hpp"
-#include "tests/support/run_program.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/process/run_program.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 #include "tools/steps/truth_comparison.hpp"
 
 namespace stageid::test {

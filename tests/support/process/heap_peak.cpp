@@ -1,4 +1,4 @@
-#include "tests/support/heap_peak.hpp"
+#include "tests/support/process/heap_peak.hpp"
 
 #include <malloc.h>
 
@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <cstdlib>
 
-#include "tests/support/own_malloc.hpp"
+#include "tests/support/process/own_malloc.hpp"
 
 namespace {
 

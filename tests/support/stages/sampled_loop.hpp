@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "tests/support/closed_loop.hpp"
-#include "tests/support/memory_log.hpp"
+#include "tests/support/logs/memory_log.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 
 /// A loop simulated sample by sample from rest, so that its records hold a true transient:
 ///   x[n+1] = A x[n] + B u[n],  y[n] = C x[n] + v[n],  u[n] = r[n] - K y[n] (+ distortions of u).

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "hal/simulator/dahl_friction.hpp"
-#include "tests/support/judgement_stage.hpp"
-#include "tests/support/memory_log.hpp"
+#include "tests/support/judgement/judgement_stage.hpp"
+#include "tests/support/logs/memory_log.hpp"
 
 namespace stageid::test {
 

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "tests/support/judgement_trouble.hpp"
+#include "tests/support/judgement/judgement_trouble.hpp"
 
 namespace stageid::test {
 

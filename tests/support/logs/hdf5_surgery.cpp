@@ -1,4 +1,4 @@
-#include "tests/support/hdf5_surgery.hpp"
+#include "tests/support/logs/hdf5_surgery.hpp"
 
 #include <stdexcept>
 

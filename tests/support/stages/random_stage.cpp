@@ -1,4 +1,4 @@
-#include "tests/support/random_stage.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/support/model_reference.hpp"
+#include "tests/support/models/model_reference.hpp"
 
 namespace stageid::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/support/lock_counter.hpp"
+#include "tests/support/process/lock_counter.hpp"
 
 #include <dlfcn.h>
 #include <pthread.h>

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "estimation/problem/fit_problem.hpp"
-#include "tests/support/model_dense_step.hpp"
+#include "tests/support/models/model_dense_step.hpp"
 
 namespace stageid::test {
 

@@ -7,7 +7,7 @@
 
 #include "estimation/model/additive_model.hpp"
 #include "frf/response/frf_estimate.hpp"
-#include "tests/support/random_numbers.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test {
 

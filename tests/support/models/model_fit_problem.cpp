@@ -1,4 +1,4 @@
-#include "tests/support/model_fit_problem.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
 
 #include <fmt/format.h>
 

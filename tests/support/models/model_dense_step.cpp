@@ -1,10 +1,10 @@
-#include "tests/support/model_dense_step.hpp"
+#include "tests/support/models/model_dense_step.hpp"
 
 #include <Eigen/LU>
 #include <cmath>
 #include <numbers>
 
-#include "tests/support/model_reference.hpp"
+#include "tests/support/models/model_reference.hpp"
 
 namespace stageid::test {
 namespace {

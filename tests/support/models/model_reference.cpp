@@ -1,4 +1,4 @@
-#include "tests/support/model_reference.hpp"
+#include "tests/support/models/model_reference.hpp"
 
 #include <Eigen/LU>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/sampled_loop.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
 
 /// One loop measured from rest again and again, with other noise.
 namespace stageid::test {
