@@ -4,6 +4,7 @@
 
 #include "estimation/modal/modal_assurance.hpp"
 #include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/prediction_error.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
 #include "estimation/modal/state_space.hpp"
 #include "estimation/modal/validation.hpp"

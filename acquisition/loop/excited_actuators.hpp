@@ -7,8 +7,8 @@
 
 namespace stageid {
 
-/// Index into `stage.actuators` of every axis of the plan, in the plan's order.
-/// @throws std::invalid_argument if an axis is no actuator of the stage.
-std::vector<int> excited_actuators(const ExperimentPlan& plan, const StageInfo& stage);
+/// Index into `stage.actuators` of every axis, in the order of the experiment.
+/// @throws std::invalid_argument naming an axis that is not an actuator of the stage.
+std::vector<int> excited_actuators(const ExperimentSpec& experiment, const StageInfo& stage);
 
 }  // namespace stageid

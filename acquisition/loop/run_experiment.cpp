@@ -60,7 +60,7 @@ class Experiment {
         recorder_(make_recorder(options, ring_.row_words())),
         log_(log, ring_, observers()),
         wall_(stage.info().clock == Clock::wall),
-        actuators_(excited_actuators(plan, stage.info())),
+        actuators_(excited_actuators(plan.spec(), stage.info())),
         runs_(plan.runs_without(options.skip)) {}
 
   /// Lets the loop's thread do the work and reports progress meanwhile.
@@ -339,7 +339,7 @@ LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
   info.transient_periods = plan.spec().transient_periods;
   info.actuators = channel_list(stage.actuators);
   info.sensors = channel_list(stage.sensors);
-  for (const int index : excited_actuators(plan, stage)) {
+  for (const int index : excited_actuators(plan.spec(), stage)) {
     const Channel& actuator = stage.actuators[static_cast<std::size_t>(index)];
     info.excitation.names.push_back(actuator.name);
     info.excitation.units.push_back(actuator.unit);

@@ -58,7 +58,7 @@ class ResidentExperiment {
         stage_(stage),
         log_(log),
         options_(options),
-        actuators_(excited_actuators(plan, stage.info())),
+        actuators_(excited_actuators(plan.spec(), stage.info())),
         runs_(plan.runs_without(options.skip)) {}
 
   ExperimentResult perform() {

@@ -21,6 +21,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/loop/measurement_loop.hpp"
 #include "acquisition/loop/run_experiment.hpp"
+#include "acquisition/prediction/limited_excitation.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/plant/plant_frf.hpp"
@@ -28,7 +29,6 @@
 #include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tools/config/stage_config.hpp"
-#include "tools/experiment/limited_excitation.hpp"
 
 namespace stageid {
 namespace {

@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 
-#include "tools/experiment/closed_loop_prediction.hpp"
+#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/experiment/limited_plan.hpp"
 #include "tools/terminal/console.hpp"

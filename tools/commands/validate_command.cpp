@@ -13,13 +13,13 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
+#include "estimation/modal/prediction_error.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/exchange/model/mode_correlation.hpp"
 #include "tools/steps/frf_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
-#include "tools/steps/prediction_error.hpp"
 #include "tools/terminal/exit_code.hpp"
 
 namespace stageid {

@@ -135,14 +135,6 @@ const char* to_string(Backend backend) noexcept {
   return "unknown";
 }
 
-int actuator_of_axis(const StageInfo& stage, const std::string& axis) {
-  const int index = channel_index(stage.actuators, axis);
-  if (index < 0)
-    throw std::invalid_argument(
-        fmt::format("axes: unknown actuator '{}'; use an actuator of the stage file", axis));
-  return index;
-}
-
 void describe_stage_keys(ConfigVisitor& visitor) {
   StageFile file;
   describe_stage_file(visitor, file);

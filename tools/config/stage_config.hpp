@@ -51,7 +51,4 @@ std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
                                            const std::vector<std::string>& actuators,
                                            const std::vector<std::string>& sensors);
 
-/// Index of the actuator that an axis of an experiment excites. @throws std::invalid_argument
-int actuator_of_axis(const StageInfo& stage, const std::string& axis);
-
 }  // namespace stageid

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/prediction/limited_excitation.hpp"
 #include "excitation/plan/limited_design.hpp"
 #include "tools/experiment/experiment_config.hpp"
-#include "tools/experiment/limited_excitation.hpp"
 
 namespace stageid {
 

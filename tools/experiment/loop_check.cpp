@@ -13,7 +13,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "hal/simulator/loop_stability.hpp"
 #include "tools/experiment/config_plan.hpp"
-#include "tools/experiment/plant_prior.hpp"
+#include "tools/experiment/plant_prior_file.hpp"
 
 namespace stageid {
 namespace {

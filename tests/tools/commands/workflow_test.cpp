@@ -8,11 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/formats/open_log.hpp"
+#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "estimation/model/additive_model.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tests/tools/program_fixture.hpp"
-#include "tools/experiment/closed_loop_prediction.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/experiment_config.hpp"
 

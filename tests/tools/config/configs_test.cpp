@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <fstream>
 
+#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "hal/can/can_dbc.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 #include "tools/config/stage_config.hpp"
-#include "tools/experiment/closed_loop_prediction.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/experiment/link_load.hpp"

@@ -6,11 +6,11 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/formats/open_log.hpp"
+#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/response/relative_variance.hpp"
 #include "tests/tools/program_fixture.hpp"
-#include "tools/experiment/closed_loop_prediction.hpp"
 #include "tools/experiment/config_plan.hpp"
 
 namespace stageid::test {

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 
 #include "frf/response/frf_estimate.hpp"
-#include "hal/stage/stage.hpp"
 
 namespace stageid {
 
@@ -15,10 +14,10 @@ namespace stageid {
 /// rows are combinations of the six motions as the channels' positions and directions show them.
 class LowFrequencyPlant {
  public:
-  /// @param sensors, actuators  the response's channels in the stage
-  LowFrequencyPlant(const FrfEstimate& frf, const StageInfo& stage,
-                    const std::vector<Eigen::Index>& sensors,
-                    const std::vector<Eigen::Index>& actuators);
+  /// @param delay_s  tau
+  /// @param output_motions, input_motions  channels x 6: each channel's part of the six rigid motions
+  LowFrequencyPlant(const FrfEstimate& frf, double delay_s, const Eigen::MatrixXd& output_motions,
+                    const Eigen::MatrixXd& input_motions);
 
   /// Channels as frf.response has them. @pre frequency_hz > 0
   Eigen::VectorXcd response(double frequency_hz) const;

@@ -1,4 +1,4 @@
-#include "tools/experiment/limited_excitation.hpp"
+#include "acquisition/prediction/limited_excitation.hpp"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include <complex>
 #include <stdexcept>
 
+#include "acquisition/loop/excited_actuators.hpp"
 #include "hal/stage/motion_controller.hpp"
-#include "tools/config/stage_config.hpp"
 
 namespace stageid {
 namespace {
@@ -27,15 +27,13 @@ constexpr double kRestMargin = 0.02;
 
 std::vector<Index> actuators_of(const ExperimentSpec& experiment, const StageInfo& stage,
                                 const PlantPrior& prior) {
-  std::vector<Index> indices;
-  for (const ExcitationAxis& axis : experiment.axes) {
-    const int index = actuator_of_axis(stage, axis.channel);
-    if (!prior.actuator_known[static_cast<std::size_t>(index)])
-      throw std::invalid_argument(fmt::format(
-          "prior: does not contain the axis '{}'; measure a pilot with all axes", axis.channel));
-    indices.push_back(index);
-  }
-  return indices;
+  const std::vector<int> excited = excited_actuators(experiment, stage);
+  for (std::size_t axis = 0; axis < excited.size(); ++axis)
+    if (!prior.actuator_known[static_cast<std::size_t>(excited[axis])])
+      throw std::invalid_argument(
+          fmt::format("prior: does not contain the axis '{}'; measure a pilot with all axes",
+                      experiment.axes[axis].channel));
+  return {excited.begin(), excited.end()};
 }
 
 std::vector<Index> outputs_of(const std::vector<std::string>& names, const StageInfo& stage,

@@ -1,4 +1,4 @@
-#include "tools/experiment/closed_loop_prediction.hpp"
+#include "acquisition/prediction/closed_loop_prediction.hpp"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,9 @@
 #include <complex>
 #include <stdexcept>
 
+#include "acquisition/loop/excited_actuators.hpp"
 #include "excitation/multisine/dft.hpp"
 #include "hal/stage/motion_controller.hpp"
-#include "tools/config/stage_config.hpp"
 
 namespace stageid {
 namespace {
@@ -25,10 +25,9 @@ ClosedLoop closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) 
   const StageInfo& info = stage.info;
   const auto n_u = static_cast<Eigen::Index>(info.actuators.size());
   Eigen::MatrixXd selection = Eigen::MatrixXd::Zero(n_u, plan.axes());
-  for (std::size_t axis = 0; axis < plan.spec().axes.size(); ++axis) {
-    const int index = actuator_of_axis(info, plan.spec().axes[axis].channel);
-    selection(index, static_cast<Eigen::Index>(axis)) = 1.0;
-  }
+  const std::vector<int> excited = excited_actuators(plan.spec(), info);
+  for (std::size_t axis = 0; axis < excited.size(); ++axis)
+    selection(excited[axis], static_cast<Eigen::Index>(axis)) = 1.0;
   const std::vector<PlantMode> modes = wafer_stage_modes(stage);
   const MotionController controller(stage.controller);
   ClosedLoop loop;

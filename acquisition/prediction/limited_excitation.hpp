@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/prediction/plant_prior.hpp"
 #include "excitation/plan/limited_design.hpp"
 #include "hal/simulator/simulated_stage.hpp"
-#include "tools/experiment/plant_prior.hpp"
 
 namespace stageid {
 

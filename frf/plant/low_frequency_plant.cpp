@@ -1,9 +1,10 @@
-#include "tools/experiment/low_frequency_plant.hpp"
+#include "frf/plant/low_frequency_plant.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -38,17 +39,8 @@ Index rigid_lines(const FrfEstimate& frf) {
   return frf.lines();
 }
 
-/// Onto the motions of the channels that a rigid body can make.
-MatrixXd rigid_motions(const std::vector<Channel>& channels, const std::vector<Index>& places) {
-  MatrixXd motions(static_cast<Index>(places.size()), 6);
-  for (Index i = 0; i < motions.rows(); ++i) {
-    const Channel& channel =
-        channels[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
-    const Eigen::Map<const Eigen::Vector3d> position(channel.position_m);
-    const Eigen::Map<const Eigen::Vector3d> direction(channel.direction);
-    motions.row(i).head<3>() = direction;
-    motions.row(i).tail<3>() = position.cross(direction);
-  }
+/// Projects onto the motions of the channels that a rigid body can make.
+MatrixXd onto_range(const MatrixXd& motions) {
   Eigen::JacobiSVD<MatrixXd> svd(motions, Eigen::ComputeThinU);
   svd.setThreshold(kSmallestMotion);
   const MatrixXd U = svd.matrixU().leftCols(svd.rank());
@@ -57,10 +49,9 @@ MatrixXd rigid_motions(const std::vector<Channel>& channels, const std::vector<I
 
 }  // namespace
 
-LowFrequencyPlant::LowFrequencyPlant(const FrfEstimate& frf, const StageInfo& stage,
-                                     const std::vector<Index>& sensors,
-                                     const std::vector<Index>& actuators)
-    : delay_s_(stage.transport_delay_s + 0.5 / stage.sample_rate_hz) {
+LowFrequencyPlant::LowFrequencyPlant(const FrfEstimate& frf, double delay_s,
+                                     const MatrixXd& output_motions, const MatrixXd& input_motions)
+    : delay_s_(delay_s) {
   const Index K = rigid_lines(frf);
   const Index n_y = frf.n_outputs();
   const Index n_u = frf.n_inputs();
@@ -88,9 +79,9 @@ LowFrequencyPlant::LowFrequencyPlant(const FrfEstimate& frf, const StageInfo& st
     terms_.col(c).head(terms) = (w.asDiagonal() * X).colPivHouseholderQr().solve(target);
   }
   const Eigen::VectorXd constant = terms_.row(0);
-  const MatrixXd B = rigid_motions(stage.sensors, sensors) *
+  const MatrixXd B = onto_range(output_motions) *
                      Eigen::Map<const MatrixXd>(constant.data(), n_y, n_u) *
-                     rigid_motions(stage.actuators, actuators);
+                     onto_range(input_motions);
   terms_.row(0) = B.reshaped().transpose();
   double square = 0.0;
   for (Index k = 0; k < K; ++k)

@@ -1,4 +1,4 @@
-#include "tools/steps/prediction_error.hpp"
+#include "estimation/modal/prediction_error.hpp"
 
 #include <fmt/format.h>
 

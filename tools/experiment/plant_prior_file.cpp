@@ -1,4 +1,4 @@
-#include "tools/experiment/plant_prior.hpp"
+#include "tools/experiment/plant_prior_file.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,9 +14,9 @@
 #include "estimation/modal/validation.hpp"
 #include "estimation/model/additive_model.hpp"
 #include "frf/file/frf_file.hpp"
+#include "frf/plant/low_frequency_plant.hpp"
 #include "frf/response/hold_compensation.hpp"
-#include "tools/config/stage_config.hpp"
-#include "tools/experiment/low_frequency_plant.hpp"
+#include "hal/simulator/rigid_body.hpp"
 
 namespace stageid {
 namespace {
@@ -147,7 +147,9 @@ PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& 
 
   std::optional<LowFrequencyPlant> low;
   if (asked_hz[0] < frf.frequency_hz[0]) {
-    low.emplace(frf, stage, sensors, actuators);
+    low.emplace(frf, stage.transport_delay_s + 0.5 / stage.sample_rate_hz,
+                rigid_body_jacobian(stage.sensors)(sensors, Eigen::all),
+                rigid_body_jacobian(stage.actuators)(actuators, Eigen::all));
     prior.extrapolated_below_hz = frf.frequency_hz[0];
     prior.extrapolation_misfit = low->misfit();
   }
