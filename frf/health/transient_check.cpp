@@ -20,6 +20,7 @@ constexpr double kFalseAlarms = 0.005;  // a log
 constexpr Index kReach = 2;             // lines on either side of a maximum
 constexpr double kMemory = 0.6;         // see the header
 constexpr double kLargestShift = 0.5;   // deviations
+constexpr double kTolerable = 10.0;     // deviations, of the bound; a tenth of it is typical
 
 /// Noise of one period on each line, and what the start has over it.
 struct Lines {
@@ -96,8 +97,8 @@ class Window {
 
   /// Of a period's transient what the next one has.
   std::complex<double> ratio() const;
-  /// See the header; deviations.
-  double shift(std::complex<double> q) const;
+  /// See the header; deviations. @param used the periods' mean includes the start
+  double shift(std::complex<double> q, bool used) const;
   double frequency_hz() const { return evidence_.frequency_hz[peak_]; }
 
  private:
@@ -148,9 +149,8 @@ std::complex<double> Window::ratio() const {
   return best;
 }
 
-double Window::shift(std::complex<double> q) const {
+double Window::shift(std::complex<double> q, bool used) const {
   const int P = evidence_.runs.front().periods;
-  const bool used = evidence_.runs.front().start_used;
   const std::complex<double> left =
       mean_of_powers(q, used ? 0 : 1, P) / (1.0 - mean_of_powers(q, 1, P));
   const double averaged = used ? P + 1.0 : P;
@@ -172,12 +172,14 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
   std::vector<double> frequencies;
   double largest = 0.0;
   double of_largest = 0.0;
+  double settled = 0.0;  // the largest shift if the start is discarded
   int more = 0;
   for (const Index peak : peaks) {
     const Window window(evidence, lines, peak);
     if (window.p_value() * static_cast<double>(peaks.size()) >= kFalseAlarms) continue;
     const std::complex<double> q = window.ratio();
-    const double shift = window.shift(q);
+    const double shift = window.shift(q, evidence.runs.front().start_used);
+    settled = std::max(settled, window.shift(q, false));
     if (shift <= kLargestShift) continue;
     frequencies.push_back(window.frequency_hz());
     more = std::max(more, static_cast<int>(
@@ -195,7 +197,7 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
     names += fmt::format(" and {} more", frequencies.size() - kMostNamed);
   const int needed = evidence.transient_periods + std::max(1, more);
   Finding finding;
-  finding.severity = Severity::doubt;
+  finding.severity = settled > kTolerable ? Severity::fault : Severity::doubt;
   finding.cause = Cause::unsettled;
   finding.what =
       fmt::format("not settled: the transient of the start still rings at {} Hz after {}", names,
@@ -203,6 +205,8 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
   finding.figure = fmt::format(
       "shifts a mode by up to {:.2g} standard deviations; {:.2g} % remains after one more period",
       largest, 100.0 * of_largest);
+  if (evidence.runs.front().start_used)
+    finding.figure += fmt::format("; {:.2g} standard deviations without the first one", settled);
   const int recorded = evidence.transient_periods + evidence.periods;
   finding.remedy =
       needed <= recorded - 2

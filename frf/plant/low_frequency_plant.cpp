@@ -6,9 +6,8 @@
 #include <complex>
 #include <limits>
 #include <numbers>
-#include <vector>
 
-#include "frf/statistics/order_statistic.hpp"
+#include "frf/response/rigid_lines.hpp"
 
 namespace stageid {
 namespace {
@@ -16,28 +15,9 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr double kModelError = 0.02;  // of a row: what three terms leave of flexible modes
-constexpr double kGrowth = 1.5;
-constexpr double kBelowGrowth = 0.7;
-constexpr Index kFewestLines = 8;
 constexpr double kSmallestMotion = 1e-6;  // of the largest
 
 double omega_of(double frequency_hz) { return 2.0 * std::numbers::pi * frequency_hz; }
-
-/// Number of lines up to where flexible modes begin.
-Index rigid_lines(const FrfEstimate& frf) {
-  std::vector<double> sizes;
-  for (Index k = 0; k < frf.lines(); ++k) {
-    sizes.push_back(std::pow(frf.frequency_hz[k], 2) * frf.response.col(k).norm());
-    std::vector<double> sorted = sizes;
-    if (k + 1 < kFewestLines || sizes.back() <= kGrowth * order_statistic(sorted, 0.5)) continue;
-    const double* const begin = frf.frequency_hz.data();
-    const Index below =
-        std::lower_bound(begin, begin + k, kBelowGrowth * frf.frequency_hz[k]) - begin;
-    return std::clamp<Index>(below, kFewestLines, k + 1);
-  }
-  return frf.lines();
-}
 
 /// Projects onto the motions of the channels that a rigid body can make.
 MatrixXd onto_range(const MatrixXd& motions) {
@@ -52,7 +32,9 @@ MatrixXd onto_range(const MatrixXd& motions) {
 LowFrequencyPlant::LowFrequencyPlant(const FrfEstimate& frf, double delay_s,
                                      const MatrixXd& output_motions, const MatrixXd& input_motions)
     : delay_s_(delay_s) {
-  const Index K = rigid_lines(frf);
+  const Index K =
+      std::clamp(rigid_lines(frf.frequency_hz, frf.response.colwise().norm().transpose()),
+                 std::min(kFewestRigidLines, frf.lines()), frf.lines());
   const Index n_y = frf.n_outputs();
   const Index n_u = frf.n_inputs();
   const Index terms = std::min<Index>(3, K);
@@ -72,7 +54,7 @@ LowFrequencyPlant::LowFrequencyPlant(const FrfEstimate& frf, double delay_s,
       const Eigen::Map<const Eigen::MatrixXcd> whole(G.col(k).data(), n_y, n_u);
       const double row = whole.row(c % n_y).squaredNorm() / static_cast<double>(n_u);
       const double noise = frf.noise_variance.size() > 0 ? 0.5 * frf.noise_variance(c, k) : 0.0;
-      const double variance = noise + kModelError * kModelError * row;
+      const double variance = noise + kRigidModelError * kRigidModelError * row;
       w[k] = variance > 0.0 && std::isfinite(variance) ? 1.0 / std::sqrt(variance) : 0.0;
     }
     const Eigen::VectorXd target = w.cwiseProduct(G.row(c).real().transpose());

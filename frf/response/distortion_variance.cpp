@@ -60,6 +60,30 @@ DistortionVariance distortion_variance(const FrfEstimate& frf) {
   return out;
 }
 
+Eigen::MatrixXcd covariance_with_distortion(const FrfEstimate& frf,
+                                            const Eigen::MatrixXd& variance) {
+  const Eigen::Index n_y = frf.n_outputs();
+  const Eigen::Index n_u = frf.n_inputs();
+  const auto scaled = [](const Eigen::MatrixXcd& C, const Eigen::ArrayXd& power) {
+    const Eigen::ArrayXd diagonal = C.diagonal().real().array();
+    const Eigen::ArrayXd scale = (diagonal > 0.0).select((power / diagonal).sqrt(), 0.0);
+    return Eigen::MatrixXcd(scale.matrix().asDiagonal() * C * scale.matrix().asDiagonal());
+  };
+  Eigen::MatrixXcd out(n_y * n_y, frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    Eigen::MatrixXcd C_E(n_y, n_y);
+    C_E.real() = frf.residual_covariance_re.col(k).reshaped(n_y, n_y);
+    C_E.imag() = frf.residual_covariance_im.col(k).reshaped(n_y, n_y);
+    const Eigen::MatrixXcd G = frf.response.col(k).reshaped(n_y, n_u);
+    const Eigen::ArrayXd noise = frf.noise_variance.col(k).reshaped(n_y, n_u).rowwise().mean();
+    const Eigen::ArrayXd total = variance.col(k).reshaped(n_y, n_u).rowwise().mean();
+    const Eigen::MatrixXcd C =
+        scaled(C_E, noise) + scaled(G * G.adjoint(), (total - noise).max(0.0));
+    out.col(k) = C.reshaped();
+  }
+  return out;
+}
+
 Eigen::MatrixXd variance_with(const Distortion& distortion, const FrfEstimate& frf) {
   Eigen::MatrixXd variance = frf.noise_variance;
   const double realizations = std::max(1, frf.realizations);

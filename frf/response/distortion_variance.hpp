@@ -34,4 +34,12 @@ struct DistortionVariance {
 /// @pre both variances are there, total_dof >= 1
 DistortionVariance distortion_variance(const FrfEstimate& frf);
 
+/// Correlation of the outputs' errors where noise and distortion add up: C_E of the noise, and G G^H of the distortion,
+/// which acts as independent forces of the actuators. Both are scaled so that the diagonal, y, has the means over the
+/// inputs of noise_variance and of variance - noise_variance.
+/// @param variance  (n_y n_u) x N, at least noise_variance
+/// @returns (n_y n_y) x N, Hermitian, in the layout of FrfEstimate::residual_covariance_re
+Eigen::MatrixXcd covariance_with_distortion(const FrfEstimate& frf,
+                                            const Eigen::MatrixXd& variance);
+
 }  // namespace stageid

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <optional>
 
-#include "frf/statistics/order_statistic.hpp"
+#include "frf/response/rigid_lines.hpp"
 
 namespace stageid {
 namespace {
@@ -16,30 +16,20 @@ namespace {
 using Index = Eigen::Index;
 
 constexpr double kTolerance = 0.1;       // of the rms of a row
-constexpr double kModelError = 0.02;     // of what the fit leaves of flexible modes
 constexpr double kLeastLogGain = 0.262;  // ln 1.3
 constexpr double kLeastExplained = 20.0;
 constexpr double kLeastBodyShare = 0.3;
-constexpr double kGrowth = 1.5;
-constexpr double kBelowGrowth = 0.7;
 constexpr double kDead = 0.05;
-constexpr std::size_t kFewestBodyLines = 8;
 
 /// The lines up to where flexible modes begin.
-std::vector<PlantLine> rigid_lines(const std::vector<PlantLine>& lines) {
-  std::vector<double> sizes;
-  for (std::size_t k = 0; k < lines.size(); ++k) {
-    const double omega = lines[k].omega_rad_s;
-    sizes.push_back(omega * omega * lines[k].G.norm());
-    std::vector<double> sorted = sizes;
-    if (sizes.size() < kFewestBodyLines || sizes.back() <= kGrowth * order_statistic(sorted, 0.5))
-      continue;
-    std::vector<PlantLine> band;
-    for (const PlantLine& line : lines)
-      if (line.omega_rad_s < kBelowGrowth * omega) band.push_back(line);
-    return band;
+std::vector<PlantLine> lines_of_body(const std::vector<PlantLine>& lines) {
+  const auto count = static_cast<Index>(lines.size());
+  Eigen::VectorXd omega_rad_s(count), gain(count);
+  for (Index k = 0; k < count; ++k) {
+    omega_rad_s[k] = lines[static_cast<std::size_t>(k)].omega_rad_s;
+    gain[k] = lines[static_cast<std::size_t>(k)].G.norm();
   }
-  return lines;
+  return {lines.begin(), lines.begin() + rigid_lines(omega_rad_s, gain)};
 }
 
 /// A and A0 with what they are held to.
@@ -60,7 +50,8 @@ Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j)
     const double omega2 = std::pow(line.omega_rad_s, 2);
     const double x = omega2 / highest;
     const double row_square = line.G.row(i).squaredNorm() / static_cast<double>(line.G.cols());
-    const double variance = 0.5 * line.variance(i, j) + kModelError * kModelError * row_square;
+    const double variance =
+        0.5 * line.variance(i, j) + kRigidModelError * kRigidModelError * row_square;
     const double w = 1.0 / (omega2 * std::sqrt(std::max(1e-300, variance)));
     X.row(k) << w, w * x, w * x * x;
     rhs.row(k) << -w * omega2 * line.G(i, j).real(), -w * omega2 * line.G0(i, j).real();
@@ -164,11 +155,11 @@ RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
                                 const std::vector<Index>& outputs,
                                 const std::vector<Index>& inputs) {
   RigidBodyCheck check;
-  const std::vector<PlantLine> lines = rigid_lines(all);
-  if (lines.size() < kFewestBodyLines) {
+  const std::vector<PlantLine> lines = lines_of_body(all);
+  if (static_cast<Index>(lines.size()) < kFewestRigidLines) {
     check.unchecked =
         fmt::format("only {} excited lines between suspension and flexible modes; {} are required",
-                    lines.size(), kFewestBodyLines);
+                    lines.size(), kFewestRigidLines);
     return check;
   }
   check.band_hz[0] = lines.front().omega_rad_s / (2.0 * std::numbers::pi);

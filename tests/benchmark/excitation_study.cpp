@@ -29,6 +29,7 @@
 #include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tools/config/stage_config.hpp"
+#include "tools/experiment/plant_prior_file.hpp"
 
 namespace stageid {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "tools/experiment/config_plan.hpp"
+#include "tools/experiment/plant_prior_file.hpp"
 #include "tools/terminal/console.hpp"
 
 namespace stageid {

@@ -41,6 +41,13 @@ std::vector<Index> places(const std::filesystem::path& file, const ChannelList& 
   return indices;
 }
 
+std::vector<Channel> chosen(const std::vector<Channel>& channels,
+                            const std::vector<Index>& indices) {
+  std::vector<Channel> some;
+  for (const Index i : indices) some.push_back(channels[static_cast<std::size_t>(i)]);
+  return some;
+}
+
 FrfEstimate prior_of_model(const std::filesystem::path& file, const StageInfo& stage,
                            const Eigen::VectorXd& frequency_hz) {
   const AdditiveModel model = read_model(file);
@@ -148,8 +155,8 @@ PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& 
   std::optional<LowFrequencyPlant> low;
   if (asked_hz[0] < frf.frequency_hz[0]) {
     low.emplace(frf, stage.transport_delay_s + 0.5 / stage.sample_rate_hz,
-                rigid_body_jacobian(stage.sensors)(sensors, Eigen::all),
-                rigid_body_jacobian(stage.actuators)(actuators, Eigen::all));
+                rigid_body_jacobian(chosen(stage.sensors, sensors)),
+                rigid_body_jacobian(chosen(stage.actuators, actuators)));
     prior.extrapolated_below_hz = frf.frequency_hz[0];
     prior.extrapolation_misfit = low->misfit();
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "estimation/request/fit_request.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/estimation/covariance_stage.hpp"
 #include "tests/estimation/delayed_fit_options.hpp"
@@ -101,6 +102,61 @@ TEST(CovarianceMonteCarlo, RelativeWeightsWithKnownVariance) {
 
 TEST(CovarianceMonteCarlo, RelativeWeightsWithUnknownVariance) {
   expect_honest(Weighting::relative, 1e-5 * covariance_stage().G.cwiseAbs2(), false);
+}
+
+// What differs from realization to realization acts as forces: the errors of the outputs follow the response together.
+// Taken for independent, they would give half of the variance.
+TEST(CovarianceMonteCarlo, DistortionOfFewRealizations) {
+  const DenseProblem problem = covariance_stage();
+  constexpr Eigen::Index kOutputs = 2, kInputs = 3;
+  constexpr int kRealizations = 4;
+  constexpr double kDistortion = 0.02;  // of one realization
+  test::RandomNumbers random(78);
+  FitRequest request;
+  request.weighting = Weighting::total_variance;
+  request.delay = DelayRequest{DelayModel::estimate, 0.0};
+  Eigen::MatrixXd values(3, kRuns);
+  Eigen::Vector3d reported = Eigen::Vector3d::Zero();
+  for (int run = 0; run < kRuns; ++run) {
+    FrfEstimate frf = test::frf_of(problem);
+    const double noise = 1e-6 * problem.G.cwiseAbs().minCoeff();
+    std::vector<Eigen::MatrixXcd> responses(kRealizations, problem.G);
+    for (Eigen::MatrixXcd& G : responses)
+      for (Eigen::Index k = 0; k < G.cols(); ++k) {
+        const Eigen::MatrixXcd force = Eigen::MatrixXcd::NullaryExpr(
+            kInputs, kInputs, [&] { return kDistortion * random.circular(); });
+        const Eigen::MatrixXcd exact = problem.G.col(k).reshaped(kOutputs, kInputs);
+        G.col(k) += (exact * force).reshaped();
+      }
+    frf.response.setZero();
+    for (const Eigen::MatrixXcd& G : responses) frf.response += G / kRealizations;
+    frf.total_variance.setZero(frf.response.rows(), frf.response.cols());
+    for (const Eigen::MatrixXcd& G : responses)
+      frf.total_variance += (G - frf.response).cwiseAbs2() / (kRealizations * (kRealizations - 1));
+    frf.noise_variance.setConstant(frf.response.rows(), frf.response.cols(), noise * noise);
+    frf.residual_covariance_re = (noise * noise * Eigen::MatrixXd::Identity(kOutputs, kOutputs))
+                                     .reshaped()
+                                     .replicate(1, frf.response.cols());
+    frf.residual_covariance_im.setZero(kOutputs * kOutputs, frf.response.cols());
+    frf.realizations = kRealizations;
+    frf.total_dof = kRealizations - 1.0;
+    FitSetup setup = make_fit_setup(request, std::move(frf));
+    setup.options.hold = problem.hold;
+    setup.options.delay_s = 1.37e-4;
+    setup.options.threads = 1;
+    const FitResult fit = fit_additive_model(setup.frf, problem.model, setup.options);
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const Submodel& s = fit.model.submodels[static_cast<std::size_t>(i) + 1];
+      values(i, run) = s.natural_frequency_hz();
+      reported[i] += std::pow(*s.natural_frequency_std_hz, 2) / kRuns;
+    }
+  }
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double scatter =
+        (values.row(i).array() - values.row(i).mean()).square().sum() / (kRuns - 1);
+    EXPECT_GT(scatter / reported[i], kLowest) << "mode " << i;
+    EXPECT_LT(scatter / reported[i], kHighest) << "mode " << i;
+  }
 }
 
 }  // namespace test_covariance_monte_carlo

@@ -95,7 +95,7 @@ TEST(StartTransient, ARingingModeIsNamedAndTheRemedySettlesIt) {
     const MemoryLog log = simulate({.periods = 14, .decay_s = 0.5, .seed = seed});
     const std::vector<Finding> found = unsettled(log);
     if (found.size() != 1 || found[0].what.find("93") == std::string::npos) continue;
-    EXPECT_EQ(found[0].severity, Severity::doubt);
+    EXPECT_EQ(found[0].severity, Severity::fault);
     EXPECT_NE(found[0].remedy.find("--method lpm"), std::string::npos);
     ++named;
     const std::string flag = "--transient-periods ";

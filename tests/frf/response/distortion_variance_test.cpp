@@ -84,5 +84,37 @@ TEST(DistortionVariance, AnOutputThatShowsNothingHasItsNoise) {
   EXPECT_GT(found.variance.minCoeff(), 0.0);
 }
 
+// Forces that differ from realization to realization: y = G (u + d) + v has the covariance C_E + s G G^H.
+TEST(DistortionVariance, OfForcesIsCorrelatedBetweenTheOutputsAsTheResponseIs) {
+  test::RandomNumbers random(8);
+  constexpr Eigen::Index kOutputs = 3, kInputs = 2, kFew = 5;
+  const auto drawn = [&random](Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXcd(
+        Eigen::MatrixXcd::NullaryExpr(rows, columns, [&random] { return random.circular(); }));
+  };
+  FrfEstimate frf;
+  frf.outputs.names.resize(kOutputs);
+  frf.inputs.names.resize(kInputs);
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(kFew, 10.0, 50.0);
+  frf.response = drawn(kOutputs * kInputs, kFew);
+  frf.noise_variance.resize(kOutputs * kInputs, kFew);
+  frf.residual_covariance_re.resize(kOutputs * kOutputs, kFew);
+  frf.residual_covariance_im.resize(kOutputs * kOutputs, kFew);
+  Eigen::MatrixXd variance(kOutputs * kInputs, kFew);
+  Eigen::MatrixXcd expected(kOutputs * kOutputs, kFew);
+  for (Eigen::Index k = 0; k < kFew; ++k) {
+    const Eigen::MatrixXcd root = drawn(kOutputs, kOutputs);
+    const Eigen::MatrixXcd C_E = root * root.adjoint();
+    frf.residual_covariance_re.col(k) = C_E.real().reshaped();
+    frf.residual_covariance_im.col(k) = C_E.imag().reshaped();
+    frf.noise_variance.col(k) = C_E.diagonal().real().replicate(kInputs, 1);
+    const Eigen::MatrixXcd G = frf.response.col(k).reshaped(kOutputs, kInputs);
+    const Eigen::MatrixXcd C = C_E + 0.3 * static_cast<double>(k) * G * G.adjoint();
+    expected.col(k) = C.reshaped();
+    variance.col(k) = C.diagonal().real().replicate(kInputs, 1);
+  }
+  EXPECT_TRUE(covariance_with_distortion(frf, variance).isApprox(expected, 1e-12));
+}
+
 }  // namespace test_distortion_variance
 }  // namespace stageid

@@ -1,5 +1,6 @@
 // From a pilot to the largest multisines that the limits allow, on the real program; and the pieces between.
 #include "tools/experiment/limited_plan.hpp"
+#include "tools/experiment/plant_prior_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace stageid {
+
+/// What three terms, B / s^2 + D + E s^2, leave of flexible modes: a share of a row's rms.
+inline constexpr double kRigidModelError = 0.02;
+/// Fewest lines on which the terms are fitted.
+inline constexpr Eigen::Index kFewestRigidLines = 8;
+
+/// How many of the lowest lines show a rigid body: those up to 0.7 of the frequency where omega^2 |G| exceeds 1.5
+/// times its median so far. All lines if it nowhere does.
+/// @param frequency  ascending, of any unit; lines
+/// @param gain       |G| over all channels; lines
+Eigen::Index rigid_lines(const Eigen::VectorXd& frequency, const Eigen::VectorXd& gain);
+
+}  // namespace stageid
