@@ -33,7 +33,7 @@ double windowed_rms(const Eigen::Ref<const Eigen::VectorXd>& period, double samp
   if (time_constant_s <= 0.0) return std::sqrt(mean_square);
   const double a = std::exp(-1.0 / (sample_rate_hz * time_constant_s));
   double largest = mean_square;
-  // One period to settle within a period's ripple, one to look.
+  // The first pass settles the window to within the ripple of one period; the second is evaluated.
   for (int pass = 0; pass < 2; ++pass)
     for (const double value : period) {
       mean_square = a * mean_square + (1.0 - a) * value * value;

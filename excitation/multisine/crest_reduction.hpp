@@ -6,12 +6,12 @@
 
 namespace stageid {
 
-/// Changes the phases of a multisine so that its peak falls, at the given amplitudes.
+/// Changes the phases of a multisine to lower its peak. The amplitudes remain as given.
 ///
-/// Each iteration clips the period, sampled four times as densely as the grid's own so that the
-/// peaks between the samples count, at a fraction of its peak, takes the phases of what is left,
-/// and restores the amplitudes. Returned is the best of all iterates, `phase_rad` among them.
-/// Source of the scheme: E. Van der Ouderaa, J. Schoukens, J. Renneboog, Peak factor minimization
+/// Each iteration clips the period at a fraction of its peak, takes the phases of the clipped signal, and
+/// restores the amplitudes. The period is sampled four times as densely as the grid, so that peaks between
+/// the samples count. The result is the best iterate, `phase_rad` included.
+/// Source: E. Van der Ouderaa, J. Schoukens, J. Renneboog, Peak factor minimization
 /// using a time-frequency domain swapping algorithm, IEEE Trans. Instrum. Meas. 37 (1988).
 /// @param amplitude, phase_rad  size of the grid
 /// @returns the new phases in [0, 2 pi), size of the grid

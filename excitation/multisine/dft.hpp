@@ -6,9 +6,8 @@
 
 namespace stageid {
 
-/// Plans and runs real DFTs of one length with FFTW. Planning is guarded by one lock for the whole
-/// program; forward() and inverse() are safe to call from several threads, each with its own
-/// object.
+/// Plans and runs real DFTs of one length with FFTW. One lock guards planning for the whole program.
+/// forward() and inverse() may be called from several threads if each thread has its own object.
 class RealDft {
  public:
   /// @throws std::invalid_argument if `length` < 2.
@@ -20,14 +19,14 @@ class RealDft {
   int length() const noexcept;
   int half_size() const noexcept { return length() / 2 + 1; }
 
-  /// The object's own aligned input buffer, size length(): fill it, then call forward().
+  /// The object's aligned input buffer, size length(): fill it, then call forward().
   std::span<double> input() noexcept;
 
   /// X(l) = sum_n x(n) exp(-2 pi j l n / N), l = 0 .. N/2; no scaling. Valid until the next call.
   std::span<const std::complex<double>> forward();
 
-  /// x(n) = sum over l of both signs of X(l) exp(2 pi j l n / N), without 1/N; `half_spectrum`
-  /// holds l = 0 .. N/2, size half_size().
+  /// x(n) = sum over l of both signs of X(l) exp(2 pi j l n / N), without 1/N. `half_spectrum`
+  /// contains l = 0 .. N/2, size half_size().
   Eigen::VectorXd inverse(const Eigen::Ref<const Eigen::VectorXcd>& half_spectrum);
 
  private:

@@ -6,12 +6,12 @@
 
 namespace stageid {
 
-/// How FFTW plans in this program. Its planner has global state and must be entered by one thread at
-/// a time; executing a plan need not.
+/// The lock and the flags of all FFTW planning. FFTW's planner has global state and allows one thread at a
+/// time; plans may be executed concurrently.
 struct FftPlanner {
   std::mutex lock;
-  /// Never FFTW_MEASURE unless asked for (fft_wisdom.hpp): it picks among algorithms by timing them,
-  /// so the rounding of the result, and with it the bytes of our files, would change from run to run.
+  /// FFTW_MEASURE (fft_wisdom.hpp) selects algorithms by timing. The rounding of results, and the
+  /// bytes of output files, would then change from run to run.
   unsigned flags = FFTW_ESTIMATE;
 };
 

@@ -51,7 +51,7 @@ std::string FftWisdom::text() const {
   std::vector<std::string> lines;
   for (std::string line; std::getline(stream, line);)
     if (!line.empty()) lines.push_back(line);
-  // The entries come in the order of a hash table. The first line names the version, the last is a closing bracket.
+  // The entries are in hash-table order. The first line is the version, the last a closing bracket.
   if (lines.size() > 2) std::sort(lines.begin() + 1, lines.end() - 1);
   return fmt::format("{}\n", fmt::join(lines, "\n"));
 }

@@ -4,19 +4,19 @@
 
 namespace stageid {
 
-/// While one exists, RealDft plans by timing. Without one, RealDft's plans depend on nothing but the length. See
+/// While an FftWisdom exists, RealDft plans by timing. Otherwise its plans depend only on the length. See
 /// docs/decisions/determinism.md.
 class FftWisdom {
  public:
-  /// Takes over plans that text() returned earlier; empty: none. One at a time, made before the RealDfts.
-  /// @throws std::invalid_argument if the plans are of another version of FFTW or kind of processor.
-  /// @throws std::logic_error if there is one already.
+  /// Loads plans that text() returned earlier; empty: none. Only one may exist; create it before the RealDfts.
+  /// @throws std::invalid_argument if the plans are from another version of FFTW or another kind of processor.
+  /// @throws std::logic_error if an FftWisdom exists already.
   explicit FftWisdom(const std::string& plans);
-  ~FftWisdom();  ///< timed plans are forgotten; RealDfts that exist keep theirs
+  ~FftWisdom();  ///< discards the timed plans; existing RealDfts keep theirs
   FftWisdom(const FftWisdom&) = delete;
   FftWisdom& operator=(const FftWisdom&) = delete;
 
-  /// All plans known now: FFTW's wisdom, its entries sorted.
+  /// All known plans: FFTW's wisdom with sorted entries.
   std::string text() const;
 };
 

@@ -49,7 +49,7 @@ void check_band(double sample_rate_hz, const LineSpec& spec) {
   }
 }
 
-/// Leaves one line of every complete group out; an incomplete last group stays whole.
+/// Omits one line of every complete group; an incomplete last group remains whole.
 std::vector<int> leave_out_at_random(const std::vector<int>& odd_lines, const LineSpec& spec) {
   const auto group = static_cast<std::size_t>(spec.group_size);
   const std::size_t complete = odd_lines.size() - odd_lines.size() % group;
@@ -100,8 +100,8 @@ FrequencyGrid FrequencyGrid::band(double sample_rate_hz, int samples_per_period,
   check_rate_and_period(sample_rate_hz, samples_per_period);
   check_band(sample_rate_hz, spec);
 
-  // An end that is a line in decimal notation must count as one, although 0.3 Hz / 0.1 Hz < 3. A
-  // billionth of the line number is far above rounding and far below a line distance.
+  // A band edge of exactly one line in decimal notation must count as that line, although 0.3 Hz / 0.1 Hz < 3
+  // in binary. A billionth of the line number is far above rounding and far below the line spacing.
   constexpr double kRounding = 1e-9;
   const double lines_per_hz = samples_per_period / sample_rate_hz;
   const int first =

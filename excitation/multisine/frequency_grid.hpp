@@ -9,30 +9,30 @@ namespace stageid {
 /// Which lines of the DFT of one period are excited.
 enum class LineSelection : std::uint8_t {
   all,        ///< every line of the band
-  odd,        ///< 1, 3, 5, ...: even lines stay empty and show even-order nonlinearity
-  odd_random  ///< odd, and one odd line of every group is left out at random: shows odd order too
+  odd,        ///< 1, 3, 5, ...: the empty even lines detect even-order nonlinearity
+  odd_random  ///< odd, with one random line omitted per group: detects odd order too
 };
 
-/// What to ask of FrequencyGrid::band(). Any values may stand here; band() checks them.
+/// Arguments of FrequencyGrid::band(), which checks them.
 struct LineSpec {
   double low_hz = 0.0;   ///< first frequency, inclusive
   double high_hz = 0.0;  ///< last frequency, inclusive
   LineSelection selection = LineSelection::odd;
-  int group_size = 4;      ///< odd_random: one of so many odd lines is left out
-  std::uint64_t seed = 0;  ///< odd_random: which one
+  int group_size = 4;      ///< odd_random: one of this many odd lines is omitted
+  std::uint64_t seed = 0;  ///< odd_random: selects the omitted lines
 };
 
-/// The lines of one period of a periodic measurement: the only place where samples, lines, Hz and
-/// rad/s meet.
+/// The lines of one period of a periodic measurement. All conversions between samples, lines, Hz and
+/// rad/s are here.
 ///
-/// Line l of a period of N samples at sample rate fs has the frequency l fs / N. Invariant: the
-/// lines are strictly increasing and in 1 .. ceil(N/2)-1 (never DC, never Nyquist).
+/// Line l of a period of N samples at sample rate fs has the frequency l fs / N. Invariant: lines
+/// strictly increase and are in 1 .. ceil(N/2)-1 (DC and Nyquist are excluded).
 class FrequencyGrid {
  public:
   /// @throws std::invalid_argument if the invariant does not hold or the rate is not positive.
   FrequencyGrid(double sample_rate_hz, int samples_per_period, std::vector<int> lines);
 
-  /// The lines of a band by `spec`.
+  /// The lines of a band according to `spec`.
   /// @throws std::invalid_argument if the band is empty, reversed, or reaches Nyquist.
   static FrequencyGrid band(double sample_rate_hz, int samples_per_period, const LineSpec& spec);
 
@@ -45,7 +45,7 @@ class FrequencyGrid {
   Eigen::VectorXd frequency_hz() const;  ///< size()
   Eigen::VectorXd omega_rad_s() const;   ///< size()
 
-  /// Lines between the first and the last excited one that are not excited: even and odd ones.
+  /// Unexcited lines between the first and the last excited one: even and odd ones.
   std::vector<int> even_detection_lines() const;
   std::vector<int> odd_detection_lines() const;
 

@@ -9,17 +9,17 @@
 
 namespace stageid {
 
-/// Goes between the lines of a grid and one period of samples, `oversampling` times as dense as the
-/// grid's own:  x(n) = 2 Re sum_k X_k exp(2 pi j l_k n / N).
+/// Converts between the lines of a grid and one period of samples, `oversampling` times as dense as the
+/// grid:  x(n) = 2 Re sum_k X_k exp(2 pi j l_k n / N).
 class LineSpectrum {
  public:
   /// @throws std::invalid_argument if the dense period has more samples than an int can count.
   explicit LineSpectrum(const FrequencyGrid& grid, int oversampling = 1);
 
-  /// X_k, size of the grid, to samples, size oversampling * samples_per_period().
+  /// Converts X_k, size of the grid, to samples, size oversampling * samples_per_period().
   Eigen::VectorXd samples(const Eigen::Ref<const Eigen::VectorXcd>& coefficients);
 
-  /// The reverse, DFT / N; what the samples hold beside the lines is dropped.
+  /// The inverse, DFT / N; other lines are discarded.
   Eigen::VectorXcd coefficients(const Eigen::Ref<const Eigen::VectorXd>& samples);
 
  private:

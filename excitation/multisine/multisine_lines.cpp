@@ -13,7 +13,7 @@ Eigen::VectorXd unit_rms_amplitude(const FrequencyGrid& grid, const Eigen::Vecto
     const double amplitude = std::sqrt(2.0 / static_cast<double>(grid.size()));
     return Eigen::VectorXd::Constant(grid.size(), amplitude);
   }
-  // Divided by its peak first: shapes in any unit, 1e-200 or 1e200, can then be squared.
+  // Divided by its peak first, so that shapes in any unit (1e-200 or 1e200) can be squared.
   const Eigen::VectorXd relative = shape / shape.maxCoeff();
   return relative * (std::numbers::sqrt2 / relative.norm());
 }

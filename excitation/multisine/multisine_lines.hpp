@@ -6,14 +6,14 @@
 
 #include "excitation/multisine/frequency_grid.hpp"
 
-/// What a multisine is before it becomes samples; arguments are taken as checked.
+/// Lines of a multisine before synthesis; arguments are not checked.
 namespace stageid {
 
-/// Amplitudes proportional to `shape` (flat if it is empty) of a multisine with rms 1, size of the
-/// grid: the mean square is sum A_k^2 / 2.
+/// Amplitudes, size of the grid, of a multisine with rms 1 (mean square sum A_k^2 / 2). They are
+/// proportional to `shape`, or flat if it is empty.
 Eigen::VectorXd unit_rms_amplitude(const FrequencyGrid& grid, const Eigen::VectorXd& shape);
 
-/// One phase a line, independent and uniform on [0, 2 pi), then changed by `crest_iterations` of
+/// One phase per line, independent and uniform on [0, 2 pi), then changed by `crest_iterations` of
 /// reduce_crest(). Size of the grid.
 Eigen::VectorXd multisine_phase_rad(const FrequencyGrid& grid, const Eigen::VectorXd& amplitude,
                                     std::uint64_t seed, int crest_iterations);

@@ -23,8 +23,8 @@ constexpr std::uint64_t stream_seed(std::uint64_t seed, std::uint64_t first,
   return splitmix64(splitmix64(splitmix64(seed) + first) + second);
 }
 
-/// Numbers that are the same on every machine: the standard fixes the bits of std::mt19937_64, but
-/// not what std::uniform_real_distribution makes of them.
+/// Random numbers that are the same on every machine: the standard specifies std::mt19937_64 bit by bit,
+/// but not std::uniform_real_distribution.
 class UniformStream {
  public:
   explicit UniformStream(std::uint64_t seed) : engine_(seed) {}

@@ -21,9 +21,9 @@ int twice(int samples) {
   return 2 * samples;
 }
 
-/// A signal's transfer at multiples of half the resolution: cubic between the four nearest of those that are
-/// known, held beyond them. Of an h that has died out after a tenth of the period it loses 1e-3; a straight
-/// line between the lines would lose 2 %.
+/// A signal's transfer at multiples of half the resolution: cubic interpolation between the four nearest known
+/// points, constant beyond them. If h decays within a tenth of the period, the error is 1e-3; linear
+/// interpolation would have an error of 2 %.
 class HalfLines {
  public:
   HalfLines(const FrequencyGrid& grid, const BoundedSignal& signal) : signal_(signal) {
@@ -86,7 +86,7 @@ struct SignalPredictor::Work {
         looseness(1.0 / std::cos(std::numbers::pi * g.lines().back() /
                                  (static_cast<double>(oversampling) * g.samples_per_period()))) {}
 
-  /// Spectra of r in the first of two periods and nothing in the second, axes x twofold.half_size().
+  /// Spectra of r in the first of two periods, followed by one period of zeros; axes x twofold.half_size().
   Eigen::MatrixXcd begun_at_rest(const Eigen::MatrixXcd& spectrum) {
     const int N = grid.samples_per_period();
     Eigen::MatrixXcd begun(spectrum.rows(), twofold.half_size());
@@ -102,7 +102,7 @@ struct SignalPredictor::Work {
     return begun;
   }
 
-  /// With the margin, and what the doubt below the band adds.
+  /// Includes the margin and the share added for doubt below the band.
   double largest_from_rest(const BoundedSignal& signal, const Eigen::MatrixXcd& begun);
 
   const FrequencyGrid& grid;
@@ -132,7 +132,7 @@ double SignalPredictor::Work::largest_from_rest(const BoundedSignal& signal,
 }
 
 SignalPredictor::SignalPredictor(const FrequencyGrid& grid) {
-  twice(grid.samples_per_period());  // refused before memory for it is asked for
+  twice(grid.samples_per_period());  // rejects too long periods before allocating memory
   work_ = std::make_unique<Work>(grid);
 }
 SignalPredictor::~SignalPredictor() = default;

@@ -9,10 +9,10 @@
 
 namespace stageid {
 
-/// The largest that a signal becomes in some runs.
+/// Largest values of a signal over a set of runs.
 struct SignalPeak {
   double steady = 0.0;     ///< bound on |x(t)| over all t, in steady state
-  double from_rest = 0.0;  ///< largest |x[n]| of the first period, begun at rest, with its margin
+  double from_rest = 0.0;  ///< largest |x[n]| of the first period from rest, with its margin
   double rms = 0.0;        ///< over the window of the signal's limit, steady state
   double peak() const { return steady > from_rest ? steady : from_rest; }
   void include(const SignalPeak& other);
@@ -20,24 +20,24 @@ struct SignalPeak {
 
 /// Predicts signals from the spectrum of the excitation of one run.
 ///
-/// Steady state: x is a trigonometric polynomial of degree l = largest line; sampled m > 2 l times a
-/// period, |x(t)| <= max_n |x(t_n)| / cos(pi l / m) for all t (M. Riesz: next to its maximum M such a
-/// polynomial stays above M cos(l t)). m is 8 l or more, so that the bound is at most 8 % high, in
-/// effect less than 1 %, as the largest of some thousand maxima hardly ever lies between the samples.
+/// Steady state: x is a trigonometric polynomial of degree l = largest line. Sampled m > 2 l times per
+/// period, |x(t)| <= max_n |x(t_n)| / cos(pi l / m) for all t (M. Riesz: near its maximum M, such a
+/// polynomial is above M cos(l t)). With m >= 8 l the bound is at most 8 % too large, and usually less than
+/// 1 %, because the largest of some thousand maxima is rarely between two samples.
 ///
-/// From rest: x = h * (r 1(t >= 0)), h from the transfer, interpolated between the lines, below
-/// them as the signal tells, held constant above them, over two periods with r in the first: what has not died out after a period
-/// wraps round.
+/// From rest: x = h * (r 1(t >= 0)) over two periods, with r in the first; what has not decayed after one
+/// period wraps around. The transfer is interpolated between the lines, taken from
+/// BoundedSignal::below_band below them, and constant above them.
 class SignalPredictor {
  public:
-  /// @throws std::invalid_argument if the dense period is too long to be counted in an int.
+  /// @throws std::invalid_argument if the number of dense samples per period exceeds an int.
   explicit SignalPredictor(const FrequencyGrid& grid);
   ~SignalPredictor();
   SignalPredictor(const SignalPredictor&) = delete;
   SignalPredictor& operator=(const SignalPredictor&) = delete;
 
   /// @param spectrum  R, axes x lines: coefficients of exp(j 2 pi l n / N) in the run
-  /// @returns one entry a signal
+  /// @returns one entry per signal
   std::vector<SignalPeak> predict(const std::vector<BoundedSignal>& signals,
                                   const Eigen::MatrixXcd& spectrum);
 
@@ -46,8 +46,8 @@ class SignalPredictor {
   std::unique_ptr<Work> work_;
 };
 
-/// Samples a period that follow a signal closely: a multiple of samples_per_period(), at least 8
-/// times the largest line.
+/// Oversampling factor for a close approximation of the signal: at least 8 samples per period of the largest
+/// line.
 int dense_oversampling(const FrequencyGrid& grid);
 
 }  // namespace stageid

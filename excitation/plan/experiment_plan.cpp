@@ -39,7 +39,7 @@ void check_axis(const FrequencyGrid& grid, const ExperimentSpec& spec, std::size
   for (Index k = 0; k < grid.size(); ++k) {
     if (!has_line(spec.scheme, static_cast<Index>(number), static_cast<Index>(spec.axes.size()), k))
       continue;
-    // A line that one axis does not excite has no FRF: it must not be in the grid.
+    // An unexcited line has no FRF, so it must not be in the grid.
     if (!(axis.shape[k] > 0.0) || !std::isfinite(axis.shape[k])) {
       throw std::invalid_argument(fmt::format(
           "{}.shape ({}): is {} at line {}; must be positive and finite on every line of the grid",
@@ -103,7 +103,7 @@ MatrixXcd mixing_matrix(ExcitationScheme scheme, int n) {
   return T;
 }
 
-/// Of rms 1, on the lines that the axis has.
+/// Amplitudes of rms 1 on the lines of the axis.
 Eigen::VectorXd axis_amplitude(const FrequencyGrid& grid, const ExperimentSpec& spec, int axis) {
   Eigen::VectorXd shape = spec.axes[static_cast<std::size_t>(axis)].shape;
   if (spec.scheme != ExcitationScheme::zippered) return unit_rms_amplitude(grid, shape);
@@ -121,8 +121,8 @@ Eigen::VectorXd draw_phase_rad(const FrequencyGrid& grid, const ExperimentSpec& 
                              spec.crest_iterations);
 }
 
-/// All phases of a plan with crest reduction, on all cores: every realization is reduced by itself,
-/// so the result does not depend on who takes which.
+/// All phases of a plan with crest reduction, on all cores. Each realization is reduced separately, so the
+/// result does not depend on the distribution over threads.
 std::vector<MatrixXd> reduced_phases(const FrequencyGrid& grid, const ExperimentSpec& spec) {
   const int axes = static_cast<int>(spec.axes.size());
   std::vector<MatrixXd> phases(static_cast<std::size_t>(spec.realizations),
@@ -217,8 +217,7 @@ MatrixXd ExperimentPlan::excitation(RunId run) const {
 }
 
 /// One amplitude for all runs, also when peaks are prescribed: the best linear approximation of a
-/// stage that is not quite linear depends on the amplitudes, so they must not change between
-/// realizations.
+/// slightly nonlinear stage depends on the amplitudes, so they must not change between realizations.
 void ExperimentPlan::set_amplitude() {
   amplitude_.resize(axes(), grid_.size());
   Eigen::VectorXd level(axes());

@@ -15,14 +15,14 @@ enum class ExcitationScheme : std::uint8_t {
   single_axis,     ///< experiment e excites axis e alone
   orthogonal_dft,  ///< all axes at once, axis p in experiment e times exp(2 pi j p e / n); any n
   orthogonal_hadamard,  ///< the same with a Hadamard matrix: n = 1, 2, 4, 8, 12, 16, 20 ...
-  zippered  ///< one experiment: axis p has the p-th, (p + n)-th, (p + 2n)-th ... line for itself
+  zippered              ///< one experiment: axis p has the p-th, (p + n)-th, (p + 2n)-th ... line
 };
 
 /// One excited channel of the stage.
 struct ExcitationAxis {
   std::string channel;         ///< actuator name
   double level = 1.0;          ///< rms or peak, unit of the channel
-  Eigen::VectorXd shape = {};  ///< relative amplitude a line; empty: flat
+  Eigen::VectorXd shape = {};  ///< relative amplitude per line; empty: flat
 };
 
 struct ExperimentSpec {
@@ -31,7 +31,7 @@ struct ExperimentSpec {
   std::vector<ExcitationAxis> axes;  ///< one experiment per axis and realization (zippered: one)
   int realizations = 2;
   int periods = 2;            ///< measured periods of every run
-  int transient_periods = 1;  ///< periods before them that are recorded and not used
+  int transient_periods = 1;  ///< discarded periods before the measured ones
   int crest_iterations = 0;
   std::uint64_t seed = 0;
 };
@@ -43,29 +43,28 @@ struct RunId {
   friend auto operator<=>(const RunId&, const RunId&) = default;
 };
 
-/// Whether axis p of n has line k (a position in the grid) for its own or shares it.
+/// Whether axis p of n excites line k (an index into the grid).
 constexpr bool has_line(ExcitationScheme scheme, Eigen::Index p, Eigen::Index n, Eigen::Index k) {
   return scheme != ExcitationScheme::zippered || k % n == p;
 }
 
-/// The whole experiment: every run's multisines follow from it, on every machine the same.
+/// The whole experiment. The multisines of all runs follow from it, identically on every machine.
 ///
-/// Axis p of realization m is a multisine with line coefficients A_p(l) / 2 exp(j phi_mp(l)); its
-/// amplitudes A_p are the same in all runs, its phases phi_mp come from a stream of their own and
-/// are new in every realization. In experiment e it plays times T(p, e), see ExcitationScheme: per
-/// line R R^H = n D_A^2 / 4 over the n experiments for the orthogonal schemes. Zippered axes have
-/// A_p(l) = 0 on the lines of the others. With
-/// AmplitudeScaling::rms, `level` is the rms of the axis in every run that excites it; with peak,
-/// its largest absolute sample in all runs together.
+/// Axis p of realization m is a multisine with line coefficients A_p(l) / 2 exp(j phi_mp(l)). The amplitudes
+/// A_p are the same in all runs. The phases phi_mp are drawn from a separate stream and are new in every
+/// realization. In experiment e they are multiplied by T(p, e), see ExcitationScheme. For the orthogonal
+/// schemes R R^H = n D_A^2 / 4 per line over the n experiments. Zippered axes have A_p(l) = 0 on the lines of
+/// the other axes. `level` is the rms of the axis in every run that excites it (AmplitudeScaling::rms), or
+/// its largest absolute sample in all runs (peak).
 class ExperimentPlan {
  public:
-  /// Takes seconds per axis and realization if spec.crest_iterations > 0, else milliseconds.
-  /// @throws std::invalid_argument naming the wrong field.
+  /// Takes seconds per axis and realization if spec.crest_iterations > 0, otherwise milliseconds.
+  /// @throws std::invalid_argument naming the invalid field.
   ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec);
 
-  /// A plan whose phases are known already, one matrix (axes x lines, in [0, 2 pi)) a realization.
+  /// A plan with given phases, one matrix (axes x lines, in [0, 2 pi)) per realization.
   /// @pre spec.crest_iterations > 0: with 0 the phases follow from the seed.
-  /// @throws std::invalid_argument naming the wrong field.
+  /// @throws std::invalid_argument naming the invalid field.
   ExperimentPlan(FrequencyGrid grid, ExperimentSpec spec, std::vector<Eigen::MatrixXd> phase_rad);
 
   const FrequencyGrid& grid() const noexcept { return grid_; }
@@ -74,18 +73,18 @@ class ExperimentPlan {
   int experiments() const noexcept {
     return spec_.scheme == ExcitationScheme::zippered ? 1 : axes();
   }
-  std::vector<RunId> runs() const;  ///< in the order of measuring: realization by realization
-  /// runs() without those of `done`, for an experiment that is resumed.
+  std::vector<RunId> runs() const;  ///< in order of measurement: realization by realization
+  /// runs() without `done`, to resume an experiment.
   std::vector<RunId> runs_without(const std::vector<RunId>& done) const;
   long long samples_per_run() const noexcept;
   double duration_s() const noexcept;
 
   /// One period of the excitation of a run, samples_per_period x axes.
-  /// @throws std::invalid_argument if the plan has no such run.
+  /// @throws std::invalid_argument if the run is not in the plan.
   Eigen::MatrixXd excitation(RunId run) const;
 
   /// Its spectrum R(l_k), axes x lines: coefficient of exp(j 2 pi l n / N), i.e. DFT / N.
-  /// @throws std::invalid_argument if the plan has no such run.
+  /// @throws std::invalid_argument if the run is not in the plan.
   Eigen::MatrixXcd spectrum(RunId run) const;
 
   /// A_p(l_k), axes x lines, unit of the channel.
@@ -104,8 +103,8 @@ class ExperimentPlan {
   ExperimentSpec spec_;
   Eigen::MatrixXcd mixing_;
   Eigen::MatrixXd amplitude_;
-  /// One matrix per realization if crest_iterations > 0, because reducing takes long; else empty,
-  /// because drawing again is cheaper than keeping.
+  /// One matrix per realization if crest_iterations > 0, because the reduction takes long. Otherwise empty,
+  /// because the phases are cheap to draw again.
   std::vector<Eigen::MatrixXd> reduced_phase_rad_;
 };
 

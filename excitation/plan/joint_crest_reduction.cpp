@@ -15,7 +15,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXcd;
 
-// As in crest_reduction.cpp: low levels change much and stall, high ones trim.
+// As in crest_reduction.cpp: low levels change the signal quickly and stall, high ones refine it.
 constexpr double kFirstFraction = 0.7;
 constexpr double kLastFraction = 0.97;
 constexpr double kStep = 1.0;
@@ -54,7 +54,7 @@ class JointCrest {
       if (peak <= problem_.enough) break;
       const double fraction = kFirstFraction + (kLastFraction - kFirstFraction) * i / iterations;
       level = fraction * peak;
-      if (i == 0) {  // the first pass only looked
+      if (i == 0) {  // the first pass() evaluated the peak only
         R_ = now;
         pass(level);
       }
@@ -68,7 +68,7 @@ class JointCrest {
   }
 
  private:
-  /// Largest peak over its limit at R_; then one correction of R_ with clipping at `level`.
+  /// Computes the largest ratio of peak to limit at R_, then corrects R_ by clipping at `level`.
   double pass(double level) {
     MatrixXcd correction = MatrixXcd::Zero(R_.rows(), R_.cols());
     Eigen::MatrixXd weight = Eigen::MatrixXd::Zero(R_.rows(), R_.cols());
@@ -78,7 +78,7 @@ class JointCrest {
       for (const MatrixXcd& H : transfer_) {
         const Eigen::VectorXcd X =
             (H.array() * (T.asDiagonal() * R_).array()).colwise().sum().transpose();
-        // What cannot reach the level even if all lines met in one peak costs no transform.
+        // The transform is skipped if the signal cannot reach the level even with all lines in phase.
         if (2.0 * X.cwiseAbs().sum() < std::min(level, peak)) continue;
         const Eigen::VectorXd x = synthesis_.samples(X);
         const double largest = x.cwiseAbs().maxCoeff();
@@ -102,7 +102,7 @@ class JointCrest {
 
   const JointCrestProblem& problem_;
   LineSpectrum synthesis_;
-  std::vector<MatrixXcd> transfer_;  // over the limit
+  std::vector<MatrixXcd> transfer_;  // divided by the limits
   MatrixXcd R_;
 };
 

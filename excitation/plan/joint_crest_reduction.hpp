@@ -8,25 +8,24 @@
 
 namespace stageid {
 
-/// What reduce_joint_crest() works on. References outlive the call.
+/// Input of reduce_joint_crest(). The references must outlive the call.
 struct JointCrestProblem {
   const FrequencyGrid& grid;
   const Eigen::MatrixXcd& mixing;             ///< T, axes x experiments
-  const std::vector<BoundedSignal>& signals;  ///< those with a finite peak limit count
+  const std::vector<BoundedSignal>& signals;  ///< those without a finite peak limit are ignored
   const Eigen::MatrixXd& amplitude;           ///< A, axes x lines
-  double enough = 0.0;  ///< peak over limit below which nothing is to be gained any more
+  double enough = 0.0;                        ///< stop below this ratio of peak to limit
 };
 
-/// Changes the phases of all axes at once so that the largest peak over its limit, of all signals in
-/// all experiments of one realization, falls at the given amplitudes: u and y, not only r.
+/// Changes the phases of all axes jointly at the given amplitudes. It lowers the largest ratio of peak to
+/// limit over all signals (u and y, not only r) in all experiments of one realization.
 ///
-/// Each iteration synthesizes every signal of every experiment densely, clips it at a level common to
-/// all ratios, and takes what was cut off, d, back through the loop by least squares,
-///   R_p <- R_p - step sum_se conj(H_sp T_pe) D_se / sum_se |H_sp T_pe|^2,   H = transfer / limit;
-/// then every line gets its amplitude back. For orthogonal T the sum over e parts the axes. The step
-/// grows with the number of signals that share the denominator and do not clip. The best iterate is
-/// returned, the start among them.
-/// Source of the scheme for one signal: E. Van der Ouderaa, J. Schoukens, J. Renneboog, Peak factor
+/// Each iteration synthesizes every signal of every experiment densely and clips it at one level for all
+/// ratios. The part that was cut off, d, is taken back through the loop by least squares,
+///   R_p <- R_p - step sum_se conj(H_sp T_pe) D_se / sum_se |H_sp T_pe|^2,   H = transfer / limit,
+/// and the amplitudes are restored. For orthogonal T the sum over e separates the axes. Both sums contain
+/// only the signals that clip. The result is the best iterate, the start included.
+/// Source for one signal: E. Van der Ouderaa, J. Schoukens, J. Renneboog, Peak factor
 /// minimization using a time-frequency domain swapping algorithm, IEEE Trans. Instrum. Meas. 37 (1988).
 /// @param phase_rad  axes x lines, the start
 /// @returns phases in [0, 2 pi), axes x lines

@@ -12,10 +12,9 @@ namespace {
 
 constexpr int kMostRounds = 3000;
 constexpr double kGap = 1e-6;
-// A multiplier that has died out could not come back if its bound is reached later.
+// A multiplier of zero could not grow again if its bound became active later.
 constexpr double kSmallestMultiplier = 1e-14;
-// Entries without cost get so much of the largest amplitude^2 that costs would ask for: they have
-// to be excited, but nothing is to be learnt there.
+// Entries without cost must be excited too: they count with this share of the largest cost.
 constexpr double kSmallestCost = 1e-12;
 
 void check(const Eigen::Ref<const Eigen::VectorXd>& cost,
@@ -62,7 +61,7 @@ PowerSpectrum least_variance_power(const Eigen::Ref<const Eigen::VectorXd>& cost
       best.multiplier = lambda * (root_sum * root_sum / (lambda.sum() * lambda.sum()));
     }
     if (best.cost <= (1.0 + kGap) * best.lower_bound) break;
-    // B a = 1 at the optimum; a is of degree -1/2 in lambda, so that the scale settles by itself.
+    // B a = 1 at the optimum. a has degree -1/2 in lambda, so the scale converges without a step size.
     lambda.array() *= use.array() / use.maxCoeff();
     lambda = lambda.cwiseMax(kSmallestMultiplier * lambda.maxCoeff());
     lambda /= lambda.maxCoeff();

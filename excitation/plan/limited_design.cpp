@@ -18,12 +18,11 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// Spectrum and crest factors depend on each other; after three turns the scale moves by less than
-// 1 %.
+// Spectrum and crest factors depend on each other; after three rounds the scale changes by less than 1 %.
 constexpr int kTurns = 3;
 constexpr int kLastTurns = 2;  // with the phases of all realizations
 constexpr double kFirstCrestFactor = 2.5;
-constexpr double kEnough = 0.93;  // what lies between the samples has to fit in as well
+constexpr double kEnough = 0.93;  // below 1, because the peaks between the samples must fit too
 
 void check(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
   const auto fail = [](const std::string& what) {
@@ -50,7 +49,7 @@ void check(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
   }
 }
 
-/// The axes of a group are excited in the same runs: one for each axis, or one for all.
+/// Axes of a group are excited in the same runs: one group per axis, or one group of all axes.
 std::vector<std::vector<Index>> groups_of(const ExperimentPlan& plan) {
   std::vector<std::vector<Index>> groups;
   const auto axes = static_cast<Index>(plan.spec().axes.size());
@@ -93,8 +92,7 @@ class Designer {
       const auto i = static_cast<std::size_t>(m);
       phases[i] = reduced(phases[i]);
     });
-    // Some realization is the worst for some signal: give that signal less where it costs least, rather
-    // than all of them.
+    // Each signal has a worst realization. Limiting that signal alone costs less variance than scaling all.
     for (int turn = 0; turn < kLastTurns; ++turn) {
       take_crest_factors(predicted_all(phases));
       set_amplitude();
@@ -107,7 +105,7 @@ class Designer {
 
   static ExperimentPlan flat_plan(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
     ExperimentSpec flat = spec.experiment;
-    flat.crest_iterations = 0;  // the plan's own random phases are the start
+    flat.crest_iterations = 0;  // the start has the plan's own random phases
     flat.scaling = AmplitudeScaling::rms;
     for (ExcitationAxis& axis : flat.axes) {
       axis.level = 1.0;
@@ -123,7 +121,7 @@ class Designer {
     return sum;
   }
 
-  /// Largest mean square that the limits leave to a signal.
+  /// Largest mean square of a signal that its limits allow.
   double allowed(std::size_t s, Index group) const {
     const BoundedSignal& signal = spec_.signals[s];
     const double peak =
@@ -160,7 +158,7 @@ class Designer {
     return reduce_joint_crest(problem, phase_rad, spec_.experiment.crest_iterations);
   }
 
-  /// Where rms limits hold the amplitudes down, peaks need not fall far below safety of their limits.
+  /// If rms limits bound the amplitudes, peaks need not fall far below `safety` of their limits.
   double enough() const { return kEnough * spec_.safety; }
 
   Peaks predicted(const MatrixXd& phase_rad) const {
@@ -200,7 +198,7 @@ class Designer {
             std::max(1.0, peaks[g][s].peak() / std::sqrt(mean_square(s, groups_[g])));
   }
 
-  /// Largest factor of the group's amplitudes that keeps all limits.
+  /// Largest factor for the group's amplitudes that satisfies all limits.
   double scale_of(const std::vector<SignalPeak>& peaks) const {
     double scale = std::numeric_limits<double>::infinity();
     for (std::size_t s = 0; s < peaks.size(); ++s) {
@@ -238,9 +236,9 @@ class Designer {
   const LimitedDesignSpec& spec_;
   ExperimentPlan plan_;
   std::vector<std::vector<Index>> groups_;
-  std::vector<MatrixXd> gain_;  // a signal's mean square over that of one line of one axis
+  std::vector<MatrixXd> gain_;  // a signal's mean square per mean square of one line of one axis
   MatrixXd crest_;              // signals x groups
-  MatrixXd cost_;               // spec_.cost on the lines that an axis has
+  MatrixXd cost_;               // spec_.cost on the lines of each axis
   MatrixXd amplitude_;
 };
 
