@@ -1,6 +1,6 @@
 #pragma once
 
-/// Stages: the interface to a machine, its limits, the simulator.
+/// Stages: the hardware interface, its limits, the simulator.
 
 #include "hal/plugin/plugin_stage.hpp"
 #include "hal/simulator/simulated_stage.hpp"

@@ -8,8 +8,8 @@
 
 namespace stageid {
 
-/// Longest time that a CAN FD frame with an 11-bit identifier occupies the bus, intermission
-/// included, with the worst-case stuffing:
+/// Longest time that a CAN FD frame with an 11-bit identifier occupies the bus, with worst-case stuffing
+/// and intermission:
 ///
 ///   t = (17 + 4 + 13) / f_nominal + (d + floor((d + 8 n) / 4) + 8 n + 4 + c + s) / f_data
 ///
@@ -18,16 +18,16 @@ namespace stageid {
 /// up to 16 bytes, 21 with 7 above. Source: ISO 11898-1:2015, frame format.
 double can_fd_frame_time_s(std::size_t bytes, double nominal_bit_rate_hz, double data_bit_rate_hz);
 
-/// What one bus has to carry.
+/// Traffic of one bus.
 struct CanBusLoad {
   std::string interface;
   double cycle_s = 0.0;          ///< frames of one sample
-  double load = 0.0;             ///< at the stage's rate, state frames included
-  double highest_rate_hz = 0.0;  ///< at the largest load that is allowed
+  double load = 0.0;             ///< at the stage's rate, including state frames
+  double highest_rate_hz = 0.0;  ///< at the largest permitted load
 };
 
-/// Load by the cyclic exchange at `sample_rate_hz`: every frame of the layout once a sample, and on
-/// the first bus the node's state ten times a second.
+/// Load of the cyclic exchange at `sample_rate_hz`: every frame of the layout once per sample. The first
+/// bus also carries the node's state ten times per second.
 std::vector<CanBusLoad> can_bus_load(const CanSpec& spec, const CanLayout& layout,
                                      double sample_rate_hz);
 
@@ -35,7 +35,7 @@ std::vector<CanBusLoad> can_bus_load(const CanSpec& spec, const CanLayout& layou
 /// spec.largest_load.
 void require_bus_carries(const CanSpec& spec, const CanLayout& layout, double sample_rate_hz);
 
-/// Seconds that a transfer of `bytes` takes on the first bus at its largest load.
+/// Duration in seconds of a transfer of `bytes` on the first bus at its largest permitted load.
 double can_transfer_time_s(const CanSpec& spec, double bytes);
 
 }  // namespace stageid

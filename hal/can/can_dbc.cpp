@@ -19,7 +19,7 @@ BU_: host node
 
 )";
 
-// 14: StandardCAN_FD of the attribute's enumeration.
+// 14: index of StandardCAN_FD in the enumeration.
 constexpr const char* kAttributes =
     R"(BA_DEF_ "BusType" STRING ;
 BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","reserved","reserved","reserved","reserved","reserved","reserved","reserved","reserved","reserved","reserved","reserved","StandardCAN_FD","ExtendedCAN_FD";
@@ -28,7 +28,7 @@ BA_DEF_DEF_ "VFrameFormat" "StandardCAN_FD";
 BA_ "BusType" "CAN FD";
 )";
 
-/// One message; signals are unsigned little-endian unless they are channels.
+/// One message; signals other than channels are unsigned little-endian.
 class Message {
  public:
   Message(std::uint16_t id, const std::string& name, std::size_t payload_bytes, bool from_host)

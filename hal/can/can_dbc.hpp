@@ -7,8 +7,8 @@
 
 namespace stageid {
 
-/// The layout of a stage's frames as a CAN database (DBC), for programs that show traffic in words:
-/// header, every channel in SI units, commands, states. Transfers are named only.
+/// The frame layout of a stage as a CAN database (DBC) for bus analyzers: header, all channels in SI units,
+/// commands, states. Transfers have a name only.
 std::string can_dbc(const CanLayout& layout, const StageInfo& info);
 
 }  // namespace stageid

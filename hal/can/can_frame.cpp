@@ -85,7 +85,7 @@ CanConversion put_can_value(CanFrame& frame, std::size_t at, double value,
 double get_can_value(const CanFrame& frame, std::size_t at, const CanScale& scale) noexcept {
   const std::uint32_t raw = frame.data[at] | static_cast<std::uint32_t>(frame.data[at + 1]) << 8 |
                             static_cast<std::uint32_t>(frame.data[at + 2]) << 16;
-  const std::int32_t count = static_cast<std::int32_t>(raw << 8) >> 8;  // the sign goes along
+  const std::int32_t count = static_cast<std::int32_t>(raw << 8) >> 8;  // sign extension
   return count == kNoValue ? std::numeric_limits<double>::quiet_NaN() : count * scale.si_per_count;
 }
 

@@ -7,24 +7,24 @@
 
 namespace stageid {
 
-/// One CAN FD frame with an 11-bit identifier, as it stands on bus number `bus` of a transport.
+/// One CAN FD frame with an 11-bit identifier on bus number `bus` of a transport.
 struct CanFrame {
   std::uint16_t id = 0;
   std::uint8_t bus = 0;
-  std::uint8_t length = 0;  ///< bytes of `data` that count
+  std::uint8_t length = 0;  ///< used bytes of `data`
   std::array<std::uint8_t, 64> data{};
   std::int64_t t_rx_ns = 0;  ///< CLOCK_MONOTONIC of the transport; 0 in frames to be sent
 };
 
-/// The smallest length a CAN FD frame can have that holds `bytes` (64 at most).
+/// Smallest valid length of a CAN FD frame for `bytes` (64 at most).
 std::size_t can_fd_length(std::size_t bytes) noexcept;
 
-/// What the first eight bytes of every frame of ours say:
+/// The first eight bytes of every frame:
 ///
 ///   0  u16  sequence   of the sample, or of the command
 ///   2  u8   kind       state, command or flags: see can_messages.hpp
-///   3  u8   run        low byte of the run's key: frames of another run are foreign
-///   4  u16  detail     time in microseconds, more of the key, or a number of a part
+///   3  u8   run        low byte of the run's key; identifies frames of another run
+///   4  u16  detail     time in microseconds, more bytes of the key, or a part number
 ///   6  u16  crc        CRC-16 over the identifier and all other bytes of the frame
 struct CanHeader {
   std::uint16_t sequence = 0;
@@ -35,18 +35,18 @@ struct CanHeader {
 inline constexpr std::size_t kCanHeaderBytes = 8;
 
 /// CRC-16/CCITT-FALSE (polynomial 0x1021, initial value 0xFFFF, not reflected) over the identifier
-/// (low byte first) and the bytes of the frame without its own two. CAN's checksum does not cover a
-/// frame that a gateway gave another identifier, nor one that was damaged in a controller's memory.
+/// (low byte first) and the bytes of the frame except the CRC. CAN's own checksum detects neither a gateway
+/// that changes the identifier nor corruption in a controller's memory.
 std::uint16_t can_frame_crc(const CanFrame& frame) noexcept;
 
-/// Writes the header in front of what stands behind it already; `payload_bytes` without the header.
+/// Writes the header in front of the payload; `payload_bytes` excludes the header.
 void seal_can_frame(CanFrame& frame, const CanHeader& header, std::size_t payload_bytes) noexcept;
 
-/// @returns false if the length is another than that of `payload_bytes`, or the CRC is wrong.
+/// @returns false if the length does not match `payload_bytes` or the CRC is wrong.
 [[nodiscard]] bool open_can_frame(const CanFrame& frame, std::size_t payload_bytes,
                                   CanHeader& header) noexcept;
 
-/// Little-endian integers at a place of a frame.
+/// Little-endian integers at a byte offset of a frame.
 template <typename Integer>
 void put_can(CanFrame& frame, std::size_t at, Integer value) noexcept {
   for (std::size_t i = 0; i < sizeof(Integer); ++i)
@@ -60,7 +60,7 @@ Integer get_can(const CanFrame& frame, std::size_t at) noexcept {
   return static_cast<Integer>(value);
 }
 
-/// How a number of a channel becomes an int24:  count = round(value / si_per_count).
+/// Conversion of a channel's value to int24:  count = round(value / si_per_count).
 struct CanScale {
   double si_per_count = 1.0;
 };
@@ -68,18 +68,17 @@ inline constexpr std::int32_t kCanLargestCount = 8388607;
 inline constexpr std::size_t kCanCountBytes = 3;
 /// range = 2^23 counts, so that a value at the range itself saturates by one count.
 inline constexpr double kCanCountsOfRange = 8388608.0;
-/// Whether every value up to `largest` is carried as it is.
+/// Whether all values up to `largest` fit into the range.
 constexpr bool can_range_holds(double range, double largest) noexcept {
   return largest * kCanCountsOfRange <= range * kCanLargestCount;
 }
 
 enum class CanConversion : std::uint8_t { good, saturated, no_number };
 
-/// Puts a value at a place. Saturates; NaN and infinity become the one code that stands for no
-/// value, -2^23.
+/// Writes a value at an offset. Saturates; NaN and infinity become the "no value" code, -2^23.
 CanConversion put_can_value(CanFrame& frame, std::size_t at, double value,
                             const CanScale& scale) noexcept;
-/// @returns NaN for the code that stands for no value.
+/// @returns NaN for the "no value" code.
 double get_can_value(const CanFrame& frame, std::size_t at, const CanScale& scale) noexcept;
 
 }  // namespace stageid

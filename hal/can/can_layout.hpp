@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// One CAN FD bus and what runs on it. The first bus also carries commands, states and transfers.
+/// One CAN FD bus and its channels. The first bus also carries commands, states and transfers.
 struct CanBusSpec {
   std::string interface;  ///< "can0"
   double nominal_bit_rate_hz = 1e6;
@@ -18,19 +18,19 @@ struct CanBusSpec {
   std::vector<int> sensors;
 };
 
-/// How a stage lies behind CAN.
+/// A stage connected by CAN.
 struct CanSpec {
   std::vector<CanBusSpec> buses;
-  std::vector<double> actuator_range_n;  ///< one an actuator: 2^23 counts
-  std::vector<double> sensor_range_m;    ///< one a sensor
-  /// The host waits so long for the answer of a cycle if the loop sets no deadline.
+  std::vector<double> actuator_range_n;  ///< one per actuator: 2^23 counts
+  std::vector<double> sensor_range_m;    ///< one per sensor
+  /// Time that the host waits for the answer of a cycle if the loop sets no deadline.
   double reply_timeout_s = 5e-3;
-  /// The node stops by itself after so long without a setpoint.
+  /// The node stops by itself after this time without a setpoint.
   double watchdog_s = 20e-3;
-  double largest_load = 0.8;  ///< of a bus
+  double largest_load = 0.8;  ///< largest permitted load of a bus
 };
 
-// Identifiers: the lower wins on the bus.
+// Lower identifiers have priority on the bus.
 inline constexpr std::uint16_t kCanCommandId = 0x080;
 inline constexpr std::uint16_t kCanSetpointId = 0x100;  ///< + number of the frame
 inline constexpr std::uint16_t kCanSensorId = 0x180;    ///< + number of the frame
@@ -41,7 +41,7 @@ inline constexpr std::uint16_t kCanDownloadId = 0x380;
 inline constexpr std::uint16_t kCanMissingId = 0x381;
 inline constexpr std::size_t kCanValuesOfFrame = 18;  ///< (64 - 8) / 3
 
-/// A frame of setpoints or measurements: which channels, in order, with three bytes each.
+/// A frame of setpoints or measurements: its channels, in order, with three bytes each.
 struct CanValueFrame {
   std::uint16_t id = 0;
   std::uint8_t bus = 0;
@@ -49,21 +49,21 @@ struct CanValueFrame {
   std::size_t payload_bytes() const noexcept { return kCanCountBytes * channels.size(); }
 };
 
-/// Which channel stands where. Host and node compute it from the same stage file.
+/// The position of each channel in the frames. Host and node compute it from the same stage file.
 struct CanLayout {
   std::vector<CanValueFrame> setpoints;
   std::vector<CanValueFrame> sensors;
   std::vector<CanScale> actuator_scale;
   std::vector<CanScale> sensor_scale;
-  /// Of everything that both sides must agree on: rate, frames, channels by name, scaling.
+  /// Hash of all settings that both sides must share: rate, frames, channels by name, scaling.
   std::uint32_t fingerprint = 0;
 };
 
 /// @throws std::invalid_argument naming the bus or channel: a channel on no bus or on two, a range
-/// that is not positive, more frames than there are identifiers, times or rates that make no sense.
+/// that is not positive, more frames than identifiers, invalid times or rates.
 CanLayout can_layout(const CanSpec& spec, const StageInfo& info);
 
-/// What the host and what the node listens to.
+/// The identifiers that the host and the node receive.
 std::vector<std::uint16_t> can_host_identifiers(const CanLayout& layout);
 std::vector<std::uint16_t> can_node_identifiers(const CanLayout& layout);
 

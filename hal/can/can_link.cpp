@@ -11,11 +11,11 @@
 namespace stageid {
 namespace {
 
-constexpr int kAttempts = 10;  // a bus that loses half of its frames is still a bus
+constexpr int kAttempts = 10;  // commands must get through even if half of all frames are lost
 constexpr std::int64_t kAnswer_ns = 60'000'000;
-constexpr std::int64_t kSecondAnswer_ns = 10'000'000;  // a node answers within a millisecond
+constexpr std::int64_t kSecondAnswer_ns = 10'000'000;  // nodes answer within a millisecond
 
-// The low byte is the number of a transfer; 0 means no transfer, so it is never drawn.
+// The low byte numbers a transfer, and 0 means no transfer.
 std::uint32_t draw_host() {
   std::random_device random;
   std::uint32_t host = 0;
@@ -32,12 +32,12 @@ CanLink::CanLink(CanTransport& transport, std::uint32_t fingerprint,
       fingerprint_(fingerprint),
       interrupted_(std::move(interrupted)),
       host_(draw_host()),
-      // A host that was started anew must not go on with numbers the node remembers.
+      // A restarted host must not reuse numbers that the node remembers.
       sequence_(static_cast<std::uint16_t>(transport.now_ns() / 1000)),
       inbox_(kCanInboxFrames),
       text_(kCanTextParts) {}
 
-/// Version 1 does not repeat the host's number: its answer still has to be heard to be refused.
+/// Answers of version 1 lack the host's number, but must be accepted here to report the version mismatch.
 bool CanLink::answers(const CanState& state, std::uint16_t sequence) const noexcept {
   return state.sequence == sequence && state.answer != CanAnswer::none &&
          (state.host == host_ || state.version != kCanProtocolVersion);
@@ -64,7 +64,7 @@ bool CanLink::take(const CanFrame& frame) noexcept {
     std::size_t part = 0;
     std::string piece;
     if (decode_can_text(frame, part, piece)) text_[part] = std::move(piece);
-  } catch (const std::exception&) {  // no memory for a text: it is only a text
+  } catch (const std::exception&) {  // out of memory: the text is optional
   }
   return true;
 }
@@ -75,7 +75,7 @@ std::string CanLink::text() const {
   return text;
 }
 
-// The time is looked at on every turn: a bus that is never silent must not keep the host waiting.
+// The deadline is checked on every iteration, because a bus may never be silent.
 bool CanLink::wait_for_answer(const CanCommand& command, const Other& other) {
   const std::int64_t until_ns = transport_.now_ns() + kAnswer_ns;
   while (true) {
@@ -140,7 +140,7 @@ bool CanLink::try_command(CanCommand command) noexcept {
     command.sequence = ++sequence_;
     command.host = host_;
     command.session = session_;
-    // The stop of a run goes out all the more when somebody has interrupted it.
+    // An interrupted run must still be stopped.
     std::function<bool()> interrupted;
     std::swap(interrupted, interrupted_);
     const bool answered = exchange(command, {});

@@ -11,43 +11,43 @@
 
 namespace stageid {
 
-/// The host's side of commands and states: what CanStage and CanResidentStage have in common.
+/// The host's side of commands and states, common to CanStage and CanResidentStage.
 ///
-/// It draws a number for its host, which all commands carry and the node's answers repeat, and keeps
-/// the key of the run that the node has begun for it.
+/// It draws a host number, which all commands carry and the node's answers repeat. It also stores the key of
+/// the run that the node has begun for this host.
 class CanLink {
  public:
-  /// Frames that are neither state nor text.
+  /// Handler of frames that are neither state nor text.
   using Other = std::function<void(const CanFrame&)>;
 
-  /// `interrupted` is asked between attempts; true ends them. Empty: never.
+  /// `interrupted` is called between attempts; true ends them. Empty: never interrupted.
   CanLink(CanTransport& transport, std::uint32_t fingerprint,
           std::function<bool()> interrupted = {});
 
-  /// Sends the command until the node answers, ten times at most, and waits for the answer.
-  /// @throws StageError if nobody answers, or the node refuses (in its own words).
+  /// Sends the command until the node answers, at most ten times.
+  /// @throws StageError if there is no answer, or with the node's text if it refuses.
   CanState command(CanCommand command, const Other& other = {});
-  /// The same without exceptions. @returns false if it was not answered or refused.
+  /// The same without exceptions. @returns false if the command was refused or not answered.
   bool try_command(CanCommand command) noexcept;
 
-  /// Asks the node who it is. Clears a fault first if `reset_fault`.
-  /// @throws StageError also if the node speaks another version, was started with another stage
+  /// Identifies the node. Clears a fault first if `reset_fault`.
+  /// @throws StageError also if the node has another protocol version or another stage
   /// file, or is in fault, or if two nodes answer.
   CanState greet(bool reset_fault);
 
-  /// Takes a state or text frame. @returns false if it is neither.
+  /// Processes a state or text frame. @returns false for other frames.
   bool take(const CanFrame& frame) noexcept;
-  /// The last state that came from the node that was greeted; it is new if `states()` has grown.
+  /// Last state of the greeted node; it is new if `states()` has increased.
   const CanState& state() const noexcept { return state_; }
   std::uint64_t states() const noexcept { return states_; }
-  /// Another node than the one that was greeted has answered since.
+  /// Whether a node other than the greeted one has answered since.
   bool other_node() const noexcept { return other_node_; }
-  /// What the node said in words last.
+  /// Last text message of the node.
   std::string text() const;
   std::uint64_t damaged() const noexcept { return damaged_; }
 
   std::uint32_t host() const noexcept { return host_; }
-  /// Key of the run; 0: none has begun.
+  /// Key of the run; 0: no run has begun.
   std::uint32_t session() const noexcept { return session_; }
   void forget_session() noexcept { session_ = 0; }
   bool interrupted() const { return interrupted_ && interrupted_(); }

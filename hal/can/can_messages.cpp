@@ -11,7 +11,7 @@ constexpr std::size_t kTextBytes = 56;
 constexpr std::size_t kMissingBytes = 48;
 constexpr std::size_t kAt = kCanHeaderBytes;
 
-// A number of 24 bits in the header's sequence and kind.
+// A 24-bit number in the header's sequence and kind.
 CanHeader numbered(std::uint32_t number, std::uint8_t run, std::uint16_t detail) noexcept {
   return {static_cast<std::uint16_t>(number), static_cast<std::uint8_t>(number >> 16), run, detail};
 }

@@ -43,7 +43,7 @@ void CanNode::serve(std::int64_t until_ns) {
   const std::int64_t now_ns = transport_.now_ns();
   if (!player_.busy() && until_ns > now_ns) transport_.wait(until_ns);
   const std::size_t count = transport_.receive(inbox_);
-  watch_bus();  // before what came in with the news: a bus that is off outweighs a last command
+  watch_bus();  // first, because a bus that is off takes precedence over received commands
   for (std::size_t i = 0; i < count; ++i) handle(inbox_[i]);
   player_.work(transport_.now_ns(), transport_);
   stage_.tick(transport_.now_ns());
@@ -72,12 +72,11 @@ void CanNode::handle(const CanFrame& frame) {
 void CanNode::take_setpoint(const CanFrame& frame, std::size_t number) {
   const CanValueFrame& layout = layout_.setpoints[number];
   CanHeader header;
-  // A newer sample than the one whose frames are being collected: that one stays incomplete.
   if (!open_can_frame(frame, layout.payload_bytes(), header) || frame.bus != layout.bus) {
     ++rejected_;
     return;
   }
-  // The key of a run that has ended is still good for hearing why.
+  // The sender of an ended run is still told why it ended.
   const std::uint32_t holder = stage_.session();
   if (session_ == 0 || (holder != 0 && holder != session_) || header.run != can_run(session_) ||
       header.detail != can_tag(session_) || player_.busy()) {
@@ -91,7 +90,8 @@ void CanNode::take_setpoint(const CanFrame& frame, std::size_t number) {
     return;
   }
   if (pending_frames_ != 0 && distance(header.sequence, pending_sequence_) < 0) return;
-  if (header.sequence != pending_sequence_) pending_frames_ = 0;
+  if (header.sequence != pending_sequence_)
+    pending_frames_ = 0;  // the older sample remains incomplete
   pending_sequence_ = header.sequence;
   if (!decode_can_values(layout, layout_.actuator_scale, frame, header, command_)) return;
   pending_frames_ |= std::uint64_t{1} << number;
@@ -104,7 +104,7 @@ void CanNode::take_complete_setpoint(std::uint16_t sequence) {
   gaps_ += static_cast<std::uint32_t>(distance(sequence, last_sequence_) - 1);
   last_sequence_ = sequence;
   if (!std::all_of(command_.begin(), command_.end(), [](double u) { return std::isfinite(u); })) {
-    stage_.fail(FaultCause::not_finite);  // the code that stands for no value is no command
+    stage_.fail(FaultCause::not_finite);  // "no value" is not a valid setpoint
     state_asked_ = true;
     return;
   }
@@ -136,7 +136,7 @@ void CanNode::make_answer(std::uint16_t sequence, std::uint64_t valid) {
 
 void CanNode::put_answer() { outbox_.insert(outbox_.end(), answer_.begin(), answer_.end()); }
 
-/// @returns why the command is refused, before anything has changed; empty: its sender may give it.
+/// @returns why the sender may not give this command; empty: permitted. Changes nothing.
 std::string CanNode::admit(const CanCommand& command) const {
   using Code = CanCommandCode;
   if (command.version != kCanProtocolVersion)
@@ -164,12 +164,12 @@ void CanNode::obey(const CanCommand& command) {
   }
   put_state(&command, refusal.empty() ? CanAnswer::accepted : CanAnswer::refused,
             refusal.empty() ? stage_.trouble() : refusal);
-  // The host needs the key in the state before it can accept y[0]: the state goes first.
+  // The host needs the key in the state before it can accept y[0].
   if (command.code == CanCommandCode::start && refusal.empty()) put_answer();
   flush();
 }
 
-/// @returns why the command is refused; empty: done.
+/// @returns why the command is refused; empty: executed.
 std::string CanNode::execute(const CanCommand& command) {
   switch (command.code) {
     case CanCommandCode::hello:
@@ -177,7 +177,7 @@ std::string CanNode::execute(const CanCommand& command) {
     case CanCommandCode::start:
       return start(command);
     case CanCommandCode::stop:
-      if (player_.busy()) {  // comes to rest under control, as nobody else holds the stage
+      if (player_.busy()) {  // comes to rest under control, as no other host owns the stage
         player_.abandon();
         return request(SupervisorCommand::quick_stop);
       }
@@ -240,7 +240,7 @@ std::string CanNode::arm(const CanCommand& command) {
   return "";
 }
 
-/// The run or reservation that has just begun belongs to this command's sender.
+/// Makes this command's sender the owner of the new run or reservation.
 void CanNode::take_over(const CanCommand& command) {
   session_ = stage_.session();
   begun_by_ = command;
@@ -266,7 +266,7 @@ void CanNode::put_state(const CanCommand* answered, CanAnswer answer, const std:
   state.rejected = rejected_;
   state.sample = stage_.sample();
   state.fingerprint = layout_.fingerprint;
-  // The words first: who sees the state has them.
+  // The text is sent first, so that it is complete when the state arrives.
   for (std::size_t part = 0; !text.empty() && part < kCanTextParts; ++part)
     outbox_.push_back(encode_can_text(text, part, can_run(session_)));
   outbox_.push_back(encode_can_state(state));

@@ -14,24 +14,23 @@ namespace stageid {
 
 /// Serves a StageNode over CAN: the node's end of docs/can-protocol.md.
 ///
-/// Streaming: the complete setpoint frames of a sample that is newer than the last one advance the
-/// stage by one sample, and are answered with the measurement of the same sequence. A repeated
-/// setpoint is answered again without advancing; skipped ones are counted as gaps and advance once
-/// only. Frames that are damaged, of a wrong length or of another run are counted and do nothing.
+/// Streaming: the complete setpoint frames of a sample newer than the last one advance the stage by one
+/// sample. They are answered with the measurement of the same sequence. A duplicate setpoint is answered again
+/// without advancing. Skipped setpoints are counted as gaps and advance once only. Frames that are damaged,
+/// of another length or of another run are counted and ignored.
 ///
-/// From start or arm on the stage belongs to the host that was told the key: what another one asks
-/// for is refused and changes nothing, but a quick stop, which anybody may ask for.
+/// From start or arm on, the stage belongs to the host that received the key. Commands of other hosts are
+/// refused and change nothing, except a quick stop, which any host may send.
 class CanNode {
  public:
   /// @param pace resident experiments: 0 as fast as possible, otherwise stage seconds per second.
   CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transport, double pace = 0.0);
 
-  /// Waits until `until_ns` of the transport's clock or something to do, takes a batch of what has
-  /// come in, and lets the stage's watchdog look at the time, however much is left. To be called at
-  /// least every millisecond.
+  /// Waits for work until `until_ns` of the transport's clock, processes a batch of received frames, and runs
+  /// the stage's watchdog even if more frames are pending. Must be called at least every millisecond.
   void serve(std::int64_t until_ns);
 
-  /// Frames that were damaged or of another run, since construction.
+  /// Number of frames that were damaged or of another run, since construction.
   std::uint32_t rejected() const noexcept { return rejected_; }
 
  private:
@@ -60,18 +59,18 @@ class CanNode {
 
   std::vector<CanFrame> inbox_;
   std::vector<CanFrame> outbox_;
-  std::vector<CanFrame> answer_;  // the last measurement, for a setpoint that comes again
+  std::vector<CanFrame> answer_;  // the last measurement, for a duplicate setpoint
   std::vector<double> command_;
   std::vector<double> y_;
-  std::vector<double> given_;  // y_ with NaN where nothing was measured
+  std::vector<double> given_;  // y_ with NaN where there is no measurement
 
   std::uint32_t boot_;
-  std::uint32_t session_ = 0;        // key of the last run that was begun here
+  std::uint32_t session_ = 0;        // key of the last run begun by this front end
   CanCommand begun_by_;              // the start or arm that began it
-  std::uint32_t trace_session_ = 0;  // whose the trace is
+  std::uint32_t trace_session_ = 0;  // of the run in the trace memory
   std::uint16_t last_sequence_ = 0;
   std::uint16_t pending_sequence_ = 0;
-  std::uint64_t pending_frames_ = 0;  // bit k: setpoint frame k has come
+  std::uint64_t pending_frames_ = 0;  // bit k: setpoint frame k was received
   std::uint32_t gaps_ = 0;
   std::uint32_t repeated_ = 0;
   std::uint32_t rejected_ = 0;

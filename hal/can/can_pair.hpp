@@ -11,9 +11,9 @@
 
 namespace stageid {
 
-/// Buses within one process and one thread, with a clock of their own: what one end sends, the
-/// other receives, and waiting lets the other side work instead of time pass. For tests of
-/// everything above the kernel: exact, without a kernel that has CAN, in no time.
+/// Buses within one process and one thread with a simulated clock. Each end receives what the other sends,
+/// and waiting runs the other side instead of passing time. It makes tests of all layers above the kernel
+/// exact and fast, and needs no CAN support in the kernel.
 class CanPair {
  public:
   explicit CanPair(std::vector<std::string> names);
@@ -22,8 +22,8 @@ class CanPair {
   CanTransport& host() noexcept;
   CanTransport& node() noexcept;
 
-  /// Called whenever the host waits: let the node work. Time goes on by `step_ns` after each call
-  /// that sent nothing, until the host's time is over.
+  /// Registers the node's work, called whenever the host waits. Time advances by `step_ns` after each call
+  /// that sent nothing, until the host's wait ends.
   void when_host_waits(std::function<void()> serve, std::int64_t step_ns = 1'000'000);
   std::int64_t now_ns() const noexcept;
   void pass_time(std::int64_t ns) noexcept;

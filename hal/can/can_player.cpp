@@ -12,7 +12,7 @@ namespace stageid {
 namespace {
 
 constexpr std::int64_t kHostSilence_ns = 1'000'000'000;
-constexpr int kSamplesAtOnce = 256;  // then the bus is looked at again
+constexpr int kSamplesAtOnce = 256;  // between two checks of the bus
 constexpr std::size_t kChunksAtOnce = 32;
 constexpr std::uint32_t kLargestDownload = 256;
 
@@ -71,7 +71,7 @@ std::string CanPlayer::prepare(const CanCommand& command) {
 }
 
 bool CanPlayer::take_chunk(const CanChunk& chunk) noexcept {
-  // What is armed has been compared with its digest.
+  // The digest of an armed waveform has been checked already.
   if (busy() || status_ == CanResident::armed) return false;
   if (chunk.token != token_ || chunk.index >= received_.size()) return false;
   const std::size_t from = chunk.index * kCanChunkBytes;
@@ -156,7 +156,7 @@ void CanPlayer::work(std::int64_t now_ns, CanTransport& transport) {
     static_cast<void>(stage_.request(SupervisorCommand::disable));
   }
   if (!busy()) return;
-  if (stage_.state() != NodeState::measuring) {  // a quick stop, the panel, the watchdog
+  if (stage_.state() != NodeState::measuring) {  // quick stop, panel or watchdog
     finish(CanResident::failed);
     return;
   }
@@ -182,7 +182,7 @@ void CanPlayer::play_sample(std::int64_t now_ns) {
     std::memcpy(&value, waveform_.data() + kCanFloatBytes * (row + k), kCanFloatBytes);
     r_[columns_[k]] = gain * static_cast<double>(value);
   }
-  measured_ = y_;  // y[n], which u[n] is computed from
+  measured_ = y_;  // y[n], from which u[n] is computed
   Inputs inputs;
   inputs.y = y_;
   const Outcome next = stage_.advance_excited(now_ns, r_, u_, inputs);
@@ -218,7 +218,7 @@ void CanPlayer::abandon() {
   download_next_ = download_end_ = 0;
 }
 
-// What the bus does not take now is sent with the next call: its queue is the flow control.
+// Flow control by the bus's send queue: the rest is sent by the next call.
 void CanPlayer::send_chunks(CanTransport& transport) {
   const std::vector<std::uint8_t>& memory = download_of_ == CanMemory::trace ? trace_ : waveform_;
   for (std::size_t i = 0; i < kChunksAtOnce && download_next_ < download_end_; ++i) {

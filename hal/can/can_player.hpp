@@ -10,32 +10,32 @@
 
 namespace stageid {
 
-/// The node's side of resident experiments: waveform memory, playing in the node's own closed loop,
-/// trace memory, and their transfer.
+/// The node's side of resident experiments: waveform memory, playback in the node's own closed loop, trace
+/// memory, and transfers.
 ///
-/// Waveform: one period, samples x excited actuators, float32, row by row. Trace: a row a sample,
-/// u[n] and y[n] of all channels as float32 and the Outcome of y[n] as uint32. The functions that
-/// return a text say why they refuse; empty: done.
+/// Waveform: one period, samples x excited actuators, float32, row by row. Trace: one row per sample,
+/// u[n] and y[n] of all channels as float32 and the Outcome of y[n] as uint32. Functions that return a text
+/// return the reason of a refusal; empty: done.
 class CanPlayer {
  public:
   /// @param pace 0: as fast as possible, otherwise stage seconds per second of wall clock.
   CanPlayer(StageNode& stage, double pace);
 
-  /// upload: a mask of actuators, b digest, c samples. The same again keeps what has come.
+  /// upload: a mask of actuators, b digest, c samples. Repeating the same command keeps the received chunks.
   std::string prepare(const CanCommand& command);
   /// @returns false if the chunk belongs to no upload.
   bool take_chunk(const CanChunk& chunk) noexcept;
   CanMissing missing() const noexcept;
 
-  /// arm: a run seed, b samples to record, c samples of the ramp behind them, d low digest.
+  /// arm: a run seed, b samples to record, c samples of the ramp after them, d low digest.
   std::string arm(const CanCommand& command);
   std::string trigger(const CanCommand& command, std::int64_t now_ns);
   /// download: a first chunk, b CanMemory, c chunks.
   std::string begin_download(const CanCommand& command);
 
-  /// Plays what is due and sends what is asked for.
+  /// Plays the samples that are due and sends requested chunks.
   void work(std::int64_t now_ns, CanTransport& transport);
-  /// A host that is silent for a second while the node is armed or plays is taken for dead.
+  /// If the host is silent for a second while the node is armed or playing, it is considered dead.
   void host_was_heard(std::int64_t now_ns) noexcept { last_heard_ns_ = now_ns; }
   void abandon();
 
@@ -57,7 +57,7 @@ class CanPlayer {
 
   std::vector<std::uint8_t> waveform_;
   std::vector<bool> received_;
-  std::size_t missing_from_ = 0;  // all chunks before have come
+  std::size_t missing_from_ = 0;  // all earlier chunks were received
   std::vector<std::size_t> columns_;
   std::uint64_t mask_ = 0;
   std::uint64_t digest_ = 0;

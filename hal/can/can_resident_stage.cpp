@@ -15,10 +15,10 @@
 namespace stageid {
 namespace {
 
-constexpr std::uint32_t kUploadWindow = 96;  // chunks between two looks at what is missing
+constexpr std::uint32_t kUploadWindow = 96;  // chunks per query for missing ones
 constexpr std::uint32_t kDownloadWindow = 128;
 constexpr std::int64_t kPause_ns = 1'000'000;
-constexpr std::int64_t kSilence_ns = 50'000'000;  // then the rest of a window is asked for again
+constexpr std::int64_t kSilence_ns = 50'000'000;  // then the rest of the window is requested again
 constexpr std::int64_t kFull_ns = 1'000'000'000;  // then the rest is sent with the next window
 constexpr int kLargestTries = 20;                 // windows without any progress
 
@@ -43,7 +43,7 @@ CanResidentStage::CanResidentStage(StageInfo info, const CanSpec& spec,
   if (info_.actuators.size() > 64)
     throw std::invalid_argument("can: resident experiments support at most 64 actuators");
   info_.backend = "can";
-  info_.clock = Clock::virtual_time;  // nobody on this side waits for samples
+  info_.clock = Clock::virtual_time;  // this side does not wait for samples
 }
 
 std::size_t CanResidentStage::row_bytes() const noexcept {
@@ -70,7 +70,7 @@ void CanResidentStage::connect() {
   greeted_ = true;
 }
 
-/// Only the columns that are not zero, as float32.
+/// Stores the columns that are not zero, as float32.
 void CanResidentStage::pack(const Waveforms& waveforms) {
   const Eigen::MatrixXd& samples = waveforms.samples;
   if (samples.cols() != static_cast<Eigen::Index>(info_.actuators.size()) || samples.rows() == 0 ||
@@ -111,7 +111,7 @@ void CanResidentStage::send_missing(const std::vector<std::uint32_t>& chunks) {
         {index,
          token_,
          {waveform_.data() + from, std::min(kCanChunkBytes, waveform_.size() - from)}});
-    // A full queue is the bus saying "not so fast".
+    // A full queue means that the bus is slower than the sender.
     const std::int64_t until_ns = transport_->now_ns() + kFull_ns;
     while (transport_->send({&frame, 1}) == 0 && worst_bus(*transport_).state < CanBusState::off) {
       if (transport_->now_ns() >= until_ns || link_.interrupted()) return;
@@ -122,7 +122,7 @@ void CanResidentStage::send_missing(const std::vector<std::uint32_t>& chunks) {
 
 void CanResidentStage::send_all() {
   const auto total = static_cast<std::uint32_t>(can_chunks(waveform_.size()));
-  std::uint32_t highest = 0;  // chunks below have been sent once
+  std::uint32_t highest = 0;  // lower chunks have been sent at least once
   std::uint32_t first = 0;
   for (int tries = 0; tries < kLargestTries;) {
     CanMissing missing;
@@ -132,7 +132,7 @@ void CanResidentStage::send_all() {
     });
     if (missing.token == token_ && missing.first >= total) return;
     tries = missing.token == token_ && missing.first > first ? 0 : tries + 1;
-    if (missing.token != token_) continue;  // the answer itself got lost
+    if (missing.token != token_) continue;  // the answer itself was lost
     first = missing.first;
     std::vector<std::uint32_t> chunks;
     for (std::uint32_t i = 0;
@@ -200,7 +200,7 @@ JobProgress CanResidentStage::poll() {
   return progress;
 }
 
-/// Fetches `bytes.size()` bytes, from chunk `chunks_done` on. @returns false if the node has fewer.
+/// Fetches `bytes.size()` bytes, starting at chunk `chunks_done`. @returns false if some are missing.
 bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
                             std::size_t& chunks_done) {
   const std::size_t total = can_chunks(bytes.size());
@@ -217,7 +217,7 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
     std::copy(chunk.bytes.begin(), chunk.bytes.end(),
               bytes.begin() + static_cast<std::ptrdiff_t>(from));
     repeated_chunks_ += have[chunk.index] ? 1U : 0U;
-    if (!have[chunk.index]) heard_ns = transport_->now_ns();  // what comes again is no progress
+    if (!have[chunk.index]) heard_ns = transport_->now_ns();  // duplicates are not progress
     have[chunk.index] = true;
   };
   std::vector<CanFrame> inbox(64);
@@ -270,7 +270,7 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
 }
 
 void CanResidentStage::stop() noexcept {
-  if (link_.session() == 0) return;  // the node has begun nothing for this host
+  if (link_.session() == 0) return;  // the node has begun no run for this host
   static_cast<void>(link_.try_command({CanCommandCode::stop}));
 }
 

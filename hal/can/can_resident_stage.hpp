@@ -13,18 +13,17 @@
 
 namespace stageid {
 
-/// A node behind CAN that plays experiments by itself. docs/can-protocol.md says what is on the wire.
+/// A node behind CAN that plays experiments by itself. Protocol: docs/can-protocol.md.
 ///
-/// Transfers go in windows of chunks; what got lost is asked for and sent again, so that they end
-/// on any bus that carries something. If nothing at all arrives for a second they end with
-/// StageError and can be continued.
+/// Transfers use windows of chunks. Lost chunks are requested and sent again, so transfers also complete on
+/// lossy buses. If nothing arrives for a second, they fail with StageError and can be resumed.
 class CanResidentStage final : public ResidentStage {
  public:
   /// @throws std::invalid_argument if the spec does not fit the stage.
   CanResidentStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTransport> transport,
                    const CanHostOptions& options);
 
-  /// Looks whether a node answers that fits; upload() and arm() do too. @throws StageError
+  /// Checks that a compatible node answers; upload() and arm() do this too. @throws StageError
   void connect();
 
   const StageInfo& info() const noexcept override { return info_; }
@@ -35,7 +34,7 @@ class CanResidentStage final : public ResidentStage {
   JobProgress download(TraceSink& sink) override;
   void stop() noexcept override;
 
-  /// Chunks that were sent or asked for more than once.
+  /// Number of chunks sent or requested more than once.
   std::uint64_t repeated_chunks() const noexcept { return repeated_chunks_; }
 
  private:
@@ -56,14 +55,14 @@ class CanResidentStage final : public ResidentStage {
   bool greeted_ = false;
   std::uint8_t token_;  // of this host's transfers
 
-  std::vector<std::uint8_t> waveform_;  // as it goes over the bus
+  std::vector<std::uint8_t> waveform_;  // as transferred
   std::uint64_t mask_ = 0;
   std::uint32_t period_samples_ = 0;
   std::uint64_t samples_ = 0;
   std::uint64_t digest_ = 0;
 
   std::vector<std::uint8_t> trace_;
-  std::size_t trace_chunks_ = 0;  // that have come
+  std::size_t trace_chunks_ = 0;  // received chunks
   std::uint64_t rows_given_ = 0;
   std::uint64_t repeated_chunks_ = 0;
 };

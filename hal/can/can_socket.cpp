@@ -130,7 +130,7 @@ std::int64_t SocketCan::now_ns() const noexcept { return monotonic_ns(); }
 std::size_t SocketCan::send(std::span<const CanFrame> frames) noexcept {
   std::size_t sent = 0;
   for (std::size_t first = 0; first < frames.size();) {
-    std::size_t last = first + 1;  // frames of one bus that stand together are one system call
+    std::size_t last = first + 1;  // consecutive frames of one bus share a system call
     while (last < frames.size() && frames[last].bus == frames[first].bus && last - first < kBatch)
       ++last;
     if (frames[first].bus < buses_.size())
@@ -204,7 +204,7 @@ std::size_t SocketCan::Bus::receive(std::span<CanFrame> frames, std::uint8_t num
   return count;
 }
 
-// False: an error frame, which says something about the bus and carries no data.
+// @returns false for an error frame: it updates the bus state and has no data.
 bool SocketCan::Bus::take(const canfd_frame& raw, CanFrame& frame) noexcept {
   if ((raw.can_id & CAN_ERR_FLAG) != 0) {
     ++health.error_frames;

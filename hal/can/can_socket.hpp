@@ -8,13 +8,13 @@
 
 namespace stageid {
 
-/// SocketCAN (Linux): one raw CAN FD socket a bus, sendmmsg and recvmmsg, exact identifier filters,
+/// SocketCAN (Linux): one raw CAN FD socket per bus, sendmmsg and recvmmsg, exact identifier filters,
 /// error frames, overflow counter.
 class SocketCan final : public CanTransport {
  public:
-  /// Only frames with `identifiers` come in.
-  /// @throws StageError naming the interface and the command that would help: no CAN in the kernel,
-  /// no such interface, interface down, no CAN FD (mtu below 72).
+  /// Receives only frames with `identifiers`.
+  /// @throws StageError naming the interface and the command that fixes it: no CAN in the kernel,
+  /// unknown interface, interface down, no CAN FD (mtu below 72).
   SocketCan(const std::vector<std::string>& interfaces,
             const std::vector<std::uint16_t>& identifiers);
   ~SocketCan() override;
@@ -32,7 +32,7 @@ class SocketCan final : public CanTransport {
   std::vector<std::unique_ptr<Bus>> buses_;
 };
 
-/// What an error frame of the kernel says about the state. Source: linux/can/error.h.
+/// Bus state after an error frame of the kernel. Source: linux/can/error.h.
 /// @param class_bits the identifier without CAN_ERR_FLAG; @param controller byte 1 of the data.
 CanBusState can_state_after_error(CanBusState before, std::uint32_t class_bits,
                                   std::uint8_t controller) noexcept;

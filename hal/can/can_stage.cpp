@@ -117,7 +117,7 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
       inputs.y.size() != info_.sensors.size())
     return Outcome::fault;
   begin_cycle(static_cast<std::uint16_t>(outputs.cycle + 1));
-  if (!send_setpoints(outputs)) return Outcome::fault;  // the wire would carry another value
+  if (!send_setpoints(outputs)) return Outcome::fault;  // the sent value would differ
   collect(reply_deadline_ns(deadline));
   for (int repeat = 0; !wall_ && repeat < kRepeats && !complete() && !over(); ++repeat) {
     ++counts_.repeats;
@@ -139,18 +139,18 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
 
 std::int64_t CanStage::reply_deadline_ns(Deadline deadline) const noexcept {
   const std::int64_t now_ns = transport_->now_ns();
-  // A loop that is late itself still gives the node a period to answer, or it would never recover.
+  // A late loop still grants the node one period to answer; otherwise it could never recover.
   if (wall_ && deadline.t_ns != 0) return std::max(deadline.t_ns, now_ns + period_ns_);
   return now_ns + reply_timeout_ns_;
 }
 
-/// Nothing more is to be expected in this cycle.
+/// Whether no further frames are expected in this cycle.
 bool CanStage::over() const noexcept {
   return meaning(node_status()).reaction == PeerReaction::stop ||
          worst_bus(*transport_).state >= CanBusState::off;
 }
 
-// The time is looked at on every turn: a bus that is never silent must not keep the loop waiting.
+// The deadline is checked on every iteration, because a bus may never be silent.
 void CanStage::collect(std::int64_t until_ns) noexcept {
   while (true) {
     const std::size_t count = transport_->receive(inbox_);
@@ -177,7 +177,7 @@ void CanStage::take(const CanFrame& frame) noexcept {
     ++counts_.foreign;
     return;
   }
-  // A node repeats an answer bit by bit.
+  // A repeated answer of one node is identical; a difference means two nodes.
   CanFrame& last = answers_[number];
   conflict_ |=
       last.length != 0 && header.sequence == get_can<std::uint16_t>(last, 0) &&
@@ -222,7 +222,7 @@ PeerStatus CanStage::bus_status() const noexcept {
   return PeerStatus::link_down;
 }
 
-/// What the node has said of itself in this cycle, in states and measurements.
+/// Status from the node's state and measurement frames of this cycle.
 PeerStatus CanStage::node_status() const noexcept {
   if (conflict_) return PeerStatus::conflict;
   if (link_.other_node()) return PeerStatus::other_node;
@@ -240,7 +240,7 @@ PeerStatus CanStage::node_status() const noexcept {
 
 PeerStatus CanStage::judge(const Inputs& inputs) noexcept {
   PeerStatus worst = std::max(bus_status(), node_status());
-  // Said once: the samples that the node has missed are marked with this one.
+  // Reported once: the gaps mark this sample only.
   if (link_.state().gaps > samples_bad_) samples_bad_ = link_.state().gaps;
   const std::uint64_t valid = inputs.valid & all_sensors();
   if (valid == all_sensors()) return worst;
@@ -251,11 +251,11 @@ PeerStatus CanStage::judge(const Inputs& inputs) noexcept {
 void CanStage::stop() noexcept {
   try {
     if (running_) trouble_at_stop_ = trouble();
-  } catch (const std::exception&) {  // no memory for a text: it is only a text
+  } catch (const std::exception&) {  // out of memory: the text is optional
   }
   running_ = false;
-  if (link_.session() == 0) return;  // the node has begun nothing for this host
-  // Without an answer the node's own watchdog has stopped it, or will.
+  if (link_.session() == 0) return;  // the node has begun no run for this host
+  // If there is no answer, the node's watchdog stops it.
   static_cast<void>(link_.try_command({CanCommandCode::stop}));
   link_.forget_session();
 }
@@ -266,7 +266,7 @@ std::string CanStage::trouble() const {
   const WorstBus worst = worst_bus(*transport_);
   if (worst.state >= CanBusState::passive)
     return fmt::format("{}: {}", transport_->name(worst.bus), to_string(worst.state));
-  // What this host could not send comes before what the node makes of it.
+  // Frames that this host could not send are reported before the node's state.
   for (std::size_t bus = 0; bus < transport_->buses(); ++bus)
     if (transport_->health(bus).send_refused > 0)
       return fmt::format(

@@ -17,37 +17,35 @@ namespace stageid {
 
 struct CanHostOptions {
   double pace = 0.0;         ///< 0: virtual time, as fast as the node answers; 1: wall clock
-  bool reset_fault = false;  ///< clear a fault of the node at the first start()
-  /// Looked at while a command waits for its answer; true ends it with StageError.
+  bool reset_fault = false;  ///< clears a fault of the node at the first start()
+  /// Called while a command waits for its answer; true ends the wait with StageError.
   std::function<bool()> interrupted = {};
 };
 
-/// What was not as it should be, over all runs.
+/// Counts of irregular events over all runs.
 struct CanCounts {
-  std::uint64_t repeats = 0;  ///< setpoints sent again (virtual time only)
-  std::uint64_t old = 0;      ///< answers to earlier samples: late, repeated or swapped
-  std::uint64_t damaged = 0;  ///< CRC or length
-  std::uint64_t foreign =
-      0;  ///< of another run or host, or with an identifier that is none of ours
-  std::uint64_t saturated = 0;  ///< values that did not fit into their range
+  std::uint64_t repeats = 0;    ///< setpoints sent again (virtual time only)
+  std::uint64_t old = 0;        ///< answers to earlier samples: late, duplicate or out of order
+  std::uint64_t damaged = 0;    ///< CRC or length
+  std::uint64_t foreign = 0;    ///< of another run or host, or with an unknown identifier
+  std::uint64_t saturated = 0;  ///< values out of range
 };
 
-/// A stage behind CAN FD, streaming: a setpoint frame a sample and bus out, the measurement of the
-/// same sequence back. docs/can-protocol.md says what is on the wire.
+/// A stage behind CAN FD, streaming: per sample, one setpoint frame per bus and the measurement of the same
+/// sequence back. Protocol: docs/can-protocol.md.
 ///
-/// The answer is awaited until the deadline, or for reply_timeout_s if there is none. Of what has
-/// come by then: everything is ok; some channels incomplete; nothing but damaged frames corrupt;
-/// nothing stale. An older answer is counted and thrown away. In virtual time, where nothing moves
-/// while the host waits, the setpoint is repeated three times before that; against the wall clock
-/// never. What the node says of itself and its bus has the meaning that peer_status.hpp gives it. A command
-/// that the wire cannot carry is a fault.
+/// The answer is awaited until the deadline, or for reply_timeout_s if there is none. The outcome is `ok` if
+/// all channels arrived, `incomplete` if some are missing, `corrupt` if only damaged frames arrived, otherwise
+/// `stale`. Older answers are counted and discarded. In virtual time the setpoint is repeated up to three times,
+/// because nothing moves while the host waits; on the wall clock it is never repeated. peer_status.hpp defines
+/// the meaning of the node's and the bus's states. A command that cannot be encoded is a fault.
 class CanStage final : public CyclicStage {
  public:
   /// @throws std::invalid_argument if the spec does not fit the stage, or a bus cannot carry it.
   CanStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTransport> transport,
            const CanHostOptions& options);
 
-  /// Looks whether a node answers that fits, before anything else is done; start() does too.
+  /// Checks that a compatible node answers; start() does this too.
   /// @throws StageError as start().
   void connect();
 
@@ -91,11 +89,11 @@ class CanStage final : public CyclicStage {
   std::size_t frames_missing_ = 0;
   std::uint64_t frames_seen_ = 0;  // bit k: sensor frame k of this cycle
   bool damaged_in_cycle_ = false;
-  bool not_carried_ = false;  // a command that does not fit on the wire
+  bool not_carried_ = false;  // a command could not be encoded
   std::uint64_t states_before_ = 0;
   NodeState measured_in_ = NodeState::not_ready;
   bool out_of_range_ = false;
-  bool conflict_ = false;          // two answers to one sample
+  bool conflict_ = false;          // two different answers to one sample
   std::uint64_t samples_bad_ = 0;  // of this run
   PeerStatus status_ = PeerStatus::good;
   std::int64_t t_rx_ns_ = 0;
@@ -105,7 +103,7 @@ class CanStage final : public CyclicStage {
   std::vector<CanFrame> outbox_;
   std::vector<CanFrame> inbox_;
   std::vector<CanFrame> answers_;  // the last of each sensor frame
-  std::vector<double> fresh_;      // NaN: nothing came
+  std::vector<double> fresh_;      // NaN: not received
   std::vector<double> decoded_;    // of one frame
 };
 

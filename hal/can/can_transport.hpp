@@ -9,34 +9,34 @@
 
 namespace stageid {
 
-/// How a controller stands with its bus, the worst last.
+/// Bus state of a controller, the worst last.
 enum class CanBusState : std::uint8_t { active, warning, passive, off, down };
 const char* to_string(CanBusState state) noexcept;
 
 struct CanBusHealth {
   CanBusState state = CanBusState::active;
   std::uint64_t error_frames = 0;
-  std::uint64_t send_refused = 0;  ///< frames the queue had no room for (a bus that is too slow)
-  std::uint64_t dropped = 0;       ///< frames that came faster than they were read
+  std::uint64_t send_refused = 0;  ///< frames refused by a full queue (the bus is too slow)
+  std::uint64_t dropped = 0;       ///< frames that arrived faster than they were read
 };
 
-/// Frames that a receiver takes from the transport at once.
+/// Largest number of frames per receive().
 inline constexpr std::size_t kCanInboxFrames = 64;
 
-/// One end of one or more CAN FD buses, and the clock that goes with them. Nothing here allocates,
-/// locks or throws after construction.
+/// One end of one or more CAN FD buses, and their clock. After construction, nothing here allocates, locks
+/// or throws.
 class CanTransport {
  public:
   virtual ~CanTransport() = default;
   virtual std::size_t buses() const noexcept = 0;
   virtual const std::string& name(std::size_t bus) const noexcept = 0;
 
-  /// Hands every frame to its bus, in order. What a bus does not take at once is lost, not kept:
-  /// old setpoints are worth nothing. @returns how many were taken.
+  /// Sends every frame on its bus, in order. Frames that a bus does not accept at once are discarded, because
+  /// old setpoints are useless. @returns the number accepted.
   virtual std::size_t send(std::span<const CanFrame> frames) noexcept = 0;
-  /// Takes what has come in, oldest first within a bus; does not wait. @returns how many.
+  /// Reads received frames, oldest first within a bus; does not wait. @returns their number.
   virtual std::size_t receive(std::span<CanFrame> frames) noexcept = 0;
-  /// Returns when something may have come in or changed, or at `until_ns` of now_ns().
+  /// Returns when frames or changes may be available, or at `until_ns` of now_ns().
   virtual void wait(std::int64_t until_ns) noexcept = 0;
 
   virtual const CanBusHealth& health(std::size_t bus) const noexcept = 0;

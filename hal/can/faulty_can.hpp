@@ -8,15 +8,15 @@
 
 namespace stageid {
 
-/// What happens to value frames (setpoints or measurements) on their way, on request.
+/// Simulated transmission faults of value frames (setpoints or measurements).
 enum class CanFaultKind : std::uint8_t {
   lost,       ///< does not arrive
   repeated,   ///< arrives twice
-  swapped,    ///< arrives behind the next one
+  swapped,    ///< arrives after the next one
   late,       ///< arrives `delay_s` later
   corrupt,    ///< one bit is wrong
   shortened,  ///< the last bytes are missing
-  foreign     ///< its content comes under an identifier of ours that is not its own
+  foreign     ///< its content arrives under another identifier of this protocol
 };
 const char* to_string(CanFaultKind kind) noexcept;
 
@@ -31,8 +31,8 @@ struct CanFault {
 /// @throws std::invalid_argument naming what is wrong.
 CanFault parse_can_fault(const std::string& text);
 
-/// Sends through another transport, and spoils what it sends as the script says. Receiving is left
-/// alone.
+/// Sends through another transport and applies the scripted faults to sent frames. Receiving is not
+/// affected.
 class FaultyCan final : public CanTransport {
  public:
   FaultyCan(CanTransport& inner, std::vector<CanFault> faults);

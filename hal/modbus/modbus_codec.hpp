@@ -6,16 +6,16 @@
 
 namespace stageid {
 
-/// Of a 32-bit setpoint or measurement.
+/// Largest absolute count of a 32-bit setpoint or measurement.
 inline constexpr double kLargestModbusCount = 2147483647.0;
 
-// How numbers lie in Modbus registers: the more significant word first.
+// Encoding of numbers in Modbus registers, the more significant word first:
 //
 //   uint32 = r[0] 2^16 + r[1];   uint64 = uint32(r) 2^32 + uint32(r + 2)
 //   int32, float32: the same 32 bits, two's complement and IEEE 754
 //
-// libmodbus' own helpers are not used: set and get of a float disagree in Debian's 3.1.6 and between
-// versions of the library.
+// libmodbus' own helpers are not used: setting and getting a float disagree in Debian's 3.1.6, and
+// between versions of the library.
 
 constexpr void put_u32(std::span<std::uint16_t, 2> r, std::uint32_t value) noexcept {
   r[0] = static_cast<std::uint16_t>(value >> 16);
@@ -47,15 +47,15 @@ constexpr float get_f32(std::span<const std::uint16_t, 2> r) noexcept {
   return std::bit_cast<float>(get_u32(r));
 }
 
-/// Whether to_counts() carries `value` as it is: finite and within +-(2^31 - 1) counts.
+/// Whether to_counts() represents `value` without saturation: finite and within +-(2^31 - 1) counts.
 bool fits_counts(double value, double si_per_count) noexcept;
 
 /// Nearest count of `value`, ties to even, saturated at +-(2^31 - 1). NaN: 0.
 std::int32_t to_counts(double value, double si_per_count) noexcept;
 
-/// The smallest power of two whose 2^31 - 1 counts hold `range` (SI, > 0); a power of two, so that a
-/// float32 holds it exactly and scaling rounds nowhere.
-/// @throws std::invalid_argument if `range` is not positive and finite, or out of float32's reach.
+/// The smallest power of two whose 2^31 - 1 counts cover `range` (SI, > 0). With a power of two, a float32
+/// is exact and scaling causes no rounding.
+/// @throws std::invalid_argument if `range` is not within 1e-20 ... 1e20.
 float count_scale(double range);
 
 }  // namespace stageid

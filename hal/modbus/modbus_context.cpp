@@ -13,7 +13,7 @@
 namespace stageid {
 namespace {
 
-// Of other rates libmodbus makes 9600 in silence.
+// libmodbus silently replaces other rates by 9600.
 constexpr std::array kBaudRates = {1200,    2400,    4800,    9600,    19200,   38400,   57600,
                                    115200,  230400,  460800,  500000,  576000,  921600,  1000000,
                                    1152000, 1500000, 2000000, 2500000, 3000000, 3500000, 4000000};

@@ -4,7 +4,7 @@
 
 #include "hal/modbus/modbus_wire.hpp"
 
-// libmodbus' own name for its handle, so that its header stays in our sources.
+// libmodbus' own name for its handle, declared here to keep its header out of other files.
 struct _modbus;  // NOLINT(bugprone-reserved-identifier)
 
 namespace stageid {
@@ -14,8 +14,8 @@ struct ModbusContextFree {
 };
 using ModbusContext = std::unique_ptr<_modbus, ModbusContextFree>;
 
-/// A handle for this address, not connected. Its errors are ours to recover from: libmodbus' own
-/// recovery of the link blocks for ever when the peer is gone.
+/// A handle for this address, not connected. libmodbus' own error recovery is disabled, because it blocks
+/// forever when the peer is gone.
 /// @throws std::invalid_argument if libmodbus refuses the address (unit, baud rate, parity).
 ModbusContext make_modbus_context(const ModbusAddress& address);
 

@@ -17,7 +17,7 @@ using Kind = ModbusFault::Kind;
 
 struct KindRule {
   std::string_view name;
-  bool lasting = false;  // without COUNT: for good
+  bool lasting = false;  // active until the end unless COUNT is given
   bool needs_value = false;
 };
 
@@ -36,7 +36,7 @@ constexpr std::array<KindRule, 9> kRules = {{{"late_reply", false, true},
       fmt::format("fault '{}': {}; expected KIND[@REQUEST][xCOUNT][:VALUE]", text, what));
 }
 
-/// Cuts off what stands behind `separator`, if it is there.
+/// Removes the text from `separator` on and returns the part after it; empty if there is none.
 std::string_view cut(std::string_view& text, char separator) {
   const std::size_t at = text.find(separator);
   if (at == std::string_view::npos) return {};

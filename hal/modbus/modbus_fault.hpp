@@ -7,38 +7,38 @@
 
 namespace stageid {
 
-/// What a simulated Modbus server can do wrong on request.
+/// A simulated fault of a Modbus server.
 struct ModbusFault {
   enum class Kind : std::uint8_t {
-    late_reply,   ///< the reply comes `value` seconds late
+    late_reply,   ///< the reply is `value` seconds late
     half_frame,   ///< the second half of the reply is missing
-    wrong_unit,   ///< another unit answers, with nothing but zeros
+    wrong_unit,   ///< the reply has another unit and zeros as data
     exception,    ///< exception code `value` instead of a reply
-    dead_server,  ///< the server hangs up and never answers again
+    dead_server,  ///< the server closes all connections and never answers again
     heartbeat,    ///< the heartbeat is no longer echoed
     interlock,    ///< the interlock is open
     temperature,  ///< the first temperature is `value` kelvin
-    gravity       ///< the first gravity compensator carries `value` newton
+    gravity       ///< the force of the first gravity compensator is `value` newton
   };
   Kind kind = Kind::late_reply;
-  std::uint64_t from = 1;   ///< the first request it concerns, 1-based
-  std::uint64_t count = 1;  ///< how many requests; 0: all that follow
+  std::uint64_t from = 1;   ///< first affected request, 1-based
+  std::uint64_t count = 1;  ///< number of affected requests; 0: all that follow
   double value = 0.0;
 };
 
 /// Reads `KIND[@REQUEST][xCOUNT][:VALUE]`: "late_reply@200:0.4", "exception@50x3:4", "interlock@100".
-/// COUNT is 1 for faults of one reply, otherwise all that follow.
-/// @throws std::invalid_argument that says what is wrong and what would be right.
+/// The default COUNT is 1 for faults of one reply, otherwise unlimited.
+/// @throws std::invalid_argument naming the problem and the correct form.
 ModbusFault parse_modbus_fault(std::string_view text);
 
-/// Says which faults are on, request by request.
+/// Determines the active faults, request by request.
 class ModbusFaultScript {
  public:
   explicit ModbusFaultScript(std::vector<ModbusFault> faults = {});
   void next_request() noexcept { ++request_; }
-  /// The fault of that kind that is on now, or null.
+  /// The active fault of that kind, or null.
   const ModbusFault* active(ModbusFault::Kind kind) const noexcept;
-  /// Whether a fault of that kind will ever be on.
+  /// Whether the script contains a fault of that kind.
   bool mentions(ModbusFault::Kind kind) const noexcept;
 
  private:

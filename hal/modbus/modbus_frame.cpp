@@ -15,7 +15,7 @@ constexpr std::size_t kReplyHeader = 3;      // unit, function, byte count
 constexpr std::size_t kWriteManyHeader = 7;  // up to the byte count
 constexpr std::size_t kWriteAndReadHeader = 11;
 
-/// Bytes of an RTU request; 0: more of it is needed to tell.
+/// Bytes of an RTU request; 0: not yet known, more bytes are needed.
 std::size_t rtu_request_bytes(std::span<const std::uint8_t> bytes) {
   std::size_t header = 0;
   if (bytes[1] == 15 || bytes[1] == 16) header = kWriteManyHeader;
@@ -24,7 +24,7 @@ std::size_t rtu_request_bytes(std::span<const std::uint8_t> bytes) {
   return bytes.size() < header ? 0 : header + bytes[header - 1] + kCrcBytes;
 }
 
-/// Bytes of an RTU reply of another unit; 0: it is none of those that we know.
+/// Bytes of an RTU reply of another unit; 0: not a known reply.
 std::size_t rtu_reply_bytes(std::span<const std::uint8_t> bytes) {
   if ((bytes[1] & 0x80U) != 0) return kExceptionReply;
   if (bytes[1] >= 1 && bytes[1] <= 4)
@@ -33,7 +33,7 @@ std::size_t rtu_reply_bytes(std::span<const std::uint8_t> bytes) {
   return bytes[1] == 5 || bytes[1] == 6 || bytes[1] == 15 || bytes[1] == 16 ? kShortRequest : 0;
 }
 
-/// Whether `length` bytes are there, and their CRC is right. A length of 0 is not known yet.
+/// Whether `length` bytes have arrived with a correct CRC. A length of 0 is not yet known.
 FrameStatus rtu_status(std::span<const std::uint8_t> bytes, std::size_t length) {
   if (length == 0 || bytes.size() < length) return FrameStatus::incomplete;
   const std::uint16_t crc = modbus_crc16(bytes.first(length - kCrcBytes));

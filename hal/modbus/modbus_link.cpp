@@ -42,7 +42,7 @@ ModbusLink::ModbusLink(const ModbusAddress& address, const ModbusTiming& timing)
                     timing.response_s, timing.worst_reply_s));
   const Duration response = duration(timing.response_s);
   modbus_set_response_timeout(context_.get(), response.seconds, response.microseconds);
-  // The response time-out restarts at every group of bytes: with the byte time-out off it is one
+  // The response timeout restarts at every group of bytes. With the byte timeout disabled, it becomes one
   // deadline for the whole reply.
   modbus_set_byte_timeout(context_.get(), 0, 0);
 }

@@ -9,19 +9,19 @@
 
 namespace stageid {
 
-/// The register map of a stage behind Modbus: addresses of holding registers, 0-based as they
-/// travel. docs/modbus-map.md is its table for people; a test keeps both the same.
+/// The register map of a stage behind Modbus: 0-based addresses of holding registers, as transmitted. It is
+/// documented in docs/modbus-map.md; a test compares both.
 ///
-/// A write is a request only if its sequence number is new: a repeated one changes nothing and is
-/// answered as before, so that a request whose reply was lost may be sent again.
+/// A write is a request only if its sequence number is new. A duplicate changes nothing and gets the same
+/// answer, so a request whose reply was lost may be sent again.
 ///
-/// A run belongs to the connection that began it and to the key that was given for it: other writes
-/// to the registers of the run are refused and change nothing.
+/// A run belongs to the connection that began it and to the key that it received. Other writes to the run's
+/// registers are refused and change nothing.
 namespace modbus_map {
 
 inline constexpr std::uint32_t kMagicValue = 0x53544749;  // "STGI"
 inline constexpr std::uint32_t kVersionValue = 2;
-inline constexpr int kMostChannels = 56;  // as many as one FC23 carries: 116 written, 124 read
+inline constexpr int kMostChannels = 56;  // limit of one FC23: 116 registers written, 124 read
 inline constexpr int kMostPanelValues = 8;
 
 // Written by the supervising host.
@@ -85,8 +85,8 @@ struct Entry {
   std::string_view name;
   Type type = Type::u32;
   int count = 1;
-  std::string_view unit;         ///< "1": none
-  Access access = Access::read;  ///< write: by FC 6, 16, 23; everything is read by FC 3, 4, 23
+  std::string_view unit;         ///< "1": dimensionless
+  Access access = Access::read;  ///< write: by FC 6, 16, 23; all entries are read by FC 3, 4, 23
   std::string_view meaning;
 
   constexpr int registers() const noexcept { return count * (type == Type::u64 ? 4 : 2); }
@@ -95,11 +95,11 @@ struct Entry {
 /// Every entry, by address.
 std::span<const Entry> entries() noexcept;
 
-/// The entries as a Markdown table, as it stands in docs/modbus-map.md.
+/// The entries as the Markdown table of docs/modbus-map.md.
 std::string markdown_table();
 
-/// FNV-1a over "NAME UNIT\n" of all actuators, then sensors: host and stage mean the same channels in
-/// the same order.
+/// FNV-1a over "NAME UNIT\n" of all actuators, then sensors. It detects hosts with other channels or another
+/// order.
 std::uint32_t channel_hash(const StageInfo& info);
 
 }  // namespace modbus_map

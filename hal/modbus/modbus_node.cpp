@@ -149,7 +149,7 @@ bool ModbusNode::needs(ModbusConnection connection) const {
   return connection == counting_ || (runs && connection == owner_);
 }
 
-// Without its heartbeat or setpoints the watchdogs do the rest.
+// The watchdogs react to the missing heartbeat or setpoints.
 void ModbusNode::hung_up(ModbusConnection connection) {
   if (counting_ == connection) counting_ = 0;
 }
@@ -164,7 +164,7 @@ void ModbusNode::disturb_panel() {
   if (const ModbusFault* fault = faults_->active(Kind::gravity); fault != nullptr)
     panel.gravity_compensator_n.at(0) = fault->value;
   const bool disturbed = on(Kind::interlock) || on(Kind::temperature) || on(Kind::gravity);
-  // Several servers show one node: only the one that disturbs it may put it right again.
+  // Several servers may share one node: only the one that disturbed the panel may restore it.
   if (disturbed || disturbed_) node_.set_panel(std::move(panel));
   disturbed_ = disturbed;
 }
@@ -180,11 +180,11 @@ ModbusException ModbusNode::write(int first, std::span<const std::uint16_t> valu
   std::copy(values.begin(), values.end(), registers_.begin() + first);
   const ModbusException refused = obey(first, values.size(), heartbeat, command, run);
   if (refused != ModbusException::none) std::copy(before.begin(), before.end(), registers_.begin());
-  set_u32(map::kRunKey, 0);  // nobody reads it here
+  set_u32(map::kRunKey, 0);  // the key must not be readable here
   return refused;
 }
 
-/// Looks at what the registers hold now, and what they held before.
+/// Acts on the changes between the previous values and the current registers.
 ModbusException ModbusNode::obey(int first, std::size_t count, std::uint32_t heartbeat,
                                  std::uint32_t command, std::uint32_t run) {
   const bool beats = u32(map::kHeartbeat) != heartbeat;
@@ -206,7 +206,7 @@ bool ModbusNode::may_control_the_run(bool commands, bool moves) const {
   const std::uint32_t holder = node_.session();
   const bool began_it = session_ != 0 && asking_ == owner_ && (holder == 0 || holder == session_);
   if (began_it && u32(map::kRunKey) == session_) return true;
-  if (began_it && !commands && !moves) return true;  // the same command again
+  if (began_it && !commands && !moves) return true;  // a duplicate command
   return holder == 0 && commands && u32(map::kRunCommand) == map::kRunBegin;
 }
 
@@ -250,7 +250,7 @@ ModbusException ModbusNode::begin_run() {
       (static_cast<std::uint64_t>(u32(map::kRunSeed)) << 32) | u32(map::kRunSeed + 2);
   try {
     session_ = node_.begin_run(seed, monotonic_ns(), inputs_);
-  } catch (const StageError&) {  // state and cause tell why
+  } catch (const StageError&) {  // the state and cause registers contain the reason
     return node_.session() != 0 ? ModbusException::busy : ModbusException::device_failure;
   }
   owner_ = asking_;
@@ -260,7 +260,7 @@ ModbusException ModbusNode::begin_run() {
 void ModbusNode::take_setpoint() {
   const std::uint32_t sequence = u32(map::kSetpointSequence);
   const std::uint32_t ahead = sequence - u32(map::kMeasurementSequence);
-  // Half of the numbers are newer, half are older, however they wrap around.
+  // Modular comparison: numbers up to 2^31 - 1 ahead are newer, all others older.
   if (ahead == 0 || ahead > 0x7FFFFFFFU) return;
   missed_ = std::min(kMostMissed, missed_ + (ahead - 1));
   for (std::size_t i = 0; i < u_.size(); ++i)

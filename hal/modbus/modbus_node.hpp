@@ -11,24 +11,24 @@
 
 namespace stageid {
 
-/// Shows a StageNode as the registers of modbus_map, to one server.
+/// Maps a StageNode to the registers of modbus_map, for one server.
 ///
-/// A setpoint with a newer sequence number moves the stage by one sample, and the measurement that
-/// is read in the same request belongs to it; the same number again moves nothing. Numbers that were
-/// left out are counted as missed and not made up for.
+/// A setpoint with a newer sequence number advances the stage by one sample. The measurement read in the
+/// same request belongs to it. A duplicate number does not advance the stage. Skipped numbers are counted as
+/// missed and are not made up for.
 ///
-/// A run is controlled by the connection that began it, with the key that the node drew for it; a
-/// request of any other to begin, end or move is answered with exception 6 and changes nothing.
+/// A run is controlled by the connection that began it, with the key that the node drew for it. Requests of
+/// other connections to begin, end or advance a run get exception 6 and change nothing.
 ///
-/// A supervising host that has once counted its heartbeat up must go on with it as long as forces may
-/// act: standing still for heartbeat_s ends in a safe stop (FaultCause::host_heartbeat). As long as
-/// it counts, no other connection may.
+/// Once a supervising host has incremented its heartbeat, it must continue while forces may act: a pause of
+/// heartbeat_s causes a safe stop (FaultCause::host_heartbeat). Meanwhile no other connection may increment
+/// it.
 class ModbusNode final : public ModbusRegisters {
  public:
-  /// `boot_id`: another one for every start of the process, so that hosts notice. `faults` may be
-  /// null: panel and heartbeat misbehave as it says. All references are kept.
-  /// @throws std::invalid_argument if the stage has more channels or panel values than the map, or
-  /// `limits` leave a channel without a range, or a fault needs a panel value that is not there.
+  /// `boot_id`: different at every start of the process, so that hosts detect a restart. `faults` may be null;
+  /// it disturbs panel and heartbeat. All references are kept.
+  /// @throws std::invalid_argument if the stage has more channels or panel values than the map, a channel has
+  /// no range in `limits`, or a fault needs a missing panel value.
   ModbusNode(StageNode& node, const StageLimits& limits, std::uint32_t boot_id,
              ModbusFaultScript* faults, double heartbeat_s = 1.0);
 
@@ -62,12 +62,12 @@ class ModbusNode final : public ModbusRegisters {
   std::array<std::uint16_t, modbus_map::kEnd> registers_{};
   std::uint32_t boot_id_;
   ModbusConnection asking_ = 0;
-  std::uint32_t session_ = 0;      // key of the last run that was begun here; 0: none
-  ModbusConnection owner_ = 0;     // who began it
-  ModbusConnection counting_ = 0;  // whose heartbeat is watched
+  std::uint32_t session_ = 0;      // key of the last run begun by this front end; 0: none
+  ModbusConnection owner_ = 0;     // connection that began the run
+  ModbusConnection counting_ = 0;  // connection whose heartbeat is watched
   std::int64_t heartbeat_ns_;
   std::uint32_t last_heartbeat_ = 0;
-  std::int64_t heartbeat_seen_ns_ = 0;  // 0: nobody counts
+  std::int64_t heartbeat_seen_ns_ = 0;  // 0: no heartbeat yet
   NodePanel undisturbed_;
   bool disturbed_ = false;
   std::vector<double> actuator_scale_;
@@ -75,10 +75,10 @@ class ModbusNode final : public ModbusRegisters {
   std::vector<double> u_;
   std::vector<double> y_;
   Inputs inputs_;
-  std::uint32_t missed_ = 0;  // setpoints of this run that were left out
+  std::uint32_t missed_ = 0;  // skipped setpoints of this run
 };
 
-/// Range of every channel on the wire: twice its limit, so that a limit is seen before the wire
+/// Range of every channel on the wire: twice its limit, so that limits are detected before the wire
 /// saturates. @throws std::invalid_argument if there is no limit.
 std::vector<float> modbus_scales(const Eigen::VectorXd& limits, std::size_t channels,
                                  const char* what);

@@ -38,7 +38,7 @@ ModbusException read_into(ModbusRegisters& registers, int first, std::size_t cou
   return ModbusException::none;
 }
 
-/// Writes the registers that begin at byte `at`, behind their byte count.
+/// Writes the registers whose data follow their byte count at byte `at`.
 ModbusException write_from(ModbusRegisters& registers, int first, std::size_t count,
                            std::size_t most, Request request, std::size_t at) {
   if (count < 1 || count > most || request[at - 1] != 2 * count || request.size() != at + 2 * count)

@@ -50,9 +50,9 @@ struct ModbusServer::Line {
   std::vector<std::uint8_t> unsent;
   std::int64_t last_byte_ns = 0;
   std::int64_t last_request_ns = 0;  // 0: none yet
-  std::int64_t owing_since_ns = 0;   // the client: the rest of a request, or taking a reply
-  std::int64_t not_before_ns = 0;    // a reply that is late on request
-  bool more = false;                 // behind a request that was answered there are more bytes
+  std::int64_t owing_since_ns = 0;   // start of an incomplete request or unread reply
+  std::int64_t not_before_ns = 0;    // end of a simulated delay of the reply
+  bool more = false;                 // unprocessed bytes follow the answered request
   bool closed = false;
 };
 
@@ -93,7 +93,7 @@ void ModbusServer::open() {
     throw StageError(fmt::format("{}: cannot listen: {}; use another port", to_string(address_),
                                  std::strerror(errno)));
   fcntl(listener_, F_SETFL, fcntl(listener_, F_GETFL) | O_NONBLOCK);
-  // Its connections inherit this: what a client does not take is noticed early and costs little.
+  // The connections inherit this: clients that do not read are detected early and use little memory.
   setsockopt(listener_, SOL_SOCKET, SO_SNDBUF, &kSocketBuffer, sizeof kSocketBuffer);
   setsockopt(listener_, SOL_SOCKET, SO_RCVBUF, &kSocketBuffer, sizeof kSocketBuffer);
   address_.port = bound_port(listener_);
@@ -120,7 +120,7 @@ void ModbusServer::serve_lines(int wait_ms) {
   }
   std::array<pollfd, kMostClients + 1> waiting{};
   const std::size_t lines = lines_.size();
-  bool now = false;  // requests are left from the turn before
+  bool now = false;  // requests remain from the previous iteration
   for (std::size_t i = 0; i < lines; ++i) {
     const Line& line = lines_[i];
     const bool sends = !line.unsent.empty() && line.not_before_ns == 0;
@@ -129,7 +129,7 @@ void ModbusServer::serve_lines(int wait_ms) {
                   static_cast<short>((sends ? POLLOUT : 0) | (receives ? POLLIN : 0)), 0};
     now |= receives && line.more;
   }
-  waiting[lines] = {listener_, POLLIN, 0};  // poll() skips a negative one
+  waiting[lines] = {listener_, POLLIN, 0};  // poll() ignores a negative descriptor
   static_cast<void>(poll(waiting.data(), lines + 1, now ? 0 : wait_ms));
   for (std::size_t i = 0; i < lines && !dead_; ++i) work(lines_[i], waiting[i].revents);
   if (!dead_ && waiting[lines].revents != 0) accept_clients();
@@ -139,7 +139,7 @@ void ModbusServer::serve_lines(int wait_ms) {
   });
 }
 
-/// One turn of one client: at most one piece is received and one request answered.
+/// Serves one client once: receives at most one piece and answers at most one request.
 void ModbusServer::work(Line& line, int events) {
   look_at_time(line);
   if (line.closed) return;
@@ -177,7 +177,7 @@ void ModbusServer::accept_clients() {
   }
 }
 
-/// Ends the connection whose last request is the oldest; the first of those that never asked.
+/// Closes the connection with the oldest last request, preferably one without any request.
 bool ModbusServer::make_room() {
   auto idle = lines_.end();
   for (auto line = lines_.begin(); line != lines_.end(); ++line)
@@ -195,7 +195,7 @@ void ModbusServer::receive(Line& line) {
   const ssize_t count = read(line.descriptor, bytes.data(), bytes.size() - line.received.size());
   if (count <= 0) {
     const bool nothing = count < 0 && (errno == EINTR || errno == EAGAIN);
-    // A pty whose other side is away says EIO until it is back.
+    // read() on a pty returns EIO while the other side is closed.
     line.closed |= !address_.serial() && !nothing;
     if (address_.serial()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     return;
@@ -215,7 +215,7 @@ void ModbusServer::answer_next(Line& line) {
     answer(line, request.transaction, request.unit, request.pdu);
   }
   line.closed |= request.status == FrameStatus::broken;
-  // Of a TCP request that is not whole nothing is taken.
+  // An incomplete TCP request remains in the buffer.
   const std::size_t taken = complete || address_.serial() ? request.bytes : 0;
   line.received.erase(line.received.begin(),
                       line.received.begin() + static_cast<std::ptrdiff_t>(taken));
@@ -270,7 +270,7 @@ void ModbusServer::reply(Line& line, std::uint16_t transaction, std::uint8_t uni
   send(line);
 }
 
-/// What the client does not take now is left for the next turn.
+/// What the client does not accept is sent in the next iteration.
 void ModbusServer::send(Line& line) {
   const ssize_t count =
       address_.serial()

@@ -12,21 +12,19 @@
 
 namespace stageid {
 
-/// A Modbus server for one unit, TCP (any number of clients up to kMostClients) or RTU, that can
-/// misbehave on request.
+/// A Modbus server for one unit, TCP (up to kMostClients clients) or RTU, with simulated faults.
 ///
-/// It never waits for a client: a reply that is not taken and a request that is not completed within
-/// kPatience_ms end the connection, and a client reads one reply before its next request is looked
-/// at. If all places are taken, a new client gets that of the one that has been silent longest, but
-/// never that of a connection that the registers need. Memory is bounded: kMostClients times one
-/// request and one reply.
+/// It never waits for a client. A reply not read or a request not completed within kPatience_ms ends the
+/// connection, and a client must read one reply before its next request is processed. If all places are taken,
+/// a new client replaces the one that has been silent longest, except connections that the registers need.
+/// Memory is bounded by kMostClients times one request and one reply.
 ///
-/// A TCP request for another unit is refused as a gateway does (exception 11), one on a serial line
-/// is not for us. Bytes that are no request end a TCP connection; on a serial line they are skipped,
-/// and what is left of a request is thrown away at the next silence of kSilence_ms.
+/// A TCP request for another unit gets the exception of a gateway (11); on a serial line it is ignored.
+/// Invalid bytes end a TCP connection. On a serial line they are skipped, and an incomplete request is
+/// discarded at the next silence of kSilence_ms.
 ///
-/// It stands up to garbage but not to an enemy: there is neither encryption nor authentication in
-/// Modbus. Listen on the loopback interface or in a closed network only.
+/// The server tolerates garbage but not attacks: Modbus has neither encryption nor authentication. Listen
+/// only on the loopback interface or in a closed network.
 class ModbusServer {
  public:
   static constexpr std::size_t kMostClients = 16;
@@ -41,17 +39,17 @@ class ModbusServer {
   ModbusServer(const ModbusServer&) = delete;
   ModbusServer& operator=(const ModbusServer&) = delete;
 
-  /// With the port that was found.
+  /// Contains the selected port.
   const ModbusAddress& address() const noexcept { return address_; }
 
-  /// Waits up to wait_ms for something to do, and does it.
+  /// Waits up to wait_ms for work and processes it.
   void serve(int wait_ms);
   /// Serves until `stop`.
   void run(const std::atomic<bool>& stop);
 
  private:
   struct Line;
-  struct Context;  // libmodbus', which opens ports and devices
+  struct Context;  // libmodbus context, which opens ports and devices
 
   void open();
   void serve_lines(int wait_ms);

@@ -69,7 +69,7 @@ void check_map(ModbusLink& link, const Block& status) {
                        status[map::kVersion], map::kVersionValue));
 }
 
-/// Sends the same request again if no good answer came.
+/// Repeats the request once if there is no valid answer.
 template <std::size_t Count, typename Answered>
 void transact(ModbusLink& link, int first, const std::array<std::uint16_t, Count>& request,
               int read_first, std::span<std::uint16_t> reply, Answered answered) {
@@ -142,7 +142,7 @@ std::string describe(const ModbusState& state) {
                      state.state == NodeState::fault ? " and add --reset-fault" : "");
 }
 
-/// Gives a run command; `session`: the key that the answer must carry, 0: any but 0.
+/// Sends a run command. `session`: the expected key in the answer, 0: any but 0.
 /// @return the key in the answer.
 std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uint64_t run_seed,
                                std::uint32_t session, std::vector<std::uint16_t>& reply) {

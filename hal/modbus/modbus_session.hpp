@@ -9,11 +9,11 @@
 
 namespace stageid {
 
-// What a host says to a stage behind Modbus before and after a run, when time does not matter.
-// Everything is tried twice, with a drain between.
+// Exchanges between host and node before and after a run, without timing requirements. Each is tried twice,
+// with a drain in between.
 
-/// Reads `count` registers from `first` on, in as many transactions as it takes.
-/// @throws StageError, the link closed.
+/// Reads `count` registers starting at `first`, in as many transactions as needed.
+/// @throws StageError, with the link closed.
 std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size_t count);
 
 struct ModbusDescription {
@@ -22,8 +22,8 @@ struct ModbusDescription {
   std::vector<double> sensor_scale;
 };
 
-/// Reads what the node says of itself, and checks it against what is expected.
-/// @throws StageError if it is no stage, has another map, other channels or another rate.
+/// Reads the node's description and compares it with the expected one.
+/// @throws StageError if it is not a stage, or has another map, other channels or another rate.
 ModbusDescription read_description(ModbusLink& link, const StageInfo& expected);
 
 struct ModbusState {
@@ -38,8 +38,8 @@ ModbusState read_state(ModbusLink& link);
 /// @throws StageError if it is refused; the message names state and cause.
 void give_supervisor_command(ModbusLink& link, SupervisorCommand command);
 
-/// Begins a run; `reply` receives the measurement block, with y[0]. @return the key of the run.
-/// @throws StageError if there is no answer, or it is refused.
+/// Begins a run; `reply` receives the measurement block with y[0]. @return the key of the run.
+/// @throws StageError if it is refused or not answered.
 std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
                         std::vector<std::uint16_t>& reply);
 /// Ends the run of this key. @throws StageError as begin_run().

@@ -170,7 +170,7 @@ PeerStatus ModbusStage::transact() noexcept {
   return status == PeerStatus::good ? PeerStatus::late : status;
 }
 
-/// A node that was restarted refuses what it knows nothing of; its boot id tells.
+/// A restarted node refuses the unknown run; its boot id has changed.
 bool ModbusStage::restarted() noexcept {
   std::array<std::uint16_t, 2> boot_id{};
   if (link_.read(map::kMeasurementBootId, boot_id) != LinkStatus::ok) return false;
@@ -199,7 +199,7 @@ PeerStatus ModbusStage::judge_reply() noexcept {
   if (boot_id == description_.boot_id && measured(map::kMeasurementSequence) == sequence_ &&
       measured(map::kSession) == session_)
     return PeerStatus::good;
-  // Zeros are what other devices show; a node that is there but new has a boot id of its own.
+  // Other devices return zeros, whereas a restarted node has a nonzero boot id of its own.
   const bool other = boot_id != description_.boot_id && boot_id != 0;
   trouble_ = other ? Trouble::node : Trouble::foreign_reply;
   return other ? PeerStatus::other_node : PeerStatus::damaged;
@@ -238,7 +238,7 @@ void ModbusStage::stop() noexcept {
 }
 
 void ModbusStage::end_run() {
-  // A node that is new, or gone, does not know of this run.
+  // A restarted or missing node does not know this run.
   if (status_ == PeerStatus::other_node) link_.close();
   if (!link_.connected()) return;
   if (trouble_ != Trouble::none) link_.drain();

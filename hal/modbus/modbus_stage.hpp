@@ -14,33 +14,33 @@ namespace stageid {
 
 struct ModbusHostOptions {
   double pace = 0.0;         ///< see Pacer
-  bool reset_fault = false;  ///< clear a fault of the node at the first start()
+  bool reset_fault = false;  ///< clears a fault of the node at the first start()
 };
 
-/// Seconds that one sample of the stage takes on the wire: setpoints out, measurements in.
+/// Duration of the exchange of one sample in seconds: setpoints out, measurements in.
 double modbus_exchange_s(const ModbusAddress& address, const ModbusTiming& timing,
                          const StageInfo& info);
 
-/// A stage behind Modbus, one function 23 a sample: u[n] out, y[n+1] in. For low rates: what one
-/// transaction takes is computed, and a faster stage is refused.
+/// A stage behind Modbus, one function 23 per sample: u[n] out, y[n+1] in. It is meant for low rates: if the
+/// computed transaction time exceeds the sample period, the stage is refused.
 ///
-/// Every measurement echoes the sequence number of its setpoint and the boot id of the node, so that
-/// a late, old or foreign reply is never taken for the answer. An exchange whose reply is missing or
-/// fails a check is drained and repeated once with the same number, which moves nothing twice:
-/// Outcome::late if that helps, otherwise link_down (no reply), corrupt or fault (refused), within
-/// 2 worst_reply_s. What the node says of itself has the meaning that peer_status.hpp gives it.
+/// Every measurement echoes the sequence number of its setpoint and the boot id of the node. A late, old or
+/// foreign reply is therefore never taken for the answer. An exchange whose reply is missing or invalid is
+/// drained and repeated once with the same number, which does not advance the stage twice. The outcome is
+/// `late` if that succeeds, otherwise `link_down` (no reply), `corrupt` or `fault` (refused), within
+/// 2 worst_reply_s. peer_status.hpp defines the meaning of the node's states.
 ///
-/// start() enables the stage if nobody has, and stop() disables it only then.
+/// start() enables the stage if necessary; only then does stop() disable it.
 class ModbusStage final : public CyclicStage {
  public:
-  /// Nothing is sent. `info`: names, rate, transport delay.
-  /// @throws std::invalid_argument if the link cannot carry info.sample_rate_hz or the channels; the
-  /// message tells the computed transaction time.
+  /// Sends nothing. `info`: names, rate, transport delay.
+  /// @throws std::invalid_argument if the link is too slow for info.sample_rate_hz or cannot carry the
+  /// channels; the message contains the computed transaction time.
   ModbusStage(StageInfo info, const ModbusAddress& address, const ModbusTiming& timing,
               const ModbusHostOptions& options = {});
 
   const StageInfo& info() const noexcept override { return info_; }
-  /// @throws StageError also if another stage is found there, or one that another program measures.
+  /// @throws StageError also if another stage answers, or if another program is measuring.
   void start(std::uint64_t run_seed, Inputs& first) override;
   [[nodiscard]] Outcome exchange(const Outputs& outputs, Inputs& inputs,
                                  Deadline deadline) noexcept override;
@@ -65,12 +65,12 @@ class ModbusStage final : public CyclicStage {
   ModbusDescription description_;
   std::uint32_t session_ = 0;
   std::uint32_t sequence_ = 0;
-  std::uint32_t missed_ = 0;  // setpoints of this run, as the node counts them
+  std::uint32_t missed_ = 0;  // missed setpoints of this run, counted by the node
   bool running_ = false;
   bool enabled_here_ = false;
   bool reset_fault_;
 
-  /// What the last exchange ran into; text is made of it when somebody asks.
+  /// Problem of the last exchange; trouble() formats it on request.
   enum class Trouble : std::uint8_t { none, link, foreign_reply, node, not_carried };
   Trouble trouble_ = Trouble::none;
   PeerStatus status_ = PeerStatus::good;

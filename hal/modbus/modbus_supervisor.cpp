@@ -51,7 +51,7 @@ PlantSnapshot parse(Status status) {
   return snapshot;
 }
 
-/// Empty: it is our map.
+/// Describes a mismatch of the register map; empty: none.
 std::string map_trouble(Status status) {
   if (u32(status, map::kMagic) != map::kMagicValue)
     return fmt::format("register {} contains {:#010x}; expected {:#010x}. Check the unit",
@@ -107,7 +107,7 @@ void ModbusSupervisor::set_trouble(std::string trouble) {
 }
 
 double ModbusSupervisor::reply_allowance_s() const noexcept {
-  // The poll that is under way, its repetition, and the one that carries the command.
+  // The current poll, its repetition, and the poll with the command.
   return 3.0 * (options_.poll_period_s + link_.timing().worst_reply_s);
 }
 
@@ -132,7 +132,7 @@ void ModbusSupervisor::run() {
     lock.unlock();
     const bool good = connect() && poll();
     lock.lock();
-    // A new command is not left waiting for the next poll; a link that is down has no use for it.
+    // A new command interrupts the wait for the next poll, unless the link is down.
     const double pause_s = good ? options_.poll_period_s : backoff_s;
     backoff_s =
         good ? options_.backoff_first_s : std::min(2.0 * backoff_s, options_.backoff_longest_s);
@@ -140,7 +140,7 @@ void ModbusSupervisor::run() {
   }
 }
 
-/// Opens the link if it is not, and takes over the command's number from whoever was here before.
+/// Connects if necessary and continues the command numbers of the previous host.
 bool ModbusSupervisor::connect() {
   if (link_.connected()) return true;
   if (!link_.try_connect()) {
@@ -154,7 +154,7 @@ bool ModbusSupervisor::connect() {
     set_trouble(fmt::format("{}: {}", to_string(link_.address()), wrong));
   } else {
     command_sequence_ = u32(status, map::kCommandEcho);
-    // So far ahead that the first poll counts only if the echo moves.
+    // Far enough ahead that the first poll is valid only if the echo changes.
     heartbeat_ = u32(status, map::kHeartbeatEcho) + kEchoPolls;
     return true;
   }
@@ -184,7 +184,7 @@ bool ModbusSupervisor::poll() {
   link_.drain();
   link_.close();
   const std::lock_guard lock(mutex_);
-  sent_ = false;  // whether it arrived is not known; the next link numbers it anew
+  sent_ = false;  // its arrival is unknown; it gets a new number after reconnecting
   return false;
 }
 

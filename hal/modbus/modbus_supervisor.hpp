@@ -14,22 +14,22 @@ namespace stageid {
 
 struct ModbusSupervisorOptions {
   double poll_period_s = 0.1;      ///< 10-20 Hz over TCP, 5-10 Hz over RTU
-  double backoff_first_s = 0.1;    ///< before the second attempt to connect; doubled up to ...
-  double backoff_longest_s = 5.0;  ///< ... this
+  double backoff_first_s = 0.1;    ///< before the second attempt to connect; then doubled
+  double backoff_longest_s = 5.0;  ///< upper bound of the doubled delay
 };
 
-/// The supervisor behind Modbus. A thread of its own polls with one function 23 (heartbeat and
-/// command out, status in), because a time-out, a drain and a reconnection take their time.
+/// The supervisor behind Modbus. A separate thread polls with one function 23 (heartbeat and command out,
+/// status in), because timeouts, drains and reconnections take time.
 ///
-/// A poll counts only if the status has the map's magic and version and echoes one of the last
-/// kEchoPolls heartbeats: that proves the program behind the server, not only its network card. A
-/// poll that fails is drained and repeated once; then the link is closed and opened again.
+/// A poll is valid only if the status has the map's magic and version and echoes one of the last kEchoPolls
+/// heartbeats. The echo proves that the program behind the server runs, not only its network card. A failed
+/// poll is drained and repeated once; then the link is closed and reopened.
 class ModbusSupervisor final : public Supervisor {
  public:
   static constexpr std::uint32_t kEchoPolls = 2;  // a PLC may copy the heartbeat one scan later
 
-  /// Starts the thread; whether somebody answers is seen by snapshot().
-  /// @throws std::invalid_argument if an address, a time or the poll period makes no sense.
+  /// Starts the thread; snapshot() shows whether the peer answers.
+  /// @throws std::invalid_argument if an address, a time or the poll period is invalid.
   ModbusSupervisor(const ModbusAddress& address, const ModbusTiming& timing,
                    const ModbusSupervisorOptions& options = {});
   ~ModbusSupervisor() override;
@@ -56,7 +56,7 @@ class ModbusSupervisor final : public Supervisor {
   std::uint32_t command_sequence_ = 0;
 
   std::mutex request_mutex_;  // one request at a time
-  mutable std::mutex mutex_;  // of all below
+  mutable std::mutex mutex_;  // guards all members below
   std::condition_variable changed_;
   PlantSnapshot snapshot_;
   std::string trouble_;
@@ -64,7 +64,7 @@ class ModbusSupervisor final : public Supervisor {
   bool sent_ = false;  // wanted_ has its sequence number
   std::optional<SupervisorReply> reply_;
   bool stop_ = false;
-  std::thread thread_;  // last: it uses all the others
+  std::thread thread_;  // last: it uses all other members
 };
 
 }  // namespace stageid

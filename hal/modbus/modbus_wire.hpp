@@ -4,13 +4,13 @@
 
 namespace stageid {
 
-/// Where a Modbus server is: TCP, or RTU on a serial line if `device` is not empty.
+/// Address of a Modbus server: TCP, or RTU on a serial line if `device` is not empty.
 struct ModbusAddress {
   std::string host = "127.0.0.1";
   int port = 502;
   std::string device;  ///< "/dev/ttyUSB0"
   int baud = 115200;
-  char parity = 'E';  ///< 'N', 'E', 'O'; without parity a second stop bit takes its place
+  char parity = 'E';  ///< 'N', 'E', 'O'; 'N' implies a second stop bit
   int unit = 1;
 
   bool serial() const noexcept { return !device.empty(); }
@@ -20,20 +20,20 @@ struct ModbusAddress {
 std::string to_string(const ModbusAddress& address);
 
 struct ModbusTiming {
-  double response_s = 0.2;     ///< a reply that is not there by then is missing
-  double worst_reply_s = 0.5;  ///< a reply that is not there by then never comes; > response_s
-  double device_s = 0.001;     ///< what the server itself needs for a reply, normally
+  double response_s = 0.2;     ///< a later reply counts as missing
+  double worst_reply_s = 0.5;  ///< no reply is expected after this time; > response_s
+  double device_s = 0.001;     ///< normal processing time of the server
 };
 
-/// Duration of one FC23 transaction that writes and reads so many registers:
+/// Duration of one FC23 transaction that writes w and reads r registers:
 ///   RTU: (13 + 2 w + 5 + 2 r) 11 bits / baud + 2 silent intervals + device_s,
 ///        silent interval: 3.5 characters, above 19200 baud 1.75 ms
-///   TCP: device_s; the wire counts for nothing beside it
+///   TCP: device_s; the time on the wire is negligible
 /// Source: Modbus over Serial Line, Specification and Implementation Guide V1.02, 2.5.1.
 double modbus_transaction_s(const ModbusAddress& address, const ModbusTiming& timing,
                             int written_registers, int read_registers);
 
-/// What was computed, for people: "13.2 ms (81 + 33 bytes at 115200 baud)".
+/// Text for the user: "13.2 ms (81 + 33 bytes at 115200 baud)".
 std::string describe_transaction(const ModbusAddress& address, const ModbusTiming& timing,
                                  int written_registers, int read_registers);
 

@@ -29,7 +29,7 @@ PanelTrouble trouble_of(const NodePanel& panel) {
   if (!panel.interlock_closed) return {FaultCause::interlock, "the interlock is open; close it"};
   for (std::size_t i = 0; i < panel.gravity_compensator_n.size(); ++i) {
     const double force_n = panel.gravity_compensator_n[i];
-    // Written so that NaN is out of range.
+    // This form treats NaN as out of range.
     if (!(force_n >= panel.gravity_low_n && force_n <= panel.gravity_high_n))
       return {FaultCause::gravity,
               fmt::format("gravity compensator {}: {:.4g} N is out of range ({:.4g} to {:.4g} N)",
@@ -84,7 +84,7 @@ StageNode::StageNode(std::unique_ptr<CyclicStage> stage, const StageLimits& limi
   y_.assign(info.sensors.size(), 0.0);
   control_.assign(info.actuators.size(), 0.0);
   command_.assign(info.actuators.size(), 0.0);
-  machine_.self_test_passed();  // stage, limits and controller fit: there is no more to test
+  machine_.self_test_passed();  // the constructor has checked stage, limits and controller
 }
 
 NodeState StageNode::state() const {
@@ -130,7 +130,7 @@ SupervisorReply StageNode::request(SupervisorCommand command) {
   return {true, ""};
 }
 
-// A run or reservation can end in many ways; all of them are changes of the state.
+// A run or reservation can end in many ways, all of which change the state.
 std::uint32_t StageNode::holder() const {
   const NodeState state = machine_.state();
   const bool held =
@@ -138,7 +138,7 @@ std::uint32_t StageNode::holder() const {
   return held ? session_ : 0;
 }
 
-// The low byte names the run in each CAN frame: neither 0 nor that of the run before.
+// The low byte identifies the run in each CAN frame: not 0, and not that of the previous run.
 std::uint32_t StageNode::draw_key() {
   std::uint32_t key = 0;
   do key = random_();
@@ -219,7 +219,7 @@ Outcome StageNode::exchange(std::int64_t now_ns, std::span<const double> u, Inpu
   }
   last_sample_ns_ = now_ns;
   Outcome outcome = stage_.exchange({sample_, now_ns, u}, inputs, {});
-  // The host need not know how the node stops: braked or in closed loop, it does so by itself.
+  // The host need not distinguish how the node stops; either way it stops by itself.
   if (outcome == Outcome::braking || outcome == Outcome::opened) outcome = Outcome::limit;
   ++sample_;
   std::copy(inputs.y.begin(), inputs.y.end(), y_.begin());
@@ -262,7 +262,7 @@ void StageNode::tick(std::int64_t now_ns) {
     hold(now_ns);
 }
 
-// The samples that have become due since the last tick; a tick that came late makes up for them.
+// Plays the samples due since the last tick, including those of a late tick.
 void StageNode::hold(std::int64_t now_ns) {
   if (!hold_began_ns_) {
     hold_began_ns_ = now_ns;

@@ -18,33 +18,36 @@
 namespace stageid {
 
 struct NodeOptions {
-  /// The host may be silent for so long while it measures; 0: 3 samples.
+  /// Longest permitted silence of the host while it measures; 0: 3 samples.
   double watchdog_s = 0.0;
-  /// The node's own controller holds the stage for so long before power is cut.
+  /// Time for which the node's own controller holds the stage before power is cut.
   double hold_s = 0.1;
 };
 
-/// What stands around the simulated stage and can be disturbed on request.
+/// Simulated environment of the stage, for simulated disturbances.
 struct NodePanel {
   bool interlock_closed = true;
   std::vector<double> gravity_compensator_n;  ///< force of each
   std::vector<double> temperature_k;
-  double gravity_low_n = 0.0;  ///< allowed range of each
+  double gravity_low_n = 0.0;  ///< permitted range of each
   double gravity_high_n = 0.0;
   double temperature_high_k = 0.0;
 };
 
-/// A stage behind wires, without the wires: plant, state machine, watchdog, safe stop. Front ends
-/// (CAN, Modbus) of one process share it; every call takes its lock.
+/// A stage behind a fieldbus, without the bus: plant, state machine, watchdog, safe stop. Front ends (CAN,
+/// Modbus) of one process share it; every call takes its lock.
 ///
-/// While the host measures, each advance() moves the plant by one sample. If none comes for
-/// watchdog_s (of the wall clock, seen by tick()), or advance() reports a limit or a fault, or the
-/// panel leaves its range, or somebody calls fail(), the node stops by itself: its own controller
-/// holds the stage for hold_s in closed loop, or LimitedStage brakes it if the loop is unsound, then
-/// forces go to zero, and the state is fault until an explicit reset. A quick stop goes the same way but ends in switch_on_disabled.
+/// While the host measures, each advance() moves the plant by one sample. The node stops by itself if
+///   - no advance() is called for watchdog_s (of the wall clock, checked by tick());
+///   - advance() reports a limit or a fault;
+///   - the panel leaves its range; or
+///   - fail() is called.
+/// Its own controller holds the stage for hold_s in closed loop; if the loop is unsound, LimitedStage brakes the
+/// stage. Then forces become zero, and the state is fault until an explicit reset. A quick stop does the
+/// same but ends in switch_on_disabled.
 ///
-/// The node's controller runs along with every sample, so that taking over gives no step but the
-/// end of the excitation.
+/// The node's controller is updated at every sample, so that taking over causes no step other than the end
+/// of the excitation.
 class StageNode {
  public:
   /// The stage must not wait in exchange() (pace 0): it is called under the lock.
@@ -56,38 +59,38 @@ class StageNode {
   const StageInfo& info() const noexcept { return stage_.info(); }
   NodeState state() const;
   FaultCause cause() const;
-  /// One line: why the node is in fault; empty if it is not.
+  /// Reason of the fault in one line; empty if there is none.
   std::string trouble() const;
-  std::uint64_t sample() const;  ///< of the current run; those of a safe stop do not count
+  std::uint64_t sample() const;  ///< of the current run, without those of a safe stop
   NodePanel panel() const;
   /// Takes effect with the next tick().
   void set_panel(NodePanel panel);
 
-  /// enable and reset_fault are refused while the panel is out of range; the reply says what.
+  /// enable and reset_fault are refused while the panel is out of range; the reply contains the reason.
   SupervisorReply request(SupervisorCommand command);
 
-  /// The key of the host that has the stage, while it measures or keeps it reserved; 0: nobody has.
+  /// Key of the host that owns the stage by a run or reservation; 0: none.
   std::uint32_t session() const;
-  /// Keeps the stage for one host until its run ends, it is released, or it is no longer enabled.
-  /// @return the key, another one each time. @throws StageError if another host has the stage.
+  /// Reserves the stage for one host until its run ends, it is released, or it is no longer enabled.
+  /// @return a new key. @throws StageError if another host owns the stage.
   std::uint32_t reserve();
   /// Ends a reservation.
   void release();
 
-  /// operation_enabled -> measuring; y[0] into `first.y` (size sensors). `session`: of a
-  /// reservation, 0 without. @return the key of the run.
-  /// @throws StageError in any other state, if another host has the stage, or if the stage refuses.
+  /// operation_enabled -> measuring; y[0] into `first.y` (size sensors). `session`: key of a reservation,
+  /// or 0. @return the key of the run.
+  /// @throws StageError in any other state, if another host owns the stage, or if the stage refuses.
   std::uint32_t begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& first,
                           std::uint32_t session = 0);
   /// u[n] -> y[n+1]. Outcome::fault unless measuring.
   [[nodiscard]] Outcome advance(std::int64_t now_ns, std::span<const double> u, Inputs& inputs);
-  /// The same with u[n] = C(y[n]) + r[n] of the node's own controller; u[n] into `u`.
+  /// The same with u[n] = C(y[n]) + r[n] of the node's own controller; writes u[n] to `u`.
   [[nodiscard]] Outcome advance_excited(std::int64_t now_ns, std::span<const double> r,
                                         std::span<double> u, Inputs& inputs);
   /// measuring -> operation_enabled, forces zero.
   void end_run();
 
-  /// Something outside of the stage failed (bus, heartbeat): safe stop, then fault.
+  /// Reports a failure outside of the stage (bus, heartbeat): safe stop, then fault.
   void fail(FaultCause cause);
 
   /// Watchdog, panel and safe stop; to be called at least every millisecond. `now_ns`:
@@ -102,7 +105,7 @@ class StageNode {
   void hold(std::int64_t now_ns);
   void come_to_rest();
 
-  // One lock for all of it: a node's own time is not the host's.
+  // One lock for all state: the node's timing does not affect the host's.
   mutable std::mutex mutex_;
   LimitedStage stage_;
   MotionController controller_;
@@ -121,7 +124,7 @@ class StageNode {
   std::int64_t held_samples_ = 0;
   std::string reason_;  // of the fault, if more is known than its cause
   std::vector<double> y_;
-  std::vector<double> control_;  // C(y), the node's own
+  std::vector<double> control_;  // C(y) of the node's controller
   std::vector<double> command_;
 };
 

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kTextSize = 512;
 using Text = std::array<char, kTextSize>;
 
-/// What a library wrote, whether it ended it or not.
+/// The library's text, even without a terminating zero.
 std::string text_of(Text& text) {
   text.back() = '\0';
   return text.data();
@@ -52,7 +52,7 @@ std::vector<stageid_channel> channels_of(const std::vector<Channel>& channels) {
 /// The loaded library and the stage that it opened.
 struct PluginStage::Library {
   explicit Library(const std::filesystem::path& file) : name(file.string()) {
-    // A name without a slash would be looked for in the system's folders.
+    // dlopen() would search a name without a slash in the system folders.
     handle.reset(::dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL));
     if (!handle)
       fail(fmt::format("cannot be loaded ({}); build it as a shared library for this machine",

@@ -10,7 +10,7 @@
 
 namespace stageid {
 
-/// Where a back end of others is, and the free keys that it is given.
+/// A back end in a shared library, and the free keys that it receives.
 struct PluginSpec {
   std::filesystem::path library;
   std::vector<std::pair<std::string, std::string>> keys;
@@ -18,13 +18,13 @@ struct PluginSpec {
 
 /// A stage behind a shared library with the C interface of stageid_backend.h.
 ///
-/// The library decides the clock; its rate and channels are those of `info`. What it returns is checked:
-/// an outcome that does not exist is a fault, and measurements that are not numbers count as missing.
+/// The library determines the clock; rate and channels are those of `info`. An unknown outcome is a fault.
+/// LimitedStage handles measurements that are not finite.
 class PluginStage final : public CyclicStage {
  public:
   /// @param pace as in the stage file; 0: virtual time
-  /// @throws StageError if the library cannot be loaded, is of another version, lacks a function, cannot
-  /// connect, or the stage is slower than the sample rate.
+  /// @throws StageError if the library cannot be loaded, has another version, lacks a function or cannot
+  /// connect, or if the stage is slower than the sample rate.
   PluginStage(StageInfo info, const PluginSpec& spec, double pace);
   ~PluginStage() override;
 

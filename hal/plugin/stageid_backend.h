@@ -1,13 +1,13 @@
-/* A back end for stageid, in C: the door between the measurement loop and any hardware.
+/* Interface in C between the measurement loop of stageid and the back end of any hardware.
  *
  * A shared library exports one function, stageid_get_backend(), and is named in the stage file:
  *
  *   backend: plugin
  *   plugin: {library: ./my_stage.so, keys: {host: 10.0.0.7}}
  *
- * stageid checks limits, records, shows and stops exactly as with its own back ends. All values are in the
- * units of the channels (SI). Functions are called from one thread at a time. Between start() and stop()
- * only exchange() is called, from the loop's thread: it must not allocate, lock or print. */
+ * stageid checks limits, records and stops as with its own back ends. All values are in the units of the
+ * channels (SI). Functions are called from one thread at a time. Between start() and stop() only exchange() is
+ * called, from the loop's thread: it must not allocate, lock or print. */
 #ifndef STAGEID_BACKEND_H
 #define STAGEID_BACKEND_H
 
@@ -18,7 +18,7 @@
 extern "C" {
 #endif
 
-/* A later version only appends members; what is there keeps its meaning. */
+/* Later versions only append members; existing ones keep their meaning. */
 #define STAGEID_BACKEND_VERSION 1
 
 struct stageid_key {
@@ -31,7 +31,7 @@ struct stageid_channel {
   const char* unit;
 };
 
-/* What the stage file asks for; valid during open() only. */
+/* Request from the stage file; valid during open() only. */
 struct stageid_request {
   uint32_t version; /* of the program */
   double sample_rate_hz;
@@ -41,28 +41,28 @@ struct stageid_request {
   uint32_t n_keys;
   const struct stageid_channel* actuators;
   const struct stageid_channel* sensors;
-  const struct stageid_key* keys; /* plugin: keys: of the stage file */
+  const struct stageid_key* keys; /* `plugin: keys:` of the stage file */
 };
 
-/* What the back end is; zeros where nothing is known. */
+/* Properties of the back end; zeros if unknown. */
 struct stageid_description {
   double maximum_rate_hz;   /* a higher rate is refused before the stage moves */
-  double transport_delay_s; /* from command computed to held output changed */
+  double transport_delay_s; /* from computed command to changed output */
   int32_t virtual_time;     /* not 0: exchange() returns at once, the sample counter is the clock */
 };
 
-/* What was measured. `y` has n_sensors entries and is filled in place. */
+/* One measurement. `y` has n_sensors entries and is filled in place. */
 struct stageid_sample {
   double* y;
   uint64_t valid;       /* bit i: sensor i was measured */
-  int64_t t_sample_ns;  /* the instant the sample belongs to, CLOCK_MONOTONIC or virtual */
-  int64_t t_receive_ns; /* when it arrived */
+  int64_t t_sample_ns;  /* the sample instant, CLOCK_MONOTONIC or virtual */
+  int64_t t_receive_ns; /* time of arrival */
 };
 
-/* How one exchange ended. */
+/* Result of an exchange. */
 enum stageid_outcome {
   STAGEID_OK = 0,
-  STAGEID_LATE = 1,       /* valid, but after its time: marked */
+  STAGEID_LATE = 1,       /* valid, but after the deadline: marked */
   STAGEID_INCOMPLETE = 2, /* some sensors are missing, see `valid` */
   STAGEID_STALE = 3,      /* nothing new: the last measurement is held, marked */
   STAGEID_CORRUPT = 4,    /* an answer failed its check */
@@ -71,28 +71,28 @@ enum stageid_outcome {
 };
 
 struct stageid_backend {
-  uint32_t version; /* STAGEID_BACKEND_VERSION that it was built with */
+  uint32_t version; /* STAGEID_BACKEND_VERSION of its header */
   uint32_t size;    /* sizeof(struct stageid_backend) */
 
-  /* Connects. NULL: it failed, and `error` holds one line for people that says what to do. */
+  /* Connects. Returns NULL on failure, with one line in `error`: the problem and its remedy. */
   void* (*open)(const struct stageid_request* request, char* error, size_t error_size);
   void (*describe)(void* stage, struct stageid_description* description);
-  /* Brings the stage to closed-loop-ready standstill and gives y[0]. `run_seed` makes a run repeatable
-   * where random numbers are drawn. Not 0: it failed, with `error` as above. */
+  /* Brings the stage to a standstill ready for closed loop and returns y[0]. `run_seed` makes random numbers
+   * repeatable. Returns nonzero on failure, with `error` as above. */
   int (*start)(void* stage, uint64_t run_seed, struct stageid_sample* first, char* error,
                size_t error_size);
-  /* Applies u[n] (n_actuators), waits for the next sample instant and gives y[n+1]. Must return by
-   * `deadline_ns` on the clock of t_sample_ns (0: none) with one of stageid_outcome. */
+  /* Applies u[n] (n_actuators), waits for the next sample instant and returns y[n+1]. Must return one of
+   * stageid_outcome by `deadline_ns` on the clock of t_sample_ns (0: none). */
   int (*exchange)(void* stage, uint64_t cycle, const double* u, int64_t deadline_ns,
                   struct stageid_sample* next);
   /* Zero force, disabled. May be called twice, and after any failure. */
   void (*stop)(void* stage);
-  /* One line on what went wrong in the last run, or an empty text. */
+  /* Describes the problem of the last run in one line, or writes an empty text. */
   void (*trouble)(void* stage, char* text, size_t text_size);
   void (*close)(void* stage);
 };
 
-/* The one exported function. The structure lives as long as the library. */
+/* The only exported function. The structure must live as long as the library. */
 const struct stageid_backend* stageid_get_backend(void);
 
 #ifdef __cplusplus

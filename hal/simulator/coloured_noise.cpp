@@ -56,7 +56,7 @@ ColouredNoise::ColouredNoise(const ColouredNoiseSpec& spec) : spec_(spec) {
       drive_.setConstant(std::sqrt(0.5 * spec.density * rate) * 2.0 * std::sin(0.5 * omega));
       break;
     case NoiseColour::flicker: {
-      // Low passes an octave apart, each of variance v, add up to the one-sided density v / (f ln 2).
+      // Low passes one octave apart, each of variance v, sum to the one-sided density v / (f ln 2).
       const double deviation = std::sqrt(spec.density * spec.reference_hz * std::numbers::ln2);
       pole_.resize(states);
       for (Eigen::Index i = 0; i < states; ++i)
@@ -91,7 +91,7 @@ void ColouredNoise::restart(std::uint64_t seed, std::uint64_t stream) noexcept {
                       std::sqrt(1.0 - pole_[i] * pole_[i]);
   }
   if (spec_.colour == NoiseColour::resonant) {
-    // Ten time constants forget the start.
+    // After ten time constants, the initial state is negligible.
     const auto samples = static_cast<int>(std::min(10.0 / (1.0 - radius_), 1e6));
     for (int n = 0; n < samples; ++n) next();
   }

@@ -7,7 +7,7 @@
 
 namespace stageid {
 
-/// Spectra of disturbances that real stages have.
+/// Spectra of disturbances of real stages.
 enum class NoiseColour : std::uint8_t {
   white,    ///< flat up to half the sample rate
   flicker,  ///< 1/f in power
@@ -26,8 +26,8 @@ struct ColouredNoiseSpec {
   double damping_ratio = 0.01;  ///< resonant
 };
 
-/// Independent noise of one colour on several channels, sample by sample. White, flicker and resonant noise start in
-/// their stationary state, drift at zero.
+/// Independent noise of one colour on several channels, sample by sample. White, flicker and resonant noise start
+/// in their stationary state, drift starts at zero.
 class ColouredNoise {
  public:
   /// @throws std::invalid_argument unless rate and reference are positive and the reference is below half the rate.
@@ -42,9 +42,9 @@ class ColouredNoise {
 
   ColouredNoiseSpec spec_;
   NormalSource source_{0, 0};
-  Eigen::ArrayXd numbers_;  // of one sample, padded to whole blocks
-  Eigen::ArrayXd pole_;     // flicker: of every octave
-  Eigen::ArrayXd drive_;    // factor of the fresh numbers, one per state of a channel
+  Eigen::ArrayXd numbers_;  // of one sample, padded to complete blocks
+  Eigen::ArrayXd pole_;     // flicker: one per octave
+  Eigen::ArrayXd drive_;    // gain of the new random numbers, one per state of a channel
   Eigen::ArrayXXd state_;   // channels x states
   double radius_ = 0.0;     // resonant: of the poles
   double turn_ = 0.0;       // resonant: 2 radius cos(angle)

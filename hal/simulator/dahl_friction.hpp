@@ -4,8 +4,8 @@
 
 namespace stageid {
 
-/// Dry friction with presliding: a spring for small motion, the full force for large motion, and a hysteresis
-/// between them. The force follows the position only; the velocity does not matter.
+/// Dry friction with presliding: a spring for small motion, the full force for large motion, and hysteresis
+/// between them. The force depends on the position only, not on the velocity.
 /// Source: P. R. Dahl, A solid friction model (1968), exponent 1.
 class DahlFriction {
  public:

@@ -8,35 +8,34 @@
 
 namespace stageid {
 
-/// Plays the faults of a WaferStageSpec. Cycles count exchanges of a run: in cycle n the command
-/// u[n] is taken and the measurement y[n+1] given.
+/// Applies the faults of a WaferStageSpec. Cycles count the exchanges of a run: cycle n takes the command
+/// u[n] and returns the measurement y[n+1].
 ///
-///   stuck_actuator  keeps the force of its last good cycle, silently
-///   missed_cycle    the command does not arrive, the last one stays; nothing new is measured: stale
-///   dead_sensor     does not answer: its valid bit is cleared, its value held: incomplete
-///   stuck_sensor    shows its last value for ever and calls it valid
-///   nan_sensor      measures NaN and calls it valid: only a check of the value can tell
-///   sensor_offset   shows `value` metres too much from one sample to the next
-///   sensor_drift    shows more by `value` metres every second
-///   actuator_gain   gives `value` times its force: -1 reversed, 0 dead
-///   extra_delay     all forces come `value` samples later
-///   interlock       the amplifiers go off: forces zero, measurements go on: fault
+///   stuck_actuator  silently keeps the force of its last good cycle
+///   missed_cycle    the command is lost and the last one remains; no new measurement: stale
+///   dead_sensor     no answer: its valid bit is cleared, its value held: incomplete
+///   stuck_sensor    repeats its last value forever, marked valid
+///   nan_sensor      measures NaN, marked valid: only a check of the value detects it
+///   sensor_offset   adds `value` metres from one sample to the next
+///   sensor_drift    adds `value` metres per second
+///   actuator_gain   multiplies the force by `value`: -1 reversed, 0 dead
+///   extra_delay     delays all forces by `value` samples
+///   interlock       switches the amplifiers off: forces zero, measurements continue: fault
 ///
-/// All of them last until the end of the run but missed_cycle, which lasts `cycles`. The last four may
-/// have channel -1: all channels.
+/// All last until the end of the run, except missed_cycle, which lasts `cycles`. sensor_offset, sensor_drift and
+/// actuator_gain may have channel -1: all channels.
 class FaultScript {
  public:
-  /// @throws std::invalid_argument if a channel does not exist, a missed_cycle lasts no cycle, or a
-  /// value makes no sense.
+  /// @throws std::invalid_argument if a channel does not exist, a missed_cycle has no cycles, or a value is
+  /// invalid.
   FaultScript(std::vector<WaferStageSpec::Fault> faults, const StageInfo& info);
 
   void start_run(int run) noexcept;
   bool missed(std::uint64_t cycle) const noexcept;
   bool interlock(std::uint64_t cycle) const noexcept;
-  /// Replaces the forces of actuators that do not give what they should. `applied`: what they gave
-  /// in the last cycle.
+  /// Replaces the forces of faulty actuators. `applied`: forces of the last cycle.
   void drive(std::uint64_t cycle, std::span<const double> applied, std::span<double> u) noexcept;
-  /// Spoils a fresh measurement; `y` still holds the last one where `fresh` is not copied.
+  /// Corrupts a fresh measurement; `last` is the previous one.
   /// @return the valid bits to clear.
   std::uint64_t spoil(std::uint64_t cycle, std::span<double> fresh,
                       std::span<const double> last) const noexcept;
@@ -52,7 +51,7 @@ class FaultScript {
 
   double period_s_ = 0.0;
   std::size_t history_cycles_ = 0;
-  std::vector<double> history_;  // of forces, a ring; empty if no delay grows
+  std::vector<double> history_;  // ring of past forces; empty if no fault adds a delay
   int run_ = -1;
 };
 

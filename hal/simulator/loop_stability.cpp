@@ -15,12 +15,12 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Rounding of the eigenvalues of a balanced matrix of some hundred rows stays far below.
+/// Far above the rounding errors of eigenvalues of a balanced matrix of some hundred rows.
 constexpr double kRounding = 1e-8;
-/// Some seconds of computation.
+/// Limits the computation to some seconds.
 constexpr Index kMostStates = 1000;
 
-/// A mode as the closed axes drive and see it; state [q, q' / omega_scale].
+/// A mode in coordinates of the closed axes; state [q, q' / omega_scale].
 struct LoopMode {
   VectorXd drive;  // axes
   VectorXd seen;   // axes
@@ -28,7 +28,7 @@ struct LoopMode {
   Eigen::Vector2d of_old, of_new;
 };
 
-/// The linear map from one sample of the loop, without excitation, to the next.
+/// The linear map from one sample of the unexcited loop to the next.
 class SampledLoop {
  public:
   SampledLoop(const WaferStageSpec& spec, const AxisLoop& axes) : axes_(axes) {
@@ -82,7 +82,7 @@ class SampledLoop {
     for (Index i = 0; i < count; ++i)
       position += modes_[static_cast<std::size_t>(i)].seen * x[2 * i];
     const VectorXd force = -control(position, x, next);
-    // Held commands, the newest first: u[n-1] ... u[n-d-1].
+    // Held commands, newest first: u[n-1] ... u[n-d-1].
     const VectorXd of_old = x.segment(first_held + n * (held_ - 1), n);
     const VectorXd of_new =
         held_ > 1 ? VectorXd(x.segment(first_held + n * (held_ - 2), n)) : force;
@@ -96,7 +96,7 @@ class SampledLoop {
     return next;
   }
 
-  /// Direct form II transposed, as MotionController has it.
+  /// Direct form II transposed, as in MotionController.
   VectorXd control(VectorXd signal, const VectorXd& x, VectorXd& next) const {
     Index at = states() - 2 * sections_;
     for (Index axis = 0; axis < axes_.axes(); ++axis)
@@ -118,8 +118,8 @@ class SampledLoop {
   std::vector<LoopMode> modes_;
 };
 
-/// Scales states by powers of two until rows and columns are alike (Parlett and Reinsch 1969): metres and newtons
-/// would cost half the digits of the eigenvalues.
+/// Scales states by powers of two until rows and columns have similar norms (Parlett and Reinsch 1969). With
+/// metres and newtons, the eigenvalues would lose half their digits.
 void balance(MatrixXd& a) {
   for (bool changed = true; changed;) {
     changed = false;
@@ -137,7 +137,7 @@ void balance(MatrixXd& a) {
   }
 }
 
-/// Frequencies where a sensitivity may be largest: everywhere, and closely around the modes.
+/// Frequencies for the search of the largest sensitivity: a logarithmic grid, refined around the modes.
 std::vector<double> test_frequencies(const WaferStageSpec& spec) {
   constexpr int kPerDecade = 200;
   constexpr int kAroundMode = 20;

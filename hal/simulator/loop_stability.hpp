@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// The loop as the controller's closed axes see it.
+/// The loop in the coordinates of the controller's closed axes.
 class AxisLoop {
  public:
   /// @throws std::invalid_argument as controller_sections()
@@ -34,24 +34,24 @@ class AxisLoop {
   std::vector<std::vector<BiquadSection>> sections_;
 };
 
-/// 1 / min |1 + lambda| over the eigenvalues of a loop gain: the largest sensitivity of its characteristic loci,
-/// whatever the units of the axes.
+/// 1 / min |1 + lambda| over the eigenvalues lambda of a loop gain: the largest sensitivity of its characteristic
+/// loci. It does not depend on the units of the axes.
 double largest_sensitivity(const Eigen::MatrixXcd& loop_gain);
 
-/// How the loop of a configured stage closes.
+/// Stability of the loop of a configured stage.
 struct LoopStability {
-  bool tested = false;  ///< false: no axis is closed, or the delay makes the loop too large to test
-  double largest_pole = 0.0;         ///< |z| of the outermost closed-loop pole; stable below 1
-  double pole_hz = 0.0;              ///< its frequency
+  bool tested = false;        ///< false: no axis is closed, or the model is too large or not finite
+  double largest_pole = 0.0;  ///< |z| of the outermost closed-loop pole; stable below 1
+  double pole_hz = 0.0;       ///< its frequency
   double largest_sensitivity = 1.0;  ///< over frequency, see largest_sensitivity()
-  double sensitivity_hz = 0.0;       ///< where that is
+  double sensitivity_hz = 0.0;       ///< frequency of the largest sensitivity
 
   bool stable() const noexcept;
 };
 
-/// From the eigenvalues of the exact sampled loop of the linear plant: modes, delay and controllers as the simulator
-/// and real time have them. Modes that no closed axis drives or sees are not part of it.
-/// @throws std::invalid_argument on a controller or plant that makes no sense
+/// Computed from the eigenvalues of the exact sampled loop of the linear plant, with modes, delay and controllers
+/// as in the simulator. Modes that no closed axis excites or measures are excluded.
+/// @throws std::invalid_argument for an invalid controller or plant
 LoopStability loop_stability(const WaferStageSpec& spec);
 
 }  // namespace stageid

@@ -13,7 +13,7 @@ namespace stageid {
 namespace {
 
 constexpr Eigen::Index kLanes = 8;     // one AVX-512 register of doubles, two of AVX2
-constexpr double kLongestDelay = 1e5;  // samples; all of them are stored
+constexpr double kLongestDelay = 1e5;  // in samples; limits the memory for held commands
 
 Eigen::Index padded(Eigen::Index n) { return (n + kLanes - 1) / kLanes * kLanes; }
 
@@ -107,8 +107,8 @@ void ModalPlant::modal_force(const double* u, double* __restrict__ force) const 
 }
 
 void ModalPlant::step(const double* u) noexcept {
-  // held_ has d + 2 columns; with u[n] in column `newest_`, u[n-d] lies d columns back, which is
-  // two ahead in the ring, and u[n-d-1] one ahead.
+  // held_ has d + 2 columns. With u[n] in column `newest_`, u[n-d] is d columns back, which is two ahead in the
+  // ring; u[n-d-1] is one ahead.
   const Eigen::Index columns = held_.cols();
   newest_ = newest_ + 1 == columns ? 0 : newest_ + 1;
   modal_force(u, held_.data() + newest_ * modes_);
@@ -141,7 +141,7 @@ void ModalPlant::step(const double* u) noexcept {
 void ModalPlant::output(double* y) const noexcept {
   const Eigen::Index rows = sensor_shape_.rows();
   for (Eigen::Index block = 0; block < rows; block += kLanes) {
-    // Four partial sums: the chain of dependent additions is a quarter as long.
+    // Four partial sums shorten the chain of dependent additions.
     double sum[4][kLanes] = {};
     const double* shape = sensor_shape_.data() + block;
     for (Eigen::Index i = 0; i < modes_; i += 4)

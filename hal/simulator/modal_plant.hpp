@@ -7,12 +7,12 @@
 
 namespace stageid {
 
-/// Linear plant in modal coordinates, discretized exactly for zero-order-held inputs that arrive
-/// delay_s late: u[n] acts from t_n + delay_s to t_(n+1) + delay_s. With delay_s fs = d + e,
-/// 0 <= e < 1, two of them act within one sample interval,
+/// Linear plant in modal coordinates, discretized exactly for zero-order-held inputs with a delay of delay_s:
+/// u[n] acts from t_n + delay_s to t_(n+1) + delay_s. With delay_s fs = d + e, 0 <= e < 1, two commands act
+/// within one sample interval,
 ///   x[n+1] = E(T) x[n] + E((1-e) T) F(e T) u[n-d-1] + F((1-e) T) u[n-d].
 ///
-/// Modes lie in lanes of fixed width, so that every inner loop is one vector instruction or two.
+/// Modes are stored in lanes of fixed width, so that every inner loop is one or two vector instructions.
 /// reset(), step() and output() do not allocate.
 class ModalPlant {
  public:
@@ -25,17 +25,17 @@ class ModalPlant {
 
   /// Standstill: all coordinates, velocities and held forces zero.
   void reset() noexcept;
-  /// One sample interval with command u[n] (size actuators).
+  /// Advances by one sample interval with command u[n] (size actuators).
   void step(const double* u) noexcept;
-  /// y at the current instant (size sensors).
+  /// Writes y at the current instant (size sensors).
   void output(double* y) const noexcept;
 
   /// Modal coordinate, mass-normalized: kg^(1/2) m.
   double coordinate(Eigen::Index mode) const noexcept { return q_[mode]; }
-  /// Gives a mode another frequency and damping ratio from this instant on; its motion goes on.
-  /// For modes that drift. Does not allocate.
+  /// Changes frequency and damping ratio of a mode from this instant on, without a step in its motion. Does not
+  /// allocate.
   void retune(Eigen::Index mode, double natural_frequency_hz, double damping_ratio) noexcept;
-  /// A modal force that acts, undelayed and constant, during the next step().
+  /// Adds a modal force that is undelayed and constant during the next step().
   void add_modal_force(Eigen::Index mode, double force) noexcept {
     extra_mode_ = mode;
     extra_force_ = force;
@@ -51,9 +51,9 @@ class ModalPlant {
   Eigen::Index modes_ = 0;          // padded to a multiple of the lane width
   Eigen::ArrayXXd actuator_shape_;  // modes x actuators
   Eigen::ArrayXXd sensor_shape_;    // padded sensors x modes
-  Eigen::ArrayXXd step_;            // modes x 8: E(T) by rows, input of the old, of the new command
-  Eigen::ArrayXXd undelayed_;       // modes x 2: F(T), for add_modal_force
-  Eigen::ArrayXXd held_;            // modes x (d + 2), ring of modal forces
+  Eigen::ArrayXXd step_;       // modes x 8: E(T) by rows, input of the old and of the new command
+  Eigen::ArrayXXd undelayed_;  // modes x 2: F(T), for add_modal_force
+  Eigen::ArrayXXd held_;       // modes x (d + 2), ring of modal forces
   Eigen::Index newest_ = 0;
   Eigen::ArrayXd q_;
   Eigen::ArrayXd v_;

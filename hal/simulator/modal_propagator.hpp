@@ -15,8 +15,8 @@ struct ModalPropagator {
   Eigen::Vector2d input;
 };
 
-/// By Taylor series of the scaled problem, doubled back: no cancellation, so it is right to
-/// rounding for a free mass (omega = 0), weak suspensions and any damping.
+/// By Taylor series of the scaled problem and repeated doubling. There is no cancellation, so the result is
+/// accurate to rounding for a free mass (omega = 0), weak suspensions and any damping.
 ModalPropagator modal_propagator(double omega_rad_s, double damping_ratio, double duration_s);
 
 }  // namespace stageid

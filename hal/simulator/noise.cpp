@@ -27,7 +27,7 @@ inline double logarithm(double x) noexcept {
   constexpr std::uint64_t kSqrtHalf = 0x3fe6a09e667f3bcd;
   const std::uint64_t bits = std::bit_cast<std::uint64_t>(x);
   const std::uint64_t shifted = bits - kSqrtHalf;  // its exponent field is k, in two's complement
-  // k + 1024 >= 0 is turned into a double by placing it in the low bits of 2^52.
+  // k + 1024 >= 0 becomes a double when placed in the low bits of 2^52.
   const std::uint64_t biased = (shifted + (std::uint64_t{1024} << 52)) >> 52;
   const double k = std::bit_cast<double>(biased | 0x4330000000000000) - (0x1p52 + 1024.0);
   const double m = std::bit_cast<double>(bits - ((biased - 1024) << 52));
@@ -79,7 +79,7 @@ inline void sine_cosine(double turns, double& sine, double& cosine) noexcept {
 }  // namespace
 
 NormalSource::NormalSource(std::uint64_t seed, std::uint64_t stream) noexcept {
-  // Hashing the stream first keeps (seed, stream) and (stream, seed) and neighbours apart.
+  // Hashing the stream first gives unrelated sequences for (seed, stream), (stream, seed) and neighbours.
   std::uint64_t mixed = stream;
   std::uint64_t state = seed ^ split_mix(mixed);
   for (auto& word : state_)

@@ -7,11 +7,11 @@
 
 namespace stageid {
 
-/// Independent standard normal numbers, fast and repeatable from (seed, stream).
+/// Independent standard normal numbers, fast and reproducible from (seed, stream).
 ///
-/// Eight xoshiro256++ generators side by side (D. Blackman and S. Vigna, Scrambled linear
-/// pseudorandom number generators, 2021), and the Box-Muller transform with own polynomials for the
-/// logarithm, sine and cosine, so that everything is vector arithmetic without branches.
+/// Eight xoshiro256++ generators in parallel (D. Blackman and S. Vigna, Scrambled linear pseudorandom number
+/// generators, 2021) and the Box-Muller transform. Logarithm, sine and cosine are polynomials, so that all
+/// operations are vector arithmetic without branches.
 class NormalSource {
  public:
   static constexpr std::size_t kLanes = 8;
@@ -37,9 +37,8 @@ struct NoiseSpec {
   double sensor_corner_hz = 1.0;   ///< of its first-order low pass
 };
 
-/// Disturbances of a stage, sample by sample: forces, and white plus coloured sensor noise. The
-/// coloured part starts in its stationary state.
-/// The numbers of one kind do not depend on whether another kind is switched on.
+/// Disturbances of a stage, sample by sample: forces, and white plus coloured sensor noise. The coloured part
+/// starts in its stationary state. Switching one kind on or off does not change the numbers of another.
 class StageNoise {
  public:
   explicit StageNoise(const NoiseSpec& spec);
@@ -59,7 +58,7 @@ class StageNoise {
   double pole_ = 0.0;
   double drive_m_ = 0.0;
   NormalSource source_{0, 0};
-  std::size_t stride_ = 0;  // numbers a sample, padded
+  std::size_t stride_ = 0;  // numbers per sample, padded
   std::size_t next_row_ = 0;
   Eigen::ArrayXd numbers_;
   Eigen::ArrayXd force_;

@@ -1,5 +1,5 @@
-// Frequency responses in closed form, by partial fractions over the poles. Nothing here is shared
-// with the simulator, which goes through real propagators in the time domain.
+// Frequency responses in closed form, by partial fractions over the poles. They share no code with the
+// simulator, which uses propagators in the time domain.
 //
 // One mode, 1 / ((s - p)(s - p*)), is the divided difference over p and p* of 1 / (s - p). Through
 // a hold delayed by (d + e) samples, 0 <= e < 1, and a sampler, 1 / (s - p) becomes
@@ -41,8 +41,7 @@ Sampling sampling(double delay_s, double sample_rate_hz, double frequency_hz) {
           std::polar(1.0, -kTwoPi * turns), std::polar(1.0, -kTwoPi * turns * whole)};
 }
 
-// 1 / (s - p), sampled. z - e^(pT) = e^(pT) (e^((j omega - p) T) - 1) keeps its digits near the
-// pole.
+// 1 / (s - p), sampled. z - e^(pT) = e^(pT) (e^((j omega - p) T) - 1) remains accurate near the pole.
 Complex sampled_first_order(Complex pole, const Sampling& at) {
   const double late = (1.0 - at.fraction) * at.period_s;
   const double early = at.fraction * at.period_s;
@@ -53,7 +52,7 @@ Complex sampled_first_order(Complex pole, const Sampling& at) {
   return at.z_delay * numerator / denominator;
 }
 
-// 1 / s^2, sampled: position and velocity of a free mass under two held forces an interval.
+// 1 / s^2, sampled: position and velocity of a free mass under two held forces per interval.
 Complex sampled_double_integrator(const Sampling& at) {
   const double late = (1.0 - at.fraction) * at.period_s;
   const double early = at.fraction * at.period_s;

@@ -10,8 +10,8 @@
 namespace stageid {
 namespace {
 
-// Degrees 0 ... 17 in each direction: nine polynomials of each parity. The frequencies of the first
-// 40 modes have then converged to better than 1e-3, those of the first 25 to 1e-6.
+// Degrees 0 ... 17 in each direction: nine polynomials of each parity. With these, the frequencies of the first
+// 40 modes have converged to better than 1e-3, those of the first 25 to 1e-6.
 constexpr int kDegrees = 18;
 constexpr int kHalf = kDegrees / 2;
 constexpr int kMaxCount = 40;
@@ -109,10 +109,10 @@ void PlateModes::append_class(int parity_x, int parity_y) {
           kronecker(of_parity(slope, parity_x), of_parity(slope, parity_y));
 
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(stiffness);
-  // One rigid motion in every class but the doubly odd one: heave and the two tilts.
+  // One rigid motion (heave and the two tilts) in every class except the doubly odd one.
   const Eigen::Index rigid = (parity_x == 1 && parity_y == 1) ? 0 : 1;
   for (Eigen::Index i = rigid; i < stiffness.rows(); ++i) {
-    // The Kronecker index runs over x slowest: transpose back to (degree in x, degree in y).
+    // In the Kronecker product the index in x is the slow one: transpose to (degree in x, degree in y).
     const Eigen::MatrixXd yx =
         Eigen::Map<const Eigen::MatrixXd>(solver.eigenvectors().col(i).data(), kHalf, kHalf);
     modes_.push_back({std::sqrt(solver.eigenvalues()[i]), parity_x, parity_y, yx.transpose()});

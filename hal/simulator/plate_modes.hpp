@@ -15,18 +15,18 @@ struct FreePlate {
 /// Flexible modes of a free plate by the Rayleigh-Ritz method with products of Legendre
 /// polynomials, w = sum_pq c_pq P_p(2x/a) P_q(2y/b).
 ///
-/// Free edges have natural boundary conditions only, so the polynomials need not satisfy any, and
-/// the first two of them are the rigid motions, exactly. The four symmetry classes (even or odd in
-/// x, in y) are solved apart: near-repeated modes of different classes do not mix.
+/// Free edges have natural boundary conditions only, which the polynomials need not satisfy. The first two
+/// polynomials are exactly the rigid motions. The four symmetry classes (even or odd in x, in y) are solved
+/// separately, so that near-repeated modes of different classes do not mix.
 /// Energy and notation: A. W. Leissa, Vibration of Plates, NASA SP-160 (1969).
 class PlateModes {
  public:
-  /// @param count flexible modes wanted, lowest first.
+  /// @param count number of flexible modes, lowest first.
   /// @throws std::invalid_argument if a length is not positive, the Poisson ratio is not in
   ///         [0, 0.5), or `count` is negative or above max_count().
   PlateModes(const FreePlate& plate, int count);
 
-  /// The number of modes that the polynomials represent well.
+  /// Largest number of modes that the polynomials represent accurately.
   static int max_count() noexcept;
 
   int count() const noexcept { return static_cast<int>(modes_.size()); }

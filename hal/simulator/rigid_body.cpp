@@ -18,8 +18,8 @@ Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix) {
   return matrix.completeOrthogonalDecomposition().pseudoInverse();
 }
 
-// J^+ J is the projection on the motions that the channels see; an axis lies wholly in it exactly
-// if its unit vector is left unchanged. J^+ mixes metres and radians, the row it leaves does not.
+// J^+ J projects onto the motions that the channels determine. It leaves an axis's unit vector unchanged if and
+// only if they determine that axis. The row has no mixed units, unlike J^+.
 void require_independent(const Jacobian& jacobian, const Eigen::MatrixXd& inverse,
                          Eigen::Index axis, const char* what) {
   constexpr double kTolerance = 1e-9;
@@ -103,7 +103,7 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
       axis.gain = unit_crossover_gain(axis, axis_inertia[i], kRigidAxisNames[i]);
     }
   }
-  static_cast<void>(MotionController(spec));  // checks the rest
+  static_cast<void>(MotionController(spec));  // checks the remaining values
   return spec;
 }
 
@@ -130,7 +130,7 @@ RigidMotion rigid_motion(const MotionControllerSpec& controller,
     add(motion.force_per_acceleration,
         braked * controller.actuator_decoupling.col(k) * controller.sensor_decoupling.row(k));
   }
-  // y - J q for the least-squares motion q: nothing is left where there are no more sensors than axes.
+  // y - J q for the least-squares motion q: zero unless there are more sensors than axes.
   const Eigen::MatrixXd rest =
       Eigen::MatrixXd::Identity(sensor_jacobian.rows(), sensor_jacobian.rows()) -
       sensor_jacobian * controller.sensor_decoupling;

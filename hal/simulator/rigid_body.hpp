@@ -12,8 +12,8 @@
 
 namespace stageid {
 
-/// The six degrees of freedom of a rigid stage, in this order everywhere: translations, then
-/// rotations about the same axes through the centre of mass.
+/// The six degrees of freedom of a rigid stage, in this order everywhere: translations, then rotations about
+/// the same axes through the centre of mass.
 inline constexpr std::size_t kRigidAxes = 6;
 inline constexpr std::array<const char*, kRigidAxes> kRigidAxisNames = {"x",  "y",  "z",
                                                                         "Rx", "Ry", "Rz"};
@@ -25,30 +25,29 @@ Eigen::MatrixXd rigid_body_jacobian(const std::vector<Channel>& channels);
 
 /// Builds the decoupled six-axis controller of a stage from the geometry of its channels:
 ///   T_y = J_y^+  (6 x sensors),   T_u = (J_u^T)^+  (actuators x 6),
-/// the least-squares estimate of the rigid motion and the least forces that give a wrench.
+/// the least-squares estimate of the rigid motion and the smallest forces with a given wrench.
 ///
-/// An axis whose crossover_hz is 0 stays open. A gain of 0 is replaced by the one that makes the
-/// open loop of the free rigid axis, C(s) / (inertia s^2), have magnitude 1 at crossover_hz.
+/// An axis with crossover_hz 0 is open. A gain of 0 is replaced by the gain with which the open loop of the
+/// free rigid axis, C(s) / (inertia s^2), has magnitude 1 at crossover_hz.
 ///
 /// @param axes in the order of kRigidAxisNames.
 /// @param axis_inertia mass (three times) in kg, then the inertias about x, y, z in kg m^2.
-/// @throws std::invalid_argument if a closed axis cannot be seen by the sensors, or not be driven
-/// by
-///         the actuators, independently of the other axes; if an inertia of a closed axis is not
-///         positive; or for controller values that MotionController refuses.
+/// @throws std::invalid_argument if the sensors or actuators cannot measure or control a closed axis
+///         independently of the other axes; if an inertia of a closed axis is not positive; or for
+///         values that MotionController refuses.
 MotionControllerSpec motion_controller_spec(double sample_rate_hz,
                                             const std::vector<Channel>& actuators,
                                             const std::vector<Channel>& sensors,
                                             const std::array<AxisController, kRigidAxes>& axes,
                                             const std::array<double, kRigidAxes>& axis_inertia);
 
-/// The motion by which a controller moves its closed axes: an axis has the inertia with which its
-/// open loop C(s) / (inertia s^2) has magnitude 1 at crossover_hz. No closed axis: empty.
+/// The motion by which a controller moves its closed axes. The inertia of an axis is derived from the
+/// controller: its open loop C(s) / (inertia s^2) has magnitude 1 at crossover_hz. No closed axis: empty.
 RigidMotion rigid_motion(const MotionControllerSpec& controller,
                          const std::vector<Channel>& actuators,
                          const std::vector<Channel>& sensors);
 
-/// C(j 2 pi frequency_hz) of one axis in continuous time, with the gain as it stands.
+/// C(j 2 pi frequency_hz) of one axis in continuous time, with the given gain.
 std::complex<double> axis_response(const AxisController& axis, double frequency_hz);
 
 }  // namespace stageid

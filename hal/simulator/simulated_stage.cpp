@@ -43,7 +43,7 @@ void quantize(Eigen::ArrayXd& values, double quantum) {
   for (double& value : values) value = quantum * std::nearbyint(value / quantum);
 }
 
-// Adding the products with zero leaves zero exactly if every entry is finite: no branch an entry.
+// A sum of products with zero is zero if and only if every entry is finite: no branch per entry.
 bool all_finite(std::span<const double> values) {
   double sum = 0.0;
   for (const double value : values) sum += 0.0 * value;
@@ -75,9 +75,9 @@ struct SimulatedStage::State {
   StageNoise noise;
   Pacer pacer;
   FaultScript faults;
-  Eigen::ArrayXd u;          // what drives the plant, disturbance included
-  Eigen::ArrayXd commanded;  // the last command that arrived
-  Eigen::ArrayXd applied;    // what the amplifiers make of it
+  Eigen::ArrayXd u;          // input of the plant, including disturbance
+  Eigen::ArrayXd commanded;  // last received command
+  Eigen::ArrayXd applied;    // output of the amplifiers
   Eigen::ArrayXd y;
   Eigen::ArrayXd last_y;
   std::uint64_t all_sensors;
@@ -90,7 +90,7 @@ struct SimulatedStage::State {
   void measure() noexcept;
 };
 
-// What the amplifiers make of the command. False: it was not finite and has been refused.
+// Computes the amplifiers' output. @returns false if the command is not finite and was refused.
 bool SimulatedStage::State::take_command(std::span<const double> command, bool missed,
                                          bool off) noexcept {
   const bool good = missed || all_finite(command);
@@ -110,7 +110,7 @@ void SimulatedStage::State::drive() noexcept {
   noise.next();
   u += Eigen::Map<const Eigen::ArrayXd>(noise.force_n(), u.size());
   if (spec.cubic_stiffness_n_m3 > 0.0) {
-    // Taken at the start of the interval and held over it: exact for the sampled nonlinearity.
+    // The nonlinear force is sampled and held over the interval, so the discretization remains exact.
     const double shape = 1.0 / std::sqrt(spec.mass_kg);
     const double z_m = shape * plant.coordinate(kHeaveMode);
     plant.add_modal_force(kHeaveMode, -shape * spec.cubic_stiffness_n_m3 * z_m * z_m * z_m);

@@ -38,8 +38,8 @@ struct WaferStageSpec {
   double length_y_m = 0.0;
   double first_mode_hz = 0.0;  ///< scales the plate's stiffness
   double poisson_ratio = 0.3;
-  int flexible_modes = 0;  ///< how many are kept, those above the band of interest included
-  std::vector<double> flexible_damping;  ///< one a mode, the last repeats
+  int flexible_modes = 0;  ///< number of modes, including those above the band of interest
+  std::vector<double> flexible_damping;  ///< one per mode, the last repeats
   std::vector<PlantMode> in_plane_modes;
 
   double delay_s =
@@ -53,7 +53,7 @@ struct WaferStageSpec {
   double cubic_stiffness_n_m3 = 0.0;   ///< on the rigid z motion; 0: off (linear)
   double actuator_saturation_n = 0.0;  ///< 0: off
 
-  /// Faults on request, from a cycle of every run on.
+  /// Simulated faults, starting at a cycle of every run.
   struct Fault {
     enum class Kind : std::uint8_t {
       none,
@@ -71,8 +71,8 @@ struct WaferStageSpec {
     Kind kind = Kind::none;
     int channel = 0;  ///< -1: all, where FaultScript allows it
     std::uint64_t from_cycle = 0;
-    std::uint64_t cycles = 1;  ///< missed_cycle: how many
-    int run = -1;              ///< which start() of the process, 0-based; -1: every one
+    std::uint64_t cycles = 1;  ///< missed_cycle: number of cycles
+    int run = -1;              ///< affected start() of the process, 0-based; -1: all
     double value = 0.0;        ///< m, m/s, factor or samples: see FaultScript
   };
   std::vector<Fault> faults;
@@ -90,7 +90,7 @@ Eigen::MatrixXcd continuous_response(const std::vector<PlantMode>& modes, double
 Eigen::MatrixXcd sampled_response(const std::vector<PlantMode>& modes, double delay_s,
                                   double sample_rate_hz, double frequency_hz);
 
-/// The simulated stage. Modal, discretized exactly (zero-order hold, non-integer delay).
+/// The simulated stage in modal coordinates, discretized exactly (zero-order hold, non-integer delay).
 ///
 /// @throws std::invalid_argument from the constructor, naming the field.
 class SimulatedStage final : public CyclicStage {
@@ -105,7 +105,7 @@ class SimulatedStage final : public CyclicStage {
   void stop() noexcept override;
 
   const std::vector<PlantMode>& modes() const noexcept;
-  /// Where the stage really is at its sensors, without noise and faults (size sensors, m).
+  /// True position of the stage at its sensors, without noise and faults (size sensors, m).
   void displacement(std::span<double> y_m) const noexcept;
 
  private:

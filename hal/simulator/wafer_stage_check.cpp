@@ -27,7 +27,7 @@ void damping(const char* field, double value) {
 
 void check_channels(const char* kind, const std::vector<Channel>& channels,
                     const WaferStageSpec& spec) {
-  // Outputs and Inputs carry one bit a sensor in 64.
+  // The valid mask of Inputs has 64 bits, one per sensor.
   if (channels.empty() || channels.size() > 64)
     throw std::invalid_argument(
         fmt::format("stage: {} {}; must be 1 to 64", channels.size(), kind));
@@ -38,7 +38,7 @@ void check_channels(const char* kind, const std::vector<Channel>& channels,
       throw std::invalid_argument(
           fmt::format("stage: {} {}: direction [{}, {}, {}] is not a unit vector", kind,
                       channel.name, d[0], d[1], d[2]));
-    // Written so that NaN fails too.
+    // This form rejects NaN too.
     const bool on_plate = std::abs(p[0]) <= 0.5 * spec.length_x_m * (1.0 + 1e-9) &&
                           std::abs(p[1]) <= 0.5 * spec.length_y_m * (1.0 + 1e-9) &&
                           std::isfinite(p[2]);

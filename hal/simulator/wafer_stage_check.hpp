@@ -4,8 +4,8 @@
 
 namespace stageid {
 
-/// Checks everything that wafer_stage_modes() and SimulatedStage rely on.
-/// @throws std::invalid_argument naming the field, its value, and what is allowed.
+/// Checks all assumptions of wafer_stage_modes() and SimulatedStage.
+/// @throws std::invalid_argument naming the field, its value, and the permitted values.
 void require_valid(const WaferStageSpec& spec);
 
 }  // namespace stageid

@@ -9,7 +9,7 @@
 namespace stageid {
 namespace {
 
-// One mode a degree of freedom, each on a spring of its own: shape J(:, axis) / sqrt(inertia).
+// One mode per degree of freedom, each on its own spring: shape J(:, axis) / sqrt(inertia).
 void append_rigid_body(const WaferStageSpec& spec, std::vector<PlantMode>& modes) {
   const Eigen::MatrixXd actuators = rigid_body_jacobian(spec.info.actuators);
   const Eigen::MatrixXd sensors = rigid_body_jacobian(spec.info.sensors);
@@ -22,7 +22,7 @@ void append_rigid_body(const WaferStageSpec& spec, std::vector<PlantMode>& modes
   }
 }
 
-// A shape whose mean square over the plate is 1 has the modal mass of the whole plate.
+// If the mean square of a shape over the plate is 1, its modal mass is that of the whole plate.
 Eigen::VectorXd shape_at(const PlateModes& plate, int mode, double mass_kg,
                          const std::vector<Channel>& channels) {
   Eigen::VectorXd shape(static_cast<Eigen::Index>(channels.size()));

@@ -32,7 +32,7 @@ BiquadSection tustin(const Quadratic& numerator, const Quadratic& denominator, d
   return {b[0] / a[0], b[1] / a[0], b[2] / a[0], a[1] / a[0], a[2] / a[0]};
 }
 
-// Maps this frequency exactly.
+// Warps this frequency so that Tustin's method is exact there.
 double prewarped(double frequency_hz, double sample_rate_hz) {
   return kTwoPi * frequency_hz / std::tan(std::numbers::pi * frequency_hz / sample_rate_hz);
 }
@@ -77,7 +77,7 @@ std::vector<BiquadSection> controller_sections(const AxisController& axis, doubl
   const double k = prewarped(axis.crossover_hz, sample_rate_hz);
   std::vector<BiquadSection> sections;
 
-  // gain (s + w_i)(s/w_1 + 1) over s (s/w_2 + 1), each factor only where it is switched on.
+  // gain (s + w_i)(s/w_1 + 1) over s (s/w_2 + 1); disabled factors are left out.
   const double wi = kTwoPi * axis.integrator_hz;
   const double zero = axis.lead_zero_hz > 0.0 ? 1.0 / (kTwoPi * axis.lead_zero_hz) : 0.0;
   const double pole = axis.lead_pole_hz > 0.0 ? 1.0 / (kTwoPi * axis.lead_pole_hz) : 0.0;

@@ -20,9 +20,8 @@ struct BiquadSection {
   }
 };
 
-/// Discretizes C(s) of an axis by Tustin: integrator and lead in one section (gain included), the
-/// low pass, and one a notch. Prewarped at the crossover; a notch at its own frequency, where it
-/// must be.
+/// Discretizes C(s) of an axis by Tustin's method: one section of integrator and lead (with the gain), one of
+/// the low pass, and one per notch. Prewarped at the crossover; notches at their own frequency.
 /// @throws std::invalid_argument for frequencies at or above the Nyquist frequency, negative or not
 ///         finite values, a lead without pole (not proper), or an undamped pole.
 std::vector<BiquadSection> controller_sections(const AxisController& axis, double sample_rate_hz);

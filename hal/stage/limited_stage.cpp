@@ -101,17 +101,17 @@ Outcome LimitedStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline 
 void LimitedStage::stop() noexcept {
   stage_->stop();
   if (loop_ != Loop::closed) emergency_.speed_m_s = guard_.speed_m_s();
-  limited_ = false;  // violation() and emergency() keep the reason until the next start()
+  limited_ = false;  // violation() and emergency() keep their values until the next start()
   loop_ = Loop::closed;
 }
 
-// Nearly every command is inside all limits: one pass without branches finds that out.
+// Fast path: one pass without branches, because nearly every command is within all limits.
 void LimitedStage::apply(std::uint64_t cycle) noexcept {
   const double fresh = 1.0 - decay_;
   int outside = 0;
   for (Eigen::Index i = 0; i < wanted_.size(); ++i) {
     const double u = wanted_[i];
-    // Written so that NaN counts as outside.
+    // This form counts NaN as outside.
     const bool inside = (std::abs(u) <= largest_n_[i]) & (std::abs(u - applied_[i]) <= step_n_[i]) &
                         (decay_ * mean_square_[i] + fresh * u * u <= mean_square_limit_n2_[i]);
     outside |= static_cast<int>(!inside);
@@ -145,7 +145,7 @@ double LimitedStage::limit_channel(Eigen::Index channel, double wanted,
   if (std::abs(wanted - last) > step)
     report_command({LimitKind::slew, number, (wanted - last) * rate_hz, step * rate_hz, cycle});
 
-  // The largest |u| whose square still fits into the mean square.
+  // The largest |u| that the limit of the mean square allows.
   const double kept = decay_ * mean_square_[channel];
   const double room = (mean_square_limit_n2_[channel] - kept) / (1.0 - decay_);
   const double warm = std::sqrt(std::max(0.0, room));
@@ -169,7 +169,7 @@ void LimitedStage::inspect(Inputs& inputs) noexcept {
 }
 
 void LimitedStage::take_emergency(const LimitViolation& cause) noexcept {
-  // Past the hard window a brake has failed, or nothing that is known has kept the stage inside.
+  // Beyond the hard window, braking has failed or cannot help.
   const bool hard = cause.kind == LimitKind::hard_position;
   if (emergency_.cause.kind == LimitKind::none) {
     emergency_.cause = cause;
@@ -186,7 +186,7 @@ void LimitedStage::report(const LimitViolation& violation) noexcept {
   limited_ = true;
 }
 
-// A loop that converges has its commands back inside the limits within a few of its time constants.
+// The commands of a stable loop return to their limits within a few of its time constants.
 void LimitedStage::report_command(const LimitViolation& violation) noexcept {
   report(violation);
   if (loop_ == Loop::closed && violation.cycle - violation_.cycle > guard_.settling_samples())

@@ -10,30 +10,29 @@
 
 namespace stageid {
 
-/// How a loop that could not be trusted was ended. Cause of kind none: it was not.
+/// Result of opening the loop. Kind `none` of the cause: the loop was not opened.
 struct Emergency {
   LimitViolation cause;
   bool braked = false;
-  double response = 1.0;   ///< of the stage, in units of the expected one; 1 if a sensor failed
-  double speed_m_s = 0.0;  ///< largest of the sensors when the forces were cut
+  double response = 1.0;   ///< of the stage, relative to the expected one; 1 if a sensor failed
+  double speed_m_s = 0.0;  ///< largest speed of all sensors when the forces were cut
 };
 
-/// Puts StageLimits between the loop and any back end.
+/// Enforces StageLimits between the loop and any back end.
 ///
-/// A command that would break a limit never reaches the back end: it is replaced by the nearest one
-/// inside the limits (clamped, slew-limited; NaN by the last good one), exchange() says
-/// Outcome::limit from then on until stop(), and violation() says which limit, where, when. A
-/// position past its window is reported the same way. The loop then ramps its excitation down under
-/// control and stops; its samples are marked.
+/// A command outside the limits is replaced by the nearest one inside (clamped, slew-limited; NaN by the
+/// last good one). From then on until stop(), exchange() returns Outcome::limit, and violation() contains limit,
+/// channel and cycle. A position outside its window is reported the same way. The loop then ramps its
+/// excitation down in closed loop and stops; its samples are marked.
 ///
-/// That needs a sound loop. As soon as LoopGuard finds it unsound, commands are ignored: the stage is
-/// braked (Outcome::braking) if its motion is known, then the forces are zero and exchange() says
-/// Outcome::opened, upon which the loop stops the stage at once. emergency() says why and what came of
-/// it. Inputs::applied holds what acted wherever it is not what was asked for.
+/// This requires a sound loop. As soon as LoopGuard finds it unsound, commands are ignored. The stage is
+/// braked (Outcome::braking) if its motion is known. Then the forces are zero, exchange() returns
+/// Outcome::opened, and the loop stops the stage at once. emergency() contains cause and result.
+/// Inputs::applied contains the applied forces if they differ from the command.
 ///
 /// The thermal limit is on sqrt(m), m[n] = a m[n-1] + (1 - a) u[n]^2, a = exp(-T / time constant),
-/// from m = 0 at start(). Where a slew limit and a limit on |u| contradict each other, |u| wins.
-/// Worse news of the back end (fault, bus off, link down) is passed on in place of these outcomes.
+/// from m = 0 at start(). If a slew limit conflicts with a limit on |u|, the latter has priority.
+/// More serious outcomes of the back end (fault, bus off, link down) replace these outcomes.
 class LimitedStage final : public CyclicStage {
  public:
   /// @throws std::invalid_argument if a limit vector has the wrong size or an entry is not
@@ -41,7 +40,7 @@ class LimitedStage final : public CyclicStage {
   LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limits);
 
   const StageInfo& info() const noexcept override { return stage_->info(); }
-  /// @throws StageError also if the stage stands outside its position window or measures no number.
+  /// @throws StageError also if the stage is outside its position window or a measurement is not finite.
   void start(std::uint64_t run_seed, Inputs& first) override;
   [[nodiscard]] Outcome exchange(const Outputs& outputs, Inputs& inputs,
                                  Deadline deadline) noexcept override;
@@ -70,8 +69,8 @@ class LimitedStage final : public CyclicStage {
   Emergency emergency_;
   bool limited_ = false;
   Loop loop_ = Loop::closed;
-  double decay_ = 1.0;  // a, of one sample
-  // Limits per sample, infinite where there is none.
+  double decay_ = 1.0;  // a, per sample
+  // Limits per sample, infinite if unlimited.
   Eigen::ArrayXd largest_n_;
   Eigen::ArrayXd step_n_;
   Eigen::ArrayXd mean_square_limit_n2_;
@@ -80,9 +79,9 @@ class LimitedStage final : public CyclicStage {
   Eigen::ArrayXd mean_square_;
 };
 
-/// One line for people: "actuator z3: |u| would be 12.4 N, limit 10 N (cycle 40123)".
+/// One line for the user: "actuator z3: |u| would be 12.4 N, limit 10 N (cycle 40123)".
 std::string describe(const LimitViolation& violation, const StageInfo& info);
-/// The same of a whole stop: the first limit and, if the loop was opened, why and how that ended.
+/// The same for a whole stop: the first limit and, if the loop was opened, its cause and result.
 std::string describe_stop(const LimitedStage& stage);
 
 }  // namespace stageid

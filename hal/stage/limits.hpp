@@ -6,19 +6,18 @@
 
 namespace stageid {
 
-/// The rigid motion of a stage as its controller sees it: what a loop can know before anything is
-/// identified. Empty matrices: unknown.
+/// The rigid motion of a stage as its controller assumes it, without identification. Empty matrices: unknown.
 struct RigidMotion {
   Eigen::MatrixXd acceleration_per_n;      ///< sensors x actuators, 1/kg
-  Eigen::MatrixXd force_per_acceleration;  ///< actuators x sensors, kg; of the axes to be braked
-  Eigen::MatrixXd contradiction;           ///< sensors x sensors: what no rigid motion shows
-  double bandwidth_rad_s = 0.0;            ///< of the slowest axis
+  Eigen::MatrixXd force_per_acceleration;  ///< actuators x sensors, kg; of the braked axes
+  Eigen::MatrixXd contradiction;  ///< sensors x sensors: part of y that no rigid motion explains
+  double bandwidth_rad_s = 0.0;   ///< of the slowest axis
 };
 
 /// The bound of what has no limit.
 inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
-/// Limits that are enforced behind every back end. Vectors: one entry a channel; an empty vector
+/// Limits that are enforced for every back end. Vectors: one entry per channel; an empty vector
 /// means no limit of that kind.
 struct StageLimits {
   Eigen::VectorXd actuator_n;            ///< |u|
@@ -29,8 +28,8 @@ struct StageLimits {
   Eigen::VectorXd hard_window_m;         ///< |y| at which forces are cut; empty: twice the window
   Eigen::VectorXd speed_m_s;             ///< at each sensor
   Eigen::VectorXd deviation_m;           ///< from the predicted motion; empty: half the window
-  double stuck_sensor_s = 0.0;           ///< a sensor may repeat one value for so long; 0: for ever
-  RigidMotion motion;                    ///< for predictions and for the brake
+  double stuck_sensor_s = 0.0;  ///< longest time that a sensor may repeat one value; 0: unlimited
+  RigidMotion motion;           ///< for predictions and for the brake
 };
 
 enum class LimitKind : std::uint8_t {
@@ -50,14 +49,14 @@ enum class LimitKind : std::uint8_t {
 };
 const char* to_string(LimitKind kind) noexcept;
 
-/// The first limit that was hit in a run.
+/// The first limit that was exceeded in a run.
 struct LimitViolation {
   LimitKind kind = LimitKind::none;
   int channel = -1;  ///< index of the actuator or sensor
   double value = 0.0;
   double limit = 0.0;
   std::uint64_t cycle = 0;
-  bool of_sensor = false;  ///< what `channel` counts
+  bool of_sensor = false;  ///< whether `channel` is a sensor
 };
 
 }  // namespace stageid

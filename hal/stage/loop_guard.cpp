@@ -15,10 +15,10 @@ constexpr double kBrakeObserverPoles = 3.0;
 constexpr double kBrakeRate = 2.0;
 constexpr double kLargestBrakeRate = 4.0;
 constexpr double kBrakeTimeConstants = 5.0;  // of the loop
-constexpr double kForceForStopping = 0.5;    // of all actuators; the rest is for the other axes
-constexpr double kBlindPoles = 0.05;  // of the sample rate, where the loop's bandwidth is unknown
-constexpr double kLeastResponse = 0.25;  // a stage that answers less cannot be braked
-constexpr double kErrorThatTells = 0.1;  // of deviation_m: below it the response counts as expected
+constexpr double kForceForStopping = 0.5;    // of all actuators; the rest is for other axes
+constexpr double kBlindPoles = 0.05;     // of the sample rate, if the loop's bandwidth is unknown
+constexpr double kLeastResponse = 0.25;  // a stage with a smaller response cannot be braked
+constexpr double kErrorThatTells = 0.1;  // of deviation_m: if less, the response is as expected
 
 void require_size(Eigen::Index size, std::size_t channels, const char* name) {
   if (size == static_cast<Eigen::Index>(channels)) return;
@@ -139,7 +139,7 @@ void LoopGuard::start(const Inputs& first) noexcept {
   force_v_.setZero();
   force_d_.setZero();
   last_error_m_.setZero();
-  last_y_.setConstant(std::numeric_limits<double>::quiet_NaN());  // equal to nothing
+  last_y_.setConstant(std::numeric_limits<double>::quiet_NaN());  // compares unequal to any value
   accelerations_.setZero();
   repeats_.setZero();
   believed_.setConstant(true);
@@ -162,13 +162,13 @@ void LoopGuard::predict(const Eigen::ArrayXd& u) noexcept {
   }
 }
 
-/// Of the commands that act in this interval: they are late by whole samples and a part.
+/// Acceleration by the commands that act in this interval, which are delayed by a fractional number of samples.
 void LoopGuard::find_acceleration(const Eigen::ArrayXd& u) noexcept {
   force_ = u.matrix();
   newest_ = newest_ + 1 == accelerations_.cols() ? 0 : newest_ + 1;
   acting_.noalias() = acceleration_per_n_ * force_;
   accelerations_.col(newest_) = acting_.array();
-  // The ring has d + 2 columns: behind the newest come the oldest, u[n-d-1], and u[n-d].
+  // The ring has d + 2 columns: the newest is followed by the oldest, u[n-d-1], and by u[n-d].
   const Eigen::Index oldest = newest_ + 1 == accelerations_.cols() ? 0 : newest_ + 1;
   const Eigen::Index next = oldest + 1 == accelerations_.cols() ? 0 : oldest + 1;
   acting_ = late_fraction_ * accelerations_.col(oldest).matrix() +
@@ -198,7 +198,7 @@ LoopGuard::Finding LoopGuard::inspect(Inputs& inputs) noexcept {
   return finding;
 }
 
-/// Is the measurement what the forces explain?
+/// Checks whether the forces explain the measurement.
 void LoopGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
                              Finding& finding) noexcept {
   const double error = y - p_[i];
@@ -206,7 +206,7 @@ void LoopGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
   const bool was_near = std::abs(last_error_m_[i]) < 0.5 * deviation_m_[i];
   last_error_m_[i] = error;
   if (repeats_allowed_ > 0 && y == last_y_[i]) {
-    ++repeats_[i];  // nothing new: the prediction goes on alone
+    ++repeats_[i];  // no new information: predict without correction
     if (far || repeats_[i] >= repeats_allowed_)
       finding.add(sensor_failure(i, LimitKind::stuck_sensor, y, repeats_[i] * period_s_, cycle),
                   false);
@@ -223,7 +223,7 @@ void LoopGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
   correct(i, error);
 }
 
-/// Do all sensors show one rigid motion?
+/// Checks whether all sensors measure one rigid motion.
 void LoopGuard::compare_sensors(const Inputs& inputs, Finding& finding) noexcept {
   const std::uint64_t all = ~std::uint64_t{0} >> (64 - p_.size());
   if ((inputs.valid & all) != all) return;
@@ -232,14 +232,14 @@ void LoopGuard::compare_sensors(const Inputs& inputs, Finding& finding) noexcept
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
     const double difference = contradicting_[i] - contradicting_at_start_[i];
     if (!(std::abs(difference) > deviation_m_[i])) continue;
-    sensor_failed_ = true;  // one of them, whichever
+    sensor_failed_ = true;  // it is unknown which one
     finding.add(violation(LimitKind::contradiction, i, difference, deviation_m_[i], inputs.cycle),
                 false);
     return;
   }
 }
 
-/// Is there room to stop?
+/// Checks whether there is enough room to stop.
 void LoopGuard::judge_place(Eigen::Index i, double y, std::uint64_t cycle,
                             Finding& finding) noexcept {
   const double v = speed(i);
@@ -290,7 +290,7 @@ bool LoopGuard::begin_brake() noexcept {
   return true;
 }
 
-// Proportional to the speed v, a brake of rate w needs the way v / w.
+// With a force proportional to the speed v, a brake of rate w needs the distance v / w.
 void LoopGuard::choose_brake_rate() noexcept {
   double needed_rad_s = kBrakeRate * bandwidth_rad_s_;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {

@@ -10,35 +10,34 @@
 
 namespace stageid {
 
-/// Judges every measurement: may the loop stay closed on it? And brakes if it may not.
+/// Judges after every measurement whether the loop may remain closed. If not, brakes the stage.
 ///
 /// For each sensor an observer predicts position p, speed v and unexplained acceleration d from the
 /// forces that were applied,
 ///   p += T v + T^2 (B u + d) / 2,   v += T (B u + d),   e = y - p,
 /// and corrects them by e with three poles at a third of the loop's bandwidth. The loop is unsound if
-///   - a sensor is not finite, repeats one value for too long, or leaves the prediction by more than
-///     deviation_m within one sample: it is not used from then on;
-///   - sensors contradict each other by more than deviation_m, where there are more of them than
-///     rigid motions: one of them drifts;
-///   - |e| grows past deviation_m: the stage does not answer the forces as it should;
-///   - the speed exceeds its limit, or the stopping point y + v |v| / (2 a) under half of all forces
-///     lies beyond the middle between window and hard window: there is too much energy in the motion;
+///   - a sensor is not finite, repeats one value for too long, or deviates from the prediction by more than
+///     deviation_m within one sample (it is not used from then on);
+///   - redundant sensors contradict each other by more than deviation_m: one of them drifts;
+///   - |e| grows beyond deviation_m: the stage does not respond to the forces as expected;
+///   - the speed exceeds its limit, or there is too much energy in the motion: the stopping point
+///     y + v |v| / (2 a) under half of all forces is beyond the middle between window and hard window;
 ///   - |y| exceeds the hard window.
-/// Without a model (StageLimits::motion empty) the predictions have no forces, and only the limits
-/// that are given count.
+/// Without a model (StageLimits::motion empty), the predictions ignore the forces, and only the given limits
+/// apply.
 ///
-/// The brake gives  u = -M (w_b v + d) / g  for as long as five time constants of the loop. Where a
-/// sensor failed, v is predicted from the forces and g = 1. Otherwise g is the response of the stage
-/// in units of the expected one, that which explains the last e best: by linearity the errors for a
-/// response g are e + (g - 1) e_f, where e_f are those of an observer that sees the forces only.
+/// The brake applies  u = -M (w_b v + d) / g  for at most five time constants of the loop. If a sensor failed,
+/// v is predicted from the forces and g = 1. Otherwise g is the response of the stage relative to the
+/// expected one that explains the recent e best. By linearity the errors for a response g are
+/// e + (g - 1) e_f, with e_f the errors of an observer that receives the forces only.
 ///
-/// Nothing here allocates but the constructor.
+/// Only the constructor allocates.
 class LoopGuard {
  public:
   struct Finding {
-    LimitViolation violation;  ///< kind none: nothing
-    bool sound = true;         ///< the loop may go on, if only for a ramp
-    /// Keeps the first of the worst.
+    LimitViolation violation;  ///< kind none: no violation
+    bool sound = true;         ///< the loop may continue, at least for a ramp
+    /// Keeps the first violation of the most serious kind.
     void add(const LimitViolation& found, bool still_sound) noexcept {
       if (violation.kind == LimitKind::none || (sound && !still_sound)) violation = found;
       sound &= still_sound;
@@ -49,26 +48,26 @@ class LoopGuard {
   /// entry is not positive.
   LoopGuard(const StageLimits& limits, const StageInfo& info);
 
-  /// Standstill at y.
+  /// Starts at rest at y.
   void start(const Inputs& first) noexcept;
-  /// The forces of the interval that begins now.
+  /// Takes the forces of the interval that begins now.
   void predict(const Eigen::ArrayXd& u) noexcept;
-  /// Judges the measurement. A value that is not finite is replaced by the last finite one, its valid
-  /// bit cleared.
+  /// Judges the measurement. A value that is not finite is replaced by the last finite one, and its valid bit
+  /// is cleared.
   Finding inspect(Inputs& inputs) noexcept;
 
-  /// False if nothing that is known could slow the stage down.
+  /// @returns false if the stage cannot be braked.
   bool begin_brake() noexcept;
   bool braking() const noexcept { return brake_samples_left_ > 0; }
   /// Forces for the next interval of a brake.
   void brake(Eigen::ArrayXd& u) noexcept;
 
-  /// A sound loop has its commands back inside their limits after so many samples.
+  /// Number of samples within which a sound loop's commands return to their limits.
   std::uint64_t settling_samples() const noexcept { return brake_samples_; }
 
   /// Largest speed over the sensors, m/s.
   double speed_m_s() const noexcept;
-  /// Of the stage, in units of the expected one, as the brake takes it.
+  /// Response of the stage relative to the expected one, as used by the brake.
   double response() const noexcept { return force_scale_; }
 
  private:
@@ -103,21 +102,21 @@ class LoopGuard {
   double bandwidth_rad_s_ = 0.0;
   double brake_rate_rad_s_ = 0.0;
   std::uint64_t brake_samples_ = std::numeric_limits<std::uint64_t>::max();
-  std::uint32_t repeats_allowed_ = 0;  // of a sensor's value; 0: any number
+  std::uint32_t repeats_allowed_ = 0;  // of a sensor's value; 0: unlimited
   double stuck_sensor_s_ = 0.0;
   Eigen::ArrayXd window_m_;
   Eigen::ArrayXd hard_window_m_;
   Eigen::ArrayXd deviation_m_;
   Eigen::ArrayXd weight_m2_;  // of an error in the response
   Eigen::ArrayXd speed_limit_m_s_;
-  Eigen::ArrayXd stopping_s2_m_;  // 1 / (2 a) of what the forces give for it; 0: unknown
-  Eigen::ArrayXd room_m_;         // in which the stage must be able to stop
+  Eigen::ArrayXd stopping_s2_m_;  // 1 / (2 a) with the available forces; 0: unknown
+  Eigen::ArrayXd room_m_;         // within which the stage must be able to stop
   Eigen::MatrixXd acceleration_per_n_;
   Eigen::MatrixXd force_per_acceleration_;
   Eigen::MatrixXd contradiction_;
-  double late_fraction_ = 0.0;  // of a sample in which the older of two commands acts
+  double late_fraction_ = 0.0;  // part of a sample in which the older of two commands acts
 
-  // sensors x samples of delay: accelerations by the commands under way, a ring.
+  // sensors x samples of delay: ring of the accelerations by pending commands.
   Eigen::ArrayXXd accelerations_;
   Eigen::Index newest_ = 0;
   Eigen::VectorXd acting_;
@@ -127,17 +126,17 @@ class LoopGuard {
   Eigen::VectorXd contradicting_;
   Eigen::VectorXd contradicting_at_start_;
   Eigen::ArrayXd p_, v_, d_;
-  Eigen::ArrayXd force_p_, force_v_, force_d_;  // of the observer that sees the forces only
+  Eigen::ArrayXd force_p_, force_v_, force_d_;  // of the observer that receives the forces only
   Eigen::ArrayXd last_error_m_;
   Eigen::ArrayXd last_y_;
   Eigen::Array<std::uint32_t, Eigen::Dynamic, 1> repeats_;
   Eigen::Array<bool, Eigen::Dynamic, 1> believed_;
   bool sensor_failed_ = false;
-  bool open_ = false;            // the loop is; the brake observes with faster poles
+  bool open_ = false;            // whether the loop is open; the brake's observer has faster poles
   double error_by_force_ = 0.0;  // mean of e e_f and e_f^2, relative to deviation_m^2
   double force_by_force_ = 0.0;
-  double response_ = 1.0;     // as the errors tell it
-  double force_scale_ = 1.0;  // as the brake takes it
+  double response_ = 1.0;     // estimated from the errors
+  double force_scale_ = 1.0;  // as used by the brake
   double brake_divisor_ = 1.0;
   std::uint64_t brake_samples_left_ = 0;
 };

@@ -6,9 +6,9 @@
 
 namespace stageid {
 
-/// Linear controller of one logical axis: integrator + lead + low pass (+ notches), in continuous
-/// time; discretized by Tustin with prewarping at the crossover (a notch at its own frequency). A
-/// frequency of 0 leaves its factor out.
+/// Linear controller of one logical axis in continuous time: integrator + lead + low pass (+ notches). It is
+/// discretized by Tustin's method with prewarping at the crossover (a notch at its own frequency). A frequency
+/// of 0 disables its factor.
 ///   C(s) = gain_n_per_m (1 + w_i/s) (s/w_1 + 1)/(s/w_2 + 1) / (s^2/w_lp^2 + 2 d s/w_lp + 1) prod
 ///   notch
 struct AxisController {
@@ -25,7 +25,7 @@ struct AxisController {
     double pole_damping = 0.0;
   };
   std::vector<Notch> notches;
-  /// In an emergency the axis is braked by what is known of its motion; otherwise forces are cut.
+  /// In an emergency, the axis is braked using its known motion; false: its forces are cut.
   bool brake = true;
 };
 
@@ -39,11 +39,11 @@ struct MotionControllerSpec {
 /// u = -T_u C(z) T_y y. Sizes fixed at construction; update() does not allocate.
 class MotionController {
  public:
-  /// @throws std::invalid_argument on sizes or frequencies that make no sense.
+  /// @throws std::invalid_argument for invalid sizes or frequencies.
   explicit MotionController(const MotionControllerSpec& spec);
 
   void reset() noexcept;
-  /// Adds nothing: writes the control part of u (size actuators) computed from y (size sensors).
+  /// Writes (does not add) the control part of u (size actuators) computed from y (size sensors).
   void update(const double* y, double* u) noexcept;
 
   Eigen::Index sensors() const noexcept { return sensor_decoupling_.cols(); }
@@ -56,12 +56,12 @@ class MotionController {
   double sample_rate_hz_ = 0.0;
   Eigen::MatrixXd sensor_decoupling_;
   Eigen::MatrixXd actuator_decoupling_;
-  // The axes lie side by side in lanes of one vector register; all have as many sections as the
-  // longest, the others end in sections that pass everything.
+  // The axes are in parallel lanes of one vector register. All are padded to the same number of sections with
+  // sections of gain 1.
   Eigen::Index sections_ = 0;
   Eigen::ArrayXXd sensor_columns_;    // padded axes x sensors
-  Eigen::ArrayXXd coefficients_;      // padded axes x 5 a section: b0 b1 b2 a1 a2
-  Eigen::ArrayXXd state_;             // padded axes x 2 a section
+  Eigen::ArrayXXd coefficients_;      // padded axes x 5 per section: b0 b1 b2 a1 a2
+  Eigen::ArrayXXd state_;             // padded axes x 2 per section
   Eigen::ArrayXXd actuator_columns_;  // padded actuators x axes
   Eigen::ArrayXd axis_;               // padded axes
 };

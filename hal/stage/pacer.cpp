@@ -8,7 +8,7 @@ namespace stageid {
 namespace {
 
 constexpr double kLongestSpin_ns = 60'000.0;  // a sleeping thread wakes up to 60 us late
-// A real-time thread that never sleeps runs into the kernel's throttling: 50 ms lost each second.
+// The kernel throttles a real-time thread that never sleeps: 50 ms are lost per second.
 constexpr double kSpinShare = 0.6;
 
 void sleep_until(std::int64_t t_ns) noexcept {

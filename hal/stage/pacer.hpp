@@ -4,27 +4,27 @@
 
 namespace stageid {
 
-/// CLOCK_MONOTONIC.
+/// Time of CLOCK_MONOTONIC.
 std::int64_t monotonic_ns() noexcept;
 
-/// Waits for sample instants: asleep until shortly before, then spinning, because a sleeping thread
-/// wakes up tens of microseconds late and a spinning one keeps others from running.
+/// Waits for sample instants. It sleeps until shortly before and then spins, because a sleeping thread wakes up
+/// tens of microseconds late and a spinning one blocks others.
 class Pacer {
  public:
   /// @param pace 0: virtual time, no waiting; otherwise stage seconds per second of wall clock.
   Pacer(double sample_rate_hz, double pace) noexcept;
 
   struct Instant {
-    std::int64_t sample_ns = 0;  ///< the sample instant, of the stage's clock
-    std::int64_t now_ns = 0;     ///< when the wait ended
-    std::int64_t ready_ns = 0;   ///< when it began; 0 in virtual time
+    std::int64_t sample_ns = 0;  ///< the sample instant on the stage's clock
+    std::int64_t now_ns = 0;     ///< end of the wait
+    std::int64_t ready_ns = 0;   ///< start of the wait; 0 in virtual time
     bool late = false;           ///< the instant had passed before the wait began
   };
 
   /// The first sample instant: now, or zero in virtual time.
   Instant restart() noexcept;
-  /// Waits for the next instant. When whole periods were missed the schedule is shifted by them:
-  /// the phase is kept and no two samples come at once.
+  /// Waits for the next instant. If whole periods were missed, the schedule is shifted by them: the phase is
+  /// kept, and samples are not caught up.
   Instant wait() noexcept;
 
  private:

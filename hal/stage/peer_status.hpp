@@ -9,8 +9,8 @@
 
 namespace stageid {
 
-/// What a peer, or the wire to it, can say. The worst is last: who hears several things at once goes
-/// by the worst.
+/// Conditions that a peer, or the link to it, can report, the worst last. If there are several, the worst
+/// applies.
 enum class PeerStatus : std::uint8_t {
   good,
   setpoints_missed,
@@ -28,7 +28,7 @@ enum class PeerStatus : std::uint8_t {
   other_node,
   bus_off,
   link_down,
-  // Before a run:
+  // Only before a run:
   first_sample_missing,
   held,
   in_fault,
@@ -37,28 +37,28 @@ enum class PeerStatus : std::uint8_t {
   other_stage
 };
 
-/// What the host does about it.
+/// Reaction of the host.
 enum class PeerReaction : std::uint8_t {
   use,    ///< the sample is good
-  mark,   ///< the sample is marked in the log; the run goes on
+  mark,   ///< the sample is marked in the log; the run continues
   stop,   ///< the run ends
-  refuse  ///< no run begins
+  refuse  ///< the run does not begin
 };
 
 struct PeerMeaning {
   PeerStatus status = PeerStatus::good;
   PeerReaction reaction = PeerReaction::use;
-  Outcome outcome = Outcome::ok;  ///< of the exchange; of no meaning for `refuse`
-  const char* words = "";         ///< for people
-  const char* can = "";           ///< how it is seen over CAN FD
-  const char* modbus = "";        ///< and over Modbus
+  Outcome outcome = Outcome::ok;  ///< of the exchange; unused for `refuse`
+  const char* words = "";         ///< for the user
+  const char* can = "";           ///< detection over CAN FD
+  const char* modbus = "";        ///< detection over Modbus
 };
 
-/// The one meaning of each status, by status. docs/stops.md has the same table.
+/// The meanings of all statuses, in order of the status. docs/stops.md has the same table.
 std::span<const PeerMeaning> peer_meanings() noexcept;
 const PeerMeaning& meaning(PeerStatus status) noexcept;
 
-/// What a node says of one sample. Codes are as they came; they may be unknown.
+/// A node's report on one sample. Codes are as received and may be unknown.
 struct PeerReport {
   std::uint8_t outcome = 0;  ///< of its own exchange with the stage
   NodeState state = NodeState::measuring;
@@ -69,16 +69,16 @@ struct PeerReport {
   bool out_of_range = false;
 };
 
-/// The worst that it says.
+/// The worst status of the report.
 PeerStatus judge(const PeerReport& report) noexcept;
 
-/// The Outcome that a code on the wire stands for; of unknown codes Outcome::fault.
+/// The Outcome of a received code; unknown codes give Outcome::fault.
 Outcome outcome_of_code(std::uint8_t code) noexcept;
 
 /// @throws StageError "PLACE: WORDS DETAIL".
 [[noreturn]] void refuse(PeerStatus status, const std::string& place, const std::string& detail);
 
-/// The meanings as a Markdown table, as in docs/stops.md.
+/// The meanings as the Markdown table of docs/stops.md.
 std::string peer_meanings_table();
 
 }  // namespace stageid

@@ -14,7 +14,7 @@ namespace {
 
 using Seconds = std::chrono::duration<double>;
 
-constexpr double kLooksAWindow = 10.0;  // how often within stale_s the snapshot is looked at
+constexpr double kLooksAWindow = 10.0;  // checks of the snapshot per stale_s
 
 void check(const PlantConditions& c) {
   const bool sound = c.stale_s > 0.0 && std::isfinite(c.stale_s) && c.enable_s > 0.0 &&
@@ -25,7 +25,7 @@ void check(const PlantConditions& c) {
         "supervisor: times must be positive, and ranges [low, high] must have low <= high");
 }
 
-/// "gravity compensator 2: 12 N is not within 40 ... 60 N"; empty if all are. NaN is not.
+/// "gravity compensator 2: 12 N is not within 40 ... 60 N"; empty if all are in range. NaN is out of range.
 std::string range_trouble(const std::vector<double>& values, double low, double high,
                           const char* what, const char* unit) {
   for (std::size_t i = 0; i < values.size(); ++i)
@@ -35,7 +35,7 @@ std::string range_trouble(const std::vector<double>& values, double low, double 
   return "";
 }
 
-/// What a look says; `enabled`: the plant has to be enabled too.
+/// Trouble of the current snapshot; `enabled`: the plant must also be enabled.
 std::string trouble_of(const Supervisor& supervisor, const PlantConditions& conditions,
                        bool enabled) {
   const PlantSnapshot snapshot = supervisor.snapshot();
@@ -102,20 +102,20 @@ PlantWatch::~PlantWatch() {
   supervisor_.request(SupervisorCommand::disable);
 }
 
-/// Waits for the plant to be there, and takes it out of its fault, if it is in one and lets itself.
+/// Waits for the plant and resets its fault, if there is one and the plant permits it.
 void PlantWatch::clear_fault() {
   static_cast<void>(wait_until_good(false));
   if (supervisor_.snapshot().state == NodeState::fault)
     static_cast<void>(supervisor_.request(SupervisorCommand::reset_fault));
 }
 
-/// The last trouble, if it did not go within enable_s.
+/// Waits up to enable_s. @returns the remaining trouble; empty if there is none.
 std::string PlantWatch::wait_until_good(bool enabled) {
   const std::int64_t until_ns = monotonic_ns() + std::llround(1e9 * conditions_.enable_s);
   while (true) {
     std::string trouble = trouble_of(supervisor_, conditions_, enabled);
     if (trouble.empty() || monotonic_ns() > until_ns) return trouble;
-    // What the panel says does not change by waiting; a link that comes up and states that go by do.
+    // Waiting does not change the panel's values, but links come up and states change.
     const PlantSnapshot snapshot = supervisor_.snapshot();
     const bool fresh = snapshot.t_ns != 0 && static_cast<double>(monotonic_ns() - snapshot.t_ns) <
                                                  1e9 * conditions_.stale_s;

@@ -11,31 +11,31 @@
 
 namespace stageid {
 
-/// What must hold around the stage while forces may act.
+/// Conditions that must hold while forces may act.
 struct PlantConditions {
-  double stale_s = 0.3;  ///< an older snapshot is worth nothing: three poll periods
+  double stale_s = 0.3;  ///< largest age of a snapshot: three poll periods
   double gravity_low_n = 0.0;
   double gravity_high_n = 0.0;
   double temperature_low_k = 0.0;
   double temperature_high_k = 0.0;
-  double enable_s = 5.0;  ///< enabling may take so long
+  double enable_s = 5.0;  ///< longest time for enabling
 };
 
-/// One line: what of the conditions does not hold, the most serious first; empty if all do.
-/// Whether the stage is enabled is no part of it.
+/// One line: the most serious violated condition; empty if all hold. It does not check whether the stage is
+/// enabled.
 std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& conditions,
                           std::int64_t now_ns);
 
-/// Brings the plant up, watches it, takes it down again.
+/// Enables the plant, monitors it, and disables it at the end.
 ///
-/// tripped() is a flag that a real-time loop may look at in every cycle: no lock stands behind it.
-/// It is set at once when a condition no longer holds or the plant is no longer enabled, and stays.
+/// tripped() is a lock-free flag for a real-time loop. It is set permanently as soon as a condition no longer
+/// holds or the plant is no longer enabled.
 class PlantWatch {
  public:
-  /// Waits for a fresh snapshot in which all conditions hold, enables the plant, waits for it, and
-  /// watches it in a thread of its own. A fault is cleared first if `reset_fault`. `supervisor` must outlive the watch.
-  /// @throws StageError that says which condition does not hold, or why it cannot be enabled.
-  /// @throws std::invalid_argument if a condition is no number or a range is empty.
+  /// Waits for a fresh snapshot in which all conditions hold, enables the plant, and monitors it in a separate
+  /// thread. A fault is cleared first if `reset_fault`. `supervisor` must outlive the watch.
+  /// @throws StageError naming the violated condition, or the reason why the plant cannot be enabled.
+  /// @throws std::invalid_argument if a condition is NaN or a range is empty.
   PlantWatch(Supervisor& supervisor, const PlantConditions& conditions, bool reset_fault = false);
   /// Disables the plant.
   ~PlantWatch();
@@ -43,7 +43,7 @@ class PlantWatch {
   PlantWatch& operator=(const PlantWatch&) = delete;
 
   const std::atomic<bool>& tripped() const noexcept { return tripped_; }
-  /// Why; empty unless tripped().
+  /// The reason for tripping; empty unless tripped().
   std::string reason() const;
 
  private:
@@ -58,7 +58,7 @@ class PlantWatch {
   std::condition_variable changed_;
   std::string reason_;
   bool stop_ = false;
-  std::thread thread_;  // last: it uses all the others
+  std::thread thread_;  // last: it uses all other members
 };
 
 }  // namespace stageid

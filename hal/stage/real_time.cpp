@@ -40,7 +40,7 @@ bool kernel_is_preempt_rt() {
   return is_preempt_rt(name.version, flag);
 }
 
-/// Empty if it worked.
+/// @returns the failure; empty if there is none.
 std::string take_priority(int priority) {
   sched_param wanted{};
   wanted.sched_priority = priority;
@@ -76,7 +76,7 @@ std::string lock_memory() {
 }  // namespace
 
 bool is_preempt_rt(std::string_view version, std::string_view flag) noexcept {
-  // Kernels before 6.12 carry it as a patch and tell by the file, later ones by their version.
+  // Kernels before 6.12 are patched and have the file; later ones report it in their version.
   return flag == "1" || version.find("PREEMPT_RT") != std::string_view::npos;
 }
 
@@ -92,7 +92,7 @@ RealTime::RealTime(const RealTimeOptions& options) {
         "real-time kernel (Debian: linux-image-rt-amd64)");
   note(pin(options.cpu));
   note(take_priority(options.priority));
-  // Of use where the priority was refused: a plain thread is woken up to 50 us late on purpose.
+  // Helps if the priority was refused: the default timer slack delays other threads by up to 50 us.
   ::prctl(PR_SET_TIMERSLACK, 1UL);
   if (options.lock_memory) {
     std::string failure = lock_memory();

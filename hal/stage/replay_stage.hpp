@@ -8,22 +8,21 @@
 
 namespace stageid {
 
-/// Where a ReplayStage gets its recorded samples from; hal knows no log files.
+/// Source of recorded samples for ReplayStage; hal does not depend on log files.
 class ReplaySource {
  public:
   virtual ~ReplaySource() = default;
   virtual int runs() const = 0;
-  /// Loads run `run` wholly: u is actuators x samples, y sensors x samples, marked size samples.
+  /// Loads run `run` completely: u is actuators x samples, y sensors x samples, marked size samples.
   virtual void load(int run, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) = 0;
 };
 
-/// Gives the recorded measurements at the recorded cycles and compares the commands with the
-/// recorded ones: a regression test of everything that stands before the stage.
-/// Each start() goes on to the next run.
+/// Returns the recorded measurements at the recorded cycles and compares the commands with the recorded
+/// ones: a regression test of everything above the stage. Each start() selects the next run.
 ///
-/// exchange() with u[n] compares it with the recorded one and gives y[n+1]; with the last u of the
-/// record it holds the last y, and after that it says link_down. A marked sample comes as
-/// Outcome::late, a marked first one with no valid bits.
+/// exchange() compares u[n] with the recorded one and returns y[n+1]; with the last u of the record it holds
+/// the last y. After that it returns link_down. A marked sample gives Outcome::late; a marked first sample has
+/// no valid bits.
 class ReplayStage final : public CyclicStage {
  public:
   /// @throws std::invalid_argument if there is no source, or the tolerance is negative or not
@@ -31,13 +30,13 @@ class ReplayStage final : public CyclicStage {
   ReplayStage(StageInfo info, std::unique_ptr<ReplaySource> source, double tolerance_n);
 
   const StageInfo& info() const noexcept override { return info_; }
-  /// @throws StageError if the source has no further run, or one that does not fit the channels.
+  /// @throws StageError if the source has no further run, or if the run does not fit the channels.
   void start(std::uint64_t run_seed, Inputs& first) override;
   [[nodiscard]] Outcome exchange(const Outputs& outputs, Inputs& inputs,
                                  Deadline deadline) noexcept override;
   void stop() noexcept override;
 
-  /// Commands, counted over all runs and channels, that differ by more than the tolerance.
+  /// Number of commands, over all runs and channels, that differ by more than the tolerance.
   std::uint64_t mismatches() const noexcept { return mismatches_; }
   double largest_mismatch_n() const noexcept { return largest_mismatch_n_; }
 

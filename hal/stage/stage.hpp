@@ -27,20 +27,20 @@ int channel_index(const std::vector<Channel>& channels, const std::string& name)
 
 enum class Clock : std::uint8_t { virtual_time, wall };
 
-/// What a back end is and can do; an experiment that does not fit is refused before it starts.
+/// Properties of a back end; an unsuitable experiment is refused before it starts.
 struct StageInfo {
   std::string name;
   std::string backend;  ///< "sim", "can", "modbus", "replay"
   double sample_rate_hz = 0.0;
   double maximum_rate_hz = 0.0;
-  double transport_delay_s = 0.0;  ///< declared, from command computed to hold output changed
+  double transport_delay_s = 0.0;  ///< declared, from computed command to changed output
   Clock clock = Clock::virtual_time;
-  double pace = 1.0;  ///< stage seconds per second of its clock; not 1 only where time is simulated
+  double pace = 1.0;  ///< stage seconds per second of its clock; not 1 only in simulations
   std::vector<Channel> actuators;
   std::vector<Channel> sensors;
 };
 
-/// How one exchange ended. `ok`, `late` and `bus_passive` carry valid measurements.
+/// Result of an exchange. `ok`, `late` and `bus_passive` have valid measurements.
 enum class Outcome : std::uint8_t {
   ok,
   late,         ///< the deadline passed; measurement valid, marked
@@ -51,13 +51,13 @@ enum class Outcome : std::uint8_t {
   bus_off,
   link_down,
   fault,    ///< the stage reports a fault (interlock, amplifier, non-finite sensor)
-  limit,    ///< a limit would have been or was exceeded: see LimitedStage::violation()
-  braking,  ///< the loop cannot be trusted and is open: the stage brakes by itself; go on exchanging
-  opened    ///< the loop is open and the forces are to be cut: stop()
+  limit,    ///< a limit is or would have been exceeded: see LimitedStage::violation()
+  braking,  ///< the loop is unsound and open: the stage brakes by itself; continue exchanging
+  opened    ///< the loop is open and the forces must be cut: call stop()
 };
 const char* to_string(Outcome outcome) noexcept;
 
-/// CiA 402-like states.
+/// States based on CiA 402.
 enum class NodeState : std::uint8_t {
   not_ready,
   switch_on_disabled,
@@ -71,7 +71,7 @@ enum class NodeState : std::uint8_t {
 };
 const char* to_string(NodeState state) noexcept;
 
-/// What the stage measured. `y` is filled in place (size sensors, SI); `valid` bit i = sensor i.
+/// A measurement. `y` is filled in place (size sensors, SI); `valid` bit i = sensor i.
 struct Inputs {
   std::uint64_t cycle = 0;
   std::int64_t t_sample_ns = 0;
@@ -79,41 +79,38 @@ struct Inputs {
   std::span<double> y;
   std::uint64_t valid = 0;
   NodeState node_state = NodeState::not_ready;
-  /// When nothing but the wait for t_sample was left to do, CLOCK_MONOTONIC; 0: not told. What lies
-  /// behind it is no execution time.
+  /// Start of the wait for t_sample, CLOCK_MONOTONIC; 0: unknown. Execution time ends here.
   std::int64_t t_ready_ns = 0;
-  /// What acted instead of Outputs::u, valid until the next exchange; empty: what was asked for.
+  /// Applied commands if they differ from Outputs::u, valid until the next exchange; otherwise empty.
   std::span<const double> applied;
 };
 
-/// What the stage shall do. `u`: size actuators, SI.
+/// Commands to the stage. `u`: size actuators, SI.
 struct Outputs {
   std::uint64_t cycle = 0;
   std::int64_t t_apply_ns = 0;
   std::span<const double> u;
 };
 
-/// Absolute time (of the stage's clock) by which an exchange must have ended; 0: none.
+/// Absolute time on the stage's clock by which an exchange must have ended; 0: none.
 struct Deadline {
   std::int64_t t_ns = 0;
 };
 
-/// The door for one exchange a sample: simulator, replay, CAN FD streaming, Modbus.
+/// Interface with one exchange per sample: simulator, replay, CAN FD streaming, Modbus.
 ///
 /// The constructors, prepare() and start() may allocate, block and throw. Between start() and
 /// stop() only exchange() is called, from one thread; it does not allocate, lock, log or throw.
 ///
-/// Order: start() leaves the stage in closed-loop-ready standstill and gives the first measurement
-/// y[0]; exchange() with u[n], computed from y[n], waits for the next sample instant and gives
-/// y[n+1].
+/// Order: start() leaves the stage at a standstill ready for closed loop and returns the first measurement
+/// y[0]. exchange() with u[n], computed from y[n], waits for the next sample instant and returns y[n+1].
 class CyclicStage {
  public:
   virtual ~CyclicStage() = default;
   virtual const StageInfo& info() const noexcept = 0;
 
   /// Brings the stage to operation_enabled and reads y[0] into `first.y`. `run_seed` makes the run
-  /// repeatable on back ends that draw random numbers (the simulator: same seed, same run, whatever
-  /// was run before); others ignore it.
+  /// reproducible on back ends that draw random numbers, independently of previous runs; others ignore it.
   /// @throws StageError if the machine does not answer or refuses.
   virtual void start(std::uint64_t run_seed, Inputs& first) = 0;
 
@@ -123,7 +120,7 @@ class CyclicStage {
   /// Brings the outputs to a safe state (zero force, disabled). Idempotent.
   virtual void stop() noexcept = 0;
 
-  /// One line on what went wrong in the last run, beyond its Outcome; empty: nothing to add.
+  /// Describes problems of the last run in one line, in addition to its Outcome; may be empty.
   virtual std::string trouble() const { return {}; }
 };
 

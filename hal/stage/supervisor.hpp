@@ -8,24 +8,24 @@
 
 namespace stageid {
 
-/// Why a node went to fault. The values travel in frames and registers: append only.
+/// Cause of a node's fault. The values are transmitted: append only.
 enum class FaultCause : std::uint8_t {
   none,
-  watchdog,       ///< the host fell silent while it measured
-  limit,          ///< a limit was hit
-  not_finite,     ///< a command or a measurement was no number
+  watchdog,       ///< the host was silent while it measured
+  limit,          ///< a limit was exceeded
+  not_finite,     ///< a command or a measurement was not finite
   interlock,      ///< the interlock chain opened
   amplifier,      ///< the stage itself reported a fault
   gravity,        ///< a gravity compensator is out of range
   temperature,    ///< a temperature is out of range
-  bus_off,        ///< the node's bus left
-  host_heartbeat  ///< the supervisor's heartbeat stood still
+  bus_off,        ///< the node's controller went off the bus
+  host_heartbeat  ///< the supervisor's heartbeat stopped
 };
 const char* to_string(FaultCause cause) noexcept;
 
-/// What stands around the stage: enable chain, gravity compensators, temperatures, interlocks.
+/// Environment of the stage: enable chain, gravity compensators, temperatures, interlocks.
 struct PlantSnapshot {
-  std::int64_t t_ns = 0;  ///< when it was read; older than three poll periods is stale
+  std::int64_t t_ns = 0;  ///< time of reading; stale after three poll periods
   std::uint32_t heartbeat = 0;
   bool interlock_closed = false;
   bool enabled = false;
@@ -42,15 +42,15 @@ struct SupervisorReply {
   std::string message;
 };
 
-/// The slow door beside the cyclic one, typically a PLC behind Modbus. Any thread may call it.
+/// The slow interface beside the cyclic one, typically a PLC behind Modbus. Safe for concurrent use.
 class Supervisor {
  public:
   virtual ~Supervisor() = default;
-  /// The last one that was read and passed its checks.
+  /// The last valid snapshot.
   virtual PlantSnapshot snapshot() const = 0;
-  /// Waits for the answer; without one the command counts as refused.
+  /// Waits for the answer; no answer counts as a refusal.
   virtual SupervisorReply request(SupervisorCommand command) = 0;
-  /// One line: why there is no fresh snapshot; empty if there is one.
+  /// Reason for a missing fresh snapshot in one line; empty if there is one.
   virtual std::string trouble() const = 0;
 };
 
