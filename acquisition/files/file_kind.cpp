@@ -12,7 +12,7 @@ namespace stageid {
 namespace {
 
 struct FileKind {
-  std::string_view mark;  ///< what the file begins with, or what it says its format is
+  std::string_view mark;  ///< first bytes of the file, or the value of its key `format`
   std::string_view name;
   std::string_view taken_by;
 };
@@ -21,7 +21,7 @@ constexpr std::string_view kTakesLogs = "use it with 'stageid frf', 'validate', 
 constexpr std::string_view kTakesConfigurations =
     "use it with 'stageid identify', 'design', 'run' or 'config check'";
 
-/// By the format that a file of ours names.
+/// By the key `format` of stageid's files.
 constexpr std::array kOurs = {
     FileKind{"stageid-log.h5", "a log in HDF5", kTakesLogs},
     FileKind{"stageid-frf.h5", "a frequency response",
@@ -62,8 +62,8 @@ std::string sentence_of_format(const std::string& format, const std::string& wan
   return "";
 }
 
-/// "stageid-model" of `"format": "stageid-model"` in JSON, `format: stageid-stage` in YAML, with .h5 the
-/// attribute of an HDF5 file; empty if there is none.
+/// Value of the key `format` in JSON or YAML, or of the attribute of an HDF5 file with .h5 appended; empty if
+/// there is none.
 std::string named_format(const std::filesystem::path& file, const std::string& head) {
   if (head.starts_with("\x89HDF")) {
     try {
@@ -72,7 +72,7 @@ std::string named_format(const std::filesystem::path& file, const std::string& h
                  ? hdf5.read_text_attribute("/", "format").append(".h5")
                  : "";
     } catch (const FormatError&) {
-      return "";  // damaged: its first bytes must do
+      return "";  // damaged: use its first bytes
     }
   }
   static const std::regex text(R"re((?:^|\n)\s*\{?\s*"?format"?\s*:\s*"?(stageid-[a-z]+))re");

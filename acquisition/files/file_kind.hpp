@@ -5,14 +5,14 @@
 
 namespace stageid {
 
-/// What a file is instead of what was wanted, told by its content, and which commands take it:
-/// "is a native log, not a model; 'stageid frf', 'validate', 'report' and 'log' take it".
+/// Describes the kind of a file by its content, and the commands that accept it:
+/// "is a native log, not a model; use it with 'stageid frf', 'validate', 'report' or 'log'".
 ///
-/// @param wanted "a model"
-/// @returns empty if the file cannot be read or is of no kind known here
+/// @param wanted expected kind, "a model"
+/// @returns empty if the file cannot be read or its kind is unknown
 std::string other_kind(const std::filesystem::path& file, const std::string& wanted);
 
-/// The same of an HDF5 file by its attribute `format`; empty if that is none of ours.
+/// The same for an HDF5 file with this attribute `format`; empty if it is unknown.
 std::string other_hdf5_kind(const std::string& format, const std::string& wanted);
 
 }  // namespace stageid

@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// XXH3-128 of a stream of bytes: names inputs in outputs. Not a protection against forgery.
+/// XXH3-128 of a stream of bytes: identifies inputs in outputs. Not a protection against forgery.
 class Fingerprint {
  public:
   Fingerprint();

@@ -8,7 +8,7 @@
 namespace stageid {
 namespace {
 
-/// One attribute opened for reading, with what it takes to name it in an error.
+/// One attribute opened for reading, with its names for error messages.
 struct Attribute {
   Attribute(const Hdf5File& source, std::string object_name, std::string attribute_name)
       : file(source), object(std::move(object_name)), name(std::move(attribute_name)) {
@@ -76,7 +76,7 @@ void write_values(const Hdf5File& file, const std::string& object, const std::st
                                                space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
                              H5Aclose);
   if (!attribute) fail(hdf5::take_reason());
-  const bool empty = H5Sget_simple_extent_npoints(space.get()) == 0;  // HDF5 insists on a buffer
+  const bool empty = H5Sget_simple_extent_npoints(space.get()) == 0;  // HDF5 requires a buffer
   if (!empty && H5Awrite(attribute.get(), memory_type, data) < 0) fail(hdf5::take_reason());
 }
 
@@ -137,7 +137,7 @@ long long Hdf5File::read_integer_attribute(const std::string& object,
   }
   double value = 0.0;
   attribute.read(H5T_NATIVE_DOUBLE, &value);
-  constexpr double kLimit = 0x1p53;  // above it a double does not tell integers apart
+  constexpr double kLimit = 0x1p53;  // above it, a double cannot represent every integer
   if (!(std::abs(value) <= kLimit) || value != std::trunc(value)) {
     attribute.fail("is " + std::to_string(value) + "; expected an integer");
   }

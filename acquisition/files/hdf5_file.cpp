@@ -28,7 +28,7 @@ void prepare_hdf5() noexcept {
 
 namespace {
 
-/// HDF5 does not tell a missing file from a forbidden one in words, the operating system does.
+/// HDF5's messages do not distinguish a missing file from a forbidden one; the operating system's do.
 void check_can_be_opened(const std::filesystem::path& file) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) {
@@ -49,8 +49,8 @@ bool begins_as_hdf5(const std::filesystem::path& file) {
 
 }  // namespace
 
-/// The datasets read or appended to last. A dataset that is opened anew for every block of rows
-/// starts with an empty chunk cache and unpacks its compressed chunks again and again.
+/// Recently read or appended datasets. A reopened dataset starts with an empty chunk cache, so opening it for
+/// every block of rows would decompress the same chunks repeatedly.
 struct Hdf5File::OpenDatasets {
   struct Entry {
     std::string name;
@@ -74,7 +74,7 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
   check_can_be_opened(file);
   if (H5Fis_hdf5(file.c_str()) <= 0) {
     H5Eclear2(H5E_DEFAULT);
-    // other_kind() would open what begins as an HDF5 file, to ask for its format.
+    // other_kind() opens HDF5 files to read their format.
     const std::string other = begins_as_hdf5(file) ? "" : other_kind(file, "an HDF5 file");
     throw FormatError(file, "",
                       !other.empty()
@@ -97,8 +97,8 @@ Hdf5File Hdf5File::create(const std::filesystem::path& file,
   prepare_hdf5();
   const Hdf5Handle properties = hdf5::property_list(H5P_FILE_CREATE);
   H5Pset_obj_track_times(properties.get(), false);
-  // The format of HDF5 1.8 has checksums on most of its structure, so that damage is noticed before
-  // the library stumbles over it; the newest one is closed to older MATLABs.
+  // The format of HDF5 1.8 has checksums on most of its structure, which detect damage before the library
+  // fails on it. Older MATLAB versions cannot read the newest format.
   const Hdf5Handle access = hdf5::property_list(H5P_FILE_ACCESS);
   H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
   Hdf5Handle handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), access.get()),
@@ -119,7 +119,7 @@ void Hdf5File::close() {
 }
 
 bool Hdf5File::exists(const std::string& object) const {
-  // H5Lexists fails, rather than answers no, when a group on the way is missing.
+  // H5Lexists fails instead of returning false if a parent group is missing.
   for (std::size_t end = object.find('/', 1);; end = object.find('/', end + 1)) {
     const std::string part = object.substr(0, end);
     if (part != "/" && H5Lexists(file_.get(), part.c_str(), H5P_DEFAULT) <= 0) {
@@ -163,9 +163,9 @@ hid_t Hdf5File::open_dataset(const std::string& dataset) const {
     if (entry.handle && entry.name == dataset) return entry.handle.get();
   }
   if (!exists(dataset)) throw FormatError(path_, dataset, "is missing; expected a dataset");
-  // Room for a chunk across all columns of the usual logs; the default of 1 MiB holds few of them.
+  // Enough for a chunk of all columns of typical logs; the default is 1 MiB.
   constexpr std::size_t kChunkCacheBytes = std::size_t{1} << 24;
-  constexpr std::size_t kChunkCacheSlots = 12421;  // a prime, as HDF5 advises
+  constexpr std::size_t kChunkCacheSlots = 12421;  // a prime, as HDF5 recommends
   const Hdf5Handle access = hdf5::property_list(H5P_DATASET_ACCESS);
   H5Pset_chunk_cache(access.get(), kChunkCacheSlots, kChunkCacheBytes, 1.0);
   Hdf5Handle handle(H5Dopen2(file_.get(), dataset.c_str(), access.get()), H5Dclose);

@@ -12,7 +12,7 @@
 
 namespace stageid {
 
-/// One HDF5 handle and what closes it.
+/// One HDF5 handle and the function that closes it.
 class Hdf5Handle {
  public:
   using Close = herr_t (*)(hid_t);
@@ -40,22 +40,21 @@ class Hdf5Handle {
   Close close_ = nullptr;
 };
 
-/// What the elements of a dataset are, as far as stageid cares.
+/// Element types that stageid distinguishes.
 enum class Hdf5Kind : std::uint8_t { real, integer, complex, text, other };
 
-/// A thin layer over the HDF5 C library: names the file and dataset in every error, checks shapes,
-/// and knows the few types that stageid's files hold. Paths are absolute ("/runs/0000/sensors").
+/// A thin layer over the HDF5 C library for the types in stageid's files. It checks shapes and names file and
+/// dataset in every error. Paths are absolute ("/runs/0000/sensors").
 ///
-/// Reading: a missing object or a wrong type or shape is a FormatError, an unreadable file a
-/// FileError (not there) or FormatError (not HDF5, cut short). A shape that the file is too short
-/// to hold is a FormatError too, so that a damaged size cannot ask for all the memory. Writing:
-/// FileError. Concurrent use: Debian's HDF5 is not thread-safe; one thread at a time in the whole
-/// program.
+/// Reading: a missing object or a wrong type or shape is a FormatError. An unreadable file is a FileError
+/// (missing) or a FormatError (not HDF5, truncated). A shape larger than the file can contain is a FormatError
+/// too, so that a damaged size cannot exhaust the memory. Writing: FileError. Concurrent use: Debian's HDF5 is
+/// not thread-safe, so only one thread of the program may use it at a time.
 class Hdf5File {
  public:
   static Hdf5File open(const std::filesystem::path& file);  ///< read-only
-  /// Truncates; no times are stored: same content, same bytes. Errors name `shown_as` if given: the
-  /// target of an OutputFile rather than its temporary file.
+  /// Truncates. Stores no times, so that the same content gives the same bytes. Errors name `shown_as` if
+  /// given: the target of an OutputFile instead of its temporary file.
   static Hdf5File create(const std::filesystem::path& file,
                          const std::filesystem::path& shown_as = {});
   ~Hdf5File();
@@ -73,7 +72,7 @@ class Hdf5File {
   Hdf5Kind attribute_kind(const std::string& object, const std::string& name) const;
   hid_t id() const noexcept { return file_.get(); }
 
-  // Attributes: object "/" is the root. An integer may be stored as a float and the reverse.
+  // Attributes: object "/" is the root. Integers may be stored as floats and vice versa.
   double read_real_attribute(const std::string& object, const std::string& name) const;
   long long read_integer_attribute(const std::string& object, const std::string& name) const;
   std::string read_text_attribute(const std::string& object, const std::string& name) const;
@@ -92,7 +91,7 @@ class Hdf5File {
   void write_attribute(const std::string& object, const std::string& name,
                        const std::vector<double>& values);
 
-  // Datasets. Numeric data come row-major (C order), as HDF5 stores them. NaN is not checked here.
+  // Datasets. Numeric data are row-major (C order), as in HDF5. NaN is not checked here.
   std::vector<double> read_reals(const std::string& dataset) const;  ///< any shape
   std::vector<std::complex<double>> read_complex(
       const std::string& dataset) const;                                  ///< compound r, i

@@ -16,7 +16,7 @@ namespace {
 
 // Layout: HDF5 File Format Specification 3.0, section III.E "Disk Format: Level 1E - Global Heap".
 // Collection: "GCOL", version 1, 3 bytes 0, size (8); objects: index (2), references (2), 4 bytes 0,
-// size (8), data padded to 8 bytes. Index 0 is the free space, whose size counts its own header.
+// size (8), data padded to 8 bytes. Index 0 is the free space; its size includes its own header.
 constexpr std::string_view kStart("GCOL\1\0\0\0", 8);
 constexpr std::size_t kHeader = 16;
 constexpr std::size_t kAlignment = 8;
@@ -29,7 +29,7 @@ std::uint64_t little_endian(std::string_view bytes) {
   return value;
 }
 
-/// True if the objects fill the collection, which `heap` holds whole.
+/// True if the objects fill the collection; `heap` contains all of it.
 bool objects_fit(std::string_view heap) {
   std::size_t at = kHeader;
   while (heap.size() - at >= kHeader) {
@@ -44,7 +44,7 @@ bool objects_fit(std::string_view heap) {
   return true;
 }
 
-/// Checks the heaps that begin in `window`, which begins at `offset` of the file.
+/// Checks the heaps that begin in `window`, which starts at `offset` of the file.
 void check_window(const std::filesystem::path& file, std::string_view window, std::uint64_t offset,
                   std::uint64_t file_bytes) {
   for (std::size_t at = window.find(kStart); at != std::string_view::npos;

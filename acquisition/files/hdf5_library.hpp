@@ -2,9 +2,9 @@
 
 namespace stageid {
 
-/// Before the first call of HDF5, by us or by a library that uses it (libmatio). HDF5 prints its error stack on stderr
-/// unless told not to; we put its reason into the exception. Its own clean-up at exit crashes on a file that a full disk
-/// kept from being closed; every handle of ours closes itself.
+/// Call before the first use of HDF5, also through other libraries (libmatio). HDF5 would print its error stack on
+/// stderr; stageid puts the reason into the exception instead. HDF5's clean-up at exit is disabled: it crashes on a
+/// file that could not be closed because the disk is full, and all handles close themselves.
 void prepare_hdf5() noexcept;
 
 }  // namespace stageid

@@ -9,7 +9,7 @@
 namespace stageid {
 namespace {
 
-/// What there is to know about an open dataset before its data are read.
+/// Properties of an open dataset before its data are read.
 struct DatasetInfo {
   DatasetInfo(const Hdf5File& source, std::string dataset_name, hid_t id)
       : file(source),
@@ -35,7 +35,7 @@ struct DatasetInfo {
     const bool compressed = H5Pget_nfilters(properties.get()) > 0;
     return hdf5::plausible_count(file.path(), name, shape, H5Tget_size(type.get()), compressed);
   }
-  /// @throws FormatError with HDF5's reason if `status` tells a failure.
+  /// @throws FormatError with HDF5's reason if `status` is a failure.
   void check_read(herr_t status) const {
     if (status < 0) {
       fail("cannot be read (" + hdf5::take_reason() + "); the file is truncated or damaged");
@@ -68,7 +68,7 @@ std::vector<Value> read_all(const DatasetInfo& info, hid_t memory_type) {
 
 std::vector<hsize_t> Hdf5File::shape(const std::string& dataset) const {
   DatasetInfo info(*this, dataset, open_dataset(dataset));
-  info.count();  // who sizes a buffer by this shape must be able to trust it
+  info.count();  // callers allocate buffers of this shape, so it must be plausible
   return std::move(info.shape);
 }
 

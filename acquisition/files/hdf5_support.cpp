@@ -16,7 +16,7 @@ herr_t keep_innermost(unsigned depth, const H5E_error2_t* error, void* reason) {
   return 0;
 }
 
-/// A failing system call is described over several lines with addresses; only its message matters.
+/// HDF5 describes a failing system call in several lines with addresses; only its message is kept.
 std::string on_one_line(std::string reason) {
   const std::string kKey = "error message = '";
   if (const auto start = reason.find(kKey); start != std::string::npos) {
@@ -107,7 +107,7 @@ std::string text_of(const std::vector<hsize_t>& shape) {
 std::size_t plausible_count(const std::filesystem::path& file, const std::string& place,
                             const std::vector<hsize_t>& shape, std::size_t element_bytes,
                             bool compressed) {
-  // deflate shrinks at most 1032 to 1. Small datasets may exist without any bytes (fill value).
+  // deflate compresses at most 1032 to 1. Small datasets may have no bytes in the file (fill value).
   constexpr std::uintmax_t kGreatestCompression = 1100;
   constexpr std::uintmax_t kAlwaysAllowed = std::uintmax_t{1} << 26;
   std::error_code ignored;

@@ -9,15 +9,15 @@
 
 #include "acquisition/files/hdf5_file.hpp"
 
-/// What the sources of Hdf5File share; not for others.
+/// Shared by the implementation files of Hdf5File only.
 namespace stageid::hdf5 {
 
-/// The innermost reason on HDF5's error stack, on one line; clears the stack.
+/// The innermost reason of HDF5's error stack, on one line; clears the stack.
 std::string take_reason();
 
 Hdf5Handle property_list(hid_t class_id);
 Hdf5Handle complex_type(hid_t float_type);  ///< compound r, i
-Hdf5Handle text_type(H5T_cset_t cset);      ///< variable length: what h5py writes and reads as str
+Hdf5Handle text_type(H5T_cset_t cset);      ///< variable length: h5py's str
 
 Hdf5Kind kind_of(hid_t type);
 std::string name_of(Hdf5Kind kind);
@@ -25,14 +25,14 @@ std::string name_of(Hdf5Kind kind);
 std::vector<hsize_t> shape_of(hid_t space);
 std::string text_of(const std::vector<hsize_t>& shape);  ///< "4000 x 4 x 13"
 
-/// The number of elements of `shape`, after checking that so many may come out of this file.
-/// @throws FormatError if they cannot: the size is damaged.
+/// The number of elements of `shape`, after checking that the file can contain them.
+/// @throws FormatError if it cannot: the size is damaged.
 std::size_t plausible_count(const std::filesystem::path& file, const std::string& place,
                             const std::vector<hsize_t>& shape, std::size_t element_bytes,
                             bool compressed);
 
-/// Reads `count` strings of fixed or variable length; `read(memory_type, buffer)` stands for
-/// H5Dread or H5Aread and tells whether it succeeded, and so does the result.
+/// Reads `count` strings of fixed or variable length. `read(memory_type, buffer)` calls H5Dread or H5Aread and
+/// returns whether it succeeded. @returns the same
 bool read_strings(hid_t file_type, hid_t space, std::size_t count,
                   const std::function<bool(hid_t, void*)>& read, std::vector<std::string>& texts);
 

@@ -23,8 +23,8 @@ Hdf5Handle timeless(hid_t class_id) {
   return properties;
 }
 
-/// Makes numbers that were never written, or whose place was lost by damage, read as NaN, which every
-/// reader refuses, instead of as zeros.
+/// Numbers that were never written or were lost by damage are read as NaN, which every reader rejects,
+/// instead of zero.
 void fill_with_nan(hid_t properties, hid_t file_type) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const std::complex<double> nan(kNan, kNan);
@@ -35,11 +35,11 @@ void fill_with_nan(hid_t properties, hid_t file_type) {
   }
 }
 
-/// Cuts the dataset into blocks of rows of about a megabyte, each with a checksum: without, a byte
-/// that changes on the way to the reader is a changed measurement.
+/// Splits the dataset into blocks of rows of about a megabyte, each with a checksum, so that changed bytes are
+/// detected when reading.
 void protect(hid_t properties, const std::vector<hsize_t>& shape, std::size_t element_bytes) {
   constexpr hsize_t kBlockBytes = hsize_t{1} << 20;
-  constexpr hsize_t kGreatestBlockBytes = hsize_t{1} << 31;  // HDF5 refuses from 4 GiB on
+  constexpr hsize_t kGreatestBlockBytes = hsize_t{1} << 31;  // HDF5 rejects 4 GiB and more
   if (shape.empty()) return;
   const hsize_t row_bytes =
       std::accumulate(shape.begin() + 1, shape.end(), hsize_t{element_bytes}, std::multiplies<>());
@@ -101,7 +101,7 @@ void Hdf5File::write_integers(const std::string& dataset, const std::vector<hsiz
 }
 
 void Hdf5File::write_texts(const std::string& dataset, const std::vector<std::string>& values) {
-  // Of fixed length, because texts of variable length stand apart from the dataset, without checksum.
+  // Of fixed length, because HDF5 stores texts of variable length outside the dataset, without checksum.
   std::size_t size = 1;
   for (const std::string& value : values) size = std::max(size, value.size());
   std::string padded;

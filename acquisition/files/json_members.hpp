@@ -7,9 +7,8 @@
 
 namespace stageid {
 
-/// A finite number under this key of a JSON value from outside; none if it is missing, null or anything else, or
-/// the value is not an object. The one way to read figures that need not be there: what could not be computed
-/// is written as null.
+/// The finite number with this key of an external JSON value. Empty if it is missing, null or of another type, or
+/// if the value is not an object. For optional figures: stageid writes null for those that it cannot compute.
 template <class Json>
 std::optional<double> number_in(const Json& object, const char* key) {
   if (!object.is_object()) return std::nullopt;
@@ -19,7 +18,7 @@ std::optional<double> number_in(const Json& object, const char* key) {
   return std::isfinite(number) ? std::optional(number) : std::nullopt;
 }
 
-/// The same of a list of numbers; empty if there is none, or one of them is not a finite number.
+/// The same for a list of numbers; empty if it is missing or a number is not finite.
 template <class Json>
 std::vector<double> numbers_in(const Json& object, const char* key) {
   std::vector<double> numbers;
@@ -33,7 +32,7 @@ std::vector<double> numbers_in(const Json& object, const char* key) {
   return numbers;
 }
 
-/// The same of text; empty if there is none.
+/// The same for text; empty if it is missing.
 template <class Json>
 std::string text_in(const Json& object, const char* key) {
   if (!object.is_object()) return "";

@@ -11,7 +11,7 @@
 namespace stageid {
 namespace {
 
-// Suffixes that name a unit. Those that stageid uses, then those that people write instead.
+// Suffixes that denote a unit: those of stageid, then common alternatives.
 constexpr std::array kUnits = {"hz", "s",  "m",  "n",   "kg",    "rms", "khz",  "rad",
                                "ms", "us", "ns", "mm",  "um",    "nm",  "v",    "a",
                                "mn", "kn", "g",  "deg", "kg_m2", "n_s", "n_m3", "n_m"};
@@ -39,14 +39,14 @@ std::string_view stem(std::string_view key) {
   return key;
 }
 
-/// Letters in upper case that are lower case otherwise, or the reverse, are no other word.
+/// Whether two words differ only in case.
 bool equal_but_for_case(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
     return std::tolower(x) == std::tolower(y);
   });
 }
 
-/// The one word of which three letters or more are the beginning: "conv" for "convert".
+/// The only word that starts with `beginning`, of three letters or more: "conv" for "convert".
 std::string whole_word(const std::string& beginning, const std::vector<std::string>& allowed) {
   const auto begins = [&](const std::string& candidate) {
     return candidate.compare(0, beginning.size(), beginning) == 0;

@@ -20,13 +20,13 @@
 namespace stageid {
 namespace {
 
-/// Temporary files of the outputs that are being written.
+/// Temporary files of unfinished outputs.
 struct UnfinishedFiles {
   std::mutex mutex;
   std::set<std::filesystem::path> files;
 };
 
-/// Never destroyed: an interrupt may come while static objects are.
+/// Never destroyed: an interrupt may occur during the destruction of static objects.
 UnfinishedFiles& unfinished() {
   static auto* const shared = new UnfinishedFiles;
   return *shared;
@@ -60,10 +60,10 @@ std::filesystem::path directory_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
-/// The file that is to be replaced: a symbolic link stays, what it points to is replaced. Devices
-/// and directories are refused, because rename() would put a file in the place of /dev/null.
+/// The file to be replaced: the target of a symbolic link, not the link. Devices and directories are refused,
+/// because rename() would replace /dev/null by a file.
 std::filesystem::path resolve_target(const std::filesystem::path& target) {
-  // Not weakly_canonical(): it does not follow a link to a file that is yet to be made.
+  // weakly_canonical() does not follow a link to a file that does not exist yet.
   constexpr int kMaxLinks = 40;  // the kernel's own limit
   std::error_code ignored;
   std::filesystem::path resolved = target;
@@ -87,7 +87,7 @@ std::filesystem::path resolve_target(const std::filesystem::path& target) {
   return resolved;
 }
 
-/// A hidden name beside the target, so that rename() stays within one file system.
+/// A hidden name in the target's directory, so that rename() stays within one file system.
 std::filesystem::path temporary_beside(const std::filesystem::path& target) {
   static std::atomic<unsigned> count = 0;  // several outputs of one process may share a target
   return directory_of(target) / fmt::format(".{}.{}.{}.tmp", target.filename().string(), ::getpid(),
@@ -97,7 +97,7 @@ std::filesystem::path temporary_beside(const std::filesystem::path& target) {
 void synchronize(const std::filesystem::path& file, int flags, const std::filesystem::path& named) {
   const Descriptor descriptor(::open(file.c_str(), flags | O_CLOEXEC));
   if (!descriptor) fail(named, "cannot be written", errno);
-  // Some file systems cannot synchronize a directory and say EINVAL: nothing is lost by that.
+  // Some file systems cannot synchronize a directory and return EINVAL, which is harmless.
   if (::fsync(descriptor.get()) != 0 && errno != EINVAL) fail(named, "cannot be written", errno);
 }
 
@@ -123,7 +123,7 @@ std::filesystem::path shown_name(const std::filesystem::path& file) {
 
 OutputFile::OutputFile(const std::filesystem::path& target)
     : target_(resolve_target(target)), temporary_(temporary_beside(target_)) {
-  constexpr mode_t kMode = 0666;  // less the user's umask
+  constexpr mode_t kMode = 0666;  // minus the user's umask
   const std::lock_guard lock(unfinished().mutex);
   const Descriptor descriptor(
       ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
@@ -153,7 +153,7 @@ void OutputFile::commit() {
 }
 
 void remove_unfinished_files() {
-  unfinished().mutex.lock();  // for ever: nothing is begun or put in its place any more
+  unfinished().mutex.lock();  // never unlocked: no output may be begun or committed after this
   for (const std::filesystem::path& file : unfinished().files) ::unlink(file.c_str());
 }
 

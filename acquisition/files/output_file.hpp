@@ -5,12 +5,12 @@
 
 namespace stageid {
 
-/// The name of an output for messages: a temporary file is called by the one that it becomes, also where
-/// that is a temporary file itself.
+/// The name of an output for messages: for a temporary file, that of its target. It is resolved repeatedly, in
+/// case the target is a temporary file too.
 std::filesystem::path shown_name(const std::filesystem::path& file);
 
-/// An output that exists whole or not at all: write to path(), then commit() renames it onto the
-/// target (after fsync). Destroyed without commit(), it removes the temporary file.
+/// An output that is written completely or not at all. Write to path(); commit() then renames it to the target
+/// (after fsync). Without commit(), the destructor removes the temporary file.
 class OutputFile {
  public:
   /// @throws FileError if the directory does not exist or cannot be written.
@@ -30,11 +30,11 @@ class OutputFile {
   bool committed_ = false;
 };
 
-/// Removes the temporary files of all outputs that are not committed, of a process that ends now: whatever
-/// begins or commits an output afterwards waits for ever.
+/// Removes the temporary files of all outputs that are not committed, in a process that is about to end. Later
+/// calls that begin or commit an output block forever.
 void remove_unfinished_files();
 
-/// Writes `text` to `target`, whole or not at all. @throws FileError
+/// Writes `text` to `target`, completely or not at all. @throws FileError
 void write_text_file(const std::filesystem::path& target, std::string_view text);
 
 }  // namespace stageid

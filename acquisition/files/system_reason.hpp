@@ -4,11 +4,11 @@
 
 namespace stageid {
 
-/// A reason in the operating system's words and what to do about it: "No space left on device; free some
-/// space, or write elsewhere". As it is where nothing is known to do.
+/// The operating system's reason with a remedy: "No space left on device; free some space, or write
+/// elsewhere". Unchanged if no remedy is known.
 std::string with_remedy(const std::string& reason);
 
-/// The same of an errno.
+/// The same for an errno.
 std::string system_reason(int error);
 
 }  // namespace stageid

@@ -4,7 +4,7 @@
 
 namespace stageid {
 
-/// Of the program and its libraries, as "0.1.0".
+/// Version of the program and its libraries, as "0.1.0".
 std::string_view version() noexcept;
 
 }  // namespace stageid

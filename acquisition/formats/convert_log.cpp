@@ -78,7 +78,7 @@ void write_run_attributes(Hdf5File& file, const std::string& group, const LogRun
   count("marked_samples", run.health.marked);
 }
 
-/// Rows of one run, as they come from the reader, appended to growing datasets.
+/// Appends the rows of one run to growing datasets, piece by piece.
 void copy_rows_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& file,
                        const std::string& group, ConvertProgress& progress) {
   LogSamples samples;
@@ -86,7 +86,7 @@ void copy_rows_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& file,
   const std::uint64_t total = reader.runs()[run].samples;
   for (std::uint64_t first = 0; first < total; first += kPieceRows) {
     const std::uint64_t count = std::min(kPieceRows, total - first);
-    reader.read(run, first, count, samples);  // takes the lock itself if it needs to
+    reader.read(run, first, count, samples);  // takes the lock itself if necessary
     {
       const std::lock_guard lock(hdf5_mutex());
       rows = samples.actuators;
@@ -136,7 +136,7 @@ void convert_to_hdf5(const LogReader& reader, const std::filesystem::path& tempo
 
 // CSV ----------------------------------------------------------------------------------------
 
-/// A text file with a large buffer whose errors are not overlooked.
+/// A text file with a large buffer that checks for errors.
 class CsvFile {
  public:
   explicit CsvFile(const std::filesystem::path& path)
@@ -147,7 +147,7 @@ class CsvFile {
 
   void text(std::string_view text) { text_ += text; }
 
-  /// A quoted cell: names may hold commas and quotes.
+  /// A quoted cell: names may contain commas and quotes.
   void quoted(const std::string& text) {
     text_ += '"';
     for (const char c : text) {
@@ -266,7 +266,7 @@ void convert_run_to_slog(const LogReader& reader, std::size_t run, SlogWriter& w
 void convert_to_slog(const LogReader& reader, const std::filesystem::path& temporary,
                      const ConvertOptions& options) {
   ConvertProgress progress(reader, options);
-  std::filesystem::remove(temporary);  // a log is never written over
+  std::filesystem::remove(temporary);  // the writer does not overwrite a log
   SlogWriter writer = SlogWriter::create(temporary, reader.info());
   for (std::size_t run = 0; run < reader.runs().size(); ++run)
     if (progress.wanted(reader.runs()[run])) convert_run_to_slog(reader, run, writer, progress);

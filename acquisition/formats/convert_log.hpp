@@ -9,17 +9,17 @@
 namespace stageid {
 
 struct ConvertOptions {
-  bool incomplete_runs = true;  ///< false: leave runs out that were broken off
-  /// Called after every piece with rows done and rows in all; may be empty.
+  bool incomplete_runs = true;  ///< false: skip incomplete runs
+  /// Called after every piece with the converted and the total number of rows; may be empty.
   std::function<void(std::uint64_t, std::uint64_t)> progress = {};
 };
 
-/// Which runs a conversion takes, and how far it is. `reader` and `options` stay until it is done.
+/// Selects the runs of a conversion and counts its progress. `reader` and `options` must outlive it.
 class ConvertProgress {
  public:
   ConvertProgress(const LogReader& reader, const ConvertOptions& options);
   bool wanted(const LogRun& run) const noexcept;
-  /// Tells the caller that `rows` more rows of the wanted runs are done.
+  /// Reports that `rows` more rows of the selected runs are done.
   void add(std::uint64_t rows);
 
  private:
@@ -28,14 +28,14 @@ class ConvertProgress {
   std::uint64_t total_ = 0;
 };
 
-/// Writes a log of either format to `to`, by its extension: .h5 or .hdf5 (the layout of
-/// Hdf5LogReader, excitation one period, metadata and health as attributes), .csv, or of an HDF5 log
-/// .slog, whose rows know no lateness.
+/// Writes a log of either format to `to`. The extension determines the format: .h5 or .hdf5 (the layout of
+/// Hdf5LogReader, excitation one period, metadata and health as attributes), .csv, or, from an HDF5 log,
+/// .slog (without lateness of the rows).
 ///
-/// CSV: one line a sample over all runs: run, realization, experiment, time_s (from the start of
-/// the run), marked, then excitation, actuators and sensors, each column headed "name [unit]".
-/// Numbers are the shortest that read back to the same double. Memory is bounded whatever the
-/// length; `to` appears whole or not at all.
+/// CSV: one line per sample over all runs: run, realization, experiment, time_s (from the start of the run),
+/// marked, then excitation, actuators and sensors, with column headings "name [unit]". Numbers are the
+/// shortest texts of the same double. Memory is bounded for any length; `to` is written completely or
+/// not at all.
 /// @throws std::invalid_argument for another extension. @throws FileError, FormatError
 void convert_log(const LogReader& reader, const std::filesystem::path& to,
                  const ConvertOptions& options = {});

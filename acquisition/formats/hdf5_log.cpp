@@ -202,7 +202,7 @@ void Hdf5LogReader::read_columns(const Dataset& dataset, std::uint64_t first,
       const std::lock_guard lock(hdf5_mutex());
       file_->read_rows(dataset.name, first + done, count, piece.data());
     }
-    // The caller looks for values that are not finite: only then is it known which.
+    // The caller searches for non-finite values, because only it can name them.
     static_cast<void>(transpose_rows(piece.data(), columns, static_cast<std::size_t>(count),
                                      columns, out.data() + done, static_cast<std::size_t>(rows)));
   }
@@ -214,15 +214,15 @@ void Hdf5LogReader::read_columns(const Dataset& dataset, std::uint64_t first,
 
 namespace {
 
-constexpr Eigen::Index kFewestRows = 8;  // needed to find where a record goes on
+constexpr Eigen::Index kFewestRows = 8;  // needed to locate the continuation of a record
 constexpr Eigen::Index kPadding = 4;     // rows at its end, if the gap is in the last period
 
-/// Row n of a periodic signal that is `ahead` rows ahead.
+/// Row n of a periodic signal displaced by `ahead` rows.
 auto row_of(const Eigen::MatrixXd& period, Eigen::Index n, Eigen::Index ahead) {
   return period.row((n + ahead) % period.rows());
 }
 
-/// First of the leading `rows` rows, from `from` on, that is not that of the period `ahead`; `rows` if all are.
+/// First of the leading `rows` rows, from `from` on, that differs from the displaced period; `rows` if none does.
 Eigen::Index first_other(const Eigen::MatrixXd& samples, const Eigen::MatrixXd& period,
                          Eigen::Index ahead, double tolerance, Eigen::Index from,
                          Eigen::Index rows) {
@@ -233,8 +233,8 @@ Eigen::Index first_other(const Eigen::MatrixXd& samples, const Eigen::MatrixXd& 
   return from;
 }
 
-/// A recorder that lost rows, of all its signals, goes on further ahead in the period.
-/// @returns how far, if all rows from `gap` to `rows` are those of one displaced period; else `ahead`
+/// If a recorder loses rows of all its signals, the record continues further ahead in the period.
+/// @returns the displacement, if all rows from `gap` to `rows` fit one displaced period; otherwise `ahead`
 Eigen::Index ahead_after_gap(const Eigen::MatrixXd& samples, const Eigen::MatrixXd& period,
                              Eigen::Index ahead, double tolerance, Eigen::Index gap,
                              Eigen::Index rows) {
@@ -257,7 +257,7 @@ Eigen::MatrixXd Hdf5LogReader::excitation(std::size_t run) const {
   if (!period.allFinite()) {
     throw FormatError(path_, dataset.name, "contains a non-finite value");
   }
-  // A run that was broken off has ramped its excitation down: nothing is to be expected of it.
+  // The excitation of an incomplete run was ramped down, so it need not be periodic.
   if (dataset.rows > static_cast<std::uint64_t>(info_.period_samples) && which.complete) {
     check_repetition(which, dataset, period);
   }
@@ -266,7 +266,7 @@ Eigen::MatrixXd Hdf5LogReader::excitation(std::size_t run) const {
 
 void Hdf5LogReader::check_repetition(const LogRun& run, const Dataset& dataset,
                                      const Eigen::MatrixXd& period) const {
-  constexpr double kTolerance = 1e-9;  // of the peak: the rounding of a writer, not a drift
+  constexpr double kTolerance = 1e-9;  // of the peak: rounding of the writer, not drift
   const auto rows = static_cast<std::uint64_t>(period.rows());
   if (dataset.rows % rows != 0) {
     throw FormatError(path_, dataset.name,
@@ -280,7 +280,7 @@ void Hdf5LogReader::check_repetition(const LogRun& run, const Dataset& dataset,
   Eigen::MatrixXd later(period.rows(), period.cols());
   for (std::uint64_t first = rows; first < dataset.rows; first += rows) {
     read_columns(dataset, first, later);
-    // Rows that fill the place of lost ones at the end of a record have no meaning.
+    // The last rows may be padding for lost ones.
     const bool last = first + rows == dataset.rows;
     const Eigen::Index count =
         last && ahead < period.rows() / 2 ? period.rows() - ahead : period.rows();

@@ -12,10 +12,10 @@
 
 namespace stageid {
 
-/// Debian's HDF5 is not thread-safe: the log reader and writer hold this while they call it.
+/// Debian's HDF5 is not thread-safe: log reader and writer hold this mutex while they call it.
 std::mutex& hdf5_mutex() noexcept;
 
-/// Reads logs of the layout that foreign programs write (docs/formats.md), `convert_log` too:
+/// Reads logs of the layout in docs/formats.md, written by other programs or convert_log():
 ///
 ///   /                attributes: format = "stageid-log", format_version = 1, sample_rate_hz,
 ///                    period_samples, transient_periods
@@ -26,9 +26,9 @@ std::mutex& hdf5_mutex() noexcept;
 ///       sensors      [S x n_y]       S = (transient_periods + periods) period_samples
 ///       marked       [S], optional: nonzero = do not use
 ///
-/// Numbers are float64, float32 or integers; a value is  scale * stored + offset  with the optional
-/// attributes scale and offset of its dataset, one number or one a column.
-/// Runs are in the order of their names. A run with complete = 0 may have any length.
+/// Numbers are float64, float32 or integers. A value is  scale * stored + offset  with the optional attributes
+/// scale and offset of its dataset, one number or one per column.
+/// Runs are ordered by name. A run with complete = 0 may have any length.
 class Hdf5LogReader final : public LogReader {
  public:
   /// Checks attributes, shapes and run lengths; values are checked when they are read.
@@ -44,7 +44,7 @@ class Hdf5LogReader final : public LogReader {
             LogSamples& out) const override;
 
  private:
-  /// value = scale * stored + offset, one pair a column; both empty: as stored.
+  /// value = scale * stored + offset, one pair per column; both empty: as stored.
   struct Scaling {
     std::vector<double> scale;
     std::vector<double> offset;
@@ -58,7 +58,7 @@ class Hdf5LogReader final : public LogReader {
     Dataset excitation;
     Dataset actuators;
     Dataset sensors;
-    std::string marked;  ///< empty: nothing is marked
+    std::string marked;  ///< empty: no sample is marked
   };
 
   void read_channels();
@@ -74,7 +74,7 @@ class Hdf5LogReader final : public LogReader {
                                       const LogSamples& samples) const;
 
   std::filesystem::path path_;
-  std::optional<Hdf5File> file_;  ///< optional, so that it is closed under the lock
+  std::optional<Hdf5File> file_;  ///< optional, so that it can be closed under the lock
   LogInfo info_;
   std::vector<LogRun> runs_;
   std::vector<Run> places_;

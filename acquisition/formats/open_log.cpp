@@ -27,7 +27,7 @@ std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool dama
   }
   if (magic == kSlogMagic) return std::make_unique<SlogReader>(file, damaged_is_error);
   if (magic == kHdf5Magic) return std::make_unique<Hdf5LogReader>(file);
-  // With its first block damaged a native log still has others.
+  // A native log whose first block is damaged may have intact blocks.
   if (!damaged_is_error) return std::make_unique<SlogReader>(file, false);
   if (const std::string other = other_kind(file, "a log"); !other.empty())
     throw FormatError(file, "", other);

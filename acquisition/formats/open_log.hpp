@@ -7,10 +7,10 @@
 
 namespace stageid {
 
-/// Opens a native log or an HDF5 one, told apart by their first bytes.
+/// Opens a native or an HDF5 log, depending on its first bytes.
 ///
-/// A native log that was cut short or is damaged is a FormatError that names the remedy
-/// ("stageid log recover"), unless `damaged_is_error` is false: then what is intact is given.
+/// A truncated or damaged native log is a FormatError that names the remedy ("stageid log recover"). If
+/// `damaged_is_error` is false, the intact part is opened instead.
 /// @throws FileError, FormatError
 std::unique_ptr<LogReader> open_log(const std::filesystem::path& file,
                                     bool damaged_is_error = true);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint64_t kVerifiedRows = 16384;
 
-/// Reads all rows: what cannot be read is damage.
+/// Reads all rows; unreadable rows are damage.
 void check_values(const LogReader& reader, VerifyReport& report) {
   LogSamples samples;
   for (std::size_t run = 0; run < reader.runs().size(); ++run) {

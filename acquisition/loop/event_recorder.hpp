@@ -9,9 +9,9 @@
 
 namespace stageid {
 
-/// Writes the events that the rows of a run tell: its begin and end, and every stretch of cycles
-/// that did not go well ("miss"). After kMissesTold stretches of one run only their number is kept,
-/// for the end of the run: a stage that fails all the time must not fill the disk with words.
+/// Writes events derived from the rows of a run: begin, end, and every sequence of bad cycles ("miss"). After
+/// kMissesTold sequences of one run, only their number is written at the end of the run, so that a failing stage
+/// cannot fill the disk.
 class EventRecorder final : public RunObserver {
  public:
   static constexpr std::uint64_t kMissesTold = 200;

@@ -13,7 +13,7 @@ namespace stageid {
 namespace {
 
 constexpr std::size_t kBlockRows = 2048;
-constexpr std::int64_t kLongestDelay_ns = 500'000'000;  // rows wait no longer than this for others
+constexpr std::int64_t kLongestDelay_ns = 500'000'000;  // until a partial block is written
 constexpr std::int64_t kSynchronizeEvery_ns = 1'000'000'000;
 constexpr std::chrono::microseconds kPause{500};
 
@@ -63,14 +63,14 @@ std::string LogThread::error() const {
 }
 
 void LogThread::run() noexcept {
-  // The loop's caller may have real-time priority: writing to a disk must not inherit it.
+  // A real-time priority of the loop's caller must not be inherited for writing to a disk.
   const sched_param normal{};
   static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
   while (true) {
     bool stop = false;
     {
       const std::lock_guard lock(mutex_);
-      stop = stop_;  // read first: what was queued before it is then still found
+      stop = stop_;  // read first, so that everything queued before it is still written
     }
     if (work()) continue;
     {
@@ -82,7 +82,7 @@ void LogThread::run() noexcept {
   }
 }
 
-/// Writes one block or executes one command; false if there is nothing to do now.
+/// Writes one block or executes one command. @returns false if there is nothing to do
 bool LogThread::work() {
   std::optional<Command> next;
   std::uint64_t limit = ring_.pushed();

@@ -18,12 +18,12 @@
 
 namespace stageid {
 
-/// The thread that empties the ring into the log, so that the loop never waits for a disk.
+/// The thread that writes the ring to the log, so that the loop never waits for a disk.
 ///
-/// Starts and ends of runs are queued with the row at which they belong: the loop may go on with
-/// the next run while the last one is still being written. The log is synchronized once a second
-/// and behind every run. When the log fails, rows are thrown away from then on and failed() is
-/// true. Observers are told of everything behind the log, of a log that has failed too.
+/// Starts and ends of runs are queued with their row, so that the loop may begin the next run while the last one
+/// is still being written. The log is synchronized once per second and after every run. If the log fails,
+/// later rows are discarded and failed() is true. Observers receive everything after the log, even if the
+/// log has failed.
 class LogThread {
  public:
   LogThread(RunWriter& log, SampleRing& ring, std::vector<RunObserver*> observers = {});
@@ -40,16 +40,16 @@ class LogThread {
   void drain();
 
   bool failed() const noexcept { return failed_.load(std::memory_order_relaxed); }
-  /// Complete runs that are in the log wholly.
+  /// Number of runs that are completely in the log.
   int complete_runs() const noexcept { return complete_runs_.load(std::memory_order_relaxed); }
-  /// What went wrong, after failed().
+  /// Error message after failed().
   std::string error() const;
 
  private:
   struct Command {
-    std::uint64_t at_row = 0;  ///< rows pushed before it
+    std::uint64_t at_row = 0;  ///< number of rows pushed before it
     LogRun run;
-    std::optional<Eigen::MatrixXd> excitation;  ///< of a start; an end has none
+    std::optional<Eigen::MatrixXd> excitation;  ///< only for the start of a run
   };
 
   void queue(Command command);
@@ -63,7 +63,7 @@ class LogThread {
   RunWriter& log_;
   SampleRing& ring_;
   std::vector<RunObserver*> observers_;
-  mutable std::mutex mutex_;  // of the four below
+  mutable std::mutex mutex_;  // guards the four members below
   std::condition_variable written_;
   std::deque<Command> commands_;
   std::string error_;
@@ -72,7 +72,7 @@ class LogThread {
   std::atomic<int> complete_runs_ = 0;
   std::int64_t last_write_ns_ = 0;
   std::int64_t last_synchronize_ns_ = 0;
-  std::thread thread_;  // last: it uses all the others
+  std::thread thread_;  // last: it uses all other members
 };
 
 }  // namespace stageid

@@ -7,20 +7,20 @@
 
 namespace stageid {
 
-/// Something that happened inside a run, to be told by another thread.
+/// An event inside a run, reported by another thread.
 struct LoopEvent {
   enum class Kind : std::uint8_t {
-    state,  ///< the stage is in another state; code: NodeState
-    stop    ///< the run is being stopped before its time; code: StopReason
+    state,  ///< the state of the stage has changed; code: NodeState
+    stop    ///< the run is stopped early; code: StopReason
   };
-  int run = 0;              ///< runs started before it by this loop
+  int run = 0;              ///< number of runs that this loop started before
   std::uint64_t cycle = 0;  ///< of the run
   Kind kind = Kind::state;
   std::uint8_t code = 0;
 };
 
-/// From the loop to one other thread, without locks. What does not fit is dropped and counted: the
-/// loop waits for nobody.
+/// Lock-free queue from the loop to one other thread. If it is full, events are dropped and counted, because
+/// the loop must not wait.
 class LoopEvents {
  public:
   void push(const LoopEvent& event) noexcept {

@@ -14,9 +14,9 @@ namespace stageid {
 
 namespace {
 
-constexpr int kBadCycle = 2;  // what a bad cycle adds to the bucket; a good one takes 1
+constexpr int kBadCycle = 2;  // added to the bucket by a bad cycle; a good one subtracts 1
 
-/// 0 times a finite number is 0, of any other NaN: one pass without branches.
+/// 0 times a finite number is 0, otherwise NaN: one pass without branches.
 bool all_finite(const std::vector<double>& values) noexcept {
   double sum = 0.0;
   for (const double value : values) sum += 0.0 * value;
@@ -155,7 +155,7 @@ LoopStatus MeasurementLoop::step() noexcept {
   if (!inputs_.applied.empty()) [[unlikely]]
     std::copy(inputs_.applied.begin(), inputs_.applied.end(), row);
   if (recording()) {
-    // u[n] may not have been applied as it stands here: then this sample is no good either.
+    // If u[n] may not have been applied as recorded, this sample is marked too.
     SampleStatus stored = status;
     stored.marked |= odd_command || !gives_measurement(outcome) || phase_ != Phase::measuring;
     row[ring_.row_words() - 1] = std::bit_cast<double>(pack_status(stored));
@@ -167,7 +167,7 @@ LoopStatus MeasurementLoop::step() noexcept {
   return advance();
 }
 
-/// A stage that does not tell when it began to wait counts as having waited from the start.
+/// If the stage does not report when its wait began, the whole exchange counts as waiting.
 void MeasurementLoop::time_cycle(std::int64_t computed_ns, Outcome outcome) noexcept {
   const std::int64_t ready_ns = std::max(computed_ns, inputs_.t_ready_ns);
   if (recording()) {
@@ -196,8 +196,8 @@ void MeasurementLoop::compute_command() noexcept {
   if (++phase_sample_ == period_samples_) phase_sample_ = 0;
 }
 
-/// Writes u[n] and y[n]. A command that is not a number goes to the stage as it is, which refuses
-/// it, but not into the log, which holds numbers only; true then.
+/// Writes u[n] and y[n]. A command that is not finite is passed to the stage, which refuses it, but the log must
+/// contain finite numbers only. @returns true for such a command
 bool MeasurementLoop::write_row(double* row) noexcept {
   const bool finite = all_finite(u_);
   if (finite) [[likely]] {
@@ -239,7 +239,7 @@ void MeasurementLoop::take_measurement(Outcome outcome) noexcept {
   health_.missing += recording() ? 1U : 0U;
   if (ends_at_once(outcome)) {
     last_trouble_ = outcome;
-    // A link that ends in the unrecorded ramp of a good run, as a replay does, has spoilt nothing.
+    // A replay ends with link_down in the unrecorded ramp of a good run; this is not a fault.
     if (phase_ == Phase::landing && reason_ == StopReason::none && outcome != Outcome::link_down) {
       reason_ = StopReason::fault;
       tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason_));
@@ -263,7 +263,7 @@ void MeasurementLoop::count_bad_cycle(Outcome outcome) noexcept {
   if (phase_ == Phase::measuring) {
     request_stop(StopReason::misses);
   } else {
-    end(StopReason::misses);  // the stage does not answer in the ramp either
+    end(StopReason::misses);  // the stage does not answer during the ramp either
   }
 }
 
@@ -274,7 +274,7 @@ void MeasurementLoop::request_stop(StopReason reason) noexcept {
   if (phase_ != Phase::measuring) return;
   reason_ = reason;
   tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason));
-  bucket_ = 0;  // a fresh allowance for the ramp
+  bucket_ = 0;  // new budget for the ramp
   ramp_left_ = ramp_samples_;
   phase_ = reason == StopReason::log ? Phase::landing : Phase::stopping;
 }

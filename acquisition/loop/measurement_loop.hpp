@@ -15,42 +15,41 @@
 namespace stageid {
 
 struct LoopOptions {
-  double ramp_s = 0.1;      ///< the excitation goes to zero over this before the stage is stopped
-  int misses_allowed = 10;  ///< leaky bucket: +2 a bad cycle, -1 a good one, above: stop
+  double ramp_s = 0.1;      ///< ramp of the excitation to zero before the stage is stopped
+  int misses_allowed = 10;  ///< leaky bucket: +2 per bad cycle, -1 per good one; above this: stop
 };
 
-/// What is added to the actuators, and for how long.
+/// Signals that are added to the actuators, and their duration.
 struct LoopExcitation {
   Eigen::MatrixXd period;      ///< one period, samples x columns
   std::vector<int> actuators;  ///< index of the actuator of each column
-  std::uint64_t samples = 0;   ///< to be measured in all
+  std::uint64_t samples = 0;   ///< total number to measure
 };
 
 enum class LoopStatus : std::uint8_t {
   running,
-  ring_full,  ///< nothing was done; call again once the log thread has made room
-  ended       ///< look at reason(); the stage is stopped
+  ring_full,  ///< nothing was done; call again after the log thread has freed a row
+  ended       ///< the stage is stopped; see reason()
 };
 
-/// Why a run ended before its time.
+/// Why a run ended early.
 enum class StopReason : std::uint8_t { none, limit, fault, misses, interrupt, log, plant };
 const char* to_string(StopReason reason) noexcept;
 
 /// One closed-loop run, cycle by cycle:  u[n] = C(y[n]) + g r[n],  exchange(u[n]) -> y[n+1].
 ///
-/// Every cycle pushes one row, u[n], y[n], status (slog_format.hpp), into the ring. The status'
-/// outcome is that of the exchange that gave y[n]; the row is marked if that was not `ok`, if the
-/// exchange of u[n] did not go well (it may not have been applied), or in the ramp of a controlled
-/// stop. Sensors that are missing or not finite keep their last value, marked.
+/// Every cycle pushes one row, u[n], y[n], status (slog_format.hpp), into the ring. The outcome in the status is
+/// that of the exchange that returned y[n]. The row is marked if that was not `ok`, if the exchange of u[n]
+/// failed (it may not have been applied), or in the ramp of a controlled stop. Sensors that are missing or not
+/// finite keep their last value, marked.
 ///
-/// g is 1. A run that has all its samples, and one that is stopped (a limit, too many misses, a
-/// request) go on in closed loop while g falls linearly to 0 over ramp_s; only then is the stage
-/// stopped. At the end of a good run the ramp is not recorded, so that a log has whole periods; in
-/// a stop it is, marked. A fault, bus-off or lost link ends the run at once: there is nothing to
-/// control. So does a stage that has opened the loop (LimitedStage), once it has braked. A row holds
-/// the u that was applied, also where that was not the u asked for.
+/// g is 1. After its last sample, or after a stop (a limit, too many misses, a request), a run continues in
+/// closed loop while g falls linearly to 0 over ramp_s; then the stage is stopped. The ramp of a good run is not
+/// recorded, so that a log has whole periods; that of a stop is recorded, marked. A fault, bus-off or lost
+/// link ends the run at once, because control is impossible. So does a stage that has opened the loop
+/// (LimitedStage), once it has braked. A row contains the applied u, even if it differs from the command.
 ///
-/// Bucket: late cycles count as bad too (their samples are valid, but the loop's phase is not).
+/// Bucket: late cycles count as bad (their samples are valid, but the phase of the loop is wrong).
 class MeasurementLoop {
  public:
   /// All memory is allocated here and in start(). References are kept.
@@ -63,24 +62,24 @@ class MeasurementLoop {
   /// on sizes, an actuator that does not exist, or an excitation that is not finite.
   void start(std::uint64_t run_seed, const LoopExcitation& excitation);
 
-  /// One cycle. Does not allocate, lock, log or throw; no system call but the exchange's. Against a
-  /// wall clock it reads the time twice, for timing().
+  /// One cycle. Does not allocate, lock, log or throw. There is no system call other than the exchange's; on a
+  /// wall clock it reads the time twice for timing().
   [[nodiscard]] LoopStatus step() noexcept;
 
-  /// Begins a controlled stop; a second one is ignored, and so is any but a limit when all samples
-  /// are recorded. From the thread that calls step().
+  /// Begins a controlled stop; a second one is ignored. After the last sample, only a limit is accepted. Call it
+  /// from the thread that calls step().
   void request_stop(StopReason reason) noexcept;
 
   StopReason reason() const noexcept { return reason_; }
-  /// True once all samples are recorded (a limit or a fault may still end the ramp behind them).
+  /// True once all samples are recorded (a limit or a fault may still end the following ramp).
   bool complete() const noexcept { return complete_; }
-  /// The outcome that ended or first troubled the run.
+  /// The last bad outcome of the run, which may have ended it.
   Outcome last_trouble() const noexcept { return last_trouble_; }
-  /// Of the current run; `seconds` is left to the caller.
+  /// Of the current run; the caller sets `seconds`.
   const RunHealth& health() const noexcept { return health_; }
   /// Of the current run; empty in virtual time.
   const RunTiming& timing() const noexcept { return timing_; }
-  /// Changes of state and stops of all runs so far; pop() is for one other thread.
+  /// State changes and stops of all runs so far; only one other thread may call pop().
   LoopEvents& events() noexcept { return events_; }
 
  private:
@@ -108,9 +107,9 @@ class MeasurementLoop {
 
   std::vector<double> u_;
   std::vector<double> y_;
-  std::vector<double> fresh_;          // y[n+1] as the stage gives it
-  std::vector<double> last_finite_u_;  // logged where a command is not a number
-  std::vector<double> excitation_;     // sample by sample, only the columns that are not zero
+  std::vector<double> fresh_;          // y[n+1] as returned by the stage
+  std::vector<double> last_finite_u_;  // logged if a command is not finite
+  std::vector<double> excitation_;     // sample by sample, without columns of zeros
   std::vector<std::size_t> excited_;   // their actuators
   std::vector<double> landing_row_;
   Inputs inputs_;
@@ -129,7 +128,7 @@ class MeasurementLoop {
   Outcome last_trouble_ = Outcome::ok;
   RunHealth health_;
   RunTiming timing_;
-  std::int64_t awake_ns_ = 0;  // when the loop got hold of y_
+  std::int64_t awake_ns_ = 0;  // time at which the loop received y_
   NodeState node_state_ = NodeState::not_ready;
   int run_ = -1;
   LoopEvents events_;

@@ -28,7 +28,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kProgressEvery{200};
 constexpr std::size_t kVirtualRingRows = std::size_t{1} << 16;
-constexpr double kWallRingSeconds = 8.0;  // a disk may stall for so long
+constexpr double kWallRingSeconds = 8.0;  // longest tolerated stall of the disk
 constexpr double kPublishEvery_s = 0.1;
 constexpr double kMostUnpublished = 1024.0;  // cycles
 
@@ -47,7 +47,7 @@ std::uint64_t mix(std::uint64_t z) noexcept {
   return z ^ (z >> 31);
 }
 
-/// One experiment while it is performed.
+/// One experiment in progress.
 class Experiment {
  public:
   Experiment(const ExperimentPlan& plan, LimitedStage& stage, MotionController& controller,
@@ -63,7 +63,7 @@ class Experiment {
         actuators_(excited_actuators(plan.spec(), stage.info())),
         runs_(plan.runs_without(options.skip)) {}
 
-  /// Lets the loop's thread do the work and reports progress meanwhile.
+  /// Runs the loop in its thread and reports progress in this one.
   ExperimentResult perform() {
     std::thread loop([this] {
       try {
@@ -93,7 +93,7 @@ class Experiment {
   }
 
  private:
-  /// Why the stage was stopped counts for more than that its log has failed too.
+  /// The reason for stopping the stage has priority over a failure of the log.
   void take_log_failure() {
     const bool stage_ended_it =
         result_.end == ExperimentEnd::limit || result_.end == ExperimentEnd::fault;
@@ -113,7 +113,7 @@ class Experiment {
     return all;
   }
 
-  /// Passes on what the loop has left behind. By the reporting thread.
+  /// Forwards the loop's events. Called by the reporting thread.
   void tell_events() {
     while (const std::optional<LoopEvent> event = loop_.events().pop()) {
       if (event->kind == LoopEvent::Kind::state) node_state_ = static_cast<NodeState>(event->code);
@@ -159,7 +159,7 @@ class Experiment {
         const StopReason reason = perform_run(run);
         if (reason == StopReason::none) continue;
         finish(reason);
-      } catch (const StageError& error) {  // it does not start
+      } catch (const StageError& error) {  // the run does not start
         if (interrupted()) {
           finish(StopReason::interrupt);
           break;
@@ -310,7 +310,7 @@ class Experiment {
   ExperimentResult result_;
   std::exception_ptr failure_;
   SharedProgress progress_;
-  NodeState node_state_ = NodeState::not_ready;  // the reporting thread's
+  NodeState node_state_ = NodeState::not_ready;  // written by the reporting thread
   std::atomic<bool> abandoned_ = false;
   std::mutex mutex_;
   std::condition_variable changed_;

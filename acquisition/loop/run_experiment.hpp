@@ -16,7 +16,7 @@
 
 namespace stageid {
 
-/// How far an experiment is. Runs that are skipped count in none of these.
+/// Progress of an experiment, without skipped runs.
 struct ExperimentProgress {
   RunId run;
   int runs_done = 0;
@@ -25,26 +25,26 @@ struct ExperimentProgress {
   double seconds_total = 0.0;
   RunHealth health;                             ///< of the current run
   RunTiming timing;                             ///< of the current run; empty in virtual time
-  NodeState node_state = NodeState::not_ready;  ///< the newest that the stage told
+  NodeState node_state = NodeState::not_ready;  ///< the last reported state
 };
 
 struct RunExperimentOptions {
   std::vector<RunId> skip = {};  ///< complete in the log already (--resume)
-  /// Set by a signal handler: controlled stop, log kept.
+  /// Set by a signal handler: controlled stop, the log is kept.
   const std::atomic<bool>* interrupt = nullptr;
-  /// Set when something around the stage does not hold any more: controlled stop, `fault`.
+  /// Set when a condition of the plant is violated: controlled stop, `fault`.
   const std::atomic<bool>* plant_tripped = nullptr;
-  std::function<std::string()> plant_reason = {};  ///< why; asked once the stage is stopped
-  /// Asked between realizations, with all that was measured in the log, while the stage stands: why it
-  /// is enough, or nothing. With a reason the experiment ends as complete.
+  std::function<std::string()> plant_reason = {};  ///< called after the stage is stopped
+  /// Called between realizations, with all data in the log and the stage at a standstill. A nonempty reason ends
+  /// the experiment as complete.
   std::function<std::string()> enough = {};
-  double ramp_s = 0.1;             ///< excitation is ramped to zero over this before stopping
-  int misses_allowed = 10;         ///< leaky bucket: +2 a bad cycle, -1 a good one, above: stop
-  RealTimeOptions real_time = {};  ///< of the loop's thread, where the clock is the wall's
-  EventLog* events = nullptr;      ///< told of runs, misses, states, limits and stops
-  std::vector<RunObserver*> observers = {};  ///< told of every row, by the log's thread
-  /// From the calling thread, a few times a second and once at the end. If it throws, the experiment
-  /// ends in a controlled stop and the exception goes on.
+  double ramp_s = 0.1;      ///< duration of the ramp of the excitation to zero before stopping
+  int misses_allowed = 10;  ///< leaky bucket: +2 per bad cycle, -1 per good one; above this: stop
+  RealTimeOptions real_time = {};            ///< of the loop's thread; ignored in virtual time
+  EventLog* events = nullptr;                ///< receives runs, misses, states, limits and stops
+  std::vector<RunObserver*> observers = {};  ///< receive every row, in the log's thread
+  /// Called from the calling thread a few times per second and once at the end. An exception ends the experiment
+  /// in a controlled stop and is rethrown.
   std::function<void(const ExperimentProgress&)> progress = {};
 
   bool interrupted() const noexcept;
@@ -59,12 +59,11 @@ struct ExperimentResult {
   std::string message = "run_experiment was not called";
   RunHealth health;   ///< over all runs
   RunTiming timing;   ///< over all runs
-  int runs_done = 0;  ///< complete ones, without those skipped
+  int runs_done = 0;  ///< number of complete runs, without skipped ones
 };
 
-/// What a log of this plan on this stage says about itself. Its excitation channels are the plan's
-/// axes, in the plan's order. @throws std::invalid_argument if the stage lacks an axis or has
-/// another rate.
+/// Description of a log of this plan on this stage. Its excitation channels are the plan's axes, in the plan's
+/// order. @throws std::invalid_argument if the stage lacks an axis or has another rate.
 LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
                             std::string metadata_json = "{}");
 
@@ -73,16 +72,16 @@ LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
 /// Source: Steele, Lea and Flood, Fast splittable pseudorandom number generators (2014).
 std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept;
 
-/// Performs every run of the plan on the stage: u = r + C(y), every sample logged.
+/// Performs every run of the plan on the stage: u = r + C(y), every sample is logged.
 ///
-/// A thread of its own is the loop, another empties the ring into the log; the calling thread
-/// reports. In virtual time the loop waits for the log, against the wall clock a full ring ends the experiment
-/// (log_failed). A limit, a fault, too many misses, the plant or an interrupt ends the current run in a
-/// controlled stop: the excitation is ramped down in closed loop, the stage stopped, the run logged
-/// as incomplete. Every run starts from standstill with the seed of (plan seed, realization,
-/// experiment), so that a repeated or resumed run is the same run.
-/// A run that cannot be started ends it with a fault too. @throws StageError if real time is required
-/// and not to be had.
+/// One thread runs the loop, another writes the ring to the log, and the calling thread reports. In virtual time
+/// the loop waits for the log; on the wall clock, a full ring ends the experiment (log_failed).
+///
+/// A limit, a fault, too many misses, the plant or an interrupt ends the current run in a controlled stop: the
+/// excitation is ramped down in closed loop, the stage is stopped, and the run is logged as incomplete. A run that
+/// does not start also ends the experiment with a fault. Every run starts from standstill with the seed of
+/// (plan seed, realization, experiment), so that a repeated or resumed run is identical.
+/// @throws StageError if real time is required but unavailable.
 /// @throws std::invalid_argument if plan, stage, controller and log do not fit.
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
                                 MotionController& controller, RunWriter& log,

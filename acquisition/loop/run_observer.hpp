@@ -6,8 +6,8 @@
 
 namespace stageid {
 
-/// Looks on while a log is written: told by the log's thread, behind the log itself. What it does
-/// takes time from the disk, never from the loop; it must not wait for anybody.
+/// Observes the writing of a log. It is called by the log's thread, after the log itself, so it delays the
+/// disk but never the loop; it must not block.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kPollEvery{20};
 
-/// Puts downloaded rows into the log as they come.
+/// Writes downloaded rows to the log as they arrive.
 class LogSink final : public TraceSink {
  public:
   LogSink(RunWriter& log, std::size_t columns) : log_(log), columns_(columns) {}
@@ -152,7 +152,7 @@ class ResidentExperiment {
   }
 
   void end_with(ExperimentEnd end, std::string message) {
-    if (result_.end != ExperimentEnd::complete) return;  // the first reason counts
+    if (result_.end != ExperimentEnd::complete) return;  // the first reason is kept
     result_.end = end;
     result_.message = std::move(message);
   }

@@ -7,11 +7,11 @@
 
 namespace stageid {
 
-/// Performs every run of the plan on a stage that closes the loop by itself: upload, arm, wait,
-/// download, log. The log is the one run_experiment() writes: rows of u, y and status.
+/// Performs every run of the plan on a stage that closes the loop by itself: upload, arm, wait, download, log.
+/// The log is the same as that of run_experiment(): rows of u, y and status.
 ///
-/// A run that the stage ends before its time is logged as far as it was recorded, incomplete, and
-/// ends the experiment. So does a stage that is lost on the way.
+/// If the stage ends a run early, the recorded part is logged as incomplete, and the experiment ends. The loss
+/// of the stage ends the experiment too.
 /// @throws std::invalid_argument if the log was made for another plan or stage, or a run is longer
 /// than the stage can record.
 ExperimentResult run_resident_experiment(const ExperimentPlan& plan, ResidentStage& stage,

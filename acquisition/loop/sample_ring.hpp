@@ -11,11 +11,11 @@
 
 namespace stageid {
 
-/// A ring of rows of fixed size between one producer (the loop) and one consumer (the log thread),
-/// without locks. All memory is allocated and touched by the constructor.
+/// A lock-free ring of rows of fixed size between one producer (the loop) and one consumer (the log thread).
+/// The constructor allocates and touches all memory.
 ///
-/// Each side keeps a copy of the other's counter and reads the shared one only when the copy says
-/// full or empty, so that the cache line travels between the cores once a batch, not once a row.
+/// Each side keeps a copy of the other's counter and reads the shared one only if the copy indicates full or
+/// empty. The cache line therefore moves between cores once per batch instead of once per row.
 class SampleRing {
  public:
   /// `capacity_rows` is rounded up to a power of two.
@@ -43,7 +43,7 @@ class SampleRing {
     return words_.data() + (pushed & (capacity_ - 1)) * row_words_;
   }
 
-  /// Hands the reserved row to the consumer.
+  /// Passes the reserved row to the consumer.
   void commit() noexcept {
     pushed_.store(pushed_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
   }
@@ -53,8 +53,8 @@ class SampleRing {
 
   // Consumer -------------------------------------------------------------------------------
 
-  /// Up to `rows` of the oldest rows, contiguous in memory, valid until pop(). They may be fewer
-  /// than there are where the ring wraps around.
+  /// Up to `rows` of the oldest rows, contiguous in memory, valid until pop(). Fewer are returned where the ring
+  /// wraps around.
   std::span<const double> front(std::size_t rows) noexcept {
     const std::uint64_t popped = popped_.load(std::memory_order_relaxed);
     if (pushed_seen_ - popped < rows) pushed_seen_ = pushed_.load(std::memory_order_acquire);
@@ -64,7 +64,7 @@ class SampleRing {
     return {words_.data() + first * row_words_, count * row_words_};
   }
 
-  /// Gives `rows` of the oldest rows back to the producer.
+  /// Returns `rows` of the oldest rows to the producer.
   void pop(std::size_t rows) noexcept {
     popped_.store(popped_.load(std::memory_order_relaxed) + rows, std::memory_order_release);
   }
@@ -79,9 +79,9 @@ class SampleRing {
   std::size_t capacity_;
   std::vector<double> words_;
   alignas(kCacheLine) std::atomic<std::uint64_t> pushed_ = 0;
-  std::uint64_t popped_seen_ = 0;  // the producer's
+  std::uint64_t popped_seen_ = 0;  // the producer's copy
   alignas(kCacheLine) std::atomic<std::uint64_t> popped_ = 0;
-  std::uint64_t pushed_seen_ = 0;  // the consumer's
+  std::uint64_t pushed_seen_ = 0;  // the consumer's copy
 };
 
 }  // namespace stageid

@@ -9,11 +9,11 @@
 
 namespace stageid {
 
-/// Counts of the current run, from the loop to the thread that reports progress, by relaxed atomics
-/// alone. Every number is right by itself; they may be some cycles apart from each other.
+/// Counts of the current run, shared by the loop with the reporting thread through relaxed atomics. Each number is
+/// exact, but they may be some cycles apart.
 class SharedProgress {
  public:
-  /// Of a run against the wall clock the timing too; of one in virtual time there is none.
+  /// Publishes the timing too for a run on the wall clock.
   void publish(const RunHealth& health, const RunTiming& timing, bool wall) noexcept {
     store(0, health.cycles);
     store(1, health.late);

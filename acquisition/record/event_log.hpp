@@ -12,29 +12,29 @@
 
 namespace stageid {
 
-/// One number, word or truth of an event.
+/// A number, text or boolean of an event.
 struct EventField {
   std::string name;
   std::variant<std::int64_t, double, bool, std::string> value;
 };
 
-/// The events of an experiment as JSON lines beside its log (docs/formats.md): one object a line,
+/// The events of an experiment as JSON lines beside its log (docs/formats.md), one object per line:
 ///   {"time_utc": "...", "event": "miss", ...}.
-/// A line is written whole and at once, so that what happened before a crash can be read. May be
-/// called from any thread but the loop's. A disk that fails does not stop the experiment: the first
-/// failure is kept in error(), and no more is written.
+/// Lines are written immediately and completely, so that the events before a crash can be read. Any thread
+/// except the loop's may call it. A failing disk does not stop the experiment: the first failure is kept in
+/// error(), and writing stops.
 class EventLog {
  public:
-  /// Continues `file` or makes it. @throws FileError if it cannot be opened.
+  /// Continues or creates `file`. @throws FileError if it cannot be opened.
   explicit EventLog(const std::filesystem::path& file);
   EventLog(const EventLog&) = delete;
   EventLog& operator=(const EventLog&) = delete;
 
   void write(std::string_view event, const std::vector<EventField>& fields = {}) noexcept;
 
-  /// The newest lines, oldest first, `most` of them at most (and 100).
+  /// The newest lines, oldest first; at most `most`, and at most 100.
   std::vector<std::string> latest(std::size_t most) const;
-  /// Why nothing is written any more; empty if all is well.
+  /// Why writing has stopped; empty if it has not.
   std::string error() const;
 
  private:
@@ -44,7 +44,7 @@ class EventLog {
   void append(std::string line);
 
   std::filesystem::path path_;
-  mutable std::mutex mutex_;  // of all below
+  mutable std::mutex mutex_;  // guards all members below
   std::unique_ptr<std::FILE, Closer> file_;
   std::vector<std::string> latest_;
   std::string error_;

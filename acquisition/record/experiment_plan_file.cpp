@@ -1,14 +1,14 @@
-// excitation.h5, an HDF5 file from which any program can play the experiment:
+// excitation.h5, an HDF5 file with which any program can play the experiment:
 //
 //   /   attributes: format = "stageid-excitation", format_version = 1, sample_rate_hz,
 //       period_samples, scheme = "single_axis" | "orthogonal_dft" | "orthogonal_hadamard" |
 //       "zippered", scaling = "rms" | "peak", realizations, periods, transient_periods, crest_iterations,
-//       seed (text, decimal: an unsigned 64-bit number fits no signed integer and no double)
+//       seed (text, decimal, because an unsigned 64-bit number fits neither a signed integer nor a double)
 //   /lines         [L] int64    excited lines of the DFT of one period
-//   /frequency_hz  [L]          their frequencies, for reading convenience
-//   /axes          [n] text     excited channels, in the order of all that follows
+//   /frequency_hz  [L]          their frequencies, redundant
+//   /axes          [n] text     excited channels, in the order of the following datasets
 //   /level         [n]          rms or peak of each axis (see scaling), unit of the channel
-//   /shape         [n x L]      optional: relative amplitudes as asked for; a row of zeros is flat
+//   /shape         [n x L]      optional: requested relative amplitudes; a row of zeros is flat
 //   /amplitude     [n x L]      A: amplitude of each line of each axis, unit of the channel
 //   /mixing        [n x E] complex   T: factor of axis (row) in experiment (column); E = n,
 //                                    zippered: 1
@@ -16,7 +16,7 @@
 //     phase_rad    [n x L]           phi
 //     spectrum     [n x L] complex   X = A / 2 exp(j phi)
 //
-// In realization m and experiment e axis p plays, period by period of N = period_samples,
+// In realization m and experiment e, axis p plays, period by period of N = period_samples,
 //   x(n) = 2 Re sum_k T(p, e) X_m(p, k) exp(2 pi j lines(k) n / N),
 // transient_periods times to settle and then `periods` times to measure.
 
@@ -129,7 +129,7 @@ MatrixXcd unmixed_spectrum(const MatrixXd& amplitude, const MatrixXd& phase_rad)
 
 // Reading --------------------------------------------------------------------------------------
 
-/// An Hdf5File and what reading a plan asks of it.
+/// Reads the parts of a plan from an Hdf5File.
 class PlanReader {
  public:
   explicit PlanReader(const std::filesystem::path& path)
@@ -285,7 +285,7 @@ std::vector<MatrixXd> PlanReader::phases(const ExperimentSpec& spec,
 }
 
 void PlanReader::check_agrees(const ExperimentPlan& plan) const {
-  // Far above the rounding of another machine's sine and DFT, far below any change that matters.
+  // Far above the rounding of other machines, far below any relevant change.
   constexpr double kTolerance = 1e-9;
   const auto check = [this](const auto& stored, const auto& wanted, const std::string& dataset) {
     const double largest = wanted.cwiseAbs().maxCoeff();
@@ -335,8 +335,8 @@ ExperimentPlan read_experiment_plan(const std::filesystem::path& file) {
   try {
     FrequencyGrid grid = reader.grid();
     ExperimentSpec spec = reader.spec(grid);
-    // Reduced phases are the outcome of hundreds of transforms: the file is the authority, because
-    // another machine's rounding may have led elsewhere.
+    // Reduced phases are read from the file: on another machine, hundreds of transforms with other rounding may
+    // have converged elsewhere.
     std::vector<MatrixXd> reduced;
     if (spec.crest_iterations > 0) reduced = reader.phases(spec, grid);
     ExperimentPlan plan(std::move(grid), std::move(spec), std::move(reduced));

@@ -17,7 +17,7 @@ struct ChannelList {
   friend bool operator==(const ChannelList&, const ChannelList&) = default;
 };
 
-/// What holds for a whole log.
+/// Properties of a whole log.
 struct LogInfo {
   double sample_rate_hz = 0.0;
   int period_samples = 0;
@@ -25,21 +25,21 @@ struct LogInfo {
   ChannelList excitation;
   ChannelList actuators;
   ChannelList sensors;
-  /// Configuration text, version, seeds, start time: for people and provenance. A JSON object in native
-  /// logs and what was converted from them; of other HDF5 logs "{}".
+  /// Configuration text, version, seeds, start time: provenance. A JSON object in native logs and logs converted
+  /// from them; "{}" for other HDF5 logs.
   std::string metadata_json = "{}";
 };
 
-/// Checks the rules of a LogInfo: positive rate and period, one period of the excitation of 1 GiB at
-/// most, transient_periods >= 0, one unit a name,
-/// at least one actuator and one sensor, no name twice in a group.
+/// Checks a LogInfo: positive rate and period, at most 1 GiB for one period of the excitation,
+/// transient_periods >= 0, one unit per name, at least one actuator and one sensor, no duplicate name within a
+/// group.
 /// @throws std::invalid_argument naming the field.
 void check_log_info(const LogInfo& info);
 
 /// True if both describe the same experiment: everything but the metadata is equal.
 bool same_measurement(const LogInfo& a, const LogInfo& b) noexcept;
 
-/// Counts of everything in a run that was not perfect.
+/// Counts of irregular cycles of a run.
 struct RunHealth {
   std::uint64_t cycles = 0;
   std::uint64_t late = 0;
@@ -48,12 +48,12 @@ struct RunHealth {
   std::int64_t largest_lateness_ns = 0;
   double seconds = 0.0;  ///< wall time of the run
 
-  /// Adds the counts of another run; the larger lateness stays.
+  /// Adds the counts of another run; the larger lateness is kept.
   RunHealth& operator+=(const RunHealth& other) noexcept;
   friend bool operator==(const RunHealth&, const RunHealth&) = default;
 };
 
-/// What holds for one run.
+/// Properties of one run.
 struct LogRun {
   std::string name;           ///< "0000", for messages
   int realization = 0;        ///< 0-based
@@ -62,7 +62,7 @@ struct LogRun {
   bool complete = true;
   std::string started_utc;  ///< ISO 8601, may be empty
   RunHealth health;
-  RunTiming timing;  ///< against the wall clock; empty in virtual time and in HDF5 logs
+  RunTiming timing;  ///< on the wall clock; empty in virtual time and in HDF5 logs
 };
 
 }  // namespace stageid

@@ -10,7 +10,7 @@
 
 namespace stageid {
 
-/// Samples of a stretch of one run. Column-major: one channel is contiguous in memory.
+/// Samples of a part of one run. Column-major: one channel is contiguous in memory.
 struct LogSamples {
   Eigen::MatrixXd actuators;                             ///< rows x actuators, SI
   Eigen::MatrixXd sensors;                               ///< rows x sensors, SI
@@ -25,14 +25,13 @@ class LogReader {
   virtual const LogInfo& info() const noexcept = 0;
   virtual const std::vector<LogRun>& runs() const noexcept = 0;
 
-  /// One period of the excitation of run `run`, period_samples x excitation channels. If the log
-  /// holds the whole excitation it must repeat: otherwise FormatError.
+  /// One period of the excitation of run `run`, period_samples x excitation channels.
+  /// @throws FormatError if the log contains the whole excitation and it is not periodic.
   virtual Eigen::MatrixXd excitation(std::size_t run) const = 0;
 
-  /// Rows [first, first + count) of a run into `out`, whose matrices are resized if they must be.
-  /// Safe to call from several threads at once, each with its own `out` (the HDF5 reader
-  /// serializes).
-  /// @throws FormatError if a value is not finite or a block is damaged: names the run and the row.
+  /// Reads rows [first, first + count) of a run into `out`, whose matrices are resized if necessary.
+  /// Safe to call from several threads at once, each with its own `out` (the HDF5 reader serializes).
+  /// @throws FormatError naming run and row if a value is not finite or a block is damaged.
   virtual void read(std::size_t run, std::uint64_t first, std::uint64_t count,
                     LogSamples& out) const = 0;
 };

@@ -9,7 +9,7 @@ namespace stageid {
 namespace {
 
 constexpr std::uint64_t kExponent = 0x7FF0000000000000U;
-constexpr std::size_t kTileRows = 64;  // 64 rows of 25 words are 12.5 kB: they stay in the L1 cache
+constexpr std::size_t kTileRows = 64;  // 64 rows of 25 words are 12.5 kB and fit the L1 cache
 
 /// One column of one tile.
 bool copy_column(const double* from, std::size_t row_words, std::size_t count,

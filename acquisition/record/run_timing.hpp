@@ -6,11 +6,11 @@
 
 namespace stageid {
 
-/// Counts of times in fixed bins: one nanosecond wide below 16 ns, then eight to every doubling, so
-/// that a quantile is known to 1/8 and better. Adding neither allocates nor branches on the value.
+/// Histogram of times in fixed bins: one nanosecond wide below 16 ns, then eight per octave, so that quantiles
+/// have a resolution of 1/8 or better. Adding a value neither allocates nor branches on it.
 class TimingHistogram {
  public:
-  /// The last bin also holds what is longer than 2^32 ns.
+  /// The last bin also contains values above 2^32 ns.
   static constexpr std::size_t kBins = 240;
 
   static constexpr std::size_t bin_of(std::uint32_t ns) noexcept {
@@ -34,8 +34,7 @@ class TimingHistogram {
   std::uint64_t count(std::size_t bin) const noexcept { return counts_[bin]; }
   std::uint64_t total() const noexcept;
 
-  /// The upper edge of the bin that holds the value at `share` (0 to 1) of all, in seconds; 0 if
-  /// nothing was counted.
+  /// The upper edge of the bin with the quantile at `share` (0 to 1), in seconds; 0 if nothing was counted.
   double quantile_s(double share) const noexcept;
 
   TimingHistogram& operator+=(const TimingHistogram& other) noexcept;
@@ -45,13 +44,13 @@ class TimingHistogram {
   std::array<std::uint64_t, kBins> counts_{};
 };
 
-/// How a run kept time against a wall clock; empty in virtual time.
+/// Timing of a run on the wall clock; empty in virtual time.
 struct RunTiming {
-  /// From the return of one exchange to the moment at which the next one had nothing left to do but
-  /// wait: controller, limits, logging, and the plant where it is simulated.
+  /// From the return of one exchange to the start of the wait in the next one: controller, limits, logging, and the
+  /// simulation of the plant if there is one.
   TimingHistogram execution;
-  TimingHistogram lateness;   ///< from the sample instant to the moment the loop got hold of it
-  std::uint64_t skipped = 0;  ///< whole periods left out behind late ones, to keep the phase
+  TimingHistogram lateness;   ///< from the sample instant until the loop received the sample
+  std::uint64_t skipped = 0;  ///< whole periods skipped after late ones, to keep the phase
 
   bool empty() const noexcept { return lateness.total() == 0; }
   RunTiming& operator+=(const RunTiming& other) noexcept;

@@ -4,7 +4,7 @@
 
 namespace stageid {
 
-/// The wall clock's time now as ISO 8601 in UTC, "2026-05-04T12:34:56Z".
+/// The current time as ISO 8601 in UTC, "2026-05-04T12:34:56Z".
 std::string utc_now();
 /// The same with milliseconds, "2026-05-04T12:34:56.789Z".
 std::string utc_now_ms();

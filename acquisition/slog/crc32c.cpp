@@ -15,7 +15,7 @@ constexpr std::uint32_t kPolynomial = 0x82F63B78U;
 
 using ByteTables = std::array<std::array<std::uint32_t, 256>, 8>;
 
-/// tables[k][b]: what byte b contributes when k more bytes follow it.
+/// tables[k][b]: contribution of byte b followed by k more bytes.
 constexpr ByteTables make_byte_tables() {
   ByteTables tables{};
   for (std::uint32_t b = 0; b < 256; ++b) {
@@ -59,8 +59,8 @@ constexpr std::uint32_t map_bits(const RegisterMap& map, std::uint32_t value) {
 
 using ShiftTables = std::array<std::array<std::uint32_t, 256>, 4>;
 
-/// Tables of the map that `length` zero bytes (a power of two) make of a CRC register. The map of
-/// one zero byte is squared log2(length) times.
+/// Tables of the map that `length` zero bytes (a power of two) apply to a CRC register. It is the map of one zero
+/// byte, squared log2(length) times.
 constexpr ShiftTables make_shift_tables(std::size_t length) {
   RegisterMap map{};
   for (std::size_t bit = 0; bit < 32; ++bit) {
@@ -89,7 +89,7 @@ std::uint32_t shift(const ShiftTables& tables, std::uint64_t crc) noexcept {
          tables[3][(crc >> 24) & 0xFFU];
 }
 
-/// Takes whole triples of `stream` bytes off the front.
+/// Removes whole triples of `stream` bytes from the front.
 template <std::size_t stream>
 void add_triples(const ShiftTables& tables, const std::byte*& at, std::size_t& size,
                  std::uint64_t& crc) noexcept {

@@ -34,7 +34,7 @@ void lock(const FileDescriptor& file, const std::filesystem::path& path) {
                               path.string()));
 }
 
-/// Makes the name of a new file as durable as its content. A file system that cannot is no error.
+/// Makes the directory entry of a new file durable. Failures are ignored: some file systems cannot.
 void synchronize_directory(const std::filesystem::path& file) {
   const std::filesystem::path parent = file.has_parent_path() ? file.parent_path() : ".";
   const FileDescriptor directory(::open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -123,7 +123,7 @@ void SlogAppender::append(SlogBlockHeader header, std::span<const std::byte> pay
   start_writeback();
 }
 
-// Begun early and in the background, so that synchronize() finds little left to wait for.
+// Starts writing in the background, so that synchronize() has little left to wait for.
 void SlogAppender::start_writeback() noexcept {
   constexpr std::uint64_t kEvery = std::uint64_t{8} << 20;
   if (bytes_ - written_back_ < kEvery) return;
@@ -163,7 +163,7 @@ void SlogAppender::write_whole(const SlogBlockHeader& header, std::span<const st
 
 void SlogAppender::fail(int error) {
   error_ = error;
-  // A partial block would be taken for damage by every reader.
+  // Readers would take a partial block for damage.
   const bool cut = is_open() && ::ftruncate(file_.get(), static_cast<off_t>(bytes_)) == 0;
   throw FileError(fmt::format("{}: cannot be written: {}; {} ({} bytes) written earlier {} kept{}",
                               shown_name(path_).string(), system_reason(error),
@@ -172,7 +172,7 @@ void SlogAppender::fail(int error) {
                               cut ? "" : ", possibly followed by part of another block"));
 }
 
-// Rows written to a file that was removed are lost.
+// Rows written to a removed file would be lost.
 void SlogAppender::require_name() {
   struct stat status {};
   if (::fstat(file_.get(), &status) != 0 || status.st_nlink > 0) return;

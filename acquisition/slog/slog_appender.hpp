@@ -28,28 +28,28 @@ class FileDescriptor {
 
 /// Appends blocks to a native log: numbers them, computes both CRCs, writes each with one call.
 ///
-/// The file is locked (flock) against a second writer. When a block cannot be written whole, the
-/// file is cut back to the last whole block and every later call fails too.
+/// The file is locked (flock) against a second writer. If a block cannot be written completely, the file is
+/// truncated after the last complete block, and every later call fails too.
 class SlogAppender {
  public:
   /// A new file with a new log_id. @throws FileError if it exists or cannot be written.
   static SlogAppender create(const std::filesystem::path& file);
 
   /// An existing file, locked; continue_at() must follow.
-  /// @throws FileError if it is not there, not writable, or being written.
+  /// @throws FileError if it is missing, not writable, or being written.
   static SlogAppender open_existing(const std::filesystem::path& file);
 
-  /// Cuts the file after the first `bytes` bytes, which hold whole blocks, and goes on there.
+  /// Truncates the file after the first `bytes` bytes, which contain whole blocks, and continues there.
   /// @throws FileError
   void continue_at(std::uint64_t bytes, std::uint32_t log_id, std::uint64_t next_sequence);
 
   /// Appends one block. `header` needs type, run, cols, first_row and rows; time_ns 0 means now.
-  /// @throws FileError if the disk is full or fails: says what is kept.
+  /// @throws FileError if the disk is full or fails; the message says what is kept.
   /// @throws std::invalid_argument if the payload is larger than kSlogLargestPayload.
   void append(SlogBlockHeader header, std::span<const std::byte> payload);
   void append(const SlogBlockHeader& header, std::string_view json);
 
-  /// Asks the kernel to have everything on the medium. @throws FileError, also if the file was removed.
+  /// Flushes everything to the medium. @throws FileError, also if the file was removed.
   void synchronize();
 
   /// @throws FileError if the operating system reports an error of an earlier write.

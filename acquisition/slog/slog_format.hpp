@@ -9,40 +9,38 @@
 //        8  uint16   type           1 log, 2 run_begin, 3 excitation, 4 samples, 5 run_end, 6 end
 //       10  uint16   version        1
 //       12  uint32   log_id         random, the same in every block of one file
-//       16  uint64   sequence       0, 1, 2, ... over the whole file
+//       12  uint32   log_id         random, the same in every block of a file
 //       24  uint32   run            index of the run, 0, 1, 2, ... (0 in log and end blocks)
-//       28  uint32   cols           8-byte words a row (samples), columns (excitation), else 0
-//       32  uint64   first_row      samples: row of the run that the block starts with, else 0
-//       40  uint32   rows           samples, excitation: rows, else 0
-//       44  uint32   payload_bytes  without padding
+//       24  uint32   run            index of the run, 0, 1, 2, ... (0 in log and end blocks)
+//       28  uint32   cols           8-byte words per row (samples), columns (excitation), otherwise 0
+//       32  uint64   first_row      samples: index within the run of the block's first row, otherwise 0
+//       40  uint32   rows           samples, excitation: rows, otherwise 0
 //       48  int64    time_ns        when it was written, since 1970-01-01T00:00:00Z
-//       56  uint32   payload_crc    CRC-32C of the payload and its padding
+//       48  int64    time_ns        time of writing, since 1970-01-01T00:00:00Z
 //       60  uint32   header_crc     CRC-32C of bytes 0 .. 59
 //
 // The payload follows, padded with zero bytes to a multiple of 64. Payloads by type:
 //
 //   log         JSON: {"sample_rate_hz", "period_samples", "transient_periods", "excitation",
 //               "actuators", "sensors": each {"names": [], "units": []}, "metadata": {...}}.
-//               The first block of a file; repeated in front of every run_begin, so that the loss
-//               of one costs nothing.
+//               The first block of a file; repeated before every run_begin, so that losing one is
+//               harmless.
 //   run_begin   JSON: {"realization", "experiment", "started_utc", "excitation_columns": [...]}.
-//   excitation  float64, one period of the excitation, column by column, only the columns that are
-//               not zero: those that run_begin lists. Absent if there are none.
-//   samples     rows of `cols` words: actuators, sensors (float64, SI), then one uint64 status
-//   word:
+//   excitation  float64, one period of the excitation, column by column, only the nonzero columns, which
+//               run_begin lists. Absent if there are none.
+//   samples     rows of `cols` words: actuators, sensors (float64, SI), then one uint64 status word:
 //               bits 0-7 hal's Outcome, bit 8 marked (do not use), bits 32-63 lateness in ns.
 //   run_end     JSON: {"realization", "experiment", "samples", "complete", "health": {"cycles",
-//               "late", "missing", "marked", "largest_lateness_ns", "seconds"}}. A run without one
-//               was cut off: incomplete.
+//               "late", "missing", "marked", "largest_lateness_ns", "seconds"}}. A run without run_end
+//               was interrupted: incomplete.
 //   end         JSON: {"exit_code", "message"}. The last block of a log that was closed properly; a
-//               log that was resumed has several.
+//               resumed log has several.
 //
-// To be read in ten lines of numpy:
+// Reader in numpy:
 //
 //   import numpy as np
 //   head = np.dtype([('magic', 'S8'), ('type', '<u2'), ('version', '<u2'), ('log_id', '<u4'),
-//       ('sequence', '<u8'), ('run', '<u4'), ('cols', '<u4'), ('first_row', '<u8'), ('rows',
-//       '<u4'),
+//       ('sequence', '<u8'), ('run', '<u4'), ('cols', '<u4'), ('first_row', '<u8'), ('rows', '<u4'),
 //       ('bytes', '<u4'), ('time_ns', '<i8'), ('payload_crc', '<u4'), ('header_crc', '<u4')])
 //   raw, at, runs = np.memmap('run.slog', np.uint8, 'r'), 0, {}
 //   while at < raw.size:
@@ -72,7 +70,7 @@ inline constexpr std::array<unsigned char, 8> kSlogMagic = {0x89, 'S',  'L',  'O
 inline constexpr std::uint16_t kSlogVersion = 1;
 inline constexpr std::size_t kSlogAlignment = 64;
 
-/// Larger payloads are refused when written and taken for damage when read.
+/// Larger payloads are refused by writers and treated as damage by readers.
 inline constexpr std::uint32_t kSlogLargestPayload = 1U << 30;
 
 struct SlogBlockHeader {
@@ -107,10 +105,10 @@ constexpr std::uint64_t slog_block_bytes(const SlogBlockHeader& header) noexcept
 
 std::uint32_t slog_header_crc(const SlogBlockHeader& header) noexcept;
 
-/// True if the magic and the header's own CRC are right. Says nothing about its fields' sense.
+/// True if the magic and the header's own CRC are right. Does not check the other fields.
 bool slog_header_intact(const SlogBlockHeader& header) noexcept;
 
-/// One sample's status as it is handed over by the loop and stored in the last word of a row.
+/// One sample's status, stored in the last word of a row.
 struct SampleStatus {
   std::uint8_t outcome = 0;  ///< hal's Outcome as a number
   bool marked = false;       ///< do not use this sample

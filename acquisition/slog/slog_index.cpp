@@ -14,7 +14,7 @@ namespace stageid {
 
 namespace {
 
-/// Follows the blocks in order and books each where it belongs.
+/// Assigns the blocks, in order, to their runs.
 class Indexer {
  public:
   Indexer(const SlogSource& source, const SlogScan& scan) : source_(source), scan_(scan) {
@@ -32,7 +32,7 @@ class Indexer {
         take(block);
       } catch (const std::invalid_argument& error) {
         book_damage(block, error.what());
-      } catch (const FormatError&) {  // only the payload: the scan looked at headers alone
+      } catch (const FormatError&) {  // damaged payload: the scan checked the headers only
         book_damage(block, "its payload is damaged");
       }
     }
@@ -44,7 +44,7 @@ class Indexer {
   }
 
  private:
-  /// Any intact copy of the description will do; they are all the same.
+  /// Reads the first intact copy of the description; all copies are equal.
   void read_info() {
     for (const SlogBlock& block : scan_.blocks) {
       if (!block.header.is(SlogBlockType::log) || !payload_intact(source_, block)) continue;
@@ -71,7 +71,7 @@ class Indexer {
     close_run();
   }
 
-  /// True if a damaged stretch lies between the last block and this one.
+  /// True if there is damage between the last block and this one.
   bool passes_damage(const SlogBlock& block) {
     bool passed = false;
     for (; next_damage_ != scan_.damage.end() && next_damage_->offset <= block.offset;
@@ -82,11 +82,11 @@ class Indexer {
   }
 
   void take(const SlogBlock& block) {
-    index_.end.reset();  // only the last block of all counts as the end
+    index_.end.reset();  // only the very last block counts as the end
     const bool within_run = block.header.is(SlogBlockType::excitation) ||
                             block.header.is(SlogBlockType::samples) ||
                             block.header.is(SlogBlockType::run_end);
-    if (within_run && !open_ && !index_.damage.empty()) return;  // said once, not a thousand times
+    if (within_run && !open_ && !index_.damage.empty()) return;  // reported already
     switch (static_cast<SlogBlockType>(block.header.type)) {
       case SlogBlockType::log:
         if (!same_measurement(parse_log_info(json(block)), index_.info)) {

@@ -12,32 +12,31 @@
 
 namespace stageid {
 
-/// One run of a native log and where its blocks stand.
+/// One run of a native log and the positions of its blocks.
 struct SlogRunIndex {
   LogRun run;
-  bool ended = false;  ///< its run_end is there
+  bool ended = false;  ///< has a run_end block
   std::vector<int> excitation_columns;
   std::optional<SlogBlock> excitation;
-  std::vector<SlogBlock> samples;  ///< without gap: first_row of each is where the last one ended
+  std::vector<SlogBlock> samples;  ///< contiguous: no rows between two blocks
 };
 
-/// A native log as far as it is intact.
+/// The intact part of a native log.
 struct SlogIndex {
   LogInfo info;
   std::vector<SlogRunIndex> runs;
-  std::vector<LogDamage> damage;  ///< of the scan, and what does not fit together
-  std::optional<SlogEnd> end;     ///< the last block, if that is an end block
-  std::uint64_t blocks = 0;       ///< intact ones
+  std::vector<LogDamage> damage;  ///< of the scan, and inconsistent blocks
+  std::optional<SlogEnd> end;     ///< the last block, if it is an end block
+  std::uint64_t blocks = 0;       ///< number of intact blocks
   std::uint64_t next_sequence = 0;
   std::uint32_t log_id = 0;
 };
 
-/// Puts the blocks of a scan together. A run from which blocks are missing is given up to the gap,
-/// as incomplete.
-/// @throws FormatError if no description of the log is left, or one does not make sense.
+/// Assembles the blocks of a scan. A run with missing blocks is truncated at the gap and incomplete.
+/// @throws FormatError if no description of the log is left, or one is invalid.
 SlogIndex index_slog(const SlogSource& source, const SlogScan& scan);
 
-/// Words of a row of samples: actuators, sensors, status.
+/// Words per row of samples: actuators, sensors, status.
 std::uint32_t slog_row_words(const LogInfo& info) noexcept;
 
 /// Name of a run by its index: "0000".

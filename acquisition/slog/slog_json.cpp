@@ -9,7 +9,8 @@ namespace stageid {
 
 namespace {
 
-using Json = nlohmann::ordered_json;  // keeps the order of keys: metadata come back as they went in
+using Json = nlohmann::
+    ordered_json;  // keeps the order of keys, so that metadata are written as they were read
 
 std::string text_of(const Json& json) {
   try {
@@ -19,7 +20,7 @@ std::string text_of(const Json& json) {
   }
 }
 
-/// Parses, and turns the library's errors into one line of ours.
+/// Parses, and converts errors of the library into one-line messages.
 template <typename Read>
 auto parse(std::string_view text, const char* what, Read read) {
   try {
@@ -38,7 +39,7 @@ ChannelList channels_of(const Json& json) {
           json.at("units").get<std::vector<std::string>>()};
 }
 
-/// [[from_ns, to_ns, count], ...] of the bins that hold something.
+/// [[from_ns, to_ns, count], ...] of the nonempty bins.
 Json json_of(const TimingHistogram& histogram) {
   Json bins = Json::array();
   for (std::size_t bin = 0; bin < TimingHistogram::kBins; ++bin)

@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// What the JSON payloads of a native log hold besides LogInfo (slog_format.hpp).
+/// JSON payloads of a native log other than LogInfo (slog_format.hpp).
 struct SlogRunBegin {
   int realization = 0;
   int experiment = 0;
@@ -31,13 +31,13 @@ struct SlogEnd {
   std::string message;
 };
 
-// Text of the values. @throws std::invalid_argument if a string is not UTF-8 or metadata no JSON.
+// Converts values to text. @throws std::invalid_argument if a string is not UTF-8 or metadata are not JSON.
 std::string to_json(const LogInfo& info);
 std::string to_json(const SlogRunBegin& begin);
 std::string to_json(const SlogRunEnd& end);
 std::string to_json(const SlogEnd& end);
 
-// Values of the text. @throws std::invalid_argument if something is missing or has another type.
+// Converts text to values. @throws std::invalid_argument if a key is missing or has another type.
 LogInfo parse_log_info(std::string_view json);
 SlogRunBegin parse_run_begin(std::string_view json);
 SlogRunEnd parse_run_end(std::string_view json);

@@ -17,12 +17,12 @@ namespace stageid {
 
 namespace {
 
-// A piece is read, checked and transposed while it is in the second-level cache.
+// Size of the pieces that are read, checked and transposed within the second-level cache.
 constexpr std::size_t kPieceBytes = std::size_t{1} << 17;
 
 }  // namespace
 
-/// The rows asked for, and where they go.
+/// The requested rows and their destination.
 struct SlogReader::Target {
   std::uint64_t first;
   std::uint64_t end;
@@ -81,7 +81,7 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
   const std::size_t sensors = index_.info.sensors.size();
   const std::size_t row_bytes = words * sizeof(double);
   const std::uint64_t padded = slog_padded(block.header.payload_bytes);
-  // Whole rows that are a multiple of 64 bytes, so that only the last piece has padding.
+  // Whole rows and a multiple of 64 bytes, so that only the last piece has padding.
   const std::size_t piece_rows = std::max<std::size_t>(8, kPieceBytes / row_bytes / 8 * 8);
   const auto stride = static_cast<std::size_t>(target.end - target.first);
   const auto piece = std::make_unique_for_overwrite<double[]>(piece_rows * words);
@@ -112,7 +112,7 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
       target.out.marked[static_cast<Eigen::Index>(to + r)] = (status & kSlogMarkedBit) != 0;
     }
     if (!finite) {
-      if (!payload_intact(source_, block)) break;  // damage first: it is the cause
+      if (!payload_intact(source_, block)) break;  // damage has priority, because it is the cause
       report_not_finite(run, rows, from, count);
     }
   }

@@ -8,11 +8,11 @@
 
 namespace stageid {
 
-/// Reads the native log. Opening reads block headers only; read() checks the CRC of every block
-/// that it touches, wholly. All functions may be called from several threads at once.
+/// Reads the native log. Opening reads block headers only; read() checks the CRC of every block that it uses.
+/// All functions may be called from several threads at once.
 class SlogReader final : public LogReader {
  public:
-  /// See open_log(). With SlogScanDepth::payloads every byte is read and checked here.
+  /// See open_log(). With SlogScanDepth::payloads, every byte is read and checked here.
   /// @throws FileError, FormatError
   explicit SlogReader(const std::filesystem::path& file, bool damaged_is_error = true,
                       SlogScanDepth depth = SlogScanDepth::headers);
@@ -24,7 +24,7 @@ class SlogReader final : public LogReader {
   void read(std::size_t run, std::uint64_t first, std::uint64_t count,
             LogSamples& out) const override;
 
-  /// What is damaged; empty unless opened with damaged_is_error = false.
+  /// The damaged parts; empty unless opened with damaged_is_error = false.
   const std::vector<LogDamage>& damage() const noexcept { return index_.damage; }
 
   std::uint64_t intact_blocks() const noexcept { return index_.blocks; }

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint32_t kFillRows = 1024;
 
-/// Copies intact blocks to a new log and closes the gaps that others have left.
+/// Copies intact blocks to a new log and fills the gaps.
 class Recovery {
  public:
   Recovery(const SlogSource& source, const std::filesystem::path& to)
@@ -30,13 +30,13 @@ class Recovery {
         out_(SlogAppender::create(to)) {}
 
   RecoverReport run() {
-    // The first block must describe the log, whatever the first intact one of the old log is.
+    // The first block must be a description, even if that of the old log is damaged.
     append_json(SlogBlockType::log, to_json(info_), 0);
     for (const SlogBlock& block : scan_.blocks) {
       try {
         take(block);
       } catch (const std::invalid_argument&) {
-        lose(block);  // intact, but written by something that is not this program
+        lose(block);  // intact, but inconsistent with the format
       }
     }
     close_run();
@@ -55,7 +55,7 @@ class Recovery {
     std::uint32_t number = 0;  ///< in the old log
     SlogRunBegin begin;
     std::uint64_t rows = 0;
-    bool usable = true;  ///< its start and excitation are there
+    bool usable = true;  ///< its start is intact
     bool excitation = false;
     RunHealth health;
     RunTiming timing;
@@ -66,7 +66,7 @@ class Recovery {
     ended_ = false;
     switch (static_cast<SlogBlockType>(block.header.type)) {
       case SlogBlockType::log:
-        return;  // written anew in front of every run
+        return;  // written before every run
       case SlogBlockType::run_begin:
         return begin_run(block.header.run, parse_run_begin(json(block)), block);
       case SlogBlockType::excitation:
@@ -111,7 +111,7 @@ class Recovery {
     append_json(SlogBlockType::run_begin, to_json(run_->begin), block.header.time_ns);
   }
 
-  /// Blocks of a run whose start is lost go to a run that says so: realization -1, incomplete.
+  /// A run whose start is lost gets realization -1 and is incomplete.
   void open_orphan(const SlogBlock& block) {
     if (run_ && run_->number == block.header.run) return;
     SlogRunBegin begin;
@@ -162,7 +162,7 @@ class Recovery {
     run_.reset();
   }
 
-  /// Marked rows of zeros up to `row`; false if there can never have been that many.
+  /// Appends marked rows of zeros up to `row`. @returns false if the number is implausible
   bool fill(std::uint64_t row) {
     const std::uint32_t words = slog_row_words(info_);
     const std::uint64_t missing = row - run_->rows;
@@ -207,7 +207,7 @@ class Recovery {
     report_.blocks_lost = scan_.blocks.back().header.sequence + 1 - report_.blocks_kept;
     const bool tail_lost =
         !scan_.damage.empty() && scan_.damage.back().offset >= scan_.blocks.back().end();
-    report_.blocks_lost += tail_lost ? 1U : 0U;  // at least; nothing tells how many
+    report_.blocks_lost += tail_lost ? 1U : 0U;  // at least one; the number is unknown
   }
 
   const SlogSource& source_;
@@ -231,7 +231,7 @@ RecoverReport recover_log(const std::filesystem::path& from, const std::filesyst
   }
   const SlogSource source(from);
   OutputFile output(to);
-  std::filesystem::remove(output.path(), ignored);  // the appender insists on a new file
+  std::filesystem::remove(output.path(), ignored);  // the appender requires a new file
   RecoverReport report = Recovery(source, output.path()).run();
   output.commit();
   return report;

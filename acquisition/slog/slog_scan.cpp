@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t kScanBytes = std::size_t{1} << 18;
 
-/// Walks through one file and gathers what it finds.
+/// Reads one file and collects its blocks and damage.
 class Scanner {
  public:
   Scanner(const SlogSource& source, SlogScanDepth depth) : source_(source), depth_(depth) {
@@ -49,7 +49,7 @@ class Scanner {
   }
 
  private:
-  /// The block whose header stands at `offset`, or what is wrong there.
+  /// The block with its header at `offset`; otherwise nothing, with the reason in `wrong`.
   std::optional<SlogBlock> block_at(std::uint64_t offset, std::string& wrong) const {
     SlogBlock block{offset, {}};
     if (source_.bytes() - offset < sizeof block.header) {
@@ -79,7 +79,7 @@ class Scanner {
     return block;
   }
 
-  /// Books an intact header (and, if asked for, payload); returns where to look next.
+  /// Records an intact header (and checks the payload if requested); returns the next offset.
   std::uint64_t take(const SlogBlock& block) {
     if (scan_.blocks.empty()) scan_.log_id = block.header.log_id;
     if (depth_ == SlogScanDepth::payloads && !payload_intact(source_, block)) {
@@ -103,7 +103,7 @@ class Scanner {
     return block.end();
   }
 
-  /// The length in an intact header is right unless bytes were inserted or deleted behind it.
+  /// The length in an intact header is valid unless bytes were inserted or deleted after it.
   std::uint64_t skip_payload(const SlogBlock& block) {
     std::string ignored;
     const bool next_stands = block.end() == source_.bytes() ||
@@ -115,7 +115,7 @@ class Scanner {
     return next;
   }
 
-  /// Offset of the next intact header of this log at or behind `from`, else the end of the file.
+  /// Offset of the next intact header of this log at or after `from`; otherwise the end of the file.
   std::uint64_t next_header(std::uint64_t from) const {
     const std::string_view magic(reinterpret_cast<const char*>(kSlogMagic.data()),
                                  kSlogMagic.size());
@@ -130,7 +130,7 @@ class Scanner {
         if (block_at(from + at, ignored)) return from + at;
       }
       if (size < kScanBytes) break;
-      from += size - (magic.size() - 1);  // a magic may straddle two pieces
+      from += size - (magic.size() - 1);  // a magic may span two pieces
     }
     return source_.bytes();
   }

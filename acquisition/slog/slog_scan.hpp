@@ -11,7 +11,7 @@
 
 namespace stageid {
 
-/// A native log opened for reading at any place, by any number of threads.
+/// A native log opened for random access by any number of threads.
 class SlogSource {
  public:
   /// @throws FileError if the file is missing or cannot be read.
@@ -20,11 +20,11 @@ class SlogSource {
   const std::filesystem::path& path() const noexcept { return path_; }
   std::uint64_t bytes() const noexcept { return bytes_; }
 
-  /// Exactly `size` bytes from `offset`.
+  /// Reads exactly `size` bytes starting at `offset`.
   /// @throws FileError if the device fails or the file has become shorter.
   void read(std::uint64_t offset, void* to, std::size_t size) const;
 
-  /// Tells the kernel what comes: one header every few hundred kB, or everything in order.
+  /// Read-ahead hint to the kernel: one header every few hundred kB, or everything in order.
   void expect_headers_only() const noexcept;
   void expect_everything() const noexcept;
 
@@ -42,7 +42,7 @@ struct SlogBlock {
   std::uint64_t end() const noexcept { return offset + slog_block_bytes(header); }
 };
 
-/// A damaged stretch of a file, for people; bytes = 0: something is missing there.
+/// A damaged part of a file; bytes = 0: data are missing there.
 struct LogDamage {
   std::uint64_t offset = 0;
   std::uint64_t bytes = 0;
@@ -57,23 +57,22 @@ struct SlogScan {
 };
 
 enum class SlogScanDepth : std::uint8_t {
-  headers,  ///< payloads are not read: under a second for a log of any size
+  headers,  ///< payloads are not read: less than a second for any log
   payloads  ///< every byte is read and checked
 };
 
-/// Finds all intact blocks. Behind a damaged stretch it goes on at the next intact header that
-/// belongs to this log, wherever it stands.
+/// Finds all intact blocks. After damage, it continues at the next intact header of this log.
 /// @throws FileError
-/// @throws FormatError if there is no intact block at all, or one of a version unknown here.
+/// @throws FormatError if there is no intact block, or one of an unknown version.
 SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth);
 
 /// The payload of a block, checked. @throws FormatError naming the block.
 std::vector<std::byte> read_payload(const SlogSource& source, const SlogBlock& block);
 
-/// True if payload and padding have the CRC that the header says. Reads in pieces.
+/// True if payload and padding match the CRC in the header. Reads in pieces.
 bool payload_intact(const SlogSource& source, const SlogBlock& block);
 
-/// "block 17 (samples, byte 81920)": the place of a block in messages.
+/// "block 17 (samples, byte 81920)": the position of a block in messages.
 std::string describe(const SlogBlock& block);
 
 }  // namespace stageid

@@ -23,7 +23,7 @@ namespace {
 
 std::uint16_t number(SlogBlockType type) { return static_cast<std::uint16_t>(type); }
 
-/// Copies everything from `offset` on to a new file FILE.damaged (.2, .3 ... if there is one).
+/// Copies everything after `offset` to a new file FILE.damaged (.2, .3 ... if it exists).
 std::filesystem::path save_tail(const SlogSource& source, std::uint64_t offset) {
   std::filesystem::path saved;
   FileDescriptor out;
@@ -54,7 +54,7 @@ std::filesystem::path save_tail(const SlogSource& source, std::uint64_t offset) 
   return saved;
 }
 
-/// Where the intact blocks end, if nothing but the end of the file is damaged.
+/// End of the intact blocks, if only the end of the file is damaged.
 std::uint64_t intact_bytes(const SlogSource& source, const SlogScan& scan, const SlogIndex& index) {
   const std::uint64_t end = scan.blocks.back().end();
   const bool only_tail = index.damage.empty() || index.damage.front().offset >= end;
@@ -71,7 +71,7 @@ struct SlogWriter::State {
   LogInfo info;
   std::string info_json;
   SlogAppender appender;
-  std::uint32_t runs = 0;  ///< begun, in the whole file
+  std::uint32_t runs = 0;  ///< number of runs begun in the whole file
   std::optional<LogRun> open_run;
   std::uint64_t acknowledged_rows = 0;
 
@@ -92,7 +92,7 @@ SlogWriter::SlogWriter(std::unique_ptr<State> state) : state_(std::move(state)) 
 SlogWriter::SlogWriter(SlogWriter&&) noexcept = default;
 SlogWriter& SlogWriter::operator=(SlogWriter&&) noexcept = default;
 
-// Without close() the log has no end block, and readers say that its writer died.
+// Without close() the log has no end block, and readers report that its writer was interrupted.
 SlogWriter::~SlogWriter() = default;
 
 SlogWriter SlogWriter::create(const std::filesystem::path& file, const LogInfo& info) {
@@ -194,7 +194,7 @@ std::uint64_t SlogWriter::bytes() const noexcept { return state_->appender.bytes
 
 void SlogWriter::close(int exit_code, const char* message) {
   State& state = *state_;
-  state.open_run.reset();  // a run without its end is incomplete
+  state.open_run.reset();  // a run without end is incomplete
   state.appender.append(state.header(SlogBlockType::end), to_json(SlogEnd{exit_code, message}));
   state.appender.close();
 }

@@ -14,20 +14,19 @@
 
 namespace stageid {
 
-/// Writes the append-only native log: blocks, each with a CRC-32C over header and payload. A block
-/// is acknowledged once write() has returned for it; it then survives the death of the process, and
-/// that of the machine from the next synchronize() on (called once a second and at the end of every
-/// run).
+/// Writes the append-only native log: blocks, each with a CRC-32C of header and payload. When write() has
+/// returned, its block survives the death of the process. It survives that of the machine after the next
+/// synchronize(), called once per second and at the end of every run.
 class SlogWriter final : public RunWriter {
  public:
   /// A new log. @throws FileError if `file` exists or cannot be written.
   /// @throws std::invalid_argument from check_log_info().
   static SlogWriter create(const std::filesystem::path& file, const LogInfo& info);
 
-  /// Continues a log: a damaged tail is moved to FILE.damaged (nothing is lost), an unfinished run
-  /// stays and counts as incomplete. The whole file is read and checked first.
-  /// @throws FormatError if `info` differs from the log's own in more than metadata, or if damage
-  ///         stands before intact blocks (recover the log first).
+  /// Continues a log: a damaged tail is moved to FILE.damaged, an unfinished run is kept as incomplete. The whole
+  /// file is read and checked first.
+  /// @throws FormatError if `info` differs from the log's own in more than metadata, or if there are intact blocks
+  ///         after damage (recover the log first).
   /// @throws FileError if the file is missing, not writable, or being written by another process.
   static SlogWriter resume(const std::filesystem::path& file, const LogInfo& info);
 
@@ -36,16 +35,16 @@ class SlogWriter final : public RunWriter {
   SlogWriter& operator=(SlogWriter&&) noexcept;
 
   /// Starts a run and stores its excitation (one period, period_samples x excitation channels).
-  /// All functions below: @throws FileError if the disk is full or fails; what was acknowledged is
-  /// kept, and every later call fails too. @throws std::invalid_argument on wrong sizes, values
-  /// that are not finite, or a wrong order of calls.
+  /// All functions below: @throws FileError if the disk is full or fails. Blocks written so far are kept, and
+  /// every later call fails too. @throws std::invalid_argument for wrong sizes, values that are not finite, or a
+  /// wrong order of calls.
   void begin_run(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& excitation) override;
-  /// Appends `rows` rows of actuators + sensors + 1 eight-byte words, row-major. One block a call.
+  /// Appends `rows` rows of actuators + sensors + 1 eight-byte words, row-major, as one block.
   void write(std::span<const double> rows) override;
-  /// Ends the run; `complete` in `run` says whether it may be used, `health` how it went. Its other
-  /// fields are those of begin_run().
+  /// Ends the run. `complete` in `run`: it may be used; `health`: its counts. Its other fields are those of
+  /// begin_run().
   void end_run(const LogRun& run) override;
-  /// Brings everything acknowledged to the medium (fdatasync).
+  /// Flushes all blocks to the medium (fdatasync).
   void synchronize() override;
   const LogInfo& info() const noexcept override;
   std::uint64_t acknowledged_rows() const noexcept;
@@ -59,8 +58,8 @@ class SlogWriter final : public RunWriter {
   std::unique_ptr<State> state_;
 };
 
-/// Appends samples of a run that was measured before, as one block: cycles of which nothing is known
-/// but whether they are marked. No marks: none is.
+/// Appends recorded samples as one block, without lateness or outcome of the cycles. If `marked` is empty, no
+/// sample is marked.
 void write_samples(SlogWriter& writer, const LogSamples& samples);
 
 }  // namespace stageid
