@@ -1,5 +1,5 @@
-// The layout stands in docs/formats.md. Only the format attribute, frequency_hz, response, inputs and
-// outputs are required to read a file; /confidence_radius follows from the others and is not read.
+// Layout: docs/formats.md. A file needs only the format attribute, frequency_hz, response, inputs and
+// outputs. /confidence_radius follows from the other datasets and is not read.
 #include "frf/file/frf_file.hpp"
 
 #include <fmt/format.h>
@@ -72,7 +72,7 @@ void write_attributes(Hdf5File& file, const FrfEstimate& frf) {
     file.write_attribute("/", "experiment_noise_ratio", frf.experiment_noise_ratio);
 }
 
-/// Of the total variance if it is known: what another measurement would show.
+/// From the total variance if it is known, because it predicts another measurement.
 template <typename WriteVariance>
 void write_confidence(Hdf5File& file, const FrfEstimate& frf, const WriteVariance& write) {
   const bool total = frf.total_variance.size() != 0 && frf.total_dof > 0.0;
@@ -258,7 +258,7 @@ void check_as_read(const std::filesystem::path& path, const FrfEstimate& frf) {
   try {
     check(frf);
   } catch (const std::invalid_argument& error) {
-    // check() says "response[line 12, z1 <- a3]: not finite"; the place belongs to the file's name.
+    // check() reports "response[line 12, z1 <- a3]: not finite"; the position is appended to the file's name.
     const std::string text = error.what();
     const std::size_t colon = text.find(": ");
     throw FormatError(path, "/" + text.substr(0, colon), text.substr(colon + 2));

@@ -6,10 +6,10 @@
 
 namespace stageid {
 
-/// frf.h5 as in docs/formats.md; whole or not at all. @throws FileError
+/// Writes frf.h5 as in docs/formats.md, completely or not at all. @throws FileError
 void write_frf(const std::filesystem::path& file, const FrfEstimate& frf);
 
-/// @throws FileError, FormatError (check() failed: names the dataset)
+/// @throws FileError, FormatError (check() failed; names the dataset)
 FrfEstimate read_frf(const std::filesystem::path& file);
 
 }  // namespace stageid

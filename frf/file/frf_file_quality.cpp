@@ -20,7 +20,7 @@ Eigen::VectorXd read_vector(const Hdf5File& file, const std::string& dataset) {
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
-/// (rows * columns) x lines from [lines x rows x columns], or empty if it is not there.
+/// (rows * columns) x lines from [lines x rows x columns], or empty if the dataset is missing.
 Eigen::MatrixXd read_if_there(const Hdf5File& file, const std::string& dataset, Eigen::Index lines,
                               Eigen::Index rows, Eigen::Index columns) {
   if (!file.exists(dataset)) return {};
@@ -117,7 +117,7 @@ void read_nonlinearity(const Hdf5File& file, FrfEstimate& frf) {
   test.odd.level = read_if_there(file, "/nonlinearity_odd_level", bands, n_y, n_g);
 }
 
-/// @throws FormatError if a number is negative or beyond what anybody measures
+/// @throws FormatError if a number is negative or implausibly large
 std::vector<double> read_counts(const Hdf5File& file, const std::string& dataset) {
   std::vector<double> counts = file.read_reals(dataset);
   for (const double count : counts) {
@@ -127,7 +127,7 @@ std::vector<double> read_counts(const Hdf5File& file, const std::string& dataset
   return counts;
 }
 
-/// What was left out, and why: a row of counts and a text each.
+/// Discarded data: one row of indices and one reason each.
 struct LeftOut {
   std::vector<std::vector<int>> where;
   std::vector<std::string> reasons;
@@ -146,7 +146,7 @@ void write_left_out(Hdf5File& file, const LeftOut& left_out, const std::string& 
   file.write_texts(reasons, left_out.reasons);
 }
 
-/// Empty if it is not there.
+/// Empty if the datasets are missing.
 LeftOut read_left_out(const Hdf5File& file, const std::string& places, const std::string& reasons,
                       std::size_t columns) {
   LeftOut left_out;

@@ -6,7 +6,7 @@
 
 #include "acquisition/files/hdf5_file.hpp"
 
-/// Between columns that are vec of a matrix, a column a line, and datasets [lines x rows x columns].
+/// Conversion between columns vec(matrix), one per line, and datasets [lines x rows x columns].
 namespace stageid {
 
 template <typename Scalar>

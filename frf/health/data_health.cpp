@@ -22,13 +22,13 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kSuspicion = 0.05;       // of clipping, where u = r - C y fails
-constexpr double kStuckShare = 0.02;      // of a run's samples that show one value
+constexpr double kSuspicion = 0.05;       // of clipping, if u = r - C y is violated
+constexpr double kStuckShare = 0.02;      // of a run's samples that have one value
 constexpr double kExcludedPower = 1e-4;   // of the inputs' power
 constexpr double kWorstExcitation = 1e3;  // cond(R)
 constexpr double kWorstInputs = 1e2;      // median of cond(U) in the upper half of the band
 constexpr double kLeastCoherence = 0.9;
-constexpr double kCertain = 1e6;  // of evidence, where there is no noise
+constexpr double kCertain = 1e6;  // evidence if there is no noise
 
 }  // namespace
 
@@ -79,7 +79,7 @@ void Examination::check_samples() {
     const bool sensor = c < record_.n_y();
     const auto stuck = static_cast<double>(scan.longest_constant());
     const bool piles_up = std::min(scan.log_p_high(), scan.log_p_low()) < limit;
-    // An actuator that nothing drives stands still by right; a whole run of one value is no clipping.
+    // A channel that is not driven may be constant, and a constant run is not clipped.
     if (stuck > std::max(kStuckShare * run_samples, 2.0) && !(piles_up && scan.returns())) {
       bool known = false;
       const auto excited = excited_actuators();
@@ -97,7 +97,7 @@ void Examination::check_samples() {
   }
 }
 
-/// @param log_p from where on an end of the range tells of clipping
+/// @param log_p below this, an end of the range counts as clipped
 void Examination::find_clipped(Index c, double log_p) {
   const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
   const bool sensor = c < record_.n_y();
@@ -115,8 +115,8 @@ void Examination::find_clipped(Index c, double log_p) {
   spoilt_.push_back(c);
 }
 
-/// Where u = r - C y fails, a few samples that pile up are enough to say why: the channel most clipped
-/// of `count` from `first` on.
+/// If u = r - C y is violated, a few samples at an end of the range suffice as explanation. Reports the most
+/// clipped of `count` channels, starting at `first`.
 bool Examination::find_suspected(Index first, Index count) {
   const auto log_p = [this](Index c) {
     const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
@@ -168,8 +168,8 @@ void Examination::check_responses() {
   }
 }
 
-/// Signals per excitation, X = Z R^-1: an axis whose column of X is noise in every channel is not driven. One F
-/// test a line and channel, Fisher's sum over the lines.
+/// Signals per excitation, X = Z R^-1: an axis is not driven if its column of X is noise in every channel. One F
+/// test per line and channel, combined by Fisher's sum over the lines.
 void Examination::check_arrival() {
   const auto axes = static_cast<Index>(record_.axes.size());
   const int dof = record_.scatter_dof();
@@ -179,7 +179,7 @@ void Examination::check_arrival() {
   Index lines = 0;
   for (const LineRecord& line : record_.lines) {
     const Eigen::MatrixXcd R = line.R(record_.axes, Eigen::all);
-    if (!(condition(R) < kWorstExcitation)) continue;  // check_excitation() tells
+    if (!(condition(R) < kWorstExcitation)) continue;  // check_excitation() reports this
     ++lines;
     const Eigen::MatrixXcd inverse = R.inverse();
     const Eigen::MatrixXcd X = record_.mean(line.Z) * inverse;
@@ -208,7 +208,7 @@ void Examination::check_arrival() {
 }
 
 void Examination::check_excitation() {
-  if (record_.axes.empty() || record_.zippered) return;  // orthogonal: they share no line
+  if (record_.axes.empty() || record_.zippered) return;  // zippered axes have no common lines
   double worst = 0.0;
   Index at = 0;
   for (Index k = 0; k < record_.frequency_hz.size(); ++k) {
@@ -236,7 +236,7 @@ void Examination::check_excitation() {
          "use one experiment per axis, or an orthogonal scheme");
 }
 
-/// After the recording's channels are put right.
+/// Called after the channels of the record are corrected.
 void Examination::check_inputs() {
   const std::vector<Index> excited = excited_actuators();
   if (excited.empty() || record_.zippered) return;
@@ -250,7 +250,8 @@ void Examination::check_inputs() {
           condition(record_.mean(record_.lines[static_cast<std::size_t>(k)].Z(rows, Eigen::all))));
   if (conditions.empty()) return;
   const double median = order_statistic(conditions, 0.5);
-  if (std::isfinite(median) && median > kWorstInputs)  // else an input without power, named already
+  if (std::isfinite(median) &&
+      median > kWorstInputs)  // otherwise an input has no power, which is reported already
     find(Severity::doubt, Cause::inputs, "", "the loop makes the inputs almost linearly dependent",
          fmt::format("median cond(U) {:.3g} above {:.4g} Hz", median, 0.5 * last_hz),
          "put more power into the weak directions: shape the excitation by the sensitivity");
@@ -258,7 +259,7 @@ void Examination::check_inputs() {
 
 void Examination::check_excluded() {
   const std::vector<Index> excited = excited_actuators();
-  // Where something drives an axis unseen the loop moves the others too.
+  // An unrecorded drive of one axis moves the others through the loop too.
   if (excited.empty() || found(Cause::unrecorded)) return;
   const auto power = [&](Index a) {
     double sum = 0.0;
@@ -286,7 +287,7 @@ std::vector<Finding> Examination::examine() {
   findings_ = check_timing(record_, nominal_);
   check_cycles();
   check_samples();
-  if (!found(Cause::aperiodic)) {  // else no spectrum is what it seems
+  if (!found(Cause::aperiodic)) {  // otherwise no spectrum is valid
     check_injection();
     check_responses();
     if (!any_fault(findings_)) check_arrival();
@@ -295,7 +296,7 @@ std::vector<Finding> Examination::examine() {
     check_excluded();
     check_stage();
     check_inputs();
-    if (!any_fault(findings_))  // of a channel that is stuck, what follows the start is no ringing
+    if (!any_fault(findings_))  // a stuck channel would look like a transient
       for (Finding& finding : check_start_transient(record_.start))
         findings_.push_back(std::move(finding));
   }

@@ -9,18 +9,18 @@
 
 namespace stageid {
 
-/// What is wrong with a log, before anyone fits: one finding a cause, faults first.
+/// Checks a log before a fit: one finding per cause, faults first.
 ///
-/// In time (timing_check.hpp): lost samples, a late excitation, a response that changes. From the samples: dead and
-/// clipped channels, marked and late cycles. From the spectra: channels
-/// without response, cond(R), cond(U), actuators that move beside the sub-plant. With the configuration: whether
-/// u = r - C y holds between the recorded signals (controller_check.hpp: names, signs, scales and
-/// timing of the recording), then whether the rigid body is that of geometry and mass
-/// (rigid_body_check.hpp: the wires behind the recording). What cannot be seen from
-/// this log is a finding of severity `unchecked` that names what is needed.
+/// - Timing (timing_check.hpp): lost samples, a late excitation, a response that changes.
+/// - Samples: dead and clipped channels, marked and late cycles.
+/// - Spectra: channels without response, cond(R), cond(U), actuators that move outside the sub-plant.
+/// - With the configuration: whether u = r - C y holds between the recorded signals (controller_check.hpp:
+///   names, signs, scales and timing of the recording), then whether the rigid body has the configured geometry
+///   and mass (rigid_body_check.hpp: wiring behind the recorder).
+/// What this log cannot show is a finding of severity `unchecked` that names the missing data.
 ///
-/// Every check states its own rate of false alarms; what matters is measured over random stages by
-/// health_study (docs/benchmarks.md).
+/// The comment of each check states its rate of false alarms. health_study measures them over random
+/// stages (docs/benchmarks.md).
 std::vector<Finding> check_health(HealthRecord record, const std::optional<NominalStage>& nominal);
 
 }  // namespace stageid

@@ -9,7 +9,7 @@
 namespace stageid {
 namespace {
 
-/// "realization 1, experiment 2: 9.8 times ...; ", the one that differs most first.
+/// "realization 1, experiment 2: 9.8 times ...; ", the largest difference first.
 std::string named(std::vector<NoisyRun> runs) {
   std::stable_sort(runs.begin(), runs.end(), [](const NoisyRun& a, const NoisyRun& b) {
     return std::abs(std::log(a.ratio)) > std::abs(std::log(b.ratio));

@@ -8,9 +8,9 @@
 
 namespace stageid {
 
-/// Whether the noise of some experiment is not that of the others (FrfEstimate::experiment_noise_ratio). One finding
-/// at most; none where they were pooled.
-/// @param runs which they are, if known
+/// Checks whether the noise of an experiment differs from that of the others
+/// (FrfEstimate::experiment_noise_ratio). At most one finding; none if the experiments were pooled.
+/// @param runs the differing runs, if known
 std::vector<Finding> check_experiment_noise(const FrfEstimate& frf,
                                             const std::vector<NoisyRun>& runs = {});
 

@@ -13,7 +13,7 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kRounding = 1e-24;  // of a line's power: what double precision leaves of no noise
+constexpr double kRounding = 1e-24;  // of a line's power: rounding errors without noise
 
 }  // namespace
 

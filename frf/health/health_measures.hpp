@@ -9,16 +9,16 @@ namespace stageid {
 /// Significance of a check over all channels.
 inline constexpr double kSignificance = 1e-4;
 
-/// Does the channel (of [sensors; actuators]) move with the excitation? F tests of the mean over periods
-/// against its scatter, one a line, over the experiments; Fisher's sum over the lines; 1e-4. True
-/// if one period is all there is: nothing says what noise is.
+/// Whether the channel (of [sensors; actuators]) moves with the excitation. One F test per line of the mean over
+/// periods against its scatter, over the experiments; Fisher's sum over the lines; kSignificance. True with only
+/// one period, because the noise is unknown then.
 bool responds(const HealthRecord& record, Eigen::Index channel);
 
-/// Median over the lines of the multiple coherence of one period: what of the power repeats. 1 for a
+/// Median over the lines of the multiple coherence of one period: the share of the power that repeats. 1 for a
 /// channel without power.
 double median_coherence(const HealthRecord& record, Eigen::Index channel);
 
-/// Condition number with the rows scaled to one, for their units differ; infinite if a row is zero.
+/// Condition number with rows of norm one, because their units differ; infinite if a row is zero.
 double condition(const Eigen::MatrixXcd& M);
 
 }  // namespace stageid

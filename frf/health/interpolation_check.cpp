@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kByChance = 1e-4;
 constexpr std::size_t kMostBands = 4;
-constexpr double kEverywhere = 0.2;  // of the lines: distortions rather than resonances
+constexpr double kEverywhere = 0.2;  // of the lines: then the cause is distortion, not resonances
 
 struct Band {
   double low_hz = 0.0;
@@ -21,7 +21,7 @@ struct Band {
   double largest = 0.0;
 };
 
-/// Neighbouring lines share their data: what is a few lines apart belongs together.
+/// Neighbouring lines share data, so lines a few apart belong to one band.
 std::vector<Band> doubtful_bands(const FrfEstimate& frf, Eigen::Index axes, Eigen::Index& lines) {
   const int dof = frf.realizations * static_cast<int>(axes) *
                   (zippered_window(static_cast<int>(axes)) - ZipperedFit::kRegressors);

@@ -7,14 +7,14 @@
 
 namespace stageid {
 
-/// Where the local models of a zippered experiment leave more than noise explains
-/// (FrfEstimate::interpolation_misfit): a resonance too narrow for the distance of an axis' own lines,
-/// where the response has a bias that its variance does not hold, or distortions of the plant, which
-/// fall on all lines. One finding at most, naming the bands; none for other experiments.
+/// Finds bands in which the local models of a zippered experiment leave more than noise
+/// (FrfEstimate::interpolation_misfit). Possible causes are a resonance too narrow for the distance of an axis's
+/// lines, with a bias that the variance does not include, and distortions of the plant, which affect all lines.
+/// One finding at most, naming the bands; none for other experiments.
 ///
-/// A line counts if noise alone leaves so much on one of ten thousand: the misfit has the distribution
-/// F(2 M a, 2 nu) then, a complex degrees of freedom of the local model, nu = noise_dof, M realizations.
-/// The outputs' shares are averaged, which makes the test stricter than stated.
+/// A line counts if its misfit has a probability below 1e-4 under noise. Without misfit it has the distribution
+/// F(2 M a, 2 nu), with a complex degrees of freedom of the local model, nu = noise_dof, M realizations. The
+/// outputs are averaged, so the true probability is smaller.
 std::vector<Finding> check_interpolation(const FrfEstimate& frf);
 
 }  // namespace stageid

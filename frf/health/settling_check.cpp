@@ -7,7 +7,7 @@ namespace stageid {
 std::vector<Finding> check_settling(const FrfEstimate& frf) {
   const NonlinearityTest& test = frf.nonlinearity;
   if (test.settled_p_value.size() == 0) return {};
-  // Of ten settled bands one in ten logs has one below the limit of a band (Bonferroni).
+  // The limit is divided by the number of bands (Bonferroni); otherwise, many bands would cause false alarms.
   const auto bands = static_cast<double>(test.settled_p_value.size());
   if (bands * test.settled_p_value.minCoeff() >= kUnsettledBelow) return {};
   std::string figure;

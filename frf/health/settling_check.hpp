@@ -12,10 +12,10 @@ inline constexpr std::string_view kUnsettledRemedy =
     "for a transient, discard more periods (--transient-periods); for a drift or slow noise, use "
     "longer periods or --method lpm";
 
-/// Where the records are not settled (NonlinearityTest::settled_p_value): a transient that is left after
-/// the periods passed over, or a drift. It adds to the response what no variance holds, and would pass
-/// for distortions of the plant. One finding at most, naming the bands; by chance in one of a hundred logs
-/// (kUnsettledBelow) at most, however many bands there are.
+/// Finds bands in which the records are not settled (NonlinearityTest::settled_p_value): the discarded periods do
+/// not cover the whole transient, or there is a drift. The variances do not include it, and it would be taken
+/// for distortion of the plant. One finding at most, naming the bands; false alarms in at most one of a
+/// hundred logs (kUnsettledBelow) for any number of bands.
 std::vector<Finding> check_settling(const FrfEstimate& frf);
 
 }  // namespace stageid

@@ -16,17 +16,17 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kFalseAlarms = 0.005;  // a log
+constexpr double kFalseAlarms = 0.005;  // probability per log
 constexpr Index kReach = 2;             // lines on either side of a maximum
 constexpr double kMemory = 0.6;         // see the header
 constexpr double kLargestShift = 0.5;   // deviations
 constexpr double kTolerable = 10.0;     // deviations, of the bound; a tenth of it is typical
 
-/// Noise of one period on each line, and what the start has over it.
+/// Noise of one period on each line, and the power of the start relative to it.
 struct Lines {
   Eigen::VectorXd noise;
   Eigen::VectorXd start;   // power of B, sum over the runs
-  Eigen::VectorXd excess;  // that over its noise, mean over the runs
+  Eigen::VectorXd excess;  // the same over its noise, mean over the runs
 };
 
 Lines lines_of(const StartEvidence& e) {
@@ -44,8 +44,8 @@ Lines lines_of(const StartEvidence& e) {
   return lines;
 }
 
-/// Lines on which the start rings more than on all others within the reach. Over the noise it would be flat
-/// about a mode that rings so long that the scatter of the periods is its own.
+/// Lines on which the power of the start has a local maximum. Relative to the noise, there would be none around a
+/// mode that rings so long that it dominates the scatter of the periods.
 std::vector<Index> maxima(const Lines& lines) {
   std::vector<Index> found;
   for (Index k = 0; k < lines.start.size(); ++k) {
@@ -83,7 +83,7 @@ class Window {
     }
   }
 
-  /// The smaller chance of the two tests, for both.
+  /// The smaller p-value of the two tests, corrected for two tests.
   double p_value() const {
     const double by_memory =
         kMemory * std::sqrt(static_cast<double>(evidence_.runs.size()) * squares_ / excess_);
@@ -95,9 +95,9 @@ class Window {
     return std::min(1.0, 2.0 * p);
   }
 
-  /// Of a period's transient what the next one has.
+  /// Ratio q of the transient in consecutive periods.
   std::complex<double> ratio() const;
-  /// See the header; deviations. @param used the periods' mean includes the start
+  /// Shift of a parameter in standard deviations; see the header. @param used the periods' mean includes the start
   double shift(std::complex<double> q, bool used) const;
   double frequency_hz() const { return evidence_.frequency_hz[peak_]; }
 
@@ -131,7 +131,7 @@ std::complex<double> Window::ratio() const {
     least = off;
     best = q;
   };
-  // A coarse grid, then three finer ones about the best of the one before.
+  // A coarse grid, then three finer ones around the best point.
   constexpr int kAngles = 48;
   for (int i = 1; i <= 80; ++i)
     for (int a = 0; a < kAngles; ++a)

@@ -14,14 +14,14 @@ constexpr Index kNeighbours = 128;
 constexpr double kLeastGlitch = 8.0;
 constexpr double kNormalMedian = 0.6745;  // of |x|, x standard normal
 
-/// |second difference| of x[n + N] - x[n], over the scatter of its neighbours; zeros at the ends.
+/// |second difference| of x[n + N] - x[n], relative to the scatter of its neighbours; zeros at the ends.
 Eigen::ArrayXd unevenness(const Eigen::Ref<const Eigen::VectorXd>& x, Index N) {
   const Index count = x.size() - N;
   const Eigen::VectorXd d = x.tail(count) - x.head(count);
   Eigen::ArrayXd h = Eigen::ArrayXd::Zero(count);
   h.segment(1, count - 2) =
       (d.head(count - 2) - 2.0 * d.segment(1, count - 2) + d.tail(count - 2)).array().abs();
-  // Of quantized signals most differences are none.
+  // In quantized signals most differences are zero.
   const double least = h.mean();
   std::vector<double> block;
   Eigen::ArrayXd ratio(count);
@@ -45,7 +45,7 @@ std::vector<Glitch> find_glitches(const Eigen::MatrixXd& samples, Index channels
   std::vector<Glitch> worst(static_cast<std::size_t>(periods));
   for (Index c = 0; c < channels; ++c) {
     const Eigen::ArrayXd ratio = unevenness(samples.col(c).head(N * periods), N);
-    // A glitch in its three second differences: what is next to one belongs to it.
+    // A glitch affects three second differences, so neighbours count as one.
     const auto stands_out = [&](int difference, Index n) {
       const Index at = difference * N + n;
       const Index first = std::max<Index>(0, at - 1);
@@ -56,7 +56,7 @@ std::vector<Glitch> find_glitches(const Eigen::MatrixXd& samples, Index channels
       for (Index n = 0; n < N; ++n) {
         const double here = ratio[p * N + n];
         if (!(here > least_ratio)) continue;
-        // d of p is made of the periods p and p + 1; that of p + 1, or of p - 1, tells which.
+        // d of period p depends on periods p and p + 1; d of p + 1, or of p - 1, identifies the wrong one.
         const bool later = p + 2 < periods ? stands_out(p + 1, n) : !stands_out(p - 1, n);
         if (!later && p == 0 && n < kNeighbours) continue;
         Glitch& glitch = worst[static_cast<std::size_t>(later ? p + 1 : p)];

@@ -5,24 +5,25 @@
 
 namespace stageid {
 
-/// A period of a record that holds a glitch.
+/// A period of a record with a glitch.
 struct Glitch {
   int period = 0;
   Eigen::Index channel = 0;
-  double ratio = 0.0;  ///< of the sample to what its neighbours scatter
+  double ratio = 0.0;  ///< of the sample's deviation to the scatter of its neighbours
 };
 
-/// Finds glitches in a record whose transient is not over, where no period is like the next.
+/// Finds glitches in a record with a transient, whose periods differ.
 ///
-/// The difference of a sample to the one a period later, d[n] = x[n + N] - x[n], holds no excitation, and what is
-/// left of the transient in it is smooth: its second difference in time is noise, and a glitch in period p
-/// stands out of it in d of p - 1 and of p. It counts from sqrt(N) times the scatter of its 128 neighbours on, and
-/// from 8 times (their median, as of normal noise: one in 1e15 samples by chance): what is less adds less than three
-/// times a period's noise and costs the mean less than a period. Which of the two periods is wrong is told by
-/// the next one, so three are needed, and in the first period the first 128 samples are not looked at, where the
-/// excitation starts. If more than (periods - 1) / 2 periods have one, that is how the signal is: none is told.
-/// @param samples  of `periods` periods (more rows are ignored), a channel a column
-/// @returns one entry a period at most, ascending
+/// The difference to the next period, d[n] = x[n + N] - x[n], does not contain the excitation, and its remaining
+/// transient is smooth. The second difference of d in time is therefore noise, and a glitch in period p is an
+/// outlier in d of p - 1 and of p. It counts if it exceeds both sqrt(N) times and 8 times the scatter of
+/// its 128 neighbours (from their median, as for normal noise; by chance in one of 1e15 samples). A smaller
+/// glitch adds less than three times the noise of a period, and keeping it costs less than losing a period.
+/// The next period identifies which of the two is wrong, so three periods are needed. The first 128 samples of
+/// the first period are skipped, because the excitation starts there. If more than (periods - 1) / 2 periods
+/// have one, this is a property of the signal, and none is reported.
+/// @param samples  of `periods` periods (more rows are ignored), one column per channel
+/// @returns at most one entry per period, ascending
 std::vector<Glitch> find_glitches(const Eigen::MatrixXd& samples, Eigen::Index channels,
                                   Eigen::Index period_samples, int periods);
 

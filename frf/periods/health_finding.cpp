@@ -6,7 +6,7 @@
 namespace stageid {
 namespace {
 
-constexpr const char* kUnknown = "unknown";  // to_string() of what is not a cause
+constexpr const char* kUnknown = "unknown";  // to_string() of unknown causes
 
 }  // namespace
 

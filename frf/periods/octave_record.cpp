@@ -14,7 +14,7 @@ constexpr std::array<double, 6> kLowPass = {0.3326705529500825,  0.8068915093110
 
 Index floor_divide(Index a, Index b) { return (a >= 0 ? a : a - b + 1) / b; }
 
-/// Every `keep`-th sum of `x` with taps `spacing` apart.
+/// Every `keep`-th value of `x` filtered by taps that are `spacing` apart.
 Eigen::VectorXd filtered(const Eigen::VectorXd& x, const std::array<double, 6>& taps, Index spacing,
                          Index keep) {
   const Index reach = 5 * spacing;
@@ -36,7 +36,7 @@ std::array<double, 6> high_pass() {
   return taps;
 }
 
-/// Adds one uninterrupted stretch of periods, from column `first` on, to the octaves.
+/// Adds one uninterrupted sequence of periods, starting at column `first`, to the octaves.
 void add_stretch(const Eigen::Ref<const Eigen::MatrixXd>& periods, Index first,
                  std::vector<OctaveRecord>& octaves) {
   const Index N = periods.rows();
@@ -82,7 +82,7 @@ std::vector<OctaveRecord> octave_records(const Eigen::Ref<const Eigen::MatrixXd>
     octave.low_hz = 0.5 * high_hz;
     octave.high_hz = high_hz;
     octave.step = step;
-    // A coefficient belongs where its middle is.
+    // A coefficient is assigned to the middle of its samples.
     octave.begin = -(length / 2 / step) * step;
     octave.length = length;
     octave.detail.setConstant(N / step, periods.cols(), std::numeric_limits<double>::quiet_NaN());

@@ -18,14 +18,14 @@ using Eigen::Index;
 using Periods = std::vector<Index>;
 
 constexpr Index kFewestLines = 8;
-constexpr double kRounding = 1e-26;  // of the largest line's power: scatter without any noise
+constexpr double kRounding = 1e-26;  // of the largest line's power: scatter without noise
 constexpr Index kFewestPositions = 4;
 
-/// The variance of a mean of n periods and one with g times their noise is as large as without it.
+/// Noise ratio g at which including one more period leaves the variance of the mean of n periods unchanged.
 double worth_dropping(std::size_t n) { return 2.0 + 1.0 / static_cast<double>(n); }
 
-/// Sum of squares of p's deviation from the mean of the core, and of the core's own, each divided by what
-/// it has of the noise of one period. `gram`: Re d_p^H d_q.
+/// Ratio of two sums of squares: p's deviation from the mean of the core, and the scatter of the core. Each is
+/// divided by its expectation for the noise of one period. `gram`: Re d_p^H d_q.
 double power_ratio(const Eigen::MatrixXd& gram, const Periods& core, Index p) {
   const auto n = static_cast<double>(core.size());
   double own = 0.0;
@@ -42,8 +42,8 @@ double power_ratio(const Eigen::MatrixXd& gram, const Periods& core, Index p) {
   return scatter > 0.0 ? deviation / scatter : 0.0;
 }
 
-/// Of one channel, one matrix per band: Re sum over its lines of conj(d_p) d_q, d the deviation from the
-/// mean over the root of the line's scatter.
+/// For one channel, one matrix per band: Re sum over its lines of conj(d_p) d_q. d is the deviation from the mean
+/// over the root of the line's scatter.
 std::vector<Eigen::MatrixXd> line_grams(const ComparedPeriods& periods, Index channel,
                                         const std::vector<Index>& bands) {
   const auto P = static_cast<Index>(periods.spectra.size());
@@ -78,7 +78,7 @@ double mean_ratio(const std::vector<Eigen::MatrixXd>& grams, const Periods& core
   return sum / static_cast<double>(grams.size());
 }
 
-/// More than half of the periods: those next to the one that has them closest.
+/// The smallest neighbourhood with more than half of the periods.
 Periods closest_periods(const std::vector<Eigen::MatrixXd>& grams) {
   const Index P = grams.front().rows();
   Eigen::MatrixXd distance = Eigen::MatrixXd::Zero(P, P);
@@ -111,7 +111,7 @@ Periods closest_periods(const std::vector<Eigen::MatrixXd>& grams) {
   return order;
 }
 
-/// Those that are worth having in the mean.
+/// The periods that reduce the variance of the mean.
 Periods core_of(const std::vector<Eigen::MatrixXd>& grams) {
   Periods core = closest_periods(grams);
   while (static_cast<Index>(core.size()) < grams.front().rows()) {
@@ -131,7 +131,7 @@ Periods core_of(const std::vector<Eigen::MatrixXd>& grams) {
   return core;
 }
 
-/// Positions where the core's coefficients are made of the core alone, and all of p's are there.
+/// Positions at which all coefficients of p exist and those of the core depend on the core alone.
 Periods comparable_positions(const OctaveRecord& octave, const Periods& core, Index p) {
   Eigen::Array<bool, Eigen::Dynamic, 1> in =
       Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(octave.detail.cols(), false);
@@ -151,12 +151,12 @@ Periods comparable_positions(const OctaveRecord& octave, const Periods& core, In
 }
 
 struct DegreesOfFreedom {
-  double period = 0.0;  ///< real ones of one period
-  double core = 0.0;    ///< of all of the core
+  double period = 0.0;  ///< real, of one period
+  double core = 0.0;    ///< real, of the whole core
 };
 
-/// From the periodogram of the core's residuals, each period in its place and zeros between: noise whose
-/// correlation lasts for periods has few. Half of what it counts, for a sine between two lines is in both.
+/// From the periodogram of the core's residuals, each period in its place and zeros between. Noise correlated
+/// over several periods has few. Half of each is used, because a sine between two lines contributes to both.
 DegreesOfFreedom degrees_of_freedom(const Eigen::MatrixXd& residuals, const Periods& core,
                                     std::span<const int> number) {
   const auto place = [&](Index p) { return Index{number[static_cast<std::size_t>(p)]}; };
@@ -191,7 +191,7 @@ double log_tail(double ratio, const DegreesOfFreedom& dof) {
   return a < 1 ? 0.0 : log_tail_of_f(ratio, a, 0.5 * dof.core);
 }
 
-/// How much p stands out of the core in one octave, if that is no chance.
+/// Power of p over that of the core in one octave, if it is significant.
 std::optional<double> excess(const OctaveRecord& octave, std::span<const int> number,
                              const Periods& core, Index p, double log_chance) {
   const Periods positions = comparable_positions(octave, core, p);
@@ -210,7 +210,7 @@ std::optional<double> excess(const OctaveRecord& octave, std::span<const int> nu
   const DegreesOfFreedom most{static_cast<double>(M), static_cast<double>(M * (n - 1))};
   if (!(ratio > 1.0 && log_tail(ratio, most) < log_chance)) return std::nullopt;
   DegreesOfFreedom dof = degrees_of_freedom(residuals, core, number);
-  // A core that was chosen for being close may lack the narrow noise that p has.
+  // A core selected for similarity may lack the narrow noise that p has.
   const double alone = degrees_of_freedom(own - mean, {p}, number).period;
   dof = {std::min(dof.period, alone), std::min(dof.core, alone * static_cast<double>(n - 1))};
   if (!(log_tail(ratio, dof) < log_chance)) return std::nullopt;
@@ -226,8 +226,8 @@ Eigen::MatrixXd record_of(const ComparedPeriods& periods, Index channel) {
   return record;
 }
 
-/// ln of how many ways there are to choose a core of n periods and one more: this one was chosen for
-/// being close.
+/// ln of the number of ways to choose a core of n periods and one more, because this core was selected for
+/// similarity.
 double log_choices(Index P, std::size_t n) {
   const auto in = static_cast<double>(n);
   const auto all = static_cast<double>(P);
@@ -240,7 +240,7 @@ struct Candidate {
   double gain = 0.0;
 };
 
-/// Of one channel.
+/// Outlier candidates of one channel.
 std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
                                   const std::vector<Index>& bands) {
   const std::vector<Eigen::MatrixXd> grams = line_grams(periods, channel, bands);

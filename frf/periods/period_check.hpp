@@ -6,43 +6,43 @@
 
 namespace stageid {
 
-/// Periods of one run that are compared with each other.
+/// Periods of one run to compare.
 struct ComparedPeriods {
   std::span<const Eigen::MatrixXcd> spectra;  ///< channels x lines (more columns are ignored)
-  std::span<const Eigen::MatrixXf> samples;   ///< samples x channels, less what all have in common
-  std::span<const int> number;                ///< of each in the run, ascending
+  std::span<const Eigen::MatrixXf> samples;   ///< samples x channels, without their common part
+  std::span<const int> number;                ///< index of each in the run, ascending
   Eigen::VectorXd frequency_hz;               ///< of the lines, increasing
   double sample_rate_hz = 0.0;
 };
 
-/// A period that does not belong with the others.
+/// A period that differs from the others by more than noise.
 struct PeriodOutlier {
-  std::size_t period = 0;    ///< position in the span given
-  Eigen::Index channel = 0;  ///< where it stands out most,
-  double low_hz = 0.0;       ///< in this octave
+  std::size_t period = 0;    ///< index in the given span
+  Eigen::Index channel = 0;  ///< channel with the largest deviation
+  double low_hz = 0.0;       ///< octave with the largest deviation
   double high_hz = 0.0;
-  double ratio = 0.0;  ///< its power of scatter over that of the others there
+  double ratio = 0.0;  ///< its power there over that of the other periods
 };
 
-/// How often a clean run loses a period by chance, at most.
+/// Largest probability that a clean run loses a period.
 inline constexpr double kDropByChance = 1e-3;
 
-/// Finds periods with a glitch, a bump or a transient in them, in ascending order.
+/// Finds periods with a glitch, a disturbance or a transient, in ascending order (docs/theory.md, section 3).
 ///
-/// In each channel the periods that lie closest together, more than half, are the core; the next
-/// closest joins it as long as this costs the mean less than to leave it out. A period with g times
-/// the core's noise makes the variance of the mean of n + 1 periods (n + g) / (n + 1)^2, without it
-/// it is 1 / n: it is worth dropping above g = 2 + 1 / n. g is the mean over octaves of the lines.
+/// In each channel, the closest majority of the periods is the core. The next closest period joins the core as
+/// long as this reduces the variance of the mean. With n clean periods and one with g times their noise, the
+/// variance is (n + g) / (n + 1)^2; without that period it is 1 / n. Dropping it reduces the variance if
+/// g > 2 + 1 / n. g is the mean over octaves of the lines.
 ///
-/// What is worth dropping must also be no chance. On the lines that cannot be told: what slow noise
-/// is at the ends of a period leaks into all lines at once, and one random number would count as
-/// many. So the record is divided into octaves in time (octave_records()), where nothing leaks, and
-/// in some octave the power of the period over that of the core must have a probability below
-/// kDropByChance over the number of channels, octaves and ways to choose the core and the period. For Gaussian noise it is F
-/// distributed, with degrees of freedom from the core's own spectrum S,
+/// The deviation must also be significant. The lines cannot decide this: different values at the start and end of
+/// a period, caused by slow noise, leak into all lines at once. The record is therefore divided into octaves in
+/// time (octave_records()), without leakage. In some octave the power of the period over that of the core must
+/// have a probability below kDropByChance, divided by the number of channels, octaves and ways to choose the core
+/// and the period. For Gaussian noise the ratio is F distributed. Its degrees of freedom follow from the core's
+/// spectrum S,
 ///   nu = (sum S)^2 / sum S^2  over its lines of both signs,
-/// of one period where S is smoothed to its resolution, and of the core.
-/// It takes three periods: of two nobody knows which is wrong.
+/// with S smoothed to the resolution of one period for the period, and unsmoothed for the core.
+/// Three periods are needed: of two, either could be wrong.
 /// Source: Satterthwaite, Biometrics Bulletin 2 (1946) 110.
 std::vector<PeriodOutlier> find_outliers(const ComparedPeriods& periods);
 

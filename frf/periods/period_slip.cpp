@@ -49,8 +49,8 @@ double floor_of(const MatrixXd& samples, Index channel) {
   return kSlipRounding * samples.col(channel).squaredNorm() + 1e-300;
 }
 
-/// Whether some block of one kind of channels resembles the earlier period shifted by a sample as much as the
-/// period itself: always so behind a gap, and where there is only noise.
+/// Whether, in some block of one kind of channels, the earlier period shifted by a sample fits as well as the
+/// period itself. This is always the case after a gap, and also if there is only noise.
 bool suspicious(const MatrixXd& earlier, const MatrixXd& later) {
   const Index N = later.rows();
   const Index blocks = blocks_of(N);
@@ -65,15 +65,15 @@ bool suspicious(const MatrixXd& earlier, const MatrixXd& later) {
   return later.cols() > 0 && (evidence <= 0.0).any();
 }
 
-/// What a shift explains of one kind of channels, sample by sample, over the scatter of the channels.
+/// Residuals of one kind of channels without and with a shift, per sample, over the scatter of the channels.
 struct Explained {
   ArrayXd before;        ///< sum over channels of e_0^2
   ArrayXd after;         ///<   and of e_d^2
   double freedom = 0.0;  ///< independent samples of a period, over the channels
 };
 
-/// Independent samples of a stationary signal: (sum S)^2 / sum S^2 over the lines of both signs of its spectrum S, the
-/// length for white noise (Satterthwaite).
+/// Independent samples of a stationary signal: (sum S)^2 / sum S^2 over the lines of both signs of its spectrum S.
+/// For white noise this is its length (Satterthwaite).
 double independent_samples(const ArrayXd& signal, RealDft& dft) {
   std::copy_n(signal.data(), signal.size(), dft.input().begin());
   double sum = 0.0;
@@ -111,7 +111,7 @@ struct Change {
   double gain = 0.0;
 };
 
-/// The beginning, or the end, of the period that a shift explains best.
+/// The part at the beginning or at the end of the period that a shift explains best.
 Change best_change(const ArrayXd& gain) {
   Change best;
   const Index N = gain.size();
@@ -128,7 +128,7 @@ Change best_change(const ArrayXd& gain) {
   return best;
 }
 
-/// How much better the rows of `change` follow the shifted period than the period: ln of the ratio, 0 if it is not known.
+/// ln of the ratio by which the shifted period fits the rows of `change` better; 0 if it is not significant.
 double advantage(const Explained& of, const Change& change) {
   const Index rows = change.last - change.first;
   const double count =
@@ -141,7 +141,7 @@ double advantage(const Explained& of, const Change& change) {
   return std::abs(ratio) > least ? ratio : 0.0;
 }
 
-/// Largest local maxima of the cross-correlation, every line of every channel with the same weight.
+/// Adds the cross-spectrum; all lines of all channels have the same weight.
 void add_peaks(const MatrixXd& earlier, const MatrixXd& later, RealDft& dft,
                Eigen::VectorXcd& correlation) {
   for (Index c = 0; c < later.cols(); ++c) {
@@ -205,14 +205,14 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
       if (!(change.gain > largest)) continue;
       const double y = advantage(sensors, change);
       const double u = advantage(actuators, change);
-      // A transient or a stuck sensor may look like a long shift, and every period of a wrong length is displaced as a
-      // whole.
+      // A transient or a stuck sensor may look like a long shift. With a wrong period length, every period is
+      // displaced as a whole.
       const bool whole = change.first == 0 && change.last == later.sensors.rows();
       const double sure = std::log(kLeastRatioAlone);
       const bool near = std::abs(shift) <= kNear;
       if (near ? !(std::min(y, u) > 0.0) && std::max(y, u) < sure : whole || std::min(y, u) < sure)
         continue;
-      // A kind of which nothing is known goes with the other.
+      // If one kind is not significant, it is assumed to have the same gap as the other.
       const bool until_the_end = change.last == later.sensors.rows();
       found = PeriodSlip{until_the_end ? change.first : change.last, static_cast<int>(shift),
                          !until_the_end, y >= 0.0, u >= 0.0};

@@ -8,29 +8,30 @@
 
 namespace stageid {
 
-/// Where one of two periods, recorded one after the other, stops following the other.
+/// Position of a gap between two consecutive periods.
 struct PeriodSlip {
-  Eigen::Index row = 0;  ///< within its period: the first row behind the gap
-  int lost = 0;          ///< samples; < 0: so many too many
+  Eigen::Index row = 0;  ///< first row after the gap, within its period
+  int lost = 0;          ///< samples; < 0: duplicated
   bool in_earlier =
-      false;            ///< the gap is in the earlier period, the later one is displaced throughout
-  bool sensors = true;  ///< which channels
+      false;            ///< the gap is in the earlier period, and the whole later one is displaced
+  bool sensors = true;  ///< affected channels
   bool actuators = true;
 };
 
-/// Finds a sample that was lost, or written twice, in one of two periods of a periodic signal.
+/// Finds lost or duplicated samples in one of two periods of a periodic signal (docs/theory.md, section 13).
 ///
-/// Behind a gap of d samples a record shows what it showed d samples earlier, x[n] = x'[(n + d) mod N]. With the
-/// differences e of `later` to `earlier` shifted by 0 and by d, both over their smallest scatter, the place of the gap is
-/// where the sum of e_0^2 - e_d^2 up to it, or from it on, is largest. It counts if there mean e_0^2 is more than
-/// 1.5 times mean e_d^2 and more than 8 deviations of noise of that spectrum beyond it (1e-15 by chance): without a gap the shift can
-/// only add to the difference, and what is not periodic (a glitch, a transient) is in both. Sensors and actuators may
-/// come from different recorders: all, or those of one kind, are looked at, and one kind alone counts from 10 times on,
-/// since a slow transient may happen to look like a shift of slow signals by half. More than 4 samples count from 10
-/// times on in both kinds, and inside a period. Few samples at the edge of a period, 1600
-/// over the channels, are not enough; the next period shows them.
+/// After a gap of d samples, the record is x[n] = x'[(n + d) mod N]. Let e_d be the difference of `later` to
+/// `earlier` shifted by d, over the smallest scatter of e_0 and e_d. The gap is where the sum of e_0^2 - e_d^2,
+/// from the start or to the end of the period, is largest. It counts if mean e_0^2 there exceeds mean e_d^2 by a
+/// factor of 1.5 and by 8 standard deviations of noise with that spectrum (1e-15 by chance). Without a gap, a
+/// shift can only increase the difference; a glitch or a transient is in both.
 ///
-/// d is any of -4 ... 4, or one of the three largest peaks of the periods' cross-correlation.
+/// Sensors and actuators may have different recorders, so all channels and those of each kind are tried. One kind
+/// alone needs a factor of 10, because a slow transient may look like a shift of slow signals. A gap of more
+/// than 4 samples needs a factor of 10 in both kinds, and must start inside a period. Too few samples at the
+/// edge of a period (1600 over the channels) are not enough; the next period reveals the gap.
+///
+/// d is any of -4 ... 4, or near one of the three largest peaks of the periods' cross-correlation.
 /// @pre both have `dft.length()` rows
 std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples& later,
                                     RealDft& dft);

@@ -7,16 +7,16 @@
 
 namespace stageid {
 
-/// A place in a run where samples were lost, or written twice.
+/// A position in a run where samples were lost or duplicated.
 struct SampleSlip {
-  std::string run{};    ///< its name in the log
+  std::string run{};    ///< name of the run in the log
   int realization = 0;  ///< counted from 0
   int experiment = 0;
-  std::uint64_t row = 0;  ///< of the run, as recorded, from 0: the first one behind the place
-  int lost = 0;           ///< samples; < 0: so many too many
-  bool sensors = true;    ///< which channels
+  std::uint64_t row = 0;  ///< of the run, as recorded, 0-based: the first one after the gap
+  int lost = 0;           ///< samples; < 0: duplicated
+  bool sensors = true;    ///< affected channels
   bool actuators = true;
-  bool spoilt = true;  ///< its period is left out; else it lies between two
+  bool spoilt = true;  ///< its period is discarded; false: the gap is between two periods
 };
 
 /// "one sample lost near row 21234"

@@ -8,8 +8,7 @@
 namespace stageid {
 namespace {
 
-constexpr double kTransientRounding =
-    1e-24;  // of a sensor's power: what double precision leaves of no noise
+constexpr double kTransientRounding = 1e-24;  // of a sensor's power, without noise
 
 }  // namespace
 
@@ -49,7 +48,7 @@ RunStart StartRecorder::finish() {
   run.noise_dof = count_ == 2 ? 1.0 : P - 2.0;
   Eigen::MatrixXd noise = rest_scatter_ / run.noise_dof;
   if (count_ == 2) noise = scale * W.cwiseAbs2();
-  // One number a sensor brings their units together and leaves the colour to the lines.
+  // One scale per sensor makes the units comparable and keeps the colour over the lines.
   for (Eigen::Index c = 0; c < noise.rows(); ++c) {
     std::vector<double> values(noise.cols());
     for (Eigen::Index k = 0; k < noise.cols(); ++k)
@@ -65,7 +64,7 @@ RunStart StartRecorder::finish() {
     run.start += weight * B.row(c).cwiseAbs2().transpose();
     run.first += weight * scale * W.row(c).cwiseAbs2().transpose();
     run.last += weight * scale * V.row(c).cwiseAbs2().transpose();
-    // Rounding is noise, where there is no other.
+    // Rounding errors count as noise, so that it is not zero.
     run.noise.array() +=
         weight * noise.row(c).transpose().array() + weight * kTransientRounding * power;
   }

@@ -5,43 +5,43 @@
 
 namespace stageid {
 
-/// How much of the start of a run is left in the periods that are used, line by line. Z_0 is the period
-/// before the used ones, or the first of them if none was passed over; Z_1 ... Z_P are those after it:
+/// Transient of the start of a run in the used periods, line by line. Z_0 is the last discarded period, or the
+/// first used one if none was discarded; Z_1 ... Z_P are the following ones:
 ///   B = Z_0 - mean(Z_1 ... Z_P),  W = Z_1 - mean(Z_2 ... Z_P),  V = Z_P - mean(Z_1 ... Z_{P-1}).
-/// A mode that rings adds A q^p to Z_p, q = e^{pole x period}, so that W is a multiple of B by one complex
-/// number in all runs; noise has any phase. Sensors are summed up, each over its noise.
+/// A ringing mode adds A q^p to Z_p, q = e^{pole x period}, so W is B times one complex number in all runs.
+/// For noise the phase is random. The sensors are summed, each over its noise.
 struct RunStart {
-  Eigen::VectorXcd along;  ///< lines: sum over the sensors of conj(B) W
+  Eigen::VectorXcd along;  ///< sum over the sensors of conj(B) W, per line
   Eigen::VectorXd start;   ///< |B|^2
   Eigen::VectorXd first;   ///< |W|^2 (P - 1) / P: the noise of one period if nothing rings
   Eigen::VectorXd last;    ///< |V|^2 (P - 1) / P
-  Eigen::VectorXd noise;   ///< of one period, from Z_2 ... Z_P; P = 2: from both
+  Eigen::VectorXd noise;   ///< of one period, from Z_2 ... Z_P; P = 2: from both periods
   double noise_dof = 0.0;
   int periods = 0;          ///< P
-  bool start_used = false;  ///< Z_0 is one of the used periods
+  bool start_used = false;  ///< whether Z_0 is one of the used periods
 };
 
-/// The runs of a log that can be told from.
+/// The runs of a log with evidence about their start.
 struct StartEvidence {
-  Eigen::VectorXd frequency_hz;  ///< of the lines; empty: nothing is known
+  Eigen::VectorXd frequency_hz;  ///< of the lines; empty: unknown
   std::vector<RunStart> runs;
   Eigen::Index sensors = 0;
-  int transient_periods = 0;  ///< passed over
-  int periods = 0;            ///< used, of a run
+  int transient_periods = 0;  ///< discarded
+  int periods = 0;            ///< used, per run
 };
 
 /// Gathers RunStart from the spectra of consecutive periods.
 class StartRecorder {
  public:
   StartRecorder() = default;
-  /// @param start Z_0, sensors x lines; empty if no period was passed over
+  /// @param start Z_0, sensors x lines; empty if no period was discarded
   explicit StartRecorder(Eigen::MatrixXcd start);
 
   void take(const Eigen::Ref<const Eigen::MatrixXcd>& spectra);
-  /// A period is missing: nothing can be told of this run.
+  /// Call this if a period is missing: the run gives no evidence then.
   void give_up() noexcept { on_ = false; }
   bool on() const noexcept { return on_; }
-  /// Periods are 0 if nothing can be told.
+  /// `periods` is 0 if there is no evidence.
   RunStart finish();
 
  private:

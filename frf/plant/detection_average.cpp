@@ -92,7 +92,7 @@ void DetectionAverage::add_line(const RealizationSpectra& spectra, const Eigen::
         spectra.periods(run) * E.col(e).cwiseAbs2();
   }
   const Eigen::MatrixXcd scatter = residual_of_Z * spectra.scatter(column);
-  // Scatter is a sum of squares, but rounding may leave less than nothing of it.
+  // The scatter is a sum of squares, but rounding may make it negative.
   noise_.col(d) += (scatter.array() * residual_of_Z.conjugate().array())
                        .rowwise()
                        .sum()

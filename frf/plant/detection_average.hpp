@@ -9,32 +9,30 @@
 
 namespace stageid {
 
-/// Lines between the first and the last of `excited` (ascending) that are not excited and at most
-/// four lines from one that is: further away the response cannot be interpolated, and a sparse grid
-/// would have thousands.
+/// Unexcited lines between the first and the last of `excited` (ascending) that are at most four lines from an
+/// excited one. The response cannot be interpolated further away, and a sparse grid would have thousands.
 std::vector<int> detection_lines(const std::vector<int>& excited);
 
-/// vec(G) on `line`, linear between the two lines of `excited` around it; `G`: a column each of them.
+/// vec(G) on `line`, interpolated linearly between the two neighbouring lines of `excited`; `G`: one column per line.
 /// @pre excited.front() < line < excited.back()
 Eigen::VectorXcd interpolated_response(const std::vector<int>& excited, int line,
                                        const Eigen::MatrixXcd& G);
 
-/// Gathers DetectionLines over realizations, one after the other. Spectra hold the excited lines
-/// first, then the detection lines.
+/// Accumulates DetectionLines over realizations. Spectra contain the excited lines first, then the detection
+/// lines.
 class DetectionAverage {
  public:
-  /// `lines`: excited ones; `axes`: names of the excited channels; `single_axis`: every run excites
-  /// one of them.
+  /// `lines`: excited ones; `axes`: names of the excited channels; `single_axis`: every run excites only one of
+  /// them.
   DetectionAverage(const std::vector<int>& lines, const std::vector<std::string>& axes,
                    bool single_axis, Eigen::Index outputs);
 
-  /// `G`: (n_y n_u) x excited lines, what is known of the response by now; `axis`: of each
-  /// experiment, the first excited one as a position in the list of axes. Does nothing if no noise
-  /// can be seen.
+  /// `G`: (n_y n_u) x excited lines, the current estimate of the response; `axis`: of each experiment, its first
+  /// excited one as an index into the list of axes. Does nothing if the noise is unknown.
   void add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G,
            const std::vector<std::size_t>& axis, int workers);
 
-  /// `resolution_hz`: distance of neighbouring lines. Empty if nothing could be added.
+  /// `resolution_hz`: distance of neighbouring lines. Empty if nothing was added.
   DetectionLines finish(double resolution_hz) const;
 
  private:
@@ -47,9 +45,9 @@ class DetectionAverage {
   std::vector<std::string> groups_;
   bool noise_known_ = true;
   double periods_ = 0.0;  // of all runs
-  Eigen::VectorXd runs_;  // a value a group
+  Eigen::VectorXd runs_;  // one value per group
   double noise_dof_ = 0.0;
-  Eigen::MatrixXd power_;  // sum of P |E|^2, which noise makes that of one period
+  Eigen::MatrixXd power_;  // sum of P |E|^2, whose expectation under noise is that of one period
   Eigen::MatrixXd noise_;  // sum of |E_p - E|^2
   Eigen::MatrixXd linear_power_;
 };

@@ -22,7 +22,7 @@ constexpr Index kFewestLines = 16;
 constexpr Index kBlockLines = 64;
 constexpr Index kMostBlocks = 16;
 constexpr double kRounding = 1e-10;  // of the output's power
-constexpr double kAsymptotic = 6.0;  // the series below have seven digits from here on
+constexpr double kAsymptotic = 6.0;  // from here on, the series below are accurate to seven digits
 
 /// psi(x) - ln x
 double mean_log_of_power(double x) {
@@ -66,7 +66,7 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
   VectorXd count = VectorXd::Zero(blocks_);
   MatrixXd variance = MatrixXd::Zero(E, blocks_);
   for (Index k = 0; k < lines_; ++k) {
-    if (!log_power.col(k).allFinite()) continue;  // nothing moved
+    if (!log_power.col(k).allFinite()) continue;  // a constant channel
     const auto block = static_cast<Index>(at(k));
     sum[at(k)] += log_power.col(k).reshaped(n_y, E);
     count[block] += 1.0;
@@ -90,7 +90,7 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
   }
 }
 
-/// The largest ratio of two experiments, 1 unless one of the outputs shows that they differ.
+/// The largest ratio of two experiments; 1 unless they differ significantly in an output.
 /// @param mean of the logarithms, outputs x experiments; `weight`: one over its variance
 double ExperimentNoise::compare(const MatrixXd& mean, const VectorXd& weight) {
   double largest = 1.0;

@@ -8,41 +8,41 @@
 
 namespace stageid {
 
-/// The noise of Y - G U in each experiment of one realization, and whether it is the same in all.
+/// The noise of Y - G U in each experiment of one realization, and a test whether it is the same in all.
 ///
-/// In the loop it is the open-loop noise, whatever was excited, so that the experiments are expected to agree and
-/// are pooled; but a compressor that runs during one of them, or a sensor that warms up, makes them differ.
-/// With s_e,i(k) the variance of output i on line k in experiment e, of nu_e complex degrees of freedom,
-/// ln s has the mean ln sigma^2 + psi(nu_e) - ln nu_e and the variance psi'(nu_e), whatever sigma is. Means of it over
-/// blocks of lines, 64 or more, are compared by a chi-square test with one in a million by chance over all
-/// blocks and outputs; and they must be apart by more than the factor 1.3, below which the degrees of freedom that
-/// pooling has are worth more. What is less than 1e-5 of the output is rounding, or a transient that a model
-/// left. A block is pooled or not as a whole.
+/// In the loop this is the open-loop noise, for any excitation, so the experiments are expected to agree and are
+/// pooled. A compressor that runs during one of them, or a sensor that warms up, makes them differ.
+///
+/// Let s_e,i(k) be the variance of output i on line k in experiment e, with nu_e complex degrees of freedom. Then
+/// ln s has the mean ln sigma^2 + psi(nu_e) - ln nu_e and the variance psi'(nu_e), for any sigma. Its means over
+/// blocks of 64 lines or more are compared by a chi-square test, with a probability of one in a million over all
+/// blocks and outputs. They must also differ by a factor of 1.3; below it, the degrees of freedom gained by
+/// pooling are worth more. Noise below 1e-5 of the output is ignored: it is rounding, or the remainder of a
+/// modelled transient. A block is either pooled or not as a whole.
 class ExperimentNoise {
  public:
   /// @param lines      of the realization, all LineStatus::good
-  /// @param shared     lines that tell as much as one: those of a local model's window, else 1
+  /// @param shared     lines per independent one: those of a local model's window, otherwise 1
   ExperimentNoise(const RealizationSpectra& spectra, const std::vector<LineEstimate>& lines,
                   double shared, int workers);
 
   bool differs(Eigen::Index k) const { return !blocks_differ_.empty() && blocks_differ_[at(k)]; }
-  /// Largest over smallest noise power of two experiments, of the output and block where that is most; 1
-  /// where none differs.
+  /// Largest ratio of the noise powers of two experiments, over outputs and blocks; 1 if they agree.
   double ratio() const noexcept { return ratio_; }
-  /// An experiment whose noise is a factor 1.3 and 5 deviations off the median where they differ; at least the one
-  /// that is most off, if any differs.
+  /// An experiment whose noise differs from the median by a factor of 1.3 and 5 standard deviations. If any differ,
+  /// at least the one with the largest deviation.
   struct Odd {
     Eigen::Index experiment = 0;
-    Eigen::Index output = 0;  ///< where it differs most
+    Eigen::Index output = 0;  ///< with the largest difference
     double ratio = 1.0;       ///< to the median
   };
   const std::vector<Odd>& odd() const noexcept { return odd_; }
 
-  /// C_Ee of one period on line k, an entry an experiment.
+  /// C_Ee of one period on line k, one entry per experiment.
   std::vector<Eigen::MatrixXcd> covariances(const LineEstimate& line, Eigen::Index k) const;
 
-  /// What comes nearest to one C_E of all experiments: experiment e has the share g_ei of the power of
-  /// output i, mean 1 over the experiments, and C_E is pooled from what is left with the shares taken out.
+  /// Approximates the experiments' covariances by one C_E. Experiment e has the share g_ei of the power of output i,
+  /// with mean 1 over the experiments. C_E is pooled after the shares have been divided out.
   ///   input_part = sum_e g_e q_e q_e^H / P_e, gain_ij = sum_e g_ei |q_ej|^2 / P_e.
   LineNoise scaled(const LineEstimate& line, const Eigen::VectorXd& periods, Eigen::Index k) const;
 
@@ -54,7 +54,7 @@ class ExperimentNoise {
   const RealizationSpectra& spectra_;
   Eigen::Index lines_;
   Eigen::Index blocks_ = 1;
-  std::vector<Eigen::MatrixXd> share_;  // a block: outputs x experiments
+  std::vector<Eigen::MatrixXd> share_;  // per block: outputs x experiments
   std::vector<bool> blocks_differ_;
   double ratio_ = 1.0;
   std::vector<Odd> odd_;

@@ -9,11 +9,11 @@
 
 namespace stageid {
 
-/// Names what an estimate was made of: for each log the file's name and the fingerprint of the
-/// samples used (in the order of realizations and experiments), the runs, the options, the version.
+/// Inputs of an estimate: for each log the file's name and the fingerprint of the samples used (in the order of
+/// realizations and experiments), the runs, the options, the version.
 ///
-/// Without anything that may differ between two runs of the same estimate: no directory, no time,
-/// no thread count; so the output files are the same byte for byte.
+/// It excludes everything that may differ between two runs of the same estimate (directory, time, number of
+/// threads), so that the output files are identical byte for byte.
 class FrfProvenance {
  public:
   FrfProvenance(const LogInfo& info, const FrfOptions& options, const ChannelChoice& channels);

@@ -8,16 +8,15 @@
 
 namespace stageid {
 
-/// Gathers LineAlignment, realization by realization. Spectra hold the excited lines first, then the
-/// detection lines.
+/// Accumulates LineAlignment over realizations. Spectra contain the excited lines first, then the detection
+/// lines.
 class AlignmentAverage {
  public:
   /// `excited`, `detection`: ascending.
   AlignmentAverage(std::vector<int> excited, std::vector<int> detection, Eigen::Index outputs);
 
-  /// `G_before`: (n_y n_u) x excited lines, the mean of the realizations before this one, which is free
-  /// of this one's noise; looked at from the second realization on. `G`: with this one, for the
-  /// detection lines.
+  /// `G_before`: (n_y n_u) x excited lines, the mean of the previous realizations, which does not contain the noise
+  /// of this one; used from the second realization on. `G`: includes this realization, for the detection lines.
   void add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G_before,
            const Eigen::MatrixXcd& G, int workers);
 
@@ -30,7 +29,7 @@ class AlignmentAverage {
   std::vector<int> excited_;
   std::vector<int> detection_;
   std::vector<int> lines_;            // of both, ascending
-  std::vector<Eigen::Index> column_;  // of the spectra, for each of lines_
+  std::vector<Eigen::Index> column_;  // index into the spectra for each of lines_
   Eigen::Index outputs_;
   bool first_ = true;
   Eigen::MatrixXd cosine_;

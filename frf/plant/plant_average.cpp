@@ -14,12 +14,12 @@
 namespace stageid {
 namespace {
 
-/// Column k of columns that are vec of a matrix with `rows` rows.
+/// Column k, vec of a matrix with `rows` rows, as a matrix.
 Eigen::Map<Eigen::MatrixXcd> unvec(Eigen::MatrixXcd& columns, Eigen::Index k, Eigen::Index rows) {
   return {columns.col(k).data(), rows, columns.rows() / rows};
 }
 
-/// Lines whose scatters tell as much as one: of the middle, all alike.
+/// Number of lines with a common scatter, at the middle line; the others have the same number.
 double lines_that_share(const RealizationSpectra& spectra) {
   const RunSpectra& run = spectra.run(0);
   if (run.scatter_window == 0) return 1.0;
@@ -145,7 +145,7 @@ void PlantAverage::add_response(const RealizationSpectra& spectra, const LineEst
   unvec(Z_sum_, k, outputs_ + inputs_) += line.Z_by_R;
   condition_[k] = std::max(condition_[k], line.input_condition);
 
-  // Welford again: mean and scatter of the realizations' own estimates.
+  // Welford's recursion again, for mean and scatter of the realizations' own estimates.
   for (Eigen::Index c = 0; c < G_mean_.rows(); ++c) {
     const std::complex<double> deviation = line.G.data()[c] - G_mean_(c, k);
     G_mean_(c, k) += deviation / static_cast<double>(realizations_);
@@ -155,12 +155,12 @@ void PlantAverage::add_response(const RealizationSpectra& spectra, const LineEst
 
 void PlantAverage::add_common(const LineNoise& noise, Eigen::Index k) {
   unvec(residual_sum_, k, outputs_) += noise.mean_of_periods * noise.residual;
-  // Hermitian in rounding too.
+  // Hermitian in spite of rounding.
   unvec(input_sum_, k, inputs_) +=
       (0.5 / noise.mean_of_periods) * (noise.input_part + noise.input_part.adjoint());
 }
 
-/// Noise whose covariance is A kron C, C of `dof` degrees of freedom.
+/// Adds noise with covariance A kron C, C with `dof` degrees of freedom.
 void PlantAverage::add_product(const Eigen::MatrixXcd& A, const Eigen::MatrixXcd& C, double dof,
                                Eigen::Index k) {
   for (Eigen::Index j = 0; j < inputs_; ++j) {
@@ -210,8 +210,8 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
   if (covariance_kind_ == CovarianceKind::full) frf.covariance = covariance_sum_ / (M * M);
 }
 
-/// Welch and Satterthwaite: of a sum of variances a_e with nu_e degrees of freedom, (sum a)^2 / sum a^2 / nu. With
-/// estimates for a, sum a^2 / (nu + 1) / (sum a)^2 has the mean 1 / (nu + 1); its mean over lines and entries.
+/// Welch and Satterthwaite: a sum of variances a_e with nu_e degrees of freedom has (sum a)^2 / (sum a^2 / nu).
+/// For estimated a, sum a^2 / (nu + 1) / (sum a)^2 has the mean 1 / (nu + 1). Averaged over lines and entries.
 double PlantAverage::effective_dof() const {
   const Eigen::ArrayXXd scarcity = scarce_sum_.array() / noise_sum_.array().square();
   const Eigen::ArrayXXd known = scarcity.isFinite().select(scarcity, 0.0);

@@ -15,21 +15,23 @@
 
 namespace stageid {
 
-/// Averages over realizations, one after the other: G = (mean_m Y_m)(mean_m U_m)^-1, Z_m = Z R^+,
+/// Mean over realizations, G = (mean_m Y_m)(mean_m U_m)^-1, Z_m = Z R^+,
 /// and the uncertainty of that mean.
-///   noise: C_n = sum_m C_n^[m] / M^2, each realization with its own U and G (memory stays
-///   bounded); with one C_E common to all, that is S kron C_E with S = sum_m A_m / (M^2 mean 1/P_e),
-///   C_E being the mean of the realizations' and of the mean of periods; total: sum_m |G^[m] - mean G|^2 / (M (M - 1)).
-/// Experiments of one realization whose noise differs (ExperimentNoise) are not pooled:
-/// C_n^[m] = sum_e q_e q_e^H / P_e kron C_Ee then, with the degrees of freedom of Welch and Satterthwaite, and S and C_E are
-/// those that come nearest to it.
+///   noise: C_n = sum_m C_n^[m] / M^2, each realization with its own U and G (bounded memory);
+///   total: sum_m |G^[m] - mean G|^2 / (M (M - 1)).
+/// With one common C_E, C_n is S kron C_E with S = sum_m A_m / (M^2 mean 1/P_e), and C_E, of the mean of periods,
+/// is the mean over the realizations.
+///
+/// Experiments of one realization whose noise differs (ExperimentNoise) are not pooled. Then
+/// C_n^[m] = sum_e q_e q_e^H / P_e kron C_Ee with the degrees of freedom of Welch and Satterthwaite, and S and
+/// C_E are approximations.
 class PlantAverage {
  public:
   PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines, Eigen::Index outputs,
                Eigen::Index inputs, CovarianceKind covariance);
 
-  /// Lines are shared among `workers` threads; each line is worked on by one. `zippered`: the model
-  /// between the lines of each axis, if they are not excited on all; the same in all calls.
+  /// Lines are distributed over `workers` threads. `zippered`: the model between the lines of each axis, if not all
+  /// axes are excited on all lines; the same in all calls.
   /// @throws std::invalid_argument "singular ..." naming realization, line and frequency.
   void add(const RealizationSpectra& spectra, int workers, const ZipperedFit* zippered = nullptr);
 
@@ -37,15 +39,15 @@ class PlantAverage {
   const Eigen::MatrixXcd& mean_response() const noexcept { return G_mean_; }
 
   /// Writes frequencies, response, variances, degrees of freedom, condition and covariances.
-  /// @throws std::invalid_argument if a full covariance is wanted and no noise could be seen.
+  /// @throws std::invalid_argument if a full covariance is requested but the noise is unknown.
   void finish(FrfEstimate& frf, int workers) const;
 
-  /// For nonlinearity_test(); empty if it needs more realizations, periods or independent lines.
+  /// Input of nonlinearity_test(); empty if more realizations, periods or independent lines are needed.
   RealizationScatter scatter() const;
 
-  /// Whether the response changes in time. @param frf as finish() leaves it; `run_periods`: of a run
+  /// Drift of the response. @param frf result of finish(); `run_periods`: periods per run
   std::optional<ModeDrift> drift(const FrfEstimate& frf, int run_periods) const;
-  /// Runs whose noise is not that of the others.
+  /// A run whose noise differs from that of the others.
   struct OddRun {
     int realization = 0;
     ExperimentNoise::Odd odd;
@@ -78,7 +80,7 @@ class PlantAverage {
   Eigen::MatrixXcd G_mean_;     // vec(G) x lines, of the realizations' own estimates
   Eigen::MatrixXd G_scatter_;   // sum |G^[m] - mean|^2
   Eigen::MatrixXd noise_sum_;   // sum of the realizations' noise variances
-  Eigen::MatrixXd scarce_sum_;  // sum of a^2 / (nu + 1) of the variances a that are its terms
+  Eigen::MatrixXd scarce_sum_;  // sum of a^2 / (nu + 1) over their terms a
   double experiment_noise_ratio_ = 1.0;
   Eigen::MatrixXcd residual_sum_;    // vec(C_E) of the mean of periods
   Eigen::MatrixXcd input_sum_;       // vec(A_m) over the mean of 1 / P_e
@@ -88,9 +90,9 @@ class PlantAverage {
   ResponseDrift drift_;
   std::vector<OddRun> odd_runs_;
   Eigen::Index zippered_axes_ = 0;
-  Eigen::VectorXd dof_sum_;       // of the noise's degrees of freedom
-  Eigen::VectorXd scarcity_sum_;  // zippered: of 1 / degrees of freedom
-  Eigen::VectorXd share_sum_;     // of the variance shares
+  Eigen::VectorXd dof_sum_;       // sum of the noise's degrees of freedom
+  Eigen::VectorXd scarcity_sum_;  // zippered: sum of 1 / degrees of freedom
+  Eigen::VectorXd share_sum_;     // sum of the variance shares
   Eigen::VectorXd misfit_sum_;
 };
 

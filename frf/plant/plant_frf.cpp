@@ -33,15 +33,15 @@
 namespace stageid {
 namespace {
 
-/// What the first realization fixes for all: lines and axes.
+/// Lines and axes, which the first realization determines for all.
 struct ExcitedPart {
   std::vector<int> lines;
   std::vector<Eigen::Index> axes;
   bool single_axis = true;           ///< in every run
-  std::vector<Eigen::Index> only{};  ///< zippered: the channel of each line; else empty
+  std::vector<Eigen::Index> only{};  ///< zippered: the channel of each line; otherwise empty
 };
 
-/// The estimate in the making: reads realization by realization, threads over the runs of one.
+/// An estimate in progress: reads realization by realization, with threads over its runs.
 class PlantEstimation {
  public:
   PlantEstimation(ChosenRuns chosen, const FrfOptions& options)
@@ -55,14 +55,14 @@ class PlantEstimation {
         std::max_element(realizations_.begin(), realizations_.end(),
                          [](const auto& a, const auto& b) { return a.runs.size() < b.runs.size(); })
             ->runs.size();
-    // No more workspaces than there is work for: each holds a period of samples.
+    // At most one workspace per run, because each contains a period of samples.
     run_workers_ = static_cast<int>(std::min(static_cast<std::size_t>(workers_), most));
     for (int w = 0; w < run_workers_; ++w) {
       workspaces_.push_back(std::make_unique<RunWorkspace>(info_.period_samples, pool_));
     }
   }
 
-  /// `health`: gathers from the same reading, if there is one.
+  /// `health`: receives the same data; may be null.
   FrfEstimate estimate(HealthGathering* health);
   const std::vector<RealizationRuns>& realizations() const noexcept { return realizations_; }
 
@@ -101,7 +101,7 @@ class PlantEstimation {
   std::unique_ptr<FrfProvenance> provenance_;
   std::vector<DroppedPeriod> dropped_;
   std::vector<LeftOutRealization> left_out_;
-  const UsedRun* first_marked_ = nullptr;  // of those without a clean period
+  const UsedRun* first_marked_ = nullptr;  // first run without a clean period
   int fewest_periods_ = std::numeric_limits<int>::max();
   double input_power_ = 0.0;
   Eigen::VectorXd excluded_power_;
@@ -204,7 +204,7 @@ void PlantEstimation::note_dropped(const RealizationRuns& realization,
   }
 }
 
-/// Whether a run without a clean period makes the realization useless, and if so, notes it.
+/// Whether a run has no clean period; records it and the realization is skipped.
 bool PlantEstimation::leave_out(const RealizationRuns& realization,
                                 const RealizationSpectra& spectra) {
   for (std::size_t e = 0; e < realization.runs.size(); ++e) {
@@ -310,7 +310,7 @@ void PlantEstimation::include(const RealizationSpectra& spectra,
   detection_->add(spectra, average_->mean_response(), axis, workers_);
 }
 
-/// What the response shows of the measurement itself.
+/// Records drift and noise differences, which only the finished response shows.
 void PlantEstimation::note_change(const FrfEstimate& frf, HealthGathering& health) const {
   std::vector<NoisyRun> noisy;
   for (const auto& [realization, odd] : average_->odd_runs()) {
@@ -353,7 +353,7 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   average_->finish(frf, workers_);
   if (health != nullptr) note_change(frf, *health);
   if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);
-  // Beyond them some axis would have to be extrapolated.
+  // Outside these lines, the response to some axis would be extrapolated.
   if (zippered_) {
     const double low_hz = frf.frequency_hz[zippered_->lines().first()];
     const double high_hz = frf.frequency_hz[zippered_->lines().last()];

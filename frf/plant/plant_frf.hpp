@@ -11,59 +11,55 @@ namespace stageid {
 
 /// Estimates the plant from closed-loop logs by the indirect method.
 ///
-/// For realization m, with Z = [Y; U] at the excited lines, averaged over the periods after the
-/// transient, Z_m = Z R^-1 over the n_r experiments, and
+/// For realization m, let Z = [Y; U] be the spectra at the excited lines, averaged over the periods after the
+/// transient, and Z_m = Z R^-1 over the n_r experiments. Then
 ///   G = (mean_m Y_m) (mean_m U_m)^-1.
-/// Variances by first-order propagation, vec(dG) = (U^-T kron [I, -G]) vec(dZ): noise from the
-/// scatter over periods, total from the scatter over realizations. Both are of the mean. With one
-/// measured period noise_variance is empty, with one realization total_variance is.
+/// Variances follow by first-order propagation, vec(dG) = (U^-T kron [I, -G]) vec(dZ): noise from the scatter
+/// over periods, total from the scatter over realizations. Both are those of the mean. With one measured period
+/// noise_variance is empty, with one realization total_variance is.
 ///
-/// The noise of Y - G U is that of the open loop, whatever was excited, so its covariance C_E is
-/// pooled over the experiments of a realization: Cov(vec G) = sum_e (q_e q_e^H) kron C_E / P_e with
-/// q_e the e-th row of U^-1, and M E (P-1) degrees of freedom (each dropped period takes one). Where the
-/// experiments' noise is found to differ, each has its own C_E and the degrees of freedom are those of Welch and
-/// Satterthwaite: experiment_noise.hpp.
+/// The noise of Y - G U is that of the open loop for any excitation. Its covariance C_E is therefore pooled over
+/// the experiments of a realization: Cov(vec G) = sum_e (q_e q_e^H) kron C_E / P_e, with q_e the e-th row of U^-1
+/// and M E (P-1) degrees of freedom (minus one per dropped period). If the noise differs between experiments, each
+/// has its own C_E, with the degrees of freedom of Welch and Satterthwaite: experiment_noise.hpp.
 ///
-/// With FrfMethod::lpm Z is the steady state of the whole record, the transient removed by a local
-/// polynomial or rational model (transient_model.hpp), and C_E comes from what that leaves beside
-/// the lines: 9 degrees of freedom a stretch, from one period on. Neighbouring lines share bins, so
-/// their variances are correlated over some 16 bins. Stretches end at marked periods and after 16
-/// periods at most: record_spectra.hpp. Memory: 16 periods a thread.
+/// With FrfMethod::lpm, Z is the steady state of the whole record. The transient is removed by a local polynomial or
+/// rational model (transient_model.hpp), and C_E follows from its residual beside the lines: 9 degrees of freedom
+/// per stretch of periods, even for one period. Neighbouring lines share bins, so their variances are correlated
+/// over some 16 bins. A stretch ends at marked periods, or after 16 periods: record_spectra.hpp. Memory: 16
+/// periods per thread.
 ///
-/// If one experiment excites several axes, each on lines of its own (zippered), it is a whole
-/// realization: the responses to each axis are modelled between its lines, see zippered_fit.hpp, after
-/// either method. The result has the lines between the axes' first and last ones; errors of
-/// neighbouring lines are correlated (FrfEstimate::correlated_lines), interpolation_misfit shows where
-/// the interpolation cannot be trusted. The noise is that between periods pooled with what the local
-/// models leave, distortions and interpolation errors among it; with one period that alone.
+/// If one experiment excites several axes, each on its own lines (zippered), it is a whole realization. The
+/// responses to each axis are then modelled between its lines (zippered_fit.hpp), with either method. The result
+/// has the lines between the axes' first and last ones. Errors of neighbouring lines are correlated
+/// (FrfEstimate::correlated_lines), and interpolation_misfit shows where the interpolation is unreliable. The
+/// noise between periods is pooled with the residual of the local models, which includes distortions and
+/// interpolation errors; with one period only the residual is used.
 ///
-/// Incomplete runs are passed over; of several complete runs of one (realization, experiment) the
-/// last counts. Periods with a marked sample are dropped, and (periodic, three periods or more)
-/// those whose scatter shows that they do not belong with the others: period_check.hpp; with lpm those with
-/// a glitch: glitch_check.hpp. A realization
-/// with a run that has no clean period is left out (FrfEstimate::left_out_realizations). With two
-/// periods and two realizations the plant's linearity is tested, see nonlinearity_test(). Inputs asked
-/// for that are only some of the excited actuators are columns of the whole estimate: the others move
-/// too.
+/// Incomplete runs are skipped; of several complete runs of one (realization, experiment), the last is used. Periods
+/// with a marked sample are dropped. So are outliers (periodic, three periods or more: period_check.hpp) and, with
+/// lpm, periods with a glitch (glitch_check.hpp). A realization with a run without clean periods is discarded
+/// (FrfEstimate::left_out_realizations). With two periods and two realizations, the plant's linearity is tested,
+/// see nonlinearity_test(). If only some of the excited actuators are requested as inputs, they are columns of the
+/// whole estimate, because the others move too.
 ///
-/// Memory (periodic): one period of samples and 16 of spectra a thread, and the spectra and scatters of one
-/// realization, (n_y + n_u)^2 numbers a line and experiment.
-/// Source: method.md section 3; Pintelon and Schoukens, System Identification (2012).
-/// @throws std::invalid_argument / FormatError: fewer experiments than inputs, singular excitation
-///         (names line and frequency), a period that does not divide the record, no realization
-///         whose runs all have a clean period, channels unknown;
-///         with lpm a single period without empty lines; zippered lines that are too few, or not the
-///         same in all realizations; covariance_lines as smooth_covariance().
+/// Memory (periodic): per thread one period of samples and 16 of spectra; in total the spectra and scatters of one
+/// realization, (n_y + n_u)^2 numbers per line and experiment.
+/// Source: docs/theory.md, section 3; Pintelon and Schoukens, System Identification (2012).
+/// @throws std::invalid_argument / FormatError: fewer experiments than inputs, singular excitation (naming line
+///         and frequency), a period that does not divide the record, no realization in which all runs have a
+///         clean period, unknown channels; with lpm a single period without empty lines; zippered lines that
+///         are too few or differ between realizations; covariance_lines as in smooth_covariance().
 FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
                                const FrfOptions& options = {});
 
 struct FrfAndHealth {
   FrfEstimate frf;
-  HealthRecord health;  ///< as read_health_record() gives it
+  HealthRecord health;  ///< as from read_health_record()
 };
 
-/// The estimate and what the checks of the data's health look at, from one reading of the logs.
-/// @throws what estimate_plant_frf() throws
+/// The estimate and the input of the health checks, from one pass over the logs.
+/// @throws the same as estimate_plant_frf()
 FrfAndHealth estimate_plant_frf_and_health(const std::vector<const LogReader*>& logs,
                                            const FrfOptions& options = {});
 

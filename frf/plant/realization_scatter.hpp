@@ -7,25 +7,25 @@
 
 namespace stageid {
 
-/// Of degrees of freedom that differ from line to line: as the mean of 1 / variance has it.
+/// Mean of degrees of freedom that differ between lines, appropriate for 1 / variance.
 double harmonic_mean(const Eigen::VectorXd& dof);
 
-/// Gathers RealizationScatter, realization by realization. With q_m = LineNoise::gain, what realization m makes
-/// of the noise C_E for an entry of G (line_estimate.hpp), and w_m = 1 / q_m, W = sum_m w_m,
+/// Accumulates RealizationScatter over realizations. With q_m = LineNoise::gain, the gain of realization m from the
+/// noise C_E to an entry of G (line_estimate.hpp), and w_m = 1 / q_m, W = sum_m w_m,
 ///   total = sum_m w_m |G^[m] - G_w|^2 / ((M - 1) W),  G_w = sum_m w_m G^[m] / W,
 ///   noise = C_E / W,  C_E pooled over the realizations by their degrees of freedom.
-/// On a linear plant w_m |G^[m] - G|^2 has the variance C_E for every m, so that their ratio has the
-/// distribution F(2 (M - 1), 2 nu) whatever the levels, phases and controllers of the realizations; that
-/// of the unweighted mean's variances has it if all q_m are alike.
+/// On a linear plant w_m |G^[m] - G|^2 has the variance C_E for every m. The ratio of total and noise therefore has
+/// the distribution F(2 (M - 1), 2 nu) for any levels, phases and controllers of the realizations. That of the
+/// unweighted mean's variances has it only if all q_m are equal.
 /// Source: Cochran's theorem, weighted sums of squares.
 class ScatterAverage {
  public:
   ScatterAverage(Eigen::Index outputs, Eigen::Index inputs, Eigen::Index lines);
 
-  /// One realization on line k, whose noise has `dof` degrees of freedom. Lines may be added at once.
+  /// Adds one realization on line k; its noise has `dof` degrees of freedom. Lines may be added concurrently.
   void add(const LineEstimate& line, const LineNoise& noise, double dof, Eigen::Index k);
 
-  /// @pre two realizations were added, on every line
+  /// @pre two realizations were added on every line
   RealizationScatter finish(int realizations) const;
 
  private:

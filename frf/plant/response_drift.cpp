@@ -19,21 +19,21 @@ using Eigen::VectorXd;
 constexpr Index kWindow = 9;
 constexpr double kDriftDeviations = 8.0;
 constexpr double kLeastShare = 0.5;
-// Distortions differ from realization to realization, on as few lines as a resonance has: five complex numbers of equal
-// size lie along one direction by so much once in some thousand times.
+// Distortions differ between realizations, on as few lines as a resonance has. Five complex numbers of equal size
+// have this share along one direction with a probability of about one in a thousand.
 constexpr double kLeastShareOfRealizations = 0.8;
 constexpr double kLeastBias = 1.0;
 constexpr double kDriftRounding = 1e-16;  // of the largest |G|^2 of a line
 
-/// A slope of G in time, and what it is per unit of noise_variance.
+/// A slope of G in time, and its variance per unit of noise_variance.
 struct Slope {
   MatrixXcd values;  // vec(G) x lines
   double variance = 0.0;
   double least_share = kLeastShare;
-  double span = 0.0;  // of the measurement, in its unit of time
+  double span = 0.0;  // duration of the measurement in its unit of time
 };
 
-/// Mean over the lines of the window about line k, cut off at the ends.
+/// Mean over the lines of the window around line k, truncated at the ends.
 VectorXd about(const MatrixXd& columns, Index k) {
   const Index first = std::max<Index>(0, k - kWindow / 2);
   const Index last = std::min(columns.cols(), k + kWindow / 2 + 1);
@@ -60,8 +60,8 @@ class DriftFit {
     for (Index k = 1; k + 1 < K; ++k) add_line(k);
   }
 
-  /// Where the response changes most of all lines in windows with a drift, by the window about it. Not the most
-  /// significant one: the scatter over the periods holds the drift, and hides it where it is largest.
+  /// Finds the line with the largest change in windows with a drift; the drift is that of the window around it. The
+  /// most significant line is unsuitable: the scatter over the periods contains the drift, largest at its maximum.
   std::optional<ModeDrift> find() const {
     const Index K = frf_.lines();
     std::vector<Index> drifting;  // middles of windows
@@ -69,7 +69,7 @@ class DriftFit {
     for (Index first = 1; first + kWindow < K; ++first) {
       if (!drifts(first)) continue;
       drifting.push_back(first + kWindow / 2);
-      // A resonance that the lines hardly resolve has no derivative that fits, but its flanks have.
+      // A poorly resolved resonance does not fit its derivative, but its flanks do.
       const Index from = std::max<Index>(1, first - kWindow);
       covered.segment(from, std::min(K, first + 2 * kWindow) - from).setOnes();
     }
@@ -122,7 +122,7 @@ class DriftFit {
     C.imag() = frf_.residual_covariance_im.col(k).reshaped(n_y, n_y);
     const MatrixXcd S = frf_.input_factor.col(k).reshaped(n_u, n_u);
     const MatrixXcd of_inputs = W.adjoint() * C * W;
-    // Not less than rounding leaves.
+    // At least the rounding errors.
     variance_[k] =
         0.5 * slope_.variance * (S.cwiseProduct(of_inputs).sum().real() + least * W.squaredNorm());
   }
@@ -172,7 +172,7 @@ std::optional<ModeDrift> ResponseDrift::find(const FrfEstimate& frf, const Matri
       frf.residual_covariance_re.size() == 0 || frf.lines() < kWindow + 2)
     return std::nullopt;
   const double M = frf.realizations;
-  // Over the realizations it is the more certain.
+  // The slope over the realizations is more accurate.
   if (frf.realizations > 1) {
     const Slope slope{(counted_sum_ - M * (M - 1.0) / 2.0 * G_mean) * (12.0 / (M * (M * M - 1.0))),
                       12.0 / (M * M - 1.0), kLeastShareOfRealizations, M};

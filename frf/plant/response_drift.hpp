@@ -10,24 +10,26 @@
 
 namespace stageid {
 
-/// How the response changes in time, summed up realization by realization: the slope over the periods within the
-/// runs and the slope over the realizations.
+/// Change of the response in time, accumulated over realizations: the slope over the periods within the runs and the
+/// slope over the realizations (docs/theory.md, section 13).
 ///
-/// Where a mode's frequency moves by the share d, G changes by X d, X = -f dG/df. In windows of nine lines d is
-/// fitted to the slope by weighted least squares, once to that within the runs, once to that over the realizations.
-/// Noise of S kron C_E gives its deviation. A drift is reported if d is 8 deviations off zero (Student's t with 36
-/// degrees of freedom, the fewest: 2e-9), if X d is more than half, over realizations 0.8, of what the slope has beyond noise (a
-/// transient or distortions have phases of their own on every line), and if half of the whole change exceeds a deviation of the response.
+/// If a mode's frequency changes by the share d, G changes by X d, X = -f dG/df. In windows of nine lines, d is fitted
+/// by weighted least squares to the slope within the runs, and to that over the realizations. Noise of S kron C_E
+/// gives its standard deviation. A drift is reported on three conditions:
+///   - d is 8 standard deviations from zero (Student's t with at least 36 degrees of freedom: 2e-9).
+///   - X d is more than half (over realizations 0.8) of the slope beyond noise. A transient or distortions have other
+///     phases on every line.
+///   - Half of the whole change exceeds one standard deviation of the response.
 class ResponseDrift {
  public:
   ResponseDrift(Eigen::Index outputs, Eigen::Index inputs, Eigen::Index lines);
 
-  /// Line k of realization number `count` from 0, of those that are used. Different lines at once.
+  /// Adds line k of realization number `count`, from 0, of the used ones. Different lines may be added concurrently.
   void add(const RealizationSpectra& spectra, const LineEstimate& line, int count, Eigen::Index k);
 
   /// @param frf          finished, on the same lines
   /// @param G_mean       mean of the realizations' responses
-  /// @param run_periods  periods of a run, transient ones too
+  /// @param run_periods  periods per run, including transient ones
   std::optional<ModeDrift> find(const FrfEstimate& frf, const Eigen::MatrixXcd& G_mean,
                                 int run_periods) const;
 

@@ -14,11 +14,11 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXcd;
 
-// Two modes close to each other and the flank of a third one. The numerators have the same order: with
-// a lower one what lies outside the window could not be added to the poles.
+// Two close modes and the flank of a third one. Numerators have the same order, so that modes outside the window
+// can be represented in addition to the poles.
 constexpr int kMostPoles = 3;
 constexpr double kNarrowestPole = 0.2;
-// That noise alone leaves so much that the residual is not pooled with the noise but taken for itself.
+// Below this probability of the misfit under noise, the residual replaces the noise instead of being pooled.
 constexpr double kMisfitByChance = 0.01;
 
 MatrixXcd open_loop_residual(const MatrixXcd& G) {  // [I, -G]
@@ -28,8 +28,8 @@ MatrixXcd open_loop_residual(const MatrixXcd& G) {  // [I, -G]
   return factor;
 }
 
-/// A that what not knowing D adds, F_i F_i^H with F_i = [I, -G] X_i U^-1, is A kron diag(C_E) in the
-/// mean over the outputs.
+/// The matrix A for which A kron diag(C_E) equals the covariance due to the uncertainty of D, F_i F_i^H with
+/// F_i = [I, -G] X_i U^-1, in the mean over the outputs.
 MatrixXcd pole_part(const LineEstimate& line, const MatrixXcd& pole_spread,
                     const Eigen::VectorXd& variance) {
   const Index n_u = line.Q.cols();
@@ -104,7 +104,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
   if (result.line.status != LineStatus::good) return result;
   result.variance_share = (fit.weight.array() * R.array()).abs2().sum() / static_cast<double>(axes);
 
-  // Of the mean of periods, as the local model sees it.
+  // For the mean of periods, the data of the local model.
   const MatrixXcd left = open_loop_residual(result.line.G) * fit.residual;
   const Eigen::VectorXd left_variance = left.rowwise().squaredNorm() / fit.dof;
   const bool from_periods = spectra.scatter_dof() > 0;
@@ -133,7 +133,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
     if (noise.minCoeff() > 0.0) result.misfit = left_variance.cwiseQuotient(noise).mean();
     if (result.misfit > 1.0 && log_tail_of_f(result.misfit, static_cast<int>(std::ceil(fit.dof)),
                                              dof) < std::log(kMisfitByChance)) {
-      // More than noise: what the model cannot follow, of which the value has its part.
+      // The misfit exceeds the noise, and the value contains part of it.
       result.noise.residual *= result.misfit;
       result.noise_dof = fit.variance_dof;
     } else {
@@ -143,7 +143,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
                               periods * share_of_left * left * left.adjoint();
     }
   } else {
-    // Not an integer where a pole took its share: divided before.
+    // Divided by fit.dof here, because it is not an integer if there are poles.
     const MatrixXcd scatter = fit.residual * fit.residual.adjoint() / fit.dof;
     result.noise = line_noise(result.line, scatter, 1, effective);
     result.noise_dof = fit.variance_dof;

@@ -13,36 +13,36 @@ struct ZipperedEstimate {
   LineEstimate line;
   LineNoise noise;
   double noise_dof = 0.0;  ///< of noise.residual
-  /// Variance of an entry of Z R^-1 over that on an excited line: mean over the axes. Below 1, as
-  /// the local model averages.
+  /// Variance of an entry of Z R^-1 over that on an excited line: mean over the axes. Below 1, because the local model
+  /// averages.
   double variance_share = 0.0;
-  /// What the local model leaves over what the noise would, mean over the outputs; 0: unknown.
+  /// Residual of the local model over the expected noise, mean over the outputs; 0: unknown.
   double misfit = 0.0;
 };
 
-/// Responses to every axis on every line, from one experiment in which each axis has lines of its own.
+/// Responses to every axis on every line, from one experiment in which each axis has its own lines.
 ///
-/// On a line k of axis p the loop gives Z(k) = H_p(k) R_p(k) + V(k), one column H_p of Z R^-1. All
-/// columns are modelled around line l, on the zippered_window() nearest lines of each axis,
+/// On a line k of axis p, the loop gives Z(k) = H_p(k) R_p(k) + V(k), one column H_p of Z R^-1. All columns are
+/// modelled around line l, on the zippered_window() nearest lines of each axis,
 ///   Z(k) = R_p(k) (theta_p0 + theta_p1 r + theta_p2 r^2 + theta_p3 r^3) / D(r) + V(k),
-/// r = (k - l) / reach, with one D of up to three poles for all axes (average_locally(): the mean over
-/// the number of poles), and G = Y U^-1 of [theta_10 theta_20 ...]. Each column is a weighted sum of spectra on other lines, so
-///   Cov(vec G) = sum_p |w_p|^2 (q_p q_p^H) kron C_E / P + (what not knowing D adds),
-/// q_p row p of U^-1. C_E is the mean of the lines', weighted as they enter, pooled with what the local
-/// model leaves; where that is more than noise leaves on one of a hundred lines, C_E is raised to it, as
-/// it holds what the model cannot follow. With one period it is the residual alone.
+/// r = (k - l) / reach. D has up to three poles and is common to all axes (average_locally() averages over their
+/// number). G = Y U^-1 of [theta_10 theta_20 ...]. Each column is a weighted sum of spectra on other lines, so
+///   Cov(vec G) = sum_p |w_p|^2 (q_p q_p^H) kron C_E / P + (uncertainty of D),
+/// q_p row p of U^-1. C_E is the weighted mean of the lines' covariances, pooled with the residual of the local
+/// model. If that residual exceeds noise with a probability below 1 %, C_E is raised to it, because it contains
+/// modelling errors. With one period C_E is the residual alone.
 /// Source: Pintelon and Schoukens, System Identification (2012), sections 2.7.2 and 7.2.
 class ZipperedFit {
  public:
   static constexpr int kRegressors = 4;
 
-  /// `outputs`: how many of the channels of Z are Y, and the rank of its noise.
+  /// `outputs`: number of channels Y of Z, and rank of its noise.
   /// @pre require_enough_lines()
   ZipperedFit(ZipperedLines lines, Eigen::Index outputs);
 
   const ZipperedLines& lines() const noexcept { return lines_; }
 
-  /// `spectra`: of one experiment. k: position of the line.
+  /// `spectra`: of one experiment. k: index of the line.
   ZipperedEstimate estimate(const RealizationSpectra& spectra, Eigen::Index k) const;
 
  private:

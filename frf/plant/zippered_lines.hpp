@@ -8,24 +8,24 @@
 
 namespace stageid {
 
-/// Lines of each axis from which its responses are told between them (zippered_fit.hpp): as many as
-/// leave the local model of all axes together six degrees of freedom, and two an axis.
+/// Number of lines per axis for the local model (zippered_fit.hpp). It leaves at least six degrees of freedom for all
+/// axes together, and two per axis.
 int zippered_window(int axes);
 
-/// Whether the log's experiments excite several axes at once, each on lines of its own, so that one
-/// experiment is a whole realization.
-/// @throws what LogReader::excitation() throws
+/// Whether the log's experiments excite several axes at once, each on its own lines, so that one experiment is a
+/// whole realization.
+/// @throws the same as LogReader::excitation()
 bool is_zippered(const LogReader& log);
 
-/// Which axis has each line of a zippered experiment.
+/// The axis of each line of a zippered experiment.
 struct ZipperedLines {
   std::vector<int> lines;          ///< ascending
   std::vector<Eigen::Index> axis;  ///< of each line, 0 .. axes - 1
   Eigen::Index axes = 0;
 
-  /// Positions of the lines of one axis, ascending.
+  /// Indices of the lines of one axis, ascending.
   std::vector<Eigen::Index> of(Eigen::Index axis) const;
-  /// Positions from which to which every axis has a line below (or there) and one above.
+  /// Range of indices in which every axis has a line at or below, and one at or above.
   Eigen::Index first() const;
   Eigen::Index last() const;
 };

@@ -8,10 +8,10 @@
 
 namespace stageid {
 
-/// Where each of `wanted` stands in `channels`.
+/// Index of each of `wanted` in `channels`.
 /// @param option, kind for messages: "inputs", "actuator"
-/// @throws std::invalid_argument "OPTION: unknown KIND 'x'; did you mean 'y'? There are ...", or where a
-///         channel is named twice
+/// @throws std::invalid_argument "OPTION: unknown KIND 'x'; did you mean 'y'? ...", or if a channel is named
+///         twice
 std::vector<Eigen::Index> channel_positions(const ChannelList& channels,
                                             const std::vector<std::string>& wanted,
                                             const char* option, const char* kind);

@@ -9,7 +9,7 @@ namespace stageid {
 
 double squared_error_quantile(double level, double dof) {
   const double known = -std::log1p(-level);
-  // expm1: many degrees of freedom leave little of the difference.
+  // expm1 avoids cancellation for many degrees of freedom.
   return dof > 0.0 ? dof * std::expm1(known / dof) : known;
 }
 

@@ -32,7 +32,7 @@ void require_smoothable(const FrfEstimate& frf, int lines) {
                        frf.covariance_lines));
 }
 
-/// Sums in one order for every line, so that nothing depends on the neighbour's rounding.
+/// Sums in the same order for every line, so that the rounding of neighbours does not matter.
 Eigen::MatrixXd smoothed(const Eigen::MatrixXd& columns, int lines) {
   Eigen::MatrixXd result(columns.rows(), columns.cols());
   for (Eigen::Index k = 0; k < columns.cols(); ++k) {
@@ -42,7 +42,7 @@ Eigen::MatrixXd smoothed(const Eigen::MatrixXd& columns, int lines) {
   return result;
 }
 
-/// Columns of variances and, where asked for, of the whole covariance: S kron C_E.
+/// Recomputes the variances and, if present, the whole covariance: S kron C_E.
 void propagate(FrfEstimate& frf) {
   const Eigen::Index n_y = frf.n_outputs();
   const Eigen::Index n_u = frf.n_inputs();

@@ -4,16 +4,16 @@
 
 namespace stageid {
 
-/// Whether the first line lies at 0 Hz, as a measurement with all lines of the DFT has it.
+/// Whether the first line is at 0 Hz, as in measurements with all DFT lines.
 bool has_dc_line(const FrfEstimate& frf);
 
-/// The other lines. A rigid body has no response at 0 Hz, the logarithmic scales of mode indicators have no place
-/// for it, and its noise is real, not circular as all that weighs by variances takes for granted: no fit and no
-/// search for modes uses it. As it is where there is none.
+/// The estimate without the line at 0 Hz; unchanged if there is none. Fits and mode searches cannot use this line: a
+/// rigid body has no response there, logarithmic frequency scales exclude it, and its noise is real instead of
+/// circular.
 /// @throws std::invalid_argument if it is the only line
 FrfEstimate without_dc_line(FrfEstimate frf);
 
-/// What is said where it was left out.
+/// Message about the discarded line.
 constexpr const char* kDcLineLeftOut =
     "the line at 0 Hz is ignored: a rigid body has no response there, and its noise differs from "
     "that of the other lines";

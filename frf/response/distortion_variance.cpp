@@ -9,8 +9,7 @@
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kLines =
-    8;                      // of a band, which give the expectation as many degrees of freedom
+constexpr Eigen::Index kLines = 8;  // per band, and degrees of freedom of the expectation
 constexpr int kPasses = 5;  // of the weights: alpha changes by less than a percent afterwards
 
 /// alpha of one channel in one band. @param power |G|^2

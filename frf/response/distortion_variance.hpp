@@ -6,32 +6,32 @@
 
 namespace stageid {
 
-/// What one realization of a nonlinear plant adds to its response, as far as an estimate shows it.
+/// Distortion of one realization of a nonlinear plant, as known from an estimate.
 struct Distortion {
-  Eigen::MatrixXd band_hz;  ///< bands x 2: first and last line; empty: none is known
+  Eigen::MatrixXd band_hz;  ///< bands x 2: first and last line; empty: unknown
   Eigen::MatrixXd level;    ///< (n_y n_u) x bands: rms over |G|, of one realization
 };
 
-/// E|dG|^2 of the mean of `realizations` by that distortion and the noise of `frf`, (n_y n_u) x N. Lines outside the bands
-/// take the nearest. @pre frf.noise_variance is there, and the channels are those of the distortion
+/// E|dG|^2 of the mean of `realizations` due to the distortion and the noise of `frf`, (n_y n_u) x N. Lines outside the
+/// bands use the nearest band. @pre frf has a noise_variance and the channels of the distortion
 Eigen::MatrixXd variance_with(const Distortion& distortion, const FrfEstimate& frf);
 
 /// The total variance of a nonlinear plant, from few realizations.
 struct DistortionVariance {
   Distortion distortion;
   Eigen::MatrixXd variance;  ///< (n_y n_u) x N, unit of |response|^2
-  double dof = 0.0;          ///< complex degrees of freedom, roughly
+  double dof = 0.0;          ///< approximate complex degrees of freedom
 };
 
-/// With M realizations the total variance of a line has M - 1 degrees of freedom, too few to weigh with, and it changes too
-/// much over the lines (distortion follows the response) for a mean over neighbouring ones. Expected is
+/// With M realizations, the total variance of a line has M - 1 degrees of freedom, too few for weights. It varies too
+/// much over the lines (distortion follows the response) for a mean over neighbouring ones. The expected variance is
 ///   v_k = noise_k + alpha |G_k|^2,
-/// alpha one number per channel and octave (at least 8 lines), by least squares on total - noise with weights 1/v^2. The
-/// estimate is the mean of the total variance and v by their degrees of freedom, M - 1 and 8: with many realizations
-/// the total variance, with few the expectation, and larger where one line stands out.
-/// Source: method.md section 3 (total - noise = stochastic nonlinear contributions); the weighted mean is that of the
-/// inverse gamma prior, as in Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) article 3.
-/// @pre both variances are there, total_dof >= 1
+/// with one alpha per channel and octave (at least 8 lines), by least squares on total - noise with weights 1/v^2. The
+/// estimate is the mean of the total variance and v, weighted by their degrees of freedom, M - 1 and 8. It approaches
+/// the total variance for many realizations and v for few, and it is larger for outlying lines.
+/// Source: docs/theory.md, section 3 (total variance). The weighted mean is that of the inverse gamma prior, as in
+/// Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) article 3.
+/// @pre both variances are known, total_dof >= 1
 DistortionVariance distortion_variance(const FrfEstimate& frf);
 
 /// Correlation of the outputs' errors where noise and distortion add up: C_E of the noise, and G G^H of the distortion,

@@ -1,4 +1,4 @@
-// check(): what every frequency response must satisfy, wherever it comes from.
+// check(): invariants of every frequency response.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -83,7 +83,7 @@ void check_variance(const char* dataset, const FrfEstimate& frf, const Eigen::Ma
   }
 }
 
-/// An optional dataset of numbers without channel names to speak of.
+/// An optional dataset of numbers without own channel names.
 template <typename Matrix>
 void check_optional(const char* dataset, const Matrix& matrix, Eigen::Index rows,
                     Eigen::Index lines) {

@@ -31,13 +31,13 @@ ChannelList pick(const ChannelList& channels, const Indices& at) {
   return picked;
 }
 
-/// Rows of a matrix whose empty form (unknown) stays empty.
+/// Selects rows of a matrix; an empty one (unknown) remains empty.
 template <typename Matrix>
 Matrix rows_or_empty(const Matrix& matrix, const Indices& rows) {
   return matrix.size() == 0 ? Matrix() : Matrix(matrix(rows, Eigen::all));
 }
 
-/// Keeps columns of a matrix whose empty form (unknown) stays empty, within its own memory.
+/// Keeps columns of a matrix, within its own memory; an empty one (unknown) remains empty.
 template <typename Matrix>
 void keep_columns(Matrix& matrix, Eigen::Index first, Eigen::Index kept) {
   if (matrix.size() == 0) return;
@@ -45,7 +45,7 @@ void keep_columns(Matrix& matrix, Eigen::Index first, Eigen::Index kept) {
   matrix.conservativeResize(Eigen::NoChange, kept);
 }
 
-/// Rows of columns that are vec of a square matrix, for the given rows and columns of that matrix.
+/// Indices into vec(square matrix) for the given rows and columns of that matrix.
 Indices square_rows(const Indices& kept, Eigen::Index size) {
   Indices rows;
   for (const Eigen::Index column : kept) {
@@ -54,7 +54,7 @@ Indices square_rows(const Indices& kept, Eigen::Index size) {
   return rows;
 }
 
-/// The rows output + n_y * group of the outputs kept, in all that detection lines tell.
+/// Selects the rows output + n_y * group of the kept outputs in all data of the detection lines.
 void select_detection(const FrfEstimate& frf, const Indices& outputs, FrfEstimate& part) {
   Indices rows;
   for (std::size_t g = 0; g < frf.detection.groups.size(); ++g) {
@@ -129,7 +129,7 @@ FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::strin
   part.total_variance = rows_or_empty(frf.total_variance, entries);
   part.residual_covariance_re = rows_or_empty(frf.residual_covariance_re, residual_rows);
   part.residual_covariance_im = rows_or_empty(frf.residual_covariance_im, residual_rows);
-  // The other inputs' estimates are marginalized: a part of S, which is already an inverse.
+  // The other inputs are marginalized by taking a part of S, which is an inverse already.
   part.input_factor = rows_or_empty(frf.input_factor, square_rows(input_at, frf.n_inputs()));
   part.covariance =
       rows_or_empty(frf.covariance, square_rows(entries, frf.n_outputs() * frf.n_inputs()));

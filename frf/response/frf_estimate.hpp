@@ -10,36 +10,35 @@
 
 namespace stageid {
 
-/// Whether the response still contains a zero-order hold (and sampler), as measured by a digital
-/// loop.
+/// Whether the response contains a zero-order hold (and sampler), as measured by a digital loop.
 enum class Hold : std::uint8_t { none, zoh };
 
-/// What was divided out of the response: nothing; e^{-j omega delay_s}; or the delay and the hold's
+/// Factor that was divided out of the response: 1; e^{-j omega delay_s}; or the same times the hold's
 /// (1 - e^{-j omega T}) / (j omega T).
 enum class Compensation : std::uint8_t { none, delay, hold };
 
 enum class FrfMethod : std::uint8_t {
   periodic,  ///< means over the periods after the transient ones
-  lpm        ///< whole records; the transient is modelled between the lines, nothing is passed over
+  lpm        ///< whole records; the transient is modelled, no period is discarded
 };
 
-/// A recorded period that was left out of the means.
+/// A recorded period that was excluded from the means.
 struct DroppedPeriod {
-  int realization = 0;  ///< all three are counted from 0,
+  int realization = 0;  ///< 0-based, as the other two
   int experiment = 0;
-  int period = 0;  ///< the periods after the transient ones
+  int period = 0;  ///< index among the periods after the transient ones
   std::string reason;
   friend bool operator==(const DroppedPeriod&, const DroppedPeriod&) = default;
 };
 
-/// A realization that was left out as a whole.
+/// A realization that was discarded.
 struct LeftOutRealization {
-  int realization = 0;  ///< counted from 0
+  int realization = 0;  ///< 0-based
   std::string reason;
   friend bool operator==(const LeftOutRealization&, const LeftOutRealization&) = default;
 };
 
-/// A frequency response with its uncertainty: what frf.h5 holds.
+/// A frequency response with its uncertainty: the content of frf.h5.
 ///
 /// Storage is the paper's vec: column k of a channel matrix is vec(G(j omega_k)), channel
 /// c = output + outputs * input.
@@ -49,15 +48,15 @@ struct FrfEstimate {
   ChannelList outputs;           ///< n_y
   Eigen::MatrixXcd response;     ///< (n_y n_u) x N, unit of output / unit of input
 
-  /// E|dG|^2 of the response given (the mean), same shape; empty (0 x 0) if unknown.
-  Eigen::MatrixXd noise_variance;  ///< from periods: what repeating the same phases would give
-  Eigen::MatrixXd
-      total_variance;  ///< from realizations: noise and stochastic nonlinear contributions
+  /// E|dG|^2 of the given response (the mean), same shape; empty (0 x 0) if unknown.
+  Eigen::MatrixXd noise_variance;  ///< from periods: for a repetition with the same phases
+  /// From realizations: noise and stochastic nonlinear contributions.
+  Eigen::MatrixXd total_variance;
 
   double sample_rate_hz = 0.0;  ///< 0: unknown
   Hold hold = Hold::none;
   Compensation compensated = Compensation::none;
-  double delay_s = 0.0;  ///< what `compensated` took out (without the hold's own T/2)
+  double delay_s = 0.0;  ///< removed by `compensated` (without the hold's own T/2)
 
   FrfMethod method = FrfMethod::periodic;
   int realizations = 0;
@@ -65,49 +64,50 @@ struct FrfEstimate {
   int experiments = 0;
   double noise_dof = 0.0;  ///< degrees of freedom of noise_variance: M E (P-1), see plant_frf.hpp
   double total_dof = 0.0;  ///< M - 1
-  Eigen::VectorXd input_condition;         ///< N: cond(U(k)), 1 is perfect; empty if unknown
+  Eigen::VectorXd input_condition;         ///< N: cond(U(k)), ideally 1; empty if unknown
   Eigen::MatrixXd residual_covariance_re;  ///< (n_y n_y) x N: C_E, Hermitian, per experiment and
   Eigen::MatrixXd residual_covariance_im;  ///<   the mean of periods; empty if unknown
   /// (n_u n_u) x N: S, Hermitian, with Cov(vec G) = S kron C_E for the mean over realizations; with one
   /// realization S = [(U U^H)^-1]^T. Empty if unknown.
   Eigen::MatrixXcd input_factor;
-  /// Largest over smallest noise power of two experiments of a realization whose noise is not that of the
-  /// others, see experiment_noise.hpp: their covariances were not pooled, and S kron C_E is the nearest to them
-  /// only. 1: the experiments agree.
+  /// Largest ratio of the noise powers of two experiments of a realization, see experiment_noise.hpp. If it is not 1,
+  /// their covariances were not pooled, and S kron C_E is only an approximation. 1: the experiments agree.
   double experiment_noise_ratio = 1.0;
-  Eigen::MatrixXcd covariance;  ///< (n_c n_c) x N on request, n_c = n_y n_u: Cov(vec G); else empty
-  int covariance_lines = 1;     ///< C_E is the mean over so many lines: smooth_covariance()
-  /// Errors of the response on neighbouring lines are correlated: all N lines tell a smooth model as
-  /// much as N / correlated_lines independent ones (zippered experiments; else 1).
+  /// (n_c n_c) x N on request, n_c = n_y n_u: Cov(vec G); otherwise empty.
+  Eigen::MatrixXcd covariance;
+  int covariance_lines = 1;  ///< C_E is the mean over this number of lines: smooth_covariance()
+  /// Errors on neighbouring lines are correlated: for a smooth model, all N lines have the information of
+  /// N / correlated_lines independent ones (zippered experiments; otherwise 1).
   double correlated_lines = 1.0;
-  /// N, zippered: residual of the local models over what noise would leave; about 1 where the
-  /// interpolation holds and the plant is linear. Empty if unknown.
+  /// N, zippered: residual of the local models over the expected noise; about 1 if the interpolation is accurate and
+  /// the plant is linear. Empty if unknown.
   Eigen::VectorXd interpolation_misfit;
   DetectionLines detection;       ///< empty if unknown
   NonlinearityTest nonlinearity;  ///< empty unless there are two periods and two realizations
   std::vector<DroppedPeriod> dropped_periods;
   std::vector<LeftOutRealization> left_out_realizations;
   std::vector<std::string> excluded_channels;  ///< actuators outside the sub-plant
-  Eigen::VectorXd excluded_power;              ///< their excited-line power over that of the inputs
-  std::string provenance_json = "{}";          ///< inputs (hash), configuration, version, seeds
+  Eigen::VectorXd excluded_power;      ///< their power on excited lines over that of the inputs
+  std::string provenance_json = "{}";  ///< inputs (hash), configuration, version, seeds
 
   Eigen::Index lines() const noexcept { return frequency_hz.size(); }
   Eigen::Index n_outputs() const noexcept { return static_cast<Eigen::Index>(outputs.size()); }
   Eigen::Index n_inputs() const noexcept { return static_cast<Eigen::Index>(inputs.size()); }
   Eigen::VectorXd omega_rad_s() const;
-  /// G(j omega_k), n_y x n_u; a view, valid while *this lives.
+  /// G(j omega_k), n_y x n_u; a view, valid as long as *this.
   Eigen::Map<const Eigen::MatrixXcd> at(Eigen::Index k) const;
 };
 
-/// The lines with low_hz <= f <= high_hz; of an estimate that is moved in, no copy. @throws std::invalid_argument if none is left.
+/// The lines with low_hz <= f <= high_hz; an estimate that is moved in is not copied.
+/// @throws std::invalid_argument if none is left.
 FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz);
 
-/// The named channels, in the order asked. @throws std::invalid_argument naming an unknown channel
-/// and those there are.
+/// The named channels, in the given order. @throws std::invalid_argument naming an unknown channel and the existing
+/// ones.
 FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,
                             const std::vector<std::string>& outputs);
 
-/// Shapes agree, frequencies increase, numbers finite, variances not negative.
+/// Checks that shapes agree, frequencies increase, numbers are finite and variances are not negative.
 /// @throws std::invalid_argument "response[line 12, z1 <- a3]: not finite".
 void check(const FrfEstimate& frf);
 

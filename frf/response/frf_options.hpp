@@ -12,22 +12,22 @@ namespace stageid {
 
 enum class CovarianceKind : std::uint8_t { diagonal, full };
 enum class PeriodChoice : std::uint8_t {
-  consistent,  ///< periods with a glitch, a bump or a transient in them are left out; lpm: a glitch
+  consistent,  ///< excludes periods with a glitch, a disturbance or a transient; lpm: with a glitch
   unmarked     ///< all without a marked sample
 };
 
 struct FrfOptions {
-  std::vector<std::string> inputs{};       ///< actuator names; empty: those that are excited
+  std::vector<std::string> inputs{};       ///< actuator names; empty: the excited ones
   std::vector<std::string> outputs{};      ///< sensor names; empty: all
   std::optional<int> transient_periods{};  ///< instead of the log's own, or of 0 with lpm
   FrfMethod method = FrfMethod::periodic;
   CovarianceKind covariance = CovarianceKind::diagonal;
   PeriodChoice periods = PeriodChoice::consistent;
-  int covariance_lines = 1;         ///< smooth_covariance() over so many lines; odd
-  std::vector<int> realizations{};  ///< which (0-based); empty: all complete ones
-  int threads = 0;                  ///< 0: as many as cores; the result does not depend on it
-  std::function<void(double done, double total)>
-      progress{};  ///< bytes; called from one thread at a time
+  int covariance_lines = 1;         ///< number of lines for smooth_covariance(), odd
+  std::vector<int> realizations{};  ///< 0-based; empty: all complete ones
+  int threads = 0;                  ///< 0: one per core; does not affect the result
+  /// In bytes; called from one thread at a time.
+  std::function<void(double done, double total)> progress{};
 };
 
 }  // namespace stageid

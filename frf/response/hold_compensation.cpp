@@ -31,7 +31,7 @@ void check_request(const FrfEstimate& frf, double delay_s) {
   }
 }
 
-/// Response and everything that goes with its square, times a factor a line.
+/// Multiplies the response by a factor per line, and its variances by the squared magnitude.
 void multiply(FrfEstimate& frf, const std::function<std::complex<double>(double)>& factor) {
   const Eigen::VectorXd omega = frf.omega_rad_s();
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
@@ -46,8 +46,8 @@ void multiply(FrfEstimate& frf, const std::function<std::complex<double>(double)
   }
 }
 
-/// What `kind` takes out at omega: (1 - e^{-j omega T}) / (j omega T) = e^{-j omega T / 2}
-/// sinc(omega T / 2), so both kinds turn by the same angle, and only `hold` changes the magnitude.
+/// The factor that `kind` removes at omega: (1 - e^{-j omega T}) / (j omega T) = e^{-j omega T / 2}
+/// sinc(omega T / 2). Both kinds have the same phase; only `hold` changes the magnitude.
 std::complex<double> taken_out(Compensation kind, double delay_s, double T, double omega) {
   const double gain = kind == Compensation::hold ? sinc(0.5 * omega * T) : 1.0;
   return std::polar(gain, -omega * (delay_s + 0.5 * T));

@@ -8,12 +8,12 @@
 namespace stageid {
 namespace {
 
-// float32 records leave 1e-8 of a dependence that is exact; what is below this is not independent.
+// float32 records have errors of 1e-8, so smaller values may be an exact dependence.
 constexpr double kSmallestReciprocalCondition = 1e-6;
-// U may be far from orthogonal where the loop is stiff. Refused is only what rounding decides.
+// U may be far from orthogonal in a stiff loop. Only values determined by rounding are refused.
 constexpr double kSmallestReciprocalConditionOfInputs = 1e-13;
 
-/// Of matrices whose entries are far from overflow: hypot() would take as long as the inverse.
+/// For matrices whose entries cannot overflow: hypot() would take as long as the inverse.
 double one_norm(const Eigen::MatrixXcd& M) {
   return M.cwiseAbs2().cwiseSqrt().colwise().sum().maxCoeff();
 }
@@ -25,8 +25,8 @@ double spectral_norm(const Eigen::MatrixXcd& M) {
   return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
 }
 
-/// Inverse of a square matrix; empty if its reciprocal condition number, after scaling the rows to
-/// one (their units differ), is below `smallest` or not a number.
+/// Inverse of a square matrix. Empty if its reciprocal condition number, after scaling the rows to norm one (their
+/// units differ), is below `smallest` or NaN.
 Eigen::MatrixXcd scaled_inverse(const Eigen::MatrixXcd& M, double smallest) {
   const Eigen::VectorXd row_norm = M.rowwise().norm();
   if (!(row_norm.minCoeff() > 0.0)) return {};
@@ -38,7 +38,7 @@ Eigen::MatrixXcd scaled_inverse(const Eigen::MatrixXcd& M, double smallest) {
   return inverse * scale.asDiagonal();
 }
 
-/// R^+ with R R^+ = I; empty if the rows of R depend on each other.
+/// R^+ with R R^+ = I; empty if the rows of R are linearly dependent.
 Eigen::MatrixXcd right_inverse(const Eigen::MatrixXcd& R) {
   if (R.rows() == R.cols()) return scaled_inverse(R, kSmallestReciprocalCondition);
   const Eigen::VectorXd row_norm = R.rowwise().norm();

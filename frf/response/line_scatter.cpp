@@ -14,12 +14,12 @@ namespace stageid {
 namespace {
 
 constexpr Eigen::Index kOrder = 2;
-constexpr int kMostPoles = 2;  // two modes close to each other
+constexpr int kMostPoles = 2;  // two close modes
 constexpr Eigen::Index kDof = 9;
 constexpr Eigen::Index kWindow = kOrder + 1 + kDof;
 
-// Medians. Of errors that do not depend on the lines the first is 1; of a response that the quadratic part cannot
-// follow it is 2^6.
+// Medians. For errors independent of the line distance, the first ratio is 1; for a response beyond the quadratic
+// model it is 2^6.
 constexpr double kMostByDistance = 3.0;
 constexpr double kMostOfResponse = 0.04;
 
@@ -43,18 +43,18 @@ LocalFit fit_around(const FrfEstimate& frf, Eigen::Index k) {
   return fit_locally(problem, kMostPoles);
 }
 
-/// Calls use(a / b) wherever b > 0.
+/// Calls use(a / b) for all b > 0.
 template <typename Use>
 void for_each_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const Use& use) {
   for (Eigen::Index i = 0; i < a.size(); ++i)
     if (b.data()[i] > 0.0) use(a.data()[i] / b.data()[i]);
 }
 
-/// Numbers that are not negative are ordered as their bits are: exponent and four bits of the fraction.
+/// Nonnegative numbers have the same order as their bits: exponent and four bits of the fraction.
 std::size_t bin_of(double ratio) { return std::bit_cast<std::uint64_t>(ratio) >> 48; }
 
-/// The upper median of numbers that are not negative. They are as many as the data: first counted in
-/// bins, and only those of the middle bin are stored.
+/// The upper median of nonnegative ratios. To save memory, they are first counted in bins, and only those of the
+/// middle bin are stored.
 double median_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   if (a.size() == 0 || b.size() != a.size()) return 0.0;
   std::vector<std::size_t> counts(std::size_t{1} << 16);

@@ -13,19 +13,18 @@ namespace stageid {
 namespace {
 
 constexpr Eigen::Index kFewestLines = 8;
-constexpr double kCertain = 1e3;  // -ln p of a scatter where there is no noise at all
+constexpr double kCertain = 1e3;  // -ln p of scatter if there is no noise at all
 
-constexpr double kRounding = 1e-24;  // of the linear power: what double precision leaves of nothing
+constexpr double kRounding = 1e-24;  // of the linear power: rounding errors
 
-/// -ln p of one line. Without any noise every scatter is certain; without either there is nothing
-/// to see, nor in the rounding of `linear` power.
+/// -ln p of one line. Without noise, any scatter above the rounding of the `linear` power is certain.
 double evidence(double power, double noise, double linear, int power_dof, double noise_dof) {
   if (power <= kRounding * linear) return 0.0;
   if (noise > 0.0) return -log_tail_of_f(power / noise, power_dof, noise_dof);
   return kCertain;
 }
 
-/// From the scatter of the realizations: column b of p_value and distortion.
+/// Scatter of the realizations: column b of p_value and distortion.
 void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, Eigen::Index first,
                   Eigen::Index K, Eigen::Index b, NonlinearityTest& test) {
   const int a = static_cast<int>(frf.total_dof);
@@ -39,7 +38,7 @@ void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, Eig
     }
     test.p_value(c, b) = tail_of_evidence(sum, K);
     const double linear = frf.response.row(c).segment(first, K).squaredNorm();
-    // An output that shows one value throughout has no response, and nothing that is distorted.
+    // A constant output has no response and hence no distortion.
     test.distortion(c, b) = linear > 0.0 ? std::sqrt((a + 1) * excess / linear) : 0.0;
   }
 }
@@ -94,7 +93,7 @@ double least_tail(const LineAlignment& alignment, double low_hz, double high_hz)
   return least;
 }
 
-/// Into settled_p_value, with what follows for the verdicts. @pre band_hz and the p-values are known
+/// Sets settled_p_value, and p-values of 1 in unsettled bands. @pre band_hz and the p-values are set
 void test_settling(const LineAlignment& alignment, NonlinearityTest& test) {
   if (alignment.frequency_hz.size() == 0) return;
   const Eigen::Index bands = test.band_hz.rows();
@@ -181,7 +180,7 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
     test_detection(detection, lines_of(detection, 0, low_hz, high_hz), linear_power, b, test.even);
     test_detection(detection, lines_of(detection, 1, low_hz, high_hz), linear_power, b, test.odd);
   }
-  // The noise of detection lines is pooled over the experiments, their power is that of some.
+  // The noise of detection lines is pooled over the experiments, whereas their power is that of some.
   if (frf.experiment_noise_ratio > 1.0)
     for (DetectedDistortion* kind : {&test.even, &test.odd}) kind->p_value.setOnes();
   test_settling(evidence.alignment, test);

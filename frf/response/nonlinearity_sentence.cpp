@@ -9,7 +9,7 @@
 namespace stageid {
 namespace {
 
-/// The channel pair and band whose distortion is largest among those that test nonlinear.
+/// The channel pair and band with the largest distortion among those that test nonlinear.
 std::string strongest_distortion(const FrfEstimate& frf, const NonlinearityTest& test) {
   double largest = 0.0;
   std::string text;

@@ -6,13 +6,13 @@
 
 namespace stageid {
 
-/// One sentence if the plant is nonlinear: where most, and by how much; else empty.
+/// If the plant is nonlinear, one sentence on where and how much; otherwise empty.
 std::string nonlinearity_sentence(const FrfEstimate& frf);
 
 /// "20 dB"; "none" for a ratio of 0.
 std::string decibels(double ratio);
 
-/// "output <- input" of a channel, the rows of FrfEstimate::response.
+/// "output <- input" of a channel (row of FrfEstimate::response).
 std::string pair_name(const FrfEstimate& frf, Eigen::Index channel);
 
 }  // namespace stageid

@@ -5,10 +5,10 @@
 
 namespace stageid {
 
-/// One number for how well a response is known:
+/// Relative variance of a response as one number:
 ///   mean over lines k and outputs i of  sum_j var G_ij(k) / sum_j |G_ij(k)|^2.
-/// Rows are not mixed, as outputs may differ in unit, and zeros of single entries do not blow it up.
-/// @throws std::invalid_argument if the estimate has no such variance, or an output is zero on a line.
+/// Rows are not mixed, because outputs may differ in unit. Zeros of single entries do not dominate it.
+/// @throws std::invalid_argument if the variance is unknown, or an output is zero on a line.
 double mean_relative_variance(const FrfEstimate& frf, VarianceKind kind);
 
 }  // namespace stageid

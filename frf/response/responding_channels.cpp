@@ -29,7 +29,7 @@ void add_channel(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& powe
 }  // namespace
 
 ChannelFlags responding_channels(const FrfEstimate& frf) {
-  const auto power = frf.response.cwiseAbs2().array();  // not evaluated: as large as half the data
+  const auto power = frf.response.cwiseAbs2().array();  // not evaluated, to save memory
   const bool noise = frf.noise_variance.size() > 0;
   const Eigen::MatrixXd& variance = noise ? frf.noise_variance : frf.total_variance;
   if (variance.size() == 0) return (power > 0.0).rowwise().any();

@@ -8,17 +8,17 @@ namespace stageid {
 
 using ChannelFlags = Eigen::Array<bool, Eigen::Dynamic, 1>;
 
-/// Which channels (n_y n_u) have a response of which a relative error means anything: |G|^2 is above the 95 %
-/// point of noise alone on at least half of the lines. The relative error of any other is that of its noise.
-/// Of data without variances: those that are not zero throughout.
+/// Channels (n_y n_u) whose response has a meaningful relative error: |G|^2 exceeds the 95 % point of noise on at
+/// least half of the lines. The relative error of other channels is that of their noise. For data without variances:
+/// channels that are not all zero.
 ChannelFlags responding_channels(const FrfEstimate& frf);
 
-/// sqrt(mean |E|^2 / |G|^2) over the lines of every channel where G is not zero, n_y n_u; NaN if there is none.
+/// sqrt(mean |E|^2 / |G|^2) over the lines with nonzero G, per channel, n_y n_u; NaN if there is none.
 /// @param error_power, power |E|^2 and |G|^2, (n_y n_u) x N
 Eigen::VectorXd relative_channel_error(const Eigen::ArrayXXd& error_power,
                                        const Eigen::ArrayXXd& power);
 
-/// The same over the lines of all channels flagged.
+/// The same over the lines of all flagged channels.
 double relative_rms_error(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& power,
                           const ChannelFlags& channels);
 

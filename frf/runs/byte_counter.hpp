@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// Tells FrfOptions::progress how many bytes of samples are read, from one thread at a time.
+/// Reports the bytes of samples read to FrfOptions::progress, from one thread at a time.
 class ByteCounter {
  public:
   ByteCounter(const FrfOptions& options, const std::vector<RealizationRuns>& realizations)

@@ -30,7 +30,7 @@ std::vector<std::string> names_of(const ChannelList& channels, const Indices& at
   return names;
 }
 
-/// The actuators named like the excited channels; all of them if some name does not match.
+/// The actuators with the names of the excited channels; all actuators if a name does not match.
 Indices excited_actuators(const LogInfo& info, const Indices& excited) {
   Indices found;
   for (const std::string& name : names_of(info.excitation, excited)) {

@@ -6,8 +6,7 @@
 namespace stageid {
 namespace {
 
-// So many samples are looked at as a whole first: hardly any piece holds a new extreme or the same
-// value twice running.
+// Samples per quick test, because few blocks contain a new extreme or a repeated value.
 constexpr Eigen::Index kTogether = 256;
 
 double log_p_of_pile(const Extreme& extreme) noexcept {

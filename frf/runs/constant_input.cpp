@@ -7,7 +7,7 @@
 namespace stageid {
 namespace {
 
-/// Of all runs, on row `row` of their spectra.
+/// Whether row `row` of the spectra is nonzero in any run.
 bool moves(const RealizationSpectra& spectra, std::size_t runs, Eigen::Index row) {
   for (std::size_t e = 0; e < runs; ++e) {
     const Eigen::MatrixXcd& mean = spectra.run(e).mean;

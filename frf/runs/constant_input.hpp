@@ -6,8 +6,8 @@
 
 namespace stageid {
 
-/// An input that shows one value throughout a realization makes U singular on every line; said by its
-/// name rather than by a line.
+/// Refuses inputs that are constant throughout a realization. They make U singular on every line, and this error
+/// names the channel instead of a line.
 /// @throws std::invalid_argument naming the first such channel
 void refuse_constant_inputs(const RealizationRuns& realization, const RealizationSpectra& spectra,
                             const ChannelChoice& channels);

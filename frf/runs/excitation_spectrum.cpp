@@ -8,11 +8,11 @@ namespace {
 
 constexpr double kSmallestLine = 1e-6;     // of the largest line of the channel
 constexpr double kSmallestChannel = 1e-9;  // of the largest line of all channels: units may differ
-constexpr double kRoundingMargin = 8.0;  // exp(-64): no line of any experiment gets there by chance
-constexpr double kRoundingAtMost = 1e-2;  // a binary sequence has a large step and no rounding
+constexpr double kRoundingMargin = 8.0;    // exp(-64): not reached by chance on any line
+constexpr double kRoundingAtMost = 1e-2;   // a binary sequence has a large step but no rounding
 
-/// Distance between neighbouring values of integer samples; tiny if the samples are real numbers.
-/// A few thousand samples meet every neighbour of a 16 bit code; finer codes do not matter here.
+/// Distance between neighbouring values of integer samples; tiny for real numbers. A few thousand samples contain
+/// neighbouring values of a 16 bit code; finer codes do not matter here.
 double smallest_step(const Eigen::VectorXd& samples) {
   constexpr Eigen::Index kEnough = 4096;
   std::vector<double> sorted(samples.data(), samples.data() + std::min(samples.size(), kEnough));

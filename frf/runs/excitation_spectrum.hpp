@@ -7,14 +7,14 @@
 
 namespace stageid {
 
-/// What one run's excitation holds.
+/// Excited lines and channels of one run.
 struct ExcitationSpectrum {
   std::vector<int> lines;              ///< excited in some channel, ascending, never DC or Nyquist
   std::vector<Eigen::Index> channels;  ///< excited on some line, ascending
-  Eigen::MatrixXcd values;             ///< R, excitation channels x lines: DFT / samples
-  std::vector<Eigen::Index> only;      ///< of each line: its only channel; -1: it has several
+  Eigen::MatrixXcd values;             ///< R, excitation channels x lines: DFT / number of samples
+  std::vector<Eigen::Index> only;      ///< of each line: its only channel; -1: several
 
-  /// Several channels are excited, each on lines of its own.
+  /// Whether several channels are excited, each on its own lines.
   bool is_zippered() const;
 
   friend bool operator==(const ExcitationSpectrum&, const ExcitationSpectrum&) = default;
@@ -22,9 +22,9 @@ struct ExcitationSpectrum {
 
 /// The spectrum of one period (samples x channels) on its excited lines.
 ///
-/// A line counts as excited if it is above 1e-6 of the channel's largest, which rounding (of
-/// float32 too) does not reach, and above the rounding of integer samples, white with variance
-/// step^2 / (12 N) a line; the step is the smallest distance between values that occur.
+/// A line counts as excited if it is above 1e-6 of the channel's largest, which rounding (also to float32) does not
+/// reach. It must also be above the rounding of integer samples, white with variance step^2 / (12 N) per line;
+/// the step is the smallest distance between the values.
 /// @pre period.rows() == dft.length()
 ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& dft);
 

@@ -11,7 +11,7 @@
 namespace stageid {
 namespace {
 
-/// At most kHealthLines of the lines: half of them in equal ratios, for the rigid body, half in equal steps, for
+/// At most kHealthLines of the lines: half of them with equal ratios, for the rigid body, half with equal spacing, for
 /// the flexible modes.
 std::vector<int> thinned(const std::vector<int>& lines) {
   if (static_cast<Eigen::Index>(lines.size()) <= kHealthLines) return lines;
@@ -48,7 +48,7 @@ std::vector<Eigen::Index> columns_of(const std::vector<int>& wanted, const Spect
   return columns;
 }
 
-/// Positions with is_known = 0 of `count` channels from `first` on, counted from there.
+/// Indices with is_known = 0 among `count` channels, relative to `first`.
 std::vector<Eigen::Index> unknown_channels(const std::vector<char>& is_known, Eigen::Index first,
                                            Eigen::Index count) {
   std::vector<Eigen::Index> channels;
@@ -76,7 +76,7 @@ void HealthPart::watch_start(const UsedRun& run, const std::vector<int>& lines,
       run.log->read(run.index, static_cast<std::uint64_t>(run.transient_periods - 1) * period,
                     period, w.samples);
     } catch (const FormatError&) {
-      return;  // damaged where nothing is used: no reason to refuse the rest
+      return;  // damage in unused periods does not matter
     }
     if ((w.samples.marked != 0).any()) return;
     start.resize(static_cast<Eigen::Index>(sensors.size()),
@@ -88,7 +88,7 @@ void HealthPart::watch_start(const UsedRun& run, const std::vector<int>& lines,
 
 void HealthPart::end() {
   for (Eigen::Index c = sensors_; c < static_cast<Eigen::Index>(scan_.size()); ++c) {
-    // An actuator that stands still throughout a run that does not excite it: an open loop.
+    // An actuator that is constant in a run without its excitation has an open loop.
     ChannelScan& scan = scan_[static_cast<std::size_t>(c)];
     if (!drive_.excites(c - sensors_) && scan.high().value == scan.low().value)
       scan.forget_constant();
@@ -207,7 +207,7 @@ HealthPart& HealthGathering::part(std::size_t realization, std::size_t experimen
   return parts_[realization][experiment];
 }
 
-/// Runs of other lines or of fewer periods would need a model of their own.
+/// Runs with other lines or numbers of periods are skipped, because they would need a separate model.
 void HealthGathering::add_start(HealthPart& part) {
   if (part.start_.periods == 0) return;
   StartEvidence& evidence = record_.start;

@@ -14,7 +14,7 @@
 namespace stageid {
 namespace {
 
-/// The work on one set of logs.
+/// Reads one set of logs.
 class RecordReading {
  public:
   RecordReading(const std::vector<const LogReader*>& logs, const FrfOptions& options)
@@ -55,7 +55,7 @@ class RecordReading {
     HealthPart* part;
   };
 
-  /// The runs of realizations first ... last - 1, all at once.
+  /// Reads the runs of realizations first ... last - 1 in parallel.
   void read_runs(std::size_t first, std::size_t last) {
     std::vector<Run> runs;
     for (std::size_t m = first; m < last; ++m)
@@ -72,7 +72,7 @@ class RecordReading {
     for_each_task(workers_, runs.size(), [&](int worker, std::size_t e) {
       excitation[e] =
           read_run_excitation(runs[e], workspaces_[static_cast<std::size_t>(worker)]->dft);
-      excitation[e].period.resize(0, 0);  // samples of all runs would be much memory
+      excitation[e].period.resize(0, 0);  // saves memory: the samples of all runs are large
     });
     gathering_.excite(realization, excitation);
   }

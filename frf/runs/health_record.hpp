@@ -14,28 +14,28 @@
 
 namespace stageid {
 
-/// Spectra (DFT / samples) of all channels of a log on one line, clean periods of all experiments of
-/// one realization side by side.
+/// Spectra (DFT / number of samples) of all channels of a log on one line, for all clean periods of all experiments
+/// of one realization.
 struct LineRecord {
   Eigen::MatrixXcd R;  ///< n_r x E: every excitation channel
-  Eigen::MatrixXcd Z;  ///< [Y; U], n_y + n_u x columns: one a period, by experiment
+  Eigen::MatrixXcd Z;  ///< [Y; U], n_y + n_u x columns: one per period, ordered by experiment
 };
 
-/// What the checks of a log's health look at.
+/// Input of the checks of a log's health.
 struct HealthRecord {
   LogInfo info;
-  int realization = 0;               ///< the one whose spectra these are
-  std::vector<int> periods;          ///< clean ones, of each experiment
-  Eigen::VectorXd frequency_hz;      ///< K: excited lines, thinned out if there are many
+  int realization = 0;               ///< the realization of the spectra
+  std::vector<int> periods;          ///< number of clean ones, of each experiment
+  Eigen::VectorXd frequency_hz;      ///< K: excited lines, a subset if there are many
   std::vector<LineRecord> lines;     ///< K
   std::vector<Eigen::Index> axes;    ///< excitation channels that are excited, ascending
-  bool zippered = false;             ///< one experiment excites them all, each on lines of its own
-  std::vector<ChannelScan> scan;     ///< [sensors; actuators], over all runs that are used
-  RunHealth health;                  ///< over all runs that are used
+  bool zippered = false;             ///< one experiment excites them all, each on its own lines
+  std::vector<ChannelScan> scan;     ///< [sensors; actuators], over all used runs
+  RunHealth health;                  ///< over all used runs
   std::vector<SampleSlip> slips;     ///< of the same runs
   std::optional<ModeDrift> drift;    ///< of the response, if there was an estimate
   std::vector<NoisyRun> noisy_runs;  ///< the same
-  StartEvidence start;               ///< of the start of the runs; empty if nothing can be told
+  StartEvidence start;               ///< of the start of the runs; empty if there is no evidence
 
   Eigen::Index n_y() const noexcept { return static_cast<Eigen::Index>(info.sensors.size()); }
   Eigen::Index n_u() const noexcept { return static_cast<Eigen::Index>(info.actuators.size()); }
@@ -46,18 +46,17 @@ struct HealthRecord {
   Eigen::MatrixXcd mean(const Eigen::MatrixXcd& columns) const;
   /// sum_e sum_p (X_pe - X_e)(X_pe - X_e)^H, with scatter_dof() degrees of freedom.
   Eigen::MatrixXcd scatter(const Eigen::MatrixXcd& columns) const;
-  /// Variance E|dX|^2 of the mean over periods of each row, pooled over the experiments; zeros if there
-  /// is one period only.
+  /// Variance E|dX|^2 of the mean over periods of each row, pooled over the experiments; zero with only one
+  /// period.
   Eigen::VectorXd variance_of_mean(const Eigen::MatrixXcd& columns) const;
 };
 
-/// Lines that the checks look at, at most: their rigid body and their modes need no more.
+/// Largest number of lines of the checks, sufficient for the rigid body and the modes.
 inline constexpr Eigen::Index kHealthLines = 800;
 
-/// Reads every clean period of all runs that FrfOptions choose; spectra are those of the first
-/// realization whose runs all have one. Memory: one period a thread, and the spectra on at most
-/// kHealthLines lines.
-/// @throws what choose_runs() and LogReader::read() throw; FormatError if there is no such realization.
+/// Reads every clean period of the runs selected by FrfOptions; spectra are those of the first realization whose runs
+/// all have one. Memory: one period per thread, and the spectra on at most kHealthLines lines.
+/// @throws the same as choose_runs() and LogReader::read(); FormatError if there is no such realization.
 HealthRecord read_health_record(const std::vector<const LogReader*>& logs,
                                 const FrfOptions& options);
 

@@ -15,18 +15,18 @@
 namespace stageid {
 namespace {
 
-/// Periods that are transformed together. More would cost memory and gain nothing: the noise of the
-/// mean is the same, and a window of 16 bins is narrow enough.
+/// Largest number of periods that are transformed together. More would only need memory: the noise of the mean is the
+/// same, and a window of 16 bins is narrow enough.
 constexpr int kLongest = 16;
 
-/// Clean periods in a row: samples of the chosen channels, outputs, estimated, excluded.
+/// Consecutive clean periods: samples of the selected channels, outputs, estimated, excluded.
 struct Segment {
-  Eigen::MatrixXd samples;  ///< rows of `periods` periods are filled
-  int first = 0;            ///< period of the run
+  Eigen::MatrixXd samples;  ///< the first `periods` periods are valid
+  int first = 0;            ///< first period within the run
   int periods = 0;
 };
 
-/// One run in the making, segment by segment.
+/// One run in progress, segment by segment.
 class RecordMeasurement {
  public:
   RecordMeasurement(const UsedRun& used, const ExcitationSpectrum& excitation,
@@ -48,7 +48,7 @@ class RecordMeasurement {
 
   void add_excitation(const Eigen::MatrixXd& period) { add_matrix(fingerprint_, period); }
 
-  /// The period in workspace.samples.
+  /// Adds the period in workspace.samples.
   void take(int period) {
     if (segment_.periods == 0) segment_.first = period;
     Eigen::Index column = 0;
@@ -78,8 +78,8 @@ class RecordMeasurement {
   }
 
  private:
-  /// A period on its own is worse off (the noise must be seen on lines that are left empty): it is
-  /// used if there is nothing else.
+  /// A single period is less accurate, because its noise must be estimated on empty lines. It is used only if there is
+  /// nothing else.
   void settle(const Segment& segment) {
     if (segment.periods == 1 && used_.periods > 1) {
       if (run_.periods == 0 && !alone_) {
@@ -93,7 +93,7 @@ class RecordMeasurement {
     }
   }
 
-  /// What lies between the periods with a glitch, if there are any.
+  /// Includes the parts between the periods with a glitch, if there are any.
   void close_segment() {
     std::vector<Glitch> glitches;
     if (choice_ == PeriodChoice::consistent)
@@ -150,18 +150,18 @@ class RecordMeasurement {
       run_.scatter_re.setZero();
       run_.scatter_im.setZero();
       run_.line_dof.setZero(part.mean.cols());
-      run_.scatter_window = part.scatter_window;  // stretches are nearly equally long
+      run_.scatter_window = part.scatter_window;  // stretches have nearly equal lengths
       run_.scatter_first = std::move(part.scatter_first);
     }
     run_.periods += segment.periods;
     run_.mean += static_cast<double>(segment.periods) * part.mean;
-    run_.scatter_re += part.scatter_re;  // of single periods, however many there are
+    run_.scatter_re += part.scatter_re;  // scaled for single periods, for any number of them
     run_.scatter_im += part.scatter_im;
     run_.scatter_dof += part.scatter_dof;
     run_.line_dof += part.line_dof;
   }
 
-  /// DFT / samples of the first `rows` samples, outputs and estimated x bins.
+  /// DFT / number of samples of the first `rows` samples, outputs and estimated x bins.
   Eigen::MatrixXcd spectrum(const Eigen::MatrixXd& samples, Eigen::Index rows,
                             Eigen::Index bins) const {
     RealDft dft(static_cast<int>(rows));
@@ -187,7 +187,7 @@ class RecordMeasurement {
   int longest_ = 1;
   Fingerprint fingerprint_;
   Segment segment_;
-  std::optional<Segment> alone_;  // of one period, until something better comes
+  std::optional<Segment> alone_;  // a single period, used only without longer segments
   RunSpectra run_;
 };
 

@@ -10,7 +10,7 @@
 namespace stageid {
 namespace {
 
-/// Row `by` becomes the first one, those before it the last.
+/// Rotates the rows so that row `by` becomes the first one.
 void turn(Eigen::MatrixXd& samples, Eigen::Index by) {
   if (by == 0) return;
   for (Eigen::Index c = 0; c < samples.cols(); ++c)
@@ -21,7 +21,7 @@ class PeriodReading {
  public:
   PeriodReading(const UsedRun& used, RunWorkspace& w) : used_(used), w_(w), N_(w.dft.length()) {}
 
-  /// Period p into `out`, displaced by what was lost before it.
+  /// Reads period p into `out`, displaced by the samples lost before it.
   void read(int p, LogSamples& out) {
     read_displaced(p, lost_of_sensors_, out);
     if (lost_of_actuators_ == lost_of_sensors_) return;
@@ -71,8 +71,9 @@ class PeriodReading {
 
 }  // namespace
 
-// A period is taken once the next one has shown that it belongs to it: a gap in the first one shows only there. The
-// one that waits is in w.ahead; without one the last that was taken, in w.samples, is what the next is held against.
+// A period is taken only after the next one has been compared with it, because a gap in the first period shows only
+// there. The waiting period is in w.ahead; if there is none, the next period is compared with the last one taken, in
+// w.samples.
 std::vector<SampleSlip> for_each_period(
     const UsedRun& used, RunWorkspace& w, const std::function<void(double bytes)>& read_done,
     const std::function<void(int period)>& take,

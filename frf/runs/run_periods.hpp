@@ -10,13 +10,12 @@
 
 namespace stageid {
 
-/// Reads the measured periods of a run one after the other into the workspace's samples: take(p) for a
-/// clean one, leave_out(p, why) for one with a marked sample or with a place where samples were lost or written
-/// twice. Behind such a place the periods are read displaced by as much, so that all have the phase of the first;
-/// where rows are missing for it at the end of the run the last period is turned in itself. `read_done` is told the
-/// bytes of each.
-/// @returns where samples are lost
-/// @throws what LogReader::read() throws
+/// Reads the measured periods of a run in order into the workspace's samples. It calls take(p) for clean ones and
+/// leave_out(p, why) for those with a marked sample or a gap. After a gap, the periods are read displaced by the lost
+/// samples, so that all have the phase of the first. If rows are missing for this at the end of the run, the last
+/// period is rotated. `read_done` receives the bytes of each period.
+/// @returns the positions of lost samples
+/// @throws the same as LogReader::read()
 std::vector<SampleSlip> for_each_period(
     const UsedRun& used, RunWorkspace& w, const std::function<void(double bytes)>& read_done,
     const std::function<void(int period)>& take,

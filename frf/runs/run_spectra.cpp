@@ -13,16 +13,16 @@
 namespace stageid {
 namespace {
 
-/// Periods that are compared with each other and averaged together, whose spectra are held for it.
+/// Largest number of periods that are compared and averaged together; limits the memory for their spectra.
 constexpr int kMostTogether = 16;
 
-/// One run in the making.
+/// One run in progress.
 class RunMeasurement {
  public:
   RunMeasurement(const UsedRun& used, const SpectrumLines& lines, const ChannelChoice& channels,
                  PeriodChoice choice, RunWorkspace& workspace)
       : used_(used), lines_(lines), channels_(channels), w_(workspace) {
-    // Groups of equal size: a last one of one or two periods could not be judged.
+    // Groups of equal size: outliers cannot be found in a last group of one or two periods.
     const int groups = (used.periods + kMostTogether - 1) / kMostTogether;
     together_ = (used.periods + groups - 1) / groups;
     compare_ = choice == PeriodChoice::consistent && together_ >= 3;
@@ -41,7 +41,7 @@ class RunMeasurement {
     run_.scatter_im = w_.pool.take(n * (n + 1) / 2, n_lines);
   }
 
-  /// The period in workspace.samples. @returns its spectra
+  /// Adds the period in workspace.samples. @returns its spectra
   const Eigen::MatrixXcd& take(int period) {
     ++unmarked_;
     Eigen::MatrixXcd& spectra = w_.spectra[waiting_.size()];
@@ -70,8 +70,8 @@ class RunMeasurement {
   }
 
  private:
-  /// The period in workspace.samples less the first of those that wait, whose excitation it shares: what
-  /// is left is noise, which a float holds.
+  /// Stores the period in workspace.samples minus the first waiting one, which has the same excitation: the difference
+  /// is noise, for which a float is accurate enough.
   void keep_samples() {
     const auto n_y = static_cast<Eigen::Index>(channels_.outputs.size());
     Eigen::MatrixXd& first = w_.first_samples;
@@ -118,7 +118,7 @@ class RunMeasurement {
     waiting_.clear();
   }
 
-  /// From sum_p p Z_p. Rounding is far below noise: few numbers, none large.
+  /// Converts sum_p p Z_p to the slope. With few and small p, rounding is far below the noise.
   void finish_slope() {
     const double mean = sum_of_numbers_ / run_.periods;
     run_.slope_spread = sum_of_squares_ - run_.periods * mean * mean;
@@ -129,9 +129,9 @@ class RunMeasurement {
     run_.slope = (run_.slope - sum_of_numbers_ * run_.mean) / run_.slope_spread;
   }
 
-  /// More periods into mean and scatter, by Welford's recursion: a difference of two large sums
-  /// would lose the noise, which is 1e-6 of the signal, in rounding; and this way the diagonal stays
-  /// >= 0. All periods into one line, whose scatter stays in the cache, then into the next.
+  /// Adds periods to mean and scatter of one line by Welford's recursion. A difference of two large sums would lose the
+  /// noise, 1e-6 of the signal, by rounding, and might make the diagonal negative. Lines are processed one by one, so
+  /// that the scatter stays in the cache.
   void include_line(const std::vector<const Eigen::MatrixXcd*>& periods, Eigen::Index k) {
     const bool scatter = run_.scatter_re.size() > 0;
     if (scatter && run_.periods == 0) {
@@ -146,7 +146,7 @@ class RunMeasurement {
     for (const Eigen::MatrixXcd* spectra : periods) {
       const double inverse_count = 1.0 / ++count;
       w_.deviation = spectra->col(k) - run_.mean.col(k);
-      // Componentwise, which the compiler makes vectors of; complex numbers it does not.
+      // By components, because the compiler does not vectorize complex numbers.
       Eigen::Map<Eigen::VectorXd>(reinterpret_cast<double*>(run_.mean.col(k).data()), 2 * n) +=
           Eigen::Map<const Eigen::VectorXd>(reinterpret_cast<const double*>(w_.deviation.data()),
                                             2 * n) *
@@ -186,10 +186,10 @@ class RunMeasurement {
   const SpectrumLines& lines_;
   const ChannelChoice& channels_;
   RunWorkspace& w_;
-  int together_ = 1;  // periods that are looked at, and included, together
+  int together_ = 1;  // periods that are compared and included together
   bool compare_ = true;
   int unmarked_ = 0;
-  double sum_of_numbers_ = 0.0;  // of the periods included
+  double sum_of_numbers_ = 0.0;  // over the included periods
   double sum_of_squares_ = 0.0;
   std::vector<int> waiting_;  // periods whose spectra are in the workspace
   RunSpectra run_;

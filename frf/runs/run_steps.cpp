@@ -33,8 +33,8 @@ void fill_for_lines(const Eigen::Ref<const Eigen::VectorXd>& samples, RealDft& d
     std::copy_n(samples.data(), samples.size(), input.begin());
 }
 
-// Spectra lie line by line. One channel's lines are so far apart that every value would cost a cache
-// line of its own; four channels at a time fill it.
+// Spectra are stored line by line, so consecutive lines of one channel are far apart. Writing four channels at a time
+// fills a cache line.
 void line_spectra(const Eigen::MatrixXd& samples, const std::vector<Eigen::Index>& channels,
                   const std::vector<int>& lines, Eigen::Index first_row, RealDft& dft,
                   Eigen::MatrixXcd& spectra) {

@@ -85,7 +85,7 @@ RunsByRealization complete_runs(const std::vector<const LogReader*>& logs,
   return table;
 }
 
-/// Every experiment, or realization, that was at least begun.
+/// Every experiment, or realization, that was begun.
 std::set<int> begun(const std::vector<const LogReader*>& logs, int LogRun::*which) {
   std::set<int> found;
   for (const LogReader* log : logs) {
@@ -119,10 +119,10 @@ void check_realizations_asked_for(const RunsByRealization& table, const FrfOptio
   }
 }
 
-/// How many experiments a realization must have to be used without having been asked for.
+/// Number of experiments that a realization must have to be used by default.
 ///
-/// As many as were begun: the missing ones excite inputs, which would silently not be estimated.
-/// Who names the inputs knows what is there, and gets what the best realization has.
+/// By default, all that were begun: missing experiments would silently exclude inputs. If the inputs are named, the
+/// number of the most complete realization suffices.
 std::size_t needed_experiments(const RunsByRealization& table, std::size_t begun,
                                const FrfOptions& options, const std::string& log) {
   const auto best = std::max_element(table.begin(), table.end(), [](const auto& a, const auto& b) {

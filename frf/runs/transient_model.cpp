@@ -1,4 +1,4 @@
-// Symbols: l a line, b = P l its bin, r = (bin - b) / half of the window's width; regressors of T are
+// Symbols: l a line, b = P l its bin, r = (bin - b) / (half the window's width). T has the regressors
 // 1, r, ..., r^5.
 #include "frf/runs/transient_model.hpp"
 
@@ -15,16 +15,16 @@
 namespace stageid {
 namespace {
 
-// With one period the window has 30 lines: order 2 and two poles left a remainder of the transient that
-// was 1.5 times the noise, and thousands of times next to a mode (docs/theory.md, section 4).
+// With one period the window has 30 lines: order 2 and two poles left a remainder of the transient of
+// 1.5 times the noise, and thousands of times next to a mode (docs/theory.md, section 4).
 constexpr Eigen::Index kOrder = 5;
 constexpr int kMostPoles = 4;
-// A pole in vain takes more of the residual than its degree of freedom, having been chosen for it.
+// A pole fitted to noise removes more of the residual than its degree of freedom, because it was selected.
 constexpr double kChanceOfAPole = 0.005;
-// Degrees of freedom left by the polynomials. More give a better noise estimate for a run, fewer a
-// narrower window, on which the polynomials hold. An even number of bins: as many below as above.
+// Degrees of freedom left by the polynomials: more give a better noise estimate per run, fewer a narrower window,
+// within which the polynomials are accurate. An even number of bins: as many below as above.
 constexpr Eigen::Index kResidualDof = 10;
-constexpr int kDof = 9;  // and of the scatter, whose bins have unequal weights: 9.5 to 9.7
+constexpr int kDof = 9;  // those of the scatter, whose bins have unequal weights: 9.5 to 9.7
 
 /// Adds weight e e^H, packed as in RunSpectra, for each column e.
 void add_scatter(double weight, const Eigen::MatrixXcd& columns, Eigen::Index k, RunSpectra& run) {
@@ -46,7 +46,7 @@ TransientModel::TransientModel(int period_samples, int periods,
   std::vector<char> taken(static_cast<std::size_t>(bins_), 0);
   taken[0] = 1;  // an offset, not a transient
   if (periods > 1) {
-    // Every line, excited or not: distortions of the plant stand there.
+    // All lines, excited or not, because they contain distortions of the plant.
     for (Eigen::Index b = 0; b < bins_; b += periods) taken[static_cast<std::size_t>(b)] = 1;
   } else {
     for (const int line : excitation.lines) taken[static_cast<std::size_t>(line)] = 1;
@@ -107,11 +107,11 @@ void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
       std::lower_bound(usable_.begin(), usable_.end(), bins.front()) - usable_.begin();
   run.mean.col(k) = Z.col(bin) - fit.value.col(0);
   run.line_dof[k] = static_cast<double>(kDof) * fit.dof / static_cast<double>(kResidualDof);
-  // As of one period, for the scatter is of single periods: the line's own noise, as the mean of the
-  // bins' has it, and that of T, the sum of |weight|^2 times the bin's own, for the loop colours the
-  // noise from bin to bin. A white one comes to 1 + leverage times what fit.dof is said to give.
+  // Scaled for single periods. The line's own noise is the mean of the bins'; that of T is the sum of |weight|^2 times
+  // the bin's own, because the loop colours the noise. For white noise the sum is (1 + leverage) times the noise,
+  // with the degrees of freedom fit.dof.
   const double periods = periods_ * static_cast<double>(kDof);
-  const double shared = static_cast<double>(kResidualDof) / fit.dof;  // by poles
+  const double shared = static_cast<double>(kResidualDof) / fit.dof;  // used by poles
   const Eigen::ArrayXd weight =
       1.0 / fit.dof + shared * fit.weight.array().abs2() / fit.freedom.array();
   add_scatter(periods, fit.residual * weight.sqrt().matrix().asDiagonal(), k, run);

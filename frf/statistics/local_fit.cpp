@@ -13,10 +13,10 @@
 namespace stageid {
 namespace {
 
-constexpr int kIterations = 8;      // of Sanathanan and Koerner; they settle in four or five
-constexpr double kSettled = 1e-10;  // a step of D so small, relative to D, is the last
-// Without a pole the first, linear step lowers the cost by one degree of freedom of many: a line on
-// which it does not do much more is not worth the iteration.
+constexpr int kIterations = 8;      // of Sanathanan and Koerner; four or five suffice
+constexpr double kSettled = 1e-10;  // relative step of D at which the iteration ends
+// Without a pole, the first, linear step lowers the cost by about one degree of freedom. If it lowers the cost only
+// a little, the iteration is skipped.
 constexpr double kWorthIterating = 0.9;
 
 /// Least squares of Z on the rows of K, group by group, by QR of K^H.
@@ -65,7 +65,7 @@ class Projection {
   std::vector<Group> groups_;
 };
 
-/// What `poles` poles leave, of all channels with noise of their own together.
+/// Residual degrees of freedom with `poles` poles, over all channels with independent noise.
 double degrees_of_freedom(const LocalProblem& problem, int poles) {
   const auto groups = static_cast<Eigen::Index>(problem.groups.size());
   return static_cast<double>(problem.tested_noise) *
@@ -73,15 +73,15 @@ double degrees_of_freedom(const LocalProblem& problem, int poles) {
          static_cast<double>(poles);
 }
 
-/// Ratio of the residual powers with and without `gained` more poles, `poles` in all, that noise alone
-/// falls below with the chance asked for. For one pole P(ratio < x) = x^q with q degrees of freedom left,
-/// of all channels with noise of their own together: D is common to them.
+/// Ratio of the residual powers with `poles` poles and with `gained` fewer, below which noise alone falls with the
+/// requested probability. For one pole P(ratio < x) = x^q, with q degrees of freedom left in all channels with
+/// independent noise together, because D is common to them.
 double significant_ratio(const LocalProblem& problem, int poles, int gained) {
   return std::pow(problem.chance_of_a_pole,
                   static_cast<double>(gained) / degrees_of_freedom(problem, poles));
 }
 
-/// Whether all poles, zeros of 1 + d_1 r + ... are as wide as the problem asks.
+/// Whether all poles, the zeros of 1 + d_1 r + ..., are at least as wide as required.
 bool wide_enough(const LocalProblem& problem, const Eigen::VectorXcd& d) {
   if (!(problem.narrowest_pole > 0.0)) return true;
   const Eigen::Index n = d.size();
@@ -110,7 +110,7 @@ struct DenominatorStep {
   Eigen::VectorXcd right;
   double cost = 0.0;  // of d = 0
 
-  /// Of the first `poles` coefficients; `linear_cost`: what they leave of it.
+  /// The first `poles` coefficients; `linear_cost`: the remaining cost.
   Eigen::VectorXcd solution(Eigen::Index poles, double& linear_cost) const {
     const Eigen::VectorXcd d =
         normal.topLeftCorner(poles, poles).fullPivLu().solve(right.head(poles));
@@ -128,7 +128,7 @@ class Fitting {
       powers_.col(i) = powers_.col(i - 1) * p_.r.array();
     const Projection projection(p_.K, p_.k0, p_.groups);
     polynomial_ = fit(Eigen::VectorXcd(), projection);
-    // Units differ, and so does the noise: every channel counts by its own.
+    // Units and noise differ, so every channel is weighted by its own residual.
     weight_ = polynomial_.residual.topRows(p_.pole_channels).rowwise().squaredNorm();
     weight_ = (weight_.array() > 0.0).select(weight_.cwiseInverse(), 0.0);
     first_step_ = denominator_step(p_.Z.topRows(p_.pole_channels), projection, most_poles);
@@ -139,13 +139,13 @@ class Fitting {
     return weight_.dot(fit.residual.topRows(p_.pole_channels).rowwise().squaredNorm());
   }
 
-  /// The fit with `poles` poles; the polynomial one if the first step shows no sign of a pole, or
-  /// the iteration breaks down.
+  /// The fit with `poles` poles; the polynomial fit if the first step does not indicate a pole or the iteration breaks
+  /// down.
   LocalFit with_poles(int poles) const {
-    // Or half of the way to what is significant.
+    // At least half way to significance.
     const double worth =
         std::max(kWorthIterating, 0.5 * (1.0 + significant_ratio(p_, poles, poles)));
-    // D = 1 at first, whatever the number of poles.
+    // The iteration starts at D = 1 for any number of poles.
     double linear_cost = 0.0;
     Eigen::VectorXcd d = first_step_.solution(poles, linear_cost);
     if (linear_cost > worth * first_step_.cost) return polynomial_;
@@ -173,7 +173,7 @@ class Fitting {
     return rows * powers_.col(power).matrix().asDiagonal();
   }
 
-  /// Least squares in d and Theta of (D Z - Theta K) / D_previous, D_previous in Z and `projection`.
+  /// Least squares in d and Theta of (D Z - Theta K) / D_previous; Z and `projection` include D_previous.
   DenominatorStep denominator_step(const Eigen::MatrixXcd& Z, const Projection& projection,
                                    Eigen::Index poles) const {
     const Eigen::MatrixXcd e = projection.residual(Z);
@@ -221,7 +221,7 @@ class Fitting {
       result.leverage[g] = weight.squaredNorm();
       first += weight.size();
     }
-    // One D for all channels takes a degree of freedom from them together.
+    // D is common to all channels, so a pole uses one degree of freedom of all together.
     result.dof = static_cast<double>(p_.r.size() - p_.K.rows() * groups) -
                  static_cast<double>(d.size()) / static_cast<double>(p_.independent_noise);
     result.variance_dof = result.dof;
@@ -230,8 +230,8 @@ class Fitting {
     return result;
   }
 
-  /// A factor of g Cov(d) g^H: g_i = d value / d d_i, Cov(d) from the curvature of the cost. The
-  /// channels' noise has the rank of the outputs only, so that many of them count.
+  /// A factor of g Cov(d) g^H: g_i = d value / d d_i, Cov(d) from the curvature of the cost. The rank of the channels'
+  /// noise is the number of outputs, so only that many channels count.
   Eigen::MatrixXcd pole_spread(const Projection& projection, const Eigen::MatrixXcd& fitted,
                                const Eigen::ArrayXcd& D, Eigen::Index poles,
                                const LocalFit& fit) const {
@@ -255,7 +255,7 @@ class Fitting {
     information *=
         static_cast<double>(p_.independent_noise) / static_cast<double>(p_.pole_channels);
     const Eigen::LLT<Eigen::MatrixXcd> factor(information);
-    if (factor.info() != Eigen::Success)  // poles that the data do not determine: no candidate
+    if (factor.info() != Eigen::Success)  // poles that the data do not determine: rejected
       return Eigen::MatrixXcd::Constant(g.rows(), poles, std::numeric_limits<double>::quiet_NaN());
     return factor.matrixL().solve(g.adjoint()).adjoint();
   }
@@ -267,7 +267,7 @@ class Fitting {
   DenominatorStep first_step_;
 };
 
-/// Of the mean of the fits' variances, each as sure as its degrees of freedom: what they differ by adds.
+/// Degrees of freedom of the mean of the fits' variances, from those of each fit and from their differences.
 double variance_dof(const LocalProblem& problem, const std::vector<LocalFit>& fits,
                     const Eigen::ArrayXd& share) {
   Eigen::ArrayXXd variance(problem.pole_channels, share.size());
@@ -287,8 +287,8 @@ double variance_dof(const LocalProblem& problem, const std::vector<LocalFit>& fi
   return 1.0 / scarcity;
 }
 
-/// ln of the probability of each fit but for a constant: residual power^-(degrees of freedom), and the
-/// odds against a pole for which chance has to make up.
+/// ln of the probability of each fit up to a constant: residual power^-(degrees of freedom), times the prior odds of
+/// its poles.
 Eigen::ArrayXd log_probability(const LocalProblem& problem, const Fitting& fitting,
                                const std::vector<LocalFit>& fits) {
   Eigen::ArrayXd log_p(static_cast<Eigen::Index>(fits.size()));

@@ -7,9 +7,8 @@
 
 namespace stageid {
 
-/// Large matrices that are done with, for the next that is needed: fresh memory must be mapped and
-/// cleared by the kernel, which for the scatter of a short run takes longer than filling it. Safe to
-/// use from several threads.
+/// Reuses large matrices. The kernel must map and clear fresh memory, which for the scatter of a short run takes longer
+/// than filling it. Safe for concurrent use.
 class MatrixPool {
  public:
   /// A matrix with arbitrary contents.

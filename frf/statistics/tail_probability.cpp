@@ -12,11 +12,11 @@ constexpr double kRescaleAbove = 1e200;
 
 }  // namespace
 
-// With w = b / (b + a x) that is the incomplete beta function
+// With w = b / (b + a x) this is the incomplete beta function
 //   I_w(b, a) = w^b sum_{j < a} Gamma(b + j) / (Gamma(b) j!) (1 - w)^j.
 double log_tail_of_f(double x, int a, double b) {
-  // By the odds (1 - w) / w: of noise-free data w is below what 1 - w can tell from one. Noise that is
-  // next to nothing must leave a number.
+  // Uses the odds (1 - w) / w: for nearly noise-free data w is so small that 1 - w rounds to one. The limit keeps the
+  // result finite.
   const double odds = std::min(a * x / b, std::numeric_limits<double>::max());
   const double rest = odds < 1.0 ? odds / (1.0 + odds) : 1.0 / (1.0 + 1.0 / odds);  // 1 - w
   double term = 1.0;
@@ -25,7 +25,7 @@ double log_tail_of_f(double x, int a, double b) {
   for (int j = 1; j < a; ++j) {
     term *= (b + j - 1.0) / j * rest;
     sum += term;
-    if (sum < kRescaleAbove) continue;  // thousands of degrees of freedom pass the largest double
+    if (sum < kRescaleAbove) continue;  // overflows for thousands of degrees of freedom otherwise
     log_scale += std::log(sum);
     term /= sum;
     sum = 1.0;

@@ -4,8 +4,8 @@
 
 namespace stageid {
 
-/// ln P(F > x) of a ratio of mean powers of complex Gaussian noise: F(2 a, 2 b), a whole and b any
-/// number > 0 of complex degrees of freedom.
+/// ln P(F > x) of a ratio of mean powers of complex Gaussian noise: F(2 a, 2 b), a a whole and b any positive number of
+/// complex degrees of freedom.
 double log_tail_of_f(double x, int a, double b);
 
 /// P(h_1 + ... + h_K > h) for independent h_k = -ln p_k, p_k uniform (Fisher's sum): half a

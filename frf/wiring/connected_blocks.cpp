@@ -13,7 +13,7 @@ constexpr double kOverNoise = 4.0;
 constexpr double kLeastPower = 0.01;
 constexpr int kScalings = 50;
 
-/// 1 over the size of each channel, such that rows and columns of D_y |G| D_u have the same power.
+/// Reciprocal size of each channel, such that rows and columns of D_y |G| D_u have the same power.
 struct Scaling {
   Eigen::VectorXd outputs;
   Eigen::VectorXd inputs;
@@ -34,7 +34,7 @@ Scaling scaling_of(const Eigen::MatrixXd& power) {
   return s;
 }
 
-/// Everything reachable from output `first`.
+/// All channels reachable from output `first`.
 ConnectedBlock block_of(Index first, const Eigen::MatrixXi& connects) {
   std::vector<char> has_output(static_cast<std::size_t>(connects.rows()), 0);
   std::vector<char> has_input(static_cast<std::size_t>(connects.cols()), 0);
@@ -71,7 +71,7 @@ std::vector<ConnectedBlock> connected_blocks(const std::vector<PlantLine>& lines
     power += line.G.cwiseAbs2() / size;
     noise += line.variance / size;
   }
-  // Sizes are those of the response, not of its noise: a channel without response counts for nothing.
+  // Sizes are those of the response without its noise, so channels without response do not count.
   Eigen::MatrixXd above = (power.array() > kOverNoise * noise.array())
                               .select(power - noise, Eigen::MatrixXd::Zero(n_y, n_u));
   const Scaling scaling = scaling_of(above);

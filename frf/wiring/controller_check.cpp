@@ -14,22 +14,21 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kEpsilonOnePeriod = 5e-2;  // no scatter says what noise is
+constexpr double kEpsilonOnePeriod = 5e-2;  // the noise is unknown
 constexpr double kDeviations = 6.0;
 constexpr double kLeastGain = 0.02;
 constexpr double kLeastControllerSkew_s = 2e-6;
 constexpr double kLeastShare = 0.3;
 constexpr int kMostChanges = 40;
-constexpr double kOfAnother =
-    0.05;  // of a row's misfit: what another's record leaves, if it is that
+constexpr double kOfAnother = 0.05;  // of a row's misfit, after an exchange
 constexpr double kHardlyWorse = 4.0;
-// Samples that a channel may be late or early by as a whole: beyond the reach of one direction.
+// Skews in samples that a channel may have as a whole, beyond the linear range of a small skew.
 constexpr std::array<double, 6> kWholeSkews = {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0};
 
-/// One line with the changes found so far undone.
+/// One line after the changes found so far have been undone.
 struct Line {
   double omega_rad_s = 0.0;
-  bool known = true;   // the controller
+  bool known = true;   // whether the controller is known here
   Eigen::MatrixXcd F;  // -C, n_u x n_y
   Eigen::MatrixXcd Y;  // means, n_y x E
   Eigen::MatrixXcd U;
@@ -41,7 +40,7 @@ struct Line {
 struct Candidate {
   ChannelChange change;
   double explained = 0.0;
-  double share = 0.0;  // of the misfit of the rows that it touches
+  double share = 0.0;  // of the misfit of the affected rows
 };
 
 class Search {
@@ -56,7 +55,7 @@ class Search {
   bool sensors_follow() const;
   bool follows(Index row) const { return follows(row, 1); }
   bool follows(Index first, Index rows) const;
-  /// E - d X with X of `direction`, rows x E.
+  /// Tries E - d X with X of `direction`, rows x E.
   template <typename Direction>
   void try_direction(ChannelChange change, double cost, Index first, Index rows,
                      const Direction& direction);
@@ -77,7 +76,7 @@ class Search {
   std::vector<Eigen::MatrixXcd> R_;
   std::vector<Line> lines_;
   bool noise_known_;
-  double epsilon_;  // what the model of the controller may be off, of C y
+  double epsilon_;  // relative error of the model of the controller, of C y
   double total_ = 0.0;
   std::vector<Candidate> candidates_;
 };
@@ -130,7 +129,7 @@ void Search::refresh() {
                    kFeedbackRounding * kFeedbackRounding * (squares(line.U) + squares(R_[k])))
                       .cwiseMax(1e-300)
                       .cwiseInverse();
-    if (!line.known) {  // says nothing
+    if (!line.known) {  // no evidence on this line
       line.E.setZero();
       line.variance.setZero();
       line.weight.setZero();
@@ -144,8 +143,8 @@ double Search::row_cost(Index row) const {
       [row](const Line& line) { return line.weight[row] * line.E.row(row).squaredNorm(); });
 }
 
-/// Is u of these actuators, but for a factor, r - C y? Without this one that moves by itself, or that is
-/// another, would be explained by a factor that makes it vanish.
+/// Whether u of these actuators is r - C y up to a factor. Otherwise an actuator with other motion would be explained
+/// by a factor that makes it vanish.
 bool Search::follows(Index first, Index rows) const {
   double along = 0.0;
   double recorded = 0.0;
@@ -161,7 +160,7 @@ bool Search::follows(Index first, Index rows) const {
   return along * along > 0.5 * recorded * asked;
 }
 
-/// The same of all sensors: is C y, but for a factor, r - u?
+/// The same for all sensors: whether C y is r - u up to a factor.
 bool Search::sensors_follow() const {
   double along = 0.0;
   double recorded = 0.0;
@@ -210,7 +209,7 @@ void Search::try_swap(ChannelChange change, double cost, double after) {
     candidates_.push_back({change, cost - after, (cost - after) / cost});
 }
 
-/// A channel late by a sample turns by more than the direction of a small skew follows.
+/// Tries large skews, beyond the linear range of a small one.
 void Search::try_whole_skews(Index a, double cost) {
   if (!noise_known_) return;
   for (const double samples : kWholeSkews) {
@@ -285,8 +284,8 @@ void Search::try_actuators() {
       };
       const double after_a = sum_over_lines(exchanged(a, b));
       const double after_b = sum_over_lines(exchanged(b, a));
-      // What one row cannot explain is not the other's: both must come out better, or one of them whole and the
-      // other hardly worse (three that have changed places come right one by one).
+      // Both rows must improve, or one must be explained completely while the other hardly gets worse (three exchanged
+      // channels are corrected one by one).
       const bool both = after_a < 0.5 * cost && after_b < 0.5 * cost_b;
       const bool one = (after_a < kOfAnother * cost && after_b < kHardlyWorse * cost_b) ||
                        (after_b < kOfAnother * cost_b && after_a < kHardlyWorse * cost);
@@ -305,7 +304,7 @@ std::optional<Candidate> Search::best() const {
   return most != nullptr ? std::optional<Candidate>(*most) : std::nullopt;
 }
 
-/// A change of a channel that was changed so already: one change by both.
+/// Combines a change with an earlier one of the same channel.
 bool merge(const ChannelChange& change, std::vector<ChannelChange>& changes) {
   for (ChannelChange& earlier : changes) {
     if (earlier.kind != change.kind || earlier.of_sensors != change.of_sensors ||
@@ -319,8 +318,8 @@ bool merge(const ChannelChange& change, std::vector<ChannelChange>& changes) {
   return false;
 }
 
-/// Weights follow what is recorded, so that costs before and after a change are not quite the same cost:
-/// an exchange and its undoing could follow each other for ever.
+/// Whether the same exchange was applied already. Weights depend on the record, so costs before and after a change
+/// are not comparable exactly, and an exchange and its inverse could alternate forever.
 bool exchanged_before(const ChannelChange& change, const std::vector<ChannelChange>& changes) {
   return change.kind == ChannelChange::Kind::swap &&
          std::any_of(changes.begin(), changes.end(), [&](const ChannelChange& earlier) {

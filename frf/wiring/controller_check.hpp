@@ -8,39 +8,38 @@
 
 namespace stageid {
 
-/// An actuator that does not do what excitation and controller ask for.
+/// An actuator that does not follow excitation and controller.
 struct ControllerMisfit {
   Eigen::Index actuator = 0;
-  double relative =
-      0.0;  ///< |u - r + C y| / |C y| over the lines; / |u| if the controller leaves it alone
+  double relative = 0.0;   ///< |u - r + C y| / |C y| over the lines; / |u| without control
   bool controlled = true;  ///< C y is not zero
-  bool of_all = false;     ///< most actuators are so: it is the controller, not the channel
+  bool of_all = false;     ///< most actuators are affected, so the controller is the cause
 };
 
 struct ControllerCheck {
-  std::vector<ChannelChange>
-      changes;  ///< in the order in which they explain the most; undone in the record
-  std::vector<ControllerMisfit> misfits;  ///< what no change of one channel explains
+  std::vector<ChannelChange> changes;     ///< ordered by what they explain; undone in the record
+  std::vector<ControllerMisfit> misfits;  ///< not explained by a change of one channel
 };
 
-/// Does u = r - C y hold between the recorded signals, line by line (S + T = I with S = U R^-1 and
-/// T = C Y R^-1)? If not, which wrongly recorded channels explain it?
+/// Checks u = r - C y between the recorded signals, line by line (S + T = I with S = U R^-1 and T = C Y R^-1). If it is
+/// violated, searches for the wrongly recorded channels that explain it.
 ///
-/// With E = U - R + C Y, means over the periods, and the weights w = 1 / (s^2 + (epsilon C Y)^2), s^2
-/// the variance of E from its scatter over periods, every change of one channel moves E along one
-/// direction X: E - d X, d real. Least squares give d, its deviation (2 |X|_w^2)^(-1/2) and how much
-/// of |E|_w^2 it explains; the exchange of two channels has no parameter. The change that explains
-/// most is undone and the next one looked for.
+/// Let E = U - R + C Y with means over the periods, and weights w = 1 / (s^2 + (epsilon C Y)^2), s^2 the variance of E
+/// from its scatter over periods. Every change of one channel moves E along one direction X: E - d X, d real. Least
+/// squares give d, its standard deviation (2 |X|_w^2)^(-1/2), and the explained part of |E|_w^2. The exchange of two
+/// channels has no parameter. The change that explains most is undone, and the search is repeated.
 ///
-/// A change counts if d is 6 deviations off zero (false alarm: 2e-9 a candidate, 6e-7 for the 300
-/// candidates of a wafer stage; s^2 is too large rather than too small, since what noise leaves in E is the
-/// difference of two ends of a period and cancels in the mean), if it explains 30 % of the misfit it is
-/// held against, and if it is large enough to matter: a gain 2 % off, a skew of 2 us. What is left is a misfit if it is
-/// both significant (F test over the experiments of each line, Fisher's sum over the lines, 1e-4 over
-/// all actuators) and 5 % of C y.
+/// A change is accepted on three conditions:
+///   - d is 6 standard deviations from zero. False alarms: 2e-9 per candidate, 6e-7 for the 300 candidates of a wafer
+///     stage. s^2 is rather too large, because the noise in E is the difference of two ends of a period and
+///     cancels in the mean.
+///   - It explains 30 % of the affected misfit.
+///   - It is large enough to matter: 2 % for a gain, 2 us for a skew.
+/// The rest is a misfit if it is both significant (F test over the experiments of each line, Fisher's sum over the
+/// lines, 1e-4 over all actuators) and 5 % of C y.
 ///
-/// @pre record.info's excitation channels that are excited bear names of actuators; all channels are
-/// known to `nominal`, and all its sensors are recorded.
+/// @pre the excited excitation channels of record.info have names of actuators; all channels are known to `nominal`,
+/// and all its sensors are recorded.
 ControllerCheck check_controller(HealthRecord& record, const NominalStage& nominal);
 
 }  // namespace stageid

@@ -12,7 +12,7 @@
 
 namespace stageid {
 
-/// The checks of one log, in the order in which one rules out the next.
+/// The checks of one log, ordered so that each can rely on the previous ones.
 class Examination {
  public:
   Examination(HealthRecord&& record, const std::optional<NominalStage>& nominal)

@@ -18,10 +18,10 @@ namespace {
 using Eigen::Index;
 
 constexpr double kLeastReduction = 4.0;
-constexpr double kClearly = 2.0;  // of the misfits of one explanation and another
+constexpr double kClearly = 2.0;  // ratio of the misfits of two explanations
 constexpr Index kFewestLines = 8;
 
-/// One excited axis on one line of one experiment, over |r|.
+/// One excited axis on one line of one experiment, relative to |r|.
 struct Entry {
   Index experiment = 0;
   int line = 0;
@@ -29,7 +29,7 @@ struct Entry {
   std::complex<double> controlled;  // -C y over r
 };
 
-/// Positions of the excited axes in the actuators; empty if a name is missing.
+/// Indices of the excited axes in the actuators; empty if a name is missing.
 std::vector<Index> actuators_of(const HealthRecord& record) {
   std::vector<Index> found;
   const auto& names = record.info.actuators.names;
@@ -42,7 +42,7 @@ std::vector<Index> actuators_of(const HealthRecord& record) {
   return found;
 }
 
-/// The controller between the recorded channels, if all of them are known.
+/// Whether the controller between the recorded channels is known.
 bool knows_all(const HealthRecord& record, const std::optional<NominalStage>& nominal,
                std::vector<Index>& u, std::vector<Index>& y) {
   if (!nominal) return false;
@@ -99,7 +99,7 @@ Alignment::Alignment(const HealthRecord& record, const std::optional<NominalStag
   }
 }
 
-/// By experiment.
+/// Misfit per experiment.
 Eigen::VectorXd Alignment::misfit_of_r(int samples) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(experiments_);
   for (const Entry& at : entries_)
@@ -114,7 +114,7 @@ double Alignment::misfit_of_u(int samples) const {
   return sum;
 }
 
-/// Where the cross-correlation is largest.
+/// Shift with the largest cross-correlation.
 int Alignment::best() const {
   RealDft dft(period_);
   Eigen::VectorXcd spectrum = Eigen::VectorXcd::Zero(dft.half_size());
@@ -136,7 +136,7 @@ std::optional<ExcitationDelay> Alignment::find() const {
   const Eigen::VectorXd aligned = misfit_of_r(samples);
   if (!(aligned.sum() * kLeastReduction < as_recorded.sum())) return std::nullopt;
   if ((aligned.array() > as_recorded.array()).any()) return std::nullopt;
-  // Without a controller, or with hardly any gain in the band, they are the same.
+  // Without a controller, or with little gain in the band, both are the same.
   const double of_actuators = misfit_of_u(samples);
   if (of_actuators * kClearly < aligned.sum()) return std::nullopt;
   return ExcitationDelay{samples, std::sqrt(as_recorded.sum() / std::max(1e-300, aligned.sum())),

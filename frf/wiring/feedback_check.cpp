@@ -45,7 +45,7 @@ FeedbackCheck check_feedback(const HealthRecord& record) {
     for (const Index axis : record.axes)
       D.row(actuators[static_cast<std::size_t>(axis)]) -= line.R.row(axis);
     const Eigen::MatrixXcd Y = record.mean(line.Z.topRows(record.n_y()));
-    // Units of sensors differ: rows scaled to one before the rank is judged.
+    // Units of sensors differ, so rows are scaled to one before the rank is determined.
     const Eigen::VectorXd size = Y.rowwise().norm().cwiseMax(1e-300);
     const Eigen::MatrixXcd scaled = size.cwiseInverse().asDiagonal() * Y;
     const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXcd> qr(scaled.adjoint());

@@ -10,7 +10,7 @@ using Index = Eigen::Index;
 
 constexpr double kExact = 1e-5;  // of the actuator's rms
 
-/// R of excitation channel `r`, a column a period, lines below each other: as Z has it.
+/// R of excitation channel `r`, repeated for every period, all lines in one column: the same order as Z.
 Eigen::VectorXcd over_periods(const HealthRecord& record, Index r) {
   Index columns = 0;
   for (const int periods : record.periods) columns += periods;

@@ -8,21 +8,21 @@
 
 namespace stageid {
 
-/// What a configuration says of a stage, against which a log is held.
+/// The configured properties of a stage, for comparison with a log.
 struct NominalStage {
   std::vector<std::string> actuators;
   std::vector<std::string> sensors;
   /// -C(e^{j omega T}) from y to u, actuators x sensors.
   std::function<Eigen::MatrixXcd(double frequency_hz)> controller;
-  double controller_from_hz = 0.0;  ///< where it is known
+  double controller_from_hz = 0.0;  ///< band in which it is known
   double controller_to_hz = std::numeric_limits<double>::infinity();
-  double controller_error = 1e-3;  ///< what it may be off, of C y
+  double controller_error = 1e-3;  ///< permitted relative error of C y
   /// The rigid body alone through hold, delay and sampler, sensors x actuators; empty: unknown.
   std::function<Eigen::MatrixXcd(double frequency_hz)> rigid_body;
-  double free_from_hz = 0.0;  ///< above it the suspension does not matter
+  double free_from_hz = 0.0;  ///< above it the suspension is negligible
 };
 
-/// Position of each of `names` in `nominal`. @returns empty if one is not there; `missing` names it.
+/// Index of each of `names` in `nominal`. @returns empty if one is missing; `missing` names it.
 std::vector<Eigen::Index> positions_in(const std::vector<std::string>& nominal,
                                        const std::vector<std::string>& names, std::string& missing);
 

@@ -18,15 +18,15 @@ std::vector<Index> picked(const std::vector<Index>& all, const std::vector<Index
   return some;
 }
 
-/// e^{j phi} of hold and delay: the largest entry of a free rigid body is -1 / omega^2 but for it, or
+/// Phase factor e^{j phi} of hold and delay: without it, the largest entry of a free rigid body is -1 / omega^2 or
 /// +1 / omega^2.
 std::complex<double> nominal_turn(const Eigen::MatrixXcd& G0) {
   Index row = 0;
   Index column = 0;
   const double largest = G0.cwiseAbs().maxCoeff(&row, &column);
   const std::complex<double> turn = -G0(row, column) / largest;
-  // Hold and delay turn by less than a quarter where the rigid body is looked at; beyond, the sign of
-  // the whole matrix does not matter.
+  // Hold and delay turn by less than 90 degrees in the band of the rigid body; beyond it, the sign of the whole matrix
+  // does not matter.
   return turn.real() < 0.0 ? -turn : turn;
 }
 

@@ -15,8 +15,8 @@ using Index = Eigen::Index;
 constexpr double kMost = 0.5;        // of the lines
 constexpr double kUnexcited = 1e-3;  // of the line's largest excitation
 
-/// 1 over the excitation's power where an actuator is excited, else 0; where the excitation is not
-/// added at actuators, 1 over their own power.
+/// 1 over the excitation's power for excited actuators, otherwise 0. If the excitation is not added at actuators, 1
+/// over their own power.
 Eigen::VectorXd weights(const HealthRecord& record, const std::vector<Index>& actuators,
                         const Eigen::VectorXcd& R, const Eigen::MatrixXcd& U) {
   Eigen::VectorXd weight = Eigen::VectorXd::Zero(record.n_u());
@@ -38,7 +38,7 @@ Eigen::VectorXd weights(const HealthRecord& record, const std::vector<Index>& ac
   return weight;
 }
 
-/// `U`: the actuators, a column a period.
+/// `U`: the actuators, one column per period.
 bool repeats(const Eigen::MatrixXcd& U, const Eigen::VectorXd& weight) {
   const auto P = static_cast<double>(U.cols());
   const Eigen::VectorXcd mean = U.rowwise().mean();
@@ -49,7 +49,7 @@ bool repeats(const Eigen::MatrixXcd& U, const Eigen::VectorXd& weight) {
   return power >= std::min(1.0 + 1.0 / P, 4.0 / P) * variance;
 }
 
-/// Share of the lines of experiment `e`, whose periods are columns from `first` on, that do not repeat.
+/// Share of nonrepeating lines of experiment `e`; its periods are the columns from `first` on.
 double share_unlike(const HealthRecord& record, const std::vector<Index>& actuators, Index e,
                     Index first) {
   const Index P = record.periods[static_cast<std::size_t>(e)];

@@ -32,14 +32,14 @@ std::vector<PlantLine> lines_of_body(const std::vector<PlantLine>& lines) {
   return {lines.begin(), lines.begin() + rigid_lines(omega_rad_s, gain)};
 }
 
-/// A and A0 with what they are held to.
+/// A and A0 with their weights.
 struct Gains {
   Eigen::MatrixXd A;
   Eigen::MatrixXd A0;
   Eigen::MatrixXd weight;
 };
 
-/// The constant term of entry (i, j): of A, of A0, and the variance of both.
+/// The constant terms of entry (i, j) of A and of A0, and their variance.
 Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j) {
   const auto K = static_cast<Index>(lines.size());
   const double highest = std::pow(lines.back().omega_rad_s, 2);
@@ -87,7 +87,7 @@ double cost(const Eigen::MatrixXd& A, const Gains& gains) {
   return (gains.weight.array() * (A - gains.A0).array().square()).sum();
 }
 
-/// The rows and columns of A with the change undone; positions are those in A.
+/// A with the change undone; indices are those in A.
 Eigen::MatrixXd undone(const ChannelChange& change, const Eigen::MatrixXd& A) {
   Eigen::MatrixXd B = change.of_sensors ? A : Eigen::MatrixXd(A.transpose());
   if (change.kind == ChannelChange::Kind::swap)
@@ -101,7 +101,7 @@ Eigen::MatrixXd undone(const ChannelChange& change, const Eigen::MatrixXd& A) {
 
 void try_gain(ChannelChange change, const Gains& gains, const Eigen::MatrixXd& A,
               std::vector<BodyCandidate>& candidates) {
-  // c A = A0 by least squares over the row, the column, or all.
+  // c A = A0 by least squares over the row, the column, or all entries.
   Eigen::MatrixXd part = Eigen::MatrixXd::Zero(A.rows(), A.cols());
   if (change.a < 0)
     part = A;
@@ -140,7 +140,7 @@ std::optional<BodyCandidate> best_change(const Gains& gains, const Eigen::Matrix
   return most != nullptr ? std::optional<BodyCandidate>(*most) : std::nullopt;
 }
 
-/// From positions in A to those in the log.
+/// Converts indices in A to those in the log.
 ChannelChange in_log(ChannelChange change, const std::vector<Index>& outputs,
                      const std::vector<Index>& inputs) {
   const std::vector<Index>& at = change.of_sensors ? outputs : inputs;

@@ -9,26 +9,26 @@
 namespace stageid {
 
 struct RigidBodyCheck {
-  std::string unchecked;                     ///< why nothing can be said; empty: it was checked
+  std::string unchecked;                     ///< the missing data; empty: it was checked
   std::vector<ChannelChange> changes;        ///< gains and exchanges, not undone in the record
-  std::vector<Eigen::Index> dead_actuators;  ///< excited and without any effect
-  double deviation = 0.0;  ///< what is left: rms over the entries, of the rms of their row
+  std::vector<Eigen::Index> dead_actuators;  ///< excited but without any effect
+  double deviation = 0.0;  ///< remaining rms over the entries, relative to the rms of their row
   double band_hz[2] = {0.0, 0.0};
 };
 
-/// Is the plant's rigid body that of the configuration's geometry and mass? If not, which wrongly wired
-/// channels explain it?
+/// Compares the plant's rigid body with the configured geometry and mass. If they differ, searches for wrongly wired
+/// channels that explain it.
 ///
 /// Below the first flexible mode, for sensor i and actuator j,
 ///   -omega^2 G_ij = A_ij + D_ij omega^2 + D'_ij omega^4,
-/// real but for the delay: A is the rigid body, D the compliance of the flexible modes. The same fit to
-/// the nominal rigid body gives A0. A channel that is wired with a gain g scales its row or column,
-/// one that is exchanged with another exchanges them: of all of these the change that brings A
-/// nearest to A0 is taken, then the next one. Entries are held to 10 % of the rms of their row: amplifiers,
-/// masses and positions are known no better; a gain counts from 30 % on, or if it is negative.
-/// The band ends at 0.7 of the frequency where omega^2 |G| has grown by half over its median.
+/// real apart from the delay: A is the rigid body, D the compliance of the flexible modes. The same fit to the nominal
+/// rigid body gives A0. A wiring gain g of a channel scales its row or column; an exchange of channels exchanges them.
+/// The change that brings A closest to A0 is accepted, and the search is repeated. Entries have a tolerance of 10 % of
+/// the rms of their row, the accuracy of amplifiers, masses and positions. A gain is accepted from 30 % on, or if it
+/// is negative.
+/// The band ends at 0.7 of the frequency at which omega^2 |G| exceeds its median by half.
 ///
-/// @param outputs, inputs channels of the log that `lines` are of, see plant_lines().
+/// @param outputs, inputs channels of the log for `lines`, see plant_lines().
 RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& lines,
                                 const std::vector<Eigen::Index>& outputs,
                                 const std::vector<Eigen::Index>& inputs);

@@ -19,15 +19,15 @@ using Index = Eigen::Index;
 constexpr int kBlocks = 20;
 constexpr int kIterations = 6;
 constexpr std::size_t kFewestSkewLines = 100;
-constexpr Index kFewestChannels = 3;  // of a kind: of two, neither is the one that is late
+constexpr Index kFewestChannels = 3;  // per kind: with two, the late one cannot be identified
 constexpr double kSkewDeviations = 8.0;
-constexpr double kNear = 0.3;  // ln of the ratio of two frequencies that see the same modes
-constexpr double kLeastDirection = 0.1;  // Im G beside the directions taken already, of |G|
-constexpr double kNoiseAllowed = 0.02;   // of |G|: above it a line's weight falls
+constexpr double kNear = 0.3;            // ln of the frequency ratio of lines with the same modes
+constexpr double kLeastDirection = 0.1;  // Im G outside the directions taken already, of |G|
+constexpr double kNoiseAllowed = 0.02;   // of |G|: above it, a line's weight decreases
 constexpr double kLeastSkew_s = 5e-6;
 constexpr double kWantedSkew_s = 10e-6;
 
-/// Normal equations M x = v, and the square of their right-hand side.
+/// Normal equations M x = v, and the squared norm of the data.
 struct Normal {
   Eigen::MatrixXd M;
   Eigen::VectorXd v;
@@ -55,7 +55,7 @@ class SkewFit {
         blocks_(kBlocks, Normal(n_y_ + n_u_)),
         skew_(Eigen::VectorXd::Zero(n_y_ + n_u_)) {}
 
-  /// Skews [tau; sigma] in s, each against the median of its kind.
+  /// Skews [tau; sigma] in s, each relative to the median of its kind.
   Eigen::VectorXd solve();
   Eigen::VectorXd deviations() const;
 
@@ -65,8 +65,8 @@ class SkewFit {
   Eigen::MatrixXd damping_directions(const Eigen::MatrixXd& imaginary, Index block) const;
   Normal normal_of(std::size_t line, const Eigen::MatrixXcd& G, const Eigen::MatrixXd& Q) const;
   Index first_of(Index block) const { return block * static_cast<Index>(lines_.size()) / kBlocks; }
-  /// Each kind against its median: what all sensors or all actuators share is the plant's delay, and
-  /// what damping adds to all of them alike.
+  /// Subtracts the median of each kind: the common delay of all sensors or all actuators belongs to the plant, and
+  /// damping adds to it.
   Eigen::VectorXd relative(Eigen::VectorXd skew) const {
     std::vector<double> values(skew.begin(), skew.end());
     const std::span all(values);
@@ -83,7 +83,7 @@ class SkewFit {
   Eigen::VectorXd skew_;
 };
 
-/// G with the skews found so far undone, divided by its size; by more where that is noise.
+/// G with the skews found so far undone, normalized; reduced if noise dominates.
 Eigen::MatrixXcd SkewFit::turned(const PlantLine& line) const {
   const auto phases = [&](const Eigen::VectorXd& delays_s) {
     Eigen::VectorXcd turn(delays_s.size());
@@ -97,9 +97,9 @@ Eigen::MatrixXcd SkewFit::turned(const PlantLine& line) const {
          phases(skew_.tail(n_u_)).asDiagonal();
 }
 
-/// Orthonormal basis of what damping adds near a block: pivoted QR takes the line with the largest
-/// Im vec G first, a resonance, then the one with the largest part beside it, and so on. A line counts
-/// the less the farther it is from the block, and half of the entries are left to tell the skews.
+/// Orthonormal basis of the contribution of damping near a block. Pivoted QR takes the line with the largest Im vec G
+/// first, a resonance, then the one with the largest remaining part, and so on. Lines are weighted by their distance
+/// from the block, and half of the entries are reserved for the skews.
 Eigen::MatrixXd SkewFit::damping_directions(const Eigen::MatrixXd& imaginary, Index block) const {
   const auto log_omega = [&](Index k) {
     return std::log(lines_[static_cast<std::size_t>(k)].omega_rad_s);
@@ -120,7 +120,7 @@ Eigen::MatrixXd SkewFit::damping_directions(const Eigen::MatrixXd& imaginary, In
   return qr.householderQ() * Eigen::MatrixXd::Identity(imaginary.rows(), rank);
 }
 
-/// @param Q what is projected off
+/// @param Q directions to project off
 Normal SkewFit::normal_of(std::size_t k, const Eigen::MatrixXcd& G,
                           const Eigen::MatrixXd& Q) const {
   Eigen::MatrixXd X = Eigen::MatrixXd::Zero(n_y_ * n_u_, n_y_ + n_u_);

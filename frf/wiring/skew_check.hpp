@@ -9,33 +9,32 @@
 namespace stageid {
 
 struct SkewCheck {
-  std::string unchecked;  ///< why nothing can be said; empty: it was checked
-  std::vector<ChannelChange>
-      changes;  ///< channels that sample or act at another time than their kind
-  double largest_deviation_s = 0.0;  ///< standard deviation of the least certain skew
+  std::string unchecked;               ///< the missing data; empty: it was checked
+  std::vector<ChannelChange> changes;  ///< channels whose timing differs from their kind's
+  double largest_deviation_s = 0.0;    ///< largest standard deviation of a skew
 };
 
-/// Do all sensors sample, and all actuators act, at one time?
+/// Checks whether all sensors sample, and all actuators act, at the same time (docs/theory.md, section 13).
 ///
-/// With real mode shapes G e^{j omega tau0} = sum_r R_r d_r(j omega), R_r real: away from the resonances it
-/// is real. A channel that is late turns its row or column by -omega tau:
+/// With real mode shapes, G e^{j omega tau0} = sum_r R_r d_r(j omega), R_r real, is real away from the resonances. A
+/// late channel turns its row or column by -omega tau:
 ///   Im G_ij = -omega (tau_i + sigma_j) Re G_ij + sum_r (R_r)_ij Im d_r.
-/// The sum is what damping adds: on all lines of a band it lies in the span of the R_r of the modes near
-/// it, found as the lines of the largest Im vec G (pivoted QR). Projected off these, the equation is
-/// least squares for tau and sigma over all lines, each divided by |G| and by its noise where that is above
-/// 2 %, and by what the equation leaves of it where that is above the median (a Cauchy weight): close to a
-/// resonance that the span does not hold, the equation says nothing of skews. The skews are undone and the
-/// step repeated, since the equation is their first order. Standard deviations by the
-/// jackknife over blocks of lines, since what is left is not noise but damping of far modes, which
-/// neighbouring lines share. A channel counts if it is 8 deviations and 5 us off the median of its kind: mode
-/// shapes that are not quite real, with phases of 2 degrees, make errors of 2 us whose deviations come out
-/// at half of that.
+/// The sum is the contribution of damping. On all lines of a band, it is in the span of the R_r of the nearby modes,
+/// estimated by the lines with the largest Im vec G (pivoted QR). After projection off these, tau and sigma follow by
+/// least squares over all lines. Each line is divided by |G|, by its noise if that is above 2 %, and by its residual if
+/// that is above the median (a Cauchy weight), because lines close to a resonance outside the span contain no
+/// information on skews. The equation is of first order, so the skews are undone and the step is repeated.
 ///
-/// Sensors and actuators that do not respond to each other (connected_blocks()) are looked at apart: how their
-/// delays differ, nothing tells, and each block has medians of its own.
+/// Standard deviations are those of the jackknife over blocks of lines: the residual is not noise but damping of
+/// distant modes, which neighbouring lines share. A channel is reported if it is 8 standard deviations and 5 us from
+/// the median of its kind. Mode shapes with phases of 2 degrees cause errors of 2 us, with standard deviations of
+/// about half of that.
 ///
-/// What all sensors, or all actuators, of a block share is the plant's delay and cannot be seen.
-/// @param outputs, inputs channels of the log that `lines` are of, see plant_lines().
+/// Sensors and actuators that do not respond to each other (connected_blocks()) are examined separately, each block
+/// with its own medians, because their relative delay cannot be determined.
+///
+/// The common delay of all sensors or all actuators of a block belongs to the plant and cannot be determined.
+/// @param outputs, inputs channels of the log for `lines`, see plant_lines().
 SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Eigen::Index>& outputs,
                      const std::vector<Eigen::Index>& inputs);
 

@@ -1,4 +1,4 @@
-// What needs the stage: the recorded signals against its controller, the plant against its rigid body.
+// Checks that need the stage: the recorded signals against its controller, the plant against its rigid body.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,12 +16,12 @@ namespace {
 using Index = Eigen::Index;
 
 constexpr double kResponds = 1e-3;  // of the largest nominal response
-constexpr double kFedBack = 1e-4;   // of an actuator: ten times what is called exact
+constexpr double kFedBack = 1e-4;   // of an actuator: ten times the limit of equality
 constexpr double kLargestRigidDeviation = 0.3;
 
 }  // namespace
 
-/// Whether the rigid body moves this sensor when the excited actuators push.
+/// Whether the excited actuators move this sensor through the rigid body.
 bool Examination::expected_to_respond(Index sensor, bool& known) const {
   std::string missing;
   known = false;
@@ -52,8 +52,8 @@ std::string Examination::why_no_nominal(bool all_sensors) const {
   return "";
 }
 
-/// An actuator that is the excitation says nothing of the loop. Whether there is a loop, the controller says,
-/// or the other actuators.
+/// An actuator that equals the excitation contains no information about the loop. The controller or the other actuators
+/// show whether there is a loop.
 void Examination::check_injection() {
   const std::vector<MappedExcitation> mapped = find_mapped_excitation(record_);
   const auto all = static_cast<std::size_t>(
@@ -81,7 +81,7 @@ void Examination::check_injection() {
   }
 }
 
-/// Whether the controller adds to this actuator what would be seen beside the excitation.
+/// Whether the controller's contribution to this actuator is measurable beside the excitation.
 bool Examination::controlled(Index actuator, bool& known) const {
   known = nominal_.has_value() && why_no_nominal(false).empty();
   if (!known) return false;
@@ -102,7 +102,7 @@ bool Examination::controlled(Index actuator, bool& known) const {
   return fed_back > kFedBack * kFedBack * moved;
 }
 
-/// Said first: what cannot be seen in this log, what file would let it be seen, and what the data alone tell.
+/// Reports, before all else, what this log cannot show, the missing file, and the results from the data alone.
 void Examination::check_without_stage() {
   const FeedbackCheck check = check_feedback(record_);
   const bool tells = check.unchecked.empty() && spoilt_.empty();
@@ -166,7 +166,7 @@ void Examination::check_recording() {
 
 void Examination::check_stage() {
   const char* what = "wiring between recorder and stage (rigid body against geometry and mass)";
-  if (!nominal_) return;  // said already
+  if (!nominal_) return;  // reported already
   std::string why = why_no_nominal(false);
   if (why.empty() && !nominal_->rigid_body)
     why = "geometry and mass: a stage file, or 'stage: FILE' in the controller file";
@@ -213,7 +213,7 @@ void Examination::check_stage() {
          fmt::format("by {:.0f} %, {:.3g} ... {:.3g} Hz", 100.0 * check.deviation, check.band_hz[0],
                      check.band_hz[1]),
          "correct mass, inertia or positions in the stage file");
-  if (!check.dead_actuators.empty()) return;  // noise has no phase
+  if (!check.dead_actuators.empty()) return;  // the phase of noise is meaningless
   const SkewCheck skew = check_skew(lines, outputs, inputs);
   for (const ChannelChange& change : skew.changes)
     findings_.push_back(to_finding(change, record_.info, false));

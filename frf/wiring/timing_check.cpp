@@ -11,9 +11,9 @@
 namespace stageid {
 namespace {
 
-constexpr int kShort = 4;  // samples that a recorder may well lose again and again
+constexpr int kShort = 4;  // in samples; a recorder may repeatedly lose this number
 
-/// Gaps of the same length, many samples each, in one run: the declared period is not that of the records.
+/// Equal long gaps in one run: the declared period differs from that of the records.
 std::optional<Finding> wrong_period(const HealthRecord& record) {
   for (std::size_t i = 0; i < record.slips.size(); ++i)
     for (std::size_t k = i + 1; k < record.slips.size(); ++k) {

@@ -9,8 +9,8 @@
 
 namespace stageid {
 
-/// What is wrong in time: lost samples, inputs that do not repeat, an excitation recorded late (put right in
-/// `record`), a response that changes. First, since it explains what other checks would blame channels for.
+/// Checks the timing: lost samples, inputs that do not repeat, an excitation recorded late (corrected in `record`), a
+/// response that changes. Runs first, because such errors would otherwise be attributed to channels.
 std::vector<Finding> check_timing(HealthRecord& record, const std::optional<NominalStage>& nominal);
 
 }  // namespace stageid
