@@ -7,7 +7,7 @@
 
 namespace stageid::test {
 
-// Open loop, one stage, its commands and measurements at hand.
+// Open loop, one stage with accessible commands and measurements.
 class Bench {
  public:
   explicit Bench(const WaferStageSpec& spec)

@@ -23,7 +23,7 @@ def fitted(data, *arguments):
     done = subprocess.run(
         [PROGRAM, "fit", DATA / data, "-o", model, "--weighting", "relative", *arguments],
         capture_output=True, text=True)
-    # 3: the model is the best of its kind, and the variances of the data say that it is not enough.
+    # 3: the model is the best of its kind, but insufficient according to the variances of the data.
     assert done.returncode in (0, 3), done.stderr
     return json.loads(model.read_text())
 

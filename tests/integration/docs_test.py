@@ -14,10 +14,10 @@ import shutil
 import subprocess
 import sys
 
-# One takes the main job's time, the other is what runs this test.
+# The first takes as long as the main job; the second runs this test.
 NOT_HERE = ("tools/quickstart", "tools/test")
 EXIT_CODE = re.compile(r"# exit code (\d+)\s*$")
-# What must be there, so that nobody empties a page without noticing.
+# Required content, so that an emptied page is noticed.
 LEAST_COMMANDS = {"README.md": 5, "docs/guide.md": 30, "docs/exchange.md": 5}
 
 

@@ -18,7 +18,7 @@ import unittest
 
 PROGRAM, CONFIGS, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
 SMALL = "configs/experiment/small_stage.yaml"
-# In order: each uses what those before it have written. The bytes of all of these are the same every time.
+# In order: each uses the output of the previous ones. All outputs are identical byte for byte in every run.
 COMMANDS = {
     "excitation.h5": ["design", SMALL],
     "frf.h5": ["frf", "run.slog", "--realizations", "1,2"],
@@ -28,7 +28,7 @@ COMMANDS = {
     "table.csv": ["log", "convert", "run.slog"],
     "back.h5": ["import", "table.csv", "--map", "configs/import/bench_csv.yaml"],
 }
-# From before main() to after most commands are done, in steps that fall everywhere between.
+# From before main() to after the end of most commands, in steps that cover everything in between.
 DELAYS_S = [0.0, 0.003, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12]
 
 
@@ -54,7 +54,7 @@ class InterruptTest(unittest.TestCase):
     def setUpClass(cls):
         shutil.rmtree(WORK, ignore_errors=True)
         shutil.copytree(CONFIGS, WORK / "configs")
-        # Late cycles of a busy machine are marked, and end nothing: this is about Ctrl-C.
+        # Late cycles of a busy machine are only marked, because this test is about Ctrl-C.
         stage = WORK / "configs/stage/small_stage.yaml"
         stage.write_text(stage.read_text() + "\nrealtime: {misses_allowed: 1000000}\n")
         for words in (["run", SMALL, "-o", "run.slog"],
@@ -63,7 +63,7 @@ class InterruptTest(unittest.TestCase):
             assert code == 0, (words, error)
 
     def check_end(self, code, error):
-        # Before main() nobody is there yet to catch it.
+        # Before main() there is no signal handler yet.
         self.assertIn(code, (0, 130, -signal.SIGINT), error)
         if code == 130:
             last = error.strip().splitlines()[-1]
@@ -74,7 +74,7 @@ class InterruptTest(unittest.TestCase):
         for output, words in COMMANDS.items():
             whole = (WORK / output).read_bytes()
             before = files()
-            for delay_s in (*DELAYS_S, 60.0):  # the last one comes too late, however slow the build
+            for delay_s in (*DELAYS_S, 60.0):  # the last one is too late for any build
                 with self.subTest(words[0], delay_s=delay_s):
                     new = pathlib.Path(f"new{pathlib.Path(output).suffix}")
                     code, error = run(*words, "-o", str(new), interrupt_after_s=delay_s)
@@ -107,7 +107,7 @@ class InterruptTest(unittest.TestCase):
                     try:
                         begun = time.monotonic()
                         code, error = run(*words, str(pipe), interrupt_after_s=1.0, by=by)
-                        self.assertIn(code, (1, 2, 130), error)  # 1, 2: refuses what is no file
+                        self.assertIn(code, (1, 2, 130), error)  # 1, 2: not a valid file
                         if code == 130:
                             self.assertRegex(error.strip().splitlines()[-1], "^stageid: interrupted; ")
                         self.assertLess(time.monotonic() - begun, 30.0)
@@ -158,7 +158,7 @@ class InterruptTest(unittest.TestCase):
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=120)
         self.assertEqual(process.returncode, 130, error)
-        self.assertIn("the measured data are kept", error)  # the loop's own words: it came to its end
+        self.assertIn("the measured data are kept", error)  # the loop's own message: it ended normally
         # The ramp is in the log: 0.1 s of stage time, marked.
         code, error = run("log", "verify", log.name)
         self.assertEqual(code, 0, error)

@@ -22,7 +22,7 @@ import unittest
 
 FLOORS = ["excitation", "hal", "acquisition", "frf", "estimation", "tools"]
 
-# The libraries that each may use. Written out, not derived: this table is the rule.
+# The libraries that each may use. Not derived from the sources: this table is the rule.
 ARROWS = {
     "files": set(),
     "excitation": set(),
@@ -34,7 +34,7 @@ ARROWS = {
     "tools": {"files", "excitation", "hal", "record", "acquisition", "frf", "estimation"},
 }
 
-# Third-party headers that stay behind one door, by the start of their name.
+# Third-party headers that only one library may include, by the start of their name.
 DOORS = {
     "fftw3": {"excitation"},
     "xxhash": {"files"},
@@ -49,7 +49,7 @@ DOORS = {
     "nlohmann/": {"record", "frf", "estimation", "tools"},
 }
 
-# What an installed header may ask of its users beside the standard library; HDF5 only behind its door.
+# Headers that an installed header may include besides the standard library; HDF5 only where permitted.
 INSTALLED_HEADERS_MAY_INCLUDE = ("Eigen/", "hdf5.h")
 
 GRAB_BAGS = {"common", "util", "utils", "helpers", "misc", "base", "core", "shared"}
@@ -79,7 +79,7 @@ class Tree:
     def __init__(self, root):
         self.root = pathlib.Path(root)
         self.rooms = {}  # "floor/room" -> Room
-        self.links = {}  # library -> libraries of ours that it links
+        self.links = {}  # library -> libraries of this project that it links
         for floor in FLOORS:
             for path in sorted((self.root / floor).rglob("CMakeLists.txt")):
                 self._read_cmake(path)
@@ -108,7 +108,7 @@ def folder_of(name):
 def include_faults(tree, path, name, used):
     text = path.read_text()
     room = tree.rooms.get(folder_of(name))
-    face = name in {f"{floor}/{floor}.hpp" for floor in FLOORS}  # what a floor's users include: above its rooms
+    face = name in {f"{floor}/{floor}.hpp" for floor in FLOORS}  # included by a floor's users: above its rooms
     above = face or name.startswith(NO_ROOM)
     if room is None and not above:
         yield f"{name}: its folder is not a room (stageid_room() in its CMakeLists.txt)"

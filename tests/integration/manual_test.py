@@ -11,9 +11,9 @@ import sys
 import unittest
 
 PROGRAM, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
-# The bash script as completion calls it: the last word is the one that is completed.
+# Calls the bash script like its completion: the last word is completed.
 COMPLETE = 'source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _stageid; printf "%s\\n" "${COMPREPLY[@]}"'
-# The same of zsh, with what its completion system would be told instead of the system.
+# The same for zsh; the functions of its completion system are replaced and print their arguments.
 COMPLETE_ZSH = """_describe() { [[ $1 == -o ]] && shift; print -rl -- ${${(P)2}//(#b)([^\\\\]):*/$match[1]}; }
 compadd() { print -rl -- ${(P)2}; }
 _files() { print -r FILES; }
@@ -98,7 +98,7 @@ class ManualTest(unittest.TestCase):
         self.assertEqual(self.completed("--verbosity", "de"), ["debug"])
         self.assertEqual(self.completed("--verbosity", "debug", "log", "inf"), ["info"])
         self.assertEqual(self.completed("frf", "run.slog", "--method", ""), ["periodic", "lpm"])
-        self.assertEqual(self.completed("frf", "run.sl"), [])  # bash offers files then
+        self.assertEqual(self.completed("frf", "run.sl"), [])  # bash completes files then
 
     def test_what_completion_offers_is_accepted(self):
         """A word that a flag does not take ends with 2; a good one gets as far as the missing file, 1."""

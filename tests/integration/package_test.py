@@ -46,7 +46,7 @@ class Wheel(unittest.TestCase):
     def test_it_installs_into_an_empty_environment(self):
         wheel = self.pack(WORK / "wheel")
         self.assertEqual(wheel.read_bytes(), self.pack(WORK / "again").read_bytes())
-        # Debian's numpy and nothing else.
+        # Debian's numpy only.
         output("/usr/bin/python3", "-m", "venv", "--system-site-packages", WORK / "venv")
         python = WORK / "venv/bin/python"
         output(python, "-m", "pip", "install", "--no-deps", "--no-index", wheel)
@@ -111,7 +111,7 @@ class Debian(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("lintian"), "no lintian here")
     def test_lintian_has_nothing_to_say(self):
-        # The suppressed one is about bugs of Debian's own archive, to which nothing was uploaded.
+        # The suppressed warning concerns uploads to Debian's own archive.
         for package in ("stageid", "python3-stageid", "libstageid-dev"):
             said = output("lintian", "--allow-root", "--suppress-tags", "initial-upload-closes-no-bugs", self.packages[package])
             self.assertEqual(said, "", package)

@@ -1,6 +1,6 @@
 // The stage on the other side of docs/examples/plugin/udp_stage.c: the simulated stage of a stage file behind UDP.
 //
-//   udp_peer STAGE.yaml [CYCLES] [PORT]     prints its port; falls silent after so many cycles of all runs; 0: never
+//   udp_peer STAGE.yaml [CYCLES] [PORT]     prints its port; silent after CYCLES cycles of all runs; 0: never
 
 #include <arpa/inet.h>
 #include <sys/socket.h>

@@ -31,7 +31,7 @@ class WholeStageTest(unittest.TestCase):
         self.assertEqual(len(modes), 20)
         self.assertTrue(all(mode["found"] for mode in modes), modes)
         self.assertEqual(summary["truth"]["extra_modes_hz"], [])
-        # Half of the errors of what was measured are below 0.4 % (see the stage file), the model's are smaller.
+        # Half of the errors of the measured FRF are below 0.4 % (see the stage file); the model's are smaller.
         self.assertLess(summary["truth"]["relative_rms_error"], 0.05)
         self.assertLess(summary["truth"]["normalized_error"], 0.005)
         # x and y actuators do not move z sensors, z actuators neither x nor y sensors.

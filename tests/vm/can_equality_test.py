@@ -30,12 +30,12 @@ class Equality(CanTest):
         self.assertLess(error, tolerance)
         self.assertGreater(error, 0.0, "the same bytes would mean that nothing went over the wire")
 
-    # A count is 40 N 1.25 / 2^23 = 6e-6 N against 1 N rms on 197 lines (0.1 N a line), and 1.5e-10 m
-    # against 1e-7 m: rounding of 1e-4 a sample, white, less by sqrt(1000 samples 3 periods 3 times).
+    # A count is 40 N 1.25 / 2^23 = 6e-6 N against 1 N rms on 197 lines (0.1 N per line), and 1.5e-10 m
+    # against 1e-7 m: rounding of 1e-4 per sample, white, reduced by sqrt(1000 samples 3 periods 3 times).
     def test_streaming_gives_the_frf_of_the_simulator(self):
         self.compare("streaming", 1e-5)
 
-    # float32: 6e-8 a sample.
+    # float32: 6e-8 per sample.
     def test_resident_gives_the_frf_of_the_simulator(self):
         self.compare("resident", 1e-7)
 
@@ -107,8 +107,8 @@ class Decoding(CanTest):
                 decoded[int(identifier, 16)].append(bytes.fromhex(data[1:]))
         samples = 2500  # of the first run
         for identifier, names in columns.items():
-            # Setpoint n travels as number n + 1, measurement n as n. A busy machine may have kept candump
-            # from some frames, and have had some asked for twice.
+            # Setpoint n is sent as number n + 1, measurement n as n. On a busy machine, candump may miss
+            # some frames, and some may be repeated.
             frames = {}
             first_run = self.value(decoded[identifier][0], *signals[identifier, "run"])
             for data in decoded[identifier]:
@@ -125,6 +125,6 @@ class Decoding(CanTest):
                 title = f"actuator {column} [N]" if identifier == 0x100 else f"sensor {column} [m]"
                 index = head.index(title)
                 logged = np.array([float(rows[row][index]) for row in frames])
-                # Measurements are logged as they came, commands before they were rounded.
+                # Measurements are logged as received, commands before rounding.
                 tolerance = 0.5001 * signal_[3] if identifier == 0x100 else 1e-6 * signal_[3]
                 self.assertLess(abs(wire - logged).max(), tolerance, column)

@@ -89,7 +89,7 @@ class Interventions(CanTest):
     def test_node_restarted(self):
         with self.machine.node(self.name) as node:
             process = self.begin()
-            process.send_signal(signal.SIGSTOP)  # the host must not see the gap, only the new node
+            process.send_signal(signal.SIGSTOP)  # the host must detect the new node, not the gap
             node.kill()
             node.wait()
             with self.machine.node(self.name):
@@ -171,7 +171,7 @@ class StageFaults(CanTest):
         ("sensor dead", "kind: dead_sensor, channel: s2", 1, "the last one: incomplete"),
         ("samples missed", "kind: missed_cycle, cycles: 100", 1, "the last one: stale"),
         ("interlock", "kind: interlock", 1, "the stage reported a fault"),
-        # No wire tells that a force stays as it was: only the FRF does.
+        # A stuck force is not visible on the bus, only in the FRF.
         ("actuator stuck", "kind: stuck_actuator, channel: a1", 0, ""),
     ]
 

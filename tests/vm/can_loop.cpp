@@ -1,5 +1,5 @@
-// Streams a small simulated stage over SocketCAN and counts what went wrong: by the wall clock with a
-// node in a process of its own, or in virtual time with one in a thread, for the sanitizers.
+// Streams a small simulated stage over SocketCAN and counts the errors: on the wall clock with a node in another
+// process, or in virtual time with one in a thread, for the sanitizers.
 //   can_loop INTERFACE RATE_HZ SECONDS process|thread
 // Exit code 0: every sample was answered in its cycle or late, none is missing, and in "process" mode
 // less than one in a thousand is late.
@@ -65,7 +65,7 @@ void serve(const Setup& setup, const std::atomic<bool>& end) {
   while (!end) front.serve(bus.now_ns() + 1'000'000);
 }
 
-/// @returns how many samples had each outcome.
+/// @returns the number of samples for each outcome.
 std::map<Outcome, int> stream(const Setup& setup, double seconds, double pace) {
   const CanLayout layout = can_layout(setup.can, setup.stage.info);
   CanStage stage(setup.stage.info, setup.can,
@@ -76,7 +76,7 @@ std::map<Outcome, int> stream(const Setup& setup, double seconds, double pace) {
   std::vector<double> u(2);
   Inputs inputs;
   inputs.y = y;
-  for (int attempt = 1;; ++attempt) {  // an emulated machine may take seconds to make the node
+  for (int attempt = 1;; ++attempt) {  // an emulated machine may take seconds to start the node
     try {
       stage.connect();
       break;

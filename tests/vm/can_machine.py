@@ -42,7 +42,7 @@ class Machine:
         if len(interfaces) == 2:
             buses = ("{interface: %s, actuators: [a1, a2], sensors: [s2]},"
                      "{interface: %s, actuators: [a3], sensors: [s1]}" % interfaces)
-        # Not the 20 and 5 ms of a machine with processors of its own: here all processes share one.
+        # More than the usual 20 and 5 ms, because all processes share one processor.
         text += ("\ncan: {mode: %s, buses: [%s], watchdog_s: 0.2,"
                  " reply_timeout_s: 0.02%s}\n" % (mode, buses, group))
         (self.at / f"{name}_stage.yaml").write_text(text)

@@ -1,7 +1,6 @@
-// Lets user-mode-linux 6.1 run on processors whose register state is larger than its buffer (AMX:
-// 11008 bytes). The host kernel refuses to set a part of the state (EFAULT, "ptrace set fp regs
-// failed" and a panic of the guest); here the part that UML does not know is put behind its own.
-// vmrun.sh compiles this and puts it into LD_PRELOAD of linux.uml.
+// Lets user-mode-linux 6.1 run on processors whose register state is larger than its buffer (AMX: 11008 bytes). The
+// host kernel refuses to set a part of the state (EFAULT, "ptrace set fp regs failed" and a panic of the guest). Here
+// the part unknown to UML is appended to its own. vmrun.sh compiles this and puts it into LD_PRELOAD of linux.uml.
 #define _GNU_SOURCE
 #include <elf.h>
 #include <stdarg.h>
@@ -13,8 +12,8 @@
 
 enum { kLargest = 1 << 16, kKnown = 1 << 13, kProcesses = 64 };
 
-// What the processes' registers were when they were read last. A process is stopped from then until
-// it is resumed, so setting the same again may be left out: nearly always, and half of UML's time.
+// The processes' registers when they were last read. A process is stopped from then until it is resumed, so setting the
+// same values can be skipped, which saves half of UML's time.
 static struct {
   pid_t pid;
   size_t size;
@@ -54,7 +53,7 @@ long ptrace(enum __ptrace_request request, ...) {
   if (address == (void*)NT_X86_XSTATE && request == PTRACE_GETREGSET) return get_state(pid, data);
   if (address == (void*)NT_X86_XSTATE && request == PTRACE_SETREGSET) return set_state(pid, data);
   switch (request) {
-    case PTRACE_SETOPTIONS:  // a new process, perhaps with the number of an old one
+    case PTRACE_SETOPTIONS:  // a new process, possibly with the number of an old one
     case PTRACE_CONT:
     case PTRACE_SYSCALL:
     case PTRACE_SINGLESTEP:

@@ -6,7 +6,7 @@
 
 namespace stageid::test {
 
-/// Expects `action` to throw an Error whose message, one line, begins with `start` and says `word`.
+/// Expects `action` to throw an Error whose one-line message begins with `start` and contains `word`.
 template <typename Error, typename Action>
 void expect_error(const Action& action, const std::string& start, const std::string& word) {
   try {

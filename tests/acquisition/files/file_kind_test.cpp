@@ -1,4 +1,4 @@
-// Kinds of files by their content alone: names and endings say nothing here.
+// Kinds of files are determined by content alone, not by names or extensions.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -37,7 +37,7 @@ TEST_F(FileKind, IsToldByTheFirstBytes) {
   EXPECT_THAT(kind_of("    -1\n   151\n"), StartsWith("is a universal file, not a cat;"));
   EXPECT_THAT(kind_of("<!DOCTYPE html>"), StartsWith("is an HTML page, not a cat;"));
   EXPECT_THAT(kind_of("{}"), StartsWith("is JSON, not a cat;"));
-  // A damaged HDF5 file still begins as one.
+  // A damaged HDF5 file still has the signature.
   EXPECT_THAT(kind_of("\x89HDF\r\n\x1a\n..."), StartsWith("is an HDF5 file of another program,"));
   EXPECT_EQ(kind_of("frequency, response\n"), "");
   EXPECT_EQ(kind_of(""), "");
@@ -53,7 +53,7 @@ TEST_F(FileKind, IsWhatAFileOfOursSays) {
               StartsWith("is a stage file, not a cat;"));
   EXPECT_THAT(kind_of("format: stageid-experiment"),
               StartsWith("is an experiment file, not a cat;"));
-  // The word in another place is no format.
+  // The word in another place is not a format.
   EXPECT_EQ(kind_of("the format: stageid-stage is YAML"), "");
   for (const auto& [format, kind] : {std::pair{"stageid-log", "is a log in HDF5,"},
                                      {"stageid-frf", "is a frequency response,"},

@@ -11,7 +11,7 @@
 namespace stageid {
 namespace test_fingerprint {
 
-// Made with the XXH3_128bits() of libxxhash 0.8.1, called from Python.
+// Computed by XXH3_128bits() of libxxhash 0.8.1, called from Python.
 constexpr const char* kOfNothing = "99aa06d3014798d86001c324468d497f";
 constexpr const char* kOfStageid = "24bd61dcccab292da82a926c0c65825f";
 
@@ -31,7 +31,7 @@ TEST(Fingerprint, SeesTheStreamNotItsPieces) {
 
 TEST(Fingerprint, OfAFileIsThatOfItsBytes) {
   const test::TemporaryDirectory directory;
-  const std::string text(3'000'001, 'x');  // several blocks and a rest
+  const std::string text(3'000'001, 'x');  // several blocks and a remainder
   std::ofstream(directory / "file", std::ios::binary) << text;
   EXPECT_EQ(fingerprint_of_file(directory / "file"), fingerprint_of(text));
 

@@ -56,7 +56,7 @@ bool has_nan(const Everything& all) {
          std::any_of(all.rows.begin(), all.rows.end(), nan);
 }
 
-/// Reads all there is; whatever is wrong with the file must come out as FormatError.
+/// Reads everything; any damage must be reported as FormatError.
 Everything read_everything(const fs::path& path) {
   const Hdf5File file = Hdf5File::open(path);
   file.children("/");
@@ -144,7 +144,7 @@ TEST(DamagedHdf5, OneWrongByteIsNoticedOrChangesNothing) {
     try {
       const Everything read = read_everything(directory / "damaged.h5");
       if (has_nan(read)) {
-        ++noticed;  // by whoever asks for numbers
+        ++noticed;  // detected by the caller, who needs numbers
       } else {
         EXPECT_TRUE(read == truth) << "byte " << at << " ^ " << bits;
         ++harmless;
@@ -153,7 +153,7 @@ TEST(DamagedHdf5, OneWrongByteIsNoticedOrChangesNothing) {
       ++noticed;
     }
   };
-  constexpr std::size_t kStructure = 6000;  // at both ends; the data stand between
+  constexpr std::size_t kStructure = 6000;  // at both ends; the data are between
   for (std::size_t at = 0; at < healthy.size(); at += 7) {
     const bool data = at > kStructure && healthy.size() - at > kStructure;
     if (!data || at % 70 == 0) flip(at, at % 2 == 0 ? 0xFF : 0x01);
@@ -167,8 +167,8 @@ TEST(DamagedHdf5, AHeapWhoseTextsOverlapIsRefused) {
   const std::string healthy = healthy_file(directory);
   const std::size_t heap = healthy.find(std::string("GCOL\1\0\0\0", 8));
   ASSERT_NE(heap, std::string::npos);
-  // The size of the collection, of its first text, and of the free space behind: HDF5 1.10 crashes
-  // or never returns on each.
+  // The size of the collection, of its first text, and of the following free space: HDF5 1.10 crashes or hangs for
+  // each.
   for (const std::size_t place : {heap + 8, heap + 24, heap + 48}) {
     for (const std::size_t byte : {0, 1, 5}) {
       std::string damaged = healthy;

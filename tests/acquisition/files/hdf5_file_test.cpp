@@ -33,7 +33,7 @@ std::string content(const fs::path& file) {
   return text.str();
 }
 
-/// A file with something of everything.
+/// A file with objects of every kind.
 void write_everything(const fs::path& path) {
   Hdf5File file = Hdf5File::create(path);
   file.write_attribute("/", "rate", 1.0 / 3.0);
@@ -257,7 +257,7 @@ TEST(Hdf5File, SaysThatTheDiskIsFull) {
     const test::FileSizeLimit limit(bytes);
     expect_error<FileError>(write, "target.h5", std::strerror(EFBIG));
   }
-  write();  // and nothing of it stays in the library
+  write();  // the library keeps no data of it
 }
 
 TEST(Hdf5File, SaysThatADeviceIsFull) {

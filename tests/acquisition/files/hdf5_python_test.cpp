@@ -9,7 +9,7 @@
 #include "excitation/plan/experiment_plan.hpp"
 #include "tests/support/process/python_script.hpp"
 
-/// Files that h5py writes are read, and ours are read by h5py.
+/// Reads files of h5py, and lets h5py read stageid's files.
 namespace stageid {
 namespace test_hdf5_python {
 
@@ -93,7 +93,7 @@ f['zeros'][:] = 0
   EXPECT_THROW(f.read_reals("/other"), FormatError);
   EXPECT_THROW(f.read_complex("/other"), FormatError);
   EXPECT_THROW(f.read_texts("/grid"), FormatError);
-  // A shape that compresses a thousandfold is no damage.
+  // A shape that compresses a thousandfold is not damage.
   EXPECT_EQ(f.read_reals("/zeros").size(), 4'000'000U);
 
   std::vector<double> rows(9);
@@ -144,7 +144,7 @@ TEST_F(Hdf5Python, AForeignProgramCanPlayAPlan) {
   const Eigen::MatrixXd played = plan.excitation({1, 2});
   {
     Hdf5File f = Hdf5File::create(directory / "played.h5");
-    f.write_reals("/columns", {3, 60}, played.data());  // column-major: one axis a row
+    f.write_reals("/columns", {3, 60}, played.data());  // column-major: one axis per row
     f.close();
   }
   run(R"(

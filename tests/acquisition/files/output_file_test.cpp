@@ -113,7 +113,7 @@ TEST(OutputFile, SaysThatADirectoryCannotBeWritten) {
   const TemporaryDirectory directory;
   fs::permissions(directory.path(), fs::perms::owner_read | fs::perms::owner_exec |
                                         fs::perms::others_read | fs::perms::others_exec);
-  // Permissions do not bind root: step down for a moment.
+  // Permissions do not restrict root: drop them temporarily.
   constexpr uid_t kNobody = 65534;
   const bool root = ::geteuid() == 0;
   if (root && ::seteuid(kNobody) != 0) GTEST_SKIP() << "cannot step down from root";

@@ -16,7 +16,7 @@
 namespace stageid {
 namespace test_convert_log {
 
-/// Two complete runs and one that was broken off.
+/// Two complete runs and an incomplete one.
 std::unique_ptr<LogReader> write_log(const std::filesystem::path& file) {
   SlogWriter log = SlogWriter::create(file, test::small_info());
   test::write_run(log, 0);
@@ -123,7 +123,7 @@ TEST(ConvertLog, LeavesNothingHalfWritten) {
   const auto reader = write_log(directory / "a.slog");
   EXPECT_THROW(convert_log(*reader, directory / "a.txt"), std::invalid_argument);
   EXPECT_THROW(convert_log(*reader, directory / "none/a.h5"), FileError);
-  // The log is damaged after it was opened: the conversion fails on the way.
+  // The log is damaged after it was opened, so that the conversion fails.
   std::string bytes = test::bytes_of(directory / "a.slog");
   bytes[bytes.size() * 3 / 4] ^= 1;
   test::write_bytes(directory / "a.slog", bytes);

@@ -69,7 +69,7 @@ class Hdf5Log : public testing::Test {
     }
   }
 
-  /// Adds a third run whose datasets the caller gives.
+  /// Adds a third run with the caller's datasets.
   static void add_run(Hdf5File& file, const std::string& group, long long realization) {
     file.create_group(group);
     file.write_attribute(group, "realization", realization);
@@ -117,7 +117,7 @@ TEST_F(Hdf5Log, TakesOneUnitOrOneAChannel) {
   expect_refused({.sensor_units = {"m", "rad", "m"}}, "/channels/sensors", "3 units");
 }
 
-// Of all signals, then the periods behind it are only displaced.
+// If all signals lose samples, the following periods are only displaced.
 TEST_F(Hdf5Log, AWholeExcitationMayLackARow) {
   write({.change = [](Hdf5File& file) {
     add_run(file, "/runs/0002", 1);
@@ -240,7 +240,7 @@ TEST_F(Hdf5Log, RefusesAttributesThatMakeNoSense) {
 }
 
 TEST_F(Hdf5Log, RefusesRunsOfNoWholePeriods) {
-  // 36 samples are three periods of 12, not whole ones of 10 or 11, nor any behind 3 transient ones.
+  // 36 samples are three periods of 12, but not a whole number of 10 or 11, and not more than 3 transient ones.
   Foreign foreign;
   foreign.period_samples = 7;
   foreign.left_out = "excitation";

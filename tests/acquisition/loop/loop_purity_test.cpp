@@ -1,5 +1,5 @@
-// Between start() and the end of a run the whole cycle (controller, limits, simulated plant, ring)
-// allocates nothing, takes no lock, and asks nothing of the kernel but the time and to sleep.
+// Between start() and the end of a run, the whole cycle (controller, limits, simulated plant, ring) allocates nothing,
+// takes no lock, and calls the kernel only for the time and to sleep.
 #include <gtest/gtest.h>
 #include <linux/audit.h>
 #include <linux/filter.h>
@@ -28,8 +28,8 @@ namespace test_loop_purity {
 
 constexpr std::uint64_t kSamples = 2000;
 
-/// The whole wafer stage in closed loop, in virtual time (pace 0) or against the clock, with a miss,
-/// so that the odd paths are walked too.
+/// The whole wafer stage in closed loop, in virtual time (pace 0) or on the wall clock, with a missed cycle to cover
+/// the exceptional paths.
 class WholeLoop {
  public:
   explicit WholeLoop(double pace)
@@ -88,7 +88,7 @@ TEST(LockCounter, CountsALockThatIsFree) {
   EXPECT_EQ(counter.count(), 3U);
 }
 
-/// From now on this process dies of any system call but sleep, time and its own end.
+/// From now on, any system call except sleep, time and exit kills this process.
 bool forbid_system_calls() {
   std::vector<sock_filter> filter = {
       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
@@ -102,8 +102,8 @@ bool forbid_system_calls() {
          ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
 }
 
-/// How a child ends that does `work` with system calls forbidden: its wait status; 77 exits where
-/// they cannot be forbidden.
+/// Wait status of a child that does `work` with system calls forbidden. The child exits with 77 if they cannot be
+/// forbidden.
 template <typename Work>
 int status_without_system_calls(Work work) {
   const pid_t child = ::fork();

@@ -10,7 +10,7 @@
 #include "acquisition/loop/measurement_loop.hpp"
 #include "tests/support/stages/analytic_stage.hpp"
 
-// A small stage in closed loop, the loop's excitation, and its rows taken apart.
+// A small stage in closed loop, the loop's excitation, and decoded rows.
 namespace stageid::test::measurement_loop {
 
 inline constexpr int kActuators = 3;
@@ -18,7 +18,7 @@ inline constexpr int kSensors = 2;
 inline constexpr int kPeriod = 20;
 inline constexpr std::uint64_t kSamples = 3 * kPeriod;
 
-/// A row of the ring, taken apart.
+/// A decoded row of the ring.
 struct Row {
   Eigen::VectorXd u;
   Eigen::VectorXd y;
@@ -67,7 +67,7 @@ class MeasurementLoopTest : public ::testing::Test {
     return which;
   }
 
-  /// r[n] as it is meant to arrive at the actuators.
+  /// r[n] as expected at the actuators.
   Eigen::VectorXd excitation_at(std::uint64_t n) const {
     Eigen::VectorXd r = Eigen::VectorXd::Zero(kActuators);
     const auto row = static_cast<Eigen::Index>(n % kPeriod);
@@ -77,7 +77,7 @@ class MeasurementLoopTest : public ::testing::Test {
     return r;
   }
 
-  /// What a controller of its own makes of the recorded y.
+  /// Output of a separate controller for the recorded y.
   std::vector<Eigen::VectorXd> controls(const std::vector<Row>& rows) const {
     MotionController again(analytic_controller(stage_.info()));
     std::vector<Eigen::VectorXd> all;

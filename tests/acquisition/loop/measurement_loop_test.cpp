@@ -41,8 +41,7 @@ TEST_F(MeasurementLoopTest, RecordsTheEquationsOfTheLoop) {
       for (Eigen::Index j = 0; j < kActuators; ++j) {
         y += AnalyticStage::input_gain(i, j) * all[n].u[j];
       }
-      // One rounding may be fused differently; without the loop's delay it would be off by
-      // percents.
+      // One rounding may be fused differently; without the loop's delay, the error would be some percent.
       ASSERT_NEAR(all[n + 1].y[i], y, 1e-15 + 1e-14 * std::abs(y)) << "y[n+1] = P(y[n], u[n])";
     }
   }
@@ -82,8 +81,7 @@ TEST_F(MeasurementLoopTest, TheSameSeedAndExcitationGiveTheSameBits) {
 
 TEST_F(MeasurementLoopTest, AStepDoesNotAllocate) {
   if (!test::AllocationCounter::works()) GTEST_SKIP() << "malloc is not ours in this build";
-  // Everything that can happen in a run: lateness, gaps, a value that is no number, a limit, its
-  // ramp.
+  // Everything that can happen in a run: lateness, gaps, a non-finite value, a limit and its ramp.
   stage_.outcomes = {{3, Outcome::late}, {5, Outcome::stale}, {8, Outcome::incomplete}};
   stage_.valid = {{8, 1}};
   stage_.first_sensor = {{11, std::numeric_limits<double>::quiet_NaN()}};
@@ -109,7 +107,7 @@ TEST_F(MeasurementLoopTest, ALimitRampsDownInClosedLoopAndMarksTheRamp) {
   EXPECT_FALSE(loop.complete());
   EXPECT_EQ(stage_.stops(), 1);
   const std::vector<Row> all = rows();
-  // Row 25 is the one whose command was not taken as it stands; 10 of the ramp follow.
+  // The command of row 25 was replaced; 10 rows of the ramp follow.
   ASSERT_EQ(all.size(), 26U + 10);
   for (std::size_t n = 0; n < all.size(); ++n) EXPECT_EQ(all[n].status.marked, n >= 25) << n;
   const std::vector<Eigen::VectorXd> control = controls(all);
@@ -147,7 +145,7 @@ TEST_F(MeasurementLoopTest, AMissingMeasurementIsHeldAndMarked) {
     run(loop);
     EXPECT_TRUE(loop.complete());
     const std::vector<Row> all = rows();
-    // Command 25 may not have arrived, measurement 26 did not.
+    // Command 25 may not have arrived, and measurement 26 did not.
     EXPECT_EQ(marked(all), (std::set<std::size_t>{25, 26}));
     EXPECT_EQ(all[26].y, all[25].y);
     EXPECT_EQ(all[26].status.outcome, static_cast<std::uint8_t>(outcome));
@@ -222,7 +220,7 @@ TEST_F(MeasurementLoopTest, ASampleOfAnErrorPassiveBusIsValidAndMarked) {
   EXPECT_EQ(loop.health().missing, 0U);
 }
 
-// Bucket of 10: k misses in a row fill 2 k; the sixth is one too many.
+// Bucket of 10: k consecutive misses add 2 k, so the sixth exceeds it.
 TEST_F(MeasurementLoopTest, TheBucketForgivesFiveMissesInARowAndNotSix) {
   for (const std::uint64_t misses : {5U, 6U}) {
     stage_.outcomes.clear();
@@ -237,7 +235,7 @@ TEST_F(MeasurementLoopTest, TheBucketForgivesFiveMissesInARowAndNotSix) {
   }
 }
 
-// Every third cycle missed: +2 -1 -1 = 0. Every second: +1 each two cycles, full after 20.
+// Every third cycle missed: +2 -1 -1 = 0. Every second: +1 per two cycles, full after 20.
 TEST_F(MeasurementLoopTest, TheBucketLeaks) {
   for (const std::uint64_t every : {3U, 2U}) {
     stage_.outcomes.clear();
@@ -283,7 +281,7 @@ TEST_F(MeasurementLoopTest, AFullRingStopsNothingHalfWay) {
   EXPECT_EQ(stage_.exchanges(), 8U);
   small.pop(8);
   EXPECT_EQ(loop.step(), LoopStatus::running);
-  // The log is lost: the ramp goes on without it.
+  // The log has failed: the ramp continues without it.
   loop.request_stop(StopReason::log);
   run(loop);
   EXPECT_EQ(loop.reason(), StopReason::log);
@@ -327,7 +325,7 @@ TEST_F(MeasurementLoopTest, AStageThatBrakesIsWaitedForAndThenStopped) {
   for (std::size_t n = 0; n < all.size(); ++n) EXPECT_EQ(all[n].status.marked, n >= 25) << n;
 }
 
-// A replay ends with its record: there is nothing behind it.
+// A replay ends with its record.
 TEST_F(MeasurementLoopTest, AStageThatIsGoneBehindAGoodRunSpoilsNothing) {
   stage_.outcomes = {{kSamples, Outcome::link_down}};
   MeasurementLoop loop = make_loop();

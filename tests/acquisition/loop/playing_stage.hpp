@@ -11,7 +11,7 @@
 
 namespace stageid::test {
 
-/// An analytic stage that closes the loop by itself, with a script of what goes wrong.
+/// An analytic stage that closes the loop by itself, with scripted failures.
 class PlayingStage final : public ResidentStage {
  public:
   PlayingStage(int actuators, int sensors)
@@ -21,11 +21,11 @@ class PlayingStage final : public ResidentStage {
 
   // The script.
   std::uint64_t polls = 1;            ///< until a run is over
-  std::function<void()> at_poll;      ///< called in every one
+  std::function<void()> at_poll;      ///< called in every poll
   std::uint64_t fails_at = 0;         ///< rows after which a run fails; 0: never
-  Outcome failure = Outcome::fault;   ///< why
+  Outcome failure = Outcome::fault;   ///< its outcome
   int loses_upload = -1;              ///< the upload of this run throws
-  int loses_download = -1;            ///< the download of this run breaks off half-way
+  int loses_download = -1;            ///< the download of this run stops half-way
   Outcome odd_outcome = Outcome::ok;  ///< of row 7
 
   int stops = 0;

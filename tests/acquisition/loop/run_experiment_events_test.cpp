@@ -1,4 +1,4 @@
-// What run_experiment() tells about a run beside its samples: events, observers, timing.
+// Output of run_experiment() other than samples: events, observers, timing.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ ExperimentPlan plan_of() {
   return {FrequencyGrid::band(1000.0, kPeriod, {.low_hz = 10.0, .high_hz = 400.0}), spec};
 }
 
-/// Counts what it is told.
+/// Counts the calls that it receives.
 class Counter final : public RunObserver {
  public:
   void begin_run(const LogRun&) noexcept override { ++begun; }
@@ -59,7 +59,7 @@ class RunExperimentEvents : public testing::Test {
     return result;
   }
 
-  /// The events of that name, as text.
+  /// The events with that name, as text.
   std::vector<std::string> told(const std::string& event) const {
     std::vector<std::string> found;
     for (const std::string& line : events_.latest(100))
@@ -83,7 +83,7 @@ TEST_F(RunExperimentEvents, RunsAndMissesAreTold) {
   EXPECT_EQ(told("run_begin").size(), 2U);
   EXPECT_EQ(told("run_end").size(), 2U);
   const auto misses = told("miss");
-  ASSERT_EQ(misses.size(), 2U);  // the script is that of every run
+  ASSERT_EQ(misses.size(), 2U);  // the same script in every run
   EXPECT_THAT(misses[1], HasSubstr(R"("realization":1,"experiment":0,"cycle":21,"cycles":2)"));
   EXPECT_TRUE(told("stop").empty());
 }
@@ -133,7 +133,7 @@ TEST_F(RunExperimentEvents, RealTimeThatIsRequiredAndNotThereEndsBeforeTheFirstR
   make_stage(Clock::wall);
   RunExperimentOptions options;
   options.real_time = {RealTimePolicy::require, 80, -1, false};
-  // Refused by the same rules as asked beforehand: a kernel that is not PREEMPT_RT, or no rights.
+  // Refused by the same rules as in an earlier query: a kernel without PREEMPT_RT, or missing permissions.
   bool refused = false;
   try {
     missing_for_real_time(options.real_time);

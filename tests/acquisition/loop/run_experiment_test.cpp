@@ -27,7 +27,7 @@ constexpr int kSensors = 2;
 constexpr int kPeriod = 100;
 constexpr std::uint64_t kSamples = 3 * kPeriod;
 
-/// Axes in another order than the actuators.
+/// The axes have another order than the actuators.
 ExperimentPlan plan_of(int realizations = 2, int periods = 2) {
   ExperimentSpec spec;
   spec.axes = {{"u3", 1.0, {}}, {"u1", 0.5, {}}};
@@ -43,7 +43,7 @@ class RunExperiment : public testing::Test {
   RunExperiment() {
     auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors);
     stage->noise = 1e-3;
-    stage->spoil_missing = false;  // a driver holds the last measurement: LimitedStage insists
+    stage->spoil_missing = false;  // a driver holds the last measurement, as LimitedStage requires
     inner_ = stage.get();
     StageLimits limits;
     limits.actuator_n = Eigen::VectorXd::Constant(kActuators, 50.0);
@@ -108,7 +108,7 @@ TEST_F(RunExperiment, LogsEveryRunOfThePlan) {
   }
 }
 
-// The controller starts from rest in every run: with the recorded y it gives the recorded u again.
+// The controller starts from rest in every run, so the recorded y gives the recorded u again.
 TEST_F(RunExperiment, TheRecordIsControllerPlusExcitationOnTheRightActuators) {
   measure_whole("a.slog");
   const SlogReader reader(directory_ / "a.slog");
@@ -133,9 +133,9 @@ TEST_F(RunExperiment, InterruptedAndResumedItGivesTheSameBits) {
   ExperimentResult result;
   {
     SlogWriter log = create("parts.slog");
-    // The second run is broken off; the first is skipped here as if it were there already.
+    // The second run is interrupted; the first is skipped as if it were complete already.
     inner_->raise = {{150, &interrupt}};
-    result = measure(log, {.skip = {{0, 1}, {1, 0}, {1, 1}}});  // run (0, 0), flag not looked at
+    result = measure(log, {.skip = {{0, 1}, {1, 0}, {1, 1}}});  // run (0, 0), flag ignored
     EXPECT_EQ(result.end, ExperimentEnd::complete);
     interrupt = false;
     result = measure(log, {.skip = {{0, 0}}, .interrupt = &interrupt, .ramp_s = 0.02});
@@ -150,7 +150,7 @@ TEST_F(RunExperiment, InterruptedAndResumedItGivesTheSameBits) {
     ASSERT_EQ(reader.runs().size(), 2U);
     EXPECT_FALSE(reader.runs()[1].complete);
     const LogSamples broken = all_samples(reader, 1);
-    // Exchange 150 raised the flag: its row is good, the next begins the stop, 20 of ramp follow.
+    // Exchange 150 set the flag: its row is good, the next begins the stop, 20 rows of the ramp follow.
     EXPECT_EQ(reader.runs()[1].samples, 151U + 1 + 20);
     EXPECT_TRUE((broken.marked.head(151) == 0).all() && (broken.marked.tail(21) == 1).all());
     for (const LogRun& run : reader.runs()) {
@@ -198,7 +198,7 @@ TEST_F(RunExperiment, APlantThatTripsEndsInAControlledStopWithItsReason) {
   EXPECT_EQ(inner_->stops(), 1);
   EXPECT_EQ(inner_->seeds().size(), 1U) << "no further run";
   const SlogReader reader(directory_ / "a.slog");
-  // As with an interrupt: the row of the exchange that raised it is good, then the stop and its ramp.
+  // As for an interrupt: the row of that exchange is good, then follow the stop and its ramp.
   EXPECT_EQ(reader.runs()[0].samples, 151U + 1 + 20);
   const LogSamples samples = all_samples(reader, 0);
   EXPECT_TRUE((samples.marked.head(151) == 0).all() && (samples.marked.tail(21) == 1).all());
@@ -208,7 +208,7 @@ TEST_F(RunExperiment, APlantThatTripsEndsInAControlledStopWithItsReason) {
 }
 
 TEST_F(RunExperiment, ALimitEndsInAControlledStopAndKeepsTheLog) {
-  inner_->first_sensor = {{140, 1e9}};  // far off: the controller asks for more than 50 N
+  inner_->first_sensor = {{140, 1e9}};  // far off, so the controller commands more than 50 N
   SlogWriter log = create("a.slog");
   const ExperimentResult result = measure(log, {.ramp_s = 0.03});
   log.close(4, result.message.c_str());
@@ -245,7 +245,7 @@ TEST_F(RunExperiment, AFaultAndTooManyMissesAreTold) {
 }
 
 TEST_F(RunExperiment, AFullDiskEndsInAControlledStop) {
-  plan_ = plan_of(2, 900);  // 90 000 rows of 48 bytes a run: more than the ring holds
+  plan_ = plan_of(2, 900);  // 90 000 rows of 48 bytes per run: more than the ring's capacity
   const auto file = directory_ / "a.slog";
   SlogWriter log = create("a.slog");
   ExperimentResult result;
@@ -353,7 +353,7 @@ TEST(RunSeed, IsTheDocumentedMix) {
   EXPECT_EQ(seeds.size(), 800U);
 }
 
-// Asked before every realization, with all before it in the log.
+// Called before every realization, with all previous ones in the log.
 TEST_F(RunExperiment, EndsCompleteBetweenRealizationsWhenItIsEnough) {
   plan_ = plan_of(3);
   SlogWriter log = create("enough.slog");

@@ -1,5 +1,4 @@
-// Experiments that the stage plays by itself leave the log that the loop on this side would have
-// written, and keep what they have when something goes wrong.
+// Resident experiments write the same log as the loop of the host, and keep their data if something fails.
 
 #include "acquisition/loop/run_resident.hpp"
 

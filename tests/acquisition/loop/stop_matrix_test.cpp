@@ -77,7 +77,7 @@ struct Case {
   Kind kind = Kind::none;
   double value = 0.0;
   double controller_gain = 1.0;
-  const char* cause = "";  // in the message; empty: the loop survives it
+  const char* cause = "";  // in the message; empty: the loop continues
   double largest_m = 2.0 * kStopWindow;
   double speed_m_s = 1e-3;  // when the forces were cut
   StopReason reason = StopReason::limit;
@@ -137,14 +137,14 @@ INSTANTIATE_TEST_SUITE_P(
              0.01},
         Case{"controller gain x5", Kind::none, 0.0, 5.0, "|u| would be"},
         Case{"controller gain x30", Kind::none, 0.0, 30.0, "|u| would be"},
-        // With the only actuator dead nothing can brake: the stage coasts at the speed it had.
+        // If the only actuator is dead, braking is impossible: the stage coasts at its speed.
         Case{"actuator dead", Kind::actuator_gain, 0.0, 1.0, "not braked", 2.0 * kStopWindow, 2e-3},
-        // The stage goes on at the speed it had, about 1 mm/s.
+        // The stage continues at its speed, about 1 mm/s.
         Case{"amplifiers off (interlock)", Kind::interlock, 0.0, 1.0, "no limit", 2.0 * kStopWindow,
              2e-3, StopReason::fault},
         Case{"nothing arrives any more", Kind::missed_cycle, 0.0, 1.0, "no limit",
              2.0 * kStopWindow, 2e-3, StopReason::misses},
-        // A single sensor that drifts looks like a stage that does not move: the loop follows it.
+        // A drifting single sensor looks like a stage at rest, and the loop follows it.
         Case{"sensor drifts by 0.3 mm/s", Kind::sensor_drift, 0.3e-3}),
     [](const testing::TestParamInfo<Case>& at) {
       std::string name;

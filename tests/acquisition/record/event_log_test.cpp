@@ -69,7 +69,7 @@ TEST_F(EventLogTest, AFullDiskIsToldAndStopsNothing) {
   EXPECT_EQ(log.latest(10).size(), 2U);
 }
 
-/// Rows of two words: something and the status.
+/// Rows of two words: a value and the status.
 std::vector<double> rows_of(const std::vector<SampleStatus>& statuses) {
   std::vector<double> rows;
   for (const SampleStatus& status : statuses) {

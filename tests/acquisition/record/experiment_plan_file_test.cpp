@@ -109,7 +109,7 @@ TEST(ExperimentPlanFile, AFullDiskLeavesNothingBehind) {
                           directory / "no/plan.h5", std::strerror(ENOENT));
 }
 
-/// Writes a plan, lets `change` spoil the HDF5 file, and expects the reader to say `word`.
+/// Writes a plan, lets `change` corrupt the HDF5 file, and expects `word` in the reader's message.
 void expect_spoilt(int crest_iterations, const std::string& place, const std::string& word,
                    const std::function<void(hid_t)>& change) {
   const TemporaryDirectory directory;
@@ -165,10 +165,10 @@ TEST(ExperimentPlanFile, NoticesNumbersThatDoNotAgree) {
                   with_first("/realizations/0002/phase_rad", value));
   }
   expect_spoilt(0, "/amplitude", word, with_first("/level", 5.0));
-  expect_spoilt(0, "", "axes[0].shape", with_first("/shape", 0.5));  // the others stay zero
+  expect_spoilt(0, "", "axes[0].shape", with_first("/shape", 0.5));  // the others remain zero
   expect_spoilt(0, "", word, [](hid_t file) { set_text(file, "seed", "1"); });
   expect_spoilt(0, "", word, [](hid_t file) { set_text(file, "scaling", "rms"); });
-  // With reduced phases the file is the authority on phases: but not on nonsense.
+  // Reduced phases are read from the file, but must be valid.
   expect_spoilt(5, "/realizations/0002/phase_rad", "out of range (0 to 2 pi)",
                 with_first("/realizations/0002/phase_rad", nan));
   expect_spoilt(5, "/realizations/0002/phase_rad", "out of range (0 to 2 pi)",

@@ -8,7 +8,7 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "tests/acquisition/record/small_log.hpp"
 
-// The small log as a foreign program would write it in HDF5: values row by row, and what may vary.
+// The small log as another program would write it in HDF5: values row by row, with variations.
 namespace stageid::test::foreign_log {
 
 using Shape = std::vector<hsize_t>;
@@ -42,7 +42,7 @@ inline std::vector<double> excitation(std::size_t run, std::uint64_t rows) {
   return values;
 }
 
-/// What a foreign program might write. Every part can be left out or replaced.
+/// A log of another program. Every part can be omitted or replaced.
 struct Foreign {
   std::string format = "stageid-log";
   long long version = 1;

@@ -49,7 +49,7 @@ TEST(TimingHistogram, QuantilesAreThoseOfTheSortedNumbersToABin) {
   for (const double share : {0.0, 0.01, 0.5, 0.9, 0.999, 1.0}) {
     const auto rank = std::max(1.0, std::ceil(share * 10'000.0));
     const auto exact = static_cast<double>(values[static_cast<std::size_t>(rank) - 1]);
-    // The upper edge of the bin that holds it.
+    // The upper edge of its bin.
     EXPECT_GT(1e9 * histogram.quantile_s(share), exact) << share;
     EXPECT_LE(1e9 * histogram.quantile_s(share), 1.125 * exact + 1.0) << share;
   }

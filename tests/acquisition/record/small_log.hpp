@@ -14,7 +14,7 @@
 
 namespace stageid::test {
 
-// A small log whose every value follows from run, row and channel, so that any mix-up shows.
+// A small log whose values follow from run, row and channel, so that any exchange is detected.
 
 inline constexpr int kPeriod = 12;
 
@@ -40,7 +40,7 @@ inline double sensor_value(std::size_t run, std::uint64_t row, int channel) {
 
 inline bool is_marked(std::size_t run, std::uint64_t row) { return (row + run) % 7 == 3; }
 
-/// Only the column of the run's experiment is not zero.
+/// Only the column of the run's experiment is nonzero.
 inline Eigen::MatrixXd excitation_of(std::size_t run) {
   Eigen::MatrixXd excitation = Eigen::MatrixXd::Zero(kPeriod, 3);
   for (int n = 0; n < kPeriod; ++n) {
@@ -93,7 +93,7 @@ inline void write_small_log(const std::filesystem::path& file, std::size_t runs 
   log.close(0, "done");
 }
 
-/// True if rows [first, first + count) are the right ones, marked rows too.
+/// True if rows [first, first + count) are correct, including the marked ones.
 inline bool holds_rows(const LogSamples& samples, std::size_t run, std::uint64_t first) {
   for (Eigen::Index r = 0; r < samples.marked.size(); ++r) {
     const std::uint64_t row = first + static_cast<std::uint64_t>(r);

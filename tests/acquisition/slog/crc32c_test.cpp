@@ -33,7 +33,7 @@ TEST_P(Crc32c, GivesThePublishedValues) {
   EXPECT_EQ(of({}), 0U);
 }
 
-// Every length passes another way through the interleaved streams, their shifts and the tail.
+// Different lengths cover different parts of the interleaved streams, their shifts and the tail.
 TEST_P(Crc32c, AgreesWithTheDefinitionBitByBitAtEveryLengthAndCut) {
   std::mt19937 engine(3);
   std::vector<std::byte> bytes(2 * 3 * 2048 + 3 * 256 + 77);

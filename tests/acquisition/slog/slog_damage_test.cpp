@@ -15,7 +15,7 @@ namespace test_slog_damage {
 
 using test::TemporaryDirectory;
 
-/// Everything that a log says, or nothing if it is refused.
+/// The whole content of a log, or nothing if it is refused.
 std::optional<std::string> content(const std::filesystem::path& file) {
   try {
     const auto reader = open_log(file);
@@ -96,8 +96,7 @@ TEST(SlogDamage, EveryTruncationIsAnErrorAndItsIntactRowsAreGiven) {
   EXPECT_EQ(rows_before, 72U);
 }
 
-// What follows is the case that a disk, not a process, has failed: any length may be cut, then
-// resumed.
+// The following tests cover failures of the disk, not of a process: the log is cut at any length, then resumed.
 TEST(SlogDamage, EveryTruncationCanBeResumed) {
   const TemporaryDirectory directory;
   const auto file = directory / "a.slog";
@@ -133,7 +132,7 @@ TEST(SlogDamage, BlocksOfAnotherLogAreNotTaken) {
   const std::string a = test::bytes_of(directory / "a.slog");
   const std::string b = test::bytes_of(directory / "b.slog");
   ASSERT_EQ(a.size(), b.size());
-  // As after a power failure: the second half was never written and shows an older file.
+  // As after a power failure: the second half was never written and contains an older file.
   SlogSource source(directory / "a.slog");
   const std::uint64_t cut = scan_slog(source, SlogScanDepth::headers).blocks[6].offset;
   test::write_bytes(directory / "c.slog", a.substr(0, cut) + b.substr(cut));
@@ -230,11 +229,11 @@ TEST_F(SlogRecover, RowsLostInTheMiddleBecomeMarkedRows) {
 TEST_F(SlogRecover, EverySingleDamagedBlockLeavesAllOthers) {
   for (std::size_t damaged = 0; damaged < blocks_.size(); ++damaged) {
     const RecoverReport report = recover(with_damage(damaged, 70));
-    // An excitation whose columns nobody knows any more is lost with its run_begin.
+    // An excitation without its run_begin is lost, because its columns are unknown.
     const std::size_t lost = blocks_[damaged].header.is(SlogBlockType::run_begin) ? 2 : 1;
     EXPECT_EQ(report.blocks_kept, blocks_.size() - lost) << describe(blocks_[damaged]);
     EXPECT_EQ(report.blocks_lost, lost);
-    const SlogReader reader(out_);  // the new log is intact, whatever the old one was
+    const SlogReader reader(out_);  // the new log is intact in any case
     EXPECT_TRUE(verify_log(out_).intact());
     const bool rows_lost = blocks_[damaged].header.is(SlogBlockType::samples);
     EXPECT_EQ(report.rows_kept, 3U * 36 - (rows_lost ? blocks_[damaged].header.rows : 0U));
@@ -277,7 +276,7 @@ TEST_F(SlogRecover, RefusesWhatItCannotSave) {
                        "0123456789012345678901234567890123456789"),
                FormatError);
   EXPECT_FALSE(std::filesystem::exists(out_)) << "no partial output";
-  // All three descriptions of the log damaged, the one in front and those of the runs.
+  // All three descriptions of the log are damaged: the first one and those of the runs.
   std::string bytes = good_;
   for (const SlogBlock& b : blocks_) {
     if (b.header.is(SlogBlockType::log)) bytes[b.offset + 70] ^= 1;

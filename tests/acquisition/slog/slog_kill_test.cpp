@@ -18,7 +18,7 @@
 namespace stageid {
 namespace test_slog_kill {
 
-/// A counter that outlives the process that counts.
+/// A counter that outlives the counting process.
 class SharedCounter {
  public:
   SharedCounter()
@@ -39,7 +39,7 @@ class SharedCounter {
 
 constexpr std::uint64_t kRunRows = 12 * 5000;
 
-/// Writes run after run until it is killed; acknowledged rows are counted over all of them.
+/// Writes runs until it is killed; acknowledged rows are counted over all of them.
 [[noreturn]] void write_until_killed(const std::filesystem::path& file, std::uint64_t block_rows,
                                      std::atomic<std::uint64_t>& acknowledged) {
   SlogWriter log = SlogWriter::create(file, test::small_info());
@@ -90,7 +90,7 @@ TEST(SlogKill, EveryAcknowledgedRowOutlivesTheProcess) {
     ASSERT_LE(there, promised + block_rows) << "one block may be written and not yet counted";
     with_rows += promised > 0 ? 1 : 0;
 
-    // And the log goes on where it was.
+    // The log can be continued.
     SlogWriter log = SlogWriter::resume(file, test::small_info());
     log.close(0, "");
     ASSERT_EQ(intact_rows(file), there);

@@ -46,7 +46,7 @@ TEST(SlogReader, GivesEveryRangeOfRows) {
   }
 }
 
-// Blocks larger than the reader's piece, so that pieces, tiles and padding all have their turn.
+// Blocks larger than the reader's piece, to cover pieces, tiles and padding.
 TEST(SlogReader, GivesRowsOfLargeBlocks) {
   const TemporaryDirectory directory;
   constexpr std::uint64_t kRows = 12 * 1751;
@@ -131,7 +131,7 @@ TEST(SlogReader, NamesTheChannelOfAValueThatIsNotFinite) {
   }
 }
 
-/// Writes one run of `rows` rows that says it is complete.
+/// Writes one run of `rows` rows, marked complete.
 std::filesystem::path log_of_length(const TemporaryDirectory& directory, std::uint64_t rows) {
   const auto file = directory / ("rows" + std::to_string(rows));
   SlogWriter log = SlogWriter::create(file, test::small_info());
@@ -194,7 +194,7 @@ TEST(RowTranspose, MovesEveryValueAndSeesEveryNonFiniteOne) {
       const std::size_t words = columns + 1;
       std::vector<double> rows(count * words);
       for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = static_cast<double>(i);
-      // The word behind the columns is no number: it must not be looked at.
+      // The word after the columns is not a number and must be ignored.
       for (std::size_t r = 0; r < count; ++r) {
         rows[r * words + columns] = std::numeric_limits<double>::quiet_NaN();
       }
@@ -218,7 +218,7 @@ TEST(RowTranspose, MovesEveryValueAndSeesEveryNonFiniteOne) {
   }
 }
 
-// The lines of numpy in slog_format.hpp are what other people will copy.
+// The numpy code in slog_format.hpp is meant to be copied.
 TEST(SlogFormat, TheNumpyLinesOfTheHeaderReadALog) {
   if (std::system("/usr/bin/python3 -c 'import numpy' 2> /dev/null") != 0) {
     GTEST_SKIP() << "needs python3 with numpy";

@@ -28,7 +28,7 @@ TEST(FrequencyGrid, IsThePapersGridOfFourThousandOddLines) {
 }
 
 TEST(FrequencyGrid, HoldsBothEndsOfTheBand) {
-  // 0.3 / 0.1 and 0.7 / 0.1 are not 3 and 7 in binary: the ends must count all the same.
+  // 0.3 / 0.1 and 0.7 / 0.1 are not 3 and 7 in binary, but the band edges must count.
   const auto grid = FrequencyGrid::band(
       10.0, 100, {.low_hz = 0.3, .high_hz = 0.7, .selection = LineSelection::all});
   EXPECT_EQ(grid.lines(), (std::vector<int>{3, 4, 5, 6, 7}));
@@ -92,7 +92,7 @@ TEST(FrequencyGrid, DrawsTheLinesOfTheIndependentReference) {
   EXPECT_NE(other, grid);
 }
 
-/// Expects an std::invalid_argument that says `word`.
+/// Expects an std::invalid_argument with `word` in its message.
 void expect_refused(double rate_hz, int samples, const LineSpec& spec, const std::string& word) {
   try {
     FrequencyGrid::band(rate_hz, samples, spec);
@@ -125,7 +125,7 @@ TEST(FrequencyGrid, RefusesWhatBreaksItsInvariant) {
   EXPECT_THROW(FrequencyGrid(100.0, 10, {}), std::invalid_argument);
   EXPECT_THROW(FrequencyGrid(100.0, 10, {0, 1}), std::invalid_argument);
   EXPECT_THROW(FrequencyGrid(100.0, 10, {1, 5}), std::invalid_argument);  // 5 is Nyquist
-  EXPECT_NO_THROW(FrequencyGrid(100.0, 11, {1, 5}));                      // here it is not
+  EXPECT_NO_THROW(FrequencyGrid(100.0, 11, {1, 5}));                      // but below Nyquist here
   EXPECT_THROW(FrequencyGrid(100.0, 11, {1, 6}), std::invalid_argument);
   EXPECT_THROW(FrequencyGrid(100.0, 10, {2, 2}), std::invalid_argument);
   EXPECT_THROW(FrequencyGrid(100.0, 10, {3, 2}), std::invalid_argument);

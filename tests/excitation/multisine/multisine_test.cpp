@@ -179,7 +179,7 @@ TEST(Multisine, PhasesOfNeighbouringStreamsAreIndependent) {
   }
 }
 
-/// Crest factor of the signal between the samples too, on a grid eight times as dense.
+/// Crest factor including the signal between the samples, on a grid eight times as dense.
 double dense_crest_factor(const Multisine& m) {
   return crest_factor(
       LineSpectrum(m.grid, 8).samples(line_coefficients(1.0, m.amplitude, m.phase_rad)));
@@ -190,7 +190,7 @@ TEST(CrestReduction, ReachesLowCrestFactorsOnThePapersGrid) {
   const double random = dense_crest_factor(random_phase_multisine(grid, {.seed = 1}));
   EXPECT_GT(random, 3.6);  // range over 300 draws: 3.63 to 5.00
   const Multisine reduced = random_phase_multisine(grid, {.seed = 1, .crest_iterations = 100});
-  // 1.60 was measured; 1.65 leaves room for another machine's rounding.
+  // 1.60 was measured; 1.65 allows for the rounding of other machines.
   EXPECT_LT(dense_crest_factor(reduced), 1.65);
   EXPECT_NEAR(rms(reduced.samples), 1.0, 32.0 * kEps);
 }
@@ -201,7 +201,7 @@ TEST(CrestReduction, NeverReturnsAWorseSignal) {
     const auto peak = [&grid, seed](int iterations) {
       const Multisine m =
           random_phase_multisine(grid, {.seed = seed, .crest_iterations = iterations});
-      // The reduction compares on a four times oversampled period, and so must this.
+      // The reduction uses a four times oversampled period, so this must too.
       return crest_factor(
           LineSpectrum(grid, 4).samples(line_coefficients(1.0, m.amplitude, m.phase_rad)));
     };
@@ -212,7 +212,7 @@ TEST(CrestReduction, NeverReturnsAWorseSignal) {
 TEST(CrestReduction, KeepsTheShapeAndDiffersBetweenRealizations) {
   const FrequencyGrid grid = odd_grid();
   MultisineSpec spec{.seed = 1, .crest_iterations = 20};
-  spec.shape = Eigen::VectorXd::LinSpaced(grid.size(), 2.0, 0.0);  // the last line stays silent
+  spec.shape = Eigen::VectorXd::LinSpaced(grid.size(), 2.0, 0.0);  // the last line has no power
   const Multisine a = random_phase_multisine(grid, spec);
   spec.seed = 2;
   const Multisine b = random_phase_multisine(grid, spec);
@@ -226,7 +226,7 @@ TEST(CrestFactor, IsPeakOverRms) {
   EXPECT_DOUBLE_EQ(crest_factor(Eigen::Vector4d(1, -1, 1, -1)), 1.0);
   EXPECT_DOUBLE_EQ(crest_factor(Eigen::Vector4d(0, -3, 0, 0)), 2.0);
   const Multisine sine = random_phase_multisine(FrequencyGrid(1.0, 1000, {1}), {});
-  EXPECT_NEAR(crest_factor(sine.samples), std::numbers::sqrt2, 1e-5);  // samples miss the very top
+  EXPECT_NEAR(crest_factor(sine.samples), std::numbers::sqrt2, 1e-5);  // samples miss the peak
   EXPECT_THROW(crest_factor(Eigen::VectorXd()), std::invalid_argument);
   EXPECT_THROW(crest_factor(Eigen::VectorXd::Zero(3)), std::invalid_argument);
 }

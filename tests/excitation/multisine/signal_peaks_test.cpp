@@ -88,12 +88,12 @@ TEST(SignalPeaks, NothingBetweenTheSamplesIsLarger) {
   }
 }
 
-// The transient of a slow pole overshoots the steady state; the first period is that of a simulation.
+// The transient of a slow pole exceeds the steady state; the first period equals that of a simulation.
 TEST(SignalPeaks, TheFirstPeriodFromRestIsThatOfASimulation) {
   for (const LineSelection lines : {LineSelection::all, LineSelection::odd}) {
     const FrequencyGrid grid = grid_of(lines);
     const ExperimentPlan plan = plan_of(grid);
-    constexpr double kPole = 0.95;  // 20 samples, against 250 that odd lines can tell apart
+    constexpr double kPole = 0.95;  // 20 samples; odd lines resolve 250
     const Eigen::MatrixXd r = plan.excitation({0, 0});
     BoundedSignal signal = low_pass(grid, kPole);
     const Eigen::VectorXd x = simulated(r, kPole, 1);
@@ -101,8 +101,8 @@ TEST(SignalPeaks, TheFirstPeriodFromRestIsThatOfASimulation) {
     change.tail(kPeriod - 1) -= x.head(kPeriod - 1);
     SignalPredictor predictor(grid);
     const double value = x.cwiseAbs().maxCoeff();
-    // Linear between the lines: h times a triangle's spectrum, (h (1 - (t / 0.25 s)^2 / ...)): 2 %; and
-    // nothing is known below the first line.
+    // Linear between the lines: h times a triangle's spectrum, (h (1 - (t / 0.25 s)^2 / ...)): 2 %. Below the first
+    // line, nothing is known.
     EXPECT_NEAR(predictor.predict({signal}, plan.spectrum({0, 0})).at(0).from_rest, value,
                 0.05 * value);
     signal.kind = SignalKind::difference;
@@ -122,7 +122,7 @@ struct Swinging {
     const auto z = std::polar(1.0, -2.0 * std::numbers::pi * f_hz / kRate_hz);
     return 1.0 / (1.0 - a * z - b * z * z);
   }
-  /// Largest of the first period from rest.
+  /// Largest value of the first period from rest.
   double largest(const Eigen::VectorXd& r) const {
     double largest = 0.0;
     double x[2] = {0.0, 0.0};
@@ -136,8 +136,8 @@ struct Swinging {
   }
 };
 
-// A loop that swings at 10 Hz, which a band from 50 Hz on does not show: started at rest it moves up to
-// three times as far as the band foretells, and the transfer below the band tells how far.
+// A loop that oscillates at 10 Hz, which a band from 50 Hz on does not contain. Started at rest, it moves up to three
+// times as far as the band predicts; the transfer below the band predicts it correctly.
 TEST(SignalPeaks, BelowTheBandTheFirstPeriodFromRestIsThatOfASimulationToo) {
   const FrequencyGrid grid =
       FrequencyGrid::band(kRate_hz, kPeriod, {.low_hz = 50.0, .high_hz = 200.0});
@@ -161,7 +161,7 @@ TEST(SignalPeaks, BelowTheBandTheFirstPeriodFromRestIsThatOfASimulationToo) {
   careful.rest_margin = 0.1;
   BoundedSignal doubtful = seeing;
   doubtful.below_band_doubt = 0.5;
-  BoundedSignal below = seeing;  // nothing but what lies below
+  BoundedSignal below = seeing;  // only the part below the band
   below.transfer.setZero();
   SignalPredictor predictor(grid);
   double least = 1.0;
@@ -172,14 +172,14 @@ TEST(SignalPeaks, BelowTheBandTheFirstPeriodFromRestIsThatOfASimulationToo) {
     least = std::min(least, peaks[0].peak() / value);
     EXPECT_NEAR(peaks[1].from_rest, value, 0.01 * value);
     EXPECT_DOUBLE_EQ(peaks[2].from_rest, 1.1 * peaks[1].from_rest);
-    // Interpolation carries some of it on to between the first two lines.
+    // Interpolation extends part of it to between the first two lines.
     EXPECT_NEAR(peaks[3].from_rest - peaks[1].from_rest, 0.5 * peaks[4].from_rest,
                 0.06 * peaks[4].from_rest);
   }
   EXPECT_LT(least, 0.6);
 }
 
-// Of a sine the window's mean square ripples: m = A^2/2 (1 + |1 / (1 + j 2 omega tau)|).
+// For a sine, the window's mean square ripples: m = A^2/2 (1 + |1 / (1 + j 2 omega tau)|).
 TEST(SignalPeaks, TheWindowedRmsOfASineIsTheKnownOne) {
   constexpr int kSamples = 20000;
   constexpr double kTau_s = 0.05;

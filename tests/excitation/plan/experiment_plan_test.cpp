@@ -197,7 +197,7 @@ TEST(ExperimentPlan, CrestReductionLowersEveryRunAndKeepsOrthogonality) {
     EXPECT_EQ(ExperimentPlan(small_grid(), spec).phase_rad(2), reduced.phase_rad(2))
         << "the number of threads must not matter";
     for (const RunId run : reduced.runs()) {
-      const int p = run.experiment;  // a Hadamard matrix changes signs only: every axis stays low
+      const int p = run.experiment;  // Hadamard signs do not change the crest factor
       EXPECT_LT(crest_factor(reduced.excitation(run).col(p)), 1.9);
     }
     EXPECT_GT((reduced.phase_rad(0) - reduced.phase_rad(1)).cwiseAbs().minCoeff(), 0.0);
@@ -230,7 +230,7 @@ TEST(ExperimentPlan, ZipperedAxesShareARunAndNoLine) {
       }
     }
   }
-  // The shape holds on the lines that the axis has.
+  // The shape is that on the lines of the axis.
   EXPECT_NEAR(plan.amplitude()(1, 4) / plan.amplitude()(1, 1),
               spec.axes[1].shape[4] / spec.axes[1].shape[1], 8.0 * kEps);
 }
@@ -253,7 +253,7 @@ TEST(ExperimentPlan, RunsFollowTheSeedAlone) {
   ExperimentSpec spec = spec_of(2, ExcitationScheme::orthogonal_dft);
   const Eigen::MatrixXd first = ExperimentPlan(small_grid(), spec).excitation({1, 1});
   EXPECT_EQ(ExperimentPlan(small_grid(), spec).excitation({1, 1}), first);
-  spec.realizations = 9;  // a longer experiment begins like the shorter one
+  spec.realizations = 9;  // a longer experiment begins like a shorter one
   EXPECT_EQ(ExperimentPlan(small_grid(), spec).excitation({1, 1}), first);
   spec.seed = 18;
   EXPECT_NE(ExperimentPlan(small_grid(), spec).excitation({1, 1}), first);

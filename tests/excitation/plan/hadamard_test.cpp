@@ -19,7 +19,7 @@ TEST(Hadamard, EverySizeItPromisesIsOrthogonal) {
     EXPECT_EQ(H * H.transpose(), n * Eigen::MatrixXd::Identity(n, n)) << n;
     EXPECT_TRUE((H.row(0).array() == 1.0).all() && (H.col(0).array() == 1.0).all()) << n;
   }
-  // 1, 2 and every multiple of four except 52, 92, 100, 116 (and none else up to 128).
+  // 1, 2 and every multiple of four except 52, 92, 100, 116, up to 128.
   EXPECT_EQ(sizes, 2 + 32 - 4);
 }
 

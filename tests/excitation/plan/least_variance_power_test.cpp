@@ -26,7 +26,7 @@ TEST(LeastVariancePower, OneBoundHasTheKnownOptimum) {
   const VectorXd b = random_positive(50, 2);
   const PowerSpectrum found = least_variance_power(c, b.transpose());
   const double root_sum = (c.array() * b.array()).sqrt().sum();
-  // The cost is flat around the optimum: 1e-6 of gap leaves 1e-3 in a.
+  // The cost is flat near the optimum: a gap of 1e-6 corresponds to 1e-3 in a.
   EXPECT_LT(
       ((found.power.array() * root_sum) / (c.array() / b.array()).sqrt() - 1.0).abs().maxCoeff(),
       2e-3);
@@ -55,7 +55,7 @@ TEST(LeastVariancePower, CostAndLowerBoundMeet) {
     EXPECT_NEAR((c.array() / found.power.array()).sum(), found.cost, 1e-12 * found.cost);
     EXPECT_LE(found.lower_bound, found.cost * (1.0 + 1e-12));
     EXPECT_LE(found.cost, found.lower_bound * (1.0 + 1e-4));
-    // The bound is one: 2 sum sqrt(c B'l) - sum l for the multipliers returned.
+    // The lower bound is 2 sum sqrt(c B'l) - sum l for the returned multipliers.
     const VectorXd price = bounds.transpose() * found.multiplier;
     EXPECT_NEAR(2.0 * (c.array() * price.array()).sqrt().sum() - found.multiplier.sum(),
                 found.lower_bound, 1e-9 * found.lower_bound);

@@ -19,8 +19,7 @@ FrequencyGrid small_grid() {
   return FrequencyGrid::band(1000.0, 400, {.low_hz = 2.5, .high_hz = 200.0});
 }
 
-/// Two axes; u_p = r_p, y = a low pass of both. The variance rises with frequency as that of a
-/// displacement does.
+/// Two axes; u_p = r_p, y = a low pass of both. The variance increases with frequency, as for a displacement.
 LimitedDesignSpec small_problem(const FrequencyGrid& grid, ExcitationScheme scheme) {
   LimitedDesignSpec spec;
   spec.experiment.scheme = scheme;
@@ -58,7 +57,7 @@ double cost_of(const LimitedDesignSpec& spec, const ExperimentPlan& plan) {
   return (power > 0.0).select(spec.cost.array() / power, 0.0).sum();  // on the lines each axis has
 }
 
-/// Predicted anew, run by run, from the plan as it stands.
+/// Predicted again, run by run, from the designed plan.
 double largest_use(const LimitedDesignSpec& spec, const ExperimentPlan& plan) {
   SignalPredictor predictor(plan.grid());
   double largest = 0.0;
@@ -91,7 +90,7 @@ TEST_P(LimitedDesignOf, HasLessThanHalfTheVarianceOfFlatRandomPhases) {
   ExperimentSpec flat = spec.experiment;
   flat.crest_iterations = 0;
   const ExperimentPlan start(grid, flat);
-  // Use is affine in the level: reserve + level * what one unit gives.
+  // The use is affine in the level: reserve + level * use of one unit.
   const double most = largest_use(spec, start);
   double level = 0.0;
   for (double high = 100.0 / most, low = 0.0; high - low > 1e-9 * high;) {
@@ -151,8 +150,8 @@ TEST(LimitedDesign, RefusesWhatCannotBeDesigned) {
   refuse([](auto& s) { s.signals.clear(); }, "excitation power");
 }
 
-// Random phases of 80 lines peak at 2.7 to 3.5 times the rms; here two signals of two experiments each
-// must come down together.
+// Random phases of 80 lines have peaks of 2.7 to 3.5 times the rms. Here two signals of two experiments each must be
+// reduced jointly.
 TEST(JointCrest, LowersAllSignalsTogetherAndKeepsTheAmplitudes) {
   const FrequencyGrid grid = small_grid();
   LimitedDesignSpec spec = small_problem(grid, ExcitationScheme::orthogonal_dft);

@@ -100,7 +100,7 @@ TEST_F(FrfFile, WhatIsUnknownStaysUnknown) {
   EXPECT_EQ(back.sample_rate_hz, 0.0);
 }
 
-// The layout of design.md: [N x n_y x n_u] in C order, which is what h5py and MATLAB users index.
+// The layout of docs/formats.md: [N x n_y x n_u] in C order, as indexed by h5py and MATLAB users.
 TEST_F(FrfFile, TheLayoutIsLinesThenOutputsThenInputs) {
   const FrfEstimate frf = numbered_frf();
   write_frf(folder_ / "frf.h5", frf);
@@ -164,7 +164,7 @@ TEST_F(FrfFile, SameContentSameBytes) {
   EXPECT_EQ(bytes("a.h5"), bytes("b.h5"));
 }
 
-/// A file of another program: contract datasets only.
+/// A file of another program: only the required datasets.
 void write_foreign(const fs::path& path, const std::string& leave_out = "") {
   Hdf5File file = Hdf5File::create(path);
   file.write_attribute("/", "format", std::string("stageid-frf"));
@@ -195,7 +195,7 @@ TEST_F(FrfFile, AMissingDatasetIsNamed) {
 
 struct Damage {
   const char* name;
-  std::function<void(Hdf5File&)> write;  ///< instead of the good objects
+  std::function<void(Hdf5File&)> write;  ///< instead of the valid objects
   const char* message;
 };
 

@@ -74,7 +74,7 @@ TEST_F(FrfQualityFile, EverythingComesBack) {
   EXPECT_EQ(back.left_out_realizations, frf.left_out_realizations);
 }
 
-// What docs/formats.md says, element by element.
+// The layout of docs/formats.md, element by element.
 TEST_F(FrfQualityFile, DatasetsAreAsDocumented) {
   const FrfEstimate frf = with_quality();
   write_frf(file_, frf);

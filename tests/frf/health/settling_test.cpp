@@ -1,5 +1,5 @@
-// A linear plant in poor records is not called nonlinear: realizations of unequal noise keep the rate of
-// false alarms, transients and drifts are called what they are.
+// A linear plant in poor records is not called nonlinear: realizations of unequal noise keep the rate of false alarms,
+// and transients and drifts are identified.
 #include "frf/health/settling_check.hpp"
 
 #include <gtest/gtest.h>
@@ -37,8 +37,7 @@ double share_below(const Eigen::MatrixXd& p, double limit) {
   return static_cast<double>((p.array() < limit).count()) / static_cast<double>(p.size());
 }
 
-// Axes with independent phases: cond(R), and with it the noise of G, differs from realization to
-// realization and from line to line.
+// Axes with independent phases: cond(R), and with it the noise of G, differs between realizations and lines.
 TEST(Settling, RealizationsOfUnequalNoiseKeepTheRateOfFalseAlarms) {
   constexpr int kSeeds = 150;
   double nonlinear = 0.0;
@@ -51,14 +50,14 @@ TEST(Settling, RealizationsOfUnequalNoiseKeepTheRateOfFalseAlarms) {
     nonlinear += share_below(test.p_value, kNonlinearBelow) / kSeeds;
     unsettled += share_below(test.settled_p_value, kUnsettledBelow) / kSeeds;
   }
-  // 1800 verdicts, two inputs of one output with a common noise: a standard deviation of 0.3 %; by the
-  // unweighted variances it was above 10 %.
+  // 1800 verdicts, two inputs of one output with a common noise: a standard deviation of 0.3 %. With the unweighted
+  // variances it would be above 10 %.
   EXPECT_NEAR(nonlinear, kNonlinearBelow, 0.01);
-  // 450 bands, the bands of one log by a test in common: 0.6 %.
+  // 450 bands; the bands of one log share a test: 0.6 %.
   EXPECT_LT(unsettled, kUnsettledBelow + 0.015);
 }
 
-/// A straight line of its own on each sensor of each run, from 0 to `end` times a normal number.
+/// A different straight line on each sensor of each run, from 0 to `end` times a normal number.
 void add_drift(MemoryLog& log, double end) {
   test::ComplexNoise random(77);
   for (LogSamples& record : log.records) {
@@ -69,7 +68,7 @@ void add_drift(MemoryLog& log, double end) {
   }
 }
 
-// A drift is the same in each period, so that the scatter of periods does not hold it.
+// A drift is the same in each period, so the scatter of the periods does not contain it.
 TEST(Settling, ADriftIsNotCalledNonlinear) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     MemoryLog log = test::simulate_sampled_log(stage(1, 0.1, 0.5), experiment(1, 3, 3, seed), 0.05);
@@ -100,7 +99,7 @@ TEST(Settling, ATransientIsNotCalledNonlinear) {
   }
 }
 
-// Ten bands, each judged at one in a hundred, would find something in one of ten settled logs.
+// Ten bands, each tested at 1 %, would cause a finding in one of ten settled logs.
 TEST(Settling, TheFindingIsRarerThanTheBands) {
   FrfEstimate frf;
   NonlinearityTest& test = frf.nonlinearity;

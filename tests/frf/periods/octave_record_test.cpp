@@ -68,7 +68,7 @@ TEST_P(OctaveRecords, ASineIsInItsOctave) {
   }
 }
 
-// A spike reaches as far as the octave says, and belongs to its own period.
+// A spike extends as far as stated by the octave, and is assigned to its own period.
 TEST_P(OctaveRecords, TheReachOfACoefficientIsKnown) {
   const Index N = GetParam();
   for (const Index at : {Index{0}, N / 2, N - 1}) {

@@ -45,7 +45,7 @@ Eigen::VectorXd resonant(Eigen::Index count, std::complex<double> pole,
   return 100.0 / deviation * x.tail(count) + white(count, random);
 }
 
-/// A correlation time of a tenth of a period: its power lies on the first few lines, and leaks.
+/// A correlation time of a tenth of a period: its power is on the first few lines, and leaks.
 Eigen::VectorXd slow(Eigen::Index count, test::ComplexNoise& random) {
   return resonant(count, 0.99, random);
 }
@@ -117,7 +117,7 @@ TEST_P(Colour, CleanPeriodsStay) {
   EXPECT_LE(dropped, 2U);
 }
 
-// A spike, a bump and a step, each as large in its period as the noise is there, ten times over.
+// A spike, a bump and a step, each ten times as large in its period as the noise.
 TEST_P(Colour, GlitchesAreFound) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     for (const Eigen::Index width : {1, 5, 40}) {
@@ -145,7 +145,7 @@ NoisyRun run_with_a_noisy_period(int periods, double factor, std::uint64_t seed)
   return run;
 }
 
-// By the variance of the mean of n + 1 periods, 2 + 1 / n times the noise is as bad as a period less.
+// For the variance of the mean, n + 1 periods with 2 + 1 / n times the noise in one are as bad as n periods.
 TEST(PeriodCheck, PeriodsThatCostLessThanTheirLossStay) {
   int dropped_below = 0;
   int dropped_above = 0;
@@ -161,7 +161,7 @@ TEST(PeriodCheck, SeveralAreFoundButNeverHalfOfAll) {
   NoisyRun run = run_of(drifting, 10, 2, 7);
   for (const Eigen::Index p : {2, 3, 8}) run.add(p, 500, 0, 3000.0);
   EXPECT_THAT(run.which(), testing::ElementsAre(2U, 3U, 8U));
-  NoisyRun five = run_of(white, 5, 1, 7);  // alike, so that each is among the others of the other
+  NoisyRun five = run_of(white, 5, 1, 7);  // two equal outliers, compared with each other too
   for (const Eigen::Index p : {1, 3}) five.add(p, 500, 0, 1000.0);
   EXPECT_THAT(five.which(), testing::ElementsAre(1U, 3U));
   NoisyRun torn = run_of(white, 4, 1, 7);
@@ -172,7 +172,7 @@ TEST(PeriodCheck, SeveralAreFoundButNeverHalfOfAll) {
   EXPECT_TRUE(two.outliers().empty());
 }
 
-// Where a period is missing the record is cut; the neighbours of a glitch at the border stay.
+// A missing period separates the record; the neighbours of a glitch at the border are kept.
 TEST(PeriodCheck, OnlyThePeriodWithTheGlitchIsFound) {
   for (const Eigen::Index at : {Eigen::Index{0}, Eigen::Index{3}, kSamples - 1}) {
     NoisyRun run = run_of(slow, 8, 1, 3);
@@ -220,11 +220,11 @@ TEST(PeriodCheck, ColouredNoiseCostsNoPeriod) {
     const MemoryLog log = coloured_log(seed, 4);
     dropped += estimate_plant_frf({&log}, {.threads = 1}).dropped_periods.size();
   }
-  EXPECT_LE(dropped, 3u);  // 300 runs, 0.3 expected at most
+  EXPECT_LE(dropped, 3u);  // 300 runs, at most 0.3 expected
 }
 
-/// The sixth period of the second run spoilt: one sample far off, or the stage pushed so that its
-/// first mode rings.
+/// Corrupts the sixth period of the second run: one outlier, or a disturbance of the stage that excites its
+/// first mode.
 void spoil(MemoryLog& log, bool bump) {
   Eigen::MatrixXd& y = log.records[1].sensors;
   const Eigen::Index first = (3 + 5) * 400;
@@ -266,7 +266,7 @@ TEST(PeriodCheck, GlitchesAndBumpsAreLeftOutWithTheirDegreeOfFreedom) {
   }
 }
 
-// More than 16 periods are compared in groups; each is as good as one of its own.
+// More than 16 periods are compared in groups; in each, outliers are found as in a separate run.
 TEST(PeriodCheck, LongRunsAreComparedInGroups) {
   MemoryLog log = coloured_log(5, 20);
   log.records[0].sensors(3 * 400 + 12, 1) += 40.0;         // in the first group

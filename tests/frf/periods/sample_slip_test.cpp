@@ -1,4 +1,4 @@
-// A recorder that loses samples, or writes them twice: told, and the rest is used.
+// A recorder that loses or duplicates samples: reported, and the rest is used.
 #include "frf/periods/sample_slip.hpp"
 
 #include <gtest/gtest.h>
@@ -46,8 +46,8 @@ struct Case {
   MemoryLog log;
 };
 
-/// Row `row` of a run is not recorded; the record goes on with what comes after it. A negative count writes the
-/// rows before it again. What is missing at the end is what a longer record would have held.
+/// Removes rows from a run, starting at `row`. A negative count duplicates the rows before it. The end is filled with
+/// the rows of a longer record.
 void lose(MemoryLog& log, std::size_t run, Index row, Index count, bool sensors = true,
           bool actuators = true) {
   const auto shift = [&](Eigen::MatrixXd& x) {
@@ -77,7 +77,7 @@ std::string text(const std::vector<Finding>& findings) {
   return all;
 }
 
-/// Mean over lines and entries of |G - truth|^2 over the stated variance: 1 on average for intervals that hold.
+/// Mean over lines and entries of |G - truth|^2 over the stated variance; 1 if the variance is right.
 double chi_square(const FrfEstimate& frf, const Case& c) {
   double sum = 0.0;
   for (Index k = 0; k < frf.lines(); ++k) {

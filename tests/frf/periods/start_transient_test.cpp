@@ -1,5 +1,5 @@
-// A single lightly damped mode that still rings is named with a remedy that works; settled records of
-// any noise are not accused.
+// A single ringing mode with light damping is named with an effective remedy; settled records of any noise cause no
+// finding.
 #include "frf/periods/start_transient.hpp"
 
 #include <gtest/gtest.h>
@@ -44,8 +44,8 @@ LoopExperiment experiment(const Setting& s) {
   return x;
 }
 
-/// Coloured: white noise through a pole of 0.99; modal: white forces beside the recorded ones, which shake the
-/// modes for as long as they remember.
+/// Coloured: white noise through a pole of 0.99; modal: unrecorded white forces, which excite the modes for as long as
+/// they ring.
 MemoryLog simulate(const Setting& s) {
   test::RandomNumbers random(s.seed);
   const test::SampledPlant plant = test::sampled_plant(
@@ -103,14 +103,14 @@ TEST(StartTransient, ARingingModeIsNamedAndTheRemedySettlesIt) {
     ASSERT_NE(at, std::string::npos) << found[0].remedy;
     const int periods = std::atoi(found[0].remedy.c_str() + at + flag.size());
     EXPECT_GE(periods, 2);
-    EXPECT_LE(periods, 9);  // two e-folds per period, from 1e6 deviations on
+    EXPECT_LE(periods, 9);  // two e-folds per period, starting at 1e6 standard deviations
     if (unsettled(log, {.transient_periods = periods}).empty()) ++cured;
   }
   EXPECT_GE(named, 19);
   EXPECT_GE(cured, 18);
 }
 
-// By the frf command's own reading too.
+// The frf command's own data give the same.
 TEST(StartTransient, TheEstimateGathersTheSame) {
   const MemoryLog log = simulate({.periods = 8, .decay_s = 0.5});
   const FrfAndHealth both = estimate_plant_frf_and_health({&log}, {.threads = 1});
@@ -124,7 +124,7 @@ TEST(StartTransient, TheEstimateGathersTheSame) {
 
 class SettledNoise : public testing::TestWithParam<Colour> {};
 
-// 60 logs of a colour with long-lived modes that are shaken, none below 1 in 200 by more than chance:
+// 60 logs of a colour with excited long-lived modes; not more findings below 1 in 200 than by chance:
 // P(3 or more of 60 at 0.005) = 0.003.
 TEST_P(SettledNoise, IsNotCalledRinging) {
   int alarms = 0;

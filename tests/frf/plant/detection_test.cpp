@@ -1,4 +1,4 @@
-// Lines that are not excited: what distortions of the plant show there, and what the loop feeds back.
+// Unexcited lines: distortions of the plant, and the controller's feedback.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ test::SampledPlant stage() {
   return test::sampled_plant(2, 2, {{12.3, 0.1}, {37.0, 0.1}}, kSampleRateHz, 0.5);
 }
 
-/// Odd lines, every fourth of them left out.
+/// Odd lines without every fourth of them.
 LoopExperiment experiment(int realizations, int periods) {
   LoopExperiment x{.sample_rate_hz = kSampleRateHz, .period_samples = kPeriod, .axes = 2};
   x.lines.clear();
@@ -59,8 +59,8 @@ TEST(Detection, OnALinearPlantFalseAlarmsAreNominalInClosedLoop) {
         at_1_percent += static_cast<double>((kind->p_value.array() < 0.01).count());
       }
     }
-    // At least 2000 tests (orthogonal: one group): standard deviations 0.5 and 0.22 %, a little more
-    // because outputs and groups share noise estimates. Three and a half of them.
+    // At least 2000 tests (orthogonal: one group): standard deviations 0.5 and 0.22 %, a little more because outputs
+    // and groups share noise estimates. The bounds are three and a half of them.
     ASSERT_GE(tests, 2000.0);
     EXPECT_NEAR(at_5_percent / tests, 0.05, 0.02);
     EXPECT_NEAR(at_1_percent / tests, 0.01, 0.009);
@@ -120,12 +120,12 @@ TEST(Detection, FeedbackIsTakenOutOfTheLevel) {
       }
     }
   }
-  // Left: G between lines that are four apart, and the distortion in G itself.
+  // The remainder is due to G between lines that are four apart, and to the distortion in G itself.
   EXPECT_LT(std::sqrt(corrected / truth_sum), 0.1) << as_measured / truth_sum;
   EXPECT_GT(std::sqrt(as_measured / truth_sum), 0.3);
 }
 
-// A cubic sensor, 1e-3 of the signal: odd lines show it, even ones do not.
+// A cubic sensor, 1e-3 of the signal: it distorts odd lines, but not even ones.
 TEST(Detection, ACubicTermAtMinus60DecibelIsFoundOnOddLines) {
   const LoopExperiment x = experiment(4, 4);
   const MemoryLog linear = test::simulate_sampled_log(stage(), x, 1e-5);

@@ -1,4 +1,4 @@
-// Noise that is not the same in all experiments of a realization, against repeated experiments.
+// Noise that differs between the experiments of a realization, against repeated experiments.
 #include "frf/plant/experiment_noise.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using test::MemoryLog;
 
 constexpr int kSeeds = 150;
 
-/// 48 lines; correlated noise at the sensors, of ten times the power in the second experiment.
+/// 48 lines; correlated noise at the sensors, with ten times the power in the second experiment.
 LoopExperiment uneven(AxisScheme scheme, int realizations, int periods) {
   LoopExperiment x{.realizations = realizations, .periods = periods, .scheme = scheme};
   x.lines.resize(48);
@@ -80,15 +80,15 @@ class ExperimentNoiseOf : public testing::TestWithParam<AxisScheme> {};
 TEST_P(ExperimentNoiseOf, WhereItDiffersTheVariancesAreThoseOfRepeatedExperiments) {
   const Repeated all = repeat(uneven(GetParam(), 2, 3));
   EXPECT_EQ(all.separate, kSeeds);
-  for (Eigen::Index c = 0; c < all.stated.rows(); ++c)  // 48 x 150 errors an entry: 1.2 %
+  for (Eigen::Index c = 0; c < all.stated.rows(); ++c)  // 48 x 150 errors per entry: 1.2 %
     EXPECT_NEAR(all.stated.row(c).cwiseQuotient(all.squares.row(c)).mean(), 1.0, 0.05) << c;
-  // The degrees of freedom are those of the scatter of the variances, over entries and lines; with
-  // axes together the variances differ by the phases too.
+  // The degrees of freedom are those of the scatter of the variances, over entries and lines. With simultaneous axes,
+  // the variances also differ because of the phases.
   if (GetParam() == AxisScheme::single_axis) {
     EXPECT_NEAR(all.dof * all.spread.mean(), 1.0, 0.15);
   }
-  EXPECT_LT(all.dof, 11.0);  // of 12 that pooling would claim
-  // A linear plant is called nonlinear as seldom as it should.
+  EXPECT_LT(all.dof, 11.0);  // pooling would give 12
+  // A linear plant is called nonlinear at the stated rate.
   EXPECT_LT(all.nonlinear, 1 + 0.01 * all.verdicts);
 }
 
@@ -105,8 +105,8 @@ TEST_P(ExperimentNoiseOf, WhereItAgreesTheExperimentsArePooled) {
 INSTANTIATE_TEST_SUITE_P(Schemes, ExperimentNoiseOf,
                          testing::Values(AxisScheme::single_axis, AxisScheme::orthogonal));
 
-// Of experiments with one axis each an entry has the noise of its axis' experiment, which is the
-// covariance that is common to all times the share of that experiment.
+// With one axis per experiment, an entry has the noise of its axis's experiment: the common covariance times the share
+// of that experiment.
 TEST(ExperimentNoise, TheFactorsComeNearestToIt) {
   const LoopExperiment x = uneven(AxisScheme::single_axis, 4, 8);
   const FrfEstimate frf = estimate(x, CovarianceKind::full);
@@ -125,7 +125,7 @@ TEST(ExperimentNoise, TheFactorsComeNearestToIt) {
   for (Eigen::Index c = 0; c < 6; ++c) EXPECT_NEAR(ratio[c], 1.0, 0.1) << c;
 }
 
-// Counted from 1, as in the program.
+// 1-based, as in the program.
 TEST(ExperimentNoise, NamesTheRunsAndByHowMuch) {
   const MemoryLog log =
       test::simulate_log(test::small_stage(), uneven(AxisScheme::single_axis, 2, 6));

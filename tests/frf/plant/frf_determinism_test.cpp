@@ -47,7 +47,7 @@ TEST(FrfDeterminism, AResumedExperimentIsTheUninterruptedOne) {
   resumed.log_info = whole.log_info;
   for (std::size_t run = 0; run < whole.log_runs.size(); ++run) {
     const LogRun& id = whole.log_runs[run];
-    if (run == 4) {  // killed here: a stub of the run stays in the log
+    if (run == 4) {  // killed here: an incomplete run remains in the log
       LogSamples stub = whole.records[run];
       stub.sensors.setZero();
       resumed.append(id.realization, id.experiment, whole.excitation_periods[run], stub);
@@ -75,10 +75,10 @@ TEST(FrfDeterminism, ProvenanceNamesFileHashAndOptionsButNoPlaceOrThread) {
   EXPECT_THAT(before, Not(HasSubstr("/some/where")));
   EXPECT_THAT(before, Not(HasSubstr("threads")));
 
-  log.records[5].sensors(251, 1) += 1e-12;  // a sample that is used
+  log.records[5].sensors(251, 1) += 1e-12;  // a used sample
   EXPECT_NE(before, estimate_plant_frf({&log}).provenance_json);
   log.records[5].sensors(251, 1) = noisy_log().records[5].sensors(251, 1);
-  log.records[5].sensors(17, 1) += 1.0;  // one of the transient is not
+  log.records[5].sensors(17, 1) += 1.0;  // a sample of the transient is not used
   EXPECT_EQ(before, estimate_plant_frf({&log}).provenance_json);
 }
 

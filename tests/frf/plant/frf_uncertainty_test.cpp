@@ -1,4 +1,4 @@
-// What the variances promise, checked by repeating the experiment with other noise.
+// Stated variances, checked by repeating the experiment with other noise.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -16,7 +16,7 @@ using test::MemoryLog;
 
 constexpr int kSeeds = 300;
 
-/// Correlated noise at the two sensors; covariance F F^H a line and period.
+/// Correlated noise at the two sensors; covariance F F^H per line and period.
 Eigen::MatrixXcd correlated_noise() {
   Eigen::MatrixXcd factor(2, 2);
   factor << std::complex<double>(1.0, 0.0), 0.0, std::complex<double>(0.5, 0.6),
@@ -27,7 +27,7 @@ Eigen::MatrixXcd correlated_noise() {
 /// Deviations from the truth and the predicted covariance, over seeds.
 struct Trials {
   Eigen::VectorXd frequency_hz;
-  std::vector<Eigen::MatrixXcd> deviations;  ///< one a seed: 6 x lines
+  std::vector<Eigen::MatrixXcd> deviations;  ///< one per seed: 6 x lines
   Eigen::MatrixXd noise_variance;            ///< mean over the seeds
   Eigen::MatrixXd total_variance;
   Eigen::MatrixXcd covariance;
@@ -68,8 +68,7 @@ Trials repeat(LoopExperiment x) {
   return trials;
 }
 
-/// Sample covariance on line k, whitened by `predicted`: the unit matrix if the prediction is
-/// right.
+/// Sample covariance on line k, whitened by `predicted`: the unit matrix if the prediction is right.
 Eigen::MatrixXcd whitened(const Trials& trials, const Eigen::MatrixXcd& predicted, Eigen::Index k) {
   const Eigen::MatrixXcd L = predicted.llt().matrixL();
   Eigen::MatrixXcd sample = Eigen::MatrixXcd::Zero(6, 6);
@@ -80,12 +79,12 @@ Eigen::MatrixXcd whitened(const Trials& trials, const Eigen::MatrixXcd& predicte
   return sample;
 }
 
-/// Cov(vec G) = A kron C_E with A transposed: what forgetting the transpose of U^-T gives.
+/// Cov(vec G) = A kron C_E with A transposed: the result of omitting the transpose of U^-T.
 Eigen::MatrixXcd with_transpose_forgotten(const Eigen::MatrixXcd& covariance) {
   Eigen::MatrixXcd wrong(6, 6);
   for (Eigen::Index i = 0; i < 3; ++i) {
     for (Eigen::Index j = 0; j < 3; ++j) {
-      // Only A is transposed; C_E stays: read off its scale from the block's trace.
+      // Only A is transposed; C_E is unchanged, with its scale from the block's trace.
       const Eigen::MatrixXcd unit =
           covariance.topLeftCorner(2, 2) / covariance.topLeftCorner(2, 2).trace();
       wrong.block(2 * i, 2 * j, 2, 2) = covariance.block(2 * j, 2 * i, 2, 2).trace() * unit;
@@ -134,11 +133,11 @@ TEST_P(NoiseVariance, TheFullCovarianceWhitensTheDeviations) {
       EXPECT_NEAR(predicted(c, c).real() / trials.noise_variance(c, k), 1.0, 1e-12);
     }
   }
-  // The test can see the fault it is there for.
+  // The test detects the error for which it exists.
   EXPECT_GT(worst_if_transposed, 10.0 / std::sqrt(kSeeds));
 }
 
-// What a likelihood needs for each line is n_u^2 + n_y^2 numbers, not (n_u n_y)^2.
+// A likelihood needs n_u^2 + n_y^2 numbers per line, not (n_u n_y)^2.
 TEST_P(NoiseVariance, InputFactorAndResidualCovarianceMakeUpTheFullCovariance) {
   const LoopExperiment x{.realizations = 2, .periods = 3, .scheme = GetParam()};
   const Trials trials = repeat(x);
@@ -158,13 +157,12 @@ TEST_P(NoiseVariance, InputFactorAndResidualCovarianceMakeUpTheFullCovariance) {
   }
 }
 
-// In the loop Y - G U is the open-loop noise, whatever the controller: C_E = F F^H / P.
+// In the loop Y - G U is the open-loop noise for any controller: C_E = F F^H / P.
 TEST_P(NoiseVariance, TheResidualCovarianceIsThatOfTheOpenLoopNoise) {
   const LoopExperiment x{.realizations = 2, .periods = 3, .scheme = GetParam()};
   const Trials trials = repeat(x);
   const Eigen::MatrixXcd expected = correlated_noise() * correlated_noise().adjoint() / x.periods;
-  // M E (P - 1) = 12 degrees of freedom a seed: standard deviation 1 / sqrt(12 S) = 1.7 %; 40
-  // entries.
+  // M E (P - 1) = 12 degrees of freedom per seed: standard deviation 1 / sqrt(12 S) = 1.7 %; 40 entries.
   for (Eigen::Index k = 0; k < trials.frequency_hz.size(); ++k) {
     const Eigen::MatrixXcd found =
         Eigen::Map<const Eigen::MatrixXcd>(trials.residual.col(k).data(), 2, 2);
@@ -183,15 +181,15 @@ TEST(FrfUncertainty, WithoutDistortionsTheTotalVarianceIsTheNoiseVariance) {
   const Trials trials = repeat({.realizations = 4, .periods = 2});
   for (Eigen::Index c = 0; c < 6; ++c) {
     for (Eigen::Index k = 0; k < trials.frequency_hz.size(); ++k) {
-      // M - 1 = 3 degrees of freedom a seed against M E (P - 1) = 12: relative standard deviation
+      // M - 1 = 3 degrees of freedom per seed against M E (P - 1) = 12: relative standard deviation
       // sqrt((1/3 + 1/12) / S) = 3.7 %; 60 ratios.
       EXPECT_NEAR(trials.total_variance(c, k) / trials.noise_variance(c, k), 1.0, 4.5 * 0.037);
     }
   }
 }
 
-// Each realization sees another plant (as with a stochastic nonlinear contribution), no noise, no
-// loop: then U R^-1 = I, G is the plain mean, and the variance of the mean follows by hand.
+// Each realization has another plant (as with stochastic nonlinear contributions), without noise or loop. Then
+// U R^-1 = I, G is the plain mean, and its variance follows by hand.
 TEST(FrfUncertainty, TheTotalVarianceIsTheScatterOverRealizations) {
   const LoopExperiment x{.periods = 2};
   const Eigen::Index n_lines = static_cast<Eigen::Index>(x.lines.size());
@@ -236,16 +234,16 @@ TEST(FrfUncertainty, OrthogonalExperimentsDivideTheVarianceByTheNumberOfAxes) {
   const MemoryLog single = test::simulate_log(loop, x);
   x.scheme = AxisScheme::orthogonal;
   const MemoryLog orthogonal = test::simulate_log(loop, x);
-  // Open loop, amplitude 1: Var = C_E,ii / (M P) against the same over 3. M E (P - 1) = 468 degrees
-  // of freedom on each of 10 lines: 1.5 % for each mean.
+  // Open loop, amplitude 1: Var = C_E,ii / (M P) against the same over 3. M E (P - 1) = 468 degrees of freedom on each
+  // of 10 lines: 1.5 % per mean.
   const double ratio = (estimate_plant_frf({&single}).noise_variance.array() /
                         estimate_plant_frf({&orthogonal}).noise_variance.array())
                            .mean();
   EXPECT_NEAR(ratio, 3.0, 0.3);
 }
 
-// With the noise of one run larger than that of the others the pooled covariance still gives the
-// right mean level: the runs' periods count alike.
+// If the noise of one run is larger than that of the others, the pooled covariance still has the right mean: all
+// periods have the same weight.
 TEST(FrfUncertainty, RunsOfUnequalLengthAreWeightedByTheirPeriods) {
   LoopExperiment x{.periods = 6, .seed = 12};
   x.noise_factor = correlated_noise();
@@ -257,8 +255,8 @@ TEST(FrfUncertainty, RunsOfUnequalLengthAreWeightedByTheirPeriods) {
   const FrfEstimate cut = estimate_plant_frf({&log});
   EXPECT_EQ(cut.periods, 2);
   EXPECT_EQ(cut.noise_dof, 1.0 + 5.0 + 5.0);
-  // Column 0 comes from the cut run alone (open loop, single axis), the others not at all:
-  // Var_i0 / Var_i1 = P_1 / P_0 = 3, exactly, for the covariance is pooled.
+  // Column 0 depends on the truncated run alone (open loop, single axis), the others not at all:
+  // Var_i0 / Var_i1 = P_1 / P_0 = 3, exactly, because the covariance is pooled.
   for (Eigen::Index k = 0; k < cut.lines(); ++k) {
     EXPECT_NEAR(cut.noise_variance(0, k) / cut.noise_variance(2, k), 3.0, 0.05);
     EXPECT_NEAR(equal.noise_variance(0, k) / equal.noise_variance(2, k), 1.0, 0.02);

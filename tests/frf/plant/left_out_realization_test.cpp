@@ -17,7 +17,7 @@ using testing::HasSubstr;
 
 constexpr int kExperiments = 2;
 
-/// Three realizations of two runs; no period of the marked runs can be used.
+/// Three realizations of two runs; the marked runs have no usable period.
 MemoryLog log_with_marked_runs(const std::vector<std::size_t>& marked_runs) {
   LoopExperiment x{.axes = kExperiments, .realizations = 3, .periods = 4};
   x.lines.clear();
@@ -80,7 +80,7 @@ TEST(LeftOutRealization, AMissingOrIncompleteRunIsTold) {
   EXPECT_EQ(frf.left_out_realizations[1].realization, 2);
   EXPECT_THAT(frf.left_out_realizations[1].reason, HasSubstr("experiment 1, 2 "));
   EXPECT_EQ(estimate_plant_frf({&log}, {.realizations = {1}}).left_out_realizations.size(), 0U);
-  // Not in the log at all, beside one whose record is spoilt; ascending.
+  // One is missing in the log, another one has a marked record; ascending.
   MemoryLog both = log_with_marked_runs({1});
   both.log_runs.pop_back();
   const FrfEstimate other = estimate_plant_frf({&both}, {});
@@ -89,7 +89,7 @@ TEST(LeftOutRealization, AMissingOrIncompleteRunIsTold) {
   EXPECT_THAT(other.left_out_realizations[1].reason, HasSubstr("no complete run of experiment 2"));
 }
 
-// The checks of the data's health look at the first realization that has all its runs.
+// The health checks use the first realization that has all its runs.
 TEST(LeftOutRealization, HealthLooksAtTheNextOne) {
   const MemoryLog log = log_with_marked_runs({1});
   const HealthRecord want = read_health_record({&log}, {.realizations = {1}});

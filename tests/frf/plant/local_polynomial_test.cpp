@@ -1,4 +1,4 @@
-// frf --method lpm on records that begin at rest: nothing is waited for.
+// frf --method lpm on records that begin at rest, without discarded periods.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using test::SampledPlant;
 constexpr double kSampleRateHz = 200.0;
 constexpr double kNoise = 0.01;
 
-/// Two modes close to each other; the slowest is down to 5 % after 3 s, the period is 4 s.
+/// Two close modes; the slower one decays to 5 % within 3 s, the period is 4 s.
 SampledPlant slow_stage() {
   return test::sampled_plant(2, 2, {{12.3, 1.0}, {13.6, 0.7}, {37.0, 0.2}}, kSampleRateHz, 0.5);
 }
@@ -49,24 +49,24 @@ TEST(LocalPolynomial, WithoutNoiseTheTransientIsRemoved) {
     left = std::max(left, (periodic.at(k) - G).norm() / G.norm());
   }
   EXPECT_LT(removed, 1e-5);
-  EXPECT_GT(left, 0.05);  // what a transient that is used costs
+  EXPECT_GT(left, 0.05);  // cost of a used transient
   EXPECT_EQ(lpm.periods, 4);
-  // Two runs; where poles were needed, up to four, they took half a degree of freedom of ten each.
+  // Two runs; poles (up to four) used half a degree of freedom of ten each.
   EXPECT_LT(lpm.noise_dof, 18.0);
   EXPECT_GE(lpm.noise_dof, 0.8 * 18.0);
 }
 
-// At equal time: four periods from the start against three after one that is passed over.
+// At equal time: four periods from the start against three after a discarded one.
 TEST(LocalPolynomial, IsAsAccurateAsPassingOverAPeriod) {
   constexpr int kSeeds = 40;
   const test::Trials lpm = repeat(slow_experiment(4), {.method = FrfMethod::lpm}, kSeeds);
   const test::Trials periodic = repeat(slow_experiment(4), {.transient_periods = 1}, kSeeds);
-  // 71 lines x 4 entries x 40 seeds: 1 % for an rms; the modelled transient costs (1 + leverage),
-  // the period more gives 4 / 3.
+  // 71 lines x 4 entries x 40 seeds: 1 % for an rms. The modelled transient costs (1 + leverage), the additional period
+  // gains 4 / 3.
   EXPECT_LT(lpm.error, 1.02 * periodic.error);
 }
 
-/// One sample of one sensor off by so many standard deviations of the noise, in a period of the first run.
+/// An outlier of one sensor in a period of the first run, in standard deviations of the noise.
 MemoryLog with_glitch(double deviations, int period, int periods, std::uint64_t seed) {
   LoopExperiment x = slow_experiment(periods);
   x.seed = seed;
@@ -75,7 +75,7 @@ MemoryLog with_glitch(double deviations, int period, int periods, std::uint64_t 
   return log;
 }
 
-// As much as leaving the period out by hand; which of two periods it is in nobody can tell.
+// Equal to removing the period manually; with two periods, the wrong one cannot be identified.
 TEST(LocalPolynomial, LeavesPeriodsWithAGlitchOut) {
   const FrfOptions lpm{.method = FrfMethod::lpm};
   FrfOptions unmarked = lpm;
@@ -107,7 +107,7 @@ TEST(LocalPolynomial, LeavesPeriodsWithAGlitchOut) {
 
 class Variance : public testing::TestWithParam<int> {};
 
-// A single period too: the noise is seen on the lines that are left empty; 18 are two records.
+// A single period too: the noise is estimated on empty lines; 18 are two records.
 TEST_P(Variance, IsThatOverSeedsAndTheMeanIsUnbiased) {
   constexpr int kSeeds = 80;
   for (const AxisScheme scheme : {AxisScheme::single_axis, AxisScheme::orthogonal}) {
@@ -123,8 +123,8 @@ TEST_P(Variance, IsThatOverSeedsAndTheMeanIsUnbiased) {
 
 class VarianceWithManyModes : public testing::TestWithParam<int> {};
 
-// Five modes within 30 Hz: a remainder of the transient in the window would pass for noise. Every
-// axis' transient is in every run.
+// Five modes within 30 Hz: a remainder of the transient in the window would count as noise. Every axis's transient is
+// in every run.
 TEST_P(VarianceWithManyModes, IsThatOverSeeds) {
   constexpr int kSeeds = 40;
   const SampledPlant plant = test::sampled_plant(
@@ -150,7 +150,7 @@ double error_over_stated(const FrfEstimate& frf) {
   return sum / static_cast<double>(frf.lines());
 }
 
-// A marked period, whatever is in it, ends one record and begins another; both count.
+// A marked period, of any content, ends one record and begins another; both are used.
 TEST(LocalPolynomial, StretchesBesideAMarkedPeriodAreBothUsed) {
   MemoryLog log = test::simulate_sampled_log(slow_stage(), slow_experiment(6), kNoise);
   for (std::size_t run = 0; run < 2; ++run) {

@@ -85,7 +85,7 @@ TEST(PlantFrfErrors, MoreInputsThanExcitedAxes) {
 TEST(PlantFrfErrors, FewerInputsThanExcitedAxes) {
   MemoryLog log = small_log();
   log.log_info.excitation = test::channels("d", 3, "N");
-  log.log_info.actuators.names.back() = "x";  // so that the rest is not "all"
+  log.log_info.actuators.names.back() = "x";
   log.log_info.actuators.names.push_back("w");
   log.log_info.actuators.units.push_back("N");
   for (LogSamples& record : log.records) {

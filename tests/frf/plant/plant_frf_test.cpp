@@ -54,7 +54,7 @@ TEST(PlantFrf, IndirectMethodRecoversTheExactPlantInClosedLoop) {
   EXPECT_NO_THROW(check(frf));
 }
 
-// If y / r passed too, the test above would prove nothing.
+// If y / r were equal too, the test above would prove nothing.
 TEST(PlantFrf, TheDirectRatioWouldBeBiasedByTheLoop) {
   const LoopExperiment x;
   const test::ClosedLoop loop = test::small_stage();
@@ -65,8 +65,8 @@ TEST(PlantFrf, TheDirectRatioWouldBeBiasedByTheLoop) {
   EXPECT_GT((Y_by_R - G).norm(), 0.3 * G.norm());
 }
 
-// The classical estimate sum Y U^H (sum U U^H)^-1 is drawn toward -1/C by noise that goes round the
-// loop; the indirect one is not. One input, one output, as much noise as excitation.
+// The classical estimate sum Y U^H (sum U U^H)^-1 is biased towards -1/C by noise in the loop; the indirect one is not.
+// One input, one output, as much noise as excitation.
 TEST(PlantFrf, NoiseInTheLoopDoesNotBiasIt) {
   const test::ClosedLoop loop{[](double omega) {
                                 return Eigen::MatrixXcd::Constant(
@@ -97,7 +97,7 @@ TEST(PlantFrf, NoiseInTheLoopDoesNotBiasIt) {
     }
     const std::complex<double> truth = loop.plant(test::omega_of(x, k))(0, 0);
     const double deviation = std::sqrt(frf.noise_variance(0, k));
-    EXPECT_LT(std::abs(frf.at(k)(0, 0) - truth), 4.0 * deviation);  // exp(-16): never by chance
+    EXPECT_LT(std::abs(frf.at(k)(0, 0) - truth), 4.0 * deviation);  // exp(-16): negligible
     EXPECT_GT(std::abs(cross / power - truth), 20.0 * deviation);
   }
 }
@@ -218,7 +218,7 @@ TEST(PlantFrf, SomeInputsAreColumnsOfTheWholeEstimate) {
     EXPECT_EQ(some.at(k).col(0), all.at(k).col(2));
     EXPECT_EQ(some.at(k).col(1), all.at(k).col(0));
   }
-  EXPECT_TRUE(some.excluded_channels.empty());  // a2 took part in the estimate
+  EXPECT_TRUE(some.excluded_channels.empty());  // a2 is part of the estimate
 }
 
 TEST(PlantFrf, ExcitationNamesOtherThanActuatorsMeanAllActuators) {
@@ -229,8 +229,8 @@ TEST(PlantFrf, ExcitationNamesOtherThanActuatorsMeanAllActuators) {
   EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
 }
 
-// Two of three actuators are excited; the controller moves the third. Estimated is then the plant
-// with the third loop closed, and the power found on the third says so.
+// Two of three actuators are excited; the controller moves the third. The estimate is then the plant with the third
+// loop closed, and the power of the third is reported.
 TEST(PlantFrf, TheInputsAreTheExcitedActuatorsAndTheOthersPowerIsReported) {
   const LoopExperiment x{.axes = 2};
   const test::ClosedLoop loop = test::small_stage();
@@ -259,7 +259,7 @@ TEST(PlantFrf, TheInputsAreTheExcitedActuatorsAndTheOthersPowerIsReported) {
 TEST(PlantFrf, OnlyTheRealizationsAskedForAreUsed) {
   MemoryLog log = test::simulate_log(test::small_stage(), {.realizations = 3});
   for (std::size_t run = 3; run < 6; ++run)
-    log.records[run].sensors *= 2.0;  // spoils realization 1
+    log.records[run].sensors *= 2.0;  // corrupts realization 1
   EXPECT_GT(largest_error(estimate_plant_frf({&log}), test::small_stage().plant), 0.1);
   const FrfEstimate frf = estimate_plant_frf({&log}, {.realizations = {2, 0}});
   EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
@@ -270,7 +270,7 @@ TEST(PlantFrf, IncompleteRunsArePassedOverWithTheirRealization) {
   MemoryLog log = test::simulate_log(test::small_stage(), {.realizations = 2});
   log.log_runs[4].complete = false;
   log.records[4].sensors.setConstant(7.0);
-  log.log_runs[4].samples = 13;  // stopped somewhere
+  log.log_runs[4].samples = 13;  // incomplete
   const FrfEstimate frf = estimate_plant_frf({&log});
   EXPECT_EQ(frf.realizations, 1);
   EXPECT_EQ(frf.total_variance.size(), 0);
@@ -280,7 +280,7 @@ TEST(PlantFrf, IncompleteRunsArePassedOverWithTheirRealization) {
 TEST(PlantFrf, OfSeveralCompleteRunsTheLastCounts) {
   const test::ClosedLoop loop = test::small_stage();
   MemoryLog log = test::simulate_log(loop, {});
-  log.append(0, 1, log.excitation_periods[1], log.records[1]);  // the repetition is good
+  log.append(0, 1, log.excitation_periods[1], log.records[1]);  // the repetition is valid
   log.records[1].sensors.setConstant(7.0);                      // the first attempt was not
   EXPECT_LT(largest_error(estimate_plant_frf({&log}), loop.plant), kRounding);
 }
@@ -340,7 +340,7 @@ TEST(PlantFrf, TheConditionOfTheInputsIsReported) {
   loop.controller = [](double) { return Eigen::MatrixXcd::Zero(3, 2); };
   MemoryLog log = test::simulate_log(loop, {.realizations = 2});
   EXPECT_LT((estimate_plant_frf({&log}).input_condition.array() - 1.0).abs().maxCoeff(), 1e-9);
-  log.excitation_periods[3] *= 5.0;  // realization 1, axis 0: the largest over realizations is told
+  log.excitation_periods[3] *= 5.0;  // realization 1, axis 0; the largest is reported
   log.records[3].actuators *= 5.0;
   log.records[3].sensors *= 5.0;
   EXPECT_LT((estimate_plant_frf({&log}).input_condition.array() - 5.0).abs().maxCoeff(), 1e-9);
@@ -361,7 +361,7 @@ TEST(PlantFrf, ProgressReachesTheTotal) {
   };
   estimate_plant_frf({&log}, options);
   EXPECT_EQ(last, end);
-  EXPECT_EQ(end, 2.0 * 3.0 * 3.0 * 250.0 * 5.0 * 8.0);  // bytes of the periods used
+  EXPECT_EQ(end, 2.0 * 3.0 * 3.0 * 250.0 * 5.0 * 8.0);  // bytes of the used periods
   EXPECT_EQ(calls, 18);
 }
 

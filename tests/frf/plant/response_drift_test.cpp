@@ -1,4 +1,4 @@
-// A mode that moves while it is measured.
+// A mode whose frequency changes during the measurement.
 #include "frf/plant/response_drift.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,8 @@ double first_hz(const Spec& spec) {
   return 60.0 + 60.0 * random.uniform();
 }
 
-/// The loop of simulate_sampled_log() with a first mode whose frequency moves evenly from the first sample to the last.
+/// The loop of simulate_sampled_log() with a first mode whose frequency changes linearly from the first sample to the
+/// last.
 MemoryLog drifting_log(const Spec& spec) {
   test::LoopExperiment x;
   x.sample_rate_hz = 2000.0;

@@ -1,4 +1,4 @@
-// Data of other programs, beside the source tree; not part of the project.
+// Data of other programs, not included in the source tree.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -113,8 +113,8 @@ TEST(SharedData, TheForeignLogGivesThePlantItWasMadeWith) {
     EXPECT_LT(ours, 1.05 * reference) << band[0] << " Hz to " << band[1] << " Hz";
   }
 
-  // The noise variance against the deviation from the truth: mean of |dG|^2 / Var over lines and
-  // entries of the quiet band, where what is left of the transient does not count.
+  // The noise variance against the deviation from the truth: mean of |dG|^2 / Var over lines and entries of the quiet
+  // band, where the rest of the transient is negligible.
   double ratio = 0.0;
   Eigen::Index count = 0;
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {

@@ -1,4 +1,4 @@
-// All axes in one experiment, each on lines of its own: the responses between them are modelled.
+// All axes in one experiment, each on its own lines: the responses between them are modelled.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,12 +53,12 @@ double largest_error(const FrfEstimate& frf, const SampledPlant& plant) {
 
 TEST(Zippered, WithoutNoiseTheResponseIsThatOfThePlantOnAllLines) {
   LoopExperiment x = zippered_experiment(2);
-  x.transient_periods = 2;  // long died out
+  x.transient_periods = 2;  // fully decayed
   const MemoryLog log = test::simulate_sampled_log(smooth_stage(), x, 0.0);
   const FrfEstimate frf = estimate_plant_frf({&log});
   EXPECT_LT(largest_error(frf, smooth_stage()), 2e-3);
   EXPECT_EQ(frf.experiments, 1);
-  // Nothing is extrapolated: the first line of the second axis, the last of the first one.
+  // No extrapolation: the first line of the second axis, the last of the first one.
   EXPECT_EQ(frf.lines(), 123);
   EXPECT_DOUBLE_EQ(frf.frequency_hz[0], 75 * 0.125);
   EXPECT_DOUBLE_EQ(frf.frequency_hz[122], 319 * 0.125);
@@ -85,17 +85,17 @@ void PrintTo(const Measured& measured, std::ostream* os) { *os << measured.name;
 
 class ZipperedVariance : public testing::TestWithParam<Measured> {};
 
-// One period: the noise is what the local models leave; two: what the periods show; lpm: what is
-// beside the lines, from rest.
+// The noise is estimated from the local models (one period), between periods (two), or beside the lines from rest
+// (lpm).
 TEST_P(ZipperedVariance, IsThatOverSeedsAndTheMeanIsUnbiased) {
   constexpr int kSeeds = 60;
   const test::Trials trials = test::repeat(smooth_stage(), zippered_experiment(GetParam().periods),
                                            kNoise, GetParam().options, kSeeds);
-  // 123 lines x 4 entries of 60 seeds, of which every fourth line is independent: sqrt(4 / 29520) =
-  // 1.2 %. The mean of 1 / (mean of 60 stated) adds less than 0.3 %.
+  // 123 lines x 4 entries of 60 seeds, of which every fourth line is independent: sqrt(4 / 29520) = 1.2 %. The mean of
+  // 1 / (mean of 60 stated variances) adds less than 0.3 %.
   EXPECT_NEAR(1.0 / trials.over_stated, 1.0, 0.05);
-  // 1, give or take sqrt(4 / 492) = 9 %, if there is no bias; one of a fifth of a standard deviation,
-  // which adds 4 % to the squared error, adds 2.4.
+  // Without bias 1 +- sqrt(4 / 492) = 9 %. A bias of a fifth of a standard deviation, which adds 4 % to the squared
+  // error, adds 2.4.
   EXPECT_LT(trials.bias, 1.0 + 2.4);
 }
 INSTANTIATE_TEST_SUITE_P(
@@ -139,8 +139,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Measured{"ThreePeriodsFromRest", 3, {.method = FrfMethod::lpm}}),
     [](const auto& parameter) { return parameter.param.name; });
 
-// The mean of a smooth function of the lines, as a fit takes it, has the variance that
-// correlated_lines says.
+// The mean of a smooth function of the lines, as in a fit, has the variance predicted by correlated_lines.
 TEST(Zippered, CorrelatedLinesSayWhatTheMeanOverTheBandIsWorth) {
   constexpr int kSeeds = 150;
   LoopExperiment x = zippered_experiment(2);
@@ -168,10 +167,10 @@ TEST(Zippered, CorrelatedLinesSayWhatTheMeanOverTheBandIsWorth) {
   EXPECT_NEAR((scatter / stated).mean(), 1.0, 0.25);
 }
 
-/// What is stated of the covariance of an output's responses to the first and the second input, over
-/// 60 seeds, against products of their errors.
+/// Stated covariance of an output's responses to the first and the second input, over 60 seeds, against products of
+/// their errors.
 struct InputCovariance {
-  double straight = 0.0;  ///< mean error product, in stated ones; 1 if they agree
+  double straight = 0.0;  ///< mean error product over the stated one; 1 if they agree
   double conjugated =
       0.0;  ///< the same with the stated one's conjugate, as a transpose too many has it
 };
@@ -180,7 +179,7 @@ InputCovariance covariance_between_inputs(const SampledPlant& plant, const LoopE
                                           double low_hz, double high_hz) {
   constexpr int kSeeds = 60;
   LoopExperiment x = wanted;
-  Eigen::MatrixXcd found, stated;  // vec of Cov(vec G), a column a line, summed over the seeds
+  Eigen::MatrixXcd found, stated;  // vec of Cov(vec G), one column per line, summed over the seeds
   for (int seed = 1; seed <= kSeeds; ++seed) {
     x.seed = static_cast<std::uint64_t>(seed);
     const MemoryLog log = test::simulate_sampled_log(plant, x, kNoise);
@@ -210,13 +209,12 @@ InputCovariance covariance_between_inputs(const SampledPlant& plant, const LoopE
   return {sum.straight / size, sum.conjugated / size};
 }
 
-// Between the two inputs too: a transpose or a conjugate too many of U^-1 would show there only.
+// The covariance between the two inputs too, because only there a wrong transpose or conjugate of U^-1 has an effect.
 TEST(Zippered, TheCovarianceBetweenInputsIsThatOverSeeds) {
   SampledPlant plant = smooth_stage();
   plant.K << 0.0, 6.0, 6.0, 0.0;  // each input follows the other; the loop's poles are below 0.92
   const InputCovariance found = covariance_between_inputs(plant, zippered_experiment(2), 9.0, 41.0);
-  // Correlations of about 0.5, products that scatter by 1: 246 entries, one of four independent, of 60
-  // seeds: 3.3 %.
+  // Correlations of about 0.5, products with a scatter of 1: 246 entries, one of four independent, of 60 seeds: 3.3 %.
   EXPECT_NEAR(found.straight, 1.0, 0.13);
   EXPECT_LT(found.conjugated, 0.5);
 }
@@ -296,7 +294,7 @@ SampledPlant sharp_stage(double width) {
       kSampleRateHz, 0.05);
 }
 
-// The poles of the local model follow a resonance as narrow as the lines; a polynomial cannot.
+// The poles of the local model follow a resonance as narrow as the lines, which a polynomial cannot.
 TEST(Zippered, ResonancesAsNarrowAsTheLinesAreFollowed) {
   for (const double width : {1.0, 2.0}) {
     LoopExperiment x = zippered_experiment(2);
@@ -317,14 +315,14 @@ TEST(Zippered, ResonancesAsNarrowAsTheLinesAreFollowed) {
         sum.col(k) += (frf.at(k) - plant.response(frf.omega_rad_s()[k], kSampleRateHz)).reshaped();
       stated += frf.noise_variance.array();
     }
-    // Squared bias over variance; the mean of 40 seeds has 1 / 40 by noise.
+    // Squared bias over variance; noise contributes 1 / 40 to the mean of 40 seeds.
     const double bias = (sum / kSeeds).cwiseAbs2().cwiseQuotient((stated / kSeeds).matrix()).mean();
     EXPECT_LT(bias, 0.5) << width;
   }
 }
 
-// On a resonance what is not known of the pole is in the responses to both inputs, with the phase between
-// their residues: 90 degrees here, as the second input acts on the other state.
+// On a resonance, the uncertainty of the pole affects the responses to both inputs, with the phase between their
+// residues: 90 degrees here, because the second input acts on the other state.
 TEST(Zippered, NotKnowingThePoleCorrelatesInputsByTheirResidues) {
   SampledPlant plant = sharp_stage(1.0);
   for (Eigen::Index i = 0; i < plant.A.rows(); i += 2) plant.B.col(1).segment(i, 2) << 0.0, 0.1;

@@ -99,7 +99,7 @@ TEST(ConfidenceRadius, OverSeedsItCoversWhatItSays) {
   for (const int realizations : {2, 5, 10}) {
     EXPECT_NEAR(coverage(realizations, 2).total, 0.95, 0.01) << realizations << " realizations";
   }
-  EXPECT_LT(coverage(1, 3).asymptotic, 0.87);  // what the test is there to see
+  EXPECT_LT(coverage(1, 3).asymptotic, 0.87);  // the error that the test detects
 }
 
 }  // namespace test_confidence

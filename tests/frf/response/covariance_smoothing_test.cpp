@@ -56,8 +56,8 @@ TEST(CovarianceSmoothing, RefusesWhatCannotBeSmoothed) {
   EXPECT_THAT(message_of(frf, 3), HasSubstr("measure two periods"));
 }
 
-// Two periods and one realization: one experiment's degree of freedom a line, 19.0 in the quantile;
-// seven lines together 7. Noise of one spectrum on all lines, in closed loop.
+// Two periods and one realization: one degree of freedom per experiment and line, 19.0 in the quantile; seven lines
+// together 7. The noise has the same spectrum on all lines, in closed loop.
 TEST(CovarianceSmoothing, OverSeedsDegreesOfFreedomAreWhatTheySay) {
   LoopExperiment x{.lines = {}, .axes = 1, .periods = 2, .transient_periods = 0};
   for (int line = 1; line <= 41; line += 2) x.lines.push_back(line);
@@ -77,7 +77,7 @@ TEST(CovarianceSmoothing, OverSeedsDegreesOfFreedomAreWhatTheySay) {
     covered +=
         (error <= confidence_radius(frf, 0.95, VarianceKind::noise).array()).cast<double>().mean() /
         kSeeds;
-    // U = 1 / (1 + 0.8), C_E = 1e-4 a period, two periods.
+    // U = 1 / (1 + 0.8), C_E = 1e-4 per period, two periods.
     const Eigen::ArrayXXd ratio = frf.noise_variance.array() / (1e-4 / 2.0 * 1.8 * 1.8);
     mean += ratio.mean() / kSeeds;
     if (seed == 1) sum = squares = Eigen::ArrayXXd::Zero(2, frf.lines());
@@ -88,7 +88,7 @@ TEST(CovarianceSmoothing, OverSeedsDegreesOfFreedomAreWhatTheySay) {
   // are independent.
   EXPECT_NEAR(covered, 0.95, 0.01);
   EXPECT_NEAR(mean, 1.0, 0.03);
-  // A variance of 7 degrees of freedom scatters by 1 / 7.
+  // A variance of 7 degrees of freedom has the relative variance 1 / 7.
   EXPECT_NEAR((squares - sum.square()).mean() * 7.0, 1.0, 0.15);
 }
 

@@ -11,8 +11,8 @@ namespace test_distortion_variance {
 
 constexpr Eigen::Index kLines = 400;
 
-/// A plant that falls by 80 dB, its noise flat and its distortion in proportion to the response; the variances are those of
-/// M realizations of P periods.
+/// A plant that falls by 80 dB, with flat noise and a distortion proportional to the response; the variances are those
+/// of M realizations of P periods.
 struct Case {
   Eigen::MatrixXd truth;  ///< of the mean of the realizations
   FrfEstimate frf;
@@ -48,7 +48,7 @@ Case draw(std::uint64_t seed, int M, double relative_distortion) {
   return out;
 }
 
-/// What weights 1/v cost: the variance of a weighted mean over that with the true variance, minus 1.
+/// Cost of weights 1/v: the variance of a weighted mean over that with the true variance, minus 1.
 double loss(const Eigen::MatrixXd& variance, const Eigen::MatrixXd& truth) {
   const Eigen::ArrayXd w = variance.row(0).transpose().array().inverse();
   const Eigen::ArrayXd v = truth.row(0).transpose().array();
@@ -75,7 +75,7 @@ TEST(DistortionVariance, IsTheTotalVarianceOfManyRealizations) {
             0.01);
 }
 
-// An octave without response has no distortion in proportion to it.
+// An octave without response has no distortion proportional to it.
 TEST(DistortionVariance, AnOutputThatShowsNothingHasItsNoise) {
   Case drawn = draw(6, 3, 0.0);
   drawn.frf.response.setZero();

@@ -76,7 +76,7 @@ TEST(SelectChannels, PicksAndOrdersEverythingThatBelongsToThem) {
     EXPECT_EQ(part.input_factor(1, k), frf.input_factor(0 + 3 * 2, k));  // row a1, column a3
     EXPECT_EQ(part.covariance(1, k),
               frf.covariance(1 + 6 * 5, k));  // row z2 <- a1, column z2 <- a3
-    EXPECT_EQ(part.covariance(2, k), frf.covariance(5 + 6 * 1, k));  // and the reverse
+    EXPECT_EQ(part.covariance(2, k), frf.covariance(5 + 6 * 1, k));  // and vice versa
   }
   EXPECT_NO_THROW(check(part));
 }

@@ -13,8 +13,7 @@ using Complex = std::complex<double>;
 constexpr double kRate = 10000.0;
 constexpr double T = 1.0 / kRate;
 
-/// One input, one output, at 0.2, 1, 1.5, 2 kHz: `response(omega)` as a digital loop would measure
-/// it.
+/// One input, one output, at 0.2, 1, 1.5, 2 kHz: `response(omega)` as a digital loop would measure it.
 template <typename Response>
 FrfEstimate sampled(const Response& response) {
   FrfEstimate frf;
@@ -56,8 +55,8 @@ Complex continuous_resonance(double omega, double w, double zeta) {
   return 1.0 / (s * s + 2.0 * zeta * w * s + w * w);
 }
 
-// facts: exact over compensated is cos(theta)/sinc^2 with the delay only, and 1.0000, .9993, .9965,
-// .9882 with the hold: the rest is aliasing.
+// Exact over compensated is cos(theta)/sinc^2 with the delay only, and 1.0000, .9993, .9965, .9882 with the hold: the
+// rest is aliasing.
 TEST(HoldCompensation, DoubleIntegratorBehindAZeroOrderHold) {
   constexpr double kDelay = 1.3 * T;
   const FrfEstimate frf = sampled([](double omega) { return double_integrator(omega, kDelay); });
@@ -89,7 +88,7 @@ TEST(HoldCompensation, ResonanceBehindAZeroOrderHold) {
   const Complex truth = continuous_resonance(w, w, kDamping);
   const Complex delay = compensate(frf, Compensation::delay, 0.0).response(0, 3);
   const Complex hold = compensate(frf, Compensation::hold, 0.0).response(0, 3);
-  // At the peak aliasing is negligible; what the delay alone leaves is the sinc: 5.8 %.
+  // At the peak, aliasing is negligible; compensating the delay alone leaves the sinc: 5.8 %.
   EXPECT_NEAR(std::abs(delay / truth), 0.942, 1e-3);
   EXPECT_LT(std::abs(hold / truth - 1.0), 2e-3);
 }
@@ -115,7 +114,7 @@ TEST(HoldCompensation, SaysWhatItDid) {
   const FrfEstimate delay = compensate(frf, Compensation::delay, 2e-4);
   EXPECT_EQ(delay.compensated, Compensation::delay);
   EXPECT_EQ(delay.delay_s, 2e-4);
-  EXPECT_EQ(delay.hold, Hold::zoh);  // the sinc is still there
+  EXPECT_EQ(delay.hold, Hold::zoh);  // the sinc remains
   const FrfEstimate hold = compensate(frf, Compensation::hold, 2e-4);
   EXPECT_EQ(hold.compensated, Compensation::hold);
   EXPECT_EQ(hold.hold, Hold::none);
@@ -134,7 +133,7 @@ TEST(AsMeasured, PutsBackWhatWasTakenOut) {
   const FrfEstimate frf = sampled([](double omega) { return double_integrator(omega, 1e-4); });
   for (const Compensation kind : {Compensation::delay, Compensation::hold}) {
     const FrfEstimate back = as_measured(compensate(frf, kind, 3.7e-4));
-    // Out and in again: a handful of roundings.
+    // Compensated and restored: only rounding remains.
     EXPECT_LT((back.response - frf.response).norm(), 1e-14 * frf.response.norm());
     EXPECT_LT((back.noise_variance - frf.noise_variance).norm(), 1e-13);
     EXPECT_LT((back.total_variance - frf.total_variance).norm(), 1e-13);

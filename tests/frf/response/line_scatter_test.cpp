@@ -14,8 +14,8 @@ constexpr Eigen::Index kLines = 400;
 constexpr double kNoise = 1e-4;         // variance of the first channel
 constexpr double kDistortion = 2.5e-3;  // as large on every line
 
-/// Two outputs, one input, two modes some lines wide; circular errors of variance `kNoise + distortion` times
-/// 1 and 9, of which the FRF names the noise.
+/// Two outputs, one input, two modes some lines wide; circular errors of variance `kNoise + distortion` times 1 and 9.
+/// The FRF's noise variance is the part of the noise.
 FrfEstimate plant(double distortion, std::uint64_t seed) {
   FrfEstimate frf;
   frf.inputs = {{"u"}, {"N"}};
@@ -41,7 +41,7 @@ FrfEstimate plant(double distortion, std::uint64_t seed) {
   return frf;
 }
 
-// The median of Gamma(9)/9, what a variance of nine complex degrees of freedom scatters like, is 0.963.
+// The median of Gamma(9)/9, the distribution of a variance of nine complex degrees of freedom, is 0.963.
 constexpr double kMedian = 0.963;
 
 TEST(LineScatter, OfALinearPlantItIsTheNoise) {
@@ -51,8 +51,8 @@ TEST(LineScatter, OfALinearPlantItIsTheNoise) {
     EXPECT_NEAR(scatter.over_noise, kMedian, 0.15);
     sum += (scatter.variance.array() / plant(0.0, seed).noise_variance.array()).mean();
   }
-  // 20 x 400 lines of two channels, twelve of them together: less than 0.01 of standard deviation. The flanks of
-  // the modes, which stand 68 dB above the noise, leave 0.04.
+  // 20 x 400 lines of two channels, twelve of them together: a standard deviation of less than 0.01. The flanks of the
+  // modes, 68 dB above the noise, leave 0.04.
   EXPECT_NEAR(sum / 20.0, 1.0, 0.06);
 }
 

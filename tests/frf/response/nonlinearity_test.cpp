@@ -48,7 +48,7 @@ TEST(Nonlinearity, BandsAreOctavesOfEnoughLines) {
   FrfEstimate frf = one_band(40, 1.0, 1.0, 1.0, 1.0);
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(40, 1.0, 40.0);
   const NonlinearityTest test = nonlinearity_test(frf);
-  // 1 ... 8 (too few below), 9 ... 17, and 18 ... 35 takes the last five lines in.
+  // 1 ... 8 (too few below), 9 ... 17, and 18 ... 35, which includes the last five lines.
   ASSERT_EQ(test.band_hz.rows(), 3);
   EXPECT_EQ(test.band_hz(0, 1), 8.0);
   EXPECT_EQ(test.band_hz(1, 1), 17.0);
@@ -80,8 +80,8 @@ TEST(Nonlinearity, OnALinearPlantFalseAlarmsAreNominal) {
     at_5_percent += static_cast<int>((test.p_value.array() < 0.05).count());
     at_1_percent += static_cast<int>((test.p_value.array() < 0.01).count());
   }
-  // 3600 tests: standard deviations 0.36 and 0.17 %; the inputs of one output share its noise
-  // estimate, which widens them a little.
+  // 3600 tests: standard deviations 0.36 and 0.17 %; slightly more, because the inputs of one output share its noise
+  // estimate.
   EXPECT_NEAR(at_5_percent / static_cast<double>(tests), 0.05, 0.016);
   EXPECT_NEAR(at_1_percent / static_cast<double>(tests), 0.01, 0.008);
 }
@@ -110,7 +110,7 @@ TEST(Nonlinearity, ACubicTermAtMinus60DecibelIsFound) {
   EXPECT_LT(found.distortion.maxCoeff(), 0.1);
 }
 
-// Without noise F passes 1e16 where the distortion is largest: that says most, not nothing.
+// Without noise, F exceeds 1e16 at the largest distortion; this is strong evidence, not none.
 TEST(Nonlinearity, WithoutNoiseEveryBandThatIsDistortedIsNonlinear) {
   const test::SampledPlant plant =
       test::sampled_plant(2, 2, {{12.3, 0.1}, {37.0, 0.1}}, 200.0, 0.5);

@@ -9,7 +9,7 @@
 namespace stageid {
 namespace test_responding_channels {
 
-/// Two channels of one input: a response of `first` and one of `second` deviations, in noise of one deviation.
+/// Two channels of one input: responses of `first` and `second` standard deviations, in noise of one.
 FrfEstimate two_channels(double first, double second, std::uint64_t seed) {
   constexpr Eigen::Index kLines = 400;
   std::mt19937_64 engine(seed);

@@ -59,7 +59,7 @@ std::uint64_t longest_stretch(const Eigen::VectorXd& x) {
 TEST(ChannelScan, NothingIsMissedWhereverItStands) {
   for (Eigen::Index at = 600; at < 624; ++at) {  // around borders between pieces of 256
     Eigen::VectorXd x = normal_samples(3000, static_cast<std::uint64_t>(at));
-    if (at % 2 == 0) x = (x * 4.0).array().round();  // values come again far apart
+    if (at % 2 == 0) x = (x * 4.0).array().round();  // values recur far apart
     x.segment(at, 5).setConstant(x.maxCoeff());
     x.segment(2048 + at, 3).setConstant(x.minCoeff());
     std::map<double, std::uint64_t> count;
@@ -87,12 +87,12 @@ TEST(ChannelScan, ClippedSamplesPileUpAndOthersDoNot) {
     ChannelScan clean;
     clean.add(x);
     EXPECT_GE(clean.log_p_high(), limit) << seed;
-    // A coarse converter repeats its outermost level, but not more often than the one before it.
+    // A coarse converter repeats its outermost level, but not more often than the adjacent one.
     ChannelScan coarse;
     coarse.add((x * 4.0).array().round().matrix());
     EXPECT_GE(coarse.log_p_high(), limit) << seed;
     EXPECT_GE(coarse.log_p_low(), limit) << seed;
-    // 2 % of the samples lie above 2.05.
+    // 2 % of the samples are above 2.05.
     ChannelScan clipped;
     clipped.add(x.cwiseMin(2.05));
     EXPECT_LT(clipped.log_p_high(), limit) << seed;

@@ -1,4 +1,4 @@
-// Channels that show one value throughout: unplugged, stuck.
+// Constant channels: unplugged, stuck.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ MemoryLog noisy_log() {
 
 class ConstantSensor : public testing::TestWithParam<double> {};
 
-// Not even rounding is taken for a response of it.
+// Not even rounding is taken for a response.
 TEST_P(ConstantSensor, GivesAResponseOfZeroAndAFault) {
   MemoryLog log = noisy_log();
   for (LogSamples& record : log.records) record.sensors.col(1).setConstant(GetParam());

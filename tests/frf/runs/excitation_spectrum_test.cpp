@@ -30,7 +30,7 @@ TEST(ExcitationSpectrum, FindsLinesChannelsAndCoefficients) {
   RealDft dft(kPeriod);
   Eigen::MatrixXd period = Eigen::MatrixXd::Zero(kPeriod, 3);
   period.col(1) = multisine(lines, Eigen::VectorXd::Constant(400, 2.0));
-  period.col(2).setConstant(4.0);  // an offset is no excitation
+  period.col(2).setConstant(4.0);  // an offset is not an excitation
   const ExcitationSpectrum found = excitation_spectrum(period, dft);
   EXPECT_EQ(found.lines, lines);
   EXPECT_EQ(found.channels, std::vector<Eigen::Index>{1});
@@ -38,7 +38,7 @@ TEST(ExcitationSpectrum, FindsLinesChannelsAndCoefficients) {
   EXPECT_EQ(found.values.row(0).norm(), 0.0);
 }
 
-// The sign of the exponent: a cosine ahead by 90 degrees (cos(x + pi/2)) has the coefficient +j/2.
+// The sign of the exponent: a cosine with a lead of 90 degrees (cos(x + pi/2)) has the coefficient +j/2.
 TEST(ExcitationSpectrum, APhaseLeadIsAPositiveAngle) {
   RealDft dft(kPeriod);
   Eigen::MatrixXd period(kPeriod, 1);
@@ -58,7 +58,7 @@ TEST(ExcitationSpectrum, ShapedSpectraKeepTheirWeakLines) {
     amplitude[k] = std::pow(10.0, -5.0 * static_cast<double>(k) / 400.0);
   RealDft dft(kPeriod);
   EXPECT_EQ(excitation_spectrum(multisine(lines, amplitude), dft).lines, lines);
-  // As float32 as well: rounding is 6e-8 of a sample.
+  // The same for float32: rounding is 6e-8 of a sample.
   const Eigen::MatrixXd single = multisine(lines, amplitude).cast<float>().cast<double>();
   EXPECT_EQ(excitation_spectrum(single, dft).lines, lines);
 }

@@ -42,7 +42,7 @@ void expect_equal(const HealthRecord& a, const HealthRecord& b) {
   }
 }
 
-// By the definition, not by what else is in the library: a DFT sum.
+// By the definition, independently of the library: a DFT sum.
 std::complex<double> dft_of(const Eigen::VectorXd& samples, int line) {
   std::complex<double> sum = 0.0;
   const auto N = static_cast<double>(samples.size());
@@ -60,7 +60,7 @@ TEST(HealthRecord, HoldsTheSpectraOfEveryChannelAndCleanPeriod) {
   ASSERT_EQ(record.lines.size(), 60U);
   ASSERT_EQ(record.lines[3].Z.rows(), 2 + 3);
   for (const Eigen::Index column : {0, 2, 4, 6}) {
-    // Of the second run the period behind the transient that is marked is missing.
+    // The second run lacks the marked period after the transient.
     const bool second = column >= 4;
     const Eigen::Index period =
         skipped + (second ? column - 4 + (column - 4 >= 2 - skipped ? 1 : 0) : column);

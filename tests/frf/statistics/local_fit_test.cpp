@@ -14,8 +14,8 @@ using test::ComplexNoise;
 constexpr Eigen::Index kBins = 12;
 constexpr Eigen::Index kChannels = 4;
 
-/// Bins -12, -10, ..., 10 without the line, polynomials of order 2, channels that are smooth or have
-/// the poles given (in units of r).
+/// Bins -12, -10, ..., 10 without the line, polynomials of order 2, channels that are smooth or have the given poles
+/// (in units of r).
 LocalProblem problem_with(const std::vector<std::complex<double>>& poles) {
   LocalProblem p;
   p.r = Eigen::VectorXd::LinSpaced(kBins, -1.0, 0.95);
@@ -49,7 +49,7 @@ TEST(LocalFit, APolynomialIsFoundExactly) {
   EXPECT_EQ(fit.dof, 9.0);
 }
 
-// The poles are as far from the line as the bins from each other: no polynomial follows that.
+// The poles are as far from the line as the bins from each other, which no polynomial can follow.
 TEST(LocalFit, PolesNarrowerThanTheBinsAreFound) {
   for (const auto& poles : {std::vector<std::complex<double>>{{0.1, 0.15}},
                             std::vector<std::complex<double>>{{0.1, 0.15}, {-0.25, 0.2}}}) {
@@ -61,7 +61,7 @@ TEST(LocalFit, PolesNarrowerThanTheBinsAreFound) {
     for (Eigen::Index c = 0; c < kChannels; ++c) {
       const std::complex<double> truth =
           -n * std::complex<double>(1.0, 0.4 * static_cast<double>(c));
-      // A polynomial through the same bins is wrong by more than a tenth.
+      // The error of a polynomial through the same bins is more than a tenth.
       EXPECT_LT(std::abs(fit.value(c, 0) - truth), 1e-8);
       EXPECT_GT(std::abs(polynomial.value(c, 0) - truth), 0.1);
     }
@@ -87,14 +87,14 @@ TEST(LocalFit, StatedCovarianceIsTheScatterOverTrials) {
       scatter += (fit.value - truth).squaredNorm() / kTrials;
       stated += (fit.leverage[0] * variance + fit.pole_spread.squaredNorm()) / kTrials;
     }
-    // 4 x 9 degrees of freedom a trial: 0.3 %; 4 values a trial: 0.8 %. Five of them, and 1 % for
+    // 4 x 9 degrees of freedom per trial: 0.3 %; 4 values per trial: 0.8 %. The bounds are five of them, plus 1 % for
     // the first-order treatment of a pole at this signal-to-noise ratio of 100.
     EXPECT_NEAR(noise / (kChannels * 1e-4), 1.0, 0.02) << resonant;
     EXPECT_NEAR(scatter / stated, 1.0, 0.05) << resonant;
   }
 }
 
-// As often as stated, or less: channels with noise of their own share one D.
+// At most at the stated rate: channels with independent noise share one D.
 TEST(LocalFit, NoiseIsSeldomTakenForAPole) {
   ComplexNoise random(3);
   int poles = 0;
@@ -110,7 +110,7 @@ TEST(LocalFit, NoiseIsSeldomTakenForAPole) {
   EXPECT_LE(poles_of_a_strict_test, 19);  // 0.5 %
 }
 
-/// Noise alone, seen by zippered lines of two axes: two groups, interleaved, a cubic each.
+/// Noise alone on zippered lines of two axes: two interleaved groups with a cubic each.
 LocalProblem two_groups(Eigen::Index channels, ComplexNoise& random) {
   constexpr Eigen::Index kOfAGroup = 7;
   LocalProblem p;
@@ -145,10 +145,9 @@ TEST(LocalFit, VariancesOfAMeanOverPolesScatterAsTheirDegreesOfFreedomSay) {
       scarcity += 1.0 / fit.variance_dof / kTrials;
     }
     const double found = sum * sum / (squares - sum * sum);
-    // Poles were chosen for what they take: 7 % of the noise of one output.
+    // Poles are selected by what they remove: 7 % of the noise of one output.
     EXPECT_NEAR(sum, 1.0, 0.09) << channels;
-    // sqrt(2 / 3000) = 2.6 % for one channel, whose fits have 5.8 degrees of freedom on average where 5.0
-    // are found.
+    // sqrt(2 / 3000) = 2.6 % for one channel. Its fits state 5.8 degrees of freedom on average; 5.0 are found.
     EXPECT_NEAR(found * scarcity, 1.0, 0.09) << channels;
   }
 }

@@ -8,7 +8,7 @@
 namespace stageid {
 namespace test_tail_probability {
 
-// scipy.stats.f.logsf(x, 2 a, 2 b); the second overflows unless it is scaled on the way.
+// scipy.stats.f.logsf(x, 2 a, 2 b); the second overflows without intermediate scaling.
 TEST(TailProbability, OfFIsThatOfScipy) {
   EXPECT_NEAR(log_tail_of_f(1.2, 130, 1170.0), -3.8900547289422773, 1e-9);
   EXPECT_NEAR(log_tail_of_f(1.05, 2000, 20000.0), -4.026592717858111, 1e-7);
@@ -22,7 +22,7 @@ TEST(TailProbability, OfEvidenceIsThatOfScipy) {
   EXPECT_EQ(tail_of_evidence(3.0, 0), 1.0);
 }
 
-// scipy.stats.chi2.sf(x, n), to the accuracy of Wilson and Hilferty: far out, and of few degrees, a factor of three.
+// scipy.stats.chi2.sf(x, n), to the accuracy of Wilson and Hilferty: far out and for few degrees, a factor of three.
 TEST(TailProbability, OfChiSquareIsThatOfScipy) {
   EXPECT_NEAR(tail_of_chi_square(4.0, 4.0), 0.40600584970983794, 2e-3);
   EXPECT_NEAR(tail_of_chi_square(52.0, 36.0), 0.04110463210330187, 1e-4);
@@ -40,7 +40,7 @@ TEST(TailProbability, AgreesWithClosedForms) {
   EXPECT_NEAR(log_tail_of_f(1.7, 2, 2.0), std::log(w * w * (3.0 - 2.0 * w)), 1e-14);
 }
 
-// Noise-free data: F beyond what 1 - w tells from one, and beyond the largest double.
+// Noise-free data: 1 - w rounds to one, and F exceeds the largest double.
 TEST(TailProbability, StaysANumberHoweverCleanTheDataAre) {
   EXPECT_NEAR(log_tail_of_f(1e20, 1, 7.0), -7.0 * std::log1p(1e20 / 7.0), 1e-10);
   EXPECT_NEAR(log_tail_of_f(1e20, 2, 2.0), std::log(3.0) - 2.0 * std::log1p(1e20), 1e-10);

@@ -1,4 +1,4 @@
-// Delays are told where the response tells them: block by block, and not from noise.
+// Delays are determined from the response, block by block, and not from noise.
 #include "frf/wiring/connected_blocks.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace test_connected_blocks {
 
 using Index = Eigen::Index;
 
-/// Blocks of a rigid body and six modes each, one delay a block, noise of one size on all entries of a line.
+/// Blocks of a rigid body and six modes each, one delay per block, noise of one size on all entries of a line.
 std::vector<PlantLine> decoupled_plant(std::uint64_t seed,
                                        const std::vector<std::array<Index, 2>>& shapes,
                                        const std::vector<double>& late_s) {
@@ -102,7 +102,7 @@ TEST(ConnectedBlocks, AChannelOfNoiseBelongsToNone) {
   EXPECT_EQ(blocks[0].outputs, (std::vector<Index>{0, 1, 3}));
 }
 
-// One block is 20 us later than the other: of its plant, nothing says that a channel is.
+// One block is 20 us later than the other: this is a property of the plant, not of a channel.
 TEST(SkewOfBlocks, ADelayBetweenBlocksIsNotACharge) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const auto lines = decoupled_plant(seed, {{4, 5}, {3, 4}}, {0.0, 20e-6});

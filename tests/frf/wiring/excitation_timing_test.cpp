@@ -1,4 +1,4 @@
-// An excitation that was recorded late: the channels are right, and so is the response.
+// An excitation that was recorded late: the channels and the response are right.
 #include "frf/wiring/excitation_timing.hpp"
 
 #include <gtest/gtest.h>
@@ -74,7 +74,7 @@ TEST(ExcitationTiming, WholeSamplesAreFoundWithAndWithoutTheController) {
         EXPECT_EQ(delay->certain, known);
         EXPECT_EQ(to_finding(*delay).severity, Severity::doubt);
       }
-      // What the finding says of the response holds.
+      // The finding's statement about the response is true.
       const FrfEstimate after = estimate_plant_frf({&c.log});
       EXPECT_LT((after.response - before.response).cwiseAbs().maxCoeff(),
                 1e-9 * before.response.cwiseAbs().maxCoeff());
@@ -92,7 +92,7 @@ TEST(ExcitationTiming, BlamesNoChannel) {
   for (const Finding& f : findings) EXPECT_NE(f.cause, Cause::skew) << f.channel << " " << f.what;
 }
 
-// Then the excitation is right, and the response wrong.
+// In this case the excitation is right and the response is wrong.
 TEST(ExcitationTiming, ActuatorsThatAreLateAreNotTakenForIt) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     Case c(seed);

@@ -1,4 +1,4 @@
-// What is mapped wrongly, or cannot be known, in a log of others: said for what it is.
+// Wrong or unknown mappings in logs of other programs are reported as such.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ NominalStage small_nominal() {
   return nominal;
 }
 
-/// Records the excitation where the plant input belongs.
+/// Records the excitation instead of the plant input.
 void map_excitation(MemoryLog& log, Eigen::Index actuator, double factor) {
   for (std::size_t e = 0; e < log.records.size(); ++e) {
     const Eigen::MatrixXd& period = log.excitation_periods[e];
@@ -92,8 +92,8 @@ TEST(MappedExcitation, OfAllActuatorsIsADoubtUnlessTheLoopIsKnown) {
   EXPECT_EQ(first_with(health_of(log, open), Cause::injection), nullptr);
 }
 
-/// A chirp in the first third of each period, an open loop, one axis an experiment.
-/// @param arrives how many of the two axes are driven
+/// A chirp in the first third of each period, an open loop, one axis per experiment.
+/// @param arrives number of the two axes that are driven
 MemoryLog chirp_log(int arrives) {
   const int axes = 2;
   LoopExperiment x{.sample_rate_hz = 1000.0, .period_samples = 1000, .axes = axes};
@@ -125,7 +125,7 @@ TEST(Chirp, FollowedByRestIsNotDead) {
   EXPECT_EQ(first_with(found, Cause::dead), nullptr) << first_with(found, Cause::dead)->channel;
   EXPECT_EQ(first_with(found, Cause::saturated), nullptr);
   EXPECT_EQ(first_with(found, Cause::excitation), nullptr);
-  // A sensor that is stuck while the chirp runs still is.
+  // A sensor that is stuck during the chirp is still detected.
   double stuck_at = 0.25;
   for (LogSamples& record : log.records)
     record.sensors.col(1).tail(2500).setConstant(stuck_at += 0.01);
@@ -134,7 +134,7 @@ TEST(Chirp, FollowedByRestIsNotDead) {
   EXPECT_EQ(first_with(stuck, Cause::dead)->channel, "z2");
 }
 
-/// As a controller makes it of the sensors' noise.
+/// As computed by a controller from the sensors' noise.
 void add_noise_to_actuators(MemoryLog& log, double rms) {
   test::RandomNumbers random(9);
   for (LogSamples& record : log.records)
@@ -153,7 +153,7 @@ TEST(SilentAxis, IsNamedThoughItsExcitationIsRecorded) {
 }
 
 TEST(SilentStage, IsNoCaseOfDeadSensors) {
-  MemoryLog log = chirp_log(0);  // the sensors see noise, the actuators get the excitation
+  MemoryLog log = chirp_log(0);  // the sensors measure noise, the actuators record the excitation
   for (Eigen::Index a = 0; a < 2; ++a) map_excitation(log, a, 1.0);
   add_noise_to_actuators(log, 0.1);
   const std::vector<Finding> found = health_of(log);
@@ -172,7 +172,7 @@ TEST(UnknownStage, IsSaidFirstWithTheFlagThatHelps) {
   EXPECT_THAT(found[0].remedy, HasSubstr("--stage FILE"));
   EXPECT_THAT(found[0].figure, HasSubstr("over 3 experiments"));
   for (LogSamples& record : log.records) record.sensors.col(0).setConstant(0.0);
-  EXPECT_EQ(health_of(log)[0].cause, Cause::dead);  // a fault comes before what is not known
+  EXPECT_EQ(health_of(log)[0].cause, Cause::dead);  // a fault precedes unchecked properties
   EXPECT_EQ(health_of(log)[1].cause, Cause::unknown_stage);
 }
 

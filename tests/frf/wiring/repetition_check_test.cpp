@@ -27,7 +27,7 @@ std::vector<Finding> check_log(const MemoryLog& log) {
   return check_repetition(read_health_record({&log}, {}));
 }
 
-/// Another period than the measured one.
+/// A period other than the measured one.
 void declare(MemoryLog& log, int samples) {
   const auto old = static_cast<Eigen::Index>(log.log_info.period_samples);
   log.log_info.period_samples = samples;
@@ -66,14 +66,14 @@ TEST(Repetition, NoiseIsNoWrongPeriod) {
           << noise << ", " << periods << " periods";
 }
 
-// F beyond 1e16 is the surest response of all.
+// F above 1e16 is the clearest response.
 TEST(DataHealth, WithoutNoiseNoSensorIsDead) {
   const MemoryLog log = log_of(experiment(4, 0.0));
   for (const Finding& finding : check_health(read_health_record({&log}, {}), std::nullopt))
     EXPECT_EQ(finding.severity, Severity::unchecked) << finding.what;
 }
 
-// An excitation added at the reference bears no actuator's name.
+// An excitation added at the reference does not have an actuator's name.
 TEST(Repetition, TheExcitationNeedNotBeAtTheActuators) {
   MemoryLog log = log_of(experiment(5, 1e-3));
   log.log_info.excitation.names = {"r1", "r2", "r3"};

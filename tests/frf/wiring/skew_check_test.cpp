@@ -20,12 +20,12 @@ struct PlantRequest {
   Index actuators = 8;
   double shape_phase_rad = 0.0;  ///< rms over the entries of the mode shapes
   double noise = 1e-3;           ///< of every entry
-  Eigen::VectorXd late_s = {};   ///< [sensors; actuators]; empty: nobody
+  Eigen::VectorXd late_s = {};   ///< [sensors; actuators]; empty: no channel
 };
 
-/// A rigid body and 15 modes of random shapes, 170 to 2300 Hz, damping ratio 0.003 to 0.015, by the sum of
-/// their fractions; a shape with phases has the residue Re R + Im R s / omega_r, as viscous damping
-/// that is not proportional makes it.
+/// A rigid body and 15 modes of random shapes, 170 to 2300 Hz, damping ratio 0.003 to 0.015, by the sum of their
+/// fractions. A shape with phases has the residue Re R + Im R s / omega_r, as for viscous damping that is not
+/// proportional.
 std::vector<PlantLine> random_plant(const PlantRequest& request) {
   test::RandomNumbers random(request.seed);
   const std::complex<double> j(0.0, 1.0);
@@ -135,7 +135,7 @@ TEST(SkewCheck, FindsNothingWhereNobodyIsLate) {
   }
 }
 
-/// A phase of 1 degree at 500 Hz is that of 5.6 us.
+/// A phase of 1 degree at 500 Hz corresponds to 5.6 us.
 TEST(SkewCheck, ModeShapesThatAreNotQuiteRealAreNotSkew) {
   PlantRequest request;
   request.shape_phase_rad = 1.0 * std::numbers::pi / 180.0;

@@ -10,10 +10,10 @@
 
 namespace stageid::test {
 
-/// Passes on what comes in as a function has changed it.
+/// Passes on received frames after a function has changed them.
 class AlteredCan final : public CanTransport {
  public:
-  /// Gets all of the receiver's room and how many frames have come; returns how many there are then.
+  /// Receives the receiver's buffer and the number of frames; returns their new number.
   using Alter = std::function<std::size_t(std::span<CanFrame>, std::size_t)>;
 
   AlteredCan(CanTransport& inner, Alter alter) : inner_(inner), alter_(std::move(alter)) {}
@@ -34,7 +34,7 @@ class AlteredCan final : public CanTransport {
   Alter alter_;
 };
 
-/// Writes the checksum anew after a change.
+/// Recomputes the checksum after a change.
 inline void reseal(CanFrame& frame) { put_can(frame, 6, can_frame_crc(frame)); }
 
 }  // namespace stageid::test

@@ -11,8 +11,8 @@
 namespace stageid {
 namespace test_can_bus_load {
 
-// Longest frames in microseconds, rounded, computed by a program that counts the bits of worst
-// cases one by one (11-bit identifiers, 1 Mbit/s nominal).
+// Longest frames in microseconds, rounded, computed by a program that counts the bits of worst cases
+// (11-bit identifiers, 1 Mbit/s nominal).
 TEST(CanBusLoad, FrameTimesAgreeWithCountedBits) {
   struct Row {
     std::size_t bytes;
@@ -39,8 +39,8 @@ CanSpec wafer_spec(const StageInfo& info, double data_bit_rate_hz) {
   return spec;
 }
 
-// 17 setpoints and 7 measurements, 64 + 32 bytes: 316, 637 and 236 us with a frame that only
-// synchronizes (41, 51 and 38 us), which this protocol does without.
+// 17 setpoints and 7 measurements, 64 + 32 bytes. The reference values include a synchronization frame, which this
+// protocol does not have.
 TEST(CanBusLoad, AWaferStageAsInTheTable) {
   const StageInfo info = test::silent_wafer_stage_spec().info;
   struct Row {

@@ -18,7 +18,7 @@ using test::CanRig;
 using Host = test::CanHost;
 using Wire = test::CanRigOptions;
 
-/// One row of the fault table: what the wire does, what the host says, what both have counted.
+/// One row of the fault table: the faults of the wire, the host's result, the counts of both sides.
 struct Row {
   const char* name;
   std::vector<std::string> node_faults;  // of measurements; frame 0 is y[0]
@@ -33,7 +33,7 @@ struct Row {
 
 class WallClockFaults : public testing::TestWithParam<Row> {};
 
-// Against the wall clock nothing is repeated: a fault costs its sample and no other.
+// On the wall clock nothing is repeated: a fault affects only its own sample.
 TEST_P(WallClockFaults, CostTheirSampleOnly) {
   const Row& row = GetParam();
   CanRig rig(Wire{row.host_faults, row.node_faults});
@@ -86,7 +86,7 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
-// In virtual time nothing moves while the host asks again: the run is the one without the fault.
+// In virtual time nothing moves while the host asks again, so the run equals that without the fault.
 TEST(CanStage, InVirtualTimeSingleFaultsHeal) {
   CanRig clean;
   Host reference(clean);

@@ -1,4 +1,4 @@
-// A bus that is never silent keeps nobody from looking at the time.
+// Deadlines are checked even if a bus is never silent.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace test_can_flood {
 using test::CanRig;
 using Host = test::CanHost;
 
-/// A bus that is never silent: each look at it takes some time and finds it full.
+/// A bus that is never silent: each receive() takes some time and returns a full batch.
 test::AlteredCan::Alter flood(CanRig& rig) {
   return [&rig](std::span<CanFrame> frames, std::size_t count) {
     rig.pair().pass_time(100'000);
@@ -46,7 +46,7 @@ TEST(CanFlood, AFrozenNodeIsNoticedInTime) {
   const std::vector<double> u(2);
   EXPECT_EQ(stage.exchange({0, 0, u}, inputs, {}), Outcome::stale);
   EXPECT_LE(rig.pair().now_ns() - before_ns, 4 * 5'100'000) << "four times reply_timeout_s";
-  stage.stop();  // ends too
+  stage.stop();  // must return too
 }
 
 TEST(CanFlood, AnInterruptEndsTheWaitForAnAnswer) {

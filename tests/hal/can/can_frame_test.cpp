@@ -271,7 +271,7 @@ TEST(CanMessages, WhatIsOutOfRangeIsRefusedThoughItsCrcIsRight) {
     put_can(frame, 6, can_frame_crc(frame));
     return frame;
   };
-  // Codes of a state that are not known yet come through: they have a meaning, see PeerStatus.
+  // Unknown codes of a state are passed on; PeerStatus defines their meaning.
   CanState state;
   ASSERT_TRUE(decode_can_state(with_byte(encode_can_state({}), 2, 9), state));
   EXPECT_GT(state.state, NodeState::fault);

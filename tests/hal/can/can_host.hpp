@@ -9,7 +9,7 @@
 
 namespace stageid::test {
 
-/// A host that gives commands and writes down how each exchange ended.
+/// A host that sends commands and records the outcome of each exchange.
 class CanHost {
  public:
   explicit CanHost(CanRig& rig, CanHostOptions options = {}) : stage_(rig.host(options)) {
@@ -20,7 +20,7 @@ class CanHost {
     const double u = command(cycle_);
     const std::vector<double> both{u, -0.5 * u};
     const Outcome outcome = stage_->exchange({cycle_++, 0, both}, inputs_, {});
-    // A run by the wall clock is late on a busy machine; that is not what is looked at here.
+    // Ignored: a run on the wall clock may be late on a busy machine.
     return outcome == Outcome::late ? Outcome::ok : outcome;
   }
   std::vector<Outcome> exchange(int count) {

@@ -1,4 +1,4 @@
-// Who has the stage: second hosts, second nodes, forged frames and garbage on a bus.
+// Ownership of the stage: second hosts, second nodes, forged frames and garbage on a bus.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ std::string refusal(Action action) {
   return "accepted";
 }
 
-/// What a run gives that nobody disturbs.
+/// Result of an undisturbed run.
 std::vector<double> undisturbed(int samples) {
   CanRig rig;
   Host host(rig);
@@ -67,7 +67,7 @@ TEST(CanOwnership, ASecondHostIsRefusedAndTheFirstNoticesNothing) {
   EXPECT_EQ(second.exchange(), Outcome::ok);
 }
 
-/// Frames whose checksum is right and whose key is not, as from a host that guesses.
+/// Frames with a correct checksum and a wrong key, as from a host that guesses.
 class Forger {
  public:
   explicit Forger(CanRig& rig) : rig_(rig) {}
@@ -84,7 +84,7 @@ class Forger {
     command.c = 1;
     command.a = 1;
     to_node(encode_can_command(command));
-    // The run is right, as whoever listens knows it, the rest of the key is not.
+    // The run number is right, because it can be read on the bus; the rest of the key is wrong.
     CanConversions conversions;
     CanFrame setpoint;
     const std::vector<double> u(2, 49.0);
@@ -170,7 +170,7 @@ TEST(CanOwnership, AnybodyMayAskForAQuickStop) {
 
 TEST(CanOwnership, AHostOfVersionOneIsToldToBeUpdated) {
   CanRig rig;
-  CanFrame frame;  // as version 1 wrote it: 24 bytes behind the header
+  CanFrame frame;  // 24 bytes after the header, as in version 1
   frame.id = kCanCommandId;
   seal_can_frame(frame, {7, static_cast<std::uint8_t>(CanCommandCode::start), 1, 0}, 24);
   static_cast<void>(rig.pair().host().send({&frame, 1}));
@@ -192,7 +192,7 @@ TEST(CanOwnership, AHostOfVersionOneIsToldToBeUpdated) {
   EXPECT_EQ(rig.node().state(), NodeState::switch_on_disabled);
 }
 
-/// Several nodes at one end of a bus: each gets every frame.
+/// Several nodes at one end of a bus; each receives every frame.
 class Hub {
  public:
   explicit Hub(CanTransport& bus) : bus_(bus) {}
@@ -233,7 +233,7 @@ class Hub {
   CanTransport& bus_;
 };
 
-/// One more node, with a stage of its own, under the identifiers of the rig's.
+/// A second node with its own stage, using the same identifiers.
 struct Twin {
   Twin(CanRig& rig, Hub& hub)
       : end(hub),
@@ -355,7 +355,7 @@ TEST(CanOwnership, AnArmedNodeWhoseHostFallsSilentIsFreeAgain) {
   static_cast<void>(rig.pair().host().send({&frame, 1}));
   rig.serve_ms(1);
   ASSERT_NE(rig.node().session(), 0U);
-  // A chunk that comes now must not change the waveform whose digest was looked at.
+  // A chunk received now must not change the waveform whose digest was checked.
   const std::uint32_t rejected = rig.front().rejected();
   for (int token = 0; token < 256; ++token) {
     const CanFrame late = encode_can_chunk(

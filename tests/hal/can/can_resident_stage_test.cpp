@@ -19,7 +19,7 @@ using test::CanRig;
 
 constexpr int kPeriod = 400;
 
-/// Loses every n-th frame in both directions, whatever it is.
+/// Loses every n-th frame in both directions, of any kind.
 class LossyCan final : public CanTransport {
  public:
   LossyCan(std::unique_ptr<CanTransport> inner, unsigned lost_of_hundred)
@@ -103,7 +103,7 @@ JobProgress play(CanRig& rig, CanResidentStage& stage, std::uint64_t seed) {
   return progress;
 }
 
-/// u = C(y) + r on the bare stage: rows of u and y.
+/// u = C(y) + r on the stage without bus: rows of u and y.
 std::vector<double> expected_rows(const WaferStageSpec& spec, std::uint64_t seed) {
   SimulatedStage stage(spec);
   MotionController controller(spec.controller);
@@ -116,7 +116,7 @@ std::vector<double> expected_rows(const WaferStageSpec& spec, std::uint64_t seed
   stage.start(seed, inputs);
   for (std::uint64_t n = 0; n < 3 * kPeriod; ++n) {
     controller.update(y.data(), u.data());
-    // The waveform goes over as float32.
+    // The waveform is transferred as float32.
     u[1] += static_cast<double>(static_cast<float>(w.samples(static_cast<int>(n % kPeriod), 1)));
     rows.insert(rows.end(), {u[0], u[1], y[0]});
     EXPECT_EQ(stage.exchange({n, 0, u}, inputs, {}), Outcome::ok);

@@ -26,8 +26,8 @@ struct CanRigOptions {
   int buses = 1;                         ///< actuator a2 on the second
 };
 
-/// A simulated stage of two actuators and one sensor behind buses within the process, at 1 kHz: the
-/// node works while the host waits, and time is that of the bus.
+/// A simulated stage of two actuators and one sensor behind buses within the process, at 1 kHz. The node works while
+/// the host waits, and the time is that of the bus.
 class CanRig {
  public:
   explicit CanRig(CanRigOptions options = {}, WaferStageSpec stage = quiet_stage())
@@ -54,7 +54,7 @@ class CanRig {
     return spec;
   }
 
-  /// A new node process: nothing of the old one is left.
+  /// Replaces the node by a new one, as after a restart.
   void boot() {
     NodeOptions options;
     options.watchdog_s = spec_.watchdog_s;
@@ -71,7 +71,7 @@ class CanRig {
   void thaw() {
     pair_.when_host_waits([this] { front_->serve(0); });
   }
-  /// The node alone, for so long.
+  /// Runs the node alone for this time.
   void serve_ms(int milliseconds) {
     for (int i = 0; i < milliseconds; ++i) {
       pair_.pass_time(1'000'000);

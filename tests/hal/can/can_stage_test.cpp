@@ -33,7 +33,7 @@ TEST(CanStage, GivesTheSamplesOfTheStageItselfButForRounding) {
     again.start(seed);
     bare.start(seed, inputs);
     for (std::uint64_t n = 0; n < 300; ++n) {
-      // Half a count of the sensor is all that the wire may change.
+      // The wire may change a measurement by at most half a count.
       ASSERT_NEAR(again.y()[0], y[0], 0.5001 * 1.25e-3 / kCanCountsOfRange) << n;
       const std::vector<double> u{Host::command(n), -0.5 * Host::command(n)};
       ASSERT_EQ(again.exchange(), Outcome::ok);
@@ -73,7 +73,7 @@ TEST(CanStage, AChannelWithoutAValueIsIncompleteOrStale) {
 }
 
 TEST(CanStage, ASetpointThatIsMissingOnOneBusMovesNothing) {
-  // Frames in turn: u[2] on the second bus is frame 5.
+  // Frames are counted in turn: u[2] on the second bus is frame 5.
   CanRig rig(Wire{{"lost@5"}, {}, 2});
   Host host(rig, {1e3, false});
   host.start();

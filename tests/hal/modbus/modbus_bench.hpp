@@ -25,7 +25,7 @@ inline std::vector<ModbusFault> modbus_faults(const std::vector<std::string>& te
   return faults;
 }
 
-/// A server in a thread of its own, on a free TCP port or on one end of a pty pair.
+/// A server in a separate thread, on a free TCP port or on one end of a pty pair.
 class ServerThread {
  public:
   ServerThread(ModbusRegisters& registers, ModbusFaultScript* faults, bool serial = false,
@@ -40,7 +40,7 @@ class ServerThread {
   ServerThread(const ServerThread&) = delete;
   ServerThread& operator=(const ServerThread&) = delete;
 
-  /// Where a client finds it.
+  /// The address for a client.
   ModbusAddress address() const {
     ModbusAddress address = server_.address();
     if (line_) address.device = line_->first();
@@ -51,7 +51,7 @@ class ServerThread {
   ModbusAddress here(int port) const {
     ModbusAddress address;
     address.port = port;
-    address.parity = 'N';  // a pty takes no other one twice
+    address.parity = 'N';  // a pty cannot be opened twice with other parities
     if (line_) address.device = line_->second();
     return address;
   }
@@ -65,7 +65,7 @@ class ServerThread {
 /// A node with two actuators and one sensor at 50 Hz behind Modbus.
 class ModbusBench {
  public:
-  /// A safe stop holds the stage for less than a sample: what moves it is the host.
+  /// A safe stop holds the stage for less than a sample, so only the host moves it.
   explicit ModbusBench(const std::vector<std::string>& faults = {}, bool serial = false,
                        double heartbeat_s = 1.0, NodePanel panel = good_panel())
       : script_(modbus_faults(faults)),
@@ -87,7 +87,7 @@ class ModbusBench {
   ModbusAddress address() const { return server_->address(); }
   StageNode& node() { return node_; }
   ModbusNode& registers() { return registers_; }
-  /// Ends the server, so that the fake stage may be looked at.
+  /// Ends the server, so that the fake stage may be examined.
   void stop() { server_.reset(); }
   /// Another server, on the same port.
   void restart(int port) {

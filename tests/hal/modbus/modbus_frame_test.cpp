@@ -45,7 +45,7 @@ TEST(ModbusFrame, AnRtuRequestEndsWhereItsFunctionSays) {
   const Bytes both = rtu_frame(7, Bytes{23, 0, 200, 0, 2, 0, 0, 0, 1, 2, 0xAB, 0xCD});
   for (const Bytes& whole : {read, write, both}) {
     Bytes line = whole;
-    line.insert(line.end(), read.begin(), read.end());  // what follows is not taken
+    line.insert(line.end(), read.begin(), read.end());  // the following bytes are not taken
     for (std::size_t size = 0; size < whole.size(); ++size)
       EXPECT_EQ(parse_rtu_request(std::span(line).first(size)).status, FrameStatus::incomplete);
     const ModbusRequest found = parse_rtu_request(line);
@@ -59,7 +59,7 @@ TEST(ModbusFrame, AnRtuRequestEndsWhereItsFunctionSays) {
 TEST(ModbusFrame, OneFlippedBitBreaksAnRtuRequest) {
   const Bytes sound = rtu_frame(1, Bytes{3, 0, 200, 0, 2});
   for (std::size_t bit = 0; bit < 8 * sound.size(); ++bit) {
-    if (bit / 8 == 1) continue;  // in the function it may change the length
+    if (bit / 8 == 1) continue;  // the function may change the length
     Bytes spoilt = sound;
     spoilt[bit / 8] = static_cast<std::uint8_t>(spoilt[bit / 8] ^ (1U << (bit % 8)));
     EXPECT_EQ(parse_rtu_request(spoilt).status, FrameStatus::broken) << bit;

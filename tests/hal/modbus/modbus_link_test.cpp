@@ -77,12 +77,12 @@ INSTANTIATE_TEST_SUITE_P(Wires, ModbusLinkTest, testing::Bool(),
 using ModbusRtuLink = ModbusLinkTest;
 INSTANTIATE_TEST_SUITE_P(Wires, ModbusRtuLink, testing::Values(true));
 
-// What drain() is there for: RTU replies have no number.
+// drain() is needed because RTU replies have no number.
 TEST_P(ModbusRtuLink, WithoutADrainTheLateReplyWouldBeTakenForTheNextAnswer) {
   serve({"late_reply:0.6"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::timeout);
-  std::this_thread::sleep_for(std::chrono::seconds(2));  // a pty of a busy machine takes its time
+  std::this_thread::sleep_for(std::chrono::seconds(2));  // a pty is slow on a busy machine
   EXPECT_EQ(read(10, values), LinkStatus::ok);
   EXPECT_EQ(values, (Pair{0, 1}));
 }

@@ -1,4 +1,4 @@
-// Who has the stage behind Modbus: second hosts, forged and random requests.
+// Ownership of the stage behind Modbus: second hosts, forged and random requests.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ using Bytes = std::vector<std::uint8_t>;
 constexpr ModbusConnection kOwner = 1;
 constexpr ModbusConnection kOther = 2;
 
-/// The registers of a node without a server: requests are given one by one.
+/// The registers of a node without a server: requests are made one by one.
 class Registers : public testing::Test {
  protected:
   Registers() : bench_(std::make_unique<ModbusBench>()) { bench_->stop(); }
@@ -44,7 +44,7 @@ class Registers : public testing::Test {
     EXPECT_EQ(bench_->registers().read(address, words), ModbusException::none);
     return get_u32(std::span<const std::uint16_t, 2>(words));
   }
-  /// Everything that a client can see but who it is.
+  /// Everything that is visible to a client, except the owner.
   std::vector<std::uint16_t> image() {
     std::vector<std::uint16_t> words(map::kEnd);
     bench_->registers().begin_request(kOwner);
@@ -144,7 +144,7 @@ TEST_F(Registers, TheRunOfAnotherDoorIsLeftAlone) {
   EXPECT_EQ(moved(), 0U);
 }
 
-// Each request as a server would get it from other clients; between them the owner goes on.
+// Each request as a server would receive it from other clients; in between, the owner continues.
 TEST_F(Registers, ForgedAndRandomRequestsOfOthersChangeNoSample) {
   begin();
   std::mt19937 engine(5);
@@ -174,11 +174,11 @@ TEST_F(Registers, ForgedAndRandomRequestsOfOthersChangeNoSample) {
     for (std::uint8_t& byte : pdu) byte = static_cast<std::uint8_t>(engine());
     constexpr std::uint8_t kFunctions[] = {3, 4, 6, 16, 23};
     pdu[0] = kFunctions[engine() % 5];
-    if (pdu.size() > 9 && engine() % 2 == 0) {  // lengths that agree, low addresses
+    if (pdu.size() > 9 && engine() % 2 == 0) {  // consistent lengths, low addresses
       pdu[1] = pdu[3] = pdu[5] = pdu[7] = 0;
       if (pdu[0] == 16) pdu[1] = 0, pdu[4] = static_cast<std::uint8_t>((pdu.size() - 6) / 2);
     }
-    // Commands of a supervisor are not of the run: a quick stop may come from anybody.
+    // Supervisor commands do not belong to the run: any client may send a quick stop.
     const bool writes = pdu[0] == 6 || pdu[0] == 16 || pdu[0] == 23;
     if (writes && pdu.size() > 6) pdu[pdu[0] == 23 ? 6 : 2] |= 16U;
     return pdu;
@@ -199,7 +199,7 @@ TEST_F(Registers, ForgedAndRandomRequestsOfOthersChangeNoSample) {
 }
 
 TEST(ModbusOwnership, ANodeThatWasRestartedIsNamedThoughItRefuses) {
-  /// One node after the other on one line.
+  /// Several nodes in turn on one line.
   class Line final : public ModbusRegisters {
    public:
     explicit Line(ModbusRegisters& first) : now(&first) {}

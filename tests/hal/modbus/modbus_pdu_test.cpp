@@ -23,7 +23,7 @@ class ModbusPdu : public testing::Test {
   test::NumberedRegisters registers_;
 };
 
-// The frames of the application protocol V1.1b3, chapter 6, with our numbers.
+// The frames of the application protocol V1.1b3, chapter 6, with other numbers.
 TEST_F(ModbusPdu, EveryFunctionAnswersAsTheProtocolSays) {
   EXPECT_EQ(answer({3, 0, 5, 0, 2}), (Bytes{3, 4, 0, 5, 0, 6}));
   EXPECT_EQ(answer({4, 0, 5, 0, 1}), (Bytes{4, 2, 0, 5}));

@@ -57,7 +57,7 @@ TEST(ModbusServer, GarbageOfOneClientDoesNotDisturbAnother) {
     const int client = raw_client(server.address().port);
     std::array<std::uint8_t, 64> bytes{};
     for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(engine() & 0xFFU);
-    // Every other time a header that looks sound, followed by a request cut off or made up.
+    // Every second time a plausible header, followed by a truncated or invented request.
     if (round % 2 == 0) std::fill_n(bytes.begin() + 2, 3, std::uint8_t{0});
     EXPECT_GT(send(client, bytes.data(), 7 + engine() % 57, MSG_NOSIGNAL), 0);
     Pair values{};
@@ -67,8 +67,8 @@ TEST(ModbusServer, GarbageOfOneClientDoesNotDisturbAnother) {
   }
 }
 
-// A request cut off, then whole ones without a pause longer than the server's silence: a server that
-// waits for the rest takes the next one's bytes for it.
+// A truncated request, then complete ones without a pause longer than the server's silence. A server that waits for the
+// rest would take bytes of the next request for it.
 TEST(ModbusServer, ASerialLineIsFoundAgainAfterHalfARequest) {
   test::NumberedRegisters registers;
   const test::ServerThread server(registers, nullptr, true);
@@ -88,7 +88,7 @@ TEST(ModbusServer, ASerialLineIsFoundAgainAfterHalfARequest) {
   close(line);
 }
 
-/// Sockets that are closed in the end.
+/// Sockets that are closed by the destructor.
 class Clients {
  public:
   Clients() {
@@ -102,7 +102,7 @@ class Clients {
   }
   Clients(const Clients&) = delete;
   Clients& operator=(const Clients&) = delete;
-  /// Out of the way: libmodbus cannot use a descriptor above 1023.
+  /// Uses descriptors from 1024 on, because libmodbus needs the lower ones.
   int add(int port) {
     const int low = raw_client(port);
     const int client = fcntl(low, F_DUPFD_CLOEXEC, 1024);
@@ -117,7 +117,7 @@ void write_to(int client, const Bytes& bytes) {
   static_cast<void>(send(client, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
 }
 
-/// Whether the server has ended this connection, by now or when it does.
+/// Whether the server has ended this connection; waits for it.
 bool hung_up(int client, int flags = 0) {
   std::array<std::uint8_t, 4096> bytes{};
   ssize_t count = 0;
@@ -128,8 +128,8 @@ bool hung_up(int client, int flags = 0) {
 
 const Bytes kReadRequest = tcp_frame(1, 1, Bytes{3, 0, 0, 0, 100});
 
-// The owner's run, a supervisor that counts, and everybody else: the owner's exchanges are answered
-// within its response time, the heartbeat is watched, and the run ends as it would have.
+// The owner's run, a supervisor with heartbeat, and other clients. The owner's exchanges are answered within its
+// response time, the heartbeat is watched, and the run ends normally.
 TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
   test::ModbusBench bench;
   ModbusStage owner(test::ModbusBench::info(), bench.address(), test::kQuickTiming);
@@ -154,7 +154,7 @@ TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
     if (i % 2 == 0) {
       write_to(client, {0, 1, 0, 0, 0});  // half a header
     } else {
-      for (int request = 0; request < 2000; ++request)  // and no reply is read
+      for (int request = 0; request < 2000; ++request)  // without reading a reply
         write_to(client, kReadRequest);
     }
     if (i % 5 != 0) continue;
@@ -196,7 +196,7 @@ TEST(ModbusServer, RepliesThatNobodyTakesEndTheConnection) {
   EXPECT_TRUE(errno == EPIPE || errno == ECONNRESET) << errno;
 }
 
-// Whatever a client does, the registers are looked at every few milliseconds, and the server ends.
+// For any client, the registers are updated every few milliseconds, and the server ends.
 TEST(ModbusServer, WatchesAndEndsWhileAClientStalls) {
   class Ticking final : public ModbusRegisters {
    public:
@@ -248,7 +248,7 @@ TEST(ModbusServer, ANewClientGetsThePlaceThatIsIdleLongestButNotAnOwners) {
   EXPECT_TRUE(ask(clients.all[4]));
 }
 
-// Requests for others and their replies, without a pause: between them ours is found and answered.
+// Requests and replies of other units without a pause: requests for this unit in between are found and answered.
 TEST(ModbusServer, OtherUnitsOnASerialLineDoNotDeafenTheNode) {
   test::NumberedRegisters registers;
   const test::ServerThread server(registers, nullptr, true);

@@ -37,7 +37,7 @@ class Host {
   std::uint64_t cycle = 0;
 };
 
-// The smallest powers of two that hold 20 N and 20 mm in 2^31 - 1 counts.
+// The smallest powers of two with which 2^31 - 1 counts cover 20 N and 20 mm.
 constexpr double kForceCount_n = 0x1p-26;
 constexpr double kPositionCount_m = 0x1p-36;
 
@@ -176,7 +176,7 @@ TEST(ModbusStage, SaysWhyAStageDoesNotStart) {
   EXPECT_THROW(stage.start(1, inputs), StageError);
 }
 
-/// A setpoint as it travels; the reply's sequence and missed count.
+/// A transmitted setpoint; the reply's sequence and missed count.
 std::pair<std::uint32_t, std::uint32_t> setpoint(ModbusLink& link, std::uint32_t session,
                                                  std::uint32_t sequence) {
   std::array<std::uint16_t, 8> request{};

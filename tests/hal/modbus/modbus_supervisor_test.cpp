@@ -20,7 +20,7 @@ using testing::HasSubstr;
 
 const ModbusSupervisorOptions kQuick = {0.01, 0.02, 0.1};
 
-/// Waits for something that must come; ten seconds are for a machine that is busy.
+/// Waits for an event; ten seconds allow for a busy machine.
 bool comes(const std::function<bool()>& condition) {
   for (int i = 0; i < 2000; ++i) {
     if (condition()) return true;
@@ -102,7 +102,7 @@ TEST(ModbusSupervisor, ConnectsAgainWhenTheServerIsBack) {
 }
 
 TEST(ModbusSupervisor, AnotherDeviceOrMapIsNamed) {
-  // The status has to be readable for its magic to be wrong.
+  // The status must be readable before its magic can be wrong.
   class Zeros final : public ModbusRegisters {
    public:
     void begin_request(ModbusConnection) override {}

@@ -9,7 +9,7 @@
 
 namespace stageid::test {
 
-/// 130 registers that hold their own number.
+/// 130 registers, each with its own number as value.
 class NumberedRegisters final : public ModbusRegisters {
  public:
   NumberedRegisters() {

@@ -11,7 +11,7 @@ namespace test_node_state_machine {
 using State = NodeState;
 using Command = SupervisorCommand;
 
-/// A machine that was led to `state` by the way a node goes.
+/// A machine brought to `state` in the way of a node.
 NodeStateMachine machine_in(State state) {
   NodeStateMachine machine;
   if (state == State::not_ready) return machine;
@@ -44,7 +44,7 @@ TEST(NodeStateMachine, EnableLeadsToOperationAndMeasuringBack) {
   EXPECT_EQ(machine.state(), State::switch_on_disabled);
 }
 
-/// One row of the table: what a command does in a state. An answer of no changes nothing.
+/// One row of the table: the effect of a command in a state. A refused command changes nothing.
 struct Row {
   State from;
   Command command;
@@ -61,7 +61,7 @@ TEST_P(CommandTable, Holds) {
   EXPECT_EQ(machine.state(), row.to);
 }
 
-// Every state that lasts, with every command.
+// Every stable state with every command.
 INSTANTIATE_TEST_SUITE_P(
     NodeStateMachine, CommandTable,
     testing::Values(

@@ -5,7 +5,7 @@
 
 namespace stageid::test {
 
-/// A plant in which all is well.
+/// A plant without faults.
 inline NodePanel good_panel() {
   NodePanel panel;
   panel.gravity_compensator_n = {50.0, 51.5};
@@ -16,7 +16,7 @@ inline NodePanel good_panel() {
   return panel;
 }
 
-/// The one sensor acts on the first of two actuators.
+/// The only sensor is at the first of two actuators.
 inline MotionControllerSpec one_axis_controller(double sample_rate_hz, double crossover_hz,
                                                 double gain_n_per_m) {
   MotionControllerSpec spec;

@@ -250,7 +250,7 @@ TEST(StageNode, RefusesWhatDoesNotFit) {
   EXPECT_THROW(make(controller(), {.hold_s = -1.0}), std::invalid_argument);
 }
 
-// The law that makes a stage behind wires comparable to one without: same seed, same run.
+// A stage behind a bus equals one without: same seed, same run.
 TEST(StageNode, GivesTheSamplesOfTheStageItself) {
   WaferStageSpec spec = test::small_stage_spec();
   spec.sensor_noise_m = 1e-9;

@@ -1,5 +1,4 @@
-// What a stage file can get wrong about a library. What a library does is tested with a real one, in another process:
-// integration.plugin.
+// Errors of a stage file about a library. integration.plugin tests a real library with another process.
 
 #include "hal/plugin/plugin_stage.hpp"
 

@@ -1,4 +1,4 @@
-// Between start() and stop() nothing of hal allocates: not in health, not at a limit, not in a fault.
+// Between start() and stop() nothing in hal allocates: not in normal operation, at a limit, or in a fault.
 #include <gtest/gtest.h>
 
 #include <memory>

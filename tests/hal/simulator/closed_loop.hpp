@@ -8,8 +8,7 @@
 
 namespace stageid::test {
 
-/// The measurement loop in its smallest form, u[n] = C y[n] + r[n]; logging and safety are left to
-/// acquisition.
+/// A minimal measurement loop, u[n] = C y[n] + r[n], without logging and safety, which belong to acquisition.
 class ClosedLoop {
  public:
   ClosedLoop(CyclicStage& stage, const MotionControllerSpec& controller)
@@ -24,7 +23,7 @@ class ClosedLoop {
     stage_.start(run_seed, inputs_);
   }
 
-  /// Computes u[n], then gives the stage the sample.
+  /// Computes u[n], then exchanges the sample with the stage.
   Outcome step(const Eigen::VectorXd& excitation) {
     controller_.update(y_.data(), u_.data());
     u_ += excitation;

@@ -8,7 +8,7 @@ namespace stageid::test {
 
 /// The whole closed loop of a noise-free stage as one discrete-time system,
 ///   x[n+1] = a x[n] + b r[n],   y[n] = c x[n],
-/// built with the general matrix exponential, by code that shares none with the simulator.
+/// built with the general matrix exponential, without code of the simulator.
 struct ClosedLoopModel {
   Eigen::MatrixXd a, b, c;
 };

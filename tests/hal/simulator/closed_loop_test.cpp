@@ -1,4 +1,4 @@
-// The stage of configs/stage/wafer_stage.yaml under its controller: is it a good experiment?
+// The stage of configs/stage/wafer_stage.yaml under its controller: suitability for experiments.
 #include "tests/hal/simulator/closed_loop.hpp"
 
 #include <gtest/gtest.h>
@@ -135,7 +135,7 @@ TEST(ClosedLoop, IsPeriodicAfterOnePeriod) {
   EXPECT_LT(change, 1e-9 * record.y.leftCols(kPeriod).norm());
 }
 
-// All thirteen axes at once, 2 N rms each, with noise: nothing comes near a limit.
+// All thirteen axes at once, 2 N rms each, with noise: all limits are far away.
 TEST(ClosedLoop, KeepsTheDefaultExperimentFarFromItsLimits) {
   const WaferStageSpec spec = test::wafer_stage_spec();
   for (const Eigen::MatrixXd& excitation :
@@ -158,9 +158,9 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// Relative standard deviation of FRF entries from three periods on one axis. With dY and dU the
-// differences between a noisy run and a silent one, dE = dY - G dU is the open-loop noise at the
-// sensors, and the error of the estimate is dE / U (three periods: over sqrt 3).
+// Relative standard deviation of FRF entries from three periods on one axis. Let dY and dU be the differences between a
+// noisy and a noise-free run. dE = dY - G dU is then the open-loop noise at the sensors, and the error of the estimate
+// is dE / U (three periods: over sqrt 3).
 class FrfNoise : public testing::Test {
  protected:
   FrfNoise() {
@@ -224,7 +224,7 @@ TEST_F(FrfNoise, LeavesEveryResonanceStandingOut) {
       const auto errors = relative_error(line);
       best.push_back(*std::min_element(errors.begin(), errors.end()));
     }
-    // The sensor that sees the mode best has 1 % or better there, even from this one actuator.
+    // The best sensor for the mode has 1 % or better there, even from this one actuator.
     EXPECT_LT(median(best), 1e-2) << "mode at " << f << " Hz";
   }
 }

@@ -49,7 +49,7 @@ double density(NoiseColour colour, double reference_hz, double hz) {
   return density(noise, hz);
 }
 
-// The deviation of a mean of 2000 periodograms is 2.2 %: bounds of five.
+// The standard deviation of a mean of 2000 periodograms is 2.2 %; the bounds are five of them.
 constexpr double kBound = 0.12;
 
 TEST(ColouredNoise, WhiteIsFlat) {
@@ -69,7 +69,7 @@ TEST(ColouredNoise, DriftFallsWithTheSquare) {
 
 TEST(ColouredNoise, ResonantHasItsDensityAtTheResonance) {
   EXPECT_NEAR(density(NoiseColour::resonant, 50.0, 50.0) / 4.0, 1.0, kBound);
-  // |H(f0)|^2 / |H(2 f0)|^2 of a second-order system is (9 + 16 zeta^2) / (4 zeta^2); the sampled one lies close.
+  // |H(f0)|^2 / |H(2 f0)|^2 of a second-order system is (9 + 16 zeta^2) / (4 zeta^2); the sampled one is close to it.
   const double ratio = (9.0 + 16.0 * 0.0025) / (4.0 * 0.0025);
   EXPECT_NEAR(density(NoiseColour::resonant, 50.0, 100.0) * ratio / 4.0, 1.0, 0.25);
 }

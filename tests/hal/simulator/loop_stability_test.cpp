@@ -20,8 +20,8 @@ WaferStageSpec with_crossovers(double factor) {
   return spec;
 }
 
-/// Growth per sample of a free motion of the loop, by steps of the matrix itself: the eigenvalues of a matrix in metres
-/// and newtons have lost half their digits.
+/// Growth per sample of a free motion of the loop, by steps of the matrix. Eigenvalues of a matrix in metres and
+/// newtons would lose half their digits.
 double growth(const Eigen::MatrixXd& a) {
   constexpr int kSteps = 20000;
   Eigen::VectorXd x = Eigen::VectorXd::Ones(a.rows());
@@ -37,7 +37,7 @@ double growth(const Eigen::MatrixXd& a) {
   return std::exp((log_size - half) / (kSteps / 2));
 }
 
-// The reference is made with the general matrix exponential, from the actuators and sensors themselves.
+// The reference uses the general matrix exponential and the actuators and sensors themselves.
 TEST(LoopStability, TheOutermostPoleIsThatOfTheWholeLoop) {
   for (const double factor : {0.5, 1.0, 3.0, 10.0}) {
     const WaferStageSpec spec = with_crossovers(factor);
@@ -52,11 +52,11 @@ TEST(LoopStability, TheOutermostPoleIsThatOfTheWholeLoop) {
 TEST(LoopStability, TheShippedStageHasMarginAndAFasterOneHasNot) {
   const LoopStability shipped = loop_stability(test::silent_wafer_stage_spec());
   EXPECT_TRUE(shipped.stable());
-  EXPECT_LT(shipped.largest_sensitivity, 1.75);  // the stage file promises 1.7, per channel
+  EXPECT_LT(shipped.largest_sensitivity, 1.75);  // the stage file states 1.7, per channel
   EXPECT_FALSE(loop_stability(with_crossovers(10.0)).stable());
 }
 
-// One axis, L = l: S = 1 / |1 + l|. Two axes of other units: the same, whatever the units.
+// One axis, L = l: S = 1 / |1 + l|. Two axes in other units give the same.
 TEST(LoopStability, SensitivityDoesNotDependOnUnits) {
   Eigen::MatrixXcd L{{std::complex<double>(-0.5, 0.0), 0.3}, {0.1, std::complex<double>(0.2, 1.0)}};
   const double size = largest_sensitivity(L);

@@ -34,8 +34,8 @@ std::vector<PlantMode> two_modes() {
           {210.0, 0.005, vector({0.4, 1.2}), vector({-0.6, 1.0})}};
 }
 
-// The same plant as one dense continuous-time system, x = [q; q' / v]; v makes the entries of a T
-// of order one, for the sake of the general matrix exponential.
+// The same plant as one dense continuous-time system, x = [q; q' / v]. v makes the entries of a T of order one, as the
+// general matrix exponential requires.
 struct StateSpace {
   MatrixXd a, b, c;
 };
@@ -69,8 +69,8 @@ VectorXd advance(const StateSpace& s, const VectorXd& x, const VectorXd& u, doub
 
 class DelayedPlant : public testing::TestWithParam<double> {};
 
-// Continuous time is cut at the sample instants and at the jumps of the input; nothing is assumed
-// about how many of them fall between two samples.
+// Continuous time is divided at the sample instants and at the jumps of the input, for any number of jumps between two
+// samples.
 TEST_P(DelayedPlant, FollowsTheMatrixExponentialOfTheWholeSystem) {
   const double rate_hz = 1000.0;
   const double delay_samples = GetParam();
@@ -130,8 +130,8 @@ TEST(ModalPlant, AgreesWithAnIndependentIntegration) {
   EXPECT_EQ(rows, 60);
 }
 
-// Excites the real plant with a periodic signal until the transient has died (here: the modes are
-// made well damped so that it does so quickly), and compares its DFT with the closed form.
+// Excites the plant with a periodic signal until the transient has decayed (the modes are well damped here), and
+// compares its DFT with the closed form.
 TEST(ModalPlant, ReachesTheClosedFormFrequencyResponse) {
   const WaferStageSpec spec = test::silent_wafer_stage_spec();
   auto modes = wafer_stage_modes(spec);
@@ -162,8 +162,8 @@ TEST(ModalPlant, ReachesTheClosedFormFrequencyResponse) {
   }
 }
 
-// A force held constant does the work u (y[n+1] - y[n]). Undamped, with collocated sensors and no
-// delay, all of it must be found again as vibration energy of the two modes.
+// A force held constant does the work u (y[n+1] - y[n]). Without damping and delay, and with collocated sensors, all of
+// it must equal the vibration energy of the two modes.
 TEST(ModalPlant, ConservesEnergy) {
   auto modes = two_modes();
   for (PlantMode& mode : modes) mode.damping_ratio = 0.0;
@@ -263,7 +263,7 @@ struct PropagatorCase {
 };
 class Propagator : public testing::TestWithParam<PropagatorCase> {};
 
-// In a unit of time in which all entries are of order one, where the general exponential is good.
+// In a unit of time in which all entries are of order one, as the general exponential requires.
 TEST_P(Propagator, IsTheMatrixExponential) {
   const auto [frequency_hz, damping, duration_s] = GetParam();
   const double wt = kTwoPi * frequency_hz * duration_s;

@@ -10,8 +10,8 @@
 
 namespace stageid::test {
 
-/// One period of a random-phase multisine on the odd lines 1, 3, ..., 2 * lines - 1. hal may not
-/// use excitation, so its tests have their own.
+/// One period of a random-phase multisine on the odd lines 1, 3, ..., 2 * lines - 1. hal must not use excitation, so
+/// its tests have this copy.
 inline Eigen::VectorXd odd_multisine(int period, int lines, double rms, std::uint64_t seed) {
   std::mt19937_64 engine(seed);
   std::uniform_real_distribution<double> phase(0.0, 2.0 * std::numbers::pi);

@@ -53,7 +53,7 @@ TEST(NormalSource, IsWhite) {
   const std::size_t n = values.size() - 100;
   for (const std::size_t lag : {1U, 2U, 7U, 8U, 16U, 32U, 64U, 96U}) {
     double sum = 0.0;
-    double squares = 0.0;  // Box-Muller pairs share their radius: look at the squares too
+    double squares = 0.0;  // Box-Muller pairs have a common radius, so the squares are tested too
     for (std::size_t i = 0; i < n; ++i) {
       sum += values[i] * values[i + lag];
       squares += (values[i] * values[i] - 1.0) * (values[i + lag] * values[i + lag] - 1.0);

@@ -11,8 +11,8 @@
 namespace stageid {
 namespace test_plate_modes {
 
-// omega a^2 sqrt(rho h / D) of the completely free square plate, nu = 0.3: K. M. Liew, Y. Xiang and
-// S. Kitipornchai, J. Sound Vib. 163 (1993), and others, to the digits they agree on.
+// omega a^2 sqrt(rho h / D) of the completely free square plate, nu = 0.3: K. M. Liew, Y. Xiang and S. Kitipornchai,
+// J. Sound Vib. 163 (1993), and others, to the digits on which they agree.
 TEST(PlateModes, AgreeWithPublishedFrequenciesOfTheFreeSquarePlate) {
   constexpr std::array<double, 10> kPublished = {13.468, 19.596, 24.270, 34.801, 34.801,
                                                  61.093, 61.093, 63.687, 69.265, 77.172};
@@ -23,8 +23,8 @@ TEST(PlateModes, AgreeWithPublishedFrequenciesOfTheFreeSquarePlate) {
   }
 }
 
-// With nu = 0 bending along x does not curve the plate along y: among the modes of the plate are
-// those of the free-free beam, cosh(b) cos(b) = 1, omega a^2 sqrt(EI / rho A) = b^2, exactly.
+// With nu = 0, bending along x does not curve the plate along y. The modes of the plate then include those of the
+// free-free beam, cosh(b) cos(b) = 1, omega a^2 sqrt(EI / rho A) = b^2, exactly.
 TEST(PlateModes, WithoutPoissonEffectContainTheFreeBeam) {
   constexpr std::array<double, 3> kBeam = {4.730040744862704, 7.853204624095838, 10.99560783800167};
   const PlateModes plate({2.0, 1.0, 0.0}, 20);

@@ -115,7 +115,7 @@ TEST_F(UncontrollableStage, IsRefusedByTheAxisThatCannotBeDriven) {
 }
 
 TEST_F(UncontrollableStage, IsRefusedByTheAxisThatCannotBeToldFromOthers) {
-  // Two z sensors see heave and tilt, but only in combinations.
+  // Two z sensors measure heave and tilt only in combination.
   EXPECT_THROW(build(stage_.info.actuators, two_sensors_, 2, 1.0), std::invalid_argument);
 }
 

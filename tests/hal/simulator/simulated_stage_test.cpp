@@ -149,8 +149,8 @@ TEST(SimulatedStage, QuantizesTheMeasurement) {
   EXPECT_GT(largest, 0.4e-7);
 }
 
-// A mass on a cubic spring alone, pushed by a constant force: it settles (the suspension's damper
-// sees to that) where k z + c z^3 = F.
+// A mass on a cubic spring under a constant force comes to rest (because of the suspension's damper) at
+// k z + c z^3 = F.
 TEST(SimulatedStage, SettlesWhereTheCubicSpringHoldsTheForce) {
   WaferStageSpec spec = test::small_stage_spec();
   spec.info.actuators[0].position_m[0] = spec.info.actuators[0].position_m[1] = 0.0;
@@ -189,7 +189,7 @@ TEST(SimulatedStage, AgainstTheWallClockIsLateOnlyWhenCalledTooLate) {
   for (int n = 1; n <= 20; ++n) {
     late += bench.step() == Outcome::late ? 1 : 0;
     EXPECT_GE(bench.inputs.t_rx_ns, bench.inputs.t_sample_ns);
-    // On the grid of 1 ms, whole periods skipped or not.
+    // On the grid of 1 ms, with or without skipped periods.
     EXPECT_EQ((bench.inputs.t_sample_ns - origin) % 1'000'000, 0);
   }
   EXPECT_LT(late, 20);

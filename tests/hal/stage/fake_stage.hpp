@@ -8,7 +8,7 @@
 
 namespace stageid::test {
 
-/// Writes down what it is told and measures what it is given.
+/// Records its commands and returns given measurements.
 class FakeStage final : public CyclicStage {
  public:
   FakeStage(int actuators, int sensors, double sample_rate_hz) {

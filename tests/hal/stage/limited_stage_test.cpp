@@ -28,7 +28,7 @@ Eigen::VectorXd vector(std::initializer_list<double> values) {
 StageLimits generous() {
   StageLimits limits;
   limits.actuator_n = vector({10.0, 20.0});
-  limits.slew_n_s = vector({8e3, 1e5});  // 8 and 100 N a sample at 1 kHz
+  limits.slew_n_s = vector({8e3, 1e5});  // 8 and 100 N per sample at 1 kHz
   limits.thermal_rms_n = vector({9.0, 15.0});
   limits.thermal_time_constant_s = 0.05;
   limits.position_window_m = vector({1e-3, 1e-3, 1e-3});
@@ -121,7 +121,7 @@ TEST_F(LimitedStageTest, LimitsTheSlewFromSampleToSample) {
   EXPECT_DOUBLE_EQ(stage_->violation().limit, 8e3);
   EXPECT_EQ(describe(stage_->violation(), stage_->info()),
             "actuator a: slew would be 9000 N/s, limit 8000 N/s (cycle 0)");
-  // The next step counts from what was applied, not from what was asked for.
+  // The next step counts from the applied command, not from the requested one.
   give(1.0);
   EXPECT_DOUBLE_EQ(reached()[0], 0.0);
 }
@@ -237,7 +237,7 @@ class StuckSensorTest : public LimitedStageTest {
 
 TEST_F(StuckSensorTest, IsReportedAfterItsTime) {
   for (int n = 1; n <= 3; ++n) EXPECT_EQ(show(1e-5 * n, 2e-5, 1e-5 * n), Outcome::ok) << n;
-  EXPECT_EQ(show(4e-5, 2e-5, 4e-5), Outcome::ok);  // shown four times: repeated three times
+  EXPECT_EQ(show(4e-5, 2e-5, 4e-5), Outcome::ok);  // four equal values: repeated three times
   EXPECT_EQ(show(5e-5, 2e-5, 5e-5), Outcome::opened);
   EXPECT_EQ(describe(stage_->violation(), stage_->info()),
             "sensor t: has repeated the value 2e-05 m for 0.004 s (cycle 5)");

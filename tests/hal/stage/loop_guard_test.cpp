@@ -18,7 +18,7 @@ namespace test_loop_guard {
 using testing::HasSubstr;
 using Kind = WaferStageSpec::Fault::Kind;
 
-/// A stage in closed loop without excitation, pushed once a sample by `push_n` on every actuator.
+/// A stage in closed loop without excitation; `push_n` acts on every actuator in every sample.
 class GuardedLoop {
  public:
   explicit GuardedLoop(const WaferStageSpec& spec) : controller_(spec.controller) {
@@ -35,13 +35,13 @@ class GuardedLoop {
     for (double& u : u_) u += push_n;
     return stage->exchange({inputs_.cycle, 0, u_}, inputs_, {});
   }
-  /// Until it is anything but ok; at most so many samples.
+  /// Runs until the outcome is not ok, for at most this number of samples.
   Outcome steps(int samples, double push_n = 0.0) {
     Outcome outcome = Outcome::ok;
     for (int n = 0; n < samples && outcome == Outcome::ok; ++n) outcome = step(push_n);
     return outcome;
   }
-  /// Until the brake has ended. @return how many samples it took.
+  /// Runs until the brake has ended. @return the number of samples
   int brake() {
     int samples = 0;
     while (step() == Outcome::braking) ++samples;
@@ -123,7 +123,7 @@ TEST(LoopGuard, ASpeedLimitBrakes) {
 TEST(LoopGuard, AStageThatCouldNotBeStoppedInTimeIsBraked) {
   WaferStageSpec spec = test::stop_stage_spec();
   GuardedLoop loop(spec);
-  // As if something had pushed it, past what the controller can hold.
+  // A disturbance beyond the capability of the controller.
   EXPECT_EQ(loop.steps(200, 640.0), Outcome::braking);
   EXPECT_EQ(loop.stage->emergency().cause.kind, LimitKind::stopping_distance);
   loop.brake();
@@ -142,7 +142,7 @@ TEST(LoopGuard, ARampThatDoesNotConvergeIsEndedByTheBrake) {
   EXPECT_LT(loop.watch->speed_m_s(), 1e-3);
 }
 
-// Four sensors see three motions out of plane: they cannot all be right.
+// Four sensors and three motions out of plane: inconsistent sensors are detected.
 TEST(LoopGuard, ASensorThatDriftsContradictsTheOthers) {
   WaferStageSpec spec = test::wafer_stage_spec();
   spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);

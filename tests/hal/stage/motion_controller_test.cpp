@@ -79,8 +79,8 @@ TEST(MotionController, LeavesOutFactorsOfFrequencyZero) {
   EXPECT_NEAR(std::abs(response(axis, 123.0) - 2.5), 0.0, 1e-14);
 }
 
-// The response as seen by running it: periodic in, periodic out, after the transient of the slowest
-// controller pole. The integrator is left out, it never forgets its start.
+// The response measured by running it: periodic input and output, after the transient of the slowest controller pole.
+// The integrator is omitted, because its transient does not decay.
 TEST(MotionController, RunsAsItsResponseSays) {
   WaferStageSpec stage = test::silent_wafer_stage_spec();
   for (AxisController& axis : stage.controller.axes) axis.integrator_hz = 0.0;
@@ -126,7 +126,7 @@ TEST(MotionController, DrivesNothingWhereAnAxisIsOpen) {
   EXPECT_EQ(u, 0.0);
 }
 
-// More axes and channels than one vector register holds.
+// More axes and channels than fit one vector register.
 TEST(MotionController, HasNoFixedSize) {
   constexpr int kAxes = 11;
   MotionControllerSpec spec;

@@ -7,8 +7,7 @@
 namespace stageid {
 namespace test_pacer {
 
-// A clock cannot be made to hold still: what is checked are order and phase, which hold however slow
-// the machine is.
+// A clock cannot be stopped, so only order and phase are checked, which are independent of the machine's speed.
 constexpr double kRate_hz = 1000.0;
 constexpr std::int64_t kPeriod_ns = 1'000'000;
 
@@ -52,7 +51,7 @@ TEST(Pacer, LeavesOutWholePeriodsAndKeepsThePhase) {
   pass(5 * kPeriod_ns + kPeriod_ns / 2);
   const Pacer::Instant late = pacer.wait();
   EXPECT_TRUE(late.late);
-  EXPECT_EQ(late.sample_ns, origin + kPeriod_ns);  // the instant that was missed
+  EXPECT_EQ(late.sample_ns, origin + kPeriod_ns);  // the missed instant
   const std::int64_t skipped = (late.now_ns - late.sample_ns) / kPeriod_ns;
   EXPECT_GE(skipped, 4);
   const Pacer::Instant next = pacer.wait();

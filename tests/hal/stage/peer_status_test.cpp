@@ -49,7 +49,7 @@ TEST(PeerStatus, CodesOfOutcomesMeanThemselvesOrAFault) {
               code <= 9 ? static_cast<Outcome>(code) : Outcome::fault);
 }
 
-/// What a node says in the third sample, and what the host makes of it.
+/// The node's report in the third sample and the host's reaction.
 template <typename Node>
 struct Row {
   PeerStatus status;
@@ -65,7 +65,7 @@ std::string name_of(const testing::TestParamInfo<Row<Node>>& row) {
   return name + std::to_string(row.index);
 }
 
-/// A frame of the node, and the bus that it comes from.
+/// A frame of the node, and its bus.
 struct CanSaid {
   CanRig* rig;
   CanFrame* frame;
@@ -225,7 +225,7 @@ INSTANTIATE_TEST_SUITE_P(
             true}),
     name_of<CanSaid>);
 
-/// The registers of a node, changed on their way out.
+/// The registers of a node, changed before they are sent.
 class LyingRegisters final : public ModbusRegisters {
  public:
   explicit LyingRegisters(ModbusRegisters& node) : node_(node) {}
@@ -332,8 +332,8 @@ INSTANTIATE_TEST_SUITE_P(
                             [](LyingRegisters& r) { r.set(map::kChannelHash, 1); }, true}),
     name_of<LyingRegisters>);
 
-// The rows that need more than one peer are in ownership_test.cpp, those of a bus in can_stage_test.cpp
-// and can_fault_test.cpp, those of a link in modbus_stage_test.cpp.
+// can_ownership_test.cpp and modbus_ownership_test.cpp test the rows that need more than one peer. can_stage_test.cpp
+// and can_fault_test.cpp test those of a bus, modbus_stage_test.cpp those of a link.
 
 }  // namespace test_peer_status
 }  // namespace stageid

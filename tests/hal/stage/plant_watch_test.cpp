@@ -55,7 +55,7 @@ TEST(PlantTrouble, EveryConditionIsNamed) {
   EXPECT_THAT(trouble(s), HasSubstr("the plant is in fault: the host stopped sending"));
 }
 
-/// A plant that does what it is told, unless it is told otherwise by the test.
+/// A plant that obeys commands unless the test changes it.
 class FakeSupervisor final : public Supervisor {
  public:
   PlantSnapshot snapshot() const override {
@@ -93,7 +93,7 @@ class FakeSupervisor final : public Supervisor {
   std::vector<SupervisorCommand> requests_;
 };
 
-/// Waits for a flag that must come; ten seconds are for a machine that is busy.
+/// Waits for a flag; ten seconds allow for a busy machine.
 bool trips(const PlantWatch& watch) {
   for (int i = 0; i < 2000 && !watch.tripped(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

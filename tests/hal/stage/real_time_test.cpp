@@ -29,7 +29,7 @@ bool this_kernel_is_rt() {
   return is_preempt_rt(name.version, flag);
 }
 
-/// Runs `work` in a child without any rights; true if it returned true there.
+/// Runs `work` in a child without permissions; true if it returned true there.
 bool without_rights(const std::function<bool()>& work) {
   const pid_t child = ::fork();
   if (child == 0) {

@@ -21,8 +21,8 @@ class Patience:
 
     response_s: float
     worst_reply_s: float
-    watchdog_s: float  # of the node: above a reply that comes late and is asked for again
-    run_s: float  # a run that is still there then has noticed nothing
+    watchdog_s: float  # of the node: longer than a late reply and its repetition
+    run_s: float  # a run that takes longer has not detected the fault
 
 
 # A pty hands its bytes on in a worker of the kernel, a transaction passes four of them, and on a busy machine one took
@@ -69,7 +69,7 @@ class Bench:
         """A node that is ready, and its port (TCP). Its watchdog is that of the slowest line it serves."""
         patience = RTU if '--modbus-rtu' in options else TCP
         stage = self.stage('node', backend='sim')
-        # A file, not a pipe, which nobody would empty.
+        # A file, because a pipe would fill up.
         said = self.work / f'node{self.nodes}.txt'
         self.nodes += 1
         with open(said, 'w') as out:

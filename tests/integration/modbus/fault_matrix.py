@@ -18,7 +18,7 @@ from bench import Bench, CAUSE, number, RTU, TCP, wait_for_state
 
 DONE, FAILED, WRONG, MARKED, INTERRUPTED = 0, 1, 2, 3, 130
 AT_REST = ('switch on disabled', 'fault')
-SLOW = 0.05  # of the stage's time: 0.4 s a cycle, so that a line on a busy machine is not late by itself
+SLOW = 0.05  # of the stage's time: 0.4 s per cycle, so that a line on a busy machine is not late without a fault
 LATE = {'tcp': 0.6, 'rtu': 3.8}  # s: past the response time-out, before the worst reply
 
 
@@ -26,21 +26,21 @@ LATE = {'tcp': 0.6, 'rtu': 3.8}  # s: past the response time-out, before the wor
 class Row:
     name: str
     exit_code: int
-    message: str  # part of what stderr says
+    message: str  # part of stderr
     faults: tuple = ()  # of the node
     line: str = 'tcp'  # tcp, rtu, plant (simulated stage, supervisor behind Modbus)
     pace: float = 0.0
-    disturb: str = ''  # what happens to a process after a while
-    log: bool = True  # there is one
-    repeated: bool = False  # one cycle at least; a busy machine may add some
-    state: tuple = AT_REST  # of the node in the end; empty: it cannot be asked
+    disturb: str = ''  # a later event of a process
+    log: bool = True  # whether there is one
+    repeated: bool = False  # at least one cycle; more on a busy machine
+    state: tuple = AT_REST  # of the node at the end; empty: unavailable
 
 
 def fault(text):
     return ('--modbus-fault', text)
 
 
-# The requests of a run are two or more for its start and one a sample; a plant is polled at 10 Hz.
+# A run has two or more requests for its start and one per sample; a plant is polled at 10 Hz.
 def repeated_rows(line, suffix):
     return [Row(name + suffix, MARKED, 'marked', fault(text), line=line, repeated=True) for name, text in (
         ('late reply', f'late_reply@300:{LATE[line]}'), ('half a frame', 'half_frame@300'),
@@ -94,7 +94,7 @@ def disturb(bench, row, node, run, options):
     """@return the port of the node that is there afterwards, if it is another one."""
     if not row.disturb:
         return None
-    time.sleep(1.0)  # into the run; what happens there does not depend on where
+    time.sleep(1.0)  # during the run; the exact time does not matter
     if row.disturb == 'freeze':
         node.send_signal(signal.SIGSTOP)
     elif row.disturb in ('kill', 'restart'):
@@ -150,7 +150,7 @@ def main():
         try:
             with Bench(program, source, folder) as bench:
                 found = list(faults_of(bench, row))
-        except Exception as error:  # a row that cannot be tried is a failure, and the others are still tried
+        except Exception as error:  # a row that cannot run is a failure; the others still run
             found = [f'{type(error).__name__}: {error}']
         failed += bool(found)
         print(f'{"FAIL" if found else "ok  "} {row.name} ({time.monotonic() - began:.1f} s)', *found, sep='\n     ',

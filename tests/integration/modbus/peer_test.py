@@ -131,7 +131,7 @@ class ModbusTest(unittest.TestCase):
         client = ModbusTcpClient('127.0.0.1', port=port)
         client.connect()
         self.addCleanup(client.close)
-        # Beyond the map, a read-only register, too many, another unit, a function that is not there.
+        # Beyond the map, a read-only register, too many, another unit, an unsupported function.
         self.assertEqual(client.read_holding_registers(9999, 2, slave=1).exception_code, 2)
         self.assertEqual(client.write_register(STATUS, 1, slave=1).exception_code, 2)
         self.assertEqual(client.read_holding_registers(STATE, 2, slave=9).exception_code, 11)
@@ -147,7 +147,7 @@ class ModbusTest(unittest.TestCase):
         done = self.bench.run('run', self.bench.experiment(stage), '-o', self.bench.work / 'run.slog', '--pace', 0)
         self.assertEqual(done.returncode, exit_code, done.stderr)
         self.assertIn(message, done.stderr)
-        # A wait of several seconds may put a line of progress beside it.
+        # After several seconds, a line of progress may be added.
         self.assertEqual(len([line for line in done.stderr.splitlines() if line.startswith('stageid:')]), 1)
         self.assertFalse((self.bench.work / 'run.slog').exists() and exit_code == 2)
 
