@@ -20,7 +20,7 @@ constexpr Index kWindow = 9;
 constexpr double kDriftDeviations = 8.0;
 constexpr double kLeastShare = 0.5;
 // Distortions differ between realizations, on as few lines as a resonance has. Five complex numbers of equal size
-// have this share along one direction with a probability of about one in a thousand.
+// have this share along one direction by chance once in several thousand cases.
 constexpr double kLeastShareOfRealizations = 0.8;
 constexpr double kLeastBias = 1.0;
 constexpr double kDriftRounding = 1e-16;  // of the largest |G|^2 of a line

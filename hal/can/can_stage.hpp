@@ -34,11 +34,12 @@ struct CanCounts {
 /// A stage behind CAN FD, streaming: per sample, one setpoint frame per bus and the measurement of the same
 /// sequence back. Protocol: docs/can-protocol.md.
 ///
-/// The answer is awaited until the deadline, or for reply_timeout_s if there is none. The outcome is `ok` if
-/// all channels arrived, `incomplete` if some are missing, `corrupt` if only damaged frames arrived, otherwise
-/// `stale`. Older answers are counted and discarded. In virtual time the setpoint is repeated up to three times,
-/// because nothing moves while the host waits; on the wall clock it is never repeated. peer_status.hpp defines
-/// the meaning of the node's and the bus's states. A command that cannot be encoded is a fault.
+/// The answer is awaited until the deadline, or for reply_timeout_s if there is none. The outcome is `ok` if all
+/// channels arrived. Otherwise it is `corrupt` if a frame was damaged, `incomplete` if some channels arrived, and
+/// `stale` if none did. Older answers are counted and discarded. In virtual time the setpoint is repeated up to
+/// three times, because nothing moves while the host waits; on the wall clock it is never repeated.
+/// peer_status.hpp defines the meaning of the node's and the bus's states. A command that cannot be encoded is a
+/// fault.
 class CanStage final : public CyclicStage {
  public:
   /// @throws std::invalid_argument if the spec does not fit the stage, or a bus cannot carry it.
