@@ -11,7 +11,7 @@
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kAtOnce = 16;  // channels that are eliminated together
+constexpr Eigen::Index kAtOnce = 16;  // channels eliminated together
 
 }  // namespace
 
@@ -57,7 +57,8 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
   for (const BasisGroup& group : groups) {
     const Eigen::Index* all = group.channels.data();
     const Eigen::Index* all_end = all + group.channels.size();
-    const Eigen::Index* begin = std::lower_bound(all, all_end, part.first);  // they are sorted
+    // the channels are sorted
+    const Eigen::Index* begin = std::lower_bound(all, all_end, part.first);
     const Eigen::Index* end = std::lower_bound(begin, all_end, part.first + part.count);
     if (begin == end) continue;
     if (group.few) {
@@ -223,7 +224,7 @@ Eigen::VectorXd ArrowSystem::solve_globals(double damping,
 
 Eigen::VectorXd ArrowSystem::solve_schur(const Eigen::VectorXd& right_side, double damping,
                                          const std::vector<Eigen::Index>& frozen) const {
-  // RIV's matrix is not symmetric: LU, scaled by the diagonal of its symmetric twin.
+  // The matrix of RIV is not symmetric: LU, scaled by the diagonal of its symmetric counterpart.
   const Eigen::VectorXd scale =
       M_.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd scaled = scale.asDiagonal() * schur_ * scale.asDiagonal();

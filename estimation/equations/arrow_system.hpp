@@ -8,29 +8,29 @@
 
 namespace stageid {
 
-/// Some channels in a row.
+/// A contiguous range of channels.
 struct ChannelRange {
   Eigen::Index first = 0;
   Eigen::Index count = 0;
 };
 
-/// What becomes of the channels' own equations.
+/// Treatment of the equations of the channels.
 enum class ChannelEquationsUse : std::uint8_t {
-  eliminated,  ///< and forgotten: memory is that of a block of channels; for solve_globals()
-  kept,        ///< eliminated and kept
-  only_kept    ///< M as it is, which may be singular; without Z, x and the Schur complement
+  eliminated,  ///< and discarded: memory of one block of channels; for solve_globals()
+  kept,        ///< eliminated and stored
+  only_kept    ///< stored without elimination, M may be singular; no Z, x, Schur complement
 };
 
 /// The equations of one step, M d_beta = e, in the order beta = (globals, numerators of channel 1,
-/// 2, ...) where globals are the denominator coefficients of all submodels and then the delays.
+/// 2, ...). Globals are the denominator coefficients of all submodels, then the delays.
 ///
 /// With J the Jacobian dP/dbeta (the instrument Phih of the paper) and Phi the regressor,
-///   riv: M = sum Re{J^H W Phi},  e = sum Re{J^H W vec E}   (identity of method.md section 6)
+///   riv: M = sum Re{J^H W Phi},  e = sum Re{J^H W vec E}   (identity of docs/theory.md, section 8)
 ///   gn:  M = sum Re{J^H W J},    e the same
 ///   sk:  M = sum Re{Phi^H W Phi}, e = sum Re{Phi^H W vec E}
 /// Phi differs from J only in the denominator columns: those of J minus (j omega)^q E / A_i.
 ///
-/// Numerators of different channels never meet in M (diagonal W), so it is an arrow: channels are
+/// With diagonal W, the numerators of different channels are not coupled, so M is an arrow: channels are
 /// eliminated one by one and the Schur complement on the globals is solved.
 class ArrowSystem {
  public:
@@ -39,7 +39,7 @@ class ArrowSystem {
               const std::vector<BasisGroup>& groups, FitMethod method,
               ChannelEquationsUse use = ChannelEquationsUse::kept);
 
-  /// What these channels alone contribute: M, e and the Schur complement are sums over parts.
+  /// The contribution of these channels only: M, e and the Schur complement are sums over parts.
   ArrowSystem(const FitProblem& problem, const FitParameters& beta,
               const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part,
               ChannelEquationsUse use = ChannelEquationsUse::kept);
@@ -51,15 +51,15 @@ class ArrowSystem {
   };
   /// Solves with `damping` times the diagonal of the Schur complement added to it.
   Step solve(double damping) const;
-  /// The globals only: enough where numerators are re-solved afterwards.
-  /// `frozen` globals stay where they are.
+  /// Solves for the globals only, for use if numerators are re-solved afterwards.
+  /// `frozen` globals remain unchanged.
   Eigen::VectorXd solve_globals(double damping, const std::vector<Eigen::Index>& frozen = {}) const;
 
-  /// M^-1 times another right-hand side than e, both (globals, vec B); damped alike. @pre regular()
+  /// M^-1 times a right-hand side other than e, both (globals, vec B); the same damping. @pre regular()
   Eigen::VectorXd solve(const Eigen::VectorXd& right_side, double damping,
                         const std::vector<Eigen::Index>& frozen) const;
 
-  /// One channel's part of M: border and numerator block.
+  /// The part of one channel in M: border and numerator block.
   struct Channel {
     Eigen::MatrixXd ab;  ///< globals x n_f
     Eigen::MatrixXd ba;  ///< n_f x globals
@@ -69,7 +69,7 @@ class ArrowSystem {
     Eigen::VectorXd x;   ///< bb^-1 e
   };
   const std::vector<Channel>& channels() const noexcept { return channels_; }
-  /// @pre it is kept
+  /// @pre the channel is stored
   const Channel& channel(Eigen::Index c) const {
     return channels_[static_cast<std::size_t>(c - range_.first)];
   }
@@ -77,14 +77,13 @@ class ArrowSystem {
   const Eigen::VectorXd& e_globals() const noexcept { return e_; }
   const Eigen::MatrixXd& schur() const noexcept { return schur_; }
   const Eigen::VectorXd& schur_gradient() const noexcept { return schur_e_; }
-  /// Whether all channels could be eliminated; if not, those behind the first that could not are not
-  /// there.
+  /// Whether all channels could be eliminated; if not, those after the first failure are missing.
   bool regular() const noexcept { return regular_; }
 
  private:
   bool keeps() const noexcept { return use_ != ChannelEquationsUse::eliminated; }
   Channel& kept(Eigen::Index c);
-  /// Where these channels' equations go: to stay, or into `passing`.
+  /// Destinations of the equations of these channels: storage, or `passing`.
   std::vector<Channel*> places(const Eigen::Index* channels, Eigen::Index count,
                                std::vector<Channel>& passing);
   void add_block(const BasisGroup& group, const GroupProducts& products, const TileRange& block);
@@ -94,7 +93,7 @@ class ArrowSystem {
                    Channel& channel) const;
   void add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
                   Eigen::Index index, Channel& channel);
-  void eliminate(const std::vector<Channel*>& channels);  ///< in their order
+  void eliminate(const std::vector<Channel*>& channels);  ///< in the given order
   Eigen::VectorXd solve_schur(const Eigen::VectorXd& right_side, double damping,
                               const std::vector<Eigen::Index>& frozen) const;
 
@@ -114,10 +113,10 @@ class ArrowSystem {
   bool regular_ = true;
 };
 
-/// Rows and columns of the unit matrix where an unknown stays where it is.
+/// Replaces rows and columns of frozen unknowns by those of the unit matrix.
 void hold_unknowns(const std::vector<Eigen::Index>& frozen, Eigen::MatrixXd& M);
 
-/// x solving M x = b for symmetric positive M, scaled to unit diagonal; matrix of right-hand sides.
+/// Solves M x = b for symmetric positive M, scaled to unit diagonal; b may have several columns.
 /// @returns false if M is singular to rounding.
 bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x);
 

@@ -13,14 +13,14 @@ namespace stageid {
 ///   M x = e,   M = sum Re{J^H W_k J},   e = sum Re{J^H W_k vec E},
 /// in the order of ArrowSystem: globals, then vec B.
 ///
-/// W_k ties the channels together, and M is no arrow any more. It is never formed: J, W_k and J^H act
-/// one after the other on tiles of lines, at the price of a few residuals, and conjugate gradients
-/// solve, preconditioned by the arrow of the diagonal weights FitProblem::W. Tiles are fixed and added
-/// in order, so that the result does not depend on the number of threads.
+/// W_k couples the channels, so M is not an arrow. It is never formed: J, W_k and J^H are applied one after another on
+/// tiles of lines, at the cost of a few residuals. The equations are solved by conjugate gradients, preconditioned by
+/// the arrow of the diagonal weights FitProblem::W. Tiles are fixed and added in order, so the result does not depend
+/// on the number of threads.
 class JointEquations {
  public:
-  /// @pre `groups` were evaluated with derivatives at `beta`, `E` is their residual, and
-  /// problem.W is weights.marginal(). All of them must outlive the equations.
+  /// @pre `groups` were evaluated with derivatives at `beta`, `E` is their residual, and problem.W is
+  /// weights.marginal(). All of them must outlive the equations.
   JointEquations(const FitProblem& problem, const WeightMatrices& weights,
                  const FitParameters& beta, const std::vector<BasisGroup>& groups,
                  const Residual& E);
@@ -35,11 +35,12 @@ class JointEquations {
 
   struct Solution {
     Eigen::VectorXd x;
-    Eigen::VectorXd residual;  ///< right_side less what x gives, on the free parameters
+    Eigen::VectorXd residual;  ///< right_side minus M x, on the free parameters
     int iterations = 0;
     bool converged = false;
   };
-  /// (M + damping D)^-1 right_side, D the diagonal of the arrow's Schur complement, on the parameters that are free; `frozen` globals stay zero.
+  /// (M + damping D)^-1 right_side on the free parameters, D the diagonal of the Schur complement of the arrow;
+  /// `frozen` globals remain zero.
   /// @param tolerance on the error of x relative to x, in the norm of the arrow
   Solution solve(const Eigen::VectorXd& right_side, const std::vector<Eigen::Index>& frozen,
                  double tolerance, double damping = 0.0) const;

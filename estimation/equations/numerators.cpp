@@ -18,7 +18,7 @@ class ScaledNormalEquations {
   explicit ScaledNormalEquations(const Eigen::MatrixXd& M) {
     scale_ = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     Eigen::MatrixXd scaled = scale_.asDiagonal() * M * scale_.asDiagonal();
-    // Far below the rounding of the sums: only keeps the factorization of coinciding poles alive.
+    // Far below the rounding of the sums; needed only to factorize coinciding poles.
     scaled.diagonal().array() += 1e-14;
     factor_.compute(scaled);
   }
@@ -42,7 +42,7 @@ void add_weighted_gradient(const BasisGroup& group, Eigen::Index first, const Da
   sums.noalias() += group.F_im.middleRows(first, n).transpose() * WE_im.transpose();
 }
 
-/// What the normal equations of a block's channels are made of; a column is a channel.
+/// Sums of the normal equations of a block of channels; one column per channel.
 struct GramSums {
   Eigen::MatrixXd FF;  ///< triangle x members: sum W Re{conj(F_i) F_j}
   Eigen::MatrixXd S;   ///< members x base columns: sum W |first|^2 base; see PairReduction
@@ -55,7 +55,7 @@ struct GramSums {
   }
 };
 
-/// Lower triangles of F^H W F of every channel by itself: for few channels.
+/// Lower triangles of F^H W F, computed per channel; for few channels.
 class OwnGrams {
  public:
   OwnGrams(Eigen::Index members, Eigen::Index n_f)
@@ -86,7 +86,7 @@ class OwnGrams {
   std::vector<Eigen::MatrixXd> grams_;
 };
 
-/// The products of all functions of a group: the same for all of its blocks.
+/// The products of all functions of a group, shared by all of its blocks.
 PairReduction function_pairs(const FitProblem& problem, const BasisGroup& group) {
   return {group.fractions, group.fractions.F, group.fractions.F,
           triangular_pairs(problem.functions())};
@@ -156,8 +156,8 @@ std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, E
 
 /// A block's numerators, members x n_f, and its sum W |E|^2; false if they are not determined.
 ///
-/// The first solution is refined with the residual itself. What the refinement d lowers the squares by
-/// is FE . d exactly, because they are quadratic; only where that is much of them are they summed anew.
+/// The first solution is refined with its residual. The refinement d lowers the squares by exactly FE . d,
+/// because they are quadratic; they are summed again only if that is a large part of them.
 bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
                  const TileRange& block, Eigen::MatrixXd& B, double& squares) {
   const GramSums gram = gram_sums(problem, group, pairs, block);
@@ -180,8 +180,8 @@ bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairR
   return true;
 }
 
-/// Calls visit(i, C_i^-1) for every submodel of a channel with the normal equations M: C_i is its block of
-/// M^-1.
+/// Calls visit(i, C_i^-1) for every submodel of a channel with the normal equations M. C_i is the block of M^-1 of the
+/// submodel.
 template <typename Visit>
 void visit_submodels(const FitProblem& problem, const Eigen::MatrixXd& M, Visit visit) {
   const Eigen::Index n_f = problem.functions();
@@ -197,7 +197,7 @@ void visit_submodels(const FitProblem& problem, const Eigen::MatrixXd& M, Visit 
   }
 }
 
-/// Calls visit(c, M) for every channel with its normal equations, members of a block on all threads.
+/// Calls visit(c, M) for every channel with its normal equations, the members of a block in parallel.
 template <typename Visit>
 void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
   for (const BasisGroup& group : groups) {

@@ -8,21 +8,21 @@
 
 namespace stageid {
 
-/// The free parameters of a model whose residues have given ranks: globals as in ArrowSystem, then
-/// the factors of every submodel. With T = d(globals, B) / d(free parameters) the normal matrix of
-/// the free ones is T^T M T, M that of the unconstrained problem.
+/// The free parameters of a model whose residues have given ranks: globals as in ArrowSystem, then the factors of
+/// every submodel. With T = d(globals, B) / d(free parameters) their normal matrix is T^T M T, M that of the
+/// unconstrained problem.
 class ResidueFactors {
  public:
-  /// Ranks as FitOptions says; modes beside the lines stand for all that the plant does there, and
-  /// their residues stay free. @throws std::invalid_argument for a rank that a submodel cannot have
+  /// Ranks as in FitOptions. Modes outside the lines represent everything that the plant has there, so their residues
+  /// remain free. @throws std::invalid_argument for a rank that a submodel cannot have
   ResidueFactors(const FitProblem& problem, const FitParameters& beta, const FitOptions& options);
 
   Eigen::Index size() const noexcept { return size_; }
   const std::vector<int>& ranks() const noexcept { return ranks_; }  ///< 0: free
 
-  /// Factors closest to the numerators of `beta`, weighted entry by entry (n_c x n_f).
+  /// Factors closest to the numerators of `beta`, weighted per entry (n_c x n_f).
   void project(const FitParameters& beta, const Eigen::MatrixXd& weight);
-  /// The numerators that the factors stand for.
+  /// Writes the numerators given by the factors.
   void write_numerators(FitParameters& beta) const;
   /// Moves the factors by their part of a step of the free parameters.
   void step(const Eigen::VectorXd& step);

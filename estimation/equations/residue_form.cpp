@@ -12,7 +12,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr int kSweeps = 30;  // of the alternating least squares; the fit goes on from there
+constexpr int kSweeps = 30;  // of the alternating least squares; the fit continues from there
 
 /// The pole of 1 + a_1 s + a_2 s^2 with positive imaginary part, and its derivatives.
 struct Pole {

@@ -7,7 +7,7 @@
 
 namespace stageid {
 
-/// How a submodel's numerators B_0 .. B_m follow from free parameters rho.
+/// Parametrization of the numerators B_0 .. B_m of a submodel by free parameters rho.
 ///
 ///   full         the entries themselves
 ///   real         B_0 = Phi Psi^T, Phi n_y x r, Psi n_u x r: a mechanical mode (r = 1) with
@@ -15,19 +15,19 @@ namespace stageid {
 ///   complex      L = phi psi^T complex, residue of the pole lambda, for modes with B_0 and B_1:
 ///                B_1 = 2 a_2 Re L, B_0 = -2 a_2 Re(conj(lambda) L): general viscous damping
 ///
-/// Psi is determined only up to a factor (a regular r x r matrix): r of its rows, the best
-/// conditioned ones, are held at the identity. Source: facts.md section 11.
+/// Psi is determined only up to a factor (a regular r x r matrix), so its r best conditioned rows are held at the
+/// identity. See docs/theory.md, section 5.
 class ResidueForm {
  public:
-  /// @param rank 0: full. `shape` must have one numerator coefficient, or be a mode with two and
-  ///        rank 1. @throws std::invalid_argument
+  /// @param rank 0: full. `shape` must have one numerator coefficient, or be a mode with two and rank 1. @throws
+  /// std::invalid_argument
   ResidueForm(const SubmodelShape& shape, int rank, Eigen::Index n_outputs, Eigen::Index n_inputs);
 
-  /// The form's best approximation of numerators B (n_c x m+1), weighted entry by entry
-  /// (n_y x n_u, inverse variances).
+  /// The best approximation of numerators B (n_c x m+1) in this form, weighted per entry (n_y x n_u, inverse
+  /// variances).
   void project(const Eigen::VectorXd& a, const Eigen::MatrixXd& B, const Eigen::MatrixXd& weight);
 
-  /// B, n_c x (m+1), of the present parameters.
+  /// B, n_c x (m+1), of the current parameters.
   Eigen::MatrixXd numerators(const Eigen::VectorXd& a) const;
 
   /// One entry of dB_m(channel) / d parameter: `parameter` counts rho from 0; -1 is a_1, -2 is a_2.
@@ -55,7 +55,7 @@ class ResidueForm {
   Eigen::MatrixXd full_;                  // n_c x functions
   Eigen::MatrixXcd phi_;                  // n_y x rank, real part only for Kind::real
   Eigen::MatrixXcd psi_;                  // n_u x rank
-  std::vector<Eigen::Index> free_input_;  // an input's place among the free rows of Psi; -1: held
+  std::vector<Eigen::Index> free_input_;  // index of an input among the free rows of Psi; -1: held
 };
 
 }  // namespace stageid

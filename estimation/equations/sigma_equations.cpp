@@ -18,13 +18,13 @@ using Complex = std::complex<double>;
 
 constexpr int kShares = 8;
 constexpr Eigen::Index kTimesOver = 3;
-constexpr double kShift = 1e-13;  // makes Gram matrices of unit columns factor
+constexpr double kShift = 1e-13;  // makes Gram matrices of unit columns factorizable
 
 Eigen::VectorXd inverse_root(const Eigen::VectorXd& diagonal) {
   return diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
 }
 
-/// The triangle R of [R; further] = Q R.
+/// The triangle R of the stacked matrix [R; further] = Q R.
 void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
   Eigen::MatrixXd both(R.rows() + further.rows(), R.cols());
   both << R, further;
@@ -32,7 +32,7 @@ void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
   R = qr.matrixQR().topRows(R.cols()).triangularView<Eigen::Upper>();
 }
 
-/// The triangle of all of them below each other, two by two.
+/// The triangle of all triangles stacked, combined in pairs.
 Eigen::MatrixXd combined(std::vector<Eigen::MatrixXd> triangles, int threads) {
   while (triangles.size() > 1) {
     const std::size_t pairs = triangles.size() / 2;
@@ -45,8 +45,8 @@ Eigen::MatrixXd combined(std::vector<Eigen::MatrixXd> triangles, int threads) {
   return std::move(triangles.front());
 }
 
-/// The lower right corner of R, n+1 x n+1, in  sqrt(w) [phi, own | -H phi, -H] = Q R: what remains of
-/// the channel's equations once its numerators are eliminated.
+/// The lower right corner of R, n+1 x n+1, in  sqrt(w) [phi, own | -H phi, -H] = Q R: the equations of the channel
+/// after elimination of its numerators.
 Eigen::MatrixXd factor_of_channel(const Eigen::VectorXd& weights, const Eigen::VectorXcd& response,
                                   const SplitMatrix& phi, const SplitMatrix& own) {
   const Eigen::Index N = response.size();
@@ -69,12 +69,12 @@ Eigen::MatrixXd factor_of_channel(const Eigen::VectorXd& weights, const Eigen::V
       A.block(numerators, numerators, n + 1, n + 1).triangularView<Eigen::Upper>());
 }
 
-/// sum_k Re{conj(X) v}, one a column of X
+/// sum_k Re{conj(X) v}, one per column of X
 Eigen::VectorXd sum(const SplitMatrix& X, const Eigen::VectorXcd& v) {
   return X.re.transpose() * v.real() + X.im.transpose() * v.imag();
 }
 
-/// Products of sqrt(w) [-H phi, -H] with itself, less what sqrt(w) [phi, own] explains of them.
+/// Products of sqrt(w) [-H phi, -H] with itself, minus the part explained by sqrt(w) [phi, own].
 Eigen::MatrixXd remaining_products(const Eigen::VectorXd& w, const Eigen::VectorXcd& H,
                                    const SplitMatrix& phi, const SplitMatrix& own,
                                    const FractionGram& products) {
@@ -126,8 +126,8 @@ Eigen::MatrixXd SigmaEquations::triangle(const PoleSet& poles, bool accurate) co
   return by_factors(phi);
 }
 
-/// A triangle for each of a fixed number of shares of the channels. Data that call for this are next to exact: a few
-/// times as many lines as unknowns say all.
+/// One triangle per share of the channels; the number of shares is fixed. Data that need this path are nearly exact,
+/// so a few times as many lines as unknowns suffice.
 Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
   const Eigen::Index unknowns = 2 * phi.cols() + own_.cols() + 1;
   const Eigen::Index stride = std::max<Eigen::Index>(1, 2 * x_.size() / (kTimesOver * unknowns));
@@ -154,7 +154,7 @@ Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
   return combined(std::move(shares), threads_) * std::sqrt(static_cast<double>(stride));
 }
 
-/// From products of fractions. @returns nothing if too few digits are left
+/// From products of fractions. @returns nothing if too few digits remain
 std::optional<Eigen::MatrixXd> SigmaEquations::by_sums(const PoleSet& poles,
                                                        const SplitMatrix& phi) const {
   const Eigen::Index n = phi.cols();

@@ -9,19 +9,19 @@
 namespace stageid {
 
 /// The equations of a pole relocation (Gustavsen and Semlyen, IEEE Trans. Power Delivery 14 (1999) 1052): in every
-/// channel H sigma is a sum of fractions with the same poles, sigma = phi c + d; here with the channels'
-/// numerators eliminated (Deschrijver et al., IEEE MWCL 18 (2008) 383).
+/// channel, H sigma is a sum of fractions with the same poles, sigma = phi c + d. The numerators of the channels are
+/// eliminated (Deschrijver et al., IEEE MWCL 18 (2008) 383).
 class SigmaEquations {
  public:
   /// @param x N: j omega, or e^{j omega T} on the unit circle
-  /// @param G n_c x N, H times a factor on every line  @param weights n_c x N, of |G - P|^2; must stay
-  /// @param own N x any: what the numerators have beside the fractions
+  /// @param G n_c x N, H times a factor on every line  @param weights n_c x N, of |G - P|^2; must outlive this
+  /// @param own N x any: functions of the numerators besides the fractions
   SigmaEquations(Eigen::VectorXcd x, bool unit_circle, const Eigen::MatrixXcd& G,
                  const Eigen::VectorXcd& factor, const Eigen::MatrixXd& weights, SplitMatrix own,
                  int threads);
 
-  /// R, n+1 x n+1: |R (c, d)|^2 is what remains of the equations. The norm of its last column is that of the
-  /// residual that numerators alone leave. The result does not depend on the threads.
+  /// R, n+1 x n+1: |R (c, d)|^2 is the squared residual of the equations. The norm of its last column is that of the
+  /// residual with numerators alone. The result does not depend on the number of threads.
   /// @param accurate to rounding; else to about half of the digits, in a tenth of the time
   Eigen::MatrixXd triangle(const PoleSet& poles, bool accurate) const;
 

@@ -15,14 +15,14 @@
 namespace stageid {
 namespace {
 
-constexpr double kNearlyExact = 1e-12;  // of the data's power: normal equations lose what is left
-// Of the cost: a step that gains less there is the last one.
+constexpr double kNearlyExact = 1e-12;  // of the data's power: normal equations lose the residual
+// At rounding level, a step that does not reduce the cost to this share is the last one.
 constexpr double kGainAtRounding = 0.5;
 constexpr int kTriesAtRounding = 3;
-constexpr int kTriesOfRiv = 3;  // before the Gauss-Newton step is taken
+constexpr int kTriesOfRiv = 3;  // before the Gauss-Newton step
 constexpr int kTries = 40;
-constexpr Eigen::Index kChannelsOfSearch = 512;  // tell one delay as well as all that are more
-// Numerators are solved again after every step.
+constexpr Eigen::Index kChannelsOfSearch = 512;  // enough to determine one delay
+// Numerators are re-solved after every step.
 constexpr ChannelEquationsUse kGlobalsOnly = ChannelEquationsUse::eliminated;
 
 /// A candidate with its numerators solved.
@@ -54,8 +54,7 @@ double relative_step(const FitProblem& problem, const FitParameters& beta,
   return largest;
 }
 
-/// max_i |e_i| / sqrt(M_ii 2 N cost): 0 to 1, the cosine between the residual and a parameter's
-/// effect.
+/// max_i |e_i| / sqrt(M_ii 2 N cost), 0 to 1: the cosine between the residual and the effect of a parameter.
 double scaled_gradient(const FitProblem& problem, const ArrowSystem& system,
                        const std::vector<Eigen::Index>& frozen, double cost) {
   const double total = 2.0 * static_cast<double>(problem.size()) * cost;
@@ -104,7 +103,7 @@ class Iteration {
     return true;
   }
 
-  /// From now on products are multiplied out. @returns false if they were
+  /// Multiplies products out from here on. @returns false if that is already done or makes no difference
   bool all_digits() {
     if (problem_.multiplied_out || !sums_fractions_of_few(problem_)) return false;
     problem_.multiplied_out = true;
@@ -138,7 +137,7 @@ class Iteration {
     if (options_.progress) options_.progress(result_.iterations, cost_);
   }
 
-  /// True if the system says that the end is reached; `result_` is then complete.
+  /// True if the equations show convergence; `result_` is then complete.
   bool at_optimum(const ArrowSystem& system) {
     frozen_ = bounds_.leaning(beta_, system.schur_gradient());
     gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
@@ -148,8 +147,8 @@ class Iteration {
                       gradient_));
       return true;
     }
-    // Newton decrement: the distance to the stationary point in standard deviations of the noise that the
-    // residual shows.
+    // Newton decrement: the distance to the stationary point in standard deviations of the noise estimated from the
+    // residual.
     const double data = static_cast<double>(problem_.size() * problem_.channels());
     const double squares = 2.0 * static_cast<double>(problem_.size()) * cost_;
     deviations_ = std::sqrt(
@@ -172,7 +171,7 @@ class Iteration {
   bool at_rounding() const { return cost_ < kNothingLeft * signal_cost_; }
 
   bool descent_step() {
-    // Without a residual the refined-IV equations are those of Gauss-Newton, at twice the price.
+    // Without a residual, the refined-IV equations equal those of Gauss-Newton, at twice the cost.
     const FitMethod method = nearly_exact() ? FitMethod::gn : options_.method;
     if (nearly_exact()) all_digits();
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
@@ -194,7 +193,7 @@ class Iteration {
     return all_digits() || end_of_descent();
   }
 
-  /// Where no step lowers the cost, or none by a part of it that is worth one more.
+  /// Ends the iteration if no step lowers the cost, or only insignificantly.
   bool end_of_descent() {
     if (nearly_exact()) {
       polish_numerators(problem_, evaluate_groups(problem_, beta_, false), beta_.B, cost_);
@@ -212,7 +211,7 @@ class Iteration {
                fmt::format("no step lowers the cost; scaled gradient {:.2g}", gradient_));
   }
 
-  /// Tries steps of growing damping; accepts the first that lowers the cost.
+  /// Tries steps with increasing damping; accepts the first that lowers the cost.
   bool attempt(const ArrowSystem& system, int tries) {
     for (int i = 0; i < tries && levenberg_ <= kLargestLevenberg; ++i) {
       const Eigen::VectorXd step = system.solve_globals(levenberg_, frozen_);
@@ -223,7 +222,7 @@ class Iteration {
         levenberg_ = i == 0 ? (levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0) : levenberg_;
         return true;
       }
-      if (step_size_ < 1e-15) break;  // nothing moves any more
+      if (step_size_ < 1e-15) break;  // at rounding
       levenberg_ = std::max(10.0 * levenberg_, 1e-4);
     }
     if (levenberg_ > kLargestLevenberg) levenberg_ = 1e-4;
@@ -275,7 +274,7 @@ class Iteration {
   const FitOptions& options_;
   PoleBounds bounds_;
   double signal_cost_;
-  std::vector<Eigen::Index> frozen_;  // modes at their bounds
+  std::vector<Eigen::Index> frozen_;  // coefficients of modes at their bounds
   IterationResult result_;
   double cost_ = 0.0;  // at beta_
   double levenberg_ = 0.0;
@@ -285,8 +284,8 @@ class Iteration {
   Trial best_;
 };
 
-/// The problem itself, or that of evenly spread channels of it, as the outputs of one input: without their own
-/// copies of data and weights, memory would be that of all.
+/// The problem, or a subset of evenly spaced channels as outputs of one input. The subset has its own copies of data
+/// and weights, to save memory.
 FitProblem some_channels(const FitProblem& problem) {
   FitProblem out = problem;
   const Eigen::Index step = (problem.channels() + kChannelsOfSearch - 1) / kChannelsOfSearch;
@@ -312,8 +311,8 @@ IterationResult iterate(const FitProblem& problem, FitParameters& beta, const Fi
 }
 
 void search_delay(const FitProblem& problem, FitParameters& beta) {
-  // The poles are not right yet, and under weights that follow the noise one sharp mode that is off
-  // by a part of its width would outweigh the phase of everything else. Relative errors do not.
+  // The poles are not right yet. With weights from the noise, one sharp mode that is off by a part of its width would
+  // outweigh the phase of everything else. With relative errors it does not.
   FitProblem relative = some_channels(problem);
   const auto power = relative.G->array().abs2();
   const Eigen::ArrayXd floor = 1e-6 * power.rowwise().mean() + 1e-300;

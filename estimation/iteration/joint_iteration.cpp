@@ -1,5 +1,4 @@
-// Gauss-Newton on denominators, delays and numerators at once, for weights that tie the channels
-// together.
+// Gauss-Newton on denominators, delays and numerators at once, for weights that couple the channels.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,7 +13,7 @@
 namespace stageid {
 namespace {
 
-// Of the step, where the cost is quadratic: the next one corrects it.
+// Relative, in a quadratic region of the cost: the next step corrects it.
 constexpr double kStepTolerance = 1e-2;
 
 class JointIteration {
@@ -52,7 +51,7 @@ class JointIteration {
     return false;
   }
 
-  /// @returns false at the end; `result_` then says why.
+  /// @returns false at the end; `result_` then has the reason.
   bool iterate_once() {
     if (options_.limit && options_.limit->reached())
       return end(options_.limit->status(), options_.limit->message());
@@ -81,7 +80,7 @@ class JointIteration {
                                                     deviations_));
   }
 
-  /// The step, modes held that stand at a bound and lean on it.
+  /// The step, with the modes held that are at a bound and pushed beyond it.
   Eigen::VectorXd free_step(const JointEquations& equations) {
     frozen_.clear();
     Eigen::VectorXd step = equations.solve(equations.gradient(), frozen_, kStepTolerance).x;
@@ -90,8 +89,8 @@ class JointIteration {
     return equations.solve(equations.gradient(), frozen_, kStepTolerance).x;
   }
 
-  /// By the Newton decrement, over all parameters: the step's length in standard deviations of the
-  /// noise that the residual shows, and as a part of that residual.
+  /// By the Newton decrement over all parameters: the length of the step in standard deviations of the noise estimated
+  /// from the residual, and as a part of that residual.
   bool at_optimum(double decrement) {
     const double squares = 2.0 * static_cast<double>(problem_.size()) * E_.cost;
     const double gradient = std::sqrt(std::max(decrement, 0.0) / std::max(squares, 1e-300));
@@ -108,7 +107,7 @@ class JointIteration {
     return true;
   }
 
-  /// Tries steps of growing damping, `step` being the first; takes the first that lowers the cost.
+  /// Tries steps with increasing damping, starting with `step`; accepts the first that lowers the cost.
   bool descend(const JointEquations& equations, Eigen::VectorXd step) {
     for (bool first = true; levenberg_ <= kLargestLevenberg; first = false) {
       if (levenberg_ > 0.0)

@@ -44,7 +44,7 @@ class LowRankIteration {
   }
 
  private:
-  /// The unconstrained numerators, each weighted by its inverse variance.
+  /// Projects the unconstrained numerators, weighted by their inverse variances.
   void project() {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, FitMethod::gn,
@@ -79,7 +79,7 @@ class LowRankIteration {
     return false;
   }
 
-  /// @returns whether to go on.
+  /// @returns whether to continue.
   bool iterate_once() {
     if (options_.limit && options_.limit->reached())
       return end(options_.limit->status(), options_.limit->message());

@@ -108,7 +108,7 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
                       "contains a number out of range for double precision" +
                           (start == std::string::npos ? "" : ": " + what.substr(start)));
   } catch (const nlohmann::ordered_json::parse_error& error) {
-    // The library's own text names line and column behind its error number.
+    // The message of the library contains line and column after its error number.
     const std::string what = error.what();
     const std::size_t start = what.find("at line");
     throw FormatError(file_, "",

@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// A place in a JSON file from outside: every access checks, every failure names file and place.
+/// A node of an untrusted JSON file: every access is checked, and every error names file and place.
 class JsonNode {
  public:
   JsonNode(const std::filesystem::path& file, std::string place,
@@ -19,10 +19,10 @@ class JsonNode {
   bool has(const std::string& key) const { return value_.is_object() && value_.contains(key); }
   JsonNode member(const std::string& key) const;
   std::vector<JsonNode> elements() const;
-  std::vector<JsonNode> elements_of(const std::string& key) const;  ///< none if it is missing
+  std::vector<JsonNode> elements_of(const std::string& key) const;  ///< empty if it is missing
   double number() const;                                            ///< finite
   double positive() const;                                          ///< > 0
-  /// A member that may be missing or null, as a number is that could not be told.
+  /// An optional member; null is the same as missing and is written for unknown numbers.
   double number_or(const std::string& key, double fallback) const;
   long long integer(long long lowest, long long highest) const;
   std::string text() const;
@@ -38,7 +38,7 @@ class JsonNode {
   const nlohmann::ordered_json& value_;
 };
 
-/// A JSON file with its "format" checked.
+/// A JSON file with a checked "format".
 class JsonFile {
  public:
   /// @throws FileError, FormatError

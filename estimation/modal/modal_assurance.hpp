@@ -10,17 +10,17 @@ namespace stageid {
 /// Modal assurance criterion between the columns of two sets of shapes on the same channels,
 ///   MAC(a, b) = |phi_a^H phi_b|^2 / (|phi_a|^2 |phi_b|^2),
 /// 1 for shapes that are multiples of each other, 0 for orthogonal ones and for a zero shape.
-/// Two random shapes on n channels have about 1/n: four sensors cannot tell seventeen modes apart.
+/// For two random shapes on n channels it is about 1/n: four sensors cannot distinguish seventeen modes.
 /// @return columns of a x columns of b
 /// @throws std::invalid_argument if the channels differ in number.
 /// Source: R. J. Allemang and D. L. Brown, Proc. 1st IMAC (1982) 110.
 Eigen::MatrixXd modal_assurance(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b);
 
-/// Shapes of modes as columns.
+/// Output shapes of the modes as columns.
 Eigen::MatrixXcd output_shapes(const std::vector<ModeShape>& modes);
 Eigen::MatrixXcd input_shapes(const std::vector<ModeShape>& modes);
 
-/// Two modes taken to be the same.
+/// Two modes that are considered the same.
 struct ModePair {
   std::size_t first = 0;              ///< index into the first set
   std::size_t second = 0;             ///< index into the second
@@ -30,15 +30,15 @@ struct ModePair {
 };
 
 struct PairingOptions {
-  double most_frequency_difference = 0.05;  ///< relative; farther modes are not the same
-  double least_mac = 0.1;                   ///< of the residues; less alike modes are not the same
+  double most_frequency_difference = 0.05;  ///< relative; modes farther apart are not paired
+  double least_mac = 0.1;  ///< of the residues; modes with less similar shapes are not paired
 };
 
 /// Pairs modes of two models with the same channels by frequency and shape, each at most once.
 ///
-/// A pair is worth  MAC_output MAC_input (1 - |frequency difference| / most),  where the product of the
-/// two MACs is that of the residues phi psi^T; the best pair is taken first, then the best of what is
-/// left. So close modes are told apart by their shapes and alike shapes by their frequencies.
+/// The score of a pair is  MAC_output MAC_input (1 - |frequency difference| / most),  where the product of the
+/// two MACs is the MAC of the residues phi psi^T. The best pair is chosen first, then the best of the rest.
+/// Close modes are thus distinguished by their shapes, and similar shapes by their frequencies.
 /// @return in the order of `first`
 /// @throws std::invalid_argument if the numbers of channels differ, or an option is not in (0, 1].
 std::vector<ModePair> pair_modes(const std::vector<ModeShape>& first,

@@ -8,7 +8,7 @@
 
 namespace stageid {
 
-/// A mode as a mechanical one: a natural frequency, a damping ratio, and how outputs and inputs see it.
+/// A mode in mechanical form: natural frequency, damping ratio, shapes at the outputs and inputs.
 ///
 /// With the pole lambda = omega (-zeta + j sqrt(1 - zeta^2)) and its residue R the mode is
 ///   P_i(s) = R/(s - lambda) + conj(R)/(s - conj(lambda)),
@@ -19,7 +19,8 @@ namespace stageid {
 /// B_0 + B_1 s (general viscous damping) they are complex. Units: those of input over output times
 /// s^-2, so kg for N and m; with outputs of several units the norm, and so the mass, depends on them.
 ///
-/// A residue that is not of rank one is represented by its largest singular value; `not_rank_one` says
+/// A residue of higher rank is represented by its largest singular value; `not_rank_one` is the relative size
+/// of the next one. An overdamped mode (two real poles) is described at its slower pole.
 /// what that leaves out. An overdamped mode (two real poles) is described at its slower pole.
 struct ModeShape {
   std::size_t submodel = 0;  ///< index into the model's
@@ -27,35 +28,34 @@ struct ModeShape {
   double damping_ratio = 0.0;
   Eigen::VectorXcd output_shape;  ///< n_y
   Eigen::VectorXcd input_shape;   ///< n_u
-  double modal_mass = 0.0;        ///< infinite, and the shapes zero, if the numerators are
+  double modal_mass = 0.0;        ///< infinite, and the shapes zero, if the numerators are zero
   double not_rank_one = 0.0;      ///< second singular value over the first
 };
 
-/// A mode of a model. @param index what it is called there  @pre submodel.is_mode()
+/// The mechanical form of a submodel. @param index of the submodel in its model  @pre submodel.is_mode()
 ModeShape mode_shape(const Submodel& submodel, std::size_t index);
-/// The pole that a mode is described at: with positive imaginary part, or the slower of two real ones.
+/// The pole used for the shapes: with positive imaginary part, or the slower of two real ones.
 std::complex<double> described_pole(const Submodel& mode);
 
-/// The modes of a model, in its order. Source: method.md section 5; D. J. Ewins, Modal Testing, 2nd ed.
-/// (2000), section 2.8, for the shapes of general viscous damping.
+/// The modes of a model, in its order. Source: D. J. Ewins, Modal Testing, 2nd ed. (2000), section 2.8, for the shapes
+/// of general viscous damping.
 std::vector<ModeShape> mode_shapes(const AdditiveModel& model);
 
-/// An output and an input at one place, in one direction.
+/// An output and an input at the same position and in the same direction.
 struct DrivingPoint {
   Eigen::Index output = 0;
   Eigen::Index input = 0;
 };
 
-/// Mass of a mode seen at a driving point:
-/// modal_mass / Re(output_shape_i input_shape_j). It does not depend on the norm of the shapes, nor on
-/// which outputs and inputs there are beside. Negative if the mode contradicts a driving point,
-/// infinite in a node.
-/// @throws std::invalid_argument if an index is none of the model's.
+/// Mass of a mode at a driving point: modal_mass / Re(output_shape_i input_shape_j). It depends neither on the norm of
+/// the shapes nor on the other outputs and inputs. Negative if the mode contradicts a driving point, infinite in a
+/// node.
+/// @throws std::invalid_argument if an index is out of range.
 double driving_point_mass(const ModeShape& mode, const DrivingPoint& point);
 
-/// The double integrator, sum over degrees of freedom r of output_r input_r^T / (mass_r s^2), by
-/// singular values; norms, signs and units as for modes. The directions are those in which the
-/// channels see the body, most mobile first, not its centre of mass and principal axes.
+/// The double integrator, sum over degrees of freedom r of output_r input_r^T / (mass_r s^2), by singular values;
+/// norms, signs and units as for modes. The directions are those in which the channels observe the body, most mobile
+/// first, not its centre of mass and principal axes.
 struct RigidBody {
   Eigen::MatrixXd output_shape;  ///< n_y x rank
   Eigen::MatrixXd input_shape;   ///< n_u x rank
@@ -63,8 +63,8 @@ struct RigidBody {
   Eigen::Index rank() const noexcept { return mass.size(); }
 };
 
-/// The rank is the submodel's residue_rank where that is held, else numerical: in a free fit noise
-/// makes it full, and only masses that are out of proportion tell. Rank 0 without double integrator.
+/// The rank is the submodel's residue_rank if held, else numerical. In a free fit, noise makes it full: spurious
+/// directions are recognized only by masses out of proportion. Rank 0 without double integrator.
 /// @throws std::invalid_argument if residue_rank contradicts the numerators.
 RigidBody rigid_body(const AdditiveModel& model);
 

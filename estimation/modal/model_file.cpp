@@ -24,7 +24,7 @@ Json matrix_to_json(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
-/// Real parts under the name itself, imaginary ones apart where the mode has them.
+/// Real parts under `name`, imaginary ones under a separate key if the mode has them.
 void add_shape(const std::string& name, const Eigen::VectorXcd& shape,
                const Eigen::VectorXcd& deviation, bool complex, Json& out) {
   const auto add = [&](const std::string& key, const Eigen::VectorXd& values) {
@@ -37,7 +37,7 @@ void add_shape(const std::string& name, const Eigen::VectorXcd& shape,
   add(name + "_imaginary_std", deviation.imag());
 }
 
-/// Shapes and mass follow from the numerators: they stand here for their standard deviations.
+/// Shapes and mass follow from the numerators; they are stored together with their standard deviations.
 void add_shapes(const Submodel& s, Json& out) {
   if (!s.is_mode() || !s.shape_std) return;
   const ModeShape mode = mode_shape(s, 0);
@@ -48,7 +48,7 @@ void add_shapes(const Submodel& s, Json& out) {
   add_shape("input_shape", mode.input_shape, s.shape_std->input_shape, complex, out);
 }
 
-/// What is not known stands as null, which is how NaN is written.
+/// Unknown values are NaN, which is written as null.
 Json submodel_to_json(const Submodel& s) {
   Json out;
   out["integrators"] = s.integrators;
@@ -109,7 +109,7 @@ PoleEstimate pole_from_json(const JsonNode& node) {
   return pole;
 }
 
-/// numerator_std: as many matrices as `numerator`, no entry negative.
+/// numerator_std: as many matrices as `numerator`, no negative entries.
 std::vector<Eigen::MatrixXd> deviations_from_json(const JsonNode& node,
                                                   const std::vector<Eigen::MatrixXd>& numerator) {
   const JsonNode list = node.member("numerator_std");
@@ -140,7 +140,7 @@ Eigen::VectorXcd shape_deviation_from_json(const JsonNode& node, const std::stri
   return out;
 }
 
-/// Of the shapes themselves nothing is read: the numerators tell them.
+/// The shapes themselves are not read, because they follow from the numerators.
 std::optional<ModeShapeDeviation> shape_deviations_from_json(
     const JsonNode& node, const std::vector<Eigen::MatrixXd>& numerator) {
   if (!node.has("modal_mass_std")) return std::nullopt;
@@ -193,7 +193,7 @@ Eigen::VectorXd delays_from_json(const JsonNode& root, const std::string& key, s
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(size));
 }
 
-/// Empty where the file has none.
+/// Empty if the file has none.
 Eigen::VectorXd delay_deviations_from_json(const JsonNode& root, const std::string& key,
                                            std::size_t size) {
   if (!root.has(key)) return {};

@@ -14,10 +14,11 @@
 namespace stageid {
 namespace {
 
-constexpr double kAllowed = 2.0;  // times the variance: the model's error is as large as the noise
-constexpr double kByChance = 1e-3;   // that any part of a right model is called not explained
-constexpr Eigen::Index kRun = 32;    // lines that are judged together
-constexpr double kRounding = 1e-20;  // of a line's power: no measurement is more exact
+// times the variance: the error of the model is then as large as the noise
+constexpr double kAllowed = 2.0;
+constexpr double kByChance = 1e-3;   // probability that any part of a right model is not explained
+constexpr Eigen::Index kRun = 32;    // lines judged together
+constexpr double kRounding = 1e-20;  // of the power of a line: no measurement is more exact
 
 /// Sums over one part of the data.
 struct Part {
@@ -25,7 +26,7 @@ struct Part {
   double t = 0.0;
   double r = 0.0;
   double entries = 0.0;
-  double lines = 0.0;  ///< that hold at least one entry
+  double lines = 0.0;  ///< with at least one entry
 
   void add(double t_of_entry, double r_of_entry) {
     t += t_of_entry;
@@ -51,7 +52,7 @@ class Parts {
     seen_.resize(parts_.size());
   }
 
-  /// One line: its residual, variance and weights (empty: all count), n_c each.
+  /// Adds one line: its residual, variance and weights (empty: all count), n_c each.
   void add_line(Eigen::Index k, const Eigen::Ref<const Eigen::VectorXcd>& residual,
                 const Eigen::Ref<const Eigen::VectorXd>& variance,
                 const Eigen::Ref<const Eigen::VectorXd>& weights) {
@@ -59,7 +60,7 @@ class Parts {
     const double rounding = kRounding * frf_.response.col(k).squaredNorm();
     std::fill(seen_.begin(), seen_.end(), false);
     for (Eigen::Index c = 0; c < residual.size(); ++c) {
-      // A variance of zero is one that nobody knows.
+      // A variance of zero is unknown.
       if (!(variance[c] > 0.0) || (weights.size() > 0 && !(weights[c] > 0.0))) continue;
       const double r = std::norm(residual[c]) / (variance[c] + rounding);
       const double scaled = r / kAllowed;
@@ -78,10 +79,10 @@ class Parts {
 
   const Part& all() const { return parts_.front(); }
 
-  /// The mean of r if the error is noise; 0: there is none.
+  /// The mean of r if the error is noise; 0: infinite.
   double expected() const { return dof_ > 1.0 ? dof_ / (dof_ - 1.0) : dof_ > 0.0 ? 0.0 : 1.0; }
 
-  /// Of the parts that are not explained the first if that is all data, else the worst; null: all are explained.
+  /// The unexplained part to report: all data if unexplained, else the worst; null: all parts are explained.
   const Part* unexplained() const {
     if (is_unexplained(all())) return &all();
     const Part* worst = nullptr;
@@ -103,7 +104,7 @@ class Parts {
   }
 
  private:
-  /// Where no mean of r exists, the mean of t is the size of the excess.
+  /// If r has no mean, the mean of t is used as size of the excess.
   double excess(const Part& part) const {
     return expected() > 0.0 ? part.mean_r() / expected() : kAllowed * part.mean_t();
   }
@@ -111,7 +112,7 @@ class Parts {
   bool is_unexplained(const Part& part) const {
     if (!(part.mean_t() > 1.0)) return false;
     if (!std::isfinite(part.mean_t())) return true;
-    // The sum of n exponential numbers is half a chi-square one with 2 n degrees of freedom.
+    // The sum of n exponential numbers is half a chi-square variable with 2 n degrees of freedom.
     const double n = std::max(1.0, part.lines / frf_.correlated_lines);
     return tail_of_chi_square(2.0 * n * part.mean_t(), 2.0 * n) *
                static_cast<double>(parts_.size()) <

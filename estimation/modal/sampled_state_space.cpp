@@ -27,7 +27,7 @@ double in_samples(double delay_s, double period_s) {
   return split.whole + split.fraction;
 }
 
-/// Output `first` gets no part; the others' are within [0, 1) above it, the inputs' within (-1, 0].
+/// Output `first` has no fraction; those of the others are in [0, 1), those of the inputs in (-1, 0].
 DividedDelays divide_from(Eigen::Index first, const Eigen::VectorXd& input_s,
                           const Eigen::VectorXd& output_s, double period_s) {
   DividedDelays out;
@@ -41,11 +41,11 @@ DividedDelays divide_from(Eigen::Index first, const Eigen::VectorXd& input_s,
   out.whole_input.resize(input_s.size());
   for (Eigen::Index j = 0; j < input_s.size(); ++j)
     out.whole_input[j] = std::ceil(in_samples(input_s[j] + output_s[first], period_s));
-  // Moved so that no output has less than none.
+  // Shifted so that no output delay is negative.
   const double least = out.whole_output.minCoeff();
   out.whole_output.array() -= least;
   out.whole_input.array() += least;
-  // The sum of a channel's delays decides, as in response(), not the sum of rounded parts.
+  // The sum of the delays of a channel decides, as in response(), not the sum of rounded parts.
   out.part_input.resize(input_s.size());
   out.rest.resize(output_s.size(), input_s.size());
   for (Eigen::Index j = 0; j < input_s.size(); ++j) {

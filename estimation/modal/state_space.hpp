@@ -8,7 +8,7 @@
 
 namespace stageid {
 
-/// States that belong together: a block on the diagonal of A.
+/// A block on the diagonal of A.
 ///
 ///   real pole      1 x 1   lambda
 ///   complex pair   2 x 2   [Re lambda, -Im lambda; Im lambda, Re lambda], Im lambda > 0
@@ -16,7 +16,7 @@ namespace stageid {
 struct StateBlock {
   Eigen::Index first = 0;
   Eigen::Index size = 1;
-  std::complex<double> pole;  ///< of A: rad/s, or a point of the z plane if A is discrete
+  std::complex<double> pole;  ///< of A: rad/s, or in the z plane if A is discrete
   long long submodel = 0;     ///< index into the model's; -1: a delay
 };
 
@@ -40,8 +40,8 @@ struct StateSpace {
 ///   R_1/s + R_2/s^2 2 rank R_2 + rank (I - P_y) R_1 (I - P_u), P_y and P_u the orthogonal projectors
 ///                   on the columns and rows of R_2
 /// which is the least number (Gilbert), unless two submodels share a pole and shapes. A rank is the
-/// submodel's residue_rank where that is held, else the number of singular values above 1e-10 of the
-/// first: a free residue of a 4 x 13 model has noise in all of them, so 8 states a mode.
+/// submodel's residue_rank if held, else the number of singular values above 1e-10 of the first: a free
+/// residue of a 4 x 13 model has noise in all of them, so 8 states per mode.
 /// Source: E. G. Gilbert, SIAM J. Control 1 (1963) 128; T. Kailath, Linear Systems (1980), ch. 6.
 ///
 /// @throws std::invalid_argument if poles coincide within a submodel, a submodel is improper or has

@@ -24,8 +24,8 @@ std::vector<Complex> all_poles(const std::vector<Complex>& representatives) {
   return out;
 }
 
-/// Partial fractions of poles closer than this lose too many digits: the residues grow as the inverse
-/// distance, and the poles themselves, as roots of A, are uncertain by the root of rounding.
+/// Partial fractions of closer poles lose too many digits: the residues grow as the inverse distance, and the poles,
+/// as roots of A, have errors of the square root of rounding.
 void require_distinct(const std::vector<Complex>& poles, std::size_t index) {
   constexpr double kClosest = 1e-6;
   for (std::size_t i = 0; i < poles.size(); ++i)

@@ -8,8 +8,8 @@
 
 namespace stageid {
 
-/// A pole other than the origin and its residue. A complex pair stands here once, with the pole of
-/// positive imaginary part: R/(s - lambda) + conj(R)/(s - conj(lambda)).
+/// A pole other than the origin and its residue. A complex pair is stored once, with the pole of positive imaginary
+/// part: R/(s - lambda) + conj(R)/(s - conj(lambda)).
 struct PoleResidue {
   std::complex<double> pole_rad_s;
   Eigen::MatrixXcd residue;  ///< n_y x n_u; real for a real pole
@@ -33,15 +33,14 @@ std::vector<std::complex<double>> pole_representatives(const Submodel& submodel)
 /// B(s) = B_0 + B_1 s + ...
 Eigen::MatrixXcd numerator_at(const Submodel& submodel, std::complex<double> s);
 
-/// @param index what errors call the submodel
+/// @param index of the submodel, for errors
 /// @throws std::invalid_argument if two poles of A are within 1e-6 of each other (relative), if there
 /// are more than two integrators, or if the submodel is improper.
 SubmodelResidues residues(const Submodel& submodel, std::size_t index);
 
-/// How many of a residue's singular values count: submodel.residue_rank if a fit held the residues at
-/// that and the values agree, else those above kRankTolerance of the first.
-/// @throws std::invalid_argument if residue_rank contradicts the values: the next one is above 1e-6 of
-/// the first.
+/// Rank of a residue: submodel.residue_rank if a fit held it at that rank, else the number of singular values above
+/// kRankTolerance of the first.
+/// @throws std::invalid_argument if residue_rank contradicts the values: the next one is above 1e-6 of the first.
 Eigen::Index residue_rank(const Submodel& submodel, std::size_t index,
                           const Eigen::VectorXd& singular_values);
 

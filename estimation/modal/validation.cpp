@@ -14,7 +14,7 @@ namespace stageid {
 
 Eigen::MatrixXcd response_like(const AdditiveModel& model, const FrfEstimate& frf) {
   if (frf.hold == Hold::none) {
-    // Continuous data: neither hold nor delay, unless the model was fitted to data like these.
+    // Continuous data have neither hold nor delay, unless the model was fitted to such data.
     AdditiveModel bare = model;
     if (model.hold != HoldModel::none) {
       bare.input_delay_s.setZero(model.n_inputs());
@@ -25,7 +25,7 @@ Eigen::MatrixXcd response_like(const AdditiveModel& model, const FrfEstimate& fr
   const HoldModel sampled = model.hold == HoldModel::none ? HoldModel::exact : model.hold;
   if (frf.compensated == Compensation::none) return response(model, frf.frequency_hz, sampled);
   if (model.hold == HoldModel::none) return response(model, frf.frequency_hz, HoldModel::none);
-  // A model that contains the delay, data that have lost it: lose the same.
+  // The model contains the delay, but it was removed from the data: remove it here too.
   Eigen::MatrixXcd P = response(model, frf.frequency_hz, sampled);
   const double period = 1.0 / frf.sample_rate_hz;
   const Eigen::VectorXd omega = frf.omega_rad_s();
@@ -41,7 +41,7 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// The same numbers in other units are another response.
+/// Equal numbers in different units are not the same response.
 void require_same_units(const char* kind, const ChannelList& model, const ChannelList& data) {
   for (std::size_t i = 0; i < model.units.size() && i < data.units.size(); ++i) {
     if (model.units[i].empty() || data.units[i].empty() || model.units[i] == data.units[i])
@@ -62,7 +62,7 @@ void fill_whiteness(const Eigen::MatrixXcd& white, Validation& out) {
         white.leftCols(n).conjugate().cwiseProduct(white.rightCols(n)).sum();
     out.whiteness = std::max(out.whiteness, std::abs(sum) / power);
   }
-  // |r|^2 of circular white noise is exponential with mean 1/count; ten lags share 1 %.
+  // r|^2 of circular white noise is exponential with mean 1/count; ten lags share the probability of 1 %.
   const double count = static_cast<double>(white.size());
   out.whiteness_limit = std::sqrt(-std::log(1.0 - std::pow(0.99, 0.1)) / count);
 }

@@ -10,19 +10,19 @@
 
 namespace stageid {
 
-/// How a continuous-time model meets sampled data, see method.md section 4.
+/// How a continuous-time model is compared with sampled data, see docs/theory.md, section 6.
 enum class HoldModel : std::uint8_t {
   none,   ///< P(j omega) e^{-j omega delay}
-  phase,  ///< and the hold's delay T/2
+  phase,  ///< and the delay T/2 of the hold
   sinc,   ///< and its magnitude sinc(omega T / 2)
-  exact   ///< every basis function through hold, delay and sampler: aliasing included
+  exact   ///< every basis function through hold, delay and sampler, including aliasing
 };
 
-/// What a fit knows about a submodel beyond its coefficients; not in model files.
+/// Role of a submodel in a fit; not stored in model files.
 enum class SubmodelRole : std::uint8_t {
   searched,   ///< an automatic search may drop it or merge it with another
-  given,      ///< asked for: it stays, and the data must determine its poles
-  suspension  ///< a rigid body's weak stiffness: it stays; below the lines its poles may be held
+  given,      ///< requested: it stays, and the data must determine its poles
+  suspension  ///< weak stiffness of a rigid body: it stays; below the lines its poles may be held
 };
 
 /// One pole (real) or one conjugate pair of a submodel.
@@ -33,9 +33,9 @@ struct PoleEstimate {
   std::optional<double> damping_ratio_std = {};
 };
 
-/// Standard deviations of what mode_shapes() tells of a mode, to first order.
+/// Standard deviations of the mode shapes computed by mode_shapes(), to first order.
 struct ModeShapeDeviation {
-  Eigen::VectorXcd output_shape;  ///< of the real parts, and of the imaginary parts
+  Eigen::VectorXcd output_shape;  ///< of the real parts and of the imaginary parts
   Eigen::VectorXcd input_shape;
   double modal_mass = 0.0;
 };
@@ -46,17 +46,18 @@ struct Submodel {
   std::vector<double> denominator = {1.0};  ///< [1, a_1, ..., a_n]
   std::vector<Eigen::MatrixXd> numerator;   ///< B_0, B_1, ...: n_y x n_u each
 
-  // Filled by a fit, where they apply.
+  // Filled by a fit where applicable.
   std::optional<double> natural_frequency_std_hz;
   std::optional<double> damping_ratio_std;
   std::optional<ModeShapeDeviation> shape_std = {};
-  std::optional<int> residue_rank = {};  ///< that the numerators were held at; none: free
-  std::vector<PoleEstimate> poles = {};  ///< of a submodel with poles that is no mode, rising
+  std::optional<int> residue_rank = {};  ///< rank at which the numerators were held; none: free
+  /// by rising frequency; only for submodels with poles that are not modes
+  std::vector<PoleEstimate> poles = {};
 
   SubmodelRole role = SubmodelRole::searched;
-  bool frequency_held = false;                      ///< a mode whose a_2 stays where it is
-  bool damping_held = false;                        ///< a mode whose a_1 stays where it is
-  std::vector<Eigen::MatrixXd> numerator_std = {};  ///< of every entry of numerator; empty: unknown
+  bool frequency_held = false;                      ///< a mode with fixed a_2
+  bool damping_held = false;                        ///< a mode with fixed a_1
+  std::vector<Eigen::MatrixXd> numerator_std = {};  ///< per entry of numerator; empty: unknown
 
   /// n = 2 with complex poles: 1/(2 pi sqrt(a_2)) and a_1/(2 sqrt(a_2)).
   bool is_mode() const noexcept { return integrators == 0 && denominator.size() == 3; }
@@ -64,20 +65,19 @@ struct Submodel {
   double damping_ratio() const;         ///< @pre is_mode()
 };
 
-/// How a fit ended, as the model file tells it.
+/// Outcome of a fit, as stored in the model file.
 struct FitRecord {
   double cost = 0.0;  ///< 1/(2N) sum vec(E)^H W vec(E)
   std::string weighting;
   int iterations = 0;
-  std::string
-      status;  ///< to_string(FitStatus); empty: unknown, of a model that another program wrote
-  std::string message;  ///< why the fit is not to be trusted; empty: nothing speaks against it
+  std::string status;   ///< to_string(FitStatus); empty: unknown, model from another program
+  std::string message;  ///< why the fit is not trustworthy; empty: no reason known
   double relative_rms_error = 0.0;  ///< sqrt(mean |E|^2/|G|^2) over lines and channels
   double band_hz[2] = {0.0, 0.0};
   double seconds = 0.0;
 };
 
-/// P(s) = sum of submodels, with delays per channel: what model.json holds.
+/// P(s) = sum of submodels, with delays per channel: the content of model.json.
 struct AdditiveModel {
   ChannelList inputs;
   ChannelList outputs;
@@ -85,8 +85,8 @@ struct AdditiveModel {
   HoldModel hold = HoldModel::none;
   Eigen::VectorXd input_delay_s;   ///< n_u
   Eigen::VectorXd output_delay_s;  ///< n_y
-  /// Standard deviations of estimated delays, n_u and n_y; empty: given, or unknown. Delays per channel are
-  /// differences to that of the last output, which is held: its deviation is 0.
+  /// Standard deviations of estimated delays, n_u and n_y; empty: given or unknown. Delays per channel are relative to
+  /// that of the last output, which is held: its deviation is 0.
   Eigen::VectorXd input_delay_std_s;
   Eigen::VectorXd output_delay_std_s;
   std::vector<Submodel> submodels;
@@ -96,19 +96,18 @@ struct AdditiveModel {
 
   Eigen::Index n_outputs() const noexcept { return static_cast<Eigen::Index>(outputs.size()); }
   Eigen::Index n_inputs() const noexcept { return static_cast<Eigen::Index>(inputs.size()); }
-  Eigen::VectorXd input_delays_s() const;   ///< n_u, also where input_delay_s is empty
+  Eigen::VectorXd input_delays_s() const;   ///< n_u, also if input_delay_s is empty
   Eigen::VectorXd output_delays_s() const;  ///< n_y
   double mean_delay_s() const;              ///< from an input to an output, over the channels
 };
 
-/// The model's response on a list of frequencies, (n_y n_u) x N, column k = vec(P(j omega_k)),
-/// through the given hold model and the model's own delays.
-/// @throws std::invalid_argument if `hold` needs a sample rate and there is none, or f is not below
-/// Nyquist.
+/// The response of the model at a list of frequencies, (n_y n_u) x N, column k = vec(P(j omega_k)), through the given
+/// hold model and the delays of the model.
+/// @throws std::invalid_argument if `hold` needs an unknown sample rate, or a frequency is not below Nyquist.
 Eigen::MatrixXcd response(const AdditiveModel& model,
                           const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold);
 
-/// model.json as in docs/formats.md; whole or not at all.
+/// Writes model.json as in docs/formats.md, atomically.
 /// @throws FileError, FormatError
 void write_model(const std::filesystem::path& file, const AdditiveModel& model);
 AdditiveModel read_model(const std::filesystem::path& file);

@@ -11,7 +11,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// out's column += factor x
+/// Adds factor x to a column of out.
 void add(Complex factor, const SplitMatrix& x, SplitMatrix& out, Eigen::Index column) {
   out.re.col(column) += factor.real() * x.re.col(0) - factor.imag() * x.im.col(0);
   out.im.col(column) += factor.real() * x.im.col(0) + factor.imag() * x.re.col(0);
@@ -25,7 +25,7 @@ std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>&
   if (n == 1) return {Complex(-1.0 / a[0])};
   if (n == 2) {
     const Complex half = std::sqrt(Complex(a[0] * a[0] - 4.0 * a[1]));
-    // The larger root first, the other from the product: no cancellation.
+    // The larger root first and the other from the product, to avoid cancellation.
     const Complex first = (a[0] >= 0.0 ? -a[0] - half : -a[0] + half) / (2.0 * a[1]);
     return {first, 1.0 / (a[1] * first)};
   }

@@ -8,7 +8,7 @@
 
 namespace stageid {
 
-/// Which rational functions s^m / (s^l A(s)), A of order n, m = 0 .. degree.
+/// The rational functions s^m / (s^l A(s)) of a submodel, A of order n, m = 0 .. degree.
 struct SubmodelShape {
   int integrators = 0;       ///< l, 0 to 2
   int order = 0;             ///< n
@@ -16,14 +16,14 @@ struct SubmodelShape {
   int functions() const noexcept { return numerator_degree + 1; }
 };
 
-/// One submodel's functions of frequency on the lines, through hold, delay and sampler.
+/// The functions of frequency of one submodel on the lines, through hold, delay and sampler.
 struct SubmodelBasis {
   SplitMatrix value;     ///< N x (m+1):  H{ s^p / (s^l A) }
   SplitMatrix gradient;  ///< N x (m+1) n: its derivative to a_q in column p n + (q-1)
   SplitMatrix delay;     ///< N x (m+1): its derivative to the delay
 };
 
-/// What of a SubmodelBasis beside the value is wanted; the rest stays empty.
+/// Parts of a SubmodelBasis to compute besides the value; the rest remains empty.
 struct WantedBasis {
   bool gradient = false;
   bool delay = false;
@@ -34,7 +34,7 @@ std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>&
 
 /// Evaluates the functions of one submodel with denominator coefficients a (size n): each is written in
 /// partial fractions, and `through` acts on every fraction in closed form.
-/// @pre the poles are simple and not zero; the function is not improper.
+/// @pre the poles are simple and not zero; the function is proper.
 void evaluate_basis(const LineOperator& through, const SubmodelShape& shape,
                     const Eigen::Ref<const Eigen::VectorXd>& a, WantedBasis wanted,
                     SubmodelBasis& out);

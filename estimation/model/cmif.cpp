@@ -13,7 +13,7 @@
 namespace stageid {
 namespace {
 
-/// G(j omega_k) with what `kind` multiplies it by.
+/// G(j omega_k) times the factors of `kind`.
 Eigen::MatrixXcd weighted_response(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
   Eigen::MatrixXcd G = frf.at(k);
   if (kind == CmifKind::accelerance) {
@@ -31,20 +31,20 @@ Eigen::MatrixXcd weighted_response(const FrfEstimate& frf, CmifKind kind, Eigen:
   return G;
 }
 
-/// Not taller than wide.
+/// Transposed if needed so that rows <= columns.
 Eigen::MatrixXcd wide_response(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
   Eigen::MatrixXcd G = weighted_response(frf, kind, k);
   if (G.rows() > G.cols()) G.transposeInPlace();
   return G;
 }
 
-/// Left singular vectors of a line: of all lines they would be as large as the response.
+/// Left singular vectors of one line; those of all lines would need as much memory as the response.
 Eigen::MatrixXcd shapes(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
   return Eigen::JacobiSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k), Eigen::ComputeThinU)
       .matrixU();
 }
 
-/// How far a peak stands above the higher of the two valleys around it, in dB of power.
+/// Height of a peak above the higher of the two valleys around it, in dB of power.
 double prominence_db(const Eigen::Ref<const Eigen::RowVectorXd>& curve, Eigen::Index peak) {
   const double height = curve[peak];
   double left = height;
@@ -56,8 +56,7 @@ double prominence_db(const Eigen::Ref<const Eigen::RowVectorXd>& curve, Eigen::I
   return 10.0 * std::log10(height / std::max({left, right, 1e-300}));
 }
 
-/// Half-power width by linear interpolation; the narrower side counts twice if the other is not
-/// clean.
+/// Half-power width by linear interpolation; if one side is not clean, twice the narrower side.
 double half_power_damping(const Eigen::VectorXd& f,
                           const Eigen::Ref<const Eigen::RowVectorXd>& curve, Eigen::Index peak) {
   const double half = 0.5 * curve[peak];
@@ -80,8 +79,8 @@ double half_power_damping(const Eigen::VectorXd& f,
   return std::clamp(width / (2.0 * f[peak]), 5e-4, 0.1);
 }
 
-/// A peak of a lower curve that only mirrors a crossing: the curve above dips there and the shapes
-/// swap.
+/// Whether a peak of a lower curve only mirrors a crossing: the curve above has a dip there and the shapes are
+/// exchanged.
 bool is_crossing(const FrfEstimate& frf, CmifKind kind, const Eigen::MatrixXd& curves,
                  Eigen::Index curve, Eigen::Index k) {
   if (curve == 0 || k == 0 || k + 1 >= curves.cols()) return false;
@@ -96,10 +95,10 @@ bool is_crossing(const FrfEstimate& frf, CmifKind kind, const Eigen::MatrixXd& c
   return mac(curve, curve - 1) > 0.5 && mac(curve - 1, curve) > 0.5;
 }
 
-constexpr double kScatterFactor = 5.0;  // a peak of pure noise in thousands of lines stays below
+constexpr double kScatterFactor = 5.0;  // peaks of pure noise in thousands of lines remain below
 
-/// Scatter of the curve around a line in dB (standard deviation of its logarithm), from second
-/// differences: slopes and the tops of smooth peaks count for nothing.
+/// Scatter of the curve around a line in dB (standard deviation of its logarithm), from second differences, which
+/// exclude slopes and the tops of smooth peaks.
 double scatter_db(const Eigen::RowVectorXd& curve_db, Eigen::Index line) {
   constexpr Eigen::Index kReach = 24;
   const Eigen::Index first = std::max<Eigen::Index>(1, line - kReach);
@@ -107,11 +106,11 @@ double scatter_db(const Eigen::RowVectorXd& curve_db, Eigen::Index line) {
   std::vector<double> bends;
   for (Eigen::Index i = first; i <= last; ++i)
     bends.push_back(std::abs(curve_db[i - 1] - 2.0 * curve_db[i] + curve_db[i + 1]));
-  return order_statistic(bends, 0.5) / (0.6745 * std::sqrt(6.0));  // of normal numbers
+  return order_statistic(bends, 0.5) / (0.6745 * std::sqrt(6.0));  // scale for normal numbers
 }
 
-/// Lower quartile of the lines beside a peak up to where the curve rises above it again: a base that
-/// the deepest dips of noise do not set.
+/// Lower quartile of the lines beside a peak, up to where the curve exceeds the peak again: a base that does not
+/// depend on the deepest dips of the noise.
 double base_db(const Eigen::RowVectorXd& curve_db, Eigen::Index peak, Eigen::Index direction) {
   std::vector<double> values;
   for (Eigen::Index k = peak + direction;
@@ -121,7 +120,7 @@ double base_db(const Eigen::RowVectorXd& curve_db, Eigen::Index peak, Eigen::Ind
   return order_statistic(values, 0.25);
 }
 
-/// Whether a local maximum stands above its surroundings by more than noise makes maxima stand.
+/// Whether a local maximum exceeds its surroundings by more than the maxima of noise do.
 bool above_scatter(const Eigen::RowVectorXd& curve_db, Eigen::Index peak) {
   const double base = std::max(base_db(curve_db, peak, -1), base_db(curve_db, peak, +1));
   return curve_db[peak] - base > kScatterFactor * scatter_db(curve_db, peak);

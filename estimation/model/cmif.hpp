@@ -8,19 +8,19 @@
 
 namespace stageid {
 
-/// What stands inside the singular values.
+/// The matrix whose singular values are computed.
 enum class CmifKind : std::uint8_t {
   response,     ///< G
-  accelerance,  ///< omega^2 G: no rigid-body slope
-  whitened      ///< every channel over its standard deviation, noise (else total); the floor is 1
+  accelerance,  ///< omega^2 G: without the slope of the rigid body
+  whitened      ///< every channel over its standard deviation, noise (else total); floor 1
 };
 
 /// Complex mode indicator function: squared singular values of G(j omega_k), min(n_y, n_u) x N,
 /// largest first. Source: paper, section 4.5; Shih et al. (1988).
-/// @throws std::invalid_argument if `whitened` is asked of an FRF without variances.
+/// @throws std::invalid_argument if `whitened` is requested for an FRF without variances.
 Eigen::MatrixXd cmif(const FrfEstimate& frf, CmifKind kind = CmifKind::response);
 
-/// A candidate mode, as modes.json holds it.
+/// A candidate mode, as in modes.json.
 struct ModeCandidate {
   double frequency_hz = 0.0;
   double damping_ratio = 0.01;
@@ -33,8 +33,8 @@ struct PeakOptions {
   int most_peaks = 100;
 };
 
-/// Peaks of the CMIF curves that are modes: prominent, not the crossing of two curves, damping from
-/// the half-power width. By frequency. A line at 0 Hz is left out.
+/// Peaks of the CMIF curves that are modes: prominent, not the crossing of two curves. Damping from the half-power
+/// width. Sorted by frequency; a line at 0 Hz is ignored.
 std::vector<ModeCandidate> pick_modes(const FrfEstimate& frf, const PeakOptions& options = {});
 
 /// modes.json as in docs/formats.md. @throws FileError, FormatError

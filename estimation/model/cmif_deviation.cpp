@@ -8,7 +8,7 @@
 namespace stageid {
 namespace {
 
-/// What every element is multiplied by inside the singular values of line k, n_y x n_u.
+/// Factor of every element of the matrix whose singular values are computed, on line k, n_y x n_u.
 Eigen::MatrixXd element_weights(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
   Eigen::MatrixXd weights = Eigen::MatrixXd::Ones(frf.n_outputs(), frf.n_inputs());
   if (kind == CmifKind::accelerance) {

@@ -12,7 +12,7 @@ HoldIntegral hold_integral(std::complex<double> lambda, double t) {
     const Complex value = (e - 1.0) / lambda;
     return {value, (t * e - value) / lambda};
   }
-  // Series: the closed form cancels for slow poles. 0.5^18/18! is far below rounding.
+  // Series, because the closed form cancels for slow poles. 0.5^18/18! is far below rounding.
   Complex term = 1.0;
   Complex value = 0.0;
   Complex derivative = 0.0;

@@ -8,14 +8,14 @@
 
 namespace stageid {
 
-/// The lines of a fit and how a continuous-time model is seen on them.
+/// The lines of a fit, and the hold and sampling at which the model is evaluated.
 struct ModelLines {
   Eigen::VectorXd omega_rad_s;
   double sample_period_s = 0.0;  ///< needed unless hold is none
   HoldModel hold = HoldModel::none;
 };
 
-/// Complex columns with their real and imaginary parts apart: what arithmetic on whole columns wants.
+/// Complex columns with real and imaginary parts stored separately, for vectorized arithmetic on whole columns.
 struct SplitMatrix {
   Eigen::MatrixXd re;
   Eigen::MatrixXd im;
@@ -35,8 +35,8 @@ struct SplitMatrix {
   bool operator==(const SplitMatrix& other) const = default;
 };
 
-/// A fraction 1/(s - lambda) and its square on every line, through hold, delay and sampler, with their
-/// derivatives to the delay: what is not asked for is empty.
+/// A fraction 1/(s - lambda) and its square on every line, through hold, delay and sampler, with their derivatives to
+/// the delay; unrequested ones are empty.
 struct Fractions {
   SplitMatrix simple;         ///< N x 1
   SplitMatrix squared;        ///< N x 1
@@ -44,7 +44,7 @@ struct Fractions {
   SplitMatrix squared_delay;  ///< N x 1
 };
 
-/// What a Fractions column is made of: first() (c[0] + c[1] q + c[2] q^2), q = 1/(x - x_lambda).
+/// Expansion of a Fractions column: first() (c[0] + c[1] q + c[2] q^2), q = 1/(x - x_lambda).
 struct FractionExpansion {
   using Coefficients = std::array<std::complex<double>, 3>;
   Coefficients simple = {};
@@ -55,9 +55,8 @@ struct FractionExpansion {
 
 /// Hold, delay and sampler on given lines: everything that all poles share.
 ///
-/// Hold, delay and sampler act on each fraction 1/(s - lambda) and 1/(s - lambda)^2 in closed form
-/// (method.md section 4): with delay = (d + f) T, E = e^{lambda T}, e_1 = e^{lambda (1-f) T}, phi(t) =
-/// (e^{lambda t} - 1)/lambda,
+/// They act on each fraction 1/(s - lambda) and 1/(s - lambda)^2 in closed form (docs/theory.md, section 6).
+/// With delay = (d + f) T, E = e^{lambda T}, e_1 = e^{lambda (1-f) T}, phi(t) = (e^{lambda t} - 1)/lambda,
 ///   H{1/(s - lambda)} = z^-d [ z^-1 phi((1-f) T) + z^-2 phi(T) e_1 / (1 - E z^-1) ],
 /// and H{1/(s - lambda)^2} is its derivative to lambda.
 class LineOperator {
@@ -72,19 +71,19 @@ class LineOperator {
   };
   void fractions(std::complex<double> lambda, Wanted wanted, Fractions& out) const;
   FractionExpansion expansion(std::complex<double> lambda) const;
-  /// A pole's place x_lambda: e^{lambda T} or lambda; and its derivative to lambda.
+  /// The image x_lambda of a pole, e^{lambda T} or lambda, and its derivative to lambda.
   std::complex<double> place(std::complex<double> lambda) const;
   std::complex<double> place_slope(std::complex<double> lambda) const;
   /// q = 1/(x - x_lambda) on every line, N x 1.
   void reciprocal(std::complex<double> lambda, SplitMatrix& q) const;
 
-  /// The variable x in which sampled functions are rational, z or s, on every line; and the factor
-  /// beside it: whole delays, or delay and hold. N x 1.
+  /// The variable x in which sampled functions are rational, z or s, on every line, and the additional factor: whole
+  /// delays, or delay and hold. N x 1.
   bool exact() const noexcept { return exact_; }
   const SplitMatrix& x() const noexcept { return z_; }
   const SplitMatrix& first() const noexcept { return first_; }
 
-  /// The constant 1: a held input seen at the sampling instants; and its derivative to the delay.
+  /// The constant 1 (a held input at the sampling instants) and its derivative to the delay.
   const SplitMatrix& constant() const noexcept { return constant_; }
   const SplitMatrix& constant_delay() const noexcept { return constant_delay_; }
 

@@ -10,7 +10,7 @@
 namespace stageid {
 namespace {
 
-constexpr double kTaken = 0.05;  // of a frequency: a neighbour as close shows in the residual
+constexpr double kTaken = 0.05;  // of a frequency: a neighbour this close is found in the residual
 
 }  // namespace
 

@@ -8,39 +8,39 @@
 
 namespace stageid {
 
-/// Which submodels beside the modes.
+/// Submodels besides the modes.
 struct ModelStructure {
   bool rigid_body = true;            ///< B_0 / s^2
   bool direct_term = false;          ///< a constant matrix: compliance of modes above the band
   bool general_damping = false;      ///< modes with B_0 + B_1 s (general viscous) instead of B_0
-  std::vector<Submodel> given = {};  ///< further ones at their start; their role is not `searched`
+  std::vector<Submodel> given = {};  ///< further ones with start values; role not `searched`
 };
 
-/// A mode at its candidate's place, numerators zero.
+/// A mode at the frequency and damping of its candidate, numerators zero.
 Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,
                        const ModeCandidate& mode);
 
-/// The submodels beside the modes, numerators zero.
+/// The submodels besides the modes, numerators zero.
 std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructure& structure);
 
-/// Those candidates that no given submodel stands for: none of its poles starts within 5 %.
+/// The candidates farther than 5 % from every starting pole of the given submodels.
 std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candidates,
                                          const ModelStructure& structure);
 
-/// A mode that a search found and may drop again.
+/// A mode that was found by a search and may be dropped again.
 bool is_searched_mode(const Submodel& submodel) noexcept;
 
-/// Of them.
+/// Number of searched modes.
 int count_modes(const AdditiveModel& model);
 
-/// The places of the submodels in the order of sort_modes().
+/// Indices of the submodels in the order of sort_modes().
 std::vector<std::size_t> mode_order(const AdditiveModel& model);
 
-/// Searched modes by frequency, behind the other submodels.
+/// Sorts searched modes by frequency, after the other submodels.
 void sort_modes(AdditiveModel& model);
 
-/// More modes than this the lines of an FRF cannot carry: a channel's functions are real combinations
-/// on 2 N real values, of which a third is left to tell noise from modes.
+/// Largest number of modes that the lines support. The functions of a channel are real combinations on 2 N real
+/// values; a third of these is reserved to distinguish modes from noise.
 Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure);
 
 }  // namespace stageid

@@ -6,8 +6,8 @@
 
 namespace stageid {
 
-/// The partial fractions of s^power / (s^l A^times): how often each pole stands there, the origin first,
-/// then the roots of A.
+/// Partial fractions of s^power / (s^l A^times), with the multiplicity of each pole: the origin first, then the roots
+/// of A.
 struct PartialFractions {
   const std::vector<std::complex<double>>& poles;  ///< [0] is the origin
   int origin_multiplicity;
@@ -17,7 +17,7 @@ struct PartialFractions {
 
   int multiplicity(std::size_t r) const { return r == 0 ? origin_multiplicity : root_multiplicity; }
 
-  /// add(r, simple, squared) for every pole: its part is simple / (s - lambda) + squared / (s - lambda)^2.
+  /// Calls add(r, simple, squared) per pole, whose part is simple / (s - lambda) + squared / (s - lambda)^2.
   template <typename Add>
   void for_each(Add&& add) const {
     for (std::size_t r = 0; r < poles.size(); ++r) {

@@ -8,19 +8,19 @@
 
 namespace stageid {
 
-/// Poles of a real rational function of x: of each conjugate pair the upper one, and the real ones.
+/// Poles of a real rational function of x: the upper one of each conjugate pair, and the real ones.
 struct PoleSet {
   std::vector<std::complex<double>> pairs;
   std::vector<double> reals;
 
-  /// Real coefficients of a sum over all poles.
+  /// Number of real coefficients of a sum over all poles.
   Eigen::Index size() const noexcept {
     return static_cast<Eigen::Index>(2 * pairs.size() + reals.size());
   }
 };
 
-/// Partial fractions with real coefficients on every line, N x size(): of a pair p the columns
-/// 1/(x-p) + 1/(x-p*) and j/(x-p) - j/(x-p*), of a real one 1/(x-p).
+/// Partial fractions with real coefficients on every line, N x size(): columns 1/(x-p) + 1/(x-p*) and j/(x-p) -
+/// j/(x-p*) per pair, 1/(x-p) per real pole.
 SplitMatrix partial_fractions(const PoleSet& poles, const Eigen::VectorXcd& x);
 
 /// The zeros of  1 + sum_i c_i phi_i(x),  phi the partial fractions: eigenvalues of the poles' real block

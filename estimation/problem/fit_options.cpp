@@ -75,7 +75,7 @@ int gravity(FitStatus status) noexcept {
   if (is_trustworthy(status)) return 0;
   if (status == FitStatus::undetermined) return 1;
   if (status == FitStatus::unexplained) return 2;
-  if (status == FitStatus::interrupted) return 6;  // whatever else: the user asked for it
+  if (status == FitStatus::interrupted) return 6;  // the request of the user comes first
   if (status == FitStatus::faulty_data) return 5;
   return status == FitStatus::search_budget ? 4 : 3;
 }

@@ -106,7 +106,7 @@ namespace {
 
 constexpr std::size_t kSubmodelsATask = 32;
 
-/// Where a submodel's columns begin.
+/// First columns of a submodel.
 struct SubmodelPlace {
   Eigen::Index function = 0;
   Eigen::Index parameter = 0;
@@ -170,7 +170,7 @@ void evaluate_submodel(const FitProblem& problem, const LineOperator& through,
   group.T_im.middleCols(place.function, functions) = basis.delay.im;
 }
 
-/// The products that are made of the functions grow with their square.
+/// The number of products of the functions grows with their square.
 void add_work(const FitProblem& problem, const WantedBasis& wanted) {
   auto columns = static_cast<double>(problem.functions());
   if (wanted.gradient) columns += static_cast<double>(derivative_columns(problem).size());

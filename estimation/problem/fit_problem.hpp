@@ -13,13 +13,13 @@
 
 namespace stageid {
 
-// Symbols (paper, section 2 and 3; method.md section 6):
+// Symbols (paper, sections 2 and 3):
 //   N lines, n_c = n_y n_u channels (column-stacked), G data, W diagonal weights, E = G - P
 //   F(k, j)   the numerator functions of all submodels, j = 1 .. n_f
 //   B(c, j)   the numerator coefficients of channel c
 //   D(k, .)   derivatives of F to the denominator coefficients
 
-/// A variance of the data whose lines are divided by a number each, without a copy of it.
+/// A variance of the data whose lines are divided by one number each, without copying it.
 struct LineVariance {
   SharedMatrix<Eigen::MatrixXd> matrix;  ///< n_c x N
   Eigen::ArrayXd divisor;                ///< N
@@ -27,8 +27,8 @@ struct LineVariance {
   Eigen::ArrayXd channel(Eigen::Index c) const;  ///< N
 };
 
-/// Data of a fit, channels as rows, one copy of them however many problems they belong to. Parts and
-/// products are made tile by tile, in real arithmetic, since parameters are real.
+/// Data of a fit, channels as rows; several problems can share one copy. Parts and products are computed tile by tile,
+/// in real arithmetic, since parameters are real.
 struct FitProblem {
   ModelLines lines;
   Eigen::Index n_outputs = 0;
@@ -37,12 +37,12 @@ struct FitProblem {
   SharedMatrix<Eigen::MatrixXd> W;     ///< n_c x N; see weights()
   std::optional<LineVariance> middle;  ///< v: the weights are W v W instead of W
   std::vector<SubmodelShape> shapes;
-  std::vector<SubmodelRole> roles;  ///< one a submodel; empty: all searched
-  std::vector<Eigen::Index> held;   ///< globals that are known and stay
+  std::vector<SubmodelRole> roles;  ///< one per submodel; empty: all searched
+  std::vector<Eigen::Index> held;   ///< globals that are known and fixed
   DelayModel delay = DelayModel::fixed;
-  bool multiplied_out = false;  ///< no sums of fractions for few channels: all digits, more time
+  bool multiplied_out = false;  ///< few channels: no sums of fractions; all digits, but slower
   int threads = 1;
-  std::shared_ptr<SearchLimit> limit;  ///< every evaluation counts; empty: none
+  std::shared_ptr<SearchLimit> limit;  ///< each evaluation counts; empty: no limit
 
   Eigen::Index channels() const noexcept { return G->rows(); }
   Eigen::Index size() const noexcept { return G->cols(); }
@@ -55,61 +55,61 @@ struct FitProblem {
   Eigen::Index parameters() const noexcept { return globals() + channels() * functions(); }
 };
 
-/// beta: everything that is estimated.
+/// beta: all estimated parameters.
 struct FitParameters {
-  std::vector<Eigen::VectorXd> a;  ///< one a submodel, size its order
+  std::vector<Eigen::VectorXd> a;  ///< one per submodel, size its order
   Eigen::VectorXd input_delay_s;   ///< n_u
-  Eigen::VectorXd output_delay_s;  ///< n_y; the last is the gauge and stays
+  Eigen::VectorXd output_delay_s;  ///< n_y; the last is the gauge and is held
   Eigen::MatrixXd B;               ///< n_c x n_f
 };
 
-/// Groups of fewer channels: what channels share costs more than it saves, unless functions are many.
+/// Smaller groups do not gain from products shared between channels, unless they have many functions.
 constexpr Eigen::Index kFewChannels = 16;
 constexpr Eigen::Index kManyFunctions = 64;
 
-/// Channels that share one delay, and the functions that they see.
+/// Channels with the same delay, and the functions evaluated with that delay.
 struct BasisGroup {
   double delay_s = 0.0;
   std::vector<Eigen::Index> channels;
   Eigen::MatrixXd F_re;  ///< N x n_f
   Eigen::MatrixXd F_im;
-  Eigen::MatrixXd D_re;  ///< N x n_d, see DerivativeColumn; empty unless asked for
+  Eigen::MatrixXd D_re;  ///< N x n_d, see DerivativeColumn; empty unless requested
   Eigen::MatrixXd D_im;
   Eigen::MatrixXd T_re;  ///< N x n_f: derivative to the delay; empty unless delays are free
   Eigen::MatrixXd T_im;
-  bool few = false;           ///< every channel's products are multiplied out by themselves
+  bool few = false;           ///< the products are multiplied out per channel
   FractionColumns fractions;  ///< unless few
 };
 
-/// What column of D belongs to what: dF_function / da_parameter, for the parameters that are not held.
+/// Meaning of a column of D: dF_function / da_parameter, for the parameters that are not held.
 struct DerivativeColumn {
   Eigen::Index function;
   Eigen::Index parameter;
 };
 std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem);
 
-/// Which globals delay a channel: none, the common one, or its input's and its output's.
+/// The globals that are delays of a channel: none, the common one, or those of its input and its output.
 std::vector<Eigen::Index> delay_parameters(const FitProblem& problem, Eigen::Index channel);
 
-/// `beta` after a step of the globals; numerators stay.
+/// `beta` after a step of the globals; numerators unchanged.
 FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
                       const Eigen::Ref<const Eigen::VectorXd>& step);
 
-/// Whether some channels are few but their functions many, so that multiplied_out makes a difference.
+/// Whether there are groups of few channels with many functions, for which multiplied_out makes a difference.
 bool sums_fractions_of_few(const FitProblem& problem);
 
 /// Evaluates the functions of every group of channels at the parameters.
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
                                         bool with_derivatives);
 
-/// The diagonal weights of a fit; for weight matrices their best diagonal. Variances from few degrees of freedom are smoothed over neighbouring
-/// lines, so that a weight does not depend on the very noise that it weighs (facts.md section 8).
-/// @throws std::invalid_argument if what the weighting needs is missing, zero or not finite.
+/// The diagonal weights of a fit; for weight matrices, their best diagonal. Variances with few degrees of freedom are
+/// smoothed over neighbouring lines, so that a weight does not depend on the noise of its own line.
+/// @throws std::invalid_argument if data required by the weighting are missing, zero or not finite.
 SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOptions& options);
 
-/// The variance v, n_c x N, for which W v W is E{W C W} on the average, W = make_weights() of a
-/// variance that is itself an estimate: weight and variance come from the same sample. None where
-/// variances do not weigh, or are exact (their degrees of freedom unknown). `frf` must outlive it.
+/// The variance v, n_c x N, for which W v W equals E{W C W} on average, with W = make_weights() of an estimated
+/// variance: weight and variance come from the same sample. Empty if the weights are not inverse variances, or if the
+/// variances are exact (unknown degrees of freedom). `frf` must outlive it.
 std::optional<LineVariance> weighed_variance(const FrfEstimate& frf, Weighting weighting);
 
 }  // namespace stageid

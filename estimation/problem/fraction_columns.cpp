@@ -12,14 +12,14 @@ using Complex = std::complex<double>;
 constexpr double kLeastAngle =
     0.1;  // |Im| / |lambda|: two poles apart, so that their fractions are small
 
-/// Strictly proper functions of one oscillating pair of poles.
+/// Whether the functions are strictly proper with one oscillating pair of poles.
 bool is_one_pair(const SubmodelShape& shape, const Eigen::VectorXd& a) {
   if (shape.order != 2 || shape.integrators != 0 || shape.numerator_degree > 1) return false;
   const Complex lambda = roots(a)[0];
   return lambda.real() < 0.0 && std::abs(lambda.imag()) > kLeastAngle * std::abs(lambda);
 }
 
-/// One submodel's columns; the lines do not matter to them.
+/// The columns of one submodel; they do not depend on the lines.
 class PairColumns {
  public:
   PairColumns(const LineOperator& through, const Eigen::VectorXd& a, Complex lambda,
@@ -36,7 +36,7 @@ class PairColumns {
     const double leading = std::pow(a_[1], times);
     PartialFractions{poles_, 0, times, power, leading}.for_each(
         [&](std::size_t r, Complex simple, Complex squared) {
-          if (r != 1) return;  // the other's are the conjugates
+          if (r != 1) return;  // the fractions of the conjugate follow by conjugation
           const auto coefficient = [&](std::size_t i) {
             return sign * (simple * expansion_.simple[i] + squared * expansion_.squared[i]);
           };

@@ -8,27 +8,27 @@
 
 namespace stageid {
 
-/// A function of frequency that one pair of poles has: first (constant + c q + d q^2 + c* p + d* p^2)
-/// with q = 1/(x - x_lambda), p = 1/(x - x_lambda*) and x, first of the LineOperator.
+/// A function of frequency with one pair of poles: first (constant + c q + d q^2 + c* p + d* p^2)
+/// with q = 1/(x - x_lambda), p = 1/(x - x_lambda*); x and first as in LineOperator.
 struct FractionColumn {
-  Eigen::Index pair = -1;  ///< which pair of poles; -1: the function is not of this form
+  Eigen::Index pair = -1;  ///< index of the pair of poles; -1: the function is not of this form
   double constant = 0.0;
   std::complex<double> simple = 0.0;   ///< c
   std::complex<double> squared = 0.0;  ///< d
 };
 
-/// The functions of a group of channels as fractions, so that the products of any two of them are sums
-/// of fractions too (see PairReduction).
+/// The functions of a group of channels as fractions, so that the products of any two of them are also sums of
+/// fractions (see PairReduction).
 struct FractionColumns {
   bool exact = false;                        ///< x = e^{j omega T}; else j omega
   double highest_rad_s = 0.0;                ///< of the lines
-  std::vector<std::complex<double>> lambda;  ///< one of each pair, rad/s
+  std::vector<std::complex<double>> lambda;  ///< one per pair, rad/s
   std::vector<std::complex<double>> place;   ///< x_lambda
   SplitMatrix first;                         ///< N x 1
-  /// N x (1 + 4 P) or, with squares, N x (1 + 8 P): 1; Re q, Im q, Re p, Im p of every pair; then those of
+  /// N x (1 + 4 P) or, with squares, N x (1 + 8 P): 1; Re q, Im q, Re p, Im p per pair; then those of
   /// the squares.
   Eigen::MatrixXd base;
-  std::vector<FractionColumn> F;  ///< like the columns of BasisGroup
+  std::vector<FractionColumn> F;  ///< as the columns of BasisGroup
   std::vector<FractionColumn> D;  ///< empty without squares
   std::vector<FractionColumn> Y;  ///< of the equation error, see equation_error_columns()
 
@@ -36,14 +36,14 @@ struct FractionColumns {
   Eigen::Index simple_columns() const noexcept { return 1 + 4 * pairs(); }
 };
 
-/// @param a denominator coefficients, one vector a submodel
-/// @param derivatives whether squares, D and Y are wanted
+/// @param a denominator coefficients, one vector per submodel
+/// @param derivatives whether squares, D and Y are computed
 FractionColumns fraction_columns(const LineOperator& through, double highest_rad_s,
                                  const std::vector<SubmodelShape>& shapes,
                                  const std::vector<Eigen::VectorXd>& a, bool derivatives);
 
-/// c of the equation error's column s^q / A at a root: through the place of the pole, so that it is
-/// d log(x - x_lambda) / d a_q up to sign. Exact hold too is then a fraction in x.
+/// Coefficient c of the equation-error column s^q / A at a root. It is taken through the image of the pole, so that it
+/// is d log(x - x_lambda) / d a_q up to sign, and a fraction in x for the exact hold too.
 std::complex<double> equation_error_residue(const LineOperator& through,
                                             const Eigen::Ref<const Eigen::VectorXd>& a,
                                             std::complex<double> lambda, Eigen::Index q);

@@ -9,7 +9,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// Loss of accuracy beyond which a pair is multiplied out: what is left is 1e-9.
+/// Loss of accuracy beyond which a pair is multiplied out; the remaining accuracy is 1e-9.
 constexpr double kLargestLoss = 1e7;
 
 /// conj(x_m-fraction of order i) times (x_l-fraction of order j) as a sum of fractions.
@@ -54,11 +54,11 @@ void add_sampled(Complex l, Complex m, const std::array<Complex, 2>& of_left,
   sum.left[1] += m * of_N_m;
 }
 
-/// The order of the fractions in a column.
+/// Highest order of the fractions in a column.
 int order(const FractionColumn& column) { return column.squared == 0.0 ? 1 : 2; }
 
-/// Up to which order(left) + order(right) products of the fractions of two pairs of poles are made sums: how many
-/// times larger than the product its terms become at the highest line grows with it.
+/// Largest order(left) + order(right) for which products of the fractions of two pairs of poles are expanded into
+/// sums. The ratio of the terms to the product at the highest line grows with that order.
 class LargestOrders {
  public:
   explicit LargestOrders(const FractionColumns& columns)
@@ -88,7 +88,7 @@ class LargestOrders {
 
 }  // namespace
 
-/// A pair's product in columns of the base.
+/// The product of a pair in columns of the base.
 struct PairReduction::Terms {
   struct Term {
     Eigen::Index column;
@@ -139,7 +139,7 @@ PairReduction::Terms PairReduction::terms(std::size_t pair) const {
   Terms out;
   out.add(0, X.constant * Y.constant + 2.0 * (with_l.one + with_conj.one).real());
   const Eigen::Index squares = columns_->simple_columns() - 1;
-  // Times q: Re and Im of the base; times conj(q): the latter's sign is the other.
+  // Times q: Re and Im of the base; conj(q) has the opposite sign of Im.
   const auto add_pair = [&](Eigen::Index column, Complex factor, double sign) {
     out.add(column, factor);
     out.add(column + 1, Complex(0.0, sign) * factor);

@@ -9,35 +9,35 @@
 
 namespace stageid {
 
-/// Two columns whose product over the lines is summed.
+/// Two columns whose product is summed over the lines.
 struct ColumnPair {
   Eigen::Index left;
   Eigen::Index right;
 };
 
-/// Sums sum_k V Re{conj(X) Y} of many pairs of columns from the sums of their fractions.
+/// Computes sums sum_k V Re{conj(X) Y} of many pairs of columns from the sums of their fractions.
 ///
 /// On the imaginary axis conj(x) = -x, on the unit circle conj(x) = 1/x, so that
 ///   conj(1/(x - m)) / (x - l) = -[q_l + conj(q_m)] / (l + m*),     x = j omega
 ///                             = [1 + l q_l + conj(m q_m)] / (1 - l m*),  x = e^{j omega T}
 /// and by differentiation to l and m* the same for squares: a product of two fractions is a sum of them.
-/// n functions then need the sums of 8 n columns, not of n^2 products. Where poles are close to each
-/// other's conjugates (a mode with itself, modes that overlap, far below the highest line), the terms
-/// cancel; such pairs, and columns that are no fractions, remain to be multiplied out.
+/// n functions then need the sums of 8 n columns, not of n^2 products. The terms cancel if a pole is close to
+/// the conjugate of another (a mode with itself, overlapping modes, far below the highest line). Such pairs,
+/// and columns that are not fractions, are multiplied out.
 class PairReduction {
  public:
-  /// @param left, right columns of `columns` that the pairs index; all three must outlive this
+  /// @param left, right columns of `columns`, indexed by the pairs; all three must outlive this
   PairReduction(const FractionColumns& columns, const std::vector<FractionColumn>& left,
                 const std::vector<FractionColumn>& right, std::vector<ColumnPair> pairs);
 
   const std::vector<ColumnPair>& pairs() const noexcept { return pairs_; }
   bool is_reduced(std::size_t pair) const noexcept { return place_[pair] < 0; }
-  /// Those to multiply out, in their order.
+  /// The pairs to multiply out, in their order.
   const std::vector<ColumnPair>& direct() const noexcept { return direct_; }
 
-  /// All pairs' sums, pairs x members.
+  /// The sums of all pairs, pairs x members.
   /// @param S members x base columns: sum_k V(c, k) |first|^2 base(k)
-  /// @param direct the direct pairs' sums, pairs x members
+  /// @param direct the sums of the direct pairs, pairs x members
   Eigen::MatrixXd expand(const Eigen::MatrixXd& S, const Eigen::MatrixXd& direct,
                          int threads) const;
   /// The same for complex V, sum_k Re{conj(X) Y V}; S is sum_k V conj(first) base(k) for columns Y
@@ -45,7 +45,7 @@ class PairReduction {
   Eigen::MatrixXd expand(const Eigen::MatrixXd& S_re, const Eigen::MatrixXd& S_im,
                          const Eigen::MatrixXd& direct, int threads) const;
 
-  /// Of a reduced pair, the sum over the channels of `factor` times its sums.
+  /// The sum over the channels of `factor` times the sums of a reduced pair.
   double weighted_sum(std::size_t pair, const Eigen::MatrixXd& S,
                       const Eigen::Ref<const Eigen::VectorXd>& factor) const;
 
@@ -64,7 +64,7 @@ class PairReduction {
   const std::vector<FractionColumn>* right_;
   std::vector<ColumnPair> pairs_;
   std::vector<ColumnPair> direct_;
-  std::vector<Eigen::Index> place_;  // of a pair in direct_; -1: reduced
+  std::vector<Eigen::Index> place_;  // index of a pair in direct_; -1: reduced
 };
 
 template <typename Task>

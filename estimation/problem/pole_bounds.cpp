@@ -14,13 +14,13 @@ using Complex = std::complex<double>;
 constexpr double kSmallestDamping = 1e-5;
 constexpr double kLargestDamping = 0.9;
 constexpr double kLargestMove = 4.0 / 3.0;  // of a natural frequency in one iteration
-constexpr double kBelowLines = 0.25;        // lower, it could not be told from the rigid body
-// A pole at 1/300 of the lowest line changes 1/s^2 by 1e-5 there: less than is ever measured.
+constexpr double kBelowLines = 0.25;        // lower: resembles the rigid body
+// A pole at 1/300 of the lowest line changes 1/s^2 by 1e-5 there, less than any measurement resolves.
 constexpr double kFarBelowLines = 1.0 / 300.0;
 constexpr double kAboveLines = 10.0;
-constexpr double kNearlyNyquist = 3.1;  // rad a sample
+constexpr double kNearlyNyquist = 3.1;  // rad per sample
 constexpr double kAtBound = 1.0 + 1e-9;
-constexpr double kPoleAtBound = 1.0 + 1e-6;  // of one that went through the coefficients
+constexpr double kPoleAtBound = 1.0 + 1e-6;  // after conversion to coefficients and back
 
 /// The slowest pole of a start's denominator.
 double slowest(const Eigen::VectorXd& a) {
@@ -57,14 +57,14 @@ bool PoleBounds::stabilize_mode(std::size_t i, const Eigen::VectorXd& before,
                                 Eigen::VectorXd& a) const {
   if (!(a[1] > 0.0)) return false;
   const double move = std::sqrt(before[1] / a[1]);
-  // Held at the bound, not refused: a mode that leans on it must not stop all the others.
+  // Held at the bound, not refused: a mode at a bound must not stop all the others.
   a[1] = std::clamp(a[1], 1.0 / (highest_rad_s_ * highest_rad_s_),
                     1.0 / (lowest_rad_s_[i] * lowest_rad_s_[i]));
   const double root = std::sqrt(a[1]);
-  // An unstable start is reflected; a step towards instability ends at the bound, where the mode is
-  // then held: reflected, it would bounce.
+  // An unstable start is reflected. A step towards instability ends at the bound, and the mode is then held there;
+  // reflection would make it oscillate.
   double damping = before[0] > 0.0 ? std::max(a[0], 0.0) : std::abs(a[0]);
-  // The lines see little of it: while the modes still move it would run to a bound and stay there.
+  // The lines hardly determine it: while the modes still move, it would run to a bound and remain there.
   if (slow_damping_[i])
     damping = std::clamp(damping, before[0] / kLargestMove, before[0] * kLargestMove);
   a[0] = 2.0 * root * std::clamp(damping / (2.0 * root), kSmallestDamping, kLargestDamping);
@@ -87,7 +87,7 @@ bool PoleBounds::stabilize_poles(std::size_t i, Eigen::VectorXd& a) const {
   bool moved = false;
   for (Complex& pole : poles) {
     const Complex kept = contained(i, pole);
-    // Coefficients stay as they are where rounding is all that would change.
+    // Do not change coefficients by mere rounding.
     if (!(std::abs(kept - pole) <= 1e-12 * std::abs(pole))) {
       pole = kept;
       moved = true;

@@ -6,31 +6,29 @@
 
 namespace stageid {
 
-/// Where the poles of a fit may go.
+/// Bounds of the poles of a fit.
 ///
-/// A pole far below or above the lines is seen only as a slope or a constant: its frequency is not in the
-/// data and would wander off. It is held at the bound, and then no longer counted among the unknowns.
+/// A pole far below or above the lines appears only as a slope or a constant. The data do not determine its
+/// frequency, which would drift; it is held at the bound and not counted as an unknown.
 class PoleBounds {
  public:
-  /// Natural frequencies from a quarter of the lowest line (or that of the lowest mode of the start) to ten
-  /// times the highest line, or nearly Nyquist with the exact hold; damping ratios in [1e-5, 0.9].
-  /// Poles of submodels that were asked for (SubmodelRole) may go to 1/300 of the lowest line, and
-  /// real poles are not bounded by Nyquist.
+  /// Natural frequencies from a quarter of the lowest line (or that of the lowest mode of the start) to ten times the
+  /// highest line, or nearly Nyquist with the exact hold; damping ratios in [1e-5, 0.9]. Poles of requested submodels
+  /// (SubmodelRole) may be as low as 1/300 of the lowest line, and real poles are not bounded by Nyquist.
   PoleBounds(const FitProblem& problem, const FitParameters& start);
 
-  /// Moves all poles of `beta` to where they may be; unstable ones of a start are reflected.
-  /// @returns false if it is not acceptable: a mode that moved by more than a third since `before`,
-  /// or coefficients without poles.
+  /// Moves all poles of `beta` into their bounds; unstable poles of a start are reflected.
+  /// @returns false if it is not acceptable: a mode moved by more than a third since `before`, or coefficients without
+  /// poles.
   bool stabilize(const FitParameters& before, FitParameters& beta) const;
 
-  /// The denominator coefficients of modes and real poles that lean on a bound and that a lower cost
-  /// (`descent`, minus its gradient) would push further, and FitProblem::held. A pole of a
-  /// submodel with three or more at its bound is no coefficient and is not among them: there a fit
-  /// that leans on it ends without converging.
+  /// The denominator coefficients at a bound that a lower cost (`descent`, minus its gradient) would push further, for
+  /// modes and real poles, and FitProblem::held. For submodels with three or more poles, a pole at its bound does not
+  /// correspond to one coefficient, so it is not included: such a fit ends without converging.
   std::vector<Eigen::Index> leaning(const FitParameters& beta,
                                     const Eigen::VectorXd& descent) const;
 
-  /// True if a pole of submodel `i` stands at a bound.
+  /// True if a pole of submodel `i` is at a bound.
   bool at_bound(std::size_t i, const Eigen::VectorXd& a) const;
 
  private:
@@ -38,8 +36,8 @@ class PoleBounds {
   bool stabilize_poles(std::size_t i, Eigen::VectorXd& a) const;
   std::complex<double> contained(std::size_t i, std::complex<double> pole) const;
 
-  std::vector<double> lowest_rad_s_;  // of every submodel
-  std::vector<bool> slow_damping_;    // suspensions: their damping may not run ahead
+  std::vector<double> lowest_rad_s_;  // per submodel
+  std::vector<bool> slow_damping_;    // suspensions: their damping must not increase too early
   double highest_rad_s_ = 0.0;
   double highest_real_rad_s_ = 0.0;
   std::vector<Eigen::Index> held_;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Eigen::Index kTileEntries = 1 << 18;
 
-/// re, im -= B F^T on as many lines as they have, from `first` on.
+/// re, im -= B F^T on as many lines as they have, starting at `first`.
 void subtract_model(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                     const Eigen::MatrixXd& B, Eigen::Index first, Eigen::MatrixXd& re,
                     Eigen::MatrixXd& im) {
@@ -32,7 +32,7 @@ void subtract_model(const FitProblem& problem, const std::vector<BasisGroup>& gr
   }
 }
 
-/// All channels on some lines; tiles depend on sizes alone, never on the number of threads.
+/// All channels on some lines; tiles depend on sizes only, never on the number of threads.
 struct LineTile {
   Eigen::Index first = 0;
   Eigen::Index lines = 0;
@@ -46,7 +46,7 @@ std::vector<LineTile> line_tiles(const FitProblem& problem) {
   return tiles;
 }
 
-/// One tile's data, residual or model after another in the same memory.
+/// Memory reused for the data, residual or model of one tile after another.
 class TileMemory {
  public:
   void load_residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,

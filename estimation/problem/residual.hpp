@@ -5,14 +5,14 @@
 
 namespace stageid {
 
-/// E = G - P of all channels, and what follows from it.
+/// E = G - P of all channels, and its cost.
 struct Residual {
   Eigen::MatrixXd re;  ///< n_c x N
   Eigen::MatrixXd im;
   double cost = 0.0;  ///< 1/(2N) sum vec(E)^H W vec(E)
 };
 
-/// The data themselves without groups.
+/// Without groups, the residual is the data.
 Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                   const Eigen::MatrixXd& B);
 
@@ -20,11 +20,11 @@ Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& grou
 double residual_cost(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                      const Eigen::MatrixXd& B);
 
-/// What a model leaves of the data.
+/// Size of the residual of a model.
 struct ResidualSize {
-  /// Over lines and channels that are flagged, where G is not 0; NaN if that is nowhere.
+  /// Over the lines with nonzero G of the flagged channels; NaN if there are none.
   double relative_rms = 0.0;
-  bool finite = true;  ///< every residual is
+  bool finite = true;  ///< whether every residual is finite
 };
 ResidualSize residual_size(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                            const Eigen::MatrixXd& B, const ChannelFlags& responding);

@@ -7,8 +7,9 @@
 namespace stageid {
 namespace {
 
-// Functions cost by entries, their products by pairs of columns. The ratio is by operation counts, the size by the search
-// of a stage of 7 x 17 channels and 4000 lines: 30 s by these numbers took about 30 s of processor.
+// The cost of functions is proportional to entries, that of their products to pairs of columns. The ratio is from
+// operation counts; the scale is from the search of a stage with 7 x 17 channels and 4000 lines, where 30 s in these
+// units took about 30 s of processor time.
 constexpr double kSecondsPerEntry = 5e-10;
 constexpr double kSecondsPerProduct = 5e-11;
 

@@ -7,31 +7,31 @@
 
 namespace stageid {
 
-/// What ends a search before it has found its own end: a budget, or an interrupt. All fits of one search share it;
-/// none of them steps any further once it is reached, and the best model so far is completed.
+/// Ends a search before it is complete, by a budget or an interrupt. All fits of one search share it: none of them
+/// takes another step after it is reached, and the best model so far is completed.
 ///
-/// The budget is counted in work, not by the clock: the same data and request give the same model, however fast the
-/// machine and whatever the number of threads.
+/// The budget counts work, not time. The same data and request give the same model on any machine and with any number
+/// of threads.
 class SearchLimit {
  public:
-  /// @param seconds of an ordinary core, see add(); 0: no end
-  /// @param interrupted looked at between the steps of a fit; empty: never
+  /// @param seconds of a typical core, see add(); 0: unlimited
+  /// @param interrupted called between the steps of a fit; empty: never
   explicit SearchLimit(double seconds, std::function<bool()> interrupted = {});
 
-  /// The evaluation of a model on all lines and channels of its data.
-  /// @param columns functions and derivatives that every channel sees
+  /// Counts one evaluation of a model on all lines and channels of its data.
+  /// @param columns functions and derivatives per channel
   void add(double lines, double channels, double columns) noexcept;
 
-  /// Lets the last fit of a search take a part of the budget beyond what the search has spent.
+  /// Lets the last fit of a search use a part of the budget beyond the work of the search.
   void begin_completion() noexcept;
 
   bool reached() const { return spent_s_ >= allowed_s_ || was_interrupted(); }
   bool was_interrupted() const { return interrupted_ && interrupted_(); }
-  /// Why it was reached: FitStatus::interrupted or FitStatus::search_budget.
+  /// The reason: FitStatus::interrupted or FitStatus::search_budget.
   FitStatus status() const;
   /// The same as a sentence.
   const char* message() const;
-  /// In seconds of an ordinary core.
+  /// In seconds of a typical core.
   double spent_s() const noexcept { return spent_s_; }
   double budget_s() const noexcept { return budget_s_; }
 
@@ -42,7 +42,7 @@ class SearchLimit {
   std::function<bool()> interrupted_;
 };
 
-/// Whether a fit is the best model of a search that did not come to its own end.
+/// Whether a fit is the best model of a search that was ended by its limit.
 bool ended_by_limit(const FitResult& fit) noexcept;
 
 }  // namespace stageid

@@ -5,21 +5,21 @@
 
 namespace stageid {
 
-/// A matrix that many read and nobody changes any more: a copy of the handle is no copy of the data.
+/// A matrix with many readers and no writers; copying the handle does not copy the data.
 template <typename Matrix>
 class SharedMatrix {
  public:
   SharedMatrix() : SharedMatrix(Matrix()) {}
-  SharedMatrix(Matrix matrix)  // NOLINT(google-explicit-constructor): it stands for the matrix
+  SharedMatrix(Matrix matrix)  // NOLINT(google-explicit-constructor): used as the matrix
       : matrix_(std::make_shared<const Matrix>(std::move(matrix))) {}
 
-  /// Of a matrix that somebody else keeps, at least as long as this handle and its copies.
+  /// Refers to a matrix that is kept elsewhere, at least as long as this handle and its copies.
   static SharedMatrix kept(const Matrix& matrix) {
     SharedMatrix out;
     out.matrix_ = std::shared_ptr<const Matrix>(std::shared_ptr<const Matrix>(), &matrix);
     return out;
   }
-  static SharedMatrix kept(Matrix&& matrix) = delete;  // it would not last
+  static SharedMatrix kept(Matrix&& matrix) = delete;  // a temporary would dangle
 
   const Matrix& operator*() const noexcept { return *matrix_; }
   const Matrix* operator->() const noexcept { return matrix_.get(); }

@@ -27,8 +27,8 @@ bool is_hermitian(const Eigen::MatrixXcd& M) {
   return (M - M.adjoint()).cwiseAbs().maxCoeff() <= kHermitian * M.cwiseAbs().maxCoeff();
 }
 
-/// M^-1 of a Hermitian positive definite matrix, scaled to unit diagonal first (units differ); empty
-/// if it is none.
+/// M^-1 of a Hermitian positive definite matrix, first scaled to unit diagonal because units differ; empty if M is not
+/// positive definite.
 Eigen::MatrixXcd definite_inverse(const Eigen::MatrixXcd& M) {
   const Eigen::VectorXd diagonal = M.diagonal().real();
   if (!(diagonal.minCoeff() > 0.0)) return {};
@@ -72,7 +72,7 @@ void require_factors(const FrfEstimate& frf) {
                         frf.outputs.names[static_cast<std::size_t>(y)], line_name(frf, k)));
 }
 
-/// Scaled to unit diagonal too, where there is one.
+/// Also scaled to unit diagonal, where the diagonal is not zero.
 bool is_semidefinite(const Eigen::MatrixXcd& W) {
   const Eigen::ArrayXd diagonal = W.diagonal().real();
   if (diagonal.minCoeff() < 0.0) return false;
@@ -167,7 +167,7 @@ void WeightMatrices::between(Eigen::Index c, Eigen::Index d, Eigen::Index first,
   } else {
     const Eigen::Index n_y = n_outputs_;
     const Eigen::Index n_u = n_c / n_y;
-    // (S^-1)(u, v), which stands transposed, times C_E^-1(y, z).
+    // (S^-1)(u, v), stored transposed, times C_E^-1(y, z).
     W = inputs_.row(d / n_y + n_u * (c / n_y)).segment(first, lines).transpose().array() *
         outputs_.row(c % n_y + n_y * (d % n_y)).segment(first, lines).transpose().array();
   }

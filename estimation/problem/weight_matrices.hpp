@@ -9,45 +9,44 @@
 
 namespace stageid {
 
-/// Weights that are not positive definite, so that the cost has no minimum: the data (or whoever weighs
-/// them) are at fault, not the request. The program then ends with exit code 3 and writes nothing.
+/// Weights that are not positive definite, so that the cost has no minimum. The data or the user's weights are wrong,
+/// not the request: the program exits with code 3 and writes nothing.
 class IndefiniteWeights : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
 };
 
-/// Hermitian weights W_k, n_c x n_c on every line, of the cost 1/(2N) sum vec(E)^H W_k vec(E), kept
-/// as they came: whole, or as the two factors of a likelihood,
-///   W_k = S_k^-1 kron C_E^-1,   which makes the sum  sum_k || C_E^-1/2 (G_k - P_k) U_k ||_F^2
-/// for one realization, S = [(U U^H)^-1]^T (facts.md section 8).
+/// Hermitian weights W_k, n_c x n_c per line, of the cost 1/(2N) sum vec(E)^H W_k vec(E), stored
+/// as given: whole, or as the two factors of a likelihood,
+///   W_k = S_k^-1 kron C_E^-1,   for which the sum is  sum_k || C_E^-1/2 (G_k - P_k) U_k ||_F^2
+/// for one realization, S = [(U U^H)^-1]^T (docs/theory.md, section 7).
 class WeightMatrices {
  public:
-  /// From residual_covariance and input_factor. C_E is smoothed over neighbouring lines until it has
-  /// enough degrees of freedom nu for an inverse, and the inverse of a complex Wishart matrix is
-  /// corrected: E{C_hat^-1} = nu / (nu - n_y) C^-1.
-  /// @throws std::invalid_argument if one of them is missing or the whole band has too few degrees of
-  /// freedom; IndefiniteWeights (naming the line) if one is not positive definite.
+  /// From residual_covariance and input_factor. C_E is smoothed over neighbouring lines until its degrees of freedom
+  /// nu suffice for an inverse, and the inverse of a complex Wishart matrix is corrected: E{C_hat^-1} = nu / (nu -
+  /// n_y) C^-1.
+  /// @throws std::invalid_argument if one of them is missing or the whole band has too few degrees of freedom;
+  /// IndefiniteWeights (naming the line) if one is not positive definite.
   static WeightMatrices likelihood(const FrfEstimate& frf);
 
-  /// The user's own: (n_c n_c) x N, column k = vec(W_k).
-  /// @throws std::invalid_argument if they do not belong to the response, are too large for memory,
-  /// or (naming the line) not finite or not Hermitian; IndefiniteWeights (naming the line) if not
-  /// positive semidefinite.
+  /// Matrices of the user: (n_c n_c) x N, column k = vec(W_k).
+  /// @throws std::invalid_argument if they do not match the response, are too large for memory, or (naming the line)
+  /// not finite or not Hermitian; IndefiniteWeights (naming the line) if not positive semidefinite.
   static WeightMatrices user(const FrfEstimate& frf, const Eigen::MatrixXcd& W);
 
-  /// Column j of `tile` (n_c x lines) becomes W_k times it, k = first + j.
+  /// Multiplies column j of `tile` (n_c x lines) by W_k, k = first + j.
   void apply(Eigen::Index first, Eigen::MatrixXcd& tile) const;
 
   /// W_k(c, d) of two channels on some lines.
   void between(Eigen::Index c, Eigen::Index d, Eigen::Index first, Eigen::Index lines,
                Eigen::ArrayXd& re, Eigen::ArrayXd& im) const;
 
-  /// The best diagonal in their place, n_c x N: 1 / (W_k^-1)_cc, one over the variance of the
-  /// channel itself where W_k = Cov(vec G)^-1; W_cc where a user's W_k is singular.
+  /// Their best diagonal approximation, n_c x N: 1 / (W_k^-1)_cc, the inverse variance of the channel if W_k = Cov(vec
+  /// G)^-1; W_cc if a W_k of the user is singular.
   const Eigen::MatrixXd& marginal() const noexcept { return marginal_; }
 
-  /// What the scatter of the estimated weights multiplies the covariance of an estimate with:
-  /// E{W C W} / E{W}, see weight_matrices.cpp. 1 where they are exact.
+  /// Factor by which the scatter of the estimated weights raises the covariance of an estimate: E{W C W} / E{W}, see
+  /// weight_matrices.cpp. 1 if they are exact.
   double scatter_factor() const noexcept { return scatter_factor_; }
 
  private:
@@ -59,21 +58,21 @@ class WeightMatrices {
   double scatter_factor_ = 1.0;
 };
 
-/// The matrices that `options` asks for; none with a diagonal weighting.
+/// The matrices that `options` requests; none with a diagonal weighting.
 std::optional<WeightMatrices> make_weight_matrices(const FrfEstimate& frf,
                                                    const FitOptions& options);
 
-/// @throws std::invalid_argument telling the memory needed, if whole matrices for `lines` lines of
-/// `channels` channels are too large.
+/// @throws std::invalid_argument naming the required memory, if whole matrices for `lines` lines of `channels`
+/// channels are too large.
 void require_memory_for_weight_matrices(Eigen::Index channels, Eigen::Index lines);
 
-/// C_E of every line, and the degrees of freedom that it has; 0: exact.
+/// C_E of every line and its degrees of freedom; 0: exact.
 struct SmoothedCovariance {
   Eigen::MatrixXcd matrices;  ///< (n_y n_y) x N
   double dof = 0.0;
 };
-/// Residual covariance averaged over as many neighbouring lines as its inverse needs: its correlations
-/// arithmetically, its variances geometrically, without bias, as make_weights() does. @pre its variances are positive.
+/// Residual covariance averaged over as many neighbouring lines as its inverse needs: its correlations arithmetically,
+/// its variances geometrically, without bias, as make_weights() does. @pre its variances are positive.
 SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf);
 
 }  // namespace stageid

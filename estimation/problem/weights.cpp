@@ -12,12 +12,11 @@
 namespace stageid {
 namespace {
 
-/// Degrees of freedom that a variance should have before it weighs: the scatter of the weights then
-/// costs 4 % of the efficiency. Smoothing costs more wherever the variance has resonances of its
-/// own.
+/// Degrees of freedom that a variance should have before it is used as a weight: the scatter of the weights then costs
+/// 4 % of the efficiency. Smoothing costs more where the variance itself has resonances.
 constexpr double kWantedDof = 25.0;
-// Degrees of freedom of a smoothed variance below which the scatter of its inverse is not finite or
-// nearly so: only where the lines are fewer than a handful.
+// With fewer degrees of freedom after smoothing, the scatter of the inverse is infinite or nearly so. Only possible
+// with a handful of lines.
 constexpr double kLeastTogether = 4.0;
 constexpr Eigen::Index kChannels = 256;  // smoothed at a time
 
@@ -36,9 +35,9 @@ double log_variance(double nu) {
   return sum + 1.0 / nu + 0.5 * r + r / nu * (1.0 / 6.0 - r * (1.0 / 30.0 - r / 42.0));
 }
 
-/// Neighbours on each side of a line whose mean scatters like a variance of kWantedDof.
+/// Neighbours on each side of a line whose mean has the scatter of a variance with kWantedDof.
 Eigen::Index window_reach(double dof) {
-  if (!(dof > 0.0) || dof >= kWantedDof) return 0;  // 0: unknown, taken as exact
+  if (!(dof > 0.0) || dof >= kWantedDof) return 0;  // 0: unknown, considered exact
   const double lines = kWantedDof * log_variance(std::max(dof, 1.0));
   return static_cast<Eigen::Index>(std::ceil(0.5 * (lines - 1.0)));
 }
@@ -52,12 +51,12 @@ Eigen::Index window_lines(Eigen::Index k, Eigen::Index reach, Eigen::Index N) {
 /// of freedom each (Gamma distributed, shape nu, mean 1).
 double expected_power(double power, double n, double nu) {
   const double share = power / n;
-  if (!(nu + share > 0.0)) return 1.0;  // infinite: one line alone, and one degree of freedom
+  if (!(nu + share > 0.0)) return 1.0;  // infinite: a single line with one degree of freedom
   return std::exp(n * (std::lgamma(nu + share) - std::lgamma(nu) - share * std::log(nu)));
 }
 
-/// v^power for power 1 or -1, v being the geometric mean over neighbouring lines: a resonance that
-/// stands out of them does not spread. Its expectation is that of the true variance's power.
+/// v^power for power 1 or -1, v the geometric mean over neighbouring lines, which does not spread a resonance of the
+/// variance. Its expectation is that power of the true variance.
 Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, double power) {
   if (!(dof > 0.0)) return power > 0.0 ? variance : Eigen::MatrixXd(variance.cwiseInverse());
   const Eigen::Index half = window_reach(dof);
@@ -83,13 +82,13 @@ Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, doub
   return out;
 }
 
-/// The inverse of the smoothed variance, without bias.
+/// The unbiased inverse of the smoothed variance.
 Eigen::MatrixXd smoothed_inverse(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
                                  double dof) {
   if (frf.residual_covariance_re.size() == 0 || &variance != &frf.noise_variance ||
       window_reach(dof) == 0)
     return smoothed_power(variance, dof, -1.0);
-  // Var(G_ij) = C_E,ii [(U U^H)^-1]_jj, and only the first factor is random: smooth that one.
+  // Var(G_ij) = C_E,ii [(U U^H)^-1]_jj, and only the first factor is random, so only that one is smoothed.
   const Eigen::Index n_y = frf.n_outputs();
   Eigen::MatrixXd C_E(n_y, variance.cols());
   for (Eigen::Index y = 0; y < n_y; ++y) C_E.row(y) = frf.residual_covariance_re.row(y * (n_y + 1));
@@ -160,7 +159,7 @@ SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {
   out.matrices.real() = frf.residual_covariance_re;
   out.matrices.imag() = frf.residual_covariance_im;
   if (!(frf.noise_dof > 0.0)) return out;
-  // An inverse of n_y x n_y scatters as that of a variance with n_y degrees of freedom less.
+  // The inverse of an n_y x n_y scatter matrix has the scatter of a variance with n_y degrees of freedom less.
   const double wanted = std::ceil((kWantedDof + static_cast<double>(n_y)) / frf.noise_dof);
   const auto count = static_cast<Eigen::Index>(std::min(wanted, static_cast<double>(N)));
   if (count == 1) return out;

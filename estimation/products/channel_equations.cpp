@@ -30,7 +30,7 @@ void global_columns(const FitProblem& problem, const FitParameters& beta, const 
 
 namespace {
 
-/// The globals that are no known values, in their order.
+/// The globals that are not held, in their order.
 std::vector<Eigen::Index> free_globals(const FitProblem& problem) {
   std::vector<Eigen::Index> out;
   for (Eigen::Index i = 0; i < problem.globals(); ++i)
@@ -38,7 +38,7 @@ std::vector<Eigen::Index> free_globals(const FitProblem& problem) {
   return out;
 }
 
-/// Equations of numerators and free globals as those of all, zero for the others.
+/// Expands equations of numerators and free globals to all globals, with zeros for the others.
 ChannelEquations scattered(const ChannelEquations& of_free, Eigen::Index functions,
                            Eigen::Index globals, const std::vector<Eigen::Index>& free) {
   if (static_cast<Eigen::Index>(free.size()) == globals) return of_free;
@@ -69,7 +69,7 @@ ChannelEquations channel_equations(const FitProblem& problem, const FitParameter
   Eigen::VectorXd E(2 * N);
   E << root.cwiseProduct(E_re), root.cwiseProduct(E_im);
 
-  // Real and imaginary parts below each other, weighted: J of the instrument, Phi of the regressor.
+  // Real and imaginary parts stacked, weighted: J of the instrument, Phi of the regressor.
   Eigen::MatrixXd re;
   Eigen::MatrixXd im;
   global_columns(problem, beta, group, c, columns, {0, N}, re, im);

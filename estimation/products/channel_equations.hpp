@@ -7,26 +7,26 @@
 
 namespace stageid {
 
-/// Some lines in a row.
+/// A contiguous range of lines.
 struct LineRange {
   Eigen::Index first = 0;
   Eigen::Index count = 0;
 };
 
-/// Columns d vec(P)_c / d globals on some lines for one channel, lines x globals each.
+/// Columns d vec(P)_c / d globals for one channel, lines x globals each.
 void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
                     Eigen::Index c, const std::vector<DerivativeColumn>& columns, LineRange lines,
                     Eigen::MatrixXd& re, Eigen::MatrixXd& im);
 
-/// One channel's share of M d_beta = e (arrow_system.hpp), order (functions, globals).
+/// The part of one channel in M d_beta = e (arrow_system.hpp), order (functions, globals).
 struct ChannelEquations {
   Eigen::MatrixXd M;
   Eigen::VectorXd e;
 };
 
-/// The equations of channel c from its own columns, as one matrix product. For groups of few channels,
-/// where the products of functions that line_sums() shares between channels cost more than they save.
-/// @param Y of equation_error_columns(); nothing for gn
+/// The equations of channel c from its own columns, as one matrix product. For groups of few channels, for which the
+/// products shared between channels by line_sums() cost more than they save.
+/// @param Y from equation_error_columns(); empty for gn
 ChannelEquations channel_equations(const FitProblem& problem, const FitParameters& beta,
                                    const BasisGroup& group, Eigen::Index c,
                                    const std::vector<DerivativeColumn>& columns,

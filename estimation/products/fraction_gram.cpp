@@ -36,7 +36,7 @@ Eigen::MatrixXd FractionGram::operator()(const Eigen::VectorXcd& v) const {
   Eigen::MatrixXcd Z =
       (left.rowwise().replicate(right.size()) + right.transpose().colwise().replicate(left.size()))
           .cwiseProduct(over_);
-  // A pair's columns are q + p and j (q - p).
+  // The columns of a pair are q + p and j (q - p).
   const Complex j(0.0, 1.0);
   for (Eigen::Index i = 0; i < 2 * pairs_; i += 2) {
     const Eigen::VectorXcd upper = Z.col(i);

@@ -9,10 +9,10 @@
 namespace stageid {
 
 /// Weighted products of the columns of partial_fractions(), summed over the lines. With q_l = 1/(x - l)
-///   conj(q_m) q_l = -[q_l + conj(q_m)] / (l + m*)               where conj(x) = -x
-///                 = [1 + l q_l + conj(m q_m)] / (1 - l m*)      where conj(x) = 1/x
-/// so that the sums of n columns are enough for n^2 products. What is lost by cancelling is the highest line
-/// over the sum of two poles' decay rates.
+///   conj(q_m) q_l = -[q_l + conj(q_m)] / (l + m*)               if conj(x) = -x
+///                 = [1 + l q_l + conj(m q_m)] / (1 - l m*)      if conj(x) = 1/x
+/// so the sums of n columns suffice for n^2 products. The loss of accuracy by cancellation is the ratio of the
+/// highest line to the sum of the decay rates of two poles.
 class FractionGram {
  public:
   /// @param x j omega, or e^{j omega T} on the unit circle
@@ -24,9 +24,9 @@ class FractionGram {
  private:
   Eigen::Index pairs_;
   bool unit_circle_;
-  Eigen::VectorXcd poles_;  // upper, lower of every pair; reals
+  Eigen::VectorXcd poles_;  // upper, lower of every pair; real poles
   Eigen::MatrixXcd q_;      // N x n
-  Eigen::MatrixXcd over_;   // n x n: the denominators' inverses
+  Eigen::MatrixXcd over_;   // n x n: inverse denominators
 };
 
 }  // namespace stageid

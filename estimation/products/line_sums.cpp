@@ -129,8 +129,8 @@ class Share {
     sums_.YE.noalias() += tile(Y_->re).transpose() * power_;
   }
 
-  /// The channels are summed before the derivatives are multiplied: one matrix product for all pairs
-  /// of functions.
+  /// The channels are summed before the derivatives are multiplied, which gives one matrix product for all pairs of
+  /// functions.
   void add_derivative_products() {
     const Eigen::MatrixXd weight = W_.transpose() * BB_;
     Eigen::VectorXd re(n_);
@@ -188,7 +188,7 @@ class Share {
   LineSums sums_;
 };
 
-/// What was left to fractions goes where it belongs.
+/// Adds the products that were reduced to fractions to their sums.
 void expand(const GroupProducts& products, const std::vector<DerivativeColumn>& columns,
             const Eigen::MatrixXd& B, int threads, LineSums& sums) {
   sums.FF = products.FF.expand(sums.S, sums.FF, threads);

@@ -12,7 +12,7 @@ struct Columns {
   Eigen::MatrixXd im;
 };
 
-/// Adds what a tile of lines says of channel c and those behind it.
+/// Adds the products of channel c and the following ones on a tile of lines.
 void add_channel(const ChannelPairs& pairs, const std::vector<Columns>& X, Eigen::Index c,
                  LineRange lines, const std::vector<FunctionSet>& sets,
                  std::vector<Eigen::MatrixXd>& out) {

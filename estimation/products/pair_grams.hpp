@@ -8,24 +8,24 @@
 
 namespace stageid {
 
-/// Functions whose parameters are looked at together: their places among those of a channel.
+/// Functions whose parameters are treated together: their indices among those of a channel.
 using FunctionSet = std::vector<Eigen::Index>;
 
-/// Columns X_c of every channel, all of one width, and what ties two channels together.
+/// Columns X_c of every channel, all of one width, and the weights between two channels.
 struct ChannelPairs {
   Eigen::Index channels = 0;
   Eigen::Index lines = 0;
   int threads = 1;
   std::function<void(Eigen::Index c, LineRange lines, Eigen::MatrixXd& re, Eigen::MatrixXd& im)>
       columns;
-  /// W(c, d) on some lines; false: none.
+  /// W(c, d) on some lines; false: zero.
   std::function<bool(Eigen::Index c, Eigen::Index d, LineRange lines, Eigen::ArrayXd& re,
                      Eigen::ArrayXd& im)>
       between;
 };
 
-/// sum_k Re{X_c^H W(c, d) X_d} of the columns in a set, for every set: element (c + n_c p, d + n_c q) of
-/// columns set[p] and set[q], as vec of channels x columns orders them. Hermitian W is taken for granted.
+/// sum_k Re{X_c^H W(c, d) X_d} of the columns in a set, for every set: element (c + n_c p, d + n_c q) belongs to
+/// columns set[p] and set[q], in the order of vec of channels x columns. W must be Hermitian.
 std::vector<Eigen::MatrixXd> pair_grams(const ChannelPairs& pairs,
                                         const std::vector<FunctionSet>& sets);
 

@@ -7,7 +7,7 @@ namespace stageid {
 namespace {
 
 constexpr Eigen::Index kBlockPairs = 192;
-constexpr Eigen::Index kShares = 8;  // of a block, if the lines make as many tiles
+constexpr Eigen::Index kShares = 8;  // per block, if there are that many tiles of lines
 
 }  // namespace
 
@@ -54,7 +54,7 @@ void DataTile::load(const FitProblem& problem, const BasisGroup& group, const Ti
                     const Eigen::MatrixXd& B, Eigen::Index first_line, Eigen::Index lines) {
   const Eigen::Index* channels = group.channels.data() + range.first_member;
   const bool in_order = channels[range.members - 1] - channels[0] == range.members - 1;  // sorted
-  /// Calls take(to, from): a channel's place in the tile and in the column of a line.
+  /// Calls take(to, from): the index of a channel in the tile and in the column of a line.
   const auto gather = [&](const auto& take) {
     if (in_order)
       for (Eigen::Index r = 0; r < range.members; ++r) take(r, channels[0] + r);

@@ -21,9 +21,9 @@ struct ComplexColumns {
   const Eigen::MatrixXd& im;
 };
 
-constexpr Eigen::Index kTileLines = 256;  // the weights' tile and the products' stay in the cache
+constexpr Eigen::Index kTileLines = 256;  // the tiles of weights and products remain in the cache
 
-/// Some channels of a group on some lines: what one task works on.
+/// Some channels of a group on some lines: the unit of work of one task.
 struct TileRange {
   Eigen::Index first_member;
   Eigen::Index members;
@@ -31,16 +31,16 @@ struct TileRange {
   Eigen::Index lines;
 };
 
-constexpr Eigen::Index kMostMembers = 256;  // of a block
+constexpr Eigen::Index kMostMembers = 256;  // per block
 
-/// Channels of a group in blocks, each with all lines: memory for sums is that of a block.
+/// Channels of a group in blocks, each with all lines: the sums need the memory of one block.
 std::vector<TileRange> member_blocks(Eigen::Index first, Eigen::Index members, Eigen::Index lines);
 
-/// A block's lines in shares for the threads. Shares depend on sizes alone, never on the number of
-/// threads: what is summed in each of them, and in which order, is always the same.
+/// Divides the lines of a block between the threads. Shares depend on sizes only, never on the number of threads, so
+/// the sums and their order are always the same.
 std::vector<TileRange> line_shares(const TileRange& block);
 
-/// The sum over a block's shares, in their order, of task(share).
+/// The sum of task(share) over the shares of a block, in their order.
 template <typename Sums, typename Task>
 Sums sum_over_shares(const TileRange& block, int threads, Task&& task) {
   const std::vector<TileRange> shares = line_shares(block);
@@ -52,7 +52,7 @@ Sums sum_over_shares(const TileRange& block, int threads, Task&& task) {
   return std::move(parts[0]);
 }
 
-/// Calls task(first line, lines) for the tiles of a share in order.
+/// Calls task(first line, lines) for the tiles of a share, in order.
 template <typename Task>
 void for_each_tile(const TileRange& range, Task&& task) {
   const Eigen::Index end = range.first_line + range.lines;
@@ -60,7 +60,7 @@ void for_each_tile(const TileRange& range, Task&& task) {
     task(k, std::min(kTileLines, end - k));
 }
 
-/// Data, weights and residual of a tile, a row a channel (members x lines).
+/// Data, weights and residual of a tile, one row per channel (members x lines).
 struct DataTile {
   Eigen::MatrixXd W, E_re, E_im;
   /// @param B numerators of the range's channels, members x n_f; empty: E is the data
@@ -69,19 +69,19 @@ struct DataTile {
   double squares() const;  ///< sum W |E|^2
 };
 
-/// S(c, b) += sum_k W(c, k) |first(k)|^2 base(k, b) over lines first_line + k, for the first columns of the
-/// base that S has: what PairReduction makes sums of products of.
+/// S(c, b) += sum_k W(c, k) |first(k)|^2 base(k, b) over lines first_line + k, for the first columns of the base, as
+/// many as S has. PairReduction expands them into sums of products.
 void add_fraction_sums(const Eigen::MatrixXd& W, const FractionColumns& fractions,
                        Eigen::Index first_line, Eigen::MatrixXd& S);
 
-/// sums(p, c) += sum_k W(c, k) Re{ conj(X(k, left_p)) Y(k, right_p) } over lines first_line + k, for pairs
-/// that are multiplied out. The products are functions of frequency alone and shared by all channels, so
-/// that this is one (pairs x lines) (lines x channels) matrix product.
+/// sums(p, c) += sum_k W(c, k) Re{ conj(X(k, left_p)) Y(k, right_p) } over lines first_line + k, for pairs that are
+/// multiplied out. The products are functions of frequency only and shared by all channels, so this is one (pairs x
+/// lines) (lines x channels) matrix product.
 void add_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X, const ComplexColumns& Y,
                    const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
                    Eigen::MatrixXd& sums);
 
-/// The same with complex weights V: sum_k Re{ conj(X) Y V }. Double precision here too: in single, the
+/// The same with complex weights V: sum_k Re{ conj(X) Y V }. Double precision here too: in single precision, the
 /// refined-IV step from a start with large residuals is wrong by up to a percent.
 void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im,
                    const ComplexColumns& X, const ComplexColumns& Y,

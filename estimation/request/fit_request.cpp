@@ -22,10 +22,10 @@
 namespace stageid {
 namespace {
 
-// The median of a linear plant's is 1 within a few percent, above where modes are narrow for the lines.
+// The median of a linear plant is 1 within a few percent, more if modes are narrow relative to the line spacing.
 constexpr double kDistorted = 2.0;
 
-/// What is said of channels whose weight is zero on all lines; empty: there is none.
+/// Note on channels whose weight is zero on all lines; empty if there are none.
 std::string channels_without_weight(const FrfEstimate& frf, const FitOptions& options) {
   const Eigen::MatrixXd& W = options.user_weights;
   std::vector<std::string> names;
@@ -41,14 +41,14 @@ std::string channels_without_weight(const FrfEstimate& frf, const FitOptions& op
       fmt::join(names, ", "), names.size() == 1 ? "has" : "have");
 }
 
-/// Sums up what the FRF decides where the request is silent.
+/// Defaults that depend on the FRF.
 class FitDefaults {
  public:
   FitDefaults(const FitRequest& request, FitSetup& setup, WholeLines whole)
       : request_(request), setup_(setup), whole_(whole) {}
 
-  /// What was taken out is put back and given to the model, which goes through hold, delay and
-  /// sampler exactly; the data keep the aliasing, and no compensation can divide it out.
+  /// Restores removed delay and hold in the data and adds them to the model, which treats hold, delay and sampler
+  /// exactly. The data still contain the aliasing, which no compensation can remove.
   void restore_as_measured() {
     FrfEstimate& frf = setup_.frf;
     const bool only_delay = frf.compensated == Compensation::delay;
@@ -114,7 +114,7 @@ class FitDefaults {
         options.weighting == Weighting::relative ? ", the response has no variances" : ""));
   }
 
-  /// Refused here: the fit would grow for hours towards a number that the lines cannot carry.
+  /// Rejected here, because the fit would grow for hours towards a number that the lines do not support.
   void require_affordable_modes() const {
     const Eigen::Index lines = setup_.frf.lines();
     const Eigen::Index most = most_modes(setup_.frf, setup_.structure.common);
@@ -171,8 +171,8 @@ class FitDefaults {
                       delay.delay_s, 0.5 / spacing_hz, spacing_hz));
   }
 
-  /// With one realization the variance by the periods lacks what nonlinear distortion adds; weighed by it, the
-  /// distortion would look like modes. @returns true if the lines scatter by more than that variance.
+  /// With one realization, the variance by periods does not include nonlinear distortion. With that weighting, the
+  /// distortion would be fitted by modes. @returns true if the lines scatter by more than that variance.
   bool weigh_by_scatter() {
     FrfEstimate& frf = setup_.frf;
     if (frf.noise_variance.size() == 0 || frf.realizations > 1) return false;
@@ -198,8 +198,8 @@ class FitDefaults {
     return true;
   }
 
-  /// Distortion moves an estimate from realization to realization as noise does; the periods do not show it. Nor do
-  /// they show a transient or a drift, where linearity cannot be told.
+  /// Distortion changes an estimate from realization to realization as noise does, but the periods do not show it.
+  /// They do not show a transient or a drift either, and then linearity cannot be tested.
   bool weigh_by_realizations() {
     FrfEstimate& frf = setup_.frf;
     if (!why_linearity_cannot_be_tested(frf).empty()) return false;
@@ -255,7 +255,7 @@ bool is_acceleration(const std::string& unit) {
          unit.ends_with(" s^-2");
 }
 
-/// The parts of the structure that are not asked for, by what the outputs are.
+/// The unset parts of the structure, chosen by the quantity of the outputs.
 FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
                           std::vector<std::string>& notes) {
   const std::vector<std::string>& units = frf.outputs.units;
@@ -277,7 +277,7 @@ FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
   return request;
 }
 
-/// Keys and words as on the command line: model.json shows the request.
+/// Keys and words as on the command line, because model.json contains the request.
 std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
   using Json = nlohmann::ordered_json;
   const FitOptions& o = setup.options;

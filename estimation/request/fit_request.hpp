@@ -13,14 +13,14 @@
 
 namespace stageid {
 
-/// Which modes a fit has.
+/// The modes of a fit.
 struct ModesRequest {
   enum class Kind : std::uint8_t {
     by_submodels,  ///< none if submodels are requested, else a search
     search,        ///< as many as are worth their parameters
     none,
-    count,  ///< so many
-    given   ///< these, which start at the given places
+    count,  ///< this number
+    given   ///< these, with the given start values
   };
   Kind kind = Kind::by_submodels;
   int count = 0;  ///< 1 to 1000
@@ -48,8 +48,8 @@ struct DelayRequest {
   double delay_s = 0.0;  ///< of a fixed delay
 };
 
-/// A request for a fit: what `stageid fit`, the section `fit` of an experiment file and Python ask for. What is not set
-/// is decided by the FRF, see make_fit_setup(); FitRequest{} is the default of all of them.
+/// A request for a fit, as in `stageid fit`, the section `fit` of an experiment file and Python. Members that are not
+/// set are chosen from the FRF, see make_fit_setup(); FitRequest{} is the default of all of them.
 struct FitRequest {
   std::optional<std::array<double, 2>> band_hz{};  ///< lowest and highest line; empty: all lines
   ModesRequest modes{};
@@ -68,15 +68,15 @@ struct FitRequest {
   int threads = 0;                ///< 0: all cores; the result does not depend on it
 };
 
-/// A request in the terms of structured_fit().
+/// A request converted to the options of structured_fit().
 struct FitSetup {
   FrfEstimate frf;  ///< the lines of the band
   RequestedStructure structure;
   ModeSelection selection;
   FitOptions options;
   Distortion distortion;              ///< included in the weights; empty: none
-  std::vector<std::string> notes;     ///< decisions that the FRF made, one line each
-  std::vector<std::string> warnings;  ///< those of them that the user should act on
+  std::vector<std::string> notes;     ///< decisions based on the FRF, one line each
+  std::vector<std::string> warnings;  ///< the decisions on which the user should act
   std::string request_json;           ///< the request with all defaults, for provenance
 };
 
@@ -88,16 +88,16 @@ struct FitSetup {
 ///   hold none                      -> no hold, delay 0
 ///   all outputs are accelerations  -> general damping, direct term, no rigid body: s^2 times the receptance of a
 ///                                     mode is D + (B_0 + B_1 s) / A
-/// Weights: noise variance if there is one, else total variance, else relative. The total variance for a nonlinear plant
+/// Weights: noise variance if known, else total variance, else relative. The total variance for a nonlinear plant
 /// (linearity_of()). With one realization, or an unknown number, of a plant whose lines scatter far more than the
 /// variances allow: that scatter, see line_scatter(), unless lines_are_coarse().
-/// @param frf moved if possible: nothing else holds as much memory
+/// @param frf moved if possible, because it is the largest object
 /// @throws std::invalid_argument naming the request's member; FileError, FormatError for the weight file
 FitSetup make_fit_setup(const FitRequest& request, FrfEstimate frf);
 
 /// Fits the additive model P(s) = sum of modes and rigid body to an FRF, with the defaults of `stageid fit`.
 /// A fit that did not converge or does not explain the data is a result: check FitResult::status.
-/// Source: method.md sections 5 to 7.
+/// Source: docs/theory.md, sections 5 to 10.
 /// @throws what make_fit_setup() and structured_fit() throw
 FitResult fit_model(FrfEstimate frf, const FitRequest& request = {});
 /// The same with a setup that is made.

@@ -13,7 +13,7 @@ namespace {
 /// Real parts of phi psi^T, see ResidueForm.
 bool takes_rank(const SubmodelRequest& submodel, int residue_rank) {
   const auto [l, n, m] = submodel.shape;
-  if (n == 0 && !submodel.order_by_search) return true;  // it stays free
+  if (n == 0 && !submodel.order_by_search) return true;  // it remains free
   return n == 2 && l == 0 && (m == 0 || (m == 1 && residue_rank == 1));
 }
 

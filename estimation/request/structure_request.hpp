@@ -6,7 +6,7 @@
 
 namespace stageid {
 
-/// What a request asks for, defaults resolved: submodels that are requested replace modes and rigid body.
+/// The kind of modes with defaults resolved: requested submodels replace modes and rigid body.
 ModesRequest::Kind modes_kind(const FitRequest& request) noexcept;
 RigidBodyRequest::Kind rigid_body_kind(const FitRequest& request) noexcept;
 

@@ -7,17 +7,17 @@
 
 namespace stageid {
 
-/// A submodel as `--submodel` takes it: `key=value` pairs with commas between them,
+/// A submodel as in `--submodel`: comma-separated `key=value` pairs,
 ///   l=0  integrators        n=4 or n=auto  order        m=3  degree of the numerator
-///   f=120:180  Hz, where its poles start        zeta=0.01 or zeta=0.01:0.02  their damping ratios
-/// l is 0 unless given, m what makes it strictly proper, n + l - 1.
-/// @throws std::invalid_argument naming the flag, what is wrong and what would be right
+///   f=120:180  start frequencies of its poles, Hz       zeta=0.01 or zeta=0.01:0.02  their damping ratios
+/// Default of l: 0; of m: n + l - 1 (strictly proper).
+/// @throws std::invalid_argument naming the flag, the problem and the remedy
 SubmodelRequest parse_submodel(std::string_view text);
 
-/// The same submodel in the same words, every key filled in.
+/// The submodel in the same format, with every key.
 std::string submodel_text(const SubmodelRequest& request);
 
-/// The degree of the numerator where none is given: the largest that is strictly proper.
+/// The default degree of the numerator: the largest that is strictly proper.
 int strictly_proper_degree(const SubmodelRequest& request);
 
 }  // namespace stageid

@@ -20,7 +20,7 @@ constexpr const char* kMatrices = "/weight_matrices";
 
 constexpr double kLeastPower = 1e-100;
 
-/// @param wanted of the lines in the band  @returns the band's first line in the dataset
+/// @param wanted shape on the lines of the band  @returns the first line of the band in the dataset
 std::size_t first_line(const Hdf5File& file, const char* dataset,
                        const std::vector<hsize_t>& wanted, WholeLines whole) {
   const std::vector<hsize_t> shape = file.shape(dataset);
@@ -60,7 +60,7 @@ void read_diagonals(const Hdf5File& file, const FrfEstimate& frf, WholeLines who
       }
   if (!(weights.maxCoeff() > 0.0))
     throw FormatError(file.path(), kDiagonals, "all weights are 0; at least one must be positive");
-  // Of numbers beyond, squares leave the range of doubles.
+  // With larger numbers, squares exceed the range of doubles.
   const double power = (weights.array() * frf.response.cwiseAbs2().array()).sum();
   if (power > 0.0 && !(power > kLeastPower && power < 1.0 / kLeastPower))
     throw FormatError(
@@ -79,7 +79,7 @@ void read_matrices(const Hdf5File& file, const FrfEstimate& frf, WholeLines whol
       whole));
   try {
     require_memory_for_weight_matrices(n_c, frf.lines());
-    // Rows of a Hermitian matrix are its columns, conjugated; what is not Hermitian is refused.
+    // Rows of a Hermitian matrix are its columns, conjugated; other matrices are rejected.
     const std::vector<std::complex<double>> values = file.read_complex(kMatrices);
     matrices.resize(n_c * n_c, frf.lines());
     for (Eigen::Index k = 0; k < frf.lines(); ++k)

@@ -27,15 +27,15 @@
 namespace stageid {
 namespace {
 
-constexpr int kGrowthIterations = 12;       // a mode that is still moving is finished later
-constexpr std::size_t kCandidates = 4;      // tried before it is believed that no mode is missing
+constexpr int kGrowthIterations = 12;   // a mode that is still moving is finished later
+constexpr std::size_t kCandidates = 4;  // tried before the search concludes that no mode is missing
 constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
-constexpr double kSettledDeviations = 0.1;  // where ways to a number of modes are compared
-constexpr int kMostGrown = 40;              // modes; more are placed at once, and only then grown
-constexpr int kIterationsOfMany = 6;        // with free poles: those that noise hides never settle
-constexpr double kSettledOfMany = 0.02;     // the same for every pole of so many, root mean square
+constexpr double kSettledDeviations = 0.1;  // if several ways to a number of modes are compared
+constexpr int kMostGrown = 40;              // modes; more are placed at once before growing
+constexpr int kIterationsOfMany = 6;        // with free poles: those hidden by noise never settle
+constexpr double kSettledOfMany = 0.02;     // the same per pole for many modes, root mean square
 
-/// Grows and prunes a model; every decision is written down.
+/// Grows and prunes a model, and records every decision.
 class AutomaticFit {
  public:
   AutomaticFit(const FrfEstimate& frf, const ModelStructure& structure,
@@ -48,22 +48,24 @@ class AutomaticFit {
         target_(selection.exactly) {
     quick_.user_weights = make_weights(frf, options);
     quick_.weighting = Weighting::user;
-    quick_.user_weight_matrices.resize(0, 0);  // the final fit's only: their best diagonal chooses
+    // only for the final fit; the search uses their best diagonal
+    quick_.user_weight_matrices.resize(0, 0);
     quick_.uncertainty = false;
     quick_.max_iterations = std::min(kGrowthIterations, options.max_iterations);
     quick_.gradient_tolerance = 1e-5;
     quick_.step_tolerance = 1e-7;
-    quick_.method = FitMethod::gn;  // the same minimum; the refined-IV iteration does the final fit
+    // the same minimum; the refined-IV iteration is for the final fit
+    quick_.method = FitMethod::gn;
     quick_.residue_rank = quick_.rigid_body_rank = 0;
     worth_ = ModeWorth(frf, structure, quick_.user_weights);
     quick_.deviation_tolerance = worth_.deviation_tolerance();
     threads_ = worker_count(options.threads);
   }
 
-  /// The fit that every search begins with.
+  /// The first fit of every search.
   void begin() { adopt(fit_additive_model(frf_, start(), quick_)); }
 
-  /// The same with the number of modes that is asked for, all placed at once.
+  /// The same with the requested number of modes, all placed at once.
   void begin_relocated() {
     AdditiveModel model = start_of({});
     const auto wanted = static_cast<std::size_t>(selection_.exactly);
@@ -81,11 +83,11 @@ class AutomaticFit {
     adopt(fit_additive_model(frf_, model, quick_));
   }
 
-  /// @param surplus modes to grow by beyond the number that is asked for
+  /// @param surplus modes to grow beyond the requested number
   void search(int surplus) {
     target_ = selection_.exactly + surplus;
     if (best_.status == FitStatus::singular || selection_.keep_modes) return;
-    // Two peaks of one mode keep a fit from converging, and what is left looks like more modes.
+    // Two modes on one peak prevent convergence, and their residual looks like more modes.
     if (selection_.exactly == 0) reduce();
     grow();
     reduce();
@@ -93,7 +95,7 @@ class AutomaticFit {
       if (grow()) reduce();
       return;
     }
-    if (!at_rounding()) {  // else the last fit says it all
+    if (!at_rounding()) {  // else the last fit is sufficient
       quick_.max_iterations = options_.max_iterations;
       quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
       adopt(fit_additive_model(frf_, best_.model, quick_));
@@ -106,7 +108,7 @@ class AutomaticFit {
   bool at_rounding() const { return worth_.at_rounding(best_); }
   bool limit_reached() const { return options_.limit->reached(); }
 
-  /// What a search weighs with; the last fit makes its own.
+  /// Releases the weights of the search; the last fit computes its own.
   void release_weights() { quick_.user_weights = {}; }
 
   FitResult finish() {
@@ -141,7 +143,7 @@ class AutomaticFit {
 
   bool many() const { return selection_.exactly > kMostGrown; }
 
-  /// Newton decrement at which every free pole is off by kSettledOfMany of its standard deviation.
+  /// Newton decrement at which every free pole is within kSettledOfMany of its standard deviation.
   double settled_of_many() const {
     double free = 0.0;
     for (const Submodel& s : best_.model.submodels)
@@ -149,7 +151,7 @@ class AutomaticFit {
     return kSettledOfMany * std::sqrt(free);
   }
 
-  /// Fits `model` with all poles free, and holds those that noise hides where they have come to.
+  /// Fits `model` with all poles free, then holds those of modes hidden by noise at the result.
   void hold_hidden(const AdditiveModel& model) {
     FitOptions while_free = quick_;
     while_free.max_iterations = std::min(kIterationsOfMany, options_.max_iterations);
@@ -191,7 +193,7 @@ class AutomaticFit {
            !limit_reached();
   }
 
-  /// Adds modes while they are worth it. @returns true if any was added.
+  /// Adds modes while they are worth their parameters. @returns true if any was added.
   bool grow() {
     bool grown = false;
     watch_.cut();
@@ -212,8 +214,8 @@ class AutomaticFit {
     return grown;
   }
 
-  /// Several at once where each is clearly worth it: pruning corrects what was one too many. Where very
-  /// many are asked for, whatever they are worth.
+  /// Adds several at once if each is clearly worth it; pruning corrects surplus ones. If very many are requested,
+  /// regardless of their worth.
   bool add_clear_ones(const std::vector<ResidualMode>& candidates) {
     const bool demanded = many();
     std::vector<ResidualMode> clear;
@@ -244,15 +246,14 @@ class AutomaticFit {
     FitResult best_trial;
     bool found = false;
     for (const ResidualMode& candidate : candidates) {
-      // The matched filter sees most of what a fit gains; far below the price none is needed.
+      // The matched filter estimates most of the gain of a fit; far below the price, no fit is needed.
       if (selection_.exactly == 0 && candidate.gain < 0.2 * worth_.price(best_)) continue;
       FitResult trial = fit_with({candidate});
       if (trial.status == FitStatus::singular) continue;
       const bool better = !found || trial.model.fit.cost < best_trial.model.fit.cost;
       if (better) best_trial = std::move(trial);
       found = true;
-      // The first candidate is usually right; the others are asked only where it is not worth its
-      // parameters.
+      // The first candidate is usually right; the others are tried only if it is not worth its parameters.
       if (worth_.criterion(best_trial) < worth_.criterion(best_) || limit_reached()) break;
     }
     if (!found) {
@@ -274,9 +275,9 @@ class AutomaticFit {
     return true;
   }
 
-  /// Replaces two modes closer than a half-power width by one where the second is not worth its
-  /// parameters: on a single resonance two nearly equal modes with large opposite residues fit as
-  /// well as one, and none of them can be dropped alone.
+  /// Replaces two modes closer than a half-power width by one if the second is not worth its parameters. On a single
+  /// resonance, two nearly equal modes with large opposite residues fit as well as one, and neither can be dropped
+  /// alone.
   void merge() {
     const std::vector<Submodel>& all = best_.model.submodels;
     for (const auto& [i, j] : overlapping_modes(best_.model)) {
@@ -285,20 +286,18 @@ class AutomaticFit {
       say("merged {:.6g} and {:.6g} Hz: cost {:.6g} -> {:.6g}", all[i].natural_frequency_hz(),
           all[j].natural_frequency_hz(), best_.model.fit.cost, merged.model.fit.cost);
       adopt(std::move(merged));
-      return merge();  // the other pairs' places have changed
+      return merge();  // the indices of the other pairs have changed
     }
   }
 
-  /// Drops modes that are not worth their parameters, several at a time, one by one where that
-  /// fails.
+  /// Drops modes that are not worth their parameters, several at a time, or one by one if that fails.
   void prune() {
     std::size_t at_once = best_.model.submodels.size();
     while (count_modes(best_.model) > 1 && at_once > 0) {
       const int surplus =
           selection_.exactly > 0 ? count_modes(best_.model) - selection_.exactly : 0;
       if (selection_.exactly > 0 && surplus <= 0) return;
-      // A refit regains part of what the removal costs: ask twice the price here, and BIC
-      // afterwards.
+      // A refit regains part of the removal cost, so the limit is twice the price here, and BIC decides afterwards.
       const double limit =
           surplus > 0 ? std::numeric_limits<double>::infinity() : 2.0 * worth_.price(best_);
       const std::size_t most = surplus > 0 ? static_cast<std::size_t>((surplus + 1) / 2) : at_once;
@@ -325,7 +324,7 @@ class AutomaticFit {
     if (selection_.exactly == 0) merge();
   }
 
-  /// Goes on from `result`; its way there becomes part of the history.
+  /// Continues from `result`, with its iterations and decisions added to the history.
   void adopt(FitResult&& result) {
     best_ = std::move(result);
     history_.insert(history_.end(), best_.cost.begin(), best_.cost.end());
@@ -342,7 +341,7 @@ class AutomaticFit {
   const FitOptions& options_;
   FitOptions quick_;
   ModeWorth worth_;
-  int target_;  ///< modes to grow to where their number is given
+  int target_;  ///< number of modes to grow to, if it is requested
   int threads_ = 1;
   GrowthWatch watch_;
   FitResult best_;
@@ -350,8 +349,8 @@ class AutomaticFit {
   std::vector<double> history_;
 };
 
-/// Where the number of modes is given, the way to it decides which minimum is reached: it is also
-/// gone with modes too many, of which the least worthy are dropped again.
+/// With a requested number of modes, the path determines which minimum is reached. A path with surplus modes is tried
+/// too; the least worthy are dropped again.
 std::vector<int> surpluses(const ModeSelection& selection, Eigen::Index most) {
   std::vector<int> out = {0};
   if (selection.exactly == 0 || selection.keep_modes) return out;

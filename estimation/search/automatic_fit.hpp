@@ -9,25 +9,25 @@
 
 namespace stageid {
 
-/// What decides the number of modes.
+/// How the number of modes is decided.
 struct ModeSelection {
-  std::vector<ModeCandidate> modes;  ///< start here; empty: from the CMIF
-  int exactly = 0;                   ///< > 0: so many modes; 0: by statistics (BIC)
-  bool keep_modes = false;           ///< fit `modes` as they are: none added, none removed
+  std::vector<ModeCandidate> modes;  ///< start values; empty: from the CMIF
+  int exactly = 0;                   ///< > 0: this number; 0: by statistics (BIC)
+  bool keep_modes = false;           ///< fit `modes` without adding or removing any
   int most = 60;
-  /// Of a search that chooses the number, in seconds of an ordinary core, see SearchLimit; 0: no end.
+  /// Budget of a search that chooses the number, in seconds of a typical core, see SearchLimit; 0: unlimited.
   double search_seconds = 180.0;
 };
 
-/// A fit that completes its own start: peaks of the CMIF, then modes at the peaks of the weighted
-/// residual's CMIF while they are worth their parameters, duplicates merged, worthless ones
-/// dropped; last, see settled_fit(). Every decision is in FitResult::decisions. FitOptions::progress is called with the iterations of
-/// all fits on the way.
-/// @throws std::invalid_argument: as fit_additive_model(), and for more modes than the lines carry
+/// A fit that completes its own start. It starts with the peaks of the CMIF and adds modes at the peaks of the CMIF of
+/// the weighted residual while they are worth their parameters. Duplicates are merged and modes that are not worth
+/// their parameters are dropped; see settled_fit() for the last fit. Every decision is in FitResult::decisions.
+/// FitOptions::progress is called for the iterations of all fits.
+/// @throws std::invalid_argument: as fit_additive_model(), and for more modes than the lines support
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
                         const ModeSelection& selection, const FitOptions& options);
 
-/// That of `options`, or a new one: with a budget where `selection` leaves the number of modes open.
+/// The limit of `options`, or a new one: with a budget if `selection` leaves the number of modes open.
 std::shared_ptr<SearchLimit> search_limit(const ModeSelection& selection,
                                           const FitOptions& options);
 

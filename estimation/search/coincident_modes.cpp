@@ -14,7 +14,7 @@
 namespace stageid {
 namespace {
 
-constexpr double kProbedWidths = 0.1;   // half-power widths that probing modes are apart
+constexpr double kProbedWidths = 0.1;   // distance of the probing modes in half-power widths
 constexpr double kProbedDamping = 0.1;  // of the damping ratio
 constexpr double kLargestPart = 0.5;    // of a half-power width, and of a damping ratio
 
@@ -26,7 +26,7 @@ void place(double frequency_factor, double damping_factor, Submodel& s) {
   s.denominator = {1.0, 2.0 * zeta * std::sqrt(a2), a2};
 }
 
-/// `tied` with another mode of that place behind mode `i`.
+/// `tied` with a copy of mode `i` after it.
 TiedModel doubled(TiedModel tied, std::size_t i) {
   const auto at = static_cast<std::ptrdiff_t>(i);
   tied.ranks[i] = 0;
@@ -35,7 +35,7 @@ TiedModel doubled(TiedModel tied, std::size_t i) {
   return tied;
 }
 
-/// Which way the two modes are taken apart: relative changes of frequency and damping ratio.
+/// How two modes are separated: relative changes of frequency and damping ratio.
 struct Direction {
   double frequency;
   double damping;

@@ -16,11 +16,11 @@
 namespace stageid {
 namespace {
 
-// Of a normal matrix with unit diagonal. One denominator of order 20 comes down to 1e-12 (the numerators
-// 1e-9) and is determined; sums of thousands of terms are precise to 1e-15.
+// Of a normal matrix with unit diagonal. One denominator of order 20 reaches 1e-12 (the numerators 1e-9) and is still
+// determined; sums of thousands of terms are accurate to 1e-15.
 constexpr double kSmallestDirection = 1e-12;  // of the numerators
 constexpr double kSmallestShare = 3e-14;      // of the denominators
-constexpr double kShareOfDirection = 0.1;     // from which a submodel is named
+constexpr double kShareOfDirection = 0.1;     // above this share, a submodel is named
 
 /// @param first coefficient of submodel `i` among the globals
 bool is_judged(const FitProblem& problem, std::size_t i, Eigen::Index first, bool judge_modes) {
@@ -31,13 +31,13 @@ bool is_judged(const FitProblem& problem, std::size_t i, Eigen::Index first, boo
   return order != 2 || problem.shapes[i].integrators > 0 || role == SubmodelRole::given;
 }
 
-/// 1 - R^2 of every free global: the part of its effect that no other parameter imitates.
+/// 1 - R^2 of every free global: the part of its effect that no other parameter can imitate.
 Eigen::VectorXd own_shares(const ArrowSystem& gn, const std::vector<Eigen::Index>& frozen) {
   const Eigen::MatrixXd inverse = free_inverse(gn.schur(), frozen);
   return (gn.M_globals().diagonal().cwiseProduct(inverse.diagonal())).cwiseInverse();
 }
 
-/// What the standard deviations say against the poles of submodel `i`, whose coefficients begin at `first`.
+/// Why the standard deviations contradict the poles of submodel `i`, whose first coefficient is `first`; else empty.
 std::string too_uncertain(const FitProblem& problem, const FitParameters& beta,
                           const Eigen::MatrixXd& covariance, std::size_t i, Eigen::Index first) {
   const Eigen::Index n = problem.shapes[i].order;
@@ -55,9 +55,9 @@ std::string too_uncertain(const FitProblem& problem, const FitParameters& beta,
   return {};
 }
 
-/// What the size of the response of submodel `i` says against it, by itself or as far as the others cannot stand in
-/// for it. Noise alone would let a submodel lower
-/// sum W |E|^2 by half of its variance for each parameter, by more where it searches its place.
+/// Why the response of submodel `i` is too small, either by itself or in the part that the others cannot replace; else
+/// empty. Noise alone would let a submodel lower sum W |E|^2 by half of its variance per parameter, and by more if its
+/// frequency is searched.
 std::string too_small(const FitProblem& problem, const FitParameters& beta, double cost,
                       double removal_cost, std::size_t i) {
   FitProblem alone = problem;

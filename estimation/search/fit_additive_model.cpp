@@ -27,14 +27,14 @@
 namespace stageid {
 namespace {
 
-/// The covariance takes the lines for independent: of so many of them only one is.
+/// The covariance assumes independent lines; of `correlated_lines` lines, only one is independent.
 void raise(ParameterCovariance& covariance, double correlated_lines) {
   covariance.globals *= correlated_lines;
   covariance.numerator_variance *= correlated_lines;
   covariance.response_variance *= correlated_lines;
 }
 
-/// What belongs to a channel without weight is not known, and does not touch the rest.
+/// Whether all weighted channels are finite; channels without weight are unknown and do not affect the others.
 bool weighted_are_finite(const FitProblem& problem, const ParameterCovariance& covariance) {
   for (Eigen::Index c = 0; c < problem.channels(); ++c) {
     const bool finite = covariance.numerator_variance.row(c).allFinite() &&
@@ -63,7 +63,7 @@ void use_covariance(const FitProblem& problem, ParameterCovariance& covariance, 
                   covariance.residual_scale, std::sqrt(covariance.residual_scale)));
 }
 
-/// With free numerators.
+/// The covariance with free numerators.
 ParameterCovariance free_covariance(const FrfEstimate& frf, const FitOptions& options,
                                     const FitProblem& problem,
                                     const std::optional<WeightMatrices>& matrices,
@@ -108,7 +108,7 @@ void fill_record(const FitOptions& options, const IterationResult& iteration, do
   result.model.cost_history = result.cost;
 }
 
-/// Goes on to residues of the given ranks. @returns the covariance there
+/// Continues to residues of the given ranks. @returns the covariance there
 ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& options,
                                     const FitProblem& problem, FitParameters& beta,
                                     IterationResult& iteration, FitResult& result) {
@@ -130,7 +130,7 @@ ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& op
   return std::move(constrained.covariance);
 }
 
-/// Residues of modes whose poles are held because noise hides them.
+/// Shrinks the residues of modes whose poles are held because noise hides them.
 void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResult& iteration,
                    FitResult& result) {
   std::vector<std::size_t> hidden;
@@ -141,7 +141,7 @@ void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResu
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, false);
   double cost = iteration.end_cost;
   result.removal_cost =
-      removal_costs(problem, groups, beta.B);  // of what solves the convex problem
+      removal_costs(problem, groups, beta.B);  // of the solution of the convex problem
   shrink_hidden_modes(problem, groups, hidden, result.removal_cost, beta.B, cost);
   result.decisions.push_back(
       fmt::format("residues of {} below the noise, James-Stein shrinkage: cost {:.6g} -> {:.6g}",
@@ -150,7 +150,7 @@ void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResu
   iteration.cost.push_back(cost);
 }
 
-/// What an earlier fit knew about the start is not known about this one.
+/// Removes the results of an earlier fit from the start.
 void forget_results(AdditiveModel& model) {
   model.input_delay_std_s.resize(0);
   model.output_delay_std_s.resize(0);
@@ -164,8 +164,8 @@ void forget_results(AdditiveModel& model) {
   }
 }
 
-/// Where the start has no finite response there is nothing to return but itself, without numerators.
-/// @returns relative error of what is returned
+/// If the start has no finite response, the start itself is returned, without numerators.
+/// @returns relative error of the result
 double keep_finite(const FrfEstimate& frf, const FitProblem& problem, const FitParameters& start,
                    FitParameters& beta, IterationResult& iteration) {
   const ChannelFlags responding = responding_channels(frf);
@@ -200,8 +200,8 @@ std::vector<std::size_t> held_submodels(const FitProblem& problem, const FitPara
   return out;
 }
 
-/// A fit that has converged is undetermined where the data leave a submodel open that was asked for;
-/// one that has not says so as well.
+/// A converged fit becomes undetermined if the data leave a requested submodel undetermined; one that has not
+/// converged gets the reason too.
 void judge(const FitProblem& problem, const FitParameters& beta, double cost,
            const Eigen::MatrixXd& covariance, const std::vector<Eigen::Index>& frozen,
            bool judge_modes, FitResult& result) {
@@ -232,7 +232,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   const std::optional<WeightMatrices> matrices = make_weight_matrices(frf, options);
   const bool searched = options.delay != DelayModel::fixed && options.delay_s == 0.0 &&
                         start.input_delay_s.size() == 0;
-  // The search weighs by itself; all that it asks is which of a user's weights are zero.
+  // The search computes its own weights; from the user's weights it only needs which are zero.
   const bool later = searched && !matrices && options.weighting != Weighting::user;
   SharedMatrix<Eigen::MatrixXd> W;
   if (matrices)
@@ -285,7 +285,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
 }
 
 void rearrange(const std::vector<std::size_t>& sources, FitResult& fit) {
-  std::vector<Eigen::Index> first = {0};  // coefficient of every submodel
+  std::vector<Eigen::Index> first = {0};  // first coefficient of every submodel
   for (const Submodel& s : fit.model.submodels)
     first.push_back(first.back() + static_cast<Eigen::Index>(s.denominator.size()) - 1);
   AdditiveModel model = fit.model;

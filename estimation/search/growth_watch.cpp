@@ -15,10 +15,10 @@
 namespace stageid {
 namespace {
 
-// In a row: a measured aircraft, which is nonlinear, comes to five before it converges.
+// In a row. A measured aircraft, which is nonlinear, has five before the search converges.
 constexpr int kMostSpurious = 6;
 
-/// A broad mode is no resonance that a narrow one within its width could be part of.
+/// Whether mode `i` overlaps another. Broad modes do not count: they are not resonances that contain a narrow one.
 bool overlaps_another(const AdditiveModel& model, std::size_t i) {
   const Submodel& one = model.submodels[i];
   const double f = one.natural_frequency_hz();
@@ -38,8 +38,8 @@ bool is_coloured(const AdditiveModel& model, std::size_t i) {
          overlaps_another(model, i);
 }
 
-/// Whether the modes that a round added are not worth their parameters without one line each, the best: noise whose
-/// tails are heavier than the variances say asks for a mode on every outlier.
+/// Whether the modes added by a round are not worth their parameters without their best line each. With noise tails
+/// heavier than assumed, every outlier would be fitted by a mode.
 bool rests_on_single_lines(const FrfEstimate& frf, const FitOptions& options,
                            const FitResult& before, const FitResult& now, std::size_t added) {
   const SharedMatrix<Eigen::MatrixXd> weights = make_weights(frf, options);
@@ -70,7 +70,7 @@ bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const 
   spurious = spurious || rests_on_single_lines(frf, options, before, now, added);
   if (!spurious) spurious_in_a_row_ = 0;
   if (spurious && spurious_in_a_row_++ == 0) back_to_ = before;
-  // Every second, fourth, eighth round: what it costs stays a small part of the search.
+  // In every second, fourth, eighth round: a small part of the cost of the search.
   if (rounds_ > 1 && is_power_of_two(rounds_) && a_delay_explains_more(frf, options, now))
     return true;
   if (spurious_in_a_row_ < kMostSpurious) return false;
@@ -94,7 +94,7 @@ bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions
   if (searched.delay != DelayModel::fixed) return false;
   FitOptions options = searched;
   options.delay = DelayModel::estimate;
-  options.delay_s = 0.0;  // searched: a wrong one is no start
+  options.delay_s = 0.0;  // 0 starts the search for a delay; a wrong value would not
   AdditiveModel start = first_.model;
   start.input_delay_s.resize(0);
   start.output_delay_s.resize(0);

@@ -8,30 +8,30 @@
 
 namespace stageid {
 
-/// Ends a search for modes that only models what is none: every mode that it adds lowers the cost by more than its
-/// parameters are worth, and still the search does not come to its end.
+/// Ends a search for modes that fits something else: every added mode lowers the cost by more than its parameters are
+/// worth, but the search does not end.
 ///
-/// Two signs are watched. A delay, where none is estimated: one more parameter for the model without the modes that
-/// were added is worth more (BIC) than all of them. And rounds in a row that added no resonance: nothing but modes
-/// beside the lines, broader than resonances are, or within the half-power width of another that is not; or modes that
-/// one line each is all the evidence for, as an outlier is. Real modes look like that too, but not so many in a row.
+/// Two signs are checked. Delay: if none is estimated, and one delay parameter without the added modes is worth more
+/// (BIC) than all of them. Spurious rounds in a row: rounds whose modes are outside the lines, broader than
+/// resonances, within the half-power width of another mode, or supported by only one line each, as outliers are. Real
+/// modes can look like that too, but not that many in a row.
 class GrowthWatch {
  public:
-  /// Looks at `now` after a round that put the last `added` submodels into it.
-  /// @param before the round   @param options those of the fits of the search
-  /// @returns true if the search is to end, with model()
+  /// Checks `now` after a round that appended the last `added` submodels.
+  /// @param before the round   @param options of the fits of the search
+  /// @returns true if the search should end, with model()
   bool ends(const FrfEstimate& frf, const FitOptions& options, const FitResult& before,
             const FitResult& now, std::size_t added);
 
-  /// A search that goes on after it was cut back: rounds before no longer stand in a row with those to come.
+  /// For a search that continues after modes were removed: restarts the count of rounds in a row.
   void cut() noexcept { spurious_in_a_row_ = 0; }
 
-  /// Adds why it ended the search, if it did.
+  /// Adds the reason if it ended the search.
   void tell(FitResult& result) const;
 
   bool ended() const noexcept { return !finding_.empty(); }
   bool by_delay() const noexcept { return by_delay_; }
-  /// What to go back to.
+  /// The model to return to.
   const FitResult& model() const noexcept { return back_to_; }
   const std::string& finding() const noexcept { return finding_; }
 

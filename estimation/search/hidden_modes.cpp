@@ -13,13 +13,14 @@ namespace {
 
 constexpr double kPart =
     0.5;  // of the best share: three quarters of the gain, a quarter of the cost
-constexpr double kLargestShare = 0.99;  // of a mode that is taken away
+constexpr double kLargestShare = 0.99;  // of a mode that is removed
 
 }  // namespace
 
 int hold_hidden_modes(const FitResult& fit, Eigen::Index channels, Eigen::Index lines,
                       AdditiveModel& model) {
-  const double noise = fit.model.fit.cost / static_cast<double>(channels);  // of a real number
+  // variance of a real number
+  const double noise = fit.model.fit.cost / static_cast<double>(channels);
   int hidden = 0;
   for (std::size_t i = 0; i < model.submodels.size(); ++i) {
     Submodel& s = model.submodels[i];
@@ -38,7 +39,7 @@ void shrink_hidden_modes(const FitProblem& problem, const std::vector<BasisGroup
                          const std::vector<std::size_t>& hidden, const std::vector<double>& removal,
                          Eigen::MatrixXd& B, double& cost) {
   const auto channels = static_cast<double>(problem.channels());
-  // Of a real number: half of a complex one's.
+  // Of a real number: half of the variance of a complex one.
   const double noise = 0.5 * residual_per_degree(problem, cost, problem.parameters());
   std::vector<double> share(problem.shapes.size(), 0.0);
   for (const std::size_t i : hidden) {

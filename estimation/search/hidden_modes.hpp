@@ -7,20 +7,20 @@
 
 namespace stageid {
 
-/// Of very many modes that are asked for the data show some not at all: their poles settle on the largest
-/// noise peaks and never come to rest. Holds the poles of those modes of `fit` that noise hides where they are.
+/// Among very many requested modes, some are hidden by noise: their poles move to the largest noise peaks and do not
+/// converge. Holds the poles of the hidden modes of `fit` at their current values.
 ///
-/// Noise is what the residual shows. A mode is hidden if noise alone would reach its removal cost on more than
+/// The noise is estimated from the residual. A mode is hidden if noise alone would reach its removal cost on more than
 /// one of the lines. @param channels outputs times inputs @param lines of the fit
-/// @returns how many are hidden
+/// @returns the number of hidden modes
 int hold_hidden_modes(const FitResult& fit, Eigen::Index channels, Eigen::Index lines,
                       AdditiveModel& model);
 
-/// Numerators of hidden modes are shrunk towards zero, since most of them is noise that their poles have found: of
-/// a mode's d numbers b with covariance C the share s = (d - 2) / (2 b' C^-1 b), at most nearly all. The others
-/// follow: sum W |E|^2 + sigma^2 sum_i s/(1 - s) b_i' C_i^-1 b_i is least, sigma^2 from the residual. For one mode
-/// the expected squared error falls whatever the truth is; twice the share is best for it and costs four times as
-/// much of the cost.
+/// Shrinks the numerators of hidden modes towards zero, since they are mostly noise that their poles have selected. Of
+/// the d numbers b of a mode with covariance C, the share s = (d - 2) / (2 b' C^-1 b) is removed, limited to nearly
+/// all. The other numerators adapt such that sum W |E|^2 + sigma^2 sum_i s/(1 - s) b_i' C_i^-1 b_i is minimal, with
+/// sigma^2 from the residual. For one mode, the expected squared error falls for every truth; twice the share would be
+/// best, but would raise the cost four times as much.
 /// Source: James and Stein, Fourth Berkeley Symposium 1 (1961) 361.
 /// @param hidden submodels  @param removal removal_costs() of B @pre `B` solves the convex problem, with that cost
 /// @param[in,out] B n_c x n_f  @param[in,out] cost 1/(2N) sum W |E|^2

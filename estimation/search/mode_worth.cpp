@@ -15,13 +15,13 @@ double information_criterion(const FrfEstimate& frf, const FitResult& fit) {
 
 namespace {
 
-/// In units of 2 ln(likelihood): ln(data) for each parameter (BIC), and 2 ln(lines) for the choice of the
-/// mode's place among them: without it the best of thousands of places is taken where none is right.
+/// In units of 2 ln(likelihood): ln(data) per parameter (BIC), and 2 ln(lines) for the choice of the frequency among
+/// the lines. Without it, the best of thousands of places would be accepted even if none is right.
 double cost_of_mode(double parameters, double data, double lines) {
   return parameters * std::log(data) + 2.0 * std::log(lines);
 }
 
-/// That cost in sum W |E|^2, of which there is `squares`.
+/// That cost in units of sum W |E|^2, whose value is `squares`.
 double in_squares(double squares, double cost, double data) {
   return squares * -std::expm1(-cost / data);
 }

@@ -20,13 +20,13 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kPairsTried = 3;  // of modes that do not come to rest, at a time
+constexpr std::size_t kPairsTried = 3;  // of modes that do not converge, at a time
 constexpr double kDearest =
-    1.5;  // times the cost: above, converging is worth less than following the data
-constexpr double kNothing = 0.1;  // of 2 ln(likelihood): what converging may cost
+    1.5;  // times the cost: above, following the data is better than convergence
+constexpr double kNothing = 0.1;  // of 2 ln(likelihood): acceptable cost of convergence
 constexpr double kClearly = 3.0;  // standard deviations of a chi-square variable
 
-/// How far a chi-square is above what its degrees of freedom give, in standard deviations.
+/// Excess of a chi-square variable over its degrees of freedom, in standard deviations.
 double sigmas_above(double chi_square, Eigen::Index degrees) {
   const auto n = static_cast<double>(degrees);
   return (chi_square - n) / std::sqrt(2.0 * std::max(n, 1.0));
@@ -71,7 +71,7 @@ class RankedFit {
     return fit_additive_model(frf_, tied.model, options);
   }
 
-  /// Modes with B_0 and B_1 have no rank but one.
+  /// Modes with B_0 and B_1 can only have rank one.
   bool may_tie() const {
     return options_.residue_rank == 1 && !(options_.limit && options_.limit->reached()) &&
            std::none_of(
@@ -81,7 +81,7 @@ class RankedFit {
 
   double criterion(const FitResult& fit) const { return information_criterion(frf_, fit); }
 
-  /// Adopts a fit that is better, or nearly as good (BIC) and converged where the present one has not.
+  /// Adopts a fit that is better. If the current one has not converged, a converged one may be slightly worse (BIC).
   bool adopt(const TiedModel& tied, FitResult&& trial) {
     const bool settles = trial.trustworthy() && !best_.trustworthy();
     if (trial.status == FitStatus::singular ||
@@ -95,7 +95,7 @@ class RankedFit {
     return true;
   }
 
-  /// The modes whose free residues say so get the rank that they have.
+  /// Raises the ranks of modes whose free residues have a higher rank.
   void raise() {
     TiedModel raised{free_.model, tied_.ranks};
     std::vector<std::string> said;
@@ -112,7 +112,7 @@ class RankedFit {
     decisions_.insert(decisions_.end(), said.begin(), said.end());
   }
 
-  /// Ties modes that run into each other and keep the fit from converging.
+  /// Ties modes that converge to each other and prevent convergence.
   void settle() {
     while (!best_.trustworthy()) {
       const std::vector<std::pair<std::size_t, std::size_t>> pairs = overlapping_modes(best_.model);
@@ -124,7 +124,7 @@ class RankedFit {
         const TiedModel tied = with_tied({best_.model, tied_.ranks}, i, j);
         FitResult trial = constrained(tied);
         if (!adopt(tied, FitResult(trial))) {
-          // Apart they are, and the way there was too long from where they began.
+          // They are separate, but the start was too far away.
           const auto apart = with_parted(frf_, {trial.model, tied.ranks}, i, options_);
           return apart && adopt(*apart, constrained(*apart));
         }
@@ -142,7 +142,7 @@ class RankedFit {
     }
   }
 
-  /// Of a number that is asked for: the modes that are worth least make room for the shapes that others lack.
+  /// With a requested number of modes: removes the least worthy modes in favour of missing shapes.
   void make_room() {
     TiedModel raised{free_.model, std::vector<int>(free_.model.submodels.size(), 0)};
     std::size_t wanted = 0;
@@ -175,7 +175,7 @@ class RankedFit {
         fmt::format("{}: cost {:.6g} -> {:.6g}", said, cost, best_.model.fit.cost));
   }
 
-  /// Takes modes at one place apart where the data do.
+  /// Separates modes at the same frequency if the data require it.
   void part() {
     for (std::size_t i = 0; i < tied_.ranks.size(); ++i) {
       if (tied_.ranks[i] != 2) continue;
@@ -189,7 +189,7 @@ class RankedFit {
     }
   }
 
-  /// Takes back what a rank that was raised is not worth, now that the others have theirs.
+  /// Lowers a raised rank that is not worth its parameters, given the ranks of the others.
   void lower() {
     for (std::size_t i = 0; i < tied_.ranks.size();) {
       TiedModel lowered{best_.model, tied_.ranks};
@@ -205,7 +205,7 @@ class RankedFit {
     }
   }
 
-  /// The modes whose residues are of a higher rank than they have.
+  /// Finds modes whose residues have a higher rank than allowed.
   void find_too_low_ranks() {
     if (options_.residue_rank == 0) return;
     const double rise = data_ * std::log(best_.model.fit.cost / free_.model.fit.cost);
@@ -270,7 +270,7 @@ FitResult ranked_fit(const FrfEstimate& frf, const AdditiveModel& start, const F
   FitResult fit = options.residue_rank > 0       ? RankedFit(frf, options, number).run(start)
                   : number == ModeNumber::chosen ? settled_fit(frf, start, options)
                                                  : fit_additive_model(frf, start, options);
-  // Modes that are given one by one the fit has judged by itself.
+  // Modes that were requested as a list have been judged by the fit itself.
   if (number != ModeNumber::given && fit.status != FitStatus::singular)
     judge_undetermined_modes(frf, number == ModeNumber::asked, fit);
   if (number == ModeNumber::asked && options.residue_rank == 0 && fit.trustworthy())
@@ -284,7 +284,7 @@ std::string rank_decision(double free_cost, double cost, double cost_to_squares,
       fmt::format("residues of the given ranks: cost {:.6g} -> {:.6g}", free_cost, cost);
   if (cost <= free_cost) return text + ", by more modes";
   if (!likelihood) return text;
-  // Twice the rise of sum W |E|^2 is chi-square distributed where the ranks are right.
+  // Twice the rise of sum W |E|^2 is chi-square distributed if the ranks are right.
   const double rise = 2.0 * cost_to_squares * (cost - free_cost);
   return text +
          fmt::format(

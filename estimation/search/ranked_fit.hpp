@@ -7,25 +7,25 @@
 
 namespace stageid {
 
-/// Who says how many modes a model has.
+/// How the number of modes was determined.
 enum class ModeNumber : std::uint8_t {
-  chosen,  ///< a search, which may go on
-  asked,   ///< the request, that many
-  given    ///< the request, one by one
+  chosen,  ///< by a search, which may continue
+  asked,   ///< the request, as a number
+  given    ///< the request, as a list of modes
 };
 
-/// The last fit of a search, with the ranks that FitOptions gives to residues. The free residues are fitted first,
-/// and their ranks tested, see residue_rank_tests().
+/// The last fit of a search, with the ranks of the residues in FitOptions. The free residues are fitted first and
+/// their ranks tested, see residue_rank_tests().
 ///
-/// With rank one a mode whose residue is of rank two is two modes (at one place, or nearly). Where the number of modes
-/// is chosen it becomes two; where it is asked for, in the place of the mode that is worth least. Two modes that do
-/// not come to rest become two at one place if that costs no more than their places are worth (BIC), and are taken
-/// apart again where the data show that they are apart. What a rank that does not suffice costs is a finding.
-/// Without a rank: fit_additive_model(), or settled_fit() where the number is chosen.
+/// With rank one, a mode whose residue has rank two is split into two modes at the same or nearly the same frequency.
+/// If the number of modes is requested, they replace the mode that is worth least. Two modes that do not converge
+/// become two at the same frequency, if that costs less than their frequencies are worth (BIC), and are separated
+/// again if the data require it. The cost of an insufficient rank is a finding.
+/// Without a rank: fit_additive_model(), or settled_fit() if the number of modes is chosen.
 FitResult ranked_fit(const FrfEstimate& frf, const AdditiveModel& start, const FitOptions& options,
                      ModeNumber number);
 
-/// What giving up the free residues cost, and whether noise alone would have.
+/// The cost of constraining the free residues, and whether noise alone explains it.
 /// @param cost_to_squares sum W |E|^2 over the cost  @param likelihood the weights are inverse variances
 std::string rank_decision(double free_cost, double cost, double cost_to_squares,
                           Eigen::Index given_up, bool likelihood);

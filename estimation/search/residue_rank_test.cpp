@@ -15,10 +15,11 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kMostShown = 8;  // of modes of higher rank
-constexpr double kBestKnown = 1e-8;    // of the largest entry: closer, rounding is what is tested
+constexpr std::size_t kMostShown = 8;  // modes of higher rank
+// of the largest entry: a smaller deviation would only test rounding
+constexpr double kBestKnown = 1e-8;
 
-/// sum |B - B_r|^2 / variance of a mode, least over residues of rank r.
+/// sum |B - B_r|^2 / variance of a mode, minimized over residues of rank r.
 class RankDistance {
  public:
   explicit RankDistance(const Submodel& s)
@@ -34,7 +35,7 @@ class RankDistance {
       B_.col(m) = s.numerator[at].reshaped();
       inverse_variance_.col(m) = s.numerator_std[at].reshaped();
     }
-    // Numerators count by what they do at the mode.
+    // Numerators are weighted by their effect at the frequency of the mode.
     const double largest =
         std::max(B_.col(0).cwiseAbs().maxCoeff(), omega * B_.rightCols(1).cwiseAbs().maxCoeff());
     for (Eigen::Index m = 0; m < B_.cols(); ++m) {
@@ -56,7 +57,7 @@ class RankDistance {
     return static_cast<int>(B_.cols() * (n_outputs_ - rank) * (n_inputs_ - rank));
   }
 
-  /// Ranks that can be held, and so be tested.
+  /// The highest rank that can be held, and therefore tested.
   int highest() const {
     return B_.cols() > 1 ? 1 : static_cast<int>(std::min(n_outputs_, n_inputs_)) - 1;
   }
@@ -74,7 +75,7 @@ bool is_tested(const Submodel& s, const AdditiveModel& model) {
   if (!is_searched_mode(s) || s.numerator_std.size() != s.numerator.size()) return false;
   if (std::min(s.numerator[0].rows(), s.numerator[0].cols()) < 2) return false;
   if (!(s.numerator_std[0].maxCoeff() > 0.0)) return false;
-  const double f = s.natural_frequency_hz();  // beside the lines it stands for several modes
+  const double f = s.natural_frequency_hz();  // outside the lines it represents several modes
   return s.natural_frequency_std_hz && f > model.fit.band_hz[0] && f < model.fit.band_hz[1];
 }
 

@@ -18,14 +18,15 @@
 namespace stageid {
 namespace {
 
-constexpr int kTrialIterations = 8;  // enough to see what a structure gains, not to end the fit
-constexpr double kMostOfCost = 0.5;  // one end of the band holds more than the rest
+// enough to show the gain of a structure, not to complete the fit
+constexpr int kTrialIterations = 8;
+constexpr double kMostOfCost = 0.5;  // one end of the band has more than the rest
 constexpr double kSmallEnd = 0.25;   // of the lines
-constexpr double kMoreBudget = 4.0;  // times, as the next to try
+constexpr double kMoreBudget = 4.0;  // factor for the next budget to try
 constexpr double kNoiseOnly = 2.0;   // |G|^2 over its variance: the response is below the noise
 constexpr double kMostLines = 0.5;
 
-/// The names of inputs or outputs all of whose entries are noise on most lines.
+/// The names of inputs or outputs whose entries are all noise on most lines.
 std::vector<std::string> silent_channels(const FrfEstimate& frf, bool inputs) {
   const Eigen::MatrixXd& variance =
       frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
@@ -62,7 +63,7 @@ std::string without_silent_channels(const FrfEstimate& frf) {
   return {};
 }
 
-/// Another structure of the same modes.
+/// The same modes with a different structure.
 struct Alternative {
   const char* flag;
   AdditiveModel model;
@@ -113,7 +114,7 @@ std::vector<Alternative> alternatives(const FrfEstimate& frf, const FitOptions& 
   if (trial.delay == DelayModel::fixed) {
     Alternative delayed{"--delay estimate", model, trial};
     delayed.options.delay = DelayModel::estimate;
-    delayed.options.delay_s = 0.0;  // searched: a wrong one is no start
+    delayed.options.delay_s = 0.0;  // 0 starts the search for a delay; a wrong value would not
     delayed.model.input_delay_s.resize(0);
     delayed.model.output_delay_s.resize(0);
     out.push_back(std::move(delayed));
@@ -123,10 +124,10 @@ std::vector<Alternative> alternatives(const FrfEstimate& frf, const FitOptions& 
     Alternative skewed{"--delay per_channel", model, trial};
     skewed.options.delay = DelayModel::per_channel;
     skewed.options.delay_s = 0.0;
-    skewed.options.max_iterations *= 3;  // it comes from farther
+    skewed.options.max_iterations *= 3;  // its start is farther away
     skewed.model.input_delay_s.resize(0);
     skewed.model.output_delay_s.resize(0);
-    // Modes that were fitted to channels of different delays lead into another minimum.
+    // Modes that were fitted to channels with different delays lead to another minimum.
     std::erase_if(skewed.model.submodels, is_searched_mode);
     for (const ModeCandidate& peak : pick_modes(frf))
       skewed.model.submodels.push_back(mode_submodel(frf, {}, peak));
@@ -178,7 +179,7 @@ std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
   return advice;
 }
 
-/// Where the smaller part of the lines holds the larger part of the cost.
+/// The band without its worse end, if the smaller part of the lines has the larger part of the cost.
 std::string better_band(const FrfEstimate& frf, const FitOptions& trial, const FitResult& fit) {
   const Eigen::MatrixXcd error =
       frf.response - response(fit.model, frf.frequency_hz, fit.model.hold);
@@ -207,7 +208,7 @@ std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const 
   std::string advice = without_silent_channels(frf);
   if (!advice.empty()) return advice;
   const FitOptions trial = trial_options(frf, options);
-  // A search that is cut short leaves poles on their way.
+  // In a search that ended early, poles have not converged.
   const FitResult same = fit_additive_model(frf, fit.model, with_deviations(trial));
   advice = better_structure(frf, options, trial, same, cut_short);
   if (advice.empty()) advice = better_band(frf, trial, same);
@@ -233,7 +234,8 @@ void tell_limit(const FrfEstimate& frf, const FitOptions& options, FitResult& fi
     fit.findings.push_back(message);
   }
   fit.decisions.push_back(message);
-  if (ended_by_limit(fit)) fit.status = FitStatus::gradient_small;  // its message says less
+  // the message of its own status is less helpful
+  if (ended_by_limit(fit)) fit.status = FitStatus::gradient_small;
   fit.distrust(status, message);
 }
 

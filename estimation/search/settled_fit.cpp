@@ -19,11 +19,11 @@
 namespace stageid {
 namespace {
 
-// A mode that is known better than this does not keep a fit from converging.
+// Better determined modes do not prevent convergence.
 constexpr double kLeastDoubt = 1.0;
 constexpr double kUndoubtedWidths = 0.1;
 
-// A model that costs so many times as much does not follow what the data show: better none that converged.
+// A model with this many times the cost does not follow the data: a fit that has not converged is better.
 constexpr double kDearestMode = 1.5;
 
 struct OpenMode {
@@ -45,14 +45,14 @@ std::optional<OpenMode> most_open(const AdditiveModel& model) {
   return open;
 }
 
-/// Standard deviation of the frequency; where there is none, a part of the half-power width.
+/// Standard deviation of the frequency; if unknown, a part of the half-power width.
 double doubt_hz(const Submodel& s) {
   const double width_hz = 2.0 * s.damping_ratio() * s.natural_frequency_hz();
   return s.natural_frequency_std_hz.value_or(kUndoubtedWidths * width_hz);
 }
 
-/// Two modes that have run into one: nearer to each other than either of them is known. Their limit is a double pole,
-/// with residues that grow without end and cancel; nothing determines the parameters there.
+/// Two modes that converged to each other: closer than the deviation of either. Their limit is a double pole with
+/// residues that grow without bound and cancel, so the parameters are undetermined.
 std::optional<std::pair<std::size_t, std::size_t>> coalesced(const AdditiveModel& model) {
   for (const auto& [i, j] : overlapping_modes(model)) {
     const Submodel& one = model.submodels[i];
@@ -68,7 +68,7 @@ struct Simpler {
   std::string reason;
 };
 
-/// The model with one mode less: of two that have run into one, else without the most open one.
+/// The model with one mode less: without one of two that converged to each other, else without the least determined.
 std::optional<Simpler> simpler(const AdditiveModel& model) {
   if (const auto pair = coalesced(model)) {
     const auto [i, j] = *pair;
@@ -94,7 +94,7 @@ bool may_converge(const FitResult& fit) {
   return fit.status == FitStatus::iteration_limit || fit.status == FitStatus::cost_stalled;
 }
 
-/// Leaves out modes that the data do not determine, one by one, where they are not worth their parameters.
+/// Removes modes that the data do not determine, one by one, if they are not worth their parameters.
 void leave_out_undetermined(const FrfEstimate& frf, const FitOptions& options, FitResult& fit,
                             std::vector<std::string>& left_out) {
   const auto without = [&](std::size_t i) {
@@ -118,7 +118,7 @@ void leave_out_undetermined(const FrfEstimate& frf, const FitOptions& options, F
   }
 }
 
-/// Gives up modes until a fit converges; the first one if none does.
+/// Removes modes until a fit converges; returns the first fit if none does.
 FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
                         const FitOptions& options, std::vector<std::string>& left_out) {
   FitResult first = fit_additive_model(frf, start, options);

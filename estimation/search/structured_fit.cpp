@@ -25,13 +25,14 @@ namespace {
 
 constexpr double kSuspensionStart = 0.25;  // of the lowest line
 constexpr double kSuspensionDamping = 0.1;
-constexpr double kWeakSpringsStart = 0.02;  // of the lowest line: where a free body comes from
+// of the lowest line: the start if a free body is replaced
+constexpr double kWeakSpringsStart = 0.02;
 constexpr int kRealPoleGrid = 17;
-constexpr double kRealPoleBelow = 0.3;  // the grid reaches beyond the lines by these factors
+constexpr double kRealPoleBelow = 0.3;  // the grid extends beyond the lines by these factors
 constexpr double kRealPoleAbove = 3.0;
-constexpr double kLargestDeviation = 0.5;  // of a frequency that counts as determined
+constexpr double kLargestDeviation = 0.5;  // of a frequency that is considered determined
 
-/// All residues free: a rigid body of up to min(n_y, n_u) degrees of freedom.
+/// With free residues: a rigid body of up to min(n_y, n_u) degrees of freedom.
 Submodel suspension_mode(const FrfEstimate& frf, double frequency_hz) {
   Submodel s = mode_submodel(frf, {}, {frequency_hz, kSuspensionDamping, 1});
   s.role = SubmodelRole::suspension;
@@ -49,7 +50,7 @@ std::vector<Submodel> suspension_modes(const FrfEstimate& frf,
   return out;
 }
 
-/// Completes requests by their poles' starts.
+/// Adds start values to requests without them.
 class PoleSearch {
  public:
   PoleSearch(const FrfEstimate& frf, ModelStructure common, const ModeSelection& selection,
@@ -77,8 +78,8 @@ class PoleSearch {
   }
 
  private:
-  /// What stands in for the submodels while modes are searched: those with a start themselves, the
-  /// others by what they hold beside their poles.
+  /// Substitutes for the submodels while modes are searched: those with a start themselves, the others by their parts
+  /// without poles.
   ModelStructure stand_in(const std::vector<SubmodelRequest>& requests) const {
     ModelStructure out = common_;
     for (const ModeCandidate& mode : selection_.modes) {  // taken: the search is for others
@@ -150,7 +151,7 @@ class PoleSearch {
     double best = low;
     double least = std::numeric_limits<double>::infinity();
     for (int g = 0; g < kRealPoleGrid; ++g) {
-      // Off the places of others: real poles of two submodels must not start as one.
+      // Shifted per submodel, because real poles of two submodels must not start at the same value.
       const double shift = (static_cast<double>(g) + 0.1 * static_cast<double>(i)) / kRealPoleGrid;
       f.back() = low * std::pow(high / low, shift);
       const double cost = cost_at(requests);
@@ -163,7 +164,7 @@ class PoleSearch {
                                      requests[i].shape.order, best));
   }
 
-  /// Numerators solved, poles where they start; without the submodels that have no start yet.
+  /// Cost with solved numerators and poles at their start, without the submodels that have no start yet.
   double cost_at(const std::vector<SubmodelRequest>& requests) const {
     ModelStructure structure = common_;
     for (const SubmodelRequest& r : requests)
@@ -189,7 +190,7 @@ class PoleSearch {
   FitResult found_;
 };
 
-/// `next` follows `result`, the way there kept.
+/// Replaces `result` by `next`, keeping the history.
 void continue_with(FitResult next, FitResult& result) {
   next.decisions.insert(next.decisions.begin(), result.decisions.begin(), result.decisions.end());
   next.cost.insert(next.cost.begin(), result.cost.begin(), result.cost.end());
@@ -214,9 +215,9 @@ void refit(const FrfEstimate& frf, const ModeSelection& selection, const FitOpti
   continue_with(std::move(next), result);
 }
 
-/// Puts the rigid body on weak springs where that is worth its two parameters (BIC). Far above the suspension the
-/// lines see little of it, but all of them together: as a wrong delay, which shifts every mode, or as a mode among
-/// the lowest lines. So the modes that were found are weighed again.
+/// Puts the rigid body on weak springs if that is worth two parameters (BIC). Far above the suspension its effect is
+/// small per line, but adds up: as a wrong delay, which shifts every mode, or as a mode among the lowest lines. The
+/// modes are therefore reassessed.
 void try_springs(const FrfEstimate& frf, const ModelStructure& structure,
                  const ModeSelection& selection, const FitOptions& options, FitResult& result) {
   const auto body = std::find_if(result.model.submodels.begin(), result.model.submodels.end(),
@@ -250,7 +251,7 @@ void try_springs(const FrfEstimate& frf, const ModelStructure& structure,
   continue_with(automatic_fit(frf, with_springs, again, options), result);
 }
 
-/// Holds the frequencies of suspension modes that the lines do not determine, the worst first.
+/// Holds the frequencies of suspension modes that the lines do not determine, the least determined first.
 void settle_suspension(const FrfEstimate& frf, const ModeSelection& selection,
                        const FitOptions& options, FitResult& result) {
   for (std::size_t left = result.model.submodels.size(); left > 0; --left) {
@@ -299,7 +300,7 @@ void check_requests(const FrfEstimate& frf, const RequestedStructure& structure)
           frequency_hz, frf.frequency_hz[0]));
 }
 
-/// A fit that leaves clearly more than noise and known distortion is not to be trusted.
+/// A fit whose residual is clearly larger than noise and known distortion is not trustworthy.
 void judge_explained(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
   const AdditiveModel& model = result.model;
   const ResidualVerdict verdict = judge_residual(

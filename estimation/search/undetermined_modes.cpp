@@ -14,14 +14,14 @@
 namespace stageid {
 namespace {
 
-constexpr std::size_t kUndeterminedTried = 4;  // each costs a fit
+constexpr std::size_t kUndeterminedTried = 4;  // one fit each
 
 bool is_open(const Submodel& s) {
   return s.natural_frequency_std_hz.value_or(0.0) >= kOpenFrequency * s.natural_frequency_hz() ||
          s.damping_ratio_std.value_or(0.0) >= kOpenDamping * s.damping_ratio();
 }
 
-/// @param with_flanks a peak beside the lines, too, that shows on them with its flank
+/// @param with_flanks also peaks outside the lines whose flank is on the lines
 bool is_between_lines(const Submodel& s, const FitRecord& record, bool with_flanks) {
   const double f = s.natural_frequency_hz();
   const double reach = with_flanks && s.damping_ratio() < kBroad ? s.damping_ratio() * f : 0.0;
@@ -32,7 +32,7 @@ bool is_at_bound(const FitResult& fit, std::size_t i) {
   return std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end();
 }
 
-/// Two for the pole, and those of residues of its rank.
+/// Two for the pole, plus those of a residue of its rank.
 double parameters_of(const Submodel& s) {
   const auto n_y = static_cast<double>(s.numerator[0].rows());
   const auto n_u = static_cast<double>(s.numerator[0].cols());
@@ -41,7 +41,7 @@ double parameters_of(const Submodel& s) {
   return 2.0 + static_cast<double>(s.numerator.size()) * residue;
 }
 
-/// Why mode `i` is no resonance of the data; empty if it may be one.
+/// Why mode `i` is not a resonance of the data; empty if it may be one.
 std::string doubt_of(const FrfEstimate& frf, bool number_asked, const FitResult& fit,
                      std::size_t i) {
   const Submodel& s = fit.model.submodels[i];

@@ -9,24 +9,24 @@
 
 namespace stageid {
 
-/// Of a natural frequency, and of a damping ratio: a standard deviation as large says that the data leave it open.
+/// Relative standard deviations of a natural frequency and of a damping ratio above which a mode is undetermined.
 inline constexpr double kOpenFrequency = 0.5;
 inline constexpr double kOpenDamping = 1.0;
 /// A mode of this damping ratio or more has no peak of its own.
 inline constexpr double kBroad = 0.1;
 
-/// The searched modes between the lines that the data leave open: at a bound, or with standard deviations as large as
-/// that. Beside the lines a mode stands for whatever the plant does there, and is none of them.
+/// The searched modes between the lines that the data do not determine: at a bound, or with large relative standard
+/// deviations. A mode outside the lines represents everything that the plant has there and is not included.
 std::vector<std::size_t> undetermined_modes(const FitResult& fit);
 
-/// Adds a finding that names them, if there are any: a fit whose number of modes is asked for keeps them, and so does
-/// one whose cost they are worth. If it converged it is FitStatus::undetermined then.
-/// @param number_asked the modes were not chosen by what they are worth: those that are not worth their parameters
-///        (price_of_mode()) are named too, and those beside the lines by less than half their half-power width
+/// Adds a finding with their names, if there are any. A fit with a requested number of modes keeps them, and so does
+/// one that is better with them. A converged fit becomes FitStatus::undetermined.
+/// @param number_asked the modes were not selected by their worth: those not worth their parameters (price_of_mode())
+/// are also named, and those outside the lines by less than half their half-power width
 void judge_undetermined_modes(const FrfEstimate& frf, bool number_asked, FitResult& fit);
 
-/// The same for pairs of modes of which one does as well: a mode too many may halve one that is there. Each of at most
-/// four pairs costs a fit.
+/// The same for pairs of modes that a single one could replace: a surplus mode may split a real one. At most four
+/// pairs are tried, one fit each.
 void judge_close_modes(const FrfEstimate& frf, const FitOptions& options, FitResult& fit);
 
 }  // namespace stageid

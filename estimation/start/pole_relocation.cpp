@@ -16,13 +16,13 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr int kIterations = 20;
-constexpr double kSettled = 1e-3;   // move of every pole in its own half-power widths
+constexpr double kSettled = 1e-3;   // movement of every pole in its own half-power widths
 constexpr double kPathShare = 0.5;  // of the start: by the path of log H, the rest by lines
 constexpr double kStartDamping = 0.01;
 constexpr double kLeastDamping = 1e-5;
-constexpr double kLinesWide = 3.0;  // of a pole's half-power width at least, but see narrowest()
-constexpr double kExact = 2e-11;    // relative residual that only rounding leaves
-constexpr double kAccurate = 1e-4;  // relative residual below which sums lose too much
+constexpr double kLinesWide = 3.0;  // minimum half-power width of a pole, but see narrowest()
+constexpr double kExact = 2e-11;    // relative residual that is only rounding
+constexpr double kAccurate = 1e-4;  // relative residual below which sums are too inaccurate
 
 Eigen::VectorXcd complex(const SplitMatrix& column) {
   return column.re.cast<Complex>() + Complex(0.0, 1.0) * column.im.cast<Complex>();
@@ -37,14 +37,14 @@ class Relocation {
                model.hold} {
     const LineOperator through(lines_, model.mean_delay_s());
     const Eigen::VectorXcd x = complex(through.x());
-    // Delay and hold out of the data: the rest is rational in x.
+    // Remove delay and hold from the data: the rest is rational in x.
     const Eigen::VectorXcd factor = complex(through.first());
     signal_ = (weights.array() * frf.response.cwiseAbs2().array()).sum();
     for (const Submodel& s : model.submodels) {
       integrators_ = std::max(integrators_, s.integrators);
       constant_ = constant_ || (s.integrators == 0 && s.denominator.size() == 1);
     }
-    constant_ = constant_ || exact_;  // a held input leaves one
+    constant_ = constant_ || exact_;  // a held input adds a constant
     equations_.emplace(x, exact_, frf.response, factor, weights, beside(x), threads);
   }
 
@@ -56,8 +56,8 @@ class Relocation {
   }
 
  private:
-  /// Poles where the response turns: as much of the path of log H, all channels together, between any two
-  /// of them, and as many lines, half and half.
+  /// Places the poles where the response changes: between any two there is an equal share of the path of log H, summed
+  /// over all channels, and of the lines, weighted by kPathShare.
   void spread(std::size_t modes) {
     const Eigen::MatrixXcd& H = equations_->H();
     const Eigen::VectorXd& omega = lines_.omega_rad_s;
@@ -91,7 +91,7 @@ class Relocation {
   Complex to_x(Complex s) const { return exact_ ? std::exp(s * lines_.sample_period_s) : s; }
   Complex to_s(Complex x) const { return exact_ ? std::log(x) / lines_.sample_period_s : x; }
 
-  /// What the numerators have beside the poles.
+  /// The functions of the numerators besides the poles.
   SplitMatrix beside(const Eigen::VectorXcd& x) const {
     const Eigen::Index count = integrators_ + (constant_ ? 1 : 0);
     SplitMatrix out{Eigen::MatrixXd(x.size(), count), Eigen::MatrixXd(x.size(), count)};
@@ -106,13 +106,13 @@ class Relocation {
     return out;
   }
 
-  /// One iteration. @returns the largest move of a pole, in half-power widths.
+  /// One iteration. @returns the largest movement of a pole, in half-power widths.
   double relocate() {
     Eigen::MatrixXd R = equations_->triangle(poles_, accurate_);
     const Eigen::Index n = poles_.size();
     if (R.col(n).squaredNorm() < kExact * kExact * signal_) return 0.0;
 
-    // Relaxed: the mean of Re sigma over the lines is 1, so that sigma cannot vanish.
+    // Relaxed: the mean of Re sigma over the lines is 1, so sigma cannot vanish.
     Eigen::VectorXd mean(n + 1);
     mean << partial_fractions(poles_, equations_->x()).re.colwise().mean().transpose(), 1.0;
     const Eigen::VectorXd scale = R.colwise().norm().cwiseMax(1e-300).cwiseInverse();
@@ -130,8 +130,8 @@ class Relocation {
     return move(zeros_of_sum(poles_, sigma.head(n) / d));
   }
 
-  /// The least damping ratio at a frequency, at most that of the start: a sharper pole is placed by the
-  /// noise of one line. Modes may be sharper, and are told so by the fit that follows.
+  /// The minimum damping ratio at a frequency, limited to that of the start. A sharper pole would be determined by the
+  /// noise of one line. Modes may be sharper; the fit that follows finds their damping.
   double narrowest(double omega_rad_s) const {
     const Eigen::VectorXd& omega = lines_.omega_rad_s;
     const Eigen::Index last = omega.size() - 1;
@@ -141,7 +141,7 @@ class Relocation {
     return std::clamp(0.5 * kLinesWide * spacing / omega_rad_s, kLeastDamping, kStartDamping);
   }
 
-  /// Takes stable zeros as they are and unstable ones reflected.
+  /// Accepts stable zeros and reflects unstable ones.
   double move(const Eigen::VectorXcd& zeros) {
     const double highest = 10.0 * lines_.omega_rad_s.maxCoeff();
     PoleSet found;
@@ -149,7 +149,7 @@ class Relocation {
       if (!(std::abs(zero) > 0.0) || (exact_ && zero.imag() == 0.0 && zero.real() < 0.0)) continue;
       Complex s = to_s(zero);
       const double size = std::min(std::abs(s), highest);
-      if (s.imag() < 0.0) continue;  // the other of the pair
+      if (s.imag() < 0.0) continue;  // the conjugate of another
       s *= size / std::abs(s);
       s = {-std::max(std::abs(s.real()), narrowest(size) * size), s.imag()};
       if (s.imag() == 0.0)
@@ -169,7 +169,7 @@ class Relocation {
     return poles_.size() == 0 ? 0.0 : largest;
   }
 
-  /// Two real poles are an overdamped mode; of an odd number the fastest is left over.
+  /// Two real poles form an overdamped mode; of an odd number, the fastest is discarded.
   std::vector<ModeCandidate> modes_of_poles() const {
     std::vector<ModeCandidate> modes;
     const auto add = [&](double omega_rad_s, double damping_ratio) {

@@ -13,15 +13,15 @@ namespace stageid {
 namespace {
 
 constexpr double kDampings[] = {0.002, 0.006, 0.02, 0.06};
-constexpr double kBelowBand = 0.5;  // candidates reach beyond the band's ends by these factors
+constexpr double kBelowBand = 0.5;  // candidates extend beyond the band by these factors
 constexpr double kAboveBand = 1.8;
 constexpr double kLeastOwnShare = 0.02;
 constexpr Eigen::Index kBlock = 64;
-constexpr Eigen::Index kChannels = 256;  // whose residual is held at a time
+constexpr Eigen::Index kChannels = 256;  // residuals stored at a time
 
-/// Frequencies a fraction of the half-power width apart, not finer than the lines.
+/// Frequencies spaced by a fraction of the half-power width, at least by the line spacing.
 std::vector<ModeCandidate> candidate_grid(const FrfEstimate& frf, const AdditiveModel& model) {
-  // Below the lines a suspension stands for all that is there.
+  // Below the lines, a suspension represents the whole plant.
   const bool suspended =
       std::any_of(model.submodels.begin(), model.submodels.end(),
                   [](const Submodel& s) { return s.role == SubmodelRole::suspension; });
@@ -36,13 +36,13 @@ std::vector<ModeCandidate> candidate_grid(const FrfEstimate& frf, const Additive
   for (const double zeta : kDampings)
     for (double f = low; f <= high; f += std::max(0.7 * zeta * f, 0.5 * spacing)) {
       const bool outside = f < frf.frequency_hz[0] || f > frf.frequency_hz[frf.lines() - 1];
-      if (outside && zeta < 0.02) continue;  // its width cannot be seen from inside
+      if (outside && zeta < 0.02) continue;  // its width cannot be determined from the band
       grid.push_back({f, zeta, 1});
     }
   return grid;
 }
 
-/// The candidate on the lines, hold and mean delay as factors: good enough to score.
+/// The candidate on the lines, hold and mean delay as factors; sufficient for ranking.
 Eigen::VectorXcd candidate_function(const Eigen::VectorXd& f, const Eigen::VectorXcd& factor,
                                     const ModeCandidate& mode) {
   Eigen::VectorXcd out(f.size());
@@ -62,8 +62,7 @@ Eigen::VectorXcd delay_factor(const FrfEstimate& frf, const AdditiveModel& model
   return out;
 }
 
-/// Orthonormal columns spanning the model's own functions under the mean weights; real and
-/// imaginary parts stacked, 2N x n.
+/// Orthonormal basis of the functions of the model under the mean weights; real and imaginary parts stacked, 2N x n.
 Eigen::MatrixXd own_functions(const FrfEstimate& frf, const AdditiveModel& model,
                               const Eigen::VectorXcd& factor, const Eigen::VectorXd& root_weight) {
   std::vector<Eigen::VectorXcd> functions;
@@ -91,7 +90,7 @@ Eigen::MatrixXd own_functions(const FrfEstimate& frf, const AdditiveModel& model
   return qr.householderQ() * Eigen::MatrixXd::Identity(2 * N, columns.cols());
 }
 
-/// Root of the mean over channels; those of very different size count alike.
+/// Square root of the mean over channels, each scaled to the same size.
 Eigen::VectorXd mean_root_weight(const Eigen::MatrixXd& weights) {
   const Eigen::VectorXd channel_scale = weights.rowwise().mean().cwiseInverse();
   Eigen::VectorXd out(weights.cols());
@@ -100,13 +99,13 @@ Eigen::VectorXd mean_root_weight(const Eigen::MatrixXd& weights) {
   return out;
 }
 
-/// Inputs in a row, with all outputs.
+/// A contiguous range of inputs, with all outputs.
 struct InputRange {
   Eigen::Index first = 0;
   Eigen::Index count = 0;
 };
 
-/// As many at a time as have some hundred channels: what is made of the data must not be as large as they are.
+/// Ranges of some hundred channels each, because temporaries must not need as much memory as the data.
 std::vector<InputRange> input_ranges(const FrfEstimate& frf) {
   const Eigen::Index most = std::max<Eigen::Index>(1, kChannels / frf.n_outputs());
   std::vector<InputRange> out;
@@ -129,7 +128,7 @@ AdditiveModel of_inputs(const AdditiveModel& model, const InputRange& inputs) {
   return out;
 }
 
-/// W E, real parts and then imaginary parts of all lines.
+/// W E; real parts of all lines, then imaginary parts.
 Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& model,
                                   const Eigen::MatrixXd& weights, const InputRange& inputs) {
   const Eigen::Index N = frf.lines();

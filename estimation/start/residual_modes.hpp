@@ -8,16 +8,15 @@
 
 namespace stageid {
 
-/// A mode that the weighted residual asks for.
+/// A mode proposed by the weighted residual.
 struct ResidualMode {
   ModeCandidate mode;
-  double gain = 0.0;  ///< estimated fall of sum |E|^2 W if it is added
+  double gain = 0.0;  ///< estimated decrease of sum |E|^2 W if it is added
 };
 
-/// Places where one more mode would lower the cost most: a matched filter of the weighted residual
-/// with modes on a grid of frequencies (beyond the band's ends too) and damping ratios, every
-/// numerator free. The gain is divided by the share of the candidate that the model's own functions
-/// cannot imitate.
+/// Frequencies at which one more mode would lower the cost most: a matched filter of the weighted residual with modes
+/// on a grid of frequencies (extending beyond the band) and damping ratios, every numerator free. The gain is divided
+/// by the share of the candidate that the functions of the model cannot imitate.
 /// @param weights n_c x N   @returns at most `most`, best first, none two closer than their widths
 std::vector<ResidualMode> residual_modes(const FrfEstimate& frf, const AdditiveModel& model,
                                          const Eigen::MatrixXd& weights, std::size_t most,

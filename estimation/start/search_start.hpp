@@ -7,8 +7,8 @@
 
 namespace stageid {
 
-/// Where a search begins: hold and delays as far as they are known, the submodels beside the modes, and these modes.
-/// @param known a model of which delays are taken, if it has submodels
+/// The start of a search: hold, known delays, the submodels besides the modes, and these modes.
+/// @param known a model whose delays are used, if it has submodels
 AdditiveModel search_start(const FrfEstimate& frf, const ModelStructure& structure,
                            const FitOptions& options, const AdditiveModel& known,
                            const std::vector<ModeCandidate>& modes);

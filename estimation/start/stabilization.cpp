@@ -15,9 +15,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kShift = 1e-12;  // keeps the Toeplitz matrix definite where the lines leave gaps
+// keeps the Toeplitz matrix definite if there are gaps between the lines
+constexpr double kShift = 1e-12;
 
-/// Sums over the lines by lag l = row - column of powers of z^-1; all that the equations consist of.
+/// Sums over the lines by lag l = row - column of powers of z^-1, from which the equations are composed.
 class NormalMatrix {
  public:
   NormalMatrix(const FrfEstimate& frf, const StabilizationOptions& options)
@@ -26,7 +27,7 @@ class NormalMatrix {
     const Eigen::VectorXcd delay =
         (Complex(0.0, options.delay_s) * omega.cast<Complex>()).array().exp().matrix();
     const Eigen::VectorXd squares =
-        omega.array().pow(4).matrix();  // w^2 before the channels' scale
+        omega.array().pow(4).matrix();  // w^2 without the scale of the channel
     const Eigen::MatrixXd lags = Eigen::RowVectorXd::LinSpaced(2 * order_ + 1, -order_, order_);
     const Eigen::MatrixXd angle = step_s_ * omega * lags;  // N x lags
     const Eigen::MatrixXd cosine = angle.array().cos().matrix();
@@ -54,7 +55,7 @@ class NormalMatrix {
     matrix_ += toeplitz(cosine.transpose() * both);
   }
 
-  /// The denominator d_0 ... d_n of that order with d_n = 1.
+  /// The denominator d_0 ... d_n of the given order with d_n = 1.
   Eigen::VectorXd denominator(int order) const {
     Eigen::VectorXd d(order + 1);
     d << matrix_.topLeftCorner(order, order).ldlt().solve(-matrix_.col(order).head(order)), 1.0;

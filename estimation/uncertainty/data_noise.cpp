@@ -5,7 +5,7 @@
 namespace stageid {
 namespace {
 
-/// Above this, a residual cannot be the noise alone.
+/// A larger residual cannot be noise alone.
 constexpr double kClearlyTooLarge = 1.5;
 
 }  // namespace
@@ -14,7 +14,7 @@ DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
   const Eigen::MatrixXd& known =
       frf.total_variance.size() > 0 ? frf.total_variance : frf.noise_variance;
   DataNoise noise;
-  // The noise variance weighs, but the estimate of a nonlinear plant scatters by more.
+  // The weights are from the noise variance, but the estimate of a nonlinear plant has a larger scatter.
   const bool distorted = weighting != Weighting::total_variance && frf.total_variance.size() > 0 &&
                          frf.nonlinearity.nonlinear();
   if (weighs_by_variance(weighting) && !distorted) {

@@ -7,47 +7,46 @@
 
 namespace stageid {
 
-/// What is known about the data's variance.
+/// Knowledge of the variance of the data.
 enum class VarianceKnowledge : std::uint8_t {
-  weights,  ///< W is its inverse, exactly or as far as it was estimated: maximum likelihood
-  given,    ///< another variance than the weights': sandwich form
+  weights,  ///< W is its inverse, known or estimated: maximum likelihood
+  given,    ///< another variance than that of the weights: sandwich form
   none      ///< proportional to 1/W, scaled by the residual
 };
 
-/// The noise of the data as far as it is known.
+/// The noise of the data, as far as known.
 struct DataNoise {
   VarianceKnowledge knowledge = VarianceKnowledge::none;
-  std::optional<LineVariance> variance;  ///< nothing: 1/W, up to a scale with `none`
+  std::optional<LineVariance> variance;  ///< none: 1/W, up to a scale with `none`
   NoiseCorrelation correlation;          ///< of channels on a line
 };
 
-/// What is known of the noise under diagonal weights. The given variance is taken as it is: the
-/// covariance is linear in it, and smoothing would only lower its peaks. Nonlinear distortion moves
-/// an estimate from realization to realization as noise does: the total variance counts where there
-/// is one. `frf` must outlive the result.
+/// The noise of the data under diagonal weights. A given variance is not smoothed: the covariance is linear in it, and
+/// smoothing would only lower its peaks. The total variance is used if there is one, because nonlinear distortion
+/// changes an estimate from realization to realization as noise does. `frf` must outlive the result.
 DataNoise data_noise(const FrfEstimate& frf, Weighting weighting);
 
-/// Real numbers of the response, as many as are independent.
+/// Number of independent real numbers of the response.
 double independent_numbers(const FrfEstimate& frf);
 
-/// True if the weights claim to be the inverse of the noise's covariance.
+/// True if the weighting is defined as the inverse covariance of the noise.
 bool weighs_by_variance(Weighting weighting) noexcept;
 
-/// Whether a channel's weight is zero on all lines: the data say nothing of it.
+/// Whether the weight of a channel is zero on all lines, so that the data do not determine it.
 bool has_no_weight(const FitProblem& problem, Eigen::Index channel);
 
-/// sum W |E|^2 per complex degree of freedom: 1 where W is the inverse variance and the model right.
+/// sum W |E|^2 per complex degree of freedom; 1 if W is the inverse variance and the model is right.
 double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters);
 
-/// What variances are multiplied with: 1 where the weights are inverse variances (`likelihood`) and the
-/// residual is not clearly larger than they predict, else the residual per degree of freedom.
+/// Factor of the variances: 1 if the weights are inverse variances (`likelihood`) and the residual is not clearly
+/// larger than predicted, else the residual per degree of freedom.
 double residual_scale(double per_degree, bool likelihood);
 
-/// That scale for what is known of the noise: 1 where the variance is given apart from the weights.
+/// That factor for the given noise: 1 if its variance is given separately from the weights.
 double covariance_scale(const FitProblem& problem, double cost, Eigen::Index parameters,
                         const DataNoise& noise);
 
-/// The problem whose Gauss-Newton matrix is K for uncorrelated noise: weights W C W.
+/// The problem whose Gauss-Newton matrix is K for uncorrelated noise, with weights W C W.
 /// @pre noise.variance is known
 FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise);
 

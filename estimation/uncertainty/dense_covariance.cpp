@@ -19,7 +19,7 @@
 namespace stageid {
 namespace {
 
-/// A fit at its end, as its equations see it.
+/// A completed fit as input of its equations.
 struct Ended {
   std::optional<WeightMatrices> matrices;
   FitProblem problem;
@@ -39,7 +39,7 @@ Ended ended_fit(const FrfEstimate& frf, const FitResult& result, const FitOption
   return out;
 }
 
-/// Z of the channels' functions in a set, in the order of DenseCovariance.
+/// Z of the functions of the channels in a set, in the order of DenseCovariance.
 template <typename Row>
 Eigen::MatrixXd stacked(const FitProblem& problem, const FunctionSet& set, const Row& row) {
   Eigen::MatrixXd out(problem.channels() * static_cast<Eigen::Index>(set.size()),
@@ -50,7 +50,7 @@ Eigen::MatrixXd stacked(const FitProblem& problem, const FunctionSet& set, const
   return out;
 }
 
-/// Of (a, b) from that of a, that of nu and between a and nu, b = nu - Z a.
+/// Covariance of (a, b) from that of a, that of nu and that between a and nu; b = nu - Z a.
 Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& nu,
                        const Eigen::MatrixXd& cross, const Eigen::MatrixXd& Z) {
   const Eigen::Index n = a.rows();
@@ -64,8 +64,8 @@ Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& nu,
   return out;
 }
 
-/// Cov(nu) between channels, 1/2 sum Re{g_c^H C(c, d) g_d} with g = W F M_bb^-1: zero unless they are
-/// correlated. Its diagonal blocks are those of the channels, which are known.
+/// Cov(nu) between channels, 1/2 sum Re{g_c^H C(c, d) g_d} with g = W F M_bb^-1, zero unless they are correlated. The
+/// diagonal blocks are those of the channels, which are known.
 std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise& noise, double half,
                                               const ParameterCovariance& covariance,
                                               const std::vector<FunctionSet>& sets) {
@@ -163,7 +163,7 @@ std::vector<DenseCovariance> of_given_ranks(const FrfEstimate& frf, const Ended&
   return out;
 }
 
-/// M of all parameters under weight matrices: globals by products, numerators in pairs of channels.
+/// M of all parameters under weight matrices: globals by products, numerators by pairs of channels.
 Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
   const FitProblem& problem = fit.problem;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
@@ -216,7 +216,7 @@ std::vector<DenseCovariance> of_weight_matrices(const Ended& fit, const FitResul
   return out;
 }
 
-/// As many numbers as one covariance of kMostParameters has; under weight matrices all parameters are in one.
+/// Limits the numbers to those of one covariance of kMostParameters; with weight matrices, all parameters are in one.
 bool are_affordable(const Ended& fit, const std::vector<FunctionSet>& sets) {
   const auto most = static_cast<double>(kMostParameters);
   double numbers = 0.0;

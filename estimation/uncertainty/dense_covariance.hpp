@@ -9,30 +9,30 @@
 
 namespace stageid {
 
-/// Covariance of all globals (denominator coefficients in the order of the submodels, then free delays)
-/// and of the numerators of some functions behind them, vec of channels x functions.
+/// Covariance of all globals (denominator coefficients in the order of the submodels, then free delays), followed by
+/// the numerators of some functions, vec of channels x functions.
 struct DenseCovariance {
-  /// Of the estimate, 1/2 M^-1 K M^-1 (see parameter_covariance()): the standard deviations are its own.
+  /// Of the estimate, 1/2 M^-1 K M^-1 (see parameter_covariance()); the standard deviations are from this one.
   Eigen::MatrixXd sandwich;
-  /// 1/2 M^-1 = [2 sum Re{J^H W J}]^-1: what it were if W was the noise's inverse covariance.
+  /// 1/2 M^-1 = [2 sum Re{J^H W J}]^-1: the covariance if W were the inverse covariance of the noise.
   Eigen::MatrixXd likelihood;
 };
 
-/// All sets together may have as many numbers as one with so many rows.
+/// All sets together may have as many numbers as one set with this many rows.
 constexpr Eigen::Index kMostParameters = 4000;
 
-/// The covariances that parameter_covariance() and the like tell the diagonals of, with all that is between
-/// channels, an entry a set. Under weight matrices they are exact: M is made and inverted there.
+/// The covariances whose diagonals parameter_covariance() and related functions compute, including those between
+/// channels; one per set. With weight matrices they are exact: M is formed and inverted.
 /// @param result of fit_additive_model() with these data and options
-/// @returns nothing where the fit has no standard deviations, or the sets are above kMostParameters
+/// @returns empty if the fit has no standard deviations, or the sets exceed kMostParameters
 std::vector<DenseCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
                                                const FitOptions& options,
                                                const std::vector<FunctionSet>& sets);
 
-/// FitResult::covariance, or a decision why there is none.
+/// Fills FitResult::covariance, or adds a decision with the reason why there is none.
 void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResult& result);
 
-/// Names the functions of submodel i: their places in a channel.
+/// The functions of submodel i: their indices among those of a channel.
 FunctionSet functions_of(const AdditiveModel& model, std::size_t submodel);
 FunctionSet all_functions(const AdditiveModel& model);
 

@@ -23,7 +23,7 @@ std::vector<Eigen::Index> parameters_of(const FitProblem& problem, const FitPara
   return own;
 }
 
-/// Columns d vec(P)_c / d own parameters on some lines, lines x own each.
+/// Columns d vec(P)_c / d own parameters, lines x own each.
 void free_columns(const FitProblem& problem, const FitParameters& beta,
                   const ResidueFactors& factors, const BasisGroup& group, Eigen::Index c,
                   const std::vector<Eigen::Index>& own, LineRange lines, Eigen::MatrixXd& re,
@@ -41,7 +41,7 @@ void free_columns(const FitProblem& problem, const FitParameters& beta,
   }
 }
 
-/// T^T K T, the channels correlated.
+/// T^T K T with correlated channels.
 Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
                                   const std::vector<BasisGroup>& groups,
                                   const ResidueFactors& factors, const DataNoise& noise) {
@@ -62,7 +62,7 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
   return correlated_gram(problem, noise.correlation, factors.size(), inputs);
 }
 
-/// Variances of one channel's numerators: rows of T over its functions.
+/// Variances of the numerators of one channel: rows of T over its functions.
 Eigen::VectorXd numerator_variances(const FitProblem& problem, const FitParameters& beta,
                                     const ResidueFactors& factors, Eigen::Index c,
                                     const Eigen::MatrixXd& C) {

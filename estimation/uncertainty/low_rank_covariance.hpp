@@ -7,9 +7,9 @@ namespace stageid {
 
 /// Covariance of the free parameters of a fit with residues of given rank, see low_rank_covariance().
 struct LowRankParameters {
-  Eigen::MatrixXd sandwich;     ///< 1/2 N^-1 (T^T K T) N^-1; empty where N is singular
+  Eigen::MatrixXd sandwich;     ///< 1/2 N^-1 (T^T K T) N^-1; empty if N is singular
   Eigen::MatrixXd likelihood;   ///< 1/2 N^-1
-  double residual_scale = 1.0;  ///< what both were multiplied with
+  double residual_scale = 1.0;  ///< factor included in both
 };
 LowRankParameters low_rank_parameters(const FitProblem& problem, const FitParameters& beta,
                                       const std::vector<BasisGroup>& groups, double cost,
@@ -17,10 +17,10 @@ LowRankParameters low_rank_parameters(const FitProblem& problem, const FitParame
                                       const std::vector<Eigen::Index>& frozen);
 
 /// Covariance of a fit with residues of given rank, first order and sandwich form as in
-/// parameter_covariance(): with the free parameters' Jacobian J T (see ResidueFactors),
+/// parameter_covariance(): with the Jacobian J T of the free parameters (see ResidueFactors),
 ///   Cov = 1/2 N^-1 (T^T K T) N^-1,   N = T^T M T,   K = sum Re{J^H W C W J}.
-/// The rank ties outputs and inputs of a mode together; their noise counts as correlated between the
-/// outputs of one input where noise.correlation says so. Empty where N is singular.
+/// The rank couples outputs and inputs of a mode; their noise is correlated between the outputs of one
+/// input according to noise.correlation. Empty if N is singular.
 ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitParameters& beta,
                                         double cost, const ResidueFactors& factors,
                                         const DataNoise& noise,

@@ -26,7 +26,7 @@ class ModeResidue {
         svd_(M_, Eigen::ComputeFullU | Eigen::ComputeFullV) {
     const ModeShape shape = mode_shape(mode, 0);
     if (!(svd_.singularValues()[0] > 0.0)) return;
-    // The shapes are the first singular vectors, turned together.
+    // The shapes are the first singular vectors, rotated by the same phase.
     const Complex turn = svd_.matrixU().col(0).dot(shape.output_shape);
     u_ = turn * svd_.matrixU();
     v_ = turn * svd_.matrixV();
@@ -53,7 +53,7 @@ class ModeResidue {
     return (m == 0 ? Complex(1.0) : lambda_) / mode_.denominator[2];
   }
 
-  /// What parameter p moves, which moves M by dM.
+  /// Adds the effect of parameter p, whose derivative of M is dM.
   void slope(const Eigen::MatrixXcd& dM, Eigen::Index p, ModeShapeSlopes& out) const {
     const Eigen::VectorXd& s = svd_.singularValues();
     const Eigen::VectorXcd left = u_.adjoint() * (dM * v_.col(0));             // u_r^H dM v_1

@@ -12,7 +12,7 @@ namespace {
 
 constexpr Eigen::Index kTileEntries = 1 << 17;  // of the columns of all channels
 
-/// C(a, b) / sqrt(C(a, a) C(b, b)) on some lines, 0 where that is none. @param C (a, b, line) -> complex
+/// C(a, b) / sqrt(C(a, a) C(b, b)) on some lines, 0 if undefined. @param C (a, b, line) -> complex
 template <typename Covariance>
 void correlation_of(const Covariance& C, Eigen::Index a, Eigen::Index b, LineRange lines,
                     Eigen::ArrayXd& re, Eigen::ArrayXd& im) {
@@ -47,7 +47,7 @@ std::vector<Eigen::Index> all_of(Eigen::Index n) {
   return places;
 }
 
-/// Correlated grams of the inputs, a tile of lines after the other.
+/// Correlated grams of the inputs, one tile of lines after another.
 class GramOfTiles {
  public:
   GramOfTiles(const FitProblem& problem, const NoiseCorrelation& correlation, Eigen::Index n,
@@ -74,7 +74,7 @@ class GramOfTiles {
   }
 
  private:
-  /// What the columns of (S kron R) X belong to.
+  /// The parameters of the columns of (S kron R) X.
   std::vector<Eigen::Index> columns_of(std::size_t u) const {
     return correlation_.between_inputs() ? all_of(n_) : inputs_.parameters[u];
   }

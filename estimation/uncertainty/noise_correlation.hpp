@@ -9,21 +9,21 @@
 
 namespace stageid {
 
-/// Columns of all outputs of one input on some lines, one matrix (lines x n) an output.
+/// Columns of all outputs of one input on some lines, one matrix (lines x n) per output.
 struct OutputColumns {
   std::vector<Eigen::MatrixXd> re;
   std::vector<Eigen::MatrixXd> im;
 };
 
-/// Correlation of the noise of a response, S_k kron R_k on line k: of the outputs from the FRF's residual
-/// covariance, of the inputs from its input factor, both over the deviations. A disturbance force moves
-/// several outputs at once, and in closed loop the controller repeats what it does to one input with the
-/// others. The numbers are made where they are used: as many a line as the data or more.
-/// Source: facts.md section 4, Cov(vec G) = S kron C_E.
+/// Correlation of the noise of a response, S_k kron R_k on line k: that of the outputs from the residual covariance of
+/// the FRF, that of the inputs from its input factor, both over the deviations. A disturbance force moves several
+/// outputs at once, and in closed loop the controller repeats its effect on one input with the others. The numbers are
+/// computed where they are used, since per line they are as many as the data or more.
+/// Source: docs/theory.md, section 3, Cov(vec G) = S kron C_E.
 class NoiseCorrelation {
  public:
-  NoiseCorrelation() = default;  ///< not known
-  /// What the FRF does not tell counts as uncorrelated. `frf` must outlive it.
+  NoiseCorrelation() = default;  ///< unknown
+  /// Correlations that the FRF does not contain are taken as zero. `frf` must outlive it.
   explicit NoiseCorrelation(const FrfEstimate& frf);
 
   bool known() const noexcept { return re_ != nullptr; }
@@ -31,10 +31,10 @@ class NoiseCorrelation {
 
   /// Y_y = sum_z R(y, z) X_z of one input. @pre known()
   OutputColumns of_outputs(const OutputColumns& X, LineRange lines) const;
-  /// Z += S(u, v) Y, the n columns of Y in the places `at` of Z. @pre between_inputs()
+  /// Z += S(u, v) Y, adding the n columns of Y to the columns `at` of Z. @pre between_inputs()
   void add_input(Eigen::Index u, Eigen::Index v, const OutputColumns& Y,
                  const std::vector<Eigen::Index>& at, LineRange lines, OutputColumns& Z) const;
-  /// (S kron R)(c, d) of two channels on some lines. @returns false: it is zero. @pre known()
+  /// (S kron R)(c, d) of two channels on some lines. @returns false if it is zero. @pre known()
   bool of_channels(Eigen::Index c, Eigen::Index d, LineRange lines, Eigen::ArrayXd& re,
                    Eigen::ArrayXd& im) const;
 
@@ -46,22 +46,22 @@ class NoiseCorrelation {
   const Eigen::MatrixXcd* S_ = nullptr;
 };
 
-/// Columns X = C_diag^1/2 W J of channels, as correlated_gram() asks for them.
+/// Columns X = C_diag^1/2 W J of channels, as required by correlated_gram().
 struct CorrelatedColumns {
   Eigen::Index first_input = 0;
-  /// An entry an input: the parameters that its columns belong to, in order.
+  /// Per input: the parameters of its columns, in order.
   std::vector<std::vector<Eigen::Index>> parameters;
   /// Columns of an output (0-based) of the input first_input + u, lines x parameters[u].
   std::function<void(Eigen::Index u, Eigen::Index output, LineRange lines, Eigen::MatrixXd& re,
                      Eigen::MatrixXd& im)>
       columns;
-  /// Sees (S kron R) X of an input, one line after the other, inputs at the same time; may be nothing. Its
-  /// columns belong to parameters[u], or to all parameters where inputs are correlated.
+  /// Called with (S kron R) X of an input, tile by tile in the order of the lines, inputs in parallel; may be empty.
+  /// Its columns belong to parameters[u], or to all parameters if inputs are correlated.
   std::function<void(Eigen::Index u, LineRange lines, const OutputColumns& Z)> use = {};
 };
 
 /// J^H W C W J = sum_k Re{X^H (S kron R) X}, n x n parameters, in tiles of lines.
-/// @pre all inputs are there if they are correlated
+/// @pre all inputs are included if they are correlated
 Eigen::MatrixXd correlated_gram(const FitProblem& problem, const NoiseCorrelation& correlation,
                                 Eigen::Index n, const CorrelatedColumns& inputs);
 

@@ -17,11 +17,11 @@
 namespace stageid {
 namespace {
 
-// Of conjugate gradients; with their residual, variances have its square.
+// Of conjugate gradients; the variances are corrected with the residual, so their error is its square.
 constexpr double kColumnTolerance = 1e-2;
 
-/// The part of the globals' columns that the channel's numerators cannot follow: J_a - F Z, with Z the
-/// channel's rows of M_bb^-1 M_ba.
+/// The part of the columns of the globals that the numerators of the channel cannot follow: J_a - F Z, with Z the rows
+/// of M_bb^-1 M_ba of the channel.
 void projected_columns(const FitProblem& problem, const FitParameters& beta,
                        const BasisGroup& group, const Eigen::MatrixXd& Z, Eigen::Index c,
                        const std::vector<DerivativeColumn>& columns, LineRange lines,
@@ -37,7 +37,7 @@ std::vector<Eigen::Index> all_globals(const FitProblem& problem) {
   return out;
 }
 
-/// Channels whose equations are kept at a time: all that are correlated with each other.
+/// Channels whose equations are stored together: all that are correlated with each other.
 std::vector<ChannelRange> channel_parts(const FitProblem& problem, const DataNoise& noise) {
   const Eigen::Index together = noise.correlation.between_inputs() ? problem.channels()
                                 : noise.correlation.known()        ? problem.n_outputs
@@ -49,14 +49,14 @@ std::vector<ChannelRange> channel_parts(const FitProblem& problem, const DataNoi
   return parts;
 }
 
-/// The equations of some channels, M and K = sum Re{J^H W C W J}, the channels' noise uncorrelated.
+/// The equations of some channels, M and K = sum Re{J^H W C W J}, with uncorrelated noise of the channels.
 struct PartEquations {
   ArrowSystem gn;
-  std::optional<ArrowSystem> weighed;  ///< with the weights W C W; nothing: K = M
+  std::optional<ArrowSystem> weighed;  ///< with the weights W C W; empty: K = M
   const ArrowSystem& middle() const { return weighed ? *weighed : gn; }
 };
 
-/// K for the globals with the numerators' part of their columns taken away, J_a - F Z.
+/// K for the globals without the part of their columns that the numerators can follow, J_a - F Z.
 Eigen::MatrixXd projected_middle(const PartEquations& part, ChannelRange range) {
   Eigen::MatrixXd K = part.middle().M_globals();
   for (Eigen::Index c = range.first; c < range.first + range.count; ++c) {
@@ -68,8 +68,8 @@ Eigen::MatrixXd projected_middle(const PartEquations& part, ChannelRange range) 
   return K;
 }
 
-/// The same, the channels correlated. @param cross of every channel with its numerators, globals x n_f
-/// each: those of the part are filled
+/// The same with correlated channels. @param cross of every channel with its numerators, globals x n_f each: those of
+/// this part are filled
 Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
                                   const std::vector<const BasisGroup*>& group_of,
                                   const PartEquations& part, ChannelRange range,
@@ -105,8 +105,8 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
   return correlated_gram(problem, noise.correlation, problem.globals(), inputs);
 }
 
-/// The nearest matrix that is a covariance, in units of the deviations: where rounding of nearly undetermined
-/// parameters, or two estimates of one noise, have left negative eigenvalues, they become zero.
+/// The nearest covariance matrix, in units of the deviations. Rounding of nearly undetermined parameters, or two
+/// estimates of one noise, can leave negative eigenvalues; they are set to zero.
 Eigen::MatrixXd nearest_covariance(const Eigen::MatrixXd& C) {
   const Eigen::VectorXd deviation = C.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
   const Eigen::VectorXd scale = deviation.cwiseInverse();
@@ -118,14 +118,14 @@ Eigen::MatrixXd nearest_covariance(const Eigen::MatrixXd& C) {
   return root * root.transpose();
 }
 
-/// A sum of squares less what the numerators follow: rounding can leave it indefinite.
+/// A sum of squares minus the part that the numerators follow; rounding can leave it indefinite.
 Eigen::MatrixXd definite_middle(const Eigen::MatrixXd& K) {
   const Eigen::VectorXd scale = K.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::LDLT<Eigen::MatrixXd> factors(scale.asDiagonal() * K * scale.asDiagonal());
   return factors.isPositive() ? K : nearest_covariance(K);
 }
 
-/// Channel and globals together as a covariance, if the parts were not.
+/// Channel and globals together as a covariance, even if the parts were not.
 ChannelCovariance made_definite(const ChannelCovariance& channel, Eigen::MatrixXd& globals) {
   const Eigen::Index g = globals.rows();
   const Eigen::Index n = channel.own.rows();
@@ -137,10 +137,10 @@ ChannelCovariance made_definite(const ChannelCovariance& channel, Eigen::MatrixX
           channel.equations_inverse};
 }
 
-/// The variances of the channel's numerators and response with these covariances.
+/// The variances of the numerators and the response of the channel with these covariances.
 struct ChannelVariances {
   Eigen::VectorXd numerators;
-  Eigen::VectorXd response;  ///< empty unless asked for
+  Eigen::VectorXd response;  ///< empty unless requested
 
   bool negative() const {
     return numerators.minCoeff() < 0.0 || (response.size() > 0 && response.minCoeff() < 0.0);
@@ -169,7 +169,7 @@ ChannelVariances channel_variances(const FitProblem& problem, const FitParameter
   return out;
 }
 
-/// The variances of the channel's numerators and response; out.globals stands.
+/// The variances of the numerators and the response of the channel; out.globals is already filled.
 void fill_channel(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
                   Eigen::Index c, const ChannelCovariance& channel, ParameterCovariance& out) {
   const bool with_response = out.response_variance.size() > 0;
@@ -180,7 +180,7 @@ void fill_channel(const FitProblem& problem, const FitParameters& beta, const Ba
     const ChannelCovariance definite = made_definite(channel, globals);
     variances = channel_variances(problem, beta, group, c, definite, globals, with_response);
   }
-  // What is left is rounding of a sum that is zero.
+  // Negative values are rounding errors of a zero sum.
   out.numerator_variance.row(c) = variances.numerators.cwiseMax(0.0).transpose();
   if (with_response) out.response_variance.row(c) = variances.response.cwiseMax(0.0).transpose();
 }
@@ -202,7 +202,7 @@ void resize(const FitProblem& problem, bool with_response, ParameterCovariance& 
   if (with_response) out.response_variance.setZero(problem.channels(), problem.size());
 }
 
-/// Calls task(channel) for some channels. @returns whether all return true
+/// Calls task(channel) for some channels. @returns whether all calls returned true
 bool fill_channels(ChannelRange range, int threads, const std::function<bool(Eigen::Index)>& task) {
   std::atomic<bool> determined = true;
   for_each_task(threads, static_cast<int>(range.count), [&](int r) {
@@ -282,7 +282,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   if (problem.globals() > 0)
     out.globals = half * inverse * definite_middle(K) * inverse.transpose();
 
-  // The equations of a part are made once more: kept, all of them would outgrow the data.
+  // The equations of a part are computed again: storing all of them would need more memory than the data.
   resize(problem, wanted.response, out);
   if (wanted.channels) {
     out.globals_inverse = inverse;

@@ -26,7 +26,7 @@ double probability_above(double r, double relation) {
   return sum / kPoints;
 }
 
-/// error_quantile_95() between tabulated values, within 1e-5.
+/// error_quantile_95() interpolated in a table, within 1e-5.
 class QuantileTable {
  public:
   QuantileTable() {
