@@ -24,7 +24,7 @@ int report(const std::exception& error, int exit_code) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  stageid::catch_signals();  // from the first moment on
+  stageid::catch_signals();  // as early as possible
   stageid::keep_freed_memory();
   try {
     return stageid::run_program(argc, argv);
@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
         std::runtime_error("out of memory; reduce the number of lines, channels or modes"),
         stageid::kWorldFailed);
   } catch (const std::exception&) {
-    // Of a library: its words would help nobody.
+    // The text of a library exception would not help users.
     return report(
         std::runtime_error(
             "unexpected error, a bug in stageid; report the command with its input files"),

@@ -1,4 +1,4 @@
-# The Debian packages that the scripts need, and how they are installed: the only list there is.
+# The Debian packages that the scripts need, and their installation. This is the only list.
 # Sourced by tools/quickstart and tools/test.
 
 # To build and run the program.
@@ -7,8 +7,8 @@ build_packages="g++ cmake ninja-build pkg-config
   libfmt-dev libxxhash-dev libcpp-httplib-dev libmodbus-dev libmatio-dev zlib1g-dev libjs-dygraphs
   gnuplot-nox"
 
-# What the tests need beside that: the references in Python, the report in a browser, the format,
-# the C++ reference, a kernel that has CAN, the packages of its own.
+# Additional packages for the tests: the references in Python, the report in a browser, the format, the C++ reference,
+# a kernel with CAN, the stageid packages.
 test_packages="libgtest-dev libgmock-dev libbenchmark-dev
   python3-dev pybind11-dev python3-venv dpkg-dev python3 python3-numpy python3-scipy python3-h5py chromium clang-format
   doxygen groff-base git zsh lintian mypy
@@ -18,7 +18,7 @@ test_packages="libgtest-dev libgmock-dev libbenchmark-dev
 # Only for tools/test --tidy.
 tidy_packages="clang-tidy"
 
-# install_packages NAME...: installs what is missing; calls apt-get only if something is.
+# install_packages NAME...: installs missing packages; calls apt-get only if there are any.
 install_packages() {
   local missing="" package
   command -v dpkg-query > /dev/null ||

@@ -15,7 +15,7 @@
 namespace stageid {
 namespace {
 
-/// From the excited channels to u and to y, on every line: (channels x axes) matrices.
+/// Transfers from the excited channels to u and to y, per line: (channels x axes) matrices.
 struct ClosedLoop {
   std::vector<Eigen::MatrixXcd> to_u;
   std::vector<Eigen::MatrixXcd> to_y;
@@ -48,7 +48,7 @@ double thermal_rms(const Eigen::VectorXd& u, double rate_hz, double time_constan
   const double a = std::exp(-1.0 / (rate_hz * time_constant_s));
   double mean_square = u.squaredNorm() / static_cast<double>(u.size());
   double largest = mean_square;
-  // One period to settle within a period's ripple, one to look.
+  // The first period settles to within the ripple of a period, the second is evaluated.
   for (int pass = 0; pass < 2; ++pass)
     for (const double value : u) {
       mean_square = a * mean_square + (1.0 - a) * value * value;

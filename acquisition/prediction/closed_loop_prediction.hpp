@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// What one channel will do, over all runs of a plan, in steady state and without noise.
+/// Predicted signal of one channel, over all runs of a plan, in steady state and without noise.
 struct ChannelPrediction {
   std::string name;
   std::string unit;
@@ -30,7 +30,7 @@ struct DesignPrediction {
 /// Predicts u and y of every run from the exact sampled plant and its controller:
 ///   u = (I - K G)^-1 r,  y = G u,  with K the response from y to u,
 /// line by line, then sample by sample over one period.
-/// @throws std::invalid_argument if the plan excites a channel that the stage has not.
+/// @throws std::invalid_argument if the plan excites a channel that the stage does not have.
 DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage);
 
 }  // namespace stageid

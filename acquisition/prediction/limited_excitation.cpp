@@ -17,12 +17,12 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-// Of a Gaussian signal one sample in 5e8 is farther out, and it would have to meet the largest one
-// of the excitation.
+// A Gaussian signal exceeds this once in 5e8 samples, and an alarm would need the largest sample of the excitation at
+// the same time.
 constexpr double kDeviations = 6.0;
 
-// Of the first period from rest: the noise of a pilot, and that of the run beyond what a steady state's
-// bound between the samples covers.
+// Of the first period from rest: the noise of a pilot, and the part of that period that the steady-state bound between
+// the samples does not cover.
 constexpr double kRestMargin = 0.02;
 
 std::vector<Index> actuators_of(const ExperimentSpec& experiment, const StageInfo& stage,
@@ -51,7 +51,7 @@ std::vector<Index> outputs_of(const std::vector<std::string>& names, const Stage
   return indices;
 }
 
-/// Transfers and noise of the loop, line by line.
+/// Transfers and noise of the loop, per line.
 class LoopTransfers {
  public:
   LoopTransfers(const FrequencyGrid& grid, const WaferStageSpec& stage, const PlantPrior& prior,
@@ -79,8 +79,8 @@ class LoopTransfers {
                     controller.response(below_hz[b]), below_u, below_y);
   }
 
-  std::vector<MatrixXcd> to_u, to_y;        ///< a channel: axes x lines
-  std::vector<MatrixXcd> below_u, below_y;  ///< axes x below_band_hz(), or nothing
+  std::vector<MatrixXcd> to_u, to_y;        ///< per channel: axes x lines
+  std::vector<MatrixXcd> below_u, below_y;  ///< axes x below_band_hz(), or empty
   MatrixXd cost;
   Eigen::VectorXd u_noise, slew_noise, y_noise, velocity_noise;  ///< mean squares
 
@@ -117,7 +117,7 @@ class LoopTransfers {
     return prior_.noise_density.size() > 0 ? prior_.noise_density(sensor, k) : 1.0;
   }
 
-  /// Two sides of the spectrum; the width that a line stands for, up to Nyquist for the last.
+  /// Both sides of the spectrum, times the width represented by a line, up to Nyquist for the last one.
   void add_noise(Index k, const MatrixXcd& K, const MatrixXcd& G) {
     const Eigen::VectorXd f = grid_.frequency_hz();
     const double from = k == 0 ? 0.0 : 0.5 * (f[k - 1] + f[k]);
@@ -132,7 +132,7 @@ class LoopTransfers {
     y_noise += y;
     u_noise += u;
     slew_noise += std::norm(kind_factor(SignalKind::difference, f[k], rate)) * u;
-    // What lies above the band is noise of the sensor, not motion.
+    // Above the band it is noise of the sensor, not motion.
     if (!last) velocity_noise += std::norm(kind_factor(SignalKind::derivative, f[k], rate)) * y;
   }
 
@@ -225,7 +225,7 @@ BoundedLoop bounded_loop(const FrequencyGrid& grid, const ExperimentSpec& experi
 double relative_variance(const ExperimentPlan& plan, const MatrixXd& cost) {
   const ExcitationScheme scheme = plan.spec().scheme;
   const auto n = static_cast<double>(plan.axes());
-  // Zippered: each axis has every n-th line, once.
+  // Zippered: each axis has every n-th line, in one experiment.
   const double factor = scheme == ExcitationScheme::single_axis ? 1.0
                         : scheme == ExcitationScheme::zippered  ? n
                                                                 : 1.0 / n;

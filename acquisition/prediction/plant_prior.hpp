@@ -5,15 +5,15 @@
 
 namespace stageid {
 
-/// What is known of a plant before it is measured: on some lines, channels as the stage has them.
+/// Knowledge of a plant before its measurement: on some lines, channels as in the stage.
 struct PlantPrior {
-  std::vector<Eigen::MatrixXcd> response;  ///< a line: sensors x actuators; 0 where unknown
+  std::vector<Eigen::MatrixXcd> response;  ///< per line: sensors x actuators; 0 if unknown
   std::vector<bool> sensor_known;
   std::vector<bool> actuator_known;
-  /// The same on the frequencies below the band that were asked for.
+  /// The same at the requested frequencies below the band.
   std::vector<Eigen::MatrixXcd> below_band;
-  double extrapolated_below_hz =
-      0.0;                            ///< 0: the prior has lines, or a model, wherever it was asked
+  /// 0: the prior has lines, or a model, at all requested frequencies
+  double extrapolated_below_hz = 0.0;
   double extrapolation_misfit = 0.0;  ///< of LowFrequencyPlant
   /// E|V|^2 N / fs of the output noise V (DFT / N of a period of N samples), unit of output^2 / Hz,
   /// sensors x lines; empty: unknown.

@@ -47,7 +47,7 @@ class Predictor {
         Eigen::VectorXd::LinSpaced(last - first_ + 1, static_cast<double>(first_),
                                    static_cast<double>(last)) *
         resolution_hz;
-    // A model without hold was fitted to data that had lost it; a log still has it.
+    // A model without hold was fitted to compensated data; a log still contains the hold.
     response_ = response(model, frequency_hz,
                          model.hold == HoldModel::none ? HoldModel::exact : model.hold);
     result_.sensors = model.outputs.names;
@@ -74,7 +74,7 @@ class Predictor {
   }
 
  private:
-  /// Number of periods used; those with a marked sample are passed over.
+  /// Number of periods used; those with a marked sample are skipped.
   double add_run(std::size_t run) {
     const auto N = static_cast<std::uint64_t>(log_.info().period_samples);
     const auto skip = static_cast<std::uint64_t>(log_.info().transient_periods);
@@ -101,7 +101,7 @@ class Predictor {
     for (Eigen::Index i = 0; i < n_y; ++i) {
       const Eigen::RowVectorXcd Y =
           spectrum(samples_.sensors.col(outputs_[static_cast<std::size_t>(i)]));
-      // Parseval: a line l of DFT / N and its conjugate carry 2 |.|^2 of the mean square.
+      // Parseval: a line l of DFT / N and its conjugate contribute 2 |.|^2 to the mean square.
       result_.error_rms[i] += 2.0 * (Y - predicted.row(i)).squaredNorm();
       result_.signal_rms[i] += 2.0 * Y.squaredNorm();
     }

@@ -19,7 +19,7 @@ constexpr double kSmallestMotion = 1e-6;  // of the largest
 
 double omega_of(double frequency_hz) { return 2.0 * std::numbers::pi * frequency_hz; }
 
-/// Projects onto the motions of the channels that a rigid body can make.
+/// Projects onto the motions of the channels that are possible for a rigid body.
 MatrixXd onto_range(const MatrixXd& motions) {
   Eigen::JacobiSVD<MatrixXd> svd(motions, Eigen::ComputeThinU);
   svd.setThreshold(kSmallestMotion);

@@ -6,12 +6,12 @@
 
 namespace stageid {
 
-/// A plant below the lines of its response, where a free body on its way to flexible modes is
+/// A plant below the lines of its response. From a free body to flexible modes it is
 ///   G(s) = (B / s^2 + D + E s^2) exp(-s tau),
-/// tau of the transport and half a sample of hold. B, D and E are fitted, entry by entry, to the lowest
-/// lines: those up to 0.7 of the frequency where omega^2 |G| has grown by half over its median, each
-/// held to its noise and to 2 % of its row. B is then reduced to what a rigid body can be: its columns and
-/// rows are combinations of the six motions as the channels' positions and directions show them.
+/// with tau the transport delay plus half a sample of hold. B, D and E are fitted per entry to the lines up to 0.7 of
+/// the frequency at which omega^2 |G| exceeds its median by half. Each line is weighted by its noise and by 2 % of its
+/// row. B is then projected onto the possible motions of a rigid body: its columns and rows are combinations of the
+/// six motions at the positions and directions of the channels.
 class LowFrequencyPlant {
  public:
   /// @param delay_s  tau
@@ -19,10 +19,10 @@ class LowFrequencyPlant {
   LowFrequencyPlant(const FrfEstimate& frf, double delay_s, const Eigen::MatrixXd& output_motions,
                     const Eigen::MatrixXd& input_motions);
 
-  /// Channels as frf.response has them. @pre frequency_hz > 0
+  /// Channels as in frf.response. @pre frequency_hz > 0
   Eigen::VectorXcd response(double frequency_hz) const;
 
-  /// What the fit leaves of its lines, rms of |error| / |G|.
+  /// Residual of the fit on its lines, rms of |error| / |G|.
   double misfit() const { return misfit_; }
 
  private:

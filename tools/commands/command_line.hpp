@@ -12,7 +12,7 @@ inline CLI::App* add_command(CLI::App& app, const std::string& name, const std::
   return command;
 }
 
-/// Refuses numbers below zero, or not above it, in words: CLI11 prints the largest double as what is allowed.
+/// Rejects numbers below zero, or zero too, in words: CLI11 would print the largest double as upper bound.
 inline CLI::Validator number_check(bool zero_is_one, const char* name) {
   const auto check = [zero_is_one](const std::string& text) -> std::string {
     double value = 0.0;
@@ -23,9 +23,9 @@ inline CLI::Validator number_check(bool zero_is_one, const char* name) {
   return {check, name, ""};
 }
 
-/// For options that take 0 or more.
+/// For options >= 0.
 inline const CLI::Validator kNotNegative = number_check(true, "NONNEGATIVE");
-/// For options that take more than 0.
+/// For options > 0.
 inline const CLI::Validator kPositive = number_check(false, "POSITIVE");
 
 }  // namespace stageid

@@ -21,7 +21,7 @@
 namespace stageid {
 namespace {
 
-/// The value of `format`, which says what a file is.
+/// The value of the key `format`, the kind of the file.
 std::string format_of(const std::filesystem::path& file) {
   const YamlDocument document = YamlDocument::read(file);
   for (const YamlNode::Entry& entry : document.root().entries)

@@ -26,11 +26,11 @@ class DesignCommand {
   bool force_ = false;
 };
 
-/// What the plan asks and what it will do, as a table.
+/// The request of the plan and its predicted signals, as a table.
 std::vector<std::string> design_table(const ExperimentConfig& config, const ExperimentPlan& plan,
                                       const DesignPrediction& prediction);
 
-/// @throws std::invalid_argument naming the first limit that would be exceeded, and how many more.
+/// @throws std::invalid_argument naming the first limit that would be exceeded, and the number of others.
 void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction);
 
 }  // namespace stageid

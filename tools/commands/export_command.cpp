@@ -20,7 +20,7 @@
 namespace stageid {
 namespace {
 
-/// Where no FRF says which lines: 1000 frequencies over the band of the fit, evenly in the logarithm.
+/// Frequencies if no FRF is given: 1000 over the band of the fit, logarithmically spaced.
 Eigen::VectorXd default_lines(const AdditiveModel& model) {
   constexpr Eigen::Index kLines = 1000;
   const auto [low_hz, high_hz] = model.fit.band_hz;

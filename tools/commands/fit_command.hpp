@@ -24,9 +24,9 @@ class FitCommand {
   Console& console_;
   std::filesystem::path frf_;
   std::filesystem::path output_;
-  std::filesystem::path covariance_;  ///< empty: not asked for
+  std::filesystem::path covariance_;  ///< empty: not requested
   FitFlags flags_;
-  FitRequest request_;  ///< its numbers
+  FitRequest request_;  ///< only its numbers
   std::vector<double> band_hz_;
   std::uint64_t seed_ = 0;
 };

@@ -25,13 +25,13 @@
 namespace stageid {
 namespace {
 
-/// The delay that a log of ours declares for its stage; 0 for others.
+/// The delay of the stage that a stageid log declares; 0 for other logs.
 double declared_delay_s(const std::filesystem::path& log) {
   const auto json = nlohmann::json::parse(open_log(log)->info().metadata_json, nullptr, false);
   return number_in(json, "transport_delay_s").value_or(0.0);
 }
 
-/// Of the responses that there are: an output that shows one value throughout has none.
+/// Over the outputs with a response; an output with a constant value has none.
 double median_relative_std(const FrfEstimate& frf, const Eigen::MatrixXd& variance) {
   std::vector<double> ratio;
   for (Eigen::Index i = 0; i < variance.size(); ++i)

@@ -33,7 +33,7 @@ void HelpCommand::run() const {
     command = command->get_subcommand(word);
     path += " " + word;
   }
-  // Not help(): that of the program hands over to the command that was called, this one.
+  // Not help(): that of the program would print the help of the called command, which is this one.
   fmt::print("{}", command->get_formatter()->make_help(command, app_.get_name() + path,
                                                        CLI::AppFormatMode::Normal));
 }

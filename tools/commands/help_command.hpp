@@ -9,11 +9,11 @@ namespace stageid {
 /// stageid help [COMMAND ...]: what `stageid COMMAND ... --help` prints.
 class HelpCommand {
  public:
-  /// The last command to be made: it completes the names of the others.
+  /// Must be created after all other commands, because it completes their names.
   explicit HelpCommand(CLI::App& app);
 
  private:
-  /// @throws std::invalid_argument for a word that is no command; the nearest one is named
+  /// @throws std::invalid_argument for an unknown command, naming the nearest one
   void run() const;
 
   const CLI::App& app_;

@@ -48,7 +48,7 @@ bool newer_than(const std::filesystem::path& output, const std::filesystem::path
          std::filesystem::last_write_time(output) >= std::filesystem::last_write_time(input);
 }
 
-/// A log that needs no more runs.
+/// Whether a log has all runs.
 bool is_complete(const std::filesystem::path& log, const ExperimentConfig& config,
                  const ExperimentPlan& plan) {
   if (!std::filesystem::exists(log)) return false;
@@ -99,7 +99,7 @@ void Identification::design() {
     finish_step("design", seconds_since(start), "up to date");
     return;
   }
-  // Within limits it was designed from what a pilot knows; the stage file's plant must not help.
+  // Within limits it was designed from the knowledge of a pilot; the plant in the stage file must not be used.
   const DesignPrediction prediction =
       config_.limits ? DesignPrediction{} : predict_closed_loop(plan_, config_.stage.spec);
   if (!request_.force) require_within_limits(config_, prediction);
@@ -156,7 +156,7 @@ FrfEstimate Identification::estimate_into(const char* name, const std::vector<in
       return frf;
     }
   }
-  // Examined are the data that are fitted; frf.h5 remembers what was found.
+  // The fitted data are examined; the findings are stored in frf.h5.
   const bool fitted = realizations == fitted_realizations();
   FrfStep step = estimate_frf({log}, options, {fitted, {}}, console_);
   write_frf(path(name), step.frf);

@@ -27,13 +27,13 @@ struct IdentificationRequest {
 /// The main job, step by step, into one directory:
 ///   excitation.h5, run.slog, frf.h5, frf_validation.h5, modes.json, model.json, model.h5, model.csv,
 ///   summary.json, report.html
-/// With `resume`, a step is passed over if its output is there, was made by the same version from the
-/// same inputs by the same request, and is not older than its input.
+/// With `resume`, a step is skipped if its output exists, was made by the same version from the same inputs with the
+/// same request, and is not older than its input.
 class Identification {
  public:
   Identification(const ExperimentConfig& config, IdentificationRequest request, Console& console);
 
-  /// @returns the exit code: kDone, kNotTrustworthy, or how the measurement ended.
+  /// @returns the exit code: kDone, kNotTrustworthy, or that of the measurement.
   /// @throws FileError, FormatError, std::invalid_argument, StageError, Interrupted
   int run();
 

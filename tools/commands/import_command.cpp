@@ -31,7 +31,7 @@ void require_frf_output(const std::filesystem::path& output) {
                     output.string(), output.extension().string()));
 }
 
-/// What came with its history keeps it; else the foreign file is the history.
+/// Keeps the provenance of a stageid file; otherwise the foreign file is the provenance.
 ImportSummary write_imported(const std::filesystem::path& output, FrfEstimate frf,
                              const std::filesystem::path& input, std::vector<std::string> notes) {
   try {

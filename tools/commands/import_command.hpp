@@ -8,8 +8,8 @@
 
 namespace stageid {
 
-/// stageid import FILE.{unv,uff,mat,csv,h5,npz,sNp} -o frf.h5|run.slog [--map MAP.yaml]; without -o it lists
-/// what the file holds.
+/// stageid import FILE.{unv,uff,mat,csv,h5,npz,sNp} -o frf.h5|run.slog [--map MAP.yaml]; without -o it lists the
+/// content of the file.
 class ImportCommand {
  public:
   ImportCommand(CLI::App& app, Console& console);

@@ -37,7 +37,7 @@ Json counts_json(const RunHealth& health) {
           {"seconds", health.seconds}};
 }
 
-/// How the loop kept time over all runs; nothing in virtual time.
+/// Timing of the loop over all runs; empty in virtual time.
 std::vector<std::string> timing_lines(const LogReader& log) {
   RunTiming timing;
   for (const LogRun& run : log.runs()) timing += run.timing;

@@ -10,7 +10,7 @@ namespace stageid {
 /// stageid manual -o DIR
 class ManualCommand {
  public:
-  /// `app` is asked for its commands when the command runs: all are there by then.
+  /// The commands of `app` are read when this command runs, because all of them exist by then.
   ManualCommand(CLI::App& app, Console& console);
 
  private:

@@ -31,7 +31,7 @@ constexpr std::size_t kCompensators = 3;
 constexpr double kRoom_k = 295.0;
 constexpr double kHot_k = 320.0;
 
-/// What the stage rests on, in the middle of the ranges that its supervisor expects.
+/// Initial values of the supervisor panel, in the middle of the expected ranges.
 NodePanel panel_of(const StageConfig& config) {
   const double share_n = config.spec.mass_kg * kGravity_m_s2 / kCompensators;
   PlantConditions ranges;
@@ -50,7 +50,7 @@ NodePanel panel_of(const StageConfig& config) {
   return panel;
 }
 
-/// The interfaces of the command line take the place of those in the file.
+/// Interfaces from the command line replace those in the file.
 CanSpec can_spec(const StageConfig& config, const std::vector<std::string>& interfaces) {
   if (!config.can.present)
     throw std::invalid_argument(
@@ -69,7 +69,7 @@ void wait_a_tick(StageNode& node) {
   std::this_thread::sleep_for(std::chrono::nanoseconds(kTick_ns));
 }
 
-/// Stops the stage; `serve` is called until it stands.
+/// Stops the stage and calls `serve` until it is at rest.
 template <typename Serve>
 void come_to_rest(StageNode& node, Serve serve) {
   static_cast<void>(node.request(SupervisorCommand::quick_stop));
@@ -116,7 +116,7 @@ NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
 
 StageNode NodeCommand::make_node(const StageConfig& config) const {
   WaferStageSpec spec = config.spec;
-  spec.pace = 0.0;  // whoever asks for samples sets the pace
+  spec.pace = 0.0;  // the requests for samples set the pace
   NodeOptions options;
   options.watchdog_s = config.can.present ? config.can.spec.watchdog_s : 0.0;
   if (watchdog_s_ >= 0.0) options.watchdog_s = watchdog_s_;
@@ -136,7 +136,7 @@ void NodeCommand::run() {
   for (const std::string& place : modbus_.places())
     console_.result(
         fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name, place));
-  std::fflush(stdout);  // who waits for the node to be there reads these lines
+  std::fflush(stdout);  // programs that wait for the node read these lines
   if (can_interfaces_.empty()) {
     while (!interrupt_flag()) wait_a_tick(node);
     come_to_rest(node, [&] { wait_a_tick(node); });
@@ -162,7 +162,7 @@ void NodeCommand::serve_can(const StageConfig& config, StageNode& node) const {
   CanNode front(node, layout, transport, pace_);
   console_.result(fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name,
                               fmt::join(can_interfaces_, ", ")));
-  std::fflush(stdout);  // who waits for the node to be there reads this line
+  std::fflush(stdout);  // programs that wait for the node read this line
   while (!interrupt_flag()) front.serve(socket.now_ns() + kTick_ns);
 
   come_to_rest(node, [&] { front.serve(socket.now_ns() + kTick_ns); });

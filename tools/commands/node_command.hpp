@@ -15,7 +15,7 @@ namespace stageid {
 
 /// stageid node STAGE --can IF | --modbus-tcp PORT | --modbus-rtu DEVICE
 ///
-/// One StageNode, and one front end for every kind of wire that was asked for.
+/// One StageNode with one front end per requested kind of connection.
 class NodeCommand {
  public:
   NodeCommand(CLI::App& app, Console& console);

@@ -20,7 +20,7 @@ namespace {
 
 const std::vector<std::string> kFigures = {"cmif", "bode", "entry"};
 
-/// Places of the named channels, in the order asked; of all if none is named.
+/// Indices of the named channels, in the given order; of all channels if none is named.
 std::vector<Eigen::Index> places(const char* flag, const std::vector<std::string>& names,
                                  const ChannelList& channels) {
   std::vector<Eigen::Index> out(names.empty() ? channels.size() : names.size());
@@ -33,7 +33,7 @@ std::vector<Eigen::Index> places(const char* flag, const std::vector<std::string
   return out;
 }
 
-/// The only channel that is asked for or that there is.
+/// The only requested channel, or the only one.
 Eigen::Index one_place(const char* flag, const std::vector<std::string>& names,
                        const ChannelList& channels) {
   const std::vector<Eigen::Index> all = places(flag, names, channels);
@@ -78,7 +78,7 @@ Picture PlotCommand::cmif(const ReportData& data) const {
     throw std::invalid_argument(
         "cmif: always uses all channels; --output-channel and --input-channel are for bode and "
         "entry");
-  // What a fit would start with, where neither modes.json nor a model says more.
+  // Without modes.json and model, show the modes with which a fit would start.
   if (!data.chosen_modes.empty() || data.model) return cmif_picture(data);
   ReportData with_modes = data;
   with_modes.chosen_modes = pick_modes(*data.frf);

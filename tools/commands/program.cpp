@@ -56,7 +56,7 @@ constexpr const char* kFooter =
     R"(Exit codes: 0 done; 1 file, link or interlock failed; 2 invalid request; 3 done but
 not to be trusted, the result contains the reason; 4 stopped for safety; 130 interrupted, recorded data are kept.)";
 
-/// Everything that CLI11 needs to know, and what the commands keep.
+/// The CLI11 parser and the commands.
 class Program {
  public:
   Program()
@@ -113,7 +113,7 @@ class Program {
                                                 : fmt::format("did you mean '{}'?", nearest)));
   }
 
-  /// Behind CLI11's "FLAG: WORD not in {A,B}": which of them is near.
+  /// For CLI11's "FLAG: WORD not in {A,B}": the nearest choice.
   static std::string nearest_choice(const std::string& what) {
     constexpr std::string_view kMiddle = " not in {";
     const std::size_t middle = what.find(kMiddle);
@@ -127,8 +127,8 @@ class Program {
     return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
   }
 
-  /// CLI11 speaks its own exceptions, for help too; translated here, at its border.
-  /// @returns false if only help or the version was asked for.
+  /// Handles the exceptions of CLI11, which also uses them for help.
+  /// @returns false if only help or the version was requested.
   bool parse(int argc, const char* const* argv) {
     try {
       app_.parse(argc, argv);
@@ -141,7 +141,7 @@ class Program {
     return true;
   }
 
-  /// What CLI11 says, or the nearest word to one that it does not know; and where help is.
+  /// The message of CLI11, or the nearest word to an unknown one; and where to find help.
   std::string explained(const CLI::ParseError& error) {
     std::string path;
     const CLI::App* innermost = &app_;
@@ -198,8 +198,8 @@ class Program {
 int run_program(int argc, const char* const* argv) {
   Program program;
   const int exit_code = program.run(argc, argv);
-  // A full disk or a closed pipe behind stdout must not end in silence.
-  // A terminal that has closed is an interrupt, whose exit code stands.
+  // A full disk or a closed pipe at stdout must be reported. A closed terminal is an interrupt and keeps its exit
+  // code.
   const bool lost = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
   if (lost && !interrupt_flag())
     throw FileError(fmt::format("stdout: cannot be written: {}", std::strerror(errno)));

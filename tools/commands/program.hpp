@@ -2,8 +2,8 @@
 
 namespace stageid {
 
-/// The whole program but for catching. @returns the exit code.
-/// @throws everything that a command may throw.
+/// The whole program except the handlers of exceptions. @returns the exit code.
+/// @throws any exception of a command.
 int run_program(int argc, const char* const* argv);
 
 }  // namespace stageid

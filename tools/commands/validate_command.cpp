@@ -25,7 +25,7 @@
 namespace stageid {
 namespace {
 
-/// An FRF is HDF5 that says so; everything else is taken for a log.
+/// An HDF5 file with the format of an FRF; all other files are treated as logs.
 bool is_frf(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   char head[8] = {};

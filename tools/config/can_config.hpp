@@ -11,17 +11,17 @@
 
 namespace stageid {
 
-/// How an experiment goes over CAN: sample by sample, or played by the node in its own loop.
+/// How an experiment is performed over CAN: streamed sample by sample, or by the loop of the node.
 enum class CanMode : std::uint8_t { streaming, resident };
 
-/// The group `can` of a stage file, complete.
+/// The group `can` of a stage file with defaults filled in.
 struct CanConfig {
   bool present = false;  ///< the file has the group
   CanMode mode = CanMode::streaming;
   CanSpec spec;
 };
 
-/// The group as it stands in the file, channels by name.
+/// The group as in the file, with channels by name.
 struct CanFile {
   struct Bus {
     CanBusSpec spec;
@@ -38,10 +38,10 @@ struct CanFile {
 /// The keys of the group.
 void describe_can(ConfigVisitor& visitor, CanFile& file);
 
-/// Channels by number, ranges (1.25 times the limits where the file gives none) and the node's
-/// watchdog (three periods, 20 ms at least, where the file gives none).
-/// @throws std::invalid_argument naming the key: an unknown channel, ranges that do not fit, no
-/// limit to take a range from, and all that can_layout() refuses.
+/// Fills in channel numbers, ranges (default: 1.25 times the limits) and the watchdog of the node (default: three
+/// periods, at least 20 ms).
+/// @throws std::invalid_argument naming the key: an unknown channel, wrong number of ranges, no limit to derive a
+/// range from, and as can_layout().
 CanConfig complete_can(const CanFile& file, const StageInfo& info, const StageLimits& limits);
 
 }  // namespace stageid

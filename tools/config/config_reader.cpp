@@ -28,7 +28,7 @@ std::string quoted(const YamlNode& node) {
   }
   constexpr std::size_t kLongest = 40;
   if (node.text.size() <= kLongest) return fmt::format("'{}'", node.text);
-  // Cut between characters, never inside one.
+  // Cut between characters, not inside a UTF-8 sequence.
   std::size_t end = kLongest;
   while (end > 0 && (static_cast<unsigned char>(node.text[end]) & 0xC0U) == 0x80U) --end;
   return fmt::format("'{}...'", node.text.substr(0, end));
@@ -49,8 +49,8 @@ class MapReader final : public ConfigVisitor {
                                           place_.empty() ? "the file" : place_, quoted(map)));
   }
 
-  /// What describe() did not ask for is unknown; only without such a key is it worth saying what is missing, which
-  /// may just be misspelt. Rules between values are for values that are right.
+  /// Keys without a description are unknown. Missing keys are reported only if there are no unknown ones, which may be
+  /// misspelt. Rules between values are checked only if the values are valid.
   void finish() const {
     bool unknown = false;
     for (const YamlNode::Entry& entry : map_.entries) {
@@ -141,8 +141,7 @@ class MapReader final : public ConfigVisitor {
     errors_.attempt([&] {
       const YamlNode* node = find(key, presence, help);
       if (node == nullptr) return;
-      FlexibleValue
-          given;  // what is wrong leaves the default: the checks that follow go on with it
+      FlexibleValue given;  // keeps the default if invalid, so that later checks can continue
       const std::size_t errors = errors_.size();
       if (node->kind == YamlNode::Kind::sequence && (rule.list || rule.pairs)) {
         given.is_list = true;
@@ -272,7 +271,7 @@ class MapReader final : public ConfigVisitor {
   static std::string in_unit(const NumberRule& rule) {
     return rule.unit.empty() ? "" : fmt::format(" in {}", rule.unit);
   }
-  /// For "4 s" and the like.
+  /// Remedy for values such as "4 s".
   static std::string unit_hint(const YamlNode& node, const NumberRule& rule) {
     if (node.kind != YamlNode::Kind::scalar || rule.unit.empty()) return "";
     if (!node.plain) return fmt::format("a number in {}, without quotes", rule.unit);

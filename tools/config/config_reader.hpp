@@ -8,9 +8,9 @@
 
 namespace stageid {
 
-/// Fills a configuration from a document: every key that stands there must be known, every required
-/// one must stand there, every value must have its type and lie in its range.
-/// @throws FormatErrors, each "FILE:LINE:COLUMN: what is wrong; what would be right".
+/// Fills a configuration from a document. Every key must be known, every required key must be present, and every value
+/// must have its type and range.
+/// @throws FormatErrors, each "FILE:LINE:COLUMN: problem; remedy".
 void read_config(const YamlDocument& document, const ConfigVisitor::Describe& describe);
 
 }  // namespace stageid

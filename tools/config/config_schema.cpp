@@ -48,7 +48,7 @@ class SchemaCollector final : public ConfigVisitor {
         value.numbers.empty() ? "" : fmt::format("{}", value.numbers.front());
     add(key, describe_forms(rule), rule.rule, value.word.empty() ? numbers : value.word, presence,
         help);
-    entries_.back().range.clear();  // the form says it
+    entries_.back().range.clear();  // included in the form
   }
   void named_numbers(const char* key, std::vector<std::pair<std::string, double>>&,
                      const NumberRule& rule, Presence presence, const char* help) override {

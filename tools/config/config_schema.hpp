@@ -7,13 +7,13 @@
 
 namespace stageid {
 
-/// One key of a configuration, as its description tells it.
+/// One key of a configuration with its description.
 struct SchemaEntry {
   int depth = 0;  ///< 0: top level
   std::string key;
   std::string type;           ///< "number", "list of maps", "one of a, b"
   std::string unit;           ///< "s"; empty: none
-  std::string range;          ///< "> 0 s"; empty: nothing to say
+  std::string range;          ///< "> 0 s"; empty: any
   std::string default_value;  ///< empty: none
   bool required = false;
   std::string help;
@@ -21,7 +21,7 @@ struct SchemaEntry {
 
 std::vector<SchemaEntry> config_schema(const ConfigVisitor::Describe& describe);
 
-/// For people: one line a key, indented like the file itself.
+/// Text for people: one line per key, indented as in the file.
 std::string schema_text(const std::vector<SchemaEntry>& entries);
 
 }  // namespace stageid

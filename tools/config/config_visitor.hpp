@@ -14,7 +14,7 @@ enum class Presence : std::uint8_t { optional, required };
 inline constexpr Presence kOptional = Presence::optional;
 inline constexpr Presence kRequired = Presence::required;
 
-/// Which numbers are allowed. All must be finite.
+/// Allowed numbers; all must be finite.
 struct NumberRule {
   std::string_view unit;  ///< for people; empty: none
   double low = -std::numeric_limits<double>::infinity();
@@ -28,21 +28,21 @@ inline constexpr NumberRule positive(std::string_view unit) {
 inline constexpr NumberRule not_negative(std::string_view unit) { return {unit, 0.0}; }
 inline constexpr NumberRule any_number(std::string_view unit) { return {unit}; }
 
-/// How many entries a list may have.
+/// Allowed number of entries of a list.
 struct CountRule {
   std::size_t least = 0;
   std::size_t most = std::numeric_limits<std::size_t>::max();
 };
 
-/// A value that may stand in several forms.
+/// A value that may have several forms.
 struct FlexibleValue {
-  std::string word;             ///< set if a word stands there
+  std::string word;             ///< set if the value is a word
   std::vector<double> numbers;  ///< one entry for a bare number
-  bool is_list = false;         ///< the numbers stood in brackets
+  bool is_list = false;         ///< the numbers are in brackets
   std::vector<std::pair<double, double>> pairs;
 };
 
-/// Which forms a FlexibleValue may take.
+/// Allowed forms of a FlexibleValue.
 struct FlexibleRule {
   std::vector<std::string> words;  ///< allowed words
   bool any_text = false;           ///< or any text, described by `text_meaning`
@@ -53,9 +53,8 @@ struct FlexibleRule {
   NumberRule rule;     ///< of every number
 };
 
-/// The one description of a configuration: functions `describe(ConfigVisitor&, Config&)` name every
-/// key once. A reader fills the values from a file, a schema printer prints type, unit, range and the
-/// default, which is what the value holds before.
+/// The single description of a configuration: functions `describe(ConfigVisitor&, Config&)` name every key once. A
+/// reader fills the values from a file; a schema printer prints type, unit, range and default, the initial value.
 class ConfigVisitor {
  public:
   using Describe = std::function<void(ConfigVisitor&)>;
@@ -75,19 +74,19 @@ class ConfigVisitor {
                       Presence presence, const char* help) = 0;
   virtual void flexible(const char* key, FlexibleValue& value, const FlexibleRule& rule,
                         Presence presence, const char* help) = 0;
-  /// A map whose keys are free names.
+  /// A map with arbitrary names as keys.
   virtual void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,
                              const NumberRule& rule, Presence presence, const char* help) = 0;
   virtual void named_texts(const char* key,
                            std::vector<std::pair<std::string, std::string>>& values,
                            Presence presence, const char* help) = 0;
-  /// A map with keys of its own.
+  /// A map with described keys.
   virtual void group(const char* key, const Describe& describe, Presence presence,
                      const char* help) = 0;
-  /// A list of maps; `describe_item` is called once for each.
+  /// A list of maps; `describe_item` is called once per item.
   virtual void items(const char* key, const Describe& describe_item, CountRule count,
                      Presence presence, const char* help) = 0;
-  /// A rule between values: unless `holds`, the file is wrong at `key`. Ignored for a schema.
+  /// A rule between values: unless `holds`, reports an error at `key`. Ignored for a schema.
   virtual void require(bool holds, const char* key, const std::string& message) = 0;
 };
 

@@ -25,7 +25,7 @@ namespace {
 using Index = Eigen::Index;
 
 constexpr std::size_t kMostStates = 1000;
-constexpr double kMeasuredError = 0.02;  // a response between its lines, of C y
+constexpr double kMeasuredError = 0.02;  // relative to C y; of a response between its lines
 
 enum class Time : std::uint8_t { discrete, continuous };
 
@@ -38,7 +38,7 @@ struct Transfer {
   std::vector<double> numerator, denominator;
 };
 
-/// What the file holds, key by key.
+/// Content of the file, key by key.
 struct ControllerFile {
   std::size_t format = 0;
   std::string stage;
@@ -150,7 +150,7 @@ Eigen::MatrixXd matrix_of(const std::vector<double>& values, Index rows, Index c
                                                                           columns);
 }
 
-/// z or s on a frequency.
+/// z or s at a frequency.
 std::complex<double> variable_of(const ControllerFile& f, double frequency_hz) {
   const double omega = 2.0 * std::numbers::pi * frequency_hz;
   return f.time == Time::discrete ? std::polar(1.0, omega / f.sample_rate_hz)
@@ -199,7 +199,7 @@ NominalStage of_transfer(const ControllerFile& f) {
   return nominal;
 }
 
-/// Between two lines by their weighted mean.
+/// Interpolates linearly between two lines.
 NominalStage of_measured(const std::filesystem::path& file) {
   const auto frf = std::make_shared<const FrfEstimate>(read_frf(file));
   NominalStage nominal;

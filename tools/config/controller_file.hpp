@@ -8,12 +8,12 @@
 
 namespace stageid {
 
-/// Whether `format:` says that this is a controller file.
+/// Whether `format:` is that of a controller file.
 bool is_controller_file(const YamlDocument& document);
 
-/// The controller of a file of format "stageid-controller" (docs/formats.md): state space, transfer functions,
-/// or a measured response, with u = r - C y. Its `stage`, if it names one, gives the rigid body.
-/// @throws FileError, FormatError "FILE:LINE:COLUMN: what is wrong; what would be right".
+/// The controller of a file of format "stageid-controller" (docs/formats.md): state space, transfer functions, or a
+/// measured response, with u = r - C y. If it names a `stage`, the rigid body is that of the stage.
+/// @throws FileError, FormatError "FILE:LINE:COLUMN: problem; remedy".
 NominalStage read_controller_file(const YamlDocument& document);
 
 /// The keys of a controller file. Used by `stageid config schema`.

@@ -9,27 +9,27 @@
 
 namespace stageid {
 
-/// The group `modbus`: where a Modbus server is and what may be expected of it.
+/// The group `modbus`: address and timing of a Modbus server.
 struct ModbusConfig {
   ModbusAddress address;
   ModbusTiming timing;
 };
 
-/// The group `supervisor` of a stage file: the plant around the stage, whatever its back end.
+/// The group `supervisor` of a stage file: the plant around the stage, for any back end.
 struct SupervisorConfig {
-  /// So quick that a poll can be repeated before three periods are over and its status is stale.
+  /// Fast enough to repeat a poll before the status is stale after three periods.
   ModbusConfig link{{}, {0.08, 0.15, 1e-3}};
   ModbusSupervisorOptions options;
   PlantConditions conditions;
 };
 
-/// What a stage file says of Modbus.
+/// The Modbus groups of a stage file.
 struct ModbusGroups {
   std::optional<ModbusConfig> stage;
   std::optional<SupervisorConfig> supervisor;
 };
 
-/// The groups `modbus` and `supervisor`; the first is needed if the stage is `behind_modbus`.
+/// Describes the groups `modbus` and `supervisor`; the first is required if the stage is `behind_modbus`.
 void describe_modbus_groups(ConfigVisitor& visitor, bool behind_modbus, ModbusGroups& groups);
 
 }  // namespace stageid

@@ -9,7 +9,7 @@ namespace stageid {
 
 bool in_range(double value, const NumberRule& rule);
 
-// The rules in words, for errors and for the schema: "> 0 s", "0 ... 0.5", "at least 1", "3 entries".
+// The rules as text, for errors and for the schema: "> 0 s", "0 ... 0.5", "at least 1", "3 entries".
 std::string describe_range(const NumberRule& rule);
 std::string describe_range(std::int64_t low, std::int64_t high);
 std::string describe_count(CountRule count);

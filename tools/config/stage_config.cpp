@@ -54,7 +54,7 @@ Eigen::VectorXd shape_vector(const StageConfig& config, const std::vector<Channe
   return shape;
 }
 
-/// Entries that the file leaves out are `scale` times the window.
+/// Omitted entries are `scale` times the window.
 Eigen::VectorXd by_window(const std::vector<ChannelConfig>& sensors, double ChannelConfig::*member,
                           double scale) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(sensors.size()));
@@ -155,7 +155,7 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
   config.supervisor = file.modbus.supervisor;
   config.plugin = file.plugin;
   if (config.plugin) config.plugin->library = path.parent_path() / config.plugin->library;
-  // What the libraries refuse gets the file's name; the place is in their own words.
+  // Errors of the libraries get the name of the file; they contain the place themselves.
   try {
     complete_spec(config, file);
     if (file.can.config.present)

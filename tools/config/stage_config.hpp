@@ -21,7 +21,7 @@ namespace stageid {
 enum class Backend : std::uint8_t { sim, can, modbus, plugin, replay };
 const char* to_string(Backend backend) noexcept;
 
-/// A stage file as it stands, before the geometry becomes a WaferStageSpec.
+/// Content of a stage file and the WaferStageSpec derived from it.
 struct StageConfig {
   std::filesystem::path file;
   std::string text;  ///< of the file, kept for the log
@@ -31,22 +31,22 @@ struct StageConfig {
   WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
   CanConfig can;
   std::optional<ModbusConfig> modbus;          ///< of the stage
-  std::optional<PluginSpec> plugin;            ///< a back end of others
-  std::optional<SupervisorConfig> supervisor;  ///< of what stands around it
+  std::optional<PluginSpec> plugin;            ///< a third-party back end
+  std::optional<SupervisorConfig> supervisor;  ///< of the plant around it
 };
 
-/// Reads a stage file and checks it through to a simulated stage that could be started.
-/// @throws FileError, FormatError "FILE:LINE:COLUMN: what is wrong; what would be right".
+/// Reads a stage file and checks it up to a simulated stage that could be started.
+/// @throws FileError, FormatError "FILE:LINE:COLUMN: problem; remedy".
 StageConfig load_stage_config(const std::filesystem::path& file);
 
-/// The same from a text, as a log carries it; `name` only names it in errors. @throws FormatError
+/// The same from a text, as stored in a log; `name` is used in errors only. @throws FormatError
 StageConfig parse_stage_config(const std::filesystem::path& name, std::string text);
 
 /// The keys of a stage file. Used by `stageid config schema`.
 void describe_stage_keys(ConfigVisitor& visitor);
 
-/// The modes that the identified sub-plant can show: out of plane and flexible, seen by at least one
-/// of `sensors` and driven by at least one of `actuators` (names).
+/// The modes that can appear in the identified sub-plant: out-of-plane and flexible ones, observed by at least one of
+/// `sensors` and driven by at least one of `actuators` (names).
 std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
                                            const std::vector<std::string>& actuators,
                                            const std::vector<std::string>& sensors);

@@ -23,7 +23,7 @@ std::vector<std::string> names_of(const std::vector<Channel>& channels) {
   return names;
 }
 
-/// What a controller file does not name, its controller neither sees nor moves.
+/// Channels that are not in the controller file have a zero response of the controller.
 NominalStage with_channels_of(const LogInfo& info, NominalStage known) {
   NominalStage all = known;
   const auto append = [](std::vector<std::string>& names, const std::vector<std::string>& more) {
@@ -84,7 +84,7 @@ std::optional<NominalStage> nominal_stage_of(const LogInfo& info,
   try {
     return nominal_stage(parse_stage_config(text_in(json, "stage_file"), stage).spec);
   } catch (const FormatError&) {
-    return std::nullopt;  // written by another version; --stage gives one that is understood
+    return std::nullopt;  // written by another version; --stage can name a readable file
   }
 }
 

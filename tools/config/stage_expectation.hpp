@@ -9,11 +9,11 @@
 
 namespace stageid {
 
-/// What a stage file says of controller and rigid body, for the checks of a log's health.
+/// Controller and rigid body of a stage file, for the health checks of a log.
 NominalStage nominal_stage(const WaferStageSpec& spec);
 
-/// That of `stage_file`, or of a controller file (controller_file.hpp); if it is empty, of the stage file that a log of ours carries in its metadata.
-/// Nothing if the log carries none, or one that this version cannot read.
+/// That of `stage_file`, or of a controller file (controller_file.hpp). If it is empty: that of the stage file in the
+/// metadata of a stageid log; empty if the log has none, or one that this version cannot read.
 /// @throws FileError, FormatError of `stage_file`
 std::optional<NominalStage> nominal_stage_of(const LogInfo& info,
                                              const std::filesystem::path& stage_file);

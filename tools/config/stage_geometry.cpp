@@ -8,7 +8,7 @@ namespace stageid {
 namespace {
 
 Eigen::Vector3d vector(const std::vector<double>& numbers) {
-  return {numbers.at(0), numbers.at(1), numbers.at(2)};  // the keys hold exactly three
+  return {numbers.at(0), numbers.at(1), numbers.at(2)};  // the keys require exactly three
 }
 
 std::vector<ChannelPlace> places(const std::vector<ChannelConfig>& channels) {

@@ -7,7 +7,7 @@
 
 namespace stageid {
 
-/// Where a channel pushes or looks.
+/// Position and direction of a channel.
 struct ChannelPlace {
   std::string name;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< from the centre of mass
@@ -15,14 +15,14 @@ struct ChannelPlace {
 };
 
 struct StageGeometry {
-  std::string stage;  ///< its name
+  std::string stage;  ///< name of the stage
   std::vector<ChannelPlace> actuators;
   std::vector<ChannelPlace> sensors;
   bool empty() const noexcept { return actuators.empty() && sensors.empty(); }
 };
 
-/// The places of the channels in the text of a stage file. `file` only names it in errors.
-/// @throws FormatError "FILE:LINE:COLUMN: ..." if it is no stage file.
+/// The positions of the channels in the text of a stage file. `file` is used in errors only.
+/// @throws FormatError "FILE:LINE:COLUMN: ..." if the text is not a stage file.
 StageGeometry stage_geometry(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace stageid

@@ -25,7 +25,7 @@ void describe_channel(ConfigVisitor& v, ChannelConfig& c, const char* unit) {
             fmt::format("direction: the length is {}; write a unit vector", length));
 }
 
-/// Adds one channel and refuses a name that is there already.
+/// Adds one channel; a duplicate name is an error.
 void add_channel(ConfigVisitor& v, ChannelConfig channel, std::vector<ChannelConfig>& list) {
   const bool twice = std::any_of(list.begin(), list.end(), [&](const ChannelConfig& other) {
     return other.channel.name == channel.channel.name;
@@ -199,11 +199,11 @@ void describe_plugin(ConfigVisitor& v, PluginSpec& plugin) {
   v.named_texts("keys", plugin.keys, kOptional, "settings passed to the library");
 }
 
-/// A value inside its limits must fit on the wire: the encoder would saturate it.
+/// A value within its limits must fit on the wire, because the encoder saturates.
 void require_range(ConfigVisitor& v, const char* key, const std::vector<double>& ranges,
                    const std::vector<ChannelConfig>& channels, double ChannelConfig::*limit,
                    const char* limit_key, const char* unit) {
-  if (ranges.size() != 1 && ranges.size() != channels.size()) return;  // refused elsewhere
+  if (ranges.size() != 1 && ranges.size() != channels.size()) return;  // reported elsewhere
   for (std::size_t i = 0; i < channels.size(); ++i) {
     const double range = ranges[std::min(i, ranges.size() - 1)];
     const double wanted = channels[i].*limit;

@@ -44,7 +44,7 @@ struct FaultConfig {
   std::string channel;
 };
 
-/// What stands in the file, key by key.
+/// Content of the file, key by key.
 struct StageFile {
   std::size_t format = 0;
   std::size_t backend = 0;
@@ -64,7 +64,7 @@ struct StageFile {
   WaferStageSpec spec;
 };
 
-/// The keys of a stage file, each named once.
+/// Describes the keys of a stage file.
 void describe_stage_file(ConfigVisitor& v, StageFile& f);
 
 }  // namespace stageid

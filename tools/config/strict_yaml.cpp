@@ -24,11 +24,11 @@ namespace {
 
 constexpr std::size_t kLongestFile = 1U << 20;
 constexpr std::size_t kDeepestNesting = 20;
-/// Bounds the work of finding duplicate keys and of merging; no configuration has a tenth of either.
+/// Limits the time for duplicate keys and merging; real configurations have less than a tenth of this.
 constexpr std::size_t kMostKeys = 1000;
 constexpr std::size_t kMostMerged = 100000;
 
-/// Length of the valid UTF-8 sequence at the head of `text`; 0 if there is none.
+/// Length of the valid UTF-8 sequence at the start of `text`; 0: invalid.
 std::size_t utf8_length(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char head = byte(0);
@@ -50,8 +50,7 @@ std::string one_line(std::string text) {
 
 }  // namespace
 
-/// Turns yaml-cpp's events into nodes; yaml-cpp's own tree keeps no place of keys and forgives
-/// duplicates.
+/// Builds nodes from the events of yaml-cpp, whose own tree has no positions of keys and accepts duplicates.
 class YamlTreeBuilder final : public YAML::EventHandler {
  public:
   explicit YamlTreeBuilder(YamlDocument& document) : document_(document) {}
@@ -107,8 +106,8 @@ class YamlTreeBuilder final : public YAML::EventHandler {
   bool is_map(const Open& open) const {
     return document_.nodes_[open.node].kind == YamlNode::Kind::map;
   }
-  /// yaml-cpp puts a value that is not there where the next token is, lines further down; the user
-  /// has to write behind the key.
+  /// yaml-cpp reports a missing value at the next token, possibly lines further down; the user has to write it after
+  /// the key.
   YamlMark place_of_null(const YAML::Mark& mark) const {
     const YamlMark here = place(mark);
     if (open_.empty() || !is_map(open_.back()) || !open_.back().has_key) return here;
@@ -140,7 +139,7 @@ class YamlTreeBuilder final : public YAML::EventHandler {
           fmt::format("nested deeper than {} levels; configurations need fewer", kDeepestNesting));
     open_.push_back({add(kind, mark, anchor), false});
   }
-  /// Of a map whose keys became `keys`.
+  /// @param keys number of keys of a map
   void refuse_too_many(const YamlMark& mark, std::size_t keys) const {
     if (keys > kMostKeys)
       document_.fail(
@@ -261,7 +260,7 @@ YamlDocument YamlDocument::parse(std::filesystem::path file, std::string text) {
     document.fail({}, "longer than 1 MiB, too long for a configuration; check the file");
   check_text(document);
   YamlTreeBuilder builder(document);
-  // yaml-cpp speaks its own exceptions; translated here, at its border.
+  // Converts the exceptions of yaml-cpp.
   try {
     std::istringstream stream(document.text_);
     YAML::Parser parser(stream);

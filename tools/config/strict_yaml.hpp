@@ -7,14 +7,14 @@
 
 namespace stageid {
 
-/// A place in a text file, both 1-based.
+/// A position in a text file, 1-based.
 struct YamlMark {
   int line = 1;
   int column = 1;
 };
 
-/// One value of a document. Children are indices into the document, so that an anchor that is used
-/// twice costs nothing and hostile nesting cannot overflow the stack.
+/// One value of a document. Children are indices into the document, so that repeated anchors cost nothing and hostile
+/// nesting cannot overflow the stack.
 struct YamlNode {
   enum class Kind : unsigned char { null, scalar, sequence, map };
   struct Entry {
@@ -30,14 +30,13 @@ struct YamlNode {
   std::vector<Entry> entries;
 };
 
-/// A YAML file as a tree that knows where everything stood. Stricter than YAML: one document, UTF-8,
-/// text keys, no key twice, no tags, at most 20 levels deep and 1 MiB long. Anchors, aliases and
-/// merge keys ("<<") work.
+/// A YAML file as a tree with positions. Stricter than YAML: one document, UTF-8, text keys, no duplicate keys, no
+/// tags, at most 20 levels deep and 1 MiB long. Anchors, aliases and merge keys ("<<") are supported.
 class YamlDocument {
  public:
   /// @throws FileError if the file cannot be read. @throws FormatError "FILE:LINE:COLUMN: ...".
   static YamlDocument read(const std::filesystem::path& file);
-  /// `file` only names the text in errors. @throws FormatError
+  /// `file` is used in errors only. @throws FormatError
   static YamlDocument parse(std::filesystem::path file, std::string text);
 
   const std::filesystem::path& file() const noexcept { return file_; }

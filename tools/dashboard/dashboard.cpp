@@ -73,7 +73,7 @@ struct Dashboard::State {
   SteadyClock::time_point start = SteadyClock::now();
   LiveLevels levels;
   LiveResponse response;
-  std::unique_ptr<DashboardServer> server;  // last: its threads use all the others
+  std::unique_ptr<DashboardServer> server;  // last: its threads use all other members
 };
 
 Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& config,

@@ -16,28 +16,28 @@ namespace stageid {
 /// Shows an experiment in a browser while it is measured: progress, levels against limits, states,
 /// misses, timing, response and CMIF, and a button that stops it as Ctrl-C does.
 ///
-/// It sees samples only behind the log (RunObserver) and the loop's own counts only through
-/// ExperimentProgress: whatever watchers do, the loop does not wait for it.
+/// It reads samples only after they were logged (RunObserver), and the counts of the loop only through
+/// ExperimentProgress. The loop never waits for watchers.
 class Dashboard {
  public:
-  /// Listens and serves from now on. @throws StageError, std::invalid_argument as DashboardServer.
+  /// Starts to listen and serve. @throws StageError, std::invalid_argument as DashboardServer.
   Dashboard(const DashboardAddress& address, const ExperimentConfig& config,
             const ExperimentPlan& plan, const StageInfo& stage, const std::filesystem::path& log,
             int runs_before);
   ~Dashboard();
 
   const std::string& url() const noexcept;
-  /// To be told of the log's rows. Valid while *this lives.
+  /// Observers of the rows of the log. Valid during the lifetime of *this.
   std::vector<RunObserver*> observers() noexcept;
-  /// Shows the newest events of it from now on, and books an abort there.
+  /// Shows the newest events of `events`, and records an abort there.
   void watch(EventLog& events) noexcept;
-  /// Shows what stands around the stage; `snapshot` may be called while *this lives.
+  /// Shows the state of the plant around the stage; `snapshot` may be called during the lifetime of *this.
   void watch(std::function<PlantSnapshot()> snapshot);
 
-  /// A few times a second, from one thread.
+  /// Must be called a few times per second, from one thread.
   void update(const ExperimentProgress& progress);
-  /// The experiment has ended. Watchers get the last state and the last response; returns when they
-  /// have left, or after kFarewell_s.
+  /// Ends the experiment. Watchers receive the last state and the last response; returns when they have left, or after
+  /// kFarewell_s.
   void finish(int exit_code, const std::string& message);
 
   static constexpr int kFarewell_s = 10;  ///< a page may be busy drawing

@@ -4,12 +4,12 @@
 
 namespace stageid {
 
-/// Where the dashboard listens.
+/// Address at which the dashboard listens.
 struct DashboardAddress {
   std::string host = "127.0.0.1";
-  int port = 0;  ///< 0: any that is free
+  int port = 0;  ///< 0: any free port
 
-  /// True if no other machine can reach it; then no token is asked for.
+  /// True if other machines cannot reach it; then no token is required.
   bool is_loopback() const;
 };
 
@@ -17,10 +17,10 @@ struct DashboardAddress {
 /// @throws std::invalid_argument naming --dashboard.
 DashboardAddress parse_dashboard_address(const std::string& text);
 
-/// 128 random bits as text, from the operating system: whoever has it may look and may abort.
+/// 128 random bits as text, from the operating system. The token permits watching and aborting.
 std::string make_token();
 
-/// Equal, in a time that does not tell where they part.
+/// Comparison in a time that does not depend on the position of a difference.
 bool same_token(const std::string& a, const std::string& b) noexcept;
 
 }  // namespace stageid

@@ -19,7 +19,7 @@ std::string text_of(const Json& json) {
 
 std::vector<double> list(const Eigen::ArrayXd& values) { return {values.begin(), values.end()}; }
 
-/// Limits of a group; null where there is none.
+/// Limits of a group; null if there are none.
 Json limits(const Eigen::VectorXd& values, std::size_t channels) {
   Json out = Json::array();
   for (std::size_t i = 0; i < channels; ++i) {
@@ -41,7 +41,7 @@ bool same_run(const LogRun& ended, const RunId& run) {
   return ended.realization == run.realization && ended.experiment == run.experiment;
 }
 
-/// Counts of everything so far: of the runs that are over and the one that is not.
+/// Total counts of the completed runs and the current one.
 void add_counts(const DashboardState& s, Json& json) {
   RunHealth health = s.ended.health;
   RunTiming timing = s.ended.timing;
@@ -57,7 +57,7 @@ void add_counts(const DashboardState& s, Json& json) {
   json["timing"] = timing_json(timing);
 }
 
-/// The page shows the values as they come, under their names.
+/// The page shows all values under their names.
 Json plant_json(const PlantSnapshot& plant) {
   Json values = Json::array();
   const auto add = [&](const char* name, const std::vector<double>& numbers, const char* unit) {

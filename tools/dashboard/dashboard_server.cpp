@@ -19,11 +19,11 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int kNice = 10;
-constexpr int kOtherThreads = 8;  // beside those of the streams: pages, responses, the abort
+constexpr int kOtherThreads = 8;  // besides those of the streams: pages, responses, the abort
 constexpr auto kKeepAlive = 250ms;
 constexpr const char* kAbortHeader = "X-Stageid";
 
-/// Not httplib's own, which lets two programs share a port.
+/// Not those of httplib, which let two programs share a port.
 void set_socket_options(int socket) {
   const int yes = 1;
   ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
@@ -96,7 +96,7 @@ void DashboardServer::State::listen() {
                   address.host, why));
 }
 
-/// What is not allowed is answered before anything else is looked at.
+/// Rejects requests that are not allowed before any other processing.
 void DashboardServer::State::route() {
   server.set_pre_routing_handler(
       [this](const httplib::Request& request, httplib::Response& response) {
@@ -154,11 +154,11 @@ void DashboardServer::State::stream(httplib::Response& response) {
       [this](bool) { watchers.fetch_sub(1); });
 }
 
-/// One piece of the stream; false ends it.
+/// Sends one piece of the stream; false ends it.
 bool DashboardServer::State::feed(std::uint64_t& seen, httplib::DataSink& sink) {
   const bool last = finishing;
   const LatestText::Edition edition = content.state.wait(seen, last ? 0ms : kKeepAlive);
-  // A comment finds out whether anybody is still there.
+  // An SSE comment detects whether the watcher is still connected.
   std::string text = ":\n\n";
   if (edition.number > seen) text = fmt::format("data: {}\n\n", *edition.text);
   seen = edition.number;
@@ -175,11 +175,11 @@ DashboardServer::DashboardServer(const DashboardAddress& address, DashboardConte
   state.url = fmt::format("http://{}:{}/?token={}", host_in_url(state.address.host),
                           state.address.port, state.token);
   state.thread = std::thread([&state] {
-    // Threads that it starts inherit this.
+    // The threads that it starts inherit this.
     ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
     state.server.listen_after_bind();
   });
-  while (!state.server.is_running()) std::this_thread::yield();  // stop() before it would be lost
+  while (!state.server.is_running()) std::this_thread::yield();  // an earlier stop() would be lost
 }
 
 DashboardServer::~DashboardServer() {

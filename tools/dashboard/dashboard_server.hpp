@@ -10,45 +10,43 @@
 
 namespace stageid {
 
-/// What the dashboard shows and may do.
+/// Content and actions of the dashboard.
 struct DashboardContent {
   std::string page;                       ///< HTML
-  LatestText state;                       ///< one JSON object a line: the stream
+  LatestText state;                       ///< the stream: one JSON object per line
   LatestText response;                    ///< JSON of the newest FRF
-  std::function<void()> abort;            ///< asked for by a watcher; must not wait
-  std::function<void()> watched = [] {};  ///< somebody began to watch
+  std::function<void()> abort;            ///< called at the request of a watcher; must not block
+  std::function<void()> watched = [] {};  ///< called when a watcher connects
 };
 
-/// Serves a page, the stream of its state (server-sent events), the newest response, and takes the
-/// order to abort:
+/// Serves a page, the stream of its state (server-sent events), the newest response, and the abort:
 ///   GET /   GET /events   GET /response.json   POST /abort
 ///
-/// Threads of its own of low priority; at most kWatchers streams at once (then 503). A watcher gets
-/// the newest state when it is ready to read: nothing is queued for a slow one, and one that does
-/// not read for kPatience_s is let go. The program's other threads never wait for any of it.
+/// It has its own threads of low priority and at most kWatchers streams at once (then 503). A watcher receives the
+/// newest state when it is ready to read; nothing is queued for slow watchers, and one that does not read for
+/// kPatience_s is disconnected. Other threads of the program never wait for the server.
 ///
-/// Where other machines can reach it a token is asked for (?token=...). On loopback only requests
-/// that name this machine are answered, and may watch without. To abort takes the token everywhere,
-/// and a page of ours (a header that other sites cannot set), so that no web page elsewhere can use
-/// the user's browser for it. Requests are short: a body above kLargestBody is refused.
+/// If other machines can reach it, a token is required (?token=...). On loopback, only requests addressed to this
+/// machine are answered, and watching needs no token. An abort always needs the token and a header that only our page
+/// can set, so that other web pages cannot use the browser of the user for it. Requests with a body above kLargestBody
+/// are rejected.
 class DashboardServer {
  public:
   static constexpr int kWatchers = 32;
   static constexpr int kPatience_s = 2;
   static constexpr std::size_t kLargestBody = 1024;
 
-  /// Listens, and serves from now on. `content` must outlive the server.
-  /// @throws StageError if the address cannot be had: says why and what to do.
+  /// Starts to listen and serve. `content` must outlive the server.
+  /// @throws StageError with cause and remedy if the address is not available.
   DashboardServer(const DashboardAddress& address, DashboardContent& content);
   ~DashboardServer();
   DashboardServer(const DashboardServer&) = delete;
   DashboardServer& operator=(const DashboardServer&) = delete;
 
-  /// To open in a browser, the token in it.
+  /// URL for the browser, including the token.
   const std::string& url() const noexcept;
   int watchers() const noexcept;
-  /// Waits until every watcher has left, but no longer than this: a page leaves when it has seen a
-  /// state that says "ended".
+  /// Waits until every watcher has left, at most for `longest`. A page leaves after a state "ended".
   void finish(std::chrono::milliseconds longest);
 
  private:

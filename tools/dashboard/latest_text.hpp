@@ -9,8 +9,7 @@
 
 namespace stageid {
 
-/// The newest of a stream of texts, for any number of readers: a slow one misses what came between,
-/// and nothing is kept for it.
+/// The newest of a stream of texts, for any number of readers. Slow readers skip editions; nothing is queued.
 class LatestText {
  public:
   struct Edition {
@@ -30,7 +29,7 @@ class LatestText {
     return edition_;
   }
 
-  /// Waits for an edition after `number`, but no longer than that; the newest in either case.
+  /// Waits for an edition after `number`, at most for `longest`; returns the newest in either case.
   Edition wait(std::uint64_t number, std::chrono::milliseconds longest) const {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, longest, [&] { return edition_.number > number; });

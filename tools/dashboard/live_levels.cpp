@@ -41,7 +41,7 @@ void LiveLevels::rows(std::span<const double> rows) noexcept {
 }
 
 void LiveLevels::end_run(const LogRun& run) noexcept {
-  const std::lock_guard lock(ended_mutex_);  // once a run; held for a copy
+  const std::lock_guard lock(ended_mutex_);  // once per run, during a copy
   ended_.health += run.health;
   ended_.timing += run.timing;
   ++ended_.runs;

@@ -10,14 +10,14 @@ namespace stageid {
 
 /// Levels of every channel, actuators then sensors, in SI.
 struct Levels {
-  Eigen::ArrayXd peak;          ///< largest magnitude since the last look
-  Eigen::ArrayXd rms;           ///< since the last look
-  Eigen::ArrayXd largest_peak;  ///< since the beginning
-  std::uint64_t rows = 0;       ///< since the last look
+  Eigen::ArrayXd peak;          ///< largest magnitude since the last take()
+  Eigen::ArrayXd rms;           ///< since the last take()
+  Eigen::ArrayXd largest_peak;  ///< since the start
+  std::uint64_t rows = 0;       ///< since the last take()
 };
 
-/// Watches the levels of all samples on their way into the log. The log's thread never waits here:
-/// if somebody looks at that very moment, it hands its numbers over with the next block.
+/// Watches the levels of all samples on their way into the log. The thread of the log never waits here: if a reader
+/// holds the lock, the numbers are handed over with the next block.
 class LiveLevels final : public RunObserver {
  public:
   explicit LiveLevels(Eigen::Index channels);
@@ -28,7 +28,7 @@ class LiveLevels final : public RunObserver {
 
   /// The levels since the last call.
   Levels take();
-  /// Sum over the runs that have ended, and the last of them.
+  /// Totals of the completed runs, and the last of them.
   struct Ended {
     RunHealth health;
     RunTiming timing;
@@ -47,7 +47,7 @@ class LiveLevels final : public RunObserver {
     std::uint64_t rows = 0;
   };
 
-  Sums gathered_;  // the log thread's own
+  Sums gathered_;  // only used by the thread of the log
   mutable std::mutex mutex_;
   Sums handed_over_;
   Eigen::ArrayXd largest_;

@@ -103,7 +103,7 @@ void LiveResponse::run() {
     lock.unlock();
     try {
       update();
-    } catch (const std::exception& error) {  // nothing of it may reach the measurement
+    } catch (const std::exception& error) {  // errors must not affect the measurement
       set_status(fmt::format("no response: {}", error.what()));
     }
     lock.lock();

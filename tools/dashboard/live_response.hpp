@@ -15,15 +15,15 @@ namespace stageid {
 
 class LogReader;
 
-/// Complete realizations of a log: those with as many different complete experiments as any has.
+/// Number of complete realizations of a log: those with the largest number of different complete experiments.
 int complete_realizations(const LogReader& log);
 
-/// The frequency response and its CMIF while they form: estimated by estimate_plant_frf(), as
-/// `stageid frf` does, from the log that is being written, whenever one more realization is complete
-/// in it. A thread of its own of the lowest priority; nothing is computed while nobody watches.
+/// The frequency response and its CMIF during a measurement. Whenever one more realization is complete in the log,
+/// they are estimated from it by estimate_plant_frf(), as `stageid frf` does. Uses its own thread of lowest priority,
+/// and computes nothing without watchers.
 class LiveResponse final : public RunObserver {
  public:
-  /// Publishes to `response`: {"realizations", "content", "blocks"} as the report page holds them.
+  /// Publishes to `response`: {"realizations", "content", "blocks"} in the format of the report page.
   LiveResponse(std::filesystem::path log, FrfOptions options, LatestText& response);
   ~LiveResponse() override;
   LiveResponse(const LiveResponse&) = delete;
@@ -33,11 +33,11 @@ class LiveResponse final : public RunObserver {
   void rows(std::span<const double>) noexcept override {}
   void end_run(const LogRun& run) noexcept override;
 
-  /// From now on somebody watches.
+  /// To be called when the first watcher connects.
   void watch();
-  /// Waits until what is complete in the log is shown, if anybody watches.
+  /// Waits until the complete part of the log is shown, if there are watchers.
   void catch_up();
-  /// One line for people: what is shown, or why nothing is.
+  /// One line for people: the shown response, or why there is none.
   std::string status() const;
 
  private:
@@ -49,14 +49,14 @@ class LiveResponse final : public RunObserver {
   std::filesystem::path log_;
   FrfOptions options_;
   LatestText& response_;
-  mutable std::mutex mutex_;  // of all below but the last two
+  mutable std::mutex mutex_;  // of all below except the last two
   std::condition_variable changed_;
   bool watched_ = false;
-  int asked_ = 1;  ///< runs complete so far, and one for what is there from the start
+  int asked_ = 1;  ///< completed runs so far, plus one for those present at the start
   int done_ = 0;
   std::string status_ = "waiting for the first complete realization";
   std::atomic<bool> stop_ = false;
-  int realizations_ = 0;  // the thread's own: shown
+  int realizations_ = 0;  // shown; only used by the thread itself
   std::thread thread_;
 };
 

@@ -7,16 +7,15 @@
 
 namespace stageid {
 
-/// The plan; drawing its multisines may take a second when crest factors are reduced, and minutes when
-/// they are designed within limits. @throws as make_limited_plan()
+/// Creates the plan. Takes a second if crest factors are reduced, and minutes if the multisines are designed within
+/// limits. @throws as make_limited_plan()
 ExperimentPlan make_plan(const ExperimentConfig& config);
 
 /// The plan that `stageid design` wrote for this experiment.
-/// @throws FileError; FormatError if the file is no plan or one of another experiment.
+/// @throws FileError; FormatError if the file is not a plan, or the plan of another experiment.
 ExperimentPlan read_plan_of(const ExperimentConfig& config, const std::filesystem::path& file);
 
-/// The plan with random phases and, where the level is still to be designed, of 1: for its runs, lines and
-/// duration.
+/// The plan with random phases and, if the level is not designed yet, level 1: for its runs, lines and duration.
 ExperimentPlan outline_plan(const ExperimentConfig& config);
 
 }  // namespace stageid

@@ -250,7 +250,7 @@ std::vector<ExcitationAxis> excitation_axes(const ExperimentFile& file, const Fr
   return axes;
 }
 
-/// Refused before it is measured: what frf could not make anything of.
+/// Rejects a plan before the measurement that `frf` could not evaluate.
 void require_zippered_lines(const ExperimentSpec& spec, const FrequencyGrid& grid) {
   const auto n = static_cast<Eigen::Index>(spec.axes.size());
   if (spec.scheme != ExcitationScheme::zippered || n < 2) return;
@@ -263,7 +263,7 @@ void require_zippered_lines(const ExperimentSpec& spec, const FrequencyGrid& gri
   require_enough_lines(lines, names, "experiment");
 }
 
-/// What is measured follows from these numbers and the stage; not from how the data are used later.
+/// Fingerprint of the numbers and the stage that determine the measurement, not of the later use of the data.
 std::string measurement_id(const ExperimentFile& f, const StageConfig& stage) {
   const ExperimentSpec& s = f.spec;
   std::string text = fmt::format(
@@ -298,7 +298,7 @@ void complete(ExperimentConfig& config, ExperimentFile& file, const YamlDocument
   file.lines.high_hz = file.band_hz[1];
   file.lines.seed = file.spec.seed;
   file.spec.scaling = is_set(file.peak_n) ? AmplitudeScaling::peak : AmplitudeScaling::rms;
-  // What the excitation library refuses gets the place of the section that asked for it.
+  // Errors of the excitation library get the position of the corresponding section.
   try {
     const auto grid =
         FrequencyGrid::band(info.sample_rate_hz, config.samples_per_period, file.lines);

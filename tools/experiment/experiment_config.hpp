@@ -14,26 +14,26 @@
 
 namespace stageid {
 
-/// Level of the excitation as the limits allow it.
+/// Design of the excitation level within the limits.
 struct LimitRequest {
   std::filesystem::path prior;  ///< frf.h5 or model.json
-  double safety = 0.9;          ///< largest predicted use of any limit
+  double safety = 0.9;          ///< largest predicted utilization of any limit
   double velocity_m_s = 0.0;    ///< of every sensor; 0: no limit
 };
 
-/// An experiment file and the stage file it names, checked through.
+/// A validated experiment file and its stage file.
 struct ExperimentConfig {
   std::filesystem::path file;
   std::string text;  ///< of the file, kept for the log
   StageConfig stage;
   LineSpec lines;
   int samples_per_period = 0;
-  ExperimentSpec experiment;           ///< with `limits`, levels are still to be designed
+  ExperimentSpec experiment;           ///< if `limits` is set, levels are still to be designed
   std::optional<LimitRequest> limits;  ///< level.limits
   FrfOptions frf;
   FitRequest fit;
-  int validation_realization = -1;  ///< 0-based; -1: none is held back
-  std::string measurement_id;       ///< fingerprint of all that decides what is measured
+  int validation_realization = -1;  ///< 0-based; -1: no realization is held back
+  std::string measurement_id;       ///< fingerprint of everything that determines the measurement
 };
 
 /// @throws FileError, FormatErrors of this file and the stage file.

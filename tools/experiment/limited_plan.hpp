@@ -10,7 +10,7 @@
 
 namespace stageid {
 
-/// Multisines within the limits of the stage file, and what they were designed with.
+/// Multisines within the limits of the stage file, and the data of their design.
 struct LimitedPlan {
   LimitedDesign design;
   BoundedLoop loop;
@@ -18,17 +18,17 @@ struct LimitedPlan {
 
 /// Designs the excitation of an experiment file with level.limits from its prior.
 /// @pre config.limits
-/// @throws FileError if the prior is not there; FormatError if it, or what is asked of it, does not fit.
+/// @throws FileError if the prior does not exist; FormatError if the prior or the request is unsuitable.
 LimitedPlan make_limited_plan(const ExperimentConfig& config);
 
-/// Time that reaches a mean relative variance with the plan's runs, whole realizations of them, in s.
+/// Duration in s of as many whole realizations of the plan as reach a mean relative variance.
 /// @throws std::invalid_argument unless `variance` is positive and finite.
 double duration_to_reach_s(const LimitedPlan& limited, double variance);
 
 /// Mean relative variance after all runs of the plan.
 double final_variance(const LimitedPlan& limited);
 
-/// The signals against their limits, and what accuracy is to be expected; `accuracy` 0: none is wanted.
+/// The signals relative to their limits, and the predicted accuracy; `accuracy` 0: no requested accuracy.
 std::vector<std::string> limited_table(const LimitedPlan& limited, double accuracy);
 nlohmann::ordered_json limited_json(const LimitedPlan& limited, double accuracy);
 

@@ -23,11 +23,11 @@ using Eigen::MatrixXcd;
 using Eigen::VectorXd;
 
 constexpr double kPi = std::numbers::pi;
-/// Modulus margin 1/3: a gain 1.5 times as large, or 19 degrees less phase, may make the loop unstable.
+/// Modulus margin 1/3: a gain higher by a factor 1.5, or 19 degrees less phase, may make the loop unstable.
 constexpr double kPoorSensitivity = 3.0;
-/// Above this gain a loop can still turn around the critical point.
+/// Above this gain, a loop can still encircle the critical point.
 constexpr double kNegligibleGain = 0.5;
-/// Between two lines; a turn further than this is not to be told from one the other way round.
+/// Between two lines; the direction of a larger turn is ambiguous.
 constexpr double kLargestTurn = 0.75 * kPi;
 
 constexpr const char* kRemedy =
@@ -41,7 +41,7 @@ std::string poor_margin(double sensitivity, double frequency_hz) {
       sensitivity, frequency_hz, kPoorSensitivity, kPoorSensitivity / (kPoorSensitivity - 1.0));
 }
 
-/// The loop gain of a prior, frequency by frequency upwards.
+/// The loop gain of a prior, by rising frequency.
 class PriorLoop {
  public:
   explicit PriorLoop(const ExperimentConfig& config) : axes_(config.stage.spec.controller) {
@@ -84,7 +84,7 @@ class PriorLoop {
   }
 
  private:
-  /// From where the loop gain is large and the plant is a free mass, above its suspension.
+  /// Frequencies starting where the loop gain is large and the plant is a free mass, above its suspension.
   static VectorXd frequencies_below(double lowest_hz, const WaferStageSpec& stage) {
     double from_hz = lowest_hz;
     for (const AxisController& axis : stage.controller.axes)
@@ -102,9 +102,9 @@ class PriorLoop {
     return out;
   }
 
-  /// det(I + L) from low to high frequencies. With every pole of plant and controller inside the unit circle or at 1,
-  /// where a free mass has -pi and the controller adds its own phase, the angle ends at -pi per unstable pole of the
-  /// closed loop (argument principle on the upper half of the unit circle).
+  /// Accumulates the angle of det(I + L) from low to high frequencies. All poles of plant and controller must be
+  /// inside the unit circle or at 1, where a free mass contributes -pi and the controller its own phase. The angle
+  /// then ends at -pi per unstable pole of the closed loop (argument principle on the upper half of the unit circle).
   void follow() const {
     std::complex<double> last = 0.0;
     for (Index k = 0; k < frequency_hz_.size(); ++k) {

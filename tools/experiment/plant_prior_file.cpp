@@ -23,9 +23,9 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kSmoothedLines = 10;  // to either side
+constexpr Index kSmoothedLines = 10;  // on each side
 
-/// Positions of the channels in the stage.
+/// Indices of the channels in the stage.
 std::vector<Index> places(const std::filesystem::path& file, const ChannelList& channels,
                           const std::vector<Channel>& stage, const char* kind) {
   std::vector<Index> indices;
@@ -87,7 +87,7 @@ FrfEstimate prior_of_frf(const std::filesystem::path& file, const StageInfo& sta
   return frf;
 }
 
-/// Where a frequency stands among others: line `below`, and how far towards the next.
+/// Location of a frequency between others: line `below`, and the fraction of the way to the next.
 struct Between {
   Index below = 0;
   double part = 0.0;

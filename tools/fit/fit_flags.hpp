@@ -8,7 +8,7 @@
 
 namespace stageid {
 
-/// The flags of `stageid fit` that take words, as given; empty: not given.
+/// The flags of `stageid fit` with text values; empty: not given.
 struct FitFlags {
   std::string modes;                  ///< auto | none | N | f1,f2,... | FILE.json
   std::string weighting;              ///< unit | inverse_magnitude | ... | likelihood | FILE.h5
@@ -22,7 +22,7 @@ struct FitFlags {
   std::vector<std::string> submodels;  ///< see parse_submodel()
 };
 
-/// Parses the flags into `request`, whose other members stay.
+/// Parses the flags into `request`; other members remain unchanged.
 /// @throws std::invalid_argument naming the flag; FileError, FormatError for a file of modes
 void parse_fit_flags(const FitFlags& flags, FitRequest& request);
 

@@ -15,7 +15,7 @@ namespace stageid {
 
 namespace {
 
-/// One entry of `submodels`: what --submodel says in one line.
+/// One entry of `submodels`, with the parts of --submodel as keys.
 void describe_submodel(ConfigVisitor& v, SubmodelRequest& r) {
   FlexibleValue order = {"", {0.0}, false, {}};
   FlexibleRule rule;
@@ -91,7 +91,7 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
     f.modes.kind = modes.word == "none" ? Modes::none : Modes::search;
   }
 
-  // The last word leaves the choice to the FRF.
+  // The last word means that the FRF decides.
   const auto word = [&](const char* key, auto& value, std::vector<std::string> names,
                         const char* help) {
     using Value = typename std::remove_reference_t<decltype(value)>::value_type;
@@ -107,7 +107,7 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   word("hold", f.hold, words_to(HoldModel::exact),
        "hold model; by_frf: exact unless the FRF is already hold-compensated");
 
-  /// A word, or a rank, which is returned; 0: a word.
+  /// Reads a word or a rank. @returns the rank; 0: a word
   const auto rank = [&](const char* key, std::string& word_given, std::vector<std::string> words,
                         const char* help) {
     FlexibleValue given = {word_given, {}, false, {}};

@@ -8,13 +8,13 @@
 
 namespace stageid {
 
-/// The whole text as a finite number, or nothing.
+/// The whole text as a finite number; empty if it is not one.
 std::optional<double> to_number(std::string_view text);
 
 /// @throws std::invalid_argument "FLAG: 'given'; write RIGHT"
 [[noreturn]] void refuse(const char* flag, const std::string& given, const std::string& right);
 
-/// The words of an enumeration up to `last`, in the order of its values, from its to_string().
+/// The words of an enumeration up to `last`, in the order of its values, from to_string().
 template <typename Enum>
 std::vector<std::string> words_to(Enum last) {
   std::vector<std::string> words;
@@ -30,11 +30,11 @@ std::vector<std::string> words_before(Enum end) {
   return words;
 }
 
-/// @throws std::invalid_argument "FLAG: 'word'; write one of ..." with the nearest of them
+/// @throws std::invalid_argument "FLAG: 'word'; write one of ..." with the nearest word
 [[noreturn]] void refuse_word(const char* flag, const std::string& word,
                               const std::vector<std::string>& names);
 
-/// The enumerator whose name stands at its place in `names`. @throws as refuse_word()
+/// The enumerator at the index of its name in `names`. @throws as refuse_word()
 template <typename Enum>
 Enum pick(const char* flag, const std::string& word, const std::vector<std::string>& names) {
   const auto found = std::find(names.begin(), names.end(), word);

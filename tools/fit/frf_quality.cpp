@@ -73,7 +73,7 @@ std::string why_not_tested(const FrfEstimate& frf) {
              : why;
 }
 
-/// Every experiment begins with a period that is unlike the others, and none has another such period.
+/// Whether every experiment begins with a period that differs from the others, and no other period does.
 bool transient_lasts(const FrfEstimate& frf) {
   const std::size_t experiments =
       static_cast<std::size_t>(frf.realizations) * static_cast<std::size_t>(frf.experiments);

@@ -6,14 +6,14 @@
 namespace stageid {
 namespace {
 
-/// The parts of the script that grow with the commands.
+/// The parts of the script that depend on the commands.
 struct Cases {
-  std::string paths;  ///< what makes the next word a command
-  std::string words;  ///< what may come, by command
+  std::string paths;  ///< words after which the next word is a command
+  std::string words;  ///< possible words, by command
   std::string values;
 };
 
-/// @param path quoted, as a pattern of `case`
+/// @param path quoted, as a pattern for `case`
 void add_values(const std::string& path, const CommandTree& command, Cases& cases) {
   for (const CommandOption& option : command.options) {
     if (option.words.empty()) continue;

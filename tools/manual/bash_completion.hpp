@@ -6,8 +6,8 @@
 
 namespace stageid {
 
-/// A script for bash that completes commands, flags and the words that a flag may have; where none fits,
-/// file names. It needs nothing but bash.
+/// A bash script that completes commands, flags, the words of a flag, and otherwise file names. It needs nothing but
+/// bash.
 std::string bash_completion(const CommandTree& program);
 
 }  // namespace stageid

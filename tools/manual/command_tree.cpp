@@ -6,7 +6,7 @@
 namespace stageid {
 namespace {
 
-/// What the parser checks against, "TEXT:{periodic,lpm}".
+/// The words that the parser accepts, from "TEXT:{periodic,lpm}".
 std::vector<std::string> checked_words(const std::string& type) {
   const std::size_t open = type.find('{');
   const std::size_t close = type.find('}', open);
@@ -14,7 +14,7 @@ std::vector<std::string> checked_words(const std::string& type) {
   return CLI::detail::split(type.substr(open + 1, close - open - 1), ',');
 }
 
-/// What our help texts list, "auto | none | how many | modes.json; default: ...": the words of it.
+/// The words in a help text such as "auto | none | how many | modes.json; default: ...".
 std::vector<std::string> listed_words(const std::string& help) {
   static const std::regex word(R"(^([a-z][a-z_]*)( ?[(,:].*)?$)");
   std::vector<std::string> words;

@@ -12,14 +12,14 @@ struct CommandOption {
   std::vector<std::string> flags;  ///< "-o", "--output"; empty: an argument
   std::string name;                ///< of an argument
   std::string value;               ///< "TEXT"; empty: takes none
-  std::vector<std::string> words;  ///< values it may have, as far as they are words
-  std::string default_value;       ///< empty: none is told
+  std::vector<std::string> words;  ///< possible values that are words
+  std::string default_value;       ///< empty: none is documented
   std::string help;
   bool required = false;
   bool repeats = false;
 };
 
-/// What a command line may hold, for manual and completion: all of it comes from the parser itself.
+/// All commands and options, for manual and completion, read from the parser itself.
 struct CommandTree {
   std::string name;
   std::string help;
@@ -31,8 +31,8 @@ struct CommandTree {
 
 CommandTree command_tree(const CLI::App& app);
 
-/// The options that are taken behind a command: its own, and the program's, --json and --verbosity, which are taken
-/// on either side of it.
+/// The options accepted after a command: its own, and the program's --json and --verbosity, which are accepted before
+/// and after it.
 std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program);
 
 /// The words that lead to a command of the command at `path`.
@@ -43,7 +43,7 @@ std::string path_below(const std::string& path, const CommandTree& sub);
 void for_each_command(const CommandTree& program,
                       const std::function<void(const std::string&, const CommandTree&)>& visit);
 
-/// Every flag of a command's options, "-o", "--output", ...
+/// All flags of the options of a command, "-o", "--output", ...
 std::vector<std::string> flags_of(const CommandTree& command);
 std::vector<std::string> names_of(const std::vector<CommandTree>& commands);
 

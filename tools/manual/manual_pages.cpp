@@ -7,8 +7,8 @@
 namespace stageid {
 namespace {
 
-/// Text as roff shows it: a backslash begins an escape, a hyphen is typographic unless escaped, and a
-/// line that begins with a dot or an apostrophe is a request.
+/// Escapes text for roff: a backslash begins an escape, an unescaped hyphen is typographic, and a line that begins
+/// with a dot or an apostrophe is a request.
 std::string roff(const std::string& text) {
   std::string out;
   bool line_begins = true;

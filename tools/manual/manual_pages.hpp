@@ -12,8 +12,7 @@ struct ManualPage {
   std::string text;  ///< roff with the man macros
 };
 
-/// One page of the program, one of each of its commands; commands of a command (`log info`) stand on its
-/// page.
+/// One page for the program and one per command; subcommands (`log info`) are on the page of their command.
 std::vector<ManualPage> manual_pages(const CommandTree& program, const std::string& version);
 
 }  // namespace stageid

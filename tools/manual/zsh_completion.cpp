@@ -15,17 +15,17 @@ std::string quoted(const std::string& text) {
   return out + "'";
 }
 
-/// name:description for _describe; the first clause is enough for one line.
+/// name:description for _describe, shortened to the first clause.
 std::string described(const std::string& name, const std::string& help) {
   std::string entry;
   for (const char c : name) entry += c == ':' ? std::string("\\:") : std::string(1, c);
   return quoted(entry + ":" + help.substr(0, help.find(';')));
 }
 
-/// The parts of the script that grow with the commands.
+/// The parts of the script that depend on the commands.
 struct ZshParts {
-  std::string paths;   ///< what makes the next word a command
-  std::string offers;  ///< what may come, by command
+  std::string paths;   ///< words after which the next word is a command
+  std::string offers;  ///< possible words, by command
   std::string values;
 };
 

@@ -6,8 +6,8 @@
 
 namespace stageid {
 
-/// A script for zsh's completion system that completes commands and flags with what they do, and the words that
-/// a flag may have; where none fits, file names. It is to stand on $fpath as _NAME.
+/// A script for the completion system of zsh that completes commands and flags with descriptions, the words of a flag,
+/// and otherwise file names. Install it in $fpath as _NAME.
 std::string zsh_completion(const CommandTree& program);
 
 }  // namespace stageid

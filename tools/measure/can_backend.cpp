@@ -23,7 +23,7 @@ std::unique_ptr<CyclicStage> make_can_stage(const StageConfig& config,
   const CanSpec& spec = config.can.spec;
   const StageInfo& info = config.spec.info;
   const CanLayout layout = can_layout(spec, info);
-  require_bus_carries(spec, layout, info.sample_rate_hz);  // before an interface is asked for
+  require_bus_carries(spec, layout, info.sample_rate_hz);  // before an interface is opened
   auto stage = std::make_unique<CanStage>(info, spec, open_buses(spec, layout), options);
   stage->connect();
   return stage;

@@ -19,7 +19,7 @@
 namespace stageid {
 namespace {
 
-/// The host closes the loop.
+/// The host closes the loop, sample by sample.
 class StreamedStage final : public MeasuredStage {
  public:
   StreamedStage(const ExperimentPlan& plan, std::unique_ptr<CyclicStage> stage,
@@ -44,13 +44,13 @@ class StreamedStage final : public MeasuredStage {
     const ExperimentEnd end = result.experiment.end;
     const std::string trouble = stage_.trouble();
     if (trouble.empty() || (end != ExperimentEnd::fault && end != ExperimentEnd::limit)) return;
-    // A limit that only the node saw is no violation on this side of the wires.
+    // A limit that only the node detected is not a violation on the host.
     const bool node_only =
         end == ExperimentEnd::limit && stage_.violation().kind == LimitKind::none;
     result.message = node_only ? trouble : result.message + "; " + trouble;
   }
 
-  /// The replay stage also compares: what it saw is part of the result.
+  /// Adds the comparison of the replay stage to the result.
   void judge_replay(MeasurementResult& result) const {
     const auto* replay = dynamic_cast<const ReplayStage*>(&stage_.inner());
     if (replay == nullptr || replay->mismatches() == 0) return;
@@ -64,7 +64,7 @@ class StreamedStage final : public MeasuredStage {
   MotionController controller_;
 };
 
-/// The stage closes the loop by itself.
+/// The stage closes the loop itself.
 class PlayingStage final : public MeasuredStage {
  public:
   PlayingStage(const ExperimentPlan& plan, std::unique_ptr<ResidentStage> stage)
@@ -119,7 +119,7 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
   const auto streamed = [&](std::unique_ptr<CyclicStage> stage) {
     return std::make_unique<StreamedStage>(plan, std::move(stage), spec);
   };
-  // A played-back motion answers to other forces than these.
+  // A recorded motion was caused by other forces.
   if (request.backend == Backend::replay) spec.limits.motion = {};
   switch (request.backend) {
     case Backend::sim:

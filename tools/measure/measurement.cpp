@@ -22,7 +22,7 @@
 namespace stageid {
 namespace {
 
-/// The runs that a log holds completely, and the check that it is the log of this experiment.
+/// The complete runs of a log, after checking that it belongs to this experiment.
 std::vector<RunId> complete_runs(const ExperimentConfig& config,
                                  const std::filesystem::path& file) {
   const std::unique_ptr<LogReader> log = open_log(file, false);
@@ -70,8 +70,8 @@ void conclude(const MeasuredStage& stage, MeasurementResult& result) {
   stage.explain(result);
 }
 
-/// Brings up the plant around the stage, if the stage file tells of one, and lets it end the
-/// experiment. What is played back has no plant any more.
+/// Starts the plant around the stage, if the stage file describes one, and lets it end the experiment. In a replay
+/// there is no plant.
 std::unique_ptr<SupervisedPlant> supervise(const ExperimentConfig& config,
                                            const MeasurementRequest& request,
                                            RunExperimentOptions& options) {
@@ -94,9 +94,9 @@ std::unique_ptr<Dashboard> make_dashboard(const ExperimentConfig& config,
   return dashboard;
 }
 
-/// Refuses what is there and must not be. @returns whether there is a log to continue.
+/// Rejects a log that must not exist. @returns whether there is a log to continue.
 bool check_log(const MeasurementRequest& request) {
-  // Killed before the first byte was written: nothing is lost by starting anew.
+  // An empty file was killed before the first byte was written, so it can be overwritten.
   std::error_code no_size;
   if (request.resume && std::filesystem::file_size(request.log, no_size) == 0 && !no_size)
     std::filesystem::remove(request.log);
@@ -107,7 +107,7 @@ bool check_log(const MeasurementRequest& request) {
   return exists;
 }
 
-/// What real time lacks here, before anything is written. @throws StageError if it is required.
+/// Warns of missing real-time capabilities, before anything is written. @throws StageError if they are required.
 void warn_of_real_time(const RealTimeOptions& options, const Console& console) {
   for (const std::string& missing : missing_for_real_time(options))
     console.warning("realtime: " + missing);
@@ -156,7 +156,7 @@ void tell_end(EventLog& events, const MeasuredStage& stage, const MeasurementRes
   events.write("end", {{"exit_code", std::int64_t{result.exit_code}}, {"message", result.message}});
 }
 
-/// The variance that all of it leaves, where the plan ended before it was small enough too.
+/// Adds the final variance, for a plan that ended before the requested one was reached, too.
 void tell_reached(UntilVariance& until, MeasurementResult& result, const Console& console) {
   const std::string reason = until.enough();
   if (reason.empty() && until.reached())
@@ -168,7 +168,7 @@ void tell_reached(UntilVariance& until, MeasurementResult& result, const Console
   result.variance = until.reached();
 }
 
-/// Who is told what while it is measured.
+/// Connects observers of the measurement.
 void listen(RunExperimentOptions& options, EventLog& events, Progress& progress,
             Dashboard* dashboard) {
   options.interrupt = &interrupt_flag();
@@ -218,7 +218,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   if (info.clock == Clock::wall) warn_of_real_time(options.real_time, console);
   if (request.until) warn_of_until(plan, config.frf, console);
   const std::unique_ptr<SupervisedPlant> plant = supervise(config, request, options);
-  std::optional<EventLog> events;  // outlives the dashboard, whose watchers write to it
+  std::optional<EventLog> events;  // must outlive the dashboard, whose watchers write to it
   const std::unique_ptr<Dashboard> dashboard =
       make_dashboard(config, plan, request, info, result.runs_before, console);
   if (dashboard && plant) dashboard->watch([&plant] { return plant->snapshot(); });
@@ -245,7 +245,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   tell_end(*events, *stage, result);
   if (dashboard) dashboard->finish(result.exit_code, result.message);
   if (const std::string error = events->error(); !error.empty()) console.warning(error);
-  std::error_code no_log;  // a log that was removed is a failure that is told already
+  std::error_code no_log;  // a removed log has already been reported as an error
   const std::uintmax_t bytes = std::filesystem::file_size(request.log, no_log);
   if (!no_log) result.log_bytes = bytes;
   return result;

@@ -12,41 +12,41 @@
 
 namespace stageid {
 
-/// How `run` is asked to measure.
+/// Options of `run`.
 struct MeasurementRequest {
   std::filesystem::path log;
   Backend backend = Backend::sim;
-  std::filesystem::path replay;  ///< backend replay: the log that is played
+  std::filesystem::path replay;  ///< backend replay: the recorded log
   double replay_tolerance_n = 1e-9;
   bool resume = false;
-  double pace = -1.0;        ///< < 0: as the stage file says
+  double pace = -1.0;        ///< < 0: that of the stage file
   bool reset_fault = false;  ///< clear a fault of the node or plant first
   std::optional<DashboardAddress> dashboard = {};
-  std::optional<double> until = {};  ///< mean relative variance that is enough
+  std::optional<double> until = {};  ///< target of the mean relative variance
 };
 
 struct MeasurementResult {
   ExperimentResult experiment;
   int runs_total = 0;
-  int runs_before = 0;  ///< complete in the log already
+  int runs_before = 0;  ///< already complete in the log
   int exit_code = 0;    ///< kDone, kWorldFailed, kNotTrustworthy, kStoppedForSafety or kInterrupted
-  std::string message;  ///< one line, why it ended
-  std::optional<double> variance = {};  ///< mean relative, at the last look; with `until` only
+  std::string message;  ///< one line, the reason of the end
+  std::optional<double> variance = {};  ///< mean relative, of the last estimate; with `until` only
   double seconds = 0.0;
   std::uint64_t log_bytes = 0;
 };
 
-/// Performs the experiment and logs it. Complete runs of a log that is resumed are not repeated.
-/// @throws std::invalid_argument if the log exists and must not be resumed, or belongs to another
-/// experiment. @throws FileError, FormatError, StageError
+/// Performs the experiment and logs it. When a log is resumed, its complete runs are skipped.
+/// @throws std::invalid_argument if the log exists and must not be resumed, or belongs to another experiment. @throws
+/// FileError, FormatError, StageError
 MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
                           const MeasurementRequest& request, const Console& console);
 
-/// What to do about a measurement that ended early, behind its message: resuming helps where the link was lost or
-/// somebody interrupted, not where the same run would hit the same limit.
+/// Remedy for a measurement that ended early, to be appended to its message. Resuming helps after a lost link or an
+/// interrupt, but not if the same run would reach the same limit.
 std::string advice_behind(const MeasurementResult& result);
 
-/// Bytes of the samples of a whole experiment in a native log.
+/// Size of the samples of a whole experiment in a native log, in bytes.
 double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage);
 
 }  // namespace stageid

@@ -10,15 +10,15 @@
 
 namespace stageid {
 
-/// The stage behind the Modbus server of the stage file, which has a group `modbus`.
-/// @throws std::invalid_argument if the link cannot carry its rate or channels.
+/// The stage at the Modbus server in the group `modbus` of the stage file.
+/// @throws std::invalid_argument if the link cannot carry the sample rate or channels.
 std::unique_ptr<CyclicStage> make_modbus_stage(const StageConfig& config,
                                                const ModbusHostOptions& options);
 
-/// The plant around the stage, up and watched as long as this lives.
+/// The plant around the stage, operated and monitored during the lifetime of this object.
 class SupervisedPlant {
  public:
-  /// @throws StageError if it does not come up.
+  /// @throws StageError if it does not start.
   SupervisedPlant(const SupervisorConfig& config, bool reset_fault);
   const PlantWatch& watch() const noexcept { return watch_; }
   PlantSnapshot snapshot() const { return supervisor_.snapshot(); }

@@ -6,7 +6,7 @@
 namespace stageid {
 namespace {
 
-/// Another one for every start: hosts notice that the node is not the one they began with.
+/// Different for every start, so that hosts detect a restarted node.
 std::uint32_t fresh_boot_id() {
   const auto now_ns = static_cast<std::uint64_t>(
       std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1));

@@ -14,8 +14,8 @@
 
 namespace stageid {
 
-/// The Modbus side of `stageid node`: its options, and one server thread a door (TCP, RTU) to the
-/// same StageNode. Every server counts its requests and has its faults for itself.
+/// The Modbus side of `stageid node`: its options, and one server thread per connection (TCP, RTU) to the same
+/// StageNode. Every server has its own request count and faults.
 class ModbusFront {
  public:
   ModbusFront() = default;
@@ -26,13 +26,13 @@ class ModbusFront {
   void add_options(CLI::App& command);
   bool wanted() const noexcept { return tcp_port_ >= 0 || !rtu_device_.empty(); }
 
-  /// Opens what was asked for and serves it. `node` must outlive the front.
-  /// @throws std::invalid_argument on faults or values that make no sense.
+  /// Opens the requested connections and serves them. `node` must outlive the front.
+  /// @throws std::invalid_argument for unknown faults or invalid values.
   /// @throws StageError if a port or device cannot be opened.
   void start(StageNode& node, const StageLimits& limits);
-  /// Ends the threads and closes the doors.
+  /// Ends the threads and closes the connections.
   void stop();
-  /// One line for each door, after start().
+  /// One line per connection, after start().
   std::vector<std::string> places() const;
 
  private:

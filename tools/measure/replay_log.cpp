@@ -10,7 +10,7 @@ ReplayLog::ReplayLog(std::unique_ptr<LogReader> log, const std::vector<RunId>& r
     : log_(std::move(log)) {
   const std::vector<LogRun>& recorded = log_->runs();
   for (const RunId wanted : runs) {
-    // Of several complete runs the last counts, as in the estimate.
+    // Of several complete runs the last one is used, as in the estimate.
     std::size_t found = recorded.size();
     for (std::size_t i = 0; i < recorded.size(); ++i)
       if (recorded[i].complete && recorded[i].realization == wanted.realization &&

@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// Gives the runs of a log to the replay stage, in the order of a plan's runs.
+/// Provides the runs of a log to the replay stage, in the order of a plan's runs.
 class ReplayLog final : public ReplaySource {
  public:
   /// @throws std::invalid_argument if the log lacks a complete run of the list.

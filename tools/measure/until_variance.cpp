@@ -31,7 +31,7 @@ std::string UntilVariance::enough() {
     static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
     try {
       look();
-    } catch (const std::exception& error) {  // nothing of it may end the measurement
+    } catch (const std::exception& error) {  // errors must not end the measurement
       failure_ = error.what();
     }
   });

@@ -9,20 +9,21 @@
 
 namespace stageid {
 
-/// Says when an experiment has measured enough: estimates the response, as `stageid frf` does, from
-/// the log that is being written, and compares its mean relative variance (relative_variance.hpp) with
-/// the one wanted. Judged is the larger of noise and total variance, of those that are known.
+/// Decides when an experiment can end. It estimates the response from the log during the measurement, as `stageid frf`
+/// does, and compares its mean relative variance (relative_variance.hpp) with the requested one. The larger of noise
+/// and total variance is used, as far as they are known.
 class UntilVariance {
  public:
   /// @throws std::invalid_argument unless `variance` is positive and finite.
   UntilVariance(std::filesystem::path log, FrfOptions options, double variance);
 
-  /// Why it is enough, or nothing. An estimate that fails is not enough; failure() tells why. The
-  /// caller may be a real-time thread: the work is done in one of normal priority.
+  /// The reason to end, or an empty text. A failed estimate does not end it, see failure(). The caller may be a
+  /// real-time thread: the work is done in a thread of normal priority.
   std::string enough();
 
-  const std::optional<double>& reached() const noexcept { return reached_; }  ///< at the last look
-  const std::string& failure() const noexcept { return failure_; }            ///< of the last look
+  /// of the last estimate
+  const std::optional<double>& reached() const noexcept { return reached_; }
+  const std::string& failure() const noexcept { return failure_; }  ///< of the last estimate
 
  private:
   void look();
@@ -35,7 +36,7 @@ class UntilVariance {
   std::string failure_;
 };
 
-/// Why a plan cannot end before its time by UntilVariance, and the remedy; empty if it can.
+/// Why UntilVariance can never end a plan early, and the remedy; empty if it can.
 std::string never_enough(const ExperimentSpec& plan, const FrfOptions& options);
 
 }  // namespace stageid

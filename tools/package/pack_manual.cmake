@@ -1,4 +1,4 @@
-# Packs man pages as Debian wants them, without a time or a name in them.
+# Compresses man pages as required by Debian, without time stamps and names.
 #   cmake -DFROM=DIR -DTO=DIR -DGZIP=PROGRAM -P pack_manual.cmake
 file(REMOVE_RECURSE ${TO})
 file(MAKE_DIRECTORY ${TO})

@@ -1,6 +1,6 @@
 # Debian packages by `cpack`, and a wheel by the target `wheel`: docs/decisions/packages.md.
 #
-# Components: program (stageid), python (python3-stageid), Unspecified is what C++ programs link
+# Components: program (stageid), python (python3-stageid); Unspecified is the development files for C++
 # (libstageid-dev).
 
 set(doc_dir ${CMAKE_INSTALL_DATADIR}/doc)
@@ -9,11 +9,11 @@ install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright
 install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright
   DESTINATION ${doc_dir}/libstageid-dev)
 
-# Packed, without a time in the packing: what changed in the program, and that this is its first Debian revision.
+# Compressed without a time stamp: the changelog of the program, and the one of this first Debian revision.
 set(STAGEID_PACKAGE_CONTACT "stageid maintainers <stageid@packages.example>" CACHE STRING
   "Whom the Debian packages name as maintainer: NAME <ADDRESS>")
 set(debian_revision 1)
-string(TIMESTAMP changelog_date "%a, %d %b %Y %H:%M:%S +0000" UTC)  # SOURCE_DATE_EPOCH if that is set
+string(TIMESTAMP changelog_date "%a, %d %b %Y %H:%M:%S +0000" UTC)  # SOURCE_DATE_EPOCH if set
 configure_file(${CMAKE_CURRENT_LIST_DIR}/changelog.Debian.in ${CMAKE_CURRENT_BINARY_DIR}/changelog.Debian @ONLY)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/CHANGELOG.md)
 set(changelogs)
@@ -30,7 +30,7 @@ install(FILES ${changelogs} DESTINATION ${doc_dir}/libstageid-dev)
 set(components program Unspecified)
 if(STAGEID_BUILD_PYTHON)
   list(APPEND components python)
-  # Debian's python3 looks here, whatever its minor version.
+  # The search path of Debian's python3 for any minor version.
   set(package_dir lib/python3/dist-packages/stageid)
   install(TARGETS stageid_python LIBRARY DESTINATION ${package_dir} COMPONENT python)
   install(FILES ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.py

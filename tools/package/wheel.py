@@ -18,7 +18,7 @@ import tempfile
 import zipfile
 
 PACKED = ("__init__.py", "__init__.pyi", "py.typed")
-EARLIEST = (1980, 1, 1, 0, 0, 0)  # a zip knows no earlier time; no time of ours belongs in it
+EARLIEST = (1980, 1, 1, 0, 0, 0)  # the earliest time in a zip; the build time is not recorded
 
 
 def tag():

@@ -13,7 +13,7 @@ namespace {
 constexpr double kWidth_in = 3.5;
 constexpr double kHeight_in = 2.5;
 
-/// The first curves, which carry the modes, dark and bold; told apart by dashes where brightness is alike.
+/// The first curves, which show the modes, are dark and bold; curves of similar brightness differ by dashes.
 constexpr std::array kCurves = {
     "lc rgb '#0b3c7d' lw 1.4",          "lc rgb '#d55e00' lw 1.2",
     "lc rgb '#35a07a' lw 1.0 dt (6,2)", "lc rgb '#b07cc6' lw 1.0",
@@ -34,7 +34,7 @@ const char* axis_title(CmifKind kind) {
   return "";
 }
 
-/// "[(m/(N s²))²]" where all elements have one unit; whitened curves have none.
+/// "[(m/(N s²))²]" if all elements have the same unit; whitened curves have none.
 std::string unit_of(const FrfEstimate& frf, CmifKind kind) {
   const std::set<std::string> outputs(frf.outputs.units.begin(), frf.outputs.units.end());
   const std::set<std::string> inputs(frf.inputs.units.begin(), frf.inputs.units.end());
@@ -46,7 +46,7 @@ std::string unit_of(const FrfEstimate& frf, CmifKind kind) {
              : fmt::format(" [({}/{})²]", *outputs.begin(), *inputs.begin());
 }
 
-/// The line next to a frequency, as on the page.
+/// The line nearest to a frequency, as on the page.
 Eigen::Index nearest_line(const Eigen::VectorXd& frequency_hz, double hz) {
   const auto above = std::ranges::lower_bound(frequency_hz, hz);
   Eigen::Index k = std::min<Eigen::Index>(above - frequency_hz.begin(), frequency_hz.size() - 1);
@@ -58,7 +58,7 @@ bool inside(const FrfEstimate& frf, double hz) {
   return hz >= frf.frequency_hz[0] && hz <= frf.frequency_hz[frf.lines() - 1];
 }
 
-/// Frequencies of the candidates and their curve's value there.
+/// Frequencies of the candidates and the values of their curves.
 std::array<Eigen::VectorXd, 2> rings(const ReportData& data) {
   std::vector<double> at_hz;
   std::vector<double> value;
@@ -75,7 +75,7 @@ std::array<Eigen::VectorXd, 2> rings(const ReportData& data) {
           Eigen::Map<Eigen::VectorXd>(value.data(), size)};
 }
 
-/// Lines over the whole height where the model has a mode, and their number.
+/// Vertical lines at the modes of the model, and their number.
 std::pair<std::string, int> mode_lines(const ReportData& data) {
   std::string script;
   int count = 0;

@@ -27,12 +27,12 @@ constexpr double kPngDotsPerInch = 300.0;
 constexpr double kSvgUnitsPerInch = 96.0;
 constexpr double kPointsPerInch = 72.0;
 
-/// Cairo takes a point of a font for 1/96 inch, SVG's reader takes it for what it is.
+/// Cairo interprets a point of a font as 1/96 inch, readers of SVG as a point.
 double font_scale(PictureFormat format) {
   return format == PictureFormat::svg ? 1.0 : kPointsPerInch / kSvgUnitsPerInch;
 }
 
-/// A directory that only this user can read, and that goes away with all it holds.
+/// A directory that only this user can read, removed with its content at the end.
 class PrivateDirectory {
  public:
   PrivateDirectory() {
@@ -56,8 +56,8 @@ class PrivateDirectory {
   std::filesystem::path path_;
 };
 
-/// How large things are in the units of a terminal, such that all formats look alike. Names of files are ours and relative: nothing from outside
-/// but quoted() texts stands in the script.
+/// Sizes in the units of a terminal, such that all formats look alike. Names of files are our own and relative:
+/// external texts are in the script only through quoted().
 std::string preamble(const Picture& picture, PictureFormat format) {
   const auto terminal = [&](const char* name, const char* unit, double per_inch, double line,
                             double point) {
@@ -80,7 +80,7 @@ std::string preamble(const Picture& picture, PictureFormat format) {
   return "";
 }
 
-/// What the environment says of language and time must not stand in the picture.
+/// Language and time settings of the environment must not affect the picture.
 std::vector<std::string> environment_of_gnuplot() {
   std::vector<std::string> out = {"LC_ALL=C.UTF-8", "TZ=UTC"};
   for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) {
@@ -99,7 +99,7 @@ std::string read_whole(const std::filesystem::path& file) {
 
 std::atomic<pid_t> running_gnuplot = -1;
 
-/// Runs `gnuplot -d script.gp` there, messages into a file. @returns the status that waitpid() gives.
+/// Runs `gnuplot -d script.gp` in the directory, messages into a file. @returns the status of waitpid()
 int run_gnuplot(const std::filesystem::path& directory) {
   std::vector<std::string> environment = environment_of_gnuplot();
   std::vector<char*> environment_pointers;
@@ -138,7 +138,7 @@ int run_gnuplot(const std::filesystem::path& directory) {
   return status;
 }
 
-/// The first line that is neither empty nor gnuplot's pointer into its script.
+/// The first line that is neither empty nor a position in the script.
 std::string first_message(const std::string& text) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
@@ -148,7 +148,7 @@ std::string first_message(const std::string& text) {
   return text.empty() ? "no message" : text.substr(0, text.find('\n'));
 }
 
-/// Cairo does not tell when a disk is full; a whole picture ends as its format says.
+/// Cairo does not report a full disk, so check the end marker of the format.
 bool is_whole(const std::string& bytes, PictureFormat format) {
   std::string_view text = bytes;
   if (format == PictureFormat::svg)
@@ -164,7 +164,7 @@ bool is_whole(const std::string& bytes, PictureFormat format) {
   return false;
 }
 
-/// PDF tells the time it was written; the same request gives the same bytes, so it becomes 1970.
+/// Sets the creation time of a PDF to 1970, so that equal requests give equal bytes.
 void forget_date(std::string& pdf) {
   static constexpr std::string_view kKey = "/CreationDate (D:";
   static constexpr std::string_view kDate = "19700101000000";

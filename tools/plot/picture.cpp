@@ -14,15 +14,15 @@
 namespace stageid {
 namespace {
 
-/// Least distance of labels of frequencies, and of powers of ten.
+/// Smallest distance of labels of frequencies, and of powers of ten.
 constexpr double kLabelWidth_in = 0.3;
 constexpr double kLabelHeight_in = 0.22;
 
-/// Of the legend's font, and of the sample beside a title with the space to the next entry.
+/// Width of a character of the legend, and of the sample beside a title plus the space to the next entry.
 constexpr double kCharacter_in = 0.06;
 constexpr double kSample_in = 0.5;
 
-/// The labels of each decade, the densest first; then every second decade, every third.
+/// Candidates for the labels of each decade, the densest first; then every second decade, every third.
 std::vector<double> frequencies_to_label(double low_hz, double high_hz, double width_in) {
   const std::vector<std::vector<double>> digits = {{1, 2, 5}, {1, 3}, {1}};
   const int first = static_cast<int>(std::floor(std::log10(low_hz)));
@@ -67,7 +67,7 @@ std::string quoted(const std::string& text) {
   for (const char32_t point : code_points_of(text)) {
     const bool control = point < 0x20 || (point >= 0x7f && point < 0xa0);
     points += control ? U' ' : point;
-    if (point == U'\'') points += point;  // two stand for one
+    if (point == U'\'') points += point;  // an escaped quote
   }
   return fmt::format("'{}'", utf8_of(points));
 }
@@ -78,7 +78,7 @@ std::string frequency_axis(double low_hz, double high_hz, double width_in, bool 
   std::vector<std::string> labels;
   for (const double hz : frequencies_to_label(low_hz, high_hz, width_in))
     labels.push_back(fmt::format("'{}' {}", labelled ? fmt::format("{:g}", hz) : "", hz));
-  // Decades without a label keep a small tick: the axis is seen to be logarithmic.
+  // Decades without a label have a small tick, so that the axis is recognizable as logarithmic.
   for (double hz = std::pow(10.0, std::ceil(std::log10(low_hz))); hz <= high_hz; hz *= 10.0)
     labels.push_back(fmt::format("'' {} 1", hz));
   return fmt::format("set logscale x 10\nset xrange [{}:{}]\nset xtics ({})\n", low_hz, high_hz,

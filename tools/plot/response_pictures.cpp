@@ -11,7 +11,7 @@
 namespace stageid {
 namespace {
 
-// Colours that differ in brightness too, for a print in grey; widths in pt, `point` is one of a symbol's size.
+// Colours that also differ in brightness, for print in grey; widths in pt, `point` is one unit of symbol size.
 constexpr const char* kMeasuredColour = "lc rgb '#f0a030'";
 constexpr const char* kModelColour = "lc rgb '#0b3c7d'";
 constexpr const char* kResidualColour = "lc rgb '#8c8c8c' pt 7";
@@ -35,7 +35,7 @@ std::string unit_of(const ChannelList& channels, Eigen::Index i) {
   return at < channels.units.size() && !channels.units[at].empty() ? channels.units[at] : "1";
 }
 
-/// "m/N" if all of these elements have one unit, else empty.
+/// "m/N" if all of these elements have the same unit, else empty.
 std::string common_unit(const FrfEstimate& frf, const std::vector<Eigen::Index>& outputs,
                         const std::vector<Eigen::Index>& inputs) {
   const std::string output = unit_of(frf.outputs, outputs.at(0));
@@ -49,7 +49,7 @@ std::string common_unit(const FrfEstimate& frf, const std::vector<Eigen::Index>&
 
 struct ElementTable {
   std::vector<std::pair<std::string, Eigen::VectorXd>> columns;
-  int model = 0, residual = 0, deviation = 0;  ///< columns counted from 1; 0: not there
+  int model = 0, residual = 0, deviation = 0;  ///< columns counted from 1; 0: missing
 
   int add(const char* name, const Eigen::VectorXd& values) {
     columns.emplace_back(name, values);
@@ -82,7 +82,7 @@ std::pair<double, double> range_of(const ElementTable& table) {
   return magnitude_range(values);
 }
 
-/// Where the panels of the matrix stand.
+/// Positions of the panels of the matrix.
 struct Grid {
   double left_in = 0.76, right_in = 0.08, bottom_in = 0.4, top_in = 0.42, gap_in = 0.05;
   double width_in = 0.0, height_in = 0.0;
@@ -99,7 +99,7 @@ struct Grid {
   double x_in(std::size_t column) const {
     return left_in + static_cast<double>(column) * (width_in + gap_in);
   }
-  /// Lower edge; rows from above.
+  /// Lower edge; rows are counted from the top.
   double y_in(std::size_t row, const Picture& picture) const {
     return picture.height_in - top_in - static_cast<double>(row + 1) * height_in -
            static_cast<double>(row) * gap_in;
@@ -130,7 +130,7 @@ std::string around_the_panels(const FrfEstimate& frf, const Grid& grid, const Pi
   return script;
 }
 
-/// Labels stand once: on the left and lower edges of the matrix.
+/// Only the panels on the left and lower edges of the matrix have labels.
 std::string bode_panel(const Picture& picture, const Grid& grid, std::size_t row,
                        std::size_t column, bool lowest, const FrfEstimate& frf,
                        std::pair<double, double> magnitudes) {
@@ -149,14 +149,14 @@ void check_count(std::size_t count, const char* kind, const char* flag) {
                     kMostRowsOrColumns, flag));
 }
 
-/// What is drawn of a table, and how the legend calls it; the model above the measurement, both above their errors.
+/// Curves of a table with their legends; the model is drawn above the measurement, both above their errors.
 struct Curves {
   std::string drawn;
   std::vector<LegendEntry> legend;         ///< of the responses
   std::vector<LegendEntry> errors_legend;  ///< of residual and deviation
 };
 
-/// @param line_width_pt of the model; the measurement is a wider line below it.
+/// @param line_width_pt of the model; the measurement is a wider line below it
 Curves curves_of(const ElementTable& table, const std::string& file, const char* kind,
                  double line_width_pt) {
   Curves curves;
@@ -217,7 +217,7 @@ Picture bode_picture(const ReportData& data, const std::vector<Eigen::Index>& ou
       const Curves curves = curves_of(table, file, "", 0.55);
       picture.script +=
           bode_panel(picture, grid, i, j, i + 1 == outputs.size(), frf, magnitudes) + curves.drawn;
-      if (i + j == 0) picture.script += "unset label\n";  // what stands around is drawn once
+      if (i + j == 0) picture.script += "unset label\n";  // drawn once for all panels
       legend = curves.legend;
     }
   picture.script += legend_row(picture, 0.12, legend) + "unset multiplot\n";

@@ -13,8 +13,8 @@
 
 namespace stageid {
 
-/// Samples of a whole experiment, one array a group. M realizations of E experiments (runs) of S
-/// samples each, behind one period of P samples of excitation.
+/// Samples of a whole experiment, one array per group. M realizations of E experiments (runs) of S samples each, and
+/// one period of P samples of excitation.
 struct ExperimentArrays {
   using Reals = RealArray;
   using Flags = FlagArray;
@@ -24,14 +24,14 @@ struct ExperimentArrays {
   std::optional<Flags> marked;  ///< [M x E x S], nonzero: do not use
 };
 
-/// A log over arrays of Python, which are not copied where the channels of a sample stand next to
-/// each other (C order, slices of it, views of other records); else once.
+/// A log in Python arrays. They are not copied if the channels of a sample are contiguous (C order, slices of it,
+/// views of other records), otherwise once.
 ///
-/// Made and destroyed with the interpreter's lock; read() needs none.
+/// Must be created and destroyed with the lock of the interpreter; read() does not need it.
 class ArrayLog final : public LogReader {
  public:
-  /// @param name stands in messages and provenance
-  /// @throws std::invalid_argument where shapes do not fit each other or the channels of `info`
+  /// @param name for messages and provenance
+  /// @throws std::invalid_argument if shapes do not match each other or the channels of `info`
   /// @throws FormatError from check_runs(): whole periods, more than the transient ones
   ArrayLog(std::filesystem::path name, LogInfo info, ExperimentArrays arrays);
 
@@ -48,7 +48,7 @@ class ArrayLog final : public LogReader {
  private:
   struct Rows {
     const double* first = nullptr;
-    std::size_t words = 0;  ///< from a sample to the next
+    std::size_t words = 0;  ///< from one sample to the next
   };
 
   void check_shapes() const;
@@ -61,7 +61,7 @@ class ArrayLog final : public LogReader {
   LogInfo info_;
   ExperimentArrays arrays_;
   std::vector<LogRun> runs_;
-  std::vector<Rows> actuators_;  // one a run, as the two below
+  std::vector<Rows> actuators_;  // one per run, as the following two
   std::vector<Rows> sensors_;
   std::vector<Eigen::Array<std::uint8_t, Eigen::Dynamic, 1>> marked_;
 };

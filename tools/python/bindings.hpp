@@ -4,7 +4,7 @@
 
 namespace stageid {
 
-// What the module holds, by the file that says it.
+// The parts of the module, by source file.
 
 void define_errors(pybind11::module_& module);      ///< errors.cpp
 void define_excitation(pybind11::module_& module);  ///< excitation_bindings.cpp

@@ -8,7 +8,7 @@
 
 namespace stageid {
 
-/// A frequency response of the module, and what the provenance of a fit calls it.
+/// A frequency response in Python, and its name in the provenance of a fit.
 struct FrfHandle {
   explicit FrfHandle(FrfEstimate estimate, std::string its_name = "memory",
                      std::string its_fingerprint = "")
@@ -17,14 +17,14 @@ struct FrfHandle {
         fingerprint(std::move(its_fingerprint)) {}
 
   FrfEstimate frf;
-  std::string name;         ///< of the file it was read from, else "memory"
+  std::string name;         ///< of its file, else "memory"
   std::string fingerprint;  ///< of that file; empty: not from a file
 };
 
 /// @throws FileError, FormatError
 FrfHandle read_frf_handle(const std::filesystem::path& file);
 
-/// Names the content of a response that is in no file: frequencies, response and variances.
+/// Identifies the content of a response without a file: frequencies, response and variances.
 std::string fingerprint_of_content(const FrfEstimate& frf);
 
 }  // namespace stageid

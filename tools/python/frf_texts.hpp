@@ -2,7 +2,7 @@
 
 namespace stageid {
 
-// What help(stageid) tells of frequency responses.
+// Texts of help(stageid) on frequency responses.
 
 inline constexpr const char* kFrfDoc =
     R"(A frequency response G(j omega_k) with its uncertainty: the content of frf.h5.

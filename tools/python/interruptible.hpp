@@ -6,11 +6,10 @@
 
 namespace stageid {
 
-/// Does `work` in a thread of its own, without Python's interpreter lock, and looks for signals
-/// meanwhile: Ctrl-C ends it at its next throw_if_interrupted() and becomes KeyboardInterrupt.
-/// `work` touches nothing of Python. Called with the lock held; as Python has it, signals arrive at
-/// the main thread only, and interrupt what all threads do here.
-/// @throws what `work` throws; pybind11::error_already_set of the signal's handler.
+/// Runs `work` in its own thread, without Python's interpreter lock, and checks for signals meanwhile: Ctrl-C ends it
+/// at its next throw_if_interrupted() and becomes KeyboardInterrupt. `work` must not use Python. Must be called with
+/// the lock held. In Python, signals arrive at the main thread only, and interrupt the work of all threads here.
+/// @throws the exceptions of `work`; pybind11::error_already_set of the signal handler.
 void run_interruptibly(const std::function<void()>& work);
 
 /// The same for work with a result.

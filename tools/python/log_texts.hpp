@@ -2,7 +2,7 @@
 
 namespace stageid {
 
-// What help(stageid) tells of logs.
+// Texts of help(stageid) on logs.
 
 inline constexpr const char* kLogDoc =
     R"(The samples of an experiment: a sequence of runs, each with its realization and experiment.

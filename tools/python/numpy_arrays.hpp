@@ -11,8 +11,8 @@
 
 namespace stageid {
 
-/// Columns that are vec of an n_y x n_u matrix, as an array [N x n_y x n_u] over the same memory.
-/// Read-only; `owner` keeps the memory alive. None where there is nothing.
+/// Columns that are vec of an n_y x n_u matrix, as a read-only array [N x n_y x n_u] over the same memory; `owner`
+/// keeps the memory alive. None for an empty matrix.
 template <typename Scalar>
 pybind11::object lines_view(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& columns,
                             Eigen::Index n_y, const pybind11::handle& owner) {
@@ -25,7 +25,7 @@ pybind11::object lines_view(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::D
   return array;
 }
 
-/// The same for a matrix that nobody else owns: it moves into the array.
+/// The same for a matrix without another owner, which is moved into the array.
 template <typename Scalar>
 pybind11::object lines_moved(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>&& columns,
                              Eigen::Index n_y) {
@@ -36,7 +36,7 @@ pybind11::object lines_moved(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynami
   return lines_view(*memory, n_y, owner);
 }
 
-/// The reverse, copied: arrays of Python have any order, the estimate owns its memory.
+/// The reverse, as a copy: Python arrays have any order, and the estimate owns its memory.
 /// @throws std::invalid_argument "NAME: ..." unless the shape is N x n_y x n_u.
 template <typename Scalar>
 Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> columns_of(

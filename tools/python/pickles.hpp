@@ -10,8 +10,8 @@
 
 namespace stageid {
 
-// What objects of the module are made of when they are pickled or copied. States are bytes and plain Python
-// objects; the bytes are those of frf.h5 and model.json, so that every number comes back to the bit.
+// The pickled state of the objects of the module: bytes and plain Python objects. The bytes are those of frf.h5 and
+// model.json, so that every number is restored exactly.
 
 pybind11::tuple state_of(const FrfHandle& frf);
 FrfHandle frf_of_state(const pybind11::tuple& state);
@@ -22,7 +22,7 @@ AdditiveModel model_of_state(const pybind11::bytes& state);
 pybind11::tuple state_of(const FitResult& fit);
 FitResult fit_of_state(const pybind11::tuple& state);
 
-/// A log in memory is its arrays, a log in a file is the file's absolute name: it is opened again.
+/// For a log in memory its arrays, for a log in a file the absolute path of the file, which is opened again.
 pybind11::tuple state_of(const LogReader& log);
 std::shared_ptr<LogReader> log_of_state(const pybind11::tuple& state);
 

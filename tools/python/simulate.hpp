@@ -9,10 +9,10 @@
 
 namespace stageid {
 
-/// All runs of an experiment in memory, in one piece.
+/// All runs of an experiment in contiguous memory.
 class RunMemory final : public RunWriter {
  public:
-  /// @param runs, samples how many of how many rows are to come
+  /// @param runs, samples expected number of runs and of rows per run
   RunMemory(LogInfo info, std::size_t runs, std::size_t samples);
 
   const LogInfo& info() const noexcept override { return info_; }
@@ -23,7 +23,7 @@ class RunMemory final : public RunWriter {
 
   /// Rows of actuators + sensors + status word (slog_format.hpp), run after run.
   const std::vector<double>& rows() const noexcept { return rows_; }
-  /// One period a run, sample by sample, run after run.
+  /// One period per run, sample by sample, run after run.
   const std::vector<double>& excitation() const noexcept { return excitation_; }
 
  private:
@@ -44,7 +44,7 @@ struct SimulatedExperiment {
 /// Performs an experiment file on its simulated stage in virtual time: the same samples as
 /// `stageid run CONFIG --backend sim --pace 0`.
 /// @throws FileError, FormatError, std::invalid_argument; Interrupted
-/// @throws StageError if a limit or a fault ended the experiment: tells which
+/// @throws StageError naming the limit or fault that ended the experiment
 SimulatedExperiment simulate_experiment(const std::filesystem::path& config);
 
 }  // namespace stageid

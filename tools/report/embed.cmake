@@ -1,6 +1,6 @@
-# Writes a C++ source that holds text files as constants of stageid::report.
+# Writes a C++ source with text files as constants of stageid::report.
 #   cmake -DOUTPUT=assets.cpp "-DASSETS=name=file[|file...],..." -P embed.cmake
-# As numbers, not as string literals: no limit of length and nothing to quote.
+# As numbers instead of string literals, to avoid length limits and quoting.
 cmake_minimum_required(VERSION 3.25)
 
 set(constants "")
@@ -15,7 +15,7 @@ foreach(asset IN LISTS assets)
   set(hex "")
   foreach(file IN LISTS files)
     file(READ "${file}" bytes HEX)
-    # A source map beside the library is not there when the page is opened: leave its address out.
+    # The source map of the library is not available with the page, so remove its address.
     # ("sourceMappingURL=" up to the end of the line or comment; 0a newline, 20 blank.)
     string(REGEX REPLACE "2f2f2320736f757263654d617070696e6755524c3d([1-9a-f][0-9a-f]|0[^a])*" ""
       bytes "${bytes}")
@@ -24,7 +24,7 @@ foreach(asset IN LISTS assets)
     if(bytes MATCHES "736f757263654d617070696e6755524c")
       message(FATAL_ERROR "embed.cmake: ${file}: an address of a source map is left in it")
     endif()
-    # "</script" and "</style" would end the element that the text is put into.
+    # "</script" and "</style" would end the element into which the text is inserted.
     if(NOT name MATCHES "html" AND bytes MATCHES "3c2f7363726970|3c2f53435249|3c2f7374796c|3c212d2d")
       message(FATAL_ERROR "embed.cmake: ${file}: contains </script, </style or <!--; write it otherwise")
     endif()

@@ -25,7 +25,7 @@ std::string escape_html(std::string_view text) {
   return out;
 }
 
-// Inside <script> only "</script" and "<!--" matter, and both begin with '<'.
+// Within <script> only "</script" and "<!--" are special, and both begin with '<'.
 std::string script_safe(std::string_view json) {
   std::string out;
   out.reserve(json.size());

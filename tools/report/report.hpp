@@ -18,14 +18,15 @@
 
 namespace stageid {
 
-/// A mode of the plant that is known, because the plant was simulated.
+/// A known mode of a simulated plant.
 struct TrueMode {
   double natural_frequency_hz = 0.0;
   double damping_ratio = 0.0;
-  bool observable = true;  ///< false: no sensor of the sub-plant sees it; missing is then no fault
+  /// false: no sensor of the sub-plant observes it, so it need not be found
+  bool observable = true;
 };
 
-/// Something the reader should know before trusting the numbers, one line.
+/// Information that the reader needs before trusting the numbers, one line.
 struct ReportMessage {
   enum class Severity : std::uint8_t { note, warning, error };
   Severity severity = Severity::note;
@@ -34,52 +35,49 @@ struct ReportMessage {
 
 const char* to_string(ReportMessage::Severity severity) noexcept;  ///< "note", "warning", "error"
 
-/// What a check of the data found, as a row of the table of findings.
+/// A finding of a check of the data, as a row of the table of findings.
 struct ReportFinding {
   ReportMessage::Severity severity = ReportMessage::Severity::note;
   std::string channel;  ///< names; empty: the whole measurement
   std::string what;
-  std::string figure;  ///< the number that says so
+  std::string figure;  ///< the number that supports it
   std::string remedy;
 };
 
-/// A labelled number or word for the header, as it is to be read: {"error against the plant", "0.12
-/// %"}.
+/// A labelled number or word for the header, as displayed: {"error against the plant", "0.12 %"}.
 struct ReportFigure {
   std::string label;
   std::string value;
 };
 
-/// Wall time of one step of the job.
+/// Duration of one step of the job.
 struct ReportStep {
   std::string name;  ///< "run", "frf", "fit", ...
   double seconds = 0.0;
   std::string note;  ///< "512 MB/s", may be empty
 };
 
-/// A text to keep with the result: a configuration, a plan. Shown verbatim, folded.
+/// A text stored with the result: a configuration, a plan. Shown verbatim, folded.
 struct ReportDocument {
   std::string name;
   std::string text;
 };
 
-/// Another day or another model beside the one reported; its own parts may be absent. The channels are those
-/// of the report.
+/// Another day or another model for comparison; its own parts may be absent. The channels are those of the report.
 struct ReportComparison {
-  std::string title;  ///< how the page calls it
+  std::string title;  ///< its name on the page
   std::optional<AdditiveModel> model;
   Eigen::MatrixXcd response;        ///< (n_y n_u) x N on frf's lines; 0 x 0: none, or the same
   Eigen::MatrixXcd model_response;  ///< same shape; 0 x 0: none
 };
 
-/// What the page shows. Every part may be absent; the page then leaves its section out.
+/// Content of the page. Every part may be absent; its section is then omitted.
 struct ReportData {
   std::string title;
   std::string version;  ///< of the program
 
-  std::optional<FrfEstimate> frf;  ///< what was fitted
-  std::optional<FrfEstimate>
-      validation_frf;  ///< what was held back; same channels and lines as frf
+  std::optional<FrfEstimate> frf;             ///< the fitted response
+  std::optional<FrfEstimate> validation_frf;  ///< held back; same channels and lines as frf
 
   std::optional<AdditiveModel> model;
   Eigen::MatrixXcd model_response;  ///< (n_y n_u) x N on frf's lines, as measured; 0 x 0: none
@@ -89,7 +87,7 @@ struct ReportData {
 
   Eigen::MatrixXd cmif_curves;  ///< min(n_y, n_u) x N on frf's lines, largest first; 0 x 0: none
   CmifKind cmif_kind = CmifKind::accelerance;
-  std::vector<ModeCandidate> chosen_modes;  ///< where the fit started
+  std::vector<ModeCandidate> chosen_modes;  ///< start of the fit
   std::vector<TrueMode> true_modes;
   std::vector<StabilizationPole> stabilization;  ///< empty: no diagram
   std::optional<NonlinearityTest> nonlinearity;  ///< of frf's channels
@@ -97,24 +95,24 @@ struct ReportData {
   std::optional<ReportComparison> comparison;
 
   std::optional<Validation> validation;
-  std::vector<double> cost;            ///< one entry an iterate; empty: the model's cost_history
+  std::vector<double> cost;            ///< one entry per iterate; empty: cost_history of the model
   std::vector<std::string> decisions;  ///< in order
 
   std::vector<ReportFinding> findings;  ///< of the checks of the data, in any order
   std::vector<LogRun> runs;             ///< timing and health of the measurement
-  double sample_rate_hz = 0.0;  ///< of the runs; with it their speed against real time is told
-  double period_s = 0.0;        ///< of the loop's own clock; 0: virtual time
+  double sample_rate_hz = 0.0;          ///< of the runs; to show their speed relative to real time
+  double period_s = 0.0;                ///< of the loop, by wall clock; 0: virtual time
   std::vector<ReportStep> steps;
 
   std::vector<ReportFigure> figures;    ///< further figures for the header
-  std::vector<ReportMessage> messages;  ///< findings, the gravest first on the page
+  std::vector<ReportMessage> messages;  ///< findings; the page shows the gravest first
   std::vector<ReportDocument> documents;
   std::string provenance_json = "{}";  ///< of the job; those of frf and model are shown as well
 };
 
-/// Writes one self-contained page: no network, no other file. Whole or not at all; the same data
-/// give the same bytes. Everything that came from outside (names, texts) is escaped.
-/// @throws std::invalid_argument if shapes do not agree: "model_response: 52 x 100, but ...".
+/// Writes one self-contained page, atomically: no network, no other file. Equal data give equal bytes. All external
+/// names and texts are escaped.
+/// @throws std::invalid_argument if shapes do not match: "model_response: 52 x 100, but ...".
 /// @throws FileError
 void write_report(const std::filesystem::path& file, const ReportData& data);
 

@@ -4,9 +4,8 @@
 
 namespace stageid::report {
 
-// The page's own sources and the plot library, built into the program by tools/report/embed.cmake.
-extern const std::string_view
-    page_html;  ///< with {{title}}, {{style}}, {{library}}, ... to fill in
+// The sources of the page and the plot library, embedded by tools/report/embed.cmake.
+extern const std::string_view page_html;  ///< template with {{title}}, {{style}}, {{library}}, ...
 extern const std::string_view dashboard_html;  ///< the same with {{dashboard_css}}
 extern const std::string_view dashboard_css;
 extern const std::string_view dashboard_js;

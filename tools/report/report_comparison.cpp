@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// Relative distance of two lines that are the same one.
+/// Largest relative distance of two lines that are considered equal.
 constexpr double kSameLine = 1e-9;
 
 void check_channels(const ReportData& own, const std::string& title, const ChannelList& outputs,
@@ -30,7 +30,7 @@ void check_channels(const ReportData& own, const std::string& title, const Chann
                   own_inputs.names.empty() ? "none" : own_inputs.names[0]));
 }
 
-/// The columns of other that are own's lines; 0 x 0 if one is missing.
+/// The columns of `other` on the lines of `own`; 0 x 0 if one is missing.
 Eigen::MatrixXcd on_lines_of(const FrfEstimate& own, const FrfEstimate& other) {
   Eigen::MatrixXcd out(other.response.rows(), own.lines());
   Eigen::Index at = 0;

@@ -13,7 +13,7 @@ namespace stageid::report {
 nlohmann::json stabilization_json(const std::vector<StabilizationPole>& poles);
 
 /// {"bands": [[low_hz, high_hz], ...], "p_value": [[channel], [band]], "distortion": the same,
-/// "chance": share of tests that a linear plant fails}; channel = output + outputs * input.
+/// "chance": share of tests that a linear plant fails by chance}; channel = output + outputs * input.
 nlohmann::json nonlinearity_json(const NonlinearityTest& test);
 
 /// [{severity, channel, what, figure, remedy}], the gravest first.

@@ -17,7 +17,7 @@ std::string packed_planes(const std::vector<T>& values) {
   return packed(byte_planes(values));
 }
 
-/// Expected values one after the other, and what turned out.
+/// Predicts values one after another from the actual ones before.
 class Extrapolation {
  public:
   explicit Extrapolation(const Expectation& expected) : expected_(expected) {}
@@ -50,7 +50,7 @@ float to_float(double value) {
   return static_cast<float>(std::clamp(value, -most, most));
 }
 
-/// Place in the order of all float32, -0 just before 0.
+/// Index in the order of all float32, -0 just before 0.
 std::uint32_t place_of(float value) {
   const auto bits = std::bit_cast<std::uint32_t>(value);
   return (bits >> 31) != 0 ? ~bits : bits | 0x80000000u;
@@ -91,7 +91,7 @@ std::complex<double> value_of(const Block16& block) {
   return {std::ldexp(block.re, power), std::ldexp(block.im, power)};
 }
 
-/// The mantissa less the expected one, as the page rounds it: halves up.
+/// The mantissa minus the expected one, with the rounding of the page: halves up.
 std::uint16_t mantissa_code(std::int16_t mantissa, double expected, int exponent) {
   const double scaled = std::floor(std::ldexp(expected, 15 - exponent) + 0.5);
   const auto guess = static_cast<std::int32_t>(std::clamp(scaled, -32767.0, 32767.0));

@@ -38,7 +38,7 @@ std::string read_text(const std::filesystem::path& file) {
   return text.str();
 }
 
-/// "stageid-frf", "stageid-log", ... as the file says itself; empty if it does not.
+/// The format in the file: "stageid-frf", "stageid-log", ...; empty if there is none.
 std::string kind_of(const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
   if (ending == ".slog") return "stageid-log";
@@ -128,7 +128,7 @@ void add_response(ReportData& data, const ReportInput& input) {
     data.validation = validate(model, *data.validation_frf, distortion_of(model));
 }
 
-/// All that delays the response, which no polynomial in z should have to imitate.
+/// All delays of the response, which a polynomial in z should not have to approximate.
 double delay_in(const FrfEstimate& frf, const std::optional<AdditiveModel>& model) {
   double delay_s = 0.0;
   if (frf.hold == Hold::zoh && frf.compensated != Compensation::hold && frf.sample_rate_hz > 0.0)
@@ -137,7 +137,7 @@ double delay_in(const FrfEstimate& frf, const std::optional<AdditiveModel>& mode
   return delay_s;
 }
 
-/// A fault of the data is an error of the page, a doubt a warning; what could not be checked is a note.
+/// A fault of the data is an error on the page, a doubt a warning, an impossible check a note.
 ReportMessage::Severity severity_of(const Finding& finding) {
   switch (finding.severity) {
     case Severity::fault:
@@ -150,7 +150,7 @@ ReportMessage::Severity severity_of(const Finding& finding) {
   return ReportMessage::Severity::note;
 }
 
-/// The verdicts that the file holds stand for all lines that were measured, whatever band was fitted.
+/// The verdicts in the file refer to all measured lines, whatever band was fitted.
 void add_checks(ReportData& data) {
   const FrfEstimate& frf = *data.frf;
   if (NonlinearityTest test = linearity_of(frf); test.band_hz.rows() > 0)
@@ -166,8 +166,8 @@ void add_stabilization(ReportData& data) {
   if (frf.lines() > 2 * options.most_order) data.stabilization = stabilization(frf, options);
 }
 
-/// What only a summary knows: the truth of a simulated plant, and how long the steps took. Notes that stand
-/// in the table of findings are not told twice.
+/// Reads the parts that only a summary has: the truth of a simulated plant, and the duration of the steps. Notes that
+/// are in the table of findings are not repeated.
 void add_summary(ReportData& data, const std::filesystem::path& file) {
   const JsonFile json(file, "stageid-summary");
   const JsonNode summary = json.root();
@@ -190,8 +190,8 @@ void add_summary(ReportData& data, const std::filesystem::path& file) {
       data.messages.push_back({ReportMessage::Severity::warning, note.text()});
 }
 
-/// A log keeps the stage file as it was; one of another version may have keys that are unknown here,
-/// and the shapes do without.
+/// A log contains the stage file. That of another version may have unknown keys; the shapes are then shown without
+/// positions.
 StageGeometry geometry_of_log(const std::filesystem::path& file, const Json& metadata) {
   const std::string stage = text_in(metadata, "stage");
   if (stage.empty()) return {};

@@ -55,13 +55,13 @@ const char* to_string(CmifKind kind) {
   return "response";
 }
 
-/// An array that is in the page already, as the page decodes it.
+/// An array that is already in the page, as decoded by the page.
 struct Based {
   const char* id = "";
   const Eigen::MatrixXcd* values = nullptr;
 };
 
-/// Blocks and their descriptions, added together so that none is without the other.
+/// Blocks with their descriptions, always added together.
 class Arrays {
  public:
   void add(const std::string& id, const char* type, std::string text, Json more = Json::object()) {
@@ -80,8 +80,8 @@ class Arrays {
     return add_complex(id, "c40", encode_complex_block16(values, {base.values, order}), order,
                        base);
   }
-  /// Square roots of variances. Each by std::sqrt: Eigen's own is an approximation on some
-  /// machines, and a page must not depend on the machine.
+  /// Square roots of variances by std::sqrt, because that of Eigen is an approximation on some machines, and a page
+  /// must not depend on the machine.
   void add_deviation(const std::string& id, const Eigen::MatrixXd& variance) {
     add_log_bytes(id, variance.unaryExpr([](double v) { return std::sqrt(v); }));
   }
@@ -105,7 +105,7 @@ class Arrays {
   std::vector<Block> blocks_;
 };
 
-/// The model travels as the residual: small errors of small numbers stay small in both.
+/// The model is stored as the residual, so that small errors of small numbers remain small in both.
 void add_measured(const ReportData& data, Arrays& arrays) {
   const FrfEstimate& frf = *data.frf;
   Eigen::MatrixXcd residual;
@@ -114,7 +114,7 @@ void add_measured(const ReportData& data, Arrays& arrays) {
     residual = arrays.add_block16("residual", frf.response - data.model_response, 0);
     from_residual = {"residual", &residual};
   }
-  // Measured less residual is the model, and that is smooth; noise is not, and twice differenced it grows.
+  // Measured minus residual is the model, which is smooth; second differences would amplify noise.
   const int order = from_residual.values != nullptr ? 2 : 1;
   const Eigen::MatrixXcd response =
       arrays.add_float32("response", frf.response, order, from_residual);
@@ -257,7 +257,7 @@ Json run_json(const LogRun& run, double sample_rate_hz) {
           {"recorded_s", recorded_s}};
 }
 
-/// A provenance text as JSON where it is some, else as the text it is.
+/// A provenance as JSON if it can be parsed, else as text.
 Json provenance(const std::string& text) {
   Json parsed = Json::parse(text, nullptr, false);
   return parsed.is_discarded() ? Json(text) : parsed;
@@ -303,7 +303,7 @@ Json candidates_json(const std::vector<ModeCandidate>& candidates) {
   return out;
 }
 
-/// Valid UTF-8 whatever came in, and safe inside <script>.
+/// Always valid UTF-8, and safe inside <script>.
 std::string text_of(const Json& json) {
   return script_safe(json.dump(-1, ' ', true, Json::error_handler_t::replace));
 }

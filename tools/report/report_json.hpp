@@ -13,9 +13,9 @@ struct Block {
   std::string base64;  ///< see report_encoding.hpp and report_packing.hpp
 };
 
-/// Everything the page's script reads.
+/// Data for the script of the page.
 struct PageContent {
-  std::string json;  ///< safe inside <script>: no '<', valid UTF-8 whatever came in
+  std::string json;  ///< safe inside <script>: no '<', always valid UTF-8
   std::vector<Block> blocks;
 };
 

@@ -27,8 +27,8 @@ std::vector<ModeRow> identified(const AdditiveModel& model) {
   return rows;
 }
 
-/// Pairs that never cross, by dynamic programming as for the alignment of two sequences: leaving a
-/// mode alone costs `furthest` a side, so that every pair nearer than that is worth its cost.
+/// Pairs that never cross, by dynamic programming as for the alignment of two sequences. An unpaired mode costs
+/// `furthest`, so every closer pair is preferred.
 class Alignment {
  public:
   Alignment(const std::vector<ModeRow>& rows, const std::vector<TrueMode>& truth, double furthest)
@@ -39,7 +39,7 @@ class Alignment {
       for (Eigen::Index j = cost_.cols() - 1; j >= 0; --j) cost_(i, j) = best(i, j);
   }
 
-  /// Index of the true mode of each row, -1 for none.
+  /// Index of the true mode per row, -1 for none.
   std::vector<int> partners() const {
     std::vector<int> partner(rows_.size(), -1);
     Eigen::Index i = 0;

@@ -9,8 +9,7 @@
 
 namespace stageid {
 
-/// One line of the table of modes: an identified mode, a true one, or both where they belong
-/// together.
+/// One row of the table of modes: an identified mode, a true one, or a pair of both.
 struct ModeRow {
   std::optional<double> frequency_hz;
   std::optional<double> damping_ratio;
@@ -18,16 +17,16 @@ struct ModeRow {
   std::optional<double> damping_std;
   std::optional<TrueMode> truth;
 
-  /// (estimate - truth) / standard deviation, where all three are known.
+  /// (estimate - truth) / standard deviation, if all three are known.
   std::optional<double> frequency_deviation() const;
   std::optional<double> damping_deviation() const;
   /// |estimate - truth| / truth of the natural frequency.
   std::optional<double> relative_frequency_error() const;
 };
 
-/// Pairs the modes of a model with true ones, one to one and in the order of frequency, such that
-/// as many as possible pair up and the sum of |f - f_true| / f_true is least; no pair is further
-/// apart than `furthest`. Rows by frequency (the truth's where nothing was identified).
+/// Pairs the modes of a model with true ones, one to one and in the order of frequency, such that the number of pairs
+/// is largest and the sum of |f - f_true| / f_true smallest; no pair differs by more than `furthest`. Rows by
+/// frequency (that of the truth if nothing was identified).
 std::vector<ModeRow> mode_table(const AdditiveModel& model, std::span<const TrueMode> truth,
                                 double furthest = 0.02);
 

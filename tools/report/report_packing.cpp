@@ -29,7 +29,7 @@ std::string base64(std::span<const std::uint8_t> bytes) {
 std::string packed(std::span<const std::uint8_t> bytes) {
   uLongf size = compressBound(static_cast<uLong>(bytes.size()));
   std::vector<std::uint8_t> out(size);
-  // With room for the bound only memory can fail.
+  // With the bound as size, only memory allocation can fail.
   if (compress2(out.data(), &size, bytes.data(), static_cast<uLong>(bytes.size()),
                 Z_BEST_COMPRESSION) != Z_OK)
     throw std::bad_alloc();

@@ -8,17 +8,17 @@
 
 namespace stageid::report {
 
-// How bytes travel inside the page: byte planes, deflate (zlib, RFC 1950), base64. The page unpacks
-// them with the browser's own DecompressionStream: tools/report/js/decode.js.
+// Packing of bytes in the page: byte planes, deflate (zlib, RFC 1950), base64. The page unpacks them with the
+// browser's own DecompressionStream: tools/report/js/decode.js.
 
 /// RFC 4648, with padding.
 std::string base64(std::span<const std::uint8_t> bytes);
 
-/// Deflated, in base64. The same bytes give the same text.
+/// Deflated, in base64. Equal bytes give equal text.
 std::string packed(std::span<const std::uint8_t> bytes);
 
-/// The lowest bytes of all numbers, then the next, ...: bytes that are alike stand together, and deflate
-/// codes each place of a byte by itself.
+/// The lowest bytes of all numbers, then the next, ...: similar bytes are adjacent, and deflate codes each place
+/// separately.
 template <typename T>
 std::vector<std::uint8_t> byte_planes(const std::vector<T>& values) {
   std::vector<std::uint8_t> bytes(values.size() * sizeof(T));

@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// Of a shape of norm one: a pixel is a thousandth.
+/// For shapes of norm one; a pixel is a thousandth.
 constexpr int kShapeDigits = 5;
 
 Json rounded(double value, int digits) {

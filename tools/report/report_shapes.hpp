@@ -8,21 +8,21 @@
 
 namespace stageid::report {
 
-/// The modes of a model with their shapes, by frequency: what the report animates and compares.
+/// The modes of a model with their shapes, by frequency, for animation and comparison.
 std::vector<ModeShape> shapes_by_frequency(const AdditiveModel& model);
 
 /// {"modes": [{frequency_hz, damping_ratio, modal_mass, not_rank_one, outputs: [re, im, ...],
 /// inputs: [re, im, ...]}], "output_mac": [[...]], "input_mac": [[...]]}; the MACs modes x modes.
 nlohmann::json shapes_json(const AdditiveModel& model);
 
-/// {"outputs": [{position_m, direction} or null], "inputs": [...]} in the order of the model's
-/// channels, by name; null where no channel has a place.
+/// {"outputs": [{position_m, direction} or null], "inputs": [...]} in the order of the channels of the model, by name;
+/// null if no channel has a position.
 nlohmann::json geometry_json(const StageGeometry& geometry, const ChannelList& outputs,
                              const ChannelList& inputs);
 
 inline constexpr int kMacDigits = 4;
 
-/// Rows of a matrix, rounded to `digits` decimals; not finite numbers become null.
+/// Rows of a matrix, rounded to `digits` decimals; values that are not finite become null.
 nlohmann::json matrix_json(const Eigen::MatrixXd& matrix, int digits);
 
 }  // namespace stageid::report

@@ -3,8 +3,8 @@
 namespace stageid::report {
 namespace {
 
-/// Realizations less one below which the scatter between them says little: the standard deviation
-/// of one value would itself be uncertain by half and draw a ragged band.
+/// With fewer degrees of freedom (realizations minus one), the standard deviation of a value would itself be uncertain
+/// by half, and the band would be ragged.
 constexpr double kLeastTotalDof = 4.0;
 
 }  // namespace

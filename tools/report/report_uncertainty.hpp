@@ -6,12 +6,12 @@
 
 namespace stageid::report {
 
-/// The variance that the standard deviation of page and pictures stands for: the total one where enough
-/// realizations tell it, else that of the noise. A view, valid while `frf` lives.
+/// The variance for the standard deviations on page and pictures: the total one if there are enough realizations, else
+/// that of the noise. A view, valid during the lifetime of `frf`.
 struct Uncertainty {
-  const Eigen::MatrixXd* variance = nullptr;  ///< null: none is known
+  const Eigen::MatrixXd* variance = nullptr;  ///< null: unknown
   const char* kind = "";                      ///< "total", "noise" or ""
-  double dof = 0.0;                           ///< of it; 0: not known
+  double dof = 0.0;                           ///< 0: unknown
 };
 Uncertainty uncertainty(const FrfEstimate& frf);
 

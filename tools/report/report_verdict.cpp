@@ -14,11 +14,11 @@ namespace {
 
 using Reasons = std::vector<std::string>;
 
-/// @returns whether the model is not to be trusted.
+/// @returns whether the model is not trustworthy.
 bool judge_fit(const ReportData& data, Reasons& reasons) {
   const ModelVerdict verdict = judge_model(*data.model, {}, data.validation);
   for (const std::string& reason : verdict.reasons) {
-    // Doubts of the data stand among the findings already, without their remedy.
+    // Doubts of the data are already in the findings, without their remedy.
     const auto said = [&](const std::string& other) { return reason.starts_with(other); };
     if (std::ranges::none_of(reasons, said)) reasons.push_back(reason);
   }
@@ -29,7 +29,7 @@ void judge_modes(const ReportData& data, Reasons& reasons) {
   if (data.true_modes.empty()) return;
   for (const ModeRow& row : mode_table(*data.model, data.true_modes)) {
     if (!row.truth) {
-      // Beside the band a mode stands for what the plant does there: suspension, modes above.
+      // Outside the band, a mode represents the rest of the plant: suspension, modes above.
       const auto& band_hz = data.model->fit.band_hz;
       if (*row.frequency_hz < band_hz[0] || (*row.frequency_hz > band_hz[1] && band_hz[1] > 0.0))
         continue;
@@ -48,7 +48,7 @@ void judge_modes(const ReportData& data, Reasons& reasons) {
   }
 }
 
-/// @returns whether one of them is an error.
+/// @returns whether one of the findings is an error.
 bool judge_findings(const ReportData& data, Reasons& reasons) {
   bool error = false;
   for (const ReportFinding& finding : data.findings) {

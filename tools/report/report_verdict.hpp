@@ -8,12 +8,12 @@
 
 namespace stageid {
 
-/// What the head of the page says of the result.
+/// The verdict in the head of the page.
 struct Verdict {
   enum class Level : std::uint8_t {
     none,  ///< nothing to judge: a measurement without a model
     good,
-    doubt,  ///< the reasons say why
+    doubt,  ///< see the reasons
     bad
   };
   Level level = Level::none;
@@ -23,8 +23,8 @@ struct Verdict {
 
 const char* to_string(Verdict::Level level) noexcept;
 
-/// Judges the model by how the fit ended, by held-back data, by the health of the runs, by the
-/// truth where it is known (3 standard deviations and 1e-4) and by the messages.
+/// Judges the model by the status of the fit, the held-back data, the health of the runs, the truth if known (3
+/// standard deviations and 1e-4) and the messages.
 Verdict judge(const ReportData& data);
 
 }  // namespace stageid

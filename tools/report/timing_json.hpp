@@ -6,8 +6,8 @@
 
 namespace stageid {
 
-/// For pages and --json: quantiles in seconds and the bins [[from_s, to_s, count], ...] of both
-/// histograms, and what was skipped; null if nothing was measured (virtual time).
+/// For pages and --json: quantiles in seconds and the bins [[from_s, to_s, count], ...] of both histograms, and
+/// skipped cycles; null without timing (virtual time).
 nlohmann::json timing_json(const RunTiming& timing);
 
 }  // namespace stageid

@@ -18,7 +18,7 @@ std::string unit_of(const ChannelList& channels, Eigen::Index c) {
   return at < channels.units.size() ? channels.units[at] : std::string();
 }
 
-/// Of B_m s^m / s^l, so that P has output over input.
+/// Unit of B_m s^m / s^l, such that P has output over input.
 std::string numerator_unit(const AdditiveModel& model, Eigen::Index y, Eigen::Index u,
                            int power_of_s) {
   const std::string ratio =
@@ -35,7 +35,7 @@ void add_denominators(const AdditiveModel& model, ParameterNames& out) {
     }
 }
 
-/// One delay of the plant stands for all inputs; of one a channel the last output's is no unknown.
+/// A common delay applies to all inputs; with one per channel, that of the last output is held.
 void add_delays(const AdditiveModel& model, Eigen::Index delays, ParameterNames& out) {
   const auto add = [&](std::string name, double value) {
     out.names.push_back(std::move(name));
@@ -96,7 +96,7 @@ ParameterNames parameter_names(const FitResult& result) {
   add_numerators(result.model, numerators);
   ParameterNames out;
   add_denominators(result.model, out);
-  // What is left of the rows are the delays that were free.
+  // The remaining rows are the free delays.
   const auto known = static_cast<Eigen::Index>(out.names.size() + numerators.names.size());
   add_delays(result.model, result.covariance.sandwich.rows() - known, out);
   const auto append = [](auto& to, const auto& from) {

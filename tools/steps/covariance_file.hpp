@@ -8,18 +8,17 @@
 
 namespace stageid {
 
-/// What a row of FitCovariance belongs to.
+/// The parameters of the rows of FitCovariance.
 struct ParameterNames {
-  std::vector<std::string>
-      names;  ///< where it stands in model.json: submodels[1].numerator[0][y][u]
+  std::vector<std::string> names;  ///< key in model.json: submodels[1].numerator[0][y][u]
   std::vector<std::string> units;
   std::vector<double> values;
 };
-/// @pre result.covariance is there
+/// @pre result.covariance is not empty
 ParameterNames parameter_names(const FitResult& result);
 
-/// Writes the covariance of a fit as in docs/formats.md, whole or not at all.
-/// @pre result.covariance is there   @throws FileError
+/// Writes the covariance of a fit as in docs/formats.md, atomically.
+/// @pre result.covariance is not empty   @throws FileError
 void write_covariance(const std::filesystem::path& file, const FitResult& result,
                       const Eigen::VectorXd& frequency_hz);
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view kFormat = "stageid-fft-wisdom 1 ";
 constexpr std::size_t kFingerprintDigits = 32;
-constexpr std::uintmax_t kMostBytes = 16U << 20U;  // thousands of lengths
+constexpr std::uintmax_t kMostBytes = 16U << 20U;  // enough for thousands of lengths
 constexpr const char* kRemedy = "remove it or use another file to time new plans";
 
 std::string read_bounded(const std::filesystem::path& file) {
@@ -35,7 +35,7 @@ std::string read_bounded(const std::filesystem::path& file) {
   return text.str();
 }
 
-/// What follows the first line. @throws FormatError
+/// The text after the first line. @throws FormatError
 std::string checked_plans(const std::filesystem::path& file) {
   const std::string text = read_bounded(file);
   const std::size_t line = kFormat.size() + kFingerprintDigits + 1;
@@ -53,7 +53,7 @@ FftWisdomFile::FftWisdomFile(std::filesystem::path file) : file_(std::move(file)
   if (std::filesystem::exists(file_)) {
     kept_ = checked_plans(file_);
   } else {
-    const OutputFile can_be_made(file_);  // before the long work
+    const OutputFile can_be_made(file_);  // checked before the long work
   }
   try {
     wisdom_ = std::make_unique<FftWisdom>(kept_);

@@ -58,14 +58,14 @@ std::string with_deviation(double value, double deviation) {
 
 Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
-/// A mode as its own pole; other submodels' as the fit left them.
+/// A mode has its own pole; those of other submodels are from the fit.
 std::vector<PoleEstimate> poles_of(const Submodel& s) {
   if (!s.is_mode()) return s.poles;
   return {{s.natural_frequency_hz(), s.damping_ratio(), s.natural_frequency_std_hz,
            s.damping_ratio_std}};
 }
 
-/// What an FRF is known to suffer from, the causes before what follows from them: modes that imitate distortion.
+/// Known problems of an FRF, causes before their consequences: distortion can be fitted as modes.
 std::vector<std::string> doubts_about(const FrfEstimate& frf, const std::vector<Finding>& health) {
   std::vector<std::string> doubts = health_notes(health, Severity::doubt);
   if (std::string nonlinear = nonlinearity_sentence(frf); !nonlinear.empty())

@@ -17,30 +17,30 @@ struct FitStep {
 
 /// Fits, shows progress, and completes the provenance of the model. A signal ends the fit with the best model so far,
 /// FitStatus::interrupted; before the first step there is none.
-/// @param frf_name, frf_fingerprint of the FRF that was fitted.
+/// @param frf_name, frf_fingerprint of the fitted FRF.
 /// @throws std::invalid_argument, Interrupted
 FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
                           const std::string& frf_fingerprint, const Console& console);
 
-/// Names what is asked of a fit, see frf_request_id().
+/// Identifies a request for a fit, see frf_request_id().
 std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint);
 
-/// The distortion that a model's provenance tells: what its fit knew of the plant.
+/// The distortion in the provenance of a model, known when it was fitted.
 Distortion distortion_of(const AdditiveModel& model);
 
-/// The decisions that a model's provenance tells.
+/// The decisions in the provenance of a model.
 std::vector<std::string> decisions_of(const AdditiveModel& model);
-/// What the data of the fit were known to suffer from: doubts of their health, nonlinearity.
+/// Known problems of the fitted data: doubts of their health, nonlinearity.
 std::vector<std::string> doubts_of(const AdditiveModel& model);
 
-/// "relative error 0.012", or that no channel responds.
+/// "relative error 0.012", or a text that no channel responds.
 std::string relative_error_text(const FitRecord& fit);
 
 /// For people: table of modes with standard deviations; cost history in one line.
 std::vector<std::string> mode_table(const AdditiveModel& model);
 std::string cost_line(const std::vector<double>& cost);
-/// The model's delays with the deviations of estimated ones: one line for a delay that all channels share,
-/// else one per channel; empty without a delay.
+/// The delays of the model with the deviations of estimated ones: one line for a common delay, else one per channel;
+/// empty without a delay.
 std::vector<std::string> delay_lines(const AdditiveModel& model);
 /// The same for --json.
 nlohmann::ordered_json modes_json(const AdditiveModel& model);

@@ -23,7 +23,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The lasting part of a log's metadata: all but times.
+/// The reproducible part of the metadata of a log: everything except times.
 Json lasting_metadata(const LogReader& log) {
   Json metadata = Json::parse(log.info().metadata_json, nullptr, false);
   if (!metadata.is_object()) return Json::object();
@@ -80,7 +80,7 @@ FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfO
 FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
                      const HealthRequest& health, const Console& console) {
   FrfStep step;
-  std::optional<NominalStage> nominal;  // before the long work: a stage file may be wrong
+  std::optional<NominalStage> nominal;  // before the long work, because a stage file may be invalid
   if (health.wanted) nominal = nominal_stage_of(logs.front()->info(), health.stage_file);
   Progress progress(console, "frf", "MB", 1.0 / kBytesPerMegabyte);
   options.progress = [&](double done, double total) {

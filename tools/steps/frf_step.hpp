@@ -14,30 +14,30 @@ struct FrfStep {
   FrfEstimate frf;
   double seconds = 0.0;
   double bytes = 0.0;             ///< of samples that were read
-  std::vector<Finding> findings;  ///< on the data's health, if it was looked at
+  std::vector<Finding> findings;  ///< on the health of the data, if examined
 };
 
-/// What the health of the data is held against.
+/// References for the health check of the data.
 struct HealthRequest {
   bool wanted = true;
-  std::filesystem::path stage_file;  ///< empty: the one that the log carries
+  std::filesystem::path stage_file;  ///< empty: the one in the log
 };
 
-/// Estimates, shows progress, and completes the provenance: configuration, seeds, the request's
-/// identity (frf_request_id()), and the findings on the data's health, which are looked for in the same
-/// reading. Nothing of it depends on directory, time or threads.
+/// Estimates, shows progress, and completes the provenance: configuration, seeds, identity of the request
+/// (frf_request_id()), and the findings on the health of the data, which are examined in the same pass. The result
+/// does not depend on directory, time or threads.
 /// @throws FileError, FormatError, std::invalid_argument, Interrupted
 FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
                      const HealthRequest& health, const Console& console);
-/// The same of logs that it opens.
+/// The same for log files.
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
                      const HealthRequest& health, const Console& console);
 
-/// Adds to the provenance which timed FFT plans were used ("fft_plans"): rounding depends on them.
+/// Adds to the provenance which timed FFT plans were used ("fft_plans"), because rounding depends on them.
 void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint);
 
-/// Names what is asked of the estimate: version, options and what the logs say of their experiment.
-/// Two estimates of equal identity from the same samples are equal.
+/// Identifies a request: version, options and the experiment metadata of the logs. Two estimates with equal identity
+/// from the same samples are equal.
 std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options);
 
 /// "request_id" of a provenance; empty if there is none.

@@ -24,7 +24,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr Severity kSeverities[] = {Severity::fault, Severity::doubt, Severity::unchecked};
 
-/// The cause is for programs that read the table now; notes need severity and texts.
+/// The cause is for programs only; stored findings need severity and texts.
 Finding finding_of(const Json& object) {
   Finding finding;
   for (const Severity severity : kSeverities)
@@ -58,7 +58,7 @@ std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& file
   try {
     both = estimate_plant_frf_and_health(opened.logs(), options);
   } catch (const FormatError&) {
-    // What cannot be estimated may still be examined, and that says why.
+    // Data without an estimate can still be examined, which gives the reason.
   } catch (const std::invalid_argument&) {
   }
   if (!both) return check_health(read_health_record(opened.logs(), options), nominal);
@@ -114,7 +114,7 @@ std::vector<std::string> health_notes(const std::vector<Finding>& findings,
 
 std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings) {
   for (Finding& finding : check_interpolation(frf)) findings.push_back(std::move(finding));
-  // A drift or a mode that rings is named already; the bands that it spoils say less.
+  // Drift and ringing modes are already reported; the bands that they affect add little.
   if (!has(findings, Cause::drift) && !has(findings, Cause::unsettled))
     for (Finding& finding : check_settling(frf)) findings.push_back(std::move(finding));
   std::stable_sort(findings.begin(), findings.end(),

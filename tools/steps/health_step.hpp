@@ -14,29 +14,29 @@
 
 namespace stageid {
 
-/// Reads logs and examines them. Controller and rigid body are those of `stage_file`, or of the stage
-/// file that the log carries. Shows progress.
-/// @throws what open_log(), read_health_record() and nominal_stage_of() throw; Interrupted
+/// Reads logs and examines them. Controller and rigid body are those of `stage_file`, or of the stage file in the log.
+/// Shows progress.
+/// @throws as open_log(), read_health_record() and nominal_stage_of(); Interrupted
 std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
                                   FrfOptions options, const std::filesystem::path& stage_file,
                                   const Console& console);
 
-/// What the logs' record and the response estimated from them show.
+/// Findings from the record of the logs and the response estimated from them.
 std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
                              const std::optional<NominalStage>& nominal);
 
-/// The table: one line a finding, in columns; a single line if there is none.
+/// The table with one line per finding; a single line if there are none.
 std::vector<std::string> health_lines(const std::vector<Finding>& findings);
 nlohmann::ordered_json health_json(const std::vector<Finding>& findings);
 
-/// Faults and doubts as sentences, for notes; or those of one severity.
+/// Faults and doubts as sentences, for notes; or only those of one severity.
 std::vector<std::string> health_notes(const std::vector<Finding>& findings,
                                       std::optional<Severity> only = {});
 
-/// Adds what the response itself shows (check_interpolation(), check_settling()) to the findings about its logs and keeps
+/// Adds findings from the response itself (check_interpolation(), check_settling()) to those of its logs, and stores
 /// all of them as "health" in its provenance; returns them, faults first.
 std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings);
-/// What keep_health() kept. What is not there, or is not as written by us, is none.
+/// The findings stored by keep_health(); empty if there are none in our format.
 std::vector<Finding> health_of(const std::string& provenance_json);
 
 }  // namespace stageid

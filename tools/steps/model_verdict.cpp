@@ -29,11 +29,11 @@ ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>&
     if (!is_trustworthy(fit))
       distrust(fit.message.empty() ? "the fit ended with status " + fit.status : fit.message);
   };
-  // Faults of the data that were fitted stand in its message; those of other data come before it.
+  // Faults of the fitted data are in the message of the fit; those of other data come before it.
   if (fit.status == to_string(FitStatus::faulty_data)) judge_fit();
   for (std::string& fault : health_notes(health, Severity::fault)) distrust(std::move(fault));
   judge_fit();
-  // Before the residual: where that is too large they are the cause.
+  // Doubts come before the residual, because they are the cause if it is too large.
   for (std::string& doubt : doubts_of(model)) add(std::move(doubt));
   for (std::string& doubt : health_notes(health, Severity::doubt)) add(std::move(doubt));
   if (validation && !validation->explained) distrust("on held-back data " + validation->reason);

@@ -11,16 +11,16 @@
 
 namespace stageid {
 
-/// Whether a model may be trusted, as the exit code says it.
+/// Whether a model can be trusted, as in the exit code.
 struct ModelVerdict {
   bool trustworthy = true;
-  bool validated = false;            ///< compared with data that were held back and have variances
-  std::vector<std::string> reasons;  ///< the gravest first; of a trustworthy model what to look at
+  bool validated = false;            ///< compared with held-back data with variances
+  std::vector<std::string> reasons;  ///< the gravest first; for a trustworthy model, warnings
 };
 
-/// Faults of the data, the end of the fit, doubts about the data, then the residual on data that were held back. Doubts
-/// alone leave the model trustworthy.
-/// @param health of the data that the model is compared with, or was fitted to
+/// Checks, in this order: faults of the data, the status of the fit, doubts about the data, then the residual on
+/// held-back data. Doubts alone leave the model trustworthy.
+/// @param health of the data to which the model is compared, or was fitted
 ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>& health,
                          const std::optional<Validation>& validation);
 

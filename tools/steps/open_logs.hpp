@@ -12,7 +12,7 @@ namespace stageid {
 /// Progress of reading logs is shown in megabytes.
 inline constexpr double kBytesPerMegabyte = 1e6;
 
-/// Several logs that are read together. @throws what open_log() throws
+/// Several logs that are read together. @throws as open_log()
 class OpenLogs {
  public:
   explicit OpenLogs(const std::vector<std::filesystem::path>& files) {

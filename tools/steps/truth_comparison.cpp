@@ -14,7 +14,7 @@
 namespace stageid {
 namespace {
 
-/// Farther than this apart, relative to the frequency, two modes are not the same.
+/// Largest relative frequency difference of two modes that are considered the same.
 constexpr double kFarthest = 0.05;
 
 struct Pair {
@@ -53,7 +53,7 @@ void match(const std::vector<const Submodel*>& estimated, const FrfEstimate& frf
     mode.frequency_std_hz = s.natural_frequency_std_hz.value_or(0.0);
     mode.damping_std = s.damping_ratio_std.value_or(0.0);
   }
-  // Modes beside the lines stand for what the plant does there: suspension, modes above the band.
+  // Modes outside the lines represent the rest of the plant there: suspension, modes above the band.
   const double low_hz = frf.frequency_hz[0];
   const double high_hz = frf.frequency_hz[frf.lines() - 1];
   for (std::size_t e = 0; e < estimated.size(); ++e) {
@@ -62,7 +62,7 @@ void match(const std::vector<const Submodel*>& estimated, const FrfEstimate& frf
   }
 }
 
-/// The exact plant on the lines, channels as in `frf`, as the loop saw it.
+/// The exact plant on the lines, channels as in `frf`, as measured in the loop.
 Eigen::MatrixXcd exact_response(const FrfEstimate& frf, const WaferStageSpec& stage) {
   const std::vector<PlantMode> modes = wafer_stage_modes(stage);
   Eigen::MatrixXcd G(frf.n_outputs() * frf.n_inputs(), frf.lines());

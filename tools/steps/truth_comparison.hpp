@@ -10,7 +10,7 @@
 
 namespace stageid {
 
-/// A mode of the simulated plant and the estimated one that is nearest to it.
+/// A mode of the simulated plant and the nearest estimated one.
 struct ModeComparison {
   double true_frequency_hz = 0.0;
   double true_damping = 0.0;
@@ -25,17 +25,16 @@ struct ModeComparison {
 
 struct TruthComparison {
   std::vector<ModeComparison> modes;  ///< every true mode in the band
-  std::vector<double> extra_hz;       ///< estimated modes on the lines that belong to no true one
+  std::vector<double> extra_hz;       ///< estimated modes on the lines without a true one
   std::vector<double> outside_hz;     ///< estimated modes below or above the lines
-  /// Of the model against the exact plant, over lines and channels that respond; NaN: none does.
+  /// Of the model relative to the exact plant, over responding lines and channels; NaN: there are none.
   double relative_rms_error = 0.0;
   double normalized_error = 0.0;  ///< sqrt(sum |P - G|^2 / sum |G|^2)
 };
 
-/// Compares a model with the exact plant of a simulated stage: flexible out-of-plane modes below
-/// the last line (one to one, the nearest pairs first), and the response on the lines of `frf`, as
-/// the loop saw it.
-/// @param frf whose lines, channels and compensation the model was fitted to.
+/// Compares a model with the exact plant of a simulated stage: flexible out-of-plane modes below the last line (one to
+/// one, the nearest pairs first), and the response on the lines of `frf`, as measured in the loop.
+/// @param frf with the lines, channels and compensation to which the model was fitted.
 TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate& frf,
                                    const WaferStageSpec& stage);
 

@@ -34,7 +34,7 @@ std::size_t width(const std::string& text) {
   }));
 }
 
-/// A terminal that can erase a line; else progress is plain lines.
+/// Whether the terminal can erase a line; else progress is shown as plain lines.
 bool redraws_lines() {
   const char* terminal = std::getenv("TERM");
   return isatty(STDERR_FILENO) != 0 && terminal != nullptr && std::string_view(terminal) != "dumb";
@@ -44,15 +44,15 @@ bool numeric(const std::string& text) {
   return !text.empty() && (text[0] == '-' || text[0] == '+' || (text[0] >= '0' && text[0] <= '9'));
 }
 
-/// To stderr. A terminal that has closed takes nothing, which is no reason to break off the work.
+/// Writes to stderr. A closed terminal is not a reason to abort the work.
 template <typename... Values>
 void tell(fmt::format_string<Values...> format, Values&&... values) {
   static_cast<void>(
       std::fputs(fmt::format(format, std::forward<Values>(values)...).c_str(), stderr));
 }
 
-/// To stdout. What cannot be written is an error, but for a terminal that has closed: that is an interrupt,
-/// whose exit code stands.
+/// Writes to stdout. A failed write is an error, except for a closed terminal: that is an interrupt and keeps its exit
+/// code.
 template <typename... Values>
 void print_result(fmt::format_string<Values...> format, Values&&... values) {
   try {
@@ -68,7 +68,7 @@ void Console::result(const std::string& line) const {
   if (!json) print_result("{}\n", line);
 }
 void Console::result(const nlohmann::ordered_json& object) const {
-  // Names from foreign files may hold anything: what is not UTF-8 is replaced, not thrown at.
+  // Names from foreign files may contain anything: invalid UTF-8 is replaced instead of an exception.
   if (json)
     print_result("{}\n",
                  object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
@@ -136,7 +136,7 @@ std::vector<std::string> table_lines(const std::vector<std::vector<std::string>>
     widths.resize(std::max(widths.size(), row.size()), 0);
     for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
   }
-  // A column is as its first body cell: a head is over numbers to the right, over words to the left.
+  // A column is aligned by its first body cell: numbers to the right, words to the left.
   std::vector<bool> right(widths.size(), false);
   for (std::size_t i = 0; i < widths.size(); ++i)
     for (std::size_t r = 1; r < rows.size() && !right[i]; ++r)

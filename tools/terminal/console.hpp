@@ -10,13 +10,12 @@ namespace stageid {
 
 enum class Verbosity : std::uint8_t { quiet, normal, debug };
 
-/// Where a command speaks: results on stdout (a text, or with --json one object), messages and
-/// progress on stderr.
+/// Output of a command: results on stdout (a text, or with --json one object), messages and progress on stderr.
 class Console {
  public:
   Verbosity verbosity = Verbosity::normal;
   bool json = false;
-  int exit_code = 0;  ///< of the command that ran
+  int exit_code = 0;  ///< of the executed command
 
   /// A line of the result; not printed with --json.
   void result(const std::string& line) const;
@@ -28,17 +27,17 @@ class Console {
   void warning(const std::string& line) const;  ///< always
 };
 
-/// Shows how far a long step is: a bar with rate and time left on a terminal, else a plain line every
-/// few seconds. Nothing when quiet. Never more than ten updates a second.
+/// Shows the progress of a long step: a bar with rate and remaining time on a terminal, else a plain line every few
+/// seconds. Nothing when quiet. At most ten updates per second.
 class Progress {
  public:
-  /// `unit` is that of the rate, e.g. "MB"; `scale` turns update()'s numbers into it.
+  /// `unit` is that of the rate, e.g. "MB"; `scale` converts the numbers of update() to it.
   Progress(const Console& console, std::string label, std::string unit, double scale = 1.0);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `total` 0: nobody knows how much there is; then no share and no time left are shown.
+  /// `total` 0: unknown; then neither share nor remaining time are shown.
   void update(double done, double total, const std::string& note = "");
   double seconds() const;
 
@@ -56,7 +55,7 @@ class Progress {
   Clock::time_point last_ = Clock::now();
 };
 
-/// Lays rows out in columns: numbers to the right, the first row is the head.
+/// Formats rows as columns, numbers right-aligned; the first row is the head.
 std::vector<std::string> table_lines(const std::vector<std::vector<std::string>>& rows);
 
 }  // namespace stageid

@@ -7,10 +7,10 @@
 
 namespace stageid {
 
-/// All that is wrong with a file and those it names; as a FormatError it is the first.
+/// All errors of a file and those it refers to; as a FormatError it is the first one.
 class FormatErrors : public FormatError {
  public:
-  /// @pre there is one
+  /// @pre `all` is not empty
   explicit FormatErrors(std::vector<FormatError> all)
       : FormatError(all.front()), all_(std::move(all)) {}
   const std::vector<FormatError>& all() const noexcept { return all_; }
@@ -19,13 +19,13 @@ class FormatErrors : public FormatError {
   std::vector<FormatError> all_;
 };
 
-/// Does one thing after the other and keeps what is wrong with each.
+/// Executes several actions and collects their errors.
 class FormatErrorList {
  public:
-  /// More than anybody reads; a hostile file could have any number.
+  /// Larger lists are not useful; a hostile file could cause any number.
   static constexpr std::size_t kMost = 100;
 
-  /// Nothing more once there are kMost.
+  /// Does nothing after kMost errors.
   template <typename Work>
   void attempt(Work work) {
     if (errors_.size() >= kMost) return;
@@ -39,7 +39,7 @@ class FormatErrorList {
   }
   bool empty() const noexcept { return errors_.empty(); }
   std::size_t size() const noexcept { return errors_.size(); }
-  /// @throws FormatErrors if there is one
+  /// @throws FormatErrors if there are any
   void raise() const {
     if (!errors_.empty()) throw FormatErrors(errors_);
   }

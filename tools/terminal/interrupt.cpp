@@ -17,14 +17,14 @@
 namespace stageid {
 namespace {
 
-// A second signal so soon is the same wish, of an impatient hand; a stage is still in its ramp.
+// A second signal within this time is considered part of the first; a stage may still be in its stop ramp.
 constexpr std::chrono::seconds kControlledStop{2};
 
 std::atomic<bool> interrupted = false;
 std::atomic<bool> ending = false;
 std::atomic<int> controlled_stops = 0;
 
-/// What the thread that waits for signals shares with the others.
+/// State shared by the thread that waits for signals and the others.
 struct AtInterrupt {
   std::mutex mutex;
   std::function<void()> clean_up;
@@ -73,10 +73,10 @@ void catch_signals() {
   std::signal(SIGPIPE, SIG_IGN);
   sigset_t signals;
   ::sigemptyset(&signals);
-  // Who ignores a signal, as nohup does, wants the work to go on.
+  // A process that ignores a signal, as under nohup, should continue.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP})
     if (!is_ignored(signal)) ::sigaddset(&signals, signal);
-  // Threads inherit the mask, so that only the one that waits gets them.
+  // Threads inherit the mask, so only the waiting one receives the signals.
   ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   static_cast<void>(at_interrupt());
   std::thread(wait_for_signals, signals).detach();

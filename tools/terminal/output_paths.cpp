@@ -18,7 +18,7 @@ namespace stageid {
 void require_no_input(const std::filesystem::path& file,
                       const std::vector<std::filesystem::path>& inputs) {
   for (const std::filesystem::path& input : inputs) {
-    std::error_code none;  // one of them is not there: they are not the same
+    std::error_code none;  // if one of them does not exist, they are not the same
     if (std::filesystem::equivalent(file, input, none))
       throw std::invalid_argument(
           fmt::format("{}: is an input file and would be overwritten; choose another name with -o",

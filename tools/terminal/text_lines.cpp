@@ -14,7 +14,7 @@
 namespace stageid {
 namespace {
 
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // before UTF-8, from Windows
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // of UTF-8 files from Windows
 
 }  // namespace
 
@@ -33,7 +33,7 @@ std::string_view TextLines::next() {
   ++line_;
   const std::size_t end = std::min(text_.find('\n', at_), text_.size());
   std::string_view line = std::string_view(text_).substr(at_, end - at_);
-  at_ = std::min(end + 1, text_.size());  // the last line may have no end
+  at_ = std::min(end + 1, text_.size());  // the last line may have no line end
   if (line.ends_with('\r')) line.remove_suffix(1);
   return line;
 }

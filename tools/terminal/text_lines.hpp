@@ -31,10 +31,10 @@ class TextLines {
   std::size_t line_ = 0;
 };
 
-/// Without blanks at both ends.
+/// Without leading and trailing blanks.
 std::string_view trimmed(std::string_view text);
 
-/// A finite number in any form that Fortran and C write: 1e-3, 1.D+00, -.5, +2.
+/// A finite number in any Fortran or C notation: 1e-3, 1.D+00, -.5, +2.
 std::optional<double> parse_number(std::string_view text);
 
 }  // namespace stageid

@@ -9,7 +9,7 @@ constexpr char32_t kReplacement = 0xFFFD;
 
 bool is_surrogate(char32_t point) { return point >= 0xD800 && point <= 0xDFFF; }
 
-/// The code point at `at`, which moves behind it.
+/// Reads the code point at `at` and moves `at` after it.
 char32_t next_point(std::string_view text, std::size_t& at) {
   const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
   const unsigned char first = byte(at++);

@@ -1,9 +1,9 @@
-// What the program tells: once in the page, then in the stream; and the newest response.
+// Data from the program: constant in the page, then streamed; and the newest response.
 
 const shown = JSON.parse(document.getElementById('shown').textContent);
 const link = { search: location.search, edition: 0, loading: false };
 
-// The response as the report page holds it; empty until the first realization is complete.
+// The response in the format of the report page; empty until the first realization is complete.
 let content = { frf: null, arrays: {}, candidates: [], modes: [] };
 let blocks = {};  // by name, unpacked
 let decoded = {};

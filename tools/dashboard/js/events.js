@@ -1,4 +1,4 @@
-// Timing, temperatures where there is a supervisor, and the newest events.
+// Timing, values of the supervisor if there is one, and the newest events.
 
 const side = {};
 

@@ -34,7 +34,7 @@ function quantity(value, unit) {
 function showLevels(state) {
   const { peak, rms, largest_peak: largest } = state.levels;
   levels.rows.forEach((row, i) => {
-    // Without a limit the largest so far is the end of the scale.
+    // Without a limit, the scale ends at the largest level so far.
     const full = row.limit || largest[i] || 1;
     const part = (v) => 100 * Math.min(1, v / full);
     const share = row.limit ? largest[i] / row.limit : 0;

@@ -1,4 +1,4 @@
-// The order of the page, and the stream.
+// Layout of the page, and the stream.
 
 let ended = false;
 
@@ -12,7 +12,7 @@ function showState(state) {
   const loaded = fetchResponse(state.response.edition);
   if (state.state !== 'ended') return;
   ended = true;
-  // The program waits for this page to leave: first the last response, then good-bye.
+  // The program waits for this page to disconnect, so fetch the last response first.
   loaded.then(() => fetchResponse(state.response.edition)).finally(() => {
     stream.close();
     window.stageidDashboard.left = true;

@@ -1,4 +1,4 @@
-// The head: what happens, how far it is, and the button that stops it.
+// The head: state, progress, and the abort button.
 
 const head = {};
 const armedFor_ms = 5000;
@@ -31,7 +31,7 @@ function endOf(state) {
 function showProgress(state) {
   const [level, text] = state.state === 'ended' ? endOf(state) : [state.state === 'running' ? 'running' : 'none', stateWords[state.state]];
   head.verdict.className = 'verdict ' + level;
-  // Only when it changes: it is read aloud.
+  // Only on changes, because screen readers read it aloud.
   if (head.text.textContent !== text) head.text.textContent = text;
   head.abort.disabled = state.state !== 'running' && state.state !== 'starting';
   const share = state.seconds_total > 0 ? Math.min(1, state.seconds_done / state.seconds_total) : 0;
@@ -59,7 +59,7 @@ function flaggedCount(value) {
   return element('span', { class: value > 0 ? 'far' : null }, count(value));
 }
 
-// Twice within a few seconds: a slip of the hand must not end a measurement of two hours.
+// Requires two presses within a few seconds, so that an accidental click does not end a measurement of two hours.
 function pressAbort() {
   if (!head.abort.classList.contains('armed')) {
     head.abort.classList.add('armed');

@@ -1,4 +1,4 @@
-// Response and CMIF: fetched whenever the stream tells of a new edition, drawn by the report's own pieces.
+// Response and CMIF: fetched when the stream announces a new edition, drawn with the code of the report.
 
 function fetchResponse(edition) {
   if (edition <= link.edition || link.loading) return Promise.resolve();

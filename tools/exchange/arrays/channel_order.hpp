@@ -5,7 +5,7 @@
 
 namespace stageid {
 
-/// [N x n_y x n_u] in C order, as files hold it, from columns that are vec of an n_y x n_u matrix.
+/// [N x n_y x n_u] in C order, as in files, from columns that are vec of an n_y x n_u matrix.
 template <typename Scalar>
 std::vector<Scalar> c_order(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& columns,
                             Eigen::Index n_y) {

@@ -12,7 +12,7 @@
 namespace stageid {
 namespace {
 
-/// What stands between fields: within quotes these belong to a name.
+/// The separator of the fields; separators within quotes are part of a name.
 char separator_of(std::string_view line) {
   std::string outside;
   bool quoted = false;
@@ -25,7 +25,7 @@ char separator_of(std::string_view line) {
   return ' ';
 }
 
-/// A field as messages quote it: a line of prose in one of them is not wanted whole.
+/// A field for messages, shortened because it could be a whole line of prose.
 std::string shortened(const std::string& field) {
   constexpr std::size_t kMost = 40;
   if (field.size() <= kMost) return field;
@@ -59,7 +59,7 @@ std::optional<double> number_of(std::string field, char separator) {
   return parse_number(field);
 }
 
-/// False: the line names the columns.
+/// Whether all fields are numbers; if not, the line contains the names of the columns.
 bool all_numbers(const std::vector<std::string>& fields, char separator) {
   return std::all_of(fields.begin(), fields.end(), [&](const std::string& field) {
     return trimmed(field).empty() || number_of(field, separator);

@@ -7,14 +7,14 @@
 
 namespace stageid {
 
-/// The columns of a text table as arrays. Fields are separated by comma, semicolon, tab or blanks: by that
-/// which the first line has, in this order after tab and semicolon; quotes may stand around them, and with
-/// semicolons a comma may be the decimal sign. Lines that begin with # or % are left out. A first line that
-/// is not all numbers names the columns; else they are 1, 2, ... A column may end before the others.
+/// The columns of a text table as arrays. The separator is the first of tab, semicolon and comma that the first line
+/// contains, else blanks. Fields may be quoted. With semicolons, a comma may be the decimal sign. Lines that begin
+/// with # or % are ignored. The first line contains the names of the columns unless all its fields are numbers; the
+/// names are then 1, 2, ... Columns may have different lengths.
 /// @throws FileError, FormatError "FILE:LINE: ..."
 ArrayList read_csv(const std::filesystem::path& file);
 
-/// A field of a table that commas separate, in quotes if it must be.
+/// A field of a comma-separated table, quoted if necessary.
 std::string csv_field(const std::string& text);
 
 }  // namespace stageid

@@ -69,14 +69,14 @@ constexpr const char* kAttributes[] = {"@format",
                                        "outputs@unit",
                                        "detection_noise@dof"};
 
-/// As MATLAB's variables are called: "@hold" is hold, "inputs@unit" inputs_unit.
+/// Name of the MATLAB variable: hold for "@hold", inputs_unit for "inputs@unit".
 std::string identifier(std::string name) {
   if (name.starts_with('@')) return name.substr(1);
   std::replace(name.begin(), name.end(), '@', '_');
   return name;
 }
 
-/// Whether shapes are MATLAB's: then attributes are variables.
+/// Whether shapes are those of MATLAB; attributes are then variables.
 bool from_matlab(const ArrayList& list) { return list.find("@format") == nullptr; }
 
 NamedArray with_axes(const ArrayList& list, NamedArray array, const Dataset& dataset, bool matlab) {
@@ -88,7 +88,7 @@ NamedArray with_axes(const ArrayList& list, NamedArray array, const Dataset& dat
   if (dataset.axes <= 1) {
     array.shape = {array.size()};
   } else if (matlab && dataset.axes == 3) {
-    // MATLAB drops trailing axes of length one: there the lines are.
+    // MATLAB drops trailing axes of length one; the last axis is that of the lines.
     while (array.shape.size() < dataset.axes) array.shape.push_back(1);
     if (array.shape.size() == 3) array = permuted(array, {2, 0, 1});
   }

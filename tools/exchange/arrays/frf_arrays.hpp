@@ -5,17 +5,17 @@
 
 namespace stageid {
 
-/// Everything that frf.h5 holds of a frequency response, under the same names: docs/formats.md.
-/// @param beside a file next to which a temporary one may stand for a moment
+/// The content of frf.h5 for a frequency response, with the same names: docs/formats.md.
+/// @param beside a file next to which a temporary file may be created
 /// @throws FileError
 ArrayList arrays_of_frf(const FrfEstimate& frf, const std::filesystem::path& beside);
 
-/// The reverse, from .npz ("inputs@unit") or .mat (inputs_unit, a x b x N) of ours.
+/// The reverse, from .npz ("inputs@unit") or .mat (inputs_unit, a x b x N) files written by stageid.
 /// @param beside as above
 /// @throws FormatError naming the file of `list`.
 FrfEstimate frf_of_arrays(const ArrayList& list, const std::filesystem::path& beside);
 
-/// True if the arrays say that they are a frequency response of ours.
+/// True if the arrays have the format of a stageid frequency response.
 bool holds_frf(const ArrayList& list);
 
 }  // namespace stageid

@@ -50,7 +50,7 @@ std::string head_of(const FrfEstimate& frf) {
 const char* const kHolds[] = {"none", "zoh"};
 const char* const kCompensations[] = {"none", "delay", "hold"};
 
-/// What the columns do not tell, so that a table is read again without a map.
+/// Properties that are not in the columns, so that the table can be read without a map.
 std::string description_of(const FrfEstimate& frf) {
   const nlohmann::ordered_json json = {
       {"format", "stageid-frf"},
@@ -73,8 +73,8 @@ std::string description_of(const FrfEstimate& frf) {
 
 constexpr std::string_view kDescription = "# {\"format\":\"stageid-frf\"";
 
-/// Names and units from the columns of a table without a description: "real z1/a1 [m/N]". The unit of an input is
-/// taken for a single one, behind the last slash.
+/// Names and units from the titles of a table without a description: "real z1/a1 [m/N]". The part after the last slash
+/// is the unit of the input.
 bool channels_from_head(const ArrayList& arrays, FrfEstimate& frf) {
   const auto add = [](ChannelList& list, const std::string& name, const std::string& unit) {
     const auto found = std::find(list.names.begin(), list.names.end(), name);
@@ -125,7 +125,7 @@ void read_description(const nlohmann::json& json, FrfEstimate& frf) {
     if (taken == kCompensations[k]) frf.compensated = static_cast<Compensation>(k);
 }
 
-/// The comment that describes the table; empty: there is none.
+/// The comment that describes the table; empty if there is none.
 std::string description_in(const std::filesystem::path& file) {
   TextLines lines(file);
   while (!lines.at_end()) {

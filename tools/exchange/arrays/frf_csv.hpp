@@ -7,19 +7,19 @@
 
 namespace stageid {
 
-/// A frequency response as a table: one line a frequency; frequency_hz, then of every channel, outputs
-/// first, "real OUTPUT/INPUT [m/N]" and "imaginary ...", and as far as they are known
-/// "noise_variance ... [(m/N)^2]" and "total_variance ...", E|error|^2 of the complex response. Lines that
-/// begin with # tell format and realizations; one of them is a JSON object with names, units, sample rate, hold
-/// and degrees of freedom. Numbers are the shortest that read back to the same double.
+/// A frequency response as a table with one line per frequency. Columns: frequency_hz, then per channel, outputs
+/// first, "real OUTPUT/INPUT [m/N]" and "imaginary ...", and if known "noise_variance ... [(m/N)^2]" and
+/// "total_variance ...", E|error|^2 of the complex response. Lines that begin with # contain format and realizations;
+/// one of them is a JSON object with names, units, sample rate, hold and degrees of freedom. Numbers are the shortest
+/// that read back to the same double.
 std::string frf_csv(const FrfEstimate& frf);
 
 /// Whether a .csv file has the columns of frf_csv().
 /// @throws FileError
 bool is_frf_csv(const std::filesystem::path& file);
 
-/// The reverse of frf_csv(). Of a table without the JSON comment the names and units are read from the titles of
-/// its columns. Covariances and provenance are not in a table.
+/// The reverse of frf_csv(). Without the JSON comment, names and units are read from the titles of the columns.
+/// Covariances and provenance are not part of the table.
 /// @throws FileError, FormatError
 FrfEstimate read_frf_csv(const std::filesystem::path& file);
 

@@ -12,7 +12,7 @@
 namespace stageid {
 namespace {
 
-/// Source index of every element of the result, in the result's C order.
+/// Source index of every element of the result, in C order of the result.
 std::vector<std::size_t> source_places(const std::vector<std::size_t>& shape,
                                        const std::vector<std::size_t>& axes) {
   const std::size_t rank = shape.size();

@@ -9,10 +9,10 @@
 
 namespace stageid {
 
-/// An array (C order: the last index runs fastest) or a list of texts, as files of any format hold it.
+/// An array (C order: the last index varies fastest) or a list of texts, independent of the file format.
 ///
-/// Names are paths without the first slash: "modes/damping_ratio"; "inputs@unit" is the attribute
-/// `unit` of the object `inputs`, "@format" one of the file itself. A single value has no shape.
+/// Names are paths without the leading slash: "modes/damping_ratio"; "inputs@unit" is the attribute `unit` of the
+/// object `inputs`, "@format" one of the file itself. A single value has an empty shape.
 struct NamedArray {
   using Values = std::variant<std::vector<double>, std::vector<std::complex<double>>,
                               std::vector<std::string>>;
@@ -38,31 +38,30 @@ struct ArrayList {
   std::vector<NamedArray> arrays;
   std::vector<UnreadVariable> unread = {};
 
-  /// By name; a leading slash may be there, and dots may stand for slashes. Null if there is none.
+  /// Finds an array by name. A leading slash is accepted, and dots instead of slashes. Null if not found.
   const NamedArray* find(const std::string& name) const;
-  /// @throws FormatError that lists the names there are.
+  /// @throws FormatError that lists the available names.
   const NamedArray& at(const std::string& name) const;
 };
 
-/// The array with axis q of the result the axis `axes[q]` of `array`, e.g. {1, 2, 0} of N x a x b gives
-/// a x b x N.
+/// Axis q of the result is axis `axes[q]` of `array`, e.g. {1, 2, 0} of N x a x b gives a x b x N.
 /// @throws std::invalid_argument unless `axes` is a permutation of the array's axes.
 NamedArray permuted(const NamedArray& array, const std::vector<std::size_t>& axes);
 
 /// All axes in reverse: C order of the result is column-major order of `array`.
 NamedArray reversed(const NamedArray& array);
 
-/// @throws FormatError naming the file if the array holds texts or, for real_values(), complex numbers.
+/// @throws FormatError naming the file if the array has texts or, for real_values(), complex numbers.
 std::vector<double> real_values(const ArrayList& list, const NamedArray& array);
 std::vector<std::complex<double>> complex_values(const ArrayList& list, const NamedArray& array);
 std::vector<std::string> text_values(const ArrayList& list, const NamedArray& array);
 
-/// Every dataset and attribute of an HDF5 file; integers as doubles. Datasets that are neither numbers nor
-/// lists of texts are left out.
+/// Every dataset and attribute of an HDF5 file; integers as doubles. Datasets that are neither numbers nor lists of
+/// texts are skipped.
 /// @throws FileError, FormatError
 ArrayList read_hdf5_arrays(const std::filesystem::path& file);
 
-/// The reverse; a text attribute of several values and numeric attributes included. Whole or not at all.
+/// The reverse, including text attributes of several values and numeric attributes. The file is replaced atomically.
 /// @throws FileError
 void write_hdf5_arrays(const std::filesystem::path& file, const ArrayList& list);
 

@@ -7,7 +7,7 @@
 namespace stageid {
 namespace {
 
-/// Deeper is no file of ours, nor of people: a group that links to itself is without end.
+/// Deeper groups are not expected; a group that links to itself is infinitely deep.
 constexpr int kDeepest = 20;
 
 std::vector<std::size_t> sizes(const std::vector<hsize_t>& shape) {

@@ -13,12 +13,12 @@
 #include "tools/terminal/output_paths.hpp"
 #include "tools/terminal/unicode.hpp"
 
-// Sources: as tools/exchange/arrays/npz_writer.cpp. What is read here comes from outside: every offset is checked.
+// Sources: as tools/exchange/arrays/npz_writer.cpp. The input is untrusted: every offset is checked.
 
 namespace stageid {
 namespace {
 
-/// A deflated stream is at most so many times as long when inflated.
+/// Largest ratio of inflated to deflated size.
 constexpr std::size_t kMostInflation = 1032;
 
 class Bytes {
@@ -86,7 +86,7 @@ std::string unpacked(const Bytes& zip, const Member& member) {
   std::string inflated(member.bytes, '\0');
   z_stream stream = {};
   if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
-  // zlib does not write to its input, but for lack of const in its interface.
+  // zlib does not write to its input; its interface merely lacks const.
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(stored.data()));
   stream.avail_in = static_cast<uInt>(stored.size());
   stream.next_out = reinterpret_cast<Bytef*>(inflated.data());
@@ -109,10 +109,10 @@ std::string content_of(const std::filesystem::path& file, std::string_view conte
   return bytes;
 }
 
-/// What the header of a .npy member says.
+/// The header of a .npy member.
 struct Layout {
   char kind = 'f';
-  std::size_t width = 8;  ///< bytes an element; of U: characters
+  std::size_t width = 8;  ///< bytes per element; for U: characters
   bool big_endian = false;
   bool column_major = false;
   std::vector<std::size_t> shape;
@@ -181,7 +181,7 @@ double element(const char* at, bool big_endian) {
 
 using ElementReader = double (*)(const char*, bool);
 
-/// Null if there is no such type.
+/// Null for an unsupported type.
 ElementReader reader_of(char kind, std::size_t width) {
   if (kind == 'f') return width == 8 ? element<double> : width == 4 ? element<float> : nullptr;
   if (kind == 'i')

@@ -11,15 +11,15 @@
 #include "tools/exchange/arrays/npz_file.hpp"
 #include "tools/terminal/unicode.hpp"
 
-// Sources: NEP 1 (the .npy format, https://numpy.org/neps/nep-0001-npy-format.html) and PKWARE's
-// APPNOTE.TXT 6.3 for the zip around it, of which only stored members are written.
+// Sources: NEP 1 (the .npy format, https://numpy.org/neps/nep-0001-npy-format.html) and PKWARE's APPNOTE.TXT 6.3 for
+// the zip file; only stored members are written.
 
 namespace stageid {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, ".npy members are written as '<'");
 
-constexpr std::size_t kMostBytes = 0xFFFF0000;  // beyond it zip needs its 64-bit form
+constexpr std::size_t kMostBytes = 0xFFFF0000;  // larger files need the 64-bit form of zip
 
 template <typename Number>
 void put(std::string& bytes, Number value) {
@@ -79,7 +79,7 @@ std::string npy_of(const NamedArray& array) {
       bytes == 0 ? std::string_view() : std::string_view(static_cast<const char*>(data), bytes));
 }
 
-/// What the local header and the directory share: from the version needed to the length of the name.
+/// The common part of the local header and the directory: from the required version to the length of the name.
 std::string member_head(const std::string& name, const std::string& content) {
   std::string head;
   put(head, std::uint16_t{20});

@@ -70,11 +70,11 @@ Options read_options(const TextLines& lines, std::string_view line) {
   return options;
 }
 
-/// What the ports' outputs and inputs are, so that their ratio has the unit of the parameters.
+/// Quantities of outputs and inputs whose ratio has the unit of the parameters.
 struct Quantities {
   std::vector<std::string> outputs, inputs;  ///< V or A; S: 1
 
-  /// Version 1 divides an impedance by the reference resistance and multiplies an admittance with it.
+  /// Version 1 divides an impedance by the reference resistance and multiplies an admittance by it.
   int power_of_ohm(Eigen::Index output, Eigen::Index input) const {
     const std::string& o = outputs.at(static_cast<std::size_t>(output));
     const std::string& i = inputs.at(static_cast<std::size_t>(input));
@@ -132,7 +132,7 @@ void append_numbers(const TextLines& lines, std::string_view line, std::vector<d
   }
 }
 
-/// Frequency and 2 N^2 numbers a line; of two ports noise parameters may follow, from a lower frequency on.
+/// A frequency and 2 N^2 numbers per line. With two ports, noise parameters may follow, starting at a lower frequency.
 std::size_t lines_of(const TextLines& lines, const std::vector<double>& numbers, std::size_t step,
                      int ports) {
   std::size_t count = 0;
@@ -188,7 +188,7 @@ TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
     frf.frequency_hz[line] = numbers[k * step] * options.unit_hz;
     for (Eigen::Index q = 0; q < n * n; ++q) {
       const std::size_t at = k * step + 1 + 2 * static_cast<std::size_t>(q);
-      // Row by row, but for two ports: 11, 21, 12, 22.
+      // Row by row, except for two ports: 11, 21, 12, 22.
       const Eigen::Index channel = ports == 2 ? q : q / n + n * (q % n);
       frf.response(channel, line) =
           value_of(numbers[at], numbers[at + 1], options.form) *

@@ -12,7 +12,7 @@ namespace stageid {
 /// (.h5, .mat, .npz) with the names of docs/exchange.md. A new file format is added here.
 /// @param output file that the response will be written to, for messages
 /// @param notes receives what the user should know about the conversion
-/// @throws FileError, FormatError; for arrays without a known meaning it asks for a map
+/// @throws FileError, FormatError; for arrays with unknown names it requests a map
 FrfEstimate read_foreign_frf(const std::filesystem::path& file, const std::filesystem::path& output,
                              std::vector<std::string>& notes);
 

@@ -23,7 +23,7 @@ std::vector<std::size_t> without_ones(const std::vector<std::size_t>& shape) {
   return kept;
 }
 
-/// line, output, input: the place of each among the axes of the array.
+/// Axes of the array for line, output and input, in this order.
 std::vector<std::size_t> axis_places(const ImportMap& map) {
   std::vector<std::size_t> places;
   for (const char* axis : {"line", "output", "input"}) {
@@ -36,7 +36,7 @@ std::vector<std::size_t> axis_places(const ImportMap& map) {
   return places;
 }
 
-/// As lines x outputs x inputs.
+/// The array as lines x outputs x inputs.
 NamedArray arranged(const ArrayList& arrays, const NamedArray& array, const ImportMap& map,
                     std::size_t lines) {
   NamedArray result = array;
@@ -49,7 +49,7 @@ NamedArray arranged(const ArrayList& arrays, const NamedArray& array, const Impo
     result.shape = {array.size(), 1, 1};
     return result;
   }
-  // MATLAB drops trailing axes of length one; a vector is one channel.
+  // MATLAB drops trailing axes of length one; a vector is a single channel.
   while (result.shape.size() < 3) result.shape.push_back(1);
   if (result.shape.size() > 3)
     throw FormatError(arrays.file, array.name,
@@ -114,7 +114,7 @@ double scalar_of(const ArrayList& arrays, const ImportMap::Scalar& scalar) {
   return values.front();
 }
 
-/// As many as the response has lines.
+/// As many frequencies as the response has lines.
 std::vector<double> even_frequencies(const ArrayList& arrays, const ImportMap& map) {
   const double first = scalar_of(arrays, map.first_hz), step = scalar_of(arrays, map.step_hz);
   if (!(step > 0.0))
@@ -208,7 +208,7 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
 
 FrfEstimate import_frf(const ArrayList& arrays, const ImportMap& map) {
   FrfEstimate frf;
-  if (map.sample_rate_hz > 0.0) (void)sample_rate_of(arrays, map);  // the file's must agree
+  if (map.sample_rate_hz > 0.0) (void)sample_rate_of(arrays, map);  // that of the file must agree
   const std::vector<double> frequency = map.frequency.empty()
                                             ? even_frequencies(arrays, map)
                                             : real_values(arrays, arrays.at(map.frequency));

@@ -39,12 +39,12 @@ LogInfo info_of(const ArrayList& arrays, const ImportMap& map, const SignalGroup
   return info;
 }
 
-/// A log that appears whole.
+/// A log that is written atomically.
 class LogImport {
  public:
   LogImport(const ImportMap& map, const std::filesystem::path& output)
       : map_(map), scratch_(output) {
-    std::filesystem::remove(scratch_.path());  // a log is never written over
+    std::filesystem::remove(scratch_.path());  // logs are never overwritten
   }
 
   void add(const ArrayList& arrays, const ImportedRun& run) {
@@ -80,7 +80,7 @@ class LogImport {
   void open(const ArrayList& arrays, const LogInfo& info) {
     if (!writer_) {
       info_ = info;
-      map_.sample_rate_hz = info.sample_rate_hz;  // that of the files behind must agree
+      map_.sample_rate_hz = info.sample_rate_hz;  // those of the following files must agree
       writer_.emplace(SlogWriter::create(scratch_.path(), info));
       return;
     }
@@ -101,7 +101,7 @@ class LogImport {
                       run.realization + 1, run.experiment + 1));
   }
 
-  /// A realization without one of its experiments cannot be used, and a run that is missing is found late.
+  /// A realization that lacks one of its experiments is unusable, so report a missing run here.
   void require_full() {
     std::set<std::int64_t> experiments;
     for (const auto& [realization, experiment] : runs_) experiments.insert(experiment);

@@ -10,11 +10,11 @@
 
 namespace stageid {
 
-/// Writes the log that a map finds among the arrays of foreign files, as .slog or .h5 by the ending of
-/// `output`; whole or not at all. Every run holds transient and further periods, all whole. Files are read
-/// one after the other.
+/// Writes the log that a map selects from the arrays of foreign files, atomically, as .slog or .h5 by the extension of
+/// `output`. Every run consists of whole periods: the transient ones and at least one more. Files are read one after
+/// another.
 /// @throws FormatError naming the file and the array, or the map and the key that is missing or wrong.
-/// @throws std::invalid_argument for another ending. @throws FileError
+/// @throws std::invalid_argument for another extension. @throws FileError
 ImportSummary import_log(const std::vector<ForeignFile>& files, const ImportMap& map,
                          const std::filesystem::path& output);
 

@@ -64,7 +64,7 @@ void describe_run(ConfigVisitor& v, ImportMap::Run& run) {
   v.integer("rows", run.rows, 0, kMost, kOptional, "0: to the end");
 }
 
-/// That the run just read is none of those before it: they would be one run of two contents.
+/// Rejects a run that is a duplicate of an earlier one: one run would have two contents.
 void require_another_run(ConfigVisitor& v, const std::vector<ImportMap::Run>& runs) {
   const ImportMap::Run& last = runs.back();
   const auto same = std::find_if(runs.begin(), runs.end(), [&](const ImportMap::Run& run) {

@@ -8,9 +8,9 @@
 
 namespace stageid {
 
-/// What a map says about a foreign file: which of its arrays are what. Names are those of variables,
-/// datasets or columns; fields of structs are "struct/field" or "struct.field". In names of files and of a
-/// log's arrays {realization} and {experiment} stand for numbers.
+/// The meaning of the arrays of a foreign file. Names are those of variables, datasets or columns; fields of structs
+/// are "struct/field" or "struct.field". In names of files and of arrays of a log, {realization} and {experiment} are
+/// placeholders for numbers.
 struct ImportMap {
   enum class Kind : std::uint8_t { frf, log };
   enum class FrequencyUnit : std::uint8_t { hz, rad_s };
@@ -18,8 +18,7 @@ struct ImportMap {
   enum class FileSampleRate : std::uint8_t { checked, ignored };
   enum class ExcitationPeriod : std::uint8_t { repeats, mean };
 
-  /// One channel of a response that is not in one array: values, or real and imaginary part, or magnitude
-  /// and phase.
+  /// One channel of a response that is not in one array: values, real and imaginary part, or magnitude and phase.
   struct Channel {
     std::string output, input;
     std::string response, real, imaginary, magnitude, phase_deg;
@@ -39,7 +38,7 @@ struct ImportMap {
     std::int64_t rows = 0;  ///< 0: to the end
   };
 
-  /// A number, or the variable of the file that holds it.
+  /// A number, or the variable of the file with that number.
   struct Scalar {
     std::optional<double> number;
     std::string variable;
@@ -49,11 +48,11 @@ struct ImportMap {
   std::filesystem::path file;
   std::string files;  ///< pattern of the files, one or more runs each; relative to the map
   Kind kind = Kind::frf;
-  double sample_rate_hz = 0.0;  ///< 0: unknown; a log takes that of the file
+  double sample_rate_hz = 0.0;  ///< 0: unknown; a log then uses that of the file
   FileSampleRate file_sample_rate = FileSampleRate::checked;
 
   std::string frequency;
-  Scalar first_hz, step_hz;  ///< in the place of `frequency`
+  Scalar first_hz, step_hz;  ///< instead of `frequency`
   FrequencyUnit frequency_unit = FrequencyUnit::hz;
   FrfHold hold = FrfHold::none;
   std::string response, response_imaginary, noise_variance, total_variance;
@@ -68,8 +67,8 @@ struct ImportMap {
   std::vector<Run> runs;
 };
 
-/// The units of `count` channels from the text of a map: one for all, or one a channel with blanks between;
-/// empty: 1.
+/// The units of `count` channels from the text of a map: one for all, or one per channel, separated by blanks; empty:
+/// 1.
 /// @throws FormatError naming the map and `key`.
 std::vector<std::string> units_of(const ImportMap& map, const char* key, const std::string& words,
                                   std::size_t count);

@@ -11,8 +11,8 @@
 namespace stageid {
 namespace {
 
-/// A period belongs to a run where it correlates with the run's first one by more than this: noise as strong
-/// as the excitation leaves 1/2, and another excitation of N samples about 1 / sqrt(N).
+/// A period belongs to a run if its correlation with the first one is above this. With noise as strong as the
+/// excitation it is 1/2; with another excitation of N samples about 1 / sqrt(N).
 constexpr double kSameExcitation = 0.5;
 
 double correlation(const SampleRows& a, const SampleRows& b) {
@@ -38,7 +38,7 @@ std::vector<RunRows> pieces_of(const SampleRows& all, Eigen::Index period, bool 
   return pieces;
 }
 
-/// "runs: [{...}, {...}, ...]" as the map needs it.
+/// "runs: [{...}, {...}, ...]" as required in the map.
 std::string runs_text(const std::vector<RunRows>& pieces, Eigen::Index first) {
   constexpr std::size_t kMost = 3;
   std::string text = "runs: [";
@@ -48,7 +48,7 @@ std::string runs_text(const std::vector<RunRows>& pieces, Eigen::Index first) {
   return text + (pieces.size() > kMost ? ", ...]" : "]");
 }
 
-/// Several runs one after the other: every piece has more than one period.
+/// Whether there are several runs, each of more than one period.
 bool are_runs(const std::vector<RunRows>& pieces, Eigen::Index period) {
   return pieces.size() > 1 &&
          std::all_of(pieces.begin(), pieces.end(),

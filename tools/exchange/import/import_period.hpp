@@ -13,14 +13,14 @@ struct RunRows {
 };
 
 /// The rows of a run of whole periods: transient ones and at least one more.
-/// @throws FormatError with what the map must say instead
+/// @throws FormatError naming the required key of the map
 RunRows rows_of(const ArrayList& arrays, const ImportMap& map, const ImportMap::Run& run,
                 Eigen::Index samples);
 
-/// One period of the excitation, period_samples x channels: given as such, repeated exactly, or, if it was
-/// measured, the mean behind the transient.
-/// @throws FormatError where the excitation does not repeat; where it repeats piece by piece, the rows of the
-/// runs are in the message
+/// One period of the excitation, period_samples x channels: given as such, repeated exactly, or, if it was measured,
+/// the mean of the periods after the transient.
+/// @throws FormatError if the excitation does not repeat; if it repeats in pieces, the message contains the rows of
+/// the runs
 Eigen::MatrixXd period_of(const ArrayList& arrays, const ImportMap& map,
                           const SignalGroup& excitation, const RunRows& rows);
 

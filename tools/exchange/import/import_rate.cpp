@@ -15,7 +15,7 @@
 namespace stageid {
 namespace {
 
-/// A rate or a step that was rounded to four digits is wrong by at most this part.
+/// Largest relative error of a rate or a step that was rounded to four digits.
 constexpr double kRounding = 5e-4;
 
 struct FileRate {
@@ -54,7 +54,7 @@ std::optional<double> rate_of_scalar(const std::string& name, double value) {
   return std::nullopt;
 }
 
-/// Of a rising axis in seconds; the median, as the axis may begin anew with every run.
+/// Rate of a rising axis in seconds, by the median, because the axis may restart with every run.
 std::optional<double> rate_of_axis(const std::vector<double>& time_s) {
   if (time_s.size() < 3) return std::nullopt;
   std::vector<double> steps;
@@ -63,7 +63,7 @@ std::optional<double> rate_of_axis(const std::vector<double>& time_s) {
   std::nth_element(steps.begin(), middle, steps.end());
   double step = *middle;
   if (!(step > 0.0)) return std::nullopt;
-  // Digits of a long axis are few for one step: the whole axis has it better, if it is one.
+  // On a long axis, single steps have few digits; the mean over the whole axis is more precise if it is even.
   const double mean = (time_s.back() - time_s.front()) / static_cast<double>(steps.size());
   if (std::abs(mean - step) < 0.5 * step) step = mean;
   return 1.0 / step;
@@ -89,7 +89,7 @@ std::vector<FileRate> rates_of(const ArrayList& arrays, const ImportMap& map) {
   return rates;
 }
 
-/// The number of six digits that is meant where the digits of a time axis leave a little more.
+/// The nearest number of six digits, if the difference is rounding of the time axis.
 double snapped(double hz) {
   const double unit = std::pow(10.0, std::floor(std::log10(hz)) - 5.0);
   const double round = std::round(hz / unit) * unit;

@@ -5,9 +5,9 @@
 
 namespace stageid {
 
-/// The sample rate of a log: the map's, or the file's where the map has none. What tells a file's rate: the
-/// abscissas of the arrays that the map names (universal files), a number or an attribute called sample_rate_hz,
-/// fs, dt and the like, or an even time axis called t or time.
+/// The sample rate of a log: that of the map, else that of the file. Sources in a file: the abscissas of the arrays
+/// that the map names (universal files), a number or an attribute called sample_rate_hz, fs, dt or similar, or an
+/// evenly spaced time axis called t or time.
 /// @throws FormatError if the two differ, or neither is known
 double sample_rate_of(const ArrayList& arrays, const ImportMap& map);
 

@@ -15,14 +15,14 @@ namespace {
 
 using Number = std::optional<long long> RunNumbers::*;
 
-/// Place of a number among all that there are, from 0.
+/// Rank of a number among all of them, from 0.
 std::int64_t rank_of(long long number, const std::vector<RunNumbers>& all, Number which) {
   std::set<long long> numbers;
   for (const RunNumbers& run : all) numbers.insert((run.*which).value_or(number));
   return std::distance(numbers.begin(), numbers.find(number));
 }
 
-/// What tells a realization or an experiment of a run.
+/// The source of the realization or experiment number of a run.
 class Source {
  public:
   Source(const ImportMap& map, const char* what) : map_(map), what_(what) {}

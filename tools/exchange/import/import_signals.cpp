@@ -29,12 +29,12 @@ std::string with_slashes(std::string name) {
   return name;
 }
 
-/// The array of a name, which may be a pattern.
+/// The array with this name, which may be a pattern.
 const NamedArray& array_of(const ArrayList& arrays, const ImportMap& map, const std::string& name,
                            const RunNumbers& wanted) {
   if (!is_pattern(name)) return arrays.at(name);
   for (const auto& [numbers, found] : matches_of(with_slashes(name), names_in(arrays))) {
-    // A name with one placeholder belongs to all runs of that number.
+    // A name with one placeholder is shared by all runs with that number.
     const bool same = (!numbers.realization || numbers.realization == wanted.realization) &&
                       (!numbers.experiment || numbers.experiment == wanted.experiment);
     if (same) return arrays.at(found);
@@ -85,7 +85,7 @@ std::vector<Axis> axes_of(const ArrayList& arrays, const NamedArray& array,
   return axes;
 }
 
-/// Without `axes`: samples x channels, and MATLAB's rows and columns are both vectors.
+/// Without `axes`: samples x channels; both rows and columns of MATLAB are vectors.
 SampleRows plain_samples(const ArrayList& arrays, const NamedArray& array, const char* key) {
   if (array.shape.size() > 2)
     throw FormatError(arrays.file, array.name,
@@ -192,7 +192,7 @@ std::vector<RunNumbers> name_numbers_of(const ArrayList& arrays, const ImportMap
       if (!is_pattern(name)) continue;
       patterns = true;
       const auto found = matches_of(with_slashes(name), names_in(arrays));
-      if (found.empty()) (void)arrays.at(name);  // says what there is
+      if (found.empty()) (void)arrays.at(name);  // throws an error that lists the available names
       if (numbers.empty())
         for (const auto& [run, text] : found) numbers.insert(run);
     }
@@ -214,7 +214,7 @@ SignalGroup read_signals(const ArrayList& arrays, const ImportMap& map, const ch
     const Eigen::Index first = out.samples.cols();
     out.samples.conservativeResize(columns.rows(), first + columns.cols());
     out.samples.rightCols(columns.cols()) = columns;
-    // Several channels in one array have no names of their own.
+    // Several channels in one array have no individual names.
     if (columns.cols() == 1 && !is_pattern(name)) out.channels.names.push_back(name);
   }
   for (Eigen::Index k = 0; k < out.samples.rows(); ++k)

@@ -14,13 +14,13 @@ namespace stageid {
 
 using SampleRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Where a run is in a file: numbers in the names of arrays, and places along their axes.
+/// Location of a run in a file: numbers in the names of arrays, and indices along their axes.
 struct RunPlace {
   RunNumbers names;
-  Eigen::Index realization = 0, experiment = 0, run = 0;  ///< along the axis of that name, from 0
+  Eigen::Index realization = 0, experiment = 0, run = 0;  ///< along the corresponding axis, from 0
 };
 
-/// How often the axes of a map's arrays repeat; 1 where there is no such axis.
+/// Extents of the axes of a map's arrays; 1 if there is no such axis.
 struct RunAxes {
   Eigen::Index realizations = 1, experiments = 1, runs = 1;
   bool has_realizations = false, has_experiments = false, has_runs = false;
@@ -36,11 +36,12 @@ struct SignalGroup {
 /// @throws FormatError
 RunAxes run_axes_of(const ArrayList& arrays, const ImportMap& map);
 
-/// The numbers that the map's patterns find in the names of arrays; one entry without numbers if it has none.
+/// The numbers found by the patterns of the map in the names of arrays; one entry without numbers if it has no
+/// patterns.
 /// @throws FormatError if nothing matches
 std::vector<RunNumbers> name_numbers_of(const ArrayList& arrays, const ImportMap& map);
 
-/// @param key "sensors", for errors   @param notes gets what was converted to SI units
+/// @param key "sensors", for errors   @param notes receives the conversions to SI units
 /// @throws FormatError naming the file and the array, or the map and the key
 SignalGroup read_signals(const ArrayList& arrays, const ImportMap& map, const char* key,
                          const ImportMap::Signals& group, const RunPlace& place,

@@ -37,7 +37,7 @@ std::string rms_line(const char* group, const ChannelList& channels, const Eigen
   return fmt::format("rms of {}: {}", group, fmt::join(parts, ", "));
 }
 
-/// Channels whose name is the unit are dimensionless: "y1 [m], y2 [rad]".
+/// Dimensionless channels have the unit in their name: "y1 [m], y2 [rad]".
 std::string named(const ChannelList& channels) {
   std::vector<std::string> parts;
   for (std::size_t c = 0; c < channels.size(); ++c)

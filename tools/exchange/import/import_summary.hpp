@@ -12,20 +12,20 @@
 
 namespace stageid {
 
-/// What an import made of a foreign file, for people (lines) and for --json (an object).
+/// Result of an import, for people (lines) and for --json (an object).
 struct ImportSummary {
   std::vector<std::string> lines;
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
 };
 
-/// Gathers the figures of a log run by run.
+/// Collects the figures of a log run by run.
 class LogSummary {
  public:
   /// @param period one period of the excitation x channels   @param actuators, sensors samples x channels
   void add(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& period,
            const Eigen::Ref<const Eigen::MatrixXd>& actuators,
            const Eigen::Ref<const Eigen::MatrixXd>& sensors);
-  /// @param notes what was converted, one sentence each
+  /// @param notes conversions, one sentence each
   ImportSummary summary(const LogInfo& info, const std::vector<std::string>& notes) const;
 
  private:
@@ -35,8 +35,9 @@ class LogSummary {
     void add(const Eigen::Ref<const Eigen::MatrixXd>& columns);
     Eigen::VectorXd rms() const;
   };
-  std::set<std::pair<int, int>> runs_;           ///< realization, experiment
-  std::vector<std::set<Eigen::Index>> excited_;  ///< per experiment: channels that are not zero
+  std::set<std::pair<int, int>> runs_;  ///< realization, experiment
+  /// per experiment: channels with nonzero excitation
+  std::vector<std::set<Eigen::Index>> excited_;
   std::vector<std::uint64_t> samples_;
   Power excitation_, actuators_, sensors_;
 };

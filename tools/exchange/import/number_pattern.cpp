@@ -16,7 +16,7 @@ constexpr const char* kExperiment = "{experiment}";
 
 struct Expression {
   std::regex regex;
-  std::vector<bool> is_realization;  ///< of every group, else an experiment
+  std::vector<bool> is_realization;  ///< per group: realization, else experiment
 };
 
 Expression expression_of(const std::string& pattern) {

@@ -8,7 +8,7 @@
 
 namespace stageid {
 
-/// The numbers of a run in a name: "run_2_13.mat" of the pattern "run_{realization}_{experiment}.mat".
+/// The numbers of a run in a name: "run_2_13.mat" matches the pattern "run_{realization}_{experiment}.mat".
 struct RunNumbers {
   std::optional<long long> realization, experiment;
   friend auto operator<=>(const RunNumbers&, const RunNumbers&) = default;
@@ -17,16 +17,16 @@ struct RunNumbers {
 /// Whether {realization} or {experiment} is in a text.
 bool is_pattern(const std::string& text);
 
-/// The numbers in `text`, which may have leading zeros; nothing where the pattern does not match.
-/// @throws std::invalid_argument if the pattern has a placeholder twice
+/// The numbers in `text`, with optional leading zeros; empty if the pattern does not match.
+/// @throws std::invalid_argument if a placeholder occurs twice in the pattern
 std::optional<RunNumbers> match_pattern(const std::string& pattern, const std::string& text);
 
-/// The texts that match, by their numbers.
+/// The texts that match, sorted by their numbers.
 /// @throws std::invalid_argument if two of them have the same numbers
 std::map<RunNumbers, std::string> matches_of(const std::string& pattern,
                                              const std::vector<std::string>& texts);
 
-/// The same for files; folders may have placeholders too.
+/// The same for files; folders may contain placeholders too.
 std::map<RunNumbers, std::filesystem::path> files_of(const std::filesystem::path& pattern);
 
 }  // namespace stageid

@@ -71,7 +71,7 @@ std::optional<SiUnit> plain_unit(std::string_view text) {
     if (!text.starts_with(prefix.text)) continue;
     const std::string_view rest = text.substr(prefix.text.size());
     for (const KnownUnit& unit : kUnits)
-      // Nobody counts kiloseconds, and Gs is a gauss.
+      // Kiloseconds are not used, and Gs is gauss.
       if (unit.takes_prefix && unit.text == rest && !(rest == "s" && prefix.factor > 1.0))
         return SiUnit{std::string(unit.si), prefix.factor * unit.factor};
     if (rest == "g") return SiUnit{"kg", 1e-3 * prefix.factor};
@@ -124,7 +124,7 @@ SiUnit si_unit(const std::string& text) {
     divides = text[end] == '/';
     at = end + 1;
   }
-  if (out.factor == 1.0) return {text, 1.0};  // as it was written
+  if (out.factor == 1.0) return {text, 1.0};  // unchanged
   return out;
 }
 

@@ -8,29 +8,28 @@
 
 namespace stageid {
 
-/// A unit in SI base or derived units without prefixes: value in `unit` = factor x value in the unit given.
+/// A unit in SI base or derived units without prefixes: value in `unit` = factor x value in the original unit.
 struct SiUnit {
   std::string unit;
   double factor = 1.0;
 };
 
-/// Prefixes (um, kN, mV, mm/s^2), degrees, % and a few customary units (in, ft, lbf, bar, min) are converted;
-/// kg stays. Products and quotients of known units are taken apart. A word that is not a known unit ("count")
-/// stays as it is, with factor 1.
+/// Prefixes (um, kN, mV, mm/s^2), degrees, % and a few customary units (in, ft, lbf, bar, min) are converted; kg is
+/// unchanged. Products and quotients of known units are decomposed. An unknown unit ("count") is kept with factor 1.
 /// Source: The International System of Units, 9th ed. (BIPM, 2019), tables 2, 4 and 7.
-/// @throws std::invalid_argument for 'g', which is a gram or the acceleration of gravity.
+/// @throws std::invalid_argument for 'g', which is ambiguous: gram or acceleration of gravity.
 SiUnit si_unit(const std::string& unit);
 
 /// Replaces the units of channels by SI ones.
 /// @param place of the units, for errors: "sensors"
-/// @param notes gets one sentence per unit that changed
+/// @param notes receives one sentence per changed unit
 /// @returns the factor of every channel
 /// @throws std::invalid_argument
 std::vector<double> take_si_units(const std::string& place, ChannelList& channels,
                                   std::vector<std::string>& notes);
 
 /// A frequency response and its variances in SI units.
-/// @throws std::invalid_argument where more than that is known of it (covariances, the test for distortion)
+/// @throws std::invalid_argument if it has more than response and variances (covariances, the test for distortion)
 void take_si_units(FrfEstimate& frf, std::vector<std::string>& notes);
 
 }  // namespace stageid

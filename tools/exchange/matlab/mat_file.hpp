@@ -9,19 +9,19 @@
 namespace stageid {
 
 enum class MatVersion : std::uint8_t {
-  v5,  ///< what every program reads; at most 2 GiB a variable
-  v73  ///< HDF5 inside
+  v5,  ///< readable by every program; at most 2 GiB per variable
+  v73  ///< based on HDF5
 };
 
-/// Writes a MATLAB file, whole or not at all: same content, same bytes (v5). Lists of arrays are written
-/// as they come, and need not be kept.
+/// Writes a MATLAB file atomically; equal content gives equal bytes (v5). Lists of arrays are written immediately and
+/// need not be kept.
 ///
 /// "modes/damping_ratio" becomes field damping_ratio of struct modes, "inputs@unit" a variable
-/// inputs_unit, "@format" a variable format; a name that begins with a digit gets an x in front. Lists
-/// of texts are cells of text, single texts are text, one-dimensional arrays columns. Arrays of three
-/// axes, N x a x b, are a x b x N, as MATLAB counts pages: what idfrd(response, frequency, ...) wants.
+/// inputs_unit, "@format" a variable format; a name that begins with a digit gets a leading x. Lists of texts
+/// are cells of text, single texts are text, one-dimensional arrays columns. Arrays with three axes,
+/// N x a x b, become a x b x N, the order of MATLAB pages, as required by idfrd(response, frequency, ...).
 /// @throws FileError
-/// @throws std::invalid_argument if an array is too large for v5; v7.3 is the remedy.
+/// @throws std::invalid_argument if an array is too large for v5; use v7.3.
 class MatWriter {
  public:
   MatWriter(const std::filesystem::path& file, MatVersion version);
@@ -29,9 +29,9 @@ class MatWriter {
   MatWriter(const MatWriter&) = delete;
   MatWriter& operator=(const MatWriter&) = delete;
 
-  /// Structs are whole: all of their fields are in one list.
+  /// All fields of a struct must be in one list.
   void add(const ArrayList& list);
-  /// The file appears. Without it none does.
+  /// Completes the file. Without this call, no file is created.
   void close();
 
  private:
@@ -39,13 +39,13 @@ class MatWriter {
   std::unique_ptr<State> state_;
 };
 
-/// All at once.
+/// Writes a file in one call.
 void write_mat(const std::filesystem::path& file, const ArrayList& list,
                MatVersion version = MatVersion::v5);
 
-/// Reads any MATLAB file that libmatio does: v4, v5, v7 and v7.3. Numbers of every class are doubles;
-/// shapes are MATLAB's; fields of scalar structs are "struct/field", of struct arrays "struct/0/field".
-/// Sparse matrices become full ones. Function handles and objects, tables among them, are ArrayList::unread.
+/// Reads any MATLAB file that libmatio supports: v4, v5, v7 and v7.3. Numbers of every class become doubles, with the
+/// shapes of MATLAB. Fields of scalar structs are "struct/field", those of struct arrays "struct/0/field". Sparse
+/// matrices become full ones. Function handles and objects, including tables, are listed in ArrayList::unread.
 /// @throws FileError, FormatError
 ArrayList read_mat(const std::filesystem::path& file);
 

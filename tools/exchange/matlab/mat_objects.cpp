@@ -28,7 +28,7 @@ std::uint32_t word_at(std::string_view bytes, std::size_t at, bool big_endian) {
   return word;
 }
 
-/// The elements of a variable from the front, as long as they are whole.
+/// The elements of a variable, up to the first incomplete one.
 class Elements {
  public:
   Elements(std::string_view bytes, bool big_endian) : bytes_(bytes), big_endian_(big_endian) {}
@@ -51,12 +51,12 @@ class Elements {
   std::size_t at_ = 0;
 };
 
-/// The first bytes of a deflated variable: names and classes are there.
+/// The first bytes of a deflated variable, which contain names and classes.
 std::string inflated_begin(std::string_view deflated) {
   std::array<char, 1024> begin{};
   z_stream stream = {};
   if (inflateInit(&stream) != Z_OK) throw std::bad_alloc();
-  // zlib does not write to its input, but for lack of const in its interface.
+  // zlib does not write to its input; its interface merely lacks const.
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(deflated.data()));
   stream.avail_in = static_cast<uInt>(deflated.size());
   stream.next_out = reinterpret_cast<Bytef*>(begin.data());
@@ -74,7 +74,7 @@ std::optional<UnreadVariable> object_of(std::string_view variable, bool big_endi
   if (!flags || flags->size() < 4 || (word_at(*flags, 0, big_endian) & 0xffU) != kOpaqueClass)
     return std::nullopt;
   const auto name = elements.next();
-  elements.next();  // the system of classes: MCOS or java
+  elements.next();  // the object system: MCOS or java
   const auto object_class = elements.next();
   if (!name || !object_class) return std::nullopt;
   return unread_object(std::string(*name), std::string(*object_class));
@@ -97,7 +97,7 @@ std::string class_of(const Hdf5File& file, const std::string& object) {
 void require_all_of(const Hdf5File& file, const std::string& group, int depth, ArrayList& list) {
   if (depth > kDeepest) return;
   for (const std::string& child : file.children(group == "/" ? "/" : group)) {
-    if (child.starts_with('#')) continue;  // what references point to, and the data of objects
+    if (child.starts_with('#')) continue;  // targets of references, and the data of objects
     const std::string object = fmt::format("{}/{}", group == "/" ? "" : group, child);
     const std::string name = object.substr(1);
     const std::string kind = class_of(file, object);

@@ -6,7 +6,7 @@
 
 namespace stageid {
 
-/// --mat-version, of a .mat file that the command writes.
+/// Adds --mat-version, for .mat files that the command writes.
 void add_mat_version(CLI::App& command, MatVersion& version);
 
 }  // namespace stageid

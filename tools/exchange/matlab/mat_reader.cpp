@@ -21,9 +21,8 @@ namespace {
 using MatFile = std::unique_ptr<mat_t, int (*)(mat_t*)>;
 using Variable = std::unique_ptr<matvar_t, void (*)(matvar_t*)>;
 
-/// Structs in structs deeper than this are no data of people.
 
-/// 1 GiB of real numbers: what a full matrix made of a sparse one may take.
+/// 1 GiB of real numbers: the limit for a full matrix from a sparse one.
 constexpr std::size_t kMostFullNumbers = std::size_t{1} << 27;
 
 template <typename Number>
@@ -35,7 +34,7 @@ void append_numbers(const void* data, std::size_t count, std::vector<double>& ou
   }
 }
 
-/// False if the type is none of numbers.
+/// False if the type is not numeric.
 bool read_numbers(matio_types type, const void* data, std::size_t count, std::vector<double>& out) {
   out.reserve(count);
   switch (type) {
@@ -121,7 +120,7 @@ class Reader {
 
   void read_struct(const matvar_t& variable, const std::string& name, int depth) {
     const std::size_t count = count_of(variable);
-    // libmatio reads only, but for lack of const in its interface.
+    // libmatio only reads it; its interface merely lacks const.
     auto* structs = const_cast<matvar_t*>(&variable);
     const unsigned fields = Mat_VarGetNumberOfFields(structs);
     char* const* names = Mat_VarGetStructFieldnames(structs);
@@ -153,7 +152,7 @@ class Reader {
   void read_array(const matvar_t& variable, const std::string& name) {
     const std::size_t count = count_of(variable);
     const std::vector<std::size_t> shape(variable.dims, variable.dims + variable.rank);
-    // Column-major: the shape backwards in C order.
+    // Column-major: the shape reversed in C order.
     NamedArray stored{name, {shape.rbegin(), shape.rend()}, {}};
     std::vector<double> real;
     if (count > 0 && variable.data == nullptr) damaged(name);
@@ -173,7 +172,7 @@ class Reader {
     list_.arrays.push_back(reversed(stored));
   }
 
-  /// As a full matrix: what follows takes channels and samples, which are full.
+  /// As a full matrix, because channels and samples are full.
   void read_sparse(const matvar_t& variable, const std::string& name) {
     const auto* sparse = static_cast<const mat_sparse_t*>(variable.data);
     const std::size_t rows = variable.dims[0];
@@ -214,12 +213,12 @@ class Reader {
   ArrayList& list_;
 };
 
-/// libmatio trusts the sizes that stand in a file; what cannot be there is refused before it allocates.
+/// libmatio trusts the sizes in a file, so impossible ones are rejected before it allocates.
 void require_plausible(const std::filesystem::path& path, const matvar_t& variable,
                        std::uintmax_t file_bytes) {
   // A deflated stream is at most 1032 times as long when inflated.
   constexpr double kMostInflation = 1032.0;
-  if (variable.class_type == MAT_C_SPARSE) return;  // its shape does not say how much is stored
+  if (variable.class_type == MAT_C_SPARSE) return;  // its shape does not determine the stored size
   double bytes = 1.0;
   for (int q = 0; q < variable.rank; ++q) bytes *= static_cast<double>(variable.dims[q]);
   if (bytes > kMostInflation * static_cast<double>(file_bytes))
@@ -227,8 +226,8 @@ void require_plausible(const std::filesystem::path& path, const matvar_t& variab
                       "its declared size exceeds the file; the file is damaged");
 }
 
-/// libmatio takes the end of a file that was cut short for that of its variables. In v5 files the elements
-/// behind the head of 128 bytes, each with type and size in front, end where the file does.
+/// libmatio does not detect a truncated file: it treats the end as that of the last variable. In v5 files, the
+/// elements after the header of 128 bytes, each with type and size first, must end at the end of the file.
 void require_whole(const std::filesystem::path& path, std::uintmax_t file_bytes) {
   std::ifstream stream(path, std::ios::binary);
   char head[kHeadBytes] = {};
@@ -249,7 +248,7 @@ void require_whole(const std::filesystem::path& path, std::uintmax_t file_bytes)
     throw FormatError(path, "", "unexpected end of file; the file is truncated or damaged");
 }
 
-/// Octave's `save` writes a format of its own unless told not to, whatever the name.
+/// The default format of Octave's `save` is its own, whatever the name of the file.
 std::string no_matlab_file(const std::filesystem::path& path) {
   char head[20] = {};
   std::ifstream(path, std::ios::binary).read(head, sizeof(head));
@@ -266,7 +265,7 @@ std::string no_matlab_file(const std::filesystem::path& path) {
 
 ArrayList read_mat(const std::filesystem::path& path) {
   require_readable(path);
-  prepare_hdf5();  // libmatio leaves HDF5 to print its errors
+  prepare_hdf5();  // suppress the error output of HDF5
   const MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), &Mat_Close);
   if (!file) throw FormatError(path, "", no_matlab_file(path));
   const std::uintmax_t bytes = std::filesystem::file_size(path);

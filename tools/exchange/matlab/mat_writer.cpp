@@ -28,7 +28,7 @@ Variable owned(matvar_t* variable) {
   return {variable, &Mat_VarFree};
 }
 
-/// An identifier of MATLAB: letters, digits, underscores, no digit first.
+/// A MATLAB identifier: letters, digits, underscores, not starting with a digit.
 std::string identifier(std::string name) {
   for (char& c : name)
     if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
@@ -63,7 +63,7 @@ Variable texts_variable(const std::string& name, const std::vector<std::string>&
   return cell;
 }
 
-/// In MATLAB's order and with its least number of axes, two.
+/// In the order of MATLAB and with at least two axes.
 NamedArray as_matlab_stores(const NamedArray& array) {
   NamedArray paged = array;
   if (array.shape.size() == 3) paged = permuted(array, {1, 2, 0});
@@ -108,7 +108,7 @@ Variable empty_struct(const std::string& name) {
   return owned(Mat_VarCreateStruct2(name.c_str(), 2, dims, nullptr));
 }
 
-/// Hangs `array` into the struct at the place that its path tells.
+/// Inserts `array` into the struct at its path.
 void insert(matvar_t* parent, const std::vector<std::string>& path, const NamedArray& array) {
   for (std::size_t level = 1; level + 1 < path.size(); ++level) {
     matvar_t* child = Mat_VarGetStructFieldByName(parent, path[level].c_str(), 0);
@@ -138,7 +138,7 @@ std::vector<Variable> variables_of(const ArrayList& list) {
   return variables;
 }
 
-/// A variable is an array or a struct with all that it holds.
+/// Checks the size limits; a variable is an array or a struct with its whole content.
 void require_room(const ArrayList& list) {
   constexpr std::size_t kMostBytes = std::size_t{1} << 31;
   std::map<std::string, std::size_t> bytes;
@@ -173,7 +173,7 @@ struct MatWriter::State {
 MatWriter::MatWriter(const std::filesystem::path& file, MatVersion version)
     : state_(std::make_unique<State>(file, version)) {
   const bool v5 = version == MatVersion::v5;
-  // The default header tells the time; ours is the same for the same content.
+  // The default header contains the time; ours depends on the content only.
   const std::string header = fmt::format("MATLAB {} MAT-file, written by stageid {}",
                                          v5 ? "5.0" : "7.3", stageid::version());
   state_->file.reset(Mat_CreateVer(state_->output.path().c_str(), header.c_str(),

@@ -22,7 +22,7 @@ void write_vector(Hdf5File& file, const std::string& dataset, const Eigen::Vecto
   file.write_reals(dataset, {size_of(values.size())}, values.data());
 }
 
-/// One shape a row: columns one after the other are the rows of a row-major array.
+/// One shape per row: the concatenated columns are the rows of a row-major array.
 void write_shapes(Hdf5File& file, const std::string& dataset, const Eigen::MatrixXcd& shapes,
                   Eigen::Index channels) {
   file.write_complex(dataset, {size_of(shapes.cols()), size_of(channels)}, shapes.data());
@@ -85,8 +85,7 @@ void write_rigid_body(Hdf5File& file, const AdditiveModel& model) {
   write_matrix(file, "/rigid_body/input_shape", body.input_shape.transpose());
 }
 
-/// A, B, C, D and, state by state, the pole (of a pair: first that with positive imaginary part in
-/// s) and the submodel.
+/// A, B, C, D and, per state, the pole (the one with positive imaginary part in s first) and the submodel.
 void write_system(Hdf5File& file, const std::string& group, const std::string& pole_name,
                   const StateSpace& system) {
   file.create_group(group);

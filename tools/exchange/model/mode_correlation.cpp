@@ -17,7 +17,7 @@
 namespace stageid {
 namespace {
 
-constexpr double kLeastDamping = 1e-4;  // finite-element models have none
+constexpr double kLeastDamping = 1e-4;  // finite-element models may have zero
 
 void require_modes(const std::filesystem::path& file, const UffContent& content) {
   if (content.modes.empty())
@@ -26,7 +26,7 @@ void require_modes(const std::filesystem::path& file, const UffContent& content)
                       "convert it with 'stageid import' first");
 }
 
-/// Where an output stands in a universal file.
+/// Node and direction of an output in a universal file.
 struct Place {
   long long node = 0;
   int direction = 0;  ///< 0 scalar; 1 to 3 X, Y, Z; 4 to 6 rotations
@@ -55,7 +55,7 @@ std::optional<std::complex<double>> value_at(const UffMode& mode, const Place& p
   return place.sign * mode.values.at(first + (scalar ? 0 : axis));
 }
 
-/// An output without a direction is the one in which its node moves, if there is but one.
+/// For an output without a direction, the only direction in which its node moves, if there is exactly one.
 Place with_direction(Place place, const std::vector<UffMode>& modes) {
   if (place.direction != 0) return place;
   for (int direction = 1; direction <= 6; ++direction) {
@@ -69,12 +69,12 @@ Place with_direction(Place place, const std::vector<UffMode>& modes) {
   return place;
 }
 
-/// Frequency and damping; the shape is filled in by whoever knows the outputs.
+/// Frequency and damping only; the caller adds the shape.
 ModeShape mode_of(const UffMode& mode) {
   ModeShape shape;
   shape.natural_frequency_hz = mode.frequency_hz;
   shape.damping_ratio = mode.damping_ratio;
-  // A complex eigenvalue tells its pole instead.
+  // A complex eigenvalue is given by its pole instead.
   if (const double omega = std::abs(mode.pole_rad_s); omega > 0.0) {
     shape.natural_frequency_hz = omega / (2.0 * std::numbers::pi);
     shape.damping_ratio = -mode.pole_rad_s.real() / omega;
@@ -115,7 +115,7 @@ ModeCorrelation correlate_modes(const AdditiveModel& model, const std::filesyste
         fmt::format("its mode shapes contain no output of the model ({}); outputs are matched to "
                     "nodes 1, 2, ... in order, or by node and direction, '12+Z'",
                     fmt::join(model.outputs.names, ", ")));
-  const Eigen::VectorXcd alike = Eigen::VectorXcd::Ones(1);  // the file says nothing of inputs
+  const Eigen::VectorXcd alike = Eigen::VectorXcd::Ones(1);  // the file has no inputs
   for (const ModeShape& mode : mode_shapes(model)) {
     out.own.push_back(mode);
     out.own.back().output_shape = mode.output_shape(rows);
@@ -139,7 +139,7 @@ std::vector<ModeCandidate> candidates_of(const std::filesystem::path& file,
   std::vector<ModeCandidate> out;
   for (const UffMode& given : content.modes) {
     const ModeShape mode = mode_of(given);
-    if (!(mode.natural_frequency_hz > 0.0)) continue;  // a rigid body of a finite-element model
+    if (!(mode.natural_frequency_hz > 0.0)) continue;  // rigid body of a finite-element model
     out.push_back({mode.natural_frequency_hz, std::clamp(mode.damping_ratio, kLeastDamping, 1.0)});
   }
   if (out.empty()) throw FormatError(file, "", "contains no mode with a frequency above zero");

@@ -44,7 +44,7 @@ UffEncoding encoding_of(const std::filesystem::path& file) {
   return file.extension() == ".uff" ? UffEncoding::binary : UffEncoding::text;
 }
 
-/// What the model's .h5 file holds: it goes through one beside the target.
+/// The content of the .h5 file of the model, read from a temporary file beside the target.
 ArrayList arrays_of_model(const std::filesystem::path& beside, const AdditiveModel& model,
                           const ExportedResponse& response,
                           const std::optional<DrivingPoint>& driving_point) {

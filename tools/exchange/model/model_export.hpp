@@ -1,6 +1,6 @@
 #pragma once
 
-// Exported models and frequency responses, by the ending of the file; docs/exchange.md.
+// Exported models and frequency responses, by file extension; docs/exchange.md.
 //
 //   .json        the model                        .h5, .hdf5   tools/exchange/model/model_hdf5.hpp
 //   .csv         model_csv.hpp, frf_csv.hpp       .npz, .mat   the content of .h5 for numpy and MATLAB
@@ -16,9 +16,9 @@
 
 namespace stageid {
 
-/// @throws std::invalid_argument for another ending, listing those there are, and for a model that
-/// the format cannot hold (.csv: submodels that are no modes; state spaces: those that have none; .unv:
-/// names or units that are too long, no frequencies).
+/// @throws std::invalid_argument for an unsupported extension, listing the supported ones, and for a model that cannot
+/// be stored in the format (.csv: submodels that are not modes; state spaces: those without one; .unv: too long names
+/// or units, no frequencies).
 /// @throws FileError
 void export_model(const std::filesystem::path& file, const AdditiveModel& model,
                   const ExportedResponse& response,

@@ -33,7 +33,7 @@ void write_submodels(Hdf5File& file, const AdditiveModel& model) {
 }
 
 std::string model_text(const AdditiveModel& model, const std::filesystem::path& beside) {
-  // write_model() writes files only; its text goes through one beside the target.
+  // write_model() only writes files, so its text is read from a temporary file beside the target.
   const OutputFile scratch(beside.string() + ".json");
   const std::filesystem::path file = scratch.path();
   write_model(file, model);
@@ -43,7 +43,7 @@ std::string model_text(const AdditiveModel& model, const std::filesystem::path& 
   return text.str();
 }
 
-/// What every reader needs first: channels, delays, and the model as stageid reads it.
+/// Content needed by every reader: channels, delays, and the model in the format of stageid.
 void write_head(Hdf5File& file, const std::filesystem::path& target, const AdditiveModel& model) {
   file.write_attribute("/", "format", std::string("stageid-model"));
   file.write_attribute("/", "format_version", 1LL);

@@ -10,13 +10,13 @@
 
 namespace stageid {
 
-/// The response that goes with an exported model; all may be empty.
+/// The response belonging to an exported model; all members may be empty.
 struct ExportedResponse {
   Eigen::VectorXd frequency_hz;
   Eigen::MatrixXd variance;  ///< (n_y n_u) x N or 0 x 0
 };
 
-/// Writes model.h5, whole or not at all.
+/// Writes model.h5 atomically.
 /// @param driving_point for /modes/driving_point_mass
 /// @throws std::invalid_argument as state_space(), rigid_body() and driving_point_mass().
 /// @throws FileError

@@ -13,7 +13,7 @@
 namespace stageid {
 namespace {
 
-/// The parts of a script that the two languages write differently.
+/// Syntax that differs between the two languages.
 class Syntax {
  public:
   explicit Syntax(ScriptLanguage language) : python_(language == ScriptLanguage::python) {}

@@ -1,8 +1,8 @@
 #pragma once
 
-// Universal files (UFF, .unv, .uff): datasets 151 (header), 164 (units), 58 (function at a nodal degree of
-// freedom, text and binary) and 55 (data at nodes). Source: the definitions of SDRC that the University of
-// Cincinnati publishes, https://www.ceas3.uc.edu/sdrluff/. Other datasets are passed over.
+// Universal files (UFF, .unv, .uff): datasets 151 (header), 164 (units), 58 (function at a nodal degree of freedom,
+// text and binary) and 55 (data at nodes). Source: the definitions of SDRC, published by the University of Cincinnati,
+// https://www.ceas3.uc.edu/sdrluff/. Other datasets are skipped.
 
 #include <array>
 #include <complex>
@@ -14,15 +14,15 @@
 
 namespace stageid {
 
-/// Where a function was measured: records 6 of dataset 58.
+/// Measurement point of a function: record 6 of dataset 58.
 struct UffPoint {
   std::string entity =
-      "NONE";  ///< at most 10 characters, ASCII: others would shift the fields behind
+      "NONE";  ///< at most 10 ASCII characters: others would shift the following fields
   long long node = 0;
   int direction = 0;  ///< 0 scalar; 1, 2, 3 +X, +Y, +Z; 4, 5, 6 rotations; negative: the other way
 };
 
-/// What an axis tells: records 8 to 10.
+/// Description of an axis: records 8 to 10.
 struct UffAxis {
   int type =
       0;  ///< 8 displacement, 11 velocity, 12 acceleration, 13 excitation force, 17 time, 18 frequency
@@ -42,7 +42,7 @@ struct UffFunction {
   UffAxis denominator_axis;
   bool complex = false;
   std::vector<double> abscissa;
-  std::vector<std::complex<double>> ordinate;  ///< as many
+  std::vector<std::complex<double>> ordinate;  ///< same length as the abscissa
   std::size_t line = 0;                        ///< of the file, 1-based: for errors
 };
 
@@ -81,22 +81,21 @@ struct UffContent {
 };
 
 enum class UffEncoding : std::uint8_t {
-  text,   ///< 13 digits, as the format prescribes (E20.12); abscissas 6 unless evenly spaced
-  binary  ///< 58b: exact; uneven abscissas of double precision, as the readers in use take them
+  text,   ///< 13 digits, as prescribed (E20.12); abscissas 6 unless evenly spaced
+  binary  ///< 58b: exact; uneven abscissas in double precision, as common readers expect
 };
 
-/// Writes datasets 151, 164, 58 and 55 whole or not at all; the same content gives the same bytes, dates
-/// are left empty. Abscissas are even where minimum and step, written with six digits, give exactly them.
+/// Writes datasets 151, 164, 58 and 55 atomically. Equal content gives equal bytes; dates are empty. Abscissas are
+/// stored as even if minimum and step, written with six digits, reproduce them exactly.
 /// @throws std::invalid_argument if an id line is longer than 80 characters, or a unit than 20.
 /// @throws FileError
 void write_uff(const std::filesystem::path& file, const UffContent& content, UffEncoding encoding);
 
-/// Whether the ending is that of a universal file.
+/// Whether the extension is that of a universal file.
 bool is_uff_name(const std::filesystem::path& file);
 
-/// Reads text and binary datasets 58 of either byte order, IEEE 754. Binary abscissas may be of single
-/// precision, as the format has it, or of double precision, as many programs write them. Texts that are
-/// not UTF-8 are read as Latin-1.
+/// Reads text and binary datasets 58 of either byte order, IEEE 754. Binary abscissas may have single precision, as in
+/// the specification, or double precision, as written by many programs. Texts that are not UTF-8 are read as Latin-1.
 /// @throws FileError, FormatError "FILE:LINE: ...".
 UffContent read_uff(const std::filesystem::path& file);
 

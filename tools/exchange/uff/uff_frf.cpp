@@ -26,7 +26,7 @@ constexpr long long kFirstInputNode = 1001;
 
 // Writing -----------------------------------------------------------------------------------------
 
-/// Specific data type of a unit.
+/// Axis with the specific data type of a unit.
 UffAxis axis_of(const std::string& unit) {
   static const std::map<std::string, int> kTypes = {
       {"m", 8}, {"m/s", 11}, {"m/s^2", 12}, {"N", 13}};
@@ -46,7 +46,7 @@ std::string name_line(const char* head, const std::string& name) {
   return head + name;
 }
 
-/// The whole name stands in an id line.
+/// The full name, as an id line.
 std::string entity_of(const std::string& name) {
   std::string entity;
   for (const char32_t point : code_points_of(name))
@@ -128,8 +128,8 @@ bool has_input(const UffFunction& f) {
   return f.type == 4 || (f.type != 1 && (f.reference.node != 0 || f.reference.entity != "NONE"));
 }
 
-/// Of a function that has no input: many programs number no node and name the channel in the label of
-/// the ordinate or in the first id line.
+/// Channel name of a function without input: many programs do not number nodes, and write the channel into the label
+/// of the ordinate or the first id line.
 std::string channel_name(const UffFunction& f) {
   if (f.response.node != 0 || f.response.entity != "NONE") return output_name(f);
   for (const std::string* text : {&f.ordinate_axis.label, &f.id[0]})
@@ -137,7 +137,7 @@ std::string channel_name(const UffFunction& f) {
   return output_name(f);
 }
 
-/// File units in one SI unit, for a quantity of this axis; none: nobody knows.
+/// Factor between file units and the SI unit for a quantity of this axis; empty if unknown.
 std::optional<double> factor_of(const UffAxis& axis, int direction, const UffUnits& units) {
   if (units.length == 1.0 && units.force == 1.0) return 1.0;
   const bool rotation = std::abs(direction) > 3;
@@ -180,7 +180,7 @@ Eigen::Index place_in(ChannelList& channels, const std::string& name, const std:
   return static_cast<Eigen::Index>(channels.size()) - 1;
 }
 
-/// What stands in a file that has no frequency response, and what can be done with it.
+/// Description of a file without frequency response, and the remedy.
 std::string other_content(const UffContent& content) {
   static const std::map<int, const char*> kNames = {
       {1, "time response"}, {2, "auto spectrum"},          {3, "cross spectrum"},
@@ -223,7 +223,7 @@ void read_settings(const std::string& description, FrfEstimate& frf) {
 
 using Channel = std::pair<Eigen::Index, Eigen::Index>;
 
-/// The functions of one kind by channel; every pair must be there once.
+/// The functions of one kind by channel; every pair must occur once.
 std::map<Channel, const UffFunction*> table_of(const std::filesystem::path& file,
                                                const UffContent& content, FrfEstimate& frf,
                                                const std::string& title) {

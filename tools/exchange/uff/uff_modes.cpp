@@ -12,8 +12,8 @@
 namespace stageid {
 namespace {
 
-/// Three values a node, though the format has scalars too: readers in use know only 3 and 6. A scalar output
-/// stands in X (note 15 of the format: degrees of freedom that are not used are zero).
+/// Three values per node, because common readers only support 3 and 6, not the scalars of the format. A scalar output
+/// is stored as X (note 15 of the format: unused degrees of freedom are zero).
 UffMode uff_mode(const ModeShape& shape, const ChannelList& outputs) {
   UffMode mode;
   mode.complex = !shape.output_shape.imag().isZero(0.0);

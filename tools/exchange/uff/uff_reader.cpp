@@ -136,15 +136,15 @@ struct EightBytes {
   char raw[8];
 };
 
-/// True if the data end at `bytes`: there stands the edge, perhaps on a line of its own.
+/// True if the data end at `bytes`: the delimiter follows, possibly on a line of its own.
 bool ends_at(std::string_view rest, std::size_t bytes) {
   if (bytes > rest.size()) return false;
   const std::string_view behind = rest.substr(bytes, 10);
   return trimmed(behind).starts_with(kEdge) && behind.find_first_not_of(" \r\n") >= 4;
 }
 
-/// Record 12 in bytes. Which width abscissas have is told by where the data end: the number of bytes in
-/// the head of the dataset is wrong in files of some programs.
+/// Record 12 in binary. The width of the abscissas follows from the end of the data, because some programs write a
+/// wrong number of bytes in the head of the dataset.
 std::vector<double> binary_values(TextLines& lines, const DataForm& form,
                                   const BinaryForm& binary) {
   const std::string_view rest = lines.rest();
@@ -215,7 +215,7 @@ std::vector<double> read_short_values(TextLines& lines, std::size_t count) {
   return values;
 }
 
-/// Modes only; other data at nodes are passed over.
+/// Reads modes only; other data at nodes are skipped.
 std::optional<UffMode> read_mode(TextLines& lines) {
   UffMode mode;
   for (std::string& id : mode.id) id = utf8_of_text(trimmed(lines.next()));
@@ -272,7 +272,7 @@ void read_header(TextLines& lines, UffContent& content) {
     *text = utf8_of_text(trimmed(lines.next()));
 }
 
-/// The form of the data if the dataset line says "58b".
+/// The form of the data if the dataset line contains "58b".
 std::optional<BinaryForm> binary_form(const TextLines& lines, std::string_view line) {
   if (line.size() < 7 || (line[6] != 'b' && line[6] != 'B')) return std::nullopt;
   Record record(lines, line.substr(7));
@@ -298,7 +298,7 @@ void read_dataset(TextLines& lines, UffContent& content) {
     const std::optional<UffMode> mode = read_mode(lines);
     if (mode) {
       content.modes.push_back(*mode);
-      return;  // its end is read
+      return;  // its end has been read
     }
   } else if (number == "164") {
     content.units = read_units(lines);

@@ -112,8 +112,8 @@ void append_bytes(std::string& bytes, double value) {
   bytes.append(raw, sizeof(value));
 }
 
-/// The format has abscissas of single precision. pyuff and MATLAB's readuff, which most people read with,
-/// take all numbers for the precision of the ordinate and fail at such files.
+/// The specification has abscissas of single precision. The most common readers, pyuff and MATLAB's readuff, expect
+/// the precision of the ordinate and fail on such files.
 std::string binary_values(const UffFunction& f, bool even) {
   std::string bytes;
   for (std::size_t k = 0; k < f.abscissa.size(); ++k) {
@@ -136,7 +136,7 @@ std::string function_text(const UffFunction& f, UffEncoding encoding) {
          function_head(f, even) + bytes + kEdgeLine;
 }
 
-/// Fields of E13.5, six a line.
+/// Fields of E13.5, six per line.
 std::string short_lines(const std::vector<double>& values) {
   std::string text;
   for (std::size_t k = 0; k < values.size(); ++k) {
@@ -149,7 +149,7 @@ std::string short_lines(const std::vector<double>& values) {
 std::string mode_text(const UffMode& mode) {
   std::string text = kEdgeLine + dataset_line(55);
   for (const std::string& id : mode.id) text += text_line(id);
-  // Structural; displacement. A scalar a node, or X, Y and Z.
+  // Structural; displacement. One scalar per node, or X, Y and Z.
   text +=
       fmt::format("{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}\n", 1, mode.complex ? 3 : 2,
                   mode.values_per_node == 3 ? 2 : 1, 8, mode.complex ? 5 : 2, mode.values_per_node);

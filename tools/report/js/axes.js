@@ -1,6 +1,6 @@
-// Logarithmic axes for dygraphs, whose own ticks crowd on a narrow plot.
+// Logarithmic axes for dygraphs, whose own ticks are too dense on a narrow plot.
 
-// Ticks of a logarithmic axis: labels at decades, at 1-3 or 1-2-5 where there is room, linear when within a decade.
+// Ticks of a logarithmic axis: labels at decades, at 1-3 or 1-2-5 if there is room, linear within a decade.
 function logTicks(min, max, pixels, label, spacing) {
   const decades = Math.log10(max / min);
   if (!(decades > 0)) return [];
@@ -66,14 +66,14 @@ function phaseTicks(min, max, pixels) {
 
 const phaseAxis = { axisLabelWidth: 58, ticker: phaseTicks };
 
-// Options that every plot shares, in the colours of the moment.
+// Options shared by all plots, in the current colours.
 function plotColours() {
   const colours = palette();
   return { gridLineColor: colours.grid, axisLineColor: colours.frame };
 }
 
-// The band of one series as one polygon: dygraphs' own draws a quadrangle between any two lines, and
-// that takes most of the time of a plot.
+// Draws the band of one series as one polygon: dygraphs draws a quadrangle between any two lines, which takes most of
+// the time of a plot.
 function drawBand(event) {
   const context = event.drawingContext;
   const area = event.plotArea;
@@ -90,7 +90,7 @@ function drawBand(event) {
   };
   for (const point of event.points) {
     if (Number.isFinite(point.y_top) && Number.isFinite(point.y_bottom)) run.push(point);
-    else if (Number.isNaN(point.yval)) fill();  // a wrap; null is a line that only the others have
+    else if (Number.isNaN(point.yval)) fill();  // a wrap; null is a line of another series
   }
   fill();
   context.restore();

@@ -1,8 +1,8 @@
-// The part of the band that is looked at: one for the whole page. Whoever changes it moves all the others.
+// The visible part of the band, common to the whole page. A change of it updates all figures.
 
 const band = { low: null, high: null, telling: false, followers: [], texts: [] };
 
-const leastLines = 4;  // what a zoom leaves at the least
+const leastLines = 4;  // minimum after a zoom
 
 function wholeBand() {
   const f = array('frequency');
@@ -20,7 +20,7 @@ function isWholeBand() {
   return shown[0] <= low * (1 + 1e-9) && shown[1] >= high * (1 - 1e-9);
 }
 
-// follower(low, high) is called whenever another part of the page has zoomed or panned.
+// Registers follower(low, high), called after another part of the page was zoomed or panned.
 function followBand(follower) {
   band.followers.push(follower);
 }
@@ -56,7 +56,7 @@ function linesBetween(low, high) {
   return Math.max(0, last - first + 1);
 }
 
-// First and last line within the band, by bisection: the lines rise.
+// First and last line within the band, by bisection of the rising frequencies.
 function bandLines(low, high) {
   const f = array('frequency');
   const least = (wanted) => {
@@ -71,7 +71,7 @@ function bandLines(low, high) {
   return [least((hz) => hz >= low), least((hz) => hz > high) - 1];
 }
 
-// Half as wide or twice as wide about the middle (factor), and to the side (shift, in widths); the axis is logarithmic.
+// Scales the band about its centre (factor) and shifts it (shift, in widths); the axis is logarithmic.
 function moveBand(factor, shift) {
   const [low, high] = shownBand().map(Math.log);
   const [least, most] = wholeBand().map(Math.log);
@@ -84,7 +84,7 @@ function moveBand(factor, shift) {
 
 const bandKeys = { '+': [0.5, 0], '=': [0.5, 0], '-': [2, 0], PageUp: [1, 0.25], PageDown: [1, -0.25] };
 
-// Keys that zoom and pan wherever a figure has the focus. @returns true if the key was one.
+// Keys for zoom and pan in every figure that has the focus. @returns true if the key was one of them.
 function bandKey(event) {
   if (event.ctrlKey || event.metaKey || event.altKey) return false;
   if (event.key === 'Home') resetBand();
@@ -112,7 +112,7 @@ function bandBar() {
     element('button', { type: 'button', class: 'plain small', onclick: resetBand }, 'Whole band'), text);
 }
 
-// Options that tie a dygraph to the band: a zoom or pan in it moves the others.
+// Options that connect a dygraph to the band: its zooms and pans apply to all figures.
 function tiedToBand() {
   return {
     dateWindow: shownBand(),

@@ -1,6 +1,6 @@
 // The response channel by channel.
 
-// Of the response that `content` and array() hold.
+// Channels of the response in `content` and array().
 function channelCount() {
   return content.frf ? content.frf.inputs.length * content.frf.outputs.length : 0;
 }
@@ -16,7 +16,7 @@ function channelName(channel) {
   return outputs[channel % outputs.length].name + ' \u2190 ' + content.frf.inputs[input].name;
 }
 
-// Everything that the panels draw of one channel: magnitudes, one a line; null where not known.
+// The curves of one channel: magnitudes, one per line; null if unknown.
 const curvesOfChannel = new Map();
 function channelCurves(channel) {
   if (!curvesOfChannel.has(channel)) curvesOfChannel.set(channel, makeCurves(channel));
@@ -50,7 +50,7 @@ function makeCurves(channel) {
   return curves;
 }
 
-// Over the lines where there is a response.
+// Over the lines with a response.
 function relativeRms(errors, values) {
   let sum = 0, used = 0;
   for (let k = 0; k < values.length; ++k) {
@@ -61,7 +61,7 @@ function relativeRms(errors, values) {
   return used > 0 ? Math.sqrt(sum / used) : null;
 }
 
-// Of another day or model: its magnitudes, and that of its difference from what is here.
+// Curves of the compared day or model: its magnitudes, and the magnitude of the difference.
 function otherCurves(channel, measured) {
   const lines = content.frf.lines;
   const part = (id) => {

@@ -60,7 +60,7 @@ function drawCmif() {
   plots.add(cmif.graph);
 }
 
-// [low, value, high]: a real Gaussian is within 1.96 standard deviations with 95 %.
+// [low, value, high]: 95 % of a real Gaussian are within 1.96 standard deviations.
 function cmifBar(value, deviation, floor) {
   const v = Math.max(value, floor);
   if (!deviation) return [v, v, v];
@@ -74,14 +74,14 @@ function cmifSeries() {
   return Object.fromEntries(Array.from({ length: content.arrays.cmif.curves }, (_, i) => ['curve ' + (i + 1), { color: colours[i % colours.length], plotter }]));
 }
 
-// Identified modes as lines behind the curves, chosen ones as rings on their curve.
+// Identified modes as lines behind the curves, chosen ones as rings on their curves.
 function markModes(context, area, graph) {
   const f = array('frequency');
   const values = array('cmif');
   const colours = palette();
   const [low, high] = graph.xAxisRange();
   const inside = (hz) => hz >= low && hz <= high;
-  // dygraphs' toDomXCoord() forgets that the axis is logarithmic; its percentage does not.
+  // The toDomXCoord() of dygraphs ignores that the axis is logarithmic; its percentage does not.
   const across = (hz) => area.x + graph.toPercentXCoord(hz) * area.w;
   context.save();
   context.strokeStyle = colours.marker;

@@ -1,4 +1,4 @@
-// Two days or two models side by side: modes paired by frequency and shape, and what changed.
+// Comparison of two days or two models: modes paired by frequency and shape, and their changes.
 
 function buildComparison() {
   const { comparison } = content;

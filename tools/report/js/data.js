@@ -1,4 +1,4 @@
-// What stands in the report itself.
+// Data embedded in the report.
 
 const content = JSON.parse(document.getElementById('content').textContent);
 
@@ -9,7 +9,7 @@ async function readBlocks() {
   blocks = await unpackAll(Object.fromEntries(Object.keys(content.arrays).map((id) => [id, document.getElementById('data-' + id).textContent])));
 }
 
-// The array of that name, decoded when first asked for; null where the report has none.
+// The array of that name, decoded on first use; null if the report does not contain it.
 function array(id) {
   const about = content.arrays[id];
   if (!about) return null;

@@ -1,4 +1,4 @@
-// Packed numbers: tools/report_packing.hpp and report_encoding.hpp are the writers.
+// Decodes packed numbers written by tools/report/report_packing.hpp and report_encoding.hpp.
 
 function bytesOf(base64) {
   const text = atob(base64);
@@ -7,8 +7,8 @@ function bytesOf(base64) {
   return bytes;
 }
 
-// The browser's own inflate. No Blob and no Response: nothing leaves this script's turn of the event loop, so that
-// in Chromium the page is whole before it counts as loaded, and may be printed.
+// Uses the browser's own inflate. Without Blob and Response, unpacking stays within one turn of the event loop, so in
+// Chromium the page is complete before it counts as loaded, and may be printed.
 async function unpack(base64) {
   const inflate = new DecompressionStream('deflate');
   const writer = inflate.writable.getWriter();
@@ -26,7 +26,7 @@ async function unpack(base64) {
   return bytes;
 }
 
-// Blocks by name, packed -> unpacked.
+// Unpacks blocks by name.
 async function unpackAll(blocks) {
   if (typeof DecompressionStream === 'undefined')
     throw new Error('This browser is too old to decompress the plot data. Open the page with Chrome or Edge 80, Firefox 113, Safari 16.4 or later.');
@@ -35,7 +35,7 @@ async function unpackAll(blocks) {
   return Object.fromEntries(names.map((name, i) => [name, unpacked[i]]));
 }
 
-// Bytes of numbers from planes: all lowest bytes, then the next, ...
+// Bytes of numbers from byte planes: all lowest bytes first, then the next, ...
 function interleaved(planes, width) {
   const count = planes.length / width;
   const bytes = new Uint8Array(planes.length);
@@ -45,7 +45,7 @@ function interleaved(planes, width) {
   return bytes.buffer;
 }
 
-// Pairs (re, im), each from what is expected of it: value(guess, i) gives number i. Rounds as class Extrapolation does.
+// Pairs (re, im) from their expected values: value(guess, i) returns number i. Rounds as class Extrapolation does.
 function expectedPairs(out, about, base, value) {
   const twice = about.order === 2 ? 2 : about.order;
   const once = about.order === 2 ? 1 : 0;
@@ -66,7 +66,7 @@ function signFirst(word) {
 
 const largestFloat = 3.4028234663852886e38;
 
-// Words: the place in the order of all float32 less that of the expected number.
+// Words: index in the order of all float32 minus that of the expected number.
 function fromComplexFloat32(bytes, about, base) {
   const words = new Uint32Array(interleaved(bytes, 4));
   const number = new Float32Array(1);
@@ -79,7 +79,7 @@ function fromComplexFloat32(bytes, about, base) {
   });
 }
 
-// m 2^(e-15): int16 m less the expected one modulo 2^16, then int8 e less the one before.
+// m 2^(e-15): int16 m minus the expected one modulo 2^16, then int8 e minus the previous one.
 function fromBlock16(bytes, about, base) {
   const count = bytes.length / 5;
   const words = new Uint16Array(interleaved(bytes.subarray(0, 4 * count), 2));
@@ -99,7 +99,7 @@ function runningSum(bytes) {
   return out;
 }
 
-// One byte a number, a logarithmic scale a row; code 0 is zero.
+// One byte per number, one logarithmic scale per row; code 0 is zero.
 function fromLogBytes(codes, low, step) {
   const columns = codes.length / low.length;
   const out = new Float64Array(codes.length);
@@ -126,7 +126,7 @@ function difference(a, b) {
 
 function magnitudes(pairs) {
   const out = new Float64Array(pairs.length / 2);
-  // Not Math.hypot(): ten times slower, and float32 squared neither overflows nor vanishes here.
+  // Math.hypot() is ten times slower; squares of float32 neither overflow nor vanish here.
   for (let k = 0; k < out.length; ++k) out[k] = Math.sqrt(pairs[2 * k] * pairs[2 * k] + pairs[2 * k + 1] * pairs[2 * k + 1]);
   return out;
 }

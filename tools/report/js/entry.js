@@ -72,14 +72,14 @@ function zoomEntry(low, high) {
   document.getElementById('entry').scrollIntoView({ behavior: 'auto', block: 'start' });
 }
 
-// [low, value, high]; a logarithmic axis has no place for what is not positive.
+// [low, value, high]; a logarithmic axis cannot show values <= 0.
 function bar(value, deviation, floor) {
   const v = Math.max(value, floor);
   if (!deviation) return [v, v, v];
   return [Math.max(value - content.frf.band_factor * deviation, floor), v, value + content.frf.band_factor * deviation];
 }
 
-// Rows of dygraphs' own format, with the names of the columns.
+// Rows in the format of dygraphs, with the names of the columns.
 function magnitudeTable(channel) {
   const scale = lineScale();
   const curves = channelCurves(channel);
@@ -98,7 +98,7 @@ function magnitudeTable(channel) {
   return { rows, names: columns.map(([name]) => name) };
 }
 
-// Phases wrap: a row of gaps between two lines breaks the trace there instead of drawing a wall.
+// Phases wrap: a row of gaps between two lines interrupts the trace there instead of drawing a vertical line.
 function phaseTable(channel) {
   const curves = channelCurves(channel);
   const phases = channelPhases(channel);
@@ -119,8 +119,8 @@ function phaseTable(channel) {
   return { rows, names: columns.map(([name]) => name), cut };
 }
 
-// Where to cut the circle, such that the traces wrap least: a rigid body's phase lies on -180 degrees,
-// and noise would throw it from edge to edge. In doubt from -180 to 180.
+// Angle at which to cut the circle, such that the traces wrap least: the phase of a rigid body is -180 degrees, where
+// noise would make it jump between the edges. Default: -180 to 180.
 function calmestCut(phases) {
   let best = -180;
   let fewest = Infinity;
@@ -214,7 +214,7 @@ function buildLegend() {
 }
 
 function toggleTrace(name) {
-  // A logarithmic axis needs something to be scaled to: the last trace stays.
+  // A logarithmic axis needs data for its scale, so the last trace cannot be hidden.
   if (!entry.hidden.has(name) && entry.order.every((other) => other === name || entry.hidden.has(other))) return;
   if (entry.hidden.has(name)) entry.hidden.delete(name);
   else entry.hidden.add(name);

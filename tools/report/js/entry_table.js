@@ -1,8 +1,8 @@
-// The numbers of the chosen element in the band shown, as a table: for screen readers, and for copying.
+// The numbers of the chosen element in the visible band as a table: for screen readers, and for copying.
 
 const entryTable = { details: null, body: null };
 
-const mostRows = 200;  // a zoom shows the rest
+const mostRows = 200;  // zoom to see the rest
 
 function buildEntryTable() {
   entryTable.body = element('div');

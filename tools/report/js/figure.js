@@ -1,4 +1,4 @@
-// Figures of our own on a canvas, and files of every figure: SVG, and PNG made from it.
+// Figures on a canvas, and export of all figures as SVG, and as PNG made from it.
 
 const figureFont = 'system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
 
@@ -6,7 +6,7 @@ function font(pixels, weight) {
   return (weight ? weight + ' ' : '') + pixels + 'px ' + figureFont;
 }
 
-// draw(context, width, height) on a canvas that follows its element, the colours and the paper.
+// Calls draw(context, width, height) on a canvas whenever its element, the colours or the medium change.
 function canvasFigure(id, label, draw, kind) {
   const canvas = element('canvas', { 'aria-hidden': 'true' });
   const node = element('div', { class: 'plot ' + (kind || ''), id, role: 'img', 'aria-label': label, tabindex: '0' }, canvas);
@@ -31,10 +31,10 @@ function paintFigure(figure) {
   figure.draw(context, width, height);
 }
 
-// What can be saved: name -> {title, legend, panels}; a panel is {width, height, draw}.
+// Figures that can be saved: name -> {title, legend, panels}; a panel is {width, height, draw}.
 const savable = new Map();
 
-// Buttons that save a figure. describe() gives {title, legend: [[name, colour]], panels} of the moment.
+// Buttons that save a figure. describe() returns its current {title, legend: [[name, colour]], panels}.
 function saveButtons(name, describe) {
   savable.set(name, describe);
   const button = (kind) => element('button', {
@@ -47,7 +47,7 @@ function canvasPanel(figure) {
   return { width: figure.node.clientWidth, height: figure.node.clientHeight, draw: figure.draw };
 }
 
-// dygraphs draws into the context that it is given; its labels are elements of the page.
+// dygraphs draws into the given context; its labels are elements of the page.
 function graphPanel(graph, title) {
   return { width: graph.width_, height: graph.height_, title, draw: (context) => drawGraph(graph, context) };
 }

@@ -1,4 +1,4 @@
-// Text and elements. Names and texts come from outside: they only ever become text nodes.
+// Text and elements. Names and texts are external: they are only used as text nodes.
 
 // element('p', {class: 'x', onclick: f}, 'text', child, ...)
 function element(tag, attributes, ...children) {
@@ -41,7 +41,7 @@ function percent(value, digits = 2) {
   return (Math.abs(text) < 1e-3 && text !== 0 ? number(text, digits) : String(text)) + '\u00a0%';
 }
 
-// In standard deviations, with sign: "+1.3".
+// In standard deviations, signed: "+1.3".
 function deviations(value) {
   if (!isNumber(value)) return '\u2013';
   const text = Math.abs(value).toFixed(1);
@@ -83,7 +83,7 @@ function section(id, short, title, lead) {
   return node;
 }
 
-// A list of [label, value], value a text or an element.
+// A list of [label, value], with a text or an element as value.
 function facts(pairs) {
   const list = element('dl', { class: 'facts' });
   for (const [label, value] of pairs) {

@@ -1,4 +1,4 @@
-// Timing and health of the measurement, and what the job spent its time on.
+// Timing and health of the measurement, and duration of the steps.
 
 const runTotals = { cycles: 0, late: 0, missing: 0, marked: 0, seconds: 0, recorded_s: 0 };
 for (const run of content.runs) for (const key of Object.keys(runTotals)) runTotals[key] += run[key];
@@ -23,7 +23,7 @@ function buildHealth() {
   if (content.runs.length) body.append(element('details', null, element('summary', null, 'Every run'), runTable()));
 }
 
-// What the checks of the data found; words beside the colours.
+// Findings of the checks of the data; words in addition to colours.
 function findingTable() {
   const grave = { error: 2, warning: 1, note: 0 };
   const heads = ['severity', 'channel', 'finding', 'figure', 'remedy'].map((title) => element('th', { scope: 'col' }, title));

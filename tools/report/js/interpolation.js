@@ -1,5 +1,5 @@
-// Zippered experiments: each axis has lines of its own, and a local model between them. What that model leaves, and
-// what lines are worth whose errors are correlated by it.
+// Zippered experiments: each axis has its own lines, with a local model between them. Shows the residual of that
+// model, and the number of independent lines.
 
 const interpolation = { graph: null };
 
@@ -7,7 +7,7 @@ function isZippered() {
   return Boolean(content.frf) && content.frf.correlated_lines > 1;
 }
 
-// What the reader of a deviation has to know; null for other experiments.
+// Explanation for readers of the deviations; null for other experiments.
 function correlationText() {
   if (!isZippered()) return null;
   const { lines, correlated_lines: each } = content.frf;

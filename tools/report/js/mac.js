@@ -1,4 +1,4 @@
-// Modal assurance criteria as a picture with a table behind it.
+// Modal assurance criteria as a picture with an equivalent table.
 
 const macs = [];
 
@@ -29,7 +29,7 @@ function buildMac(id, name, get) {
     element('p', { class: 'plot-title' }, text), folded(name + ' as a table', '', table));
 }
 
-// MACs of sensors, actuators, or their product: that of the residues.
+// MACs of sensors, of actuators, or their product, which is that of the residues.
 function macValues(outputs, inputs, kind) {
   if (kind === 'outputs') return outputs;
   if (kind === 'inputs') return inputs;

@@ -1,4 +1,4 @@
-// The order of the page.
+// Layout of the page.
 
 const startedMs = performance.now();
 

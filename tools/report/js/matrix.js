@@ -1,8 +1,8 @@
-// The element-wise Bode matrix: one small canvas a channel, drawn when it comes into view.
+// The element-wise Bode matrix: one small canvas per channel, drawn when it becomes visible.
 
 const matrix = { panels: [], selected: -1, onselect: null, timesOmega: 0, pending: 0 };
 
-// What multiplies a magnitude: 1 or omega^2 (acceleration instead of position).
+// Factor of the magnitudes: 1 or omega^2 (acceleration instead of position).
 function lineScale() {
   const f = array('frequency');
   return matrix.timesOmega ? Float64Array.from(f, (hz) => (2 * Math.PI * hz) ** matrix.timesOmega) : null;
@@ -12,7 +12,7 @@ function scaled(values, scale) {
   return scale && values ? Float64Array.from(values, (v, k) => v * scale[k]) : values;
 }
 
-// The common range in the band shown: everything measured, and below it most of the residual.
+// The common range in the visible band: all measured values and most of the residual below them.
 function matrixRange(scale) {
   let high = 0;
   let low = Infinity;
@@ -72,7 +72,7 @@ function buildMatrix() {
   watchPanels();
 }
 
-// What the panels show of another day or model: its measurement, else its model.
+// The trace of the compared day or model: its measurement, else its model.
 function otherTrace() {
   if (content.arrays.other_response) return 'other';
   return content.arrays.other_model ? 'otherModel' : null;
@@ -126,7 +126,7 @@ function moveFocus(event) {
   target.focus();
 }
 
-// Panels in view are drawn at once, the others when the browser has nothing else to do.
+// Visible panels are drawn at once, the others when the browser is idle.
 function watchPanels() {
   const seen = new IntersectionObserver((entries) => {
     for (const entry of entries) if (entry.isIntersecting) drawPanel(Number(entry.target.dataset.channel));
@@ -238,7 +238,7 @@ function drawDecades(context, frame) {
   context.stroke();
 }
 
-// The line's half pixel column, and its place; the same for all curves of that width and band.
+// The half-pixel column of every line; the same for all curves of that width and band.
 function columnsOf(frame) {
   const { width, x0, x1, columns } = { ...frame, columns: matrix.columns };
   if (!columns || columns.width !== width || columns.x0 !== x0 || columns.x1 !== x1) {
@@ -248,7 +248,7 @@ function columnsOf(frame) {
   return matrix.columns;
 }
 
-// First, least, largest and last of every half pixel column: peaks of one line survive.
+// First, smallest, largest and last value per half-pixel column, so that peaks of a single line remain visible.
 function drawCurve(context, frame, values, colour, width) {
   if (!values) return;
   const { x: places, column: columns } = columnsOf(frame);
@@ -263,7 +263,7 @@ function drawCurve(context, frame, values, colour, width) {
     context.lineTo(x, y(high));
     context.lineTo(x, y(last));
   };
-  // One line beyond the band on either side: curves run to the edge.
+  // One line beyond the band on either side, so that curves reach the edge.
   const [inside, end] = bandLines(...shownBand());
   const start = Math.max(0, inside - 1);
   for (let k = start; k <= Math.min(values.length - 1, end + 1); ++k) {

@@ -1,9 +1,9 @@
-// What the pointer does in the matrix, and the matrix as one picture.
+// Pointer actions in the matrix, and the matrix as one picture.
 
-// Drags over less than this are clicks.
+// Shorter drags are clicks.
 const leastDrag = 6;
 
-// A drag across a panel zooms all of them; a click stays a choice. Fingers scroll the page instead.
+// A drag across a panel zooms all of them; a click selects a panel. Touch scrolls the page instead.
 function dragAcross(event) {
   const button = event.target.closest('.panel');
   if (!button || event.button !== 0 || event.pointerType === 'touch') return;
@@ -40,7 +40,7 @@ function swallowClick(button) {
   setTimeout(() => button.removeEventListener('click', swallow, { capture: true }));
 }
 
-// The whole matrix for a slide: 16 to 9 or so, names beside rows and above columns.
+// The whole matrix for a slide: about 16 to 9, names beside rows and above columns.
 function savedMatrix() {
   const { inputs, outputs } = content.frf;
   const width = Math.max(80, Math.min(300, Math.floor(1240 / inputs.length)));

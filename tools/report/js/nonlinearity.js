@@ -1,4 +1,4 @@
-// Where the scatter over realizations is more than noise: nonlinear distortions, a pair and a band at a time.
+// Pairs and bands in which the scatter over realizations is larger than noise: nonlinear distortions.
 
 const distortion = { figure: null, text: null };
 
@@ -17,13 +17,13 @@ function buildNonlinearity() {
     folded('Table of the bands and pairs above noise', '', distortionTable(bands)));
 }
 
-// [{channel, band, p, level, settled}] of every pair and band.
+// [{channel, band, p, level, settled}] per pair and band.
 function distortionBars() {
   const { p_value: p, distortion: level, settled } = content.nonlinearity;
   return p.flatMap((row, channel) => row.map((value, i) => ({ channel, band: i, p: value, level: level[channel][i], settled: settled[i] })));
 }
 
-// Of everything that could be tested.
+// All tests that were possible.
 function distortionTests() {
   return distortionBars().filter((bar) => bar.settled);
 }
@@ -58,7 +58,7 @@ function distortionTable(bands) {
   ], rows);
 }
 
-// Sensors are rows; where the names of many actuators do not fit beside each other, columns.
+// Sensors are rows, or columns if the names of many actuators do not fit beside each other.
 function distortionFrame(width, height) {
   const { inputs, outputs } = content.frf;
   const area = { x: 64, y: 22, w: width - 70, h: height - 28 };

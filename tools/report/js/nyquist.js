@@ -14,7 +14,7 @@ function buildNyquist() {
     element('p', { class: 'plot-title' }, text));
 }
 
-// What to look at: the zoom, or the strongest resonance, as the whole band is nothing but its steepest part.
+// The visible band: the zoom, or else the strongest resonance, since the whole band would only show its steepest part.
 function nyquistBand(channel) {
   if (!isWholeBand()) return shownBand();
   const f = array('frequency');
@@ -33,7 +33,8 @@ function nyquistBand(channel) {
   return [Math.max(f[0], low), Math.min(f[f.length - 1], high)];
 }
 
-// {points: [{k, re, im, radius}], model: [{re, im}], other: [{re, im}]} on the lines of that band, with the factor of the moment.
+// {points: [{k, re, im, radius}], model: [{re, im}], other: [{re, im}]} on the lines of that band, with the current
+// factor.
 function nyquistData(channel, low, high) {
   const [first, last] = bandLines(low, high);
   const lines = content.frf.lines;
@@ -62,7 +63,7 @@ function showNyquist(channel) {
   nyquist.figure.redraw();
 }
 
-// Equal scales on both axes, the data in the middle.
+// Equal scales on both axes, the data centred.
 function planeFrame(data, width, height) {
   const all = data.points.concat(data.model, data.other);
   const range = (part) => [Math.min(...all.map((p) => p[part])), Math.max(...all.map((p) => p[part]))];
@@ -109,7 +110,7 @@ function drawNyquist(context, width, height) {
   context.restore();
 }
 
-// Circles that would hide each other are left out: every one shown stands for its neighbours.
+// Circles that would overlap are omitted: each one shown represents its neighbours.
 function drawCircles(context, frame, points, colour) {
   let last = null;
   for (const p of points) {

@@ -1,8 +1,8 @@
-// A smooth surface over scattered points: what the eye needs between a dozen channels.
+// A smooth surface through scattered points, for display between a dozen channels.
 
 // Thin-plate spline (Duchon 1977): w = a + b x + c y + sum_i d_i r_i^2 ln r_i, the smoothest surface near the values;
-// `smoothing` gives way where neighbours disagree. Points in the unit square or so. @returns (x, y) -> w, or null if
-// the points lie on a line.
+// `smoothing` allows deviations if neighbours disagree. Points about in the unit square. @returns (x, y) -> w, or null
+// if the points are on a line.
 function plateThrough(points, values, smoothing = 0.01) {
   const n = points.length;
   const kernel = (dx, dy) => {
@@ -20,7 +20,7 @@ function plateThrough(points, values, smoothing = 0.01) {
   };
 }
 
-// Gaussian elimination with the largest pivot of each column; rows are [A | b]. @returns x, null if singular.
+// Gaussian elimination with column pivoting; rows are [A | b]. @returns x, null if singular.
 function solveDense(rows) {
   const n = rows.length;
   for (let k = 0; k < n; ++k) {

@@ -1,9 +1,9 @@
-// report.html#selftest checks itself and leaves the findings as JSON in the element "selftest".
-// The program's own browser test reads it; so can anyone who doubts a page.
+// report.html#selftest checks itself and writes the findings as JSON into the element "selftest". The browser test of
+// the program reads it; anyone else can too.
 
 async function selfTest(startedMs) {
   const builtMs = performance.now();
-  await new Promise((done) => setTimeout(done, 100));  // figures draw when they get their size
+  await new Promise((done) => setTimeout(done, 100));  // figures are drawn when they get their size
   const findings = {
     title: document.title, verdict: content.verdict.level, sections: Array.from(document.querySelectorAll('main > section'), (s) => s.id),
     ready_ms: Math.round(builtMs), script_ms: Math.round(builtMs - startedMs),
@@ -31,11 +31,12 @@ async function selfTest(startedMs) {
   findings.timed_cycles = Array.from(document.querySelectorAll('.histogram .step-time'), (cell) => Number(cell.textContent.replace(/\u202f/g, '')))
     .reduce((a, b) => a + b, 0);
   findings.errors = window.stageidReport.errors;
-  if (window.parent !== window) window.parent.postMessage(findings, '*');  // the test's narrow frame
+  // the narrow frame of the test
+  if (window.parent !== window) window.parent.postMessage(findings, '*');
   document.body.append(element('script', { type: 'application/json', id: 'selftest' }, JSON.stringify(findings).replace(/</g, '\\u003c')));
 }
 
-// Once a canvas: a browser complains about more.
+// Once per canvas: browsers warn about more.
 function pixelsOf(canvas) {
   const { width, height } = canvas;
   return width > 0 && height > 0 ? canvas.getContext('2d').getImageData(0, 0, width, height) : null;
@@ -45,7 +46,7 @@ function hasInk(pixels) {
   return pixels !== null && new Set(new Uint32Array(pixels.data.buffer)).size > 8;
 }
 
-// The highest line of the acceleration stands in the panel, however many lines share its pixel.
+// The highest line of the acceleration must be visible in the panel, however many lines share its pixel.
 function showsPeak(channel, pixels) {
   const f = array('frequency');
   const { measured } = channelCurves(channel);
@@ -75,7 +76,7 @@ function smallestPanel() {
   return { width: Math.min(...widths), height: Math.min(...heights) };
 }
 
-// Enough to tell a wrong order, sign, scale or type: count, extremes, and a sum with places as weights.
+// Detects wrong order, sign, scale or type: count, extremes, and a sum weighted by index.
 function summary(id) {
   return summaryOf(array(id));
 }
@@ -90,7 +91,7 @@ function summaryOf(values) {
   return { count: values.length, low, high, weighted, first: values[0], last: values[values.length - 1] };
 }
 
-// What the large plot would draw: the traces and the extremes of each.
+// Content of the large plot: the traces and the extremes of each.
 function entrySummary(channel) {
   const table = magnitudeTable(channel);
   const phase = phaseTable(channel);
@@ -101,7 +102,7 @@ function entrySummary(channel) {
   return { traces: table.names, phases: phase.names, lines: table.rows.length, extremes: Object.fromEntries(extremes) };
 }
 
-// A zoom of the magnitude must move all the others with it, and back.
+// A zoom of the magnitude must move all the others, and back.
 function zoomCheck() {
   const f = array('frequency');
   const ranges = () => ({ magnitude: entry.magnitude.xAxisRange(), phase: entry.phase.xAxisRange(), matrix: matrixBand(), ...(cmif.graph ? { cmif: cmif.graph.xAxisRange() } : {}) });
@@ -118,7 +119,7 @@ function zoomCheck() {
   return { asked, ...zoomed, whole, restored: ranges() };
 }
 
-// The table of the last ten lines holds their numbers, to its five digits.
+// The table of the last ten lines must contain their numbers, to its five digits.
 function tableCheck() {
   const f = array('frequency');
   entryTable.details.open = true;
@@ -132,7 +133,7 @@ function tableCheck() {
   return { rows: cells.length, right };
 }
 
-// A drag over the right half of the first panel shows the upper half of the (logarithmic) band everywhere.
+// A drag over the right half of the first panel must show the upper half of the (logarithmic) band everywhere.
 function dragCheck() {
   const { button } = matrix.panels[0];
   const box = button.getBoundingClientRect();
@@ -156,7 +157,7 @@ function nyquistCheck() {
   });
 }
 
-// What stands in the diagrams: symbols counted in the files that would be saved.
+// Content of the diagrams: symbols counted in the files that would be saved.
 function diagramCheck() {
   const symbols = (name, fill) => (savable.has(name) ? svgOf(name).text.split('fill="' + fill + '"').length - 1 : 0);
   const severity = document.querySelector('.findings .severity');
@@ -168,7 +169,7 @@ function diagramCheck() {
   };
 }
 
-// The numbers behind shapes and MACs; and how far the surface is from a plane and from values that it must meet.
+// The numbers of shapes and MACs; and the distance of the surface from a plane and from given values.
 function shapesCheck() {
   const corners = [[-0.5, -0.5], [0.5, -0.4], [0.4, 0.5], [-0.5, 0.4], [0.1, 0]];
   const plane = plateThrough(corners, corners.map(([x, y]) => 1 + 2 * x - 3 * y));
@@ -181,7 +182,8 @@ function shapesCheck() {
   };
 }
 
-// Every figure as a file: SVG that parses and holds only numbers, PNG with ink; the peak stands where it belongs.
+// Every figure as a file: SVG that can be parsed and has valid numbers only, non-empty PNG; the peak must be at the
+// right place.
 async function savedCheck() {
   const saved = {};
   for (const name of savable.keys()) {
@@ -197,7 +199,7 @@ async function savedCheck() {
   return saved;
 }
 
-// Height of the highest point of the measured trace in the file, and where its magnitude belongs.
+// Height of the highest point of the measured trace in the file, and the height expected from its magnitude.
 function savedPeak() {
   const file = new DOMParser().parseFromString(svgOf('element').text, 'image/svg+xml');
   const heights = Array.from(file.querySelectorAll('path[stroke-width="3.2"]')).slice(0, 1)
@@ -209,7 +211,7 @@ function savedPeak() {
   return { found: Math.min(...heights), wanted: top + area.h * Math.log(high / most) / Math.log(high / low) };
 }
 
-// What a reader does: choose a panel, walk with the keys, switch a trace, multiply by omega squared.
+// Actions of a reader: choose a panel, move with the keys, hide a trace, multiply by omega squared.
 function useCheck() {
   const last = matrix.panels.length - 1;
   const title = document.getElementById('entry-title');

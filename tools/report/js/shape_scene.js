@@ -1,4 +1,4 @@
-// How a mode shape is drawn at one moment of its cycle.
+// Drawing of a mode shape at one instant of its cycle.
 
 function displacement(point) {
   return point.re * Math.cos(shapes.phase) - point.im * Math.sin(shapes.phase);
@@ -10,9 +10,9 @@ function drawShape(context, width, height) {
   else drawBars(context, width, height);
 }
 
-const lift = 0.2;  // largest deflection over the size of the stage
+const lift = 0.2;  // largest deflection relative to the size of the stage
 
-// Seen from above at a slant, after a turn about the upright axis; no perspective: parallels stay so.
+// Oblique view from above after a rotation about the vertical axis; no perspective, so parallels stay parallel.
 function stageView(width, height) {
   const scale = Math.min(width / 1.4, height / 1.05);
   const [sine, cosine] = [Math.sin(shapes.turn), Math.cos(shapes.turn)];
@@ -44,7 +44,7 @@ function drawStage(context, width, height) {
     context.globalAlpha = 1;
     drawChannel(context, point.kind, now.x, now.y);
     context.font = font(11);
-    // A sensor and an actuator at one place: names to either side.
+    // For a sensor and an actuator at the same position, names on either side.
     const sensor = point.kind === 'outputs';
     context.textAlign = sensor ? 'right' : 'left';
     context.textBaseline = 'middle';
@@ -65,7 +65,7 @@ function drawChannel(context, kind, x, y) {
   context.stroke();
 }
 
-// Cells from the far to the near, coloured by their height.
+// Cells from back to front, coloured by their height.
 function drawSurface(context, scene, view) {
   const corners = scene.grid.map((point) => {
     const z = displacement(point) / scene.most;
@@ -92,7 +92,7 @@ function drawSurface(context, scene, view) {
   }
 }
 
-// From blue through the paper's colour to orange.
+// From blue through the colour of the paper to orange.
 function heightColour(z) {
   const { background, below, above } = palette();
   const end = z < 0 ? below : above;
@@ -101,7 +101,7 @@ function heightColour(z) {
   return 'rgb(' + [0, 1, 2].map((i) => Math.round(part(background, i) * (1 - share) + part(end, i) * share)).join(',') + ')';
 }
 
-// Without positions: a bar a channel, sensors first.
+// Without positions: one bar per channel, sensors first.
 function drawBars(context, width, height) {
   const { points, most } = shapes.scene;
   const colours = palette();

@@ -1,9 +1,9 @@
-// Mode shapes in motion on the positions of actuators and sensors; bars where no positions are known.
+// Animated mode shapes at the positions of actuators and sensors; bars if no positions are known.
 
 const shapes = { index: 0, phase: 0, turn: -0.6, playing: false, visible: false, frames: 0, figure: null, scene: null };
 
 const reducedMotion = window.matchMedia('(prefers-reduced-motion: reduce)');
-const cycleMs = 1800;  // of the animation; the true one is told beside it
+const cycleMs = 1800;  // of the animation; the true one is shown as text
 
 function buildShapes() {
   const { modes } = content.shapes;
@@ -37,7 +37,7 @@ function legendOfShapes() {
   return element('div', { class: 'legend' }, element('span', { class: 'mark disc' }, 'sensor'), element('span', { class: 'mark square' }, 'actuator'));
 }
 
-// The first mode within the band that was fitted: those beside it stand for something else.
+// The first mode within the fitted band; those outside do not represent single modes.
 function strongestShape() {
   const [low, high] = content.model.band_hz;
   const first = content.shapes.modes.findIndex((mode) => !(high > low) || (mode.frequency_hz >= low && mode.frequency_hz <= high));
@@ -63,7 +63,7 @@ function showShape(index) {
   shapes.figure.redraw();
 }
 
-// Channels with their complex components, to the same rms; and the grid of the surface.
+// Channels with their complex components, scaled to equal rms; and the grid of the surface.
 function makeScene(mode) {
   const list = (kind, channels) => {
     const own = mode[kind];
@@ -80,7 +80,8 @@ function makeScene(mode) {
 
 const gridCells = 16;
 
-// Size and middle of the stage, and heights on a grid from the channels that act or look across its plane.
+// Size and centre of the stage, and heights on a grid from the channels that act or measure perpendicular to its
+// plane.
 function surfaceOf(placed) {
   const range = (axis) => {
     const values = placed.map((p) => p.place.position_m[axis]);

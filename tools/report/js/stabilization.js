@@ -1,4 +1,4 @@
-// Poles over orders: those of the plant stay where they are, those of the noise wander.
+// Poles over orders: those of the plant are stable, those of the noise vary.
 
 const stability = { figure: null };
 
@@ -30,7 +30,7 @@ function stabilizationSummary() {
   return 'Stabilization diagram up to order ' + lastOrder() + '; ' + plural(stablePoles().length, 'pole') + ' of the largest order are stable in frequency and damping';
 }
 
-// Beside each stable pole the identified mode next to it.
+// Every stable pole with the nearest identified mode.
 function stableTable() {
   const near = (hz) => identifiedModes().reduce((best, mode) => (best === null || Math.abs(mode.frequency_hz - hz) < Math.abs(best.frequency_hz - hz) ? mode : best), null);
   return sortableTable([
@@ -85,7 +85,7 @@ function drawModeLines(context, x, area) {
   context.globalAlpha = 1;
 }
 
-// On a logarithmic scale of its own that fills the height.
+// On its own logarithmic scale that fills the height.
 function drawFirstCurve(context, x, area, low, high) {
   const f = array('frequency');
   const [first, last] = bandLines(low, high);

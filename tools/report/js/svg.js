@@ -1,5 +1,5 @@
-// A drawing context that writes SVG: what a figure draws on the page's canvas, it draws into a file too.
-// As much of CanvasRenderingContext2D as the page and dygraphs use. Coordinates to a hundredth of a pixel.
+// A drawing context that writes SVG, so that figures can be drawn into a file as onto the canvas. Implements the part
+// of CanvasRenderingContext2D used by the page and dygraphs. Coordinates are rounded to a hundredth of a pixel.
 
 const svgRound = (v) => String(Math.round(v * 100) / 100);
 
@@ -58,7 +58,7 @@ class SvgContext {
   }
   setLineDash(dash) { this.dash = Array.from(dash); }
   getLineDash() { return this.dash; }
-  clearRect() {}  // a file begins empty
+  clearRect() {}  // a file is empty at the start
 
   paint(attributes) {
     this.parts.push('<path d="' + this.path + '" ' + attributes + (this.globalAlpha < 1 ? ' opacity="' + svgRound(this.globalAlpha) + '"' : '') + '/>');

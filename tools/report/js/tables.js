@@ -1,4 +1,4 @@
-// Words and tables: the head, the modes, the validation, the decisions, where everything came from.
+// Texts and tables: the head, the modes, the validation, the decisions, the provenance.
 
 function buildHead() {
   const head = document.getElementById('head');
@@ -32,7 +32,7 @@ function figureList(figures) {
   return list;
 }
 
-// Columns: [title, sort key of a row, cell of a row, class]. Sorted by a click on a title.
+// Columns: [title, sort key of a row, cell of a row, class]. A click on a title sorts by it.
 function sortableTable(columns, rows, caption) {
   const body = element('tbody');
   const heads = columns.map(([title], i) => element('th', { scope: 'col', 'aria-sort': 'none' },
@@ -95,7 +95,7 @@ function hundred(value) {
   return isNumber(value) ? (100 * value).toPrecision(4) : '\u2013';
 }
 
-// The mode's number, and the way to its shape.
+// The number of the mode as a link to its shape.
 function shapeCell(row) {
   const index = content.shapes ? content.shapes.modes.findIndex((mode) => mode.frequency_hz === row.frequency_hz) : -1;
   if (index < 0) return String(row.place);
@@ -149,7 +149,7 @@ function buildValidation() {
   if (content.frf && v.channel_error.length === channelCount()) body.append(channelErrors(v.channel_error));
 }
 
-// Relative rms error a channel, shaded on a logarithmic scale between the least and the largest.
+// Relative rms error per channel, shaded on a logarithmic scale between the smallest and the largest.
 function channelErrors(errors) {
   const { inputs, outputs } = content.frf;
   const logs = errors.filter((e) => e > 0).map(Math.log);
@@ -194,7 +194,7 @@ function buildProvenance() {
   for (const { name, text } of content.documents) body.append(folded(name, text));
 }
 
-// A text, or an element, behind its title.
+// A text, or an element, folded under its title.
 function folded(title, text, node) {
   return element('details', null, element('summary', null, title), node || element('pre', null, text));
 }

@@ -1,5 +1,5 @@
-// Colours of the plots, told apart without red-green vision too (after Okabe and Ito). The measurement is a wide pale
-// line, the model a thin strong one on it: where they agree, both are seen.
+// Colours of the plots, also distinguishable without red-green vision (after Okabe and Ito). The measurement is a wide
+// pale line below the thin strong one of the model: if they agree, both are visible.
 
 const palettes = {
   light: {
@@ -16,7 +16,7 @@ const palettes = {
 
 const darkScheme = window.matchMedia('(prefers-color-scheme: dark)');
 let printing = false;
-const redraws = [];  // called when the colours have changed
+const redraws = [];  // called after a change of the colours
 
 function palette() {
   return darkScheme.matches && !printing ? palettes.dark : palettes.light;
@@ -32,7 +32,7 @@ function recolour() {
 
 darkScheme.addEventListener('change', recolour);
 
-// Plots keep their pixels on paper: they get the size of the page (class "printing") before.
+// Plots keep their pixels on paper, so they are resized to the page (class "printing") before printing.
 const plots = new Set();  // of dygraphs and figures
 
 function print(on) {
@@ -45,7 +45,7 @@ function print(on) {
 window.addEventListener('beforeprint', () => print(true));
 window.addEventListener('afterprint', () => print(false));
 
-// The reader sees the head and the tables at once, the plots a moment later. The self-check waits for nothing.
+// Head and tables are shown at once, the plots a moment later. The self-check does not wait.
 function afterFirstPaint(work) {
   if (location.hash === '#selftest') work();
   else requestAnimationFrame(() => setTimeout(work));

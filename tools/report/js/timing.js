@@ -1,8 +1,8 @@
-// How the loop kept time: bins of nanoseconds, gathered into a bar a doubling.
+// Timing of the loop: bins of nanoseconds, collected into one bar per octave.
 
-const shortestBar = 9;  // 2^9 ns: what is below is no matter here
+const shortestBar = 9;  // 2^9 ns: shorter times do not matter
 
-// [[from_s, to_s, count], ...] -> the same, a row a doubling of the time.
+// [[from_s, to_s, count], ...] -> the same, one row per octave.
 function octaves(bins) {
   const rows = new Map();
   for (const [from, , n] of bins) {
@@ -12,7 +12,7 @@ function octaves(bins) {
   return Array.from(rows, ([place, n]) => ({ to: 2 ** (place + 1) * 1e-9, n })).sort((a, b) => a.to - b.to);
 }
 
-// Lengths are logarithmic in the count: one late cycle among a million is what matters.
+// Lengths are logarithmic in the count, so that one late cycle among a million is visible.
 function histogramBars(title, histogram, period) {
   const rows = octaves(histogram.bins);
   const most = Math.max(...rows.map((row) => row.n), 1);
