@@ -1,5 +1,5 @@
-// What the log and the loop cost, each beside what memcpy does on the same machine in the same run:
-// on a shared machine only the ratios can be compared from day to day.
+// Cost of the log and of the loop, relative to memcpy on the same machine in the same run, because on a shared
+// machine only the ratios can be compared from day to day.
 
 #include <benchmark/benchmark.h>
 

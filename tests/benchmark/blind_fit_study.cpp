@@ -1,10 +1,10 @@
-// How often a fit that is told nothing finds what is there: blind fits of random stages (4 x 13, 5 to 25
-// modes, up to three close pairs, up to three peaks of the CMIF missing on purpose, noise -30 to -70 dB),
-// and the paper's plain iteration beside it.
+// How often a fit with default settings finds the modes: blind fits of random stages (4 x 13, 5 to 25 modes, up to
+// three close pairs, up to three peaks of the CMIF removed, noise -30 to -70 dB), compared with the plain iteration of
+// the paper.
 //
 //   blind_fit_study [stages = 40] [first seed = 1] [threads = 0: all] [-v: every report]
 //
-// Prints a line a stage, the decisions of every failure, and the share and times at the end.
+// Prints one line per stage, the decisions of every failure, and the share and times at the end.
 
 #include <fmt/format.h>
 

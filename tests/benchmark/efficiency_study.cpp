@@ -1,11 +1,11 @@
-// Does a fit scatter as much as it says, and as little as any can? One 4 x 13 stage of 17 modes with
-// close pairs, measured many times.
+// Compares the scatter of fits with the reported deviations and with the Cramer-Rao bound. One 4 x 13 stage of 17
+// modes with close pairs, measured many times.
 //
 //   efficiency_study [runs = 200] [degrees of freedom of the variances = 0: exactly known]
 //                    [threads = 0: all] [residue rank = 0: free] [blind fits = 3]
 //                    [first noise seed = 1] [stage seed = 5]
 //
-// Prints a line a mode: scatter over the reported standard deviation with the 95 % chi-square interval
+// Prints a line per mode: scatter over the reported standard deviation with the 95 % chi-square interval
 // of that ratio around 1, coverage of 95 % intervals, and scatter over the Cramer-Rao bound (of free
 // residues); then all of them together. Runs start from the truth; the first ones are repeated from
 // nothing, and must end at the same minimum.

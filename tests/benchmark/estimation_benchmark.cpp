@@ -77,7 +77,7 @@ Case make_case(int times, Eigen::Index every, int threads) {
   return out;
 }
 
-/// What an iteration of iterate() does: equations, step, numerators at the new poles.
+/// One iteration of iterate(): equations, step, numerators at the new poles.
 double iterate_once(const Case& c, FitMethod method) {
   const std::vector<BasisGroup> groups = evaluate_groups(c.problem, c.beta, true);
   const ArrowSystem system(c.problem, c.beta, groups, method, ChannelEquationsUse::eliminated);
@@ -194,7 +194,7 @@ double memory_mb(const std::string& key) {
   return 0.0;
 }
 
-/// Peak of memory while something runs, beyond what was there before it, MB.
+/// Peak of additional memory while a task runs, MB.
 template <typename Task>
 double memory_of_mb(const Task& task) {
   std::ofstream("/proc/self/clear_refs") << 5;  // the peak begins anew

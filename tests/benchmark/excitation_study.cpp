@@ -1,6 +1,6 @@
-// What a design is worth, on a simulated stage: orthogonal against single-axis multisines at equal rms and
-// time, multisines within limits against flat random-phase ones at equal limits, and whether the limits
-// hold in simulated runs.
+// Benefit of a design, on a simulated stage: orthogonal against single-axis multisines at equal rms and time,
+// multisines within limits against flat random-phase ones at equal limits, and whether the limits hold in simulated
+// runs.
 //
 //   excitation_study STAGE.yaml [runs = 1000] [period_s = 4] [high_hz = 2000] [axes = 13]
 //                    [realizations = 3] [crest iterations = 40] [pilot rms/N = 0.5] [rms/N = 1]
@@ -113,7 +113,7 @@ double gain_of_orthogonality(const Study& study) {
   return whole;
 }
 
-/// The part of a cost that stands for lines from `low_hz` on.
+/// The part of a cost on lines from `low_hz`.
 Eigen::MatrixXd cost_above(const FrequencyGrid& grid, Eigen::MatrixXd cost, double low_hz) {
   for (Eigen::Index k = 0; k < grid.size(); ++k)
     if (grid.frequency_hz()[k] < low_hz) cost.col(k).setZero();

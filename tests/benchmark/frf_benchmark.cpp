@@ -20,8 +20,8 @@
 namespace stageid {
 namespace {
 
-/// Every run and period gives the same samples with a little of the run's own: nothing is
-/// simulated, and one period is in memory, so what is measured is the estimate.
+/// Every run and period gives the same samples plus a small part of its own. Nothing is simulated and only one period
+/// is in memory, so only the estimate is measured.
 class RepeatingLog : public LogReader {
  public:
   RepeatingLog(int axes, int periods) : periods_(periods) {

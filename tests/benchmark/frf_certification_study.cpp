@@ -1,4 +1,4 @@
-// Are the variances and radii of an FRF what they say? One closed loop, measured many times.
+// Tests the variances and radii of an FRF: one closed loop, measured many times.
 //
 //   frf_certification_study variance [seeds = 500] [outputs = 4] [inputs = 13] [periods = 4]
 //                                    [realizations = 2] [scheme = 0: single axis | 1: orthogonal]

@@ -80,7 +80,7 @@ def main():
             "disk, frf": lambda: from_disk(log, lambda: child("frf", log, "-o", folder / "disk.h5")),
         }
         times = {way: [] for way in ways}
-        for _ in range(REPEATS):  # alternately, so that all see the same machine
+        for _ in range(REPEATS):  # alternating, so that all have the same conditions
             for way, run in ways.items():
                 times[way].append(run())
         assert (folder / "all.h5").read_bytes() == (folder / "one.h5").read_bytes()

@@ -1,4 +1,4 @@
-// One cycle of the wafer stage on one core: what the measurement loop asks of hal at every sample.
+// One cycle of the wafer stage on one core: the cost of hal per sample of the measurement loop.
 #include <benchmark/benchmark.h>
 
 #include <memory>

@@ -1,4 +1,4 @@
-// Does the program know when its model is right?
+// Tests whether the program recognizes right and wrong models.
 //
 //   judgement_study COUNT FIRST_SEED [--trouble NAME]... [--jobs N] [--output FILE] [--program FILE] [--keep DIRECTORY]
 //

@@ -1,11 +1,11 @@
-// What frf --method lpm gains on a loop that is slow to settle: a 4 x 13 stage whose slowest mode is
-// down to 5 % after 3 s, measured from rest with periods of 4 s.
+// Benefit of frf --method lpm on a loop that settles slowly: a 4 x 13 stage whose slowest mode decays to 5 % in 3 s,
+// measured from rest with periods of 4 s.
 //
 //   local_polynomial_study [seeds = 30]
 //
-// Prints the rms error of P periods from rest (lpm) over that of the same time with the first period
-// passed over; and for records of 1, 2 and 4 periods the empirical over the stated variance, and the
-// squared mean error over the variance of that mean (1: unbiased).
+// Prints the rms error of P periods from rest (lpm) relative to that of the same time with the first period skipped;
+// and for records of 1, 2 and 4 periods the empirical relative to the stated variance, and the squared mean error
+// relative to the variance of that mean (1: unbiased).
 #include <fmt/format.h>
 
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// What a cycle of the whole loop costs at 10 kHz by the wall clock: controller, limits, logging to a
-// file and the simulated wafer stage, as a share of the period.   loop_cost [SECONDS [off|try]]
+// Cost of a cycle of the whole loop at 10 kHz by the wall clock, as a share of the period: controller, limits,
+// logging to a file and the simulated wafer stage.   loop_cost [SECONDS [off|try]]
 
 #include <fmt/format.h>
 

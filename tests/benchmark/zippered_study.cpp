@@ -1,4 +1,4 @@
-// What one experiment with zippered lines gives: every axis has every n-th line for itself.
+// Results of one experiment with zippered lines: every axis has every n-th line.
 //
 //   zippered_study variance [seeds = 30] [outputs = 4] [inputs = 13]
 //   zippered_study resonance [seeds = 200]
@@ -6,13 +6,13 @@
 //   zippered_study time [seeds = 10]
 //
 // variance: stated over empirical variance, and the squared mean error over the variance of that mean
-//   (1: unbiased), for a record of one period from rest (lpm), for one period after one that is passed
-//   over (noise from what the local models leave), and for two (noise from the periods).
+//   (1: unbiased), for a record of one period from rest (lpm), for one period after a skipped one
+//   (noise from the residual of the local models), and for two (noise from the periods).
 // resonance: a mode of half-power width w in distances of an axis' own lines, 2 x 2, around its
 //   resonance: bias over stated standard deviation, and the fraction of experiments in which the check
-//   of the interpolation speaks up.
+//   of the interpolation reports a finding.
 // plants: the same two variances on random plants, over all of them and on the worst and best one, and the
-//   noise that is stated (C_E) over the true one; lpm adds the noise of its transient model.
+//   stated noise (C_E) over the true one; lpm adds the noise of its transient model.
 // time: the error of one zippered period against the orthogonal scheme in the same measuring time, on
 //   resonances and between them.
 #include <fmt/format.h>

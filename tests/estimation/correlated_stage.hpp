@@ -9,8 +9,8 @@ namespace stageid::test {
 
 /// Noise of a measured FRF, Cov(vec G) = S kron C_E on every line, both changing from line to line.
 struct CorrelatedNoise {
-  std::vector<Eigen::MatrixXcd> C;  ///< n_y x n_y a line
-  std::vector<Eigen::MatrixXcd> S;  ///< n_u x n_u a line
+  std::vector<Eigen::MatrixXcd> C;  ///< n_y x n_y per line
+  std::vector<Eigen::MatrixXcd> S;  ///< n_u x n_u per line
 
   /// Written out, n_c x n_c.
   Eigen::MatrixXcd covariance(std::size_t k) const {
@@ -61,8 +61,8 @@ inline CorrelatedNoise correlated_noise(const DenseProblem& problem, double leve
   return noise;
 }
 
-/// The exact response with such noise, and what a measurement of it tells: exactly if dof is 0, else
-/// C_E from that many degrees of freedom.
+/// The exact response with such noise and its covariance: exact if dof is 0, else C_E from that many degrees of
+/// freedom.
 inline FrfEstimate measured(const DenseProblem& problem, const CorrelatedNoise& noise,
                             RandomNumbers& random, int dof = 0) {
   FrfEstimate frf = frf_of(problem);

@@ -42,7 +42,7 @@ class ProgramTest : public testing::Test {
                          const std::string& to) const;
   std::string stage(const std::string& file, const std::string& from, const std::string& to) const;
 
-  /// run.slog of the small experiment; made once a test.
+  /// run.slog of the small experiment; made once per test.
   void make_log() const;
   void make_frf() const;
   /// model.json on the band of the configuration; makes frf.h5 too.

@@ -21,8 +21,8 @@ using test::RandomNumbers;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
-/// 2 x 2: rigid body, a mode, a mode with B_0 + B_1 s; rad/s of order one, so that the dense
-/// equations are well conditioned as they stand.
+/// 2 x 2: rigid body, a mode, a mode with B_0 + B_1 s; rad/s of order one, so that the dense equations are well
+/// conditioned without scaling.
 DenseProblem stage_problem(std::uint64_t seed) {
   RandomNumbers random(seed);
   DenseProblem problem;
@@ -36,8 +36,7 @@ DenseProblem stage_problem(std::uint64_t seed) {
   return problem;
 }
 
-/// 3 x 2 with what is rarer: an integrator with a lag, a first-order submodel, a third-order one,
-/// a constant.
+/// 3 x 2 with less common submodels: an integrator with a lag, first-order, third-order, a constant.
 DenseProblem general_problem(std::uint64_t seed) {
   RandomNumbers random(seed);
   DenseProblem problem;
@@ -127,8 +126,8 @@ TEST(FitStep, TheThreeMethodsAreThreeMethods) {
   EXPECT_GT(difference(gn, sk, beta), 1e-3);
 }
 
-// facts.md section 9: off its block diagonal the paper's solution holds blocks of M^-1 r, which are
-// zero only at the end. If they were zero here, the identity would be tested at a fixed point.
+// The off-diagonal blocks of the paper's solution are blocks of M^-1 r, which are zero only at the end. If they were
+// zero here, the identity would be tested at a fixed point.
 TEST(FitStep, ThePapersOffDiagonalBlocksAreNotZeroAwayFromTheFixedPoint) {
   const DenseProblem problem = stage_problem(5);
   const test::PaperStep paper = test::paper_step(problem, test::Left::instrument);

@@ -107,7 +107,7 @@ TEST_P(OnBothAxes, TheLastColumnIsTheResidualOfThePoles) {
   EXPECT_LT(equations.triangle(c.poles, true).col(5).norm(), 1e-12 * 10.0);
   PoleSet off = c.poles;
   off.pairs[1] *= 1.01;
-  // A fifth of the lines is asked; the norm is scaled to that of all.
+  // A fifth of the lines is used; the norm is scaled to that of all.
   const double some = equations.triangle(off, true).col(5).norm();
   const double all = equations.triangle(off, false).col(5).norm();
   EXPECT_NEAR(some, all, 0.2 * all);

@@ -1,5 +1,5 @@
-// Residues of given rank: the factors' derivatives against finite differences, exact data, what
-// noise and what a wrong rank do to the cost.
+// Residues of given rank: the derivatives of the factors compared with finite differences, exact data, effect of noise
+// and of a wrong rank on the cost.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -72,7 +72,7 @@ TEST(ResidueForm, DerivativesOfARankOneMode) { expect_derivatives({0, 2, 0}, 1);
 TEST(ResidueForm, DerivativesOfARankTwoRigidBody) { expect_derivatives({2, 0, 0}, 2); }
 TEST(ResidueForm, DerivativesOfAComplexRankOneMode) { expect_derivatives({0, 2, 1}, 1); }
 
-TEST(ResidueForm, CountsItsParameters) {  // facts.md section 11
+TEST(ResidueForm, CountsItsParameters) {
   EXPECT_EQ(ResidueForm({0, 2, 0}, 1, 4, 13).size(), 4 + 13 - 1);
   EXPECT_EQ(ResidueForm({2, 0, 0}, 3, 4, 13).size(), 3 * (4 + 13 - 3));
   EXPECT_EQ(ResidueForm({0, 2, 1}, 1, 4, 13).size(), 2 * (4 + 13 - 1));
@@ -80,7 +80,7 @@ TEST(ResidueForm, CountsItsParameters) {  // facts.md section 11
 }
 
 TEST(ResidueForm, ProjectsByTheWeights) {
-  // One entry is wrong and its weight says so: the projection is the matrix without the error.
+  // One entry is wrong and has almost no weight: the projection is the matrix without the error.
   const Eigen::VectorXd phi{{1.0, -2.0, 0.5}};
   const Eigen::VectorXd psi{{2.0, 1.0, -1.0, 3.0}};
   const Eigen::MatrixXd truth = phi * psi.transpose();

@@ -142,7 +142,7 @@ TEST_F(ModelFile, WrittenAgainIsTheSameFile) {
   EXPECT_EQ(text_of(again), text_of(file_));
 }
 
-// What other programs rely on, design.md section 5.
+// The fields that other programs rely on, docs/formats.md.
 TEST_F(ModelFile, HasTheFieldsOfTheContract) {
   const AdditiveModel model = full_model();
   write_model(file_, model);

@@ -24,7 +24,7 @@ namespace test_sampled_state_space {
 using Complex = std::complex<double>;
 using test::basis::kPeriod;
 
-/// A rigid body, a lag, a mode and, if asked for, a direct term, at the sample rate of the cases.
+/// A rigid body, a lag, a mode and optionally a direct term, at the sample rate of the cases.
 AdditiveModel delayed_model(const Eigen::VectorXd& input_samples,
                             const Eigen::VectorXd& output_samples, bool direct = true) {
   test::RandomNumbers random(5);
@@ -63,7 +63,7 @@ TEST(SampledStateSpace, EverySubmodelTheFileAllowsIsSampledExactly) {
       const Eigen::MatrixXcd expected = test::reference_response(model, lines, HoldModel::exact);
       const Eigen::MatrixXcd found = test::response_of(sampled_state_space(model), lines);
       for (Eigen::Index k = 0; k < lines.size(); ++k) {
-        // Biproper functions do not shrink as amplification() has it: they are no partial fraction.
+        // Biproper functions do not decay as in amplification(), because they are not partial fractions.
         const double growth = std::max(
             1.0, test::basis::amplification(c, degree, 1, 2.0 * std::numbers::pi * lines[k]));
         EXPECT_LT((found - expected).col(k).norm(), 1e-13 * growth * expected.col(k).norm())

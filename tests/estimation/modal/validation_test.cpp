@@ -40,7 +40,7 @@ FrfEstimate measured(const AdditiveModel& model, HoldModel hold) {
   return test::frf_of(problem);
 }
 
-/// Adds noise of the variance that the FRF then tells, or of `factor` times it.
+/// Adds noise of the variance in the FRF, or of `factor` times it.
 void add_noise(FrfEstimate& frf, std::uint64_t seed, double factor = 1.0) {
   test::RandomNumbers random(seed);
   frf.noise_variance = 1e-4 * frf.response.cwiseAbs2();
@@ -127,7 +127,7 @@ TEST(Validation, AModelThatIsWrongShowsInEveryFigure) {
   EXPECT_GT(result.relative_rms_error, 0.02);
 }
 
-// One realization: the lines scatter by more than the periods say, about a smooth response.
+// One realization: the lines scatter by more than the variance from periods, about a smooth response.
 TEST(Validation, ScatterOfTheLinesExplainsWhatTheNoiseDoesNot) {
   const AdditiveModel model = stage_model(HoldModel::exact);
   FrfEstimate frf = measured(model, HoldModel::exact);
@@ -139,7 +139,7 @@ TEST(Validation, ScatterOfTheLinesExplainsWhatTheNoiseDoesNot) {
   EXPECT_LT(result.whiteness, result.whiteness_limit * 1.5);
 }
 
-// Without lines enough to tell, the noise is all that is known.
+// With too few lines for a scatter, only the noise is known.
 TEST(Validation, NoiseThatIsLargerThanToldShowsInChiSquare) {
   const AdditiveModel model = stage_model(HoldModel::exact);
   FrfEstimate frf = measured(model, HoldModel::exact);
@@ -265,7 +265,7 @@ TEST(ResponseLike, DataThatHaveLostHoldAndDelayMeetAModelThatLosesThemToo) {
   EXPECT_LT(distance(response_like(model, frf), frf.response), 1e-9);
 }
 
-// method.md section 4, level 1: e^{-j omega (delay_s + T/2)} is divided out, the magnitude is left.
+// Hold level "phase": e^{-j omega (delay_s + T/2)} is divided out, the magnitude is unchanged.
 TEST(ResponseLike, DataThatHaveLostTheirDelayMeetAModelThatLosesItToo) {
   const AdditiveModel model = stage_model(HoldModel::exact);
   FrfEstimate frf = measured(model, HoldModel::exact);

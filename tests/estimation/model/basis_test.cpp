@@ -92,9 +92,9 @@ TEST(Basis, TheDoubleIntegratorHasItsTextbookTransferFunction) {
   }
 }
 
-// Levels 1 and 2 of the hold, and what they leave behind: for the double integrator the sampled
-// response over the continuous one with half a sample of delay is cos(t/2) / sinc(t/2)^2, t =
-// omega T, and dividing the sinc out once leaves cos(t/2) / sinc(t/2)^3 of it.
+// Errors of the hold levels "phase" and "sinc". For the double integrator, the ratio of the sampled response to the
+// continuous one with half a sample of delay is cos(t/2) / sinc(t/2)^2, t = omega T. After division by the sinc, it is
+// cos(t/2) / sinc(t/2)^3.
 TEST(Basis, PhaseAndSincDifferFromExactByWhatIsKnown) {
   const Case c{"double integrator", 2, {}, 0};
   const Eigen::VectorXd hz{{200.0, 1000.0, 1500.0, 2000.0}};
@@ -134,9 +134,8 @@ TEST(Basis, PhaseAndSincAreTheRationalFunctionTimesTheHoldsPhaseAndMagnitude) {
     }
 }
 
-/// f'(0) of f(h) and a bound of its error: central differences with h and 2h, extrapolated; what
-/// the extrapolation changed bounds what it left, by far, since the next term is smaller by
-/// (h / scale)^2.
+/// f'(0) of f(h) and a bound of its error: central differences with h and 2h, extrapolated. The change by the
+/// extrapolation is a generous bound of the remaining error, since the next term is smaller by (h / scale)^2.
 struct Difference {
   Complex value;
   double error;
@@ -209,8 +208,8 @@ TEST(Basis, TheDelayDerivativeIsThatOfTheReference) {
       }
 }
 
-// At a whole number of samples the response of a first-order function has a kink in the delay; the
-// library stands on its right side, where the fraction is zero.
+// At a whole number of samples the response of a first-order function has a kink in the delay; the library uses the
+// right side, where the fraction is zero.
 TEST(Basis, AtWholeSamplesTheDelayDerivativeIsTheOneFromAbove) {
   const Case c = cases()[0];
   const double h = 1e-3;
@@ -221,7 +220,7 @@ TEST(Basis, AtWholeSamplesTheDelayDerivativeIsTheOneFromAbove) {
       const auto f = [&](double more) {
         return test::sampled(c.function(0), omega, kPeriod, (samples + more) * kPeriod);
       };
-      // Third order: what is left is h^3 / 4 of the fourth derivative, (lambda T)^4 < 1e-4 here.
+      // Third order: the remainder is h^3 / 4 of the fourth derivative, (lambda T)^4 < 1e-4 here.
       const Complex expected =
           (-11.0 * f(0.0) + 18.0 * f(h) - 9.0 * f(2.0 * h) + 2.0 * f(3.0 * h)) / (6.0 * h);
       EXPECT_LT(std::abs(basis.delay(k, 0) * kPeriod - expected),

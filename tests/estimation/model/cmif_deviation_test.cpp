@@ -18,7 +18,7 @@ std::complex<double> gaussian(std::mt19937_64& engine) {
   return std::polar(std::sqrt(-std::log(uniform())), 2.0 * std::numbers::pi * uniform());
 }
 
-/// Lines of random matrices whose singular values stand apart, and variances of 1e-6 of them.
+/// Lines of random matrices with well separated singular values, and variances of 1e-6 of them.
 FrfEstimate some_frf(std::mt19937_64& engine, int outputs, int inputs) {
   constexpr Eigen::Index kLines = 3;
   FrfEstimate frf;

@@ -162,8 +162,8 @@ TEST(PickModes, ARepeatedModeShowsInTheSecondCurve) {
   EXPECT_EQ(modes[0].cmif_curve + modes[1].cmif_curve, 3);
 }
 
-// Two modes of different direction: their curves cross between them, where the second curve has a
-// peak that is no mode.
+// Two modes of different direction: their curves cross between them, where the second curve has a peak that is not a
+// mode.
 TEST(PickModes, ACrossingIsNotAMode) {
   FrfEstimate frf = empty_frf(2, 2, 4000, 50.0, 800.0);
   add_mode(frf, 200.0, 0.01, Eigen::Vector2d(1.0, 0.05), Eigen::Vector2d(1.0, 0.05));

@@ -1,5 +1,4 @@
-// Data whose best pole lies where no stable or visible pole is: the fit ends at the bound and says
-// that it has converged.
+// Data whose best pole is outside the stable or visible range: the fit ends at the bound and has converged.
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// A search that does not come to its own end: it stops at its budget or at an interrupt, keeps its best model and says
-// what would fit better.
+// A search that does not end by itself: it stops at its budget or at an interrupt, keeps its best model and advises a
+// better request.
 
 #include "estimation/problem/search_limit.hpp"
 
@@ -141,7 +141,7 @@ TEST(SearchLimit, AnEnoughBudgetChangesNothing) {
   EXPECT_EQ(bounded.cost, unbounded.cost);
 }
 
-// Their number is what the user asked for, and takes what it takes.
+// A requested number of modes is fitted without a budget.
 TEST(SearchLimit, ModesThatAreAskedForHaveNoBudget) {
   const FrfEstimate frf = measured(10, [](test::DenseProblem&) {});
   ModeSelection selection = with_budget(kTinyBudget_s);

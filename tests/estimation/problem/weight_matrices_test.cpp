@@ -1,4 +1,4 @@
-// Weight matrices: what they are made of, and what is refused.
+// Weight matrices: their construction, and rejected ones.
 
 #include "estimation/problem/weight_matrices.hpp"
 

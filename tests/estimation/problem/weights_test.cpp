@@ -75,9 +75,9 @@ TEST(Weights, UsersAreTakenAsTheyAre) {
   EXPECT_EQ(&*make_weights(small_frf(), options), &*options.user_weights);  // and no copy of them
 }
 
-// facts.md section 3 and 8: variances from few degrees of freedom, E{1/variance} is infinite for one.
-// After smoothing, the inverse may not be off by more than a few per cent; nor W v W, which says what
-// the scatter of the weights themselves does to an estimate, although v and W are of one sample.
+// Variances with few degrees of freedom: E{1/variance} is infinite for one. After smoothing, the inverse must be right
+// within a few per cent, and so must W v W, the effect of the scatter of the weights on an estimate, although v and W
+// are from the same sample.
 TEST(Weights, InversesOfSmoothedVariancesAreUnbiasedAndTheirScatterIsCounted) {
   constexpr Eigen::Index kChannels = 40;
   constexpr Eigen::Index kLines = 400;
@@ -111,7 +111,7 @@ TEST(Weights, InversesOfSmoothedVariancesAreUnbiasedAndTheirScatterIsCounted) {
   }
 }
 
-// Var(G_ij) = C_E,ii [(U U^H)^-1]_jj: what the inputs do on a line is known exactly and stays sharp.
+// Var(G_ij) = C_E,ii [(U U^H)^-1]_jj: the factor of the inputs is known exactly on every line and is not smoothed.
 TEST(Weights, OnlyTheRandomFactorIsSmoothed) {
   constexpr Eigen::Index kLines = 300;
   test::RandomNumbers random(8);

@@ -78,8 +78,8 @@ TEST(LineSums, SharedSumsOfManyChannelsAreTheChannelsOwn) {
     }
 }
 
-// One that cannot be eliminated keeps nobody from the equations of the others: modal forms and
-// covariances of other weights need no more.
+// A channel that cannot be eliminated does not affect the equations of the others, which modal forms and covariances
+// of other weights use without elimination.
 TEST(LineSums, ChannelsThatAreOnlyKeptAreAllThere) {
   DenseProblem problem = wide_problem(HoldModel::exact);
   constexpr Eigen::Index kSpoilt = 3;

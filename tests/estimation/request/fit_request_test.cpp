@@ -68,7 +68,7 @@ TEST(FitRequest, WithoutNoiseTheTotalVarianceWeighs) {
   EXPECT_EQ(make_fit_setup({}, frf).options.weighting, Weighting::total_variance);
 }
 
-/// Thirty lines that stand `scatter` off a constant, now on this side, now on that; their variance is 0.25.
+/// Thirty lines at distance `scatter` from a constant, in varying directions; their stated variance is 0.25.
 FrfEstimate scattered(double scatter) {
   FrfEstimate frf = measured();
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(30, 10.0, 39.0);
@@ -109,7 +109,7 @@ TEST(FitRequest, AccelerationsGetTheStructureThatTheyHave) {
     EXPECT_FALSE(setup.structure.common.rigid_body);
     EXPECT_THAT(setup.notes.front(), HasSubstr("accelerations"));
   }
-  FitRequest asked;  // whoever says one of the three is taken at his word
+  FitRequest asked;  // an explicit request for one of the three is not changed
   asked.general_damping = false;
   const ModelStructure own = make_fit_setup(asked, frf).structure.common;
   EXPECT_FALSE(own.general_damping);

@@ -1,4 +1,4 @@
-// A fit that is told nothing must find what is there.
+// A fit with default settings must find the modes.
 
 #include "estimation/search/automatic_fit.hpp"
 
@@ -45,7 +45,7 @@ TEST(AutomaticFit, FindsWhatIsThereBlind) {
   if (!failures.empty()) std::fputs(failures.c_str(), stdout);
 }
 
-// The measure itself must be able to fail: a fit of two modes too few is no success.
+// The measure itself must be able to fail: a fit with two modes too few is not a success.
 TEST(AutomaticFit, TheMeasureOfSuccessSeesAMissingMode) {
   const test::RandomStage stage = test::draw_random_stage(101, quick_stage());
   FitOptions options;
@@ -132,8 +132,8 @@ TEST_F(SmallStage, FitsSoManyModesAsAsked) {
   }
 }
 
-// Growing mode by mode ends beside the best place for a given number; going by way of more modes and
-// dropping the least worthy finds it.
+// Growing mode by mode ends near the best minimum for a given number; a path with more modes, of which the least
+// worthy are dropped, finds it.
 TEST_F(SmallStage, TriesMoreThanOneWayToTheNumberAsked) {
   const FitResult fit = automatic_fit(frf_, {}, {.modes = {}, .exactly = 2}, {});
   EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("2 modes, reached by way of ")));
@@ -186,7 +186,7 @@ TEST_F(SmallStage, WithoutRigidBodyThereIsNone) {
   EXPECT_EQ(fit.model.submodels.size(), 3U);
 }
 
-// A search that goes on for what is no mode ------------------------------------------------------
+// Searches that add modes which are not modes -----------------------------------------------------
 
 TEST_F(SmallStage, ADelayThatIsDeniedEndsTheSearchAndIsNamed) {
   constexpr double kDelay_s = 1e-4;
@@ -233,7 +233,7 @@ TEST_F(SmallStage, RoundsInARowThatOnlyModelColourEndTheSearch) {
   fit.model.fit.band_hz[0] = 10.0;
   fit.model.fit.band_hz[1] = 1000.0;
   GrowthWatch watch;
-  // Broad, beside the lines on either side, on another; a resonance of its own begins the count anew.
+  // Broad, outside the lines on either side, on another; a resonance resets the count.
   EXPECT_FALSE(ends_after(watch, frf_, fit, {{120.0, 0.01}, {300.0, 0.3}, {5.0, 0.01}}));
   EXPECT_FALSE(ends_after(watch, frf_, fit, {{1100.0, 0.02}, {120.5, 0.01}, {500.0, 0.2}}));
   EXPECT_FALSE(ends_after(watch, frf_, fit, {{300.0, 0.01}}));
@@ -259,7 +259,7 @@ bool six_rounds_end(const FrfEstimate& frf, const FitResult& before, const FitRe
   return ended;
 }
 
-// Noise with heavier tails than its variances say: every outlier looks like a mode sharper than the lines.
+// Noise with heavier tails than its variances imply: every outlier looks like a mode sharper than the lines.
 TEST_F(SmallStage, ModesThatRestOnOneLineEachEndTheSearchAndResonancesDoNot) {
   AdditiveModel less = problem_.model;
   less.submodels.pop_back();

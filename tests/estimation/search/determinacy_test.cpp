@@ -1,5 +1,5 @@
-// Structures that the data do not carry: the fit ends, says whose fault it is, and returns neither an
-// unstable pole nor a number that is not finite.
+// Structures that the data do not support: the fit ends, names the submodel, and returns neither an unstable pole nor
+// a number that is not finite.
 
 #include "estimation/search/determinacy.hpp"
 

@@ -57,7 +57,7 @@ TEST(FewChannels, ManyFunctionsAreSummedAsFractionsToEightDigits) {
   }
 }
 
-// Where poles are exact, what tells so is a residual of nothing but rounding.
+// With exact poles, the residual is only rounding.
 TEST(FewChannels, ExactPolesLeaveRoundingOnly) {
   DenseProblem problem = many_functions();
   problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);

@@ -1,5 +1,5 @@
-// Where a fit ends and what it says about it: the first-order condition by separate code, the convex
-// start against a QR factorization, three methods, every status, any number of threads.
+// Convergence of a fit and its message: the first-order condition by separate code, the convex start against a QR
+// factorization, three methods, every status, any number of threads.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -59,8 +59,8 @@ TEST(FitConvergence, ThePapersFirstOrderConditionHolds) {
       FitOptions strict;
       strict.deviation_tolerance = 0.0;
       const auto [end, last] = fit_and_condition(method, hold, strict);
-      // As small as asked where that ended it; else the cost is flat to rounding, and a gradient of
-      // its root is left.
+      // As small as requested if that ended the fit; else the cost is flat to rounding, and the gradient is the square
+      // root of rounding.
       EXPECT_LT(last, end.status == FitStatus::gradient_small ? 1e-8 : 1e-6)
           << to_string(method) << ", hold " << to_string(hold) << ": " << end.message;
     }
@@ -226,7 +226,7 @@ TEST(FitStatus, TwoModesInOnePlaceAreNotReportedAsConverged) {
   AdditiveModel start = moved(problem.model, 1.0, 1.0);
   start.submodels[3].denominator = start.submodels[2].denominator;
   const FitResult fit = fit_additive_model(test::frf_of(problem), start, {});
-  // Either it says so, or it has parted them and found the minimum that is there.
+  // Either the status reports it, or the fit has separated the modes and found the minimum.
   if (fit.trustworthy()) {
     const FitResult good =
         fit_additive_model(test::frf_of(problem), moved(problem.model, 1.0, 1.0));

@@ -1,4 +1,4 @@
-// What a fit takes on the heap, against the bytes of its data: response, variances and weights.
+// Heap memory of a fit, relative to the bytes of its data: response, variances and weights.
 
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ class FitMemory : public testing::Test {
     entry_ = static_cast<double>(frf_.response.size() * static_cast<Eigen::Index>(sizeof(double)));
   }
 
-  /// Bytes of the data that stand before the fit begins.
+  /// Bytes of the data that exist before the fit.
   double given() const {
     const auto real = frf_.noise_variance.size() + frf_.total_variance.size() +
                       frf_.residual_covariance_re.size() + frf_.residual_covariance_im.size();

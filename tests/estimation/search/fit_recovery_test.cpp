@@ -1,5 +1,5 @@
-// What is put in comes out: noise-free data of known models, from starts that are near, far and at
-// the optimum. The data come from the matrix exponential of tests/support, not from the library.
+// A fit recovers the model of noise-free data, from starts that are near, far and at the optimum. The data are
+// computed by the matrix exponential of tests/support, not by the library.
 
 #include <gtest/gtest.h>
 

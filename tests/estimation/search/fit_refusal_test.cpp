@@ -1,4 +1,4 @@
-// What a fit does not take, each with its own words.
+// Requests that a fit rejects, and their messages.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -66,7 +66,7 @@ TEST(HiddenModes, OnlyWhatIsNotThereIsHeld) {
   EXPECT_GE(held, 49) << "of 50; noise alone is above the threshold at one place of 400";
 }
 
-// Held poles are no unknowns: the fit leaves them, to the last bit, and finds the others as if they were known.
+// Held poles are not unknowns: the fit does not change them, and finds the others as if they were known.
 TEST(HiddenModes, AFitLeavesHeldPolesWhereTheyAre) {
   Placed placed(1, {500.0, 1300.0});
   placed.hold_from(4);
@@ -81,7 +81,7 @@ TEST(HiddenModes, AFitLeavesHeldPolesWhereTheyAre) {
   }
 }
 
-// By itself a hidden mode keeps 1 - s of its numerators; the record's cost is that of what is returned.
+// Alone, a hidden mode keeps 1 - s of its numerators; the recorded cost is that of the returned model.
 TEST(HiddenModes, OneHiddenModeKeepsItsPart) {
   Placed placed(3, {500.0});
   placed.hold_from(4);
@@ -121,7 +121,7 @@ TEST(HiddenModes, ShrinkingSavesWhatTheorySays) {
   EXPECT_NEAR(saved / kSeeds / of_a_number, 0.75 * 4.0, 0.3);  // 0.1 by chance
 }
 
-// What stands out keeps its numerators, whatever is hidden beside it.
+// A mode above the noise keeps its numerators if another one is hidden.
 TEST(HiddenModes, WithoutAHiddenModeNothingChanges) {
   Placed placed(5, {});
   const FitResult before = placed.fit_numerators();

@@ -1,4 +1,4 @@
-// Modes at one place: the rank that the data ask of a residue, and what a fit of rank one makes of it.
+// Modes at the same frequency: the required rank of a residue, and the result of a fit with rank one.
 
 #include "estimation/search/ranked_fit.hpp"
 

@@ -108,7 +108,7 @@ TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
   EXPECT_THAT(fit.decisions.front(), HasSubstr("which the data do not support"));
 }
 
-// Where a number of modes is asked for they stay, and such a fit is not to be trusted.
+// Requested modes are kept, and such a fit is not trustworthy.
 TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined) {
   FitResult fit = fit_additive_model(frf_, true_, options_);
   judge_undetermined_modes(frf_, false, fit);
@@ -125,21 +125,21 @@ TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined
   EXPECT_EQ(fit.message, fit.findings[0]);
   EXPECT_EQ(fit.model.fit.status, "undetermined");
   fit.findings.clear();
-  fit.status = FitStatus::iteration_limit;  // what kept it from converging is told first
+  fit.status = FitStatus::iteration_limit;  // the reason for not converging comes first
   judge_undetermined_modes(frf_, false, fit);
   EXPECT_EQ(fit.findings.size(), 1U);
   EXPECT_EQ(fit.status, FitStatus::iteration_limit);
   fit.findings.clear();
   fit.status = converged;
-  fit.model.fit.band_hz[1] = 300.0;  // beside the lines a mode stands for what is there
+  fit.model.fit.band_hz[1] = 300.0;  // outside the lines, a mode represents the rest of the plant
   fit.model.submodels[0].damping_ratio_std = 1e-4;
   judge_undetermined_modes(frf_, false, fit);
   EXPECT_TRUE(fit.findings.empty());
   EXPECT_EQ(fit.status, converged);
 }
 
-// One mode too many follows the noise: its deviations are a few tenths of its size, and it is worth less than its
-// parameters. Of modes that were chosen by their worth nothing is said.
+// A surplus mode follows the noise: its deviations are a few tenths of its size, and it is worth less than its
+// parameters. For modes that were chosen by their worth there is no finding.
 TEST_F(SettledFit, AModeThatIsAskedForAndNotWorthItsParametersIsUndetermined) {
   const auto asked = [&](int modes) {
     return automatic_fit(frf_, {.rigid_body = false}, {.modes = {}, .exactly = modes}, options_);

@@ -1,5 +1,5 @@
-// Poles that nobody gave, and one denominator for several modes. The same model set written as modes with
-// B_0 + B_1 s is the independent reference: response, cost and standard deviations must agree.
+// Poles without start values, and one denominator for several modes. The same model set written as modes with B_0 +
+// B_1 s is the independent reference: response, cost and standard deviations must agree.
 
 #include "estimation/search/structured_fit.hpp"
 

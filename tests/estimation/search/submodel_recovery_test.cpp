@@ -1,5 +1,5 @@
-// The general additive structure: what is put in comes out, for submodels that are no modes. Data
-// from the matrix exponential of tests/support, not from the library.
+// The general additive structure: recovery of submodels that are not modes. The data are computed by the matrix
+// exponential of tests/support, not by the library.
 
 #include <gtest/gtest.h>
 
@@ -78,7 +78,7 @@ TEST_P(SubmodelRecovery, ByEveryDescentMethodThroughHoldAndDelay) {
   }
 }
 
-// Its fixed point is the truth where there is no noise.
+// Without noise, its fixed point is the true model.
 TEST_P(SubmodelRecovery, BySanathananAndKoerner) {
   const DenseProblem problem = measured(GetParam().parts, HoldModel::none, 0.0);
   FitOptions options;

@@ -1,5 +1,5 @@
-// A rigid body on weak springs, measured above them: 1/s^2 does not explain the lines, its modes below
-// them do, and what the lines cannot tell is said.
+// A rigid body on weak springs, measured above them: 1/s^2 does not explain the lines, its modes below them do, and
+// parameters that the lines do not determine are reported.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ TEST(Suspension, IsFoundFarBelowTheLines) {
   const FitResult fit = fit_suspended(test::frf_of(problem), {}, {});
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   ASSERT_EQ(fit.model.submodels.size(), 2U);
-  // (0.4/5)^2 of the response is what tells the frequency.
+  // The frequency affects the response by only (0.4/5)^2.
   EXPECT_NEAR(fit.model.submodels[0].natural_frequency_hz(), 0.4, 1e-6);
   EXPECT_NEAR(fit.model.submodels[0].damping_ratio(), 0.1, 1e-6);
   EXPECT_THAT(fit.decisions, Not(Contains(HasSubstr("held"))));
@@ -53,7 +53,7 @@ TEST(Suspension, WhereARigidBodyAloneDoesNotExplainTheLines) {
   EXPECT_LT(fit_suspended(frf, {}, {}).model.fit.relative_rms_error, 1e-9);
 }
 
-/// A free rigid body is asked for, as it is where nothing is said; the delay is estimated.
+/// Requests a free rigid body, the default; the delay is estimated.
 FitResult fit_by_default(const test::DenseProblem& problem, double noise) {
   FitOptions options;
   options.weighting = Weighting::noise_variance;

@@ -76,7 +76,7 @@ TEST(PoleRelocationShares, DataOfAnUnstablePlantGiveStableModes) {
   for (const ModeCandidate& mode : modes) EXPECT_GT(mode.damping_ratio, 0.0);
 }
 
-// Its width is a tenth of the lines' spacing: where it is, one line tells, and how sharp it is, none.
+// Its width is a tenth of the line spacing: one line determines its frequency, none its damping.
 TEST(PoleRelocationShares, AModeNarrowerThanTheLinesIsPlacedWider) {
   DenseProblem problem = test::noisy_stage(HoldModel::none, 0.0);
   const std::vector<double> a = test::mode_coefficients(900.0, 2.5e-4);

@@ -39,7 +39,7 @@ Complex pole_of(const KnownPole& known) {
 
 const std::vector<KnownPole> kKnown = {{60.0, 0.02}, {64.0, 0.01}, {310.0, 0.004}};
 
-/// Modes with the double integrator of a rigid body: what a stage is, and no rational function of z.
+/// Modes and the double integrator of a rigid body, as in a stage; not a rational function of z.
 Complex stage(int channel, Complex s) {
   Complex sum = 1.0 / (s * s);
   for (std::size_t i = 0; i < kKnown.size(); ++i) {

@@ -1,4 +1,4 @@
-// What a fit says about its own uncertainty, against what happens when the measurement is repeated.
+// The uncertainty reported by a fit, compared with repeated measurements.
 
 #include <gtest/gtest.h>
 
@@ -21,8 +21,7 @@ constexpr int kRuns = 150;
 constexpr double kLowest = 0.62;
 constexpr double kHighest = 1.52;
 
-/// Fits kRuns noisy measurements; scatter over what was reported, and the errors of the response
-/// over theirs.
+/// Fits kRuns noisy measurements. Checks the scatter relative to the reported deviations, also of the response.
 void expect_honest(Weighting weighting, const Eigen::MatrixXd& variance, bool tell_variance) {
   const DenseProblem problem = covariance_stage();
   test::RandomNumbers random(77);

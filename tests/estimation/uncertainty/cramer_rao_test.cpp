@@ -1,4 +1,4 @@
-// What a fit of the paper's size reports, against the Cramer-Rao bound from differences and QR.
+// Deviations of a fit of the paper's size, compared with the Cramer-Rao bound from differences and QR.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What a fit says about its delays, against what happens when the measurement is repeated.
+// The delay deviations reported by a fit, compared with repeated measurements.
 
 #include <gtest/gtest.h>
 

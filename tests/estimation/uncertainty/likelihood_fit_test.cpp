@@ -91,7 +91,7 @@ TEST(LikelihoodFit, EndsWhereTheDenseFirstOrderConditionHolds) {
   // 1e-7 deviations are 1e-7 / sqrt(2400) of the residual; the delay's column is good to 1e-9.
   EXPECT_LT(first_order_condition(dense, fit.model.fit.cost, m.frf.lines()), 1e-8);
 
-  // Which the diagonal fit does not fulfil: the test can see the difference.
+  // The diagonal fit does not satisfy it, so the test is sensitive to the difference.
   at.model = fit_additive_model(m.frf, m.start(), options_with(Weighting::noise_variance)).model;
   const DenseEquations diagonal = dense_equations(at, m.frf, m.noise, DelayModel::estimate);
   EXPECT_GT(first_order_condition(diagonal, dense_cost(at.model, m.frf, m.noise), m.frf.lines()),
@@ -233,7 +233,7 @@ TEST(LikelihoodFit, WholeMatricesOfAUserGiveTheSameModel) {
     const double deviation = *factors.model.submodels[i].natural_frequency_std_hz;
     EXPECT_NEAR(whole.model.submodels[i].natural_frequency_hz(),
                 factors.model.submodels[i].natural_frequency_hz(), 1e-4 * deviation);
-    // A user's scale is not believed: the residual tells it.
+    // The scale of a user's weights is not trusted: it is estimated from the residual.
     EXPECT_NEAR(*whole.model.submodels[i].natural_frequency_std_hz, std::sqrt(scale) * deviation,
                 5e-3 * deviation);
   }
@@ -280,7 +280,7 @@ TEST(LikelihoodFit, AutomaticFitChoosesByTheDiagonalAndEndsWithTheLikelihood) {
 TEST(LikelihoodFit, ModesAtABoundAreHeld) {
   const Measurement m;
   AdditiveModel start = m.start();
-  // A mode far below the lines that nothing in the data asks for.
+  // A mode far below the lines that the data do not require.
   start.submodels.push_back(
       test::empty_submodel(m.problem.model, 0, test::mode_coefficients(4.0, 0.3), 1));
   const FitResult fit = fit_additive_model(m.frf, start, options_with(Weighting::likelihood));

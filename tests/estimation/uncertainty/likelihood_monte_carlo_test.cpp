@@ -19,7 +19,7 @@ constexpr int kRuns = 150;
 constexpr double kLowest = 0.62;
 constexpr double kHighest = 1.52;
 
-/// Scatter of frequencies and damping ratios over runs, what was reported, and the response's error.
+/// Scatter of frequencies and damping ratios over runs, the reported deviations, and the error of the response.
 struct Repeated {
   Eigen::VectorXd scatter = Eigen::VectorXd::Zero(6);
   Eigen::VectorXd reported = Eigen::VectorXd::Zero(6);

@@ -1,5 +1,5 @@
-// What fits with diagonal weights, residues of given rank or free, say about their uncertainty, against
-// what happens when a measurement whose channels are disturbed together is repeated.
+// The uncertainty reported by fits with diagonal weights, with residues of given rank or free, compared with repeated
+// measurements with correlated disturbances of the channels.
 
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ Eigen::VectorXd quantities(const AdditiveModel& model, bool deviations) {
 struct Repeated {
   Eigen::ArrayXd scatter;             ///< variances
   Eigen::ArrayXd reported;            ///< mean of the reported ones
-  Eigen::ArrayXd without;             ///< those of a file that does not tell the correlation
+  Eigen::ArrayXd without;             ///< of a file without the correlation
   double response_ratio = 0.0;        ///< |error|^2 over its reported mean
   double response_ratio_error = 0.0;  ///< standard error of it
 };
@@ -120,8 +120,8 @@ TEST(CovarianceMonteCarlo, FreeResiduesCountTheCorrelationOfOutputsAndInputs) {
   expect_the_correlation_to_matter(repeated);
 }
 
-// Outputs of different noise, which unit weights do not know and the variances say. (Relative weights
-// would follow the noise where the response sinks into it.)
+// Outputs with different noise, which is in the variances but not in unit weights. (Relative weights would follow the
+// noise where the response is below it.)
 TEST(LowRankCovarianceMonteCarlo, OtherWeightsWithKnownVarianceAreSandwiched) {
   expect_honest(repeat(Weighting::unit));
 }

@@ -1,4 +1,4 @@
-// What a fit says about its own uncertainty, against the dense Fisher and sandwich matrices.
+// The uncertainty reported by a fit, compared with the dense Fisher and sandwich matrices.
 
 #include "estimation/uncertainty/parameter_covariance.hpp"
 
@@ -154,7 +154,7 @@ TEST(Covariance, OfOtherWeightsTakesTheTotalVarianceWhereThereIsOne) {
   expect_dense_uncertainty(problem, fit, make_weights(frf, options), variance);
 }
 
-// Weights from variances of few degrees of freedom scatter, and what they scatter costs.
+// The scatter of weights from variances with few degrees of freedom raises the covariance.
 TEST(Covariance, OfEstimatedVariancesCountsTheScatterOfTheWeights) {
   const DenseProblem problem = covariance_stage();
   test::RandomNumbers random(37);
@@ -191,7 +191,7 @@ TEST(Covariance, IsRaisedAndSaidSoWhereTheModelDoesNotExplainTheData) {
   const Eigen::MatrixXd variance = problem.W.cwiseInverse();
   FrfEstimate frf = test::frf_of(problem);
   frf.response = noisy(random, problem, 4.0 * variance);
-  frf.noise_variance = variance;  // claims a quarter of what is there
+  frf.noise_variance = variance;  // a quarter of the true one
   const FitResult fit =
       fit_additive_model(frf, problem.model, options_with(Weighting::noise_variance));
   ASSERT_FALSE(fit.decisions.empty());
@@ -202,8 +202,8 @@ TEST(Covariance, IsRaisedAndSaidSoWhereTheModelDoesNotExplainTheData) {
   expect_dense_uncertainty(problem, fit, problem.W, scale * variance);
 }
 
-// Outputs that a disturbance moves together, Cov(vec G) = (input part) kron C_E: diagonal weights do
-// not see it, the covariance does.
+// Outputs that a disturbance moves together, Cov(vec G) = (input part) kron C_E: the covariance includes this
+// correlation, diagonal weights do not.
 TEST(Covariance, CountsTheCorrelationOfTheOutputs) {
   const DenseProblem problem = covariance_stage();
   test::RandomNumbers random(35);
@@ -219,7 +219,7 @@ TEST(Covariance, CountsTheCorrelationOfTheOutputs) {
       frf.response(2 * u + 1, k) += std::sqrt(variance(2 * u + 1, k)) * second;
     }
   frf.noise_variance = variance;
-  // Any scale: a correlation is what is taken from it.
+  // Any scale, because only the correlation is used.
   frf.residual_covariance_re.resize(4, frf.lines());
   frf.residual_covariance_im.resize(4, frf.lines());
   const double a = 3.0;

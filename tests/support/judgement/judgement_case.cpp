@@ -41,7 +41,7 @@ double children_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// One command of the program, with what it said.
+/// One command of the program, with its output.
 struct Command {
   ProgramResult ran;
   Json json = Json::object();
@@ -88,7 +88,7 @@ WaferStageSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
     spec.in_plane_modes[static_cast<std::size_t>(plan.drifting_mode)].natural_frequency_hz *=
         1.0 - 0.5 * plan.drift_relative / stage.realizations;
   if (plan.swapped[0] >= 0 && !stage.stage_file) {
-    // Nothing but a stage file can know it: the right answer is that of the names in the log.
+    // Only a stage file could reveal it; the expected answer uses the names in the log.
     const auto a = static_cast<std::size_t>(plan.swapped[0]);
     const auto b = static_cast<std::size_t>(plan.swapped[1]);
     std::swap(spec.info.sensors[a], spec.info.sensors[b]);
@@ -160,8 +160,8 @@ void compare(const AdditiveModel& model, const FrfEstimate& frf, const WaferStag
   result["excess"] = excess_of(model, frf, spec, heave);
 }
 
-/// The first thing that a reader of exit code 3 is told: the finding of a log that is not to be trusted, then the
-/// message of the fit, then of the validation.
+/// The first cause in the output for exit code 3: the finding of an untrustworthy log, then the message of the fit,
+/// then that of the validation.
 std::string first_cause(const Command& frf, const Command& fit, const Command& validation) {
   if (frf.ran.exit_code != 0) {
     if (frf.json.contains("health"))

@@ -157,7 +157,7 @@ class Loop {
   HeaveRegression regression_;
   double last_z_m_ = 0.0;
   Eigen::VectorXd y_;
-  Eigen::VectorXd seen_;  // what the controller is given: the error from the setpoint
+  Eigen::VectorXd seen_;  // input of the controller: the error from the setpoint
   Eigen::VectorXd u_;
   Eigen::VectorXd force_;
 };

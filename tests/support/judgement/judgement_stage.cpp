@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kSuspensionHz =
-    0.02;  // far below all lines: of its springs they see little, but all together enough to shift a delay
+    0.02;  // far below all lines: weak per line, but together enough to shift a delay
 constexpr double kDecayed = 1e-5;
 
 struct Sizes {
@@ -62,7 +62,7 @@ void place_vertical(RandomNumbers& random, const char* prefix, const char* unit,
   }
 }
 
-/// Three sensors, three or four actuators in the plane: x, y and Rz can be told apart.
+/// Three sensors, three or four actuators in the plane: x, y and Rz can be distinguished.
 void place_in_plane(RandomNumbers& random, const char* prefix, const char* unit, int count,
                     const WaferStageSpec& spec, std::vector<Channel>& channels) {
   const double a = 0.4 * spec.length_x_m * random.uniform(0.8, 1.0);

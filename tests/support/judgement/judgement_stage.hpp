@@ -15,7 +15,7 @@ struct JudgementStage {
   /// The true plant, its limits unused, and the controller that closes the loop. Modes in the band and one or two
   /// above it are `in_plane_modes`, whose shapes reach all channels.
   WaferStageSpec spec;
-  ColouredNoiseSpec noise;  ///< of the sensors, beside the white spec.sensor_noise_m
+  ColouredNoiseSpec noise;  ///< of the sensors, in addition to the white spec.sensor_noise_m
   double snr_db = 0.0;      ///< median magnitude of the response over the noise of its mean
   double level_n = 1.0;     ///< rms per axis
   double motion_m = 0.0;    ///< rms of the rigid heave under excitation
@@ -36,8 +36,8 @@ struct JudgementStage {
   std::string description() const;
 };
 
-/// Sizes 2 x 2 to 7 x 17. The loop is stable: a kick decays. Peaks of all modes in the band stand at least 20 dB
-/// above the noise of the response in their best channel.
+/// Sizes 2 x 2 to 7 x 17. The loop is stable: a kick decays. Peaks of all modes in the band are at least 20 dB above
+/// the noise of the response in their best channel.
 JudgementStage draw_judgement_stage(std::uint64_t seed);
 
 }  // namespace stageid::test

@@ -31,11 +31,11 @@ inline constexpr int kTroubles = 14;
 const char* to_string(Trouble trouble) noexcept;
 std::optional<Trouble> trouble_of(const std::string& name) noexcept;
 
-/// What is planted in one measurement; drawn by draw_trouble().
+/// The trouble planted in one measurement; drawn by draw_trouble().
 struct TroublePlan {
   Trouble trouble = Trouble::clean;
   std::string variant;  ///< empty: there is one kind only
-  /// What the program may say, any of these: causes of findings, or parts of a verdict's sentence.
+  /// Accepted answers of the program: causes of findings, or parts of the sentence of a verdict.
   std::vector<std::string> right_causes;
   // at the stage
   double actuator_quantum_n = 0.0;
@@ -56,7 +56,7 @@ struct TroublePlan {
   int reference_late_samples = 0;
   int swapped[2] = {-1, -1};  ///< sensors
   bool excitation_as_actuators = false;
-  bool silent_in_record = false;  ///< the record knows that the silent axis was not excited
+  bool silent_in_record = false;  ///< the record contains that the silent axis was not excited
 };
 
 /// May change the stage: the strength of its noise, its transient periods.

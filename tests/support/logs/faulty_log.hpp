@@ -7,8 +7,8 @@
 #include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/logs/memory_log.hpp"
 
-/// Logs of random stages with faults planted: the loop is closed here, sample by sample, around hal's
-/// modal plant and motion controller, so that faults can stand before and behind the recording.
+/// Logs of random stages with planted faults. The loop is closed here, sample by sample, around the modal plant and
+/// motion controller of hal, so that faults can be inside or outside the recording.
 namespace stageid::test {
 
 /// One fault. Channels count within sensors or actuators.

@@ -17,7 +17,7 @@ class MemoryLog : public LogReader {
   std::filesystem::path file = "memory.slog";
   LogInfo log_info;
   std::vector<LogRun> log_runs;
-  std::vector<Eigen::MatrixXd> excitation_periods;  ///< period_samples x axes, one a run
+  std::vector<Eigen::MatrixXd> excitation_periods;  ///< period_samples x axes, one per run
   std::vector<LogSamples> records;                  ///< whole runs
 
   const std::filesystem::path& path() const noexcept override { return file; }

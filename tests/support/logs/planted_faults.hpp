@@ -28,7 +28,7 @@ struct NamedFault {
 struct Judgement {
   bool named =
       false;       ///< the cause at the channel, with its number; or nothing if nothing is planted
-  int others = 0;  ///< faults and doubts beside it
+  int others = 0;  ///< other faults and doubts
   double error = 0.0;  ///< of its number: of a factor, relative; of a skew, us
 };
 
@@ -41,7 +41,7 @@ inline std::string channel_text(const PlantedFault& fault, const LogInfo& info) 
   return name(std::min(fault.a, fault.b)) + " " + name(std::max(fault.a, fault.b));
 }
 
-/// One of each kind, at channels drawn from `seed`. `clean` tells how far its channels move.
+/// One of each kind, at channels drawn from `seed`. `clean` determines how far its channels move.
 inline std::vector<NamedFault> faults_to_plant(std::uint64_t seed, const MemoryLog& clean) {
   using Kind = PlantedFault::Kind;
   RandomNumbers random(seed + 7777);

@@ -9,7 +9,7 @@ namespace stageid::test {
 
 /// The least standard deviations that any unbiased estimate can have; one entry a submodel.
 struct CramerRaoBound {
-  Eigen::VectorXd frequency_std_hz;  ///< 0 where the submodel is no mode
+  Eigen::VectorXd frequency_std_hz;  ///< 0 if the submodel is not a mode
   Eigen::VectorXd damping_std;
   std::vector<Eigen::MatrixXd> numerator_std;  ///< of B_0, n_y x n_u
 };

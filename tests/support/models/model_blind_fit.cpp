@@ -24,8 +24,7 @@ std::vector<const Submodel*> modes_of(const AdditiveModel& model) {
   return modes;
 }
 
-/// Modes of `wanted` that no mode of `given` stands for: closest pairs are taken away first, and
-/// count as the same within a half-power width.
+/// Modes of `wanted` without a mode of `given`: the closest pairs within a half-power width are removed first.
 std::vector<double> unmatched(const AdditiveModel& wanted, const AdditiveModel& given) {
   const std::vector<const Submodel*> from = modes_of(wanted);
   const std::vector<const Submodel*> to = modes_of(given);

@@ -5,12 +5,12 @@
 
 #include "estimation/model/additive_model.hpp"
 
-// The paper's estimator as it is written: dense, a line at a time, all K right-hand sides. Only for
+// The paper's estimator as printed: dense, line by line, all K right-hand sides. Only for
 // problems of a few parameters; shares nothing with the library but the structs.
 
 namespace stageid::test {
 
-/// A model beside the data that it is to explain.
+/// A model and the data to fit.
 struct DenseProblem {
   AdditiveModel model;
   Eigen::VectorXd frequency_hz;
@@ -34,8 +34,8 @@ Eigen::MatrixXcd instrument_rows(const DenseProblem& problem, Eigen::Index k);
 /// P_i).
 Eigen::MatrixXcd regressor_rows(const DenseProblem& problem, Eigen::Index k);
 
-/// What stands left of W in the paper's estimator: the instrument (refined instrumental variables),
-/// or the regressor itself (Sanathanan and Koerner).
+/// The left factor of W in the paper's estimator: the instrument (refined instrumental variables), or the regressor
+/// itself (Sanathanan and Koerner).
 enum class Left { instrument, regressor };
 
 /// The K-column solution of

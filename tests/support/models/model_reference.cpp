@@ -74,7 +74,7 @@ SampledSystem make_sampled(const RationalFunction& function, double period_s, do
   }
 
   const Long samples = static_cast<Long>(delay_s) / T;
-  // A delay that is meant as a whole number of samples is one, whatever its last bit says.
+  // A delay that is a whole number of samples up to its last bit counts as whole.
   const Long nearest = std::round(samples);
   const bool whole = std::abs(samples - nearest) < 1e-12L;
   out.whole_delay = static_cast<int>(whole ? nearest : std::floor(samples));

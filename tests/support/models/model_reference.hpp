@@ -6,9 +6,9 @@
 
 #include "estimation/model/additive_model.hpp"
 
-// What an additive model is, written a second time and in another way: rational functions term by
-// term, and hold, delay and sampler by a matrix exponential in extended precision or by the
-// aliasing sum. Nothing of the library's evaluation is used here; only its structs hold the values.
+// A second, independent implementation of an additive model: rational functions term by term, and hold, delay and
+// sampler by a matrix exponential in extended precision or by the aliasing sum. Uses only the structs of the library,
+// not its evaluation.
 
 namespace stageid::test {
 
@@ -38,7 +38,7 @@ std::complex<double> sampled(const RationalFunction& function, double omega_rad_
 /// s_n = j (omega + n 2 pi / T).
 struct AliasingSum {
   std::complex<double> value;
-  double tail = 0.0;  ///< bound of what the terms left out can add
+  double tail = 0.0;  ///< bound of the omitted terms
 };
 AliasingSum aliasing_sum(const RationalFunction& function, double omega_rad_s, double period_s,
                          double delay_s, int terms);

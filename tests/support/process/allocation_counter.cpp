@@ -57,7 +57,7 @@ std::uint64_t AllocationCounter::count() const noexcept { return allocations - b
 
 bool AllocationCounter::works() noexcept {
   const AllocationCounter counter;
-  // Volatile: gcc removes an allocation that nobody looks at.
+  // Volatile, because gcc removes an unused allocation.
   void* volatile memory = std::malloc(1);
   std::free(memory);
   return counter.count() == 1;

@@ -5,7 +5,7 @@
 
 namespace stageid::test {
 
-/// What the Error says that `call` throws; another kind of error, or none, is said to be so.
+/// The message of the Error thrown by `call`; a text that says so if there is another error, or none.
 template <typename Error, typename Call>
 std::string error_message(const Call& call) {
   try {

@@ -77,7 +77,7 @@ std::size_t HeapPeak::bytes() const noexcept { return largest - before_; }
 bool HeapPeak::works() noexcept {
   constexpr std::size_t kSize = 1 << 20;
   const HeapPeak peak;
-  // Volatile: gcc removes an allocation that nobody looks at.
+  // Volatile, because gcc removes an unused allocation.
   void* volatile memory = std::malloc(kSize);
   std::free(memory);
   return peak.bytes() >= kSize && living == peak.before_;

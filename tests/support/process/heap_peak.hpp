@@ -4,8 +4,8 @@
 
 namespace stageid::test {
 
-/// The largest number of bytes on the heap between its construction and bytes(), of all threads, beyond
-/// what was there at its construction. Link heap_peak.cpp into the test executable; one at a time.
+/// The largest number of additional bytes on the heap between its construction and bytes(), of all threads. Link
+/// heap_peak.cpp into the test executable; one object at a time.
 class HeapPeak {
  public:
   HeapPeak() noexcept;

@@ -10,7 +10,7 @@ namespace {
 
 thread_local std::uint64_t locks = 0;
 
-/// What the C library itself calls by this name.
+/// The function of this name in the C library.
 template <typename Function>
 Function next(const char* name) noexcept {
   return reinterpret_cast<Function>(::dlsym(RTLD_NEXT, name));

@@ -4,9 +4,8 @@
 
 namespace stageid::test {
 
-/// Counts what the calling thread asks of locks between its construction and count(): mutexes,
-/// read-write locks, condition variables, semaphores, those that try and those that signal. Link
-/// lock_counter.cpp into the test executable.
+/// Counts the lock operations of the calling thread between its construction and count(): mutexes, read-write locks,
+/// condition variables, semaphores, including attempts and signals. Link lock_counter.cpp into the test executable.
 class LockCounter {
  public:
   LockCounter() noexcept;

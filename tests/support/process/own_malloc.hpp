@@ -2,13 +2,14 @@
 
 #include <cstddef>
 
-// For test executables that bring their own malloc: whether they may (sanitizers bring theirs), and what it calls.
+// For test executables with their own malloc: whether it is possible (sanitizers have theirs), and the functions to
+// call.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
 #define STAGEID_MALLOC_IS_OURS 0
 #else
 #define STAGEID_MALLOC_IS_OURS 1
 
-// glibc's own names for what is replaced.
+// glibc's own names of the replaced functions.
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);

@@ -11,8 +11,7 @@
 
 namespace stageid::test {
 
-/// A directory and scripts in it that see what another program makes of our files. Skipped where
-/// Python has not the packages.
+/// A directory and scripts in it that read our files with another program. Skipped if Python lacks the packages.
 class PythonScriptTest : public testing::Test {
  protected:
   explicit PythonScriptTest(std::string packages = "h5py, numpy as np")

@@ -7,8 +7,8 @@
 
 namespace stageid::test {
 
-/// A new empty directory that goes away with its content. In memory where that can be had: what is
-/// tested is not the disk, and files that are synchronized take milliseconds each there.
+/// A new empty directory that is removed with its content. In memory if possible: the disk is not under test, and
+/// synchronizing files takes milliseconds each there.
 class TemporaryDirectory {
  public:
   TemporaryDirectory() {

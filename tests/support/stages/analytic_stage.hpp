@@ -42,7 +42,7 @@ class AnalyticStage final : public CyclicStage {
   // The script: what exchange number n (of every run) does instead of `ok`.
   std::map<std::uint64_t, Outcome> outcomes;
   std::map<std::uint64_t, std::uint64_t> valid;   ///< mask of an `incomplete` exchange
-  std::map<std::uint64_t, double> first_sensor;   ///< replaces what the first sensor shows
+  std::map<std::uint64_t, double> first_sensor;   ///< replaces the value of the first sensor
   std::int64_t lateness_ns = 0;                   ///< of every `late` exchange
   int refuse_run = -1;                            ///< start() of this run throws
   std::atomic<bool>* raise_at_refusal = nullptr;  ///< set to true then
@@ -97,7 +97,7 @@ class AnalyticStage final : public CyclicStage {
       give(inputs, y_);
       if (shown != first_sensor.end()) inputs.y[0] = shown->second;
     } else if (spoil_missing) {
-      // What a driver may leave behind: it must not be used.
+      // Values that a driver may leave behind; they must not be used.
       for (double& value : inputs.y) value = std::numeric_limits<double>::quiet_NaN();
     }
     inputs.t_rx_ns = inputs.t_sample_ns + (outcome == Outcome::late ? lateness_ns : 0);

@@ -15,8 +15,7 @@
 #include "excitation/multisine/dft.hpp"
 #include "tests/support/logs/memory_log.hpp"
 
-/// Closed-loop records solved line by line from u = r - C y, y = G u + v, so that no discretization
-/// error stands between an estimate and the truth.
+/// Closed-loop records solved line by line from u = r - C y, y = G u + v, so that there is no discretization error.
 namespace stageid::test {
 
 using Transfer = std::function<Eigen::MatrixXcd(double omega_rad_s)>;
@@ -33,14 +32,14 @@ struct LoopExperiment {
   int period_samples = 250;
   std::vector<int> lines = {1, 3, 5, 7, 9, 13, 21, 35, 51, 75};
   int axes = 3;         ///< excited ones: the first actuators
-  int experiments = 0;  ///< 0: as many as axes; zippered: one, whatever stands here
+  int experiments = 0;  ///< 0: as many as axes; ignored if zippered: one
   int realizations = 1;
   int periods = 2;
   int transient_periods = 1;  ///< these carry a ramp on top of the periodic part
   AxisScheme scheme = AxisScheme::single_axis;
   std::uint64_t seed = 1;
   Eigen::MatrixXcd
-      noise_factor{};  ///< n_y x n_y, v = factor * w, E w w^H = I a line and period; empty: none
+      noise_factor{};  ///< n_y x n_y, v = factor * w, E w w^H = I per line and period; empty: none
   std::vector<double> noise_scale{};  ///< of v, an experiment; empty: 1
 };
 
@@ -156,7 +155,7 @@ inline LogSamples simulate_run(const ClosedLoop& loop, const LoopExperiment& x,
     record.actuators.middleRows(p * n, n) = synthesize(U, x.lines, dft);
     record.sensors.middleRows(p * n, n) = synthesize(Y, x.lines, dft);
     if (p >= x.transient_periods) continue;
-    // What dies out after the start: without it, a test could not see the transient being used.
+    // A decaying transient, so that a test would detect its use.
     const Eigen::VectorXd decay = Eigen::VectorXd::LinSpaced(n, 1.0, 0.0);
     record.actuators.middleRows(p * n, n).colwise() += decay;
     record.sensors.middleRows(p * n, n).colwise() += 2.0 * decay;

@@ -115,7 +115,7 @@ RandomStage draw_random_stage(std::uint64_t seed, const RandomStageSpec& spec) {
   RandomStage stage;
   const int modes = random.integer(spec.least_modes, spec.most_modes);
   stage.seed = seed;
-  // From numbers of its own: the stages of earlier seeds stay what they are.
+  // From a separate generator, so that the stages of earlier seeds do not change.
   stage.missing_peaks = RandomNumbers(seed + 0x9e3779b9U).integer(0, spec.most_missing_peaks);
   stage.pairs = random.integer(0, std::min(spec.most_pairs, modes / 2));
   stage.noise_db = random.uniform(spec.least_noise_db, spec.most_noise_db);

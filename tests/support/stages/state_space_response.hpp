@@ -8,7 +8,7 @@
 
 namespace stageid::test {
 
-/// vec of C (x I - A)^-1 B + D by a dense solve that knows nothing of blocks.
+/// vec of C (x I - A)^-1 B + D by a dense solver that does not use blocks.
 inline Eigen::VectorXcd transfer(const StateSpace& system, std::complex<double> x) {
   const Eigen::MatrixXcd left =
       x * Eigen::MatrixXcd::Identity(system.order(), system.order()) - system.A;

@@ -1,4 +1,4 @@
-// What is asked of the program: unknown commands and flags, help.
+// Command line of the program: unknown commands and flags, help.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

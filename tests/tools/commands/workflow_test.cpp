@@ -261,8 +261,8 @@ TEST_F(Workflow, TheDesignForetellsWhatTheRunDoes) {
         y_rms.cwiseMax(last.sensors.colwise().squaredNorm().transpose() / static_cast<double>(N));
     y_peak = y_peak.cwiseMax(last.sensors.cwiseAbs().colwise().maxCoeff().transpose());
   }
-  // What is left of the transient after four periods of 0.25 s with loops of 20 Hz and a slowly
-  // integrating controller, and noise of 1e-9 m beside motions of some 1e-6 m.
+  // The remaining transient after four periods of 0.25 s with loops of 20 Hz and a slowly integrating controller, and
+  // noise of 1e-9 m with motions of about 1e-6 m.
   constexpr double kTolerance = 0.02;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const ChannelPrediction& channel = prediction.actuators[static_cast<std::size_t>(i)];
@@ -317,7 +317,7 @@ TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
   make_model();
   const json figures =
       json::parse(succeed({"validate", name("model.json"), name("run.slog"), "--json"}).out);
-  // Small against the motion itself; the transient and noise are what is left.
+  // Small relative to the motion itself; the remainder is transient and noise.
   EXPECT_LT(figures["time_domain"]["normalized"].get<double>(), 0.05);
   EXPECT_EQ(figures["time_domain"]["runs"], 9);
   // A model that is wrong by a factor must not pass.

@@ -1,4 +1,4 @@
-// Every configuration that we ship loads, and is what it says.
+// Every shipped configuration loads and has the documented properties.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -45,7 +45,8 @@ TEST(Configs, WhatTheWiresHaveToCarryIsForetold) {
   const std::vector<LinkLoad> buses = link_loads(can);
   ASSERT_FALSE(buses.empty());
   for (const LinkLoad& bus : buses) {
-    EXPECT_GE(bus.load, bus.cycle_s * can.spec.info.sample_rate_hz);  // states beside the cycle
+    // states in addition to the cycle
+    EXPECT_GE(bus.load, bus.cycle_s * can.spec.info.sample_rate_hz);
     EXPECT_LT(bus.load, 0.8);
     EXPECT_GT(bus.most_hz, can.spec.info.sample_rate_hz);
   }
@@ -140,7 +141,7 @@ TEST(Configs, SeventeenModesOfTheWaferStageAreSeenBelowTwoKilohertz) {
        flexible_modes_seen(spec, {"z1", "z5", "z13"}, {"sz1", "sz2", "sz3", "sz4"}))
     below += mode.natural_frequency_hz < 2000.0 ? 1 : 0;
   EXPECT_EQ(below, test::kModesInBand);
-  EXPECT_EQ(flexible_modes_seen(spec, {"z1"}, {"sx1"}).size(), 0U);  // x sensors see none of z
+  EXPECT_EQ(flexible_modes_seen(spec, {"z1"}, {"sx1"}).size(), 0U);  // x sensors observe none of z
 }
 
 TEST(Configs, TheMeasurementIsAnotherIfStageOrExcitationChange) {

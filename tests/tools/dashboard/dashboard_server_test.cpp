@@ -1,5 +1,4 @@
-// The dashboard's server by itself: who may ask for what, and what it does with watchers that do not
-// read.
+// The server of the dashboard by itself: permissions, and watchers that do not read.
 #include "tools/dashboard/dashboard_server.hpp"
 
 #include <gmock/gmock.h>
@@ -20,7 +19,7 @@ namespace test_dashboard_server {
 
 using namespace std::chrono_literals;
 
-/// A connection that asks for the stream and may or may not read what comes.
+/// A connection that requests the stream and may or may not read it.
 class RawWatcher {
  public:
   explicit RawWatcher(int port, const std::string& path = "/events")
@@ -201,7 +200,7 @@ TEST_F(DashboardServerTest, OneThatNeverReadsIsLetGoAndHoldsNobodyUp) {
   // More than all buffers on the way hold.
   const std::string much(200'000, 'x');
   for (int i = 0; i < 200 && server_->watchers() == 2; ++i) {
-    content_.state.publish(much);  // comes back at once, whoever reads
+    content_.state.publish(much);  // returns at once, regardless of readers
     std::this_thread::sleep_for(50ms);
   }
   EXPECT_EQ(server_->watchers(), 1);

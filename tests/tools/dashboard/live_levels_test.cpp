@@ -59,7 +59,7 @@ TEST(LiveLevels, NothingIsLostToWhoeverLooksAllTheTime) {
   for (std::uint64_t i = 0; i < kRows; ++i) levels.rows(rows);
   done = true;
   looker.join();
-  levels.rows({});  // hands over what was left while the other looked
+  levels.rows({});  // hands over the levels gathered while the reader held the lock
   seen += levels.take().rows;
   EXPECT_EQ(seen, kRows);
 }

@@ -109,7 +109,7 @@ class RoundTrips(Case):
         self.succeed("export", frf, "-o", "d.uff")
         self.succeed("import", "d.uff", "-o", "back.h5")
         back, given = everything(WORK / "back.h5"), everything(frf)
-        # What a universal file has no place for, and the radii, which follow from the degrees of freedom.
+        # Data without a place in a universal file, and the radii, which follow from the degrees of freedom.
         lost = ("@noise_dof", "@provenance", "confidence_radius")
         for name in given:
             if not name.startswith(lost):

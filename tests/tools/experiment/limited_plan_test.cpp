@@ -58,7 +58,7 @@ TEST_F(LimitedPlanTest, WhatIsForetoldFromThePilotHolds) {
   succeed({"run", limits_, "--excitation", name("e.h5"), "-o", name("r.slog")});
   succeed({"frf", name("r.slog"), "-o", name("r.h5")});
   const double reached = mean_relative_variance(read_frf(at("r.h5")), VarianceKind::noise);
-  // The pilot of 1.5 s knows the noise of a line from some 20 lines, and its own noise is in |G|.
+  // The pilot of 1.5 s estimates the noise of a line from about 20 lines, and its own noise is in |G|.
   EXPECT_GT(reached, variance / 1.6);
   EXPECT_LT(reached, variance * 1.6);
 }
@@ -76,8 +76,8 @@ Eigen::VectorXd largest_position(const std::filesystem::path& file) {
   return largest;
 }
 
-// A position window binds in the first period, where what lies below the band swings: the loop at 20 Hz,
-// of which a band from 50 Hz on shows nothing, and a pilot from 50 Hz on no more.
+// A position window limits the first period, because of motion below the band: the loop at 20 Hz is not visible in a
+// band or a pilot from 50 Hz.
 TEST_F(LimitedPlanTest, PositionsFromRestAreForetoldBelowTheBandToo) {
   const std::string stage = read_bytes(at("small_stage.yaml"));
   for (const char* pilot_band : {"[4, 800]", "[52, 800]"}) {
@@ -165,7 +165,7 @@ TEST_F(LimitedPlanTest, RunEndsWhenTheVarianceIsReachedAndGoesOnWithResume) {
       succeed({"run", limits_, "-o", log, "--until", "1e-12", "--resume", "--json"}).out);
   EXPECT_EQ(rest["runs_complete"], 9);
   EXPECT_THAT(rest["message"].get<std::string>(), HasSubstr("the plan ended"));
-  // What was stopped and resumed is what would have been measured in one go.
+  // A measurement that was stopped and resumed equals an uninterrupted one.
   succeed({"run", limits_, "-o", name("whole.slog")});
   succeed({"frf", log, "-o", name("a.h5")});
   succeed({"frf", name("whole.slog"), "-o", name("b.h5")});

@@ -52,7 +52,8 @@ class LoopCheckTest : public testing::Test {
   ExperimentConfig config_;
 };
 
-// Two ways to one verdict: the eigenvalues of the configured plant, and the turns of what a pilot has measured.
+// Two methods with the same verdict: the eigenvalues of the configured plant, and the encirclements of the response
+// measured by a pilot.
 TEST_F(LoopCheckTest, APriorAndThePlantItselfAgree) {
   const WaferStageSpec stage = config_.stage.spec;
   int stable = 0;

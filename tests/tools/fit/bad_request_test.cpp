@@ -124,7 +124,7 @@ TEST_F(BadRequest, StageFiles) {
   wrong("direction: [0, 0, 1], limit_n", "direction: [0, 0, 2], limit_n", "write a unit vector");
   wrong("name: a2", "name: a1", "duplicate channel name 'a1'");
   wrong("backend: sim", "backend: cann", "did you mean 'can'?");
-  wrong("Ry: *loop", "Rx: *loop", "stage_bad.yaml: ");  // no sensor sees Rx
+  wrong("Ry: *loop", "Rx: *loop", "stage_bad.yaml: ");  // no sensor observes Rx
   wrong("[-0.26, 0, 0]", "[-2.6, 0, 0]", "is not on the plate");
   wrong("noise:", "faults: [{kind: dead_sensor, channel: s9}]\nnoise:", "unknown sensor 's9'");
   wrong("noise:", "faults: [{kind: extra_delay}]\nnoise:", "extra_delay needs at least 1 sample");
@@ -263,7 +263,7 @@ TEST_F(BadRequest, AFullDiskLeavesNothingBehind) {
   fail({"export", name("model.json"), "-o", name("m.mat")}, 1, "m.mat: cannot be written", full);
   fail({"log", "convert", name("run.slog"), "-o", name("l.h5")}, 1, "l.h5", full);
   fail({"log", "convert", name("run.slog"), "-o", name("l.csv")}, 1, "l.csv: cannot be wr", full);
-  // What was recorded before the disk was full stays.
+  // The part recorded before the disk was full is kept.
   full.largest_file_bytes = 200000;
   const ProgramResult run_full = run({"run", config_, "-o", name("full.slog")}, full);
   EXPECT_EQ(run_full.exit_code, 1);

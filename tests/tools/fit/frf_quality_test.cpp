@@ -1,4 +1,4 @@
-// What stageid frf says of linearity and of periods, end to end.
+// Output of stageid frf on linearity and periods, end to end.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

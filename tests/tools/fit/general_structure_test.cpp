@@ -52,7 +52,7 @@ TEST_F(GeneralStructure, ASuspensionIsFittedFromTheLowestLine) {
            "--direct-term", "full"});
   const AdditiveModel model = read_model(at("m.json"));
   EXPECT_NEAR(model.fit.band_hz[0], 16.0, 1e-9);
-  // Two of the suspension, four flexible ones, a direct term: no mode that stands in for anything.
+  // Two of the suspension, four flexible ones, a direct term; no substitute modes.
   ASSERT_EQ(model.submodels.size(), 7U);
   for (const Submodel& s : model.submodels) {
     if (!s.is_mode()) continue;

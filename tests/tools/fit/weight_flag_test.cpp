@@ -1,4 +1,4 @@
-// Weights from a file: what is taken, and what is refused with the file's name.
+// Weights from a file: accepted ones, and rejected ones with the name of the file.
 
 #include "estimation/request/weight_file.hpp"
 
@@ -27,7 +27,7 @@ class WeightFile : public testing::Test {
     file.write_complex("/weight_matrices", {4, 6, 6}, values.data());
     file.close();
   }
-  /// 2 on the diagonal, one coupling on line 1 that tells rows from columns.
+  /// 2 on the diagonal, one coupling on line 1 that distinguishes rows from columns.
   static std::vector<Complex> matrices() {
     std::vector<Complex> values(4 * 36);
     for (std::size_t k = 0; k < 4; ++k)

@@ -1,4 +1,4 @@
-// Pictures for print: what is drawn is what stands in the files, whatever the channels are called.
+// Pictures for print show the data in the files, for any names of the channels.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -137,7 +137,7 @@ TEST_F(Plot, TheModeIndicatorHasItsCurvesAndAMarkForEveryMode) {
   ReportData data = read(false);
   data.chosen_modes = {{file.frequency_hz[10] + 1e-3, 0.01, 1},
                        {file.frequency_hz[20] - 1e-3, 0.01, 2},
-                       {1e6, 0.01, 1}};  // beside the lines: no place for a mark
+                       {1e6, 0.01, 1}};  // outside the lines: cannot be marked
   const Picture picture = cmif_picture(data);
   const auto curves = table_of(picture, "cmif.txt");
   const Eigen::Index n = std::min(file.n_outputs(), file.n_inputs());

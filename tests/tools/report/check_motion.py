@@ -11,7 +11,7 @@ STAGEID_REQUIRE_BROWSER is not set.
 import subprocess
 import sys
 
-from page_checks import expect, run  # the first: it knows where the browser is
+from page_checks import expect, run  # must be first: it locates the browser
 
 from browser import Browser, find_browser
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import zlib
 
-from page_checks import expect, run  # the first: it knows where the browser is
+from page_checks import expect, run  # must be first: it locates the browser
 
 from browser import Browser, find_browser
 

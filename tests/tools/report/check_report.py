@@ -239,7 +239,7 @@ def check_saved(saved):
 
 def check_use(use, expected, width):
     expect(use["clicked"] == use["last"], f"a click on the last panel shows {use['clicked']!r}")
-    # To the right stands the next actuator; on a narrow page, which is turned, the next sensor.
+    # To the right is the next actuator; on a narrow page, which is transposed, the next sensor.
     outputs, inputs = expected["shape"]
     step = min(1, outputs - 1) if width <= 700 else outputs * min(1, inputs - 1)
     expect(use["walked"] == step, f"the right arrow leads to panel {use['walked']} instead of {step}")

@@ -81,7 +81,7 @@ inline std::int64_t signed_of(std::uint32_t word) {
   return word % 2 == 0 ? half : -half - 1;
 }
 
-/// Where a finite float stands among all, the negative ones below zero.
+/// Rank of a finite float among all, negative for negative ones.
 inline std::int64_t rank_of(float value) {
   std::int32_t bits = 0;
   std::memcpy(&bits, &value, sizeof bits);
@@ -98,7 +98,7 @@ inline float float_of_rank(std::int64_t any) {
   return value;
 }
 
-/// What a number is expected to be from those before it: `order` as the page's description has it.
+/// Expected value of a number from the previous ones; `order` as in the description of the page.
 template <typename Number>
 std::complex<double> expectation(const std::vector<Number>& values,
                                  const std::vector<std::complex<double>>& base, int order) {

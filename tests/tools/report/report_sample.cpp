@@ -1,4 +1,4 @@
-// Writes report.html of a synthetic stage and expected.json, what a browser must find in it.
+// Writes report.html of a synthetic stage and expected.json, the content that a browser must find.
 //   report_sample DIRECTORY [full|full_compared|small|compared|bare|hostile]
 
 #include <fmt/format.h>

@@ -124,7 +124,7 @@ Eigen::MatrixXd noise_variance(const Eigen::MatrixXcd& response, const Eigen::Ve
   return variance;
 }
 
-/// What an estimate from `dof` degrees of freedom makes of it: chi-square of that many, over them.
+/// Random estimates with `dof` degrees of freedom: chi-square variables divided by them.
 Eigen::MatrixXd estimated(const Eigen::MatrixXd& variance, int dof, Random& random) {
   return variance.unaryExpr([&](double exact) {
     double sum = 0.0;
@@ -260,7 +260,7 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
   add_runs(data, size);
   add_checks(data);
 
-  // The truth is as far from the model as the stated deviations say.
+  // The truth differs from the model by about the stated deviations.
   for (TrueMode& mode : data.true_modes) {
     mode.natural_frequency_hz *= 1.0 + 2e-5 * 0.8 * random.normal();
     mode.damping_ratio *= 1.0 + 2e-3 * 0.8 * random.normal();

@@ -6,7 +6,7 @@
 
 namespace stageid::test {
 
-/// A stage as the report sees it, at any size.
+/// A synthetic stage of any size for the report.
 struct SyntheticSize {
   Eigen::Index outputs = 4;
   Eigen::Index inputs = 13;
@@ -24,7 +24,7 @@ ReportData synthetic_report(const SyntheticSize& size = {}, std::uint64_t seed =
 /// Share by which add_other_day() moves every natural frequency.
 constexpr double kOtherDayShift = 4e-4;
 
-/// Another day beside it: every natural frequency higher by kOtherDayShift, the first mode gone, the
+/// Another day for comparison: every natural frequency higher by kOtherDayShift, the first mode gone, the
 /// response 2 % smaller and with noise of its own.
 void add_other_day(ReportData& data, std::uint64_t seed = 2);
 

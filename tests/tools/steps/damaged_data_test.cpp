@@ -1,4 +1,4 @@
-// Logs and FRFs that are damaged or not what they should be, on the real program.
+// Damaged or unexpected logs and FRFs, with the real program.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -110,14 +110,14 @@ TEST_F(DamagedData, AnAxisThatIsNeverExcitedIsRefusedOrLeftOut) {
   const std::string two_axes = spoilt("whole.h5", repeat_first_experiment);
   fail({"frf", two_axes, "-o", name("f.h5"), "--inputs", "a1,a2,a3"}, 2,
        "3 inputs but only 2 excited axes (a1, a3)");
-  // Where nobody asks for it, it is left out, and the health of the data says so.
+  // If it is not requested, it is omitted, and the health of the data contains a finding.
   const ProgramResult without = succeed({"frf", two_axes, "-o", name("f.h5")});
   EXPECT_THAT(without.out,
               testing::ContainsRegex("doubt +a2 +is not an input of the sub-plant but moves"));
 }
 
 TEST_F(DamagedData, ThreeExperimentsOfRankTwoAreSingular) {
-  // Every axis moves in every experiment: only the rank says that one is missing.
+  // Every axis moves in every experiment, so only the rank reveals the missing one.
   config_ = experiment("all_axes.yaml", "lines: all", "lines: all\n  scheme: orthogonal_dft");
   make_hdf5_log();
   fail({"frf", spoilt("whole.h5", repeat_first_experiment), "-o", name("f.h5")}, 2,

@@ -87,7 +87,7 @@ TEST_F(FftWisdomFileTest, AnotherLengthIsAdded) {
   EXPECT_GT(read(file_).size(), kept.size());
 }
 
-// Without it plans depend on nothing: neither on what was timed before nor on what it knew.
+// Without the file, plans depend neither on earlier timings nor on earlier files.
 TEST_F(FftWisdomFileTest, NothingOfItStays) {
   const Eigen::VectorXcd before = spectrum();
   const std::string plans = make();

@@ -27,7 +27,7 @@ test::FaultyLogRequest request_of(std::uint64_t seed) {
   return request;
 }
 
-/// All findings that are not "not checked", one a line.
+/// All findings that are not "not checked", one per line.
 std::string told(const std::vector<Finding>& findings) {
   std::string text;
   for (const std::string& note : health_notes(findings)) text += note + "\n";
@@ -70,7 +70,7 @@ TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
   EXPECT_EQ(findings.front().cause, Cause::unknown_stage);
 }
 
-// Whose record another one's nearly still record would stand for, if that other one's were not spoilt by it.
+// The nearly constant record of another actuator would fit in its place, but its own would not fit in the other's.
 TEST(DataHealth, AnActuatorThatMovesByItselfHasNotChangedPlacesWithOneThatStandsStill) {
   for (const std::uint64_t seed : {2002U, 2004U}) {
     const test::FaultyLogRequest request = request_of(seed);
@@ -96,7 +96,7 @@ class RecordingFault : public ::testing::Test {
   MemoryLog log_ = test::simulate_faulty_log(request_, {});
 };
 
-// Three that have changed places in a circle are no factor 1e5 of all actuators.
+// Three cyclically exchanged actuators must not be reported as a factor of 1e5 of all actuators.
 TEST_F(RecordingFault, ThreeActuatorsInACircleAreNamedOneExchangeAfterTheOther) {
   using Kind = test::PlantedFault::Kind;
   test::spoil_recording({Kind::recorded_swap, false, 0, 1}, log_);
@@ -134,7 +134,7 @@ TEST_F(RecordingFault, AFactorOfThreePercentIsFound) {
   }
 }
 
-// At a twentieth of the samples it stands still for longer than a sensor that is stuck, again and again.
+// In a twentieth of the samples it is constant for longer than a stuck sensor, repeatedly.
 TEST_F(RecordingFault, ASensorThatIsClippedHardIsNotDead) {
   const Eigen::VectorXd samples = log_.records.front().sensors.col(1).cwiseAbs();
   std::vector<double> sorted(samples.begin(), samples.end());
@@ -147,7 +147,7 @@ TEST_F(RecordingFault, ASensorThatIsClippedHardIsNotDead) {
   EXPECT_EQ(found.front().cause, Cause::saturated) << told(found);
 }
 
-/// A limit that three samples of every period reach: 25 at one end would tell by themselves, so few do
+/// Three samples per period reach a limit. 25 samples at one end would be a finding by themselves; so few are one
 /// because u = r - C y fails.
 TEST(DataHealth, AFewClippedSamplesAreNotTakenForAnExcitationThatWasNotRecorded) {
   test::FaultyLogRequest request = request_of(40);
@@ -165,7 +165,7 @@ TEST(DataHealth, AFewClippedSamplesAreNotTakenForAnExcitationThatWasNotRecorded)
   EXPECT_EQ(findings.front().channel, "z8");
 }
 
-/// The loop moves the other ten: Y U^-1 of three is not the plant, and says nothing of the wiring.
+/// The loop moves the other ten: Y U^-1 of three is not the plant, so it cannot be used to check the wiring.
 TEST(DataHealth, ActuatorsThatMoveUnexcitedAreNoFaultOfTheWiring) {
   test::FaultyLogRequest request = request_of(5);
   request.axes = 3;

@@ -55,8 +55,8 @@ TEST(TruthComparison, TheExactModelHasNoError) {
   const WaferStageSpec stage = small_stage();
   const AdditiveModel model = exact_model(stage);
   const TruthComparison truth = compare_with_truth(model, lines(model), stage);
-  // hal and estimation share no code: two ways to the same numbers, through sampled responses whose
-  // closed forms cancel by (f / f_mode)^2 at most, 400^2 here.
+  // hal and estimation share no code: two independent computations of the same numbers, through sampled responses
+  // whose closed forms cancel by (f / f_mode)^2 at most, 400^2 here.
   EXPECT_LT(truth.relative_rms_error, 1e-9);
   EXPECT_LT(truth.normalized_error, 1e-9);
   ASSERT_EQ(truth.modes.size(), 1U);
