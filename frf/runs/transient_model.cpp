@@ -16,7 +16,7 @@ namespace stageid {
 namespace {
 
 // With one period the window has 30 lines: order 2 and two poles left a remainder of the transient of
-// 1.5 times the noise, and thousands of times next to a mode (docs/theory.md, section 4).
+// 1.5 times the noise, and tens of times next to a mode (docs/theory.md, section 4).
 constexpr Eigen::Index kOrder = 5;
 constexpr int kMostPoles = 4;
 // A pole fitted to noise removes more of the residual than its degree of freedom, because it was selected.

@@ -21,7 +21,6 @@ namespace {
 using MatFile = std::unique_ptr<mat_t, int (*)(mat_t*)>;
 using Variable = std::unique_ptr<matvar_t, void (*)(matvar_t*)>;
 
-
 /// 1 GiB of real numbers: the limit for a full matrix from a sparse one.
 constexpr std::size_t kMostFullNumbers = std::size_t{1} << 27;
 
