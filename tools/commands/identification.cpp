@@ -185,8 +185,9 @@ void Identification::pick() {
   std::vector<ModeCandidate> modes = setup_->selection.modes;
   if (modes.empty()) modes = pick_modes(setup_->frf);
   write_modes(path("modes.json"), modes);
+  chosen_modes_ = std::move(modes);
   notes_.insert(notes_.end(), setup_->warnings.begin(), setup_->warnings.end());
-  finish_step("modes", seconds_since(start), fmt::format("{} candidates", modes.size()));
+  finish_step("modes", seconds_since(start), fmt::format("{} candidates", chosen_modes_.size()));
 }
 
 bool Identification::fit_is_up_to_date(const FitSetup& setup,
@@ -242,9 +243,19 @@ void Identification::write_outputs() {
   export_model(path("model.h5"), model_, {setup_->frf.frequency_hz, model_variance_});
   export_model(path("model.csv"), model_, {});
   finish_step("export", seconds_since(start), "model.h5, model.csv");
+  summary_ = summary();
   write_text_file(path("summary.json"),
-                  summary().dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
-  ReportData report = read_report_data(report_input({request_.directory}));
+                  summary_.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  ReportParts parts;
+  parts.frf = std::move(frf_);
+  parts.validation_frf = std::move(validation_frf_);
+  parts.model = model_;
+  parts.model_variance = std::move(model_variance_);
+  parts.chosen_modes = std::move(chosen_modes_);
+  parts.log = path("run.slog");
+  parts.summary_file = path("summary.json");
+  parts.summary = summary_;
+  ReportData report = report_data(std::move(parts));
   report.title = config_.stage.spec.info.name;
   write_report(path("report.html"), report);
 }
@@ -290,7 +301,7 @@ void Identification::print_summary() const {
   for (const std::string& note : notes_) console_.warning(note);
   console_.result(verdict_line(verdict_));
   console_.result(fmt::format("report: {}", path("report.html").string()));
-  console_.result(summary());
+  console_.result(summary_);
 }
 
 }  // namespace stageid

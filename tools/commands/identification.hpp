@@ -71,10 +71,12 @@ class Identification {
   std::optional<FrfEstimate> frf_;
   std::optional<FrfEstimate> validation_frf_;
   std::optional<FitSetup> setup_;
+  std::vector<ModeCandidate> chosen_modes_;
   AdditiveModel model_;
   Eigen::MatrixXd model_variance_;
   std::optional<Validation> validation_;
   std::optional<TruthComparison> truth_;
+  nlohmann::ordered_json summary_;
 };
 
 }  // namespace stageid

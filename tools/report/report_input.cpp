@@ -112,20 +112,13 @@ void add_file(ReportInput& input, const std::filesystem::path& file) {
   }
 }
 
-void add_response(ReportData& data, const ReportInput& input) {
-  const AdditiveModel& model = *data.model;
-  if (!data.frf) return;
-  if (model.fit.band_hz[1] > model.fit.band_hz[0]) {
-    data.frf = select_band(std::move(*data.frf), model.fit.band_hz[0], model.fit.band_hz[1]);
-    if (data.validation_frf)
-      data.validation_frf =
-          select_band(std::move(*data.validation_frf), model.fit.band_hz[0], model.fit.band_hz[1]);
-  }
-  data.model_response = response_like(model, *data.frf);
-  if (!input.model_h5.empty())
-    data.model_variance = read_response_variance(input.model_h5, data.frf->frequency_hz);
-  if (data.validation_frf)
-    data.validation = validate(model, *data.validation_frf, distortion_of(model));
+/// Only the lines that the model was fitted to are shown.
+void keep_fitted_band(ReportParts& parts) {
+  if (!parts.model || !(parts.model->fit.band_hz[1] > parts.model->fit.band_hz[0])) return;
+  for (std::optional<FrfEstimate>* frf : {&parts.frf, &parts.validation_frf})
+    if (*frf)
+      *frf =
+          select_band(std::move(**frf), parts.model->fit.band_hz[0], parts.model->fit.band_hz[1]);
 }
 
 /// All delays of the response, which a polynomial in z should not have to approximate.
@@ -168,9 +161,9 @@ void add_stabilization(ReportData& data) {
 
 /// Reads the parts that only a summary has: the truth of a simulated plant, and the duration of the steps. Notes that
 /// are in the table of findings are not repeated.
-void add_summary(ReportData& data, const std::filesystem::path& file) {
-  const JsonFile json(file, "stageid-summary");
-  const JsonNode summary = json.root();
+void add_summary(ReportData& data, const std::filesystem::path& file,
+                 const nlohmann::ordered_json& json) {
+  const JsonNode summary(file, "/", json);
   if (summary.has("truth")) {
     const JsonNode truth = summary.member("truth");
     for (const JsonNode& mode : truth.elements_of("modes"))
@@ -239,24 +232,48 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files) {
   return input;
 }
 
-ReportData read_response_data(const ReportInput& input) {
+ReportParts read_report_parts(const ReportInput& input) {
+  ReportParts parts;
+  if (!input.frf.empty()) parts.frf = read_frf(input.frf);
+  if (!input.validation_frf.empty()) parts.validation_frf = read_frf(input.validation_frf);
+  if (!input.model.empty()) parts.model = read_model(input.model);
+  keep_fitted_band(parts);
+  if (parts.model && parts.frf && !input.model_h5.empty())
+    parts.model_variance = read_response_variance(input.model_h5, parts.frf->frequency_hz);
+  if (!input.modes.empty()) parts.chosen_modes = read_modes(input.modes);
+  parts.log = input.log;
+  parts.stage = input.stage;
+  parts.summary_file = input.summary;
+  if (!input.summary.empty())
+    parts.summary = JsonFile(input.summary, "stageid-summary").root().raw();
+  return parts;
+}
+
+ReportData response_data(ReportParts parts) {
+  keep_fitted_band(parts);
   ReportData data;
-  if (!input.frf.empty()) data.frf = read_frf(input.frf);
-  if (!input.validation_frf.empty()) data.validation_frf = read_frf(input.validation_frf);
-  if (!input.model.empty()) {
-    data.model = read_model(input.model);
-    add_response(data, input);
+  data.frf = std::move(parts.frf);
+  data.validation_frf = std::move(parts.validation_frf);
+  data.model = std::move(parts.model);
+  data.model_variance = std::move(parts.model_variance);
+  data.chosen_modes = std::move(parts.chosen_modes);
+  if (!data.frf) return data;
+  if (data.model) {
+    data.model_response = response_like(*data.model, *data.frf);
+    if (data.validation_frf)
+      data.validation = validate(*data.model, *data.validation_frf, distortion_of(*data.model));
   }
-  if (data.frf) {
-    data.cmif_kind = PeakOptions().kind;
-    data.cmif_curves = cmif(*data.frf, data.cmif_kind);
-  }
-  if (!input.modes.empty()) data.chosen_modes = read_modes(input.modes);
+  data.cmif_kind = PeakOptions().kind;
+  data.cmif_curves = cmif(*data.frf, data.cmif_kind);
   return data;
 }
 
-ReportData read_report_data(const ReportInput& input) {
-  ReportData data = read_response_data(input);
+ReportData report_data(ReportParts parts) {
+  const std::filesystem::path log = parts.log;
+  const std::filesystem::path stage = parts.stage;
+  const std::filesystem::path summary_file = parts.summary_file;
+  const nlohmann::ordered_json summary = std::move(parts.summary);
+  ReportData data = response_data(std::move(parts));
   data.version = version();
   data.title = "stageid";
   if (data.model) {
@@ -267,10 +284,10 @@ ReportData read_report_data(const ReportInput& input) {
     add_checks(data);
     add_stabilization(data);
   }
-  if (!input.log.empty()) add_log(data, input.log);
-  if (!input.stage.empty()) data.geometry = stage_geometry(input.stage, read_text(input.stage));
+  if (!log.empty()) add_log(data, log);
+  if (!stage.empty()) data.geometry = stage_geometry(stage, read_text(stage));
   if (!data.geometry.stage.empty()) data.title = data.geometry.stage;
-  if (!input.summary.empty()) add_summary(data, input.summary);
+  if (!summary.is_null()) add_summary(data, summary_file, summary);
   return data;
 }
 
