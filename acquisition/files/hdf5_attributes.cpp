@@ -21,7 +21,8 @@ struct Attribute {
     }
     type = {H5Aget_type(handle.get()), H5Tclose};
     space = {H5Aget_space(handle.get()), H5Sclose};
-    if (!type || !space) fail("cannot be read (" + hdf5::take_reason() + "); the file is damaged");
+    if (!type || !space)
+      fail("cannot be read" + hdf5::take_system_reason() + "; the file is damaged, copy it again");
     kind = hdf5::kind_of(type.get());
     count = hdf5::plausible_count(file.path(), object, hdf5::shape_of(space.get()),
                                   H5Tget_size(type.get()), false);
@@ -40,7 +41,7 @@ struct Attribute {
   bool is_number() const { return kind == Hdf5Kind::real || kind == Hdf5Kind::integer; }
   void read(hid_t memory_type, void* buffer) const {
     if (H5Aread(handle.get(), memory_type, buffer) < 0) {
-      fail("cannot be read (" + hdf5::take_reason() + "); the file is damaged");
+      fail("cannot be read" + hdf5::take_system_reason() + "; the file is damaged, copy it again");
     }
   }
 
@@ -60,7 +61,8 @@ std::vector<std::string> read_texts_of(const Attribute& attribute) {
   };
   if (!hdf5::read_strings(attribute.type.get(), attribute.space.get(), attribute.count, read,
                           texts)) {
-    attribute.fail("cannot be read (" + hdf5::take_reason() + "); the file is damaged");
+    attribute.fail("cannot be read" + hdf5::take_system_reason() +
+                   "; the file is damaged, copy it again");
   }
   return texts;
 }
@@ -105,9 +107,9 @@ std::vector<std::string> Hdf5File::attributes(const std::string& object) const {
   std::vector<std::string> names;
   if (H5Aiterate_by_name(id(), object.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names,
                          H5P_DEFAULT) < 0) {
-    throw FormatError(
-        path_, object,
-        "its attributes cannot be listed (" + hdf5::take_reason() + "); the file is damaged");
+    throw FormatError(path_, object,
+                      "its attributes cannot be listed" + hdf5::take_system_reason() +
+                          "; the file is damaged, copy it again");
   }
   return names;
 }

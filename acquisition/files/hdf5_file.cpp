@@ -85,8 +85,8 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
   Hdf5Handle handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!handle) {
     throw FormatError(file, "",
-                      "the HDF5 file is truncated, damaged or still being written (" +
-                          hdf5::take_reason() + "); copy it again or recreate it");
+                      "the HDF5 file is truncated, damaged or still being written" +
+                          hdf5::take_system_reason() + "; copy it again or recreate it");
   }
   return {file, std::move(handle)};
 }
@@ -153,7 +153,7 @@ std::vector<std::string> Hdf5File::children(const std::string& group) const {
   };
   std::vector<std::string> names;
   if (H5Literate(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names) < 0) {
-    fail("cannot be listed (" + hdf5::take_reason() + "); the file is damaged");
+    fail("cannot be listed" + hdf5::take_system_reason() + "; the file is damaged, copy it again");
   }
   return names;
 }
@@ -172,7 +172,7 @@ hid_t Hdf5File::open_dataset(const std::string& dataset) const {
   if (!handle) {
     throw FormatError(
         path_, dataset,
-        "is not a dataset, or is damaged (" + hdf5::take_reason() + "); expected a dataset");
+        "is not a dataset, or is damaged" + hdf5::take_system_reason() + "; expected a dataset");
   }
   OpenDatasets::Entry& entry = open_datasets_->entries[open_datasets_->oldest];
   open_datasets_->oldest = (open_datasets_->oldest + 1) % OpenDatasets::kEntries;

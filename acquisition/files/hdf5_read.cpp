@@ -17,7 +17,8 @@ struct DatasetInfo {
         dataset(id),
         type(H5Dget_type(id), H5Tclose),
         space(H5Dget_space(id), H5Sclose) {
-    if (!type || !space) fail("cannot be read (" + hdf5::take_reason() + "); the file is damaged");
+    if (!type || !space)
+      fail("cannot be read" + hdf5::take_system_reason() + "; the file is damaged, copy it again");
     kind = hdf5::kind_of(type.get());
     shape = hdf5::shape_of(space.get());
   }
@@ -38,7 +39,8 @@ struct DatasetInfo {
   /// @throws FormatError with HDF5's reason if `status` is a failure.
   void check_read(herr_t status) const {
     if (status < 0) {
-      fail("cannot be read (" + hdf5::take_reason() + "); the file is truncated or damaged");
+      fail("cannot be read" + hdf5::take_system_reason() +
+           "; the file is truncated or damaged, copy it again");
     }
   }
 

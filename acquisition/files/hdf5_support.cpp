@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <string_view>
 
 #include "acquisition/files/file_error.hpp"
 
@@ -17,10 +18,11 @@ herr_t keep_innermost(unsigned depth, const H5E_error2_t* error, void* reason) {
 }
 
 /// HDF5 describes a failing system call in several lines with addresses; only its message is kept.
+constexpr std::string_view kSystemMessage = "error message = '";
+
 std::string on_one_line(std::string reason) {
-  const std::string kKey = "error message = '";
-  if (const auto start = reason.find(kKey); start != std::string::npos) {
-    reason.erase(0, start + kKey.size());
+  if (const auto start = reason.find(kSystemMessage); start != std::string::npos) {
+    reason.erase(0, start + kSystemMessage.size());
     reason.erase(std::min(reason.find('\''), reason.size()));
   }
   std::replace_if(
@@ -28,13 +30,21 @@ std::string on_one_line(std::string reason) {
   return reason.empty() ? "unknown reason" : reason;
 }
 
-}  // namespace
-
-std::string take_reason() {
+std::string take_innermost() {
   std::string reason;
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_innermost, &reason);
   H5Eclear2(H5E_DEFAULT);
-  return on_one_line(std::move(reason));
+  return reason;
+}
+
+}  // namespace
+
+std::string take_reason() { return on_one_line(take_innermost()); }
+
+std::string take_system_reason() {
+  std::string reason = take_innermost();
+  if (reason.find(kSystemMessage) == std::string::npos) return "";
+  return " (" + on_one_line(std::move(reason)) + ")";
 }
 
 Hdf5Handle property_list(hid_t class_id) { return {H5Pcreate(class_id), H5Pclose}; }

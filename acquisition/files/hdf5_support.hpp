@@ -14,6 +14,9 @@ namespace stageid::hdf5 {
 
 /// The innermost reason of HDF5's error stack, on one line; clears the stack.
 std::string take_reason();
+/// The system's message on that stack as " (Input/output error)", empty if the system has none; clears the stack.
+/// For files that are read: HDF5's own words describe its internals, not what to do.
+std::string take_system_reason();
 
 Hdf5Handle property_list(hid_t class_id);
 Hdf5Handle complex_type(hid_t float_type);  ///< compound r, i

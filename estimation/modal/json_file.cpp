@@ -1,6 +1,7 @@
 #include "estimation/modal/json_file.hpp"
 
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -10,6 +11,18 @@
 #include "acquisition/files/system_reason.hpp"
 
 namespace stageid {
+namespace {
+
+/// "LINE:COLUMN", which only the library's text contains: "parse error at line 417, column 3: ...".
+std::string place_of(const nlohmann::ordered_json::parse_error& error) {
+  unsigned line = 0;
+  unsigned column = 0;
+  const char* const at = std::strstr(error.what(), "at line ");
+  if (at == nullptr || std::sscanf(at, "at line %u, column %u", &line, &column) != 2) return "";
+  return std::to_string(line) + ":" + std::to_string(column);
+}
+
+}  // namespace
 
 JsonNode JsonNode::member(const std::string& key) const {
   if (!value_.is_object()) fail("must be an object with \"" + key + "\"");
@@ -108,12 +121,10 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
                       "contains a number out of range for double precision" +
                           (start == std::string::npos ? "" : ": " + what.substr(start)));
   } catch (const nlohmann::ordered_json::parse_error& error) {
-    // The message of the library contains line and column after its error number.
-    const std::string what = error.what();
-    const std::size_t start = what.find("at line");
-    throw FormatError(file_, "",
-                      "is not JSON: " + (start == std::string::npos ? what : what.substr(start)) +
-                          "; give " + wanted);
+    throw FormatError(file_, place_of(error),
+                      "is not JSON, or is truncated; check brackets, quotes and commas up to here, "
+                      "or give " +
+                          wanted);
   }
   const JsonNode node = root();
   if (!value_.is_object() || !node.has("format") || !value_["format"].is_string() ||

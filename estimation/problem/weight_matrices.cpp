@@ -145,9 +145,10 @@ WeightMatrices WeightMatrices::user(const FrfEstimate& frf, const Eigen::MatrixX
           line_name(frf, k)));
     const Eigen::MatrixXcd inverse = definite_inverse(W_k);
     if (inverse.size() == 0 && !is_semidefinite(W_k))
-      refuse_indefinite(fmt::format(
-          "weight matrix of {}: is not positive semidefinite, so the cost would have no minimum",
-          line_name(frf, k)));
+      refuse_indefinite(
+          fmt::format("weight matrix of {}: is not positive semidefinite, so the cost has no "
+                      "minimum; correct it",
+                      line_name(frf, k)));
     if (inverse.size() > 0)
       out.marginal_.col(k) = inverse.diagonal().real().cwiseInverse();
     else

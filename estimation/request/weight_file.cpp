@@ -34,7 +34,7 @@ std::size_t first_line(const Hdf5File& file, const char* dataset,
 }
 
 IndefiniteWeights indefinite(const Hdf5File& file, const char* dataset, const std::string& what) {
-  return IndefiniteWeights(fmt::format("{}: {}: {}", file.path().string(), dataset, what));
+  return IndefiniteWeights(fmt::format("{}:{}: {}", file.path().string(), dataset, what));
 }
 
 void read_diagonals(const Hdf5File& file, const FrfEstimate& frf, WholeLines whole,

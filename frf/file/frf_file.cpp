@@ -154,9 +154,12 @@ void require_format(const Hdf5File& file) {
   const std::string format = file.read_text_attribute("/", "format");
   if (format != kFormat) {
     const std::string other = other_hdf5_kind(format, "a frequency response");
-    throw FormatError(
-        file.path(), "/",
-        !other.empty() ? other : fmt::format("format is '{}'; expected '{}'", format, kFormat));
+    throw FormatError(file.path(), "/",
+                      !other.empty()
+                          ? other
+                          : fmt::format("format is '{}'; expected '{}'. Convert files of other "
+                                        "programs with 'stageid import'",
+                                        format, kFormat));
   }
   if (!file.has_attribute("/", "format_version")) return;
   const long long version = file.read_integer_attribute("/", "format_version");
@@ -270,7 +273,7 @@ void check_as_read(const std::filesystem::path& path, const FrfEstimate& frf) {
 void write_frf(const std::filesystem::path& path, const FrfEstimate& frf) {
   check(frf);
   OutputFile output(path);
-  Hdf5File file = Hdf5File::create(output.path());
+  Hdf5File file = Hdf5File::create(output.path(), path);
   write_attributes(file, frf);
   file.write_reals("/frequency_hz", {size_of(frf.lines())}, frf.frequency_hz.data());
   file.write_complex("/response",

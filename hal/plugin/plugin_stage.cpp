@@ -53,10 +53,16 @@ std::vector<stageid_channel> channels_of(const std::vector<Channel>& channels) {
 struct PluginStage::Library {
   explicit Library(const std::filesystem::path& file) : name(file.string()) {
     // dlopen() would search a name without a slash in the system folders.
-    handle.reset(::dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL));
-    if (!handle)
-      fail(fmt::format("cannot be loaded ({}); build it as a shared library for this machine",
-                       ::dlerror()));
+    const std::string path = std::filesystem::absolute(file).string();
+    handle.reset(::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL));
+    if (!handle) {
+      std::string reason = ::dlerror();  // begins with the path
+      if (reason.starts_with(path + ": ")) reason.erase(0, path.size() + 2);
+      fail(fmt::format("cannot be loaded: {}; {}", reason,
+                       std::filesystem::exists(file)
+                           ? "build it as a shared library for this machine"
+                           : "check its path in the stage file"));
+    }
     using Entry = const struct stageid_backend* (*)();
     const auto entry = reinterpret_cast<Entry>(::dlsym(handle.get(), "stageid_get_backend"));
     if (entry == nullptr)

@@ -18,7 +18,7 @@ inline CLI::Validator number_check(bool zero_is_one, const char* name) {
     double value = 0.0;
     if (CLI::detail::lexical_cast(text, value) && (zero_is_one ? value >= 0.0 : value > 0.0))
       return {};
-    return "'" + text + "' is not " + (zero_is_one ? "0 or more" : "above 0");
+    return "got '" + text + "'; expected a number " + (zero_is_one ? "of 0 or more" : "above 0");
   };
   return {check, name, ""};
 }

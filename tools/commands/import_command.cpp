@@ -27,8 +27,8 @@ namespace {
 void require_frf_output(const std::filesystem::path& output) {
   if (output.extension() != ".h5" && output.extension() != ".hdf5")
     throw std::invalid_argument(
-        fmt::format("{}: a frequency response is written as .h5; '{}' is unsupported",
-                    output.string(), output.extension().string()));
+        fmt::format("{}: a frequency response is written as .h5; use a name with that ending",
+                    output.string()));
 }
 
 /// Keeps the provenance of a stageid file; otherwise the foreign file is the provenance.

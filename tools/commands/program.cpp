@@ -7,14 +7,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/key_suggestion.hpp"
+#include "acquisition/files/system_reason.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/commands/config_command.hpp"
 #include "tools/commands/design_command.hpp"
@@ -31,6 +30,7 @@
 #include "tools/commands/plot_command.hpp"
 #include "tools/commands/report_command.hpp"
 #include "tools/commands/run_command.hpp"
+#include "tools/commands/usage_problem.hpp"
 #include "tools/commands/validate_command.hpp"
 #include "tools/manual/command_tree.hpp"
 #include "tools/terminal/console.hpp"
@@ -79,8 +79,11 @@ class Program {
     app_.name("stageid");
     app_.set_version_flag("--version", fmt::format("stageid {}", version()));
     app_.add_flag("--json", console_.json, "print the result as one JSON object on stdout");
-    const std::vector<std::pair<std::string, Verbosity>> levels = {
-        {"quiet", Verbosity::quiet}, {"normal", Verbosity::normal}, {"debug", Verbosity::debug}};
+    // As int: CLI11 would print the enumerators as characters.
+    const std::vector<std::pair<std::string, int>> levels = {
+        {"quiet", static_cast<int>(Verbosity::quiet)},
+        {"normal", static_cast<int>(Verbosity::normal)},
+        {"debug", static_cast<int>(Verbosity::debug)}};
     app_.add_option("--verbosity", console_.verbosity, "quiet | normal | debug")
         ->transform(CLI::CheckedTransformer(levels).description("{quiet,normal,debug}"));
     app_.require_subcommand(0, 1);
@@ -113,20 +116,6 @@ class Program {
                                                 : fmt::format("did you mean '{}'?", nearest)));
   }
 
-  /// For CLI11's "FLAG: WORD not in {A,B}": the nearest choice.
-  static std::string nearest_choice(const std::string& what) {
-    constexpr std::string_view kMiddle = " not in {";
-    const std::size_t middle = what.find(kMiddle);
-    const std::size_t word = what.find(": ");
-    if (middle == std::string::npos || word >= middle) return "";
-    std::istringstream list(what.substr(middle + kMiddle.size()));
-    std::vector<std::string> names;
-    for (std::string name; std::getline(list, name, ',');)
-      names.push_back(name.substr(0, name.find('}')));
-    const std::string nearest = nearest_word(what.substr(word + 2, middle - word - 2), names);
-    return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
-  }
-
   /// Handles the exceptions of CLI11, which also uses them for help.
   /// @returns false if only help or the version was requested.
   bool parse(int argc, const char* const* argv) {
@@ -141,7 +130,7 @@ class Program {
     return true;
   }
 
-  /// The message of CLI11, or the nearest word to an unknown one; and where to find help.
+  /// The problem that CLI11 found, or the nearest word to an unknown one; and where to find help.
   std::string explained(const CLI::ParseError& error) {
     std::string path;
     const CLI::App* innermost = &app_;
@@ -166,11 +155,13 @@ class Program {
                              ? "a subcommand is missing"
                              : fmt::format("unknown subcommand '{}'", left_over.front()),
                          fmt::join(names_of(command.commands), ", "), path);
-    std::string what = error.what();
-    std::replace(what.begin(), what.end(), '\n', ' ');
-    what += nearest_choice(what);
-    if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) what += "; write a number";
-    return fmt::format("{}; see 'stageid{} --help'", what, path);
+    if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr && !left_over.empty()) {
+      const auto flag = std::find_if(left_over.begin(), left_over.end(),
+                                     [](const std::string& word) { return word.starts_with('-'); });
+      return fmt::format("unexpected argument '{}'; see 'stageid{} --help'",
+                         flag == left_over.end() ? left_over.front() : *flag, path);
+    }
+    return fmt::format("{}; see 'stageid{} --help'", usage_problem(error), path);
   }
 
   Console console_;
@@ -202,7 +193,7 @@ int run_program(int argc, const char* const* argv) {
   // code.
   const bool lost = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
   if (lost && !interrupt_flag())
-    throw FileError(fmt::format("stdout: cannot be written: {}", std::strerror(errno)));
+    throw FileError(fmt::format("stdout: cannot be written: {}", system_reason(errno)));
   return exit_code;
 }
 

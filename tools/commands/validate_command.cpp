@@ -2,6 +2,7 @@
 #include "tools/steps/fit_step.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
@@ -120,6 +122,17 @@ ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(con
   command->final_callback([this] { run(); });
 }
 
+void ValidateCommand::require_channels(const std::vector<std::string>& of_data,
+                                       const std::vector<std::string>& of_model,
+                                       const char* kind) const {
+  for (const std::string& name : of_model)
+    if (std::find(of_data.begin(), of_data.end(), name) == of_data.end())
+      throw FormatError(data_, "",
+                        fmt::format("has no {0} '{1}', which {2} has; its {0}s are {3}. Use data "
+                                    "and a model of the same stage",
+                                    kind, name, model_.string(), fmt::join(of_data, ", ")));
+}
+
 void ValidateCommand::run() const {
   const AdditiveModel model = read_model(model_);
   if (is_uff_name(data_)) {
@@ -141,6 +154,8 @@ void ValidateCommand::run() const {
   else
     step = estimate_frf({data_}, options, {true, stage_}, console_);
   const std::vector<Finding> health = health_of(step.frf.provenance_json);
+  require_channels(step.frf.outputs.names, model.outputs.names, "output");
+  require_channels(step.frf.inputs.names, model.inputs.names, "input");
   FrfEstimate frf = select_channels(step.frf, model.inputs.names, model.outputs.names);
   const bool fitted_band = model.fit.band_hz[1] > 0.0;
   const double low_hz = !band_hz_.empty() ? band_hz_[0]

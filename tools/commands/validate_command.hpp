@@ -18,6 +18,9 @@ class ValidateCommand {
 
  private:
   void run() const;
+  /// @throws FormatError if the model has a channel that the data lack
+  void require_channels(const std::vector<std::string>& of_data,
+                        const std::vector<std::string>& of_model, const char* kind) const;
 
   Console& console_;
   std::filesystem::path model_;

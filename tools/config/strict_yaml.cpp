@@ -275,9 +275,10 @@ YamlDocument YamlDocument::parse(std::filesystem::path file, std::string text) {
   } catch (const YAML::Exception& error) {
     const YamlMark mark =
         error.mark.is_null() ? YamlMark{} : YamlMark{error.mark.line + 1, error.mark.column + 1};
-    document.fail(
-        mark,
-        fmt::format("not YAML: {}; check brackets, quotes and indentation up to here", error.msg));
+    document.fail(mark, error.msg.starts_with(YAML::ErrorMsg::UNKNOWN_ANCHOR)
+                            ? "undefined anchor; define it with '&' above its first use"
+                            : "not YAML; check brackets, quotes, colons and indentation (spaces, "
+                              "no tabs) up to here");
   }
   return document;
 }

@@ -14,16 +14,15 @@ TEST_F(CommandLine, Usage) {
   fail({"--json"}, 2, "no command");
   fail({"frf"}, 2, "required");
   fail({"frf", "a.slog", "-o", "b.h5", "--no-such-flag"}, 2, "--no-such-flag");
-  fail({"frf", "a.slog", "-o", "b.h5", "--method", "lmp"}, 2, "; did you mean 'lpm'?");
+  fail({"frf", "a.slog", "-o", "b.h5", "--method", "lmp"}, 2, "(did you mean 'lpm'?)");
   fail({"frf", "a.slog", "-o", "b.h5", "--delay", "1e-3"}, 2, "add --compensate delay or hold");
-  fail({"config", "schema", "stge"}, 2, "; did you mean 'stage'?");
-  fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads: '-1' is not 0 or more");
+  fail({"config", "schema", "stge"}, 2, "(did you mean 'stage'?)");
+  fail({"frf", "a.slog", "-o", "b.h5", "--threads", "-1"}, 2, "--threads: got '-1'; expected");
   fail({"frf", "a.slog", "-o", "b.h5", "--transient-periods", "one"}, 2, "--transient-periods");
-  fail({"log"}, 2, "a subcommand is missing; use one of info, verify, recover, convert; see");
+  fail({"log"}, 2, "a subcommand is missing");
   fail({"log", "inf", "a.slog"}, 2, "unknown argument 'inf'; did you mean 'info'?");
   fail({"log", "conv", "a.slog"}, 2, "unknown argument 'conv'; did you mean 'convert'?");
-  fail({"log", "a.slog"}, 2,
-       "unknown subcommand 'a.slog'; use one of info, verify, recover, convert");
+  fail({"log", "a.slog"}, 2, "unknown subcommand 'a.slog'");
   fail({"frf", "a.slog", "-o", "b.h5", "--methd=lpm"}, 2, "did you mean '--method'?");
   fail({"frf", "a.slog", "-o", "b.h5", "--jsn"}, 2, "did you mean '--json'? See 'stageid frf");
   fail({"manual", "-o", config_}, 1, "cannot create the directory");

@@ -158,11 +158,11 @@ Layout layout_of(const Bytes& npy, std::string_view header) {
   Layout layout;
   const std::string_view type = value_of(npy, header, "descr");
   const std::size_t quote = type.size() < 2 ? std::string_view::npos : type.find('\'', 1);
+  if (type.starts_with("'|O")) npy.fail("contains Python objects; save arrays of numbers or text");
   if (!type.starts_with('\'') || quote == std::string_view::npos || quote < 4)
     npy.fail("contains records; save one array of numbers per name");
   layout.big_endian = type[1] == '>';
   layout.kind = type[2];
-  if (layout.kind == 'O') npy.fail("contains Python objects; save arrays of numbers or text");
   layout.width = whole_number(npy, type.substr(3, quote - 3));
   layout.column_major = value_of(npy, header, "fortran_order").starts_with("True");
   read_shape(npy, value_of(npy, header, "shape"), layout);

@@ -71,9 +71,9 @@ bool are_runs(const std::vector<RunRows>& pieces, Eigen::Index period) {
                            "period_samples: {}, or list the rows of each run in the key runs",
                            row, rows.first, period));
   refuse_map(
-      map, fmt::format("key 'excitation_period' is missing: the excitation does not repeat from "
-                       "row {} on; if it was measured write excitation_period: mean, else correct "
-                       "period_samples: {} or list the rows of each run in the key runs",
+      map, fmt::format("excitation: does not repeat from row {} on. Correct period_samples: {}, or "
+                       "list the rows of each run in the key runs. If the excitation was measured, "
+                       "add excitation_period: mean",
                        row, period));
 }
 

@@ -79,7 +79,7 @@ void write_model_hdf5(const std::filesystem::path& target, const AdditiveModel& 
                       const ExportedResponse& exported,
                       const std::optional<DrivingPoint>& driving_point) {
   OutputFile output(target);
-  Hdf5File file = Hdf5File::create(output.path());
+  Hdf5File file = Hdf5File::create(output.path(), target);
   write_head(file, target, model);
   write_submodels(file, model);
   write_modal_form(file, model, driving_point);
