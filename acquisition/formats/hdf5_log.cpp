@@ -113,7 +113,9 @@ void Hdf5LogReader::read_channels() {
   try {
     check_log_info(info_);
   } catch (const std::invalid_argument& error) {
-    throw FormatError(path_, "/", error.what());
+    std::string what = error.what();
+    if (what.starts_with("log: ")) what.erase(0, 5);  // the file is the place
+    throw FormatError(path_, "/", what);
   }
 }
 
