@@ -76,7 +76,7 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
   Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(channels, frequency_hz.size());
   SubmodelBasis basis;
   for (const auto& [delay, members] : channels_by_delay(model)) {
-    const LineOperator through(lines, delay);
+    const HoldEquivalent through(lines, delay);
     for (const Submodel& submodel : model.submodels) {
       const SubmodelShape shape{submodel.integrators,
                                 static_cast<int>(submodel.denominator.size()) - 1,

@@ -44,7 +44,7 @@ std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>&
   return out;
 }
 
-void evaluate_basis(const LineOperator& through, const SubmodelShape& shape,
+void evaluate_basis(const HoldEquivalent& through, const SubmodelShape& shape,
                     const Eigen::Ref<const Eigen::VectorXd>& a, WantedBasis wanted,
                     SubmodelBasis& out) {
   const Eigen::Index N = through.lines();

@@ -4,7 +4,7 @@
 #include <complex>
 #include <vector>
 
-#include "estimation/model/line_operator.hpp"
+#include "estimation/model/hold_equivalent.hpp"
 
 namespace stageid {
 
@@ -35,7 +35,7 @@ std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>&
 /// Evaluates the functions of one submodel with denominator coefficients a (size n): each is written in
 /// partial fractions, and `through` acts on every fraction in closed form.
 /// @pre the poles are simple and not zero; the function is proper.
-void evaluate_basis(const LineOperator& through, const SubmodelShape& shape,
+void evaluate_basis(const HoldEquivalent& through, const SubmodelShape& shape,
                     const Eigen::Ref<const Eigen::VectorXd>& a, WantedBasis wanted,
                     SubmodelBasis& out);
 

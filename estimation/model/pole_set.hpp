@@ -4,7 +4,7 @@
 #include <complex>
 #include <vector>
 
-#include "estimation/model/line_operator.hpp"
+#include "estimation/model/hold_equivalent.hpp"
 
 namespace stageid {
 

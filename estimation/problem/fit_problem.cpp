@@ -136,7 +136,7 @@ void resize(const FitProblem& problem, WantedBasis wanted, BasisGroup& group) {
   if (wanted.delay) set(problem.functions(), group.T_re, group.T_im);
 }
 
-void evaluate_fractions(const FitProblem& problem, const LineOperator& through,
+void evaluate_fractions(const FitProblem& problem, const HoldEquivalent& through,
                         const FitParameters& beta, bool derivatives, FractionColumns& out) {
   out = fraction_columns(through, problem.lines.omega_rad_s.maxCoeff(), problem.shapes, beta.a,
                          derivatives);
@@ -152,7 +152,7 @@ void evaluate_fractions(const FitProblem& problem, const LineOperator& through,
   }
 }
 
-void evaluate_submodel(const FitProblem& problem, const LineOperator& through,
+void evaluate_submodel(const FitProblem& problem, const HoldEquivalent& through,
                        const FitParameters& beta, std::size_t i, const SubmodelPlace& place,
                        WantedBasis wanted, SubmodelBasis& basis, BasisGroup& group) {
   evaluate_basis(through, problem.shapes[i], beta.a[i], wanted, basis);
@@ -199,7 +199,7 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
   const WantedBasis wanted{with_derivatives, with_derivatives && problem.delays() > 0};
   if (problem.limit) add_work(problem, wanted);
   const std::vector<SubmodelPlace> places = submodel_places(problem);
-  std::vector<std::optional<LineOperator>> through(groups.size());
+  std::vector<std::optional<HoldEquivalent>> through(groups.size());
   for_each_task(problem.threads, static_cast<int>(groups.size()), [&](int g) {
     const auto at = static_cast<std::size_t>(g);
     BasisGroup& group = groups[at];

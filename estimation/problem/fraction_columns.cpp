@@ -22,7 +22,7 @@ bool is_one_pair(const SubmodelShape& shape, const Eigen::VectorXd& a) {
 /// The columns of one submodel; they do not depend on the lines.
 class PairColumns {
  public:
-  PairColumns(const LineOperator& through, const Eigen::VectorXd& a, Complex lambda,
+  PairColumns(const HoldEquivalent& through, const Eigen::VectorXd& a, Complex lambda,
               Eigen::Index pair)
       : through_(through),
         a_(a),
@@ -55,14 +55,14 @@ class PairColumns {
   }
 
  private:
-  const LineOperator& through_;
+  const HoldEquivalent& through_;
   const Eigen::VectorXd& a_;
   std::vector<Complex> poles_;
   FractionExpansion expansion_;
   Eigen::Index pair_;
 };
 
-void fill_base(const LineOperator& through, bool squares, FractionColumns& out) {
+void fill_base(const HoldEquivalent& through, bool squares, FractionColumns& out) {
   const Eigen::Index simple = out.simple_columns();
   out.base.resize(through.lines(), squares ? 2 * simple - 1 : simple);
   out.base.col(0).setOnes();
@@ -83,7 +83,7 @@ void fill_base(const LineOperator& through, bool squares, FractionColumns& out) 
 
 }  // namespace
 
-std::complex<double> equation_error_residue(const LineOperator& through,
+std::complex<double> equation_error_residue(const HoldEquivalent& through,
                                             const Eigen::Ref<const Eigen::VectorXd>& a,
                                             Complex lambda, Eigen::Index q) {
   Complex slope = 0.0;  // A'(lambda)
@@ -92,7 +92,7 @@ std::complex<double> equation_error_residue(const LineOperator& through,
   return through.place_slope(lambda) * std::pow(lambda, static_cast<int>(q)) / slope;
 }
 
-FractionColumns fraction_columns(const LineOperator& through, double highest_rad_s,
+FractionColumns fraction_columns(const HoldEquivalent& through, double highest_rad_s,
                                  const std::vector<SubmodelShape>& shapes,
                                  const std::vector<Eigen::VectorXd>& a, bool derivatives) {
   FractionColumns out;

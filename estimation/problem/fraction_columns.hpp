@@ -9,7 +9,7 @@
 namespace stageid {
 
 /// A function of frequency with one pair of poles: first (constant + c q + d q^2 + c* p + d* p^2)
-/// with q = 1/(x - x_lambda), p = 1/(x - x_lambda*); x and first as in LineOperator.
+/// with q = 1/(x - x_lambda), p = 1/(x - x_lambda*); x and first as in HoldEquivalent.
 struct FractionColumn {
   Eigen::Index pair = -1;  ///< index of the pair of poles; -1: the function is not of this form
   double constant = 0.0;
@@ -38,13 +38,13 @@ struct FractionColumns {
 
 /// @param a denominator coefficients, one vector per submodel
 /// @param derivatives whether squares, D and Y are computed
-FractionColumns fraction_columns(const LineOperator& through, double highest_rad_s,
+FractionColumns fraction_columns(const HoldEquivalent& through, double highest_rad_s,
                                  const std::vector<SubmodelShape>& shapes,
                                  const std::vector<Eigen::VectorXd>& a, bool derivatives);
 
 /// Coefficient c of the equation-error column s^q / A at a root. It is taken through the image of the pole, so that it
 /// is d log(x - x_lambda) / d a_q up to sign, and a fraction in x for the exact hold too.
-std::complex<double> equation_error_residue(const LineOperator& through,
+std::complex<double> equation_error_residue(const HoldEquivalent& through,
                                             const Eigen::Ref<const Eigen::VectorXd>& a,
                                             std::complex<double> lambda, Eigen::Index q);
 

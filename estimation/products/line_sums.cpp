@@ -247,7 +247,7 @@ void equation_error_columns(const FitProblem& problem, const FitParameters& beta
                             Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
   re.resize(problem.size(), problem.denominators());
   im.resize(problem.size(), problem.denominators());
-  const LineOperator through(problem.lines, 0.0);
+  const HoldEquivalent through(problem.lines, 0.0);
   Eigen::Index column = 0;
   SplitMatrix fraction;
   for (const Eigen::VectorXd& a : beta.a) {

@@ -35,7 +35,7 @@ class Relocation {
       : exact_(model.hold == HoldModel::exact),
         lines_{frf.omega_rad_s(), frf.sample_rate_hz > 0.0 ? 1.0 / frf.sample_rate_hz : 0.0,
                model.hold} {
-    const LineOperator through(lines_, model.mean_delay_s());
+    const HoldEquivalent through(lines_, model.mean_delay_s());
     const Eigen::VectorXcd x = complex(through.x());
     // Remove delay and hold from the data: the rest is rational in x.
     const Eigen::VectorXcd factor = complex(through.first());

@@ -94,7 +94,7 @@ inline ModelLines lines(HoldModel hold) {
 inline SubmodelBasis evaluate(const Case& c, HoldModel hold, double delay_s) {
   const std::vector<double> a = c.a();
   SubmodelBasis out;
-  evaluate_basis(LineOperator(lines(hold), delay_s), c.shape(),
+  evaluate_basis(HoldEquivalent(lines(hold), delay_s), c.shape(),
                  Eigen::Map<const Eigen::VectorXd>(a.data(), static_cast<Eigen::Index>(a.size())),
                  {.gradient = true, .delay = true}, out);
   return out;

@@ -102,7 +102,7 @@ TEST(Basis, PhaseAndSincDifferFromExactByWhatIsKnown) {
   const double sinc_ratio[] = {1.0000, 0.9993, 0.9965, 0.9882};
   const auto value = [&](HoldModel hold) {
     SubmodelBasis basis;
-    evaluate_basis(LineOperator({2.0 * std::numbers::pi * hz, kPeriod, hold}, 0.0), c.shape(),
+    evaluate_basis(HoldEquivalent({2.0 * std::numbers::pi * hz, kPeriod, hold}, 0.0), c.shape(),
                    Eigen::VectorXd(), {}, basis);
     return Eigen::VectorXcd(basis.value.re + Complex(0.0, 1.0) * basis.value.im);
   };
@@ -271,7 +271,7 @@ TEST(Basis, AHeldConstantComesOutAtTheNextWholeSample) {
   for (const auto& [samples, shifts] :
        {std::pair{0.0, 0.0}, {0.3, 1.0}, {1.0, 1.0}, {1.3, 2.0}, {3.0, 3.0}}) {
     SubmodelBasis basis;
-    evaluate_basis(LineOperator(lines(HoldModel::exact), samples * kPeriod), {0, 0, 0},
+    evaluate_basis(HoldEquivalent(lines(HoldModel::exact), samples * kPeriod), {0, 0, 0},
                    Eigen::VectorXd(), {.gradient = true, .delay = true}, basis);
     for (Eigen::Index k = 0; k < lines_hz().size(); ++k) {
       const double angle = -2.0 * std::numbers::pi * lines_hz()[k] * kPeriod * shifts;
@@ -282,7 +282,7 @@ TEST(Basis, AHeldConstantComesOutAtTheNextWholeSample) {
 }
 
 TEST(Basis, WhatIsNotAskedForIsEmptyAndChangesNothing) {
-  const LineOperator through(lines(HoldModel::exact), 1e-5);
+  const HoldEquivalent through(lines(HoldModel::exact), 1e-5);
   for (const Case& c : cases()) {
     const std::vector<double> a = c.a();
     const Eigen::Map<const Eigen::VectorXd> coefficients(a.data(),
@@ -331,7 +331,7 @@ TEST(Basis, NearlyEqualRealRootsDoNotCancel) {
 }
 
 TEST(Basis, RefusesWhatIsNotAModel) {
-  const LineOperator through(lines(HoldModel::none), 0.0);
+  const HoldEquivalent through(lines(HoldModel::none), 0.0);
   SubmodelBasis out;
   const auto improper = [&] {
     evaluate_basis(through, {0, 1, 2}, Eigen::VectorXd{{1e-3}}, {}, out);

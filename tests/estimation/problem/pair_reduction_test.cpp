@@ -202,7 +202,7 @@ TEST_F(ReductionTest, WithComplexWeightsToo) {
 
 TEST_F(ReductionTest, WhatWouldCancelIsMultipliedOut) {
   const double highest_rad_s = 2.0 * std::numbers::pi * 2000.0;
-  const LineOperator through(
+  const HoldEquivalent through(
       {Eigen::VectorXd::LinSpaced(50, 100.0, highest_rad_s), 1e-4, HoldModel::exact}, 1.3e-4);
   std::vector<SubmodelShape> shapes;
   std::vector<Eigen::VectorXd> a;

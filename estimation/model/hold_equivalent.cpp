@@ -1,4 +1,4 @@
-#include "estimation/model/line_operator.hpp"
+#include "estimation/model/hold_equivalent.hpp"
 
 #include <cmath>
 
@@ -40,7 +40,7 @@ void polynomial(const SplitMatrix& first, const SplitMatrix& q,
 
 }  // namespace
 
-LineOperator::LineOperator(const ModelLines& lines, double delay_s)
+HoldEquivalent::HoldEquivalent(const ModelLines& lines, double delay_s)
     : exact_(lines.hold == HoldModel::exact), period_s_(lines.sample_period_s) {
   const Eigen::Index N = lines.omega_rad_s.size();
   const auto omega = [&](Eigen::Index k) { return lines.omega_rad_s[k]; };
@@ -77,15 +77,15 @@ LineOperator::LineOperator(const ModelLines& lines, double delay_s)
   constant_delay_.im = -z_.im.cwiseProduct(first_.re);
 }
 
-std::complex<double> LineOperator::place(Complex lambda) const {
+std::complex<double> HoldEquivalent::place(Complex lambda) const {
   return exact_ ? std::exp(lambda * period_s_) : lambda;
 }
 
-std::complex<double> LineOperator::place_slope(Complex lambda) const {
+std::complex<double> HoldEquivalent::place_slope(Complex lambda) const {
   return exact_ ? period_s_ * std::exp(lambda * period_s_) : Complex(1.0);
 }
 
-void LineOperator::reciprocal(Complex lambda, SplitMatrix& q) const {
+void HoldEquivalent::reciprocal(Complex lambda, SplitMatrix& q) const {
   const Complex pole = place(lambda);
   q.resize(z_.re.rows(), 1);
   const auto re = z_.re.col(0).array() - pole.real();
@@ -95,7 +95,7 @@ void LineOperator::reciprocal(Complex lambda, SplitMatrix& q) const {
   q.im.col(0) = (-im * scale).matrix();
 }
 
-void LineOperator::fractions(Complex lambda, Wanted wanted, Fractions& out) const {
+void HoldEquivalent::fractions(Complex lambda, Wanted wanted, Fractions& out) const {
   SplitMatrix q;
   reciprocal(lambda, q);
   const FractionExpansion c = expansion(lambda);
@@ -105,7 +105,7 @@ void LineOperator::fractions(Complex lambda, Wanted wanted, Fractions& out) cons
   if (wanted.squares && wanted.delay) polynomial(first_, q, c.squared_delay, out.squared_delay);
 }
 
-FractionExpansion LineOperator::expansion(Complex lambda) const {
+FractionExpansion HoldEquivalent::expansion(Complex lambda) const {
   FractionExpansion c;
   if (!exact_) {
     c.simple = {0.0, 1.0, 0.0};

@@ -59,9 +59,9 @@ struct FractionExpansion {
 /// With delay = (d + f) T, E = e^{lambda T}, e_1 = e^{lambda (1-f) T}, phi(t) = (e^{lambda t} - 1)/lambda,
 ///   H{1/(s - lambda)} = z^-d [ z^-1 phi((1-f) T) + z^-2 phi(T) e_1 / (1 - E z^-1) ],
 /// and H{1/(s - lambda)^2} is its derivative to lambda.
-class LineOperator {
+class HoldEquivalent {
  public:
-  LineOperator(const ModelLines& lines, double delay_s);
+  HoldEquivalent(const ModelLines& lines, double delay_s);
 
   Eigen::Index lines() const noexcept { return first_.re.rows(); }
 
