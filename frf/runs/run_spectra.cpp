@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <span>
 
-#include "frf/periods/period_check.hpp"
+#include "frf/periods/outlier_detection.hpp"
 #include "frf/runs/health_gathering.hpp"
 #include "frf/runs/run_periods.hpp"
 #include "frf/runs/run_steps.hpp"

@@ -176,7 +176,7 @@ void study(const Colour& colour, const Study& s) {
   stageid::RealDft dft(kPeriod);
   FrfOptions plain{.method = s.method, .periods = stageid::PeriodChoice::unmarked, .threads = 1};
   FrfOptions check{.method = s.method, .threads = 1};
-  Errors clean_plain, clean_check, glitch_plain, glitch_check;
+  Errors clean_plain, clean_check, glitch_plain, glitch_detection;
   int done = 0;
   std::size_t dropped = 0, spoilt = 0, found = 0;
   for (std::size_t run = 0; done < s.wanted; ++run) {
@@ -221,14 +221,15 @@ void study(const Colour& colour, const Study& s) {
     }
     glitch_plain.add(estimate_plant_frf({&log}, plain), P);
     const FrfEstimate glitched = estimate_plant_frf({&log}, check);
-    glitch_check.add(glitched, P);
+    glitch_detection.add(glitched, P);
     found += glitched.dropped_periods.size();
   }
   fmt::print("{:18} {:7} {:9.2f} {:8.3f} ({:.3f}) {:8} {:8} {:9.3f} ({:.3f}) {:9.1f} ({:.1f})\n",
              colour.name, done, 1e3 * static_cast<double>(dropped) / done,
              clean_check.relative_to(clean_plain), clean_check.absolute_to(clean_plain), spoilt,
-             found, glitch_check.relative_to(clean_plain), glitch_check.absolute_to(clean_plain),
-             glitch_plain.relative_to(clean_plain), glitch_plain.absolute_to(clean_plain));
+             found, glitch_detection.relative_to(clean_plain),
+             glitch_detection.absolute_to(clean_plain), glitch_plain.relative_to(clean_plain),
+             glitch_plain.absolute_to(clean_plain));
   std::fflush(stdout);
 }
 

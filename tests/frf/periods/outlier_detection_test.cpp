@@ -1,4 +1,4 @@
-#include "frf/periods/period_check.hpp"
+#include "frf/periods/outlier_detection.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
-namespace test_period_check {
+namespace test_outlier_detection {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -146,7 +146,7 @@ NoisyRun run_with_a_noisy_period(int periods, double factor, std::uint64_t seed)
 }
 
 // For the variance of the mean, n + 1 periods with 2 + 1 / n times the noise in one are as bad as n periods.
-TEST(PeriodCheck, PeriodsThatCostLessThanTheirLossStay) {
+TEST(OutlierDetection, PeriodsThatCostLessThanTheirLossStay) {
   int dropped_below = 0;
   int dropped_above = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
@@ -157,7 +157,7 @@ TEST(PeriodCheck, PeriodsThatCostLessThanTheirLossStay) {
   EXPECT_GE(dropped_above, 49);
 }
 
-TEST(PeriodCheck, SeveralAreFoundButNeverHalfOfAll) {
+TEST(OutlierDetection, SeveralAreFoundButNeverHalfOfAll) {
   NoisyRun run = run_of(drifting, 10, 2, 7);
   for (const Eigen::Index p : {2, 3, 8}) run.add(p, 500, 0, 3000.0);
   EXPECT_THAT(run.which(), testing::ElementsAre(2U, 3U, 8U));
@@ -173,7 +173,7 @@ TEST(PeriodCheck, SeveralAreFoundButNeverHalfOfAll) {
 }
 
 // A missing period separates the record; the neighbours of a glitch at the border are kept.
-TEST(PeriodCheck, OnlyThePeriodWithTheGlitchIsFound) {
+TEST(OutlierDetection, OnlyThePeriodWithTheGlitchIsFound) {
   for (const Eigen::Index at : {Eigen::Index{0}, Eigen::Index{3}, kSamples - 1}) {
     NoisyRun run = run_of(slow, 8, 1, 3);
     run.number = {0, 1, 2, 4, 5, 6, 7, 8};
@@ -182,7 +182,7 @@ TEST(PeriodCheck, OnlyThePeriodWithTheGlitchIsFound) {
   }
 }
 
-TEST(PeriodCheck, WithoutNoiseRoundingIsNotAnOutlier) {
+TEST(OutlierDetection, WithoutNoiseRoundingIsNotAnOutlier) {
   NoisyRun run =
       run_of([](Eigen::Index count,
                 test::ComplexNoise&) -> Eigen::VectorXd { return Eigen::VectorXd::Ones(count); },
@@ -214,7 +214,7 @@ MemoryLog coloured_log(std::uint64_t seed, int periods) {
   return log;
 }
 
-TEST(PeriodCheck, ColouredNoiseCostsNoPeriod) {
+TEST(OutlierDetection, ColouredNoiseCostsNoPeriod) {
   std::size_t dropped = 0;
   for (std::uint64_t seed = 1; seed <= 150; ++seed) {
     const MemoryLog log = coloured_log(seed, 4);
@@ -238,7 +238,7 @@ void spoil(MemoryLog& log, bool bump) {
   }
 }
 
-TEST(PeriodCheck, GlitchesAndBumpsAreLeftOutWithTheirDegreeOfFreedom) {
+TEST(OutlierDetection, GlitchesAndBumpsAreLeftOutWithTheirDegreeOfFreedom) {
   for (const bool bump : {false, true}) {
     MemoryLog log = coloured_log(3, 8);
     spoil(log, bump);
@@ -267,7 +267,7 @@ TEST(PeriodCheck, GlitchesAndBumpsAreLeftOutWithTheirDegreeOfFreedom) {
 }
 
 // More than 16 periods are compared in groups; in each, outliers are found as in a separate run.
-TEST(PeriodCheck, LongRunsAreComparedInGroups) {
+TEST(OutlierDetection, LongRunsAreComparedInGroups) {
   MemoryLog log = coloured_log(5, 20);
   log.records[0].sensors(3 * 400 + 12, 1) += 40.0;         // in the first group
   log.records[0].sensors((3 + 19) * 400 + 12, 1) += 40.0;  // in the last
@@ -277,5 +277,5 @@ TEST(PeriodCheck, LongRunsAreComparedInGroups) {
   EXPECT_EQ(frf.dropped_periods[1].period, 19);
 }
 
-}  // namespace test_period_check
+}  // namespace test_outlier_detection
 }  // namespace stageid

@@ -1,4 +1,4 @@
-#include "frf/periods/glitch_check.hpp"
+#include "frf/periods/glitch_detection.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "frf/periods/period_check.hpp"
+#include "frf/periods/outlier_detection.hpp"
 
 #include <algorithm>
 #include <cmath>
