@@ -8,7 +8,7 @@
 #include <span>
 #include <stdexcept>
 
-#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/stage/pacer.hpp"
 
 namespace stageid {

@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "hal/stage/peer_status.hpp"
 

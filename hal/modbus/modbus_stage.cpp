@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "hal/stage/supervisor.hpp"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "hal/modbus/modbus_session.hpp"
 #include "hal/modbus/modbus_stage.hpp"

@@ -6,7 +6,7 @@
 #include <array>
 #include <limits>
 
-#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
 #include "tests/hal/modbus/numbered_registers.hpp"

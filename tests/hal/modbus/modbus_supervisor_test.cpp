@@ -8,7 +8,7 @@
 #include <functional>
 #include <thread>
 
-#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
 

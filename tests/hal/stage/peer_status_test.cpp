@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "hal/modbus/modbus_stage.hpp"
 #include "tests/hal/can/altered_can.hpp"

@@ -1,4 +1,4 @@
-#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_encoding.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <stdexcept>
 
 namespace stageid {
-namespace test_modbus_codec {
+namespace test_modbus_encoding {
 
-TEST(ModbusCodec, TheMoreSignificantWordComesFirst) {
+TEST(ModbusEncoding, TheMoreSignificantWordComesFirst) {
   std::array<std::uint16_t, 4> r{};
   put_u32(std::span(r).first<2>(), 0x53544749);
   EXPECT_EQ(r[0], 0x5354);
@@ -21,7 +21,7 @@ TEST(ModbusCodec, TheMoreSignificantWordComesFirst) {
 }
 
 // Bit patterns of IEEE 754 and of two's complement, written out.
-TEST(ModbusCodec, FloatsAndSignedNumbersAreTheirBits) {
+TEST(ModbusEncoding, FloatsAndSignedNumbersAreTheirBits) {
   std::array<std::uint16_t, 2> r{};
   put_f32(r, 1.5F);
   EXPECT_EQ(r, (std::array<std::uint16_t, 2>{0x3FC0, 0x0000}));
@@ -34,7 +34,7 @@ TEST(ModbusCodec, FloatsAndSignedNumbersAreTheirBits) {
   EXPECT_EQ(get_i32(r), -2);
 }
 
-TEST(ModbusCodec, CountsAreTheNearestAndSaturate) {
+TEST(ModbusEncoding, CountsAreTheNearestAndSaturate) {
   EXPECT_EQ(to_counts(3.4, 1.0), 3);
   EXPECT_EQ(to_counts(-3.6, 1.0), -4);
   EXPECT_EQ(to_counts(0.75, 0.5), 2);  // 1.5: to even
@@ -43,7 +43,7 @@ TEST(ModbusCodec, CountsAreTheNearestAndSaturate) {
   EXPECT_EQ(to_counts(std::numeric_limits<double>::quiet_NaN(), 1.0), 0);
 }
 
-TEST(ModbusCodec, KnowsWhatItCannotCarry) {
+TEST(ModbusEncoding, KnowsWhatItCannotCarry) {
   EXPECT_TRUE(fits_counts(2147483647.0, 1.0));
   EXPECT_TRUE(fits_counts(-1.0, 0.5));
   EXPECT_FALSE(fits_counts(2147483648.0, 1.0));
@@ -51,7 +51,7 @@ TEST(ModbusCodec, KnowsWhatItCannotCarry) {
   EXPECT_FALSE(fits_counts(std::numeric_limits<double>::quiet_NaN(), 1.0));
 }
 
-TEST(ModbusCodec, AScaleIsTheSmallestPowerOfTwoThatHoldsTheRange) {
+TEST(ModbusEncoding, AScaleIsTheSmallestPowerOfTwoThatHoldsTheRange) {
   for (const double range : {40e-3, 2.0, 1.0, 2147483647.0, 80.0, 1e-20, 1e20}) {
     const auto scale = static_cast<double>(count_scale(range));
     int exponent = 0;
@@ -61,11 +61,11 @@ TEST(ModbusCodec, AScaleIsTheSmallestPowerOfTwoThatHoldsTheRange) {
   }
 }
 
-TEST(ModbusCodec, ARangeThatCannotBeScaledIsRefused) {
+TEST(ModbusEncoding, ARangeThatCannotBeScaledIsRefused) {
   for (const double range : {0.0, -1.0, 1e-21, 1e21, std::numeric_limits<double>::infinity(),
                              std::numeric_limits<double>::quiet_NaN()})
     EXPECT_THROW(static_cast<void>(count_scale(range)), std::invalid_argument) << range;
 }
 
-}  // namespace test_modbus_codec
+}  // namespace test_modbus_encoding
 }  // namespace stageid

@@ -1,4 +1,4 @@
-#include "hal/modbus/modbus_codec.hpp"
+#include "hal/modbus/modbus_encoding.hpp"
 
 #include <fmt/format.h>
 
