@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "hal/modbus/modbus_wire.hpp"
+#include "hal/modbus/modbus_address.hpp"
 
 // libmodbus' own name for its handle, declared here to keep its header out of other files.
 struct _modbus;  // NOLINT(bugprone-reserved-identifier)

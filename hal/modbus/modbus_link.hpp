@@ -4,8 +4,8 @@
 #include <span>
 #include <string>
 
+#include "hal/modbus/modbus_address.hpp"
 #include "hal/modbus/modbus_context.hpp"
-#include "hal/modbus/modbus_wire.hpp"
 
 namespace stageid {
 

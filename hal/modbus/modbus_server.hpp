@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "hal/modbus/modbus_address.hpp"
 #include "hal/modbus/modbus_fault.hpp"
 #include "hal/modbus/modbus_pdu.hpp"
-#include "hal/modbus/modbus_wire.hpp"
 
 namespace stageid {
 

@@ -2,8 +2,8 @@
 
 #include <optional>
 
+#include "hal/modbus/modbus_address.hpp"
 #include "hal/modbus/modbus_supervisor.hpp"
-#include "hal/modbus/modbus_wire.hpp"
 #include "hal/stage/plant_watch.hpp"
 #include "tools/config/config_visitor.hpp"
 

@@ -1,4 +1,4 @@
-#include "hal/modbus/modbus_wire.hpp"
+#include "hal/modbus/modbus_address.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include "hal/modbus/modbus_stage.hpp"
 
 namespace stageid {
-namespace test_modbus_wire {
+namespace test_modbus_address {
 
 ModbusAddress serial(int baud) {
   ModbusAddress address;
@@ -24,13 +24,13 @@ double rate_hz(int baud) {
 // 17 setpoints and 7 measurements of 32 bits: 81 + 33 bytes of 11 bits. By hand, 19200 baud:
 // 1254 bits / 19200 + 2 x 38.5 bits / 19200 = 69.3 ms; 115200: 10.885 + 3.5 = 14.39 ms; 921600:
 // 1.361 + 3.5 = 4.861 ms.
-TEST(ModbusWire, ASerialTransactionTakesItsBytesAndTwoSilences) {
+TEST(ModbusAddress, ASerialTransactionTakesItsBytesAndTwoSilences) {
   EXPECT_NEAR(rate_hz(19200), 1.0 / 69.32e-3, 0.01);
   EXPECT_NEAR(rate_hz(115200), 1.0 / 14.385e-3, 0.01);
   EXPECT_NEAR(rate_hz(921600), 1.0 / 4.8607e-3, 0.05);
 }
 
-TEST(ModbusWire, OverTcpTheDeviceCounts) {
+TEST(ModbusAddress, OverTcpTheDeviceCounts) {
   ModbusTiming timing;
   timing.device_s = 0.004;
   EXPECT_EQ(modbus_transaction_s({}, timing, 100, 100), 0.004);
@@ -69,5 +69,5 @@ TEST(ModbusStageRate, MoreChannelsThanOneTransactionAreRefused) {
   EXPECT_THAT(refusal(info(10.0, 1, 57), {}), testing::HasSubstr("57 sensors"));
 }
 
-}  // namespace test_modbus_wire
+}  // namespace test_modbus_address
 }  // namespace stageid

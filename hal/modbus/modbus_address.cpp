@@ -1,4 +1,4 @@
-#include "hal/modbus/modbus_wire.hpp"
+#include "hal/modbus/modbus_address.hpp"
 
 #include <fmt/format.h>
 
