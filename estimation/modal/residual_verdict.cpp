@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "frf/response/line_scatter.hpp"
-#include "frf/statistics/tail_probability.hpp"
+#include "frf/statistics/distributions.hpp"
 
 namespace stageid {
 namespace {

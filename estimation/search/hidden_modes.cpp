@@ -6,7 +6,7 @@
 #include "estimation/equations/numerators.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/uncertainty/data_noise.hpp"
-#include "frf/statistics/tail_probability.hpp"
+#include "frf/statistics/distributions.hpp"
 
 namespace stageid {
 namespace {

@@ -10,7 +10,7 @@
 #include "acquisition/files/counted.hpp"
 #include "estimation/equations/residue_form.hpp"
 #include "estimation/model/model_structure.hpp"
-#include "frf/statistics/tail_probability.hpp"
+#include "frf/statistics/distributions.hpp"
 
 namespace stageid {
 namespace {

@@ -5,8 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include "frf/statistics/distributions.hpp"
 #include "frf/statistics/order_statistic.hpp"
-#include "frf/statistics/tail_probability.hpp"
 
 namespace stageid {
 namespace {

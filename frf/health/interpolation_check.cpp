@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "frf/plant/zippered_fit.hpp"
-#include "frf/statistics/tail_probability.hpp"
+#include "frf/statistics/distributions.hpp"
 
 namespace stageid {
 namespace {

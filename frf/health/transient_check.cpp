@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "acquisition/files/counted.hpp"
-#include "frf/statistics/tail_probability.hpp"
+#include "frf/statistics/distributions.hpp"
 
 namespace stageid {
 namespace {

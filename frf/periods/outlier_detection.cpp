@@ -7,9 +7,9 @@
 
 #include "excitation/multisine/dft.hpp"
 #include "frf/periods/octave_record.hpp"
+#include "frf/statistics/distributions.hpp"
 #include "frf/statistics/frequency_bands.hpp"
 #include "frf/statistics/order_statistic.hpp"
-#include "frf/statistics/tail_probability.hpp"
 
 namespace stageid {
 namespace {

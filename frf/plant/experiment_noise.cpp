@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "excitation/threads/worker_pool.hpp"
+#include "frf/statistics/distributions.hpp"
 #include "frf/statistics/order_statistic.hpp"
-#include "frf/statistics/tail_probability.hpp"
 
 namespace stageid {
 namespace {

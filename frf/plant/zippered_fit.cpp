@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "frf/statistics/distributions.hpp"
 #include "frf/statistics/local_fit.hpp"
-#include "frf/statistics/tail_probability.hpp"
 
 namespace stageid {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "frf/response/frf_estimate.hpp"
+#include "frf/statistics/distributions.hpp"
 #include "frf/statistics/frequency_bands.hpp"
-#include "frf/statistics/tail_probability.hpp"
 
 namespace stageid {
 namespace {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <optional>
 
-#include "frf/statistics/tail_probability.hpp"
+#include "frf/statistics/distributions.hpp"
 #include "frf/wiring/feedback_check.hpp"
 
 namespace stageid {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "acquisition/files/counted.hpp"
-#include "frf/statistics/tail_probability.hpp"
+#include "frf/statistics/distributions.hpp"
 #include "frf/wiring/injection_check.hpp"
 
 namespace stageid {

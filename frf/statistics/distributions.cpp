@@ -1,4 +1,4 @@
-#include "frf/statistics/tail_probability.hpp"
+#include "frf/statistics/distributions.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "frf/statistics/tail_probability.hpp"
+#include "frf/statistics/distributions.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,30 +6,30 @@
 #include <limits>
 
 namespace stageid {
-namespace test_tail_probability {
+namespace test_distributions {
 
 // scipy.stats.f.logsf(x, 2 a, 2 b); the second overflows without intermediate scaling.
-TEST(TailProbability, OfFIsThatOfScipy) {
+TEST(Distributions, OfFIsThatOfScipy) {
   EXPECT_NEAR(log_tail_of_f(1.2, 130, 1170.0), -3.8900547289422773, 1e-9);
   EXPECT_NEAR(log_tail_of_f(1.05, 2000, 20000.0), -4.026592717858111, 1e-7);
   EXPECT_NEAR(log_tail_of_f(0.9, 5, 7.5), -0.5881163002608537, 1e-12);
 }
 
 // scipy.stats.chi2.sf(2 h, 2 K)
-TEST(TailProbability, OfEvidenceIsThatOfScipy) {
+TEST(Distributions, OfEvidenceIsThatOfScipy) {
   EXPECT_NEAR(tail_of_evidence(12.3, 7), 0.03872784616227062, 1e-12);
   EXPECT_EQ(tail_of_evidence(0.0, 7), 1.0);
   EXPECT_EQ(tail_of_evidence(3.0, 0), 1.0);
 }
 
 // scipy.stats.chi2.sf(x, n), to the accuracy of Wilson and Hilferty: far out and for few degrees, a factor of three.
-TEST(TailProbability, OfChiSquareIsThatOfScipy) {
+TEST(Distributions, OfChiSquareIsThatOfScipy) {
   EXPECT_NEAR(tail_of_chi_square(4.0, 4.0), 0.40600584970983794, 2e-3);
   EXPECT_NEAR(tail_of_chi_square(52.0, 36.0), 0.04110463210330187, 1e-4);
   EXPECT_NEAR(std::log(tail_of_chi_square(38.0, 4.0)), -16.00426772644601, std::log(3.0));
 }
 
-TEST(TailProbability, AgreesWithClosedForms) {
+TEST(Distributions, AgreesWithClosedForms) {
   // F(2, 2 b): P(F > x) = (1 + x / b)^-b. Chi-square with two degrees of freedom: exp(-h).
   EXPECT_NEAR(log_tail_of_f(2.5, 1, 7.0), -7.0 * std::log1p(2.5 / 7.0), 1e-14);
   EXPECT_NEAR(tail_of_evidence(3.0, 1), std::exp(-3.0), 1e-15);
@@ -41,7 +41,7 @@ TEST(TailProbability, AgreesWithClosedForms) {
 }
 
 // Noise-free data: 1 - w rounds to one, and F exceeds the largest double.
-TEST(TailProbability, StaysANumberHoweverCleanTheDataAre) {
+TEST(Distributions, StaysANumberHoweverCleanTheDataAre) {
   EXPECT_NEAR(log_tail_of_f(1e20, 1, 7.0), -7.0 * std::log1p(1e20 / 7.0), 1e-10);
   EXPECT_NEAR(log_tail_of_f(1e20, 2, 2.0), std::log(3.0) - 2.0 * std::log1p(1e20), 1e-10);
   EXPECT_NEAR(log_tail_of_f(1e-20, 1, 7.0), -1e-20, 1e-34);
@@ -55,5 +55,5 @@ TEST(TailProbability, StaysANumberHoweverCleanTheDataAre) {
   EXPECT_EQ(tail_of_evidence(1e300, 5), 0.0);
 }
 
-}  // namespace test_tail_probability
+}  // namespace test_distributions
 }  // namespace stageid
