@@ -8,6 +8,7 @@
 
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/problem/weight_matrices.hpp"
+#include "frf/statistics/distributions.hpp"
 
 namespace stageid {
 namespace {
@@ -26,19 +27,10 @@ std::string channel_name(const FrfEstimate& frf, Eigen::Index c, Eigen::Index k)
          std::to_string(frf.frequency_hz[k]) + " Hz";
 }
 
-/// Variance of the logarithm of a sample variance with nu complex degrees of freedom: trigamma(nu),
-/// by recurrence and its asymptotic series.
-double log_variance(double nu) {
-  double sum = 0.0;
-  for (; nu < 8.0; nu += 1.0) sum += 1.0 / (nu * nu);
-  const double r = 1.0 / (nu * nu);
-  return sum + 1.0 / nu + 0.5 * r + r / nu * (1.0 / 6.0 - r * (1.0 / 30.0 - r / 42.0));
-}
-
 /// Neighbours on each side of a line whose mean has the scatter of a variance with kWantedDof.
 Eigen::Index window_reach(double dof) {
   if (!(dof > 0.0) || dof >= kWantedDof) return 0;  // 0: unknown, considered exact
-  const double lines = kWantedDof * log_variance(std::max(dof, 1.0));
+  const double lines = kWantedDof * variance_of_log_power(std::max(dof, 1.0));
   return static_cast<Eigen::Index>(std::ceil(0.5 * (lines - 1.0)));
 }
 

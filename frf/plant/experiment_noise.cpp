@@ -22,23 +22,6 @@ constexpr Index kFewestLines = 16;
 constexpr Index kBlockLines = 64;
 constexpr Index kMostBlocks = 16;
 constexpr double kRounding = 1e-10;  // of the output's power
-constexpr double kAsymptotic = 6.0;  // from here on, the series below are accurate to seven digits
-
-/// psi(x) - ln x
-double mean_log_of_power(double x) {
-  double sum = -std::log(x);
-  for (; x < kAsymptotic; x += 1.0) sum -= 1.0 / x;
-  const double y = 1.0 / (x * x);
-  return sum + std::log(x) - 0.5 / x - y * (1.0 / 12.0 - y * (1.0 / 120.0 - y / 252.0));
-}
-
-/// psi'(x)
-double variance_of_log_power(double x) {
-  double sum = 0.0;
-  for (; x < kAsymptotic; x += 1.0) sum += 1.0 / (x * x);
-  const double y = 1.0 / (x * x);
-  return sum + (1.0 + 0.5 / x + y * (1.0 / 6.0 - y * (1.0 / 30.0 - y / 42.0))) / x;
-}
 
 }  // namespace
 
@@ -60,7 +43,7 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
     for (Index e = 0; e < E; ++e)
       log_power.col(k).segment(n_y * e, n_y) =
           (C[static_cast<std::size_t>(e)].diagonal().real().array() + rounding).log() -
-          mean_log_of_power(spectra.run(static_cast<std::size_t>(e)).dof(k));
+          mean_of_log_power(spectra.run(static_cast<std::size_t>(e)).dof(k));
   });
   std::vector<MatrixXd> sum(static_cast<std::size_t>(blocks_), MatrixXd::Zero(n_y, E));
   VectorXd count = VectorXd::Zero(blocks_);

@@ -1,6 +1,9 @@
 #include "frf/statistics/distributions.hpp"
 
 #include <algorithm>
+#include <boost/math/special_functions/digamma.hpp>
+#include <boost/math/special_functions/gamma.hpp>
+#include <boost/math/special_functions/trigamma.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -10,9 +13,18 @@ namespace {
 
 constexpr double kRescaleAbove = 1e200;
 
+/// Boost returns NaN instead of throwing: the callers check their data and have their own messages.
+namespace policies = boost::math::policies;
+using Quiet = policies::policy<
+    policies::domain_error<policies::ignore_error>, policies::pole_error<policies::ignore_error>,
+    policies::overflow_error<policies::ignore_error>,
+    policies::evaluation_error<policies::ignore_error>,
+    policies::rounding_error<policies::ignore_error>, policies::promote_double<false>>;
+
 }  // namespace
 
-// With w = b / (b + a x) this is the incomplete beta function
+// Boost has no logarithm of the incomplete beta function, which underflows here.
+// With w = b / (b + a x) that is the incomplete beta function
 //   I_w(b, a) = w^b sum_{j < a} Gamma(b + j) / (Gamma(b) j!) (1 - w)^j.
 double log_tail_of_f(double x, int a, double b) {
   // Uses the odds (1 - w) / w: for nearly noise-free data w is so small that 1 - w rounds to one. The limit keeps the
@@ -34,21 +46,17 @@ double log_tail_of_f(double x, int a, double b) {
 }
 
 double tail_of_evidence(double h, Eigen::Index K) {
-  if (!(h > 0.0) || K == 0) return 1.0;
-  if (std::isinf(h)) return 0.0;
-  double sum = 0.0;
-  for (Eigen::Index j = 0; j < K; ++j) {
-    const double n = static_cast<double>(j);
-    sum += std::exp(n * std::log(h) - std::lgamma(n + 1.0) - h);
-  }
-  return std::min(1.0, sum);
+  return !(h > 0.0) || K == 0 ? 1.0 : tail_of_chi_square(2.0 * h, 2.0 * static_cast<double>(K));
 }
 
 double tail_of_chi_square(double x, double n) {
-  const double variance = 2.0 / (9.0 * n);
-  return tail_of_normal((std::cbrt(x / n) - 1.0 + variance) / std::sqrt(variance));
+  return x <= 0.0 ? 1.0 : boost::math::gamma_q(0.5 * n, 0.5 * x, Quiet());
 }
 
 double tail_of_normal(double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); }
+
+double mean_of_log_power(double dof) { return boost::math::digamma(dof, Quiet()) - std::log(dof); }
+
+double variance_of_log_power(double dof) { return boost::math::trigamma(dof, Quiet()); }
 
 }  // namespace stageid

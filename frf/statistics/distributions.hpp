@@ -12,10 +12,15 @@ double log_tail_of_f(double x, int a, double b);
 /// chi-square variable with 2 K degrees of freedom. 1 if K is 0.
 double tail_of_evidence(double h, Eigen::Index K);
 
-/// P(chi-square with n degrees of freedom > x), by the cube root of Wilson and Hilferty (PNAS 17 (1931) 684).
+/// P(chi-square with n > 0 degrees of freedom > x), n not necessarily whole.
 double tail_of_chi_square(double x, double n);
 
 /// P(Z > z) of a standard normal variable.
 double tail_of_normal(double z);
+
+/// Mean and variance of the logarithm of a mean power of complex Gaussian noise whose true value is 1,
+/// with dof > 0 complex degrees of freedom: psi(dof) - ln dof and psi'(dof).
+double mean_of_log_power(double dof);
+double variance_of_log_power(double dof);
 
 }  // namespace stageid
