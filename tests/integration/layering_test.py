@@ -44,6 +44,7 @@ DOORS = {
     "modbus": {"hal"},
     "matio": {"tools"},
     "zlib": {"tools"},
+    "utf8.h": {"tools"},
     "yaml-cpp/": {"tools"},
     "CLI/": {"tools"},
     "httplib": {"tools"},

@@ -1,12 +1,14 @@
 #include "tools/config/strict_yaml.hpp"
 
 #include <fmt/format.h>
+#include <utf8.h>
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/exceptions.h>
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -27,21 +29,6 @@ constexpr std::size_t kDeepestNesting = 20;
 /// Limits the time for duplicate keys and merging; real configurations have less than a tenth of this.
 constexpr std::size_t kMostKeys = 1000;
 constexpr std::size_t kMostMerged = 100000;
-
-/// Length of the valid UTF-8 sequence at the start of `text`; 0: invalid.
-std::size_t utf8_length(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char head = byte(0);
-  if (head < 0x80) return 1;
-  const std::size_t length = head >= 0xF0 ? 4 : head >= 0xE0 ? 3 : 2;
-  if (head < 0xC2 || head > 0xF4 || text.size() < length) return 0;
-  for (std::size_t i = 1; i < length; ++i)
-    if ((byte(i) & 0xC0U) != 0x80U) return 0;
-  const bool overlong = (head == 0xE0 && byte(1) < 0xA0) || (head == 0xF0 && byte(1) < 0x90);
-  const bool surrogate = head == 0xED && byte(1) > 0x9F;
-  const bool beyond = head == 0xF4 && byte(1) > 0x8F;
-  return overlong || surrogate || beyond ? 0 : length;
-}
 
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -205,27 +192,25 @@ namespace {
 void check_text(const YamlDocument& document) {
   YamlMark mark;
   std::string_view rest = document.text();
-  if (rest.substr(0, 3) == "\xEF\xBB\xBF") rest.remove_prefix(3);
-  while (!rest.empty()) {
-    const std::size_t length = utf8_length(rest);
-    const char head = rest.front();
-    if (length == 0)
-      document.fail(mark, fmt::format("byte 0x{:02X} is not UTF-8 text; save the file as UTF-8",
-                                      static_cast<unsigned char>(head)));
+  if (utf8::starts_with_bom(rest)) rest.remove_prefix(3);
+  const auto end = utf8::find_invalid(rest.begin(), rest.end());
+  for (auto at = rest.begin(); at != end;) {
+    const std::uint32_t point = utf8::unchecked::next(at);
     const bool control =
-        (static_cast<unsigned char>(head) < 0x20 && head != '\n' && head != '\t' && head != '\r') ||
-        head == 0x7F;
+        (point < 0x20 && point != '\n' && point != '\t' && point != '\r') || point == 0x7F;
     if (control)
       document.fail(
           mark, fmt::format("byte 0x{:02X} is not text; save the configuration as a YAML text file",
-                            static_cast<unsigned char>(head)));
-    rest.remove_prefix(length);
-    if (head == '\n') {
+                            point));
+    if (point == '\n') {
       mark = {mark.line + 1, 1};
     } else {
       ++mark.column;
     }
   }
+  if (end != rest.end())
+    document.fail(mark, fmt::format("byte 0x{:02X} is not UTF-8 text; save the file as UTF-8",
+                                    static_cast<unsigned char>(*end)));
 }
 
 }  // namespace
