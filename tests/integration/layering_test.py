@@ -44,6 +44,7 @@ DOORS = {
     "modbus": {"hal"},
     "matio": {"tools"},
     "zlib": {"tools"},
+    "zip.h": {"tools"},
     "utf8.h": {"tools"},
     "yaml-cpp/": {"tools"},
     "CLI/": {"tools"},

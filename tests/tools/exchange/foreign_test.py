@@ -5,10 +5,12 @@ of MATLAB, damaged files, Touchstone parameters, tables that stageid wrote.
     foreign_test.py PROGRAM WORK_DIR
 """
 
+import io
 import json
 import struct
 import sys
 import unittest
+import zipfile
 import zlib
 
 import h5py
@@ -40,6 +42,12 @@ HEAD_V5 = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
 def compressed(data):
     packed = zlib.compress(data)
     return struct.pack("<II", 15, len(packed)) + packed
+
+
+def npy(array):
+    content = io.BytesIO()
+    np.save(content, array)
+    return content.getvalue()
 
 
 def set_class(item, name):
@@ -171,6 +179,64 @@ class Numpy(Case):
             error = self.refuse("the file is damaged", "import", "x.npz")
             if save is np.savez:
                 self.assertIn("x.npz:w.npy: its checksum (CRC-32) does not match", error)
+
+    def test_hostile_archives(self):
+        """Of the one member w.npy; offsets as in PKWARE's APPNOTE.TXT, 4.3.7 and 4.3.12."""
+        def change(local, central, format, value):
+            damaged = bytearray(whole)
+            struct.pack_into(format, damaged, local, value)
+            struct.pack_into(format, damaged, damaged.index(b"PK\x01\x02") + central, value)
+            (WORK / "x.npz").write_bytes(damaged)
+
+        with zipfile.ZipFile(WORK / "x.npz", "w") as archive:
+            archive.writestr("w.npy", npy(np.arange(8.0)))
+        whole = (WORK / "x.npz").read_bytes()
+        self.succeed("import", "x.npz")
+        change(6, 8, "<H", 1)
+        self.refuse("x.npz:w.npy: is encrypted; save it without a password", "import", "x.npz")
+        change(8, 10, "<H", 12)
+        self.refuse("x.npz:w.npy: unsupported compression method", "import", "x.npz")
+        change(22, 24, "<I", 0xFFFFFFF0)
+        self.refuse("x.npz:w.npy: its size is damaged", "import", "x.npz")
+        change(18, 20, "<I", 0xFFFFFFF0)
+        self.refuse("x.npz:w.npy: unexpected end of file", "import", "x.npz")
+        for length in (0, 1, 30, len(whole) // 2, len(whole) - 1):
+            (WORK / "x.npz").write_bytes(whole[:length])
+            self.refuse("x.npz: is not an .npz file, or is truncated", "import", "x.npz")
+        for place in range(0, len(whole), 3):
+            damaged = bytearray(whole)
+            damaged[place] ^= 0x5A
+            (WORK / "x.npz").write_bytes(damaged)
+            result = run("import", "x.npz", "--json")
+            self.assertIn(result.returncode, (0, 2), (place, result.stderr))
+
+    def test_more_than_memory(self):
+        """A stream that inflates to more than its directory entry: no more than the entry is read."""
+        with zipfile.ZipFile(WORK / "x.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("w.npy", npy(np.zeros(1 << 20)))
+        damaged = bytearray((WORK / "x.npz").read_bytes())
+        for start, offset in ((0, 22), (damaged.index(b"PK\x01\x02"), 24)):
+            struct.pack_into("<I", damaged, start + offset, 4096)
+        (WORK / "x.npz").write_bytes(damaged)
+        self.refuse("x.npz:w.npy: cannot be decompressed; the file is damaged", "import", "x.npz")
+
+    def test_zip64(self):
+        """What numpy writes of arrays from 2 GiB on: sizes in the extra field."""
+        content = npy(np.arange(64.0))
+        with zipfile.ZipFile(WORK / "x.npz", "w") as archive:
+            with archive.open("w.npy", "w", force_zip64=True) as member:
+                member.write(content)
+        whole = bytearray((WORK / "x.npz").read_bytes())
+        self.assertEqual(struct.unpack_from("<I", whole, 18), (0xFFFFFFFF,))
+        self.succeed("import", "x.npz")
+
+    def test_what_is_written(self):
+        """Stored members without a time: the same content is the same bytes."""
+        self.succeed("export", self.frf(), "-o", "a.npz")
+        with zipfile.ZipFile(WORK / "a.npz") as archive:
+            for info in archive.infolist():
+                self.assertEqual((info.compress_type, info.date_time), (zipfile.ZIP_STORED, (1980, 1, 1, 0, 0, 0)))
+            self.assertIsNone(archive.testzip())
 
 
 class Touchstone(Case):

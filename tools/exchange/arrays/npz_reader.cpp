@@ -1,24 +1,24 @@
 #include <fmt/format.h>
-#include <zlib.h>
+#include <zip.h>
 
 #include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <iterator>
+#include <memory>
+#include <system_error>
 
 #include "acquisition/files/file_error.hpp"
 #include "tools/exchange/arrays/npz_file.hpp"
 #include "tools/terminal/output_paths.hpp"
 #include "tools/terminal/unicode.hpp"
 
-// Sources: as tools/exchange/arrays/npz_writer.cpp. The input is untrusted: every offset is checked.
+// Sources: as tools/exchange/arrays/npz_writer.cpp. Input is untrusted: every offset is checked.
 
 namespace stageid {
 namespace {
 
-/// Largest ratio of inflated to deflated size.
+/// Limit of the compression ratio of a deflated stream.
 constexpr std::size_t kMostInflation = 1032;
 
 class Bytes {
@@ -46,70 +46,64 @@ class Bytes {
   std::string_view data_;
 };
 
-struct Member {
-  std::string name;
-  unsigned method = 0;
-  std::uint32_t crc = 0;
-  std::size_t stored_bytes = 0;
-  std::size_t bytes = 0;
-  std::size_t offset = 0;
+/// The members of a file. Sizes in its directory are checked before memory is allocated for them.
+class NpzArchive {
+ public:
+  explicit NpzArchive(const std::filesystem::path& file)
+      : file_(file), archive_(zip_open(file.c_str(), ZIP_RDONLY, nullptr), &zip_discard) {
+    std::error_code error;
+    bytes_ = std::filesystem::file_size(file, error);
+    if (archive_ == nullptr || error || bytes_ == 0)  // libzip accepts an empty file as an archive
+      throw FormatError(file, "",
+                        "is not an .npz file, or is truncated; write it with numpy.savez()");
+  }
+
+  zip_uint64_t members() const {
+    return static_cast<zip_uint64_t>(zip_get_num_entries(archive_.get(), 0));
+  }
+  std::string name(zip_uint64_t index) const { return member(index).name; }
+
+  /// @throws FormatError naming the member
+  std::string content(zip_uint64_t index) const {
+    const zip_stat_t stat = member(index);
+    const auto fail = [&](const char* what) { throw FormatError(file_, stat.name, what); };
+    if (stat.encryption_method != ZIP_EM_NONE) fail("is encrypted; save it without a password");
+    const bool stored = stat.comp_method == ZIP_CM_STORE;
+    if (!stored && stat.comp_method != ZIP_CM_DEFLATE)
+      fail("unsupported compression method; use numpy.savez()");
+    if (stat.comp_size > bytes_) fail("unexpected end of file; the file is truncated or damaged");
+    if (stat.size > (stored ? stat.comp_size : kMostInflation * (stat.comp_size + 1)))
+      fail("its size is damaged");
+    const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> opened(
+        zip_fopen_index(archive_.get(), index, 0), &zip_fclose);
+    if (opened == nullptr) fail("cannot be read; the file is truncated or damaged");
+    std::string content(stat.size, '\0');
+    const zip_int64_t got = zip_fread(opened.get(), content.data(), content.size());
+    // libzip compares the checksum when it reaches the end.
+    char beyond = 0;
+    const zip_int64_t more = zip_fread(opened.get(), &beyond, 1);
+    if (zip_error_code_zip(zip_file_get_error(opened.get())) == ZIP_ER_CRC)
+      fail("its checksum (CRC-32) does not match; the file is damaged. Copy or save it again");
+    if (more != 0 || got != static_cast<zip_int64_t>(content.size()))
+      fail("cannot be decompressed; the file is damaged");
+    return content;
+  }
+
+ private:
+  zip_stat_t member(zip_uint64_t index) const {
+    zip_stat_t stat;
+    zip_stat_init(&stat);
+    if (zip_stat_index(archive_.get(), index, 0, &stat) != 0)
+      throw FormatError(file_, "", "its directory is damaged");
+    return stat;
+  }
+
+  const std::filesystem::path& file_;
+  zip_uint64_t bytes_ = 0;
+  std::unique_ptr<zip_t, decltype(&zip_discard)> archive_;
 };
 
-std::vector<Member> directory_of(const std::filesystem::path& file, std::string_view content) {
-  const Bytes zip(file, "", content);
-  const std::size_t end = content.rfind(std::string_view("PK\x05\x06", 4));
-  if (!content.starts_with("PK") || end == std::string_view::npos)
-    zip.fail("is not an .npz file, or is truncated; write it with numpy.savez()");
-  std::size_t at = zip.number<std::uint32_t>(end + 16);
-  std::vector<Member> members(zip.number<std::uint16_t>(end + 10));
-  for (Member& member : members) {
-    if (zip.piece(at, 4) != std::string_view("PK\x01\x02", 4)) zip.fail("its directory is damaged");
-    member.method = zip.number<std::uint16_t>(at + 10);
-    member.crc = zip.number<std::uint32_t>(at + 16);
-    member.stored_bytes = zip.number<std::uint32_t>(at + 20);
-    member.bytes = zip.number<std::uint32_t>(at + 24);
-    member.offset = zip.number<std::uint32_t>(at + 42);
-    const std::size_t name_bytes = zip.number<std::uint16_t>(at + 28);
-    member.name = zip.piece(at + 46, name_bytes);
-    at += 46 + name_bytes + zip.number<std::uint16_t>(at + 30) + zip.number<std::uint16_t>(at + 32);
-  }
-  return members;
-}
-
-std::string unpacked(const Bytes& zip, const Member& member) {
-  const std::size_t start = member.offset + 30 + zip.number<std::uint16_t>(member.offset + 26) +
-                            zip.number<std::uint16_t>(member.offset + 28);
-  const std::string_view stored = zip.piece(start, member.stored_bytes);
-  if (member.method == 0) return std::string(stored);
-  if (member.method != 8) zip.fail("unsupported compression method; use numpy.savez()");
-  if (member.bytes > kMostInflation * (stored.size() + 1)) zip.fail("its size is damaged");
-  std::string inflated(member.bytes, '\0');
-  z_stream stream = {};
-  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
-  // zlib does not write to its input; its interface merely lacks const.
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(stored.data()));
-  stream.avail_in = static_cast<uInt>(stored.size());
-  stream.next_out = reinterpret_cast<Bytef*>(inflated.data());
-  stream.avail_out = static_cast<uInt>(inflated.size());
-  const int status = inflate(&stream, Z_FINISH);
-  const bool whole = status == Z_STREAM_END && stream.avail_out == 0;
-  inflateEnd(&stream);
-  if (!whole) zip.fail("cannot be decompressed; the file is damaged");
-  return inflated;
-}
-
-std::string content_of(const std::filesystem::path& file, std::string_view content,
-                       const Member& member) {
-  const Bytes zip(file, member.name, content);
-  std::string bytes = unpacked(zip, member);
-  const uLong crc =
-      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<z_size_t>(bytes.size()));
-  if (crc != member.crc)
-    zip.fail("its checksum (CRC-32) does not match; the file is damaged. Copy or save it again");
-  return bytes;
-}
-
-/// The header of a .npy member.
+/// Header of a .npy member.
 struct Layout {
   char kind = 'f';
   std::size_t width = 8;  ///< bytes per element; for U: characters
@@ -181,7 +175,7 @@ double element(const char* at, bool big_endian) {
 
 using ElementReader = double (*)(const char*, bool);
 
-/// Null for an unsupported type.
+/// Null if the type is unknown.
 ElementReader reader_of(char kind, std::size_t width) {
   if (kind == 'f') return width == 8 ? element<double> : width == 4 ? element<float> : nullptr;
   if (kind == 'i')
@@ -258,13 +252,13 @@ NamedArray array_of(const std::filesystem::path& file, std::string name, std::st
 
 ArrayList read_npz(const std::filesystem::path& file) {
   require_readable(file);
-  std::ifstream stream(file, std::ios::binary);
-  const std::string content(std::istreambuf_iterator<char>(stream), {});
+  const NpzArchive archive(file);
   ArrayList list{file, {}};
-  for (const Member& member : directory_of(file, content)) {
-    std::string name = member.name;
+  for (zip_uint64_t i = 0; i < archive.members(); ++i) {
+    std::string name = archive.name(i);
+    const std::string content = archive.content(i);
     if (name.ends_with(".npy")) name.resize(name.size() - 4);
-    list.arrays.push_back(array_of(file, name, content_of(file, content, member)));
+    list.arrays.push_back(array_of(file, name, content));
   }
   return list;
 }

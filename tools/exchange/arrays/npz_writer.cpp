@@ -1,25 +1,25 @@
 #include <fmt/format.h>
-#include <zlib.h>
+#include <zip.h>
 
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <stdexcept>
+#include <memory>
+#include <new>
 
+#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/exchange/arrays/npz_file.hpp"
 #include "tools/terminal/unicode.hpp"
 
-// Sources: NEP 1 (the .npy format, https://numpy.org/neps/nep-0001-npy-format.html) and PKWARE's APPNOTE.TXT 6.3 for
-// the zip file; only stored members are written.
+// Source: NEP 1 (the .npy format, https://numpy.org/neps/nep-0001-npy-format.html).
 
 namespace stageid {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, ".npy members are written as '<'");
 
-constexpr std::size_t kMostBytes = 0xFFFF0000;  // larger files need the 64-bit form of zip
+constexpr zip_uint16_t kFirstDay = 0x0021;  // 1980-01-01, the zip format's zero
 
 template <typename Number>
 void put(std::string& bytes, Number value) {
@@ -71,62 +71,56 @@ std::string npy_of(const NamedArray& array) {
                          ? static_cast<const void*>(std::get<1>(array.values).data())
                          : static_cast<const void*>(std::get<0>(array.values).data());
   const std::size_t bytes = array.size() * width;
-  if (bytes >= kMostBytes)
-    throw std::invalid_argument(
-        fmt::format("'{}' has 4 GiB or more, too large for .npz files; write .h5", array.name));
   return npy(
       array.is_complex() ? "<c16" : "<f8", array.shape,
       bytes == 0 ? std::string_view() : std::string_view(static_cast<const char*>(data), bytes));
 }
 
-/// The common part of the local header and the directory: from the required version to the length of the name.
-std::string member_head(const std::string& name, const std::string& content) {
-  std::string head;
-  put(head, std::uint16_t{20});
-  put(head, std::uint16_t{0x0800});  // the name is UTF-8
-  put(head, std::uint16_t{0});       // stored
-  put(head, std::uint16_t{0});       // no time: 1980-01-01
-  put(head, std::uint16_t{0x0021});
-  put(head, static_cast<std::uint32_t>(
-                crc32_z(0, reinterpret_cast<const Bytef*>(content.data()), content.size())));
-  put(head, static_cast<std::uint32_t>(content.size()));
-  put(head, static_cast<std::uint32_t>(content.size()));
-  put(head, static_cast<std::uint16_t>(name.size()));
-  put(head, std::uint16_t{0});  // no extra field
-  return head;
-}
+/// The bytes of the archive. libzip does not write the file itself: an interrupt would leave its temporary
+/// file behind.
+std::string archive_of(const std::filesystem::path& file, const ArrayList& list) {
+  const std::unique_ptr<zip_source_t, decltype(&zip_source_free)> bytes(
+      zip_source_buffer_create(nullptr, 0, 0, nullptr), &zip_source_free);
+  std::unique_ptr<zip_t, decltype(&zip_discard)> archive(
+      zip_open_from_source(bytes.get(), ZIP_CREATE | ZIP_TRUNCATE, nullptr), &zip_discard);
+  if (archive == nullptr) throw std::bad_alloc();
+  zip_source_keep(bytes.get());  // the archive frees it, too
+  const auto require = [&](bool done) {
+    if (!done)
+      throw FileError(
+          fmt::format("{}: cannot be written: {}", file.string(), zip_strerror(archive.get())));
+  };
 
-std::string directory_entry(const std::string& name, const std::string& head, std::size_t offset) {
-  std::string entry("PK\x01\x02\x14\x00", 6);
-  entry += head;
-  entry.append(10, '\0');  // no comment, first disk, no attributes
-  put(entry, static_cast<std::uint32_t>(offset));
-  return entry + name;
+  std::vector<std::string> contents;  // zip_close() reads them
+  for (const NamedArray& array : list.arrays) contents.push_back(npy_of(array));
+  for (std::size_t k = 0; k < contents.size(); ++k) {
+    zip_source_t* content =
+        zip_source_buffer(archive.get(), contents[k].data(), contents[k].size(), 0);
+    const zip_int64_t at = zip_file_add(archive.get(), (list.arrays[k].name + ".npy").c_str(),
+                                        content, ZIP_FL_ENC_UTF_8);
+    if (at < 0) zip_source_free(content);
+    require(at >= 0);
+    const auto index = static_cast<zip_uint64_t>(at);
+    require(zip_set_file_compression(archive.get(), index, ZIP_CM_STORE, 0) == 0);
+    require(zip_file_set_dostime(archive.get(), index, 0, kFirstDay, 0) == 0);
+  }
+  require(zip_close(archive.get()) == 0);
+  static_cast<void>(archive.release());
+
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  if (zip_source_stat(bytes.get(), &stat) != 0 || zip_source_open(bytes.get()) != 0)
+    throw std::bad_alloc();
+  std::string out(stat.size, '\0');
+  zip_source_read(bytes.get(), out.data(), out.size());
+  zip_source_close(bytes.get());
+  return out;
 }
 
 }  // namespace
 
 void write_npz(const std::filesystem::path& path, const ArrayList& list) {
-  std::string bytes, directory;
-  for (const NamedArray& array : list.arrays) {
-    const std::string name = array.name + ".npy";
-    const std::string content = npy_of(array);
-    const std::string head = member_head(name, content);
-    directory += directory_entry(name, head, bytes.size());
-    bytes.append("PK\x03\x04").append(head).append(name).append(content);
-    if (bytes.size() >= kMostBytes)
-      throw std::invalid_argument(fmt::format(
-          "{}: would have 4 GiB or more, too large for an .npz file; write .h5", path.string()));
-  }
-  const std::size_t offset = bytes.size();
-  bytes += directory;
-  bytes.append("PK\x05\x06\0\0\0\0", 8);
-  put(bytes, static_cast<std::uint16_t>(list.arrays.size()));
-  put(bytes, static_cast<std::uint16_t>(list.arrays.size()));
-  put(bytes, static_cast<std::uint32_t>(directory.size()));
-  put(bytes, static_cast<std::uint32_t>(offset));
-  put(bytes, std::uint16_t{0});
-  write_text_file(path, bytes);
+  write_text_file(path, archive_of(path, list));
 }
 
 }  // namespace stageid
