@@ -48,7 +48,7 @@ r, u, y = log.arrays()
 print(f"{len(log)} runs: r {r.shape} N, u {u.shape} N, y {y.shape} m")
 for m, e in np.ndindex(*r.shape[:2]):
     excited = [log.excitation[c] for c in np.flatnonzero(np.ptp(r[m, e], axis=0))]
-    print(f"realization {m}, experiment {e}: {', '.join(excited)} excited, "
+    print(f"realization {m + 1}, experiment {e + 1}: {', '.join(excited)} excited, "
           f"u rms {np.sqrt(np.mean(u[m, e] ** 2)):.2f} N, y peak {1e6 * np.abs(y[m, e]).max():.2f} um")
 
 # %% [markdown]

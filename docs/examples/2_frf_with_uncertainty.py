@@ -38,8 +38,9 @@ print(f"relative standard deviation: median {np.median(relative):.1e}, largest {
 # variances. 95 % circles should contain 95 % of the differences.
 
 # %%
-first, second = (stageid.frf(log, realizations=[m]) for m in (0, 1))
+first, second = (stageid.frf(log, realizations=[m]) for m in (1, 2))
 assert first.noise_variance is not None and second.noise_variance is not None
+assert first.noise_dof is not None and second.noise_dof is not None
 difference = np.abs(first.response - second.response) ** 2
 nu = first.noise_dof + second.noise_dof
 variance = first.noise_variance + second.noise_variance

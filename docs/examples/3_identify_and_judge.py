@@ -9,8 +9,8 @@ import numpy as np
 import stageid
 
 log = stageid.simulate("configs/experiment/small_stage.yaml")
-frf = stageid.frf(log, realizations=[0, 1])
-held_back = stageid.frf(log, realizations=[2])
+frf = stageid.frf(log, realizations=[1, 2])
+held_back = stageid.frf(log, realizations=[3])
 
 # %% [markdown]
 # ## Candidates
@@ -18,8 +18,8 @@ held_back = stageid.frf(log, realizations=[2])
 
 # %%
 for peak in stageid.modes(frf.select(band_hz=(120, 800))):
-    print(f"peak at {peak['frequency_hz']:7.2f} Hz, damping {peak['damping_ratio']:.4f}")
-stable = [p for p in stageid.stabilization(frf, most_order=40, delay_s=600e-6) if p["stable_damping"]]
+    print(f"peak at {peak.frequency_hz:7.2f} Hz, damping {peak.damping_ratio:.4f}")
+stable = [p for p in stageid.stabilization(frf, most_order=40, delay_s=600e-6) if p.stable_damping]
 print(f"{len(stable)} stable poles over 20 orders")
 
 # %% [markdown]
@@ -34,10 +34,10 @@ print(f"{fit.status}, cost {fit.cost[0]:.3g} -> {fit.cost[-1]:.3g}")
 assert fit.trustworthy
 
 for found in fit.model.modes():
-    if found["natural_frequency_hz"] > frf.frequency_hz[0]:
-        print(f"{found['natural_frequency_hz']:9.3f} +- {found['natural_frequency_std_hz']:.4f} Hz   damping "
-              f"{found['damping_ratio']:.5f} +- {found['damping_ratio_std']:.6f}   "
-              f"shape at the sensors {np.round(found['output_shape'].real, 2)}")
+    if found.natural_frequency_hz > frf.frequency_hz[0]:
+        print(f"{found.natural_frequency_hz:9.3f} +- {found.natural_frequency_std_hz:.4f} Hz   damping "
+              f"{found.damping_ratio:.5f} +- {found.damping_ratio_std:.6f}   "
+              f"shape at the sensors {np.round(found.output_shape.real, 2)}")
 
 # %% [markdown]
 # ## Validate
@@ -46,16 +46,18 @@ for found in fit.model.modes():
 
 # %%
 figures = stageid.validate(fit.model, held_back)
-print(f"relative error {figures['relative_rms_error']:.2e}, chi-square {figures['chi_square_per_dof']:.2f} "
-      f"(of noise alone {figures['expected_chi_square']:.2f}), "
-      f"residuals above their 95 % point {100 * figures['whitened_above_95']:.1f} %")
+print(f"relative error {figures.relative_rms_error:.2e}, chi-square {figures.chi_square_per_dof:.2f} "
+      f"(of noise alone {figures.expected_chi_square:.2f})")
+assert figures.explained and figures.chi_square_per_dof is not None and figures.whitened_above_95 is not None
+print(f"residuals above their 95 % point: {100 * figures.whitened_above_95:.1f} %")
 
 # The same figures detect a model with too few modes.
 poor = stageid.fit(frf, modes=1, rigid_body="suspension:0.4:0.5", direct_term="full").model
 too_few = stageid.validate(poor, held_back)
-print(f"with one mode: relative error {too_few['relative_rms_error']:.2e}, "
-      f"chi-square {too_few['chi_square_per_dof']:.3g}")
-assert too_few["chi_square_per_dof"] > 100 * figures["chi_square_per_dof"]
+print(f"with one mode: relative error {too_few.relative_rms_error:.2e}, "
+      f"chi-square {too_few.chi_square_per_dof:.3g}")
+assert not too_few.explained and too_few.chi_square_per_dof is not None
+assert too_few.chi_square_per_dof > 100 * figures.chi_square_per_dof
 
 # %% [markdown]
 # The standard deviation of the model is smaller than that of the data, because the model has fewer parameters.

@@ -39,16 +39,15 @@ tuesday = identify("tuesday", stage.replace("first_mode_hz: 170", "first_mode_hz
 before, after = monday.modes(), tuesday.modes()
 changes = []
 for pair in stageid.pair_modes(monday, tuesday):
-    a, b = before[pair["first"]], after[pair["second"]]
-    if a["natural_frequency_hz"] < 16:
+    a, b = before[pair.first], after[pair.second]
+    if a.natural_frequency_hz < 16:
         continue
-    std_a, std_b = a["natural_frequency_std_hz"], b["natural_frequency_std_hz"]
-    assert std_a is not None and std_b is not None
-    std = np.hypot(std_a, std_b)
-    moved = b["natural_frequency_hz"] - a["natural_frequency_hz"]
-    changes.append(100 * pair["frequency_difference"])
-    print(f"{a['natural_frequency_hz']:8.2f} Hz moved by {moved:6.2f} Hz, {abs(moved) / std:6.1f} standard "
-          f"deviations; MAC {pair['output_mac']:.3f}")
+    assert a.natural_frequency_std_hz is not None and b.natural_frequency_std_hz is not None
+    std = np.hypot(a.natural_frequency_std_hz, b.natural_frequency_std_hz)
+    moved = b.natural_frequency_hz - a.natural_frequency_hz
+    changes.append(100 * pair.frequency_difference)
+    print(f"{a.natural_frequency_hz:8.2f} Hz moved by {moved:6.2f} Hz, {abs(moved) / std:6.1f} standard "
+          f"deviations; MAC {pair.output_mac:.3f}")
 # All frequencies of a plate change in proportion: 1 / 170 = 0.588 %.
 print(f"the first mode moved by {changes[0]:.3f} %")
 assert abs(changes[0] + 100 / 170) < 0.05
@@ -58,30 +57,17 @@ assert abs(changes[0] + 100 / 170) < 0.05
 # The sampled state space is exact at the samples. Whole samples of delay are separate; here they become states.
 
 # %%
-A, B, C, D, input_delay, output_delay = monday.sampled_state_space()
-n, n_u = B.shape
-delay = int(input_delay.max() + output_delay.max())
-print(f"order {n}, {delay} whole samples of delay")
-
-# x[n+1] = A x + B v_1, with v_1 the delayed u: a chain of registers.
-size = n + delay * n_u
-Ad, Bd = np.zeros((size, size)), np.zeros((size, n_u))
-Ad[:n, :n] = A
-if delay:
-    Ad[:n, n:n + n_u] = B
-    for k in range(delay - 1):
-        Ad[n + k * n_u:n + (k + 1) * n_u, n + (k + 1) * n_u:n + (k + 2) * n_u] = np.eye(n_u)
-    Bd[-n_u:] = np.eye(n_u)
-else:
-    Bd[:n] = B
+sampled = monday.sampled_state_space()
+A, B, C, D = sampled.with_delays()
+size, n_u = B.shape
+print(f"{size} states, of which {size - len(sampled.system.A)} are delays")
 
 # Penalize positions (1 um as much as 10 N), then compute the poles of the loop.
-Cd = np.hstack([C, np.zeros((C.shape[0], size - n))])
-Q = Cd.T @ Cd / 1e-6**2 + 1e-12 * np.eye(size)
+Q = C.T @ C / 1e-6**2 + 1e-12 * np.eye(size)
 R = np.eye(n_u) / 10.0**2
-X = solve_discrete_are(Ad, Bd, Q, R)
-K = np.linalg.solve(R + Bd.T @ X @ Bd, Bd.T @ X @ Ad)
-open_loop = np.abs(np.linalg.eigvals(Ad)).max()
-closed_loop = np.abs(np.linalg.eigvals(Ad - Bd @ K)).max()
+X = solve_discrete_are(A, B, Q, R)
+K = np.linalg.solve(R + B.T @ X @ B, B.T @ X @ A)
+open_loop = np.abs(np.linalg.eigvals(A)).max()
+closed_loop = np.abs(np.linalg.eigvals(A - B @ K)).max()
 print(f"largest pole {open_loop:.5f} without, {closed_loop:.5f} with the regulator")
 assert closed_loop < open_loop and closed_loop < 1

@@ -74,6 +74,7 @@ class Wheel(unittest.TestCase):
         with zipfile.ZipFile(self.pack(WORK / "typed")) as archive:
             self.assertIn("stageid/py.typed", archive.namelist())
             self.assertIn("stageid/__init__.pyi", archive.namelist())
+            self.assertIn("stageid/_results.py", archive.namelist())
 
     def test_without_the_compiled_part(self):
         (WORK / "empty").mkdir()

@@ -33,10 +33,8 @@ if(STAGEID_BUILD_PYTHON)
   # The search path of Debian's python3 for any minor version.
   set(package_dir lib/python3/dist-packages/stageid)
   install(TARGETS stageid_python LIBRARY DESTINATION ${package_dir} COMPONENT python)
-  install(FILES ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.py
-    ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.pyi
-    ${PROJECT_SOURCE_DIR}/tools/python/stageid/py.typed
-    DESTINATION ${package_dir} COMPONENT python)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/tools/python/stageid/ DESTINATION ${package_dir} COMPONENT python
+    FILES_MATCHING PATTERN *.py PATTERN *.pyi PATTERN py.typed PATTERN __pycache__ EXCLUDE)
   install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright ${changelogs}
     DESTINATION ${doc_dir}/python3-stageid COMPONENT python)
 

@@ -17,7 +17,7 @@ import sysconfig
 import tempfile
 import zipfile
 
-PACKED = ("__init__.py", "__init__.pyi", "py.typed")
+PACKED = ("*.py", "*.pyi", "py.typed")
 EARLIEST = (1980, 1, 1, 0, 0, 0)  # the earliest time in a zip; the build time is not recorded
 
 
@@ -68,7 +68,8 @@ def record_line(name, content):
 def pack(arguments):
     info = f"stageid-{arguments.version}.dist-info"
     name, content = compiled(arguments.package, arguments.strip)
-    files = {f"stageid/{file}": (arguments.package / file).read_bytes() for file in PACKED}
+    files = {f"stageid/{file.name}": file.read_bytes() for pattern in PACKED
+             for file in sorted(arguments.package.glob(pattern))}
     files[f"stageid/{name}"] = content
     files[f"{info}/LICENSE"] = arguments.licence.read_bytes()
     files[f"{info}/METADATA"] = metadata(arguments.version, arguments.readme.read_text()).encode()

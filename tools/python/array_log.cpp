@@ -129,8 +129,9 @@ void ArrayLog::locate_runs() {
       sensors_.push_back(rows_of(a.sensors, m, e));
       if (!period_of(a.excitation, m, e).allFinite())
         throw std::invalid_argument(fmt::format(
-            "excitation: realization {}, experiment {} is not finite; remove NaN and infinity", m,
-            e));
+            "excitation: realization {}, experiment {} (counted from 1) is not finite; remove NaN "
+            "and infinity",
+            m + 1, e + 1));
       auto& marked = marked_.emplace_back();
       marked.setZero(a.sensors.shape(2));
       if (!a.marked) continue;

@@ -8,6 +8,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "hal/stage/stage.hpp"
 #include "tools/python/bindings.hpp"
+#include "tools/python/docstring.hpp"
 #include "tools/terminal/exit_code.hpp"
 
 namespace stageid {
@@ -21,12 +22,11 @@ PyObject* format_error = nullptr;
 PyObject* request_error = nullptr;
 PyObject* stage_error = nullptr;
 
-PyObject* new_error(py::module_& module, const char* name, const char* doc, PyObject* base,
-                    PyObject* kind) {
+PyObject* new_error(py::module_& module, const char* name, PyObject* base, PyObject* kind) {
   const py::tuple bases = kind == nullptr ? py::make_tuple(py::handle(base))
                                           : py::make_tuple(py::handle(base), py::handle(kind));
   const auto type = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(
-      (std::string("stageid.") + name).c_str(), doc, bases.ptr(), nullptr));
+      (std::string("stageid.") + name).c_str(), docstring(name), bases.ptr(), nullptr));
   if (!type) throw py::error_already_set();
   module.attr(name) = type;
   return type.ptr();
@@ -62,18 +62,11 @@ void translate(std::exception_ptr thrown) {
 }  // namespace
 
 void define_errors(py::module_& module) {
-  PyObject* base = new_error(module, "StageidError", "Base class of all errors of stageid.",
-                             PyExc_Exception, nullptr);
-  request_error = new_error(module, "RequestError", "An invalid request (exit code 2).", base,
-                            PyExc_ValueError);
-  format_error =
-      new_error(module, "FormatError", "A file has an invalid format or content (exit code 2).",
-                base, PyExc_ValueError);
-  file_error = new_error(module, "FileError", "A file cannot be read or written (exit code 1).",
-                         base, PyExc_OSError);
-  stage_error =
-      new_error(module, "StageError", "The stage or its link failed (exit codes 1 and 4).", base,
-                PyExc_RuntimeError);
+  PyObject* base = new_error(module, "StageidError", PyExc_Exception, nullptr);
+  request_error = new_error(module, "RequestError", base, PyExc_ValueError);
+  format_error = new_error(module, "FormatError", base, PyExc_ValueError);
+  file_error = new_error(module, "FileError", base, PyExc_OSError);
+  stage_error = new_error(module, "StageError", base, PyExc_RuntimeError);
   py::register_local_exception_translator(&translate);
 }
 

@@ -4,6 +4,7 @@
 #include "excitation/multisine/multisine.hpp"
 #include "tools/fit/flag_values.hpp"
 #include "tools/python/bindings.hpp"
+#include "tools/python/docstring.hpp"
 #include "tools/python/real_arrays.hpp"
 
 namespace stageid {
@@ -28,26 +29,13 @@ Eigen::VectorXd multisine(double sample_rate_hz, int period_samples, double low_
       .samples;
 }
 
-constexpr const char* kMultisine =
-    R"(One period of a random-phase multisine, x(n) = sum_k A_k cos(2 pi l_k n / N + phi_k).
-
-sample_rate_hz, low_hz, high_hz   Hz; the band is inclusive
-period_samples                    N
-rms                               RMS value of the samples, in the unit of the result
-seed                              the same seed gives the same signal on every machine
-lines                             'all', 'odd' or 'odd_random'
-shape [lines]                     relative amplitude per line; None: flat
-crest_iterations                  number of clipping iterations that lower the crest factor; 0: none
-
-Returns float64 [period_samples], not copied. Raises RequestError.)";
-
 }  // namespace
 
 void define_excitation(py::module_& module) {
   module.def("multisine", &multisine, py::arg("sample_rate_hz"), py::arg("period_samples"),
              py::arg("low_hz"), py::arg("high_hz"), py::arg("rms"), py::arg("seed"), py::kw_only(),
              py::arg("lines") = "all", py::arg("shape") = py::none(),
-             py::arg("crest_iterations") = 0, kMultisine);
+             py::arg("crest_iterations") = 0, docstring("multisine"));
 }
 
 }  // namespace stageid

@@ -1,12 +1,10 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
 #include <memory>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -16,12 +14,14 @@
 #include "frf/response/hold_compensation.hpp"
 #include "tools/fit/flag_values.hpp"
 #include "tools/python/bindings.hpp"
+#include "tools/python/channels.hpp"
+#include "tools/python/docstring.hpp"
 #include "tools/python/frf_handle.hpp"
-#include "tools/python/frf_texts.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/python/numpy_arrays.hpp"
 #include "tools/python/pickles.hpp"
 #include "tools/python/real_arrays.hpp"
+#include "tools/python/results.hpp"
 #include "tools/steps/frf_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/output_paths.hpp"
@@ -29,25 +29,14 @@
 namespace stageid {
 
 namespace py = pybind11;
+using py::literals::operator""_a;
 
 namespace {
 
-using Names = std::optional<std::vector<std::string>>;
 using Complexes = py::array_t<std::complex<double>, py::array::forcecast>;
 
 const std::vector<std::string> kHolds = {"none", "zoh"};
 const std::vector<std::string> kCompensations = {"none", "delay", "hold"};
-
-ChannelList channels(Eigen::Index count, const char* prefix, const Names& names,
-                     const Names& units) {
-  ChannelList list;
-  if (names) list.names = *names;
-  if (!names)
-    for (Eigen::Index c = 0; c < count; ++c)
-      list.names.push_back(fmt::format("{}{}", prefix, c + 1));
-  list.units = units ? *units : std::vector<std::string>(list.size());
-  return list;
-}
 
 /// None: not known.
 Eigen::MatrixXd variance_of(const py::object& given, const char* name) {
@@ -57,19 +46,21 @@ Eigen::MatrixXd variance_of(const py::object& given, const char* name) {
 
 FrfHandle frf_of_arrays(const py::object& frequency_hz, const Complexes& response,
                         const py::object& noise_variance, const py::object& total_variance,
-                        double noise_dof, double total_dof, const Names& inputs,
-                        const Names& outputs, const Names& input_units, const Names& output_units,
-                        double sample_rate_hz, const std::string& hold) {
+                        std::optional<double> noise_dof, std::optional<double> total_dof,
+                        const Names& inputs, const Names& outputs,
+                        const std::optional<Units>& input_units,
+                        const std::optional<Units>& output_units,
+                        std::optional<double> sample_rate_hz, const std::string& hold) {
   FrfEstimate frf;
   frf.frequency_hz = real_vector(frequency_hz, "frequency_hz");
   frf.response = columns_of<std::complex<double>>(response, "response");
-  frf.outputs = channels(response.shape(1), "y", outputs, output_units);
-  frf.inputs = channels(response.shape(2), "u", inputs, input_units);
+  frf.outputs = channels("outputs", response.shape(1), "y", outputs, output_units);
+  frf.inputs = channels("inputs", response.shape(2), "u", inputs, input_units);
   frf.noise_variance = variance_of(noise_variance, "noise_variance");
   frf.total_variance = variance_of(total_variance, "total_variance");
-  frf.noise_dof = noise_dof;
-  frf.total_dof = total_dof;
-  frf.sample_rate_hz = sample_rate_hz;
+  frf.noise_dof = noise_dof.value_or(0.0);
+  frf.total_dof = total_dof.value_or(0.0);
+  frf.sample_rate_hz = sample_rate_hz.value_or(0.0);
   frf.hold = pick<Hold>("hold", hold, kHolds);
   check(frf);
   return FrfHandle(std::move(frf));
@@ -95,40 +86,35 @@ std::vector<std::shared_ptr<LogReader>> logs_of(const py::object& given) {
   return logs;
 }
 
-/// As the program refuses them, but counted as they are given here.
-void require_realizations(const std::vector<const LogReader*>& logs,
-                          const std::vector<int>& realizations) {
-  std::set<int> complete;
-  for (const LogReader* log : logs)
-    for (const LogRun& run : log->runs())
-      if (run.complete) complete.insert(run.realization);
-  for (const int realization : realizations)
-    if (!complete.contains(realization))
-      throw std::invalid_argument(fmt::format(
-          "realizations: {} has no complete run in {}; there are {}. Realizations count from 0 in "
-          "Python, as log[i]['realization'] does, and from 1 in the program",
-          realization, logs.front()->path().string(), fmt::join(complete, ", ")));
+/// None is the default. An empty list is refused: it would mean "all", too.
+template <typename T>
+std::vector<T> chosen(const char* what, const std::optional<std::vector<T>>& given) {
+  if (given && given->empty())
+    throw std::invalid_argument(
+        fmt::format("{}: empty list. Give at least one, or None for the default", what));
+  return given.value_or(std::vector<T>{});
 }
 
-FrfHandle frf(const py::object& given, const std::vector<std::string>& inputs,
-              const std::vector<std::string>& outputs, const std::vector<int>& realizations,
+FrfHandle frf(const py::object& given, const Names& inputs, const Names& outputs,
+              const std::optional<std::vector<int>>& realizations,
               std::optional<int> transient_periods, const std::string& method,
               const std::string& covariance, const std::string& periods, int covariance_lines,
-              bool health, const std::optional<std::filesystem::path>& stage, int threads) {
+              bool health, const std::optional<std::filesystem::path>& stage,
+              std::optional<int> threads) {
   FrfOptions options;
-  options.inputs = inputs;
-  options.outputs = outputs;
-  options.realizations = realizations;
+  options.inputs = chosen("inputs", inputs);
+  options.outputs = chosen("outputs", outputs);
+  options.realizations = chosen("realizations", realizations);
+  for (int& realization : options.realizations) --realization;  // users count from 1
   options.transient_periods = transient_periods;
   options.method = pick<FrfMethod>("method", method, {"periodic", "lpm"});
   options.covariance = pick<CovarianceKind>("covariance", covariance, {"diagonal", "full"});
   options.periods = pick<PeriodChoice>("periods", periods, {"consistent", "unmarked"});
   options.covariance_lines = covariance_lines;
-  options.threads = threads;
+  options.threads = threads.value_or(0);
   const std::vector<std::shared_ptr<LogReader>> kept = logs_of(given);
   std::vector<const LogReader*> logs;
   for (const auto& log : kept) logs.push_back(log.get());
-  require_realizations(logs, realizations);
   Console silent;
   silent.verbosity = Verbosity::quiet;
   return interruptible([&] {
@@ -156,17 +142,17 @@ py::object radius(const FrfHandle& of, double level, const std::string& variance
 
 py::list health(const FrfEstimate& frf) {
   py::list list;
-  for (const Finding& finding : health_of(frf.provenance_json)) {
-    py::dict entry;
-    entry["severity"] = to_string(finding.severity);
-    entry["cause"] = to_string(finding.cause);
-    entry["channel"] = finding.channel;
-    entry["what"] = finding.what;
-    entry["figure"] = finding.figure;
-    entry["remedy"] = finding.remedy;
-    list.append(entry);
-  }
+  for (const Finding& f : health_of(frf.provenance_json))
+    list.append(result("Finding", "severity"_a = to_string(f.severity),
+                       "cause"_a = to_string(f.cause), "channel"_a = unless_empty(f.channel),
+                       "what"_a = f.what, "figure"_a = unless_empty(f.figure),
+                       "remedy"_a = unless_empty(f.remedy)));
   return list;
+}
+
+void write(const std::filesystem::path& file, const FrfHandle& of) {
+  require_frf_ending(file);
+  write_frf(file, of.frf);
 }
 
 /// A read-only array over a matrix of the response.
@@ -178,88 +164,71 @@ auto view(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> FrfEstimate::*co
   };
 }
 
+const char* of(const char* name) { return docstring(std::string("Frf.") + name); }
+
 template <typename Class>
 void define_properties(Class& c) {
-  const auto property = [&](const char* name, auto get, const char* doc) {
-    c.def_property_readonly(
-        name, [get](const FrfHandle& h) { return get(h.frf); }, doc);
+  const auto array = [&](const char* name, auto get) {
+    c.def_property_readonly(name, get, of(name));
   };
-  c.def_property_readonly("response", view(&FrfEstimate::response), kResponseDoc);
-  c.def_property_readonly("noise_variance", view(&FrfEstimate::noise_variance), kNoiseVarianceDoc);
-  c.def_property_readonly("total_variance", view(&FrfEstimate::total_variance), kTotalVarianceDoc);
+  array("response", view(&FrfEstimate::response));
+  array("noise_variance", view(&FrfEstimate::noise_variance));
+  array("total_variance", view(&FrfEstimate::total_variance));
   c.def_property_readonly(
       "frequency_hz",
       [](const FrfHandle& h) -> const Eigen::VectorXd& { return h.frf.frequency_hz; },
-      py::return_value_policy::reference_internal,
-      "Frequencies in Hz, [N], increasing; a view, not copied");
-  property(
-      "inputs", [](const FrfEstimate& f) { return f.inputs.names; }, "Names [n_u]");
-  property(
-      "outputs", [](const FrfEstimate& f) { return f.outputs.names; }, "Names [n_y]");
-  property(
-      "input_units", [](const FrfEstimate& f) { return f.inputs.units; },
-      "Units of the inputs [n_u]");
-  property(
-      "output_units", [](const FrfEstimate& f) { return f.outputs.units; },
-      "Units of the outputs [n_y]");
-  property(
-      "sample_rate_hz", [](const FrfEstimate& f) { return f.sample_rate_hz; }, "Hz; 0: unknown");
-  property(
-      "hold", [](const FrfEstimate& f) { return kHolds[static_cast<std::size_t>(f.hold)]; },
-      "'zoh' if a digital loop measured it, 'none' for a continuous-time plant");
-  property(
-      "compensated",
-      [](const FrfEstimate& f) { return kCompensations[static_cast<std::size_t>(f.compensated)]; },
-      "What the response is compensated for: 'none', 'delay' or 'hold'");
-  property(
-      "delay_s", [](const FrfEstimate& f) { return f.delay_s; }, "Compensated delay in s");
-  property(
-      "noise_dof", [](const FrfEstimate& f) { return f.noise_dof; },
-      "Complex degrees of freedom of noise_variance");
-  property(
-      "total_dof", [](const FrfEstimate& f) { return f.total_dof; },
-      "Complex degrees of freedom of total_variance");
-  property(
-      "correlated_lines", [](const FrfEstimate& f) { return f.correlated_lines; },
-      "Zippered experiments: number of lines per independent line; else 1");
-  property(
-      "provenance_json", [](const FrfEstimate& f) { return f.provenance_json; },
-      "Input files with their hashes, options and versions, as JSON");
-  property("health", &health, kHealthDoc);
+      py::return_value_policy::reference_internal, of("frequency_hz"));
+
+  const auto property = [&](const char* name, auto get) {
+    c.def_property_readonly(
+        name, [get](const FrfHandle& h) { return get(h.frf); }, of(name));
+  };
+  using F = FrfEstimate;
+  property("inputs", [](const F& f) { return f.inputs.names; });
+  property("outputs", [](const F& f) { return f.outputs.names; });
+  property("input_units", [](const F& f) { return units_of(f.inputs); });
+  property("output_units", [](const F& f) { return units_of(f.outputs); });
+  property("sample_rate_hz", [](const F& f) { return unless_zero(f.sample_rate_hz); });
+  property("hold", [](const F& f) { return kHolds[static_cast<std::size_t>(f.hold)]; });
+  const auto if_compensated = [](const F& f, auto value) {
+    return f.compensated == Compensation::none ? py::none() : py::cast(value);
+  };
+  property("compensated", [=](const F& f) {
+    return if_compensated(f, kCompensations[static_cast<std::size_t>(f.compensated)]);
+  });
+  property("delay_s", [=](const F& f) { return if_compensated(f, f.delay_s); });
+  property("noise_dof", [](const F& f) { return unless_zero(f.noise_dof); });
+  property("total_dof", [](const F& f) { return unless_zero(f.total_dof); });
+  property("correlated_lines", [](const F& f) { return f.correlated_lines; });
+  property("provenance_json", [](const F& f) { return f.provenance_json; });
+  property("health", &health);
 }
 
 }  // namespace
 
 void define_frf(py::module_& module) {
-  py::class_<FrfHandle, std::shared_ptr<FrfHandle>> c(module, "Frf", kFrfDoc);
+  py::class_<FrfHandle, std::shared_ptr<FrfHandle>> c(module, "Frf", docstring("Frf"));
   c.def(py::init(&frf_of_arrays), py::arg("frequency_hz"), py::arg("response"), py::kw_only(),
         py::arg("noise_variance") = py::none(), py::arg("total_variance") = py::none(),
-        py::arg("noise_dof") = 0.0, py::arg("total_dof") = 0.0, py::arg("inputs") = py::none(),
-        py::arg("outputs") = py::none(), py::arg("input_units") = py::none(),
-        py::arg("output_units") = py::none(), py::arg("sample_rate_hz") = 0.0,
-        py::arg("hold") = "none", kFrfInitDoc);
+        py::arg("noise_dof") = py::none(), py::arg("total_dof") = py::none(),
+        py::arg("inputs") = py::none(), py::arg("outputs") = py::none(),
+        py::arg("input_units") = py::none(), py::arg("output_units") = py::none(),
+        py::arg("sample_rate_hz") = py::none(), py::arg("hold") = "none", of("__init__"));
   c.def(py::pickle([](const FrfHandle& frf) { return state_of(frf); }, &frf_of_state));
   define_properties(c);
   c.def("select", &select, py::kw_only(), py::arg("band_hz") = py::none(),
-        py::arg("inputs") = py::none(), py::arg("outputs") = py::none(), kSelectDoc);
-  c.def("compensate", &compensated, py::arg("what"), py::arg("delay_s"), kCompensateDoc);
+        py::arg("inputs") = py::none(), py::arg("outputs") = py::none(), of("select"));
+  c.def("compensate", &compensated, py::arg("what"), py::arg("delay_s"), of("compensate"));
   c.def("confidence_radius", &radius, py::arg("level") = 0.95, py::arg("variance") = "noise",
-        kRadiusDoc);
-  module.def(
-      "frf", &frf, py::arg("logs"), py::kw_only(), py::arg("inputs") = std::vector<std::string>{},
-      py::arg("outputs") = std::vector<std::string>{}, py::arg("realizations") = std::vector<int>{},
-      py::arg("transient_periods") = py::none(), py::arg("method") = "periodic",
-      py::arg("covariance") = "diagonal", py::arg("periods") = "consistent",
-      py::arg("covariance_lines") = 1, py::arg("health") = true, py::arg("stage") = py::none(),
-      py::arg("threads") = 0, kEstimateDoc);
-  module.def("read_frf", &read_frf_handle, py::arg("file"), kReadFrfDoc);
-  module.def(
-      "write_frf",
-      [](const std::filesystem::path& file, const FrfHandle& h) {
-        require_frf_ending(file);
-        write_frf(file, h.frf);
-      },
-      py::arg("file"), py::arg("frf"), kWriteFrfDoc);
+        of("confidence_radius"));
+  module.def("frf", &frf, py::arg("logs"), py::kw_only(), py::arg("inputs") = py::none(),
+             py::arg("outputs") = py::none(), py::arg("realizations") = py::none(),
+             py::arg("transient_periods") = py::none(), py::arg("method") = "periodic",
+             py::arg("covariance") = "diagonal", py::arg("periods") = "consistent",
+             py::arg("covariance_lines") = 1, py::arg("health") = true,
+             py::arg("stage") = py::none(), py::arg("threads") = py::none(), docstring("frf"));
+  module.def("read_frf", &read_frf_handle, py::arg("file"), docstring("read_frf"));
+  module.def("write_frf", &write, py::arg("file"), py::arg("frf"), docstring("write_frf"));
 }
 
 }  // namespace stageid

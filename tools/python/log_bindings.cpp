@@ -5,6 +5,7 @@
 
 #include <bit>
 #include <map>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -13,34 +14,19 @@
 #include "acquisition/slog/slog_format.hpp"
 #include "tools/python/array_log.hpp"
 #include "tools/python/bindings.hpp"
+#include "tools/python/channels.hpp"
+#include "tools/python/docstring.hpp"
 #include "tools/python/interruptible.hpp"
-#include "tools/python/log_texts.hpp"
 #include "tools/python/pickles.hpp"
 #include "tools/python/real_arrays.hpp"
+#include "tools/python/results.hpp"
 #include "tools/python/simulate.hpp"
 
 namespace stageid {
 namespace {
 
 namespace py = pybind11;
-
-using Names = std::optional<std::vector<std::string>>;
-
-/// Names and units of a group of channels: prefix1, prefix2, ... unless given.
-ChannelList channels(const char* group, py::ssize_t count, const char* prefix, const Names& names,
-                     const Names& units) {
-  ChannelList list;
-  if (names) list.names = *names;
-  if (!names)
-    for (py::ssize_t c = 0; c < count; ++c)
-      list.names.push_back(fmt::format("{}{}", prefix, c + 1));
-  list.units = units ? *units : std::vector<std::string>(list.size());
-  if (list.units.size() != list.size())
-    throw std::invalid_argument(fmt::format("{}: {} for {}; give one per channel", group,
-                                            counted(list.units.size(), "unit"),
-                                            counted(list.size(), "channel")));
-  return list;
-}
+using py::literals::operator""_a;
 
 /// The arguments r, u, y and marked (None: nothing is marked) of a log.
 ExperimentArrays given_arrays(const py::object& r, const py::object& u, const py::object& y,
@@ -54,7 +40,8 @@ std::shared_ptr<LogReader> log_of_arrays(const py::object& r, const py::object& 
                                          const py::object& y, double sample_rate_hz,
                                          int transient_periods, const Names& excitation,
                                          const Names& actuators, const Names& sensors,
-                                         const Names& actuator_units, const Names& sensor_units,
+                                         const std::optional<Units>& actuator_units,
+                                         const std::optional<Units>& sensor_units,
                                          const py::object& marked) {
   ExperimentArrays arrays = given_arrays(r, u, y, marked);
   const auto last_axis = [](const py::array& array) {
@@ -117,7 +104,7 @@ std::shared_ptr<LogReader> simulate(const std::filesystem::path& config) {
                                     arrays_of(std::move(experiment)));
 }
 
-py::dict run_at(const LogReader& log, py::ssize_t index) {
+py::object run_at(const LogReader& log, py::ssize_t index) {
   const auto count = static_cast<py::ssize_t>(log.runs().size());
   if (index < -count || index >= count)
     throw py::index_error(fmt::format("run {} is out of range; the log has {} runs", index, count));
@@ -125,15 +112,18 @@ py::dict run_at(const LogReader& log, py::ssize_t index) {
   const LogRun& about = log.runs()[run];
   LogSamples samples;
   log.read(run, 0, about.samples, samples);
-  py::dict out;
-  out["realization"] = about.realization;
-  out["experiment"] = about.experiment;
-  out["complete"] = about.complete;
-  out["excitation"] = log.excitation(run);
-  out["actuators"] = std::move(samples.actuators);
-  out["sensors"] = std::move(samples.sensors);
-  out["marked"] = std::move(samples.marked);
-  return out;
+  return result("Run", "realization"_a = about.realization + 1,
+                "experiment"_a = about.experiment + 1, "complete"_a = about.complete,
+                "excitation"_a = log.excitation(run), "actuators"_a = std::move(samples.actuators),
+                "sensors"_a = std::move(samples.sensors),
+                "marked"_a = py::cast(std::move(samples.marked)).attr("astype")("bool"));
+}
+
+std::set<int> complete_realizations(const LogReader& log) {
+  std::set<int> realizations;
+  for (const LogRun& run : log.runs())
+    if (run.complete) realizations.insert(run.realization + 1);
+  return realizations;
 }
 
 /// Where each run of a full experiment stands: [realization][experiment] without a gap.
@@ -161,7 +151,7 @@ std::vector<std::size_t> full_experiment(const LogReader& log, py::ssize_t& M, p
   return order;
 }
 
-py::tuple read_arrays(const LogReader& log) {
+py::object read_arrays(const LogReader& log) {
   py::ssize_t M = 0, E = 0;
   const std::vector<std::size_t> order = full_experiment(log, M, E);
   const LogInfo& info = log.info();
@@ -182,73 +172,67 @@ py::tuple read_arrays(const LogReader& log) {
     put(u, samples.actuators);
     put(y, samples.sensors);
   }
-  return py::make_tuple(r, u, y);
+  return result("LogArrays", r, u, y);
 }
 
-py::tuple arrays(const LogReader& log) {
+py::object arrays(const LogReader& log) {
   const auto* in_memory = dynamic_cast<const ArrayLog*>(&log);
   if (in_memory == nullptr) return read_arrays(log);
   const ExperimentArrays& a = in_memory->arrays();
-  return py::make_tuple(a.excitation, a.actuators, a.sensors);
+  return result("LogArrays", a.excitation, a.actuators, a.sensors);
 }
 
 std::shared_ptr<LogReader> read_log(const std::filesystem::path& file) { return open_log(file); }
 
+const char* of(const char* name) { return docstring(std::string("Log.") + name); }
+
 template <typename Class>
 void define_properties(Class& log) {
-  const auto property = [&](const char* name, auto get, const char* doc) {
+  log.def_property_readonly(
+      "realizations",
+      [](const LogReader& l) {
+        const std::set<int> found = complete_realizations(l);
+        return std::vector<int>(found.begin(), found.end());
+      },
+      of("realizations"));
+  const auto property = [&](const char* name, auto get) {
     log.def_property_readonly(
-        name, [get](const LogReader& l) { return get(l.info()); }, doc);
+        name, [get](const LogReader& l) { return get(l.info()); }, of(name));
   };
-  property(
-      "sample_rate_hz", [](const LogInfo& i) { return i.sample_rate_hz; },
-      "Sample rate of the loop in Hz");
-  property(
-      "period_samples", [](const LogInfo& i) { return i.period_samples; },
-      "Samples per period of the excitation");
-  property(
-      "transient_periods", [](const LogInfo& i) { return i.transient_periods; },
-      "Periods at the beginning of every run that an estimate discards");
-  property(
-      "excitation", [](const LogInfo& i) { return i.excitation.names; },
-      "Names of the excited channels [n_r]");
-  property(
-      "actuators", [](const LogInfo& i) { return i.actuators.names; },
-      "Names of the actuators [n_u]");
-  property(
-      "sensors", [](const LogInfo& i) { return i.sensors.names; }, "Names of the sensors [n_y]");
-  property(
-      "actuator_units", [](const LogInfo& i) { return i.actuators.units; },
-      "Units of the actuators [n_u]");
-  property(
-      "sensor_units", [](const LogInfo& i) { return i.sensors.units; },
-      "Units of the sensors [n_y]");
+  using I = LogInfo;
+  property("sample_rate_hz", [](const I& i) { return i.sample_rate_hz; });
+  property("period_samples", [](const I& i) { return i.period_samples; });
+  property("transient_periods", [](const I& i) { return i.transient_periods; });
+  property("excitation", [](const I& i) { return i.excitation.names; });
+  property("actuators", [](const I& i) { return i.actuators.names; });
+  property("sensors", [](const I& i) { return i.sensors.names; });
+  property("actuator_units", [](const I& i) { return units_of(i.actuators); });
+  property("sensor_units", [](const I& i) { return units_of(i.sensors); });
 }
 
 }  // namespace
 
 void define_logs(py::module_& module) {
-  py::class_<LogReader, std::shared_ptr<LogReader>> log(module, "Log", kLogDoc);
+  py::class_<LogReader, std::shared_ptr<LogReader>> log(module, "Log", docstring("Log"));
   log.def(py::init(&log_of_arrays), py::arg("r"), py::arg("u"), py::arg("y"), py::kw_only(),
           py::arg("sample_rate_hz"), py::arg("transient_periods") = 0,
           py::arg("excitation") = py::none(), py::arg("actuators") = py::none(),
           py::arg("sensors") = py::none(), py::arg("actuator_units") = py::none(),
-          py::arg("sensor_units") = py::none(), py::arg("marked") = py::none(), kLogInitDoc);
-  log.def(py::pickle([](const LogReader& of) { return state_of(of); }, &log_of_state));
+          py::arg("sensor_units") = py::none(), py::arg("marked") = py::none(), of("__init__"));
+  log.def(py::pickle([](const LogReader& l) { return state_of(l); }, &log_of_state));
   define_properties(log);
   log.def(
-      "__len__", [](const LogReader& l) { return l.runs().size(); },
-      "Number of runs, including incomplete ones");
+      "__len__", [](const LogReader& l) { return l.runs().size(); }, of("__len__"));
   log.def(
       "__iter__",
       [](const py::object& self) {
         return py::reinterpret_steal<py::object>(PySeqIter_New(self.ptr()));
       },
-      "Iterates over the runs");
-  log.def("__getitem__", &run_at, py::arg("run"), kRunDoc);
-  log.def("arrays", &arrays, kArraysDoc);
-  module.def("read_log", &read_log, py::arg("file"), kReadLogDoc);
-  module.def("simulate", &simulate, py::arg("config"), kSimulateDoc);
+      of("__iter__"));
+  log.def("__getitem__", &run_at, py::arg("run"), of("__getitem__"));
+  log.def("arrays", &arrays, of("arrays"));
+  module.def("read_log", &read_log, py::arg("file"), docstring("read_log"));
+  module.def("simulate", &simulate, py::arg("config"), docstring("simulate"));
 }
 
 }  // namespace stageid

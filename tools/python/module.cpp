@@ -6,6 +6,7 @@
 #include "acquisition/files/version.hpp"
 #include "tools/commands/program.hpp"
 #include "tools/python/bindings.hpp"
+#include "tools/python/docstring.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/terminal/interrupt.hpp"
 
@@ -23,12 +24,6 @@ int call(const py::args& arguments) {
       [&] { return run_program(static_cast<int>(pointers.size()), pointers.data()); });
 }
 
-constexpr const char* kCall =
-    R"(Runs a command of the program in this process: call('fit', 'frf.h5', '-o', 'model.json').
-
-Returns its exit code: 0 done, 3 done but the result is not trustworthy, 4 stopped for safety, 1 ended by the stage.
-Raises RequestError, FormatError, FileError or StageError if the program reports an error.)";
-
 }  // namespace
 
 PYBIND11_MODULE(_native, module) {
@@ -43,7 +38,7 @@ PYBIND11_MODULE(_native, module) {
   define_modes(module);
   define_model(module);
   define_fit(module);
-  module.def("call", &call, kCall);
+  module.def("call", &call, docstring("call"));
   module.attr("__name__") = "stageid._native";
 }
 

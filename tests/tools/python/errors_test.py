@@ -86,10 +86,13 @@ class Refused(unittest.TestCase):
         self.refuses(stageid.RequestError, "outputs: unknown output 'velocity'; available:", frf.select,
                      outputs=["velocity"])
         self.refuses(stageid.RequestError,
-                     r"realizations: 8 has no complete run in .*run.slog; there are 0, 1, 2.* count from 0 in Python",
-                     stageid.frf, WORK / "run.slog", realizations=[8])
-        self.refuses(stageid.RequestError, "realizations: -1 has no complete run", stageid.frf, WORK / "run.slog",
-                     realizations=[0, -1])
+                     r"run.slog: realization 9 has no complete run; those with one are 1, 2, 3 \(counted from 1\)",
+                     stageid.frf, WORK / "run.slog", realizations=[9])
+        self.refuses(stageid.RequestError, "realization 0 has no complete run", stageid.frf, WORK / "run.slog",
+                     realizations=[1, 0])
+        for option in ("realizations", "inputs", "outputs"):
+            self.refuses(stageid.RequestError, f"{option}: empty list", stageid.frf, WORK / "run.slog",
+                         **{option: []})
         self.refuses(stageid.RequestError, "covariance_lines|odd", stageid.frf, WORK / "run.slog", covariance_lines=2)
         self.refuses(stageid.FileError, "no.yaml", stageid.frf, WORK / "run.slog", stage=WORK / "no.yaml")
         self.refuses(stageid.RequestError, "max_iterations", stageid.fit, frf, max_iterations=0)
@@ -112,7 +115,7 @@ class Refused(unittest.TestCase):
                 ((f[:2], G), {}, ""), ((f, G * np.nan), {}, "finite"),
                 ((f, G), {"noise_variance": -np.ones(G.shape)}, "variance"),
                 ((f, G), {"noise_variance": np.ones((3, 2))}, "noise_variance"),
-                ((f, G), {"inputs": ["one"]}, ""), ((f, G), {"hold": "first"}, "first")):
+                ((f, G), {"inputs": ["one"]}, ""), ((f, G), {"input_units": ["N"]}, "inputs: 1 unit for 2 channels"), ((f, G), {"hold": "first"}, "first")):
             with self.subTest(text=text, **options):
                 self.refuses(stageid.RequestError, text, stageid.Frf, *words, **options)
         self.assertRaises(TypeError, stageid.Frf, f, "text")
@@ -137,7 +140,7 @@ class Refused(unittest.TestCase):
         r, u, y = arrays()
         for given, text in (((r[0], u, y), "excitation.*axes|excitation.*x"), ((r, u[..., 0], y), "actuators"),
                             ((r[:1], u, y), "excitation"), ((r, u[:, :1], y), "actuators"),
-                            ((r, u[:, :, 1:], y), "actuators"), ((np.full_like(r, np.inf), u, y), "finite"),
+                            ((r, u[:, :, 1:], y), "actuators"), ((np.full_like(r, np.inf), u, y), "realization 1, experiment 1 .*finite"),
                             ((r[:0], u[:0], y[:0]), "one realization")):
             with self.subTest(text=text):
                 self.refuses(stageid.RequestError, text, stageid.Log, *given, sample_rate_hz=RATE_HZ)
@@ -160,7 +163,7 @@ class Refused(unittest.TestCase):
 
     def test_runs(self):
         log = stageid.read_log(WORK / "run.slog")
-        self.assertEqual(log[-1]["experiment"], 2)
+        self.assertEqual(log[-1].experiment, 3)
         self.assertRaises(IndexError, lambda: log[9])
         self.assertRaises(IndexError, lambda: log[-10])
         self.assertRaises(TypeError, stageid.frf, 5)

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """The Python package gives what the program gives, to the bit. Arguments: experiment.py."""
 
+import dataclasses
 import json
 import subprocess
 import unittest
@@ -17,6 +18,11 @@ BAND = (120.0, 800.0)
 
 def setUpModule():
     measure()
+
+
+def as_json(result, without=None):
+    """As the program writes it: an empty text for what is absent."""
+    return {key: "" if value is None else value for key, value in vars(result).items() if key != without}
 
 
 class SameAsTheProgram(unittest.TestCase):
@@ -53,7 +59,7 @@ class SameAsTheProgram(unittest.TestCase):
     def test_a_response_with_options(self):
         program("frf", "run.slog", "-o", "options.h5", "--realizations", "1,3", "--inputs", "a2,a1",
                 "--transient-periods", "1", "--covariance", "full")
-        frf = stageid.frf(WORK / "run.slog", realizations=[0, 2], inputs=["a2", "a1"],
+        frf = stageid.frf(WORK / "run.slog", realizations=[1, 3], inputs=["a2", "a1"],
                           transient_periods=1, covariance="full")
         stageid.write_frf(WORK / "module.h5", frf)
         self.assertEqual((WORK / "module.h5").read_bytes(), (WORK / "options.h5").read_bytes())
@@ -74,14 +80,14 @@ class SameAsTheProgram(unittest.TestCase):
         found = json.loads(done.stdout)["health"]
         self.assertIn("fault", [f["severity"] for f in found])
         frf = stageid.frf(WORK / "turned.h5")
-        self.assertEqual(frf.health, found)
+        self.assertEqual([as_json(finding) for finding in frf.health], found)
         self.assertEqual(stageid.frf(WORK / "turned.h5", health=False).health, [])
         program("frf", "run.slog", "-o", "unseen.h5", "--no-health", "--periods", "unmarked", "--smooth-covariance", "3")
         stageid.write_frf(WORK / "module.h5", stageid.frf(WORK / "run.slog", health=False, periods="unmarked",
                                                           covariance_lines=3))
         self.assertEqual((WORK / "module.h5").read_bytes(), (WORK / "unseen.h5").read_bytes())
         in_memory = stageid.Log(r, u, y, sample_rate_hz=read.sample_rate_hz, transient_periods=2)
-        self.assertNotIn("fault", [f["severity"] for f in stageid.frf(in_memory).health])
+        self.assertNotIn("fault", [f.severity for f in stageid.frf(in_memory).health])
 
     def test_a_response_from_arrays(self):
         read = stageid.read_log(WORK / "run.slog")
@@ -116,7 +122,7 @@ class SameAsTheProgram(unittest.TestCase):
         for flags in (marked != 0, 256 * marked.astype(int), 0.5 * marked, -marked, np.nan * marked == 0, marked.tolist()):
             log = stageid.Log(r, u, y, marked=flags, sample_rate_hz=2000.0)
             expected = np.asarray(flags) != 0
-            np.testing.assert_array_equal(log[0]["marked"] != 0, expected[0, 0])
+            np.testing.assert_array_equal(log[0].marked, expected[0, 0])
 
     def test_a_fit_of_a_file(self):
         fit = stageid.fit(WORK / "frf.h5", band_hz=BAND)
@@ -153,42 +159,52 @@ class SameAsTheProgram(unittest.TestCase):
         f = np.linspace(*BAND, 50)
         np.testing.assert_array_equal(model.response(f), program_model.response(f))
         for ours, theirs in zip(model.submodels, program_model.submodels):
-            self.assertEqual(ours["denominator"], theirs["denominator"])
-            np.testing.assert_array_equal(ours["numerator"], theirs["numerator"])
+            np.testing.assert_array_equal(ours.denominator, theirs.denominator)
+            np.testing.assert_array_equal(ours.numerator, theirs.numerator)
 
     def test_the_covariance_is_what_the_program_writes(self):
         program("fit", "frf.h5", "-o", "with.json", "--band", *BAND, "--covariance", "covariance.h5")
         self.assertIsNone(stageid.fit(WORK / "frf.h5", band_hz=BAND).covariance)
         fit = stageid.fit(WORK / "frf.h5", band_hz=BAND, covariance=True)
         with h5py.File(WORK / "covariance.h5") as file:
-            self.assertEqual([n.decode() for n in file["parameters/name"]], fit.covariance["name"])
+            self.assertEqual([n.decode() for n in file["parameters/name"]], fit.covariance.name)
             for ours, theirs in (("value", "parameters/value"), ("sandwich", "covariance/sandwich"),
                                  ("likelihood", "covariance/likelihood"),
                                  ("response_variance", "response_variance"),
                                  ("confidence_radius", "confidence_radius")):
-                np.testing.assert_array_equal(fit.covariance[ours], file[theirs][:])
-        deviation = np.sqrt(np.diag(fit.covariance["sandwich"]))
-        by_name = dict(zip(fit.covariance["name"], deviation))
+                np.testing.assert_array_equal(getattr(fit.covariance, ours), file[theirs][:])
+        deviation = np.sqrt(np.diag(fit.covariance.sandwich))
+        by_name = dict(zip(fit.covariance.name, deviation))
         for i, submodel in enumerate(fit.model.submodels):
-            std = submodel["numerator_std"][0]
+            std = submodel.numerator_std[0]
             for y, u in np.ndindex(std.shape):
                 self.assertAlmostEqual(by_name[f"submodels[{i}].numerator[0][{y}][{u}]"] / std[y, u], 1.0, 6)
         for mode in fit.model.modes():
-            self.assertTrue(0 < mode["modal_mass_std"] < mode["modal_mass"])
-            self.assertEqual(mode["input_shape_std"].shape, mode["input_shape"].shape)
+            self.assertTrue(0 < mode.modal_mass_std < mode.modal_mass)
+            self.assertEqual(mode.input_shape_std.shape, mode.input_shape.shape)
 
     def test_candidate_modes(self):
         program("modes", "frf.h5", "-o", "modes.json", "--band", *BAND)
         found = stageid.modes(stageid.read_frf(WORK / "frf.h5").select(band_hz=BAND))
-        self.assertEqual(found, json.loads((WORK / "modes.json").read_text())["modes"])
+        self.assertEqual([as_json(mode) for mode in found], json.loads((WORK / "modes.json").read_text())["modes"])
 
     def test_validation(self):
         done = json.loads(subprocess.run([PROGRAM, "--json", "validate", "model.json", "frf.h5"], cwd=WORK,
                                          capture_output=True, check=True).stdout)
         ours = stageid.validate(stageid.read_model(WORK / "model.json"), stageid.read_frf(WORK / "frf.h5"))
         theirs = done["frequency_domain"]
-        np.testing.assert_array_equal(ours.pop("channel_error").ravel("F"), theirs.pop("channel_error"))
-        self.assertEqual(ours, theirs)
+        np.testing.assert_array_equal(ours.channel_error.ravel("F"), theirs.pop("channel_error"))
+        self.assertEqual(as_json(ours, without="channel_error"), theirs)
+
+    def test_a_validation_without_variances(self):
+        frf = stageid.read_frf(WORK / "frf.h5")
+        bare = stageid.Frf(frf.frequency_hz, frf.response, inputs=frf.inputs, outputs=frf.outputs,
+                           sample_rate_hz=frf.sample_rate_hz, hold=frf.hold)
+        found = stageid.validate(stageid.read_model(WORK / "model.json"), bare)
+        for name in ("variance", "chi_square_per_dof", "expected_chi_square", "reason", "whitened_above_95",
+                     "whiteness", "whiteness_limit"):
+            self.assertIsNone(getattr(found, name), name)
+        self.assertTrue(found.explained and found.relative_rms_error < 1)
 
 
 class Values(unittest.TestCase):
@@ -198,7 +214,47 @@ class Values(unittest.TestCase):
             self.assertEqual(len(runs), len(h5["runs"]))
             for run, name in zip(runs, h5["runs"]):
                 for group in ("excitation", "actuators", "sensors"):
-                    np.testing.assert_array_equal(run[group], h5[f"runs/{name}/{group}"][()])
+                    np.testing.assert_array_equal(getattr(run, group), h5[f"runs/{name}/{group}"][()])
+
+    def test_realizations_are_counted_from_1(self):
+        log = stageid.read_log(WORK / "run.slog")
+        self.assertEqual(log.realizations, [1, 2, 3])
+        self.assertEqual([(run.realization, run.experiment) for run in log],
+                         [(m, e) for m in (1, 2, 3) for e in (1, 2, 3)])
+        r, u, y = log.arrays()
+        np.testing.assert_array_equal(log[4].sensors, y[1, 1])
+
+    def test_what_is_absent_is_none(self):
+        frf = stageid.Frf([100.0, 200.0], np.ones((2, 1, 2), complex), input_units=["N", None])
+        for name in ("noise_variance", "total_variance", "noise_dof", "total_dof", "sample_rate_hz", "compensated",
+                     "delay_s"):
+            self.assertIsNone(getattr(frf, name), name)
+        self.assertEqual((frf.input_units, frf.output_units), (["N", None], [None]))
+        compensated = stageid.read_frf(WORK / "frf.h5").compensate("delay", 1e-4)
+        self.assertEqual((compensated.compensated, compensated.delay_s), ("delay", 1e-4))
+        model = stageid.fit(stageid.Frf(compensated.frequency_hz, compensated.response), band_hz=BAND, modes=1).model
+        self.assertEqual((model.sample_rate_hz, model.input_delay_std_s), (None, None))
+        self.assertEqual(model.fit.band_hz, BAND)
+
+    def test_delays_as_states(self):
+        """The response of the state space with its delays is that of the model at the samples."""
+        model = stageid.read_model(WORK / "model.json")
+        sampled = model.sampled_state_space()
+        shifted = dataclasses.replace(sampled, input_delay_samples=np.array([3, 0, 1]),
+                                      output_delay_samples=np.array([0, 2]))
+        A, B, C, D = shifted.with_delays()
+        self.assertEqual(len(A), len(sampled.system.A) + 6)
+        f = np.array([150.0, 333.0])
+        z = np.exp(2j * np.pi * f / sampled.sample_rate_hz)
+        a, b, c, d = sampled.system
+        for k, zk in enumerate(z):
+            system = c @ np.linalg.solve(zk * np.eye(len(a)) - a, b) + d
+            expected = zk ** -np.array([[0.0], [2.0]]) * system * zk ** -np.array([3.0, 0.0, 1.0])
+            np.testing.assert_allclose(C @ np.linalg.solve(zk * np.eye(len(A)) - A, B) + D, expected, rtol=1e-8)
+            whole = zk ** -np.add.outer(sampled.output_delay_samples, sampled.input_delay_samples).astype(float) * system
+            np.testing.assert_allclose(whole, model.response(f)[k], rtol=1e-6)
+        early = dataclasses.replace(sampled, input_delay_samples=np.array([-1, 0, 0]))
+        self.assertRaisesRegex(stageid.RequestError, "negative delay", early.with_delays)
 
     def test_a_model(self):
         model = stageid.read_model(WORK / "model.json")
@@ -207,9 +263,11 @@ class Values(unittest.TestCase):
             np.testing.assert_array_equal(model.response(h5["frequency_hz"][()]), h5["response"][()])
             for given, name in zip(model.state_space(), "ABCD"):
                 np.testing.assert_array_equal(given, h5[f"state_space/continuous/{name}"][()])
-            for given, name in zip(model.sampled_state_space(), "ABCD"):
+            sampled = model.sampled_state_space()
+            self.assertEqual(sampled.sample_rate_hz, model.sample_rate_hz)
+            for given, name in zip(sampled.system, "ABCD"):
                 np.testing.assert_array_equal(given, h5[f"state_space/discrete/{name}"][()])
-            np.testing.assert_array_equal([m["modal_mass"] for m in model.modes()],
+            np.testing.assert_array_equal([m.modal_mass for m in model.modes()],
                                           h5["modes/modal_mass"][()])
         model.save(WORK / "saved.json")
         self.assertEqual(stageid.read_model(WORK / "saved.json").outputs, model.outputs)
@@ -228,10 +286,10 @@ class Values(unittest.TestCase):
     def test_a_model_is_paired_with_itself(self):
         model = stageid.read_model(WORK / "model.json")
         pairs = stageid.pair_modes(model, model)
-        self.assertEqual([p["first"] for p in pairs], list(range(len(model.modes()))))
+        self.assertEqual([p.first for p in pairs], list(range(len(model.modes()))))
         for pair in pairs:
-            self.assertEqual((pair["second"], pair["frequency_difference"]), (pair["first"], 0.0))
-            self.assertAlmostEqual(pair["output_mac"], 1.0, places=12)
+            self.assertEqual((pair.second, pair.frequency_difference), (pair.first, 0.0))
+            self.assertAlmostEqual(pair.output_mac, 1.0, places=12)
 
     def test_a_multisine(self):
         x = stageid.multisine(1000.0, 500, 10.0, 100.0, rms=2.0, seed=7)
@@ -274,8 +332,8 @@ class Values(unittest.TestCase):
         # Squared singular values from G G^H: the small one loses the digits of its ratio to the large.
         np.testing.assert_allclose(stageid.cmif(frf), expected, rtol=1e-9, atol=1e-13 * expected.max())
         poles = stageid.stabilization(frf, most_order=20)
-        self.assertTrue(all(0 < p["frequency_hz"] <= frf.frequency_hz[-1] for p in poles))
-        self.assertEqual(max(p["order"] for p in poles), 20)
+        self.assertTrue(all(0 < p.frequency_hz <= frf.frequency_hz[-1] for p in poles))
+        self.assertEqual(max(p.order for p in poles), 20)
 
 
 class Memory(unittest.TestCase):

@@ -61,9 +61,9 @@ class Pickles(unittest.TestCase):
                               other.removal_cost),
                              (fit.status, fit.message, fit.trustworthy, fit.cost, fit.decisions, fit.removal_cost))
             np.testing.assert_array_equal(other.response_variance, fit.response_variance)
-            self.assertEqual(other.covariance["name"], fit.covariance["name"])
+            self.assertEqual(other.covariance.name, fit.covariance.name)
             for key in ("sandwich", "likelihood", "response_variance", "confidence_radius"):
-                np.testing.assert_array_equal(other.covariance[key], fit.covariance[key])
+                np.testing.assert_array_equal(getattr(other.covariance, key), getattr(fit.covariance, key))
             np.testing.assert_array_equal(other.model.response([200.0]), fit.model.response([200.0]))
 
     def test_logs(self):
@@ -83,7 +83,21 @@ class Pickles(unittest.TestCase):
         log = stageid.Log(np.ones((1, 1, 50, 1)), g.normal(size=(1, 1, 200, 1)), g.normal(size=(1, 1, 200, 1)),
                           sample_rate_hz=100.0, marked=marked)
         for other in copies(log):
-            np.testing.assert_array_equal(other[0]["marked"], log[0]["marked"])
+            np.testing.assert_array_equal(other[0].marked, log[0].marked)
+
+    def test_results(self):
+        frf, model = stageid.read_frf(WORK / "frf.h5"), stageid.read_model(WORK / "model.json")
+        results = (stageid.read_log(WORK / "run.slog")[0], stageid.modes(frf)[0], model.modes()[0], model.submodels[0],
+                   model.fit, stageid.validate(model, frf), stageid.pair_modes(model, model)[0],
+                   model.sampled_state_space())
+        for result in results:
+            for other in copies(result):
+                self.assertIs(type(other), type(result))
+                for name, value in vars(result).items():
+                    np.testing.assert_equal(getattr(other, name), value)
+        for named in (model.state_space(), stageid.read_log(WORK / "run.slog").arrays()):
+            for other in copies(named):
+                self.assertEqual(other._fields, named._fields)
 
     def test_worker_processes(self):
         frf = stageid.read_frf(WORK / "frf.h5")

@@ -25,7 +25,8 @@ if(STAGEID_MYPY)
   add_test(NAME tools.python_types
     COMMAND ${STAGEID_MYPY} --config-file ${CMAKE_CURRENT_LIST_DIR}/mypy.ini
       --python-executable /usr/bin/python3 --cache-dir ${CMAKE_CURRENT_BINARY_DIR}/mypy_cache
-      ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.pyi ${example_files})
+      ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.pyi
+      ${PROJECT_SOURCE_DIR}/tools/python/stageid/_results.py ${example_files})
   set_tests_properties(tools.python_types PROPERTIES LABELS "tools;python" TIMEOUT 300
     ENVIRONMENT MYPYPATH=${PROJECT_SOURCE_DIR}/tools/python)
 endif()

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""The type stub says what the compiled package has: names, parameters in their order, defaults; every
-public thing has a docstring that tells units or shapes. Arguments: experiment.py."""
+"""The stub agrees with the package: names, parameters in order, defaults, docstrings. Arguments: experiment.py."""
 
 import ast
+import inspect
 import re
 import unittest
 
@@ -10,9 +10,6 @@ from experiment import PACKAGES, run_tests
 
 import stageid
 
-# Kinds of results and of arguments: in the stub only.
-TYPES_ONLY = {"File", "Reals", "Complexes", "Run", "CandidateMode", "StabilizationPole", "Mode", "Submodel",
-              "ModePair", "Covariance", "Finding"}
 SPECIAL = {"__init__", "__len__", "__iter__", "__getitem__"}
 
 
@@ -30,7 +27,10 @@ def stub_parameters(function):
 
 
 def compiled_parameters(function, name):
-    """The same from the signature that begins the docstring of a compiled function."""
+    """The same of a function: a compiled one has its signature at the beginning of its docstring."""
+    if inspect.isfunction(function):
+        return [(p.name, p.kind is p.KEYWORD_ONLY, None if p.default is p.empty else repr(p.default))
+                for p in list(inspect.signature(function).parameters.values())[1:]]
     signature = re.match(rf"{name}\((.*)\) -> ", function.__doc__).group(1)
     listed, only, depth, word = [], False, 0, ""
     for character in signature + ",":
@@ -51,10 +51,12 @@ def compiled_parameters(function, name):
 class Stub(unittest.TestCase):
     def test_names(self):
         nodes = [n for n in stub_tree().body if isinstance(n, (ast.ClassDef, ast.FunctionDef))]
-        names = {n.name for n in nodes} - TYPES_ONLY
-        self.assertEqual(names, set(stageid.__all__) - {"__version__"})
-        self.assertEqual(set(stageid.__all__), {n for n in dir(stageid._native) if n == "__version__" or
-                                                not n.startswith("_")})
+        names = {n.name for n in nodes} | {"__version__"}
+        results = {a.name for n in stub_tree().body if isinstance(n, ast.ImportFrom) for a in n.names if a.asname}
+        self.assertEqual(names | results, set(stageid.__all__))
+        self.assertEqual(names, {n for n in dir(stageid._native) if n == "__version__" or not n.startswith("_")})
+        self.assertEqual(results, {n for n, kind in vars(stageid._results).items() if isinstance(kind, type)
+                                   and kind.__module__ == "stageid._results"})
         self.assertTrue((PACKAGES / "stageid" / "py.typed").exists())
 
     def test_parameters(self):
@@ -99,6 +101,16 @@ class Stub(unittest.TestCase):
                     if not member.startswith("_"):
                         with self.subTest(f"{name}.{member}"):
                             self.assertTrue(value.__doc__ and len(value.__doc__.strip()) > 3)
+
+    def test_docstrings_of_the_stub_are_those_of_the_package(self):
+        for node in stub_tree().body:
+            if isinstance(node, ast.ClassDef):
+                kind = getattr(stageid, node.name)
+                self.assertEqual(inspect.getdoc(kind), ast.get_docstring(node))
+                for member in node.body:
+                    if isinstance(member, ast.FunctionDef):
+                        with self.subTest(f"{node.name}.{member.name}"):
+                            self.assertIn(ast.get_docstring(member), inspect.getdoc(getattr(kind, member.name)))
 
     def check_function(self, name, function):
         """Behind the signature stands a text; it tells of every parameter, and says what is raised."""
