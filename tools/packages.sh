@@ -10,7 +10,8 @@ build_packages="g++ cmake ninja-build pkg-config
 # Additional packages for the tests: the references in Python, the report in a browser, the format, the C++ reference,
 # the documentation site, a kernel with CAN, the stageid packages.
 test_packages="libgtest-dev libgmock-dev libbenchmark-dev
-  python3-dev pybind11-dev python3-venv dpkg-dev python3 python3-numpy python3-scipy python3-h5py chromium clang-format
+  python3-dev pybind11-dev python3-venv dpkg-dev python3 python3-numpy python3-scipy python3-h5py python3-xarray chromium
+  clang-format
   doxygen mkdocs python3-pygments libjs-katex groff-base git zsh lintian mypy
   mbpoll python3-pymodbus python3-serial-asyncio socat
   user-mode-linux busybox-static iproute2 kmod can-utils"

@@ -55,6 +55,7 @@ assert abs(changes[0] + 100 / 170) < 0.05
 # %% [markdown]
 # ## A regulator
 # The sampled state space is exact at the samples. Whole samples of delay are separate; here they become states.
+# `monday.to_control()` gives the same system to the package python-control.
 
 # %%
 sampled = monday.sampled_state_space()

@@ -39,6 +39,7 @@ PYBIND11_MODULE(_native, module) {
   define_model(module);
   define_fit(module);
   module.def("call", &call, docstring("call"));
+  module.def("_docstring", &docstring);
   module.attr("__name__") = "stageid._native";
 }
 

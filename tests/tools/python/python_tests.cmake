@@ -1,5 +1,5 @@
-# The Python package: as the program, its errors, its stub.
-foreach(script module errors pickle stub)
+# The Python package: as the program, its display, its errors, its stub.
+foreach(script module display errors pickle stub)
   add_test(NAME tools.python_${script}
     COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/${script}_test.py
       $<TARGET_FILE:stageid_program> ${PROJECT_BINARY_DIR}/tools/python
@@ -26,6 +26,8 @@ if(STAGEID_MYPY)
     COMMAND ${STAGEID_MYPY} --config-file ${CMAKE_CURRENT_LIST_DIR}/mypy.ini
       --python-executable /usr/bin/python3 --cache-dir ${CMAKE_CURRENT_BINARY_DIR}/mypy_cache
       ${PROJECT_SOURCE_DIR}/tools/python/stageid/__init__.pyi
+      ${PROJECT_SOURCE_DIR}/tools/python/stageid/_conversions.py
+      ${PROJECT_SOURCE_DIR}/tools/python/stageid/_display.py
       ${PROJECT_SOURCE_DIR}/tools/python/stageid/_results.py ${example_files})
   set_tests_properties(tools.python_types PROPERTIES LABELS "tools;python" TIMEOUT 300
     ENVIRONMENT MYPYPATH=${PROJECT_SOURCE_DIR}/tools/python)

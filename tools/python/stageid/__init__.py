@@ -3,6 +3,7 @@
 Results are identical to those of the program `stageid`, because both use the same compiled functions.
 """
 
+from stageid import _conversions, _display, _native
 from stageid._native import (
     FileError,
     Fit,
@@ -84,3 +85,12 @@ __all__ = [
     "validate",
     "write_frf",
 ]
+
+# What needs no compiled code is written in Python.
+for _method, _name in ((_conversions.to_xarray, "Frf.to_xarray"), (_conversions.to_control, "Model.to_control")):
+    _method.__doc__ = _native._docstring(_name)
+Frf.to_xarray = _conversions.to_xarray
+Model.to_control = _conversions.to_control
+for _kind in (Log, Frf, Model, Fit):
+    _kind.__repr__ = getattr(_display, f"{_kind.__name__.lower()}_text")
+    _kind._repr_html_ = getattr(_display, f"{_kind.__name__.lower()}_html")

@@ -6,6 +6,7 @@ from os import PathLike
 from typing import Any, Literal, Union
 
 import numpy as np
+import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from stageid._results import CandidateMode as CandidateMode
@@ -310,6 +311,17 @@ class Frf:
         ----------
         R. Pintelon and J. Schoukens, System Identification, 2nd ed. (2012), section 2.7.
         """
+    def to_xarray(self) -> xarray.Dataset:
+        """The response and its variances as an xarray.Dataset with the dimensions frequency, output and input.
+
+        The arrays are not copied. Units are in the attributes `units` of the variables and in the coordinates
+        output_unit and input_unit. Unknown values are omitted.
+
+        Raises
+        ------
+        ImportError
+            The package xarray is not installed.
+        """
 
 class Model:
     """The model P(s) = sum of submodels, with delays: the content of model.json.
@@ -399,6 +411,22 @@ class Model:
         References
         ----------
         K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed. (1997), sections 2.3 and 2.4.
+        """
+    def to_control(self, *, sampled: bool | None = None) -> Any:
+        """The model as control.StateSpace of the package python-control, with the names of inputs and outputs.
+
+        Parameters
+        ----------
+        sampled
+            True: sampled_state_space() with the delays as states. False: state_space(), without the delays.
+            None: sampled if the sample rate is known.
+
+        Raises
+        ------
+        ImportError
+            The package control is not installed.
+        RequestError
+            As state_space() or sampled_state_space(), or a delay is negative.
         """
     def save(self, file: File) -> None:
         """Writes model.json atomically.
