@@ -53,7 +53,8 @@ struct FractionExpansion {
   Coefficients squared_delay = {};
 };
 
-/// Hold, delay and sampler on given lines: everything that all poles share.
+/// The hold equivalent of continuous-time functions on given lines: hold, delay and sampler, which all
+/// poles share.
 ///
 /// They act on each fraction 1/(s - lambda) and 1/(s - lambda)^2 in closed form (docs/theory.md, section 6).
 /// With delay = (d + f) T, E = e^{lambda T}, e_1 = e^{lambda (1-f) T}, phi(t) = (e^{lambda t} - 1)/lambda,

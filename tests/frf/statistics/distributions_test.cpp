@@ -8,7 +8,7 @@
 namespace stageid {
 namespace test_distributions {
 
-// scipy.stats.f.logsf(x, 2 a, 2 b); the second overflows unless it is scaled on the way.
+// scipy.stats.f.logsf(x, 2 a, 2 b); the second overflows without intermediate scaling.
 TEST(Distributions, LogTailOfFIsThatOfScipy) {
   EXPECT_NEAR(log_tail_of_f(1.2, 130, 1170.0), -3.8900547289422773, 1e-9);
   EXPECT_NEAR(log_tail_of_f(1.05, 2000, 20000.0), -4.026592717858111, 1e-7);
