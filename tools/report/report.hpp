@@ -12,6 +12,7 @@
 #include "estimation/model/additive_model.hpp"
 #include "estimation/model/cmif.hpp"
 #include "estimation/start/stabilization.hpp"
+#include "frf/periods/health_finding.hpp"
 #include "frf/response/frf_estimate.hpp"
 #include "frf/response/nonlinearity.hpp"
 #include "tools/config/stage_geometry.hpp"
@@ -34,15 +35,6 @@ struct ReportMessage {
 };
 
 const char* to_string(ReportMessage::Severity severity) noexcept;  ///< "note", "warning", "error"
-
-/// A finding of a check of the data, as a row of the table of findings.
-struct ReportFinding {
-  ReportMessage::Severity severity = ReportMessage::Severity::note;
-  std::string channel;  ///< names; empty: the whole measurement
-  std::string what;
-  std::string figure;  ///< the number that supports it
-  std::string remedy;
-};
 
 /// A labelled number or word for the header, as displayed: {"error against the plant", "0.12 %"}.
 struct ReportFigure {
@@ -98,10 +90,10 @@ struct ReportData {
   std::vector<double> cost;            ///< one entry per iterate; empty: cost_history of the model
   std::vector<std::string> decisions;  ///< in order
 
-  std::vector<ReportFinding> findings;  ///< of the checks of the data, in any order
-  std::vector<LogRun> runs;             ///< timing and health of the measurement
-  double sample_rate_hz = 0.0;          ///< of the runs; to show their speed relative to real time
-  double period_s = 0.0;                ///< of the loop, by wall clock; 0: virtual time
+  std::vector<Finding> findings;  ///< of the checks of the data, in any order
+  std::vector<LogRun> runs;       ///< timing and health of the measurement
+  double sample_rate_hz = 0.0;    ///< of the runs; to show their speed relative to real time
+  double period_s = 0.0;          ///< of the loop, by wall clock; 0: virtual time
   std::vector<ReportStep> steps;
 
   std::vector<ReportFigure> figures;    ///< further figures for the header

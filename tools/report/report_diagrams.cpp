@@ -46,11 +46,11 @@ Json nonlinearity_json(const NonlinearityTest& test) {
           {"chance", kNonlinearBelow}};
 }
 
-Json findings_json(const std::vector<ReportFinding>& findings) {
-  std::vector<ReportFinding> sorted = findings;
-  std::ranges::stable_sort(sorted, std::ranges::greater{}, &ReportFinding::severity);
+Json findings_json(const std::vector<Finding>& findings) {
+  std::vector<Finding> sorted = findings;
+  std::ranges::stable_sort(sorted, {}, &Finding::severity);
   Json out = Json::array();
-  for (const ReportFinding& finding : sorted)
+  for (const Finding& finding : sorted)
     out.push_back({{"severity", to_string(finding.severity)},
                    {"channel", finding.channel},
                    {"what", finding.what},

@@ -17,6 +17,6 @@ nlohmann::json stabilization_json(const std::vector<StabilizationPole>& poles);
 nlohmann::json nonlinearity_json(const NonlinearityTest& test);
 
 /// [{severity, channel, what, figure, remedy}], the gravest first.
-nlohmann::json findings_json(const std::vector<ReportFinding>& findings);
+nlohmann::json findings_json(const std::vector<Finding>& findings);
 
 }  // namespace stageid::report

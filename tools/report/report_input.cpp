@@ -130,27 +130,12 @@ double delay_in(const FrfEstimate& frf, const std::optional<AdditiveModel>& mode
   return delay_s;
 }
 
-/// A fault of the data is an error on the page, a doubt a warning, an impossible check a note.
-ReportMessage::Severity severity_of(const Finding& finding) {
-  switch (finding.severity) {
-    case Severity::fault:
-      return ReportMessage::Severity::error;
-    case Severity::doubt:
-      return ReportMessage::Severity::warning;
-    case Severity::unchecked:
-      return ReportMessage::Severity::note;
-  }
-  return ReportMessage::Severity::note;
-}
-
 /// The verdicts in the file refer to all measured lines, whatever band was fitted.
 void add_checks(ReportData& data) {
   const FrfEstimate& frf = *data.frf;
   if (NonlinearityTest test = linearity_of(frf); test.band_hz.rows() > 0)
     data.nonlinearity = std::move(test);
-  for (const Finding& finding : health_of(frf.provenance_json))
-    data.findings.push_back(
-        {severity_of(finding), finding.channel, finding.what, finding.figure, finding.remedy});
+  data.findings = health_of(frf.provenance_json);
 }
 
 void add_stabilization(ReportData& data) {

@@ -48,12 +48,12 @@ void judge_modes(const ReportData& data, Reasons& reasons) {
   }
 }
 
-/// @returns whether one of the findings is an error.
+/// @returns whether one of the findings is a fault.
 bool judge_findings(const ReportData& data, Reasons& reasons) {
   bool error = false;
-  for (const ReportFinding& finding : data.findings) {
-    if (finding.severity == ReportMessage::Severity::note) continue;
-    error = error || finding.severity == ReportMessage::Severity::error;
+  for (const Finding& finding : data.findings) {
+    if (finding.severity == Severity::unchecked) continue;
+    error = error || finding.severity == Severity::fault;
     reasons.push_back(fmt::format("{}{}{}{}", finding.channel, finding.channel.empty() ? "" : ": ",
                                   finding.what,
                                   finding.figure.empty() ? "" : " (" + finding.figure + ")"));

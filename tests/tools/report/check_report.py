@@ -224,7 +224,7 @@ def check_diagrams(found, expected):
                and found["distortion_text"].endswith("in 1 of 3 bands the records are not settled"), found["distortion_text"])  # fmt: skip
     expect(found["findings"] == expected["findings"], f"{found['findings']} findings instead of {expected['findings']}")
     if found["findings"]:
-        expect(found["first_finding"] == "error", f"the first finding is {found['first_finding']}")
+        expect(found["first_finding"] == "fault", f"the first finding is {found['first_finding']}")
 
 
 def check_saved(saved):

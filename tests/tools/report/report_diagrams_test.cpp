@@ -39,17 +39,16 @@ TEST(ReportDiagrams, KeepFourDigitsOfATestHoweverSmallItsChance) {
 }
 
 TEST(ReportDiagrams, TellTheGravestFindingFirst) {
-  using Severity = ReportMessage::Severity;
-  const json got = findings_json({{Severity::note, "", "a", "", ""},
-                                  {Severity::error, "z1", "b", "3", "c"},
-                                  {Severity::warning, "z2", "d", "", ""}});
+  const json got = findings_json({{Severity::unchecked, Cause::incoherent, "", "a", "", ""},
+                                  {Severity::fault, Cause::incoherent, "z1", "b", "3", "c"},
+                                  {Severity::doubt, Cause::incoherent, "z2", "d", "", ""}});
   ASSERT_EQ(got.size(), 3u);
-  EXPECT_EQ(got[0], json({{"severity", "error"},
+  EXPECT_EQ(got[0], json({{"severity", "fault"},
                           {"channel", "z1"},
                           {"what", "b"},
                           {"figure", "3"},
                           {"remedy", "c"}}));
-  EXPECT_EQ(got[1]["severity"], "warning");
+  EXPECT_EQ(got[1]["severity"], "doubt");
   EXPECT_EQ(got[2]["channel"], "");
 }
 

@@ -16,7 +16,6 @@ namespace stageid {
 namespace test_report_input {
 
 using testing::ElementsAre;
-using MessageSeverity = ReportMessage::Severity;
 
 const std::vector<Finding> kFindings = {
     {Severity::unchecked, Cause::skew, "", "timing is not checked", "", "needs two periods"},
@@ -45,10 +44,10 @@ TEST_F(ReportInputTest, FindingsComeFromTheProvenanceOfTheResponse) {
   keep_health(frf, kFindings);
   const ReportData data = read_back(frf);
   ASSERT_EQ(data.findings.size(), 3u);
-  EXPECT_EQ(data.findings[0].severity, MessageSeverity::error);
-  EXPECT_EQ(data.findings[1].severity, MessageSeverity::warning);
-  EXPECT_EQ(data.findings[2].severity, MessageSeverity::note);
-  const ReportFinding& fault = data.findings[0];
+  EXPECT_EQ(data.findings[0].severity, Severity::fault);
+  EXPECT_EQ(data.findings[1].severity, Severity::doubt);
+  EXPECT_EQ(data.findings[2].severity, Severity::unchecked);
+  const Finding& fault = data.findings[0];
   EXPECT_THAT((std::vector{fault.channel, fault.what, fault.figure, fault.remedy}),
               ElementsAre("a1 a2", "wired crosswise", "0.99", "exchange them"));
 }

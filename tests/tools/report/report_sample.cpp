@@ -202,7 +202,7 @@ void make_hostile(ReportData& data) {
   data.frf->outputs.names[0] = "z\xff\xc0 {{content}} " + attack;
   test::add_other_day(data);
   data.comparison->title = attack;
-  for (ReportFinding& finding : data.findings)
+  for (Finding& finding : data.findings)
     finding.channel = finding.what = finding.figure = finding.remedy = attack;
   data.model->inputs.names[0] = attack;
   data.geometry.actuators[0].name = attack;

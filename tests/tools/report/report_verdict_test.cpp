@@ -37,13 +37,15 @@ TEST(Verdict, ASoundResultIsGood) {
 }
 
 TEST(Verdict, AFaultOfTheDataIsNotTrustedAndADoubtIsDoubted) {
-  using Severity = ReportMessage::Severity;
   ReportData data = sound();
-  data.findings = {{Severity::note, "", "timing is not checked", "", "two periods"}};
+  data.findings = {
+      {Severity::unchecked, Cause::incoherent, "", "timing is not checked", "", "two periods"}};
   EXPECT_EQ(judge(data).level, Level::good);
-  data.findings.push_back({Severity::warning, "", "hum", "12 dB", "look at the shield"});
+  data.findings.push_back(
+      {Severity::doubt, Cause::incoherent, "", "hum", "12 dB", "look at the shield"});
   expect_doubt(data, "hum (12 dB)");
-  data.findings.push_back({Severity::error, "a1 a2", "wired crosswise", "", "exchange them"});
+  data.findings.push_back(
+      {Severity::fault, Cause::incoherent, "a1 a2", "wired crosswise", "", "exchange them"});
   const Verdict verdict = judge(data);
   EXPECT_EQ(verdict.level, Level::bad);
   EXPECT_THAT(verdict.reasons, ElementsAre("hum (12 dB)", "a1 a2: wired crosswise"));

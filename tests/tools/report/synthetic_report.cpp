@@ -237,11 +237,12 @@ void add_checks(ReportData& data) {
   test.settled_p_value = Eigen::Vector3d(0.4, 0.5, 1e-6);
   test.p_value.col(2).setOnes();
   data.nonlinearity = test;
-  using Severity = ReportMessage::Severity;
-  data.findings = {
-      {Severity::note, "", "linearity not checked per axis", "", "measure two realizations"},
-      {Severity::warning, "z1", "hum at 50 Hz", "12 dB above its neighbours", "look at the shield"},
-      {Severity::error, "az2", "clips", "312 samples at the limit", "less excitation"}};
+  data.findings = {{Severity::unchecked, Cause::incoherent, "", "linearity not checked per axis",
+                    "", "measure two realizations"},
+                   {Severity::doubt, Cause::incoherent, "z1", "hum at 50 Hz",
+                    "12 dB above its neighbours", "look at the shield"},
+                   {Severity::fault, Cause::incoherent, "az2", "clips", "312 samples at the limit",
+                    "less excitation"}};
   if (data.frf->lines() > 160) data.stabilization = stabilization(*data.frf, {.delay_s = delay_s});
 }
 

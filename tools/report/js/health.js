@@ -25,7 +25,7 @@ function buildHealth() {
 
 // Findings of the checks of the data; words in addition to colours.
 function findingTable() {
-  const grave = { error: 2, warning: 1, note: 0 };
+  const grave = { fault: 2, doubt: 1, 'not checked': 0 };
   const heads = ['severity', 'channel', 'finding', 'figure', 'remedy'].map((title) => element('th', { scope: 'col' }, title));
   const rows = content.findings.map((finding) => element('tr', null, element('td', null, element('span', { class: 'severity level-' + grave[finding.severity] }, finding.severity)),
     element('td', { class: 'name' }, finding.channel || 'all'), element('td', null, finding.what), element('td', null, finding.figure || '\u2013'), element('td', null, finding.remedy || '\u2013')));
