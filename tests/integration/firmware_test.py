@@ -1,0 +1,332 @@
+#!/usr/bin/env python3
+"""The example firmware, docs/examples/firmware: built outside the tree, measured over Modbus TCP, disturbed, and
+compared request by request with `stageid node`.
+
+firmware_test.py STAGEID SOURCE_DIR WORK_DIR
+"""
+
+import json
+import pathlib
+import re
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import time
+import unittest
+
+PROGRAM, SOURCE, WORK = sys.argv[1:4]
+FIRMWARE = pathlib.Path(SOURCE) / "docs/examples/firmware"
+FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
+WATCHDOG_S = 2.0
+DELAY_S = 1.0  # of a busy machine
+
+ENABLE, DISABLE, QUICK_STOP, RESET = 1, 2, 3, 4
+BEGIN, END = 1, 2
+DISABLED, ENABLED, MEASURING, FAULT = 1, 4, 5, 8
+BUSY = "exception 6"
+
+
+def run(*words):
+    return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True, timeout=50)
+
+
+def words(*numbers):
+    return [word for number in numbers for word in (number >> 16 & 0xFFFF, number & 0xFFFF)]
+
+
+def number(registers, index=0):
+    return registers[index] << 16 | registers[index + 1]
+
+
+class Client:
+    """One connection, with one request at a time."""
+
+    def __init__(self, port):
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=10)
+        self.transaction = 0
+
+    def close(self):
+        self.socket.close()
+
+    def receive(self, count):
+        data = b""
+        while len(data) < count:
+            part = self.socket.recv(count - len(data))
+            if not part:
+                raise ConnectionError("the node has closed the connection")
+            data += part
+        return data
+
+    def send(self, pdu, unit=1):
+        self.transaction += 1
+        self.socket.sendall(struct.pack(">HHHB", self.transaction, 0, len(pdu) + 1, unit) + pdu)
+        transaction, protocol, length, answered = struct.unpack(">HHHB", self.receive(7))
+        assert (transaction, protocol, answered) == (self.transaction, 0, unit)
+        return self.receive(length - 1)
+
+    def ask(self, pdu, unit=1):
+        """The registers of the reply, or its exception."""
+        reply = self.send(pdu, unit)
+        if reply[0] & 0x80:
+            return f"exception {reply[1]}"
+        return list(struct.unpack(f">{reply[1] // 2}H", reply[2:])) if pdu[0] in (3, 4, 23) else []
+
+    def read(self, first, count):
+        return self.ask(struct.pack(">BHH", 3, first, count))
+
+    def write(self, first, values):
+        return self.ask(struct.pack(f">BHHB{len(values)}H", 16, first, len(values), 2 * len(values), *values))
+
+    def exchange(self, first, values, read_first, count):
+        return self.ask(struct.pack(f">BHHHHB{len(values)}H", 23, read_first, count, first, len(values),
+                                    2 * len(values), *values))
+
+    def state(self):
+        return number(self.read(208, 2))
+
+    def command(self, code):
+        """1 accepted, 2 refused"""
+        echo = number(self.read(214, 2))
+        return number(self.exchange(2, words(code, echo + 1), 214, 4), 2)
+
+    def run_command(self, code, sequence, key=0):
+        return self.exchange(16, words(code, sequence, 0, 3, key), 300, 16)
+
+    def setpoint(self, key, sequence, u=(0, 0)):
+        return self.exchange(24, words(key, sequence, *u), 300, 16)
+
+
+class Firmware(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.work = pathlib.Path(WORK)
+        shutil.rmtree(cls.work, ignore_errors=True)
+        shutil.copytree(FIRMWARE, cls.work)
+        sources = sorted(path.name for path in cls.work.glob("*.c"))
+        subprocess.run(["cc", *FLAGS, "-o", "node", *sources, "-lm"], cwd=cls.work, check=True)
+
+    def setUp(self):
+        self.nodes = []
+        self.clients = []
+
+    def tearDown(self):
+        for client in self.clients:
+            client.close()
+        for node in self.nodes:
+            node.kill()
+            node.wait()
+            node.stdout.close()
+
+    def start(self, *command):
+        """A node whose first lines contain its port."""
+        node = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                text=True)
+        self.nodes.append(node)
+        for line in node.stdout:
+            found = re.search(r"(?:port |127\.0\.0\.1:)(\d+)", line)
+            if found:
+                return node, int(found.group(1))
+        self.fail("the node does not start")
+
+    def firmware(self):
+        node, port = self.start(self.work / "node", 0, int(1000 * WATCHDOG_S))
+        text = (FIRMWARE / "stage.yaml").read_text()
+        for example, test in (("port: 1502", f"port: {port}"), ("response_s: 0.2", "response_s: 1"),
+                              ("worst_reply_s: 0.5", "worst_reply_s: 1.5")):
+            self.assertIn(example, text)
+            text = text.replace(example, test)
+        (self.work / "stage.yaml").write_text(text)
+        return node, port
+
+    def client(self, port):
+        self.clients.append(Client(port))
+        return self.clients[-1]
+
+    def identify(self, name, *options, between=lambda process: None):
+        """Frequencies of the modes, in Hz."""
+        log, frf, model = (self.work / f"{name}.{kind}" for kind in ("slog", "h5", "json"))
+        process = subprocess.Popen([PROGRAM, "run", str(self.work / "experiment.yaml"), "-o", str(log), *options],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        between(process)
+        _, errors = process.communicate(timeout=50)
+        self.assertEqual(process.returncode, 0, errors)
+        done = run("frf", log, "-o", frf)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("--json", "fit", frf, "-o", model, "--rigid-body", "none")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return [mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"]]
+
+    def wait_for(self, client, state, seconds):
+        end = time.monotonic() + seconds
+        while client.state() != state:
+            self.assertLess(time.monotonic(), end, f"state {client.state()}; expected {state}")
+            time.sleep(0.005)
+
+    def check_forces_are_zero(self, node, state, cause):
+        for line in node.stdout:
+            if line.startswith(f"state {state}, cause {cause},"):
+                self.assertRegex(line, r"forces 0 0 N$")
+                return
+        self.fail("the node ended")
+
+    def check_modes(self, found):
+        true_hz = [float(hz) for hz in re.findall(r"\{(\d+\.\d+), 0\.\d+, \{", (FIRMWARE / "stage_plant.c").read_text())]
+        self.assertEqual(len(true_hz), 5)
+        self.assertEqual(len(found), 5, found)
+        for expected, measured in zip(sorted(true_hz), sorted(found)):
+            self.assertLess(abs(measured / expected - 1.0), 1e-4)
+
+    def test_measures_the_modes_and_refuses_a_second_host(self):
+        _, port = self.firmware()
+        undisturbed = self.identify("undisturbed")
+        self.check_modes(undisturbed)
+        intruder = self.client(port)
+
+        def intrude(process):
+            self.wait_for(intruder, MEASURING, 10)
+            while process.poll() is None:
+                self.assertEqual(intruder.setpoint(1, 1000000, (1 << 24, 1 << 24)), BUSY)
+                self.assertEqual(intruder.run_command(END, 77, 1), BUSY)
+                self.assertEqual(intruder.write(28, [1, 2, 3]), BUSY)
+                self.assertEqual(intruder.read(304, 2), [0, 0], "the key is secret")
+                self.assertEqual(intruder.read(24, 2), [0, 0], "the key is secret")
+
+        # The seed of the run is that of the noise: the same experiment gives the same numbers.
+        self.assertEqual(self.identify("disturbed", between=intrude), undisturbed)
+
+    def test_a_killed_host_leaves_the_stage_without_forces(self):
+        node, port = self.firmware()
+        client = self.client(port)
+        slow = [PROGRAM, "run", self.work / "experiment.yaml", "-o", self.work / "killed.slog", "--pace", "0.1"]
+        host = subprocess.Popen(slow, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.wait_for(client, MEASURING, 10)
+        while number(client.read(302, 2)) < 10 or not any(client.read(28, 4)):
+            time.sleep(0.005)
+        host.kill()
+        killed = time.monotonic()
+        host.communicate()
+        self.wait_for(client, FAULT, WATCHDOG_S + DELAY_S)
+        self.assertLess(time.monotonic() - killed, WATCHDOG_S + DELAY_S)
+        self.assertEqual(number(client.read(210, 2)), 1)
+        self.check_forces_are_zero(node, FAULT, 1)
+        done = run("run", self.work / "experiment.yaml", "-o", self.work / "refused.slog")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("--reset-fault", done.stderr)
+        self.check_modes(self.identify("after", "--reset-fault"))
+
+    def test_a_lost_heartbeat_stops_the_stage(self):
+        node, port = self.firmware()
+        client, other = self.client(port), self.client(port)
+        self.assertEqual(client.command(ENABLE), 1)
+        self.assertEqual(client.write(0, words(5)), [])
+        self.assertEqual(other.write(0, words(6)), BUSY)
+        began = time.monotonic()
+        self.wait_for(client, FAULT, 1.0 + DELAY_S)
+        self.assertGreater(time.monotonic() - began, 0.9)
+        self.assertEqual(number(client.read(210, 2)), 9)
+        self.check_forces_are_zero(node, FAULT, 9)
+
+    def test_a_host_is_refused_while_another_measures(self):
+        _, port = self.firmware()
+        owner = self.client(port)
+        self.assertEqual(owner.command(ENABLE), 1)
+        key = number(owner.run_command(BEGIN, 5), 4)
+        second = subprocess.Popen([PROGRAM, "run", self.work / "experiment.yaml", "-o", self.work / "second.slog"],
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        n = 0
+        while second.poll() is None:
+            n += 1
+            reply = owner.setpoint(key, n)
+            self.assertEqual((number(reply, 2), number(reply, 6)), (n, MEASURING << 8))
+            time.sleep(0.01)
+        self.assertEqual(second.returncode, 1)
+        self.assertIn("another host", second.communicate()[1])
+        self.assertEqual(number(owner.run_command(END, 6, key), 4), key)
+        self.assertEqual(owner.state(), ENABLED)
+
+    def conversation(self, port):
+        """Requests, most of them wrong, and what a node answers to them."""
+        one, two = self.client(port), self.client(port)
+        said = []
+
+        def note(what, reply, part=slice(None)):
+            said.append((what, reply[part] if isinstance(reply, list) else reply))
+
+        note("identity", one.read(200, 4))
+        note("description", [one.read(first, 58) for first in range(500, 732, 58)])
+        note("end of the map", one.read(731, 2))
+        note("unused registers", one.read(732 - 100, 90))
+        note("read 126", one.read(0, 126))
+        note("read 0", one.read(0, 0))
+        note("function 4", one.ask(struct.pack(">BHH", 4, 200, 2)))
+        note("function 5", one.ask(struct.pack(">BHH", 5, 0, 0)))
+        note("unit 2", one.ask(struct.pack(">BHH", 3, 200, 2), unit=2))
+        note("short", one.ask(struct.pack(">BH", 3, 200)))
+        note("byte count", one.ask(struct.pack(">BHHBH", 16, 28, 1, 4, 0)))
+        note("read only", one.write(208, words(4)))
+        note("across the end", one.write(138, words(0, 0)))
+        note("setpoint without a run", one.setpoint(0, 1))
+        note("end without a run", one.run_command(END, 9))
+        note("begin before enable", one.run_command(BEGIN, 10))
+        note("unknown command", one.command(5))
+        note("reset", one.command(RESET))
+        note("quick stop", one.command(QUICK_STOP))
+        note("disable", one.command(DISABLE))
+        note("enable", [one.command(ENABLE), one.command(ENABLE), one.state(), two.command(RESET)])
+        note("unknown run command", one.run_command(3, 11))
+        begun = one.run_command(BEGIN, 12)
+        key = number(begun, 4)
+        note("begin", [key != 0, begun[2:4], begun[6:12], one.state()])
+        note("begin again", one.run_command(BEGIN, 12) == begun)
+        note("begin again with the key", one.run_command(BEGIN, 12, key) == begun)
+        note("new begin", [one.run_command(BEGIN, 13), one.run_command(BEGIN, 14, key), two.run_command(BEGIN, 15)])
+        note("the same sequence, foreign", two.run_command(BEGIN, 12))
+        first = one.setpoint(key, 1, (1000, 2000))
+        note("setpoint 1", first, slice(2, 4))
+        note("status 1", first, slice(6, 12))
+        note("setpoint again", one.setpoint(key, 1, (9, 9)) == first)
+        note("older", one.setpoint(key, 0, (9, 9)) == first)
+        note("much older", one.setpoint(key, 0x80000001, (9, 9)) == first)
+        note("wrong key", [one.setpoint(key ^ 1, 2), two.setpoint(key, 2), two.run_command(END, 16, key)])
+        note("seen by others", [two.read(304, 2), one.read(24, 2), two.read(302, 2)])
+        gap = one.setpoint(key, 5)
+        note("three missed", gap[2:4] + gap[6:8])
+        note("disable while measuring", two.command(DISABLE))
+        note("enable while measuring", two.command(ENABLE))
+        ended = one.run_command(END, 17, key)
+        note("end", [number(ended, 4) == key, ended[2:4], ended[6:16], one.state()])
+        note("end again", one.run_command(END, 17, key) == ended)
+        note("setpoint after the end", one.setpoint(key, 1), slice(2, 4))
+        late = one.setpoint(key, 2)
+        note("status after the end", [late[6:12], number(late, 4) == key])
+        note("foreign setpoint after the end", two.setpoint(key, 3))
+        again = number(two.run_command(BEGIN, 18), 4)
+        note("another host", [again != 0, again != key, one.setpoint(key, 3), one.read(304, 2)])
+        note("quick stop while measuring", one.command(QUICK_STOP))
+        self.wait_for(one, DISABLED, 2)
+        stopped = two.setpoint(again, 1)
+        note("status after a quick stop", [stopped[2:4], stopped[6:12], number(stopped, 4) == again])
+        note("enable", two.command(ENABLE))
+        begun = two.run_command(BEGIN, 19)
+        note("silent", begun[6:8])
+        self.wait_for(one, FAULT, WATCHDOG_S + DELAY_S)
+        failed = two.setpoint(number(begun, 4), 1)
+        note("status after silence", [failed[2:4], failed[6:12], failed[4:6] == begun[4:6]])
+        note("end after silence", two.run_command(END, 20, number(begun, 4)), slice(6, 12))
+        note("in fault", [one.command(ENABLE), one.command(DISABLE), one.command(QUICK_STOP), one.state()])
+        note("begin in fault", one.run_command(BEGIN, 21))
+        note("reset", [one.command(RESET), one.state(), number(one.read(210, 2))])
+        return said
+
+    def test_answers_as_the_reference_node(self):
+        _, port = self.firmware()
+        _, reference = self.start(PROGRAM, "node", self.work / "stage.yaml", "--modbus-tcp", 0, "--watchdog", WATCHDOG_S)
+        for ours, theirs in zip(self.conversation(port), self.conversation(reference), strict=True):
+            with self.subTest(ours[0]):
+                self.assertEqual(ours, theirs)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
