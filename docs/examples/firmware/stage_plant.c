@@ -21,7 +21,7 @@ static uint64_t random_state;
 /* Uniform noise. Without any, the rounding to counts would repeat in every period and look like distortion. */
 static double noise_m(void) {
   random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-  return 4e-9 * ((double)(random_state >> 32) / 4294967296.0 - 0.5);
+  return 1e-7 * ((double)(random_state >> 32) / 4294967296.0 - 0.5);
 }
 
 static void discretize(int m) {

@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+"""The example firmware behind CAN FD, docs/examples/firmware: streaming, resident, without its host, with two hosts.
+
+    can_firmware_test.py PROGRAM SOURCE_DIR [unittest arguments]
+
+To be run inside the machine of vmrun.sh, which has vcan0.
+"""
+
+import json
+import pathlib
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import time
+import unittest
+
+from can_machine import FRAME, node_state, raw_socket, wait_for_state
+
+PROGRAM, SOURCE = sys.argv[1:3]
+FIRMWARE = pathlib.Path(SOURCE) / "docs/examples/firmware"
+FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
+WORK = pathlib.Path("/tmp/can_firmware")
+WATCHDOG_S = 2.0
+DELAY_S = 5.0  # of a machine in a machine
+
+
+def crc(data):
+    value = 0xFFFF
+    for byte in data:
+        value ^= byte << 8
+        for _ in range(8):
+            value = (value << 1 ^ 0x1021 if value & 0x8000 else value << 1) & 0xFFFF
+    return value
+
+
+def send_setpoint(run, sequence):
+    """A setpoint for two actuators, in a frame of 16 bytes."""
+    head = struct.pack("<HBBH", sequence, 0, run, 0x1234)
+    values = bytes([0, 0, 0x10] * 2 + [0, 0])
+    data = head + struct.pack("<H", crc(b"\x00\x01" + head + values)) + values
+    with raw_socket("vcan0") as raw:
+        raw.send(FRAME.pack(0x100, len(data), 1, 0, 0, data))
+
+
+def rejected():
+    """Frames that the node has rejected, from its next state."""
+    with raw_socket("vcan0") as raw:
+        while True:
+            data = raw.recv(FRAME.size)
+            if len(data) == FRAME.size and FRAME.unpack(data)[0] == 0x200:
+                return struct.unpack_from("<I", FRAME.unpack(data)[5], 20)[0]
+
+
+class Firmware(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        shutil.copytree(FIRMWARE, WORK)
+        sources = ["socketcan_node.c", "can_frame.c", "can_node.c", "can_resident.c", "stage_plant.c"]
+        subprocess.run(["cc", *FLAGS, "-o", "can_node", *sources, "-lm"], cwd=WORK, check=True)
+        stage = (WORK / "stage_can.yaml").read_text().replace("interface: can0", "interface: vcan0")
+        stage = stage.replace("can:\n", "can:\n  reply_timeout_s: 0.1\n", 1)
+        experiment = (WORK / "experiment.yaml").read_text()
+        for mode in ("streaming", "resident"):
+            (WORK / f"stage_{mode}.yaml").write_text(stage.replace("mode: streaming", f"mode: {mode}"))
+            (WORK / f"{mode}.yaml").write_text(experiment.replace("stage.yaml", f"stage_{mode}.yaml"))
+
+    def setUp(self):
+        self.node = subprocess.Popen([WORK / "can_node", "vcan0", str(int(1000 * WATCHDOG_S))],
+                                     stdout=subprocess.PIPE, text=True)
+        self.assertIn("state 1", self.node.stdout.readline())
+
+    def tearDown(self):
+        self.node.kill()
+        self.node.wait()
+        self.node.stdout.close()
+
+    def call(self, *words):
+        return subprocess.run([PROGRAM, *map(str, words)], cwd=WORK, capture_output=True, text=True, timeout=300)
+
+    def start(self, mode, log, *options):
+        return subprocess.Popen([PROGRAM, "run", f"{mode}.yaml", "-o", log, *options], cwd=WORK,
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def check_modes(self, mode, *options):
+        (WORK / f"{mode}.slog").unlink(missing_ok=True)
+        done = self.call("run", f"{mode}.yaml", "-o", f"{mode}.slog", *options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.call("frf", f"{mode}.slog", "-o", "frf.h5")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.call("--json", "fit", "frf.h5", "-o", "model.json", "--rigid-body", "none")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = sorted(mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"])
+        true_hz = sorted(float(hz) for hz in re.findall(r"\{(\d+\.\d+), 0\.\d+, \{",
+                                                        (FIRMWARE / "stage_plant.c").read_text()))
+        self.assertEqual(len(true_hz), 5)
+        self.assertEqual(len(found), 5, found)
+        for expected, measured in zip(true_hz, found):
+            self.assertLess(abs(measured / expected - 1.0), 1e-4)
+
+    def test_streaming(self):
+        self.check_modes("streaming")
+
+    def test_resident(self):
+        self.check_modes("resident")
+
+    def test_a_killed_host_leaves_the_stage_without_forces(self):
+        host = self.start("streaming", "killed.slog", "--pace", "0.1")
+        wait_for_state("measuring")
+        time.sleep(1.0)
+        host.kill()
+        killed = time.monotonic()
+        host.communicate()
+        self.assertEqual(wait_for_state("fault"), ("fault", "watchdog"))
+        self.assertLess(time.monotonic() - killed, WATCHDOG_S + DELAY_S)
+        self.assertRegex([self.node.stdout.readline() for _ in range(2)][-1], r"^state 8, cause 1, forces 0 0 N$")
+        done = self.call("run", "streaming.yaml", "-o", "refused.slog")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.check_modes("streaming", "--reset-fault")
+
+    def test_a_second_host_is_refused(self):
+        first = self.start("streaming", "first.slog", "--pace", "0.1")
+        wait_for_state("measuring")
+        for mode in ("streaming", "resident"):
+            done = self.call("run", f"{mode}.yaml", "-o", f"second_{mode}.slog")
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn("another host", done.stderr)
+        before = rejected()
+        for run in range(256):
+            send_setpoint(run, 1000)
+        self.assertEqual(rejected(), before + 256)
+        self.assertEqual(node_state(), ("measuring", "none"))
+        self.assertIsNone(first.poll())
+        first.kill()
+        first.communicate()
+
+
+if __name__ == "__main__":
+    unittest.main(argv=["can_firmware_test.py", *sys.argv[3:]], verbosity=2)
