@@ -20,7 +20,7 @@ constexpr double kFalseAlarms = 0.005;  // probability per log
 constexpr Index kReach = 2;             // lines on either side of a maximum
 constexpr double kMemory = 0.6;         // see the header
 constexpr double kLargestShift = 0.5;   // deviations
-constexpr double kTolerable = 10.0;     // deviations, of the bound; a tenth of it is typical
+constexpr double kTolerable = 3.0;      // standard deviations, of the expected shift
 
 /// Noise of one period on each line, and the power of the start relative to it.
 struct Lines {
@@ -197,7 +197,9 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
     names += fmt::format(" and {} more", frequencies.size() - kMostNamed);
   const int needed = evidence.transient_periods + std::max(1, more);
   Finding finding;
-  finding.severity = settled > kTolerable ? Severity::fault : Severity::doubt;
+  // The bound is reached if all runs shift the mode alike. Their phases are random.
+  const double expected = settled / std::sqrt(static_cast<double>(evidence.runs.size()));
+  finding.severity = expected > kTolerable ? Severity::fault : Severity::doubt;
   finding.cause = Cause::unsettled;
   finding.what =
       fmt::format("not settled: the transient of the start still rings at {} Hz after {}", names,

@@ -26,7 +26,9 @@ namespace stageid {
 /// From W = c B follows q: c = (q - mean q^2...q^P) / (1 - mean q...q^P). The transient in the mean of the used
 /// periods, relative to its noise and over all runs, sensors and lines of the window, bounds the shift of every
 /// fitted parameter in its own standard deviations (Cauchy-Schwarz). Shifts below half a deviation are not
-/// reported; the remedy discards as many periods as are needed to get there.
+/// reported; the remedy discards as many periods as are needed to get there. Runs have random phases, so the
+/// expected shift is the bound over the root of their number. A fault if it is above three deviations although the
+/// first period is discarded.
 std::vector<Finding> check_start_transient(const StartEvidence& evidence);
 
 }  // namespace stageid
