@@ -66,6 +66,8 @@ std::optional<std::pair<std::size_t, std::size_t>> coalesced(const AdditiveModel
 struct Simpler {
   AdditiveModel model;
   std::string reason;
+  std::optional<AdditiveModel> held = {};  ///< with the mode, its pole held
+  std::string reason_to_hold = {};
 };
 
 /// The model with one mode less: without one of two that converged to each other, else without the least determined.
@@ -86,6 +88,13 @@ std::optional<Simpler> simpler(const AdditiveModel& model) {
       "removed {:.6g} Hz, which the data do not support (standard deviation {:.2g} times its "
       "value) and which prevented the fit from converging",
       place->natural_frequency_hz(), open->doubt);
+  out.reason_to_hold = fmt::format(
+      "held the pole at {:.6g} Hz, which the data need but do not determine (standard deviation "
+      "{:.2g} times its value) and which prevented the fit from converging",
+      place->natural_frequency_hz(), open->doubt);
+  out.held = model;
+  Submodel& mode = out.held->submodels[open->submodel];
+  mode.frequency_held = mode.damping_held = true;
   out.model.submodels.erase(place);
   return out;
 }
@@ -129,10 +138,19 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
     const std::optional<Simpler> fewer = simpler(fit.model);
     if (!fewer) break;
     const double cost = fit.model.fit.cost;
+    const double criterion = information_criterion(frf, fit);
+    std::string reason = fewer->reason;
     fit = fit_additive_model(frf, fewer->model, options);
+    // A mode beside the lines may be needed although its pole is undetermined.
+    if (fewer->held && information_criterion(frf, fit) > criterion) {
+      FitResult held = fit_additive_model(frf, *fewer->held, options);
+      if (information_criterion(frf, held) < information_criterion(frf, fit)) {
+        fit = std::move(held);
+        reason = fewer->reason_to_hold;
+      }
+    }
     if (!(fit.model.fit.cost < kDearestMode * first.model.fit.cost)) return first;
-    given_up.push_back(
-        fmt::format("{}: cost {:.6g} -> {:.6g}", fewer->reason, cost, fit.model.fit.cost));
+    given_up.push_back(fmt::format("{}: cost {:.6g} -> {:.6g}", reason, cost, fit.model.fit.cost));
   }
   if (!fit.trustworthy()) return first;
   left_out = std::move(given_up);

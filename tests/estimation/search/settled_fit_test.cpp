@@ -72,6 +72,26 @@ TEST_F(SettledFit, AModeThatTheDataLeaveOpenIsLeftOut) {
   EXPECT_THAT(fit.decisions.front(), HasSubstr("removed 25"));
 }
 
+// The flank of a mode above the highest line: its residue is needed, its pole is not determined.
+TEST_F(SettledFit, AModeBesideTheLinesThatIsNeededKeepsItsPlace) {
+  constexpr double kBeside_hz = 700.0;
+  const double compliance = 0.02 * true_.submodels[1].denominator[2];
+  for (Eigen::Index k = 0; k < frf_.lines(); ++k)
+    frf_.response(0, k) += compliance / (1.0 - std::pow(frf_.frequency_hz[k] / kBeside_hz, 2));
+  AdditiveModel start = true_;
+  start.submodels.push_back(
+      test::empty_submodel(true_, 0, test::mode_coefficients(kBeside_hz, 1e-4), 1));
+  options_.max_iterations = 3;
+  ASSERT_FALSE(fit_additive_model(frf_, start, options_).trustworthy());
+  const FitResult fit = settled_fit(frf_, start, options_);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  ASSERT_EQ(count_modes(fit.model), 3);
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
+  ASSERT_FALSE(fit.decisions.empty());
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("held the pole at"));
+}
+
 // The data have a double pole: nothing that two modes with numerators B_0 reach, though the nearer they come the better
 // they fit.
 TEST_F(SettledFit, TwoModesThatRunIntoEachOtherBecomeOne) {
