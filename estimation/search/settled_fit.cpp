@@ -66,37 +66,33 @@ std::optional<std::pair<std::size_t, std::size_t>> coalesced(const AdditiveModel
 struct Simpler {
   AdditiveModel model;
   std::string reason;
-  std::optional<AdditiveModel> held = {};  ///< with the mode, its pole held
-  std::string reason_to_hold = {};
 };
 
-/// The model with one mode less: without one of two that converged to each other, else without the least determined.
-std::optional<Simpler> simpler(const AdditiveModel& model) {
+/// Simpler models, the simplest first: without one of two modes that converged to each other, else without the least
+/// determined mode, or with its pole held. Empty: all modes are determined.
+std::vector<Simpler> simpler(const AdditiveModel& model) {
   if (const auto pair = coalesced(model)) {
     const auto [i, j] = *pair;
-    return Simpler{
-        with_one_of(model, i, j),
-        fmt::format(
-            "merged {:.6g} and {:.6g} Hz, which coincided and prevented the fit from converging",
-            model.submodels[i].natural_frequency_hz(), model.submodels[j].natural_frequency_hz())};
+    return {
+        {with_one_of(model, i, j), fmt::format("merged {:.6g} and {:.6g} Hz, which coincided and",
+                                               model.submodels[i].natural_frequency_hz(),
+                                               model.submodels[j].natural_frequency_hz())}};
   }
   const std::optional<OpenMode> open = most_open(model);
-  if (!open) return std::nullopt;
-  Simpler out{model, {}};
-  const auto place = out.model.submodels.begin() + static_cast<std::ptrdiff_t>(open->submodel);
-  out.reason = fmt::format(
-      "removed {:.6g} Hz, which the data do not support (standard deviation {:.2g} times its "
-      "value) and which prevented the fit from converging",
-      place->natural_frequency_hz(), open->doubt);
-  out.reason_to_hold = fmt::format(
-      "held the pole at {:.6g} Hz, which the data need but do not determine (standard deviation "
-      "{:.2g} times its value) and which prevented the fit from converging",
-      place->natural_frequency_hz(), open->doubt);
-  out.held = model;
-  Submodel& mode = out.held->submodels[open->submodel];
+  if (!open) return {};
+  const double frequency_hz = model.submodels[open->submodel].natural_frequency_hz();
+  const std::string doubt =
+      fmt::format("(standard deviation {:.2g} times its value) and which", open->doubt);
+  Simpler without{model, fmt::format("removed {:.6g} Hz, which the data do not support {}",
+                                     frequency_hz, doubt)};
+  without.model.submodels.erase(without.model.submodels.begin() +
+                                static_cast<std::ptrdiff_t>(open->submodel));
+  Simpler held{
+      model, fmt::format("held the pole at {:.6g} Hz, which the data need but do not determine {}",
+                         frequency_hz, doubt)};
+  Submodel& mode = held.model.submodels[open->submodel];
   mode.frequency_held = mode.damping_held = true;
-  out.model.submodels.erase(place);
-  return out;
+  return {std::move(without), std::move(held)};
 }
 
 bool may_converge(const FitResult& fit) {
@@ -135,22 +131,22 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
   FitResult fit = first;
   std::vector<std::string> given_up;
   while (may_converge(fit) && count_modes(fit.model) > 1) {
-    const std::optional<Simpler> fewer = simpler(fit.model);
-    if (!fewer) break;
-    const double cost = fit.model.fit.cost;
-    const double criterion = information_criterion(frf, fit);
-    std::string reason = fewer->reason;
-    fit = fit_additive_model(frf, fewer->model, options);
+    const std::vector<Simpler> models = simpler(fit.model);
+    if (models.empty()) break;
+    FitResult next = fit_additive_model(frf, models[0].model, options);
+    std::size_t chosen = 0;
     // A mode beside the lines may be needed although its pole is undetermined.
-    if (fewer->held && information_criterion(frf, fit) > criterion) {
-      FitResult held = fit_additive_model(frf, *fewer->held, options);
-      if (information_criterion(frf, held) < information_criterion(frf, fit)) {
-        fit = std::move(held);
-        reason = fewer->reason_to_hold;
+    if (models.size() > 1 && information_criterion(frf, next) > information_criterion(frf, fit)) {
+      FitResult held = fit_additive_model(frf, models[1].model, options);
+      if (information_criterion(frf, held) < information_criterion(frf, next)) {
+        next = std::move(held);
+        chosen = 1;
       }
     }
-    if (!(fit.model.fit.cost < kDearestMode * first.model.fit.cost)) return first;
-    given_up.push_back(fmt::format("{}: cost {:.6g} -> {:.6g}", reason, cost, fit.model.fit.cost));
+    if (!(next.model.fit.cost < kDearestMode * first.model.fit.cost)) return first;
+    given_up.push_back(fmt::format("{} prevented the fit from converging: cost {:.6g} -> {:.6g}",
+                                   models[chosen].reason, fit.model.fit.cost, next.model.fit.cost));
+    fit = std::move(next);
   }
   if (!fit.trustworthy()) return first;
   left_out = std::move(given_up);

@@ -117,11 +117,8 @@ class DriftFit {
     change_[k] = D.norm();
     bias_[k] = (X.array().abs() / noise.sqrt()).maxCoeff();
     const Eigen::Map<const MatrixXcd> W(weighted.data(), n_y, n_u);
-    MatrixXcd C(n_y, n_y);
-    C.real() = frf_.residual_covariance_re.col(k).reshaped(n_y, n_y);
-    C.imag() = frf_.residual_covariance_im.col(k).reshaped(n_y, n_y);
     const MatrixXcd S = frf_.input_factor.col(k).reshaped(n_u, n_u);
-    const MatrixXcd of_inputs = W.adjoint() * C * W;
+    const MatrixXcd of_inputs = W.adjoint() * output_covariance(frf_, k) * W;
     // At least the rounding errors.
     variance_[k] =
         0.5 * slope_.variance * (S.cwiseProduct(of_inputs).sum().real() + least * W.squaredNorm());

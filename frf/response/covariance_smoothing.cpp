@@ -48,9 +48,7 @@ void propagate(FrfEstimate& frf) {
   const Eigen::Index n_u = frf.n_inputs();
   const Eigen::Index n_c = n_y * n_u;
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    Eigen::MatrixXcd C(n_y, n_y);
-    C.real() = frf.residual_covariance_re.col(k).reshaped(n_y, n_y);
-    C.imag() = frf.residual_covariance_im.col(k).reshaped(n_y, n_y);
+    const Eigen::MatrixXcd C = output_covariance(frf, k);
     const Eigen::Map<const Eigen::MatrixXcd> S(frf.input_factor.col(k).data(), n_u, n_u);
     for (Eigen::Index j = 0; j < n_u; ++j)
       frf.noise_variance.col(k).segment(n_y * j, n_y) = S(j, j).real() * C.diagonal().real();

@@ -70,14 +70,11 @@ Eigen::MatrixXcd covariance_with_distortion(const FrfEstimate& frf,
   };
   Eigen::MatrixXcd out(n_y * n_y, frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    Eigen::MatrixXcd C_E(n_y, n_y);
-    C_E.real() = frf.residual_covariance_re.col(k).reshaped(n_y, n_y);
-    C_E.imag() = frf.residual_covariance_im.col(k).reshaped(n_y, n_y);
     const Eigen::MatrixXcd G = frf.response.col(k).reshaped(n_y, n_u);
     const Eigen::ArrayXd noise = frf.noise_variance.col(k).reshaped(n_y, n_u).rowwise().mean();
     const Eigen::ArrayXd total = variance.col(k).reshaped(n_y, n_u).rowwise().mean();
-    const Eigen::MatrixXcd C =
-        scaled(C_E, noise) + scaled(G * G.adjoint(), (total - noise).max(0.0));
+    const Eigen::MatrixXcd C = scaled(output_covariance(frf, k), noise) +
+                               scaled(G * G.adjoint(), (total - noise).max(0.0));
     out.col(k) = C.reshaped();
   }
   return out;

@@ -111,6 +111,13 @@ FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
   return frf;
 }
 
+Eigen::MatrixXcd output_covariance(const FrfEstimate& frf, Eigen::Index k) {
+  Eigen::MatrixXcd C(frf.n_outputs(), frf.n_outputs());
+  C.real() = frf.residual_covariance_re.col(k).reshaped(C.rows(), C.cols());
+  C.imag() = frf.residual_covariance_im.col(k).reshaped(C.rows(), C.cols());
+  return C;
+}
+
 FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,
                             const std::vector<std::string>& outputs) {
   const Indices input_at = positions(frf.inputs, inputs, "inputs", "input");

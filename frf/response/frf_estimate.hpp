@@ -102,6 +102,9 @@ struct FrfEstimate {
 /// @throws std::invalid_argument if none is left.
 FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz);
 
+/// C_E of line k, n_y x n_y. @pre the residual covariance is known
+Eigen::MatrixXcd output_covariance(const FrfEstimate& frf, Eigen::Index k);
+
 /// The named channels, in the given order. @throws std::invalid_argument naming an unknown channel and the existing
 /// ones.
 FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,

@@ -246,16 +246,13 @@ void Identification::write_outputs() {
   summary_ = summary();
   write_text_file(path("summary.json"),
                   summary_.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
-  ReportParts parts;
-  parts.frf = std::move(frf_);
-  parts.validation_frf = std::move(validation_frf_);
-  parts.model = model_;
-  parts.model_variance = std::move(model_variance_);
-  parts.chosen_modes = std::move(chosen_modes_);
-  parts.log = path("run.slog");
-  parts.summary_file = path("summary.json");
-  parts.summary = summary_;
-  ReportData report = report_data(std::move(parts));
+  ReportData report;
+  report.frf = std::move(frf_);
+  report.validation_frf = std::move(validation_frf_);
+  report.model = model_;
+  report.model_variance = std::move(model_variance_);
+  report.chosen_modes = std::move(chosen_modes_);
+  complete_report(report, {path("run.slog"), {}, path("summary.json"), summary_});
   report.title = config_.stage.spec.info.name;
   write_report(path("report.html"), report);
 }

@@ -107,7 +107,7 @@ void PlotCommand::run() const {
   if (input.frf.empty())
     throw std::invalid_argument(fmt::format("{}: contains no frequency response; add an FRF file",
                                             inputs_.front().string()));
-  draw(picture(response_data(read_report_parts(input))), output_);
+  draw(picture(read_response_data(input)), output_);
   console_.result(
       fmt::format("wrote {}, {} bytes", output_.string(), std::filesystem::file_size(output_)));
   console_.result({{"output", output_.string()},

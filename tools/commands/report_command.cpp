@@ -34,7 +34,7 @@ void ReportCommand::run() const {
     throw std::invalid_argument(fmt::format(
         "{}: the report is an HTML page; use a name ending in .html. To print it, use a browser",
         output_.string()));
-  ReportData data = report_data(read_report_parts(report_input(inputs_)));
+  ReportData data = read_report_data(report_input(inputs_));
   if (!compare_.empty()) add_comparison(data, compare_);
   write_report(output_, data);
   console_.result(fmt::format("wrote {}", output_.string()));

@@ -113,12 +113,11 @@ void add_file(ReportInput& input, const std::filesystem::path& file) {
 }
 
 /// Only the lines that the model was fitted to are shown.
-void keep_fitted_band(ReportParts& parts) {
-  if (!parts.model || !(parts.model->fit.band_hz[1] > parts.model->fit.band_hz[0])) return;
-  for (std::optional<FrfEstimate>* frf : {&parts.frf, &parts.validation_frf})
+void keep_fitted_band(ReportData& data) {
+  if (!data.model || !(data.model->fit.band_hz[1] > data.model->fit.band_hz[0])) return;
+  for (std::optional<FrfEstimate>* frf : {&data.frf, &data.validation_frf})
     if (*frf)
-      *frf =
-          select_band(std::move(**frf), parts.model->fit.band_hz[0], parts.model->fit.band_hz[1]);
+      *frf = select_band(std::move(**frf), data.model->fit.band_hz[0], data.model->fit.band_hz[1]);
 }
 
 /// All delays of the response, which a polynomial in z should not have to approximate.
@@ -193,6 +192,18 @@ void add_log(ReportData& data, const std::filesystem::path& file) {
       data.documents.push_back({name, text});
 }
 
+ReportData read_response(const ReportInput& input) {
+  ReportData data;
+  if (!input.frf.empty()) data.frf = read_frf(input.frf);
+  if (!input.validation_frf.empty()) data.validation_frf = read_frf(input.validation_frf);
+  if (!input.model.empty()) data.model = read_model(input.model);
+  keep_fitted_band(data);
+  if (data.model && data.frf && !input.model_h5.empty())
+    data.model_variance = read_response_variance(input.model_h5, data.frf->frequency_hz);
+  if (!input.modes.empty()) data.chosen_modes = read_modes(input.modes);
+  return data;
+}
+
 }  // namespace
 
 ReportInput report_input(const std::vector<std::filesystem::path>& files) {
@@ -217,32 +228,9 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files) {
   return input;
 }
 
-ReportParts read_report_parts(const ReportInput& input) {
-  ReportParts parts;
-  if (!input.frf.empty()) parts.frf = read_frf(input.frf);
-  if (!input.validation_frf.empty()) parts.validation_frf = read_frf(input.validation_frf);
-  if (!input.model.empty()) parts.model = read_model(input.model);
-  keep_fitted_band(parts);
-  if (parts.model && parts.frf && !input.model_h5.empty())
-    parts.model_variance = read_response_variance(input.model_h5, parts.frf->frequency_hz);
-  if (!input.modes.empty()) parts.chosen_modes = read_modes(input.modes);
-  parts.log = input.log;
-  parts.stage = input.stage;
-  parts.summary_file = input.summary;
-  if (!input.summary.empty())
-    parts.summary = JsonFile(input.summary, "stageid-summary").root().raw();
-  return parts;
-}
-
-ReportData response_data(ReportParts parts) {
-  keep_fitted_band(parts);
-  ReportData data;
-  data.frf = std::move(parts.frf);
-  data.validation_frf = std::move(parts.validation_frf);
-  data.model = std::move(parts.model);
-  data.model_variance = std::move(parts.model_variance);
-  data.chosen_modes = std::move(parts.chosen_modes);
-  if (!data.frf) return data;
+void complete_response(ReportData& data) {
+  keep_fitted_band(data);
+  if (!data.frf) return;
   if (data.model) {
     data.model_response = response_like(*data.model, *data.frf);
     if (data.validation_frf)
@@ -250,15 +238,10 @@ ReportData response_data(ReportParts parts) {
   }
   data.cmif_kind = PeakOptions().kind;
   data.cmif_curves = cmif(*data.frf, data.cmif_kind);
-  return data;
 }
 
-ReportData report_data(ReportParts parts) {
-  const std::filesystem::path log = parts.log;
-  const std::filesystem::path stage = parts.stage;
-  const std::filesystem::path summary_file = parts.summary_file;
-  const nlohmann::ordered_json summary = std::move(parts.summary);
-  ReportData data = response_data(std::move(parts));
+void complete_report(ReportData& data, const ReportSources& sources) {
+  complete_response(data);
   data.version = version();
   data.title = "stageid";
   if (data.model) {
@@ -269,10 +252,25 @@ ReportData report_data(ReportParts parts) {
     add_checks(data);
     add_stabilization(data);
   }
-  if (!log.empty()) add_log(data, log);
-  if (!stage.empty()) data.geometry = stage_geometry(stage, read_text(stage));
+  if (!sources.log.empty()) add_log(data, sources.log);
+  if (!sources.stage.empty())
+    data.geometry = stage_geometry(sources.stage, read_text(sources.stage));
   if (!data.geometry.stage.empty()) data.title = data.geometry.stage;
-  if (!summary.is_null()) add_summary(data, summary_file, summary);
+  if (!sources.summary.is_null()) add_summary(data, sources.summary_file, sources.summary);
+}
+
+ReportData read_response_data(const ReportInput& input) {
+  ReportData data = read_response(input);
+  complete_response(data);
+  return data;
+}
+
+ReportData read_report_data(const ReportInput& input) {
+  ReportData data = read_response(input);
+  ReportSources sources{input.log, input.stage, input.summary, {}};
+  if (!input.summary.empty())
+    sources.summary = JsonFile(input.summary, "stageid-summary").root().raw();
+  complete_report(data, sources);
   return data;
 }
 

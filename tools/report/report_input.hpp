@@ -25,31 +25,30 @@ struct ReportInput {
 /// @throws std::invalid_argument for an unsupported file, or two of the same kind.
 ReportInput report_input(const std::vector<std::filesystem::path>& files);
 
-/// The results that pages and pictures are made of, from files or from the job that computed them; each may be missing.
-struct ReportParts {
-  std::optional<FrfEstimate> frf;
-  std::optional<FrfEstimate> validation_frf;
-  std::optional<AdditiveModel> model;
-  Eigen::MatrixXd model_variance;  ///< (n_y n_u) x lines of the FRF in the band of the model
-  std::vector<ModeCandidate> chosen_modes;
+/// What a page shows beside the response data.
+struct ReportSources {
   std::filesystem::path log;
-  std::filesystem::path stage;
+  std::filesystem::path stage;         ///< for the positions; default: the one in the log
   std::filesystem::path summary_file;  ///< named in errors
   nlohmann::ordered_json summary;      ///< of `identify`; null: none
 };
 
-/// @throws FileError, FormatError, std::invalid_argument
-ReportParts read_report_parts(const ReportInput& input);
+/// Completes the response data of pages and pictures: FRFs within the band of the model, response and error of the
+/// model on their lines, validation, CMIF curves.
+/// @param data with FRFs, model, its variance and the chosen modes, as far as they exist
+/// @throws std::invalid_argument
+void complete_response(ReportData& data);
 
-/// The response data of pages and pictures: the FRF within the band of the model, response and error of the model on
-/// its lines, held-back data, validation, CMIF curves, chosen modes.
-/// @throws FileError, FormatError, std::invalid_argument
-ReportData response_data(ReportParts parts);
-
-/// Everything: the response, the verdicts on linearity and the health findings in the FRF (computed if the file has
+/// Completes a page: the response, the verdicts on linearity and the health findings in the FRF (computed if it has
 /// none), poles over orders, log and summary.
-/// @throws as response_data()
-ReportData report_data(ReportParts parts);
+/// @throws FileError, FormatError, std::invalid_argument
+void complete_report(ReportData& data, const ReportSources& sources);
+
+/// The response data of files. @throws FileError, FormatError, std::invalid_argument
+ReportData read_response_data(const ReportInput& input);
+
+/// Everything in the files. @throws as read_response_data()
+ReportData read_report_data(const ReportInput& input);
 
 /// Adds another day or model: a directory of `identify`, or its FRF and model.
 /// @throws as report_input() and report::make_comparison(); std::invalid_argument if neither exists.

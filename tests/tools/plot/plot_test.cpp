@@ -64,7 +64,7 @@ class Plot : public ProgramTest {
     ReportInput input;
     input.frf = at("frf.h5");
     if (with_model) input.model = at("model.json");
-    return response_data(read_report_parts(input));
+    return read_response_data(input);
   }
 };
 

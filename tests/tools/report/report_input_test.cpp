@@ -34,7 +34,7 @@ class ReportInputTest : public testing::Test {
  protected:
   ReportData read_back(const FrfEstimate& frf) const {
     write_frf(directory_ / "frf.h5", frf);
-    return report_data(read_report_parts(report_input({directory_.path()})));
+    return read_report_data(report_input({directory_.path()}));
   }
   const test::TemporaryDirectory directory_;
 };
