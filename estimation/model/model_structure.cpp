@@ -11,6 +11,7 @@ namespace stageid {
 namespace {
 
 constexpr double kTaken = 0.05;  // of a frequency: a neighbour this close is found in the residual
+constexpr double kSuspensionDamping = 0.1;
 
 }  // namespace
 
@@ -22,6 +23,25 @@ Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,
   s.numerator.assign(structure.general_damping ? 2 : 1,
                      Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs()));
   return s;
+}
+
+Submodel suspension_mode(const FrfEstimate& frf, double frequency_hz) {
+  Submodel s = mode_submodel(frf, {}, {frequency_hz, kSuspensionDamping, 1});
+  s.role = SubmodelRole::suspension;
+  return s;
+}
+
+ModelStructure structure_of(const AdditiveModel& model) {
+  ModelStructure out{.rigid_body = false};
+  for (const Submodel& s : model.submodels) {
+    if (s.role != SubmodelRole::searched)
+      out.given.push_back(s);
+    else if (s.is_mode())
+      out.general_damping = out.general_damping || s.numerator.size() > 1;
+    else
+      (s.integrators == 2 ? out.rigid_body : out.direct_term) = true;
+  }
+  return out;
 }
 
 std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructure& structure) {

@@ -8,13 +8,31 @@
 
 namespace stageid {
 
+/// The parts of a structure that a search may change.
+struct OpenStructure {
+  bool rigid_body = false;
+  bool direct_term = false;
+  bool general_damping = false;
+  bool delay = false;
+  bool operator==(const OpenStructure&) const = default;
+};
+
 /// Submodels besides the modes.
 struct ModelStructure {
   bool rigid_body = true;            ///< B_0 / s^2
   bool direct_term = false;          ///< a constant matrix: compliance of modes above the band
   bool general_damping = false;      ///< modes with B_0 + B_1 s (general viscous) instead of B_0
   std::vector<Submodel> given = {};  ///< further ones with start values; role not `searched`
+  OpenStructure open = {};           ///< a search chooses these, starting from the values above
 };
+
+constexpr double kSuspensionStart = 0.25;  ///< of the lowest line: frequency of a suspension
+
+/// A rigid body of up to min(n_y, n_u) degrees of freedom on springs, numerators zero.
+Submodel suspension_mode(const FrfEstimate& frf, double frequency_hz);
+
+/// The structure of a model, with nothing open.
+ModelStructure structure_of(const AdditiveModel& model);
 
 /// A mode at the frequency and damping of its candidate, numerators zero.
 Submodel mode_submodel(const FrfEstimate& frf, const ModelStructure& structure,

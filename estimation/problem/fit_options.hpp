@@ -111,8 +111,9 @@ struct FitResult {
       model;  ///< the iterate of least cost, with standard deviations if variances are known
   FitStatus status = FitStatus::iteration_limit;
   std::string message = "fit_additive_model was not called";
-  Eigen::Index parameters = 0;         ///< free ones
-  std::vector<double> cost;            ///< one entry per iterate, the start first
+  Eigen::Index parameters = 0;           ///< free ones
+  DelayModel delay = DelayModel::fixed;  ///< of these, the delays
+  std::vector<double> cost;              ///< one entry per iterate, the start first
   std::vector<std::string> decisions;  ///< choices of an automatic fit and their reasons, in order
   std::vector<std::string> findings;   ///< the decisions on which the user should act
   std::vector<ResidueRankTest> residue_ranks;  ///< if residues were free and deviations requested

@@ -271,9 +271,9 @@ FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
         fmt::format("structure: numerators B_0 + B_1 s, a direct term and no rigid body, because "
                     "the outputs are accelerations [{}]",
                     units.front()));
-  if (!request.general_damping) request.general_damping = chosen;
-  if (!request.direct_term) request.direct_term = chosen;
-  if (chosen) request.rigid_body.kind = RigidBodyRequest::Kind::none;
+  if (!chosen) return request;
+  request.general_damping = request.direct_term = true;
+  request.rigid_body.kind = RigidBodyRequest::Kind::none;
   return request;
 }
 
@@ -281,6 +281,8 @@ FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
 std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
   using Json = nlohmann::ordered_json;
   const FitOptions& o = setup.options;
+  const ModelStructure& structure = setup.structure.common;
+  const OpenStructure& open = structure.open;
   Json modes = modes_kind(request) == ModesRequest::Kind::none ? "none" : "auto";
   if (setup.selection.exactly > 0) modes = fmt::format("{}", setup.selection.exactly);
   if (!setup.selection.modes.empty()) {
@@ -298,8 +300,12 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
       {"rigid_body", rigid_body_text(request)},
       {"residue_rank",
        request.residue_rank == 0 ? "full" : fmt::format("{}", request.residue_rank)},
-      {"direct_term", request.direct_term.value_or(false) ? "full" : "none"},
-      {"damping", request.general_damping.value_or(false) ? "general" : "proportional"},
+      {"direct_term", open.direct_term        ? "auto"
+                      : structure.direct_term ? "full"
+                                              : "none"},
+      {"damping", open.general_damping        ? "auto"
+                  : structure.general_damping ? "general"
+                                              : "proportional"},
       {"method", to_string(request.method)},
       {"max_iterations", o.max_iterations},
       {"search_seconds", request.search_seconds}};

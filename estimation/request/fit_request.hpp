@@ -30,7 +30,7 @@ struct ModesRequest {
 /// The term B_0 / s^2, or what replaces it.
 struct RigidBodyRequest {
   enum class Kind : std::uint8_t {
-    automatic,  ///< free, or a suspension if that is worth its parameters
+    automatic,  ///< none, free or a suspension, whichever is worth its parameters
     none,
     free,         ///< B_0 / s^2; `rank` of B_0
     suspension,   ///< modes below the lowest line
@@ -86,6 +86,7 @@ struct FitSetup {
 ///                                  -> restored in the response; hold exact, delay fixed to the removed one.
 ///                                     With hold none the response is not changed
 ///   hold none                      -> no hold, delay 0
+///   structure not set              -> a search for modes also chooses damping, direct term, rigid body and delays
 ///   all outputs are accelerations  -> general damping, direct term, no rigid body: s^2 times the receptance of a
 ///                                     mode is D + (B_0 + B_1 s) / A
 /// Weights: noise variance if known, else total variance, else relative. The total variance for a nonlinear plant

@@ -42,7 +42,6 @@ void choose_rigid_body(const FitRequest& request, FitSetup& setup) {
   RequestedStructure& structure = setup.structure;
   const Kind kind = rigid_body_kind(request);
   structure.common.rigid_body = kind == Kind::automatic || kind == Kind::free;
-  structure.springs_if_worth = kind == Kind::automatic;
   structure.suspension = kind == Kind::suspension;
   if (kind == Kind::free) setup.options.rigid_body_rank = request.rigid_body.rank;
   if (kind != Kind::suspension) return;
@@ -116,6 +115,12 @@ void choose_structure(const FitRequest& request, FitSetup& setup) {
   setup.structure.common.direct_term = request.direct_term.value_or(false);
   setup.structure.common.general_damping = request.general_damping.value_or(false);
   choose_rigid_body(request, setup);
+  if (request.submodels.empty())
+    setup.structure.common.open = {
+        .rigid_body = rigid_body_kind(request) == RigidBodyRequest::Kind::automatic,
+        .direct_term = !request.direct_term,
+        .general_damping = !request.general_damping && request.residue_rank <= 1,
+        .delay = !request.delay && setup.options.hold != HoldModel::none};
   choose_residue_rank(request, setup);
   choose_submodels(request, setup);
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/residue_rank_test.hpp"
 #include "estimation/search/search_advice.hpp"
+#include "estimation/search/structure_moves.hpp"
 #include "estimation/start/pole_relocation.hpp"
 #include "estimation/start/residual_modes.hpp"
 #include "estimation/start/search_start.hpp"
@@ -88,13 +90,17 @@ class AutomaticFit {
     target_ = selection_.exactly + surplus;
     if (best_.status == FitStatus::singular || selection_.keep_modes) return;
     // Two modes on one peak prevent convergence, and their residual looks like more modes.
-    if (selection_.exactly == 0) reduce();
+    if (selection_.exactly == 0) {
+      reduce();
+      if (restructure()) reduce();
+    }
     grow();
     reduce();
     if (selection_.exactly == 0) {
-      if (grow()) reduce();
+      for (bool changed = restructure(); grow() || changed; changed = restructure()) reduce();
       return;
     }
+    restructure();
     if (!at_rounding()) {  // else the last fit is sufficient
       quick_.max_iterations = options_.max_iterations;
       quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
@@ -193,11 +199,59 @@ class AutomaticFit {
            !limit_reached();
   }
 
+  /// Changes the structure as long as that lowers the criterion, each time by the change that lowers it most.
+  /// @returns true if anything was changed
+  bool restructure() {
+    bool changed = false;
+    if (structure_.open == OpenStructure{}) return false;
+    while (!limit_reached() && change_structure()) changed = true;
+    return changed;
+  }
+
+  /// The change is chosen by trial on a part of the data, and taken if all data confirm it.
+  bool change_structure() {
+    const StructureTrial data = structure_trial(frf_, quick_, best_.model);
+    const ModeWorth worth(data.frf, structure_, data.options.user_weights);
+    double least = worth.criterion(fit_additive_model(data.frf, data.model, data.options));
+    std::optional<StructureMove> chosen;
+    for (StructureMove& move :
+         structure_moves(data.frf, data.options, data.model, structure_.open)) {
+      const bool keeps_number = count_modes(move.model) == count_modes(best_.model);
+      if (selection_.exactly > 0 && !keeps_number) continue;
+      const FitResult trial = fit_additive_model(data.frf, move.model, move.options);
+      if (trial.status == FitStatus::singular || !(worth.criterion(trial) < least)) continue;
+      least = worth.criterion(trial);
+      move.model = trial.model;
+      chosen = std::move(move);
+    }
+    if (!chosen) return false;
+    FitOptions options = quick_;
+    options.delay = chosen->options.delay;
+    options.delay_s = chosen->options.delay_s;
+    FitResult fit =
+        fit_additive_model(frf_, with_all_inputs(frf_, std::move(chosen->model)), options);
+    if (fit.status == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
+      return false;
+    say("structure: {}: cost {:.6g} -> {:.6g}, {} -> {} parameters", chosen->flag,
+        best_.model.fit.cost, fit.model.fit.cost, best_.parameters, fit.parameters);
+    const OpenStructure open = structure_.open;
+    structure_ = structure_of(fit.model);
+    structure_.open = open;
+    quick_.delay = options_.delay = options.delay;
+    quick_.delay_s = options_.delay_s = options.delay_s;
+    worth_ = ModeWorth(frf_, structure_, quick_.user_weights);
+    watch_ = {};  // it compares models of one structure
+    adopt(std::move(fit));
+    return true;
+  }
+
   /// Adds modes while they are worth their parameters. @returns true if any was added.
   bool grow() {
     bool grown = false;
     watch_.cut();
-    while (wanted_more()) {
+    for (int round = 0; wanted_more(); ++round) {
+      const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
+      if (selection_.exactly == 0 && doubled && restructure()) reduce();
       const std::size_t most =
           std::max(kCandidates, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
       const std::vector<ResidualMode> candidates =
@@ -336,9 +390,9 @@ class AutomaticFit {
   }
 
   const FrfEstimate& frf_;
-  const ModelStructure& structure_;
+  ModelStructure structure_;  ///< of best_, once it is fitted
   const ModeSelection& selection_;
-  const FitOptions& options_;
+  FitOptions options_;
   FitOptions quick_;
   ModeWorth worth_;
   int target_;  ///< number of modes to grow to, if it is requested

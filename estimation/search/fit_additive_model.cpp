@@ -258,6 +258,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   }
   ParameterCovariance covariance;
   result.parameters = problem.parameters();
+  result.delay = options.delay;
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   if (low_rank && iteration.status != FitStatus::singular)
     covariance = constrain_ranks(frf, options, problem, beta, iteration, result);

@@ -46,19 +46,18 @@ double ModeWorth::squares(const FitResult& fit) const {
   return std::max(2.0 * lines_ * fit.model.fit.cost, rounding_);
 }
 
-double ModeWorth::cost_of_modes(int modes) const {
-  return modes * cost_of_mode(parameters_of_mode_, data_, lines_);
-}
+double ModeWorth::cost_of_one() const { return cost_of_mode(parameters_of_mode_, data_, lines_); }
 
 double ModeWorth::criterion(const FitResult& fit) const {
-  return data_ * std::log(squares(fit)) + cost_of_modes(count_modes(fit.model));
+  return data_ * std::log(squares(fit)) + static_cast<double>(fit.parameters) * std::log(data_) +
+         2.0 * count_modes(fit.model) * std::log(lines_);
 }
 
 double ModeWorth::price(const FitResult& fit) const {
-  return in_squares(squares(fit), cost_of_modes(1), data_);
+  return in_squares(squares(fit), cost_of_one(), data_);
 }
 
-double ModeWorth::deviation_tolerance() const { return std::sqrt(0.01 * cost_of_modes(1)); }
+double ModeWorth::deviation_tolerance() const { return std::sqrt(0.01 * cost_of_one()); }
 
 bool ModeWorth::at_rounding(const FitResult& fit) const { return squares(fit) <= rounding_; }
 

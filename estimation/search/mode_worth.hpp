@@ -42,7 +42,7 @@ class ModeWorth {
 
  private:
   double squares(const FitResult& fit) const;  ///< sum W |E|^2, not below rounding
-  double cost_of_modes(int modes) const;
+  double cost_of_one() const;                  ///< mode, in units of 2 ln(likelihood)
 
   double lines_ = 0.0;
   double data_ = 0.0;  ///< number of independent real numbers

@@ -13,6 +13,7 @@
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
+#include "estimation/search/structure_moves.hpp"
 #include "estimation/start/residual_modes.hpp"
 
 namespace stageid {
@@ -63,87 +64,6 @@ std::string without_silent_channels(const FrfEstimate& frf) {
   return {};
 }
 
-/// The same modes with a different structure.
-struct Alternative {
-  const char* flag;
-  AdditiveModel model;
-  FitOptions options;
-};
-
-bool is_rigid_body(const Submodel& s) {
-  return s.role != SubmodelRole::given && s.integrators == 2 && s.denominator.size() == 1;
-}
-
-bool is_biproper(const Submodel& s) {
-  return s.numerator.size() >= s.denominator.size() + static_cast<std::size_t>(s.integrators);
-}
-
-std::vector<Alternative> alternatives(const FrfEstimate& frf, const FitOptions& asked,
-                                      const FitOptions& trial, const AdditiveModel& model,
-                                      bool cut_short) {
-  std::vector<Alternative> out;
-  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
-  const auto has = [&](auto is_one) {
-    return std::any_of(model.submodels.begin(), model.submodels.end(), is_one);
-  };
-  if (asked.residue_rank <= 1) {
-    Alternative general{"--damping general", model, trial};
-    for (Submodel& s : general.model.submodels)
-      if (is_searched_mode(s) && s.numerator.size() == 1) s.numerator.push_back(zero);
-    const bool fits = 2 * count_modes(model) <= most_modes(frf, {});
-    if (fits &&
-        has([](const Submodel& s) { return is_searched_mode(s) && s.numerator.size() == 1; }))
-      out.push_back(std::move(general));
-  }
-  if (!has(is_biproper)) {
-    Alternative direct{"--direct-term full", model, trial};
-    direct.model.submodels.push_back({0, {1.0}, {zero}, {}, {}});
-    out.push_back(std::move(direct));
-  }
-  if (has(is_rigid_body) && has(is_searched_mode)) {
-    Alternative free{"--rigid-body none", model, trial};
-    std::erase_if(free.model.submodels, is_rigid_body);
-    out.push_back(std::move(free));
-  } else if (!has([](const Submodel& s) {
-               return s.integrators > 0 || s.role == SubmodelRole::suspension;
-             })) {
-    Alternative rigid{"--rigid-body full", model, trial};
-    rigid.model.submodels.push_back({2, {1.0}, {zero}, {}, {}});
-    out.push_back(std::move(rigid));
-  }
-  if (trial.delay == DelayModel::fixed) {
-    Alternative delayed{"--delay estimate", model, trial};
-    delayed.options.delay = DelayModel::estimate;
-    delayed.options.delay_s = 0.0;  // 0 starts the search for a delay; a wrong value would not
-    delayed.model.input_delay_s.resize(0);
-    delayed.model.output_delay_s.resize(0);
-    out.push_back(std::move(delayed));
-  }
-  if (trial.delay != DelayModel::per_channel && model.hold != HoldModel::none &&
-      frf.response.rows() > 1) {
-    Alternative skewed{"--delay per_channel", model, trial};
-    skewed.options.delay = DelayModel::per_channel;
-    skewed.options.delay_s = 0.0;
-    skewed.options.max_iterations *= 3;  // its start is farther away
-    skewed.model.input_delay_s.resize(0);
-    skewed.model.output_delay_s.resize(0);
-    // Modes that were fitted to channels with different delays lead to another minimum.
-    std::erase_if(skewed.model.submodels, is_searched_mode);
-    for (const ModeCandidate& peak : pick_modes(frf))
-      skewed.model.submodels.push_back(mode_submodel(frf, {}, peak));
-    out.push_back(std::move(skewed));
-  }
-  if (cut_short) return out;  // such a search would add modes in any case
-  const std::vector<ResidualMode> missed =
-      residual_modes(frf, model, trial.user_weights, 1, trial.threads);
-  if (!missed.empty()) {
-    Alternative more{"more modes", model, trial};
-    more.model.submodels.push_back(mode_submodel(frf, {}, missed.front().mode));
-    out.push_back(std::move(more));
-  }
-  return out;
-}
-
 FitOptions trial_options(const FrfEstimate& frf, const FitOptions& options) {
   FitOptions trial = options;
   trial.limit.reset();
@@ -168,7 +88,20 @@ std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
                              const FitOptions& trial, const FitResult& same, bool cut_short) {
   double least = information_criterion(frf, same);
   std::string advice;
-  for (const Alternative& other : alternatives(frf, options, trial, same.model, cut_short)) {
+  const OpenStructure open{.rigid_body = true,
+                           .direct_term = true,
+                           .general_damping = options.residue_rank <= 1,
+                           .delay = true};
+  std::vector<StructureMove> moves = richer_structures(frf, trial, same.model, open);
+  for (StructureMove& move : simpler_structures(trial, same.model, {.rigid_body = true}))
+    moves.push_back(std::move(move));
+  if (!cut_short)  // such a search would add modes in any case
+    for (const ResidualMode& missed :
+         residual_modes(frf, same.model, trial.user_weights, 1, trial.threads)) {
+      moves.push_back({"more modes", same.model, trial});
+      moves.back().model.submodels.push_back(mode_submodel(frf, {}, missed.mode));
+    }
+  for (const StructureMove& other : moves) {
     const FitResult fit = fit_additive_model(frf, other.model, other.options);
     const double criterion = information_criterion(frf, fit);
     if (fit.status == FitStatus::singular || !(criterion < least)) continue;

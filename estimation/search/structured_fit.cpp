@@ -23,21 +23,12 @@
 namespace stageid {
 namespace {
 
-constexpr double kSuspensionStart = 0.25;  // of the lowest line
-constexpr double kSuspensionDamping = 0.1;
 // of the lowest line: the start if a free body is replaced
 constexpr double kWeakSpringsStart = 0.02;
 constexpr int kRealPoleGrid = 17;
 constexpr double kRealPoleBelow = 0.3;  // the grid extends beyond the lines by these factors
 constexpr double kRealPoleAbove = 3.0;
 constexpr double kLargestDeviation = 0.5;  // of a frequency that is considered determined
-
-/// With free residues: a rigid body of up to min(n_y, n_u) degrees of freedom.
-Submodel suspension_mode(const FrfEstimate& frf, double frequency_hz) {
-  Submodel s = mode_submodel(frf, {}, {frequency_hz, kSuspensionDamping, 1});
-  s.role = SubmodelRole::suspension;
-  return s;
-}
 
 std::vector<Submodel> suspension_modes(const FrfEstimate& frf,
                                        const std::vector<double>& known_hz) {
@@ -218,8 +209,8 @@ void refit(const FrfEstimate& frf, const ModeSelection& selection, const FitOpti
 /// Puts the rigid body on weak springs if that is worth two parameters (BIC). Far above the suspension its effect is
 /// small per line, but adds up: as a wrong delay, which shifts every mode, or as a mode among the lowest lines. The
 /// modes are therefore reassessed.
-void try_springs(const FrfEstimate& frf, const ModelStructure& structure,
-                 const ModeSelection& selection, const FitOptions& options, FitResult& result) {
+void try_springs(const FrfEstimate& frf, const ModeSelection& selection, const FitOptions& options,
+                 FitResult& result) {
   const auto body = std::find_if(result.model.submodels.begin(), result.model.submodels.end(),
                                  [](const Submodel& s) { return s.integrators == 2; });
   if (body == result.model.submodels.end() || result.status == FitStatus::singular ||
@@ -238,16 +229,13 @@ void try_springs(const FrfEstimate& frf, const ModelStructure& structure,
   result.decisions.push_back(
       fmt::format("rigid body on weak springs instead of a free rigid body: cost {:.6g} -> {:.6g}",
                   result.model.fit.cost, trial.model.fit.cost));
-  ModelStructure with_springs = structure;
-  with_springs.rigid_body = false;
+  const ModelStructure with_springs = structure_of(trial.model);
   ModeSelection again = selection;
   again.keep_modes = selection.keep_modes || selection.exactly > 0;
   again.modes.clear();
-  for (const Submodel& s : trial.model.submodels) {
-    if (s.role == SubmodelRole::suspension) with_springs.given.push_back(s);
+  for (const Submodel& s : trial.model.submodels)
     if (is_searched_mode(s))
       again.modes.push_back({s.natural_frequency_hz(), s.damping_ratio(), 1});
-  }
   continue_with(automatic_fit(frf, with_springs, again, options), result);
 }
 
@@ -346,8 +334,8 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   PoleSearch(frf, complete, selection, options, decisions).complete(requests);
   for (const SubmodelRequest& r : requests) complete.given.push_back(start_submodel(frf, r));
   FitResult result = automatic_fit(frf, complete, selection, options);
-  if (structure.springs_if_worth && structure.common.rigid_body)
-    try_springs(frf, complete, selection, options, result);
+  options.delay = result.delay;
+  if (structure.common.open.rigid_body) try_springs(frf, selection, options, result);
   settle_suspension(frf, selection, options, result);
   result.decisions.insert(result.decisions.begin(), decisions.begin(), decisions.end());
   judge_explained(frf, options, result);

@@ -9,10 +9,9 @@ namespace stageid {
 
 /// The submodels besides the modes of an automatic fit.
 struct RequestedStructure {
-  ModelStructure common;
+  /// With an open rigid body, a free one is replaced by one on springs if that is worth its parameters.
+  ModelStructure common{.open = {.rigid_body = true}};
   std::vector<SubmodelRequest> submodels;
-  /// A free rigid body is replaced by one on weak springs if that is worth two more parameters (BIC).
-  bool springs_if_worth = true;
   bool suspension =
       false;  ///< modes below the lowest line instead of 1/s^2: a rigid body on weak springs
   /// Their known frequencies, which are held; empty: one mode for all rigid degrees of freedom, with a fitted

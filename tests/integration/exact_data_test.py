@@ -112,7 +112,8 @@ class ExactData(unittest.TestCase):
     def test_the_other_holds_leave_an_error(self):
         G = stage(np.full((N_Y, N_U), 1.3 / RATE_HZ))
         for hold in ("phase", "sinc"):
-            model = fitted(G, "--delay", "estimate", hold=hold)
+            # Another structure would stand in for a part of the hold.
+            model = fitted(G, "--delay", "estimate", "--damping", "proportional", "--direct-term", "none", hold=hold)
             self.assertGreater(model["fit"]["relative_rms_error"], 1e-3)
 
 

@@ -42,17 +42,20 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
       "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
       "FILE.h5 with /weights or /weight_matrices; default: from the variances in the FRF");
   command->add_option("--hold", flags_.hold, "none | phase | sinc | exact; default: from the FRF");
-  command->add_option("--delay", flags_.delay,
-                      "SECONDS | estimate | per_channel; default: from the FRF");
+  command->add_option(
+      "--delay", flags_.delay,
+      "SECONDS | estimate | per_channel; default: from the FRF, per_channel if the data "
+      "require it");
   command->add_option(
       "--rigid-body", flags_.rigid_body,
       "none | full | RANK: the term B_0 / s^2 | suspension: a mode below the lines instead, for a "
-      "rigid body on weak springs | suspension:F1:F2: at these known frequencies, Hz | auto: full, "
-      "or suspension if the fit improves enough; default: auto, or none with --submodel or if the "
+      "rigid body on weak springs | suspension:F1:F2: at these known frequencies, Hz | auto: none, "
+      "full or suspension, as the data require; default: auto, or none with --submodel or if the "
       "outputs are accelerations");
-  command->add_option("--direct-term", flags_.direct_term,
-                      "none | full: a constant, the compliance of modes above the band; default: "
-                      "none, or full if the outputs are accelerations");
+  command->add_option(
+      "--direct-term", flags_.direct_term,
+      "none | full: a constant, the compliance of modes above the band; default: as "
+      "the data require, full if the outputs are accelerations");
   command
       ->add_option("--residue-rank", flags_.residue_rank,
                    "full | 1: residues phi psi^T of mechanical modes")
@@ -65,9 +68,10 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
           "per pair, the real pole of an odd n last; default: a search. n=auto: one denominator "
           "for all modes that a search finds")
       ->allow_extra_args(false);
-  command->add_option("--damping", flags_.damping,
-                      "proportional | general: numerators B_0, or B_0 + B_1 s; default: "
-                      "proportional, or general if the outputs are accelerations");
+  command->add_option(
+      "--damping", flags_.damping,
+      "proportional | general: numerators B_0, or B_0 + B_1 s; default: as the data "
+      "require, general if the outputs are accelerations");
   command->add_option("--method", flags_.method, "riv | gn | sk")->capture_default_str();
   command->add_option("--max-iterations", request_.max_iterations, "iterations per fit")
       ->capture_default_str();

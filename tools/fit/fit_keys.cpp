@@ -141,8 +141,8 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   f.rigid_body.rank =
       rank("rigid_body", body, bodies,
            "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); "
-           "suspension: a mode below the lines instead; auto: full, or suspension if the fit "
-           "improves enough; by_submodels: none if submodels are listed, else auto");
+           "suspension: a mode below the lines instead; auto: none, full or suspension, as the "
+           "data require; by_submodels: none if submodels are listed, else auto");
   f.rigid_body.kind =
       body.empty()
           ? Body::free
@@ -156,10 +156,10 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
       rank("residue_rank", full, {"full"}, "rank of the residues: full, or 1 for mechanical modes");
   word("direct_term", f.direct_term, {"none", "full"},
        "a constant: the compliance of modes above the band; by_frf: full if the outputs are "
-       "accelerations, else none");
+       "accelerations, else as the data require");
   word("damping", f.general_damping, {"proportional", "general"},
        "numerators B_0, or B_0 + B_1 s; by_frf: general if the outputs are accelerations, else "
-       "proportional");
+       "as the data require");
   auto method = static_cast<std::size_t>(f.method);
   v.choice("method", method, words_to(FitMethod::sk), kOptional, "iteration method");
   f.method = static_cast<FitMethod>(method);

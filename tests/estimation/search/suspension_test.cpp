@@ -45,7 +45,7 @@ TEST(Suspension, IsFoundFarBelowTheLines) {
 TEST(Suspension, WhereARigidBodyAloneDoesNotExplainTheLines) {
   const FrfEstimate frf = test::frf_of(suspended(0.4));
   RequestedStructure rigid;
-  rigid.springs_if_worth = false;
+  rigid.common.open.rigid_body = false;
   ModeSelection modes;
   modes.modes = {{299.0, 0.01, 1}};
   modes.keep_modes = true;

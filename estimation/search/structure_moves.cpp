@@ -1,0 +1,173 @@
+#include "estimation/search/structure_moves.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kTrialLines = 500;        // at least
+constexpr Eigen::Index kTrialLinesOfAMode = 20;  // at least, per mode
+constexpr Eigen::Index kTrialChannels = 256;     // at most, if an input has no more
+constexpr int kIterationsOfDelays = 3;           // times as many: the start is farther away
+
+bool is_rigid_body(const Submodel& s) {
+  return s.role == SubmodelRole::searched && s.integrators == 2 && s.denominator.size() == 1;
+}
+
+bool is_direct_term(const Submodel& s) {
+  return s.role == SubmodelRole::searched && s.integrators == 0 && s.denominator.size() == 1;
+}
+
+bool is_biproper(const Submodel& s) {
+  return s.numerator.size() >= s.denominator.size() + static_cast<std::size_t>(s.integrators);
+}
+
+bool is_general(const Submodel& s) { return is_searched_mode(s) && s.numerator.size() > 1; }
+
+template <typename Predicate>
+bool has(const AdditiveModel& model, Predicate is_one) {
+  return std::any_of(model.submodels.begin(), model.submodels.end(), is_one);
+}
+
+/// Delays are searched from nothing.
+void free_delays(DelayModel delay, StructureMove& move) {
+  move.options.delay = delay;
+  move.options.delay_s = 0.0;
+  move.model.input_delay_s.resize(0);
+  move.model.output_delay_s.resize(0);
+}
+
+}  // namespace
+
+std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOptions& options,
+                                             const AdditiveModel& model,
+                                             const OpenStructure& open) {
+  std::vector<StructureMove> out;
+  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
+  const bool affordable = 2 * count_modes(model) <= most_modes(frf, {});
+  if (open.general_damping && affordable &&
+      has(model, [](const Submodel& s) { return is_searched_mode(s) && !is_general(s); })) {
+    StructureMove general{"--damping general", model, options};
+    for (Submodel& s : general.model.submodels)
+      if (is_searched_mode(s) && !is_general(s)) s.numerator.push_back(zero);
+    out.push_back(std::move(general));
+  }
+  if (open.direct_term && !has(model, is_biproper)) {
+    StructureMove direct{"--direct-term full", model, options};
+    direct.model.submodels.push_back({0, {1.0}, {zero}, {}, {}});
+    out.push_back(direct);
+    // Instead of the modes above the lines, which stand in for it.
+    const double highest_hz = frf.frequency_hz[frf.lines() - 1];
+    if (std::erase_if(direct.model.submodels, [&](const Submodel& s) {
+          return is_searched_mode(s) && s.natural_frequency_hz() > highest_hz;
+        }) > 0)
+      out.push_back(std::move(direct));
+  }
+  if (open.rigid_body && has(model, is_rigid_body)) {
+    StructureMove springs{"--rigid-body suspension", model, options};
+    std::erase_if(springs.model.submodels, is_rigid_body);
+    springs.model.submodels.push_back(suspension_mode(frf, kSuspensionStart * frf.frequency_hz[0]));
+    out.push_back(std::move(springs));
+  } else if (open.rigid_body && !has(model, [](const Submodel& s) {
+               return s.integrators > 0 || s.role == SubmodelRole::suspension;
+             })) {
+    out.push_back({"--rigid-body full", model, options});
+    out.back().model.submodels.push_back({2, {1.0}, {zero}, {}, {}});
+  }
+  if (open.delay && options.delay == DelayModel::fixed) {
+    out.push_back({"--delay estimate", model, options});
+    free_delays(DelayModel::estimate, out.back());
+  }
+  if (open.delay && options.delay != DelayModel::per_channel && model.hold != HoldModel::none &&
+      frf.response.rows() > 1) {
+    StructureMove skewed{"--delay per_channel", model, options};
+    free_delays(DelayModel::per_channel, skewed);
+    skewed.options.max_iterations *= kIterationsOfDelays;
+    // Modes that were fitted to channels with different delays lead to another minimum.
+    std::erase_if(skewed.model.submodels, is_searched_mode);
+    const ModelStructure structure{.general_damping = has(model, is_general)};
+    for (const ModeCandidate& peak : pick_modes(frf))
+      skewed.model.submodels.push_back(mode_submodel(frf, structure, peak));
+    out.push_back(std::move(skewed));
+  }
+  return out;
+}
+
+std::vector<StructureMove> simpler_structures(const FitOptions& options, const AdditiveModel& model,
+                                              const OpenStructure& open) {
+  std::vector<StructureMove> out;
+  if (open.general_damping && has(model, is_general)) {
+    out.push_back({"--damping proportional", model, options});
+    for (Submodel& s : out.back().model.submodels)
+      if (is_general(s)) s.numerator.resize(1);
+  }
+  if (open.delay && options.delay == DelayModel::per_channel) {
+    out.push_back({"--delay estimate", model, options});
+    out.back().options.delay = DelayModel::estimate;
+    out.back().model.input_delay_s.setConstant(model.mean_delay_s());
+    out.back().model.output_delay_s.setZero();
+  }
+  if (!has(model, is_searched_mode)) return out;
+  if (open.direct_term && has(model, is_direct_term)) {
+    out.push_back({"--direct-term none", model, options});
+    std::erase_if(out.back().model.submodels, is_direct_term);
+  }
+  if (open.rigid_body && has(model, is_rigid_body)) {
+    out.push_back({"--rigid-body none", model, options});
+    std::erase_if(out.back().model.submodels, is_rigid_body);
+  }
+  return out;
+}
+
+std::vector<StructureMove> structure_moves(const FrfEstimate& frf, const FitOptions& options,
+                                           const AdditiveModel& model, const OpenStructure& open) {
+  std::vector<StructureMove> out = richer_structures(frf, options, model, open);
+  for (StructureMove& move : simpler_structures(options, model, open))
+    out.push_back(std::move(move));
+  return out;
+}
+
+StructureTrial structure_trial(const FrfEstimate& frf, const FitOptions& options,
+                               const AdditiveModel& model) {
+  const Eigen::Index wanted =
+      std::max<Eigen::Index>(kTrialLines, kTrialLinesOfAMode * count_modes(model));
+  const Eigen::Index step = std::max<Eigen::Index>(1, frf.lines() / wanted);
+  const auto lines = Eigen::seqN(0, (frf.lines() - 1) / step + 1, step);
+  const Eigen::Index count =
+      std::clamp<Eigen::Index>(kTrialChannels / frf.n_outputs(), 1, frf.n_inputs());
+  const auto inputs = Eigen::seqN(0, count, frf.n_inputs() / count);
+  std::vector<Eigen::Index> channels;
+  StructureTrial out;
+  for (Eigen::Index u = 0; u < count; ++u) {
+    for (Eigen::Index y = 0; y < frf.n_outputs(); ++y)
+      channels.push_back(inputs[u] * frf.n_outputs() + y);
+    out.frf.inputs.names.push_back(frf.inputs.names[static_cast<std::size_t>(inputs[u])]);
+    out.frf.inputs.units.push_back(frf.inputs.units[static_cast<std::size_t>(inputs[u])]);
+  }
+  out.options = options;
+  out.options.user_weights = Eigen::MatrixXd((*options.user_weights)(channels, lines));
+  out.frf.frequency_hz = frf.frequency_hz(lines);
+  out.frf.response = frf.response(channels, lines);
+  out.frf.outputs = frf.outputs;
+  out.frf.sample_rate_hz = frf.sample_rate_hz;
+  out.frf.hold = frf.hold;
+  out.model = model;
+  out.model.inputs = out.frf.inputs;
+  if (model.input_delay_s.size() > 0) out.model.input_delay_s = model.input_delay_s(inputs).eval();
+  for (Submodel& s : out.model.submodels)
+    for (Eigen::MatrixXd& B : s.numerator) B = B(Eigen::all, inputs).eval();
+  return out;
+}
+
+AdditiveModel with_all_inputs(const FrfEstimate& frf, AdditiveModel model) {
+  if (model.n_inputs() == frf.n_inputs()) return model;
+  if (model.input_delay_s.size() > 0)
+    model.input_delay_s.setConstant(frf.n_inputs(), model.input_delay_s.mean());
+  model.inputs = frf.inputs;
+  for (Submodel& s : model.submodels)
+    for (Eigen::MatrixXd& B : s.numerator) B.setZero(frf.n_outputs(), frf.n_inputs());
+  return model;
+}
+
+}  // namespace stageid
