@@ -116,10 +116,14 @@ class Iteration {
         return end_at_best(options_.limit->status(), options_.limit->message());
       return end(options_.limit->status(), options_.limit->message());
     }
-    if (result_.iterations >= options_.max_iterations)
-      return end(problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
-                 fmt::format("stopped after {} iterations, scaled gradient {:.2g}",
-                             result_.iterations, gradient_));
+    if (result_.iterations >= options_.max_iterations) {
+      const bool near = problem_.globals() == 0 ||
+                        (options_.method != FitMethod::sk && deviations_ < kRoundingDeviations);
+      return end(near ? FitStatus::gradient_small : FitStatus::iteration_limit,
+                 fmt::format("stopped after {} iterations, {:.1g} standard deviations from the "
+                             "first-order condition; scaled gradient {:.2g}",
+                             result_.iterations, deviations_, gradient_));
+    }
     return options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
   }
 
@@ -207,8 +211,11 @@ class Iteration {
                  fmt::format("converged: the cost is at rounding level, within {:.1g} standard "
                              "deviations of the first-order condition; scaled gradient {:.2g}",
                              deviations_, gradient_));
-    return end(FitStatus::cost_stalled,
-               fmt::format("no step lowers the cost; scaled gradient {:.2g}", gradient_));
+    return end(
+        FitStatus::cost_stalled,
+        fmt::format("no step lowers the cost, {:.1g} standard deviations from the first-order "
+                    "condition; scaled gradient {:.2g}",
+                    deviations_, gradient_));
   }
 
   /// Tries steps with increasing damping; accepts the first that lowers the cost.
@@ -280,7 +287,7 @@ class Iteration {
   double levenberg_ = 0.0;
   double gradient_ = 1.0;
   double step_size_ = 0.0;
-  double deviations_ = 0.0;
+  double deviations_ = HUGE_VAL;  // from the first-order condition, before the last step
   Trial best_;
 };
 

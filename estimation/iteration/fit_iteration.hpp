@@ -29,8 +29,8 @@ IterationResult iterate(const FitProblem& problem, FitParameters& beta, const Fi
 IterationResult iterate(const FitProblem& problem, const WeightMatrices& weights,
                         FitParameters& beta, const FitOptions& options);
 
-/// If no step lowers the cost, the cost is at rounding level if the stationary point is at most this many standard
-/// deviations away.
+/// If no step lowers the cost, or there were as many as allowed, the fit has converged if the stationary point is at
+/// most this many standard deviations away: the variance of the estimate is then right to 0.3 %.
 inline constexpr double kRoundingDeviations = 0.05;
 
 /// Part of the weighted power of the data: if no step lowers a residual below it, the residual is rounding, not a

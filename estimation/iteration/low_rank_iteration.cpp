@@ -30,9 +30,11 @@ class LowRankIteration {
     while (iterate_once() && result_.iterations < options_.max_iterations) {
     }
     if (result_.message.empty())
-      end(FitStatus::iteration_limit,
-          fmt::format("residues of given rank: stopped after {} iterations, scaled gradient {:.2g}",
-                      result_.iterations, gradient_));
+      end(deviations_ < kRoundingDeviations ? FitStatus::gradient_small
+                                            : FitStatus::iteration_limit,
+          fmt::format("residues of given rank: stopped after {} iterations, {:.1g} standard "
+                      "deviations from the first-order condition; scaled gradient {:.2g}",
+                      result_.iterations, deviations_, gradient_));
     if (options_.uncertainty && result_.status != FitStatus::singular)
       out.covariance = low_rank_covariance(problem_, beta_, result_.end_cost, factors_, noise,
                                            frozen_, options_.response_variance);
@@ -97,22 +99,23 @@ class LowRankIteration {
         gradient_ =
             std::max(gradient_, std::abs(g_[i]) / std::sqrt(std::max(N_(i, i) * squares, 1e-300)));
     const double data = static_cast<double>(problem_.size() * problem_.channels());
-    const double deviations = std::sqrt(std::abs(solve(0.0).dot(g_)) * data / squares);
-    if (gradient_ < options_.gradient_tolerance || deviations < options_.deviation_tolerance)
+    deviations_ = std::sqrt(std::abs(solve(0.0).dot(g_)) * data / squares);
+    if (gradient_ < options_.gradient_tolerance || deviations_ < options_.deviation_tolerance)
       return end(FitStatus::gradient_small,
                  fmt::format("residues of given rank: within {:.1g} standard deviations of the "
                              "first-order condition, scaled gradient {:.2g}",
-                             deviations, gradient_));
+                             deviations_, gradient_));
     if (attempt()) return true;
-    if (deviations < kRoundingDeviations)
+    if (deviations_ < kRoundingDeviations)
       return end(FitStatus::step_small,
                  fmt::format("residues of given rank: converged: the cost is at rounding level, "
                              "within {:.1g} standard deviations of the first-order condition",
-                             deviations));
+                             deviations_));
     return end(
         FitStatus::cost_stalled,
-        fmt::format("residues of given rank: no step lowers the cost; scaled gradient {:.2g}",
-                    gradient_));
+        fmt::format("residues of given rank: no step lowers the cost, {:.1g} standard deviations "
+                    "from the first-order condition; scaled gradient {:.2g}",
+                    deviations_, gradient_));
   }
 
   bool attempt() {
@@ -148,6 +151,7 @@ class LowRankIteration {
   Eigen::VectorXd g_;
   std::vector<Eigen::Index> frozen_;
   double levenberg_ = 0.0;
+  double deviations_ = HUGE_VAL;
   double gradient_ = 1.0;
 };
 

@@ -208,31 +208,37 @@ class AutomaticFit {
     return changed;
   }
 
-  /// The change is chosen by trial on a part of the data, and taken if all data confirm it.
+  /// The changes are ranked by trial on a part of the data; the first that all data confirm is taken.
   bool change_structure() {
     const StructureTrial data = structure_trial(frf_, quick_, best_.model);
     const ModeWorth worth(data.frf, structure_, data.options.user_weights);
-    double least = worth.criterion(fit_additive_model(data.frf, data.model, data.options));
-    std::optional<StructureMove> chosen;
+    const double now = worth.criterion(fit_additive_model(data.frf, data.model, data.options));
+    std::vector<std::pair<double, StructureMove>> better;
     for (StructureMove& move :
          structure_moves(data.frf, data.options, data.model, structure_.open)) {
       const bool keeps_number = count_modes(move.model) == count_modes(best_.model);
       if (selection_.exactly > 0 && !keeps_number) continue;
-      const FitResult trial = fit_additive_model(data.frf, move.model, move.options);
-      if (trial.status == FitStatus::singular || !(worth.criterion(trial) < least)) continue;
-      least = worth.criterion(trial);
-      move.model = trial.model;
-      chosen = std::move(move);
+      FitResult trial = fit_additive_model(data.frf, move.model, move.options);
+      const double then = worth.criterion(trial);
+      if (trial.status == FitStatus::singular || !(then < now)) continue;
+      move.model = std::move(trial.model);
+      better.emplace_back(then, std::move(move));
     }
-    if (!chosen) return false;
+    std::stable_sort(better.begin(), better.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    return std::any_of(better.begin(), better.end(),
+                       [this](const auto& ranked) { return take(ranked.second); });
+  }
+
+  /// @returns false if all data do not confirm the change
+  bool take(const StructureMove& move) {
     FitOptions options = quick_;
-    options.delay = chosen->options.delay;
-    options.delay_s = chosen->options.delay_s;
-    FitResult fit =
-        fit_additive_model(frf_, with_all_inputs(frf_, std::move(chosen->model)), options);
+    options.delay = move.options.delay;
+    options.delay_s = move.options.delay_s;
+    FitResult fit = fit_additive_model(frf_, with_all_inputs(frf_, move.model), options);
     if (fit.status == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
       return false;
-    say("structure: {}: cost {:.6g} -> {:.6g}, {} -> {} parameters", chosen->flag,
+    say("structure: {}: cost {:.6g} -> {:.6g}, {} -> {} parameters", move.flag,
         best_.model.fit.cost, fit.model.fit.cost, best_.parameters, fit.parameters);
     const OpenStructure open = structure_.open;
     structure_ = structure_of(fit.model);

@@ -28,18 +28,20 @@ constexpr double kDearestMode = 1.5;
 
 struct OpenMode {
   std::size_t submodel = 0;
-  double doubt = 0.0;  ///< larger of std(zeta)/zeta and std(f)/(zeta f)
+  double doubt = 0.0;  ///< larger of std(zeta)/zeta and std(f)/(zeta f); infinite at a bound
 };
 
-std::optional<OpenMode> most_open(const AdditiveModel& model) {
+std::optional<OpenMode> most_open(const FitResult& fit) {
   std::optional<OpenMode> open;
-  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
-    const Submodel& s = model.submodels[i];
-    if (!is_searched_mode(s)) continue;
+  for (std::size_t i = 0; i < fit.model.submodels.size(); ++i) {
+    const Submodel& s = fit.model.submodels[i];
+    if (!is_searched_mode(s) || s.frequency_held) continue;
     const double damping = s.damping_ratio();
     const double width_hz = damping * s.natural_frequency_hz();
-    const double doubt = std::max(s.damping_ratio_std.value_or(0.0) / damping,
-                                  s.natural_frequency_std_hz.value_or(0.0) / width_hz);
+    const bool at_bound = std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end();
+    const double doubt = at_bound ? HUGE_VAL
+                                  : std::max(s.damping_ratio_std.value_or(0.0) / damping,
+                                             s.natural_frequency_std_hz.value_or(0.0) / width_hz);
     if (doubt > (open ? open->doubt : kLeastDoubt)) open = {i, doubt};
   }
   return open;
@@ -70,7 +72,8 @@ struct Simpler {
 
 /// Simpler models, the simplest first: without one of two modes that converged to each other, else without the least
 /// determined mode, or with its pole held. Empty: all modes are determined.
-std::vector<Simpler> simpler(const AdditiveModel& model) {
+std::vector<Simpler> simpler(const FitResult& fit) {
+  const AdditiveModel& model = fit.model;
   if (const auto pair = coalesced(model)) {
     const auto [i, j] = *pair;
     return {
@@ -78,11 +81,13 @@ std::vector<Simpler> simpler(const AdditiveModel& model) {
                                                model.submodels[i].natural_frequency_hz(),
                                                model.submodels[j].natural_frequency_hz())}};
   }
-  const std::optional<OpenMode> open = most_open(model);
+  const std::optional<OpenMode> open = most_open(fit);
   if (!open) return {};
   const double frequency_hz = model.submodels[open->submodel].natural_frequency_hz();
   const std::string doubt =
-      fmt::format("(standard deviation {:.2g} times its value) and which", open->doubt);
+      std::isfinite(open->doubt)
+          ? fmt::format("(standard deviation {:.2g} times its value) and which", open->doubt)
+          : "(at its bound) and which";
   Simpler without{model, fmt::format("removed {:.6g} Hz, which the data do not support {}",
                                      frequency_hz, doubt)};
   without.model.submodels.erase(without.model.submodels.begin() +
@@ -131,7 +136,7 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
   FitResult fit = first;
   std::vector<std::string> given_up;
   while (may_converge(fit) && count_modes(fit.model) > 1) {
-    const std::vector<Simpler> models = simpler(fit.model);
+    const std::vector<Simpler> models = simpler(fit);
     if (models.empty()) break;
     FitResult next = fit_additive_model(frf, models[0].model, options);
     std::size_t chosen = 0;

@@ -1,4 +1,5 @@
 #include "estimation/search/structured_fit.hpp"
+#include "estimation/search/channel_delays.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -338,6 +339,11 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   if (structure.common.open.rigid_body) try_springs(frf, selection, options, result);
   settle_suspension(frf, selection, options, result);
   result.decisions.insert(result.decisions.begin(), decisions.begin(), decisions.end());
+  if (result.delay == DelayModel::per_channel && asked.delay != DelayModel::per_channel)
+    if (std::string late = late_channels(result.model); !late.empty()) {
+      result.decisions.push_back(late);
+      result.findings.push_back(std::move(late));
+    }
   judge_explained(frf, options, result);
   if (options.uncertainty) fill_shape_deviations(frf, options, result);
   if (options.covariance) fill_covariance(frf, options, result);

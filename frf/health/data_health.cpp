@@ -28,7 +28,8 @@ constexpr double kExcludedPower = 1e-4;   // of the inputs' power
 constexpr double kWorstExcitation = 1e3;  // cond(R)
 constexpr double kWorstInputs = 1e2;      // median of cond(U) in the upper half of the band
 constexpr double kLeastCoherence = 0.9;
-constexpr double kCertain = 1e6;  // evidence if there is no noise
+constexpr double kMovedTogether = 0.5;  // coherence of two sensors beside the excitation
+constexpr double kCertain = 1e6;        // evidence if there is no noise
 
 }  // namespace
 
@@ -131,9 +132,10 @@ bool Examination::find_suspected(Index first, Index count) {
 }
 
 void Examination::check_responses() {
-  bool any = false;
-  for (Index s = 0; s < record_.n_y(); ++s) any = any || responds(record_, s);
-  if (!any && spoilt_.empty()) {
+  std::vector<bool> responding;
+  for (Index s = 0; s < record_.n_y(); ++s) responding.push_back(responds(record_, s));
+  const bool none = std::find(responding.begin(), responding.end(), true) == responding.end();
+  if (none && spoilt_.empty()) {
     find(Severity::fault, Cause::incoherent, "",
          "no sensor signal repeats with the excitation: a disturbance moves the stage, or the "
          "excitation does not reach it",
@@ -142,12 +144,26 @@ void Examination::check_responses() {
          "keep the setpoint constant, raise the level or check the injection, then measure again");
     return;
   }
+  // Dead sensors have independent noise; what moves the stage moves several.
+  const auto moves = [this](Index s) {
+    for (Index other = 0; other < record_.n_y(); ++other)
+      if (other != s && !spoilt(other) && common_motion(record_, s, other) > kMovedTogether)
+        return true;
+    return false;
+  };
   for (Index s = 0; s < record_.n_y(); ++s) {
     if (spoilt(s)) continue;
     bool known = false;
     const bool expected = expected_to_respond(s, known);
-    if (!responds(record_, s)) {
+    if (!responding[static_cast<std::size_t>(s)]) {
       if (known && !expected) continue;
+      if (moves(s)) {
+        find(Severity::fault, Cause::incoherent, name(s),
+             "moves with other sensors, but not with the excitation: a disturbance or a moving "
+             "setpoint drowns the response",
+             "no line above the motion", "keep the setpoint constant, then measure again");
+        continue;
+      }
       find(known ? Severity::fault : Severity::doubt, Cause::dead, name(s),
            known
                ? "dead: only noise, although the rigid body moves it"
@@ -298,7 +314,7 @@ std::vector<Finding> Examination::examine() {
     check_inputs();
     if (!any_fault(findings_))  // a stuck channel would look like a transient
       for (Finding& finding : check_start_transient(record_.start))
-        findings_.push_back(std::move(finding));
+        if (!found(finding.cause)) findings_.push_back(std::move(finding));
   }
   std::stable_sort(findings_.begin(), findings_.end(),
                    [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });

@@ -2,6 +2,8 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
+#include <array>
+#include <complex>
 #include <limits>
 #include <vector>
 
@@ -43,6 +45,18 @@ double median_coherence(const HealthRecord& record, Index channel) {
   }
   if (values.empty()) return 1.0;
   return order_statistic(values, 0.5);
+}
+
+double common_motion(const HealthRecord& record, Index one, Index other) {
+  const auto dof = static_cast<double>(record.scatter_dof());
+  if (dof < 2.0) return 0.0;
+  std::vector<double> values;
+  for (const LineRecord& line : record.lines) {
+    const Eigen::MatrixXcd S = record.scatter(line.Z(std::array{one, other}, Eigen::all));
+    const double power = S(0, 0).real() * S(1, 1).real();
+    if (power > 0.0) values.push_back((dof * std::norm(S(0, 1)) / power - 1.0) / (dof - 1.0));
+  }
+  return values.empty() ? 0.0 : order_statistic(values, 0.5);
 }
 
 double condition(const Eigen::MatrixXcd& M) {

@@ -18,6 +18,10 @@ bool responds(const HealthRecord& record, Eigen::Index channel);
 /// channel without power.
 double median_coherence(const HealthRecord& record, Eigen::Index channel);
 
+/// Median over the lines of the coherence between what does not repeat in two channels, corrected for its expectation
+/// 1/nu if they are independent; 0 with nu = scatter_dof() < 2.
+double common_motion(const HealthRecord& record, Eigen::Index one, Eigen::Index other);
+
 /// Condition number with rows of norm one, because their units differ; infinite if a row is zero.
 double condition(const Eigen::MatrixXcd& M);
 

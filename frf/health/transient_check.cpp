@@ -58,6 +58,26 @@ std::vector<Index> maxima(const Lines& lines) {
   return found;
 }
 
+/// Rayleigh's test of the phases of the runs, with weights.
+class Phases {
+ public:
+  void add(std::complex<double> x, double squared_weight) {
+    const double size = std::abs(x);
+    if (size > 0.0) resultant_ += std::sqrt(squared_weight) * x / size;
+    squares_ += squared_weight;
+  }
+  /// @param by_memory resultant over the root of the sum of squared weights that noise with a memory has
+  double p_value(double by_memory) const {
+    if (!(squares_ > 0.0)) return 1.0;
+    const double beyond = std::max(0.0, std::abs(resultant_) / std::sqrt(squares_) - by_memory);
+    return std::exp(-beyond * beyond);
+  }
+
+ private:
+  std::complex<double> resultant_ = 0.0;
+  double squares_ = 0.0;
+};
+
 /// The sums over one window.
 class Window {
  public:
@@ -67,32 +87,34 @@ class Window {
     const Index last = std::min(lines.noise.size() - 1, peak + kReach);
     for (const RunStart& run : e.runs) {
       std::complex<double> along = 0.0;
+      std::complex<double> bend = 0.0;
       double start = 0.0;
+      double slope = 0.0;
       for (Index k = first; k <= last; ++k) {
         along += run.along[k] / lines.noise[k];
+        bend += run.bend[k] / lines.noise[k];
         start += run.start[k] / lines.noise[k];
+        slope += run.slope[k] / lines.noise[k];
         first_power_ += run.first[k] / lines.noise[k];
         last_power_ += run.last[k] / lines.noise[k];
       }
-      const double m = std::sqrt(start);
-      const double size = std::abs(along);
       along_ += along;
       start_ += start;
-      if (size > 0.0) resultant_ += m * along / size;
-      squares_ += m * m;
+      phases_.add(along, start);
+      bends_.add(bend, slope);
     }
   }
 
   /// The smaller p-value of the two tests, corrected for two tests.
   double p_value() const {
     const double by_memory =
-        kMemory * std::sqrt(static_cast<double>(evidence_.runs.size()) * squares_ / excess_);
-    const double beyond = std::max(0.0, std::abs(resultant_) - by_memory);
-    double p = squares_ > 0.0 ? std::exp(-beyond * beyond / squares_) : 1.0;
-    const int runs = static_cast<int>(evidence_.runs.size());
-    if (evidence_.runs.front().periods >= 3 && last_power_ > 0.0)
-      p = std::min(p, std::exp(log_tail_of_f(first_power_ / last_power_, runs, runs)));
-    return std::min(1.0, 2.0 * p);
+        kMemory * std::sqrt(static_cast<double>(evidence_.runs.size()) / excess_);
+    return std::min(1.0, 2.0 * std::min(phases_.p_value(by_memory), p_of_decay()));
+  }
+
+  /// Whether the periods change along a straight line, as a drift does and a transient does not.
+  bool straight() const {
+    return bends_.p_value(0.0) >= kFalseAlarms && p_of_decay() >= kFalseAlarms;
   }
 
   /// Ratio q of the transient in consecutive periods.
@@ -102,6 +124,13 @@ class Window {
   double frequency_hz() const { return evidence_.frequency_hz[peak_]; }
 
  private:
+  /// Test 2: whether the first period differs more from the others than the last does.
+  double p_of_decay() const {
+    const int runs = static_cast<int>(evidence_.runs.size());
+    if (evidence_.runs.front().periods < 3 || !(last_power_ > 0.0)) return 1.0;
+    return std::exp(log_tail_of_f(first_power_ / last_power_, runs, runs));
+  }
+
   std::complex<double> mean_of_powers(std::complex<double> q, int from, int to) const {
     std::complex<double> sum = 0.0;
     for (int p = from; p <= to; ++p) sum += std::pow(q, p);
@@ -115,8 +144,8 @@ class Window {
   double start_ = 0.0;
   double first_power_ = 0.0;
   double last_power_ = 0.0;
-  std::complex<double> resultant_ = 0.0;
-  double squares_ = 0.0;
+  Phases phases_;
+  Phases bends_;
 };
 
 std::complex<double> Window::ratio() const {
@@ -163,6 +192,16 @@ std::string periods_text(int periods) {
   return counted(static_cast<std::size_t>(periods), "period");
 }
 
+/// "71, 182 and 3 more Hz"
+std::string names_of(const std::vector<double>& frequencies_hz) {
+  std::string names;
+  for (std::size_t i = 0; i < frequencies_hz.size() && i < kMostNamed; ++i)
+    names += fmt::format("{}{:.4g}", i > 0 ? ", " : "", frequencies_hz[i]);
+  if (frequencies_hz.size() > kMostNamed)
+    names += fmt::format(" and {} more", frequencies_hz.size() - kMostNamed);
+  return names + " Hz";
+}
+
 }  // namespace
 
 std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
@@ -174,9 +213,17 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
   double of_largest = 0.0;
   double settled = 0.0;  // the largest shift if the start is discarded
   int more = 0;
+  std::vector<double> drifting;
+  double least_p = 1.0;
   for (const Index peak : peaks) {
     const Window window(evidence, lines, peak);
-    if (window.p_value() * static_cast<double>(peaks.size()) >= kFalseAlarms) continue;
+    const double p = window.p_value() * static_cast<double>(peaks.size());
+    if (p >= kFalseAlarms) continue;
+    if (window.straight()) {
+      least_p = std::min(least_p, p);
+      drifting.push_back(window.frequency_hz());
+      continue;
+    }
     const std::complex<double> q = window.ratio();
     const double shift = window.shift(q, evidence.runs.front().start_used);
     settled = std::max(settled, window.shift(q, false));
@@ -189,21 +236,23 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
       of_largest = std::abs(q);
     }
   }
-  if (frequencies.empty()) return {};
-  std::string names;
-  for (std::size_t i = 0; i < frequencies.size() && i < kMostNamed; ++i)
-    names += fmt::format("{}{:.4g}", i > 0 ? ", " : "", frequencies[i]);
-  if (frequencies.size() > kMostNamed)
-    names += fmt::format(" and {} more", frequencies.size() - kMostNamed);
+  std::vector<Finding> findings;
+  if (!drifting.empty())
+    findings.push_back({Severity::doubt, Cause::drift, "",
+                        fmt::format("the response changes steadily during the runs at {}: a mode "
+                                    "drifts",
+                                    names_of(drifting)),
+                        fmt::format("p = {:.1g}", least_p),
+                        "let the stage warm up, or measure for a shorter time"});
+  if (frequencies.empty()) return findings;
   const int needed = evidence.transient_periods + std::max(1, more);
   Finding finding;
   // The bound is reached if all runs shift the mode alike. Their phases are random.
   const double expected = settled / std::sqrt(static_cast<double>(evidence.runs.size()));
   finding.severity = expected > kTolerable ? Severity::fault : Severity::doubt;
   finding.cause = Cause::unsettled;
-  finding.what =
-      fmt::format("not settled: the transient of the start still rings at {} Hz after {}", names,
-                  periods_text(evidence.transient_periods));
+  finding.what = fmt::format("not settled: the transient of the start still rings at {} after {}",
+                             names_of(frequencies), periods_text(evidence.transient_periods));
   finding.figure = fmt::format(
       "shifts a mode by up to {:.2g} standard deviations; {:.2g} % remains after one more period",
       largest, 100.0 * of_largest);
@@ -214,7 +263,8 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
       needed <= recorded - 2
           ? fmt::format("--transient-periods {}, or --method lpm", needed)
           : fmt::format("--method lpm, or measure again with transient_periods: {}", needed);
-  return {finding};
+  findings.push_back(std::move(finding));
+  return findings;
 }
 
 }  // namespace stageid

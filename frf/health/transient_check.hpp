@@ -23,6 +23,10 @@ namespace stageid {
 /// freedom per run on either side, because lines and sensors share their noise. False alarms in at most one
 /// of two hundred logs (Bonferroni over maxima and tests).
 ///
+/// A drift changes the periods along a straight line, which test 1 detects as well. The phase of the curvature K
+/// relative to the slope L (RunStart) is the same in all runs for a transient and random for a drift. If neither it
+/// nor test 2 shows a decay, the finding is a drift.
+///
 /// From W = c B follows q: c = (q - mean q^2...q^P) / (1 - mean q...q^P). The transient in the mean of the used
 /// periods, relative to its noise and over all runs, sensors and lines of the window, bounds the shift of every
 /// fitted parameter in its own standard deviations (Cauchy-Schwarz). Shifts below half a deviation are not

@@ -24,11 +24,12 @@ void StartRecorder::take(const Eigen::Ref<const Eigen::MatrixXcd>& spectra) {
   ++count_;
   latest_ = spectra;
   if (count_ == 1) {
-    first_ = spectra;
+    first_ = moment_ = spectra;
     rest_mean_.setZero(spectra.rows(), spectra.cols());
     rest_scatter_.setZero(spectra.rows(), spectra.cols());
     return;
   }
+  moment_ += count_ * spectra;
   const double n = count_ - 1;
   const Eigen::MatrixXcd deviation = spectra - rest_mean_;
   rest_mean_ += deviation / n;
@@ -44,6 +45,8 @@ RunStart StartRecorder::finish() {
   const Eigen::MatrixXcd B = start_ - mean;
   const Eigen::MatrixXcd W = first_ - rest_mean_;
   const Eigen::MatrixXcd V = latest_ - (P * mean - latest_) / (P - 1.0);
+  const Eigen::MatrixXcd L = moment_ - 0.5 * P * (start_ + P * mean);
+  const Eigen::MatrixXcd K = start_ - first_ - 2.0 / P * W;
   const double scale = (P - 1.0) / P;
   run.noise_dof = count_ == 2 ? 1.0 : P - 2.0;
   Eigen::MatrixXd noise = rest_scatter_ / run.noise_dof;
@@ -57,11 +60,14 @@ RunStart StartRecorder::finish() {
     const double level = std::max(order_statistic(values, 0.5), kTransientRounding * power);
     const double weight = level > 0.0 ? 1.0 / level : 0.0;
     if (c == 0) {
-      run.along.setZero(noise.cols());
-      run.start = run.first = run.last = run.noise = Eigen::VectorXd::Zero(noise.cols());
+      run.along = run.bend = Eigen::VectorXcd::Zero(noise.cols());
+      run.start = run.slope = run.first = run.last = run.noise =
+          Eigen::VectorXd::Zero(noise.cols());
     }
     run.along += weight * B.row(c).conjugate().cwiseProduct(W.row(c)).transpose();
+    run.bend += weight * L.row(c).conjugate().cwiseProduct(K.row(c)).transpose();
     run.start += weight * B.row(c).cwiseAbs2().transpose();
+    run.slope += weight * L.row(c).cwiseAbs2().transpose();
     run.first += weight * scale * W.row(c).cwiseAbs2().transpose();
     run.last += weight * scale * V.row(c).cwiseAbs2().transpose();
     // Rounding errors count as noise, so that it is not zero.

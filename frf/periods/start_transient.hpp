@@ -10,9 +10,14 @@ namespace stageid {
 ///   B = Z_0 - mean(Z_1 ... Z_P),  W = Z_1 - mean(Z_2 ... Z_P),  V = Z_P - mean(Z_1 ... Z_{P-1}).
 /// A ringing mode adds A q^p to Z_p, q = e^{pole x period}, so W is B times one complex number in all runs.
 /// For noise the phase is random. The sensors are summed, each over its noise.
+///
+/// A drift adds D p to Z_p. B and W are then proportional too, but there is no curvature:
+///   L = sum_p (p - P/2) Z_p (slope),  K = Z_0 - (1 + 2/P) Z_1 + 2/P mean(Z_2 ... Z_P) (zero for a straight line).
 struct RunStart {
   Eigen::VectorXcd along;  ///< sum over the sensors of conj(B) W, per line
+  Eigen::VectorXcd bend;   ///< the same of conj(L) K
   Eigen::VectorXd start;   ///< |B|^2
+  Eigen::VectorXd slope;   ///< |L|^2
   Eigen::VectorXd first;   ///< |W|^2 (P - 1) / P: the noise of one period if nothing rings
   Eigen::VectorXd last;    ///< |V|^2 (P - 1) / P
   Eigen::VectorXd noise;   ///< of one period, from Z_2 ... Z_P; P = 2: from both periods
@@ -51,6 +56,7 @@ class StartRecorder {
   Eigen::MatrixXcd start_;
   Eigen::MatrixXcd first_;
   Eigen::MatrixXcd latest_;
+  Eigen::MatrixXcd moment_;     // sum of p Z_p
   Eigen::MatrixXcd rest_mean_;  // of Z_2 ...
   Eigen::MatrixXd rest_scatter_;
 };

@@ -12,7 +12,16 @@ namespace {
 constexpr Eigen::Index kLines = 8;  // per band, and degrees of freedom of the expectation
 constexpr int kPasses = 5;  // of the weights: alpha changes by less than a percent afterwards
 
-/// alpha of one channel in one band. @param power |G|^2
+/// Mean over the inputs of |G|^2, n_y x N.
+Eigen::MatrixXd row_power(const FrfEstimate& frf) {
+  const Eigen::Index n_y = frf.n_outputs();
+  Eigen::MatrixXd power = Eigen::MatrixXd::Zero(n_y, frf.lines());
+  for (Eigen::Index u = 0; u < frf.n_inputs(); ++u)
+    power += frf.response.middleRows(u * n_y, n_y).cwiseAbs2();
+  return power / static_cast<double>(frf.n_inputs());
+}
+
+/// alpha of one channel in one band. @param power row_power()
 double relative_distortion(const Eigen::ArrayXd& total, const Eigen::ArrayXd& noise,
                            const Eigen::ArrayXd& power) {
   if (!(power.sum() > 0.0)) return 0.0;
@@ -32,6 +41,7 @@ DistortionVariance distortion_variance(const FrfEstimate& frf) {
   const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kLines);
   DistortionVariance out;
   out.variance.resize(frf.response.rows(), frf.lines());
+  const Eigen::MatrixXd row = row_power(frf);
   const double prior_dof = static_cast<double>(kLines);
   out.dof = frf.total_dof + prior_dof;
   const auto bands = static_cast<Eigen::Index>(limits.size()) - 1;
@@ -43,12 +53,12 @@ DistortionVariance distortion_variance(const FrfEstimate& frf) {
     out.distortion.band_hz.row(at) << frf.frequency_hz[limits[b]],
         frf.frequency_hz[limits[b + 1] - 1];
     for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
-      const auto band = [&](const auto& matrix) {
-        return matrix.row(c).segment(limits[b], count).transpose().array().eval();
+      const auto band = [&](const Eigen::MatrixXd& matrix, Eigen::Index i) {
+        return matrix.row(i).segment(limits[b], count).transpose().array().eval();
       };
-      const Eigen::ArrayXd total = band(frf.total_variance);
-      const Eigen::ArrayXd noise = band(frf.noise_variance);
-      const Eigen::ArrayXd power = band(frf.response).abs2();
+      const Eigen::ArrayXd total = band(frf.total_variance, c);
+      const Eigen::ArrayXd noise = band(frf.noise_variance, c);
+      const Eigen::ArrayXd power = band(row, c % frf.n_outputs());
       const double alpha = relative_distortion(total, noise, power);
       out.distortion.level(c, at) = std::sqrt((frf.total_dof + 1.0) * alpha);
       const Eigen::ArrayXd expected = noise + alpha * power;
@@ -82,13 +92,14 @@ Eigen::MatrixXcd covariance_with_distortion(const FrfEstimate& frf,
 
 Eigen::MatrixXd variance_with(const Distortion& distortion, const FrfEstimate& frf) {
   Eigen::MatrixXd variance = frf.noise_variance;
+  const Eigen::MatrixXd row = row_power(frf);
   const double realizations = std::max(1, frf.realizations);
   Eigen::Index b = 0;
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     while (b + 1 < distortion.band_hz.rows() && frf.frequency_hz[k] >= distortion.band_hz(b + 1, 0))
       ++b;
     variance.col(k) += (distortion.level.col(b).array().square() *
-                        frf.response.col(k).array().abs2() / realizations)
+                        row.col(k).replicate(frf.n_inputs(), 1).array() / realizations)
                            .matrix();
   }
   return variance;

@@ -9,7 +9,7 @@ namespace stageid {
 /// Distortion of one realization of a nonlinear plant, as known from an estimate.
 struct Distortion {
   Eigen::MatrixXd band_hz;  ///< bands x 2: first and last line; empty: unknown
-  Eigen::MatrixXd level;    ///< (n_y n_u) x bands: rms over |G|, of one realization
+  Eigen::MatrixXd level;  ///< (n_y n_u) x bands: rms over that of the row of G, of one realization
 };
 
 /// E|dG|^2 of the mean of `realizations` due to the distortion and the noise of `frf`, (n_y n_u) x N. Lines outside the
@@ -24,8 +24,9 @@ struct DistortionVariance {
 };
 
 /// With M realizations, the total variance of a line has M - 1 degrees of freedom, too few for weights. It varies too
-/// much over the lines (distortion follows the response) for a mean over neighbouring ones. The expected variance is
-///   v_k = noise_k + alpha |G_k|^2,
+/// much over the lines (distortion follows the response) for a mean over neighbouring ones. Distortion acts as forces
+/// of all actuators, whichever is excited, so the expected variance at output y is
+///   v_k = noise_k + alpha mean_u |G_yu,k|^2,
 /// with one alpha per channel and octave (at least 8 lines), by least squares on total - noise with weights 1/v^2. The
 /// estimate is the mean of the total variance and v, weighted by their degrees of freedom, M - 1 and 8. It approaches
 /// the total variance for many realizations and v for few, and it is larger for outlying lines.

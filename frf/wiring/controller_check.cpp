@@ -1,7 +1,6 @@
 #include "frf/wiring/controller_check.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -22,8 +21,9 @@ constexpr double kLeastShare = 0.3;
 constexpr int kMostChanges = 40;
 constexpr double kOfAnother = 0.05;  // of a row's misfit, after an exchange
 constexpr double kHardlyWorse = 4.0;
-// Skews in samples that a channel may have as a whole, beyond the linear range of a small skew.
-constexpr std::array<double, 6> kWholeSkews = {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0};
+// Skews in samples beyond the linear range of a small skew.
+constexpr double kLargestSkew = 4.0;
+constexpr double kSkewStep = 0.5;
 
 /// One line after the changes found so far have been undone.
 struct Line {
@@ -212,7 +212,7 @@ void Search::try_swap(ChannelChange change, double cost, double after) {
 /// Tries large skews, beyond the linear range of a small one.
 void Search::try_whole_skews(Index a, double cost) {
   if (!noise_known_) return;
-  for (const double samples : kWholeSkews) {
+  for (double samples = -kLargestSkew; samples <= kLargestSkew; samples += kSkewStep) {
     const double skew_s = samples / record_.info.sample_rate_hz;
     double length = 0.0;
     const double after = sum_over_lines([&](const Line& line) {

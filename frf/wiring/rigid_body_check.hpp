@@ -20,8 +20,8 @@ struct RigidBodyCheck {
 /// channels that explain it.
 ///
 /// Below the first flexible mode, for sensor i and actuator j,
-///   -omega^2 G_ij = A_ij + D_ij omega^2 + D'_ij omega^4,
-/// real apart from the delay: A is the rigid body, D the compliance of the flexible modes. The same fit to the nominal
+///   -omega^2 G_ij = A_ij + D_ij omega^2 + D'_ij omega^4 + K_ij omega^-2,
+/// real apart from the delay: A is the rigid body, D the compliance of the flexible modes, K the springs. The same fit to the nominal
 /// rigid body gives A0. A wiring gain g of a channel scales its row or column; an exchange of channels exchanges them.
 /// The change that brings A closest to A0 is accepted, and the search is repeated. Entries have a tolerance of 10 % of
 /// the rms of their row, the accuracy of amplifiers, masses and positions. A gain is accepted from 30 % on, or if it

@@ -153,7 +153,7 @@ void Examination::check_recording() {
     const bool is_input =
         std::find(excited.begin(), excited.end(), misfit.actuator) != excited.end();
     find(Severity::fault, Cause::unrecorded, name(record_.n_y() + misfit.actuator),
-         is_input ? "moves more than r - C y: an excitation was not recorded"
+         is_input ? "moves more than r - C y: an excitation, or a moving setpoint, was not recorded"
                   : "moves independently of the sub-plant: its excitation was not recorded",
          fmt::format("u - r + C y is {:.2g} of {}", misfit.relative,
                      misfit.controlled ? "C y" : "u; C y is zero"),

@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 
 #include "frf/health/data_health.hpp"
+#include "frf/health/transient_check.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
@@ -120,6 +122,55 @@ TEST(StartTransient, TheEstimateGathersTheSame) {
     EXPECT_TRUE(both.health.start.runs[e].along.isApprox(alone.start.runs[e].along, 1e-9)) << e;
   EXPECT_TRUE(
       estimate_plant_frf_and_health({&log}, {.method = FrfMethod::lpm}).health.start.runs.empty());
+}
+
+/// 30 runs of five periods and the one before them: noise, and change(p) times a random phase on five lines.
+template <typename Change>
+std::vector<Finding> of_change(const Change& change, std::uint64_t seed) {
+  test::RandomNumbers random(seed);
+  StartEvidence evidence{.frequency_hz = Eigen::VectorXd::LinSpaced(60, 5.0, 64.0),
+                         .runs = {},
+                         .sensors = 2,
+                         .transient_periods = 2,
+                         .periods = 4};
+  for (int run = 0; run < 30; ++run) {
+    const auto period = [&](const Eigen::MatrixXcd& shape, int p) {
+      Eigen::MatrixXcd Z =
+          Eigen::MatrixXcd::NullaryExpr(2, 60, [&random] { return random.circular(); });
+      Z.middleCols(30, 5) += change(p) * shape;
+      return Z;
+    };
+    const Eigen::MatrixXcd shape =
+        Eigen::MatrixXcd::NullaryExpr(2, 5, [&random] { return random.circular(); });
+    StartRecorder recorder(period(shape, 0));
+    for (int p = 1; p <= 4; ++p) recorder.take(period(shape, p));
+    evidence.runs.push_back(recorder.finish());
+  }
+  return check_start_transient(evidence);
+}
+
+TEST(StartTransient, ASteadyChangeIsADrift) {
+  int named = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const std::vector<Finding> found = of_change([](int p) { return 3.0 * p; }, seed);
+    named += found.size() == 1 && found[0].cause == Cause::drift;
+    EXPECT_TRUE(std::none_of(found.begin(), found.end(), [](const Finding& f) {
+      return f.severity == Severity::fault;
+    })) << seed;
+  }
+  EXPECT_GE(named, 19);
+}
+
+TEST(StartTransient, ADecayIsNoDrift) {
+  for (const double q : {0.2, 0.5, 0.7}) {
+    int named = 0;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      const std::vector<Finding> found =
+          of_change([q](int p) { return 30.0 * std::pow(q, p); }, seed);
+      named += found.size() == 1 && found[0].cause == Cause::unsettled;
+    }
+    EXPECT_GE(named, 19) << q;
+  }
 }
 
 class SettledNoise : public testing::TestWithParam<Colour> {};

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <complex>
 
 #include "tests/support/process/random_numbers.hpp"
 
@@ -23,6 +24,8 @@ Case draw(std::uint64_t seed, int M, double relative_distortion) {
   Case out;
   FrfEstimate& frf = out.frf;
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(kLines, 10.0, 1000.0);
+  frf.inputs.names = {"a"};
+  frf.outputs.names = {"z"};
   frf.response.resize(1, kLines);
   out.truth.resize(1, kLines);
   constexpr double kNoise = 1e-14;
@@ -82,6 +85,40 @@ TEST(DistortionVariance, AnOutputThatShowsNothingHasItsNoise) {
   const DistortionVariance found = distortion_variance(drawn.frf);
   EXPECT_TRUE(found.variance.allFinite());
   EXPECT_GT(found.variance.minCoeff(), 0.0);
+}
+
+// A force error of the actuator that drives a mode moves the output also while the other actuator is excited, which
+// hardly drives that mode.
+TEST(DistortionVariance, OfAWeaklyDrivenModeIsThatOfItsStrongActuator) {
+  test::RandomNumbers random(11);
+  FrfEstimate frf;
+  frf.inputs.names = {"strong", "weak"};
+  frf.outputs.names = {"z"};
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(kLines, 10.0, 1000.0);
+  frf.response.resize(2, kLines);
+  frf.total_variance.resize(2, kLines);
+  frf.noise_variance.setConstant(2, kLines, 1e-12);
+  frf.total_dof = 1.0;
+  frf.noise_dof = 20.0;
+  Eigen::VectorXd truth(kLines);
+  for (Eigen::Index k = 0; k < kLines; ++k) {
+    const double ratio = frf.frequency_hz[k] / 400.0;
+    const std::complex<double> mode = 1.0 / std::complex<double>(1.0 - ratio * ratio, 0.02 * ratio);
+    frf.response.col(k) << mode, 1.0 + 0.01 * mode;
+    truth[k] = 1e-12 + 1e-4 * frf.response.col(k).squaredNorm();
+    for (Eigen::Index u = 0; u < 2; ++u)
+      frf.total_variance(u, k) = truth[k] * std::norm(random.circular());
+  }
+  const DistortionVariance found = distortion_variance(frf);
+  Eigen::Index peak = 0;
+  truth.maxCoeff(&peak);
+  for (Eigen::Index u = 0; u < 2; ++u) {
+    const Eigen::VectorXd ratio = found.variance.row(u)
+                                      .segment(peak - 4, 9)
+                                      .transpose()
+                                      .cwiseQuotient(truth.segment(peak - 4, 9));
+    EXPECT_NEAR(ratio.mean(), 1.0, 0.3) << "input " << u;
+  }
 }
 
 // Forces that differ from realization to realization: y = G (u + d) + v has the covariance C_E + s G G^H.

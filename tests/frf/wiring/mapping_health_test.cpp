@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "frf/health/data_health.hpp"
+#include "frf/health/health_measures.hpp"
 #include "frf/wiring/feedback_check.hpp"
 #include "frf/wiring/injection_check.hpp"
 #include "tests/support/process/random_numbers.hpp"
@@ -161,6 +163,32 @@ TEST(SilentStage, IsNoCaseOfDeadSensors) {
   EXPECT_EQ(found[0].cause, Cause::incoherent) << found[0].what << found[0].channel;
   EXPECT_EQ(found[0].severity, Severity::fault);
   EXPECT_EQ(first_with(found, Cause::dead), nullptr);
+}
+
+/// A slow motion that does not repeat with the period.
+void move(MemoryLog& log, double first_m, double second_m) {
+  for (LogSamples& record : log.records)
+    for (Eigen::Index n = 0; n < record.sensors.rows(); ++n) {
+      const double slow = std::sin(0.0021 * static_cast<double>(n) + 0.4);
+      record.sensors(n, 0) += first_m * slow;
+      record.sensors(n, 1) += second_m * slow;
+    }
+}
+
+TEST(MovingSetpoint, IsNotADeadSensor) {
+  MemoryLog log = closed_loop_log();
+  EXPECT_LT(common_motion(read_health_record({&log}, {}), 0, 1), 0.3);  // independent noise
+  move(log, 300.0, 1.0);
+  EXPECT_GT(common_motion(read_health_record({&log}, {}), 0, 1), 0.9);
+  NominalStage nominal = small_nominal();
+  nominal.rigid_body = [](double) { return Eigen::MatrixXcd(Eigen::MatrixXcd::Ones(2, 3)); };
+  const std::vector<Finding> found = health_of(log, nominal);
+  EXPECT_EQ(first_with(found, Cause::dead), nullptr);
+  const Finding* finding = first_with(found, Cause::incoherent);
+  ASSERT_NE(finding, nullptr);
+  EXPECT_EQ(finding->severity, Severity::fault);
+  EXPECT_EQ(finding->channel, "z1");
+  EXPECT_THAT(finding->what, HasSubstr("moving setpoint"));
 }
 
 TEST(UnknownStage, IsSaidFirstWithTheFlagThatHelps) {

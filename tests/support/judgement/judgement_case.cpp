@@ -24,8 +24,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kHeave = 2;  // of wafer_stage_modes()
-
 /// NaN where JSON has null.
 double number(const Json& object, const char* key) {
   return object.contains(key) && object[key].is_number() ? object[key].get<double>()
@@ -99,44 +97,57 @@ WaferStageSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
   return spec;
 }
 
-/// The modes of the best linear approximation: the plant's, with the nonlinear force on the heave linearized.
-std::vector<PlantMode> linear_modes(const WaferStageSpec& spec, const HeaveLinearization& heave) {
-  std::vector<PlantMode> modes = wafer_stage_modes(spec);
-  PlantMode& mode = modes[kHeave];
-  const double own = 2.0 * std::numbers::pi * mode.natural_frequency_hz;
-  const double omega = std::sqrt(own * own + heave.stiffness_n_m / spec.mass_kg);
-  mode.damping_ratio =
-      (mode.damping_ratio * own + 0.5 * heave.damping_n_s_m / spec.mass_kg) / omega;
-  mode.natural_frequency_hz = omega / (2.0 * std::numbers::pi);
-  return modes;
+/// Response of the plant with its trouble as a flawless measurement records it, (n_y n_u) x N in the order of `frf`.
+Eigen::MatrixXcd exact_response(const JudgementStage& stage, const TroublePlan& plan,
+                                const FrfEstimate& frf) {
+  const WaferStageSpec spec = plant_of(stage, plan);
+  const std::vector<PlantMode> modes = wafer_stage_modes(spec);
+  const bool nonlinear = plan.cubic_n_m3 > 0.0 || plan.friction_n > 0.0;
+  const Eigen::MatrixXcd average =
+      nonlinear ? best_linear_approximation(stage, plan) : Eigen::MatrixXcd();
+  const Eigen::VectorXd grid_hz = stage.plan().grid().frequency_hz();
+  const auto n_y = static_cast<Eigen::Index>(spec.info.sensors.size());
+  Eigen::MatrixXcd exact(frf.response.rows(), frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    Eigen::MatrixXcd G =
+        sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, frf.frequency_hz[k]);
+    if (nonlinear) {
+      Eigen::Index at = 0;
+      (grid_hz.array() - frf.frequency_hz[k]).abs().minCoeff(&at);
+      G = average.col(at).reshaped(n_y, G.cols());
+    }
+    if (plan.late >= 0) {
+      const std::complex<double> turn =
+          std::polar(1.0, -2.0 * std::numbers::pi * frf.frequency_hz[k] * plan.late_samples /
+                              spec.info.sample_rate_hz);
+      if (plan.late_sensor)
+        G.row(plan.late) *= turn;
+      else
+        G.col(plan.late) /= turn;
+    }
+    for (Eigen::Index c = 0; c < exact.rows(); ++c)
+      exact(c, k) =
+          G(channel_index(spec.info.sensors,
+                          frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())]),
+            channel_index(spec.info.actuators,
+                          frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]));
+  }
+  return exact;
 }
 
 /// Squared error of the model over that of the measured response, weighed by the variances of noise.
-double excess_of(const AdditiveModel& model, const FrfEstimate& frf, const WaferStageSpec& spec,
-                 const HeaveLinearization& heave) {
+double excess_of(const AdditiveModel& model, const FrfEstimate& frf,
+                 const Eigen::MatrixXcd& exact) {
   if (frf.noise_variance.size() == 0) return 0.0;
-  const std::vector<PlantMode> modes = linear_modes(spec, heave);
-  const Eigen::MatrixXcd response = response_like(model, frf);
-  double of_model = 0.0;
-  double of_measurement = 0.0;
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    const Eigen::MatrixXcd whole =
-        sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, frf.frequency_hz[k]);
-    for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
-      for (Eigen::Index i = 0; i < frf.n_outputs(); ++i) {
-        const Eigen::Index c = i + frf.n_outputs() * j;
-        const std::complex<double> exact = whole(
-            channel_index(spec.info.sensors, frf.outputs.names[static_cast<std::size_t>(i)]),
-            channel_index(spec.info.actuators, frf.inputs.names[static_cast<std::size_t>(j)]));
-        of_model += std::norm(response(c, k) - exact) / frf.noise_variance(c, k);
-        of_measurement += std::norm(frf.response(c, k) - exact) / frf.noise_variance(c, k);
-      }
-  }
-  return of_model / of_measurement;
+  const auto size = [&](const Eigen::MatrixXcd& G) {
+    return ((G - exact).cwiseAbs2().array() / frf.noise_variance.array()).sum();
+  };
+  return size(response_like(model, frf)) / size(frf.response);
 }
 
-void compare(const AdditiveModel& model, const FrfEstimate& frf, const WaferStageSpec& spec,
-             const HeaveLinearization& heave, Json& result) {
+void compare(const AdditiveModel& model, const FrfEstimate& frf, const JudgementStage& stage,
+             const TroublePlan& plan, Json& result) {
+  const WaferStageSpec spec = plant_of(stage, plan);
   const TruthComparison truth = compare_with_truth(model, frf, spec);
   Json df = Json::array();
   Json dz = Json::array();
@@ -157,7 +168,7 @@ void compare(const AdditiveModel& model, const FrfEstimate& frf, const WaferStag
   result["df"] = std::move(df);
   result["dz"] = std::move(dz);
   result["relative_error"] = truth.relative_rms_error;
-  result["excess"] = excess_of(model, frf, spec, heave);
+  result["excess"] = excess_of(model, frf, exact_response(stage, plan, frf));
 }
 
 /// The first cause in the output for exit code 3: the finding of an untrustworthy log, then the message of the fit,
@@ -191,8 +202,7 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
 void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& session,
                const std::filesystem::path& directory, Json& result) {
   const auto path = [&](const char* name) { return (directory / name).string(); };
-  const TroubledMeasurement measured = measure_with_trouble(stage, plan);
-  convert_log(measured.log, directory / "log.h5");
+  convert_log(measure_with_trouble(stage, plan), directory / "log.h5");
   std::vector<std::string> words = {
       "frf",          path("log.h5"),   "-o",
       path("frf.h5"), "--realizations", realization_list(stage.realizations - 1)};
@@ -234,8 +244,8 @@ void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& se
   result["dropped"] = frf.json.contains("dropped_periods") ? frf.json["dropped_periods"].size() : 0;
   result["periods"] = stage.plan().experiments() * (stage.realizations - 1) * stage.periods;
   if (fitted)
-    compare(read_model(directory / "model.json"), read_frf(directory / "frf.h5"),
-            plant_of(stage, plan), measured.heave, result);
+    compare(read_model(directory / "model.json"), read_frf(directory / "frf.h5"), stage, plan,
+            result);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -7,6 +8,7 @@
 #include <utility>
 
 #include "acquisition/loop/run_experiment.hpp"
+#include "excitation/multisine/dft.hpp"
 #include "hal/simulator/modal_plant.hpp"
 #include "hal/simulator/noise.hpp"
 #include "hal/simulator/rigid_body.hpp"
@@ -43,27 +45,6 @@ double setpoint(double turns) {
          0.3 * std::sin(kTwoPi * 1.3124 * turns + 2.0);
 }
 
-/// Sums over the samples of all runs, for a HeaveLinearization.
-class HeaveRegression {
- public:
-  void add(double z_m, double v_m_s, double force_n) {
-    displacement_ += z_m * z_m;
-    velocity_ += v_m_s * v_m_s;
-    stiffness_ -= force_n * z_m;
-    damping_ -= force_n * v_m_s;
-  }
-  HeaveLinearization result() const {
-    if (displacement_ == 0.0 || velocity_ == 0.0) return {};
-    return {stiffness_ / displacement_, damping_ / velocity_};
-  }
-
- private:
-  double displacement_ = 0.0;
-  double velocity_ = 0.0;
-  double stiffness_ = 0.0;
-  double damping_ = 0.0;
-};
-
 /// The closed loop, sample by sample.
 class Loop {
  public:
@@ -90,7 +71,6 @@ class Loop {
     noise_.restart(stage_.spec.seed + stage_.seed, seed);
     coloured_.restart(~stage_.seed, seed);
     if (friction_) friction_->reset();
-    last_z_m_ = 0.0;
     LogSamples record;
     record.actuators.resize(samples, u_.size());
     record.sensors.resize(samples, y_.size());
@@ -107,7 +87,6 @@ class Loop {
     }
     return record;
   }
-  HeaveLinearization heave() const { return regression_.result(); }
 
  private:
   void drift(double done) {
@@ -140,8 +119,6 @@ class Loop {
     const double z_m = shape * plant_.coordinate(kHeave);
     double extra_n = -plan_.cubic_n_m3 * z_m * z_m * z_m;
     if (friction_) extra_n += friction_->move_to(z_m);
-    regression_.add(z_m, (z_m - last_z_m_) * stage_.spec.info.sample_rate_hz, extra_n);
-    last_z_m_ = z_m;
     if (extra_n != 0.0) plant_.add_modal_force(kHeave, shape * extra_n);
     plant_.step(force_.data());
   }
@@ -154,8 +131,6 @@ class Loop {
   ColouredNoise coloured_;
   std::optional<DahlFriction> friction_;
   std::vector<double> heave_;
-  HeaveRegression regression_;
-  double last_z_m_ = 0.0;
   Eigen::VectorXd y_;
   Eigen::VectorXd seen_;  // input of the controller: the error from the setpoint
   Eigen::VectorXd u_;
@@ -213,7 +188,7 @@ void spoil(const TroublePlan& plan, int run, Eigen::Index transient, MemoryLog& 
 
 }  // namespace
 
-TroubledMeasurement measure_with_trouble(const JudgementStage& stage, const TroublePlan& plan) {
+MemoryLog measure_with_trouble(const JudgementStage& stage, const TroublePlan& plan) {
   const ExperimentPlan experiment = stage.plan();
   const Eigen::Index period = stage.period_samples;
   const Eigen::Index transient = period * stage.transient_periods;
@@ -243,7 +218,53 @@ TroubledMeasurement measure_with_trouble(const JudgementStage& stage, const Trou
     log.log_runs.back().samples = static_cast<std::uint64_t>(samples);
     log.records.back().marked.setZero(samples);
   }
-  return {std::move(log), loop.heave()};
+  return log;
+}
+
+Eigen::MatrixXcd best_linear_approximation(const JudgementStage& stage, const TroublePlan& plan) {
+  constexpr int kRealizations = 20;
+  JudgementStage quiet = stage;
+  quiet.seed = ~stage.seed;
+  quiet.realizations = kRealizations;
+  quiet.spec.sensor_noise_m = quiet.spec.force_noise_n = 0.0;
+  quiet.noise.colour = NoiseColour::white;
+  quiet.noise.density = 0.0;
+  const ExperimentPlan experiment = quiet.plan();
+  const std::vector<int>& lines = experiment.grid().lines();
+  const auto n_y = static_cast<Eigen::Index>(stage.spec.info.sensors.size());
+  const auto n_u = static_cast<Eigen::Index>(stage.spec.info.actuators.size());
+  const Eigen::Index E = experiment.experiments();
+  const Eigen::Index period = stage.period_samples;
+  const Eigen::Index samples = period * (stage.transient_periods + 1);
+  Loop loop(quiet, plan);
+  RealDft dft(stage.period_samples);
+  std::vector<Eigen::MatrixXcd> Z(lines.size(), Eigen::MatrixXcd(n_y + n_u, E));
+  std::vector<Eigen::MatrixXcd> R(lines.size(), Eigen::MatrixXcd(n_u, E));
+  std::vector<Eigen::MatrixXcd> sum(lines.size(), Eigen::MatrixXcd::Zero(n_y + n_u, n_u));
+  const auto take = [&](const auto& signal, std::vector<Eigen::MatrixXcd>& into, Eigen::Index row,
+                        Eigen::Index e) {
+    std::copy(signal.begin(), signal.end(), dft.input().begin());
+    const auto spectrum = dft.forward();
+    for (std::size_t k = 0; k < lines.size(); ++k)
+      into[k](row, e) = spectrum[static_cast<std::size_t>(lines[k])];
+  };
+  for (const RunId& run : experiment.runs()) {
+    const Eigen::MatrixXd r = experiment.excitation(run);
+    const LogSamples record = loop.run(r, samples, 1, {0.0, 1.0});
+    const Eigen::Index e = run.experiment;
+    for (Eigen::Index i = 0; i < n_y; ++i) take(record.sensors.col(i).tail(period), Z, i, e);
+    for (Eigen::Index j = 0; j < n_u; ++j) {
+      take(record.actuators.col(j).tail(period), Z, n_y + j, e);
+      take(r.col(j), R, j, e);
+    }
+    if (e + 1 < E) continue;  // a realization is complete
+    for (std::size_t k = 0; k < lines.size(); ++k) sum[k] += Z[k] * R[k].inverse();
+  }
+  Eigen::MatrixXcd G(n_y * n_u, static_cast<Eigen::Index>(lines.size()));
+  for (std::size_t k = 0; k < lines.size(); ++k)
+    G.col(static_cast<Eigen::Index>(k)) =
+        (sum[k].topRows(n_y) * sum[k].bottomRows(n_u).inverse()).reshaped();
+  return G;
 }
 
 }  // namespace stageid::test

@@ -157,26 +157,29 @@ MotionControllerSpec controller(const WaferStageSpec& spec, const Sizes& sizes,
                                  spec.inertia_kg_m2[1], spec.inertia_kg_m2[2]});
 }
 
-/// Samples until a kick at all actuators has decayed to kDecayed of its largest motion; -1: it does not within `most`.
+/// Samples until a kick at all actuators has decayed to kDecayed of its largest motion, in the sensors and in each
+/// flexible mode; -1: it does not within `most`.
 int settling_samples(const WaferStageSpec& spec, int most) {
   ModalPlant plant(wafer_stage_modes(spec), spec.delay_s, spec.info.sample_rate_hz);
   MotionController loop(spec.controller);
   Eigen::VectorXd y(plant.sensors());
   Eigen::VectorXd u(plant.actuators());
-  std::vector<double> motion;
-  double largest = 0.0;
+  const auto modes = static_cast<Eigen::Index>(spec.in_plane_modes.size());
+  Eigen::ArrayXXd motion(1 + modes, most);  // of the sensors, of each mode
   for (int n = 0; n < most; ++n) {
     plant.output(y.data());
-    motion.push_back(y.cwiseAbs().maxCoeff());
-    largest = std::max(largest, motion.back());
-    if (!(largest < 1e6)) return -1;
+    motion(0, n) = y.cwiseAbs().maxCoeff();
+    for (Eigen::Index i = 0; i < modes; ++i)
+      motion(1 + i, n) = std::abs(plant.coordinate(static_cast<Eigen::Index>(kRigidAxes) + i));
+    if (!(motion(0, n) < 1e6)) return -1;
     loop.update(y.data(), u.data());
     if (n == 0)
       for (Eigen::Index i = 0; i < u.size(); ++i) u[i] += 1.0 + 0.3 * static_cast<double>(i % 3);
     plant.step(u.data());
   }
+  const Eigen::ArrayXd small = kDecayed * motion.rowwise().maxCoeff();
   int last = most - 1;
-  while (last > 0 && motion[static_cast<std::size_t>(last)] < kDecayed * largest) --last;
+  while (last > 0 && (motion.col(last) < small).all()) --last;
   return last > most * 3 / 4 ? -1 : last;
 }
 

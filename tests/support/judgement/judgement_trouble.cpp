@@ -130,8 +130,8 @@ TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
       break;
     case Trouble::setpoint_motion:
       plan.setpoint_m = stage.motion_m * std::pow(10.0, random.uniform(0.0, 2.0));
-      plan.right_causes = {"aperiodic", "incoherent", "setpoint",  "motion",
-                           "unsettled", "drift",      "controller"};
+      plan.right_causes = {"aperiodic", "incoherent", "setpoint",   "motion",
+                           "unsettled", "drift",      "controller", "unrecorded"};
       break;
     case Trouble::wrong_map:
       draw_wrong_map(random, stage, plan);

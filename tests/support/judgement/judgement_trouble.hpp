@@ -62,21 +62,14 @@ struct TroublePlan {
 /// May change the stage: the strength of its noise, its transient periods.
 TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage);
 
-/// The spring and damper that come closest to a nonlinear force on the heave: minus the regression of the force on
-/// displacement and velocity (statistical linearization; Roberts and Spanos, Random Vibration and Statistical
-/// Linearization, chapter 5). With Gaussian motion they make the best linear approximation of the plant.
-struct HeaveLinearization {
-  double stiffness_n_m = 0.0;
-  double damping_n_s_m = 0.0;
-};
-
-struct TroubledMeasurement {
-  MemoryLog log;
-  HeaveLinearization heave;
-};
-
 /// Measures the stage with its trouble, in virtual time, as `stageid run` would, in the layout of a foreign log.
 /// @throws std::runtime_error if the loop runs away.
-TroubledMeasurement measure_with_trouble(const JudgementStage& stage, const TroublePlan& plan);
+MemoryLog measure_with_trouble(const JudgementStage& stage, const TroublePlan& plan);
+
+/// The best linear approximation of the plant with its trouble: the mean over 20 noise-free realizations of the same
+/// excitation with other phases (Pintelon and Schoukens, System Identification, section 3.4).
+/// @returns (sensors x actuators) x lines of stage.plan().grid()
+/// @throws std::runtime_error if the loop runs away.
+Eigen::MatrixXcd best_linear_approximation(const JudgementStage& stage, const TroublePlan& plan);
 
 }  // namespace stageid::test

@@ -1,0 +1,42 @@
+#include "estimation/search/channel_delays.hpp"
+
+#include <gtest/gtest.h>
+
+namespace stageid {
+namespace test_channel_delays {
+
+AdditiveModel with_delays(const Eigen::VectorXd& inputs_s, const Eigen::VectorXd& outputs_s) {
+  AdditiveModel model;
+  for (Eigen::Index i = 0; i < inputs_s.size(); ++i)
+    model.inputs.names.push_back("a" + std::to_string(i + 1));
+  for (Eigen::Index i = 0; i < outputs_s.size(); ++i)
+    model.outputs.names.push_back("z" + std::to_string(i + 1));
+  model.sample_rate_hz = 1000.0;
+  model.input_delay_s = inputs_s;
+  model.output_delay_s = outputs_s;
+  model.input_delay_std_s.setConstant(inputs_s.size(), 1e-6);
+  model.output_delay_std_s.setConstant(outputs_s.size(), 1e-6);
+  return model;
+}
+
+TEST(ChannelDelays, ALateSensorAndAnEarlyActuatorAreNamed) {
+  const std::string text = late_channels(
+      with_delays(Eigen::Vector4d(2e-3, 2e-3, 1.5e-3, 2e-3), Eigen::Vector3d(0.0, 1e-3, 0.0)));
+  EXPECT_NE(text.find("z2 +1, a3 -0.5 samples relative"), std::string::npos) << text;
+}
+
+TEST(ChannelDelays, DifferencesWithinTheirDeviationsAreNotNamed) {
+  EXPECT_EQ(late_channels(
+                with_delays(Eigen::Vector3d(2e-3, 2.004e-3, 1.997e-3), Eigen::Vector2d(0.0, 3e-6))),
+            "");
+}
+
+TEST(ChannelDelays, OfTwoTheLaterIsNamed) {
+  const std::string text =
+      late_channels(with_delays(Eigen::Vector2d(3e-3, 2e-3), Eigen::VectorXd::Zero(1)));
+  EXPECT_NE(text.find("a1 +1 samples"), std::string::npos) << text;
+  EXPECT_EQ(text.find("a2"), std::string::npos);
+}
+
+}  // namespace test_channel_delays
+}  // namespace stageid
