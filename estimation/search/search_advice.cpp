@@ -95,6 +95,9 @@ std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
   std::vector<StructureMove> moves = richer_structures(frf, trial, same.model, open);
   for (StructureMove& move : simpler_structures(trial, same.model, {.rigid_body = true}))
     moves.push_back(std::move(move));
+  std::erase_if(moves, [&](const StructureMove& move) {  // of other modes, not of the structure
+    return count_modes(move.model) > count_modes(same.model);
+  });
   if (!cut_short)  // such a search would add modes in any case
     for (const ResidualMode& missed :
          residual_modes(frf, same.model, trial.user_weights, 1, trial.threads)) {

@@ -59,6 +59,7 @@ std::optional<std::pair<std::size_t, std::size_t>> coalesced(const AdditiveModel
   for (const auto& [i, j] : overlapping_modes(model)) {
     const Submodel& one = model.submodels[i];
     const Submodel& other = model.submodels[j];
+    if (one.frequency_held || other.frequency_held) continue;
     const double apart_hz = std::abs(one.natural_frequency_hz() - other.natural_frequency_hz());
     if (apart_hz < std::min(doubt_hz(one), doubt_hz(other))) return std::pair(i, j);
   }
@@ -70,34 +71,40 @@ struct Simpler {
   std::string reason;
 };
 
-/// Simpler models, the simplest first: without one of two modes that converged to each other, else without the least
-/// determined mode, or with its pole held. Empty: all modes are determined.
+Simpler with_held(const AdditiveModel& model, std::size_t i, const std::string& doubt) {
+  Simpler held{
+      model, fmt::format("held the pole at {:.6g} Hz, which the data need but do not determine {}",
+                         model.submodels[i].natural_frequency_hz(), doubt)};
+  Submodel& mode = held.model.submodels[i];
+  mode.frequency_held = mode.damping_held = true;
+  return held;
+}
+
+/// Simpler models: without one of two modes that converged to each other, else without the least determined mode; then
+/// with the pole of that mode held. Empty: all modes are determined.
 std::vector<Simpler> simpler(const FitResult& fit) {
   const AdditiveModel& model = fit.model;
   if (const auto pair = coalesced(model)) {
     const auto [i, j] = *pair;
-    return {
-        {with_one_of(model, i, j), fmt::format("merged {:.6g} and {:.6g} Hz, which coincided and",
-                                               model.submodels[i].natural_frequency_hz(),
-                                               model.submodels[j].natural_frequency_hz())}};
+    const double one_hz = model.submodels[i].natural_frequency_hz();
+    const double other_hz = model.submodels[j].natural_frequency_hz();
+    return {{with_one_of(model, i, j),
+             fmt::format("merged {:.6g} and {:.6g} Hz, which coincided and", one_hz, other_hz)},
+            with_held(model, doubt_hz(model.submodels[i]) > doubt_hz(model.submodels[j]) ? i : j,
+                      "(another mode is as near as its standard deviation) and which")};
   }
   const std::optional<OpenMode> open = most_open(fit);
   if (!open) return {};
-  const double frequency_hz = model.submodels[open->submodel].natural_frequency_hz();
   const std::string doubt =
       std::isfinite(open->doubt)
           ? fmt::format("(standard deviation {:.2g} times its value) and which", open->doubt)
           : "(at its bound) and which";
-  Simpler without{model, fmt::format("removed {:.6g} Hz, which the data do not support {}",
-                                     frequency_hz, doubt)};
+  Simpler without{model,
+                  fmt::format("removed {:.6g} Hz, which the data do not support {}",
+                              model.submodels[open->submodel].natural_frequency_hz(), doubt)};
   without.model.submodels.erase(without.model.submodels.begin() +
                                 static_cast<std::ptrdiff_t>(open->submodel));
-  Simpler held{
-      model, fmt::format("held the pole at {:.6g} Hz, which the data need but do not determine {}",
-                         frequency_hz, doubt)};
-  Submodel& mode = held.model.submodels[open->submodel];
-  mode.frequency_held = mode.damping_held = true;
-  return {std::move(without), std::move(held)};
+  return {std::move(without), with_held(model, open->submodel, doubt)};
 }
 
 bool may_converge(const FitResult& fit) {
@@ -141,7 +148,7 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
     FitResult next = fit_additive_model(frf, models[0].model, options);
     std::size_t chosen = 0;
     // A mode beside the lines may be needed although its pole is undetermined.
-    if (models.size() > 1 && information_criterion(frf, next) > information_criterion(frf, fit)) {
+    if (information_criterion(frf, next) > information_criterion(frf, fit)) {
       FitResult held = fit_additive_model(frf, models[1].model, options);
       if (information_criterion(frf, held) < information_criterion(frf, next)) {
         next = std::move(held);

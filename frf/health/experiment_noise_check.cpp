@@ -23,6 +23,17 @@ std::string named(std::vector<NoisyRun> runs) {
   return text;
 }
 
+// Times the noise power of the others. Disturbances of a stage rarely reach it; a limit cycle stops at one run and not
+// at the next.
+constexpr double kLimitCycle = 100.0;
+
+bool mostly_unsettled(const NonlinearityTest& test) {
+  Eigen::Index unsettled = 0;
+  for (Eigen::Index b = 0; b < test.settled_p_value.size(); ++b)
+    unsettled += test.settled(b) ? 0 : 1;
+  return 2 * unsettled > test.settled_p_value.size();
+}
+
 }  // namespace
 
 std::vector<Finding> check_experiment_noise(const FrfEstimate& frf,
@@ -40,6 +51,16 @@ std::vector<Finding> check_experiment_noise(const FrfEstimate& frf,
   finding.remedy =
       "find out what disturbed these experiments; 'fit --weighting likelihood' uses the nearest "
       "common covariance";
+  // Noise has random phases on neighbouring lines, a limit cycle has not.
+  if (frf.experiment_noise_ratio > kLimitCycle && mostly_unsettled(frf.nonlinearity)) {
+    finding.severity = Severity::fault;
+    finding.cause = Cause::limit_cycle;
+    finding.what =
+        "the loop oscillates by itself in some experiments: a limit cycle, as coarse steps of the "
+        "command or friction cause";
+    finding.remedy =
+        "raise the level, excite all axes in every experiment, or use a finer converter";
+  }
   return {finding};
 }
 

@@ -66,6 +66,8 @@ const char* to_string(Cause cause) noexcept {
       return "unsettled";
     case Cause::uneven_noise:
       return "uneven_noise";
+    case Cause::limit_cycle:
+      return "limit_cycle";
     case Cause::lost_samples:
       return "lost_samples";
     case Cause::excitation_timing:

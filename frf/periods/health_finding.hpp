@@ -40,6 +40,7 @@ enum class Cause : std::uint8_t {
   aperiodic,          ///< the inputs do not repeat with the period
   unsettled,          ///< a transient or a drift prevents the linearity test
   uneven_noise,       ///< the noise differs between experiments
+  limit_cycle,        ///< it differs by so much that the loop oscillates by itself in some of them
   lost_samples,       ///< samples of a run are missing or duplicated
   excitation_timing,  ///< the excitation was recorded whole samples late or early
   drift,              ///< the response changes during the measurement

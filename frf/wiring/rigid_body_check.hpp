@@ -8,6 +8,9 @@
 
 namespace stageid {
 
+/// Deviation above which the rigid body itself differs from the configuration.
+inline constexpr double kLargestRigidDeviation = 0.3;
+
 struct RigidBodyCheck {
   std::string unchecked;                     ///< the missing data; empty: it was checked
   std::vector<ChannelChange> changes;        ///< gains and exchanges, not undone in the record
@@ -20,10 +23,11 @@ struct RigidBodyCheck {
 /// channels that explain it.
 ///
 /// Below the first flexible mode, for sensor i and actuator j,
-///   -omega^2 G_ij = A_ij + D_ij omega^2 + D'_ij omega^4 + K_ij omega^-2,
-/// real apart from the delay: A is the rigid body, D the compliance of the flexible modes, K the springs. The same fit to the nominal
+///   -omega^2 G_ij = A_ij + D_ij omega^2 + D'_ij omega^4,
+/// real apart from the delay: A is the rigid body, D the compliance of the flexible modes. The same fit to the nominal
 /// rigid body gives A0. A wiring gain g of a channel scales its row or column; an exchange of channels exchanges them.
-/// The change that brings A closest to A0 is accepted, and the search is repeated. Entries have a tolerance of 10 % of
+/// The change that brings A closest to A0 is accepted, and the search is repeated. Positive gains after which the body
+/// still differs by more than kLargestRigidDeviation are no explanation and are discarded. Entries have a tolerance of 10 % of
 /// the rms of their row, the accuracy of amplifiers, masses and positions. A gain is accepted from 30 % on, or if it
 /// is negative.
 /// The band ends at 0.7 of the frequency at which omega^2 |G| exceeds its median by half.

@@ -17,7 +17,6 @@ using Index = Eigen::Index;
 
 constexpr double kResponds = 1e-3;  // of the largest nominal response
 constexpr double kFedBack = 1e-4;   // of an actuator: ten times the limit of equality
-constexpr double kLargestRigidDeviation = 0.3;
 
 }  // namespace
 

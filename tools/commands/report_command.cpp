@@ -1,12 +1,15 @@
 #include "tools/commands/report_command.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "tools/commands/command_line.hpp"
 #include "tools/report/report_input.hpp"
+#include "tools/report/report_verdict.hpp"
+#include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
@@ -38,7 +41,16 @@ void ReportCommand::run() const {
   if (!compare_.empty()) add_comparison(data, compare_);
   write_report(output_, data);
   console_.result(fmt::format("wrote {}", output_.string()));
-  console_.result({{"output", output_.string()}});
+  const Verdict verdict = judge(data);
+  console_.result({{"output", output_.string()},
+                   {"verdict",
+                    {{"level", to_string(verdict.level)},
+                     {"text", verdict.text},
+                     {"reasons", verdict.reasons}}}});
+  if (verdict.level != Verdict::Level::bad) return;
+  console_.exit_code = kNotTrustworthy;
+  console_.warning(
+      fmt::format("{}: not to be trusted: {}", output_.string(), fmt::join(verdict.reasons, "; ")));
 }
 
 }  // namespace stageid

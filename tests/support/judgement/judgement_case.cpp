@@ -9,11 +9,13 @@
 #include <fstream>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "acquisition/formats/convert_log.hpp"
 #include "estimation/modal/validation.hpp"
 #include "frf/file/frf_file.hpp"
+#include "frf/response/distortion_variance.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "tests/support/process/run_program.hpp"
 #include "tests/support/process/temporary_directory.hpp"
@@ -23,6 +25,8 @@ namespace stageid::test {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr int kMostHalvings = 6;  // of a nonlinearity that makes the loop unstable
 
 /// NaN where JSON has null.
 double number(const Json& object, const char* key) {
@@ -135,12 +139,14 @@ Eigen::MatrixXcd exact_response(const JudgementStage& stage, const TroublePlan& 
   return exact;
 }
 
-/// Squared error of the model over that of the measured response, weighed by the variances of noise.
+/// Squared error of the model over that of the measured response, weighed by the variances of noise and distortion.
 double excess_of(const AdditiveModel& model, const FrfEstimate& frf,
                  const Eigen::MatrixXcd& exact) {
   if (frf.noise_variance.size() == 0) return 0.0;
+  const Eigen::MatrixXd variance =
+      frf.total_dof >= 1.0 ? distortion_variance(frf).variance : frf.noise_variance;
   const auto size = [&](const Eigen::MatrixXcd& G) {
-    return ((G - exact).cwiseAbs2().array() / frf.noise_variance.array()).sum();
+    return ((G - exact).cwiseAbs2().array() / variance.array()).sum();
   };
   return size(response_like(model, frf)) / size(frf.response);
 }
@@ -254,18 +260,24 @@ nlohmann::ordered_json judge_case(std::uint64_t seed, Trouble trouble,
                                   const std::filesystem::path& program,
                                   const std::filesystem::path& keep) {
   JudgementStage stage = draw_judgement_stage(seed);
-  const TroublePlan plan = draw_trouble(trouble, stage);
+  TroublePlan plan = draw_trouble(trouble, stage);
   Json result = {{"seed", seed},
                  {"trouble", to_string(trouble)},
                  {"variant", plan.variant},
                  {"stage", stage.description() + (stage.stage_file ? ", stage file" : "")}};
   Session session(program);
-  if (keep.empty()) {
-    const TemporaryDirectory scratch;
-    run_steps(stage, plan, session, scratch.path(), result);
-  } else {
-    std::filesystem::create_directories(keep);
-    run_steps(stage, plan, session, keep, result);
+  std::optional<TemporaryDirectory> scratch;
+  if (keep.empty()) scratch.emplace();
+  const std::filesystem::path directory = scratch ? scratch->path() : keep;
+  std::filesystem::create_directories(directory);
+  for (int halvings = 0;; ++halvings) {
+    try {
+      run_steps(stage, plan, session, directory, result);
+      break;
+    } catch (const LoopRanAway&) {
+      if (plan.cubic_n_m3 == 0.0 || halvings == kMostHalvings) throw;
+      plan.cubic_n_m3 *= 0.5;
+    }
   }
   result["seconds"] = session.seconds();
   return result;

@@ -103,8 +103,7 @@ class Loop {
     y_ += Eigen::Map<const Eigen::VectorXd>(noise_.sensor_m(), y_.size());
     y_ += coloured_.next().matrix();
     quantize(y_, plan_.sensor_quantum_m);
-    if (!(y_.cwiseAbs().maxCoeff() < 1e6))
-      throw std::runtime_error("judgement stage: the loop ran away");
+    if (!(y_.cwiseAbs().maxCoeff() < 1e6)) throw LoopRanAway("judgement stage: the loop ran away");
     seen_ = y_;
     if (plan_.setpoint_m == 0.0) return;
     for (Eigen::Index i = 0; i < y_.size(); ++i)

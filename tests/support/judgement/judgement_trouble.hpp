@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -62,14 +63,18 @@ struct TroublePlan {
 /// May change the stage: the strength of its noise, its transient periods.
 TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage);
 
+struct LoopRanAway : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Measures the stage with its trouble, in virtual time, as `stageid run` would, in the layout of a foreign log.
-/// @throws std::runtime_error if the loop runs away.
+/// @throws LoopRanAway
 MemoryLog measure_with_trouble(const JudgementStage& stage, const TroublePlan& plan);
 
 /// The best linear approximation of the plant with its trouble: the mean over 20 noise-free realizations of the same
 /// excitation with other phases (Pintelon and Schoukens, System Identification, section 3.4).
 /// @returns (sensors x actuators) x lines of stage.plan().grid()
-/// @throws std::runtime_error if the loop runs away.
+/// @throws LoopRanAway
 Eigen::MatrixXcd best_linear_approximation(const JudgementStage& stage, const TroublePlan& plan);
 
 }  // namespace stageid::test
