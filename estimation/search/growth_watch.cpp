@@ -31,10 +31,12 @@ bool overlaps_another(const AdditiveModel& model, std::size_t i) {
   return false;
 }
 
-bool is_coloured(const AdditiveModel& model, std::size_t i) {
+bool is_coloured(const FitResult& fit, std::size_t i) {
+  const AdditiveModel& model = fit.model;
   const Submodel& s = model.submodels[i];
   const double f = s.natural_frequency_hz();
-  return f < model.fit.band_hz[0] || f > model.fit.band_hz[1] || s.damping_ratio() > kBroad ||
+  return std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end() ||
+         f < model.fit.band_hz[0] || f > model.fit.band_hz[1] || s.damping_ratio() > kBroad ||
          overlaps_another(model, i);
 }
 
@@ -66,7 +68,7 @@ bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const 
   ++rounds_;
   bool spurious = true;
   for (std::size_t i = now.model.submodels.size() - added; i < now.model.submodels.size(); ++i)
-    spurious = spurious && is_coloured(now.model, i);
+    spurious = spurious && is_coloured(now, i);
   spurious = spurious || rests_on_single_lines(frf, options, before, now, added);
   if (!spurious) spurious_in_a_row_ = 0;
   if (spurious && spurious_in_a_row_++ == 0) back_to_ = before;

@@ -12,7 +12,7 @@ namespace stageid {
 /// worth, but the search does not end.
 ///
 /// Two signs are checked. Delay: if none is estimated, and one delay parameter without the added modes is worth more
-/// (BIC) than all of them. Spurious rounds in a row: rounds whose modes are outside the lines, broader than
+/// (BIC) than all of them. Spurious rounds in a row: rounds whose modes are outside the lines, at a bound, broader than
 /// resonances, within the half-power width of another mode, or supported by only one line each, as outliers are. Real
 /// modes can look like that too, but not that many in a row.
 class GrowthWatch {

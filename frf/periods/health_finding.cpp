@@ -86,8 +86,9 @@ std::optional<Cause> cause_of(std::string_view name) noexcept {
 
 int rank_of(const Finding& finding) noexcept {
   const bool fault = finding.severity == Severity::fault;
-  if (finding.cause == Cause::unknown_stage) return 1;
-  return fault ? 0 : 1 + static_cast<int>(finding.severity);
+  if (finding.cause == Cause::limit_cycle) return 0;  // causes other faults
+  if (finding.cause == Cause::unknown_stage) return 2;
+  return fault ? 1 : 2 + static_cast<int>(finding.severity);
 }
 
 bool any_fault(const std::vector<Finding>& findings) noexcept {

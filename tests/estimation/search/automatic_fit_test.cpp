@@ -266,6 +266,9 @@ TEST_F(SmallStage, ModesThatRestOnOneLineEachEndTheSearchAndResonancesDoNot) {
   const FitResult two = fit_additive_model(frf_, less, {});
   const FitResult three = fit_additive_model(frf_, problem_.model, {});
   EXPECT_FALSE(six_rounds_end(frf_, two, three));
+  FitResult at_bound = three;
+  at_bound.held.push_back(three.model.submodels.size() - 1);
+  EXPECT_TRUE(six_rounds_end(frf_, two, at_bound));
 
   constexpr Eigen::Index kOutlier = 250;
   frf_.response.col(kOutlier) *= 3.0;
