@@ -84,6 +84,7 @@ class Iteration {
       result_.end_cost = cost_;
     }
     result_.frozen = frozen_;
+    result_.deviations = deviations_;
     return std::move(result_);
   }
 
@@ -116,14 +117,11 @@ class Iteration {
         return end_at_best(options_.limit->status(), options_.limit->message());
       return end(options_.limit->status(), options_.limit->message());
     }
-    if (result_.iterations >= options_.max_iterations) {
-      const bool near = problem_.globals() == 0 ||
-                        (options_.method != FitMethod::sk && deviations_ < kRoundingDeviations);
-      return end(near ? FitStatus::gradient_small : FitStatus::iteration_limit,
+    if (result_.iterations >= options_.max_iterations)
+      return end(problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
                  fmt::format("stopped after {} iterations, {:.1g} standard deviations from the "
                              "first-order condition; scaled gradient {:.2g}",
                              result_.iterations, deviations_, gradient_));
-    }
     return options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
   }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@ struct IterationResult {
   std::string message;
   std::vector<double> cost;  ///< the start (with solved numerators) first
   int iterations = 0;
+  double deviations = HUGE_VAL;      ///< FitResult::deviations
   double end_cost = 0.0;             ///< at the returned parameters
   std::vector<Eigen::Index> frozen;  ///< globals that ended at a bound and are not unknowns
 };
@@ -29,8 +31,8 @@ IterationResult iterate(const FitProblem& problem, FitParameters& beta, const Fi
 IterationResult iterate(const FitProblem& problem, const WeightMatrices& weights,
                         FitParameters& beta, const FitOptions& options);
 
-/// If no step lowers the cost, or there were as many as allowed, the fit has converged if the stationary point is at
-/// most this many standard deviations away: the variance of the estimate is then right to 0.3 %.
+/// If no step lowers the cost, the cost is at rounding level if the stationary point is at most this many standard
+/// deviations away.
 inline constexpr double kRoundingDeviations = 0.05;
 
 /// Part of the weighted power of the data: if no step lowers a residual below it, the residual is rounding, not a

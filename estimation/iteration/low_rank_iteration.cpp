@@ -30,8 +30,7 @@ class LowRankIteration {
     while (iterate_once() && result_.iterations < options_.max_iterations) {
     }
     if (result_.message.empty())
-      end(deviations_ < kRoundingDeviations ? FitStatus::gradient_small
-                                            : FitStatus::iteration_limit,
+      end(FitStatus::iteration_limit,
           fmt::format("residues of given rank: stopped after {} iterations, {:.1g} standard "
                       "deviations from the first-order condition; scaled gradient {:.2g}",
                       result_.iterations, deviations_, gradient_));
@@ -39,6 +38,7 @@ class LowRankIteration {
       out.covariance = low_rank_covariance(problem_, beta_, result_.end_cost, factors_, noise,
                                            frozen_, options_.response_variance);
     result_.frozen = frozen_;
+    result_.deviations = deviations_;
     out.parameters = factors_.size();
     out.ranks = factors_.ranks();
     out.iteration = std::move(result_);

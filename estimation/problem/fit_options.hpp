@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -114,6 +115,8 @@ struct FitResult {
   Eigen::Index parameters = 0;           ///< free ones
   DelayModel delay = DelayModel::fixed;  ///< of these, the delays
   std::vector<double> cost;              ///< one entry per iterate, the start first
+  /// Distance from the stationary point before the last step, in standard deviations (Newton decrement).
+  double deviations = HUGE_VAL;
   std::vector<std::string> decisions;  ///< choices of an automatic fit and their reasons, in order
   std::vector<std::string> findings;   ///< the decisions on which the user should act
   std::vector<ResidueRankTest> residue_ranks;  ///< if residues were free and deviations requested

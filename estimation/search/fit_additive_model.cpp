@@ -268,6 +268,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   result.status = iteration.status;
   result.message = iteration.message;
   result.cost = iteration.cost;
+  result.deviations = iteration.deviations;
   result.held = held_submodels(problem, beta, iteration.frozen);
   result.frozen = iteration.frozen;
   fill_model(frf, options, problem, beta, result);

@@ -26,6 +26,10 @@ constexpr double kUndoubtedWidths = 0.1;
 // A model with this many times the cost does not follow the data: a fit that has not converged is better.
 constexpr double kDearestMode = 1.5;
 
+// Times the tolerance: a fit that ends by its number of iterations so near to the stationary point has converged if all
+// its modes are determined. With the default tolerance, its error is a hundredth of a standard deviation.
+constexpr double kNearly = 100.0;
+
 struct OpenMode {
   std::size_t submodel = 0;
   double doubt = 0.0;  ///< larger of std(zeta)/zeta and std(f)/(zeta f); infinite at a bound
@@ -81,17 +85,22 @@ Simpler with_held(const AdditiveModel& model, std::size_t i, const std::string& 
 }
 
 /// Simpler models: without one of two modes that converged to each other, else without the least determined mode; then
-/// with the pole of that mode held. Empty: all modes are determined.
+/// with the pole of that mode held, of a pair only if it is beside the lines. Empty: all modes are determined.
 std::vector<Simpler> simpler(const FitResult& fit) {
   const AdditiveModel& model = fit.model;
   if (const auto pair = coalesced(model)) {
     const auto [i, j] = *pair;
     const double one_hz = model.submodels[i].natural_frequency_hz();
     const double other_hz = model.submodels[j].natural_frequency_hz();
-    return {{with_one_of(model, i, j),
-             fmt::format("merged {:.6g} and {:.6g} Hz, which coincided and", one_hz, other_hz)},
-            with_held(model, doubt_hz(model.submodels[i]) > doubt_hz(model.submodels[j]) ? i : j,
-                      "(another mode is as near as its standard deviation) and which")};
+    std::vector<Simpler> out = {
+        {with_one_of(model, i, j),
+         fmt::format("merged {:.6g} and {:.6g} Hz, which coincided and", one_hz, other_hz)}};
+    const double* band_hz = model.fit.band_hz;
+    if (std::max(one_hz, other_hz) < band_hz[0] || std::min(one_hz, other_hz) > band_hz[1])
+      out.push_back(with_held(model,
+                              doubt_hz(model.submodels[i]) > doubt_hz(model.submodels[j]) ? i : j,
+                              "(another mode is as near as its standard deviation) and which"));
+    return out;
   }
   const std::optional<OpenMode> open = most_open(fit);
   if (!open) return {};
@@ -148,7 +157,7 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
     FitResult next = fit_additive_model(frf, models[0].model, options);
     std::size_t chosen = 0;
     // A mode beside the lines may be needed although its pole is undetermined.
-    if (information_criterion(frf, next) > information_criterion(frf, fit)) {
+    if (models.size() > 1 && information_criterion(frf, next) > information_criterion(frf, fit)) {
       FitResult held = fit_additive_model(frf, models[1].model, options);
       if (information_criterion(frf, held) < information_criterion(frf, next)) {
         next = std::move(held);
@@ -159,6 +168,12 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
     given_up.push_back(fmt::format("{} prevented the fit from converging: cost {:.6g} -> {:.6g}",
                                    models[chosen].reason, fit.model.fit.cost, next.model.fit.cost));
     fit = std::move(next);
+  }
+  if (!fit.trustworthy() && simpler(fit).empty() &&
+      fit.deviations < kNearly * options.deviation_tolerance) {
+    fit.status = FitStatus::gradient_small;
+    fit.model.fit.status = to_string(fit.status);
+    fit.model.fit.message.clear();
   }
   if (!fit.trustworthy()) return first;
   left_out = std::move(given_up);

@@ -7,10 +7,10 @@ namespace test_channel_delays {
 
 AdditiveModel with_delays(const Eigen::VectorXd& inputs_s, const Eigen::VectorXd& outputs_s) {
   AdditiveModel model;
-  for (Eigen::Index i = 0; i < inputs_s.size(); ++i)
-    model.inputs.names.push_back("a" + std::to_string(i + 1));
-  for (Eigen::Index i = 0; i < outputs_s.size(); ++i)
-    model.outputs.names.push_back("z" + std::to_string(i + 1));
+  model.inputs.names = {"a1", "a2", "a3", "a4"};
+  model.inputs.names.resize(static_cast<std::size_t>(inputs_s.size()));
+  model.outputs.names = {"z1", "z2", "z3"};
+  model.outputs.names.resize(static_cast<std::size_t>(outputs_s.size()));
   model.sample_rate_hz = 1000.0;
   model.input_delay_s = inputs_s;
   model.output_delay_s = outputs_s;
