@@ -1,8 +1,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "estimation/request/fit_request.hpp"
 #include "estimation/search/fit_additive_model.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
+#include "tests/support/models/model_reference.hpp"
+#include "tests/support/stages/random_stage.hpp"
 #include "tests/support/stages/varied_plant.hpp"
 
 // Plants of random structure, fitted without any option and with one that is wrong.
@@ -66,6 +72,51 @@ TEST(StructureSearchFixed, ANumberOfModesLeavesTheStructureOpen) {
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   EXPECT_TRUE(structure_of(fit.model).general_damping);
   EXPECT_NEAR(fit.model.fit.cost / cost_of_truth(plant), 1.0, 0.01);
+}
+
+/// A body on two soft springs far below the lines, and two modes: 2 x 2, white noise of known variance.
+FrfEstimate on_soft_springs(std::uint64_t seed, double damping_of_springs) {
+  test::RandomNumbers random(seed);
+  test::DenseProblem problem;
+  problem.model = test::named_model(2, 2);
+  problem.model.sample_rate_hz = 2000.0;
+  problem.model.input_delay_s.setConstant(5e-4);
+  problem.hold = HoldModel::exact;
+  problem.frequency_hz = Eigen::VectorXd::LinSpaced(784, 16.0, 799.0);
+  const auto add = [&](double f, double damping, const Eigen::Matrix2d& residue) {
+    problem.model.submodels.push_back(
+        test::empty_submodel(problem.model, 0, test::mode_coefficients(f, damping), 1));
+    Submodel& s = problem.model.submodels.back();
+    s.numerator[0] = s.denominator[2] * residue;
+  };
+  const Eigen::Vector2d heave(1.0, 1.0), pitch(1.0, -1.0);
+  add(2.0, damping_of_springs, heave * heave.transpose() / 8.0);
+  add(2.5, damping_of_springs, pitch * pitch.transpose() / 8.0);
+  add(92.0, 0.006, 0.09 * Eigen::Vector2d(1.0, 0.5) * Eigen::RowVector2d(1.0, 0.6));
+  add(310.0, 0.01, 0.09 * Eigen::Vector2d(0.9, -1.0) * Eigen::RowVector2d(1.0, -0.8));
+  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+  FrfEstimate frf = test::frf_of(problem);
+  frf.noise_variance.setConstant(4, frf.lines(), 1e-18);
+  for (std::complex<double>& value : frf.response.reshaped()) value += 1e-9 * random.circular();
+  return frf;
+}
+
+TEST(StructureSearchFixed, PolesFarBelowTheLinesAreHeldWhereTheDataLeaveThemOpen) {
+  int sound = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const FitResult fit = fit_model(on_soft_springs(seed, seed % 2 == 0 ? 0.5 : 0.1));
+    if (!fit.trustworthy()) continue;
+    ++sound;
+    for (const double f : {92.0, 310.0})
+      EXPECT_TRUE(std::any_of(fit.model.submodels.begin(), fit.model.submodels.end(),
+                              [f](const Submodel& s) {
+                                return s.natural_frequency_std_hz &&
+                                       std::abs(s.natural_frequency_hz() - f) <
+                                           5.0 * *s.natural_frequency_std_hz;
+                              }))
+          << f << ", seed " << seed;
+  }
+  EXPECT_GE(sound, 4);
 }
 
 }  // namespace
