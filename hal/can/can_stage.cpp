@@ -13,7 +13,6 @@
 namespace stageid {
 namespace {
 
-constexpr int kRepeats = 3;
 constexpr int kStartAttempts = 3;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
@@ -119,7 +118,7 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
   begin_cycle(static_cast<std::uint16_t>(outputs.cycle + 1));
   if (!send_setpoints(outputs)) return Outcome::fault;  // the sent value would differ
   collect(reply_deadline_ns(deadline));
-  for (int repeat = 0; !wall_ && repeat < kRepeats && !complete() && !over(); ++repeat) {
+  for (int repeat = 0; !wall_ && repeat < kCanRepeats && !complete() && !over(); ++repeat) {
     ++counts_.repeats;
     static_cast<void>(transport_->send(outbox_));
     collect(transport_->now_ns() + reply_timeout_ns_);
