@@ -11,6 +11,7 @@
 #include "acquisition/record/log_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "hal/stage/real_time.hpp"
+#include "hal/stage/real_time_checks.hpp"
 #include "tools/dashboard/dashboard.hpp"
 #include "tools/experiment/run_metadata.hpp"
 #include "tools/measure/measured_stage.hpp"
@@ -107,10 +108,13 @@ bool check_log(const MeasurementRequest& request) {
   return exists;
 }
 
-/// Warns of missing real-time capabilities, before anything is written. @throws StageError if they are required.
+/// Warns of missing real-time capabilities and of settings that delay the loop, before anything is written. @throws StageError if they are required.
 void warn_of_real_time(const RealTimeOptions& options, const Console& console) {
   for (const std::string& missing : missing_for_real_time(options))
     console.warning("realtime: " + missing);
+  if (options.policy == RealTimePolicy::off) return;
+  for (const std::string& obstacle : real_time_obstacles(options.cpu))
+    console.warning("realtime: " + obstacle);
 }
 
 void warn_of_until(const ExperimentPlan& plan, const FrfOptions& options, const Console& console) {
