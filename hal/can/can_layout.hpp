@@ -27,6 +27,8 @@ struct CanSpec {
   double reply_timeout_s = 5e-3;
   /// The node stops by itself after this time without a setpoint.
   double watchdog_s = 20e-3;
+  /// The node samples by its own clock and sets the pace of the host, on the wall clock.
+  bool node_clock = false;
   double largest_load = 0.8;  ///< largest permitted load of a bus
 };
 

@@ -75,6 +75,11 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
   v.numbers(
       "sensor_range_m", f.sensor_range_m, positive("m"), {}, kOptional,
       "full scale of 2^23 counts; one for all or one per sensor; omitted: 1.25 times window_m");
+  std::size_t clock = spec.node_clock ? 1 : 0;
+  v.choice("clock", clock, {"host", "node"}, kOptional,
+           "of the samples; node: the node samples at its own ticks and the host follows it, with "
+           "pace: 1");
+  spec.node_clock = clock == 1;
   v.number("reply_timeout_s", spec.reply_timeout_s, positive("s"), kOptional,
            "the host waits this long for a reply");
   v.number("watchdog_s", f.watchdog_s, not_negative("s"), kOptional,
