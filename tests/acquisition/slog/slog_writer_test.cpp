@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <limits>
 
 #include "acquisition/files/file_error.hpp"
@@ -43,6 +44,38 @@ TEST(SlogWriter, WhatIsWrittenIsReadBack) {
     EXPECT_EQ(reader.excitation(run), test::excitation_of(run));
     reader.read(run, 0, read.samples, samples);
     EXPECT_TRUE(test::holds_rows(samples, run, 0));
+  }
+}
+
+TEST(SlogWriter, RowsWithTimeStampsAreReadBackAndResumed) {
+  const TemporaryDirectory directory;
+  LogInfo info = test::small_info();
+  info.stamps = true;
+  const std::vector<double> plain = test::rows_of(0, 0, 3 * test::kPeriod);
+  std::vector<double> stamped;
+  for (std::size_t at = 0; at < plain.size(); at += 6) {
+    stamped.insert(stamped.end(), plain.begin() + static_cast<std::ptrdiff_t>(at),
+                   plain.begin() + static_cast<std::ptrdiff_t>(at) + 5);
+    // All bits set is not a number as a double, and must not matter.
+    stamped.push_back(std::bit_cast<double>(~std::uint64_t{0}));
+    stamped.push_back(plain[at + 5]);
+  }
+  const auto write = [&](SlogWriter log) {
+    log.begin_run(test::run_of(0), test::excitation_of(0));
+    log.write(stamped);
+    log.end_run(test::run_of(0));
+    log.close(0, "");
+  };
+  write(SlogWriter::create(directory / "a.slog", info));
+  write(SlogWriter::resume(directory / "a.slog", test::small_info()));  // as in another pace
+  const SlogReader reader(directory / "a.slog");
+  EXPECT_TRUE(reader.info().stamps);
+  ASSERT_EQ(reader.runs().size(), 2U);
+  LogSamples samples;
+  for (std::size_t run = 0; run < 2; ++run) {
+    reader.read(run, 0, reader.runs()[run].samples, samples);
+    EXPECT_EQ(reader.runs()[run].samples, 36U);
+    EXPECT_TRUE(test::holds_rows(samples, 0, 0));
   }
 }
 
