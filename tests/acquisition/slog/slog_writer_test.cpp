@@ -51,23 +51,23 @@ TEST(SlogWriter, RowsWithTimeStampsAreReadBackAndResumed) {
   const TemporaryDirectory directory;
   LogInfo info = test::small_info();
   info.stamps = true;
-  const std::vector<double> plain = test::rows_of(0, 0, 3 * test::kPeriod);
-  std::vector<double> stamped;
-  for (std::size_t at = 0; at < plain.size(); at += 6) {
-    stamped.insert(stamped.end(), plain.begin() + static_cast<std::ptrdiff_t>(at),
-                   plain.begin() + static_cast<std::ptrdiff_t>(at) + 5);
-    // All bits set is not a number as a double, and must not matter.
-    stamped.push_back(std::bit_cast<double>(~std::uint64_t{0}));
-    stamped.push_back(plain[at + 5]);
-  }
-  const auto write = [&](SlogWriter log) {
-    log.begin_run(test::run_of(0), test::excitation_of(0));
+  const auto write = [](SlogWriter log, std::size_t run) {
+    const std::vector<double> plain = test::rows_of(run, 0, 3 * test::kPeriod);
+    std::vector<double> stamped;
+    for (auto row = plain.begin(); row != plain.end(); row += 6) {
+      stamped.insert(stamped.end(), row, row + 5);
+      // All bits set is not a number as a double, and must not matter.
+      stamped.push_back(std::bit_cast<double>(~std::uint64_t{0}));
+      stamped.push_back(row[5]);
+    }
+    log.begin_run(test::run_of(run), test::excitation_of(run));
     log.write(stamped);
-    log.end_run(test::run_of(0));
+    log.end_run(test::run_of(run));
     log.close(0, "");
   };
-  write(SlogWriter::create(directory / "a.slog", info));
-  write(SlogWriter::resume(directory / "a.slog", test::small_info()));  // as in another pace
+  write(SlogWriter::create(directory / "a.slog", info), 0);
+  // In virtual time, stamps are not requested.
+  write(SlogWriter::resume(directory / "a.slog", test::small_info()), 1);
   const SlogReader reader(directory / "a.slog");
   EXPECT_TRUE(reader.info().stamps);
   ASSERT_EQ(reader.runs().size(), 2U);
@@ -75,7 +75,7 @@ TEST(SlogWriter, RowsWithTimeStampsAreReadBackAndResumed) {
   for (std::size_t run = 0; run < 2; ++run) {
     reader.read(run, 0, reader.runs()[run].samples, samples);
     EXPECT_EQ(reader.runs()[run].samples, 36U);
-    EXPECT_TRUE(test::holds_rows(samples, 0, 0));
+    EXPECT_TRUE(test::holds_rows(samples, run, 0));
   }
 }
 
