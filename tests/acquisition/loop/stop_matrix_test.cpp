@@ -104,9 +104,9 @@ const auto kFaults = testing::Values(
          StopReason::limit, LinkEvent::none, "deviation"},
     // The stage continues at its speed, about 1 mm/s.
     Case{"amplifiers off (interlock)", Kind::interlock, 0.0, 1.0, "no limit", 2.0 * kStopWindow,
-         2e-3, StopReason::fault},
+         2e-3, StopReason::fault, LinkEvent::none, "fault"},
     Case{"nothing arrives any more", Kind::missed_cycle, 0.0, 1.0, "no limit", 2.0 * kStopWindow,
-         2e-3, StopReason::misses},
+         2e-3, StopReason::misses, LinkEvent::none, "no"},
     // A drifting single sensor looks like a stage at rest, and the loop follows it.
     Case{"sensor drifts by 0.3 mm/s", Kind::sensor_drift, 0.3e-3});
 
