@@ -26,7 +26,7 @@ StageInfo info_of(StageInfo info, const CanSpec& spec, const CanLayout& layout, 
   info.sets_pace = spec.node_clock;
   if (spec.node_clock && pace != 1.0)
     throw std::invalid_argument(
-        "can: clock: node requires pace: 1, as the node keeps its own time");
+        "can: clock: node needs the wall clock; set pace: 1, or clock: host");
   return info;
 }
 

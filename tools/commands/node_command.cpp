@@ -179,7 +179,7 @@ void NodeCommand::serve_can(const StageConfig& config, StageNode& node) const {
     }
   }
   FaultyCan transport(socket, faults);
-  CanNode front(node, layout, transport, pace_);
+  CanNode front(node, layout, transport, pace_, config.can.spec.node_clock);
   console_.result(fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name,
                               fmt::join(can_interfaces_, ", ")));
   std::fflush(stdout);  // programs that wait for the node read this line

@@ -92,6 +92,9 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
 CanConfig complete_can(const CanFile& file, const StageInfo& info, const StageLimits& limits) {
   CanConfig config = file.config;
   CanSpec& spec = config.spec;
+  if (spec.node_clock && info.clock != Clock::wall)
+    throw std::invalid_argument(
+        "can: clock: node needs the wall clock; set pace: 1, or clock: host");
   const double pause_s = can_longest_pause_s(spec, info);
   if (file.watchdog_s > 0.0 && file.watchdog_s < pause_s && config.mode == CanMode::streaming)
     throw std::invalid_argument(fmt::format(

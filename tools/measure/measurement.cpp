@@ -211,7 +211,8 @@ std::string advice_behind(const MeasurementResult& result) {
 }
 
 double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage) {
-  const auto words = static_cast<double>(stage.actuators.size() + stage.sensors.size() + 1);
+  const auto words =
+      static_cast<double>(stage.actuators.size() + stage.sensors.size() + (stage.stamps ? 2 : 1));
   return static_cast<double>(plan.samples_per_run()) * static_cast<double>(plan.runs().size()) *
          words * 8.0;
 }

@@ -155,6 +155,18 @@ TEST(CanClock, ASkippedTickShowsInTheStamps) {
   EXPECT_EQ(long_steps, 1);
 }
 
+TEST(CanClock, ASimulatedNodeCanWaitForItsTicks) {
+  CanRig rig;
+  CanNode front(rig.node(), rig.layout(), rig.pair().node(), 0.0, true);
+  rig.pair().when_host_waits([&] { front.serve(0); });
+  test::CanHost host(rig);
+  host.start();
+  const std::int64_t began_ns = monotonic_ns();
+  EXPECT_EQ(host.exchange(10), test::all_ok(10));
+  // The first tick may be near; a busy machine may be slower, never faster.
+  EXPECT_GE(monotonic_ns() - began_ns, 9 * std::llround(kPeriod_ns));
+}
+
 TEST(CanClock, ANodeWithAClockNeedsTheWallClock) {
   CanRig rig;
   CanSpec spec = rig.spec();
