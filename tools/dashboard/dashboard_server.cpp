@@ -35,8 +35,21 @@ void set_socket_options(int socket) {
 
 constexpr std::chrono::seconds kPatience{DashboardServer::kPatience_s};
 
-/// One request of a client, with a deadline for its header and body. httplib limits the time between two pieces only, so a few
-/// clients that send a byte now and then would occupy all threads.
+constexpr const char* kWholeAddress = "open the address printed by stageid, with its token";
+
+void refuse(httplib::Response& response, int status, const std::string& why) {
+  response.status = status;
+  response.set_content(why + "\n", "text/plain");
+}
+
+std::string host_in_url(const std::string& host) {
+  return host.find(':') == std::string::npos ? host : "[" + host + "]";
+}
+
+}  // namespace
+
+/// One request of a client, with a deadline for its header and body. httplib limits the time between two pieces
+/// only, so a few clients that send a byte now and then would occupy all threads.
 class PatientStream final : public httplib::Stream {
  public:
   explicit PatientStream(int socket) : socket_(socket) {}
@@ -85,19 +98,6 @@ class PatientServer final : public httplib::Server {
     return good;
   }
 };
-
-constexpr const char* kWholeAddress = "open the address printed by stageid, with its token";
-
-void refuse(httplib::Response& response, int status, const std::string& why) {
-  response.status = status;
-  response.set_content(why + "\n", "text/plain");
-}
-
-std::string host_in_url(const std::string& host) {
-  return host.find(':') == std::string::npos ? host : "[" + host + "]";
-}
-
-}  // namespace
 
 struct DashboardServer::State {
   State(const DashboardAddress& asked, DashboardContent& shown)
