@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "acquisition/files/file_error.hpp"
 #include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "hal/can/can_dbc.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
