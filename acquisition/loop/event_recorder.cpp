@@ -26,13 +26,13 @@ void EventRecorder::begin_run(const LogRun& run) noexcept {
   events_.write("run_begin", place(run));
 }
 
-void EventRecorder::rows(std::span<const double> rows) noexcept {
-  for (std::size_t at = row_words_ - 1; at < rows.size(); at += row_words_)
+void EventRecorder::rows(std::span<const double> rows, std::size_t words) noexcept {
+  for (std::size_t at = words - 1; at < rows.size(); at += words)
     take(unpack_status(std::bit_cast<std::uint64_t>(rows[at])));
 }
 
 void EventRecorder::take(const SampleStatus& status) noexcept {
-  const bool good = static_cast<Outcome>(status.outcome) == Outcome::ok;
+  const bool good = static_cast<Outcome>(status.outcome) == Outcome::ok && !status.irregular;
   if (open_ && (good || open_->outcome != status.outcome)) tell_miss();
   if (!good) {
     if (!open_) open_ = {cycle_, 0, status.outcome, 0};
@@ -49,7 +49,9 @@ void EventRecorder::tell_miss() noexcept {
   std::vector<EventField> fields = place(run_);
   fields.push_back({"cycle", whole(miss.cycle)});
   fields.push_back({"cycles", whole(miss.cycles)});
-  fields.push_back({"outcome", std::string(to_string(static_cast<Outcome>(miss.outcome)))});
+  const auto outcome = static_cast<Outcome>(miss.outcome);
+  fields.push_back(
+      {"outcome", outcome == Outcome::ok ? "irregular" : std::string(to_string(outcome))});
   fields.push_back({"lateness_s", 1e-9 * miss.lateness_ns});
   events_.write("miss", fields);
 }
@@ -62,6 +64,7 @@ void EventRecorder::end_run(const LogRun& run) noexcept {
   fields.push_back({"late", whole(run.health.late)});
   fields.push_back({"missing", whole(run.health.missing)});
   fields.push_back({"marked", whole(run.health.marked)});
+  fields.push_back({"irregular", whole(run.health.irregular)});
   fields.push_back({"misses_not_told", whole(misses_ > kMissesTold ? misses_ - kMissesTold : 0)});
   events_.write("run_end", fields);
 }

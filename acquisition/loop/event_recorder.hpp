@@ -16,11 +16,10 @@ class EventRecorder final : public RunObserver {
  public:
   static constexpr std::uint64_t kMissesTold = 200;
 
-  EventRecorder(EventLog& events, std::size_t row_words) noexcept
-      : events_(events), row_words_(row_words) {}
+  explicit EventRecorder(EventLog& events) noexcept : events_(events) {}
 
   void begin_run(const LogRun& run) noexcept override;
-  void rows(std::span<const double> rows) noexcept override;
+  void rows(std::span<const double> rows, std::size_t words) noexcept override;
   void end_run(const LogRun& run) noexcept override;
 
  private:
@@ -34,7 +33,6 @@ class EventRecorder final : public RunObserver {
   void tell_miss() noexcept;
 
   EventLog& events_;
-  std::size_t row_words_;
   LogRun run_;
   std::uint64_t cycle_ = 0;
   std::uint64_t misses_ = 0;

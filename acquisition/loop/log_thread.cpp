@@ -42,7 +42,14 @@ LogThread::~LogThread() {
 }
 
 void LogThread::begin_run(LogRun run, Eigen::MatrixXd excitation) {
+  unconfirmed_.store(true, std::memory_order_relaxed);
   queue({ring_.pushed(), std::move(run), std::move(excitation)});
+}
+
+void LogThread::forget_run() {
+  const std::lock_guard lock(mutex_);
+  commands_.pop_back();
+  unconfirmed_.store(false, std::memory_order_relaxed);
 }
 
 void LogThread::end_run(LogRun run) { queue({ring_.pushed(), std::move(run), std::nullopt}); }
@@ -90,7 +97,9 @@ bool LogThread::work() {
     const std::lock_guard lock(mutex_);
     if (!commands_.empty()) {
       limit = std::min(limit, commands_.front().at_row);
-      if (ring_.popped() == limit && commands_.front().at_row == limit) {
+      const bool wait = commands_.size() == 1 && commands_.front().excitation &&
+                        unconfirmed_.load(std::memory_order_acquire);
+      if (ring_.popped() == limit && commands_.front().at_row == limit && !wait) {
         next = std::move(commands_.front());
       }
     }
@@ -119,7 +128,7 @@ bool LogThread::write_rows(std::uint64_t available, bool all) {
   const std::span<const double> rows =
       ring_.front(static_cast<std::size_t>(std::min<std::uint64_t>(available, kBlockRows)));
   guarded([&] { log_.write(rows); });
-  for (RunObserver* observer : observers_) observer->rows(rows);
+  for (RunObserver* observer : observers_) observer->rows(rows, ring_.row_words());
   ring_.pop(rows.size() / ring_.row_words());
   last_write_ns_ = now_ns();
   return true;

@@ -32,9 +32,13 @@ class LogThread {
   LogThread(const LogThread&) = delete;
   LogThread& operator=(const LogThread&) = delete;
 
-  // Called between runs, by the producer's thread; they take a lock.
+  // Called between runs, by the producer's thread; they take a lock. Nothing of a run is written before it is
+  // confirmed.
   void begin_run(LogRun run, Eigen::MatrixXd excitation);
+  void forget_run();  ///< the run that was begun did not start
   void end_run(LogRun run);
+  /// The run that was begun has started. Neither locks nor allocates, because the stage may move.
+  void confirm_run() noexcept { unconfirmed_.store(false, std::memory_order_release); }
 
   /// Waits until everything queued is written and synchronized, or the log has failed.
   void drain();
@@ -68,6 +72,7 @@ class LogThread {
   std::deque<Command> commands_;
   std::string error_;
   bool stop_ = false;
+  std::atomic<bool> unconfirmed_ = false;  // the last command begins a run that may not start
   std::atomic<bool> failed_ = false;
   std::atomic<int> complete_runs_ = 0;
   std::int64_t last_write_ns_ = 0;

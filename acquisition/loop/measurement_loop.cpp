@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <stdexcept>
 
@@ -55,12 +56,19 @@ const char* to_string(StopReason reason) noexcept {
 
 MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controller, SampleRing& ring,
                                  const LoopOptions& options)
-    : stage_(stage), controller_(controller), ring_(ring), misses_allowed_(options.misses_allowed) {
+    : stage_(stage),
+      controller_(controller),
+      ring_(ring),
+      misses_allowed_(options.misses_allowed),
+      sets_pace_(stage.info().sets_pace),
+      jitter_ns_(std::llround(1e9 * options.jitter_s / stage.info().pace)),
+      clock_(jitter_ns_) {
   const StageInfo& info = stage.info();
   const std::size_t actuators = info.actuators.size();
   const std::size_t sensors = info.sensors.size();
-  if (!(options.ramp_s >= 0.0) || !std::isfinite(options.ramp_s) || options.misses_allowed < 0) {
-    throw std::invalid_argument("loop: ramp_s and misses_allowed must be 0 or more");
+  if (!(options.ramp_s >= 0.0) || !std::isfinite(options.ramp_s) || options.misses_allowed < 0 ||
+      !(options.jitter_s >= 0.0)) {
+    throw std::invalid_argument("loop: ramp_s, jitter_s and misses_allowed must be 0 or more");
   }
   if (static_cast<std::size_t>(controller.sensors()) != sensors ||
       static_cast<std::size_t>(controller.actuators()) != actuators) {
@@ -68,9 +76,11 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
         fmt::format("loop: the controller has {} sensors and {} actuators, the stage {} and {}",
                     controller.sensors(), controller.actuators(), sensors, actuators));
   }
-  if (ring.row_words() != actuators + sensors + 1 || sensors > 64) {
+  stamps_ = ring.row_words() == actuators + sensors + 2;
+  if ((ring.row_words() != actuators + sensors + 1 && !stamps_) || sensors > 64) {
     throw std::invalid_argument(fmt::format(
-        "loop: a row has {} words for {} actuators, {} sensors (at most 64) and a status word",
+        "loop: a row has {} words for {} actuators, {} sensors (at most 64), a stamp word if there "
+        "are any, and a status word",
         ring.row_words(), actuators, sensors));
   }
   ramp_samples_ = static_cast<std::uint64_t>(std::llround(options.ramp_s * info.sample_rate_hz));
@@ -117,6 +127,8 @@ void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excita
   health_ = {};
   timing_ = {};
   status_ = {};
+  stamp_ = {};
+  clock_.restart();
   ++run_;
   std::fill(y_.begin(), y_.end(), 0.0);
   std::fill(last_finite_u_.begin(), last_finite_u_.end(), 0.0);
@@ -140,12 +152,14 @@ LoopStatus MeasurementLoop::step() noexcept {
 
   compute_command();
   const SampleStatus status = status_;
+  const SampleStamp stamp = stamp_;
+  const std::int64_t sent_ns = inputs_.t_sample_ns;
   const bool odd_command = write_row(row);
   const Deadline deadline{wall_clock_ ? inputs_.t_sample_ns + 2 * period_ns_ : 0};
   std::int64_t computed_ns = 0;
   if (wall_clock_) [[unlikely]]
     computed_ns = monotonic_ns();
-  inputs_.t_ready_ns = 0;
+  inputs_.t_ready_ns = inputs_.t_arrival_ns = inputs_.stamp_ns = 0;
   const Outcome outcome = stage_.exchange({cycle_, inputs_.t_sample_ns, u_}, inputs_, deadline);
   if (wall_clock_) [[unlikely]]
     time_cycle(computed_ns, outcome);
@@ -158,13 +172,32 @@ LoopStatus MeasurementLoop::step() noexcept {
     // If u[n] may not have been applied as recorded, this sample is marked too.
     SampleStatus stored = status;
     stored.marked |= odd_command || !gives_measurement(outcome) || phase_ != Phase::measuring;
+    if (stamps_) row[ring_.row_words() - 2] = std::bit_cast<double>(pack_stamp(stamp));
     row[ring_.row_words() - 1] = std::bit_cast<double>(pack_status(stored));
     ring_.commit();
     ++health_.cycles;
     health_.marked += stored.marked ? 1U : 0U;
   }
   take_measurement(outcome);
+  if (wall_clock_) [[unlikely]]
+    judge_instant(sent_ns);
   return advance();
+}
+
+/// The instant of y[n+1] is that of the setpoint u[n] plus a constant, or n periods by the clock of the stage.
+void MeasurementLoop::judge_instant(std::int64_t sent_ns) noexcept {
+  stamp_ = {};
+  if (inputs_.t_arrival_ns != 0)
+    stamp_.arrival_ns = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
+        inputs_.t_arrival_ns - sent_ns, 1, std::numeric_limits<std::uint32_t>::max()));
+  if (inputs_.stamp_ns == 0) return;
+  if (inputs_.stamp_of_stage) stamp_.node_us = static_cast<std::uint16_t>(inputs_.stamp_ns / 1000);
+  if (jitter_ns_ == 0) return;
+  const std::int64_t expected_ns =
+      sets_pace_ ? static_cast<std::int64_t>(cycle_) * period_ns_ : sent_ns;
+  if (std::abs(clock_.take(expected_ns, inputs_.stamp_ns)) <= jitter_ns_) return;
+  status_.irregular = status_.marked = true;
+  health_.irregular += recording() ? 1U : 0U;
 }
 
 /// If the stage does not report when its wait began, the whole exchange counts as waiting.

@@ -10,12 +10,16 @@
 #include "acquisition/record/log_info.hpp"
 #include "acquisition/slog/slog_format.hpp"
 #include "hal/stage/motion_controller.hpp"
+#include "hal/stage/sample_clock.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
 
 struct LoopOptions {
-  double ramp_s = 0.1;      ///< ramp of the excitation to zero before the stage is stopped
+  double ramp_s = 0.1;  ///< ramp of the excitation to zero before the stage is stopped
+  /// Samples whose instant deviates by more are marked; 0: not checked. Only on the wall clock, of stages that stamp
+  /// their samples.
+  double jitter_s = 0.0;
   int misses_allowed = 10;  ///< leaky bucket: +2 per bad cycle, -1 per good one; above this: stop
 };
 
@@ -48,6 +52,9 @@ const char* to_string(StopReason reason) noexcept;
 /// recorded, so that a log has whole periods; that of a stop is recorded, marked. A fault, bus-off or lost
 /// link ends the run at once, because control is impossible. So does a stage that has opened the loop
 /// (LimitedStage), once it has braked. A row contains the applied u, even if it differs from the command.
+///
+/// A stage that stamps its samples is also watched for jitter: a row whose instant deviates by more than jitter_s
+/// from the followed clock (SampleClock) is marked as irregular, and does not count in the bucket.
 ///
 /// Bucket: late cycles count as bad (their samples are valid, but the phase of the loop is wrong).
 class MeasurementLoop {
@@ -91,6 +98,7 @@ class MeasurementLoop {
   void hold_missing(std::uint64_t valid) noexcept;
   void count_bad_cycle(Outcome outcome) noexcept;
   void time_cycle(std::int64_t computed_ns, Outcome outcome) noexcept;
+  void judge_instant(std::int64_t sent_ns) noexcept;
   void tell_state() noexcept;
   void tell(LoopEvent::Kind kind, std::uint8_t code) noexcept;
   void end(StopReason reason) noexcept;
@@ -121,6 +129,11 @@ class MeasurementLoop {
   std::uint64_t ramp_left_ = 0;
   double gain_ = 1.0;
   SampleStatus status_;  // of y_
+  SampleStamp stamp_;    // of y_
+  bool stamps_;          // whether rows have them
+  bool sets_pace_;
+  std::int64_t jitter_ns_;
+  SampleClock clock_;
   int bucket_ = 0;
   Phase phase_ = Phase::idle;
   bool complete_ = false;

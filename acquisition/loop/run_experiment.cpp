@@ -21,6 +21,7 @@
 #include "acquisition/loop/measurement_loop.hpp"
 #include "acquisition/loop/shared_progress.hpp"
 #include "acquisition/record/utc_time.hpp"
+#include "acquisition/slog/slog_index.hpp"
 
 namespace stageid {
 
@@ -55,9 +56,9 @@ class Experiment {
       : plan_(plan),
         stage_(stage),
         options_(options),
-        ring_(log.info().actuators.size() + log.info().sensors.size() + 1, ring_rows(stage.info())),
-        loop_(stage, controller, ring_, {options.ramp_s, options.misses_allowed}),
-        recorder_(make_recorder(options, ring_.row_words())),
+        ring_(slog_row_words(log.info()), ring_rows(stage.info())),
+        loop_(stage, controller, ring_, {options.ramp_s, options.jitter_s, options.misses_allowed}),
+        recorder_(make_recorder(options)),
         log_(log, ring_, observers()),
         wall_(stage.info().clock == Clock::wall),
         actuators_(excited_actuators(plan.spec(), stage.info())),
@@ -101,10 +102,8 @@ class Experiment {
     if (!stage_ended_it) result_.end = ExperimentEnd::log_failed;
   }
 
-  static std::unique_ptr<EventRecorder> make_recorder(const RunExperimentOptions& options,
-                                                      std::size_t row_words) {
-    return options.events == nullptr ? nullptr
-                                     : std::make_unique<EventRecorder>(*options.events, row_words);
+  static std::unique_ptr<EventRecorder> make_recorder(const RunExperimentOptions& options) {
+    return options.events == nullptr ? nullptr : std::make_unique<EventRecorder>(*options.events);
   }
 
   std::vector<RunObserver*> observers() const {
@@ -184,8 +183,14 @@ class Experiment {
     run.realization = id.realization;
     run.experiment = id.experiment;
     run.started_utc = utc_now();
-    loop_.start(run_seed(plan_.spec().seed, id), excitation);
-    log_.begin_run(run, std::move(excitation.period));
+    log_.begin_run(run, excitation.period);  // first: it allocates and locks
+    try {
+      loop_.start(run_seed(plan_.spec().seed, id), excitation);
+    } catch (...) {
+      log_.forget_run();
+      throw;
+    }
+    log_.confirm_run();
     cycle_until_end();
     run.complete = loop_.complete() && loop_.reason() != StopReason::log;
     run.health = loop_.health();
@@ -344,6 +349,7 @@ LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
     info.excitation.names.push_back(actuator.name);
     info.excitation.units.push_back(actuator.unit);
   }
+  info.stamps = stage.stamps;
   info.metadata_json = std::move(metadata_json);
   check_log_info(info);
   return info;

@@ -39,6 +39,7 @@ struct RunExperimentOptions {
   /// the experiment as complete.
   std::function<std::string()> enough = {};
   double ramp_s = 0.1;      ///< duration of the ramp of the excitation to zero before stopping
+  double jitter_s = 0.0;    ///< see LoopOptions
   int misses_allowed = 10;  ///< leaky bucket: +2 per bad cycle, -1 per good one; above this: stop
   RealTimeOptions real_time = {};            ///< of the loop's thread; ignored in virtual time
   EventLog* events = nullptr;                ///< receives runs, misses, states, limits and stops

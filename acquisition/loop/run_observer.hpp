@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 #include "acquisition/record/log_info.hpp"
@@ -12,8 +13,8 @@ class RunObserver {
  public:
   virtual ~RunObserver() = default;
   virtual void begin_run(const LogRun& run) noexcept = 0;
-  /// Rows of actuators + sensors + status word, row-major (slog_format.hpp).
-  virtual void rows(std::span<const double> rows) noexcept = 0;
+  /// Rows of `words` words, row-major: actuators, sensors, ..., status word (slog_format.hpp).
+  virtual void rows(std::span<const double> rows, std::size_t words) noexcept = 0;
   virtual void end_run(const LogRun& run) noexcept = 0;
 };
 

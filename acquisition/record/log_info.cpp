@@ -70,6 +70,7 @@ RunHealth& RunHealth::operator+=(const RunHealth& other) noexcept {
   late += other.late;
   missing += other.missing;
   marked += other.marked;
+  irregular += other.irregular;
   largest_lateness_ns = std::max(largest_lateness_ns, other.largest_lateness_ns);
   seconds += other.seconds;
   return *this;

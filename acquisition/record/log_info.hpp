@@ -25,6 +25,7 @@ struct LogInfo {
   ChannelList excitation;
   ChannelList actuators;
   ChannelList sensors;
+  bool stamps = false;  ///< rows have a stamp word before the status word (slog_format.hpp)
   /// Configuration text, version, seeds, start time: provenance. A JSON object in native logs and logs converted
   /// from them; "{}" for other HDF5 logs.
   std::string metadata_json = "{}";
@@ -36,7 +37,7 @@ struct LogInfo {
 /// @throws std::invalid_argument naming the field.
 void check_log_info(const LogInfo& info);
 
-/// True if both describe the same experiment: everything but the metadata is equal.
+/// True if both describe the same experiment: everything but the metadata and stamps is equal.
 bool same_measurement(const LogInfo& a, const LogInfo& b) noexcept;
 
 /// Counts of irregular cycles of a run.
@@ -45,6 +46,7 @@ struct RunHealth {
   std::uint64_t late = 0;
   std::uint64_t missing = 0;  ///< incomplete, stale, corrupt or link trouble
   std::uint64_t marked = 0;
+  std::uint64_t irregular = 0;  ///< jitter beyond the limit; 0 in older logs
   std::int64_t largest_lateness_ns = 0;
   double seconds = 0.0;  ///< wall time of the run
 

@@ -17,7 +17,7 @@ class RunWriter {
   /// This and the functions below throw if the destination fails; no further run is written then.
   virtual void begin_run(const LogRun& run,
                          const Eigen::Ref<const Eigen::MatrixXd>& excitation) = 0;
-  /// Rows of actuators + sensors + status word, row-major (slog_format.hpp).
+  /// Rows of actuators + sensors + stamp word, if info() has stamps, + status word, row-major (slog_format.hpp).
   virtual void write(std::span<const double> rows) = 0;
   /// Ends the run. `complete` in `run`: it may be used; `health`: its counts.
   virtual void end_run(const LogRun& run) = 0;

@@ -22,16 +22,20 @@
 // The payload follows, padded with zero bytes to a multiple of 64. Payloads by type:
 //
 //   log         JSON: {"sample_rate_hz", "period_samples", "transient_periods", "excitation",
-//               "actuators", "sensors": each {"names": [], "units": []}, "metadata": {...}}.
+//               "actuators", "sensors": each {"names": [], "units": []}, "stamps": true if rows
+//               have them, "metadata": {...}}.
 //               The first block of a file; repeated before every run_begin, so that losing one is
 //               harmless.
 //   run_begin   JSON: {"realization", "experiment", "started_utc", "excitation_columns": [...]}.
 //   excitation  float64, one period of the excitation, column by column, only the nonzero columns, which
 //               run_begin lists. Absent if there are none.
 //   samples     rows of `cols` words: actuators, sensors (float64, SI), then one uint64 status word:
-//               bits 0-7 hal's Outcome, bit 8 marked (do not use), bits 32-63 lateness in ns.
+//               bits 0-7 hal's Outcome, bit 8 marked (do not use), bit 9 irregular (jitter beyond
+//               the limit), bits 32-63 lateness in ns. With "stamps", a uint64 stamp word stands before
+//               it: bits 0-31 ns from the instant of the setpoint to the arrival of the measurement
+//               (0: unknown), bit 32: bits 48-63 are the node's time in us, modulo 2^16.
 //   run_end     JSON: {"realization", "experiment", "samples", "complete", "health": {"cycles",
-//               "late", "missing", "marked", "largest_lateness_ns", "seconds"}}. A run without run_end
+//               "late", "missing", "marked", "irregular", "largest_lateness_ns", "seconds"}}. A run without run_end
 //               was interrupted: incomplete.
 //   end         JSON: {"exit_code", "message"}. The last block of a log that was closed properly; a
 //               resumed log has several.
@@ -55,6 +59,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 namespace stageid {
@@ -113,19 +118,40 @@ struct SampleStatus {
   std::uint8_t outcome = 0;  ///< hal's Outcome as a number
   bool marked = false;       ///< do not use this sample
   std::uint32_t lateness_ns = 0;
+  bool irregular = false;  ///< its instant deviates by more than the jitter limit
   friend bool operator==(const SampleStatus&, const SampleStatus&) = default;
 };
 
 inline constexpr std::uint64_t kSlogMarkedBit = 1U << 8;
+inline constexpr std::uint64_t kSlogIrregularBit = 1U << 9;
 
 constexpr std::uint64_t pack_status(const SampleStatus& status) noexcept {
   return static_cast<std::uint64_t>(status.outcome) | (status.marked ? kSlogMarkedBit : 0U) |
+         (status.irregular ? kSlogIrregularBit : 0U) |
          (static_cast<std::uint64_t>(status.lateness_ns) << 32);
 }
 
 constexpr SampleStatus unpack_status(std::uint64_t word) noexcept {
   return {static_cast<std::uint8_t>(word & 0xFFU), (word & kSlogMarkedBit) != 0,
-          static_cast<std::uint32_t>(word >> 32)};
+          static_cast<std::uint32_t>(word >> 32), (word & kSlogIrregularBit) != 0};
+}
+
+/// Time stamps of one sample, stored in the word before the status.
+struct SampleStamp {
+  std::uint32_t arrival_ns = 0;          ///< after the instant of the setpoint; 0: unknown
+  std::optional<std::uint16_t> node_us;  ///< the node's time, modulo 2^16
+  friend bool operator==(const SampleStamp&, const SampleStamp&) = default;
+};
+
+constexpr std::uint64_t pack_stamp(const SampleStamp& stamp) noexcept {
+  return stamp.arrival_ns |
+         (stamp.node_us ? (std::uint64_t{1} << 32) | (std::uint64_t{*stamp.node_us} << 48) : 0U);
+}
+
+constexpr SampleStamp unpack_stamp(std::uint64_t word) noexcept {
+  SampleStamp stamp{static_cast<std::uint32_t>(word), {}};
+  if (((word >> 32) & 1U) != 0) stamp.node_us = static_cast<std::uint16_t>(word >> 48);
+  return stamp;
 }
 
 }  // namespace stageid

@@ -208,7 +208,8 @@ SlogIndex index_slog(const SlogSource& source, const SlogScan& scan) {
 }
 
 std::uint32_t slog_row_words(const LogInfo& info) noexcept {
-  return static_cast<std::uint32_t>(info.actuators.size() + info.sensors.size() + 1);
+  return static_cast<std::uint32_t>(info.actuators.size() + info.sensors.size() +
+                                    (info.stamps ? 2 : 1));
 }
 
 std::string slog_run_name(std::size_t index) { return fmt::format("{:04}", index); }

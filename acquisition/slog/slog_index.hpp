@@ -36,7 +36,7 @@ struct SlogIndex {
 /// @throws FormatError if no description of the log is left, or one is invalid.
 SlogIndex index_slog(const SlogSource& source, const SlogScan& scan);
 
-/// Words per row of samples: actuators, sensors, status.
+/// Words per row of samples: actuators, sensors, stamp if there are any, status.
 std::uint32_t slog_row_words(const LogInfo& info) noexcept;
 
 /// Name of a run by its index: "0000".

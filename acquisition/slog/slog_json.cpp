@@ -83,13 +83,13 @@ std::string to_json(const LogInfo& info) {
   } catch (const Json::exception&) {
     throw std::invalid_argument("log: metadata_json is not valid JSON");
   }
-  return text_of({{"sample_rate_hz", info.sample_rate_hz},
-                  {"period_samples", info.period_samples},
-                  {"transient_periods", info.transient_periods},
-                  {"excitation", json_of(info.excitation)},
-                  {"actuators", json_of(info.actuators)},
-                  {"sensors", json_of(info.sensors)},
-                  {"metadata", metadata}});
+  Json json = {
+      {"sample_rate_hz", info.sample_rate_hz},       {"period_samples", info.period_samples},
+      {"transient_periods", info.transient_periods}, {"excitation", json_of(info.excitation)},
+      {"actuators", json_of(info.actuators)},        {"sensors", json_of(info.sensors)}};
+  if (info.stamps) json["stamps"] = true;
+  json["metadata"] = std::move(metadata);
+  return text_of(json);
 }
 
 LogInfo parse_log_info(std::string_view text) {
@@ -101,6 +101,7 @@ LogInfo parse_log_info(std::string_view text) {
     read.excitation = channels_of(json.at("excitation"));
     read.actuators = channels_of(json.at("actuators"));
     read.sensors = channels_of(json.at("sensors"));
+    read.stamps = json.value("stamps", false);
     read.metadata_json = json.at("metadata").dump();
     return read;
   });
@@ -136,6 +137,7 @@ std::string to_json(const SlogRunEnd& end) {
                  {"marked", health.marked},
                  {"largest_lateness_ns", health.largest_lateness_ns},
                  {"seconds", health.seconds}}}};
+  if (health.irregular > 0) json["health"]["irregular"] = health.irregular;
   if (!end.timing.empty()) json["timing"] = json_of(end.timing);
   return text_of(json);
 }
@@ -152,6 +154,7 @@ SlogRunEnd parse_run_end(std::string_view text) {
     end.health.late = health.at("late").get<std::uint64_t>();
     end.health.missing = health.at("missing").get<std::uint64_t>();
     end.health.marked = health.at("marked").get<std::uint64_t>();
+    end.health.irregular = health.value("irregular", std::uint64_t{0});
     end.health.largest_lateness_ns = health.at("largest_lateness_ns").get<std::int64_t>();
     end.health.seconds = health.at("seconds").get<double>();
     if (json.contains("timing")) end.timing = timing_of(json.at("timing"));

@@ -128,8 +128,9 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
 void SlogReader::report_not_finite(const SlogRunIndex& run, const double* rows,
                                    std::uint64_t first_row, std::size_t count) const {
   const std::size_t words = slog_row_words(index_.info);
+  const std::size_t channels = index_.info.actuators.size() + index_.info.sensors.size();
   for (std::size_t r = 0; r < count; ++r) {
-    for (std::size_t c = 0; c + 1 < words; ++c) {
+    for (std::size_t c = 0; c < channels; ++c) {
       if (std::isfinite(rows[r * words + c])) continue;
       throw_not_finite(path(), index_.info, run.run, first_row + r, c);
     }

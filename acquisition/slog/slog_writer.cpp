@@ -106,7 +106,6 @@ SlogWriter SlogWriter::create(const std::filesystem::path& file, const LogInfo& 
 
 SlogWriter SlogWriter::resume(const std::filesystem::path& file, const LogInfo& info) {
   check_log_info(info);
-  std::string json = to_json(info);
   SlogAppender appender = SlogAppender::open_existing(file);  // locked before it is read
   const SlogSource source(file);
   const SlogScan scan = scan_slog(source, SlogScanDepth::payloads);
@@ -123,8 +122,11 @@ SlogWriter SlogWriter::resume(const std::filesystem::path& file, const LogInfo& 
   for (const SlogBlock& block : scan.blocks) {
     if (block.header.is(SlogBlockType::run_begin)) runs = block.header.run + 1;
   }
-  return SlogWriter(std::unique_ptr<State>(
-      new State{info, std::move(json), std::move(appender), runs, std::nullopt, 0}));
+  LogInfo continued = info;
+  continued.stamps = index.info.stamps;  // all rows of a file have the same width
+  std::string json = to_json(continued);
+  return SlogWriter(std::unique_ptr<State>(new State{std::move(continued), std::move(json),
+                                                     std::move(appender), runs, std::nullopt, 0}));
 }
 
 void SlogWriter::begin_run(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& excitation) {

@@ -128,6 +128,11 @@ std::vector<std::uint16_t> can_node_identifiers(const CanLayout& layout) {
   return identifiers(layout.setpoints, {kCanCommandId, kCanUploadId});
 }
 
+double can_longest_pause_s(const CanSpec& spec, const StageInfo& info) {
+  const double period_s = 1.0 / info.sample_rate_hz;
+  return period_s + (info.clock == Clock::wall ? period_s : kCanRepeats * spec.reply_timeout_s);
+}
+
 CanLayout can_layout(const CanSpec& spec, const StageInfo& info) {
   check_times(spec);
   check_once(spec, info.actuators, &CanBusSpec::actuators);

@@ -27,8 +27,17 @@ struct CanSpec {
   double reply_timeout_s = 5e-3;
   /// The node stops by itself after this time without a setpoint.
   double watchdog_s = 20e-3;
+  /// The node samples by its own clock and sets the pace of the host, on the wall clock.
+  bool node_clock = false;
   double largest_load = 0.8;  ///< largest permitted load of a bus
 };
+
+/// In virtual time, a setpoint without an answer is sent again so often.
+inline constexpr int kCanRepeats = 3;
+
+/// Longest time between two new setpoints of a run that continues. On the wall clock, one setpoint was lost; in
+/// virtual time, one was repeated every reply_timeout_s. The watchdog of a node must be longer.
+double can_longest_pause_s(const CanSpec& spec, const StageInfo& info);
 
 // Lower identifiers have priority on the bus.
 inline constexpr std::uint16_t kCanCommandId = 0x080;

@@ -25,11 +25,14 @@ std::int16_t distance(std::uint16_t sequence, std::uint16_t from) {
 
 }  // namespace
 
-CanNode::CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transport, double pace)
+CanNode::CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transport, double pace,
+                 bool own_clock)
     : stage_(stage),
       layout_(layout),
       transport_(transport),
       player_(stage, pace),
+      ticks_(stage.info().sample_rate_hz, 1.0),
+      own_clock_(own_clock),
       boot_(std::random_device()() | 1U) {
   if (layout_.setpoints.size() > 64)
     throw std::invalid_argument("can: a node supports at most 64 setpoint frames");
@@ -108,6 +111,9 @@ void CanNode::take_complete_setpoint(std::uint16_t sequence) {
     state_asked_ = true;
     return;
   }
+  if (own_clock_)
+    while (ticks_.wait().late) {  // keep the phase
+    }
   Inputs inputs;
   inputs.y = y_;
   const Outcome outcome = stage_.advance(transport_.now_ns(), command_, inputs);
@@ -224,6 +230,7 @@ std::string CanNode::start(const CanCommand& command) {
     return error.what();
   }
   take_over(command);
+  static_cast<void>(ticks_.restart());
   last_sequence_ = 0;
   pending_frames_ = 0;
   gaps_ = repeated_ = 0;

@@ -9,6 +9,7 @@
 #include "hal/can/can_player.hpp"
 #include "hal/can/can_transport.hpp"
 #include "hal/node/stage_node.hpp"
+#include "hal/stage/pacer.hpp"
 
 namespace stageid {
 
@@ -24,7 +25,9 @@ namespace stageid {
 class CanNode {
  public:
   /// @param pace resident experiments: 0 as fast as possible, otherwise stage seconds per second.
-  CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transport, double pace = 0.0);
+  /// @param own_clock streaming: a setpoint waits for the next sample instant of this computer's clock
+  CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transport, double pace = 0.0,
+          bool own_clock = false);
 
   /// Waits for work until `until_ns` of the transport's clock, processes a batch of received frames, and runs
   /// the stage's watchdog even if more frames are pending. Must be called at least every millisecond.
@@ -56,6 +59,8 @@ class CanNode {
   CanLayout layout_;
   CanTransport& transport_;
   CanPlayer player_;
+  Pacer ticks_;
+  bool own_clock_;
 
   std::vector<CanFrame> inbox_;
   std::vector<CanFrame> outbox_;

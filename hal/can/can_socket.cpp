@@ -15,6 +15,7 @@
 #include <cstring>
 #include <ctime>
 
+#include "hal/can/can_arrival.hpp"
 #include "hal/stage/pacer.hpp"
 #include "hal/stage/stage.hpp"
 
@@ -70,6 +71,7 @@ void configure(int fd, const std::string& interface,
       setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof(errors)) != 0 ||
       setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof(on)) != 0)
     refuse(interface, fmt::format("cannot be configured: {}", std::strerror(errno)));
+  stamp_arrivals(fd);
 }
 
 canfd_frame to_kernel(const CanFrame& frame) noexcept {
@@ -101,6 +103,7 @@ struct SocketCan::Bus {
   std::string interface;
   int fd;
   CanBusHealth health;
+  CanArrivals arrivals;
 };
 
 SocketCan::SocketCan(const std::vector<std::string>& interfaces,
@@ -177,8 +180,9 @@ std::size_t SocketCan::Bus::receive(std::span<CanFrame> frames, std::uint8_t num
   canfd_frame raw[kBatch];
   iovec part[kBatch];
   mmsghdr message[kBatch]{};
-  alignas(cmsghdr) char control[kBatch][CMSG_SPACE(sizeof(std::uint32_t))];
+  alignas(cmsghdr) char control[kBatch][CMSG_SPACE(sizeof(std::uint32_t)) + kArrivalControlBytes];
   std::size_t count = 0;
+  arrivals.begin(now);
   while (count < frames.size()) {
     const std::size_t asked = std::min(kBatch, frames.size() - count);
     for (std::size_t i = 0; i < asked; ++i) {
@@ -196,7 +200,7 @@ std::size_t SocketCan::Bus::receive(std::span<CanFrame> frames, std::uint8_t num
     for (int i = 0; i < n; ++i) {
       watch_overflow(message[i].msg_hdr);
       frames[count].bus = number;
-      frames[count].t_rx_ns = now;
+      frames[count].t_rx_ns = arrivals.arrival_ns(message[i].msg_hdr);
       if (take(raw[i], frames[count])) ++count;
     }
     if (static_cast<std::size_t>(n) < asked) break;

@@ -13,8 +13,8 @@
 namespace stageid {
 namespace {
 
-constexpr int kRepeats = 3;
 constexpr int kStartAttempts = 3;
+constexpr std::int64_t kStampEra_ns = 65'536'000;  // of the node's time in its frames
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 StageInfo info_of(StageInfo info, const CanSpec& spec, const CanLayout& layout, double pace) {
@@ -22,6 +22,11 @@ StageInfo info_of(StageInfo info, const CanSpec& spec, const CanLayout& layout, 
   info.backend = "can";
   info.clock = pace > 0.0 ? Clock::wall : Clock::virtual_time;
   info.pace = pace > 0.0 ? pace : 1.0;
+  info.stamps = pace > 0.0;
+  info.sets_pace = spec.node_clock;
+  if (spec.node_clock && pace != 1.0)
+    throw std::invalid_argument(
+        "can: clock: node needs the wall clock; set pace: 1, or clock: host");
   return info;
 }
 
@@ -37,6 +42,7 @@ CanStage::CanStage(StageInfo info, const CanSpec& spec, std::unique_ptr<CanTrans
       wall_(options.pace > 0.0),
       reset_fault_(options.reset_fault),
       reply_timeout_ns_(std::llround(1e9 * spec.reply_timeout_s)),
+      host_of_node_(std::llround(5e8 / info_.sample_rate_hz)),
       outbox_(layout_.setpoints.size()),
       inbox_(kCanInboxFrames) {
   info_ = info_of(std::move(info_), spec, layout_, options.pace);
@@ -80,7 +86,14 @@ void CanStage::start(std::uint64_t run_seed, Inputs& first) {
                        info_.sensors[static_cast<std::size_t>(std::countr_one(first.valid))].name));
   }
   running_ = true;
-  const Pacer::Instant now = pacer_.restart();
+  stamped_ns_ = arrival_ns_;
+  stamped_us_ = node_us_;
+  node_ns_ = kStampEra_ns + 1000 * std::int64_t{node_us_};
+  node_time_ = NodeTime::unknown;
+  host_of_node_.restart();
+  instant_ns_ = transport_->now_ns();
+  const Pacer::Instant now =
+      info_.sets_pace ? Pacer::Instant{instant_ns_, instant_ns_, 0, false} : pacer_.restart();
   first.cycle = 0;
   first.t_sample_ns = now.sample_ns;
   first.t_rx_ns = now.now_ns;
@@ -118,8 +131,9 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
     return Outcome::fault;
   begin_cycle(static_cast<std::uint16_t>(outputs.cycle + 1));
   if (!send_setpoints(outputs)) return Outcome::fault;  // the sent value would differ
+  const std::int64_t ready_ns = transport_->now_ns();
   collect(reply_deadline_ns(deadline));
-  for (int repeat = 0; !wall_ && repeat < kRepeats && !complete() && !over(); ++repeat) {
+  for (int repeat = 0; !wall_ && repeat < kCanRepeats && !complete() && !over(); ++repeat) {
     ++counts_.repeats;
     static_cast<void>(transport_->send(outbox_));
     collect(transport_->now_ns() + reply_timeout_ns_);
@@ -128,13 +142,39 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
   status_ = judge(inputs);
   const Outcome outcome = meaning(status_).outcome;
   samples_bad_ += status_ == PeerStatus::good ? 0U : 1U;
-  const Pacer::Instant now = pacer_.wait();
+  if (wall_ && frames_seen_ != 0) stamp(inputs);
+  const Pacer::Instant now = info_.sets_pace ? wait_for_instant(ready_ns) : pacer_.wait();
   inputs.t_ready_ns = now.ready_ns;
   inputs.cycle = outputs.cycle + 1;
   inputs.t_sample_ns = now.sample_ns;
   inputs.t_rx_ns = now.now_ns;
   const bool past_deadline = deadline.t_ns != 0 && now.now_ns > deadline.t_ns;
   return outcome == Outcome::ok && (now.late || past_deadline) ? Outcome::late : outcome;
+}
+
+/// The node's time has 16 bits; the arrival tells how often they have overflowed.
+void CanStage::stamp(Inputs& inputs) noexcept {
+  inputs.t_arrival_ns = arrival_ns_;
+  const auto step_us = static_cast<std::uint16_t>(node_us_ - stamped_us_);
+  const std::int64_t left_ns = (arrival_ns_ - stamped_ns_) - 1000 * std::int64_t{step_us};
+  const std::int64_t eras =
+      (left_ns + kStampEra_ns / 2) / kStampEra_ns - (left_ns < -kStampEra_ns / 2);
+  if (node_time_ == NodeTime::unknown)
+    node_time_ = step_us == 0 && eras <= 0 ? NodeTime::none : NodeTime::runs;
+  node_ns_ += 1000 * std::int64_t{step_us} + std::max<std::int64_t>(0, eras) * kStampEra_ns;
+  stamped_ns_ = arrival_ns_;
+  stamped_us_ = node_us_;
+  inputs.stamp_of_stage = node_time_ == NodeTime::runs;
+  inputs.stamp_ns = inputs.stamp_of_stage ? node_ns_ : arrival_ns_;
+  if (!info_.sets_pace) return;
+  static_cast<void>(host_of_node_.take(inputs.stamp_ns, arrival_ns_));
+  instant_ns_ = host_of_node_.stamp_ns(inputs.stamp_ns);
+}
+
+/// The node has waited; without an answer, the next instant follows a period after the last.
+Pacer::Instant CanStage::wait_for_instant(std::int64_t ready_ns) noexcept {
+  if (frames_seen_ == 0) instant_ns_ += period_ns_;
+  return {instant_ns_, transport_->now_ns(), ready_ns, false};
 }
 
 std::int64_t CanStage::reply_deadline_ns(Deadline deadline) const noexcept {
@@ -188,11 +228,14 @@ void CanStage::take(const CanFrame& frame) noexcept {
     return;
   }
   last = frame;
+  if (frames_seen_ == 0) {
+    arrival_ns_ = frame.t_rx_ns;
+    node_us_ = header.detail;
+  }
   frames_seen_ |= bit;
   --frames_missing_;
   measured_in_ = static_cast<NodeState>(header.kind & ~kCanSaturatedBit);
   out_of_range_ |= (header.kind & kCanSaturatedBit) != 0;
-  t_rx_ns_ = frame.t_rx_ns;
   for (const int channel : layout_.sensors[number].channels)
     fresh_[static_cast<std::size_t>(channel)] = decoded_[static_cast<std::size_t>(channel)];
 }

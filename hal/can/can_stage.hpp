@@ -11,6 +11,7 @@
 #include "hal/can/can_transport.hpp"
 #include "hal/stage/pacer.hpp"
 #include "hal/stage/peer_status.hpp"
+#include "hal/stage/sample_clock.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -38,6 +39,9 @@ struct CanCounts {
 /// channels arrived. Otherwise it is `corrupt` if a frame was damaged, `incomplete` if some channels arrived, and
 /// `stale` if none did. Older answers are counted and discarded. In virtual time the setpoint is repeated up to
 /// three times, because nothing moves while the host waits; on the wall clock it is never repeated.
+/// Measurements on the wall clock are stamped by the node's time, or by their arrival if the node has no clock.
+/// With CanSpec::node_clock, the host does not wait for instants of its own: the instant of a sample is the node's,
+/// converted to the clock of the host with the offset and drift that follow from the stamps.
 /// peer_status.hpp defines the meaning of the node's and the bus's states. A command that cannot be encoded is a
 /// fault.
 class CanStage final : public CyclicStage {
@@ -69,6 +73,8 @@ class CanStage final : public CyclicStage {
   bool complete() const noexcept { return frames_missing_ == 0; }
   bool over() const noexcept;
   std::int64_t reply_deadline_ns(Deadline deadline) const noexcept;
+  void stamp(Inputs& inputs) noexcept;
+  Pacer::Instant wait_for_instant(std::int64_t ready_ns) noexcept;
   PeerStatus judge(const Inputs& inputs) noexcept;
   PeerStatus bus_status() const noexcept;
   PeerStatus node_status() const noexcept;
@@ -97,7 +103,14 @@ class CanStage final : public CyclicStage {
   bool conflict_ = false;          // two different answers to one sample
   std::uint64_t samples_bad_ = 0;  // of this run
   PeerStatus status_ = PeerStatus::good;
-  std::int64_t t_rx_ns_ = 0;
+  std::int64_t arrival_ns_ = 0;   // of the last measurement's first frame
+  std::uint16_t node_us_ = 0;     // its time by the node, modulo 2^16
+  std::int64_t stamped_ns_ = 0;   // arrival of the last one that was stamped
+  std::uint16_t stamped_us_ = 0;  // its time by the node
+  std::int64_t node_ns_ = 0;  // the same without modulo; its lowest 16 bits in us are the node's
+  enum class NodeTime : std::uint8_t { unknown, none, runs } node_time_ = NodeTime::unknown;
+  SampleClock host_of_node_;     // arrival over the node's time
+  std::int64_t instant_ns_ = 0;  // of the last sample, if the node sets the pace
   CanConversions conversions_;
   CanCounts counts_;
   std::string trouble_at_stop_;

@@ -34,6 +34,10 @@ double modbus_transaction_s(const ModbusAddress& address, const ModbusTiming& ti
          2.0 * silence_s + timing.device_s;
 }
 
+double modbus_longest_pause_s(const ModbusTiming& timing, double sample_rate_hz) {
+  return timing.worst_reply_s + timing.response_s + 1.0 / sample_rate_hz;
+}
+
 std::string describe_transaction(const ModbusAddress& address, const ModbusTiming& timing,
                                  int written_registers, int read_registers) {
   const double milliseconds =

@@ -33,6 +33,11 @@ struct ModbusTiming {
 double modbus_transaction_s(const ModbusAddress& address, const ModbusTiming& timing,
                             int written_registers, int read_registers);
 
+/// Longest time between two new setpoints of a run that continues: a request or its reply was lost, so it is
+/// repeated after worst_reply_s and answered within response_s; the next setpoint follows a sample later. The
+/// watchdog of a node must be longer.
+double modbus_longest_pause_s(const ModbusTiming& timing, double sample_rate_hz);
+
 /// Text for the user: "13.2 ms (81 + 33 bytes at 115200 baud)".
 std::string describe_transaction(const ModbusAddress& address, const ModbusTiming& timing,
                                  int written_registers, int read_registers);

@@ -75,6 +75,7 @@ ModbusStage::ModbusStage(StageInfo info, const ModbusAddress& address, const Mod
   info_.maximum_rate_hz = checked_rate_hz(info_, address, timing);
   info_.clock = options.pace > 0.0 ? Clock::wall : Clock::virtual_time;
   info_.pace = options.pace > 0.0 ? options.pace : 1.0;
+  info_.stamps = options.pace > 0.0;
   request_.assign(kSetpointHead + 2 * info_.actuators.size(), 0);
   reply_.assign(kMeasurementHead + 2 * info_.sensors.size(), 0);
 }
@@ -142,6 +143,7 @@ Outcome ModbusStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline d
     return Outcome::fault;
   }
   status_ = transact();
+  if (status_ == PeerStatus::good) inputs.t_arrival_ns = inputs.stamp_ns = monotonic_ns();
   const Pacer::Instant now = pacer_.wait();
   inputs.cycle = sequence_;
   inputs.t_ready_ns = now.ready_ns;

@@ -13,6 +13,9 @@ namespace stageid {
 namespace {
 
 constexpr double kWatchdogSamples = 3.0;
+// Leaky bucket of the samples that the node itself controls, as that of the host: six in a row are too many.
+constexpr int kBadSample = 2;
+constexpr int kMissesAllowed = 10;
 
 std::int64_t nanoseconds(double seconds, const char* name) {
   if (!(seconds >= 0.0) || !std::isfinite(seconds))
@@ -180,6 +183,7 @@ std::uint32_t StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, 
   reserved_ = false;
   running_ = true;
   sample_ = 0;
+  bucket_ = 0;
   last_sample_ns_ = now_ns;
   hold_began_ns_.reset();
   std::copy(first.y.begin(), first.y.end(), y_.begin());
@@ -204,7 +208,19 @@ Outcome StageNode::advance_excited(std::int64_t now_ns, std::span<const double> 
   std::transform(control_.begin(), control_.end(), r.begin(), u.begin(), std::plus<>());
   const Outcome outcome = exchange(now_ns, u, inputs);
   std::copy(inputs.applied.begin(), inputs.applied.end(), u.begin());
-  return outcome;
+  if (!lost(outcome) || machine_.state() != NodeState::measuring) return outcome;
+  machine_.fail(FaultCause::amplifier);
+  reason_ = "the stage gives no measurements";
+  inputs.node_state = machine_.state();
+  return Outcome::fault;
+}
+
+/// Whether too many measurements are missing to control the stage.
+bool StageNode::lost(Outcome outcome) noexcept {
+  const bool missing =
+      outcome == Outcome::stale || outcome == Outcome::incomplete || outcome == Outcome::corrupt;
+  bucket_ = missing ? bucket_ + kBadSample : std::max(0, bucket_ - 1);
+  return bucket_ > kMissesAllowed;
 }
 
 void StageNode::give_nothing(Inputs& inputs) const {
@@ -276,10 +292,12 @@ void StageNode::hold(std::int64_t now_ns) {
   bool controlled = running_;
   for (; controlled && held_samples_ < due; ++held_samples_) {
     std::copy(control_.begin(), control_.end(), command_.begin());
-    const Outcome outcome = stage_.exchange({sample_, now_ns, command_}, inputs, {});
+    // The limits need the cycle: a loop that does not settle is opened.
+    const std::uint64_t cycle = sample_ + static_cast<std::uint64_t>(held_samples_);
+    const Outcome outcome = stage_.exchange({cycle, now_ns, command_}, inputs, {});
     controller_.update(y_.data(), control_.data());
-    controlled =
-        outcome != Outcome::fault && outcome != Outcome::link_down && outcome != Outcome::opened;
+    controlled = outcome != Outcome::fault && outcome != Outcome::link_down &&
+                 outcome != Outcome::opened && !lost(outcome);
   }
   if (controlled && elapsed_ns < hold_ns_) return;
   come_to_rest();

@@ -40,6 +40,7 @@ struct NodePanel {
 /// While the host measures, each advance() moves the plant by one sample. The node stops by itself if
 ///   - no advance() is called for watchdog_s (of the wall clock, checked by tick());
 ///   - advance() reports a limit or a fault;
+///   - its own loop misses six measurements in a row, by a leaky bucket like the host's;
 ///   - the panel leaves its range; or
 ///   - fail() is called.
 /// Its own controller holds the stage for hold_s in closed loop; if the loop is unsound, LimitedStage brakes the
@@ -102,6 +103,7 @@ class StageNode {
   void give_nothing(Inputs& inputs) const;
   std::uint32_t holder() const;
   std::uint32_t draw_key();
+  bool lost(Outcome outcome) noexcept;
   void hold(std::int64_t now_ns);
   void come_to_rest();
 
@@ -122,6 +124,7 @@ class StageNode {
   std::int64_t last_sample_ns_ = 0;
   std::optional<std::int64_t> hold_began_ns_;
   std::int64_t held_samples_ = 0;
+  int bucket_ = 0;      // of missing measurements, while the node's own loop controls
   std::string reason_;  // of the fault, if more is known than its cause
   std::vector<double> y_;
   std::vector<double> control_;  // C(y) of the node's controller

@@ -129,6 +129,7 @@ PluginStage::PluginStage(StageInfo info, const PluginSpec& spec, double pace)
   if (description.transport_delay_s > 0.0) info_.transport_delay_s = description.transport_delay_s;
   info_.clock = description.virtual_time != 0 ? Clock::virtual_time : Clock::wall;
   info_.pace = info_.clock == Clock::wall && pace > 0.0 ? pace : 1.0;
+  info_.stamps = info_.clock == Clock::wall;
 }
 
 PluginStage::~PluginStage() = default;
@@ -155,6 +156,7 @@ Outcome PluginStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline d
   inputs.valid = sample.valid;
   inputs.t_sample_ns = sample.t_sample_ns;
   inputs.t_rx_ns = sample.t_receive_ns;
+  inputs.t_arrival_ns = inputs.stamp_ns = sample.t_receive_ns;
   return outcome_of(code);
 }
 

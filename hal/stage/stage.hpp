@@ -35,7 +35,9 @@ struct StageInfo {
   double maximum_rate_hz = 0.0;
   double transport_delay_s = 0.0;  ///< declared, from computed command to changed output
   Clock clock = Clock::virtual_time;
-  double pace = 1.0;  ///< stage seconds per second of its clock; not 1 only in simulations
+  double pace = 1.0;       ///< stage seconds per second of its clock; not 1 only in simulations
+  bool stamps = false;     ///< Inputs have t_arrival_ns and stamp_ns
+  bool sets_pace = false;  ///< wall clock: the stage samples by its own clock, not by the host's
   std::vector<Channel> actuators;
   std::vector<Channel> sensors;
 };
@@ -81,6 +83,11 @@ struct Inputs {
   NodeState node_state = NodeState::not_ready;
   /// Start of the wait for t_sample, CLOCK_MONOTONIC; 0: unknown. Execution time ends here.
   std::int64_t t_ready_ns = 0;
+  /// Arrival of the measurement on the clock of t_sample; 0: unknown.
+  std::int64_t t_arrival_ns = 0;
+  /// Instant of the measurement by a clock of any offset and drift: of the stage, else of the host; 0: unknown.
+  std::int64_t stamp_ns = 0;
+  bool stamp_of_stage = false;
   /// Applied commands if they differ from Outputs::u, valid until the next exchange; otherwise empty.
   std::span<const double> applied;
 };

@@ -19,7 +19,7 @@ import unittest
 PROGRAM, SOURCE, WORK = sys.argv[1:4]
 FIRMWARE = pathlib.Path(SOURCE) / "docs/examples/firmware"
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
-WATCHDOG_S = 2.0
+WATCHDOG_S = 2.6
 DELAY_S = 1.0  # of a busy machine
 
 ENABLE, DISABLE, QUICK_STOP, RESET = 1, 2, 3, 4

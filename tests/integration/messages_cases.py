@@ -185,6 +185,7 @@ REVERSED = "{kind: actuator_gain, channel: a1, from_cycle: 1500, value: -1}"
 case("Actuator with the wrong sign", RUN, fault(REVERSED), **STOPPED)
 case("Dashboard on a port that does not exist", f"{RUN} --dashboard 80800")
 case("Node without a link", f"node {STAGE}")
+case("Watchdog shorter than a repetition", f"node {STAGE} --modbus-tcp 0 --watchdog 0.06")
 case("Directory of an earlier identification", f"identify {EXPERIMENT} -o .", needs=("run.slog",), keeps=True)
 
 case = chapter("Logs")

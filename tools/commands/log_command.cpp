@@ -29,11 +29,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json counts_json(const RunHealth& health) {
-  return {{"cycles", health.cycles},
-          {"late", health.late},
-          {"missing", health.missing},
-          {"marked", health.marked},
-          {"largest_lateness_ns", health.largest_lateness_ns},
+  return {{"cycles", health.cycles},       {"late", health.late},
+          {"missing", health.missing},     {"marked", health.marked},
+          {"irregular", health.irregular}, {"largest_lateness_ns", health.largest_lateness_ns},
           {"seconds", health.seconds}};
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <stdexcept>
@@ -108,8 +109,9 @@ NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
   modbus_.add_options(*command);
   command
       ->add_option("--watchdog", watchdog_s_,
-                   "the node stops if a measuring host is silent for this many seconds; 0: 3 "
-                   "samples; default: from the group 'can', otherwise 0")
+                   "the node stops if a measuring host is silent for this many seconds; 0, the "
+                   "default: 'watchdog_s' of the group 'can', or over Modbus a sample longer than "
+                   "a repeated request takes")
       ->check(CLI::Range(0.0, 3600.0));
   command->final_callback([this] { run(); });
 }
@@ -118,11 +120,29 @@ StageNode NodeCommand::make_node(const StageConfig& config) const {
   WaferStageSpec spec = config.spec;
   spec.pace = 0.0;  // the requests for samples set the pace
   NodeOptions options;
-  options.watchdog_s = config.can.present ? config.can.spec.watchdog_s : 0.0;
-  if (watchdog_s_ >= 0.0) options.watchdog_s = watchdog_s_;
+  options.watchdog_s = watchdog_s(config);
   options.hold_s = hold_s_;
   return {std::make_unique<SimulatedStage>(spec), spec.limits, spec.controller, panel_of(config),
           options};
+}
+
+double NodeCommand::watchdog_s(const StageConfig& config) const {
+  const StageInfo& info = config.spec.info;
+  double pause_s = 0.0;
+  // Without the group 'modbus', the host has another stage file; its times are probably the defaults.
+  if (modbus_.wanted())
+    pause_s = modbus_longest_pause_s(config.modbus ? config.modbus->timing : ModbusTiming{},
+                                     info.sample_rate_hz);
+  if (!can_interfaces_.empty() && config.can.mode == CanMode::streaming)
+    pause_s = std::max(pause_s, can_longest_pause_s(config.can.spec, info));
+  if (watchdog_s_ > 0.0 && watchdog_s_ < pause_s)
+    throw std::invalid_argument(fmt::format(
+        "--watchdog: {:.4g} s is too short: the node would stop the stage before a lost reply is "
+        "repeated. Use more than {:.4g} s, or shorter reply times in the stage file",
+        watchdog_s_, pause_s));
+  if (watchdog_s_ > 0.0) return watchdog_s_;
+  const double can_s = config.can.present ? config.can.spec.watchdog_s : 0.0;
+  return std::max(can_s, pause_s + 1.0 / info.sample_rate_hz);
 }
 
 void NodeCommand::run() {
@@ -159,7 +179,7 @@ void NodeCommand::serve_can(const StageConfig& config, StageNode& node) const {
     }
   }
   FaultyCan transport(socket, faults);
-  CanNode front(node, layout, transport, pace_);
+  CanNode front(node, layout, transport, pace_, config.can.spec.node_clock);
   console_.result(fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name,
                               fmt::join(can_interfaces_, ", ")));
   std::fflush(stdout);  // programs that wait for the node read this line

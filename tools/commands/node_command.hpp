@@ -23,6 +23,7 @@ class NodeCommand {
  private:
   void run();
   StageNode make_node(const StageConfig& config) const;
+  double watchdog_s(const StageConfig& config) const;
   void serve_can(const StageConfig& config, StageNode& node) const;
 
   Console& console_;
@@ -31,7 +32,7 @@ class NodeCommand {
   std::vector<std::string> can_faults_;
   double pace_ = 0.0;
   double hold_s_ = 0.1;
-  double watchdog_s_ = -1.0;
+  double watchdog_s_ = 0.0;
   ModbusFront modbus_;
 };
 

@@ -11,7 +11,6 @@ namespace stageid {
 namespace {
 
 constexpr double kRangePerLimit = 1.25;
-constexpr double kWatchdogSamples = 3.0;
 constexpr double kLeastWatchdog_s = 20e-3;
 
 void describe_bus(ConfigVisitor& v, std::vector<CanFile::Bus>& list) {
@@ -76,10 +75,16 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
   v.numbers(
       "sensor_range_m", f.sensor_range_m, positive("m"), {}, kOptional,
       "full scale of 2^23 counts; one for all or one per sensor; omitted: 1.25 times window_m");
+  std::size_t clock = spec.node_clock ? 1 : 0;
+  v.choice("clock", clock, {"host", "node"}, kOptional,
+           "of the samples; node: the node samples at its own ticks and the host follows it, with "
+           "pace: 1");
+  spec.node_clock = clock == 1;
   v.number("reply_timeout_s", spec.reply_timeout_s, positive("s"), kOptional,
            "the host waits this long for a reply");
   v.number("watchdog_s", f.watchdog_s, not_negative("s"), kOptional,
-           "the node stops if it receives no setpoint for this long; 0: 3 periods, at least 20 ms");
+           "the node stops if it receives no setpoint for this long; 0: a period longer than the "
+           "replacement of a lost frame takes, at least 20 ms");
   v.number("largest_load", spec.largest_load, {"", 0.0, 1.0, true}, kOptional,
            "largest load of a bus; experiments that need more are refused");
 }
@@ -87,9 +92,19 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
 CanConfig complete_can(const CanFile& file, const StageInfo& info, const StageLimits& limits) {
   CanConfig config = file.config;
   CanSpec& spec = config.spec;
+  if (spec.node_clock && info.clock != Clock::wall)
+    throw std::invalid_argument(
+        "can: clock: node needs the wall clock; set pace: 1, or clock: host");
+  const double pause_s = can_longest_pause_s(spec, info);
+  if (file.watchdog_s > 0.0 && file.watchdog_s < pause_s && config.mode == CanMode::streaming)
+    throw std::invalid_argument(fmt::format(
+        "can: watchdog_s: {:.4g} s is too short: the node would stop the stage before a lost frame "
+        "is replaced. Use more than {:.4g} s{}",
+        file.watchdog_s, pause_s,
+        info.clock == Clock::wall ? "" : ", or a shorter reply_timeout_s"));
   spec.watchdog_s = file.watchdog_s > 0.0
                         ? file.watchdog_s
-                        : std::max(kLeastWatchdog_s, kWatchdogSamples / info.sample_rate_hz);
+                        : std::max(kLeastWatchdog_s, pause_s + 1.0 / info.sample_rate_hz);
   const bool only = file.buses.size() == 1;
   for (const CanFile::Bus& bus : file.buses) {
     CanBusSpec complete = bus.spec;

@@ -38,10 +38,10 @@ struct CanFile {
 /// The keys of the group.
 void describe_can(ConfigVisitor& visitor, CanFile& file);
 
-/// Fills in channel numbers, ranges (default: 1.25 times the limits) and the watchdog of the node (default: three
-/// periods, at least 20 ms).
+/// Fills in channel numbers, ranges (default: 1.25 times the limits) and the watchdog of the node (default: a
+/// period longer than can_longest_pause_s(), at least 20 ms).
 /// @throws std::invalid_argument naming the key: an unknown channel, wrong number of ranges, no limit to derive a
-/// range from, and as can_layout().
+/// range from, a watchdog shorter than the longest pause, and as can_layout().
 CanConfig complete_can(const CanFile& file, const StageInfo& info, const StageLimits& limits);
 
 }  // namespace stageid

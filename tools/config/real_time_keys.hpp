@@ -8,6 +8,7 @@ namespace stageid {
 /// The group `realtime` of a stage file.
 struct RealTimeKeys {
   RealTimeOptions options;
+  double jitter_s = 0.0;    ///< 0: tolerable_jitter_s()
   int misses_allowed = 10;  ///< see LoopOptions
 };
 

@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 #include <httplib.h>
+#include <poll.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <thread>
 
@@ -21,6 +24,7 @@ using namespace std::chrono_literals;
 constexpr int kNice = 10;
 constexpr int kOtherThreads = 8;  // besides those of the streams: pages, responses, the abort
 constexpr auto kKeepAlive = 250ms;
+constexpr int kKeepAlive_ms = 1000;  // until the next request of a connection
 constexpr const char* kAbortHeader = "X-Stageid";
 
 /// Not those of httplib, which let two programs share a port.
@@ -28,6 +32,8 @@ void set_socket_options(int socket) {
   const int yes = 1;
   ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
 }
+
+constexpr std::chrono::seconds kPatience{DashboardServer::kPatience_s};
 
 constexpr const char* kWholeAddress = "open the address printed by stageid, with its token";
 
@@ -42,6 +48,57 @@ std::string host_in_url(const std::string& host) {
 
 }  // namespace
 
+/// One request of a client, with a deadline for its header and body. httplib limits the time between two pieces
+/// only, so a few clients that send a byte now and then would occupy all threads.
+class PatientStream final : public httplib::Stream {
+ public:
+  explicit PatientStream(int socket) : socket_(socket) {}
+  void request_is_read() { deadline_ = Clock::time_point::max(); }
+
+  bool is_readable() const override { return ready(POLLIN); }
+  bool is_writable() const override { return ready(POLLOUT); }
+  ssize_t read(char* data, std::size_t size) override {
+    return is_readable() ? ::recv(socket_, data, size, 0) : -1;
+  }
+  ssize_t write(const char* data, std::size_t size) override {
+    return is_writable() ? ::send(socket_, data, size, MSG_NOSIGNAL) : -1;
+  }
+  void get_remote_ip_and_port(std::string&, int&) const override {}
+  void get_local_ip_and_port(std::string&, int&) const override {}
+  socket_t socket() const override { return socket_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  bool ready(short events) const {
+    const auto until = std::min(deadline_, Clock::now() + kPatience);
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now());
+    pollfd wanted{socket_, events, 0};
+    return left.count() > 0 && ::poll(&wanted, 1, static_cast<int>(left.count())) > 0;
+  }
+
+  int socket_;
+  Clock::time_point deadline_ = Clock::now() + kPatience;
+};
+
+class PatientServer final : public httplib::Server {
+  bool process_and_close_socket(socket_t socket) override {
+    bool good = true;
+    bool closed = false;
+    for (auto left = keep_alive_max_count_; good && !closed && left > 0; --left) {
+      pollfd next{socket, POLLIN, 0};
+      if (svr_sock_ == INVALID_SOCKET || ::poll(&next, 1, kKeepAlive_ms) <= 0) break;
+      PatientStream stream(socket);
+      good = process_request(stream, left == 1, closed, [&stream](httplib::Request& request) {
+        if (request.method == "GET") stream.request_is_read();
+      });
+    }
+    ::shutdown(socket, SHUT_RDWR);
+    ::close(socket);
+    return good;
+  }
+};
+
 struct DashboardServer::State {
   State(const DashboardAddress& asked, DashboardContent& shown)
       : address(asked), content(shown), token(make_token()) {}
@@ -50,7 +107,7 @@ struct DashboardServer::State {
   DashboardContent& content;
   std::string token;
   std::string url;
-  httplib::Server server;
+  PatientServer server;
   std::thread thread;
   std::atomic<int> watchers = 0;
   std::atomic<bool> finishing = false;
@@ -78,9 +135,6 @@ bool DashboardServer::State::allowed(const httplib::Request& request) const {
 void DashboardServer::State::listen() {
   server.set_socket_options(set_socket_options);
   server.set_tcp_nodelay(true);
-  server.set_read_timeout(kPatience_s);
-  server.set_write_timeout(kPatience_s);
-  server.set_keep_alive_timeout(1);
   server.set_payload_max_length(kLargestBody);
   server.new_task_queue = [] { return new httplib::ThreadPool(kWatchers + kOtherThreads); };
   errno = 0;

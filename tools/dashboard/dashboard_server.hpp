@@ -24,7 +24,7 @@ struct DashboardContent {
 ///
 /// It has its own threads of low priority and at most kWatchers streams at once (then 503). A watcher receives the
 /// newest state when it is ready to read; nothing is queued for slow watchers, and one that does not read for
-/// kPatience_s is disconnected. Other threads of the program never wait for the server.
+/// kPatience_s, or whose request takes longer, is disconnected. Other threads of the program never wait for the server.
 ///
 /// If other machines can reach it, a token is required (?token=...). On loopback, only requests addressed to this
 /// machine are answered, and watching needs no token. An abort always needs the token and a header that only our page

@@ -24,10 +24,9 @@ LiveLevels::LiveLevels(Eigen::Index channels)
 
 void LiveLevels::begin_run(const LogRun&) noexcept {}
 
-void LiveLevels::rows(std::span<const double> rows) noexcept {
+void LiveLevels::rows(std::span<const double> rows, std::size_t words) noexcept {
   const Eigen::Index channels = gathered_.peak.size();
-  const Eigen::Index words = channels + 1;
-  for (Eigen::Index at = 0; at + words <= static_cast<Eigen::Index>(rows.size()); at += words) {
+  for (std::size_t at = 0; at + words <= rows.size(); at += words) {
     const Eigen::Map<const Eigen::ArrayXd> row(rows.data() + at, channels);
     gathered_.peak = gathered_.peak.max(row.abs());
     gathered_.squares += row.square();

@@ -23,7 +23,7 @@ class LiveLevels final : public RunObserver {
   explicit LiveLevels(Eigen::Index channels);
 
   void begin_run(const LogRun& run) noexcept override;
-  void rows(std::span<const double> rows) noexcept override;
+  void rows(std::span<const double> rows, std::size_t words) noexcept override;
   void end_run(const LogRun& run) noexcept override;
 
   /// The levels since the last call.

@@ -30,7 +30,7 @@ class LiveResponse final : public RunObserver {
   LiveResponse& operator=(const LiveResponse&) = delete;
 
   void begin_run(const LogRun&) noexcept override {}
-  void rows(std::span<const double>) noexcept override {}
+  void rows(std::span<const double>, std::size_t) noexcept override {}
   void end_run(const LogRun& run) noexcept override;
 
   /// To be called when the first watcher connects.

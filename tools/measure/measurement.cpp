@@ -11,6 +11,8 @@
 #include "acquisition/record/log_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "hal/stage/real_time.hpp"
+#include "hal/stage/real_time_checks.hpp"
+#include "hal/stage/sample_clock.hpp"
 #include "tools/dashboard/dashboard.hpp"
 #include "tools/experiment/run_metadata.hpp"
 #include "tools/measure/measured_stage.hpp"
@@ -57,7 +59,7 @@ int exit_code_of(const ExperimentResult& result) {
   return kWorldFailed;
 }
 
-void conclude(const MeasuredStage& stage, MeasurementResult& result) {
+void conclude(const MeasuredStage& stage, double jitter_s, MeasurementResult& result) {
   result.message = result.experiment.message;
   result.exit_code = exit_code_of(result.experiment);
   const RunHealth& health = result.experiment.health;
@@ -67,6 +69,12 @@ void conclude(const MeasuredStage& stage, MeasurementResult& result) {
         "discards the periods that contain them",
         counted(health.missing, "cycle is", "cycles are"),
         counted(health.marked, "sample is", "samples are"));
+  if (health.irregular > 0 && result.exit_code == kNotTrustworthy)
+    result.message += fmt::format(
+        "; {} the jitter limit of {:.3g} us ('jitter_s' in the stage file): use a real-time "
+        "kernel, or "
+        "a node with a clock",
+        counted(health.irregular, "exceeds", "exceed"), 1e6 * jitter_s);
   stage.explain(result);
 }
 
@@ -107,10 +115,18 @@ bool check_log(const MeasurementRequest& request) {
   return exists;
 }
 
-/// Warns of missing real-time capabilities, before anything is written. @throws StageError if they are required.
+/// Warns of missing real-time capabilities and of settings that delay the loop, before anything is written. @throws StageError if they are required.
 void warn_of_real_time(const RealTimeOptions& options, const Console& console) {
   for (const std::string& missing : missing_for_real_time(options))
     console.warning("realtime: " + missing);
+  if (options.policy == RealTimePolicy::off) return;
+  for (const std::string& obstacle : real_time_obstacles(options.cpu))
+    console.warning("realtime: " + obstacle);
+}
+
+double jitter_limit_s(const ExperimentConfig& config, const ExperimentPlan& plan) {
+  const double given_s = config.stage.real_time.jitter_s;
+  return given_s > 0.0 ? given_s : tolerable_jitter_s(plan.grid().frequency_hz().maxCoeff());
 }
 
 void warn_of_until(const ExperimentPlan& plan, const FrfOptions& options, const Console& console) {
@@ -195,7 +211,8 @@ std::string advice_behind(const MeasurementResult& result) {
 }
 
 double expected_log_bytes(const ExperimentPlan& plan, const StageInfo& stage) {
-  const auto words = static_cast<double>(stage.actuators.size() + stage.sensors.size() + 1);
+  const auto words =
+      static_cast<double>(stage.actuators.size() + stage.sensors.size() + (stage.stamps ? 2 : 1));
   return static_cast<double>(plan.samples_per_run()) * static_cast<double>(plan.runs().size()) *
          words * 8.0;
 }
@@ -214,6 +231,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   const StageInfo& info = stage->info();
   options.real_time = config.stage.real_time.options;
   options.misses_allowed = config.stage.real_time.misses_allowed;
+  options.jitter_s = jitter_limit_s(config, plan);
   options.ramp_s = config.stage.ramp_s;
   if (info.clock == Clock::wall) warn_of_real_time(options.real_time, console);
   if (request.until) warn_of_until(plan, config.frf, console);
@@ -237,7 +255,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   listen(options, *events, progress, dashboard.get());
   result.experiment = stage->perform(log, options);
   result.seconds = progress.seconds();
-  conclude(*stage, result);
+  conclude(*stage, options.jitter_s, result);
   if (until && result.experiment.end == ExperimentEnd::complete)
     tell_reached(*until, result, console);
   if (result.experiment.end != ExperimentEnd::log_failed)

@@ -14,13 +14,18 @@
 #include <cstddef>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "acquisition/loop/measurement_loop.hpp"
+#include "acquisition/loop/run_experiment.hpp"
+#include "acquisition/slog/slog_writer.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limited_stage.hpp"
 #include "tests/support/process/allocation_counter.hpp"
 #include "tests/support/process/lock_counter.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/analytic_stage.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
@@ -78,6 +83,58 @@ TEST_P(LoopPurity, NoAllocationAndNoLock) {
   EXPECT_EQ(locks.count(), 0U);
   EXPECT_EQ(whole.loop().health().cycles, kSamples);
   EXPECT_EQ(whole.loop().timing().empty(), GetParam() == 0.0);
+}
+
+/// Counts from the end of start(), when the stage may move, to the first exchange.
+class CountingStage final : public CyclicStage {
+ public:
+  const StageInfo& info() const noexcept override { return plant_.info(); }
+  void start(std::uint64_t seed, Inputs& first) override {
+    plant_.start(seed, first);
+    allocations_.emplace();
+    locks_.emplace();
+  }
+  Outcome exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept override {
+    if (outputs.cycle == 0) {
+      allocations += allocations_->count();
+      locks += locks_->count();
+      ++runs;
+    }
+    return plant_.exchange(outputs, inputs, deadline);
+  }
+  void stop() noexcept override { plant_.stop(); }
+
+  std::uint64_t allocations = 0;
+  std::uint64_t locks = 0;
+  int runs = 0;
+
+ private:
+  test::AnalyticStage plant_{1, 1};
+  std::optional<test::AllocationCounter> allocations_;
+  std::optional<test::LockCounter> locks_;
+};
+
+TEST(LoopPurityBegin, NothingIsAllocatedOrLockedOnceTheStageMoves) {
+  if (!test::AllocationCounter::works() || !test::LockCounter::works())
+    GTEST_SKIP() << "malloc or the locks are not ours in this build";
+  const test::TemporaryDirectory directory;
+  ExperimentSpec spec;
+  spec.axes = {{"u1", 1.0, {}}};
+  spec.realizations = 3;
+  const ExperimentPlan plan(FrequencyGrid::band(1000.0, 100, {.low_hz = 10.0, .high_hz = 400.0}),
+                            spec);
+  auto counting = std::make_unique<CountingStage>();
+  const CountingStage& counts = *counting;
+  StageLimits limits;
+  limits.actuator_n = Eigen::VectorXd::Constant(1, 50.0);
+  LimitedStage stage(std::move(counting), limits);
+  MotionController controller(test::analytic_controller(stage.info()));
+  SlogWriter log =
+      SlogWriter::create(directory / "run.slog", experiment_log_info(plan, stage.info()));
+  EXPECT_EQ(run_experiment(plan, stage, controller, log).end, ExperimentEnd::complete);
+  EXPECT_EQ(counts.runs, 3);
+  EXPECT_EQ(counts.allocations, 0U);
+  EXPECT_EQ(counts.locks, 0U);
 }
 
 TEST(LockCounter, CountsALockThatIsFree) {

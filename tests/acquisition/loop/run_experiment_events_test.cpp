@@ -32,7 +32,7 @@ ExperimentPlan plan_of() {
 class Counter final : public RunObserver {
  public:
   void begin_run(const LogRun&) noexcept override { ++begun; }
-  void rows(std::span<const double> rows) noexcept override { words += rows.size(); }
+  void rows(std::span<const double> rows, std::size_t) noexcept override { words += rows.size(); }
   void end_run(const LogRun& run) noexcept override { complete += run.complete ? 1 : 0; }
   int begun = 0;
   int complete = 0;

@@ -87,13 +87,13 @@ constexpr SampleStatus late(std::uint32_t ns) {
 
 TEST_F(EventLogTest, AStretchOfBadCyclesIsOneEventAcrossBlocks) {
   EventLog log(file_);
-  EventRecorder recorder(log, 2);
+  EventRecorder recorder(log);
   LogRun run;
   run.realization = 1;
   run.experiment = 4;
   recorder.begin_run(run);
-  recorder.rows(rows_of({kGood, kGood, late(5000)}));
-  recorder.rows(rows_of({late(9000), kStale, kGood, kStale}));
+  recorder.rows(rows_of({kGood, kGood, late(5000)}), 2);
+  recorder.rows(rows_of({late(9000), kStale, kGood, kStale}), 2);
   run.complete = false;
   recorder.end_run(run);
   const auto lines = lines_of(file_);
@@ -108,9 +108,9 @@ TEST_F(EventLogTest, AStretchOfBadCyclesIsOneEventAcrossBlocks) {
 
 TEST_F(EventLogTest, AStageThatFailsAllTheTimeDoesNotFillTheDisk) {
   EventLog log(file_);
-  EventRecorder recorder(log, 2);
+  EventRecorder recorder(log);
   recorder.begin_run({});
-  for (int i = 0; i < 1000; ++i) recorder.rows(rows_of({kGood, kStale}));
+  for (int i = 0; i < 1000; ++i) recorder.rows(rows_of({kGood, kStale}), 2);
   recorder.end_run({});
   const auto lines = lines_of(file_);
   EXPECT_EQ(lines.size(), EventRecorder::kMissesTold + 2);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <limits>
 
 #include "acquisition/files/file_error.hpp"
@@ -42,6 +43,38 @@ TEST(SlogWriter, WhatIsWrittenIsReadBack) {
     EXPECT_EQ(read.health, written.health);
     EXPECT_EQ(reader.excitation(run), test::excitation_of(run));
     reader.read(run, 0, read.samples, samples);
+    EXPECT_TRUE(test::holds_rows(samples, run, 0));
+  }
+}
+
+TEST(SlogWriter, RowsWithTimeStampsAreReadBackAndResumed) {
+  const TemporaryDirectory directory;
+  LogInfo info = test::small_info();
+  info.stamps = true;
+  const auto write = [](SlogWriter log, std::size_t run) {
+    const std::vector<double> plain = test::rows_of(run, 0, 3 * test::kPeriod);
+    std::vector<double> stamped;
+    for (auto row = plain.begin(); row != plain.end(); row += 6) {
+      stamped.insert(stamped.end(), row, row + 5);
+      // All bits set is not a number as a double, and must not matter.
+      stamped.push_back(std::bit_cast<double>(~std::uint64_t{0}));
+      stamped.push_back(row[5]);
+    }
+    log.begin_run(test::run_of(run), test::excitation_of(run));
+    log.write(stamped);
+    log.end_run(test::run_of(run));
+    log.close(0, "");
+  };
+  write(SlogWriter::create(directory / "a.slog", info), 0);
+  // In virtual time, stamps are not requested.
+  write(SlogWriter::resume(directory / "a.slog", test::small_info()), 1);
+  const SlogReader reader(directory / "a.slog");
+  EXPECT_TRUE(reader.info().stamps);
+  ASSERT_EQ(reader.runs().size(), 2U);
+  LogSamples samples;
+  for (std::size_t run = 0; run < 2; ++run) {
+    reader.read(run, 0, reader.runs()[run].samples, samples);
+    EXPECT_EQ(reader.runs()[run].samples, 36U);
     EXPECT_TRUE(test::holds_rows(samples, run, 0));
   }
 }

@@ -108,6 +108,26 @@ INSTANTIATE_TEST_SUITE_P(
                     FaultCase{"dead_server#", false, Outcome::link_down, 1, "not connected"},
                     FaultCase{"interlock#", false, Outcome::fault, 1, "interlock"}));
 
+TEST(ModbusStage, TheArrivalOfAReplyIsStampedOnTheWallClock) {
+  ModbusBench bench({"late_reply@" + std::to_string(kStartRequests + 2) + ":0.01"});
+  ModbusStage stage(ModbusBench::info(), bench.address(), test::kQuickTiming, {.pace = 1.0});
+  EXPECT_TRUE(stage.info().stamps);
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
+  stage.start(1, inputs);
+  const std::array<double, 2> u = {0.0, 0.0};
+  for (std::uint64_t n = 0; n < 2; ++n) {
+    const std::int64_t sent_ns = inputs.t_sample_ns;
+    static_cast<void>(stage.exchange({n, sent_ns, u}, inputs, {}));
+    EXPECT_EQ(inputs.stamp_ns, inputs.t_arrival_ns);
+    EXPECT_FALSE(inputs.stamp_of_stage);
+    EXPECT_GE(inputs.t_arrival_ns - sent_ns, n == 1 ? 10'000'000 : 0) << "half a period late";
+  }
+  stage.stop();
+  bench.stop();
+}
+
 TEST(ModbusStage, ACommandThatIsNoNumberIsNotSent) {
   ModbusBench bench;
   Host host(bench);

@@ -155,6 +155,21 @@ TEST_F(StageNodeTest, TheNodesOwnLoopTellsWhatItApplied) {
   EXPECT_THAT(u, testing::ElementsAre(10.0, 0.5));
 }
 
+TEST_F(StageNodeTest, ItsOwnLoopEndsWithoutMeasurements) {
+  measure();
+  std::vector<double> u(2);
+  const std::vector<double> r{0.5, 0.5};
+  fake_->outcome = Outcome::stale;
+  for (int n = 0; n < 5; ++n)
+    EXPECT_EQ(node_->advance_excited(now_ns_, r, u, inputs_), Outcome::stale) << n;
+  EXPECT_EQ(node_->advance_excited(now_ns_, r, u, inputs_), Outcome::fault);
+  EXPECT_EQ(node_->trouble(), "the stage gives no measurements");
+  EXPECT_EQ(inputs_.node_state, NodeState::fault_reaction);
+  tick_for(3);
+  EXPECT_EQ(node_->state(), NodeState::fault) << "nothing is left to hold the stage by";
+  EXPECT_EQ(fake_->stops, 1);
+}
+
 TEST_F(StageNodeTest, DoesNotHoldOnASensorThatFailed) {
   measure();
   fake_->measurement = {5e-3};

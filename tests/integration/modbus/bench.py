@@ -65,16 +65,17 @@ class Bench:
             time.sleep(0.01)
         return ends
 
-    def node(self, *options, tcp=True):
-        """A node that is ready, and its port (TCP). Its watchdog is that of the slowest line it serves."""
+    def node(self, *options, tcp=True, own_watchdog=False):
+        """A node that is ready, and its port (TCP). Its watchdog is that of the slowest line it serves, or its own."""
         patience = RTU if '--modbus-rtu' in options else TCP
         stage = self.stage('node', backend='sim')
         # A file, because a pipe would fill up.
         said = self.work / f'node{self.nodes}.txt'
         self.nodes += 1
         with open(said, 'w') as out:
-            process = self.start(self.program, 'node', stage, *(['--modbus-tcp', 0] if tcp else []), '--watchdog',
-                                 patience.watchdog_s, *options, stdout=out, stderr=subprocess.STDOUT)
+            process = self.start(self.program, 'node', stage, *(['--modbus-tcp', 0] if tcp else []),
+                                 *([] if own_watchdog else ['--watchdog', patience.watchdog_s]), *options, stdout=out,
+                                 stderr=subprocess.STDOUT)
         process.said = said
         while 'ends it' not in said.read_text():
             if process.poll() is not None:

@@ -33,6 +33,7 @@ class Row:
     disturb: str = ''  # a later event of a process
     log: bool = True  # whether there is one
     repeated: bool = False  # at least one cycle; more on a busy machine
+    own_watchdog: bool = False  # of the node: its default
     state: tuple = AT_REST  # of the node at the end; empty: unavailable
 
 
@@ -48,6 +49,8 @@ def repeated_rows(line, suffix):
 
 
 ROWS = repeated_rows('tcp', '') + repeated_rows('rtu', ', RTU') + [
+    Row('late reply, default watchdog', MARKED, 'marked', fault(f'late_reply@300:{LATE["tcp"]}'), repeated=True,
+        own_watchdog=True),
     Row('no reply for good', FAILED, 'no reply within', fault('late_reply@300x0:1.6'), state=()),
     Row('wrong unit for good', FAILED, 'corrupt', fault('wrong_unit@300x0'), state=()),
     Row('wrong unit for good, RTU', FAILED, 'corrupt', fault('wrong_unit@300x0'), line='rtu', state=()),
@@ -82,7 +85,7 @@ def open_line(bench, row):
         here, there = bench.serial_line()
         options += ['--modbus-rtu', there, '--modbus-parity', 'N']
         stage = bench.stage('stage', door=f'rtu: {{device: {here}, parity: N}}')
-    node, port = bench.node(*options)
+    node, port = bench.node(*options, own_watchdog=row.own_watchdog)
     if row.line == 'tcp':
         stage = bench.stage('stage', door=f'tcp: {{port: {port}}}')
     elif row.line == 'plant':

@@ -83,7 +83,7 @@ class ModbusTest(unittest.TestCase):
         node.terminate()
         self.assertEqual(node.wait(), 0)
         self.bench.start(PROGRAM, 'node', self.bench.stage('node', backend='sim'), '--modbus-tcp', port,
-                         '--watchdog', 0.5, stdout=subprocess.DEVNULL)
+                         stdout=subprocess.DEVNULL)
         while subprocess.run(['mbpoll', '-m', 'tcp', '-p', str(port), '-1', '127.0.0.1'],
                              capture_output=True).returncode != 0:
             pass

@@ -66,6 +66,7 @@ class WatchedStage final : public CyclicStage {
   const StageInfo& info() const noexcept override { return stage_.info(); }
   void start(std::uint64_t run_seed, Inputs& first) override { stage_.start(run_seed, first); }
   Outcome exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept override {
+    ++cycles;
     for (const double u : outputs.u) largest_n = std::max(largest_n, std::abs(u));
     const Outcome outcome = stage_.exchange(outputs, inputs, deadline);
     std::swap(now_m_, before_m_);
@@ -86,6 +87,7 @@ class WatchedStage final : public CyclicStage {
 
   double largest_m = 0.0;
   double largest_n = 0.0;
+  std::uint64_t cycles = 0;
 
  private:
   SimulatedStage stage_;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "acquisition/files/file_error.hpp"
 #include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "hal/can/can_dbc.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
@@ -59,6 +60,21 @@ TEST(Configs, WhatTheWiresHaveToCarryIsForetold) {
   EXPECT_DOUBLE_EQ(links[0].load, links[0].cycle_s * modbus.spec.info.sample_rate_hz);
   EXPECT_LE(links[0].load, 1.0);
   EXPECT_TRUE(link_loads(load_stage_config(kConfigs / "stage/small_stage.yaml")).empty());
+}
+
+// Otherwise the node stops the stage before the host has sent a lost frame again.
+TEST(Configs, TheWatchdogOutlastsARepetition) {
+  const std::filesystem::path file = kConfigs / "stage/small_stage_can.yaml";
+  const std::string text = load_stage_config(file).text;
+  const auto watchdog_s = [&](const std::string& keys) {
+    return parse_stage_config(file, text + keys).can.spec.watchdog_s;
+  };
+  EXPECT_EQ(watchdog_s(""), 20e-3);
+  EXPECT_GT(watchdog_s("  reply_timeout_s: 0.05\n"), kCanRepeats * 0.05);
+  EXPECT_EQ(watchdog_s("  watchdog_s: 16e-3\n"), 16e-3);
+  EXPECT_THROW(watchdog_s("  watchdog_s: 15e-3\n"), FormatError);
+  EXPECT_EQ(watchdog_s("  watchdog_s: 15e-3\npace: 1\n"), 15e-3) << "nothing is repeated";
+  EXPECT_THROW(watchdog_s("  watchdog_s: 0.9e-3\npace: 1\n"), FormatError);
 }
 
 // The file for can-utils and SavvyCAN is what `config dbc` writes for the wafer stage today.

@@ -97,6 +97,37 @@ TEST_F(DashboardServerTest, ServesThePageAndTheNewestResponse) {
   EXPECT_EQ(client().Get("/other")->status, 404);
 }
 
+TEST_F(DashboardServerTest, ClientsThatTrickleTheirHeaderDoNotLockOthersOut) {
+  serve();
+  constexpr int kMoreThanThreads = DashboardServer::kWatchers + 16;
+  std::vector<int> sockets;
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<std::uint16_t>(port_));
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  for (int i = 0; i < kMoreThanThreads; ++i) {
+    sockets.push_back(::socket(AF_INET, SOCK_STREAM, 0));
+    ASSERT_EQ(::connect(sockets.back(), reinterpret_cast<sockaddr*>(&to), sizeof to), 0);
+    const std::string begin = "GET / HTTP/1.1\r\nX: ";
+    ASSERT_GT(::send(sockets.back(), begin.data(), begin.size(), MSG_NOSIGNAL), 0);
+  }
+  std::atomic<bool> stop = false;
+  std::thread trickle([&] {
+    while (!stop) {
+      for (const int socket : sockets) ::send(socket, "x", 1, MSG_NOSIGNAL);
+      std::this_thread::sleep_for(200ms);
+    }
+  });
+  httplib::Client other = client();
+  other.set_read_timeout(20s);
+  const httplib::Result result = other.Get("/");
+  stop = true;
+  trickle.join();
+  for (const int socket : sockets) ::close(socket);
+  ASSERT_TRUE(result) << "no answer";
+  EXPECT_EQ(result->body, "<p>page</p>");
+}
+
 TEST_F(DashboardServerTest, StreamsTheNewestState) {
   content_.state.publish("{\"n\":1}");
   serve();

@@ -17,8 +17,8 @@ std::vector<double> rows_of(const std::vector<std::pair<double, double>>& values
 
 TEST(LiveLevels, PeakAndRmsAreThoseSinceTheLastLook) {
   LiveLevels levels(2);
-  levels.rows(rows_of({{1.0, 0.0}, {-3.0, 0.5}}));
-  levels.rows(rows_of({{2.0, -0.5}}));
+  levels.rows(rows_of({{1.0, 0.0}, {-3.0, 0.5}}), 3);
+  levels.rows(rows_of({{2.0, -0.5}}), 3);
   Levels seen = levels.take();
   EXPECT_EQ(seen.rows, 3U);
   EXPECT_EQ(seen.peak[0], 3.0);
@@ -26,7 +26,7 @@ TEST(LiveLevels, PeakAndRmsAreThoseSinceTheLastLook) {
   EXPECT_DOUBLE_EQ(seen.rms[0], std::sqrt(14.0 / 3.0));
   EXPECT_DOUBLE_EQ(seen.rms[1], std::sqrt(0.5 / 3.0));
 
-  levels.rows(rows_of({{0.25, 0.0}}));
+  levels.rows(rows_of({{0.25, 0.0}}), 3);
   seen = levels.take();
   EXPECT_EQ(seen.peak[0], 0.25);
   EXPECT_EQ(seen.largest_peak[0], 3.0);
@@ -56,10 +56,10 @@ TEST(LiveLevels, NothingIsLostToWhoeverLooksAllTheTime) {
     while (!done) seen += levels.take().rows;
   });
   const auto rows = rows_of({{1.0, 2.0}});
-  for (std::uint64_t i = 0; i < kRows; ++i) levels.rows(rows);
+  for (std::uint64_t i = 0; i < kRows; ++i) levels.rows(rows, 3);
   done = true;
   looker.join();
-  levels.rows({});  // hands over the levels gathered while the reader held the lock
+  levels.rows({}, 3);  // hands over the levels gathered while the reader held the lock
   seen += levels.take().rows;
   EXPECT_EQ(seen, kRows);
 }

@@ -1,0 +1,179 @@
+// A node that samples by its own clock, and the host that follows it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <vector>
+
+#include "tests/hal/can/can_host.hpp"
+
+namespace stageid {
+namespace test_can_clock {
+
+using test::CanRig;
+
+constexpr double kPeriod_ns = 1e6;
+constexpr double kDrift = 100e-6;
+constexpr double kOffset_ns = 3e12;
+
+/// The end of a node whose clock has another offset and is fast.
+class DriftingEnd final : public CanTransport {
+ public:
+  explicit DriftingEnd(CanTransport& end) : end_(end) {}
+  std::size_t buses() const noexcept override { return end_.buses(); }
+  const std::string& name(std::size_t bus) const noexcept override { return end_.name(bus); }
+  std::size_t send(std::span<const CanFrame> frames) noexcept override { return end_.send(frames); }
+  std::size_t receive(std::span<CanFrame> frames) noexcept override { return end_.receive(frames); }
+  void wait(std::int64_t until_ns) noexcept override { end_.wait(until_ns); }
+  const CanBusHealth& health(std::size_t bus) const noexcept override { return end_.health(bus); }
+  std::int64_t now_ns() const noexcept override {
+    return std::llround(kOffset_ns + (1.0 + kDrift) * static_cast<double>(end_.now_ns()));
+  }
+
+ private:
+  CanTransport& end_;
+};
+
+/// The node works at its ticks only, one per period of its clock.
+class TickingNode {
+ public:
+  explicit TickingNode(std::int64_t tick_ns = 1'000'000)
+      : end_(pair_.node()),
+        node_(std::make_unique<SimulatedStage>(rig_.stage_spec()), rig_.stage_spec().limits,
+              rig_.stage_spec().controller, {}, {.watchdog_s = 0.1}),
+        front_(node_, rig_.layout(), end_),
+        tick_ns_(tick_ns) {
+    pair_.when_host_waits([this] { serve(); }, 1'000);
+  }
+
+  CanPair& pair() { return pair_; }
+  std::unique_ptr<CanStage> host(bool node_clock) {
+    CanSpec spec = rig_.spec();
+    spec.node_clock = node_clock;
+    // The transport of the pair lives longer than the host.
+    return std::make_unique<CanStage>(rig_.stage_spec().info, spec,
+                                      std::make_unique<FaultyCan>(pair_.host(), faults_),
+                                      CanHostOptions{.pace = 1.0});
+  }
+  int skip_at = -1;  ///< tick that does nothing
+
+ private:
+  void serve() {
+    if (node_.state() != NodeState::measuring) {
+      front_.serve(0);
+      next_ns_ = 0;
+      return;
+    }
+    const std::int64_t now_ns = end_.now_ns();
+    if (next_ns_ == 0) next_ns_ = now_ns + tick_ns_;
+    if (now_ns < next_ns_) return;
+    next_ns_ += tick_ns_;
+    if (ticks_++ != skip_at) front_.serve(0);
+  }
+
+  CanRig rig_;
+  CanPair pair_{{"pair0"}};
+  DriftingEnd end_;
+  StageNode node_;
+  CanNode front_;
+  std::vector<CanFault> faults_;
+  std::int64_t tick_ns_;
+  std::int64_t next_ns_ = 0;
+  int ticks_ = 0;
+};
+
+/// Exchanges zeros and records the instants.
+struct Samples {
+  std::vector<std::int64_t> instant_ns, stamp_ns, arrival_ns;
+  std::vector<Outcome> outcomes;
+};
+
+Samples measure(CanStage& stage, int count) {
+  Samples samples;
+  std::vector<double> y(1);
+  const std::vector<double> u(2, 0.0);
+  Inputs inputs;
+  inputs.y = y;
+  stage.start(7, inputs);
+  for (int n = 0; n < count; ++n) {
+    const Outputs outputs{static_cast<std::uint64_t>(n), inputs.t_sample_ns, u};
+    inputs.stamp_ns = inputs.t_arrival_ns = 0;
+    samples.outcomes.push_back(
+        stage.exchange(outputs, inputs, {inputs.t_sample_ns + 2 * std::llround(kPeriod_ns)}));
+    samples.instant_ns.push_back(inputs.t_sample_ns);
+    samples.stamp_ns.push_back(inputs.stamp_ns);
+    samples.arrival_ns.push_back(inputs.t_arrival_ns);
+  }
+  return samples;
+}
+
+TEST(CanClock, TheHostFollowsTheTicksOfTheNode) {
+  TickingNode node;
+  const std::unique_ptr<CanStage> host = node.host(true);
+  EXPECT_TRUE(host->info().sets_pace);
+  EXPECT_TRUE(host->info().stamps);
+  const Samples samples = measure(*host, 2000);
+  EXPECT_THAT(samples.outcomes, testing::Each(Outcome::ok));
+  for (std::size_t n = 1; n < samples.stamp_ns.size(); ++n)
+    ASSERT_NEAR(static_cast<double>(samples.stamp_ns[n] - samples.stamp_ns[n - 1]), kPeriod_ns, 2e3)
+        << "one period of the node, with its resolution of 1 us, " << n;
+  // On the host's clock a period is shorter, by the drift. The steps of the simulated time are 1 us.
+  const double first = static_cast<double>(samples.instant_ns[1000]);
+  const double period_ns = (static_cast<double>(samples.instant_ns[1999]) - first) / 999.0;
+  EXPECT_NEAR(period_ns, kPeriod_ns / (1.0 + kDrift), 5.0);
+  for (std::size_t n = 1000; n < 2000; ++n)
+    ASSERT_NEAR(static_cast<double>(samples.instant_ns[n] - samples.arrival_ns[n]), 0.0, 2e3) << n;
+}
+
+TEST(CanClock, TheNodesTimeGoesOnOverItsSixteenBits) {
+  TickingNode node(40'000'000);  // 40 ms of 65.536 ms
+  const std::unique_ptr<CanStage> host = node.host(true);
+  std::vector<double> y(1);
+  const std::vector<double> u(2, 0.0);
+  Inputs inputs;
+  inputs.y = y;
+  host->start(7, inputs);
+  std::int64_t last = 0;
+  for (std::uint64_t n = 0; n < 20; ++n) {
+    ASSERT_EQ(host->exchange({n, 0, u}, inputs, {inputs.t_sample_ns + 100'000'000}), Outcome::ok);
+    if (n > 0) {
+      EXPECT_NEAR(static_cast<double>(inputs.stamp_ns - last), 40e6, 2e3) << n;
+    }
+    last = inputs.stamp_ns;
+  }
+}
+
+TEST(CanClock, ASkippedTickShowsInTheStamps) {
+  TickingNode node;
+  node.skip_at = 1500;
+  const std::unique_ptr<CanStage> host = node.host(true);
+  const Samples samples = measure(*host, 2000);
+  int long_steps = 0;
+  for (std::size_t n = 1; n < samples.stamp_ns.size(); ++n)
+    long_steps += std::abs(samples.stamp_ns[n] - samples.stamp_ns[n - 1] - 2'000'000) < 2'000;
+  EXPECT_EQ(long_steps, 1);
+}
+
+TEST(CanClock, ASimulatedNodeCanWaitForItsTicks) {
+  CanRig rig;
+  CanNode front(rig.node(), rig.layout(), rig.pair().node(), 0.0, true);
+  rig.pair().when_host_waits([&] { front.serve(0); });
+  test::CanHost host(rig);
+  host.start();
+  const std::int64_t began_ns = monotonic_ns();
+  EXPECT_EQ(host.exchange(10), test::all_ok(10));
+  // The first tick may be near; a busy machine may be slower, never faster.
+  EXPECT_GE(monotonic_ns() - began_ns, 9 * std::llround(kPeriod_ns));
+}
+
+TEST(CanClock, ANodeWithAClockNeedsTheWallClock) {
+  CanRig rig;
+  CanSpec spec = rig.spec();
+  spec.node_clock = true;
+  EXPECT_THROW(CanStage(rig.stage_spec().info, spec, rig.host_bus(), {.pace = 0.0}),
+               std::invalid_argument);
+}
+
+}  // namespace test_can_clock
+}  // namespace stageid
