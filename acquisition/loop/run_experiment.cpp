@@ -20,6 +20,7 @@
 #include "acquisition/loop/log_thread.hpp"
 #include "acquisition/loop/measurement_loop.hpp"
 #include "acquisition/loop/shared_progress.hpp"
+#include "acquisition/loop/side_thread.hpp"
 #include "acquisition/record/utc_time.hpp"
 
 namespace stageid {
@@ -56,10 +57,13 @@ class Experiment {
         stage_(stage),
         options_(options),
         ring_(log.info().actuators.size() + log.info().sensors.size() + 1, ring_rows(stage.info())),
-        loop_(stage, controller, ring_, {options.ramp_s, options.misses_allowed}),
+        loop_(stage, controller, ring_,
+              {options.ramp_s, options.misses_allowed, options.between_runs}),
         recorder_(make_recorder(options, ring_.row_words())),
         log_(log, ring_, observers()),
         wall_(stage.info().clock == Clock::wall),
+        side_(wall_ && options.between_runs == BetweenRuns::hold ? std::make_unique<SideThread>()
+                                                                 : nullptr),
         actuators_(excited_actuators(plan.spec(), stage.info())),
         runs_(plan.runs_without(options.skip)) {}
 
@@ -142,17 +146,12 @@ class Experiment {
     std::string enough;
     int realization = -1;
     for (const RunId& run : runs_) {
-      if (interrupted()) {
-        finish(StopReason::interrupt);
-        break;
-      }
-      if (options_.tripped()) {
-        finish(StopReason::plant);
-        break;
-      }
+      if (stopped_between_runs()) break;
       if (options_.enough && run.realization != std::exchange(realization, run.realization)) {
-        log_.drain();
-        enough = options_.enough();
+        meanwhile([&] {
+          log_.drain();
+          enough = options_.enough();
+        });
         if (!enough.empty()) break;
       }
       try {
@@ -169,60 +168,107 @@ class Experiment {
       }
       break;
     }
+    loop_.release();
+    if (result_.end == ExperimentEnd::complete)
+      finish(loop_.reason());  // stopped after the last run
     if (result_.end == ExperimentEnd::complete) {
       result_.message = fmt::format("{}{}{} measured", enough, enough.empty() ? "" : "; ",
                                     counted(result_.runs_done, "run"));
     }
   }
 
+  bool stopped_between_runs() {
+    const StopReason reason = interrupted()        ? StopReason::interrupt
+                              : options_.tripped() ? StopReason::plant
+                                                   : loop_.reason();
+    finish(reason);
+    return reason != StopReason::none;
+  }
+
   StopReason perform_run(RunId id) {
     const auto started = std::chrono::steady_clock::now();
     progress_.begin(id, wall_);
-    LoopExcitation excitation{plan_.excitation(id), actuators_,
-                              static_cast<std::uint64_t>(plan_.samples_per_run())};
+    LoopExcitation excitation;
+    PreparedExcitation prepared;
     LogRun run;
     run.realization = id.realization;
     run.experiment = id.experiment;
-    run.started_utc = utc_now();
-    loop_.start(run_seed(plan_.spec().seed, id), excitation);
-    log_.begin_run(run, std::move(excitation.period));
-    cycle_until_end();
+    const bool held = loop_.holding();
+    meanwhile([&] {
+      excitation = {plan_.excitation(id), actuators_,
+                    static_cast<std::uint64_t>(plan_.samples_per_run())};
+      run.started_utc = utc_now();
+      if (!held) return;
+      prepared = loop_.prepare(excitation);
+      log_.begin_run(run, std::move(excitation.period));
+    });
+    if (held) {
+      loop_.next(prepared);  // does nothing if the loop has been stopped meanwhile
+    } else {
+      loop_.start(run_seed(plan_.spec().seed, id), excitation);
+      log_.begin_run(run, std::move(excitation.period));
+    }
+    if (!held || !loop_.ended()) cycle_until_end();
     run.complete = loop_.complete() && loop_.reason() != StopReason::log;
     run.health = loop_.health();
+    run.timing = loop_.timing();
     run.health.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-    run.timing = loop_.timing();
-    log_.end_run(run);
+    const StopReason reason = loop_.reason();
+    meanwhile([&] { log_.end_run(run); });
     result_.health += run.health;
     result_.timing += run.timing;
     result_.runs_done += run.complete ? 1 : 0;
     progress_.publish(run.health, run.timing, wall_);
     progress_.runs_done.store(result_.runs_done, std::memory_order_relaxed);
-    return loop_.reason();
+    return reason;
+  }
+
+  /// Does what is to be done between runs. If the stage is held on the wall clock, the loop keeps cycling.
+  template <typename Work>
+  void meanwhile(Work work) {
+    if (!side_ || !loop_.holding()) {
+      work();
+      return;
+    }
+    side_->begin(work);
+    while (!side_->done()) {
+      if (loop_.holding()) {
+        static_cast<void>(cycle());
+      } else if (loop_.step() == LoopStatus::ended) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    }
+    side_->rethrow();
   }
 
   void cycle_until_end() {
     const auto publish_every = static_cast<std::uint64_t>(
         std::clamp(kPublishEvery_s * stage_.info().sample_rate_hz, 1.0, kMostUnpublished));
     std::uint64_t until_publish = publish_every;
-    while (true) {
-      const LoopStatus status = loop_.step();
-      if (status == LoopStatus::ended) return;
-      if (status == LoopStatus::ring_full) {
-        if (wall_ || log_.failed()) {
-          loop_.request_stop(StopReason::log);
-        } else {
-          std::this_thread::yield();
-        }
-      }
-      if (interrupted()) loop_.request_stop(StopReason::interrupt);
-      if (options_.tripped()) loop_.request_stop(StopReason::plant);
-      if (log_.failed()) loop_.request_stop(StopReason::log);
+    while (cycle()) {
       if (--until_publish == 0) {
         until_publish = publish_every;
         progress_.publish(loop_.health(), loop_.timing(), wall_);
       }
     }
+  }
+
+  /// @returns false if the run is over
+  bool cycle() {
+    const LoopStatus status = loop_.step();
+    if (status == LoopStatus::ended) return false;
+    if (status == LoopStatus::ring_full) {
+      if (wall_ || log_.failed()) {
+        loop_.request_stop(StopReason::log);
+      } else {
+        std::this_thread::yield();
+      }
+    }
+    if (interrupted()) loop_.request_stop(StopReason::interrupt);
+    if (options_.tripped()) loop_.request_stop(StopReason::plant);
+    if (log_.failed()) loop_.request_stop(StopReason::log);
+    return status != LoopStatus::held;
   }
 
   bool interrupted() const noexcept {
@@ -305,6 +351,7 @@ class Experiment {
   std::unique_ptr<EventRecorder> recorder_;
   LogThread log_;
   bool wall_;
+  std::unique_ptr<SideThread> side_;  // only if the loop keeps cycling between runs
   std::vector<int> actuators_;
   std::vector<RunId> runs_;
   ExperimentResult result_;

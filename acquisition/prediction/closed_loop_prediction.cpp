@@ -67,13 +67,12 @@ void compare(ChannelPrediction& channel, const char* what, double value,
 class Predictor {
  public:
   Predictor(const ExperimentPlan& plan, const WaferStageSpec& stage)
-      : plan_(plan),
-        stage_(stage),
-        loop_(closed_loop(plan, stage)),
-        dft_(plan.grid().samples_per_period()) {
+      : plan_(plan), stage_(stage), dft_(plan.grid().samples_per_period()) {
+    result_.crest_factor.assign(plan.spec().axes.size(), 0.0);
+    if (!why_unpredictable(stage).empty()) return;
+    loop_ = closed_loop(plan, stage);
     for (const Channel& channel : stage.info.actuators) add(result_.actuators, channel);
     for (const Channel& channel : stage.info.sensors) add(result_.sensors, channel);
-    result_.crest_factor.assign(plan.spec().axes.size(), 0.0);
   }
 
   DesignPrediction predict() {
@@ -103,8 +102,10 @@ class Predictor {
         largest = std::max(largest, crest_factor(r.col(axis)));
       }
     const Eigen::MatrixXcd R = plan_.spectrum(run);
+    const Eigen::VectorXd& feed_forward = stage_.controller.feed_forward_n;
     for (std::size_t i = 0; i < result_.actuators.size(); ++i) {
-      const Eigen::VectorXd u = period(loop_.to_u, R, static_cast<Eigen::Index>(i));
+      Eigen::VectorXd u = period(loop_.to_u, R, static_cast<Eigen::Index>(i));
+      if (feed_forward.size() > 0) u.array() += feed_forward[static_cast<Eigen::Index>(i)];
       ChannelPrediction& channel = result_.actuators[i];
       add_period(channel, u);
       double step = std::abs(u[0] - u[u.size() - 1]);
@@ -156,6 +157,13 @@ std::vector<std::string> DesignPrediction::violations() const {
     for (const ChannelPrediction& channel : *list)
       all.insert(all.end(), channel.violations.begin(), channel.violations.end());
   return all;
+}
+
+std::string why_unpredictable(const WaferStageSpec& stage) {
+  if (stage.controller.by_peer)
+    return "the stage closes the loop by a controller of its own ('controller: peer')";
+  if (!stage.has_plant()) return "the stage file has no 'plant'";
+  return "";
 }
 
 DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) {

@@ -45,6 +45,51 @@ double unit_crossover_gain(AxisController axis, double inertia, const char* name
   return inertia * omega * omega / std::abs(axis_response(axis, axis.crossover_hz));
 }
 
+/// y - J q for the least-squares motion q. Empty if always zero: not more sensors than axes.
+Eigen::MatrixXd contradiction_of(const Jacobian& jacobian, const Eigen::MatrixXd& inverse) {
+  Eigen::MatrixXd rest =
+      Eigen::MatrixXd::Identity(jacobian.rows(), jacobian.rows()) - jacobian * inverse;
+  if (rest.cwiseAbs().maxCoeff() > 1e-9) return rest;
+  return {};
+}
+
+/// The lowest frequency at which an eigenvalue of the loop gain with the rigid stage falls below 1; 0: none.
+double lowest_crossover_hz(const MotionController& controller, double sample_rate_hz,
+                           const Eigen::MatrixXd& acceleration_per_n) {
+  const auto sizes = [&](double f) {
+    const double omega = 2.0 * pi * f;
+    const Eigen::MatrixXcd gain =
+        (acceleration_per_n / (omega * omega)).cast<std::complex<double>>() *
+        controller.response(f);
+    return Eigen::VectorXd(
+        Eigen::ComplexEigenSolver<Eigen::MatrixXcd>(gain, false).eigenvalues().cwiseAbs());
+  };
+  const double lowest_hz = 1e-5 * sample_rate_hz;
+  const auto closed = (sizes(lowest_hz).array() > 1.0).count();
+  if (closed == 0) return 0.0;
+  const double ratio = std::pow(10.0, 1.0 / 50.0);
+  for (double f = lowest_hz; f < 0.5 * sample_rate_hz; f *= ratio)
+    if ((sizes(f).array() > 1.0).count() < closed) return f;
+  return 0.0;
+}
+
+RigidMotion free_motion(const MotionController& controller, double sample_rate_hz,
+                        const Jacobian& actuators, const Jacobian& sensors,
+                        const std::array<double, kRigidAxes>& axis_inertia) {
+  const Eigen::Map<const Eigen::Matrix<double, 6, 1>> inertia(axis_inertia.data());
+  if (!(inertia.array() > 0.0).all() || !controller.acts()) return {};
+  RigidMotion motion;
+  motion.acceleration_per_n = sensors * inertia.cwiseInverse().asDiagonal() * actuators.transpose();
+  motion.bandwidth_rad_s =
+      2.0 * pi * lowest_crossover_hz(controller, sample_rate_hz, motion.acceleration_per_n);
+  if (motion.bandwidth_rad_s == 0.0) return {};
+  const Eigen::MatrixXd sensor_inverse = pseudo_inverse(sensors);
+  motion.force_per_acceleration =
+      pseudo_inverse(actuators).transpose() * inertia.asDiagonal() * sensor_inverse;
+  motion.contradiction = contradiction_of(sensors, sensor_inverse);
+  return motion;
+}
+
 }  // namespace
 
 Eigen::MatrixXd rigid_body_jacobian(const std::vector<Channel>& channels) {
@@ -108,10 +153,13 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
 }
 
 RigidMotion rigid_motion(const MotionControllerSpec& controller,
-                         const std::vector<Channel>& actuators,
-                         const std::vector<Channel>& sensors) {
+                         const std::vector<Channel>& actuators, const std::vector<Channel>& sensors,
+                         const std::array<double, kRigidAxes>& axis_inertia) {
   const Jacobian actuator_jacobian = rigid_body_jacobian(actuators);
   const Jacobian sensor_jacobian = rigid_body_jacobian(sensors);
+  if (controller.axes.empty())
+    return free_motion(MotionController(controller), controller.sample_rate_hz, actuator_jacobian,
+                       sensor_jacobian, axis_inertia);
   RigidMotion motion;
   const auto add = [](Eigen::MatrixXd& sum, const Eigen::MatrixXd& term) {
     sum = sum.size() == 0 ? term : sum + term;
@@ -130,12 +178,8 @@ RigidMotion rigid_motion(const MotionControllerSpec& controller,
     add(motion.force_per_acceleration,
         braked * controller.actuator_decoupling.col(k) * controller.sensor_decoupling.row(k));
   }
-  // y - J q for the least-squares motion q: zero unless there are more sensors than axes.
-  const Eigen::MatrixXd rest =
-      Eigen::MatrixXd::Identity(sensor_jacobian.rows(), sensor_jacobian.rows()) -
-      sensor_jacobian * controller.sensor_decoupling;
-  if (motion.bandwidth_rad_s > 0.0 && rest.cwiseAbs().maxCoeff() > 1e-9)
-    motion.contradiction = rest;
+  if (motion.bandwidth_rad_s > 0.0)
+    motion.contradiction = contradiction_of(sensor_jacobian, controller.sensor_decoupling);
   return motion;
 }
 

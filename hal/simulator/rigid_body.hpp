@@ -41,11 +41,14 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
                                             const std::array<AxisController, kRigidAxes>& axes,
                                             const std::array<double, kRigidAxes>& axis_inertia);
 
-/// The motion by which a controller moves its closed axes. The inertia of an axis is derived from the
-/// controller: its open loop C(s) / (inertia s^2) has magnitude 1 at crossover_hz. No closed axis: empty.
+/// The motion by which a controller moves the stage. The inertia of a closed axis is derived from the controller: its
+/// open loop C(s) / (inertia s^2) has magnitude 1 at crossover_hz. A controller without axes needs the inertia of all
+/// rigid axes; its bandwidth is the lowest frequency at which a loop with the free rigid stage has gain 1.
+/// Empty if there is no closed axis, or nothing is known.
+/// @param axis_inertia as in motion_controller_spec(); zeros: unknown
 RigidMotion rigid_motion(const MotionControllerSpec& controller,
-                         const std::vector<Channel>& actuators,
-                         const std::vector<Channel>& sensors);
+                         const std::vector<Channel>& actuators, const std::vector<Channel>& sensors,
+                         const std::array<double, kRigidAxes>& axis_inertia = {});
 
 /// C(j 2 pi frequency_hz) of one axis in continuous time, with the given gain.
 std::complex<double> axis_response(const AxisController& axis, double frequency_hz);

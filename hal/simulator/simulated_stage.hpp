@@ -78,6 +78,9 @@ struct WaferStageSpec {
   std::vector<Fault> faults;
   std::uint64_t seed = 0;
   double pace = 0.0;  ///< 0: virtual time; 1: wall clock
+
+  /// Whether the plant is described. Only then can the stage be simulated and its signals predicted.
+  bool has_plant() const noexcept { return mass_kg > 0.0; }
 };
 
 /// All modes of the stage: rigid-body ones on their suspension first, then flexible out of plane by

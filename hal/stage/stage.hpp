@@ -27,6 +27,9 @@ int channel_index(const std::vector<Channel>& channels, const std::string& name)
 
 enum class Clock : std::uint8_t { virtual_time, wall };
 
+/// What happens to the stage between the runs of an experiment: its forces are cut, or the controller keeps it.
+enum class BetweenRuns : std::uint8_t { release, hold };
+
 /// Properties of a back end; an unsuitable experiment is refused before it starts.
 struct StageInfo {
   std::string name;

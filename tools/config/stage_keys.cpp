@@ -45,6 +45,12 @@ void describe_actuator(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
            "largest change of u; inf: no limit");
   v.number("thermal_rms_n", c.thermal_rms_n, positive("N"), kOptional,
            "largest rms of u over the thermal time constant; inf: no limit");
+  v.number("bias_n", c.bias_n, any_number("N"), kOptional,
+           "constant feed-forward, e.g. against gravity; it rises over ramp_s when the loop is "
+           "closed");
+  v.require(
+      std::abs(c.bias_n) <= c.limit_n, "bias_n",
+      fmt::format("bias_n: {} N exceeds limit_n: {}; write a smaller value", c.bias_n, c.limit_n));
   add_channel(v, std::move(c), list);
 }
 
@@ -160,6 +166,15 @@ void describe_controller(ConfigVisitor& v, StageFile& f) {
     v.group(
         kRigidAxisNames[i], [&](ConfigVisitor& axis) { describe_axis(axis, f.axes[i]); }, kOptional,
         "loop of this degree of freedom; omitted: open");
+  for (const ChannelConfig& sensor : f.sensors) f.linear.sensors.push_back(sensor.channel.name);
+  for (const ChannelConfig& actuator : f.actuators)
+    f.linear.actuators.push_back(actuator.channel.name);
+  describe_linear_controller(v, f.linear);
+  const bool of_axes = std::any_of(f.axes.begin(), f.axes.end(),
+                                   [](const AxisController& a) { return a.crossover_hz > 0.0; });
+  v.require(int{of_axes} + int{f.linear.has_state_space} + int{!f.linear.transfer.empty()} <= 1,
+            f.linear.has_state_space ? "state_space" : "transfer",
+            "controller: write axes, state_space or transfer, not several of them");
 }
 
 void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
@@ -247,17 +262,27 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
            "time in which a stop ramps the excitation to zero, in closed loop if the loop can be "
            "trusted");
+  choose(v, "between_runs", f.between_runs, {"release", "hold"}, kOptional,
+         "release: forces are cut after every run; hold: the controller keeps the stage between "
+         "the runs of an experiment");
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
            "of the thermal rms limit");
+  const bool simulated = f.backend == static_cast<std::size_t>(Backend::sim);
   v.group(
-      "plant", [&](ConfigVisitor& plant) { describe_plant(plant, f); }, kRequired,
-      "the simulated stage");
+      "plant", [&](ConfigVisitor& plant) { describe_plant(plant, f); },
+      simulated ? kRequired : kOptional,
+      "the simulated stage; other back ends do without it, but then the loop is tested and signals "
+      "are predicted only with a prior");
   v.group(
       "noise", [&](ConfigVisitor& noise) { describe_noise(noise, s); }, kOptional,
       "of the simulated stage");
-  v.group(
+  v.group_or_text(
       "controller", [&](ConfigVisitor& controller) { describe_controller(controller, f); },
-      kRequired, "one entry per closed degree of freedom: x y z Rx Ry Rz");
+      f.controller, kRequired,
+      "one entry per closed degree of freedom: x y z Rx Ry Rz; or state_space or transfer, "
+      "discrete "
+      "at sample_rate_hz; or a file with either (.yaml, .json, .mat, .npz, .h5, .csv), relative to "
+      "this one; or peer: the stage closes the loop by a controller of its own");
   v.number("pace", s.pace, not_negative(""), kOptional,
            "0: virtual time, as fast as possible; 1: wall clock");
   v.group(

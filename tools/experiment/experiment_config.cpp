@@ -281,7 +281,7 @@ std::string measurement_id(const ExperimentFile& f, const StageConfig& stage) {
                                                              : "not there yet");
   for (const auto& [frequency_hz, amplitude] : f.shape.pairs)
     text += fmt::format(" shape {} {}", frequency_hz, amplitude);
-  return fingerprint_of(text + "\n" + stage.text);
+  return fingerprint_of(text + "\n" + stage.text + stage.controller_text);
 }
 
 void complete(ExperimentConfig& config, ExperimentFile& file, const YamlDocument& document) {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/plant_prior_file.hpp"
 #include "tools/terminal/console.hpp"
@@ -44,6 +45,10 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config) {
   const LimitRequest& request = config.limits.value();
   const ExperimentPlan outline = outline_plan(config);
   const WaferStageSpec& stage = config.stage.spec;
+  if (stage.controller.by_peer)
+    throw FormatError(config.file, "",
+                      "level.limits: " + why_unpredictable(stage) +
+                          ", so its signals cannot be predicted; use rms_n or peak_n");
   const PlantPrior prior = read_plant_prior(
       request.prior, stage.info, outline.grid().frequency_hz(), below_band_hz(outline.grid()));
   Eigen::VectorXd velocity_m_s;

@@ -107,6 +107,23 @@ void require_backend(const ExperimentConfig& config, Backend backend) {
     throw std::invalid_argument(
         fmt::format("--backend {0}: {1} has no group '{0}'; see 'stageid config schema'",
                     to_string(backend), config.stage.file.string()));
+  if (backend == Backend::sim && !config.stage.spec.has_plant())
+    throw std::invalid_argument(
+        fmt::format("--backend sim: {} has no group 'plant', which is the simulated stage; add it",
+                    config.stage.file.string()));
+  const bool resident = backend == Backend::can && config.stage.can.mode == CanMode::resident;
+  if (config.stage.spec.controller.by_peer && !resident)
+    throw std::invalid_argument(fmt::format(
+        "{}: 'controller: peer' needs a stage that plays the excitation in a loop of its own: "
+        "'backend: can' with 'mode: resident'. With back end {}, this program closes the loop; "
+        "write its controller",
+        config.stage.file.string(), to_string(backend)));
+  if (config.stage.between_runs == BetweenRuns::hold && resident)
+    throw std::invalid_argument(
+        fmt::format("{}: 'between_runs: hold' is not possible with 'mode: resident', because the "
+                    "node closes the loop and cuts its forces after every run. Use 'mode: "
+                    "streaming', or 'between_runs: release'",
+                    config.stage.file.string()));
 }
 
 std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& config,
