@@ -58,10 +58,11 @@ double thermal_rms(const Eigen::VectorXd& u, double rate_hz, double time_constan
 }
 
 void compare(ChannelPrediction& channel, const char* what, double value,
-             const Eigen::VectorXd& limits, Eigen::Index index, const char* unit) {
+             const Eigen::VectorXd& limits, Eigen::Index index, const char* per = "") {
   if (limits.size() == 0 || !(value > limits[index])) return;
-  channel.violations.push_back(fmt::format("{}: {} would be {:.4g} {}, limit {:.4g} {}",
-                                           channel.name, what, value, unit, limits[index], unit));
+  channel.violations.push_back(fmt::format("{}: {} would be {:.4g} {}{}, limit {:.4g} {}{}",
+                                           channel.name, what, value, channel.unit, per,
+                                           limits[index], channel.unit, per));
 }
 
 class Predictor {
@@ -81,7 +82,7 @@ class Predictor {
     for (std::size_t i = 0; i < result_.sensors.size(); ++i) {
       ChannelPrediction& channel = result_.sensors[i];
       compare(channel, "|y|", channel.peak, stage_.limits.position_window_m,
-              static_cast<Eigen::Index>(i), "m");
+              static_cast<Eigen::Index>(i));
     }
     return std::move(result_);
   }
@@ -137,9 +138,9 @@ class Predictor {
     ChannelPrediction& channel = result_.actuators[i];
     const StageLimits& limits = stage_.limits;
     const auto index = static_cast<Eigen::Index>(i);
-    compare(channel, "|u|", channel.peak, limits.actuator_n, index, "N");
-    compare(channel, "slew", channel.slew_per_s, limits.slew_n_s, index, "N/s");
-    compare(channel, "thermal rms", channel.thermal_rms, limits.thermal_rms_n, index, "N");
+    compare(channel, "|u|", channel.peak, limits.actuator_n, index);
+    compare(channel, "slew", channel.slew_per_s, limits.slew_n_s, index, "/s");
+    compare(channel, "thermal rms", channel.thermal_rms, limits.thermal_rms_n, index);
   }
 
   const ExperimentPlan& plan_;

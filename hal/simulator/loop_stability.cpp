@@ -48,8 +48,11 @@ Range range_of(const MatrixXd& m) {
 
 /// A mode as the controller excites it; state [q, q' / omega_scale].
 struct LoopMode {
-  VectorXd drive;  // by the directions of the commands
-  VectorXd seen;   // sensors
+  VectorXd drive;          // by the directions of the commands
+  VectorXd seen;           // sensors
+  VectorXd accelerations;  // sensors, or empty
+  double omega = 0.0;
+  double damping_ratio = 0.0;
   double measured = 0.0;
   Eigen::Matrix2d transition;
   Eigen::Vector2d of_old, of_new;
@@ -93,12 +96,14 @@ class SampledLoop {
       m.drive =
           commands_.directions.transpose() * commands_.scale.asDiagonal() * mode.actuator_shape;
       m.seen = mode.sensor_shape;
-      m.measured =
-          (measured.directions.transpose() * measured.scale.asDiagonal() * mode.sensor_shape)
-              .norm();
-      const double omega = kTwoPi * mode.natural_frequency_hz;
+      m.accelerations = mode.acceleration_shape;
+      m.omega = kTwoPi * mode.natural_frequency_hz;
+      m.damping_ratio = mode.damping_ratio;
+      VectorXd shape = mode.sensor_shape;
+      if (m.accelerations.size() > 0) shape += m.accelerations;
+      m.measured = (measured.directions.transpose() * measured.scale.asDiagonal() * shape).norm();
       const auto over = [&](double part) {
-        return modal_propagator(omega, mode.damping_ratio, part * period_s);
+        return modal_propagator(m.omega, mode.damping_ratio, part * period_s);
       };
       m.transition = over(1.0).transition;
       m.of_old = over(1.0 - fraction_).transition * over(fraction_).input;
@@ -117,14 +122,20 @@ class SampledLoop {
     const Index count = static_cast<Index>(modes_.size());
     const Index first_held = 2 * count;
     VectorXd y = VectorXd::Zero(controller_.d.cols());
-    for (Index i = 0; i < count; ++i) y += modes_[static_cast<std::size_t>(i)].seen * x[2 * i];
+    // Held commands, newest first: u[n-1] ... u[n-d-1].
+    const VectorXd of_old = x.segment(first_held + n * (held_ - 1), n);
+    for (Index i = 0; i < count; ++i) {
+      const LoopMode& m = modes_[static_cast<std::size_t>(i)];
+      y += m.seen * x[2 * i];
+      if (m.accelerations.size() > 0)
+        y += m.accelerations * (m.drive.dot(of_old) - m.omega * m.omega * x[2 * i] -
+                                2.0 * m.damping_ratio * m.omega * x[2 * i + 1]);
+    }
     const auto states = x.tail(controller_.a.rows());
     next.tail(controller_.a.rows()) = controller_.a * states + controller_.b * y;
     const VectorXd force =
         -commands_.directions.transpose() *
         ((controller_.c * states + controller_.d * y).array() / commands_.scale.array()).matrix();
-    // Held commands, newest first: u[n-1] ... u[n-d-1].
-    const VectorXd of_old = x.segment(first_held + n * (held_ - 1), n);
     const VectorXd of_new =
         held_ > 1 ? VectorXd(x.segment(first_held + n * (held_ - 2), n)) : force;
     for (Index i = 0; i < count; ++i) {

@@ -116,6 +116,9 @@ LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
     *state = p_;
   repeats_.setZero(sensors);
   believed_.setConstant(sensors, true);
+  moves_.resize(sensors);
+  for (Eigen::Index i = 0; i < sensors; ++i)
+    moves_[i] = !is_acceleration(info.sensors[static_cast<std::size_t>(i)]);
 }
 
 /// Three equal poles of a constant-acceleration observer (a g-h-k filter, critically damped).
@@ -310,7 +313,8 @@ void LoopGuard::brake(Eigen::ArrayXd& u) noexcept {
 
 double LoopGuard::speed_m_s() const noexcept {
   double largest = 0.0;
-  for (Eigen::Index i = 0; i < v_.size(); ++i) largest = std::max(largest, std::abs(speed(i)));
+  for (Eigen::Index i = 0; i < v_.size(); ++i)
+    if (moves_[i]) largest = std::max(largest, std::abs(speed(i)));
   return largest;
 }
 

@@ -131,6 +131,7 @@ class LoopGuard {
   Eigen::ArrayXd last_y_;
   Eigen::Array<std::uint32_t, Eigen::Dynamic, 1> repeats_;
   Eigen::Array<bool, Eigen::Dynamic, 1> believed_;
+  Eigen::Array<bool, Eigen::Dynamic, 1> moves_;  // not a sensor of acceleration
   bool sensor_failed_ = false;
   bool open_ = false;            // whether the loop is open; the brake's observer has faster poles
   double error_by_force_ = 0.0;  // mean of e e_f and e_f^2, relative to deviation_m^2

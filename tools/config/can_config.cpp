@@ -73,9 +73,13 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
   v.numbers(
       "actuator_range_n", f.actuator_range_n, positive("N"), {}, kOptional,
       "full scale of 2^23 counts; one for all or one per actuator; omitted: 1.25 times limit_n");
+  v.numbers("actuator_range", f.actuator_range_n, positive(""), {}, kOptional,
+            "the same in the units of the actuators");
   v.numbers(
       "sensor_range_m", f.sensor_range_m, positive("m"), {}, kOptional,
       "full scale of 2^23 counts; one for all or one per sensor; omitted: 1.25 times window_m");
+  v.numbers("sensor_range", f.sensor_range_m, positive(""), {}, kOptional,
+            "the same in the units of the sensors");
   v.number("reply_timeout_s", spec.reply_timeout_s, positive("s"), kOptional,
            "the host waits this long for a reply");
   v.number("watchdog_s", f.watchdog_s, not_negative("s"), kOptional,

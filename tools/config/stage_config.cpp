@@ -76,6 +76,9 @@ void take_limits(const StageFile& file, WaferStageSpec& spec) {
   spec.limits.position_window_m = limit_vector(file.sensors, &ChannelConfig::window_m);
   spec.limits.hard_window_m = by_window(file.sensors, &ChannelConfig::hard_window_m, 2.0);
   spec.limits.deviation_m = by_window(file.sensors, &ChannelConfig::deviation_m, 0.5);
+  for (std::size_t i = 0; i < file.sensors.size(); ++i)
+    if (is_acceleration(file.sensors[i].channel))  // not predicted
+      spec.limits.deviation_m[static_cast<Eigen::Index>(i)] = kNoLimit;
   spec.limits.speed_m_s = limit_vector(file.sensors, &ChannelConfig::speed_m_s);
   spec.limits.thermal_time_constant_s = file.thermal_time_constant_s;
 }

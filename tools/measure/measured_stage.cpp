@@ -54,8 +54,9 @@ class StreamedStage final : public MeasuredStage {
   void judge_replay(MeasurementResult& result) const {
     const auto* replay = dynamic_cast<const ReplayStage*>(&stage_.inner());
     if (replay == nullptr || replay->mismatches() == 0) return;
-    result.message += fmt::format("; {} commands differ from the recorded ones, by up to {:.3g} N",
-                                  replay->mismatches(), replay->largest_mismatch_n());
+    result.message += fmt::format("; {} commands differ from the recorded ones, by up to {:.3g}{}",
+                                  replay->mismatches(), replay->largest_mismatch_n(),
+                                  common_unit(replay->info().actuators));
     if (result.exit_code == kDone) result.exit_code = kNotTrustworthy;
   }
 
