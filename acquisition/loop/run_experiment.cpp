@@ -215,13 +215,25 @@ class Experiment {
     run.health.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     const StopReason reason = loop_.reason();
-    meanwhile([&] { log_.end_run(run); });
+    const std::int64_t held_before = std::exchange(held_cycles_, 0);
+    meanwhile([&] {
+      log_.end_run(run);
+      if (held) tell_hold(id, held_before);
+    });
     result_.health += run.health;
     result_.timing += run.timing;
     result_.runs_done += run.complete ? 1 : 0;
     progress_.publish(run.health, run.timing, wall_);
     progress_.runs_done.store(result_.runs_done, std::memory_order_relaxed);
     return reason;
+  }
+
+  /// Between the runs nothing is recorded.
+  void tell_hold(RunId next, std::int64_t cycles) {
+    if (options_.events == nullptr) return;
+    options_.events->write("hold", {{"realization", std::int64_t{next.realization}},
+                                    {"experiment", std::int64_t{next.experiment}},
+                                    {"cycles_not_recorded", cycles}});
   }
 
   /// Does what is to be done between runs. If the stage is held on the wall clock, the loop keeps cycling.
@@ -234,6 +246,7 @@ class Experiment {
     side_->begin(work);
     while (!side_->done()) {
       if (loop_.holding()) {
+        ++held_cycles_;
         static_cast<void>(cycle());
       } else if (loop_.step() == LoopStatus::ended) {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -354,6 +367,7 @@ class Experiment {
   std::unique_ptr<SideThread> side_;  // only if the loop keeps cycling between runs
   std::vector<int> actuators_;
   std::vector<RunId> runs_;
+  std::int64_t held_cycles_ = 0;  // since the last run
   ExperimentResult result_;
   std::exception_ptr failure_;
   SharedProgress progress_;
