@@ -71,7 +71,7 @@ Identification::Identification(const ExperimentConfig& config, IdentificationReq
     : config_(config), request_(std::move(request)), console_(console), plan_(make_plan(config)) {}
 
 int Identification::run() {
-  require_backend(config_, config_.stage.backend);
+  require_backend(config_, config_.stage.backend, config_.stage.spec.pace);
   say_at_interrupt("finished steps are kept; continue with --resume");
   design();
   const int measured = measure_all();

@@ -99,7 +99,7 @@ std::unique_ptr<CyclicStage> replayed_stage(const ExperimentConfig& config,
 
 }  // namespace
 
-void require_backend(const ExperimentConfig& config, Backend backend) {
+void require_backend(const ExperimentConfig& config, Backend backend, double pace) {
   const bool there = backend == Backend::can      ? config.stage.can.present
                      : backend == Backend::modbus ? config.stage.modbus.has_value()
                      : backend == Backend::plugin ? config.stage.plugin.has_value()
@@ -119,6 +119,13 @@ void require_backend(const ExperimentConfig& config, Backend backend) {
         "'backend: can' with 'mode: resident'. With back end {}, this program closes the loop; "
         "write its controller",
         config.stage.file.string(), to_string(backend)));
+  const bool virtual_link =
+      (backend == Backend::can || backend == Backend::modbus) && !(pace > 0.0);
+  if (config.stage.between_runs == BetweenRuns::hold && virtual_link && !resident)
+    throw std::invalid_argument(
+        fmt::format("{}: 'between_runs: hold' with back end {} needs the wall clock, because the "
+                    "watchdog of the node runs by it. Set 'pace: 1'",
+                    config.stage.file.string(), to_string(backend)));
   if (config.stage.between_runs == BetweenRuns::hold && resident)
     throw std::invalid_argument(
         fmt::format("{}: 'between_runs: hold' is not possible with 'mode: resident', because the "
@@ -131,9 +138,9 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
                                                    const ExperimentPlan& plan,
                                                    const MeasurementRequest& request,
                                                    const std::vector<RunId>& skip) {
-  require_backend(config, request.backend);
   WaferStageSpec spec = config.stage.spec;
   if (request.pace >= 0.0) spec.pace = request.pace;
+  require_backend(config, request.backend, spec.pace);
   const auto streamed = [&](std::unique_ptr<CyclicStage> stage) {
     return std::make_unique<StreamedStage>(plan, std::move(stage), spec);
   };
