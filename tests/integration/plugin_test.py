@@ -121,7 +121,7 @@ class Plugin(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         done = run("--json", "frf", log, "-o", frf, "--stage", stage)
         self.assertEqual(done.returncode, 0, done.stderr)
-        findings = json.loads(done.stdout)["health"]["findings"]
+        findings = json.loads(done.stdout)["health"]
         self.assertEqual([f for f in findings if f["severity"] in ("fault", "doubt")], [])
         self.assertTrue(any("geometry and mass" in f["remedy"] for f in findings), findings)
         # What the pilot says replaces the plant: the loop is tested and the signals are predicted.
