@@ -249,7 +249,9 @@ std::string describe_stop(const LimitedStage& stage) {
   text += "; the loop was opened";
   if (std::abs(emergency.response - 1.0) > 0.1)
     text += fmt::format(", the response was {:.2g} times the expected one", emergency.response);
-  const std::string unit = common_unit(stage.info().sensors);
+  std::vector<Channel> moving = stage.info().sensors;
+  std::erase_if(moving, is_acceleration);
+  const std::string unit = common_unit(moving);
   return text + fmt::format("; {}, {:.2g}{} when the forces were cut",
                             emergency.braked ? "braked" : "not braked", emergency.speed_m_s,
                             unit.empty() ? "" : unit + "/s");

@@ -126,7 +126,8 @@ class Plugin(unittest.TestCase):
         self.assertTrue(any("geometry and mass" in f["remedy"] for f in findings), findings)
         # What the pilot says replaces the plant: the loop is tested and the signals are predicted.
         designed = self.work / "designed.yaml"
-        designed.write_text(file.read_text().replace("level: {rms_n: 1.0}", "level: {limits: {prior: real.h5}}"))
+        designed.write_text(file.read_text().replace(
+            "level: {rms_n: 1.0}", "level: {limits: {prior: real.h5}}\n  crest_iterations: 20"))
         done = run("design", designed, "-o", self.work / "designed.h5")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertNotIn("not tested", done.stderr)

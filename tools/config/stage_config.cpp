@@ -250,10 +250,13 @@ std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
   };
   const std::vector<PlantMode> all = wafer_stage_modes(spec);
   std::vector<PlantMode> modes;
-  for (std::size_t i = kRigidAxes; i < all.size(); ++i)
+  for (std::size_t i = kRigidAxes; i < all.size(); ++i) {
+    Eigen::VectorXd shape = all[i].sensor_shape;
+    if (all[i].acceleration_shape.size() > 0) shape += all[i].acceleration_shape;
     if (seen(all[i].actuator_shape, spec.info.actuators, actuators) &&
-        seen(all[i].sensor_shape, spec.info.sensors, sensors))
+        seen(shape, spec.info.sensors, sensors))
       modes.push_back(all[i]);
+  }
   return modes;
 }
 

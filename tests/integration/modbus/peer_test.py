@@ -80,7 +80,8 @@ class ModbusTest(unittest.TestCase):
 
     def held_experiment(self, port):
         stage = self.bench.stage('held_stage', door=f'tcp: {{port: {port}}}')
-        stage.write_text(stage.read_text().replace('stuck_sensor_s', 'between_runs: hold\nstuck_sensor_s'))
+        stage.write_text(stage.read_text().replace(
+            'stuck_sensor_s', 'between_runs: hold\nrealtime: {misses_allowed: 1000}\nstuck_sensor_s'))
         experiment = self.bench.experiment(stage, 'held')
         text = experiment.read_text()
         for old, new in (('period_s: 10', 'period_s: 2.5'), ('transient_periods: 2', 'transient_periods: 1'),

@@ -33,7 +33,7 @@ class Units : public ProgramTest {
     std::string plan = read_bytes(config_);
     plan = replaced(plan, "stage: small_stage.yaml", "stage: currents.yaml");
     plan = replaced(plan, "rms_n: 1.0", "rms: 0.08");
-    plan = replaced(plan, "\nfit:\n", "\nfrf:\n  outputs: [b1, b2]\n\nfit:\n");
+    plan = replaced(plan, "\nfit:\n", "\nfrf:\n  outputs: [b1, b2]\n\n");
     plan = replaced(plan, "  rigid_body: suspension\n  suspension_hz: [0.4, 0.5]\n", "");
     plan = replaced(plan, "  direct_term: full ", "  # ");
     write_bytes(at("units.yaml"), plan);
