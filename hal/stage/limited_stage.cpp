@@ -55,6 +55,10 @@ LimitedStage::LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limit
   mean_square_.setZero(largest_n_.size());
 }
 
+void LimitedStage::carry(const MotionControllerSpec& controller) {
+  guard_.carry(controller.feed_forward_n, MotionController(controller).feed_forward_samples());
+}
+
 void LimitedStage::start(std::uint64_t run_seed, Inputs& first) {
   violation_ = {};
   emergency_ = {};

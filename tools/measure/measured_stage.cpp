@@ -24,7 +24,9 @@ class StreamedStage final : public MeasuredStage {
  public:
   StreamedStage(const ExperimentPlan& plan, std::unique_ptr<CyclicStage> stage,
                 const WaferStageSpec& spec)
-      : plan_(plan), stage_(std::move(stage), spec.limits), controller_(spec.controller) {}
+      : plan_(plan), stage_(std::move(stage), spec.limits), controller_(spec.controller) {
+    stage_.carry(spec.controller);
+  }
 
   const StageInfo& info() const noexcept override { return stage_.info(); }
 
