@@ -262,9 +262,7 @@ void CanStage::stop() noexcept {
 
 std::string CanStage::trouble() const {
   if (!running_) return trouble_at_stop_;
-  if (not_carried_)
-    return "a command is not finite or exceeds the range of its actuator (actuator_range_n or "
-           "actuator_range)";
+  if (not_carried_) return "a command is not finite or exceeds actuator_range_n";
   const WorstBus worst = worst_bus(*transport_);
   if (worst.state >= CanBusState::passive)
     return fmt::format("{}: {}", transport_->name(worst.bus), to_string(worst.state));
