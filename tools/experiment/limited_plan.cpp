@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
@@ -55,6 +56,9 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config) {
   if (request.velocity_m_s > 0.0)
     velocity_m_s.setConstant(static_cast<Eigen::Index>(stage.info.sensors.size()),
                              request.velocity_m_s);
+  for (Eigen::Index i = 0; i < velocity_m_s.size(); ++i)
+    if (is_acceleration(stage.info.sensors[static_cast<std::size_t>(i)]))
+      velocity_m_s[i] = std::numeric_limits<double>::infinity();
   try {
     BoundedLoop loop = bounded_loop(outline.grid(), config.experiment, stage, prior,
                                     config.frf.outputs, velocity_m_s);
