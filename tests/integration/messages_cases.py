@@ -141,7 +141,6 @@ case("Limit in N of a current", CHECK_STAGE, stage("unit: N, position_m: [-0.20"
 case("Limit in two units", CHECK_STAGE, stage("limit_n: 40,", "limit_n: 40, limit: 40,"))
 case("Missing limit", CHECK_STAGE, stage("limit_n: 40, ", ""))
 case("Bias above the limit", CHECK_STAGE, stage("limit_n: 40,", "limit_n: 40, bias_n: 50,"))
-case("Simulated stage without a plant", CHECK_STAGE, stage("plant:", "plants:"))
 case("Controller of two kinds", CHECK_STAGE, stage("  Ry: *loop", "  state_space: {d: [1, 0, 0, 1, 0, 1]}"))
 case("Controller with a matrix of the wrong size", CHECK_STAGE, stage(
     "  Ry: *loop", "  Ry: *loop\n  state_space: {d: [1, 0]}"))
