@@ -76,8 +76,8 @@ class LoopController : public testing::Test {
   }
   std::string controller_file(double rate_hz = 2000.0) const {
     return fmt::format(
-        "{{format: stageid-controller, sensors: [s1, s2], actuators: [a1, a2, a3], "
-        "sample_rate_hz: {}, {}}}\n",
+        "format: stageid-controller\nsensors: [s1, s2]\nactuators: [a1, a2, a3]\n"
+        "sample_rate_hz: {}\n{}\n",
         rate_hz, matrices());
   }
   ArrayList arrays(const std::string& file) const {
