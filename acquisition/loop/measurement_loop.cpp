@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "hal/stage/pacer.hpp"
 
@@ -84,6 +85,7 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
         ring.row_words(), actuators, sensors));
   }
   ramp_samples_ = static_cast<std::uint64_t>(std::llround(options.ramp_s * info.sample_rate_hz));
+  hold_ = options.between_runs == BetweenRuns::hold;
   wall_clock_ = info.clock == Clock::wall;
   period_ns_ = std::llround(1e9 / (info.sample_rate_hz * info.pace));
   u_.assign(actuators, 0.0);
@@ -93,7 +95,7 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
   landing_row_.assign(ring.row_words(), 0.0);
 }
 
-void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excitation) {
+PreparedExcitation MeasurementLoop::prepare(const LoopExcitation& excitation) const {
   const Eigen::MatrixXd& period = excitation.period;
   if (period.rows() == 0 || excitation.samples == 0 || !period.allFinite() ||
       period.cols() != static_cast<Eigen::Index>(excitation.actuators.size())) {
@@ -101,7 +103,7 @@ void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excita
         "loop: the excitation must be finite, with at least one sample and one column per "
         "actuator");
   }
-  excited_.clear();
+  PreparedExcitation out;
   std::vector<Eigen::Index> columns;
   for (Eigen::Index c = 0; c < period.cols(); ++c) {
     const int actuator = excitation.actuators[static_cast<std::size_t>(c)];
@@ -109,39 +111,86 @@ void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excita
       throw std::invalid_argument(fmt::format("loop: unknown actuator number {}", actuator));
     }
     if (period.col(c).isZero(0.0)) continue;
-    excited_.push_back(static_cast<std::size_t>(actuator));
+    out.actuators.push_back(static_cast<std::size_t>(actuator));
     columns.push_back(c);
   }
-  excitation_.clear();
   for (Eigen::Index n = 0; n < period.rows(); ++n) {
-    for (const Eigen::Index c : columns) excitation_.push_back(period(n, c));
+    for (const Eigen::Index c : columns) out.rows.push_back(period(n, c));
   }
-  period_samples_ = static_cast<std::uint64_t>(period.rows());
-  samples_ = excitation.samples;
-  cycle_ = phase_sample_ = 0;
-  gain_ = 1.0;
+  out.period_samples = static_cast<std::uint64_t>(period.rows());
+  out.samples = excitation.samples;
+  return out;
+}
+
+void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excitation) {
+  excitation_ = prepare(excitation);
+  cycle_ = 0;
   bucket_ = 0;
-  complete_ = false;
-  reason_ = StopReason::none;
-  last_trouble_ = Outcome::ok;
-  health_ = {};
-  timing_ = {};
   status_ = {};
   stamp_ = {};
   clock_.restart();
-  ++run_;
   std::fill(y_.begin(), y_.end(), 0.0);
   std::fill(last_finite_u_.begin(), last_finite_u_.end(), 0.0);
   controller_.reset();
   inputs_ = {};
   inputs_.y = fresh_;
+  begin(controller_.feed_forward_samples());
+  const Phase first = std::exchange(phase_, Phase::idle);
   stage_.start(run_seed, inputs_);
+  phase_ = first;
   if (wall_clock_) awake_ns_ = monotonic_ns();
   tell_state();
-  phase_ = Phase::measuring;
   take_measurement(Outcome::ok);
   const std::uint64_t all = ~std::uint64_t{0} >> (64 - y_.size());
   status_.marked |= (inputs_.valid & all) != all;
+}
+
+void MeasurementLoop::next(PreparedExcitation& excitation) noexcept {
+  if (phase_ != Phase::holding) return;
+  std::swap(excitation_, excitation);
+  begin(0);
+}
+
+void MeasurementLoop::release() noexcept {
+  if (phase_ == Phase::holding) end(StopReason::none);
+}
+
+/// The next run. `quiet_samples` pass without excitation.
+void MeasurementLoop::begin(std::uint64_t quiet_samples) noexcept {
+  ++run_;
+  sample_ = 0;
+  quiet_left_ = quiet_samples;
+  ramp_left_ = hold_ ? ramp_samples_ : 0;
+  // The phase continues from the ramp into the first recorded sample, which begins the period.
+  const std::uint64_t period = excitation_.period_samples;
+  phase_sample_ = (period - ramp_left_ % period) % period;
+  complete_ = false;
+  reason_ = StopReason::none;
+  last_trouble_ = Outcome::ok;
+  phase_ = Phase::leading;
+  begin_measuring();
+  lead_gain();
+}
+
+/// After a sample before the run.
+void MeasurementLoop::lead() noexcept {
+  --(quiet_left_ > 0 ? quiet_left_ : ramp_left_);
+  begin_measuring();
+  lead_gain();
+}
+
+/// Unless samples before the run are left.
+void MeasurementLoop::begin_measuring() noexcept {
+  if (quiet_left_ + ramp_left_ > 0) return;
+  phase_ = Phase::measuring;
+  health_ = {};
+  timing_ = {};
+}
+
+void MeasurementLoop::lead_gain() noexcept {
+  gain_ = quiet_left_ > 0
+              ? 0.0
+              : 1.0 - static_cast<double>(ramp_left_) / static_cast<double>(ramp_samples_ + 1);
 }
 
 LoopStatus MeasurementLoop::step() noexcept {
@@ -219,14 +268,17 @@ void MeasurementLoop::tell_state() noexcept {
 }
 
 void MeasurementLoop::tell(LoopEvent::Kind kind, std::uint8_t code) noexcept {
-  events_.push({run_, cycle_, kind, code});
+  events_.push({run_, sample_, kind, code});
 }
 
 void MeasurementLoop::compute_command() noexcept {
   controller_.update(y_.data(), u_.data());
-  const double* r = excitation_.data() + phase_sample_ * excited_.size();
-  for (std::size_t k = 0; k < excited_.size(); ++k) u_[excited_[k]] += gain_ * r[k];
-  if (++phase_sample_ == period_samples_) phase_sample_ = 0;
+  if (quiet_left_ > 0 || phase_ == Phase::holding) [[unlikely]]
+    return;
+  const std::vector<std::size_t>& excited = excitation_.actuators;
+  const double* r = excitation_.rows.data() + phase_sample_ * excited.size();
+  for (std::size_t k = 0; k < excited.size(); ++k) u_[excited[k]] += gain_ * r[k];
+  if (++phase_sample_ == excitation_.period_samples) phase_sample_ = 0;
 }
 
 /// Writes u[n] and y[n]. A command that is not finite is passed to the stage, which refuses it, but the log must
@@ -273,7 +325,8 @@ void MeasurementLoop::take_measurement(Outcome outcome) noexcept {
   if (ends_at_once(outcome)) {
     last_trouble_ = outcome;
     // A replay ends with link_down in the unrecorded ramp of a good run; this is not a fault.
-    if (phase_ == Phase::landing && reason_ == StopReason::none && outcome != Outcome::link_down) {
+    if (phase_ == Phase::landing && reason_ == StopReason::none && !hold_ &&
+        outcome != Outcome::link_down) {
       reason_ = StopReason::fault;
       tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason_));
     }
@@ -293,7 +346,7 @@ void MeasurementLoop::count_bad_cycle(Outcome outcome) noexcept {
   last_trouble_ = outcome;
   bucket_ += kBadCycle;
   if (bucket_ <= misses_allowed_) return;
-  if (phase_ == Phase::measuring) {
+  if (phase_ != Phase::stopping && phase_ != Phase::landing) {
     request_stop(StopReason::misses);
   } else {
     end(StopReason::misses);  // the stage does not answer during the ramp either
@@ -301,19 +354,21 @@ void MeasurementLoop::count_bad_cycle(Outcome outcome) noexcept {
 }
 
 void MeasurementLoop::request_stop(StopReason reason) noexcept {
-  if (phase_ == Phase::landing && reason == StopReason::limit && reason_ == StopReason::none) {
-    reason_ = reason;
-  }
-  if (phase_ != Phase::measuring) return;
+  const bool over = phase_ == Phase::landing && reason_ == StopReason::none;
+  if (over && !hold_ && reason == StopReason::limit) reason_ = reason;
+  const bool unrecorded = phase_ == Phase::leading || phase_ == Phase::holding || (over && hold_);
+  if (phase_ != Phase::measuring && !unrecorded) return;
   reason_ = reason;
   tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason));
   bucket_ = 0;  // new budget for the ramp
-  ramp_left_ = ramp_samples_;
-  phase_ = reason == StopReason::log ? Phase::landing : Phase::stopping;
+  ramp_left_ = static_cast<std::uint64_t>(std::llround(gain_ * static_cast<double>(ramp_samples_)));
+  quiet_left_ = 0;
+  phase_ = unrecorded || reason == StopReason::log ? Phase::landing : Phase::stopping;
 }
 
 void MeasurementLoop::end(StopReason reason) noexcept {
-  if (reason_ == StopReason::none && phase_ != Phase::landing && reason != StopReason::none) {
+  if (reason_ == StopReason::none && (phase_ != Phase::landing || hold_) &&
+      reason != StopReason::none) {
     reason_ = reason;
     tell(LoopEvent::Kind::stop, static_cast<std::uint8_t>(reason));
   }
@@ -324,15 +379,28 @@ void MeasurementLoop::end(StopReason reason) noexcept {
 LoopStatus MeasurementLoop::advance() noexcept {
   ++cycle_;
   if (phase_ == Phase::measuring) [[likely]] {
-    if (cycle_ < samples_) [[likely]]
+    if (++sample_ < excitation_.samples) [[likely]]
       return LoopStatus::running;
     phase_ = Phase::landing;
     complete_ = true;
     bucket_ = 0;
     ramp_left_ = ramp_samples_;
+  } else if (phase_ == Phase::idle) {
+    return LoopStatus::ended;
+  } else if (phase_ == Phase::holding) {
+    return LoopStatus::held;
+  } else if (phase_ == Phase::leading) {
+    lead();
+    return LoopStatus::running;
+  } else {
+    ++sample_;
   }
-  if (phase_ == Phase::idle) return LoopStatus::ended;
   if (ramp_left_ == 0) {
+    if (hold_ && reason_ == StopReason::none) {
+      phase_ = Phase::holding;
+      gain_ = 0.0;
+      return LoopStatus::held;
+    }
     end(reason_);
     return LoopStatus::ended;
   }

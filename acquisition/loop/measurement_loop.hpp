@@ -21,6 +21,7 @@ struct LoopOptions {
   /// their samples.
   double jitter_s = 0.0;
   int misses_allowed = 10;  ///< leaky bucket: +2 per bad cycle, -1 per good one; above this: stop
+  BetweenRuns between_runs = BetweenRuns::release;
 };
 
 /// Signals that are added to the actuators, and their duration.
@@ -30,8 +31,17 @@ struct LoopExcitation {
   std::uint64_t samples = 0;   ///< total number to measure
 };
 
+/// A LoopExcitation as the loop needs it.
+struct PreparedExcitation {
+  std::vector<double> rows;  ///< sample by sample, without columns of zeros
+  std::vector<std::size_t> actuators;
+  std::uint64_t period_samples = 1;
+  std::uint64_t samples = 0;
+};
+
 enum class LoopStatus : std::uint8_t {
   running,
+  held,       ///< the run is over and the controller keeps the stage; see next() and release()
   ring_full,  ///< nothing was done; call again after the log thread has freed a row
   ended       ///< the stage is stopped; see reason()
 };
@@ -56,6 +66,10 @@ const char* to_string(StopReason reason) noexcept;
 /// A stage that stamps its samples is also watched for jitter: a row whose instant deviates by more than jitter_s
 /// from the followed clock (SampleClock) is marked as irregular, and does not count in the bucket.
 ///
+/// Held between runs (BetweenRuns::hold), the loop stays closed after that ramp, unrecorded, with the same limits and
+/// reasons to stop. The next run begins without a step: before its first sample, r rises linearly over ramp_s, with
+/// the phase that the period continues. A feed-forward of the controller rises before that, when the loop is closed.
+///
 /// Bucket: late cycles count as bad (their samples are valid, but the phase of the loop is wrong).
 class MeasurementLoop {
  public:
@@ -69,12 +83,21 @@ class MeasurementLoop {
   /// on sizes, an actuator that does not exist, or an excitation that is not finite.
   void start(std::uint64_t run_seed, const LoopExcitation& excitation);
 
+  /// What start() computes from an excitation, for next(). May be called from another thread during a run.
+  PreparedExcitation prepare(const LoopExcitation& excitation) const;
+  /// Begins the next run while the stage is held. Swaps, so that nothing is allocated or freed.
+  void next(PreparedExcitation& excitation) noexcept;
+  /// Ends holding: opens the loop.
+  void release() noexcept;
+  bool holding() const noexcept { return phase_ == Phase::holding; }
+  bool ended() const noexcept { return phase_ == Phase::idle; }
+
   /// One cycle. Does not allocate, lock, log or throw. There is no system call other than the exchange's; on a
   /// wall clock it reads the time twice for timing().
   [[nodiscard]] LoopStatus step() noexcept;
 
-  /// Begins a controlled stop; a second one is ignored. After the last sample, only a limit is accepted. Call it
-  /// from the thread that calls step().
+  /// Begins a controlled stop; a second one is ignored. In the ramp after the last sample, only a limit is accepted,
+  /// unless the stage is to be held. Call it from the thread that calls step().
   void request_stop(StopReason reason) noexcept;
 
   StopReason reason() const noexcept { return reason_; }
@@ -90,7 +113,12 @@ class MeasurementLoop {
   LoopEvents& events() noexcept { return events_; }
 
  private:
-  enum class Phase : std::uint8_t { idle, measuring, stopping, landing };
+  enum class Phase : std::uint8_t { idle, leading, measuring, stopping, landing, holding };
+
+  void begin(std::uint64_t quiet_samples) noexcept;
+  void lead() noexcept;
+  void begin_measuring() noexcept;
+  void lead_gain() noexcept;
 
   void compute_command() noexcept;
   bool write_row(double* row) noexcept;
@@ -103,7 +131,9 @@ class MeasurementLoop {
   void tell(LoopEvent::Kind kind, std::uint8_t code) noexcept;
   void end(StopReason reason) noexcept;
   LoopStatus advance() noexcept;
-  bool recording() const noexcept { return phase_ != Phase::landing; }
+  bool recording() const noexcept {
+    return phase_ == Phase::measuring || phase_ == Phase::stopping;
+  }
 
   CyclicStage& stage_;
   MotionController& controller_;
@@ -117,15 +147,15 @@ class MeasurementLoop {
   std::vector<double> y_;
   std::vector<double> fresh_;          // y[n+1] as returned by the stage
   std::vector<double> last_finite_u_;  // logged if a command is not finite
-  std::vector<double> excitation_;     // sample by sample, without columns of zeros
-  std::vector<std::size_t> excited_;   // their actuators
+  PreparedExcitation excitation_;
   std::vector<double> landing_row_;
   Inputs inputs_;
 
-  std::uint64_t period_samples_ = 1;
+  bool hold_ = false;
   std::uint64_t phase_sample_ = 0;  // n mod period
-  std::uint64_t samples_ = 0;
-  std::uint64_t cycle_ = 0;
+  std::uint64_t cycle_ = 0;         // of the stage, since the loop was closed
+  std::uint64_t sample_ = 0;        // of the run
+  std::uint64_t quiet_left_ = 0;    // samples until the excitation begins to rise
   std::uint64_t ramp_left_ = 0;
   double gain_ = 1.0;
   SampleStatus status_;  // of y_

@@ -20,6 +20,7 @@
 #include "acquisition/loop/log_thread.hpp"
 #include "acquisition/loop/measurement_loop.hpp"
 #include "acquisition/loop/shared_progress.hpp"
+#include "acquisition/loop/side_thread.hpp"
 #include "acquisition/record/utc_time.hpp"
 #include "acquisition/slog/slog_index.hpp"
 
@@ -57,10 +58,13 @@ class Experiment {
         stage_(stage),
         options_(options),
         ring_(slog_row_words(log.info()), ring_rows(stage.info())),
-        loop_(stage, controller, ring_, {options.ramp_s, options.jitter_s, options.misses_allowed}),
+        loop_(stage, controller, ring_,
+              {options.ramp_s, options.jitter_s, options.misses_allowed, options.between_runs}),
         recorder_(make_recorder(options)),
         log_(log, ring_, observers()),
         wall_(stage.info().clock == Clock::wall),
+        side_(wall_ && options.between_runs == BetweenRuns::hold ? std::make_unique<SideThread>()
+                                                                 : nullptr),
         actuators_(excited_actuators(plan.spec(), stage.info())),
         runs_(plan.runs_without(options.skip)) {}
 
@@ -141,17 +145,12 @@ class Experiment {
     std::string enough;
     int realization = -1;
     for (const RunId& run : runs_) {
-      if (interrupted()) {
-        finish(StopReason::interrupt);
-        break;
-      }
-      if (options_.tripped()) {
-        finish(StopReason::plant);
-        break;
-      }
+      if (stopped_between_runs()) break;
       if (options_.enough && run.realization != std::exchange(realization, run.realization)) {
-        log_.drain();
-        enough = options_.enough();
+        meanwhile([&] {
+          log_.drain();
+          enough = options_.enough();
+        });
         if (!enough.empty()) break;
       }
       try {
@@ -168,66 +167,124 @@ class Experiment {
       }
       break;
     }
+    loop_.release();
+    if (result_.end == ExperimentEnd::complete)
+      finish(loop_.reason());  // stopped after the last run
     if (result_.end == ExperimentEnd::complete) {
       result_.message = fmt::format("{}{}{} measured", enough, enough.empty() ? "" : "; ",
                                     counted(result_.runs_done, "run"));
     }
   }
 
+  bool stopped_between_runs() {
+    const StopReason reason = interrupted()        ? StopReason::interrupt
+                              : options_.tripped() ? StopReason::plant
+                                                   : loop_.reason();
+    finish(reason);
+    return reason != StopReason::none;
+  }
+
   StopReason perform_run(RunId id) {
     const auto started = std::chrono::steady_clock::now();
     progress_.begin(id, wall_);
-    LoopExcitation excitation{plan_.excitation(id), actuators_,
-                              static_cast<std::uint64_t>(plan_.samples_per_run())};
+    LoopExcitation excitation;
+    PreparedExcitation prepared;
     LogRun run;
     run.realization = id.realization;
     run.experiment = id.experiment;
-    run.started_utc = utc_now();
-    log_.begin_run(run, excitation.period);  // first: it allocates and locks
-    try {
-      loop_.start(run_seed(plan_.spec().seed, id), excitation);
-    } catch (...) {
-      log_.forget_run();
-      throw;
+    const bool held = loop_.holding();
+    meanwhile([&] {
+      excitation = {plan_.excitation(id), actuators_,
+                    static_cast<std::uint64_t>(plan_.samples_per_run())};
+      run.started_utc = utc_now();
+      if (held) prepared = loop_.prepare(excitation);
+      log_.begin_run(run, excitation.period);  // before the stage moves: it allocates and locks
+    });
+    if (held) {
+      loop_.next(prepared);  // does nothing if the loop has been stopped meanwhile
+    } else {
+      try {
+        loop_.start(run_seed(plan_.spec().seed, id), excitation);
+      } catch (...) {
+        log_.forget_run();
+        throw;
+      }
     }
     log_.confirm_run();
-    cycle_until_end();
+    if (!held || !loop_.ended()) cycle_until_end();
     run.complete = loop_.complete() && loop_.reason() != StopReason::log;
     run.health = loop_.health();
+    run.timing = loop_.timing();
     run.health.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-    run.timing = loop_.timing();
-    log_.end_run(run);
+    const StopReason reason = loop_.reason();
+    const std::int64_t held_before = std::exchange(held_cycles_, 0);
+    meanwhile([&] {
+      log_.end_run(run);
+      if (held) tell_hold(id, held_before);
+    });
     result_.health += run.health;
     result_.timing += run.timing;
     result_.runs_done += run.complete ? 1 : 0;
     progress_.publish(run.health, run.timing, wall_);
     progress_.runs_done.store(result_.runs_done, std::memory_order_relaxed);
-    return loop_.reason();
+    return reason;
+  }
+
+  /// Between the runs nothing is recorded.
+  void tell_hold(RunId next, std::int64_t cycles) {
+    if (options_.events == nullptr) return;
+    options_.events->write("hold", {{"realization", std::int64_t{next.realization}},
+                                    {"experiment", std::int64_t{next.experiment}},
+                                    {"cycles_not_recorded", cycles}});
+  }
+
+  /// Does what is to be done between runs. If the stage is held on the wall clock, the loop keeps cycling.
+  template <typename Work>
+  void meanwhile(Work work) {
+    if (!side_ || !loop_.holding()) {
+      work();
+      return;
+    }
+    side_->begin(work);
+    while (!side_->done()) {
+      if (loop_.holding()) {
+        ++held_cycles_;
+        static_cast<void>(cycle());
+      } else if (loop_.step() == LoopStatus::ended) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    }
+    side_->rethrow();
   }
 
   void cycle_until_end() {
     const auto publish_every = static_cast<std::uint64_t>(
         std::clamp(kPublishEvery_s * stage_.info().sample_rate_hz, 1.0, kMostUnpublished));
     std::uint64_t until_publish = publish_every;
-    while (true) {
-      const LoopStatus status = loop_.step();
-      if (status == LoopStatus::ended) return;
-      if (status == LoopStatus::ring_full) {
-        if (wall_ || log_.failed()) {
-          loop_.request_stop(StopReason::log);
-        } else {
-          std::this_thread::yield();
-        }
-      }
-      if (interrupted()) loop_.request_stop(StopReason::interrupt);
-      if (options_.tripped()) loop_.request_stop(StopReason::plant);
-      if (log_.failed()) loop_.request_stop(StopReason::log);
+    while (cycle()) {
       if (--until_publish == 0) {
         until_publish = publish_every;
         progress_.publish(loop_.health(), loop_.timing(), wall_);
       }
     }
+  }
+
+  /// @returns false if the run is over
+  bool cycle() {
+    const LoopStatus status = loop_.step();
+    if (status == LoopStatus::ended) return false;
+    if (status == LoopStatus::ring_full) {
+      if (wall_ || log_.failed()) {
+        loop_.request_stop(StopReason::log);
+      } else {
+        std::this_thread::yield();
+      }
+    }
+    if (interrupted()) loop_.request_stop(StopReason::interrupt);
+    if (options_.tripped()) loop_.request_stop(StopReason::plant);
+    if (log_.failed()) loop_.request_stop(StopReason::log);
+    return status != LoopStatus::held;
   }
 
   bool interrupted() const noexcept {
@@ -310,8 +367,10 @@ class Experiment {
   std::unique_ptr<EventRecorder> recorder_;
   LogThread log_;
   bool wall_;
+  std::unique_ptr<SideThread> side_;  // only if the loop keeps cycling between runs
   std::vector<int> actuators_;
   std::vector<RunId> runs_;
+  std::int64_t held_cycles_ = 0;  // since the last run
   ExperimentResult result_;
   std::exception_ptr failure_;
   SharedProgress progress_;

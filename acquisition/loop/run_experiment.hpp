@@ -41,6 +41,8 @@ struct RunExperimentOptions {
   double ramp_s = 0.1;      ///< duration of the ramp of the excitation to zero before stopping
   double jitter_s = 0.0;    ///< see LoopOptions
   int misses_allowed = 10;  ///< leaky bucket: +2 per bad cycle, -1 per good one; above this: stop
+  /// hold: the loop remains closed from the first run to the last. In virtual time no time passes between runs.
+  BetweenRuns between_runs = BetweenRuns::release;
   RealTimeOptions real_time = {};            ///< of the loop's thread; ignored in virtual time
   EventLog* events = nullptr;                ///< receives runs, misses, states, limits and stops
   std::vector<RunObserver*> observers = {};  ///< receive every row, in the log's thread
@@ -81,7 +83,8 @@ std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept;
 /// A limit, a fault, too many misses, the plant or an interrupt ends the current run in a controlled stop: the
 /// excitation is ramped down in closed loop, the stage is stopped, and the run is logged as incomplete. A run that
 /// does not start also ends the experiment with a fault. Every run starts from standstill with the seed of
-/// (plan seed, realization, experiment), so that a repeated or resumed run is identical.
+/// (plan seed, realization, experiment), so that a repeated or resumed run is identical. If the stage is held between
+/// the runs, only the first one starts so, and between the runs there are the same reasons to stop.
 /// @throws StageError if real time is required but unavailable.
 /// @throws std::invalid_argument if plan, stage, controller and log do not fit.
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,

@@ -58,22 +58,22 @@ double thermal_rms(const Eigen::VectorXd& u, double rate_hz, double time_constan
 }
 
 void compare(ChannelPrediction& channel, const char* what, double value,
-             const Eigen::VectorXd& limits, Eigen::Index index, const char* unit) {
+             const Eigen::VectorXd& limits, Eigen::Index index, const char* per = "") {
   if (limits.size() == 0 || !(value > limits[index])) return;
-  channel.violations.push_back(fmt::format("{}: {} would be {:.4g} {}, limit {:.4g} {}",
-                                           channel.name, what, value, unit, limits[index], unit));
+  channel.violations.push_back(fmt::format("{}: {} would be {:.4g} {}{}, limit {:.4g} {}{}",
+                                           channel.name, what, value, channel.unit, per,
+                                           limits[index], channel.unit, per));
 }
 
 class Predictor {
  public:
   Predictor(const ExperimentPlan& plan, const WaferStageSpec& stage)
-      : plan_(plan),
-        stage_(stage),
-        loop_(closed_loop(plan, stage)),
-        dft_(plan.grid().samples_per_period()) {
+      : plan_(plan), stage_(stage), dft_(plan.grid().samples_per_period()) {
+    result_.crest_factor.assign(plan.spec().axes.size(), 0.0);
+    if (!why_unpredictable(stage).empty()) return;
+    loop_ = closed_loop(plan, stage);
     for (const Channel& channel : stage.info.actuators) add(result_.actuators, channel);
     for (const Channel& channel : stage.info.sensors) add(result_.sensors, channel);
-    result_.crest_factor.assign(plan.spec().axes.size(), 0.0);
   }
 
   DesignPrediction predict() {
@@ -82,7 +82,7 @@ class Predictor {
     for (std::size_t i = 0; i < result_.sensors.size(); ++i) {
       ChannelPrediction& channel = result_.sensors[i];
       compare(channel, "|y|", channel.peak, stage_.limits.position_window_m,
-              static_cast<Eigen::Index>(i), "m");
+              static_cast<Eigen::Index>(i));
     }
     return std::move(result_);
   }
@@ -103,8 +103,10 @@ class Predictor {
         largest = std::max(largest, crest_factor(r.col(axis)));
       }
     const Eigen::MatrixXcd R = plan_.spectrum(run);
+    const Eigen::VectorXd& feed_forward = stage_.controller.feed_forward_n;
     for (std::size_t i = 0; i < result_.actuators.size(); ++i) {
-      const Eigen::VectorXd u = period(loop_.to_u, R, static_cast<Eigen::Index>(i));
+      Eigen::VectorXd u = period(loop_.to_u, R, static_cast<Eigen::Index>(i));
+      if (feed_forward.size() > 0) u.array() += feed_forward[static_cast<Eigen::Index>(i)];
       ChannelPrediction& channel = result_.actuators[i];
       add_period(channel, u);
       double step = std::abs(u[0] - u[u.size() - 1]);
@@ -136,9 +138,9 @@ class Predictor {
     ChannelPrediction& channel = result_.actuators[i];
     const StageLimits& limits = stage_.limits;
     const auto index = static_cast<Eigen::Index>(i);
-    compare(channel, "|u|", channel.peak, limits.actuator_n, index, "N");
-    compare(channel, "slew", channel.slew_per_s, limits.slew_n_s, index, "N/s");
-    compare(channel, "thermal rms", channel.thermal_rms, limits.thermal_rms_n, index, "N");
+    compare(channel, "|u|", channel.peak, limits.actuator_n, index);
+    compare(channel, "slew", channel.slew_per_s, limits.slew_n_s, index, "/s");
+    compare(channel, "thermal rms", channel.thermal_rms, limits.thermal_rms_n, index);
   }
 
   const ExperimentPlan& plan_;
@@ -156,6 +158,13 @@ std::vector<std::string> DesignPrediction::violations() const {
     for (const ChannelPrediction& channel : *list)
       all.insert(all.end(), channel.violations.begin(), channel.violations.end());
   return all;
+}
+
+std::string why_unpredictable(const WaferStageSpec& stage) {
+  if (stage.controller.by_peer)
+    return "the stage closes the loop by a controller of its own ('controller: peer')";
+  if (!stage.has_plant()) return "the stage file has no 'plant'";
+  return "";
 }
 
 DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) {

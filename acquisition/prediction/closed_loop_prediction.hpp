@@ -27,9 +27,12 @@ struct DesignPrediction {
   std::vector<std::string> violations() const;
 };
 
+/// Why the signals of a stage cannot be predicted; empty if they can: its plant and its controller are known.
+std::string why_unpredictable(const WaferStageSpec& stage);
+
 /// Predicts u and y of every run from the exact sampled plant and its controller:
-///   u = (I - K G)^-1 r,  y = G u,  with K the response from y to u,
-/// line by line, then sample by sample over one period.
+///   u = f + (I - K G)^-1 r,  y = G u,  with feed-forward f and K the response from y to u,
+/// line by line, then sample by sample over one period. Only the crest factors if the signals are unpredictable.
 /// @throws std::invalid_argument if the plan excites a channel that the stage does not have.
 DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage);
 

@@ -165,8 +165,15 @@ void add_actuator(BoundedLoop& loop, const LoopTransfers& transfers, const Wafer
   u.transfer = transfers.to_u[i];
   if (!transfers.below_u.empty()) u.below_band = transfers.below_u[i];
   BoundedSignal slew = u;
-  u.peak_limit = limit_of(stage.limits.actuator_n, i);
-  u.rms_limit = limit_of(stage.limits.thermal_rms_n, i);
+  const Eigen::VectorXd& feed_forward = stage.controller.feed_forward_n;
+  const double bias = feed_forward.size() > 0 ? feed_forward[static_cast<Index>(i)] : 0.0;
+  u.peak_limit = limit_of(stage.limits.actuator_n, i) - std::abs(bias);
+  const double rms = limit_of(stage.limits.thermal_rms_n, i);
+  if (!(u.peak_limit > 0.0) || !(rms > std::abs(bias)))
+    throw std::invalid_argument(
+        fmt::format("the feed-forward of '{}' alone, {} {}, reaches a limit; lower it",
+                    channel.name, bias, channel.unit));
+  u.rms_limit = std::sqrt(rms * rms - bias * bias);
   u.rms_time_constant_s = stage.limits.thermal_time_constant_s;
   u.reserve = reserve_of(transfers.u_noise, i);
   add(loop, std::move(u), channel.unit);

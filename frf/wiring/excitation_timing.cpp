@@ -45,7 +45,7 @@ std::vector<Index> actuators_of(const HealthRecord& record) {
 /// Whether the controller between the recorded channels is known.
 bool knows_all(const HealthRecord& record, const std::optional<NominalStage>& nominal,
                std::vector<Index>& u, std::vector<Index>& y) {
-  if (!nominal) return false;
+  if (!nominal || !nominal->controller) return false;
   std::string missing;
   u = positions_in(nominal->actuators, record.info.actuators.names, missing);
   y = positions_in(nominal->sensors, record.info.sensors.names, missing);

@@ -12,7 +12,7 @@ namespace stageid {
 struct NominalStage {
   std::vector<std::string> actuators;
   std::vector<std::string> sensors;
-  /// -C(e^{j omega T}) from y to u, actuators x sensors.
+  /// -C(e^{j omega T}) from y to u, actuators x sensors; empty: unknown, the stage closes the loop itself.
   std::function<Eigen::MatrixXcd(double frequency_hz)> controller;
   double controller_from_hz = 0.0;  ///< band in which it is known
   double controller_to_hz = std::numeric_limits<double>::infinity();

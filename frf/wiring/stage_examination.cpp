@@ -82,7 +82,7 @@ void Examination::check_injection() {
 
 /// Whether the controller's contribution to this actuator is measurable beside the excitation.
 bool Examination::controlled(Index actuator, bool& known) const {
-  known = nominal_.has_value() && why_no_nominal(false).empty();
+  known = nominal_ && nominal_->controller && why_no_nominal(false).empty();
   if (!known) return false;
   std::string missing;
   const auto u = positions_in(nominal_->actuators, record_.info.actuators.names, missing);
@@ -128,6 +128,12 @@ void Examination::check_recording() {
   const char* what = "names, signs, scales and timing of the recorded channels (u = r - C y)";
   if (const std::string why = why_no_nominal(true); !why.empty()) {
     find(Severity::unchecked, Cause::controller, "", what, "", "needs " + why);
+    return;
+  }
+  if (!nominal_->controller) {
+    find(Severity::unchecked, Cause::controller, "", what, "",
+         "needs the controller, which belongs to the stage ('controller: peer'): --stage FILE with "
+         "a controller file");
     return;
   }
   if (!spoilt_.empty()) {

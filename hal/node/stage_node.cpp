@@ -73,6 +73,7 @@ StageNode::StageNode(std::unique_ptr<CyclicStage> stage, const StageLimits& limi
                      const MotionControllerSpec& controller, NodePanel panel,
                      const NodeOptions& options)
     : stage_(std::move(stage), limits), controller_(controller), panel_(std::move(panel)) {
+  stage_.carry(controller);
   const StageInfo& info = stage_.info();
   if (controller_.sensors() != static_cast<Eigen::Index>(info.sensors.size()) ||
       controller_.actuators() != static_cast<Eigen::Index>(info.actuators.size()))

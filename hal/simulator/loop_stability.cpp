@@ -1,9 +1,12 @@
 #include "hal/simulator/loop_stability.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "hal/simulator/modal_propagator.hpp"
 
@@ -20,10 +23,37 @@ constexpr double kRounding = 1e-8;
 /// Limits the computation to some seconds.
 constexpr Index kMostStates = 1000;
 
-/// A mode in coordinates of the closed axes; state [q, q' / omega_scale].
+/// The directions in which a matrix has entries: m = scale * directions * directions^T / scale * m, with as few columns
+/// as its rank.
+struct Range {
+  VectorXd scale;       // of the rows, which may have different units
+  MatrixXd directions;  // orthonormal columns
+};
+
+Range range_of(const MatrixXd& m) {
+  constexpr double kRankThreshold = 1e-10;
+  Range out;
+  out.scale = m.cwiseAbs().rowwise().maxCoeff();
+  out.scale = (out.scale.array() > 0.0).select(out.scale, 1.0);
+  MatrixXd scaled = out.scale.cwiseInverse().asDiagonal() * m;
+  for (Index i = 0; i < scaled.cols(); ++i) {
+    const double size = scaled.col(i).norm();
+    if (size > 0.0) scaled.col(i) /= size;
+  }
+  Eigen::ColPivHouseholderQR<MatrixXd> qr(scaled);
+  qr.setThreshold(kRankThreshold);
+  out.directions = qr.householderQ() * MatrixXd::Identity(m.rows(), m.isZero(0.0) ? 0 : qr.rank());
+  return out;
+}
+
+/// A mode as the controller excites it; state [q, q' / omega_scale].
 struct LoopMode {
-  VectorXd drive;  // axes
-  VectorXd seen;   // axes
+  VectorXd drive;          // by the directions of the commands
+  VectorXd seen;           // sensors
+  VectorXd accelerations;  // sensors, or empty
+  double omega = 0.0;
+  double damping_ratio = 0.0;
+  double measured = 0.0;
   Eigen::Matrix2d transition;
   Eigen::Vector2d of_old, of_new;
 };
@@ -31,18 +61,23 @@ struct LoopMode {
 /// The linear map from one sample of the unexcited loop to the next.
 class SampledLoop {
  public:
-  SampledLoop(const WaferStageSpec& spec, const AxisLoop& axes) : axes_(axes) {
+  SampledLoop(const WaferStageSpec& spec, ControllerStateSpace controller)
+      : controller_(std::move(controller)) {
     const double period_s = 1.0 / spec.info.sample_rate_hz;
     const double whole = std::floor(spec.delay_s / period_s);
     fraction_ = spec.delay_s / period_s - whole;
     held_ = static_cast<Index>(whole) + 1;
-    add_modes(wafer_stage_modes(spec), period_s);
-    for (const std::vector<BiquadSection>& list : axes.sections())
-      sections_ += static_cast<Index>(list.size());
+    const ControllerStateSpace& k = controller_;
+    MatrixXd outputs(k.d.rows(), k.a.cols() + k.d.cols());
+    outputs << k.c, k.d;
+    MatrixXd inputs(k.d.cols(), k.a.rows() + k.d.rows());
+    inputs << k.b.transpose(), k.d.transpose();
+    commands_ = range_of(outputs);
+    add_modes(wafer_stage_modes(spec), range_of(inputs), period_s);
   }
 
   Index states() const {
-    return 2 * static_cast<Index>(modes_.size()) + held_ * axes_.axes() + 2 * sections_;
+    return 2 * static_cast<Index>(modes_.size()) + held_ * commands() + controller_.a.rows();
   }
 
   MatrixXd matrix() const {
@@ -52,38 +87,55 @@ class SampledLoop {
   }
 
  private:
-  void add_modes(const std::vector<PlantMode>& modes, double period_s) {
+  Index commands() const { return commands_.directions.cols(); }
+
+  void add_modes(const std::vector<PlantMode>& modes, const Range& measured, double period_s) {
     double strongest = 0.0;
     for (const PlantMode& mode : modes) {
       LoopMode m;
-      m.drive = axes_.actuator_decoupling().transpose() * mode.actuator_shape;
-      m.seen = axes_.sensor_decoupling() * mode.sensor_shape;
-      const double omega = kTwoPi * mode.natural_frequency_hz;
+      m.drive =
+          commands_.directions.transpose() * commands_.scale.asDiagonal() * mode.actuator_shape;
+      m.seen = mode.sensor_shape;
+      m.accelerations = mode.acceleration_shape;
+      m.omega = kTwoPi * mode.natural_frequency_hz;
+      m.damping_ratio = mode.damping_ratio;
+      VectorXd shape = mode.sensor_shape;
+      if (m.accelerations.size() > 0) shape += m.accelerations;
+      m.measured = (measured.directions.transpose() * measured.scale.asDiagonal() * shape).norm();
       const auto over = [&](double part) {
-        return modal_propagator(omega, mode.damping_ratio, part * period_s);
+        return modal_propagator(m.omega, mode.damping_ratio, part * period_s);
       };
       m.transition = over(1.0).transition;
       m.of_old = over(1.0 - fraction_).transition * over(fraction_).input;
       m.of_new = over(1.0 - fraction_).input;
-      strongest = std::max(strongest, m.drive.norm() * m.seen.norm());
+      strongest = std::max(strongest, m.drive.norm() * m.measured);
       modes_.push_back(std::move(m));
     }
     std::erase_if(modes_, [&](const LoopMode& m) {
-      return m.drive.norm() * m.seen.norm() <= 1e-12 * strongest;
+      return m.drive.norm() * m.measured <= 1e-12 * strongest;
     });
   }
 
   VectorXd step(const VectorXd& x) const {
     VectorXd next(x.size());
-    const Index n = axes_.axes();
+    const Index n = commands();
     const Index count = static_cast<Index>(modes_.size());
     const Index first_held = 2 * count;
-    VectorXd position = VectorXd::Zero(n);
-    for (Index i = 0; i < count; ++i)
-      position += modes_[static_cast<std::size_t>(i)].seen * x[2 * i];
-    const VectorXd force = -control(position, x, next);
+    VectorXd y = VectorXd::Zero(controller_.d.cols());
     // Held commands, newest first: u[n-1] ... u[n-d-1].
     const VectorXd of_old = x.segment(first_held + n * (held_ - 1), n);
+    for (Index i = 0; i < count; ++i) {
+      const LoopMode& m = modes_[static_cast<std::size_t>(i)];
+      y += m.seen * x[2 * i];
+      if (m.accelerations.size() > 0)
+        y += m.accelerations * (m.drive.dot(of_old) - m.omega * m.omega * x[2 * i] -
+                                2.0 * m.damping_ratio * m.omega * x[2 * i + 1]);
+    }
+    const auto states = x.tail(controller_.a.rows());
+    next.tail(controller_.a.rows()) = controller_.a * states + controller_.b * y;
+    const VectorXd force =
+        -commands_.directions.transpose() *
+        ((controller_.c * states + controller_.d * y).array() / commands_.scale.array()).matrix();
     const VectorXd of_new =
         held_ > 1 ? VectorXd(x.segment(first_held + n * (held_ - 2), n)) : force;
     for (Index i = 0; i < count; ++i) {
@@ -96,25 +148,10 @@ class SampledLoop {
     return next;
   }
 
-  /// Direct form II transposed, as in MotionController.
-  VectorXd control(VectorXd signal, const VectorXd& x, VectorXd& next) const {
-    Index at = states() - 2 * sections_;
-    for (Index axis = 0; axis < axes_.axes(); ++axis)
-      for (const BiquadSection& s : axes_.sections()[static_cast<std::size_t>(axis)]) {
-        const double in = signal[axis];
-        const double out = s.b0 * in + x[at];
-        next[at] = s.b1 * in - s.a1 * out + x[at + 1];
-        next[at + 1] = s.b2 * in - s.a2 * out;
-        signal[axis] = out;
-        at += 2;
-      }
-    return signal;
-  }
-
-  const AxisLoop& axes_;
+  ControllerStateSpace controller_;
+  Range commands_;
   double fraction_ = 0.0;
   Index held_ = 1;
-  Index sections_ = 0;
   std::vector<LoopMode> modes_;
 };
 
@@ -155,34 +192,6 @@ std::vector<double> test_frequencies(const WaferStageSpec& spec) {
 
 }  // namespace
 
-AxisLoop::AxisLoop(const MotionControllerSpec& spec) : sample_rate_hz_(spec.sample_rate_hz) {
-  std::vector<Index> closed;
-  for (std::size_t i = 0; i < spec.axes.size(); ++i) {
-    if (spec.axes[i].crossover_hz == 0.0 || spec.axes[i].gain == 0.0) continue;
-    closed.push_back(static_cast<Index>(i));
-    sections_.push_back(controller_sections(spec.axes[i], spec.sample_rate_hz));
-  }
-  sensor_decoupling_ = spec.sensor_decoupling(closed, Eigen::all);
-  actuator_decoupling_ = spec.actuator_decoupling(Eigen::all, closed);
-}
-
-MatrixXcd AxisLoop::plant_of_axes(const MatrixXcd& plant) const {
-  return sensor_decoupling_ * plant * actuator_decoupling_;
-}
-
-Eigen::VectorXcd AxisLoop::controllers(double frequency_hz) const {
-  const std::complex<double> z_inverse = std::polar(1.0, -kTwoPi * frequency_hz / sample_rate_hz_);
-  Eigen::VectorXcd out = Eigen::VectorXcd::Ones(axes());
-  for (Index axis = 0; axis < axes(); ++axis)
-    for (const BiquadSection& s : sections_[static_cast<std::size_t>(axis)])
-      out[axis] *= s.response(z_inverse);
-  return out;
-}
-
-MatrixXcd AxisLoop::gain(const MatrixXcd& plant, double frequency_hz) const {
-  return plant_of_axes(plant) * controllers(frequency_hz).asDiagonal();
-}
-
 double largest_sensitivity(const MatrixXcd& loop_gain) {
   if (loop_gain.size() == 0) return 1.0;
   const Eigen::ComplexEigenSolver<MatrixXcd> loci(loop_gain, false);
@@ -192,10 +201,10 @@ double largest_sensitivity(const MatrixXcd& loop_gain) {
 bool LoopStability::stable() const noexcept { return !tested || largest_pole <= 1.0 + kRounding; }
 
 LoopStability loop_stability(const WaferStageSpec& spec) {
-  const AxisLoop axes(spec.controller);
+  const MotionController controller(spec.controller);
   LoopStability out;
-  if (axes.axes() == 0) return out;
-  const SampledLoop loop(spec, axes);
+  if (!controller.acts()) return out;
+  const SampledLoop loop(spec, controller.realization());
   if (loop.states() > kMostStates) return out;
   MatrixXd a = loop.matrix();
   balance(a);
@@ -208,8 +217,9 @@ LoopStability loop_stability(const WaferStageSpec& spec) {
       std::abs(std::arg(solver.eigenvalues()[outermost])) / kTwoPi * spec.info.sample_rate_hz;
   const std::vector<PlantMode> modes = wafer_stage_modes(spec);
   for (const double f : test_frequencies(spec)) {
-    const double size = largest_sensitivity(
-        axes.gain(sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, f), f));
+    const double size =
+        largest_sensitivity(-sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, f) *
+                            controller.response(f));
     if (!(size > out.largest_sensitivity)) continue;
     out.largest_sensitivity = size;
     out.sensitivity_hz = f;

@@ -37,11 +37,13 @@ void check(const std::vector<PlantMode>& modes, double delay_s, double sample_ra
     if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0))
       throw std::invalid_argument(fmt::format(
           "plant: mode {}: damping_ratio must be in [0, 1); got {}", i + 1, mode.damping_ratio));
-    if (mode.actuator_shape.size() != modes[0].actuator_shape.size() ||
+    if (mode.acceleration_shape.size() != modes[0].acceleration_shape.size() ||
+        mode.actuator_shape.size() != modes[0].actuator_shape.size() ||
         mode.sensor_shape.size() != modes[0].sensor_shape.size())
       throw std::invalid_argument(fmt::format(
           "plant: mode {}: the shapes have a different size than those of mode 1", i + 1));
-    if (!mode.actuator_shape.allFinite() || !mode.sensor_shape.allFinite())
+    if (!mode.actuator_shape.allFinite() || !mode.sensor_shape.allFinite() ||
+        !mode.acceleration_shape.allFinite())
       throw std::invalid_argument(fmt::format("plant: mode {}: a shape is not finite", i + 1));
   }
 }
@@ -62,6 +64,10 @@ ModalPlant::ModalPlant(const std::vector<PlantMode>& modes, double delay_s, doub
   sensor_shape_.setZero(padded(sensors_), modes_);
   step_.setZero(modes_, 8);
   undelayed_.setZero(modes_, 2);
+  resistance_.setZero(modes_, 2);
+  if (std::any_of(modes.begin(), modes.end(),
+                  [](const PlantMode& mode) { return mode.acceleration_shape.size() > 0; }))
+    acceleration_shape_.setZero(sensors_, modes_);
   held_.setZero(modes_, static_cast<Eigen::Index>(whole) + 2);
   q_.setZero(modes_);
   v_.setZero(modes_);
@@ -70,6 +76,7 @@ ModalPlant::ModalPlant(const std::vector<PlantMode>& modes, double delay_s, doub
     retune(i, mode.natural_frequency_hz, mode.damping_ratio);
     actuator_shape_.row(i) = mode.actuator_shape.transpose();
     sensor_shape_.col(i).head(sensors_) = mode.sensor_shape;
+    if (mode.acceleration_shape.size() > 0) acceleration_shape_.col(i) = mode.acceleration_shape;
   }
 }
 
@@ -86,6 +93,7 @@ void ModalPlant::retune(Eigen::Index mode, double natural_frequency_hz,
   step_.row(mode) << e(0, 0), e(0, 1), e(1, 0), e(1, 1), of_old[0], of_old[1], late.input[0],
       late.input[1];
   undelayed_.row(mode) << all.input[0], all.input[1];
+  resistance_.row(mode) << omega * omega, 2.0 * damping_ratio * omega;
 }
 
 void ModalPlant::reset() noexcept {
@@ -93,7 +101,7 @@ void ModalPlant::reset() noexcept {
   q_.setZero();
   v_.setZero();
   newest_ = 0;
-  extra_mode_ = -1;
+  extra_mode_ = last_extra_mode_ = -1;
 }
 
 void ModalPlant::modal_force(const double* u, double* __restrict__ force) const noexcept {
@@ -131,6 +139,7 @@ void ModalPlant::step(const double* u) noexcept {
       v[i] = v_next;
     }
   }
+  last_extra_mode_ = extra_mode_;
   if (extra_mode_ >= 0) {
     q[extra_mode_] += undelayed_(extra_mode_, 0) * extra_force_;
     v[extra_mode_] += undelayed_(extra_mode_, 1) * extra_force_;
@@ -153,6 +162,17 @@ void ModalPlant::output(double* y) const noexcept {
     for (Eigen::Index lane = 0; lane < kLanes; ++lane)
       total[lane] = (sum[0][lane] + sum[1][lane]) + (sum[2][lane] + sum[3][lane]);
     for (Eigen::Index lane = 0; lane < used; ++lane) y[block + lane] = total[lane];
+  }
+  if (acceleration_shape_.size() > 0) add_accelerations(y);
+}
+
+/// Just before this instant, under the command that acted last.
+void ModalPlant::add_accelerations(double* y) const noexcept {
+  const Eigen::Index acting = (newest_ + 2) % held_.cols();
+  for (Eigen::Index i = 0; i < modes_; ++i) {
+    double a = held_(i, acting) - resistance_(i, 0) * q_[i] - resistance_(i, 1) * v_[i];
+    if (i == last_extra_mode_) a += extra_force_;
+    for (Eigen::Index s = 0; s < sensors_; ++s) y[s] += acceleration_shape_(s, i) * a;
   }
 }
 

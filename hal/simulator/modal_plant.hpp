@@ -42,15 +42,18 @@ class ModalPlant {
   }
 
  private:
+  void add_accelerations(double* y) const noexcept;
   void modal_force(const double* u, double* force) const noexcept;
 
   double period_s_ = 0.0;
   double fraction_ = 0.0;  // of the delay, in samples
   Eigen::Index actuators_ = 0;
   Eigen::Index sensors_ = 0;
-  Eigen::Index modes_ = 0;          // padded to a multiple of the lane width
-  Eigen::ArrayXXd actuator_shape_;  // modes x actuators
-  Eigen::ArrayXXd sensor_shape_;    // padded sensors x modes
+  Eigen::Index modes_ = 0;              // padded to a multiple of the lane width
+  Eigen::ArrayXXd actuator_shape_;      // modes x actuators
+  Eigen::ArrayXXd sensor_shape_;        // padded sensors x modes
+  Eigen::MatrixXd acceleration_shape_;  // sensors x modes; empty without sensors of acceleration
+  Eigen::ArrayXXd resistance_;          // modes x 2: omega^2, 2 zeta omega
   Eigen::ArrayXXd step_;       // modes x 8: E(T) by rows, input of the old and of the new command
   Eigen::ArrayXXd undelayed_;  // modes x 2: F(T), for add_modal_force
   Eigen::ArrayXXd held_;       // modes x (d + 2), ring of modal forces
@@ -59,6 +62,7 @@ class ModalPlant {
   Eigen::ArrayXd v_;
   Eigen::Index extra_mode_ = -1;
   double extra_force_ = 0.0;
+  Eigen::Index last_extra_mode_ = -1;  // of the last step
 };
 
 }  // namespace stageid

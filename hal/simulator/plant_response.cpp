@@ -62,17 +62,29 @@ Complex sampled_double_integrator(const Sampling& at) {
   return at.z_delay * (position + at.period_s * velocity / z_minus_1) / z_minus_1;
 }
 
-Complex sampled_mode(const PlantMode& mode, const Sampling& at) {
-  if (mode.natural_frequency_hz == 0.0) return sampled_double_integrator(at);
+/// Position and acceleration of a mode.
+struct ModalResponse {
+  Complex position;
+  Complex acceleration;
+};
+
+/// By q'' = f - 2 zeta omega q' - omega^2 q, with the force just before the sample.
+ModalResponse sampled_mode(const PlantMode& mode, const Sampling& at) {
+  const Complex force = at.z_delay * at.z_inverse;
+  if (mode.natural_frequency_hz == 0.0) return {sampled_double_integrator(at), force};
   const double omega = kTwoPi * mode.natural_frequency_hz;
   const double zeta = mode.damping_ratio;
   const Complex pole(-zeta * omega, omega * std::sqrt(1.0 - zeta * zeta));
-  return (sampled_first_order(pole, at) - sampled_first_order(std::conj(pole), at)) /
-         Complex(0.0, 2.0 * pole.imag());
+  const Complex one = sampled_first_order(pole, at);
+  const Complex other = sampled_first_order(std::conj(pole), at);
+  const Complex span(0.0, 2.0 * pole.imag());
+  const Complex position = (one - other) / span;
+  const Complex speed = (pole * one - std::conj(pole) * other) / span;
+  return {position, force - 2.0 * zeta * omega * speed - omega * omega * position};
 }
 
-template <typename ModalResponse>
-Eigen::MatrixXcd sum_of_modes(const std::vector<PlantMode>& modes, ModalResponse response) {
+template <typename Response>
+Eigen::MatrixXcd sum_of_modes(const std::vector<PlantMode>& modes, Response response) {
   if (modes.empty()) throw std::invalid_argument("plant response: at least one mode is needed");
   Eigen::MatrixXcd sum =
       Eigen::MatrixXcd::Zero(modes[0].sensor_shape.size(), modes[0].actuator_shape.size());
@@ -81,7 +93,10 @@ Eigen::MatrixXcd sum_of_modes(const std::vector<PlantMode>& modes, ModalResponse
       throw std::invalid_argument(fmt::format(
           "plant response: damping_ratio must be in [0, 1); got {}", mode.damping_ratio));
     }
-    sum += response(mode) * (mode.sensor_shape * mode.actuator_shape.transpose());
+    const ModalResponse of_mode = response(mode);
+    sum += of_mode.position * (mode.sensor_shape * mode.actuator_shape.transpose());
+    if (mode.acceleration_shape.size() > 0)
+      sum += of_mode.acceleration * (mode.acceleration_shape * mode.actuator_shape.transpose());
   }
   return sum;
 }
@@ -92,8 +107,9 @@ Eigen::MatrixXcd continuous_response(const std::vector<PlantMode>& modes, double
   const double omega = kTwoPi * frequency_hz;
   return sum_of_modes(modes, [omega](const PlantMode& mode) {
     const double omega_0 = kTwoPi * mode.natural_frequency_hz;
-    return 1.0 / Complex((omega_0 - omega) * (omega_0 + omega),
-                         2.0 * mode.damping_ratio * omega_0 * omega);
+    const Complex position = 1.0 / Complex((omega_0 - omega) * (omega_0 + omega),
+                                           2.0 * mode.damping_ratio * omega_0 * omega);
+    return ModalResponse{position, -omega * omega * position};
   });
 }
 

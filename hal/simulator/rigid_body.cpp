@@ -37,12 +37,68 @@ void require_independent(const Jacobian& jacobian, const Eigen::MatrixXd& invers
 double unit_crossover_gain(AxisController axis, double inertia, const char* name) {
   if (!(inertia > 0.0) || !std::isfinite(inertia)) {
     throw std::invalid_argument(fmt::format(
-        "controller: axis {} has gain 0 (automatic), which needs a positive inertia; got {}", name,
-        inertia));
+        "controller: axis {} has gain 0 (automatic), which needs a positive inertia; got {}. Write "
+        "'gain', or the inertia in 'plant'",
+        name, inertia));
   }
   axis.gain = 1.0;
   const double omega = 2.0 * pi * axis.crossover_hz;
   return inertia * omega * omega / std::abs(axis_response(axis, axis.crossover_hz));
+}
+
+/// Of sensors of the position. An acceleration does not determine it.
+Jacobian position_jacobian(const std::vector<Channel>& sensors) {
+  Jacobian jacobian = rigid_body_jacobian(sensors);
+  for (std::size_t i = 0; i < sensors.size(); ++i)
+    if (is_acceleration(sensors[i])) jacobian.row(static_cast<Eigen::Index>(i)).setZero();
+  return jacobian;
+}
+
+/// y - J q for the least-squares motion q. Empty if always zero: not more sensors than axes.
+Eigen::MatrixXd contradiction_of(const Jacobian& jacobian, const Eigen::MatrixXd& inverse) {
+  Eigen::MatrixXd rest =
+      Eigen::MatrixXd::Identity(jacobian.rows(), jacobian.rows()) - jacobian * inverse;
+  for (Eigen::Index i = 0; i < jacobian.rows(); ++i)
+    if (jacobian.row(i).isZero(0.0)) rest(i, i) = 0.0;
+  if (rest.cwiseAbs().maxCoeff() > 1e-9) return rest;
+  return {};
+}
+
+/// The lowest frequency at which an eigenvalue of the loop gain with the rigid stage falls below 1; 0: none.
+double lowest_crossover_hz(const MotionController& controller, double sample_rate_hz,
+                           const Eigen::MatrixXd& acceleration_per_n) {
+  const auto sizes = [&](double f) {
+    const double omega = 2.0 * pi * f;
+    const Eigen::MatrixXcd gain =
+        (acceleration_per_n / (omega * omega)).cast<std::complex<double>>() *
+        controller.response(f);
+    return Eigen::VectorXd(
+        Eigen::ComplexEigenSolver<Eigen::MatrixXcd>(gain, false).eigenvalues().cwiseAbs());
+  };
+  const double lowest_hz = 1e-5 * sample_rate_hz;
+  const auto closed = (sizes(lowest_hz).array() > 1.0).count();
+  if (closed == 0) return 0.0;
+  const double ratio = std::pow(10.0, 1.0 / 50.0);
+  for (double f = lowest_hz; f < 0.5 * sample_rate_hz; f *= ratio)
+    if ((sizes(f).array() > 1.0).count() < closed) return f;
+  return 0.0;
+}
+
+RigidMotion free_motion(const MotionController& controller, double sample_rate_hz,
+                        const Jacobian& actuators, const Jacobian& sensors,
+                        const std::array<double, kRigidAxes>& axis_inertia) {
+  const Eigen::Map<const Eigen::Matrix<double, 6, 1>> inertia(axis_inertia.data());
+  if (!(inertia.array() > 0.0).all() || !controller.acts()) return {};
+  RigidMotion motion;
+  motion.acceleration_per_n = sensors * inertia.cwiseInverse().asDiagonal() * actuators.transpose();
+  motion.bandwidth_rad_s =
+      2.0 * pi * lowest_crossover_hz(controller, sample_rate_hz, motion.acceleration_per_n);
+  if (motion.bandwidth_rad_s == 0.0) return {};
+  const Eigen::MatrixXd sensor_inverse = pseudo_inverse(sensors);
+  motion.force_per_acceleration =
+      pseudo_inverse(actuators).transpose() * inertia.asDiagonal() * sensor_inverse;
+  motion.contradiction = contradiction_of(sensors, sensor_inverse);
+  return motion;
 }
 
 }  // namespace
@@ -53,8 +109,12 @@ Eigen::MatrixXd rigid_body_jacobian(const std::vector<Channel>& channels) {
     const Channel& channel = channels[static_cast<std::size_t>(row)];
     const auto position = Eigen::Map<const Eigen::RowVector3d>(channel.position_m);
     const auto direction = Eigen::Map<const Eigen::RowVector3d>(channel.direction);
-    jacobian.block<1, 3>(row, 0) = direction;
-    jacobian.block<1, 3>(row, 3) = position.cross(direction);
+    if (is_rotation(channel)) {
+      jacobian.row(row) << Eigen::RowVector3d::Zero(), direction;
+    } else {
+      jacobian.row(row) << direction, position.cross(direction);
+    }
+    jacobian.row(row) *= channel.gain;
   }
   return jacobian;
 }
@@ -84,7 +144,7 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
                                             const std::array<AxisController, kRigidAxes>& axes,
                                             const std::array<double, kRigidAxes>& axis_inertia) {
   const Jacobian actuator_jacobian = rigid_body_jacobian(actuators);
-  const Jacobian sensor_jacobian = rigid_body_jacobian(sensors);
+  const Jacobian sensor_jacobian = position_jacobian(sensors);
   const Eigen::MatrixXd actuator_inverse = pseudo_inverse(actuator_jacobian);
   const Eigen::MatrixXd sensor_inverse = pseudo_inverse(sensor_jacobian);
 
@@ -108,10 +168,13 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
 }
 
 RigidMotion rigid_motion(const MotionControllerSpec& controller,
-                         const std::vector<Channel>& actuators,
-                         const std::vector<Channel>& sensors) {
+                         const std::vector<Channel>& actuators, const std::vector<Channel>& sensors,
+                         const std::array<double, kRigidAxes>& axis_inertia) {
   const Jacobian actuator_jacobian = rigid_body_jacobian(actuators);
-  const Jacobian sensor_jacobian = rigid_body_jacobian(sensors);
+  const Jacobian sensor_jacobian = position_jacobian(sensors);
+  if (controller.axes.empty())
+    return free_motion(MotionController(controller), controller.sample_rate_hz, actuator_jacobian,
+                       sensor_jacobian, axis_inertia);
   RigidMotion motion;
   const auto add = [](Eigen::MatrixXd& sum, const Eigen::MatrixXd& term) {
     sum = sum.size() == 0 ? term : sum + term;
@@ -130,12 +193,8 @@ RigidMotion rigid_motion(const MotionControllerSpec& controller,
     add(motion.force_per_acceleration,
         braked * controller.actuator_decoupling.col(k) * controller.sensor_decoupling.row(k));
   }
-  // y - J q for the least-squares motion q: zero unless there are more sensors than axes.
-  const Eigen::MatrixXd rest =
-      Eigen::MatrixXd::Identity(sensor_jacobian.rows(), sensor_jacobian.rows()) -
-      sensor_jacobian * controller.sensor_decoupling;
-  if (motion.bandwidth_rad_s > 0.0 && rest.cwiseAbs().maxCoeff() > 1e-9)
-    motion.contradiction = rest;
+  if (motion.bandwidth_rad_s > 0.0)
+    motion.contradiction = contradiction_of(sensor_jacobian, controller.sensor_decoupling);
   return motion;
 }
 

@@ -12,13 +12,15 @@
 
 namespace stageid {
 
-/// One mode of a simulated plant:  shape_y shape_u^T / (s^2 + 2 zeta omega s + omega^2),
-/// mass-normalized.
+/// One mode of a simulated plant:
+///   (sensor_shape + s^2 acceleration_shape) actuator_shape^T / (s^2 + 2 zeta omega s + omega^2),
+/// mass-normalized, in the units of the channels.
 struct PlantMode {
   double natural_frequency_hz = 0.0;
   double damping_ratio = 0.0;
-  Eigen::VectorXd actuator_shape;  ///< size actuators
-  Eigen::VectorXd sensor_shape;    ///< size sensors
+  Eigen::VectorXd actuator_shape;           ///< size actuators
+  Eigen::VectorXd sensor_shape;             ///< size sensors
+  Eigen::VectorXd acceleration_shape = {};  ///< of sensors of acceleration; empty: none
 };
 
 /// A wafer stage: free rectangular plate on weak springs with actuators and sensors at positions.
@@ -78,6 +80,9 @@ struct WaferStageSpec {
   std::vector<Fault> faults;
   std::uint64_t seed = 0;
   double pace = 0.0;  ///< 0: virtual time; 1: wall clock
+
+  /// Whether the plant is described. Only then can the stage be simulated and its signals predicted.
+  bool has_plant() const noexcept { return mass_kg > 0.0; }
 };
 
 /// All modes of the stage: rigid-body ones on their suspension first, then flexible out of plane by

@@ -38,6 +38,14 @@ void check_channels(const char* kind, const std::vector<Channel>& channels,
       throw std::invalid_argument(
           fmt::format("stage: {} {}: direction [{}, {}, {}] is not a unit vector", kind,
                       channel.name, d[0], d[1], d[2]));
+    if (spec.flexible_modes > 0 && is_rotation(channel))
+      throw std::invalid_argument(
+          fmt::format("stage: {} {}: a plate with flexible modes is simulated without rotations; "
+                      "use forces and translations, or 'modes: 0'",
+                      kind, channel.name));
+    if (channel.gain == 0.0 || !std::isfinite(channel.gain))
+      throw std::invalid_argument(fmt::format("stage: {} {}: gain is {}; must not be zero", kind,
+                                              channel.name, channel.gain));
     // This form rejects NaN too.
     const bool on_plate = std::abs(p[0]) <= 0.5 * spec.length_x_m * (1.0 + 1e-9) &&
                           std::abs(p[1]) <= 0.5 * spec.length_y_m * (1.0 + 1e-9) &&

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "hal/simulator/plate_modes.hpp"
 #include "hal/simulator/rigid_body.hpp"
@@ -28,7 +29,7 @@ Eigen::VectorXd shape_at(const PlateModes& plate, int mode, double mass_kg,
   Eigen::VectorXd shape(static_cast<Eigen::Index>(channels.size()));
   for (Eigen::Index i = 0; i < shape.size(); ++i) {
     const Channel& channel = channels[static_cast<std::size_t>(i)];
-    shape[i] = channel.direction[2] *
+    shape[i] = channel.gain * channel.direction[2] *
                plate.shape(mode, channel.position_m[0], channel.position_m[1]) / std::sqrt(mass_kg);
   }
   return shape;
@@ -48,6 +49,21 @@ void append_flexible(const WaferStageSpec& spec, std::vector<PlantMode>& modes) 
   }
 }
 
+Eigen::ArrayXd gains_of(const std::vector<Channel>& channels) {
+  Eigen::ArrayXd gains(static_cast<Eigen::Index>(channels.size()));
+  for (Eigen::Index i = 0; i < gains.size(); ++i)
+    gains[i] = channels[static_cast<std::size_t>(i)].gain;
+  return gains;
+}
+
+void separate_accelerations(const std::vector<Channel>& sensors, PlantMode& mode) {
+  if (std::none_of(sensors.begin(), sensors.end(), is_acceleration)) return;
+  mode.acceleration_shape.setZero(mode.sensor_shape.size());
+  for (Eigen::Index i = 0; i < mode.sensor_shape.size(); ++i)
+    if (is_acceleration(sensors[static_cast<std::size_t>(i)]))
+      std::swap(mode.acceleration_shape[i], mode.sensor_shape[i]);
+}
+
 }  // namespace
 
 std::vector<PlantMode> wafer_stage_modes(const WaferStageSpec& spec) {
@@ -55,7 +71,12 @@ std::vector<PlantMode> wafer_stage_modes(const WaferStageSpec& spec) {
   std::vector<PlantMode> modes;
   append_rigid_body(spec, modes);
   append_flexible(spec, modes);
-  modes.insert(modes.end(), spec.in_plane_modes.begin(), spec.in_plane_modes.end());
+  for (PlantMode mode : spec.in_plane_modes) {
+    mode.actuator_shape.array() *= gains_of(spec.info.actuators);
+    mode.sensor_shape.array() *= gains_of(spec.info.sensors);
+    modes.push_back(std::move(mode));
+  }
+  for (PlantMode& mode : modes) separate_accelerations(spec.info.sensors, mode);
   return modes;
 }
 

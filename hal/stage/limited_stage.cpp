@@ -55,6 +55,10 @@ LimitedStage::LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limit
   mean_square_.setZero(largest_n_.size());
 }
 
+void LimitedStage::carry(const MotionControllerSpec& controller) {
+  guard_.carry(controller.feed_forward_n, MotionController(controller).feed_forward_samples());
+}
+
 void LimitedStage::start(std::uint64_t run_seed, Inputs& first) {
   violation_ = {};
   emergency_ = {};
@@ -199,39 +203,41 @@ std::string describe(const LimitViolation& violation, const StageInfo& info) {
   std::string who = fmt::format(
       "{} {}", violation.of_sensor ? "sensor" : "actuator",
       index < channels.size() ? channels[index].name : std::to_string(violation.channel));
-  const auto line = [&](const char* what, const char* unit) {
-    return fmt::format("{}: {} {:.4g} {}, limit {:.4g} {} (cycle {})", who, what,
-                       std::abs(violation.value), unit, violation.limit, unit, violation.cycle);
+  const std::string unit = index < channels.size() ? channels[index].unit : "";
+  const auto line = [&](const char* what, const char* per = "") {
+    return fmt::format("{}: {} {:.4g} {}{}, limit {:.4g} {}{} (cycle {})", who, what,
+                       std::abs(violation.value), unit, per, violation.limit, unit, per,
+                       violation.cycle);
   };
   switch (violation.kind) {
     case LimitKind::none:
       break;
     case LimitKind::actuator:
-      return line("|u| would be", "N");
+      return line("|u| would be");
     case LimitKind::slew:
-      return line("slew would be", "N/s");
+      return line("slew would be", "/s");
     case LimitKind::thermal_rms:
-      return line("thermal rms would be", "N");
+      return line("thermal rms would be");
     case LimitKind::position:
-      return line("|y| is", "m");
+      return line("|y| is");
     case LimitKind::not_finite:
       return fmt::format("{}: {} is not finite (cycle {})", who,
                          violation.of_sensor ? "the measurement" : "the command", violation.cycle);
     case LimitKind::stuck_sensor:
-      return fmt::format("{}: has repeated the value {:.6g} m for {:.4g} s (cycle {})", who,
-                         violation.value, violation.limit, violation.cycle);
+      return fmt::format("{}: has repeated the value {:.6g} {} for {:.4g} s (cycle {})", who,
+                         violation.value, unit, violation.limit, violation.cycle);
     case LimitKind::sensor_jump:
-      return line("jumped from the predicted motion by", "m");
+      return line("jumped from the predicted motion by");
     case LimitKind::deviation:
-      return line("deviation from the predicted motion is", "m");
+      return line("deviation from the predicted motion is");
     case LimitKind::contradiction:
-      return line("differs from the rigid motion of all sensors by", "m");
+      return line("differs from the rigid motion of all sensors by");
     case LimitKind::speed:
-      return line("speed is", "m/s");
+      return line("speed is", "/s");
     case LimitKind::stopping_distance:
-      return line("the stopping position with half of the forces is", "m");
+      return line("the stopping position with half of the forces is");
     case LimitKind::hard_position:
-      return line("|y| is", "m").insert(who.size() + 1, " beyond the hard window:");
+      return line("|y| is").insert(who.size() + 1, " beyond the hard window:");
   }
   return who;
 }
@@ -247,8 +253,12 @@ std::string describe_stop(const LimitedStage& stage) {
   text += "; the loop was opened";
   if (std::abs(emergency.response - 1.0) > 0.1)
     text += fmt::format(", the response was {:.2g} times the expected one", emergency.response);
-  return text + fmt::format("; {}, {:.2g} m/s when the forces were cut",
-                            emergency.braked ? "braked" : "not braked", emergency.speed_m_s);
+  std::vector<Channel> moving = stage.info().sensors;
+  std::erase_if(moving, is_acceleration);
+  const std::string unit = common_unit(moving);
+  return text + fmt::format("; {}, {:.2g}{} when the forces were cut",
+                            emergency.braked ? "braked" : "not braked", emergency.speed_m_s,
+                            unit.empty() ? "" : unit + "/s");
 }
 
 }  // namespace stageid

@@ -6,6 +6,7 @@
 
 #include "hal/stage/limits.hpp"
 #include "hal/stage/loop_guard.hpp"
+#include "hal/stage/motion_controller.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -38,6 +39,9 @@ class LimitedStage final : public CyclicStage {
   /// @throws std::invalid_argument if a limit vector has the wrong size or an entry is not
   /// positive.
   LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limits);
+
+  /// The feed-forward of the controller is not expected to move the stage, see LoopGuard::carry().
+  void carry(const MotionControllerSpec& controller);
 
   const StageInfo& info() const noexcept override { return stage_->info(); }
   /// @throws StageError also if the stage is outside its position window or a measurement is not finite.

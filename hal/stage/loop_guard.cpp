@@ -116,6 +116,9 @@ LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
     *state = p_;
   repeats_.setZero(sensors);
   believed_.setConstant(sensors, true);
+  moves_.resize(sensors);
+  for (Eigen::Index i = 0; i < sensors; ++i)
+    moves_[i] = !is_acceleration(info.sensors[static_cast<std::size_t>(i)]);
 }
 
 /// Three equal poles of a constant-acceleration observer (a g-h-k filter, critically damped).
@@ -126,7 +129,15 @@ LoopGuard::Gains LoopGuard::observer_gains(double pole_rad_s, double rate_hz) no
           rest * rest * rest * rate_hz * rate_hz};
 }
 
+void LoopGuard::carry(const Eigen::VectorXd& load, std::uint64_t ramp_samples) {
+  if (load.size() == 0 || ramp_samples == 0 || !model_known_) return;
+  require_size(load.size(), static_cast<std::size_t>(force_.size()), "load");
+  load_ = load;
+  load_samples_ = ramp_samples;
+}
+
 void LoopGuard::start(const Inputs& first) noexcept {
+  carried_samples_ = 0;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
     const double y = first.y[static_cast<std::size_t>(i)];
     p_[i] = std::isfinite(y) ? y : 0.0;
@@ -165,6 +176,10 @@ void LoopGuard::predict(const Eigen::ArrayXd& u) noexcept {
 /// Acceleration by the commands that act in this interval, which are delayed by a fractional number of samples.
 void LoopGuard::find_acceleration(const Eigen::ArrayXd& u) noexcept {
   force_ = u.matrix();
+  if (load_.size() > 0) {
+    carried_samples_ = std::min(carried_samples_ + 1, load_samples_);
+    force_ -= carried_share() * load_;
+  }
   newest_ = newest_ + 1 == accelerations_.cols() ? 0 : newest_ + 1;
   acting_.noalias() = acceleration_per_n_ * force_;
   accelerations_.col(newest_) = acting_.array();
@@ -304,13 +319,15 @@ void LoopGuard::choose_brake_rate() noexcept {
 void LoopGuard::brake(Eigen::ArrayXd& u) noexcept {
   wanted_acceleration_ = -(brake_rate_rad_s_ * v_ + d_).matrix() / brake_divisor_;
   force_.noalias() = force_per_acceleration_ * wanted_acceleration_;
+  if (load_.size() > 0) force_ += carried_share() * load_;
   u = force_.array();
   --brake_samples_left_;
 }
 
 double LoopGuard::speed_m_s() const noexcept {
   double largest = 0.0;
-  for (Eigen::Index i = 0; i < v_.size(); ++i) largest = std::max(largest, std::abs(speed(i)));
+  for (Eigen::Index i = 0; i < v_.size(); ++i)
+    if (moves_[i]) largest = std::max(largest, std::abs(speed(i)));
   return largest;
 }
 

@@ -48,6 +48,9 @@ class LoopGuard {
   /// entry is not positive.
   LoopGuard(const StageLimits& limits, const StageInfo& info);
 
+  /// A constant load, e.g. the weight, that the commands take over in their first `ramp_samples`: this part of them
+  /// does not accelerate the stage, and a brake continues it. @throws std::invalid_argument for a wrong size
+  void carry(const Eigen::VectorXd& load, std::uint64_t ramp_samples);
   /// Starts at rest at y.
   void start(const Inputs& first) noexcept;
   /// Takes the forces of the interval that begins now.
@@ -88,6 +91,9 @@ class LoopGuard {
                                   std::uint64_t cycle) noexcept {
     return {kind, static_cast<int>(sensor), value, limit, cycle, true};
   }
+  double carried_share() const noexcept {
+    return static_cast<double>(carried_samples_) / static_cast<double>(load_samples_);
+  }
   void choose_brake_rate() noexcept;
   void correct(Eigen::Index sensor, double error) noexcept;
   double speed(Eigen::Index sensor) const noexcept {
@@ -121,6 +127,9 @@ class LoopGuard {
   Eigen::Index newest_ = 0;
   Eigen::VectorXd acting_;
   Eigen::VectorXd force_;
+  Eigen::VectorXd load_;  // empty: none
+  std::uint64_t load_samples_ = 1;
+  std::uint64_t carried_samples_ = 0;
   Eigen::VectorXd wanted_acceleration_;
   Eigen::VectorXd measured_;
   Eigen::VectorXd contradicting_;
@@ -131,6 +140,7 @@ class LoopGuard {
   Eigen::ArrayXd last_y_;
   Eigen::Array<std::uint32_t, Eigen::Dynamic, 1> repeats_;
   Eigen::Array<bool, Eigen::Dynamic, 1> believed_;
+  Eigen::Array<bool, Eigen::Dynamic, 1> moves_;  // not a sensor of acceleration
   bool sensor_failed_ = false;
   bool open_ = false;            // whether the loop is open; the brake's observer has faster poles
   double error_by_force_ = 0.0;  // mean of e e_f and e_f^2, relative to deviation_m^2

@@ -14,7 +14,7 @@ ReplayStage::ReplayStage(StageInfo info, std::unique_ptr<ReplaySource> source, d
   if (!source_) throw std::invalid_argument("replay: a source is required");
   if (!(tolerance_n >= 0.0) || !std::isfinite(tolerance_n))
     throw std::invalid_argument(
-        fmt::format("replay: the tolerance must be 0 N or more; got {}", tolerance_n));
+        fmt::format("replay: the tolerance must be 0 or more; got {}", tolerance_n));
   if (info_.sensors.empty() || info_.sensors.size() > 64)
     throw std::invalid_argument(
         fmt::format("replay: {} sensors are unsupported; must be 1 to 64", info_.sensors.size()));

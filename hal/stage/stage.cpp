@@ -2,6 +2,20 @@
 
 namespace stageid {
 
+bool is_rotation(const Channel& channel) noexcept {
+  return channel.unit == "Nm" || channel.unit == "rad" || channel.unit == "rad/s^2";
+}
+
+bool is_acceleration(const Channel& channel) noexcept {
+  return channel.unit == "m/s^2" || channel.unit == "rad/s^2";
+}
+
+std::string common_unit(const std::vector<Channel>& channels) {
+  for (const Channel& channel : channels)
+    if (channel.unit != channels.front().unit) return "";
+  return channels.empty() ? "" : " " + channels.front().unit;
+}
+
 int channel_index(const std::vector<Channel>& channels, const std::string& name) noexcept {
   for (std::size_t i = 0; i < channels.size(); ++i)
     if (channels[i].name == name) return static_cast<int>(i);

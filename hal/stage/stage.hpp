@@ -14,18 +14,30 @@ class StageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// One actuator or sensor, SI units.
+/// One actuator or sensor. Its values are in its unit; positions are in metres.
 struct Channel {
   std::string name;
-  std::string unit;                     ///< "N", "m"
+  std::string unit;  ///< "N", "Nm", "A", "V"; "m", "rad", "m/s^2", "rad/s^2", "V"
   double position_m[3] = {0., 0., 0.};  ///< on the stage, centre of mass = origin
-  double direction[3] = {0., 0., 1.};   ///< unit vector
+  double direction[3] = {0., 0., 1.};   ///< unit vector; of a rotation: its axis
+  /// Of an actuator: N or Nm per unit; of a sensor: units per m or rad, or per m/s^2 or rad/s^2.
+  double gain = 1.0;
 };
+
+/// Whether a channel is a torque, or measures a rotation: by its unit.
+bool is_rotation(const Channel& channel) noexcept;
+/// Whether a sensor measures acceleration: by its unit.
+bool is_acceleration(const Channel& channel) noexcept;
+/// The unit of all these channels with a blank before it; empty if they have several.
+std::string common_unit(const std::vector<Channel>& channels);
 
 /// Index of the channel of that name, -1 if there is none.
 int channel_index(const std::vector<Channel>& channels, const std::string& name) noexcept;
 
 enum class Clock : std::uint8_t { virtual_time, wall };
+
+/// What happens to the stage between the runs of an experiment: its forces are cut, or the controller keeps it.
+enum class BetweenRuns : std::uint8_t { release, hold };
 
 /// Properties of a back end; an unsuitable experiment is refused before it starts.
 struct StageInfo {

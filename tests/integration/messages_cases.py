@@ -39,6 +39,11 @@ def stage(old, new):
     return "the stage", (old, new)
 
 
+def controller(text):
+    return stage("controller:\n  z: &loop {crossover_hz: 20, integrator_hz: 2, lead_zero_hz: 6, lead_pole_hz: 80, "
+                 "lowpass_hz: 200}\n  Ry: *loop", f"controller: {text}")
+
+
 def fault(entry):
     return stage("controller:", f"faults: [{entry}]\ncontroller:")
 
@@ -132,6 +137,14 @@ case("Negative mass", CHECK_STAGE, stage("mass_kg: 8", "mass_kg: -8"))
 case("Direction that is not a unit vector", CHECK_STAGE, stage("direction: [0, 0, 1]", "direction: [0, 1, 1]"))
 case("Position with two coordinates", CHECK_STAGE, stage("[-0.20, -0.12, 0]", "[-0.20, -0.12]"))
 case("Duplicate channel", CHECK_STAGE, stage("name: a2", "name: a1"))
+case("Limit in N of a current", CHECK_STAGE, stage("unit: N, position_m: [-0.20", "unit: A, position_m: [-0.20"))
+case("Limit in two units", CHECK_STAGE, stage("limit_n: 40,", "limit_n: 40, limit: 40,"))
+case("Missing limit", CHECK_STAGE, stage("limit_n: 40, ", ""))
+case("Bias above the limit", CHECK_STAGE, stage("limit_n: 40,", "limit_n: 40, bias_n: 50,"))
+case("Controller of two kinds", CHECK_STAGE, stage("  Ry: *loop", "  state_space: {d: [1, 0, 0, 1, 0, 1]}"))
+case("Controller with a matrix of the wrong size", CHECK_STAGE, stage(
+    "  Ry: *loop", "  Ry: *loop\n  state_space: {d: [1, 0]}"))
+case("Controller in a file of unknown kind", CHECK_STAGE, controller("loop.doc"))
 case("Duplicate key", CHECK_STAGE, stage("delay_s: 600e-6", "sample_rate_hz: 1000\ndelay_s: 600e-6"))
 case("Undefined anchor", CHECK_STAGE, stage("Ry: *loop", "Ry: *lopp"))
 case("Unknown back end", CHECK_STAGE, stage("backend: sim", "backend: ethercat"))
@@ -166,6 +179,7 @@ case("Excitation that is a log", f"{RUN} --excitation run.slog")
 case("Unknown back end on the command line", f"{RUN} --backend ethercat")
 case("Replay without a log", f"{RUN} --backend replay")
 case("Replay of a text", f"{RUN} --backend replay --replay letter.txt")
+case("Controller of the stage itself, simulated", RUN, controller("peer"))
 case("Plugin that is missing", RUN, stage("backend: sim", "backend: plugin\nplugin: {library: libbench.so}"))
 case("Plugin that is not a library", RUN, stage("backend: sim", "backend: plugin\nplugin: {library: ../../letter.txt}"),
      needs=("letter.txt",))  # fmt: skip

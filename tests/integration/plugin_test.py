@@ -6,6 +6,7 @@ plugin_test.py STAGEID UDP_PEER SOURCE_DIR WORK_DIR
 """
 
 import json
+import math
 import pathlib
 import shutil
 import subprocess
@@ -84,6 +85,58 @@ class Plugin(unittest.TestCase):
         self.peer(0, port)
         done = run("run", experiment, "-o", log, "--resume")
         self.assertEqual(done.returncode, 0, done.stderr)
+
+    def without_plant(self, name, port, **changes):
+        """The stage file of a real stage: no plant, the gains of the controller in N/m and N m/rad."""
+        def gain(inertia):
+            crossover, integrator, zero, pole, low = (2j * math.pi * hz for hz in (20, 2, 6, 80, 200))
+            x = crossover / abs(low)
+            controller = ((1 + abs(integrator) / crossover) * (crossover / abs(zero) + 1)
+                          / (crossover / abs(pole) + 1) / (x * x + 1.4 * x + 1))
+            return inertia * abs(crossover) ** 2 / abs(controller)
+        file = self.udp(name, port)
+        stage = self.work / f"{name}_stage.yaml"
+        text = stage.read_text()
+        text = text[:text.index("plant:")] + "controller:" + text[text.index("controller:") + len("controller:"):]
+        text = text.replace("z: &loop {", f"z: {{gain: {gain(8.0)}, ")
+        axis = text[text.index("z: {") + 3:].split("}")[0] + "}"
+        text = text.replace("Ry: *loop", "Ry: " + axis.replace(str(gain(8.0)), str(gain(0.25))))
+        for old, new in changes.items():
+            text = text.replace(old, new)
+        stage.write_text(text)
+        return file, stage
+
+    def test_a_real_stage_needs_no_plant_and_can_be_held(self):
+        file, stage = self.without_plant("real", self.peer(), stuck_sensor_s="between_runs: hold\nstuck_sensor_s")
+        self.assertNotIn("plant:", stage.read_text())
+        for checked in (file, stage):
+            done = run("config", "check", checked)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("stability of the loop is not tested: there is no 'plant'", done.stderr)
+        done = run("design", file, "-o", self.work / "blind.h5")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("signals are not predicted: the stage file has no 'plant'", done.stderr)
+        log, frf = self.work / "real.slog", self.work / "real.h5"
+        done = run("run", file, "-o", log)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("--json", "frf", log, "-o", frf, "--stage", stage)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        findings = json.loads(done.stdout)["health"]
+        self.assertEqual([f for f in findings if f["severity"] in ("fault", "doubt")], [])
+        self.assertTrue(any("geometry and mass" in f["remedy"] for f in findings), findings)
+        # What the pilot says replaces the plant: the loop is tested and the signals are predicted.
+        designed = self.work / "designed.yaml"
+        designed.write_text(file.read_text().replace(
+            "level: {rms_n: 1.0}", "level: {limits: {prior: real.h5}}\n  crest_iterations: 20"))
+        done = run("design", designed, "-o", self.work / "designed.h5")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("not tested", done.stderr)
+        done = run("run", file, "-o", self.work / "sim.slog", "--backend", "sim")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("has no group 'plant', which is the simulated stage", done.stderr)
+        done = run("identify", file, "-o", self.work / "all")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("truth", json.loads((self.work / "all/summary.json").read_text()))
 
     def refused(self, name, plugin, *words):
         done = run("run", self.experiment(name, plugin), "-o", self.work / f"{name}.slog")

@@ -104,6 +104,15 @@ void require_within_limits(const ExperimentConfig& config, const DesignPredictio
       fmt::format("{}{}; lower the level, or override with --force", violations.front(), more));
 }
 
+void warn_of_prediction(const ExperimentConfig& config, const Console& console) {
+  const std::string reason = why_unpredictable(config.stage.spec);
+  if (reason.empty()) return;
+  console.warning(
+      fmt::format("{}: actuator and sensor signals are not predicted: {}. The limits "
+                  "are enforced by stopping the run. Begin with a low level",
+                  config.stage.file.string(), reason));
+}
+
 DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(
       app, "design",
@@ -134,6 +143,7 @@ void DesignCommand::run() const {
                       "FILE}}' in the experiment file");
   const ExperimentPlan plan = make_plan(config);
   const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
+  warn_of_prediction(config, console_);
   const bool written = force_ || prediction.violations().empty();
   if (written) write_experiment_plan(output_, plan);
   for (const std::string& line : design_table(config, plan, prediction)) console_.result(line);

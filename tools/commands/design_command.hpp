@@ -30,6 +30,9 @@ class DesignCommand {
 std::vector<std::string> design_table(const ExperimentConfig& config, const ExperimentPlan& plan,
                                       const DesignPrediction& prediction);
 
+/// Warns if the signals of the stage cannot be predicted, see why_unpredictable().
+void warn_of_prediction(const ExperimentConfig& config, const Console& console);
+
 /// @throws std::invalid_argument naming the first limit that would be exceeded, and the number of others.
 void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction);
 

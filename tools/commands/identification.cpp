@@ -71,7 +71,7 @@ Identification::Identification(const ExperimentConfig& config, IdentificationReq
     : config_(config), request_(std::move(request)), console_(console), plan_(make_plan(config)) {}
 
 int Identification::run() {
-  require_backend(config_, config_.stage.backend);
+  require_backend(config_, config_.stage.backend, config_.stage.spec.pace);
   say_at_interrupt("finished steps are kept; continue with --resume");
   design();
   const int measured = measure_all();
@@ -102,6 +102,7 @@ void Identification::design() {
   // Within limits it was designed from the knowledge of a pilot; the plant in the stage file must not be used.
   const DesignPrediction prediction =
       config_.limits ? DesignPrediction{} : predict_closed_loop(plan_, config_.stage.spec);
+  if (!config_.limits) warn_of_prediction(config_, console_);
   if (!request_.force) require_within_limits(config_, prediction);
   require_directory(request_.directory);
   write_experiment_plan(path("excitation.h5"), plan_);
@@ -235,7 +236,8 @@ void Identification::check_model() {
         validate(model_, select_band(*validation_frf_, low_hz, high_hz), distortion_of(model_));
   }
   verdict_ = judge_model(model_, health_, validation_);
-  truth_ = compare_with_truth(model_, setup_->frf, config_.stage.spec);
+  if (config_.stage.spec.has_plant())
+    truth_ = compare_with_truth(model_, setup_->frf, config_.stage.spec);
 }
 
 void Identification::write_outputs() {

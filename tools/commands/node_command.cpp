@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "acquisition/files/file_error.hpp"
 #include "hal/can/can_node.hpp"
 #include "hal/can/can_socket.hpp"
 #include "hal/can/faulty_can.hpp"
@@ -150,6 +151,13 @@ void NodeCommand::run() {
     throw std::invalid_argument(
         "node: nothing to serve; add --can INTERFACE, --modbus-tcp PORT or --modbus-rtu DEVICE");
   const StageConfig config = load_stage_config(config_);
+  if (!config.spec.has_plant())
+    throw FormatError(config_, "",
+                      "the node simulates the stage, but there is no group 'plant'; add it");
+  if (config.spec.controller.by_peer)
+    throw FormatError(
+        config_, "",
+        "the node closes the loop, but its controller is 'peer'; write the controller");
   const ControlledStop comes_to_rest;
   StageNode node = make_node(config);
   if (modbus_.wanted()) modbus_.start(node, config.spec.limits);

@@ -39,7 +39,8 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   command
       ->add_option(
           "--replay-tolerance", replay_tolerance_n_,
-          "backend replay: largest allowed difference between a command and the recorded one, N")
+          "backend replay: largest allowed difference between a command and the recorded one, in "
+          "the unit of the actuators")
       ->capture_default_str();
   command
       ->add_option("--pace", pace_,

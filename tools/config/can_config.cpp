@@ -72,9 +72,13 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
   v.numbers(
       "actuator_range_n", f.actuator_range_n, positive("N"), {}, kOptional,
       "full scale of 2^23 counts; one for all or one per actuator; omitted: 1.25 times limit_n");
+  v.numbers("actuator_range", f.actuator_range_n, positive(""), {}, kOptional,
+            "the same in the units of the actuators");
   v.numbers(
       "sensor_range_m", f.sensor_range_m, positive("m"), {}, kOptional,
       "full scale of 2^23 counts; one for all or one per sensor; omitted: 1.25 times window_m");
+  v.numbers("sensor_range", f.sensor_range_m, positive(""), {}, kOptional,
+            "the same in the units of the sensors");
   std::size_t clock = spec.node_clock ? 1 : 0;
   v.choice("clock", clock, {"host", "node"}, kOptional,
            "of the samples; node: the node samples at its own ticks and the host follows it, with "

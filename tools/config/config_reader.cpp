@@ -194,6 +194,17 @@ class MapReader final : public ConfigVisitor {
       if (const YamlNode* node = find(key, presence, help)) read_map(key, *node, describe);
     });
   }
+  void group_or_text(const char* key, const Describe& describe, std::string& text,
+                     Presence presence, const char* help) override {
+    errors_.attempt([&] {
+      const YamlNode* node = find(key, presence, help);
+      if (node == nullptr) return;
+      if (node->kind == YamlNode::Kind::scalar && !node->text.empty())
+        text = node->text;
+      else
+        read_map(key, *node, describe);
+    });
+  }
   void items(const char* key, const Describe& describe_item, CountRule count, Presence presence,
              const char* help) override {
     errors_.attempt([&] {

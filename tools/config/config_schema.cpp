@@ -63,6 +63,11 @@ class SchemaCollector final : public ConfigVisitor {
     add(key, "map", {}, "", presence, help);
     descend(describe);
   }
+  void group_or_text(const char* key, const Describe& describe, std::string&, Presence presence,
+                     const char* help) override {
+    add(key, "map or text", {}, "", presence, help);
+    descend(describe);
+  }
   void items(const char* key, const Describe& describe_item, CountRule count, Presence presence,
              const char* help) override {
     add(key, fmt::format("list of maps, {}", describe_count(count)), {}, "[]", presence, help);

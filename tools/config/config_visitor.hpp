@@ -83,6 +83,9 @@ class ConfigVisitor {
   /// A map with described keys.
   virtual void group(const char* key, const Describe& describe, Presence presence,
                      const char* help) = 0;
+  /// A map with described keys, or a text.
+  virtual void group_or_text(const char* key, const Describe& describe, std::string& text,
+                             Presence presence, const char* help) = 0;
   /// A list of maps; `describe_item` is called once per item.
   virtual void items(const char* key, const Describe& describe_item, CountRule count,
                      Presence presence, const char* help) = 0;

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/config/config_reader.hpp"
+#include "tools/config/controller_keys.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/config/stage_expectation.hpp"
 
@@ -24,89 +24,19 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr std::size_t kMostStates = 1000;
 constexpr double kMeasuredError = 0.02;  // relative to C y; of a response between its lines
 
 enum class Time : std::uint8_t { discrete, continuous };
-
-struct StateSpace {
-  std::vector<double> a, b, c, d;
-};
-
-struct Transfer {
-  std::string actuator, sensor;
-  std::vector<double> numerator, denominator;
-};
 
 /// Content of the file, key by key.
 struct ControllerFile {
   std::size_t format = 0;
   std::string stage;
-  std::vector<std::string> sensors;
-  std::vector<std::string> actuators;
   Time time = Time::discrete;
   double sample_rate_hz = 0.0;
-  bool has_state_space = false;
-  StateSpace state_space;
-  std::vector<Transfer> transfer;
+  LinearControllerKeys linear;
   std::string measured;
 };
-
-void describe_matrix(ConfigVisitor& v, const char* key, std::vector<double>& values,
-                     Presence presence, const char* help) {
-  v.numbers(key, values, any_number(""), {0, kMostStates * kMostStates}, presence, help);
-}
-
-void describe_state_space(ConfigVisitor& v, ControllerFile& f) {
-  StateSpace& s = f.state_space;
-  f.has_state_space = true;
-  describe_matrix(v, "a", s.a, kOptional, "states x states, row by row; omitted: no states");
-  describe_matrix(v, "b", s.b, kOptional, "states x sensors, row by row");
-  describe_matrix(v, "c", s.c, kOptional, "actuators x states, row by row");
-  describe_matrix(v, "d", s.d, kOptional, "actuators x sensors, row by row; omitted: zero");
-  const auto n = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(s.a.size()))));
-  const std::size_t n_y = f.sensors.size();
-  const std::size_t n_u = f.actuators.size();
-  const auto check = [&](const char* key, std::size_t have, std::size_t rows, std::size_t columns) {
-    v.require(have == rows * columns, key,
-              fmt::format("{}: got {}; expected a matrix of {} x {}, {} numbers, row by row", key,
-                          counted(have, "number"), rows, columns, rows * columns));
-  };
-  check("a", s.a.size(), n, n);
-  check("b", s.b.size(), n, n_y);
-  check("c", s.c.size(), n_u, n);
-  if (!s.d.empty()) check("d", s.d.size(), n_u, n_y);
-  v.require(n > 0 || !s.d.empty(), "d", "d: required for a controller without states");
-}
-
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-void describe_transfer(ConfigVisitor& v, ControllerFile& f) {
-  Transfer t;
-  v.text("actuator", t.actuator, kRequired, "actuator that it drives");
-  v.text("sensor", t.sensor, kRequired, "sensor that it reads");
-  v.numbers("numerator", t.numerator, any_number(""), {1, kMostStates}, kRequired,
-            "coefficients of falling powers of z or s");
-  v.numbers("denominator", t.denominator, any_number(""), {1, kMostStates}, kRequired,
-            "coefficients of falling powers of z or s");
-  v.require(contains(f.actuators, t.actuator), "actuator",
-            fmt::format("actuator: '{}' is not in the list 'actuators'", t.actuator));
-  v.require(contains(f.sensors, t.sensor), "sensor",
-            fmt::format("sensor: '{}' is not in the list 'sensors'", t.sensor));
-  v.require(
-      std::any_of(t.denominator.begin(), t.denominator.end(), [](double x) { return x != 0.0; }),
-      "denominator",
-      "denominator: all coefficients are zero; write at least one nonzero coefficient");
-  const bool twice = std::any_of(f.transfer.begin(), f.transfer.end(), [&](const Transfer& other) {
-    return other.actuator == t.actuator && other.sensor == t.sensor;
-  });
-  v.require(!twice, "sensor",
-            fmt::format("sensor: duplicate transfer function from '{}' to '{}'; write their sum",
-                        t.sensor, t.actuator));
-  f.transfer.push_back(std::move(t));
-}
 
 void require_unique(ConfigVisitor& v, const char* key, const std::vector<std::string>& names) {
   v.require(std::set<std::string>(names.begin(), names.end()).size() == names.size(), key,
@@ -118,36 +48,28 @@ void describe(ConfigVisitor& v, ControllerFile& f) {
   v.text("stage", f.stage, kOptional,
          "stage file with geometry and mass, relative to this one; omitted: the wiring is not "
          "checked");
-  v.texts("sensors", f.sensors, {0, 64}, kOptional, "inputs of the controller, in its order");
-  v.texts("actuators", f.actuators, {0, 64}, kOptional, "outputs of the controller, in its order");
-  require_unique(v, "sensors", f.sensors);
-  require_unique(v, "actuators", f.actuators);
+  v.texts("sensors", f.linear.sensors, {0, 64}, kOptional,
+          "inputs of the controller, in its order");
+  v.texts("actuators", f.linear.actuators, {0, 64}, kOptional,
+          "outputs of the controller, in its order");
+  require_unique(v, "sensors", f.linear.sensors);
+  require_unique(v, "actuators", f.linear.actuators);
   choose(v, "time", f.time, {"discrete", "continuous"}, kOptional,
          "time domain of matrices and coefficients");
   v.number("sample_rate_hz", f.sample_rate_hz, positive("Hz"), kOptional,
            "of a discrete controller");
-  v.group(
-      "state_space", [&](ConfigVisitor& group) { describe_state_space(group, f); }, kOptional,
-      "matrices from y to C y, u = r - C y");
-  v.items(
-      "transfer", [&](ConfigVisitor& item) { describe_transfer(item, f); }, {}, kOptional,
-      "transfer functions from y to C y, u = r - C y; omitted pairs: zero");
+  describe_linear_controller(v, f.linear);
   v.text("measured", f.measured, kOptional,
          "or a frequency response in HDF5, laid out as frf.h5, relative to this file: its inputs "
          "are the sensors, its outputs the actuators");
-  const int forms = int{f.has_state_space} + int{!f.transfer.empty()} + int{!f.measured.empty()};
+  const int forms =
+      int{f.linear.has_state_space} + int{!f.linear.transfer.empty()} + int{!f.measured.empty()};
   v.require(forms == 1, "format", "write exactly one of state_space, transfer and measured");
   const bool matrices = f.measured.empty();
-  v.require(!matrices || (!f.sensors.empty() && !f.actuators.empty()), "format",
+  v.require(!matrices || (!f.linear.sensors.empty() && !f.linear.actuators.empty()), "format",
             "sensors, actuators: missing; list the channels of the matrices, in their order");
   v.require(!matrices || f.time == Time::continuous || f.sample_rate_hz > 0.0, "format",
             "sample_rate_hz: required for a discrete controller");
-}
-
-Eigen::MatrixXd matrix_of(const std::vector<double>& values, Index rows, Index columns) {
-  if (values.empty()) return Eigen::MatrixXd::Zero(rows, columns);
-  return Eigen::Map<const Eigen::Matrix<double, -1, -1, Eigen::RowMajor>>(values.data(), rows,
-                                                                          columns);
 }
 
 /// z or s at a frequency.
@@ -164,9 +86,9 @@ std::complex<double> polynomial(const std::vector<double>& coefficients, std::co
 }
 
 NominalStage of_state_space(const ControllerFile& f) {
-  const auto n_y = static_cast<Index>(f.sensors.size());
-  const auto n_u = static_cast<Index>(f.actuators.size());
-  const StateSpace& s = f.state_space;
+  const auto n_y = static_cast<Index>(f.linear.sensors.size());
+  const auto n_u = static_cast<Index>(f.linear.actuators.size());
+  const LinearControllerKeys::StateSpace& s = f.linear.state_space;
   const Index n = s.a.empty() ? 0 : static_cast<Index>(s.b.size()) / n_y;
   NominalStage nominal;
   nominal.controller = [f, A = matrix_of(s.a, n, n), B = matrix_of(s.b, n, n_y),
@@ -185,13 +107,13 @@ NominalStage of_state_space(const ControllerFile& f) {
 NominalStage of_transfer(const ControllerFile& f) {
   NominalStage nominal;
   nominal.controller = [f](double hz) {
-    Eigen::MatrixXcd response = Eigen::MatrixXcd::Zero(static_cast<Index>(f.actuators.size()),
-                                                       static_cast<Index>(f.sensors.size()));
+    Eigen::MatrixXcd response = Eigen::MatrixXcd::Zero(
+        static_cast<Index>(f.linear.actuators.size()), static_cast<Index>(f.linear.sensors.size()));
     const std::complex<double> x = variable_of(f, hz);
-    for (const Transfer& t : f.transfer) {
-      const auto u = std::find(f.actuators.begin(), f.actuators.end(), t.actuator);
-      const auto y = std::find(f.sensors.begin(), f.sensors.end(), t.sensor);
-      response(u - f.actuators.begin(), y - f.sensors.begin()) =
+    for (const LinearControllerKeys::Transfer& t : f.linear.transfer) {
+      const auto u = std::find(f.linear.actuators.begin(), f.linear.actuators.end(), t.actuator);
+      const auto y = std::find(f.linear.sensors.begin(), f.linear.sensors.end(), t.sensor);
+      response(u - f.linear.actuators.begin(), y - f.linear.sensors.begin()) =
           -polynomial(t.numerator, x) / polynomial(t.denominator, x);
     }
     return response;
@@ -223,6 +145,12 @@ NominalStage of_measured(const std::filesystem::path& file) {
   return nominal;
 }
 
+ControllerFile read_keys(const YamlDocument& document) {
+  ControllerFile f;
+  read_config(document, [&](ConfigVisitor& visitor) { describe(visitor, f); });
+  return f;
+}
+
 }  // namespace
 
 bool is_controller_file(const YamlDocument& document) {
@@ -232,19 +160,26 @@ bool is_controller_file(const YamlDocument& document) {
   });
 }
 
+LinearControllerKeys read_discrete_controller(const YamlDocument& document,
+                                              double& sample_rate_hz) {
+  const ControllerFile f = read_keys(document);
+  if (f.linear.empty() || f.time != Time::discrete)
+    throw FormatError(document.file(), "",
+                      "the controller cannot be computed sample by sample. Write a discrete "
+                      "state_space or transfer");
+  sample_rate_hz = f.sample_rate_hz;
+  return f.linear;
+}
+
 NominalStage read_controller_file(const YamlDocument& document) {
-  ControllerFile f;
-  read_config(document, [&](ConfigVisitor& visitor) {
-    f = ControllerFile{};
-    describe(visitor, f);
-  });
+  const ControllerFile f = read_keys(document);
   const std::filesystem::path folder = document.file().parent_path();
-  NominalStage nominal = f.has_state_space     ? of_state_space(f)
-                         : !f.transfer.empty() ? of_transfer(f)
-                                               : of_measured(folder / f.measured);
+  NominalStage nominal = f.linear.has_state_space     ? of_state_space(f)
+                         : !f.linear.transfer.empty() ? of_transfer(f)
+                                                      : of_measured(folder / f.measured);
   if (f.measured.empty()) {
-    nominal.sensors = f.sensors;
-    nominal.actuators = f.actuators;
+    nominal.sensors = f.linear.sensors;
+    nominal.actuators = f.linear.actuators;
   }
   if (!f.stage.empty()) {
     const NominalStage stage = nominal_stage(load_stage_config(folder / f.stage).spec);

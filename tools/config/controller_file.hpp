@@ -4,6 +4,7 @@
 
 #include "frf/wiring/nominal_stage.hpp"
 #include "tools/config/config_visitor.hpp"
+#include "tools/config/controller_keys.hpp"
 #include "tools/config/strict_yaml.hpp"
 
 namespace stageid {
@@ -15,6 +16,10 @@ bool is_controller_file(const YamlDocument& document);
 /// measured response, with u = r - C y. If it names a `stage`, the rigid body is that of the stage.
 /// @throws FileError, FormatError "FILE:LINE:COLUMN: problem; remedy".
 NominalStage read_controller_file(const YamlDocument& document);
+
+/// The matrices or transfer functions of such a file, for a loop at its sample rate.
+/// @throws FormatError also if the controller is measured or continuous
+LinearControllerKeys read_discrete_controller(const YamlDocument& document, double& sample_rate_hz);
 
 /// The keys of a controller file. Used by `stageid config schema`.
 void describe_controller_keys(ConfigVisitor& visitor);

@@ -9,12 +9,16 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "hal/simulator/rigid_body.hpp"
+#include "hal/stage/loop_guard.hpp"
 #include "tools/config/config_reader.hpp"
+#include "tools/config/loop_controller.hpp"
 #include "tools/config/stage_keys.hpp"
 #include "tools/config/strict_yaml.hpp"
 
 namespace stageid {
 namespace {
+
+constexpr const char* kPeer = "peer";
 
 template <typename Member>
 Eigen::VectorXd limit_vector(const std::vector<ChannelConfig>& channels, Member member) {
@@ -72,6 +76,9 @@ void take_limits(const StageFile& file, WaferStageSpec& spec) {
   spec.limits.position_window_m = limit_vector(file.sensors, &ChannelConfig::window_m);
   spec.limits.hard_window_m = by_window(file.sensors, &ChannelConfig::hard_window_m, 2.0);
   spec.limits.deviation_m = by_window(file.sensors, &ChannelConfig::deviation_m, 0.5);
+  for (std::size_t i = 0; i < file.sensors.size(); ++i)
+    if (is_acceleration(file.sensors[i].channel))  // not predicted
+      spec.limits.deviation_m[static_cast<Eigen::Index>(i)] = kNoLimit;
   spec.limits.speed_m_s = limit_vector(file.sensors, &ChannelConfig::speed_m_s);
   spec.limits.thermal_time_constant_s = file.thermal_time_constant_s;
 }
@@ -92,6 +99,30 @@ void take_faults(const StageConfig& config, const StageFile& file, WaferStageSpe
   }
 }
 
+void take_controller(StageConfig& config, const StageFile& file,
+                     const std::array<double, kRigidAxes>& inertia) {
+  const StageInfo& info = config.spec.info;
+  MotionControllerSpec& controller = config.spec.controller;
+  LinearControllerKeys linear = file.linear;
+  if (!config.controller_text.empty())
+    linear = parse_loop_controller(config.file.parent_path() / file.controller,
+                                   config.controller_text, info.sample_rate_hz);
+  if (file.controller.empty() && linear.empty()) {
+    controller = motion_controller_spec(info.sample_rate_hz, info.actuators, info.sensors,
+                                        file.axes, inertia);
+  } else {
+    controller.sample_rate_hz = info.sample_rate_hz;
+    controller.by_peer = file.controller == kPeer;
+    controller.sensor_decoupling.resize(0, static_cast<Eigen::Index>(info.sensors.size()));
+    controller.actuator_decoupling.resize(static_cast<Eigen::Index>(info.actuators.size()), 0);
+    take_linear_controller(linear, info.actuators, info.sensors, controller);
+  }
+  controller.feed_forward_ramp_s = file.ramp_s;
+  controller.feed_forward_n.resize(static_cast<Eigen::Index>(file.actuators.size()));
+  for (Eigen::Index i = 0; i < controller.feed_forward_n.size(); ++i)
+    controller.feed_forward_n[i] = file.actuators[static_cast<std::size_t>(i)].bias_n;
+}
+
 void complete_spec(StageConfig& config, const StageFile& file) {
   WaferStageSpec& spec = config.spec;
   spec = file.spec;
@@ -101,8 +132,10 @@ void complete_spec(StageConfig& config, const StageFile& file) {
   spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
   spec.info.actuators = channels_of(file.actuators);
   spec.info.sensors = channels_of(file.sensors);
-  std::copy_n(file.inertia_kg_m2.begin(), 3, spec.inertia_kg_m2);
-  std::copy_n(file.suspension_hz.begin(), 6, spec.suspension_hz);
+  if (spec.has_plant()) {
+    std::copy_n(file.inertia_kg_m2.begin(), 3, spec.inertia_kg_m2);
+    std::copy_n(file.suspension_hz.begin(), 6, spec.suspension_hz);
+  }
   for (const InPlaneModeConfig& mode : file.in_plane_modes)
     spec.in_plane_modes.push_back(
         {mode.natural_frequency_hz, mode.damping_ratio,
@@ -110,11 +143,12 @@ void complete_spec(StageConfig& config, const StageFile& file) {
          shape_vector(config, spec.info.sensors, mode.sensors, "sensor")});
   take_limits(file, spec);
   take_faults(config, file, spec);
-  spec.controller = motion_controller_spec(
-      spec.info.sample_rate_hz, spec.info.actuators, spec.info.sensors, file.axes,
-      {spec.mass_kg, spec.mass_kg, spec.mass_kg, spec.inertia_kg_m2[0], spec.inertia_kg_m2[1],
-       spec.inertia_kg_m2[2]});
-  spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
+  const std::array<double, kRigidAxes> inertia = {spec.mass_kg,          spec.mass_kg,
+                                                  spec.mass_kg,          spec.inertia_kg_m2[0],
+                                                  spec.inertia_kg_m2[1], spec.inertia_kg_m2[2]};
+  take_controller(config, file, inertia);
+  spec.limits.motion =
+      rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors, inertia);
 }
 
 }  // namespace
@@ -142,12 +176,19 @@ void describe_stage_keys(ConfigVisitor& visitor) {
 
 namespace {
 
-StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& document) {
+StageFile stage_file(const YamlDocument& document) {
   StageFile file;
   read_config(document, [&](ConfigVisitor& visitor) { describe_stage_file(visitor, file); });
+  return file;
+}
+
+StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& document,
+                         const StageFile& file, std::string controller_text) {
   StageConfig config;
   config.file = path;
   config.text = document.text();
+  config.controller_text = std::move(controller_text);
+  config.between_runs = file.between_runs;
   config.backend = static_cast<Backend>(file.backend);
   config.real_time = file.real_time;
   config.ramp_s = file.ramp_s;
@@ -160,7 +201,11 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
     complete_spec(config, file);
     if (file.can.config.present)
       config.can = complete_can(file.can, config.spec.info, config.spec.limits);
-    const LimitedStage stage(std::make_unique<SimulatedStage>(config.spec), config.spec.limits);
+    if (config.spec.has_plant()) {
+      const LimitedStage stage(std::make_unique<SimulatedStage>(config.spec), config.spec.limits);
+    } else {
+      const LoopGuard guard(config.spec.limits, config.spec.info);
+    }
     const MotionController controller(config.spec.controller);
   } catch (const std::invalid_argument& error) {
     throw FormatError(path, "", error.what());
@@ -171,11 +216,25 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
 }  // namespace
 
 StageConfig load_stage_config(const std::filesystem::path& path) {
-  return stage_config(path, YamlDocument::read(path));
+  const YamlDocument document = YamlDocument::read(path);
+  const StageFile file = stage_file(document);
+  std::string controller;
+  if (!file.controller.empty() && file.controller != kPeer) {
+    StageInfo info = file.spec.info;
+    info.actuators = channels_of(file.actuators);
+    info.sensors = channels_of(file.sensors);
+    controller = loop_controller_text(path.parent_path() / file.controller, info);
+  }
+  return stage_config(path, document, file, std::move(controller));
 }
 
-StageConfig parse_stage_config(const std::filesystem::path& name, std::string text) {
-  return stage_config(name, YamlDocument::parse(name, std::move(text)));
+StageConfig parse_stage_config(const std::filesystem::path& name, std::string text,
+                               std::string controller_text) {
+  const YamlDocument document = YamlDocument::parse(name, std::move(text));
+  const StageFile file = stage_file(document);
+  if (!file.controller.empty() && file.controller != kPeer && controller_text.empty())
+    throw FormatError(name, "", "the controller is in another file, which is unknown");
+  return stage_config(name, document, file, std::move(controller_text));
 }
 
 std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
@@ -191,10 +250,13 @@ std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
   };
   const std::vector<PlantMode> all = wafer_stage_modes(spec);
   std::vector<PlantMode> modes;
-  for (std::size_t i = kRigidAxes; i < all.size(); ++i)
+  for (std::size_t i = kRigidAxes; i < all.size(); ++i) {
+    Eigen::VectorXd shape = all[i].sensor_shape;
+    if (all[i].acceleration_shape.size() > 0) shape += all[i].acceleration_shape;
     if (seen(all[i].actuator_shape, spec.info.actuators, actuators) &&
-        seen(all[i].sensor_shape, spec.info.sensors, sensors))
+        seen(shape, spec.info.sensors, sensors))
       modes.push_back(all[i]);
+  }
   return modes;
 }
 

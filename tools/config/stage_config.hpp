@@ -24,10 +24,12 @@ const char* to_string(Backend backend) noexcept;
 /// Content of a stage file and the WaferStageSpec derived from it.
 struct StageConfig {
   std::filesystem::path file;
-  std::string text;  ///< of the file, kept for the log
+  std::string text;             ///< of the file, kept for the log
+  std::string controller_text;  ///< of the controller in another file; empty: none
   Backend backend = Backend::sim;
   RealTimeKeys real_time;
   double ramp_s = 0.1;  ///< of a stop, see LoopOptions
+  BetweenRuns between_runs = BetweenRuns::release;
   WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
   CanConfig can;
   std::optional<ModbusConfig> modbus;          ///< of the stage
@@ -35,12 +37,13 @@ struct StageConfig {
   std::optional<SupervisorConfig> supervisor;  ///< of the plant around it
 };
 
-/// Reads a stage file and checks it up to a simulated stage that could be started.
+/// Reads a stage file and checks it up to a stage that could be started.
 /// @throws FileError, FormatError "FILE:LINE:COLUMN: problem; remedy".
 StageConfig load_stage_config(const std::filesystem::path& file);
 
-/// The same from a text, as stored in a log; `name` is used in errors only. @throws FormatError
-StageConfig parse_stage_config(const std::filesystem::path& name, std::string text);
+/// The same from texts, as stored in a log; `name` is used in errors only. @throws FormatError
+StageConfig parse_stage_config(const std::filesystem::path& name, std::string text,
+                               std::string controller_text);
 
 /// The keys of a stage file. Used by `stageid config schema`.
 void describe_stage_keys(ConfigVisitor& visitor);

@@ -56,10 +56,13 @@ NominalStage nominal_stage(const WaferStageSpec& spec) {
   NominalStage nominal;
   nominal.actuators = names_of(spec.info.actuators);
   nominal.sensors = names_of(spec.info.sensors);
-  const auto controller = std::make_shared<const MotionController>(spec.controller);
-  nominal.controller = [controller](double frequency_hz) {
-    return controller->response(frequency_hz);
-  };
+  if (!spec.controller.by_peer) {
+    const auto controller = std::make_shared<const MotionController>(spec.controller);
+    nominal.controller = [controller](double frequency_hz) {
+      return controller->response(frequency_hz);
+    };
+  }
+  if (!spec.has_plant()) return nominal;
   std::vector<PlantMode> rigid = wafer_stage_modes(spec);
   rigid.resize(kRigidAxes);
   nominal.rigid_body = [rigid, delay_s = spec.delay_s,
@@ -82,7 +85,8 @@ std::optional<NominalStage> nominal_stage_of(const LogInfo& info,
   const std::string stage = text_in(json, "stage");
   if (stage.empty()) return std::nullopt;
   try {
-    return nominal_stage(parse_stage_config(text_in(json, "stage_file"), stage).spec);
+    return nominal_stage(
+        parse_stage_config(text_in(json, "stage_file"), stage, text_in(json, "controller")).spec);
   } catch (const FormatError&) {
     return std::nullopt;  // written by another version; --stage can name a readable file
   }

@@ -11,18 +11,48 @@
 namespace stageid {
 namespace {
 
-void describe_channel(ConfigVisitor& v, ChannelConfig& c, const char* unit) {
-  c.channel.unit = unit;
-  std::size_t only = 0;
+/// The first unit is the default.
+void describe_channel(ConfigVisitor& v, ChannelConfig& c, const std::vector<std::string>& units,
+                      const char* gain) {
+  std::size_t unit = 0;
   v.text("name", c.channel.name, kRequired, "name used in logs and models");
-  v.choice("unit", only, {unit}, kOptional, "SI");
+  v.choice("unit", unit, units, kOptional, "of its values in commands, logs and models");
+  c.channel.unit = units.at(unit);
+  v.number("gain", c.channel.gain, any_number(""), kOptional, gain);
+  v.require(c.channel.gain != 0.0, "gain", "gain: must not be zero");
   v.numbers("position_m", c.position_m, any_number("m"), {3, 3}, kRequired,
             "x, y, z from the centre of mass");
-  v.numbers("direction", c.direction, any_number(""), {3, 3}, kOptional, "unit vector");
+  v.numbers("direction", c.direction, any_number(""), {3, 3}, kOptional,
+            "unit vector; of a rotation: its axis");
   const double length =
       c.direction.size() == 3 ? std::hypot(c.direction[0], c.direction[1], c.direction[2]) : 1.0;
   v.require(std::abs(length - 1.0) < 1e-6, "direction",
             fmt::format("direction: the length is {}; write a unit vector", length));
+}
+
+/// A number with two keys: one in SI with the unit in its name, and one in the unit of the channel.
+struct TwoKeys {
+  const char* si_key;
+  const char* si_unit;
+  const char* key;
+};
+
+void describe_number(ConfigVisitor& v, const ChannelConfig& c, double& value, TwoKeys keys,
+                     NumberRule rule, const char* help) {
+  const double unset = value;
+  double neutral = value;
+  rule.unit = keys.si_unit;
+  v.number(keys.si_key, value, rule, kOptional, help);
+  rule.unit = "";
+  v.number(keys.key, neutral, rule, kOptional, "the same in the unit of the channel");
+  const bool si = value != unset;
+  v.require(!si || neutral == unset, keys.key,
+            fmt::format("{}: is also given as {}; write one of them", keys.key, keys.si_key));
+  const std::string& unit = c.channel.unit;
+  v.require(!si || unit == "N" || unit == "m", keys.si_key,
+            fmt::format("{}: the unit of this channel is {}; write '{}: NUMBER' in this unit",
+                        keys.si_key, unit, keys.key));
+  if (!si) value = neutral;
 }
 
 /// Adds one channel; a duplicate name is an error.
@@ -38,34 +68,46 @@ void add_channel(ConfigVisitor& v, ChannelConfig channel, std::vector<ChannelCon
 
 void describe_actuator(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
   ChannelConfig c;
-  describe_channel(v, c, "N");
-  v.number("limit_n", c.limit_n, positive("N"), kRequired,
-           "largest |u|; the stage is stopped if it is exceeded");
-  v.number("slew_n_s", c.slew_n_s, positive("N/s"), kOptional,
-           "largest change of u; inf: no limit");
-  v.number("thermal_rms_n", c.thermal_rms_n, positive("N"), kOptional,
-           "largest rms of u over the thermal time constant; inf: no limit");
+  describe_channel(v, c, {"N", "Nm", "A", "V"}, "force in N, or torque in Nm, per unit");
+  describe_number(v, c, c.limit_n, {"limit_n", "N", "limit"}, positive(""),
+                  "largest |u|, required; the stage is stopped if it is exceeded");
+  v.require(std::isfinite(c.limit_n), "name",
+            "key 'limit' is missing; add it (largest |u|, in the unit of the channel)");
+  describe_number(v, c, c.slew_n_s, {"slew_n_s", "N/s", "slew"}, positive(""),
+                  "largest change of u; inf: no limit");
+  describe_number(v, c, c.thermal_rms_n, {"thermal_rms_n", "N", "thermal_rms"}, positive(""),
+                  "largest rms of u over the thermal time constant; inf: no limit");
+  describe_number(v, c, c.bias_n, {"bias_n", "N", "bias"}, any_number(""),
+                  "constant feed-forward, e.g. against gravity; it rises over ramp_s when the loop "
+                  "is closed");
+  v.require(std::abs(c.bias_n) <= c.limit_n, "bias_n",
+            fmt::format("bias_n: {} {} exceeds limit_n: {}; write a smaller value", c.bias_n,
+                        c.channel.unit, c.limit_n));
   add_channel(v, std::move(c), list);
 }
 
 void describe_sensor(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
   ChannelConfig c;
-  describe_channel(v, c, "m");
-  v.number("window_m", c.window_m, positive("m"), kRequired,
-           "largest |y|; the stage is stopped if it is exceeded");
-  v.number("hard_window_m", c.hard_window_m, not_negative("m"), kOptional,
-           "|y| at which forces are cut; 0: twice window_m");
-  v.number("deviation_m", c.deviation_m, not_negative("m"), kOptional,
-           "largest difference from the motion predicted from the forces; if exceeded, the loop is "
-           "opened and the stage braked; 0: half of window_m");
-  v.number("speed_m_s", c.speed_m_s, positive("m/s"), kOptional,
-           "largest speed; the stage is braked if it is exceeded; inf: the speed that full force "
-           "can stop");
+  describe_channel(v, c, {"m", "rad", "m/s^2", "rad/s^2", "V"},
+                   "units per m or rad, or per m/s^2 or rad/s^2");
+  describe_number(v, c, c.window_m, {"window_m", "m", "window"}, positive(""),
+                  "largest |y|, required; the stage is stopped if it is exceeded");
+  v.require(std::isfinite(c.window_m), "name",
+            "key 'window' is missing; add it (largest |y|, in the unit of the channel)");
+  describe_number(v, c, c.hard_window_m, {"hard_window_m", "m", "hard_window"}, not_negative(""),
+                  "|y| at which forces are cut; 0: twice window_m");
+  describe_number(
+      v, c, c.deviation_m, {"deviation_m", "m", "deviation"}, not_negative(""),
+      "largest difference from the motion predicted from the forces; if exceeded, the "
+      "loop is opened and the stage braked; 0: half of window_m; not for accelerations");
+  describe_number(v, c, c.speed_m_s, {"speed_m_s", "m/s", "speed"}, positive(""),
+                  "largest speed; the stage is braked if it is exceeded; inf: the speed that full "
+                  "force can stop");
   v.require(
       c.hard_window_m == 0.0 || c.hard_window_m >= c.window_m, "hard_window_m",
       fmt::format(
-          "hard_window_m: {} m is less than window_m: {}; write a larger value, or omit the key",
-          c.hard_window_m, c.window_m));
+          "hard_window_m: {} {} is less than window_m: {}; write a larger value, or omit the key",
+          c.hard_window_m, c.channel.unit, c.window_m));
   add_channel(v, std::move(c), list);
 }
 
@@ -115,13 +157,14 @@ void describe_plant(ConfigVisitor& v, StageFile& f) {
 }
 
 void describe_noise(ConfigVisitor& v, WaferStageSpec& s) {
-  v.number("sensor_m", s.sensor_noise_m, not_negative("m rms"), kOptional, "white sensor noise");
+  v.number("sensor_m", s.sensor_noise_m, not_negative("m rms"), kOptional,
+           "white sensor noise, in the unit of each sensor");
   v.number("sensor_coloured_m", s.sensor_noise_coloured_m, not_negative("m rms"), kOptional,
            "coloured floor of the sensors");
   v.number("sensor_corner_hz", s.sensor_noise_corner_hz, positive("Hz"), kOptional,
            "corner of the coloured floor");
   v.number("force_n", s.force_noise_n, not_negative("N rms"), kOptional,
-           "white force disturbance at every actuator");
+           "white force disturbance at every actuator, in its unit");
   v.number("sensor_quantum_m", s.sensor_quantum_m, not_negative("m"), kOptional, "0: off");
   v.number("actuator_quantum_n", s.actuator_quantum_n, not_negative("N"), kOptional, "0: off");
   count(v, "seed", s.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
@@ -160,6 +203,15 @@ void describe_controller(ConfigVisitor& v, StageFile& f) {
     v.group(
         kRigidAxisNames[i], [&](ConfigVisitor& axis) { describe_axis(axis, f.axes[i]); }, kOptional,
         "loop of this degree of freedom; omitted: open");
+  for (const ChannelConfig& sensor : f.sensors) f.linear.sensors.push_back(sensor.channel.name);
+  for (const ChannelConfig& actuator : f.actuators)
+    f.linear.actuators.push_back(actuator.channel.name);
+  describe_linear_controller(v, f.linear);
+  const bool of_axes = std::any_of(f.axes.begin(), f.axes.end(),
+                                   [](const AxisController& a) { return a.crossover_hz > 0.0; });
+  v.require(int{of_axes} + int{f.linear.has_state_space} + int{!f.linear.transfer.empty()} <= 1,
+            f.linear.has_state_space ? "state_space" : "transfer",
+            "controller: write axes, state_space or transfer, not several of them");
 }
 
 void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
@@ -202,11 +254,12 @@ void describe_plugin(ConfigVisitor& v, PluginSpec& plugin) {
 /// A value within its limits must fit on the wire, because the encoder saturates.
 void require_range(ConfigVisitor& v, const char* key, const std::vector<double>& ranges,
                    const std::vector<ChannelConfig>& channels, double ChannelConfig::*limit,
-                   const char* limit_key, const char* unit) {
+                   const char* limit_key) {
   if (ranges.size() != 1 && ranges.size() != channels.size()) return;  // reported elsewhere
   for (std::size_t i = 0; i < channels.size(); ++i) {
     const double range = ranges[std::min(i, ranges.size() - 1)];
     const double wanted = channels[i].*limit;
+    const std::string& unit = channels[i].channel.unit;
     if (!std::isfinite(wanted) || can_range_holds(range, wanted)) continue;
     v.require(false, key,
               fmt::format("{}: {} {} cannot represent {}: {} {} of '{}'; write more than {}, or "
@@ -219,9 +272,9 @@ void require_range(ConfigVisitor& v, const char* key, const std::vector<double>&
 
 void require_ranges(ConfigVisitor& v, const StageFile& f) {
   require_range(v, "actuator_range_n", f.can.actuator_range_n, f.actuators, &ChannelConfig::limit_n,
-                "limit_n", "N");
+                "limit_n");
   require_range(v, "sensor_range_m", f.can.sensor_range_m, f.sensors, &ChannelConfig::window_m,
-                "window_m", "m");
+                "window_m");
 }
 
 }  // namespace
@@ -247,17 +300,27 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
            "time in which a stop ramps the excitation to zero, in closed loop if the loop can be "
            "trusted");
+  choose(v, "between_runs", f.between_runs, {"release", "hold"}, kOptional,
+         "release: forces are cut after every run; hold: the controller keeps the stage between "
+         "the runs of an experiment");
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
            "of the thermal rms limit");
+  const bool simulated = f.backend == static_cast<std::size_t>(Backend::sim);
   v.group(
-      "plant", [&](ConfigVisitor& plant) { describe_plant(plant, f); }, kRequired,
-      "the simulated stage");
+      "plant", [&](ConfigVisitor& plant) { describe_plant(plant, f); },
+      simulated ? kRequired : kOptional,
+      "the simulated stage; other back ends do without it, but then the loop is tested and signals "
+      "are predicted only with a prior");
   v.group(
       "noise", [&](ConfigVisitor& noise) { describe_noise(noise, s); }, kOptional,
       "of the simulated stage");
-  v.group(
+  v.group_or_text(
       "controller", [&](ConfigVisitor& controller) { describe_controller(controller, f); },
-      kRequired, "one entry per closed degree of freedom: x y z Rx Ry Rz");
+      f.controller, kRequired,
+      "one entry per closed degree of freedom: x y z Rx Ry Rz; or state_space or transfer, "
+      "discrete "
+      "at sample_rate_hz; or a file with either (.yaml, .json, .mat, .npz, .h5, .csv), relative to "
+      "this one; or peer: the stage closes the loop by a controller of its own");
   v.number("pace", s.pace, not_negative(""), kOptional,
            "0: virtual time, as fast as possible; 1: wall clock");
   v.group(

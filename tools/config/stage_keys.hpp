@@ -12,6 +12,7 @@
 #include "hal/simulator/simulated_stage.hpp"
 #include "tools/config/can_config.hpp"
 #include "tools/config/config_visitor.hpp"
+#include "tools/config/controller_keys.hpp"
 #include "tools/config/modbus_config.hpp"
 #include "tools/config/real_time_keys.hpp"
 
@@ -26,6 +27,7 @@ struct ChannelConfig {
   double limit_n = kNoLimit;
   double slew_n_s = kNoLimit;
   double thermal_rms_n = kNoLimit;
+  double bias_n = 0.0;
   double window_m = kNoLimit;
   double hard_window_m = 0.0;  // 0: derived
   double deviation_m = 0.0;    // 0: derived
@@ -50,12 +52,15 @@ struct StageFile {
   std::size_t backend = 0;
   double thermal_time_constant_s = 10.0;
   double ramp_s = 0.1;
+  BetweenRuns between_runs = BetweenRuns::release;
   std::vector<ChannelConfig> actuators;
   std::vector<ChannelConfig> sensors;
   std::vector<double> inertia_kg_m2;
   std::vector<double> suspension_hz;
   std::vector<InPlaneModeConfig> in_plane_modes;
   std::array<AxisController, kRigidAxes> axes;
+  LinearControllerKeys linear;
+  std::string controller;  // peer or a file; empty: in this file
   std::vector<FaultConfig> faults;
   RealTimeKeys real_time;
   CanFile can;

@@ -233,7 +233,8 @@ YamlDocument YamlDocument::read(const std::filesystem::path& file) {
   text.resize(static_cast<std::size_t>(stream.gcount()));
   if (stream.bad())
     throw FileError(fmt::format("{}: cannot be read; check the disk", file.string()));
-  if (text.starts_with('{') || text.find('\0') != std::string::npos)
+  const bool json = text.starts_with('{') && file.extension() != ".json";  // JSON is YAML
+  if (json || text.find('\0') != std::string::npos)
     if (const std::string other = other_kind(file, "a YAML file"); !other.empty())
       throw FormatError(file, "", other);
   return parse(file, std::move(text));

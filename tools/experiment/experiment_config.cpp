@@ -51,6 +51,16 @@ void describe_limits(ConfigVisitor& v, std::optional<LimitRequest>& limits) {
   limits = std::move(request);
 }
 
+/// The key without a unit in its name, for axes in any unit.
+void describe_neutral(ConfigVisitor& v, const char* key, const char* si_key, FlexibleValue& value,
+                      const FlexibleRule& rule) {
+  FlexibleValue neutral;
+  v.flexible(key, neutral, rule, kOptional, "the same in the units of the axes");
+  v.require(!is_set(neutral) || !is_set(value), key,
+            fmt::format("{}: is also given as {}; write one of them", key, si_key));
+  if (is_set(neutral)) value = neutral;
+}
+
 void describe_level(ConfigVisitor& v, ExperimentFile& f) {
   FlexibleRule rule;
   rule.number = true;
@@ -58,6 +68,9 @@ void describe_level(ConfigVisitor& v, ExperimentFile& f) {
   rule.rule = positive("N");
   v.flexible("rms_n", f.rms_n, rule, kOptional, "rms of each axis; a list: one per axis");
   v.flexible("peak_n", f.peak_n, rule, kOptional, "or largest sample of each axis");
+  rule.rule = positive("");
+  describe_neutral(v, "rms", "rms_n", f.rms_n, rule);
+  describe_neutral(v, "peak", "peak_n", f.peak_n, rule);
   v.group(
       "limits", [&](ConfigVisitor& limits) { describe_limits(limits, f.limits); }, kOptional,
       "or as large as the limits allow, distributed for the smallest mean relative variance");
@@ -281,7 +294,7 @@ std::string measurement_id(const ExperimentFile& f, const StageConfig& stage) {
                                                              : "not there yet");
   for (const auto& [frequency_hz, amplitude] : f.shape.pairs)
     text += fmt::format(" shape {} {}", frequency_hz, amplitude);
-  return fingerprint_of(text + "\n" + stage.text);
+  return fingerprint_of(text + "\n" + stage.text + stage.controller_text);
 }
 
 void complete(ExperimentConfig& config, ExperimentFile& file, const YamlDocument& document) {

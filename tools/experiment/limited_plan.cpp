@@ -4,9 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/plant_prior_file.hpp"
 #include "tools/terminal/console.hpp"
@@ -44,12 +46,19 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config) {
   const LimitRequest& request = config.limits.value();
   const ExperimentPlan outline = outline_plan(config);
   const WaferStageSpec& stage = config.stage.spec;
+  if (stage.controller.by_peer)
+    throw FormatError(config.file, "",
+                      "level.limits: " + why_unpredictable(stage) +
+                          ", so its signals cannot be predicted; use rms_n or peak_n");
   const PlantPrior prior = read_plant_prior(
       request.prior, stage.info, outline.grid().frequency_hz(), below_band_hz(outline.grid()));
   Eigen::VectorXd velocity_m_s;
   if (request.velocity_m_s > 0.0)
     velocity_m_s.setConstant(static_cast<Eigen::Index>(stage.info.sensors.size()),
                              request.velocity_m_s);
+  for (Eigen::Index i = 0; i < velocity_m_s.size(); ++i)
+    if (is_acceleration(stage.info.sensors[static_cast<std::size_t>(i)]))
+      velocity_m_s[i] = std::numeric_limits<double>::infinity();
   try {
     BoundedLoop loop = bounded_loop(outline.grid(), config.experiment, stage, prior,
                                     config.frf.outputs, velocity_m_s);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -44,8 +45,8 @@ std::string poor_margin(double sensitivity, double frequency_hz) {
 /// The loop gain of a prior, by rising frequency.
 class PriorLoop {
  public:
-  explicit PriorLoop(const ExperimentConfig& config) : axes_(config.stage.spec.controller) {
-    if (axes_.axes() == 0) return;
+  explicit PriorLoop(const ExperimentConfig& config) : controller_(config.stage.spec.controller) {
+    if (!controller_.acts()) return;
     const ExperimentPlan outline = outline_plan(config);
     const VectorXd band_hz = outline.grid().frequency_hz();
     const VectorXd below_hz = frequencies_below(band_hz[0], config.stage.spec);
@@ -59,12 +60,12 @@ class PriorLoop {
 
   LoopCheck check() const {
     LoopCheck out;
-    if (axes_.axes() == 0) return out;
+    if (!controller_.acts()) return out;
     follow();
     if (signs_ > 0 || (turns() > 0 && certain()))
       out.problem = fmt::format(
           "the controller does not stabilize the plant of the prior: {}. {}",
-          signs_ > 0 ? fmt::format("{} of {} axes have the wrong sign", signs_, axes_.axes())
+          signs_ > 0 ? fmt::format("{} of {} axes have the wrong sign", signs_, closed_)
                      : fmt::format("the loop gain encircles the critical point {} times", turns()),
           kRemedy);
     else if (!certain())
@@ -89,7 +90,7 @@ class PriorLoop {
     double from_hz = lowest_hz;
     for (const AxisController& axis : stage.controller.axes)
       if (axis.crossover_hz > 0.0) from_hz = std::min(from_hz, axis.crossover_hz);
-    from_hz /= 30.0;
+    from_hz /= 30.0;  // without axes: the band includes the crossover
     for (const double suspension_hz : stage.suspension_hz)
       from_hz = std::max(from_hz, 3.0 * suspension_hz);
     if (!(from_hz < lowest_hz)) return {};
@@ -109,12 +110,11 @@ class PriorLoop {
     std::complex<double> last = 0.0;
     for (Index k = 0; k < frequency_hz_.size(); ++k) {
       const double f = frequency_hz_[k];
-      const MatrixXcd plant = axes_.plant_of_axes(plant_[static_cast<std::size_t>(k)]);
-      const MatrixXcd L = plant * axes_.controllers(f).asDiagonal();
+      const MatrixXcd L = -plant_[static_cast<std::size_t>(k)] * controller_.response(f);
       const std::complex<double> value =
           (MatrixXcd::Identity(L.rows(), L.rows()) + L).partialPivLu().determinant();
       if (k == 0) {
-        angle_ = start_angle(plant, axes_.controllers(f), value);
+        angle_ = start_angle(L, value);
       } else {
         const double turn = std::arg(value / last);
         angle_ += turn;
@@ -133,13 +133,18 @@ class PriorLoop {
     }
   }
 
-  double start_angle(const MatrixXcd& plant, const Eigen::VectorXcd& controllers,
-                     std::complex<double> value) const {
+  /// Where the loop gain is large, every closed axis is an eigenvalue of it: a free mass, which is negative above its
+  /// suspension, times PI and lead, which are positive.
+  double start_angle(const MatrixXcd& loop_gain, std::complex<double> value) const {
     double expected = 0.0;
-    for (Index i = 0; i < axes_.axes(); ++i) {
-      expected += std::arg(controllers[i]) - kPi;
-      // A free mass is negative above its suspension; PI and lead are positive.
-      if (plant(i, i).real() * controllers[i].real() > 0.0) ++signs_;
+    const Eigen::VectorXcd loci =
+        Eigen::ComplexEigenSolver<MatrixXcd>(loop_gain, false).eigenvalues();
+    for (const std::complex<double>& locus : loci) {
+      if (std::abs(locus) < kNegligibleGain) continue;
+      ++closed_;
+      if (locus.real() > 0.0) ++signs_;
+      const double angle = std::arg(locus);
+      expected += angle > 0.5 * kPi ? angle - 2.0 * kPi : angle;
     }
     return expected + std::remainder(std::arg(value) - expected, 2.0 * kPi);
   }
@@ -147,9 +152,10 @@ class PriorLoop {
   int turns() const { return static_cast<int>(std::lround(std::abs(angle_) / (2.0 * kPi))); }
   bool certain() const { return last_gain_ <= kNegligibleGain && largest_turn_ <= kLargestTurn; }
 
-  AxisLoop axes_;
+  MotionController controller_;
   VectorXd frequency_hz_;
   std::vector<MatrixXcd> plant_;
+  mutable int closed_ = 0;
   mutable int signs_ = 0;
   mutable double angle_ = 0.0;
   mutable double largest_turn_ = 0.0;
@@ -159,6 +165,17 @@ class PriorLoop {
   mutable double sensitivity_hz_ = 0.0;
 };
 
+/// Why nothing is known about the loop of a stage file; empty if it can be tested.
+std::string why_untested(const WaferStageSpec& stage) {
+  if (stage.controller.by_peer)
+    return "stability of the loop is not tested: the stage closes it by a controller of its own "
+           "('controller: peer')";
+  if (!stage.has_plant())
+    return "stability of the loop is not tested: there is no 'plant'. Measure a pilot and design "
+           "from it with 'level: {limits: {prior: FILE}}'";
+  return "";
+}
+
 void judge(const std::filesystem::path& file, const LoopCheck& check, const Console& console) {
   if (!check.problem.empty()) throw FormatError(file, "", check.problem);
   if (!check.doubt.empty()) console.warning(fmt::format("{}: {}", file.string(), check.doubt));
@@ -167,6 +184,7 @@ void judge(const std::filesystem::path& file, const LoopCheck& check, const Cons
 }  // namespace
 
 LoopCheck check_loop(const WaferStageSpec& stage) {
+  if (const std::string reason = why_untested(stage); !reason.empty()) return {"", reason};
   const LoopStability loop = loop_stability(stage);
   LoopCheck out;
   if (!loop.tested) return out;
@@ -182,6 +200,7 @@ LoopCheck check_loop(const WaferStageSpec& stage) {
 }
 
 LoopCheck check_loop(const ExperimentConfig& config) {
+  if (config.stage.spec.controller.by_peer) return check_loop(config.stage.spec);
   return config.limits ? PriorLoop(config).check() : check_loop(config.stage.spec);
 }
 

@@ -23,6 +23,7 @@ std::string run_metadata(const ExperimentConfig& config, Backend backend, const 
       {"configuration", config.text},
       {"stage_file", config.stage.file.filename().string()},
       {"stage", config.stage.text}};
+  if (!config.stage.controller_text.empty()) json["controller"] = config.stage.controller_text;
   // There is no pace in virtual time, so its logs do not contain one.
   if (stage.clock == Clock::wall) json["pace"] = stage.pace;
   return json.dump();

@@ -24,7 +24,9 @@ class StreamedStage final : public MeasuredStage {
  public:
   StreamedStage(const ExperimentPlan& plan, std::unique_ptr<CyclicStage> stage,
                 const WaferStageSpec& spec)
-      : plan_(plan), stage_(std::move(stage), spec.limits), controller_(spec.controller) {}
+      : plan_(plan), stage_(std::move(stage), spec.limits), controller_(spec.controller) {
+    stage_.carry(spec.controller);
+  }
 
   const StageInfo& info() const noexcept override { return stage_.info(); }
 
@@ -54,8 +56,9 @@ class StreamedStage final : public MeasuredStage {
   void judge_replay(MeasurementResult& result) const {
     const auto* replay = dynamic_cast<const ReplayStage*>(&stage_.inner());
     if (replay == nullptr || replay->mismatches() == 0) return;
-    result.message += fmt::format("; {} commands differ from the recorded ones, by up to {:.3g} N",
-                                  replay->mismatches(), replay->largest_mismatch_n());
+    result.message += fmt::format("; {} commands differ from the recorded ones, by up to {:.3g}{}",
+                                  replay->mismatches(), replay->largest_mismatch_n(),
+                                  common_unit(replay->info().actuators));
     if (result.exit_code == kDone) result.exit_code = kNotTrustworthy;
   }
 
@@ -98,7 +101,7 @@ std::unique_ptr<CyclicStage> replayed_stage(const ExperimentConfig& config,
 
 }  // namespace
 
-void require_backend(const ExperimentConfig& config, Backend backend) {
+void require_backend(const ExperimentConfig& config, Backend backend, double pace) {
   const bool there = backend == Backend::can      ? config.stage.can.present
                      : backend == Backend::modbus ? config.stage.modbus.has_value()
                      : backend == Backend::plugin ? config.stage.plugin.has_value()
@@ -107,15 +110,39 @@ void require_backend(const ExperimentConfig& config, Backend backend) {
     throw std::invalid_argument(
         fmt::format("--backend {0}: {1} has no group '{0}'; see 'stageid config schema'",
                     to_string(backend), config.stage.file.string()));
+  if (backend == Backend::sim && !config.stage.spec.has_plant())
+    throw std::invalid_argument(
+        fmt::format("--backend sim: {} has no group 'plant', which is the simulated stage; add it",
+                    config.stage.file.string()));
+  const bool resident = backend == Backend::can && config.stage.can.mode == CanMode::resident;
+  if (config.stage.spec.controller.by_peer && !resident)
+    throw std::invalid_argument(fmt::format(
+        "{}: 'controller: peer' needs a stage that plays the excitation in a loop of its own: "
+        "'backend: can' with 'mode: resident'. With back end {}, this program closes the loop; "
+        "write its controller",
+        config.stage.file.string(), to_string(backend)));
+  const bool virtual_link =
+      (backend == Backend::can || backend == Backend::modbus) && !(pace > 0.0);
+  if (config.stage.between_runs == BetweenRuns::hold && virtual_link && !resident)
+    throw std::invalid_argument(
+        fmt::format("{}: 'between_runs: hold' with back end {} needs the wall clock, because the "
+                    "watchdog of the node runs by it. Set 'pace: 1'",
+                    config.stage.file.string(), to_string(backend)));
+  if (config.stage.between_runs == BetweenRuns::hold && resident)
+    throw std::invalid_argument(
+        fmt::format("{}: 'between_runs: hold' is not possible with 'mode: resident', because the "
+                    "node closes the loop and cuts its forces after every run. Use 'mode: "
+                    "streaming', or 'between_runs: release'",
+                    config.stage.file.string()));
 }
 
 std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& config,
                                                    const ExperimentPlan& plan,
                                                    const MeasurementRequest& request,
                                                    const std::vector<RunId>& skip) {
-  require_backend(config, request.backend);
   WaferStageSpec spec = config.stage.spec;
   if (request.pace >= 0.0) spec.pace = request.pace;
+  require_backend(config, request.backend, spec.pace);
   const auto streamed = [&](std::unique_ptr<CyclicStage> stage) {
     return std::make_unique<StreamedStage>(plan, std::move(stage), spec);
   };

@@ -23,7 +23,7 @@ class MeasuredStage {
 };
 
 /// @throws std::invalid_argument if the stage file does not have what the back end needs.
-void require_backend(const ExperimentConfig& config, Backend backend);
+void require_backend(const ExperimentConfig& config, Backend backend, double pace);
 
 /// @param skip runs to skip
 /// @throws std::invalid_argument if the files lack something that the back end needs, or it cannot carry the

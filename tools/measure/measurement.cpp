@@ -156,6 +156,8 @@ void tell_begin(EventLog& events, const ExperimentConfig& config, const StageInf
                 {"measurement_id", config.measurement_id},
                 {"runs_before", std::int64_t{result.runs_before}},
                 {"runs_total", std::int64_t{result.runs_total}},
+                {"between_runs",
+                 std::string(config.stage.between_runs == BetweenRuns::hold ? "hold" : "release")},
                 {"realtime", std::string(name_of(real_time.policy))}});
 }
 
@@ -233,6 +235,8 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   options.misses_allowed = config.stage.real_time.misses_allowed;
   options.jitter_s = jitter_limit_s(config, plan);
   options.ramp_s = config.stage.ramp_s;
+  // A recorded run ends with the run.
+  if (request.backend != Backend::replay) options.between_runs = config.stage.between_runs;
   if (info.clock == Clock::wall) warn_of_real_time(options.real_time, console);
   if (request.until) warn_of_until(plan, config.frf, console);
   const std::unique_ptr<SupervisedPlant> plant = supervise(config, request, options);

@@ -359,6 +359,168 @@ TEST_F(MeasurementLoopTest, ASlowedStageIsLateByItsOwnPeriods) {
   EXPECT_EQ(slow.last_deadline_ns(), 20'000'000);
 }
 
+/// Commands as the stage received them since the loop was closed.
+Eigen::VectorXd sent_at(const test::AnalyticStage& stage, std::size_t n) {
+  return Eigen::Map<const Eigen::VectorXd>(stage.sent().data() + n * kActuators, kActuators);
+}
+
+constexpr LoopOptions kHold = {.ramp_s = 0.01, .between_runs = BetweenRuns::hold};
+
+TEST_F(MeasurementLoopTest, HeldBetweenRunsTheLoopIsNeverOpened) {
+  MeasurementLoop loop = make_loop(kHold);
+  loop.start(1, excitation_);
+  run(loop);
+  EXPECT_TRUE(loop.holding());
+  EXPECT_TRUE(loop.complete());
+  for (int n = 0; n < 7; ++n) EXPECT_EQ(loop.step(), LoopStatus::held);
+  PreparedExcitation prepared = loop.prepare(excitation_);
+  loop.next(prepared);
+  EXPECT_FALSE(loop.complete());
+  run(loop);
+  EXPECT_TRUE(loop.holding());
+  EXPECT_EQ(stage_.seeds().size(), 1U);
+  EXPECT_EQ(stage_.stops(), 0);
+  EXPECT_EQ(loop.health().cycles, kSamples);
+  loop.release();
+  EXPECT_EQ(stage_.stops(), 1);
+  EXPECT_EQ(loop.reason(), StopReason::none);
+  EXPECT_TRUE(loop.ended());
+  // Both records begin at the start of the period, at full level, without marks.
+  const std::vector<Row> all = rows();
+  ASSERT_EQ(all.size(), 2 * kSamples);
+  EXPECT_TRUE(marked(all).empty());
+  // 10 leading samples, the run, 10 of the landing, 7 held, 10 leading samples.
+  const std::size_t second = 10 + kSamples + 10 + 7 + 10;
+  for (std::size_t n = 0; n < kSamples; ++n) {
+    EXPECT_EQ(all[n].u, sent_at(stage_, 10 + n)) << n;
+    EXPECT_EQ(all[kSamples + n].u, sent_at(stage_, second + n)) << n;
+  }
+}
+
+// In and out of a run, r rises and falls in equal steps and continues its phase.
+TEST_F(MeasurementLoopTest, AHeldStageIsHandedOverWithoutAStep) {
+  excitation_.period.setZero();
+  excitation_.period.col(0).setOnes();  // so that any step is one of the gain
+  MeasurementLoop loop = make_loop(kHold);
+  loop.start(1, excitation_);
+  run(loop);
+  for (int n = 0; n < 5; ++n) static_cast<void>(loop.step());
+  PreparedExcitation prepared = loop.prepare(excitation_);
+  loop.next(prepared);
+  run(loop);
+  MotionController again(test::analytic_controller(stage_.info()));
+  Eigen::VectorXd y = Eigen::VectorXd::Zero(kSensors);
+  Eigen::VectorXd control(kActuators);
+  double last = 0.0;
+  double largest = 0.0;
+  for (std::size_t n = 0; n < stage_.exchanges(); ++n) {
+    again.update(y.data(), control.data());
+    const Eigen::VectorXd u = sent_at(stage_, n);
+    const double r = (u - control)[2];
+    largest = std::max(largest, std::abs(r - last));
+    last = r;
+    for (Eigen::Index i = 0; i < kSensors; ++i) {
+      y[i] *= test::AnalyticStage::kPole;
+      for (Eigen::Index j = 0; j < kActuators; ++j)
+        y[i] += test::AnalyticStage::input_gain(i, j) * u[j];
+    }
+  }
+  EXPECT_NEAR(largest, 1.0 / 11.0, 1e-12);
+}
+
+TEST_F(MeasurementLoopTest, TheSameReasonsStopAHeldStage) {
+  for (const auto& [outcome, reason] :
+       {std::pair(Outcome::limit, StopReason::limit), std::pair(Outcome::fault, StopReason::fault),
+        std::pair(Outcome::link_down, StopReason::fault)}) {
+    const int stops = stage_.stops();
+    stage_.outcomes = {{100, outcome}};
+    MeasurementLoop loop = make_loop(kHold);
+    loop.start(1, excitation_);
+    run(loop);
+    ASSERT_TRUE(loop.holding());
+    LoopStatus status = LoopStatus::held;
+    for (int n = 0; n < 40 && status != LoopStatus::ended; ++n) status = loop.step();
+    EXPECT_EQ(status, LoopStatus::ended);
+    EXPECT_EQ(loop.reason(), reason);
+    EXPECT_TRUE(loop.complete());
+    EXPECT_EQ(stage_.stops(), stops + 1);
+    EXPECT_EQ(stage_.exchanges(), 101U);
+    ring_.pop(rows().size());
+  }
+}
+
+TEST_F(MeasurementLoopTest, MissesAndAnInterruptStopAHeldStage) {
+  for (std::uint64_t n = 90; n < 1000; ++n) stage_.outcomes[n] = Outcome::stale;
+  MeasurementLoop loop = make_loop(kHold);
+  loop.start(1, excitation_);
+  run(loop);
+  while (loop.step() != LoopStatus::ended) {
+  }
+  EXPECT_EQ(loop.reason(), StopReason::misses);
+
+  ring_.pop(rows().size());
+  stage_.outcomes.clear();
+  loop.start(1, excitation_);
+  run(loop);
+  loop.request_stop(StopReason::interrupt);
+  EXPECT_EQ(loop.step(), LoopStatus::ended);
+  EXPECT_EQ(loop.reason(), StopReason::interrupt);
+  EXPECT_EQ(stage_.stops(), 2);
+  EXPECT_EQ(rows().size(), kSamples);
+}
+
+TEST_F(MeasurementLoopTest, AStopBeforeTheFirstSampleRecordsNothing) {
+  MeasurementLoop loop = make_loop(kHold);
+  loop.start(1, excitation_);
+  for (int n = 0; n < 5; ++n) static_cast<void>(loop.step());
+  loop.request_stop(StopReason::interrupt);
+  while (loop.step() != LoopStatus::ended) {
+  }
+  EXPECT_EQ(loop.reason(), StopReason::interrupt);
+  EXPECT_FALSE(loop.complete());
+  EXPECT_TRUE(rows().empty());
+  EXPECT_EQ(loop.health().cycles, 0U);
+}
+
+TEST_F(MeasurementLoopTest, HoldingAndTheNextRunDoNotAllocate) {
+  if (!test::AllocationCounter::works()) GTEST_SKIP() << "malloc is not ours in this build";
+  MeasurementLoop loop = make_loop(kHold);
+  loop.start(1, excitation_);
+  run(loop);
+  PreparedExcitation prepared = loop.prepare(excitation_);
+  std::uint64_t allocations = 0;
+  {
+    const test::AllocationCounter counter;
+    for (int n = 0; n < 20; ++n) static_cast<void>(loop.step());
+    loop.next(prepared);
+    run(loop);
+    for (int n = 0; n < 20; ++n) static_cast<void>(loop.step());
+    allocations = counter.count();
+  }
+  EXPECT_EQ(allocations, 0U);
+  EXPECT_TRUE(loop.complete());
+}
+
+// The forces of the feed-forward are there before the excitation begins.
+TEST_F(MeasurementLoopTest, AFeedForwardRisesBeforeTheRecord) {
+  MotionControllerSpec spec = test::analytic_controller(stage_.info());
+  spec.feed_forward_n = Eigen::Vector3d(5.0, 0.0, -2.0);
+  spec.feed_forward_ramp_s = 0.02;
+  MotionController controller(spec);
+  for (const BetweenRuns between : {BetweenRuns::release, BetweenRuns::hold}) {
+    MeasurementLoop loop(stage_, controller, ring_, {.ramp_s = 0.01, .between_runs = between});
+    loop.start(1, excitation_);
+    run(loop);
+    const std::vector<Row> all = rows();
+    ASSERT_EQ(all.size(), kSamples);
+    const std::size_t lead = between == BetweenRuns::hold ? 21 + 10 : 21;
+    EXPECT_LT(sent_at(stage_, 0).norm(), 0.3);
+    EXPECT_EQ(all[0].u, sent_at(stage_, lead));
+    for (std::size_t n = 0; n < kSamples; ++n) EXPECT_EQ(all[n].u, sent_at(stage_, lead + n)) << n;
+    ring_.pop(all.size());
+  }
+}
+
 TEST(StopReasonNames, EveryReasonHasItsOwn) {
   std::set<std::string> names;
   for (const StopReason reason :

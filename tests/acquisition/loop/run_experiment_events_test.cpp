@@ -145,5 +145,17 @@ TEST_F(RunExperimentEvents, RealTimeThatIsRequiredAndNotThereEndsBeforeTheFirstR
   EXPECT_TRUE(inner_->seeds().empty());
 }
 
+TEST_F(RunExperimentEvents, HoldingIsToldAsNotRecorded) {
+  make_stage(Clock::wall);
+  RunExperimentOptions options;
+  options.between_runs = BetweenRuns::hold;
+  measure(options);
+  EXPECT_EQ(told("run_end").size(), 2U);
+  const std::vector<std::string> holds = told("hold");
+  ASSERT_EQ(holds.size(), 1U);  // between two runs
+  EXPECT_THAT(holds[0], HasSubstr("\"realization\":1"));
+  EXPECT_THAT(holds[0], testing::Not(HasSubstr("\"cycles_not_recorded\":0}")));
+}
+
 }  // namespace test_run_experiment_events
 }  // namespace stageid

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <set>
 #include <thread>
 
@@ -369,6 +370,75 @@ TEST_F(RunExperiment, EndsCompleteBetweenRealizationsWhenItIsEnough) {
   EXPECT_EQ(result.message, "good enough; 4 runs measured");
   EXPECT_EQ(seen, (std::vector<std::size_t>{0, 2, 4}));
   EXPECT_EQ(SlogReader(directory_ / "enough.slog").runs().size(), 4U);
+}
+
+TEST_F(RunExperiment, AHeldStageIsStartedAndStoppedOnce) {
+  SlogWriter log = create("held.slog");
+  RunExperimentOptions options;
+  options.between_runs = BetweenRuns::hold;
+  const ExperimentResult result = measure(log, options);
+  log.close(0, "");
+  EXPECT_EQ(result.end, ExperimentEnd::complete);
+  EXPECT_EQ(result.runs_done, 4);
+  EXPECT_EQ(inner_->seeds().size(), 1U);
+  EXPECT_EQ(inner_->stops(), 1);
+  const SlogReader reader(directory_ / "held.slog");
+  ASSERT_EQ(reader.runs().size(), 4U);
+  for (const LogRun& run : reader.runs()) {
+    EXPECT_TRUE(run.complete);
+    EXPECT_EQ(static_cast<std::uint64_t>(run.samples), kSamples);
+    EXPECT_EQ(run.health.marked, 0U);
+  }
+}
+
+// Deciding whether it is enough may take long: the loop must not wait for it.
+TEST_F(RunExperiment, AHeldStageIsControlledWhileTheResultIsEvaluated) {
+  auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors, 1000.0, Clock::wall);
+  AnalyticStage& inner = *stage;
+  stage_ = std::make_unique<LimitedStage>(std::move(stage), StageLimits{});
+  SlogWriter log = create("evaluated.slog");
+  RunExperimentOptions options;
+  options.between_runs = BetweenRuns::hold;
+  std::atomic<bool> cycled = false;
+  inner.raise[100'000] = &cycled;  // far beyond the 1000 exchanges of the first realization
+  int asked = 0;
+  options.enough = [&]() -> std::string {
+    if (asked++ == 0) return "";  // before the loop is closed
+    for (int wait = 0; wait < 1000 && !cycled; ++wait)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return "";
+  };
+  const ExperimentResult result = measure(log, options);
+  EXPECT_EQ(result.end, ExperimentEnd::complete);
+  EXPECT_EQ(inner.stops(), 1);
+  EXPECT_EQ(asked, 2);
+  EXPECT_TRUE(cycled);
+}
+
+TEST_F(RunExperiment, ALimitBetweenRunsStopsAHeldStageAndKeepsTheRun) {
+  auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors, 1000.0, Clock::wall);
+  AnalyticStage& inner = *stage;
+  // After the leading ramp (100), the run (300) and its landing (100).
+  for (std::uint64_t n = 510; n < 2000; ++n) inner.first_sensor[n] = 1.0;
+  StageLimits limits;
+  limits.position_window_m = Eigen::VectorXd::Constant(kSensors, 0.5);
+  limits.hard_window_m = Eigen::VectorXd::Constant(kSensors, 2.0);
+  stage_ = std::make_unique<LimitedStage>(std::move(stage), limits);
+  SlogWriter log = create("between.slog");
+  RunExperimentOptions options;
+  options.between_runs = BetweenRuns::hold;
+  int asked = 0;
+  options.enough = [&]() -> std::string {
+    if (asked++ > 0) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    return "";
+  };
+  plan_ = plan_of(2);
+  const ExperimentResult result = measure(log, options);
+  log.close(4, "");
+  EXPECT_EQ(result.end, ExperimentEnd::limit);
+  EXPECT_THAT(result.message, HasSubstr("sensor y1: |y| is 1 m, limit 0.5 m"));
+  EXPECT_EQ(inner.stops(), 1);
+  EXPECT_GE(result.runs_done, 1);
 }
 
 }  // namespace test_run_experiment

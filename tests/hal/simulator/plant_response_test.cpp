@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "hal/simulator/modal_plant.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
@@ -147,6 +148,57 @@ TEST(PlantResponse, RefusesWhatHasNone) {
   EXPECT_THROW(continuous_response(one_mode(10.0, 1.0), 1.0), std::invalid_argument);
   EXPECT_THROW(sampled_response(modes, 0.0, 0.0, 1.0), std::invalid_argument);
   EXPECT_THROW(sampled_response(modes, -1.0, 1e3, 1.0), std::invalid_argument);
+}
+
+/// Response of the simulated plant by running it, after its transient.
+Eigen::MatrixXcd run_response(const std::vector<PlantMode>& modes, double delay_s, double rate_hz,
+                              int line, int period) {
+  ModalPlant plant(modes, delay_s, rate_hz);
+  Eigen::MatrixXcd response(plant.sensors(), plant.actuators());
+  Eigen::VectorXd y(plant.sensors());
+  for (Eigen::Index j = 0; j < plant.actuators(); ++j) {
+    plant.reset();
+    Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(plant.sensors());
+    for (int n = 0; n < 40 * period; ++n) {
+      const double angle = 2.0 * std::numbers::pi * line * n / period;
+      plant.output(y.data());
+      if (n >= 39 * period) sum += y * std::polar(2.0 / period, -angle);
+      const Eigen::VectorXd u = Eigen::VectorXd::Unit(plant.actuators(), j) * std::cos(angle);
+      plant.step(u.data());
+    }
+    response.col(j) = sum;
+  }
+  return response;
+}
+
+// Sensors of position and of acceleration; two methods that share no code.
+TEST(PlantResponse, AccelerationsAreExactThroughTheHold) {
+  PlantMode one{40.0, 0.1, Eigen::Vector2d(1.0, 0.5), Eigen::Vector2d(0.7, 0.0)};
+  PlantMode other{170.0, 0.05, Eigen::Vector2d(-0.3, 1.0), Eigen::Vector2d(0.2, 0.0)};
+  one.acceleration_shape = Eigen::Vector2d(0.0, 1.3);
+  other.acceleration_shape = Eigen::Vector2d(0.0, -0.8);
+  for (const double delay_s : {0.0, 0.4e-3, 2.3e-3}) {
+    for (const int line : {3, 20, 77}) {
+      const Eigen::MatrixXcd exact =
+          sampled_response({one, other}, delay_s, 1000.0, line * 1000.0 / 200.0);
+      const Eigen::MatrixXcd run = run_response({one, other}, delay_s, 1000.0, line, 200);
+      for (Eigen::Index i = 0; i < 2; ++i)
+        EXPECT_LT((run.row(i) - exact.row(i)).norm(), 1e-8 * exact.row(i).norm())
+            << delay_s << " " << line;
+    }
+  }
+  const Eigen::MatrixXcd continuous = continuous_response({one, other}, 60.0);
+  PlantMode position = one;
+  position.sensor_shape = one.acceleration_shape;
+  position.acceleration_shape.resize(0);
+  PlantMode second = other;
+  second.sensor_shape = other.acceleration_shape;
+  second.acceleration_shape.resize(0);
+  const double omega = 2.0 * std::numbers::pi * 60.0;
+  EXPECT_LT(
+      (continuous.row(1) + omega * omega * continuous_response({position, second}, 60.0).row(1))
+          .norm(),
+      1e-12 * continuous.row(1).norm());
 }
 
 }  // namespace test_plant_response

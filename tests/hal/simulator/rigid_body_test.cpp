@@ -133,5 +133,51 @@ TEST_F(UncontrollableStage, IsRefusedWithImpossibleFrequencies) {
                std::invalid_argument);
 }
 
+Channel channel(const char* unit, double gain, Eigen::Vector3d position = {0.1, 0.2, 0.0},
+                Eigen::Vector3d direction = {0.0, 0.0, 1.0}) {
+  Channel c;
+  c.name = unit;
+  c.unit = unit;
+  c.gain = gain;
+  for (int i = 0; i < 3; ++i) {
+    c.position_m[i] = position[i];
+    c.direction[i] = direction[i];
+  }
+  return c;
+}
+
+TEST(Units, GainsAndRotationsAreInTheJacobian) {
+  const Eigen::MatrixXd jacobian = rigid_body_jacobian(
+      {channel("N", 1.0), channel("A", 12.0), channel("Nm", 1.0), channel("rad", 2.0)});
+  Eigen::MatrixXd expected(4, 6);
+  expected << 0, 0, 1, 0.2, -0.1, 0,  //
+      0, 0, 12, 2.4, -1.2, 0,         //
+      0, 0, 0, 0, 0, 1,               //
+      0, 0, 0, 0, 0, 2;
+  EXPECT_LT((jacobian - expected).norm(), 1e-14);
+}
+
+// A controller in A per m, from geometry, crossover and mass: the same loop as in N.
+TEST(Units, ALoopInAmperesIsThatInNewtons) {
+  const std::vector<Channel> sensors = {channel("m", 1.0, {0, 0, 0}), channel("m/s^2", 1.0)};
+  std::array<AxisController, kRigidAxes> axes;
+  axes[2].crossover_hz = 10.0;
+  axes[2].lead_zero_hz = 4.0;
+  axes[2].lead_pole_hz = 40.0;
+  const auto spec = [&](const Channel& actuator) {
+    return motion_controller_spec(1000.0, {actuator}, sensors, axes, {2, 2, 2, 1, 1, 1});
+  };
+  const Channel newton = channel("N", 1.0, {0, 0, 0});
+  const Channel ampere = channel("A", 8.0, {0, 0, 0});
+  const Eigen::MatrixXcd in_n = MotionController(spec(newton)).response(20.0);
+  const Eigen::MatrixXcd in_a = MotionController(spec(ampere)).response(20.0);
+  EXPECT_LT((8.0 * in_a - in_n).norm(), 1e-12 * in_n.norm());
+  EXPECT_EQ(in_n(0, 1), std::complex<double>(0.0));  // an acceleration is not a position
+  const RigidMotion motion = rigid_motion(spec(ampere), {ampere}, sensors);
+  EXPECT_NEAR(motion.acceleration_per_n(0, 0), 8.0 / 2.0, 1e-12);
+  EXPECT_EQ(motion.acceleration_per_n(1, 0), 0.0);
+  EXPECT_EQ(motion.contradiction.size(), 0);
+}
+
 }  // namespace test_rigid_body
 }  // namespace stageid

@@ -157,6 +157,38 @@ TEST(LoopGuard, ASensorThatDriftsContradictsTheOthers) {
   EXPECT_LT(loop.watch->largest_m, 2.0 * spec.limits.position_window_m[0]);
 }
 
+// Feed-forward against gravity: the simulator has no weight, so the stage is played by hand, at rest.
+TEST(LoopGuard, AWeightThatIsCarriedIsNotAMotion) {
+  WaferStageSpec spec = test::stop_stage_spec();
+  spec.limits.stuck_sensor_s = 0.0;
+  const auto actuators = static_cast<Eigen::Index>(spec.info.actuators.size());
+  const Eigen::VectorXd load =
+      Eigen::VectorXd::Constant(actuators, 9.81 * spec.mass_kg / static_cast<double>(actuators));
+  constexpr int kRamp = 200;
+  for (const bool carried : {false, true}) {
+    LoopGuard guard(spec.limits, spec.info);
+    if (carried) guard.carry(load, kRamp);
+    std::vector<double> y(spec.info.sensors.size(), 0.0);
+    Inputs inputs;
+    inputs.y = y;
+    inputs.valid = ~std::uint64_t{0};
+    guard.start(inputs);
+    LimitKind kind = LimitKind::none;
+    for (int n = 1; n <= 2 * kRamp && kind == LimitKind::none; ++n) {
+      guard.predict(std::min(1.0, static_cast<double>(n) / kRamp) * load.array());
+      kind = guard.inspect(inputs).violation.kind;
+    }
+    EXPECT_EQ(kind == LimitKind::none, carried) << to_string(kind);
+    if (!carried) continue;
+    ASSERT_TRUE(guard.begin_brake());
+    Eigen::ArrayXd u(actuators);
+    guard.brake(u);
+    EXPECT_LT((u.matrix() - load).norm(), 1e-9 * load.norm());  // a brake lets nothing fall
+  }
+  EXPECT_THROW(LoopGuard(spec.limits, spec.info).carry(Eigen::VectorXd::Ones(actuators + 1), 1),
+               std::invalid_argument);
+}
+
 TEST(LoopGuard, WithoutAMotionNothingIsPredicted) {
   WaferStageSpec spec = with_fault(Kind::sensor_offset, 150e-6);
   spec.limits.motion = {};

@@ -6,11 +6,14 @@
 The FRF measured through the wire is that of the simulator in the process, but for the wire's quantization;
 mbpoll and pymodbus read what docs/modbus-map.md says; a link that is too slow is refused with its figures.
 """
+import json
 import pathlib
 import shutil
+import signal
 import struct
 import subprocess
 import sys
+import time
 import unittest
 
 import h5py
@@ -74,6 +77,45 @@ class ModbusTest(unittest.TestCase):
         self.assertEqual(wait_for_state(port, ('switch on disabled',)), 'switch on disabled')
         self.frf(stage, 'supervised')
         self.assertEqual(wait_for_state(port, ('switch on disabled',)), 'switch on disabled')
+
+    def held_experiment(self, port):
+        stage = self.bench.stage('held_stage', door=f'tcp: {{port: {port}}}')
+        stage.write_text(stage.read_text().replace(
+            'stuck_sensor_s', 'between_runs: hold\nrealtime: {misses_allowed: 1000}\nstuck_sensor_s'))
+        experiment = self.bench.experiment(stage, 'held')
+        text = experiment.read_text()
+        for old, new in (('period_s: 10', 'period_s: 2.5'), ('transient_periods: 2', 'transient_periods: 1'),
+                         ('  periods: 3', '  periods: 1'), ('realizations: 1', 'realizations: 2')):
+            text = text.replace(old, new)
+        experiment.write_text(text)
+        return experiment
+
+    def test_a_held_stage_is_in_one_run_of_the_node_from_first_to_last(self):
+        _, port = self.bench.node()
+        experiment = self.held_experiment(port)
+        log = self.bench.work / 'held.slog'
+        done = self.bench.run('run', experiment, '-o', log, '--pace', 5)
+        self.assertIn(done.returncode, (0, 3), done.stderr)  # late cycles on a busy machine
+        self.assertIn('6 of 6 runs complete', done.stdout)
+        events = [json.loads(line) for line in (self.bench.work / 'held.events.jsonl').read_text().splitlines()]
+        holds = [event for event in events if event['event'] == 'hold']
+        self.assertEqual(len(holds), 5)
+        states = [event['state'] for event in events if event['event'] == 'state']
+        self.assertEqual(states.count('measuring'), 1, states)
+        done = self.bench.run('run', experiment, '-o', self.bench.work / 'fast.slog', '--pace', 0)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("needs the wall clock, because the watchdog of the node runs by it. Set 'pace: 1'", done.stderr)
+
+    def test_ctrl_c_stops_a_held_stage(self):
+        _, port = self.bench.node()
+        log = self.bench.work / 'held.slog'
+        run = self.bench.start_run(self.held_experiment(port), log, '--pace', 5)
+        self.assertEqual(wait_for_state(port, {'measuring'}), 'measuring')
+        time.sleep(1.5)
+        run.send_signal(signal.SIGINT)
+        _, said = run.communicate(timeout=20)
+        self.assertEqual(run.returncode, 130, said)
+        self.assertNotIn(wait_for_state(port, {'switch on disabled', 'operation enabled'}), ('measuring', 'fault'))
 
     def test_an_interrupted_experiment_is_resumed_with_a_new_node(self):
         node, port = self.bench.node('--modbus-fault', 'dead_server@3500')

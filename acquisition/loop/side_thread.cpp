@@ -1,0 +1,46 @@
+#include "acquisition/loop/side_thread.hpp"
+
+#include <pthread.h>
+#include <sched.h>
+
+#include <chrono>
+#include <utility>
+
+namespace stageid {
+
+namespace {
+
+constexpr std::chrono::microseconds kPause{500};
+
+}  // namespace
+
+SideThread::SideThread() : thread_([this] { run(); }) {}
+
+SideThread::~SideThread() {
+  stop_.store(true, std::memory_order_relaxed);
+  thread_.join();
+}
+
+void SideThread::rethrow() {
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+}
+
+void SideThread::run() noexcept {
+  const sched_param normal{};
+  static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
+  while (!stop_.load(std::memory_order_relaxed)) {
+    const Call call = call_.load(std::memory_order_acquire);
+    if (call == nullptr) {
+      std::this_thread::sleep_for(kPause);
+      continue;
+    }
+    try {
+      call(context_);
+    } catch (...) {
+      failure_ = std::current_exception();
+    }
+    call_.store(nullptr, std::memory_order_release);
+  }
+}
+
+}  // namespace stageid

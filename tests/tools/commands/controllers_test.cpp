@@ -1,0 +1,122 @@
+// Controllers in every form, feed-forward and the held loop, with the real program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/log_reader.hpp"
+#include "tests/tools/program_fixture.hpp"
+#include "tools/config/stage_config.hpp"
+#include "tools/exchange/arrays/npz_file.hpp"
+
+namespace stageid::test {
+namespace test_controllers {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+NamedArray array_of(const char* name, const Eigen::MatrixXd& m) {
+  const Eigen::MatrixXd rows = m.transpose();
+  return {name,
+          {static_cast<std::size_t>(m.rows()), static_cast<std::size_t>(m.cols())},
+          std::vector<double>(rows.data(), rows.data() + rows.size())};
+}
+
+class Controllers : public ProgramTest {
+ protected:
+  /// The small experiment with another text from `controller:` on in its stage file.
+  std::string with_controller(const std::string& file, const std::string& controller) const {
+    const std::string stage = read_bytes(at("small_stage.yaml"));
+    write_bytes(at("stage_" + file), stage.substr(0, stage.find("controller:")) + controller);
+    return experiment(file, "stage: small_stage.yaml", "stage: stage_" + file);
+  }
+  /// Its controller as matrices, times a factor.
+  std::string in_matrices(const std::string& file, double factor) const {
+    const MotionController controller(load_stage_config(at("small_stage.yaml")).spec.controller);
+    const ControllerStateSpace s = controller.realization();
+    write_npz(at("c.npz"), {at("c.npz"),
+                            {array_of("A", s.a), array_of("B", s.b), array_of("C", factor * s.c),
+                             array_of("D", factor * s.d)}});
+    return with_controller(file, "controller: c.npz\n");
+  }
+  json findings(const std::string& log) const {
+    const json told = json::parse(run({"frf", name(log), "-o", name(log + ".h5"), "--json"}).out);
+    return told["health"];
+  }
+};
+
+TEST_F(Controllers, MatricesMeasureAndAreCheckedAsAxesAre) {
+  const std::string config = in_matrices("matrices.yaml", 1.0);
+  EXPECT_EQ(succeed({"config", "check", config}).err, "");
+  const std::string axes = succeed({"design", config_, "-o", name("axes.h5")}).out;
+  const std::string matrices = succeed({"design", config, "-o", name("matrices.h5")}).out;
+  EXPECT_EQ(axes.substr(0, axes.find("wrote")), matrices.substr(0, matrices.find("wrote")));
+  succeed({"run", config, "-o", name("m.slog")});
+  std::filesystem::remove(at("c.npz"));  // the log knows its controller
+  for (const json& finding : findings("m.slog")) {
+    EXPECT_NE(finding["severity"], "fault") << finding;
+    EXPECT_NE(finding["severity"], "doubt") << finding;
+    EXPECT_NE(finding["cause"], "unknown_stage") << finding;
+  }
+}
+
+TEST_F(Controllers, AWrongSignIsRefusedBeforeAnythingMoves) {
+  const std::string config = in_matrices("wrong.yaml", -1.0);
+  for (const char* command : {"run", "design", "identify"}) {
+    const ProgramResult result = run({command, config, "-o", name("wrong.slog")});
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_THAT(result.err, HasSubstr("the controller does not stabilize the plant")) << command;
+  }
+  EXPECT_THAT(run({"config", "check", config}).err, HasSubstr("does not stabilize"));
+}
+
+TEST_F(Controllers, APeerIsNotComputedHere) {
+  const std::string config = with_controller("peer.yaml", "controller: peer\n");
+  EXPECT_THAT(succeed({"config", "check", config}).err,
+              HasSubstr("the stage closes it by a controller of its own ('controller: peer')"));
+  EXPECT_THAT(succeed({"design", config, "-o", name("peer.h5")}).err,
+              HasSubstr("signals are not predicted"));
+  const ProgramResult refused = run({"run", config, "-o", name("peer.slog")});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("'backend: can' with 'mode: resident'"));
+  EXPECT_THAT(run({"node", name("stage_peer.yaml"), "--modbus-tcp", "0"}).err,
+              HasSubstr("its controller is 'peer'"));
+}
+
+TEST_F(Controllers, AFeedForwardIsInTheCommandsAndCountsInTheLimits) {
+  const std::string config = stage("bias.yaml", "limit_n: 40", "limit_n: 40, bias_n: 6");
+  succeed({"run", config, "-o", name("bias.slog")});
+  LogSamples samples;
+  const std::unique_ptr<LogReader> log = open_log(at("bias.slog"));
+  log->read(0, 0, 1, samples);
+  // It pushed the simulated stage, which has no weight, aside; the noise is 1e-9 m.
+  EXPECT_GT(std::abs(samples.sensors(0, 0)), 1e-6);
+  const std::string strong = stage("strong.yaml", "limit_n: 40", "limit_n: 40, bias_n: 38");
+  const ProgramResult refused = run({"design", strong, "-o", name("strong.h5")});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("a1: |u| would be"));
+}
+
+TEST_F(Controllers, AHeldStageIsMeasuredAndResumed) {
+  const std::string config = stage("held.yaml", "\nstuck", "\nbetween_runs: hold\nstuck");
+  succeed({"run", config, "-o", name("held.slog")});
+  for (const json& finding : findings("held.slog")) {
+    EXPECT_NE(finding["severity"], "fault") << finding;
+    EXPECT_NE(finding["severity"], "doubt") << finding;
+  }
+  EXPECT_THAT(succeed({"run", config, "-o", name("held.slog"), "--resume"}).out,
+              HasSubstr("9 of 9 runs complete"));
+  EXPECT_THAT(read_bytes(at("held.events.jsonl")), HasSubstr("\"event\":\"hold\""));
+  // A recorded run ends with the run.
+  const ProgramResult replayed =
+      run({"run", config, "-o", name("again.slog"), "--backend", "replay", "--replay",
+           name("held.slog"), "--replay-tolerance", "100"});
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
+}
+
+}  // namespace test_controllers
+}  // namespace stageid::test
