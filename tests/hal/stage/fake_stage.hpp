@@ -15,8 +15,8 @@ class FakeStage final : public CyclicStage {
     info_.sample_rate_hz = sample_rate_hz;
     info_.actuators.resize(static_cast<std::size_t>(actuators));
     info_.sensors.resize(static_cast<std::size_t>(sensors));
-    for (Channel& actuator : info_.actuators) actuator.unit = "N";
-    for (Channel& sensor : info_.sensors) sensor.unit = "m";
+    for (Channel& actuator : info_.actuators) actuator.unit.assign(1, 'N');
+    for (Channel& sensor : info_.sensors) sensor.unit.assign(1, 'm');
     for (int i = 0; i < actuators; ++i)
       info_.actuators[static_cast<std::size_t>(i)].name.assign(1, static_cast<char>('a' + i));
     for (int i = 0; i < sensors; ++i)
