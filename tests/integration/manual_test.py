@@ -45,8 +45,8 @@ def flags_in(text):
 class ManualTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        shutil.rmtree(WORK, ignore_errors=True)
-        WORK.mkdir(parents=True)
+        shutil.rmtree(WORK / "share", ignore_errors=True)
+        WORK.mkdir(parents=True, exist_ok=True)
         subprocess.run([PROGRAM, "manual", "-o", WORK / "share"], check=True, capture_output=True)
 
     def completed(self, *words):
