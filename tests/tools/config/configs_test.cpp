@@ -67,7 +67,7 @@ TEST(Configs, TheWatchdogOutlastsARepetition) {
   const std::filesystem::path file = kConfigs / "stage/small_stage_can.yaml";
   const std::string text = load_stage_config(file).text;
   const auto watchdog_s = [&](const std::string& keys) {
-    return parse_stage_config(file, text + keys).can.spec.watchdog_s;
+    return parse_stage_config(file, text + keys, "").can.spec.watchdog_s;
   };
   EXPECT_EQ(watchdog_s(""), 20e-3);
   EXPECT_GT(watchdog_s("  reply_timeout_s: 0.05\n"), kCanRepeats * 0.05);
