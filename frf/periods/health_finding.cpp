@@ -83,9 +83,10 @@ std::optional<Cause> cause_of(std::string_view name) noexcept {
 }
 
 int rank_of(const Finding& finding) noexcept {
-  const bool fault = finding.severity == Severity::fault;
   if (finding.cause == Cause::unknown_stage) return 1;
-  return fault ? 0 : 1 + static_cast<int>(finding.severity);
+  if (finding.severity == Severity::fault) return 0;
+  if (finding.severity == Severity::unchecked) return 4;
+  return finding.cause == Cause::uneven_noise ? 3 : 2;  // a transient or a drift looks like noise
 }
 
 bool any_fault(const std::vector<Finding>& findings) noexcept {

@@ -97,8 +97,7 @@ void PlantAverage::add(const RealizationSpectra& spectra, int workers,
   if (!noise_known_) return;
   const ExperimentNoise experiments(spectra, lines, lines_that_share(spectra), workers);
   experiment_noise_ratio_ = std::max(experiment_noise_ratio_, experiments.ratio());
-  for (const ExperimentNoise::Odd& odd : experiments.odd())
-    odd_runs_.push_back({spectra.realization(), odd});
+  noise_levels_.push_back(experiments.levels());
   for_each_line(workers, frequency_hz_.size(), [&](Eigen::Index k) {
     add_noise(spectra, lines[static_cast<std::size_t>(k)], experiments, periods, k);
   });
@@ -112,7 +111,7 @@ void PlantAverage::add_noise(const RealizationSpectra& spectra, const LineEstima
       experiments.differs(k) ? experiments.scaled(line, periods, k)
                              : line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods);
   add_common(noise, k);
-  scatter_.add(line, noise, dof, k);
+  scatter_.add(line, noise, experiments.level(k), dof, k);
   if (!experiments.differs(k)) {
     add_product(noise.input_part, noise.residual, dof, k);
     return;

@@ -47,12 +47,8 @@ class PlantAverage {
 
   /// Drift of the response. @param frf result of finish(); `run_periods`: periods per run
   std::optional<ModeDrift> drift(const FrfEstimate& frf, int run_periods) const;
-  /// A run whose noise differs from that of the others.
-  struct OddRun {
-    int realization = 0;
-    ExperimentNoise::Odd odd;
-  };
-  const std::vector<OddRun>& odd_runs() const noexcept { return odd_runs_; }
+  /// Runs whose noise differs from that of the others.
+  std::vector<OddRun> odd_runs() const { return stageid::odd_runs(noise_levels_); }
 
  private:
   void add_noise(const RealizationSpectra& spectra, const LineEstimate& line,
@@ -88,7 +84,7 @@ class PlantAverage {
   Eigen::VectorXd condition_;
   ScatterAverage scatter_;
   ResponseDrift drift_;
-  std::vector<OddRun> odd_runs_;
+  std::vector<NoiseLevels> noise_levels_;  // by realization
   Eigen::Index zippered_axes_ = 0;
   Eigen::VectorXd dof_sum_;       // sum of the noise's degrees of freedom
   Eigen::VectorXd scarcity_sum_;  // zippered: sum of 1 / degrees of freedom

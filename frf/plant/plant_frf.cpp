@@ -313,10 +313,11 @@ void PlantEstimation::include(const RealizationSpectra& spectra,
 /// Records drift and noise differences, which only the finished response shows.
 void PlantEstimation::note_change(const FrfEstimate& frf, HealthGathering& health) const {
   std::vector<NoisyRun> noisy;
-  for (const auto& [realization, odd] : average_->odd_runs()) {
-    const auto of = std::find_if(realizations_.begin(), realizations_.end(),
-                                 [m = realization](const auto& r) { return r.realization == m; });
-    noisy.push_back({realization,
+  for (const OddRun& odd : average_->odd_runs()) {
+    const auto of = std::find_if(realizations_.begin(), realizations_.end(), [&odd](const auto& r) {
+      return r.realization == odd.realization;
+    });
+    noisy.push_back({odd.realization,
                      of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
                      frf.outputs.names[static_cast<std::size_t>(odd.output)], odd.ratio});
   }
