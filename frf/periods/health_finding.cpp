@@ -1,5 +1,7 @@
 #include "frf/periods/health_finding.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string_view>
 
@@ -80,6 +82,15 @@ std::optional<Cause> cause_of(std::string_view name) noexcept {
   for (int i = 0; to_string(static_cast<Cause>(i)) != std::string_view(kUnknown); ++i)
     if (to_string(static_cast<Cause>(i)) == name) return static_cast<Cause>(i);
   return std::nullopt;
+}
+
+std::string named_realizations(const std::vector<int>& realizations) {
+  std::string text = realizations.size() == 1 ? "realization " : "realizations ";
+  for (std::size_t i = 0; i < realizations.size() && i < kMostNamed; ++i)
+    text += fmt::format("{}{}", i > 0 ? ", " : "", realizations[i] + 1);
+  if (realizations.size() > kMostNamed)
+    text += fmt::format(" and {} more", realizations.size() - kMostNamed);
+  return text;
 }
 
 int rank_of(const Finding& finding) noexcept {
