@@ -5,13 +5,16 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "frf/health/health_measures.hpp"
 #include "frf/health/transient_check.hpp"
 #include "frf/statistics/distributions.hpp"
 #include "frf/statistics/order_statistic.hpp"
+#include "frf/wiring/controller_check.hpp"
 #include "frf/wiring/examination.hpp"
+#include "frf/wiring/excitation_timing.hpp"
 #include "frf/wiring/repetition_check.hpp"
 #include "frf/wiring/rigid_body_check.hpp"
 #include "frf/wiring/skew_check.hpp"
@@ -299,17 +302,102 @@ void Examination::check_excluded() {
   }
 }
 
+/// The checks of one realization's recording.
+void Examination::check_realization() {
+  check_injection();
+  check_responses();
+  if (!any_fault(findings_)) check_arrival();
+  check_excitation();
+  check_recording();
+  check_excluded();
+}
+
+/// Of a realization after the first one. @pre spoilt_ is that of the whole log
+std::vector<Finding> Examination::examine_other() {
+  if (const std::optional<ExcitationDelay> delay = align_excitation(record_, nominal_))
+    findings_.push_back(to_finding(*delay));
+  check_realization();
+  std::erase_if(findings_, [](const Finding& f) {
+    return f.severity == Severity::unchecked || f.cause == Cause::unknown_stage;
+  });
+  return std::move(findings_);
+}
+
+/// Whether u = r - C y holds; true if this is unknown.
+bool Examination::follows_stage() {
+  return !nominal_ || !spoilt_.empty() || !why_no_nominal(true).empty() ||
+         follows_controller(record_, *nominal_);
+}
+
+/// Merges the findings `own` of the first realization with those of the others: what only some have names them. If the
+/// first has no finding, only those are examined whose response lies apart, or whose signals violate u = r - C y.
+void Examination::check_others(std::vector<Finding>& own) {
+  std::erase_if(own, [&](const Finding& f) {
+    const bool of_log = f.severity == Severity::unchecked || f.cause == Cause::unknown_stage;
+    if (of_log) findings_.push_back(f);
+    return of_log;
+  });
+  const auto& apart = record_.differences.outlying;
+  const bool clean = own.empty();
+  for (Finding& f : own) f.realizations = {record_.realization};
+  for (RealizationRecord& other : record_.others) {
+    HealthRecord record;
+    static_cast<RealizationRecord&>(record) = std::move(other);
+    record.info = record_.info;
+    record.scan = record_.scan;
+    Examination examination(std::move(record), nominal_);
+    examination.spoilt_ = spoilt_of_log_;
+    const int realization = examination.record_.realization;
+    if (clean && std::find(apart.begin(), apart.end(), realization) == apart.end() &&
+        examination.follows_stage())
+      continue;
+    for (Finding& f : examination.examine_other()) {
+      auto same = std::find_if(own.begin(), own.end(), [&f](const Finding& one) {
+        return one.cause == f.cause && one.channel == f.channel && one.severity == f.severity &&
+               one.what == f.what;
+      });
+      if (same == own.end()) same = own.insert(own.end(), std::move(f));
+      same->realizations.push_back(realization);
+    }
+  }
+  // What the recording does not explain is a difference at the stage, or the stage is unknown.
+  for (const RealizationChange& change : record_.differences.changes) {
+    Finding f = to_finding(change);
+    const bool explained = std::any_of(own.begin(), own.end(), [&](const Finding& one) {
+      return one.severity == Severity::fault &&
+             std::find(one.realizations.begin(), one.realizations.end(), change.realization) !=
+                 one.realizations.end() &&
+             one.realizations.size() <= record_.others.size();
+    });
+    if (!explained) findings_.push_back(std::move(f));
+  }
+  for (Finding& f : own) {
+    if (f.realizations.size() > record_.others.size())
+      f.realizations.clear();
+    else
+      f.what += fmt::format(", in {} only", named_realizations(f.realizations));
+    findings_.push_back(std::move(f));
+  }
+}
+
 std::vector<Finding> Examination::examine() {
   findings_ = check_timing(record_, nominal_);
   check_cycles();
   check_samples();
+  spoilt_of_log_ = spoilt_;
   if (!found(Cause::aperiodic)) {  // otherwise no spectrum is valid
-    check_injection();
-    check_responses();
-    if (!any_fault(findings_)) check_arrival();
-    check_excitation();
-    check_recording();
-    check_excluded();
+    std::vector<Finding> of_log = std::move(findings_);
+    findings_.clear();
+    const auto late = std::find_if(of_log.begin(), of_log.end(), [](const Finding& f) {
+      return f.cause == Cause::excitation_timing;
+    });
+    if (late != of_log.end()) {
+      findings_.push_back(std::move(*late));
+      of_log.erase(late);
+    }
+    check_realization();
+    std::vector<Finding> own = std::exchange(findings_, std::move(of_log));
+    check_others(own);
     check_stage();
     check_inputs();
     if (!any_fault(findings_))  // a stuck channel would look like a transient

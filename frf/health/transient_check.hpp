@@ -11,16 +11,16 @@ namespace stageid {
 /// lightly damped mode rings on a few lines only.
 ///
 /// Test 1: the phase of X = sum B* W of each run, at a local maximum of the power of B over the lines (five
-/// lines; B, W, V as in RunStart). If W is noise, the phases are uniform over the runs, for any colour and any
+/// lines; B, W as in RunStart). If W is noise, the phases are uniform over the runs, for any colour and any
 /// correlation of the sensors. Then the resultant R with weights m, which depend on B only, satisfies
 /// P(R^2 > t sum m^2) <= e^-t (Rayleigh's test). Noise with a memory longer than a period (a disturbed lightly
 /// damped mode) correlates W with the noise of B, for an AR(1) process by at most 0.45 (limit of a long memory).
 /// Therefore 0.6 over the root of B's power over the noise is subtracted from R / sum m. (0.6, because
 /// B's own noise is up to 1.6 times what the scatter predicts.)
 ///
-/// Test 2, with at least three periods: the power of W against that of V, the last period relative to the earlier
-/// ones, which is W with time reversed. For noise both have the same distribution. F with one complex degree of
-/// freedom per run on either side, because lines and sensors share their noise. False alarms in at most one
+/// Test 2, with at least three periods: the power of the first period against that of the last, both relative to the
+/// periods between them. For noise, which may be reversed in time, both have the same distribution. F with one complex
+/// degree of freedom per run on either side, because lines and sensors share their noise. False alarms in at most one
 /// of two hundred logs (Bonferroni over maxima and tests).
 ///
 /// A drift changes the periods along a straight line, which test 1 detects as well. The phase of the curvature K

@@ -1,5 +1,7 @@
 #include "frf/periods/health_finding.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string_view>
 
@@ -84,11 +86,21 @@ std::optional<Cause> cause_of(std::string_view name) noexcept {
   return std::nullopt;
 }
 
+std::string named_realizations(const std::vector<int>& realizations) {
+  std::string text = realizations.size() == 1 ? "realization " : "realizations ";
+  for (std::size_t i = 0; i < realizations.size() && i < kMostNamed; ++i)
+    text += fmt::format("{}{}", i > 0 ? ", " : "", realizations[i] + 1);
+  if (realizations.size() > kMostNamed)
+    text += fmt::format(" and {} more", realizations.size() - kMostNamed);
+  return text;
+}
+
 int rank_of(const Finding& finding) noexcept {
-  const bool fault = finding.severity == Severity::fault;
   if (finding.cause == Cause::limit_cycle) return 0;  // causes other faults
+  if (finding.severity == Severity::fault) return 1;
   if (finding.cause == Cause::unknown_stage) return 2;
-  return fault ? 1 : 2 + static_cast<int>(finding.severity);
+  if (finding.severity == Severity::unchecked) return 5;
+  return finding.cause == Cause::uneven_noise ? 4 : 3;  // a transient or a drift looks like noise
 }
 
 bool any_fault(const std::vector<Finding>& findings) noexcept {

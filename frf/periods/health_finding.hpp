@@ -60,7 +60,12 @@ struct Finding {
   std::string what;     ///< the problem, or the unchecked property
   std::string figure;   ///< the evidence as a number
   std::string remedy;   ///< the remedy, or the missing data
+  /// Counted from 0; empty: all of them. `what` names them. For programs within the process only.
+  std::vector<int> realizations{};
 };
+
+/// "realization 3", "realizations 2, 3", "realizations 1, 2, 3, 4 and 6 more". @pre counted from 0, not empty
+std::string named_realizations(const std::vector<int>& realizations);
 
 /// Order in the table: faults, an unknown stage, doubts, other unchecked properties.
 int rank_of(const Finding& finding) noexcept;

@@ -191,8 +191,13 @@ double log_tail(double ratio, const DegreesOfFreedom& dof) {
   return a < 1 ? 0.0 : log_tail_of_f(ratio, a, 0.5 * dof.core);
 }
 
-/// Power of p over that of the core in one octave, if it is significant.
-std::optional<double> excess(const OctaveRecord& octave, std::span<const int> number,
+struct Excess {
+  double ratio = 0.0;  ///< power of the period over that of the core
+  double power = 0.0;  ///< of the period's deviation
+};
+
+/// Of p in one octave, if it is significant.
+std::optional<Excess> excess(const OctaveRecord& octave, std::span<const int> number,
                              const Periods& core, Index p, double log_chance) {
   const Periods positions = comparable_positions(octave, core, p);
   const auto M = static_cast<Index>(positions.size());
@@ -214,7 +219,8 @@ std::optional<double> excess(const OctaveRecord& octave, std::span<const int> nu
   const double alone = degrees_of_freedom(own - mean, {p}, number).period;
   dof = {std::min(dof.period, alone), std::min(dof.core, alone * static_cast<double>(n - 1))};
   if (!(log_tail(ratio, dof) < log_chance)) return std::nullopt;
-  return ratio;
+  // The coefficients of an octave have the density of the power in it.
+  return Excess{ratio, deviation / static_cast<double>(M) * (octave.high_hz - octave.low_hz)};
 }
 
 /// The record of one channel, samples x periods.
@@ -261,12 +267,14 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
     if (std::binary_search(core.begin(), core.end(), p)) continue;
     Candidate most{{static_cast<std::size_t>(p), channel, 0.0, 0.0, 0.0},
                    mean_ratio(grams, core, p)};
+    double power = 0.0;
     for (const OctaveRecord& octave : octaves) {
-      const std::optional<double> ratio =
+      const std::optional<Excess> here =
           excess(octave, periods.number, core, p, std::log(kDropByChance) - log_tests);
-      if (ratio.value_or(0.0) > most.outlier.ratio)
-        most.outlier = {static_cast<std::size_t>(p), channel, octave.low_hz, octave.high_hz,
-                        *ratio};
+      if (!here || !(here->power > power)) continue;
+      power = here->power;
+      most.outlier = {static_cast<std::size_t>(p), channel, octave.low_hz, octave.high_hz,
+                      here->ratio};
     }
     if (most.outlier.ratio > 0.0) found.push_back(most);
   }

@@ -19,6 +19,9 @@ constexpr int kNear = 4;           // shifts that are always tried
 constexpr std::size_t kPeaks = 3;  // of the cross-correlation, beyond them
 constexpr double kLeastGain = 1.5;
 constexpr double kLeastRatioAlone = 10.0;
+constexpr double kLeastRatioOfOne = 30.0;
+constexpr double kWorthTrying = 4.0;  // ratio of the block powers of a channel
+constexpr double kClearlyMore = 1.2;
 constexpr double kDeviations = 8.0;
 constexpr double kSlipRounding = 1e-24;  // of a channel's power
 
@@ -49,20 +52,36 @@ double floor_of(const MatrixXd& samples, Index channel) {
   return kSlipRounding * samples.col(channel).squaredNorm() + 1e-300;
 }
 
+/// Whether a shift of 2 ... 4 samples fits some block of a channel clearly better.
+bool clearly_shifted(const MatrixXd& earlier, const MatrixXd& later, Index channel,
+                     const ArrayXd& here) {
+  for (Index shift = 2; shift <= kNear; ++shift)
+    for (const Index s : {shift, -shift})
+      if ((kWorthTrying * block_power(difference(later, earlier, channel, s), here.size()) < here)
+              .any())
+        return true;
+  return false;
+}
+
 /// Whether, in some block of one kind of channels, the earlier period shifted by a sample fits as well as the
-/// period itself. This is always the case after a gap, and also if there is only noise.
+/// period itself, or clearly better in one channel. This is always the case after a gap, and also if there is only
+/// noise.
 bool suspicious(const MatrixXd& earlier, const MatrixXd& later) {
   const Index N = later.rows();
   const Index blocks = blocks_of(N);
   ArrayXd evidence = ArrayXd::Zero(blocks);
+  bool one = false;
   for (Index c = 0; c < later.cols(); ++c) {
     const double least = floor_of(later, c);
     const ArrayXd here = block_power(difference(later, earlier, c, 0), blocks) + least;
     const ArrayXd next = block_power(difference(later, earlier, c, 1), blocks) + least;
     const ArrayXd last = block_power(difference(later, earlier, c, -1), blocks) + least;
-    evidence += (next.min(last) / here).log();
+    const ArrayXd ratio = next.min(last) / here;
+    evidence += ratio.log();
+    one = one || ratio.minCoeff() * kWorthTrying < 1.0 ||
+          (ratio.minCoeff() < 1.0 && clearly_shifted(earlier, later, c, here));
   }
-  return later.cols() > 0 && (evidence <= 0.0).any();
+  return one || (later.cols() > 0 && (evidence <= 0.0).any());
 }
 
 /// Residuals of one kind of channels without and with a shift, per sample, over the scatter of the channels.
@@ -86,23 +105,37 @@ double independent_samples(const ArrayXd& signal, RealDft& dft) {
   return squares > 0.0 ? 2.0 * sum * sum / squares : 0.0;
 }
 
-Explained explained(const MatrixXd& earlier, const MatrixXd& later, Index shift, RealDft& dft) {
+Explained explained_of(const MatrixXd& earlier, const MatrixXd& later, Index c, Index shift,
+                       RealDft& dft) {
   const Index N = later.rows();
   const Index blocks = blocks_of(N);
-  Explained sum{ArrayXd::Zero(N), ArrayXd::Zero(N), 0.0};
-  for (Index c = 0; c < later.cols(); ++c) {
-    const ArrayXd before = difference(later, earlier, c, 0);
-    const ArrayXd after = difference(later, earlier, c, shift);
-    const double scatter =
-        block_power(before, blocks).min(block_power(after, blocks)).sum() / static_cast<double>(N);
-    const double power = later.col(c).squaredNorm();
-    if (!(power > 0.0)) continue;
-    const double weight = 1.0 / (scatter + floor_of(later, c) / static_cast<double>(N));
-    sum.before += weight * before.square();
-    sum.after += weight * after.square();
-    sum.freedom += std::min(independent_samples(before, dft), independent_samples(after, dft));
+  const double power = later.col(c).squaredNorm();
+  if (!(power > 0.0)) return {ArrayXd::Zero(N), ArrayXd::Zero(N), 0.0};
+  const ArrayXd before = difference(later, earlier, c, 0);
+  const ArrayXd after = difference(later, earlier, c, shift);
+  const double scatter =
+      block_power(before, blocks).min(block_power(after, blocks)).sum() / static_cast<double>(N);
+  const double weight = 1.0 / (scatter + floor_of(later, c) / static_cast<double>(N));
+  return {weight * before.square(), weight * after.square(),
+          std::min(independent_samples(before, dft), independent_samples(after, dft))};
+}
+
+Explained sum_of(const std::vector<Explained>& channels, Index rows) {
+  Explained sum{ArrayXd::Zero(rows), ArrayXd::Zero(rows), 0.0};
+  for (const Explained& one : channels) {
+    sum.before += one.before;
+    sum.after += one.after;
+    sum.freedom += one.freedom;
   }
   return sum;
+}
+
+std::vector<Explained> explained(const MatrixXd& earlier, const MatrixXd& later, Index shift,
+                                 RealDft& dft) {
+  std::vector<Explained> channels;
+  for (Index c = 0; c < later.cols(); ++c)
+    channels.push_back(explained_of(earlier, later, c, shift, dft));
+  return channels;
 }
 
 struct Change {
@@ -192,14 +225,27 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
   if (!suspicious(earlier.sensors, later.sensors) &&
       !suspicious(earlier.actuators, later.actuators))
     return std::nullopt;
+  const Index N = later.sensors.rows();
   std::optional<PeriodSlip> found;
   double largest = 0.0;
+  std::optional<PeriodSlip> of_one;  // of a single channel
+  double largest_of_one = 0.0;
   for (const Index shift : shifts_to_try(earlier, later, dft)) {
-    const Explained sensors = explained(earlier.sensors, later.sensors, shift, dft);
-    const Explained actuators = explained(earlier.actuators, later.actuators, shift, dft);
+    const std::vector<Explained> each_sensor =
+        explained(earlier.sensors, later.sensors, shift, dft);
+    const std::vector<Explained> each_actuator =
+        explained(earlier.actuators, later.actuators, shift, dft);
+    const Explained sensors = sum_of(each_sensor, N);
+    const Explained actuators = sum_of(each_actuator, N);
     const ArrayXd of_sensors = sensors.before - sensors.after;
     const ArrayXd of_actuators = actuators.before - actuators.after;
     const std::array<ArrayXd, 3> gains = {of_sensors + of_actuators, of_sensors, of_actuators};
+    const bool near = std::abs(shift) <= kNear;
+    const auto slip_of = [&](const Change& change, bool y, bool u) {
+      const bool until_the_end = change.last == N;
+      return PeriodSlip{until_the_end ? change.first : change.last, static_cast<int>(shift),
+                        !until_the_end, y, u};
+    };
     for (const ArrayXd& gain : gains) {
       const Change change = best_change(gain);
       if (!(change.gain > largest)) continue;
@@ -207,19 +253,30 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
       const double u = advantage(actuators, change);
       // A transient or a stuck sensor may look like a long shift. With a wrong period length, every period is
       // displaced as a whole.
-      const bool whole = change.first == 0 && change.last == later.sensors.rows();
+      const bool whole = change.first == 0 && change.last == N;
       const double sure = std::log(kLeastRatioAlone);
-      const bool near = std::abs(shift) <= kNear;
       if (near ? !(std::min(y, u) > 0.0) && std::max(y, u) < sure : whole || std::min(y, u) < sure)
         continue;
       // If one kind is not significant, it is assumed to have the same gap as the other.
-      const bool until_the_end = change.last == later.sensors.rows();
-      found = PeriodSlip{until_the_end ? change.first : change.last, static_cast<int>(shift),
-                         !until_the_end, y >= 0.0, u >= 0.0};
+      found = slip_of(change, y >= 0.0, u >= 0.0);
       largest = change.gain;
     }
+    if (!near) continue;
+    const auto try_one = [&](const Explained& channel, Index c, bool of_sensor) {
+      const Change change = best_change(channel.before - channel.after);
+      if (!(change.gain > largest_of_one) ||
+          advantage(channel, change) < std::log(kLeastRatioOfOne))
+        return;
+      of_one = slip_of(change, of_sensor, !of_sensor);
+      of_one->channel = c;
+      largest_of_one = change.gain;
+    };
+    for (Index c = 0; c < later.sensors.cols(); ++c)
+      try_one(each_sensor[static_cast<std::size_t>(c)], c, true);
+    for (Index c = 0; c < later.actuators.cols(); ++c)
+      try_one(each_actuator[static_cast<std::size_t>(c)], c, false);
   }
-  return found;
+  return of_one && largest_of_one > kClearlyMore * largest ? of_one : found;
 }
 
 }  // namespace stageid

@@ -16,6 +16,7 @@ struct PeriodSlip {
       false;            ///< the gap is in the earlier period, and the whole later one is displaced
   bool sensors = true;  ///< affected channels
   bool actuators = true;
+  Eigen::Index channel = -1;  ///< the only affected one of its kind; -1: all of them
 };
 
 /// Finds lost or duplicated samples in one of two periods of a periodic signal (docs/theory.md, section 13).
@@ -30,6 +31,9 @@ struct PeriodSlip {
 /// alone needs a factor of 10, because a slow transient may look like a shift of slow signals. A gap of more
 /// than 4 samples needs a factor of 10 in both kinds, and must start inside a period. Too few samples at the
 /// edge of a period (1600 over the channels) are not enough; the next period reveals the gap.
+///
+/// A channel with its own recorder or filter may lose samples alone. It needs a factor of 30, at most 4 samples, and
+/// explains more than a gap of its whole kind.
 ///
 /// d is any of -4 ... 4, or near one of the three largest peaks of the periods' cross-correlation.
 /// @pre both have `dft.length()` rows

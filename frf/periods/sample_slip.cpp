@@ -7,27 +7,30 @@
 #include "acquisition/files/counted.hpp"
 
 namespace stageid {
+namespace {
 
-std::string to_string(const SampleSlip& slip) {
+/// "one sample of s2"
+std::string samples_of(const SampleSlip& slip) {
   const int count = std::abs(slip.lost);
   const std::string samples = count == 1 ? "one sample" : counted(count, "sample");
-  const char* of = slip.sensors && slip.actuators ? ""
-                   : slip.sensors                 ? " of all sensors"
-                                                  : " of all actuators";
-  return fmt::format("{}{} {} near row {}", samples, of, slip.lost > 0 ? "lost" : "too many",
-                     slip.row);
+  if (!slip.channel.empty()) return fmt::format("{} of {}", samples, slip.channel);
+  if (slip.sensors && slip.actuators) return samples;
+  return fmt::format("{} of all {}", samples, slip.sensors ? "sensors" : "actuators");
+}
+
+}  // namespace
+
+std::string to_string(const SampleSlip& slip) {
+  const std::string samples = samples_of(slip);
+  return fmt::format("{} {} near row {}", samples, slip.lost > 0 ? "lost" : "too many", slip.row);
 }
 
 Finding to_finding(const SampleSlip& slip) {
-  const int count = std::abs(slip.lost);
-  const std::string samples = count == 1 ? "one sample" : counted(count, "sample");
-  const char* of = slip.sensors && slip.actuators ? ""
-                   : slip.sensors                 ? " of all sensors"
-                                                  : " of all actuators";
+  const std::string samples = samples_of(slip);
   Finding finding;
   finding.severity = Severity::doubt;
   finding.cause = Cause::lost_samples;
-  finding.what = fmt::format("{}{} {} in run {} near row {}", samples, of,
+  finding.what = fmt::format("{} {} in run {} near row {}", samples,
                              slip.lost > 0 ? "lost" : "too many", slip.run, slip.row);
   finding.figure =
       fmt::format("realization {}, experiment {}", slip.realization + 1, slip.experiment + 1);

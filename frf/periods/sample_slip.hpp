@@ -16,7 +16,8 @@ struct SampleSlip {
   int lost = 0;           ///< samples; < 0: duplicated
   bool sensors = true;    ///< affected channels
   bool actuators = true;
-  bool spoilt = true;  ///< its period is discarded; false: the gap is between two periods
+  std::string channel{};  ///< the only affected one; empty: all channels of these kinds
+  bool spoilt = true;     ///< its period is discarded; false: the gap is between two periods
 };
 
 /// "one sample lost near row 21234"

@@ -44,7 +44,10 @@ RunStart StartRecorder::finish() {
   const Eigen::MatrixXcd mean = (first_ + (P - 1.0) * rest_mean_) / P;
   const Eigen::MatrixXcd B = start_ - mean;
   const Eigen::MatrixXcd W = first_ - rest_mean_;
-  const Eigen::MatrixXcd V = latest_ - (P * mean - latest_) / (P - 1.0);
+  // Both against the same periods, so that time can be reversed.
+  const Eigen::MatrixXcd inner = ((P - 1.0) * rest_mean_ - latest_) / std::max(1.0, P - 2.0);
+  const Eigen::MatrixXcd first = first_ - inner;
+  const Eigen::MatrixXcd last = latest_ - inner;
   const Eigen::MatrixXcd L = moment_ - 0.5 * P * (start_ + P * mean);
   const Eigen::MatrixXcd K = start_ - first_ - 2.0 / P * W;
   const double scale = (P - 1.0) / P;
@@ -68,8 +71,8 @@ RunStart StartRecorder::finish() {
     run.bend += weight * L.row(c).conjugate().cwiseProduct(K.row(c)).transpose();
     run.start += weight * B.row(c).cwiseAbs2().transpose();
     run.slope += weight * L.row(c).cwiseAbs2().transpose();
-    run.first += weight * scale * W.row(c).cwiseAbs2().transpose();
-    run.last += weight * scale * V.row(c).cwiseAbs2().transpose();
+    run.first += weight * first.row(c).cwiseAbs2().transpose();
+    run.last += weight * last.row(c).cwiseAbs2().transpose();
     // Rounding errors count as noise, so that it is not zero.
     run.noise.array() +=
         weight * noise.row(c).transpose().array() + weight * kTransientRounding * power;

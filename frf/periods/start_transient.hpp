@@ -7,7 +7,7 @@ namespace stageid {
 
 /// Transient of the start of a run in the used periods, line by line. Z_0 is the last discarded period, or the
 /// first used one if none was discarded; Z_1 ... Z_P are the following ones:
-///   B = Z_0 - mean(Z_1 ... Z_P),  W = Z_1 - mean(Z_2 ... Z_P),  V = Z_P - mean(Z_1 ... Z_{P-1}).
+///   B = Z_0 - mean(Z_1 ... Z_P),  W = Z_1 - mean(Z_2 ... Z_P).
 /// A ringing mode adds A q^p to Z_p, q = e^{pole x period}, so W is B times one complex number in all runs.
 /// For noise the phase is random. The sensors are summed, each over its noise.
 ///
@@ -18,8 +18,8 @@ struct RunStart {
   Eigen::VectorXcd bend;   ///< the same of conj(L) K
   Eigen::VectorXd start;   ///< |B|^2
   Eigen::VectorXd slope;   ///< |L|^2
-  Eigen::VectorXd first;   ///< |W|^2 (P - 1) / P: the noise of one period if nothing rings
-  Eigen::VectorXd last;    ///< |V|^2 (P - 1) / P
+  Eigen::VectorXd first;   ///< |Z_1 - mean(Z_2 ... Z_{P-1})|^2
+  Eigen::VectorXd last;    ///< |Z_P - mean(Z_2 ... Z_{P-1})|^2
   Eigen::VectorXd noise;   ///< of one period, from Z_2 ... Z_P; P = 2: from both periods
   double noise_dof = 0.0;
   int periods = 0;          ///< P

@@ -19,21 +19,34 @@ constexpr double kByChance = 1e-6;
 constexpr double kWorthwhileRatio = 1.3;
 constexpr double kDeviations = 5.0;
 constexpr Index kFewestLines = 16;
-constexpr Index kBlockLines = 64;
-constexpr Index kMostBlocks = 16;
 constexpr double kRounding = 1e-10;  // of the output's power
+
+/// Factor of the variance of a block's mean if its lines are not independent, outputs x blocks.
+MatrixXd dependence_of(const RealizationSpectra& spectra, Index outputs, Index blocks) {
+  MatrixXd common = MatrixXd::Zero(outputs, blocks);
+  MatrixXd own = MatrixXd::Zero(outputs, blocks);
+  for (Index e = 0; e < spectra.experiments(); ++e) {
+    const RunSpectra& run = spectra.run(static_cast<std::size_t>(e));
+    if (run.common_sum.size() == 0) continue;
+    common += run.common_sum;
+    own += run.own_sum;
+  }
+  return (own.array() > 0.0).select((common.array() / own.array()).max(1.0), 1.0);
+}
 
 }  // namespace
 
 ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
                                  const std::vector<LineEstimate>& lines, double shared, int workers)
-    : spectra_(spectra), lines_(static_cast<Index>(lines.size())) {
+    : spectra_(spectra),
+      lines_(static_cast<Index>(lines.size())),
+      outputs_(lines.empty() ? 0 : lines.front().G.rows()) {
   const Index E = spectra.experiments();
+  const Index n_y = outputs_;
   for (Index e = 0; e < E; ++e)
     if (spectra.run(static_cast<std::size_t>(e)).scatter_dof == 0) return;
-  if (E < 2 || lines_ < kFewestLines) return;
-  blocks_ = std::clamp<Index>(lines_ / kBlockLines, 1, kMostBlocks);
-  const Index n_y = lines.front().G.rows();
+  if (lines_ < kFewestLines) return;
+  const Index blocks = noise_blocks(lines_);
 
   MatrixXd log_power(n_y * E, lines_);
   for_each_line(workers, lines_, [&](Index k) {
@@ -45,27 +58,34 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
           (C[static_cast<std::size_t>(e)].diagonal().real().array() + rounding).log() -
           mean_of_log_power(spectra.run(static_cast<std::size_t>(e)).dof(k));
   });
-  std::vector<MatrixXd> sum(static_cast<std::size_t>(blocks_), MatrixXd::Zero(n_y, E));
-  VectorXd count = VectorXd::Zero(blocks_);
-  MatrixXd variance = MatrixXd::Zero(E, blocks_);
+  levels_.realization = spectra.realization();
+  levels_.log_power.assign(static_cast<std::size_t>(blocks), MatrixXd::Zero(n_y, E));
+  levels_.weight = levels_.log_power;
+  levels_.differs.setConstant(n_y, blocks, false);
+  VectorXd count = VectorXd::Zero(blocks);
+  MatrixXd variance = MatrixXd::Zero(E, blocks);
   for (Index k = 0; k < lines_; ++k) {
     if (!log_power.col(k).allFinite()) continue;  // a constant channel
     const auto block = static_cast<Index>(at(k));
-    sum[at(k)] += log_power.col(k).reshaped(n_y, E);
+    levels_.log_power[at(k)] += log_power.col(k).reshaped(n_y, E);
     count[block] += 1.0;
     for (Index e = 0; e < E; ++e)
       variance(e, block) += variance_of_log_power(spectra.run(static_cast<std::size_t>(e)).dof(k));
   }
-  blocks_differ_.assign(static_cast<std::size_t>(blocks_), false);
-  for (Index b = 0; b < blocks_; ++b) {
-    MatrixXd& mean = sum[static_cast<std::size_t>(b)];
+  const MatrixXd dependence = dependence_of(spectra, n_y, blocks);
+  for (std::size_t b = 0; b < levels_.log_power.size(); ++b) {
+    const auto block = static_cast<Index>(b);
+    MatrixXd& mean = levels_.log_power[b];
     share_.emplace_back(MatrixXd::Ones(n_y, E));
-    if (count[b] < kFewestLines) continue;
-    mean /= count[b];
+    blocks_differ_.push_back(false);
+    if (count[block] < kFewestLines) continue;
+    mean /= count[block];
     const VectorXd weight =
-        variance.col(b).cwiseInverse() * (count[b] * count[b] / std::max(1.0, shared));
-    const double ratio = compare(mean, weight);
-    blocks_differ_[static_cast<std::size_t>(b)] = ratio > 1.0;
+        variance.col(block).cwiseInverse() * (count[block] * count[block] / std::max(1.0, shared));
+    levels_.weight[b] = dependence.col(block).cwiseInverse() * weight.transpose();
+    if (E < 2) continue;
+    const double ratio = compare(b);
+    blocks_differ_[b] = ratio > 1.0;
     ratio_ = std::max(ratio_, ratio);
     MatrixXd& share = share_.back();
     share = (mean.colwise() - mean.rowwise().mean()).array().exp();
@@ -74,46 +94,89 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
 }
 
 /// The largest ratio of two experiments; 1 unless they differ significantly in an output.
-/// @param mean of the logarithms, outputs x experiments; `weight`: one over its variance
-double ExperimentNoise::compare(const MatrixXd& mean, const VectorXd& weight) {
+double ExperimentNoise::compare(std::size_t block) {
   double largest = 1.0;
-  const double tests = static_cast<double>(mean.rows() * blocks_);
+  const MatrixXd& mean = levels_.log_power[block];
+  const double tests =
+      static_cast<double>(mean.rows()) * static_cast<double>(levels_.log_power.size());
   for (Index i = 0; i < mean.rows(); ++i) {
     const VectorXd x = mean.row(i).transpose();
+    const VectorXd weight = levels_.weight[block].row(i).transpose();
     const double centre = x.dot(weight) / weight.sum();
     const double chi_square = weight.dot((x.array() - centre).square().matrix());
     const double ratio = std::exp(x.maxCoeff() - x.minCoeff());
-    if (ratio <= kWorthwhileRatio ||
-        tail_of_chi_square(chi_square, static_cast<double>(x.size() - 1)) >= kByChance / tests)
+    const double dof = std::max(1.0, weight.minCoeff());
+    const auto E = static_cast<double>(x.size());
+    if (ratio <= kWorthwhileRatio || tail_of_chi_square(chi_square, E - 1.0) >= kByChance / tests ||
+        log_tail_of_f(ratio, static_cast<int>(std::min(dof, 1e6)), dof) >=
+            std::log(kByChance / tests / (E * (E - 1.0))))
       continue;
+    levels_.differs(i, static_cast<Index>(block)) = true;
     largest = std::max(largest, ratio);
-    note(x, weight, i);
   }
   return largest;
 }
 
-void ExperimentNoise::note(const VectorXd& log_power, const VectorXd& weight, Index output) {
-  std::vector<double> values(log_power.begin(), log_power.end());
-  const double middle = order_statistic(values, 0.5);
-  const Eigen::ArrayXd off = (log_power.array() - middle).abs();
-  Index most = 0;
-  off.maxCoeff(&most);
-  for (Index e = 0; e < off.size(); ++e) {
-    const bool differs =
-        off[e] > std::log(kWorthwhileRatio) && off[e] * std::sqrt(weight[e]) > kDeviations;
-    if (!differs && e != most) continue;
-    const double ratio = std::exp(log_power[e] - middle);
-    const auto known = std::find_if(odd_.begin(), odd_.end(),
-                                    [e](const Odd& other) { return other.experiment == e; });
-    if (known == odd_.end())
-      odd_.push_back({e, output, ratio});
-    else if (off[e] > std::abs(std::log(known->ratio)))
-      *known = {e, output, ratio};
-  }
+VectorXd ExperimentNoise::level(Index k) const {
+  if (levels_.log_power.empty() || !(levels_.weight[at(k)].minCoeff() > 0.0))
+    return VectorXd::Ones(outputs_);
+  return levels_.log_power[at(k)].array().exp().matrix().rowwise().mean();
+}
+
+std::vector<OddRun> odd_runs(const std::vector<NoiseLevels>& realizations) {
+  std::vector<OddRun> found;
+  const auto note = [&found](const OddRun& run) {
+    const auto known = std::find_if(found.begin(), found.end(), [&run](const OddRun& other) {
+      return other.realization == run.realization && other.experiment == run.experiment;
+    });
+    if (known == found.end())
+      found.push_back(run);
+    else if (std::abs(std::log(run.ratio)) > std::abs(std::log(known->ratio)))
+      *known = run;
+  };
+  const NoiseLevels* first = nullptr;
+  for (const NoiseLevels& one : realizations)
+    if (first == nullptr && one.differs.any()) first = &one;
+  if (first == nullptr) return found;
+  for (Index b = 0; b < first->differs.cols(); ++b)
+    for (Index i = 0; i < first->differs.rows(); ++i) {
+      const bool differs = std::any_of(
+          realizations.begin(), realizations.end(),
+          [i, b](const NoiseLevels& one) { return one.differs.size() > 0 && one.differs(i, b); });
+      if (!differs) continue;
+      std::vector<double> values;
+      for (const NoiseLevels& one : realizations)
+        if (one.differs.size() > 0)
+          for (const double x : one.log_power[static_cast<std::size_t>(b)].row(i))
+            values.push_back(x);
+      const double middle = value_of_rank(values, (values.size() - 1) / 2);
+      OddRun most;
+      double largest = 0.0;
+      bool any = false;
+      for (const NoiseLevels& one : realizations) {
+        if (one.differs.size() == 0) continue;
+        const MatrixXd& x = one.log_power[static_cast<std::size_t>(b)];
+        for (Index e = 0; e < x.cols(); ++e) {
+          const double off = std::abs(x(i, e) - middle);
+          const OddRun run{one.realization, e, i, std::exp(x(i, e) - middle)};
+          if (off > largest) {
+            largest = off;
+            most = run;
+          }
+          if (!(off > std::log(kWorthwhileRatio)) ||
+              !(off * std::sqrt(one.weight[static_cast<std::size_t>(b)](i, e)) > kDeviations))
+            continue;
+          note(run);
+          any = true;
+        }
+      }
+      if (!any && largest > 0.0) note(most);
+    }
+  return found;
 }
 
 std::size_t ExperimentNoise::at(Index k) const {
-  return static_cast<std::size_t>(k * blocks_ / lines_);
+  return static_cast<std::size_t>(noise_block(k, lines_));
 }
 
 std::vector<MatrixXcd> ExperimentNoise::covariances(const LineEstimate& line, Index k) const {

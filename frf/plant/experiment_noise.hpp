@@ -8,6 +8,14 @@
 
 namespace stageid {
 
+/// The noise of Y - G U of one realization, by block of lines.
+struct NoiseLevels {
+  int realization = 0;
+  std::vector<Eigen::MatrixXd> log_power;  ///< mean over the lines, outputs x experiments
+  std::vector<Eigen::MatrixXd> weight;     ///< one over its variance; zero: unknown
+  Eigen::Array<bool, -1, -1> differs;      ///< outputs x blocks: between experiments
+};
+
 /// The noise of Y - G U in each experiment of one realization, and a test whether it is the same in all.
 ///
 /// In the loop this is the open-loop noise, for any excitation, so the experiments are expected to agree and are
@@ -19,6 +27,11 @@ namespace stageid {
 /// blocks and outputs. They must also differ by a factor of 1.3; below it, the degrees of freedom gained by
 /// pooling are worth more. Noise below 1e-5 of the output is ignored: it is rounding, or the remainder of a
 /// modelled transient. A block is either pooled or not as a whole.
+///
+/// Slow noise leaks into all lines of a period at once, so lines may depend on each other. The variance of a mean is
+/// multiplied by the factor that the periods show (RunSpectra::common_sum over own_sum, at least 1). The mean power
+/// then has few degrees of freedom, a = 1 / variance, and its logarithm is not normal. Therefore the ratio of the
+/// largest and the smallest must also have that probability under F(2a, 2a), over all pairs.
 class ExperimentNoise {
  public:
   /// @param lines      of the realization, all LineStatus::good
@@ -29,14 +42,10 @@ class ExperimentNoise {
   bool differs(Eigen::Index k) const { return !blocks_differ_.empty() && blocks_differ_[at(k)]; }
   /// Largest ratio of the noise powers of two experiments, over outputs and blocks; 1 if they agree.
   double ratio() const noexcept { return ratio_; }
-  /// An experiment whose noise differs from the median by a factor of 1.3 and 5 standard deviations. If any differ,
-  /// at least the one with the largest deviation.
-  struct Odd {
-    Eigen::Index experiment = 0;
-    Eigen::Index output = 0;  ///< with the largest difference
-    double ratio = 1.0;       ///< to the median
-  };
-  const std::vector<Odd>& odd() const noexcept { return odd_; }
+  /// Mean logarithms of the power; empty if unknown.
+  const NoiseLevels& levels() const noexcept { return levels_; }
+  /// Power of each output's noise in the block of line k, mean over the experiments; ones if unknown.
+  Eigen::VectorXd level(Eigen::Index k) const;
 
   /// C_Ee of one period on line k, one entry per experiment.
   std::vector<Eigen::MatrixXcd> covariances(const LineEstimate& line, Eigen::Index k) const;
@@ -48,16 +57,27 @@ class ExperimentNoise {
 
  private:
   std::size_t at(Eigen::Index k) const;  ///< the block of line k
-  double compare(const Eigen::MatrixXd& mean, const Eigen::VectorXd& weight);
-  void note(const Eigen::VectorXd& log_power, const Eigen::VectorXd& weight, Eigen::Index output);
+  double compare(std::size_t block);
 
   const RealizationSpectra& spectra_;
   Eigen::Index lines_;
-  Eigen::Index blocks_ = 1;
+  Eigen::Index outputs_ = 0;
+  NoiseLevels levels_;
   std::vector<Eigen::MatrixXd> share_;  // per block: outputs x experiments
   std::vector<bool> blocks_differ_;
   double ratio_ = 1.0;
-  std::vector<Odd> odd_;
 };
+
+/// A run whose noise differs from that of the others.
+struct OddRun {
+  int realization = 0;  ///< counted from 0
+  Eigen::Index experiment = 0;
+  Eigen::Index output = 0;  ///< with the largest difference
+  double ratio = 1.0;       ///< to the median of all runs
+};
+
+/// The runs that explain why experiments differ: those 1.3 times and 5 standard deviations from the median of all runs,
+/// in outputs and blocks with a difference. At least one, that with the largest deviation. Of two runs, the noisier.
+std::vector<OddRun> odd_runs(const std::vector<NoiseLevels>& realizations);
 
 }  // namespace stageid

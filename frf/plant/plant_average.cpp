@@ -54,7 +54,8 @@ PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
       inputs_(inputs),
       covariance_kind_(covariance),
       scatter_(outputs, inputs, frequency_hz_.size()),
-      drift_(outputs, inputs, frequency_hz_.size()) {
+      drift_(outputs, inputs, frequency_hz_.size()),
+      comparison_(outputs, inputs, frequency_hz_.size()) {
   const Eigen::Index N = frequency_hz_.size();
   const Eigen::Index n_c = outputs * inputs;
   Z_sum_.setZero((outputs + inputs) * inputs, N);
@@ -75,6 +76,7 @@ PlantAverage::PlantAverage(Eigen::VectorXd frequency_hz, std::vector<int> lines,
 void PlantAverage::add(const RealizationSpectra& spectra, int workers,
                        const ZipperedFit* zippered) {
   ++realizations_;
+  comparison_.begin(spectra.realization());
   if (zippered != nullptr) {
     zippered_axes_ = zippered->lines().axes;
     for_each_line(workers, frequency_hz_.size(),
@@ -97,8 +99,7 @@ void PlantAverage::add(const RealizationSpectra& spectra, int workers,
   if (!noise_known_) return;
   const ExperimentNoise experiments(spectra, lines, lines_that_share(spectra), workers);
   experiment_noise_ratio_ = std::max(experiment_noise_ratio_, experiments.ratio());
-  for (const ExperimentNoise::Odd& odd : experiments.odd())
-    odd_runs_.push_back({spectra.realization(), odd});
+  noise_levels_.push_back(experiments.levels());
   for_each_line(workers, frequency_hz_.size(), [&](Eigen::Index k) {
     add_noise(spectra, lines[static_cast<std::size_t>(k)], experiments, periods, k);
   });
@@ -112,7 +113,7 @@ void PlantAverage::add_noise(const RealizationSpectra& spectra, const LineEstima
       experiments.differs(k) ? experiments.scaled(line, periods, k)
                              : line_noise(line, spectra.scatter(k), spectra.scatter_dof(), periods);
   add_common(noise, k);
-  scatter_.add(line, noise, dof, k);
+  scatter_.add(line, noise, experiments.level(k), dof, k);
   if (!experiments.differs(k)) {
     add_product(noise.input_part, noise.residual, dof, k);
     return;
@@ -143,6 +144,7 @@ void PlantAverage::add_response(const RealizationSpectra& spectra, const LineEst
            frequency_hz_[k]);
   }
   unvec(Z_sum_, k, outputs_ + inputs_) += line.Z_by_R;
+  comparison_.add(line.G, k);
   condition_[k] = std::max(condition_[k], line.input_condition);
 
   // Welford's recursion again, for mean and scatter of the realizations' own estimates.

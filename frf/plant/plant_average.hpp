@@ -6,6 +6,7 @@
 
 #include "frf/plant/experiment_noise.hpp"
 #include "frf/plant/plant_frf.hpp"
+#include "frf/plant/realization_comparison.hpp"
 #include "frf/plant/realization_scatter.hpp"
 #include "frf/plant/response_drift.hpp"
 #include "frf/plant/zippered_fit.hpp"
@@ -47,12 +48,10 @@ class PlantAverage {
 
   /// Drift of the response. @param frf result of finish(); `run_periods`: periods per run
   std::optional<ModeDrift> drift(const FrfEstimate& frf, int run_periods) const;
-  /// A run whose noise differs from that of the others.
-  struct OddRun {
-    int realization = 0;
-    ExperimentNoise::Odd odd;
-  };
-  const std::vector<OddRun>& odd_runs() const noexcept { return odd_runs_; }
+  /// Differences between the realizations' responses. @param frf as for drift()
+  RealizationDifferences differences(const FrfEstimate& frf) const { return comparison_.find(frf); }
+  /// Runs whose noise differs from that of the others.
+  std::vector<OddRun> odd_runs() const { return stageid::odd_runs(noise_levels_); }
 
  private:
   void add_noise(const RealizationSpectra& spectra, const LineEstimate& line,
@@ -88,7 +87,8 @@ class PlantAverage {
   Eigen::VectorXd condition_;
   ScatterAverage scatter_;
   ResponseDrift drift_;
-  std::vector<OddRun> odd_runs_;
+  RealizationComparison comparison_;
+  std::vector<NoiseLevels> noise_levels_;  // by realization
   Eigen::Index zippered_axes_ = 0;
   Eigen::VectorXd dof_sum_;       // sum of the noise's degrees of freedom
   Eigen::VectorXd scarcity_sum_;  // zippered: sum of 1 / degrees of freedom

@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -313,15 +314,21 @@ void PlantEstimation::include(const RealizationSpectra& spectra,
 /// Records drift and noise differences, which only the finished response shows.
 void PlantEstimation::note_change(const FrfEstimate& frf, HealthGathering& health) const {
   std::vector<NoisyRun> noisy;
-  for (const auto& [realization, odd] : average_->odd_runs()) {
-    const auto of = std::find_if(realizations_.begin(), realizations_.end(),
-                                 [m = realization](const auto& r) { return r.realization == m; });
-    noisy.push_back({realization,
+  for (const OddRun& odd : average_->odd_runs()) {
+    const auto of = std::find_if(realizations_.begin(), realizations_.end(), [&odd](const auto& r) {
+      return r.realization == odd.realization;
+    });
+    noisy.push_back({odd.realization,
                      of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
                      frf.outputs.names[static_cast<std::size_t>(odd.output)], odd.ratio});
   }
   const UsedRun& run = realizations_.front().runs.front();
-  health.note(average_->drift(frf, run.transient_periods + run.periods), std::move(noisy));
+  RealizationDifferences differences = average_->differences(frf);
+  // A channel that one realization records differently has a slope over the realizations, too.
+  std::optional<ModeDrift> drift;
+  if (differences.changes.empty())
+    drift = average_->drift(frf, run.transient_periods + run.periods);
+  health.note(drift, std::move(noisy), std::move(differences));
 }
 
 FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
@@ -336,7 +343,7 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
                       counted(excited_.axes.size(), "excited axis", "excited axes"),
                       counted(realization.runs.size(), "experiment"), realization.realization + 1));
     }
-    if (health != nullptr && !health->complete()) health->excite(m, excitation);
+    if (health != nullptr) health->excite(m, excitation);
     std::vector<Eigen::MatrixXcd> R;
     for (const RunExcitation& run : excitation)
       R.push_back(run.spectrum.values(excited_.axes, Eigen::all));

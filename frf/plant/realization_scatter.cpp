@@ -14,14 +14,14 @@ ScatterAverage::ScatterAverage(Eigen::Index outputs, Eigen::Index inputs, Eigen:
   dof_.setZero(lines);
 }
 
-void ScatterAverage::add(const LineEstimate& line, const LineNoise& noise, double dof,
-                         Eigen::Index k) {
+void ScatterAverage::add(const LineEstimate& line, const LineNoise& noise,
+                         const Eigen::VectorXd& level, double dof, Eigen::Index k) {
   const Eigen::Index outputs = residual_.rows();
-  residual_.col(k) += dof * noise.residual.diagonal().real();
+  residual_.col(k) += dof * noise.residual.diagonal().real().cwiseQuotient(level);
   dof_[k] += dof;
   // West's recursion: Welford's with weights.
   for (Eigen::Index c = 0; c < weight_.rows(); ++c) {
-    const double weight = 1.0 / noise.gain(c % outputs, c / outputs);
+    const double weight = 1.0 / (level[c % outputs] * noise.gain(c % outputs, c / outputs));
     weight_(c, k) += weight;
     const double share = weight / weight_(c, k);
     const std::complex<double> deviation = line.G.data()[c] - mean_(c, k);

@@ -16,14 +16,17 @@ double harmonic_mean(const Eigen::VectorXd& dof);
 ///   noise = C_E / W,  C_E pooled over the realizations by their degrees of freedom.
 /// On a linear plant w_m |G^[m] - G|^2 has the variance C_E for every m. The ratio of total and noise therefore has
 /// the distribution F(2 (M - 1), 2 nu) for any levels, phases and controllers of the realizations. That of the
-/// unweighted mean's variances has it only if all q_m are equal.
+/// unweighted mean's variances has it only if all q_m are equal. If the noise of the realizations differs, q_m includes
+/// its level, and C_E is divided by it.
 /// Source: Cochran's theorem, weighted sums of squares.
 class ScatterAverage {
  public:
   ScatterAverage(Eigen::Index outputs, Eigen::Index inputs, Eigen::Index lines);
 
-  /// Adds one realization on line k; its noise has `dof` degrees of freedom. Lines may be added concurrently.
-  void add(const LineEstimate& line, const LineNoise& noise, double dof, Eigen::Index k);
+  /// Adds one realization on line k; its noise has `dof` degrees of freedom and the `level` of its outputs, from many
+  /// lines. Lines may be added concurrently.
+  void add(const LineEstimate& line, const LineNoise& noise, const Eigen::VectorXd& level,
+           double dof, Eigen::Index k);
 
   /// @pre two realizations were added on every line
   RealizationScatter finish(int realizations) const;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -30,7 +32,8 @@ struct Slope {
   MatrixXcd values;  // vec(G) x lines
   double variance = 0.0;
   double least_share = kLeastShare;
-  double span = 0.0;  // duration of the measurement in its unit of time
+  bool poles = false;  // whether X may follow from a pole
+  double span = 0.0;   // duration of the measurement in its unit of time
 };
 
 /// Mean over the lines of the window around line k, truncated at the ends.
@@ -40,24 +43,83 @@ VectorXd about(const MatrixXd& columns, Index k) {
   return columns.middleCols(first, last - first).rowwise().mean();
 }
 
-/// X = -f dG/df from the neighbours of line k.
-Eigen::VectorXcd derivative(const FrfEstimate& frf, Index k) {
-  const double apart_hz = frf.frequency_hz[k + 1] - frf.frequency_hz[k - 1];
-  return (frf.response.col(k + 1) - frf.response.col(k - 1)) * (-frf.frequency_hz[k] / apart_hz);
+/// X = -f dG/df from the neighbours of each line of the window.
+MatrixXcd by_differences(const FrfEstimate& frf, Index first) {
+  MatrixXcd X(frf.response.rows(), kWindow);
+  for (Index i = 0; i < kWindow; ++i) {
+    const Index k = first + i;
+    const double apart_hz = frf.frequency_hz[k + 1] - frf.frequency_hz[k - 1];
+    X.col(i) =
+        (frf.response.col(k + 1) - frf.response.col(k - 1)) * (-frf.frequency_hz[k] / apart_hz);
+  }
+  return X;
 }
+
+/// The same if the resonance is narrower than a few lines: G = N / (r - p) with N quadratic in the line r and a pole p
+/// common to the channels, X = f N(p) / (r - p)^2. Least squares of (r - p) G - N over all channels, relative to the
+/// noise. Empty without a pole in the window.
+MatrixXcd by_pole(const FrfEstimate& frf, Index first, const Eigen::ArrayXd& noise) {
+  const double middle_hz = frf.frequency_hz[first + kWindow / 2];
+  const VectorXd away_hz = frf.frequency_hz.segment(first, kWindow).array() - middle_hz;
+  const double reach_hz = away_hz.cwiseAbs().maxCoeff();
+  const Eigen::ArrayXd r = away_hz.array() / reach_hz;
+  const MatrixXcd G = frf.response.middleCols(first, kWindow).transpose() *
+                      noise.rsqrt().matrix().cast<std::complex<double>>().asDiagonal();
+  std::complex<double> pole = 0.0;
+  MatrixXcd N;  // coefficients x channels
+  VectorXd weight = VectorXd::Ones(kWindow);
+  for (int pass = 0; pass < 3; ++pass) {  // Sanathanan and Koerner's weights
+    MatrixXd powers(kWindow, 3);
+    powers << weight, weight.array() * r, weight.array() * r * r;
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(powers);
+    const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(kWindow, 3);
+    const auto rest = [&](const MatrixXcd& columns) {
+      return MatrixXcd(columns - Q * (Q.transpose() * columns));
+    };
+    const MatrixXcd A = rest(weight.asDiagonal() * G);
+    const MatrixXcd B = rest((weight.array() * r).matrix().asDiagonal() * G);
+    const double length = A.squaredNorm();
+    if (!(length > 0.0)) return {};
+    pole = A.conjugate().cwiseProduct(B).sum() / length;
+    weight = (r - pole).abs().max(1e-6).inverse();
+    const MatrixXcd left = (r - pole).matrix().asDiagonal() * G;
+    MatrixXcd plain(kWindow, 3);
+    plain.col(0).setOnes();
+    plain.col(1) = r.matrix().cast<std::complex<double>>();
+    plain.col(2) = r.square().matrix().cast<std::complex<double>>();
+    const MatrixXcd W = weight.cast<std::complex<double>>().asDiagonal() * plain;
+    N = (W.adjoint() * W).ldlt().solve(W.adjoint() * (weight.asDiagonal() * left));
+  }
+  if (std::abs(pole.real()) > 1.0 || std::abs(pole.imag()) > 1.0) return {};
+  const Eigen::RowVectorXcd at_pole = N.row(0) + pole * N.row(1) + pole * pole * N.row(2);
+  const Eigen::ArrayXcd shape =
+      (r - pole).square().inverse() * (middle_hz / reach_hz + pole.real());
+  return noise.sqrt().matrix().asDiagonal() * at_pole.transpose() * shape.matrix().transpose();
+}
+
+/// Least squares of one slope in one window.
+struct WindowFit {
+  double along = 0.0;     ///< Re X^H V^-1 D
+  double length = 0.0;    ///< X^H V^-1 X
+  double variance = 0.0;  ///< of `along`
+  double bias = 0.0;      ///< largest |X| over a deviation of the response
+  double explained() const { return length > 0.0 ? along * along / length : 0.0; }
+};
 
 /// Least squares of one slope, in windows.
 class DriftFit {
  public:
   DriftFit(const FrfEstimate& frf, const Slope& slope) : frf_(frf), slope_(slope) {
     const Index K = frf.lines();
-    along_.setZero(K);
-    length_.setZero(K);
-    variance_.setZero(K);
-    excess_.setZero(K);
-    bias_.setZero(K);
+    power_.setZero(K);
+    expected_.setZero(K);
     change_.setZero(K);
-    for (Index k = 1; k + 1 < K; ++k) add_line(k);
+    for (Index k = 1; k + 1 < K; ++k) {
+      const Eigen::ArrayXd variance = slope_.variance * noise_about(k);
+      power_[k] = (slope_.values.col(k).array().abs2() / variance).sum();
+      expected_[k] = slope_.variance * (frf.noise_variance.col(k).array() / variance).sum();
+      change_[k] = slope_.values.col(k).norm();
+    }
   }
 
   /// Finds the line with the largest change in windows with a drift; the drift is that of the window around it. The
@@ -67,7 +129,10 @@ class DriftFit {
     std::vector<Index> drifting;  // middles of windows
     VectorXd covered = VectorXd::Zero(K);
     for (Index first = 1; first + kWindow < K; ++first) {
-      if (!drifts(first)) continue;
+      // Without this excess, no direction can explain as much as 8 standard deviations.
+      if (!(excess(first) > 0.5 * kDriftDeviations * kDriftDeviations) ||
+          !drifts(fit(first), first))
+        continue;
       drifting.push_back(first + kWindow / 2);
       // A poorly resolved resonance does not fit its derivative, but its flanks do.
       const Index from = std::max<Index>(1, first - kWindow);
@@ -80,58 +145,76 @@ class DriftFit {
         drifting.begin(), drifting.end(),
         [most](Index a, Index b) { return std::abs(a - most) < std::abs(b - most); });
     const Index first = middle - kWindow / 2;
-    const double length = length_.segment(first, kWindow).sum();
+    const WindowFit window = fit(first);
+    // What the drift leaves unexplained is an error of X, and makes the drift as uncertain as noise of that size.
+    const double expected = expected_.segment(first, kWindow).sum();
+    const double rest = power_.segment(first, kWindow).sum() - window.explained();
+    const double larger = std::sqrt(std::max(1.0, rest / expected));
     ModeDrift drift;
     drift.frequency_hz = frf_.frequency_hz[most];
-    drift.change = along_.segment(first, kWindow).sum() / length * slope_.span;
-    drift.deviation = std::sqrt(variance_.segment(first, kWindow).sum()) / length * slope_.span;
-    drift.bias = 0.5 * std::abs(drift.change) * bias_.segment(first, kWindow).maxCoeff();
+    drift.change = window.along / window.length * slope_.span;
+    drift.deviation = larger * std::sqrt(window.variance) / window.length * slope_.span;
+    drift.bias = 0.5 * std::abs(drift.change) * window.bias;
     drift.in_total = frf_.realizations > 1;
     if (!(drift.bias > kLeastBias)) return std::nullopt;
     return drift;
   }
 
  private:
-  bool drifts(Index first) const {
-    const double along = along_.segment(first, kWindow).sum();
-    const double length = length_.segment(first, kWindow).sum();
-    const double deviation = std::sqrt(variance_.segment(first, kWindow).sum());
-    if (!(length > 0.0) || !(std::abs(along) > kDriftDeviations * deviation)) return false;
-    const double excess = excess_.segment(first, kWindow).sum();
-    return along * along / length >= slope_.least_share * excess;
+  double least(Index k) const {
+    return kDriftRounding * frf_.response.col(k).cwiseAbs2().maxCoeff() + 1e-300;
+  }
+  Eigen::ArrayXd noise_about(Index k) const {
+    return about(frf_.noise_variance, k).array() + least(k);
   }
 
-  void add_line(Index k) {
+  /// Power of the slope beyond noise.
+  double excess(Index first) const {
+    return power_.segment(first, kWindow).sum() - expected_.segment(first, kWindow).sum();
+  }
+
+  bool drifts(const WindowFit& window, Index first) const {
+    return std::abs(window.along) > kDriftDeviations * std::sqrt(window.variance) &&
+           window.explained() >= slope_.least_share * excess(first);
+  }
+
+  /// With that X which explains more.
+  WindowFit fit(Index first) const {
+    const WindowFit one = fit(first, by_differences(frf_, first));
+    if (!slope_.poles) return one;
+    const MatrixXcd X = by_pole(frf_, first, noise_about(first + kWindow / 2));
+    if (X.size() == 0) return one;
+    const WindowFit other = fit(first, X);
+    return other.explained() > one.explained() ? other : one;
+  }
+
+  WindowFit fit(Index first, const MatrixXcd& X) const {
     const Index n_y = frf_.n_outputs();
     const Index n_u = frf_.n_inputs();
-    const Eigen::VectorXcd X = derivative(frf_, k);
-    const Eigen::VectorXcd D = slope_.values.col(k);
-    const double least = kDriftRounding * frf_.response.col(k).cwiseAbs2().maxCoeff() + 1e-300;
-    const Eigen::ArrayXd noise = about(frf_.noise_variance, k).array() + least;
-    const Eigen::ArrayXd variance = slope_.variance * noise;
-    const Eigen::VectorXcd weighted = X.array() / variance;
-    along_[k] = weighted.dot(D).real();
-    length_[k] = (X.array().abs2() / variance).sum();
-    excess_[k] = (D.array().abs2() / variance).sum() -
-                 slope_.variance * (frf_.noise_variance.col(k).array() / variance).sum();
-    change_[k] = D.norm();
-    bias_[k] = (X.array().abs() / noise.sqrt()).maxCoeff();
-    const Eigen::Map<const MatrixXcd> W(weighted.data(), n_y, n_u);
-    const MatrixXcd S = frf_.input_factor.col(k).reshaped(n_u, n_u);
-    const MatrixXcd of_inputs = W.adjoint() * output_covariance(frf_, k) * W;
-    // At least the rounding errors.
-    variance_[k] =
-        0.5 * slope_.variance * (S.cwiseProduct(of_inputs).sum().real() + least * W.squaredNorm());
+    WindowFit window;
+    for (Index i = 0; i < kWindow; ++i) {
+      const Index k = first + i;
+      const Eigen::ArrayXd noise = noise_about(k);
+      const Eigen::ArrayXd variance = slope_.variance * noise;
+      const Eigen::VectorXcd weighted = X.col(i).array() / variance;
+      window.along += weighted.dot(slope_.values.col(k)).real();
+      window.length += (X.col(i).array().abs2() / variance).sum();
+      window.bias = std::max(window.bias, (X.col(i).array().abs() / noise.sqrt()).maxCoeff());
+      const Eigen::Map<const MatrixXcd> W(weighted.data(), n_y, n_u);
+      const MatrixXcd S = frf_.input_factor.col(k).reshaped(n_u, n_u);
+      const MatrixXcd of_inputs = W.adjoint() * output_covariance(frf_, k) * W;
+      // At least the rounding errors.
+      window.variance += 0.5 * slope_.variance *
+                         (S.cwiseProduct(of_inputs).sum().real() + least(k) * W.squaredNorm());
+    }
+    return window;
   }
 
   const FrfEstimate& frf_;
   const Slope& slope_;
-  VectorXd along_;     // Re X^H V^-1 D, by line
-  VectorXd length_;    // X^H V^-1 X
-  VectorXd variance_;  // of along_
-  VectorXd excess_;    // D^H V^-1 D beyond noise
+  VectorXd power_;     // D^H V^-1 D, by line
+  VectorXd expected_;  // the same of noise
   VectorXd change_;    // |D|
-  VectorXd bias_;      // largest |X| over a deviation of the response
 };
 
 }  // namespace
@@ -172,11 +255,11 @@ std::optional<ModeDrift> ResponseDrift::find(const FrfEstimate& frf, const Matri
   // The slope over the realizations is more accurate.
   if (frf.realizations > 1) {
     const Slope slope{(counted_sum_ - M * (M - 1.0) / 2.0 * G_mean) * (12.0 / (M * (M * M - 1.0))),
-                      12.0 / (M * M - 1.0), kLeastShareOfRealizations, M};
+                      12.0 / (M * M - 1.0), kLeastShareOfRealizations, true, M};
     if (auto drift = DriftFit(frf, slope).find()) return drift;
   }
   if (!std::isfinite(variance_sum_.sum())) return std::nullopt;
-  const Slope slope{slope_sum_ / M, variance_sum_[0] / M, kLeastShare,
+  const Slope slope{slope_sum_ / M, variance_sum_[0] / M, kLeastShare, false,
                     M * frf.experiments * run_periods};
   return DriftFit(frf, slope).find();
 }

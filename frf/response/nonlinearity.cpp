@@ -125,7 +125,7 @@ double NonlinearityTest::least_p_value() const {
 
 bool NonlinearityTest::nonlinear() const {
   const auto tests = p_value.size() + even.p_value.size() + odd.p_value.size();
-  return least_p_value() * static_cast<double>(tests) < kNonlinearBelow;
+  return tests > 0 && least_p_value() * static_cast<double>(tests) < kNonlinearBelow;
 }
 
 std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {

@@ -108,7 +108,7 @@ void HealthPart::take(RunWorkspace& w, const KnownSpectra* known) {
     line_spectra(w.samples.sensors, start_sensors_, start_lines_, 0, w.dft, spectra);
     recorder_.take(spectra);
   }
-  if (lines_.empty()) return;
+  if (lines_.empty() || periods_.size() >= most_periods_) return;
   const Eigen::Index n_y = w.samples.sensors.cols();
   Eigen::MatrixXcd Z(n_y + w.samples.actuators.cols(), static_cast<Eigen::Index>(lines_.size()));
   std::vector<char> is_known(static_cast<std::size_t>(Z.rows()), 0);
@@ -154,43 +154,51 @@ HealthGathering::HealthGathering(const std::vector<RealizationRuns>& realization
   HealthPart empty;
   empty.scan_.resize(record_.scan.size());
   for (const RealizationRuns& realization : realizations) {
-    parts_.emplace_back(realization.runs.size(), empty);
-    realization_.push_back(realization.realization);
+    Realization& one = realizations_.emplace_back();
+    one.parts.assign(realization.runs.size(), empty);
+    one.record.realization = realization.realization;
     for (const UsedRun& used : realization.runs) record_.health += used.run().health;
   }
 }
 
-std::size_t HealthGathering::first_without_spectra() const {
+std::size_t HealthGathering::Realization::first_without_spectra() const {
   const auto missing = [](const HealthPart& part) { return part.periods_.empty(); };
-  return static_cast<std::size_t>(std::find_if(excited_->begin(), excited_->end(), missing) -
-                                  excited_->begin());
+  return static_cast<std::size_t>(std::find_if(parts.begin(), parts.end(), missing) -
+                                  parts.begin());
+}
+
+std::size_t HealthGathering::first_without_spectra() const {
+  return realizations_[excited_].first_without_spectra();
 }
 
 bool HealthGathering::complete() const {
-  return excited_ != nullptr && first_without_spectra() == excited_->size();
+  return std::any_of(realizations_.begin(), realizations_.end(),
+                     [](const Realization& one) { return one.complete(); });
 }
 
 void HealthGathering::excite(std::size_t realization, const std::vector<RunExcitation>& runs) {
-  if (excited_ != nullptr)
-    for (HealthPart& part : *excited_) part.periods_.clear();
-  excited_ = &parts_[realization];
-  record_.realization = realization_[realization];
-  record_.axes.clear();
+  const bool first = !complete();
+  excited_ = realization;
+  Realization& one = realizations_[realization];
+  RealizationRecord& record = one.record;
   for (const RunExcitation& run : runs)
-    record_.axes.insert(record_.axes.end(), run.spectrum.channels.begin(),
-                        run.spectrum.channels.end());
-  std::sort(record_.axes.begin(), record_.axes.end());
-  record_.axes.erase(std::unique(record_.axes.begin(), record_.axes.end()), record_.axes.end());
-  record_.zippered = runs.size() == 1 && runs.front().spectrum.is_zippered();
-  lines_ = thinned(runs.front().spectrum.lines);
-  for (HealthPart& part : *excited_) part.lines_ = lines_;
-  const auto K = static_cast<Eigen::Index>(lines_.size());
-  record_.frequency_hz.resize(K);
-  record_.lines.resize(lines_.size());
+    record.axes.insert(record.axes.end(), run.spectrum.channels.begin(),
+                       run.spectrum.channels.end());
+  std::sort(record.axes.begin(), record.axes.end());
+  record.axes.erase(std::unique(record.axes.begin(), record.axes.end()), record.axes.end());
+  record.zippered = runs.size() == 1 && runs.front().spectrum.is_zippered();
+  one.lines = thinned(runs.front().spectrum.lines);
+  for (HealthPart& part : one.parts) {
+    part.lines_ = one.lines;
+    if (!first) part.most_periods_ = kPeriodsOfOthers;
+  }
+  const auto K = static_cast<Eigen::Index>(one.lines.size());
+  record.frequency_hz.resize(K);
+  record.lines.resize(one.lines.size());
   for (Eigen::Index k = 0; k < K; ++k) {
-    const int line = lines_[static_cast<std::size_t>(k)];
-    record_.frequency_hz[k] = line * record_.info.sample_rate_hz / record_.info.period_samples;
-    LineRecord& at = record_.lines[static_cast<std::size_t>(k)];
+    const int line = one.lines[static_cast<std::size_t>(k)];
+    record.frequency_hz[k] = line * record_.info.sample_rate_hz / record_.info.period_samples;
+    LineRecord& at = record.lines[static_cast<std::size_t>(k)];
     at.R.setZero(static_cast<Eigen::Index>(record_.info.excitation.size()),
                  static_cast<Eigen::Index>(runs.size()));
     for (std::size_t e = 0; e < runs.size(); ++e) {
@@ -204,7 +212,7 @@ void HealthGathering::excite(std::size_t realization, const std::vector<RunExcit
 }
 
 HealthPart& HealthGathering::part(std::size_t realization, std::size_t experiment) {
-  return parts_[realization][experiment];
+  return realizations_[realization].parts[experiment];
 }
 
 /// Runs with other lines or numbers of periods are skipped, because they would need a separate model.
@@ -228,26 +236,39 @@ void HealthGathering::add_start(HealthPart& part) {
   evidence.runs.push_back(std::move(part.start_));
 }
 
-void HealthGathering::add(HealthPart&& part) {
+void HealthGathering::add(HealthPart& part) {
   for (std::size_t c = 0; c < part.scan_.size(); ++c) record_.scan[c].add(part.scan_[c]);
   record_.slips.insert(record_.slips.end(), part.slips_.begin(), part.slips_.end());
   add_start(part);
-  if (part.periods_.empty()) return;
-  record_.periods.push_back(static_cast<int>(part.periods_.size()));
-  for (std::size_t k = 0; k < lines_.size(); ++k) {
-    Eigen::MatrixXcd& Z = record_.lines[k].Z;
-    const Eigen::Index first = Z.cols();
-    Z.conservativeResize(part.periods_.front().rows(),
-                         first + static_cast<Eigen::Index>(part.periods_.size()));
-    for (std::size_t p = 0; p < part.periods_.size(); ++p)
-      Z.col(first + static_cast<Eigen::Index>(p)) =
-          part.periods_[p].col(static_cast<Eigen::Index>(k));
-  }
 }
 
 HealthRecord HealthGathering::finish() {
-  for (std::vector<HealthPart>& realization : parts_)
-    for (HealthPart& part : realization) add(std::move(part));
+  bool first = true;
+  for (Realization& one : realizations_) {
+    for (HealthPart& part : one.parts) add(part);
+    if (!one.complete()) continue;
+    RealizationRecord& record = one.record;
+    Eigen::Index columns = 0;
+    for (const HealthPart& part : one.parts) {
+      record.periods.push_back(static_cast<int>(part.periods_.size()));
+      columns += record.periods.back();
+    }
+    for (LineRecord& line : record.lines)
+      line.Z.resize(static_cast<Eigen::Index>(record_.scan.size()), columns);
+    Eigen::Index column = 0;
+    for (HealthPart& part : one.parts) {
+      for (const Eigen::MatrixXcd& spectra : part.periods_) {
+        for (std::size_t k = 0; k < record.lines.size(); ++k)
+          record.lines[k].Z.col(column) = spectra.col(static_cast<Eigen::Index>(k));
+        ++column;
+      }
+      part.periods_.clear();
+    }
+    if (std::exchange(first, false))
+      static_cast<RealizationRecord&>(record_) = std::move(record);
+    else
+      record_.others.push_back(std::move(record));
+  }
   return std::move(record_);
 }
 

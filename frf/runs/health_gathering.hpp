@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -44,6 +45,7 @@ class HealthPart {
                         Eigen::MatrixXcd& Z) const;
 
   std::vector<int> lines_;  // empty: no spectra of this run are needed
+  std::size_t most_periods_ = std::numeric_limits<std::size_t>::max();  // whose spectra are kept
   std::vector<Eigen::MatrixXcd> periods_;
   std::vector<ChannelScan> scan_;
   std::vector<SampleSlip> slips_;
@@ -59,18 +61,17 @@ class HealthPart {
 /// A HealthRecord in progress, filled while the logs are read for another purpose.
 class HealthGathering {
  public:
-  /// Spectra are those of the first complete realization, on at most kHealthLines lines.
   explicit HealthGathering(const std::vector<RealizationRuns>& realizations);
 
   /// Index of the first run without spectra in the realization that was excited last; the number of runs if there is
   /// none.
   std::size_t first_without_spectra() const;
 
-  /// Whether each run of the realization that was excited last has spectra.
+  /// Whether a realization is complete: each of its runs has spectra.
   bool complete() const;
 
-  /// Sets the excitation of a realization whose spectra are needed because the earlier ones were incomplete. Call it
-  /// before a part of the realization is filled. @pre !complete()
+  /// Sets the excitation of a realization. Call it before a part of the realization is filled; parts of the earlier
+  /// ones are filled, unless one of them is complete().
   void excite(std::size_t realization, const std::vector<RunExcitation>& runs);
 
   /// The part for run `experiment` of realization `realization` (indices); different parts may be filled
@@ -78,22 +79,30 @@ class HealthGathering {
   HealthPart& part(std::size_t realization, std::size_t experiment);
 
   /// Adds results that only the estimate provides.
-  void note(const std::optional<ModeDrift>& drift, std::vector<NoisyRun> noisy_runs) {
+  void note(const std::optional<ModeDrift>& drift, std::vector<NoisyRun> noisy_runs,
+            RealizationDifferences differences) {
     record_.drift = drift;
     record_.noisy_runs = std::move(noisy_runs);
+    record_.differences = std::move(differences);
   }
 
   /// Call once, after all parts are filled. @pre complete()
   HealthRecord finish();
 
  private:
-  void add(HealthPart&& part);
+  struct Realization {
+    std::vector<HealthPart> parts;  // one per experiment
+    RealizationRecord record;
+    std::vector<int> lines;  // empty: not excited
+    std::size_t first_without_spectra() const;
+    bool complete() const { return !lines.empty() && first_without_spectra() == parts.size(); }
+  };
+
+  void add(HealthPart& part);
   void add_start(HealthPart& part);
 
-  std::vector<std::vector<HealthPart>> parts_;  // by realization and experiment
-  std::vector<int> realization_;                // their numbers
-  std::vector<HealthPart>* excited_ = nullptr;  // parts whose spectra are wanted
-  std::vector<int> lines_;
+  std::vector<Realization> realizations_;
+  std::size_t excited_ = 0;       // the last one whose excitation was set
   std::vector<int> start_lines_;  // of the first run with evidence about its start
   HealthRecord record_;
 };

@@ -45,6 +45,7 @@ class RecordReading {
       if (marked == nullptr && e < runs.size()) marked = &runs[e];
       ++m;
     }
+    for (std::size_t other = m; other < realizations_.size(); ++other) read_excitation(other);
     read_runs(m, realizations_.size());
     return gathering_.finish();
   }
@@ -100,11 +101,11 @@ class RecordReading {
 
 }  // namespace
 
-int HealthRecord::scatter_dof() const noexcept {
+int RealizationRecord::scatter_dof() const noexcept {
   return std::accumulate(periods.begin(), periods.end(), 0) - static_cast<int>(periods.size());
 }
 
-Eigen::MatrixXcd HealthRecord::mean(const Eigen::MatrixXcd& columns) const {
+Eigen::MatrixXcd RealizationRecord::mean(const Eigen::MatrixXcd& columns) const {
   Eigen::MatrixXcd means(columns.rows(), experiments());
   Eigen::Index first = 0;
   for (Eigen::Index e = 0; e < experiments(); ++e) {
@@ -115,7 +116,7 @@ Eigen::MatrixXcd HealthRecord::mean(const Eigen::MatrixXcd& columns) const {
   return means;
 }
 
-Eigen::MatrixXcd HealthRecord::scatter(const Eigen::MatrixXcd& columns) const {
+Eigen::MatrixXcd RealizationRecord::scatter(const Eigen::MatrixXcd& columns) const {
   Eigen::MatrixXcd deviation = columns;
   const Eigen::MatrixXcd means = mean(columns);
   Eigen::Index first = 0;
@@ -127,7 +128,7 @@ Eigen::MatrixXcd HealthRecord::scatter(const Eigen::MatrixXcd& columns) const {
   return deviation * deviation.adjoint();
 }
 
-Eigen::VectorXd HealthRecord::variance_of_mean(const Eigen::MatrixXcd& columns) const {
+Eigen::VectorXd RealizationRecord::variance_of_mean(const Eigen::MatrixXcd& columns) const {
   double mean_of_periods = 0.0;
   for (const int P : periods) mean_of_periods += 1.0 / P / static_cast<double>(experiments());
   return scatter(columns).diagonal().real() * (mean_of_periods / std::max(1, scatter_dof()));

@@ -7,6 +7,7 @@
 #include "acquisition/record/log_reader.hpp"
 #include "frf/periods/mode_drift.hpp"
 #include "frf/periods/noisy_run.hpp"
+#include "frf/periods/realization_change.hpp"
 #include "frf/periods/sample_slip.hpp"
 #include "frf/periods/start_transient.hpp"
 #include "frf/response/frf_options.hpp"
@@ -21,24 +22,15 @@ struct LineRecord {
   Eigen::MatrixXcd Z;  ///< [Y; U], n_y + n_u x columns: one per period, ordered by experiment
 };
 
-/// Input of the checks of a log's health.
-struct HealthRecord {
-  LogInfo info;
-  int realization = 0;               ///< the realization of the spectra
-  std::vector<int> periods;          ///< number of clean ones, of each experiment
-  Eigen::VectorXd frequency_hz;      ///< K: excited lines, a subset if there are many
-  std::vector<LineRecord> lines;     ///< K
-  std::vector<Eigen::Index> axes;    ///< excitation channels that are excited, ascending
-  bool zippered = false;             ///< one experiment excites them all, each on its own lines
-  std::vector<ChannelScan> scan;     ///< [sensors; actuators], over all used runs
-  RunHealth health;                  ///< over all used runs
-  std::vector<SampleSlip> slips;     ///< of the same runs
-  std::optional<ModeDrift> drift;    ///< of the response, if there was an estimate
-  std::vector<NoisyRun> noisy_runs;  ///< the same
-  StartEvidence start;               ///< of the start of the runs; empty if there is no evidence
+/// Spectra of one realization, on at most kHealthLines excited lines.
+struct RealizationRecord {
+  int realization = 0;
+  std::vector<int> periods;        ///< number of clean ones, of each experiment
+  Eigen::VectorXd frequency_hz;    ///< K: excited lines, a subset if there are many
+  std::vector<LineRecord> lines;   ///< K
+  std::vector<Eigen::Index> axes;  ///< excitation channels that are excited, ascending
+  bool zippered = false;           ///< one experiment excites them all, each on its own lines
 
-  Eigen::Index n_y() const noexcept { return static_cast<Eigen::Index>(info.sensors.size()); }
-  Eigen::Index n_u() const noexcept { return static_cast<Eigen::Index>(info.actuators.size()); }
   Eigen::Index experiments() const noexcept { return static_cast<Eigen::Index>(periods.size()); }
   /// Degrees of freedom of the scatter between periods: sum_e (P_e - 1).
   int scatter_dof() const noexcept;
@@ -51,11 +43,30 @@ struct HealthRecord {
   Eigen::VectorXd variance_of_mean(const Eigen::MatrixXcd& columns) const;
 };
 
+/// Input of the checks of a log's health. The spectra are those of the first complete realization.
+struct HealthRecord : RealizationRecord {
+  LogInfo info;
+  /// The other complete realizations, with at most kPeriodsOfOthers periods per run.
+  std::vector<RealizationRecord> others;
+  std::vector<ChannelScan> scan;       ///< [sensors; actuators], over all used runs
+  RunHealth health;                    ///< over all used runs
+  std::vector<SampleSlip> slips;       ///< of the same runs
+  std::optional<ModeDrift> drift;      ///< of the response, if there was an estimate
+  std::vector<NoisyRun> noisy_runs;    ///< the same
+  RealizationDifferences differences;  ///< the same
+  StartEvidence start;                 ///< of the start of the runs; empty if there is no evidence
+
+  Eigen::Index n_y() const noexcept { return static_cast<Eigen::Index>(info.sensors.size()); }
+  Eigen::Index n_u() const noexcept { return static_cast<Eigen::Index>(info.actuators.size()); }
+};
+
 /// Largest number of lines of the checks, sufficient for the rigid body and the modes.
 inline constexpr Eigen::Index kHealthLines = 800;
+/// Largest number of periods per run of the realizations after the first one. It limits the memory for them.
+inline constexpr std::size_t kPeriodsOfOthers = 2;
 
-/// Reads every clean period of the runs selected by FrfOptions; spectra are those of the first realization whose runs
-/// all have one. Memory: one period per thread, and the spectra on at most kHealthLines lines.
+/// Reads every clean period of the runs selected by FrfOptions. A realization is complete if all its runs have one.
+/// Memory: one period per thread, and the spectra on at most kHealthLines lines per realization.
 /// @throws the same as choose_runs() and LogReader::read(); FormatError if there is no such realization.
 HealthRecord read_health_record(const std::vector<const LogReader*>& logs,
                                 const FrfOptions& options);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "frf/periods/period_slip.hpp"
 
@@ -24,12 +25,22 @@ class PeriodReading {
   /// Reads period p into `out`, displaced by the samples lost before it.
   void read(int p, LogSamples& out) {
     read_displaced(p, lost_of_sensors_, out);
-    if (lost_of_actuators_ == lost_of_sensors_) return;
-    std::swap(out.sensors, w_.other.sensors);
-    std::swap(out.marked, w_.other.marked);
-    read_displaced(p, lost_of_actuators_, out);
-    out.marked = out.marked.max(w_.other.marked);
-    std::swap(out.sensors, w_.other.sensors);
+    if (lost_of_actuators_ != lost_of_sensors_) {
+      std::swap(out.sensors, w_.other.sensors);
+      std::swap(out.marked, w_.other.marked);
+      read_displaced(p, lost_of_actuators_, out);
+      out.marked = out.marked.max(w_.other.marked);
+      std::swap(out.sensors, w_.other.sensors);
+    }
+    for (const OwnLoss& own : own_losses_) {
+      read_displaced(p, own.lost + (own.of_sensors ? lost_of_sensors_ : lost_of_actuators_),
+                     w_.other);
+      out.marked = out.marked.max(w_.other.marked);
+      if (own.of_sensors)
+        out.sensors.col(own.channel) = w_.other.sensors.col(own.channel);
+      else
+        out.actuators.col(own.channel) = w_.other.actuators.col(own.channel);
+    }
   }
 
   SampleSlip note(const PeriodSlip& slip, int earlier, int later) {
@@ -38,19 +49,41 @@ class PeriodReading {
     noted.run = used_.run().name;
     noted.realization = used_.run().realization;
     noted.experiment = used_.run().experiment;
-    const std::int64_t lost = slip.sensors ? lost_of_sensors_ : lost_of_actuators_;
+    std::int64_t lost = slip.sensors ? lost_of_sensors_ : lost_of_actuators_;
+    OwnLoss* own = slip.channel >= 0 ? &own_loss(slip) : nullptr;
+    if (own != nullptr) lost += own->lost;
     noted.row = static_cast<std::uint64_t>(
         std::max<std::int64_t>(0, (used_.transient_periods + period) * N_ + slip.row - lost));
     noted.lost = slip.lost;
     noted.sensors = slip.sensors;
     noted.actuators = slip.actuators;
     noted.spoilt = slip.row > 0;
+    if (own != nullptr) {
+      const LogInfo& info = used_.log->info();
+      noted.channel = (slip.sensors ? info.sensors : info.actuators)
+                          .names[static_cast<std::size_t>(slip.channel)];
+      own->lost += slip.lost;
+      return noted;
+    }
     if (slip.sensors) lost_of_sensors_ += slip.lost;
     if (slip.actuators) lost_of_actuators_ += slip.lost;
     return noted;
   }
 
  private:
+  /// Samples that one channel lost in addition to its kind.
+  struct OwnLoss {
+    bool of_sensors = true;
+    Eigen::Index channel = 0;
+    std::int64_t lost = 0;
+  };
+
+  OwnLoss& own_loss(const PeriodSlip& slip) {
+    for (OwnLoss& own : own_losses_)
+      if (own.of_sensors == slip.sensors && own.channel == slip.channel) return own;
+    return own_losses_.emplace_back(OwnLoss{slip.sensors, slip.channel, 0});
+  }
+
   void read_displaced(int p, std::int64_t lost, LogSamples& out) const {
     const auto samples = static_cast<std::int64_t>(used_.run().samples);
     const std::int64_t wanted = (used_.transient_periods + p) * N_ - lost;
@@ -67,6 +100,7 @@ class PeriodReading {
   std::int64_t N_;
   std::int64_t lost_of_sensors_ = 0;
   std::int64_t lost_of_actuators_ = 0;
+  std::vector<OwnLoss> own_losses_;
 };
 
 }  // namespace

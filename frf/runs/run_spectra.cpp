@@ -37,6 +37,9 @@ class RunMeasurement {
     run_.mean.setZero(n, n_lines);
     if (used.periods < 2) return;
     run_.slope.setZero(n, n_lines);
+    const auto outputs = static_cast<Eigen::Index>(channels.outputs.size());
+    run_.common_sum.setZero(outputs, noise_blocks(static_cast<Eigen::Index>(lines.excited)));
+    run_.own_sum = run_.common_sum;
     run_.scatter_re = w_.pool.take(n * (n + 1) / 2, n_lines);
     run_.scatter_im = w_.pool.take(n * (n + 1) / 2, n_lines);
   }
@@ -114,8 +117,35 @@ class RunMeasurement {
       for (std::size_t i = 0; i < periods.size() && run_.slope.size() > 0; ++i)
         run_.slope.col(k) += numbers[i] * periods[i]->col(k);
     }
+    compare_lines(periods);
     run_.periods += static_cast<int>(periods.size());
     waiting_.clear();
+  }
+
+  /// Adds to common_sum and own_sum. Two periods share the scatter of each line equally.
+  void compare_lines(const std::vector<const Eigen::MatrixXcd*>& periods) {
+    const auto P = static_cast<Eigen::Index>(periods.size());
+    if (P < 3) return;
+    const Eigen::Index outputs = run_.common_sum.rows();
+    const auto excited = static_cast<Eigen::Index>(lines_.excited);
+    Eigen::MatrixXcd deviation(outputs, P);
+    Eigen::ArrayXXd share(outputs, P);
+    Eigen::ArrayXXd sum = Eigen::ArrayXXd::Zero(outputs, P);
+    for (Eigen::Index k = 0; k < excited; ++k) {
+      for (Eigen::Index p = 0; p < P; ++p)
+        deviation.col(p) = periods[static_cast<std::size_t>(p)]->col(k).head(outputs);
+      const Eigen::VectorXcd mean = deviation.rowwise().mean();
+      deviation.colwise() -= mean;
+      share = deviation.array().abs2();
+      const Eigen::ArrayXd scatter = share.rowwise().sum() + 1e-300;
+      share = share.colwise() / scatter - 1.0 / static_cast<double>(P);
+      const Eigen::Index block = noise_block(k, excited);
+      run_.own_sum.col(block).array() += share.square().rowwise().sum();
+      sum += share;
+      if (k + 1 < excited && noise_block(k + 1, excited) == block) continue;
+      run_.common_sum.col(block).array() += sum.square().rowwise().sum();
+      sum.setZero();
+    }
   }
 
   /// Converts sum_p p Z_p to the slope. With few and small p, rounding is far below the noise.
@@ -238,6 +268,14 @@ void RunSpectra::drop(int period, std::string reason) {
   DroppedPeriod& one = *dropped.emplace(at);
   one.period = period;
   one.reason = std::move(reason);
+}
+
+Eigen::Index noise_blocks(Eigen::Index lines) {
+  return std::clamp<Eigen::Index>(lines / 64, 1, 16);
+}
+
+Eigen::Index noise_block(Eigen::Index k, Eigen::Index lines) {
+  return k * noise_blocks(lines) / lines;
 }
 
 double common_scatter(const RunSpectra& run, Eigen::Index k, Eigen::Index l) {

@@ -31,6 +31,11 @@ struct RunSpectra {
   Eigen::MatrixXcd slope{};
   /// sum_p (p - mean p)^2: the slope's variance is that of a period divided by it.
   double slope_spread = 0.0;
+  /// How far the excited lines of an output have their noise in common, by output and noise_block(). With f the share of
+  /// a period in the scatter of a line, minus 1/P: sum_p (sum_k f)^2 over sum_p sum_k f^2 is 1 for independent lines, and
+  /// their number if slow noise leaks into all of them. Empty from a whole record.
+  Eigen::MatrixXd common_sum{};
+  Eigen::MatrixXd own_sum{};
   int periods = 0;                 ///< number of clean ones
   Eigen::VectorXd excluded_power;  ///< sum over the lines of |U|^2 of the excluded actuators
   std::string fingerprint;         ///< of the excitation and of every unmarked sample
@@ -43,6 +48,11 @@ struct RunSpectra {
 /// Common part of two lines' scatters: the squared correlation of their mean squares; 1 for k = l. For two windows with
 /// m of n bins in common, without the local polynomials, it is approximately x (2 + x) / 3, x = m / n.
 double common_scatter(const RunSpectra& run, Eigen::Index k, Eigen::Index l);
+
+/// Blocks of at least 64 lines, at most 16, in which the noise of experiments is compared.
+Eigen::Index noise_blocks(Eigen::Index lines);
+/// The block of line k.
+Eigen::Index noise_block(Eigen::Index k, Eigen::Index lines);
 
 /// The lines of the spectra: the excited ones, ascending, then others.
 struct SpectrumLines {

@@ -47,6 +47,8 @@ class Search {
  public:
   Search(HealthRecord& record, const NominalStage& nominal);
   ControllerCheck run();
+  /// Whether there is nothing to search for.
+  bool follows();
 
  private:
   void refresh();
@@ -328,6 +330,22 @@ bool exchanged_before(const ChannelChange& change, const std::vector<ChannelChan
          });
 }
 
+bool Search::follows() {
+  refresh();
+  for (Index a = 0; a < record_.n_u(); ++a) {
+    double evidence = 0.0;
+    for (const Line& line : lines_) {
+      const auto E = static_cast<int>(line.E.cols());
+      evidence -= log_tail_of_f(line.weight[a] * line.E.row(a).squaredNorm() / E, E,
+                                std::max(1, record_.scatter_dof()));
+    }
+    if (tail_of_evidence(evidence, static_cast<Index>(lines_.size())) <
+        kFeedbackSignificance / static_cast<double>(record_.n_u()))
+      return false;
+  }
+  return true;
+}
+
 ControllerCheck Search::run() {
   ControllerCheck check;
   refresh();
@@ -385,6 +403,10 @@ std::vector<ControllerMisfit> Search::misfits() const {
 }
 
 }  // namespace
+
+bool follows_controller(HealthRecord& record, const NominalStage& nominal) {
+  return Search(record, nominal).follows();
+}
 
 ControllerCheck check_controller(HealthRecord& record, const NominalStage& nominal) {
   return Search(record, nominal).run();

@@ -42,4 +42,8 @@ struct ControllerCheck {
 /// and all its sensors are recorded.
 ControllerCheck check_controller(HealthRecord& record, const NominalStage& nominal);
 
+/// Whether u = r - C y holds, without a search: the F test of the misfit over all lines, with 1 / w for the noise and
+/// for any size. @pre as check_controller()
+bool follows_controller(HealthRecord& record, const NominalStage& nominal);
+
 }  // namespace stageid

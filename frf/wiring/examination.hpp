@@ -21,6 +21,10 @@ class Examination {
   std::vector<Finding> examine();
 
  private:
+  void check_realization();
+  std::vector<Finding> examine_other();
+  void check_others(std::vector<Finding>& own);
+  bool follows_stage();
   void check_cycles();
   void check_samples();
   void check_responses();
@@ -53,7 +57,8 @@ class Examination {
   HealthRecord record_;
   const std::optional<NominalStage>& nominal_;
   std::vector<Finding> findings_;
-  std::vector<Eigen::Index> spoilt_;  // of [sensors; actuators]: dead or clipped
+  std::vector<Eigen::Index> spoilt_;         // of [sensors; actuators]: dead or clipped
+  std::vector<Eigen::Index> spoilt_of_log_;  // those known from the samples of all runs
 };
 
 }  // namespace stageid

@@ -50,6 +50,8 @@ std::size_t unsettled_bands(const NonlinearityTest& test) {
 }
 
 std::string unsettled_line(const NonlinearityTest& test) {
+  if (test.settled_p_value.maxCoeff() == 0.0)
+    return "linearity cannot be tested: the data health names what makes the realizations differ";
   return fmt::format(
       "linearity cannot be tested in {} of {} bands, because the records are not settled there: {}",
       unsettled_bands(test), test.band_hz.rows(), kUnsettledRemedy);
@@ -71,15 +73,6 @@ std::string why_not_tested(const FrfEstimate& frf) {
   return why.empty()
              ? "nonlinearity test: the file contains none; estimate the FRF again from the logs"
              : why;
-}
-
-/// Whether every experiment begins with a period that differs from the others, and no other period does.
-bool transient_lasts(const FrfEstimate& frf) {
-  const std::size_t experiments =
-      static_cast<std::size_t>(frf.realizations) * static_cast<std::size_t>(frf.experiments);
-  return experiments > 0 && frf.dropped_periods.size() == experiments &&
-         std::all_of(frf.dropped_periods.begin(), frf.dropped_periods.end(),
-                     [](const DroppedPeriod& period) { return period.period == 0; });
 }
 
 }  // namespace
@@ -156,11 +149,12 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
   }
   if (more > 0)
     lines.push_back(fmt::format("... and {} more periods, listed in /dropped_periods", more));
-  if (transient_lasts(frf))
-    lines.emplace_back(
-        "the first measured period of every experiment was discarded: the transient was not over, "
-        "and its remainder resembles distortion; increase --transient-periods by one, or use "
-        "--method lpm");
+  if (const int starts = runs_with_discarded_start(frf); starts > 0)
+    lines.push_back(fmt::format(
+        "the first measured period of {} of {} experiments was discarded: the transient was not "
+        "over, and its remainder resembles distortion; increase --transient-periods by one, or "
+        "use --method lpm",
+        starts, frf.realizations * frf.experiments));
   return lines;
 }
 

@@ -115,8 +115,15 @@ std::vector<std::string> health_notes(const std::vector<Finding>& findings,
 std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings) {
   for (Finding& finding : check_interpolation(frf)) findings.push_back(std::move(finding));
   // Drift and ringing modes are already reported; the bands that they affect add little.
-  if (!has(findings, Cause::drift) && !has(findings, Cause::unsettled))
-    for (Finding& finding : check_settling(frf)) findings.push_back(std::move(finding));
+  const auto settled_so_far = [&] {
+    return !has(findings, Cause::drift) && !has(findings, Cause::unsettled);
+  };
+  if (settled_so_far())
+    for (Finding& finding : check_discarded_starts(frf)) findings.push_back(std::move(finding));
+  std::vector<Finding> unsettled_bands;
+  if (settled_so_far()) unsettled_bands = check_settling(frf);
+  withdraw_linearity_test(frf, findings);
+  for (Finding& finding : unsettled_bands) findings.push_back(std::move(finding));
   std::stable_sort(findings.begin(), findings.end(),
                    [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });
   Json provenance = Json::parse(frf.provenance_json, nullptr, false);

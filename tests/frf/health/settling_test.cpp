@@ -131,5 +131,33 @@ TEST(Settling, ADistortedPlantIsSettled) {
   }
 }
 
+TEST(Settling, DiscardedFirstPeriodsAreATransient) {
+  FrfEstimate frf;
+  frf.realizations = frf.experiments = 2;
+  frf.dropped_periods = {{0, 0, 0, ""}, {0, 1, 0, ""}};
+  EXPECT_TRUE(check_discarded_starts(frf).empty());
+  frf.dropped_periods.push_back({1, 0, 0, ""});
+  const std::vector<Finding> found = check_discarded_starts(frf);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].cause, Cause::unsettled);
+  EXPECT_EQ(found[0].figure, "3 of 4 runs");
+}
+
+TEST(Settling, AFindingThatExplainsItWithdrawsTheLinearityTest) {
+  FrfEstimate frf;
+  frf.nonlinearity.band_hz.setOnes(1, 2);
+  frf.nonlinearity.p_value.setZero(1, 1);
+  withdraw_linearity_test(frf, {{Severity::fault, Cause::scale, "", "", "", ""}});
+  EXPECT_TRUE(frf.nonlinearity.nonlinear());
+  withdraw_linearity_test(frf, {{Severity::fault, Cause::scale, "", "", "", "", {2}}});
+  EXPECT_FALSE(frf.nonlinearity.nonlinear());
+  EXPECT_FALSE(frf.nonlinearity.settled(0));
+  frf.nonlinearity = {};
+  frf.nonlinearity.band_hz.setOnes(1, 2);
+  frf.nonlinearity.p_value.setZero(1, 1);
+  withdraw_linearity_test(frf, {{Severity::doubt, Cause::drift, "", "", "", ""}});
+  EXPECT_FALSE(frf.nonlinearity.nonlinear());
+}
+
 }  // namespace test_settling
 }  // namespace stageid

@@ -147,6 +147,31 @@ TEST(SampleSlip, SeveralLostOrDoubledSamplesOfAllOrOneKindOfChannels) {
   }
 }
 
+// A channel with its own recorder or filter.
+TEST(SampleSlip, OneChannelMayLoseSamplesAlone) {
+  for (const bool of_sensor : {true, false})
+    for (const Index count : {1, -1, 3})
+      for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+        Case c(seed);
+        const Index row = 2300 + 1013 * static_cast<Index>(seed);
+        MemoryLog whole = c.log;
+        lose(whole, 1, row, count);
+        if (of_sensor)
+          c.log.records[1].sensors.col(1) = whole.records[1].sensors.col(1);
+        else
+          c.log.records[1].actuators.col(1) = whole.records[1].actuators.col(1);
+        const FrfAndHealth both = estimate_plant_frf_and_health({&c.log});
+        ASSERT_EQ(both.health.slips.size(), 1U) << of_sensor << " " << count << " " << seed;
+        const SampleSlip& slip = both.health.slips.front();
+        EXPECT_EQ(slip.channel, of_sensor ? "z2" : "a2");
+        EXPECT_EQ(slip.lost, count) << seed;
+        EXPECT_NEAR(static_cast<double>(slip.row), static_cast<double>(row), 200.0) << seed;
+        EXPECT_NE(to_string(slip).find(of_sensor ? " of z2 " : " of a2 "), std::string::npos);
+        EXPECT_LT(chi_square(both.frf, c), 1.6) << of_sensor << " " << count << " " << seed;
+        EXPECT_EQ(told(both.health).size(), 1U) << text(told(both.health));
+      }
+}
+
 TEST(SampleSlip, IsTheSameForBothMethodsAndForTheRecordAlone) {
   Case c(3);
   lose(c.log, 2, 5100, 1);

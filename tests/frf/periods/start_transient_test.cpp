@@ -112,6 +112,17 @@ TEST(StartTransient, ARingingModeIsNamedAndTheRemedySettlesIt) {
   EXPECT_GE(cured, 18);
 }
 
+// The fewest runs: their phases alone are no evidence, but the first period is.
+TEST(StartTransient, IsFoundInFourRuns) {
+  int named = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const std::vector<Finding> found = unsettled(
+        simulate({.realizations = 2, .periods = 4, .decay_s = 0.45, .noise = 1e-6, .seed = seed}));
+    named += found.size() == 1 && found[0].what.find("93") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_GE(named, 19);
+}
+
 // The frf command's own data give the same.
 TEST(StartTransient, TheEstimateGathersTheSame) {
   const MemoryLog log = simulate({.periods = 8, .decay_s = 0.5});

@@ -143,6 +143,48 @@ TEST(ExperimentNoise, NamesTheRunsAndByHowMuch) {
     EXPECT_NE(findings[0].figure.find(name), std::string::npos) << findings[0].figure;
 }
 
+// With two experiments per realization, only the other realizations show which of them is unusual.
+TEST(ExperimentNoise, NamesTheNoisyOneOfTwoAndTheLogStaysLinear) {
+  int nonlinear = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    LoopExperiment x{.axes = 2, .realizations = 3, .periods = 4, .seed = seed};
+    x.lines.resize(96);
+    std::iota(x.lines.begin(), x.lines.end(), 4);
+    x.noise_factor = 0.001 * Eigen::MatrixXcd::Identity(2, 2);
+    MemoryLog log = test::simulate_log(test::small_stage(), x);
+    x.noise_factor *= 5.0;
+    const MemoryLog noisy = test::simulate_log(test::small_stage(), x);
+    log.records[2] = noisy.records[2];  // the first experiment of the second realization
+    const FrfAndHealth both = estimate_plant_frf_and_health({&log}, {.threads = 1});
+    ASSERT_EQ(both.health.noisy_runs.size(), 1U) << seed;
+    EXPECT_EQ(both.health.noisy_runs[0].realization, 1);
+    EXPECT_EQ(both.health.noisy_runs[0].experiment, 0);
+    EXPECT_NEAR(std::log(both.health.noisy_runs[0].ratio), std::log(25.0), 0.5);
+    nonlinear += both.frf.nonlinearity.nonlinear() ? 1 : 0;
+  }
+  EXPECT_LE(nonlinear, 1);
+}
+
+// Stationary noise far below the lines: different values at the start and end of a period leak into all of them.
+TEST(ExperimentNoise, SlowNoiseIsTheSameInAllExperiments) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    LoopExperiment x{.axes = 2, .realizations = 2, .periods = 8, .seed = seed};
+    x.lines.resize(96);
+    std::iota(x.lines.begin(), x.lines.end(), 4);
+    MemoryLog log = test::simulate_log(test::small_stage(), x);
+    test::ComplexNoise random(seed);
+    for (LogSamples& record : log.records)
+      for (Eigen::Index c = 0; c < record.sensors.cols(); ++c) {
+        double slow = 0.0;
+        for (Eigen::Index n = -5000; n < record.sensors.rows(); ++n) {
+          slow = 0.998 * slow + random.gaussian().real();
+          if (n >= 0) record.sensors(n, c) += 1e-3 * slow;
+        }
+      }
+    EXPECT_EQ(estimate_plant_frf({&log}).experiment_noise_ratio, 1.0) << seed;
+  }
+}
+
 TEST(ExperimentNoise, IsToldAndNotSmoothed) {
   const FrfEstimate frf = estimate(uneven(AxisScheme::orthogonal, 2, 3));
   const std::vector<Finding> findings = check_experiment_noise(frf);

@@ -39,6 +39,12 @@ TEST(Nonlinearity, PValuesAreThoseOfScipy) {
   EXPECT_NEAR(p(10, 1.7, 3, 12.0), 0.014870413896499016, 1e-9);
 }
 
+// Files of others often lack the degrees of freedom.
+TEST(Nonlinearity, WithoutATestThereIsNoVerdict) {
+  EXPECT_FALSE(NonlinearityTest{}.nonlinear());
+  EXPECT_FALSE(linearity_of(one_band(20, 1.0, 1.0, 0.0, 0.0)).nonlinear());
+}
+
 TEST(Nonlinearity, DistortionIsThatOfOneRealization) {
   const FrfEstimate frf = one_band(10, 5.0, 1.0, 2.0, 4.0);
   EXPECT_NEAR(nonlinearity_test(frf).distortion(0, 0), std::sqrt(3.0 * 4.0), 1e-12);

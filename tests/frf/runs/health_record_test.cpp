@@ -33,6 +33,16 @@ void expect_equal(const HealthRecord& a, const HealthRecord& b) {
     EXPECT_EQ(a.lines[k].R, b.lines[k].R);
     EXPECT_EQ(a.lines[k].Z, b.lines[k].Z);
   }
+  ASSERT_EQ(a.others.size(), b.others.size());
+  for (std::size_t m = 0; m < a.others.size(); ++m) {
+    EXPECT_EQ(a.others[m].realization, b.others[m].realization);
+    EXPECT_EQ(a.others[m].periods, b.others[m].periods);
+    ASSERT_EQ(a.others[m].lines.size(), b.others[m].lines.size());
+    for (std::size_t k = 0; k < a.others[m].lines.size(); ++k) {
+      EXPECT_EQ(a.others[m].lines[k].R, b.others[m].lines[k].R);
+      EXPECT_EQ(a.others[m].lines[k].Z, b.others[m].lines[k].Z);
+    }
+  }
   ASSERT_EQ(a.scan.size(), b.scan.size());
   for (std::size_t c = 0; c < a.scan.size(); ++c) {
     EXPECT_EQ(a.scan[c].samples(), b.scan[c].samples());
@@ -87,6 +97,18 @@ TEST(HealthRecord, IsTheSameFromTheReadingOfTheEstimate) {
     EXPECT_EQ(both.frf.noise_variance, estimate.noise_variance);
     EXPECT_EQ(both.frf.provenance_json, estimate.provenance_json);
   }
+}
+
+TEST(HealthRecord, HoldsAFewPeriodsOfTheOtherRealizations) {
+  LoopExperiment x{.axes = 2, .realizations = 3, .periods = 9};
+  const MemoryLog log = test::simulate_log(test::small_stage(), x);
+  const HealthRecord record = read_health_record({&log}, {});
+  EXPECT_EQ(record.periods, (std::vector<int>{9, 9}));
+  ASSERT_EQ(record.others.size(), 2U);
+  const auto most = static_cast<int>(kPeriodsOfOthers);
+  EXPECT_EQ(record.others[1].realization, 2);
+  EXPECT_EQ(record.others[1].periods, (std::vector<int>{most, most}));
+  EXPECT_EQ(record.others[1].lines[0].Z.cols(), 2 * most);
 }
 
 TEST(HealthRecord, HoldsAllChannelsWhateverIsEstimated) {

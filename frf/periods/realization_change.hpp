@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "frf/periods/health_finding.hpp"
+
+namespace stageid {
+
+/// What one realization has different from the others: one channel of its response, two, or all.
+struct RealizationChange {
+  enum class Kind : std::uint8_t { gain, skew, swap };
+  Kind kind = Kind::gain;
+  int realization = 0;  ///< counted from 0
+  int other = -1;       ///< the only other one, if there are two: either may be wrong
+  std::string channel;  ///< "s2", "a1 a3", or "all sensors"
+  double value = 1.0;   ///< factor or delay in s, relative to the other realizations
+  double deviation = 0.0;
+};
+Finding to_finding(const RealizationChange& change);
+
+/// Differences between the realizations of a log.
+struct RealizationDifferences {
+  std::vector<RealizationChange> changes;  ///< by realization, then by what they explain
+  std::vector<int>
+      outlying;  ///< counted from 0: much farther from the others than these from each other
+};
+
+}  // namespace stageid

@@ -1,0 +1,127 @@
+// A channel that is recorded differently in one realization only.
+#include "frf/plant/realization_comparison.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "frf/health/data_health.hpp"
+#include "frf/plant/plant_frf.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
+
+namespace stageid {
+namespace test_realization_comparison {
+
+using test::MemoryLog;
+using testing::HasSubstr;
+
+struct Spec {
+  int realizations = 3;
+  std::uint64_t seed = 1;
+  double noise = 1e-4;
+  double cubic = 0.0;
+};
+
+MemoryLog recorded(const Spec& spec) {
+  test::LoopExperiment x;
+  x.sample_rate_hz = 2000.0;
+  x.period_samples = 1000;
+  x.lines = test::line_range(3, 301, 2);
+  x.axes = 2;
+  x.realizations = spec.realizations;
+  x.periods = 4;
+  x.transient_periods = 3;
+  x.seed = spec.seed;
+  test::ComplexNoise random(spec.seed + 100);
+  const double first_hz = 60.0 + 60.0 * random.uniform();
+  return test::simulate_sampled_log(
+      test::sampled_plant(3, 2, {{first_hz, 0.05}, {2.1 * first_hz, 0.04}}, x.sample_rate_hz, 0.02),
+      x, spec.noise, spec.cubic);
+}
+
+/// Changes the records of one realization, counted from 0.
+void change(MemoryLog& log, int realization, const std::function<void(LogSamples&)>& by) {
+  for (std::size_t run = 0; run < log.records.size(); ++run)
+    if (log.log_runs[run].realization == realization) by(log.records[run]);
+}
+
+std::vector<Finding> told(const MemoryLog& log) {
+  std::vector<Finding> findings =
+      check_health(estimate_plant_frf_and_health({&log}).health, std::nullopt);
+  std::erase_if(findings, [](const Finding& f) { return f.severity == Severity::unchecked; });
+  return findings;
+}
+
+std::string text(const std::vector<Finding>& findings) {
+  std::string all;
+  for (const Finding& f : findings) all += f.channel + " " + f.what + " (" + f.figure + ")\n";
+  return all;
+}
+
+TEST(RealizationComparison, FindsNothingInCleanAndDistortedLogs) {
+  for (std::uint64_t seed = 1; seed <= 15; ++seed)
+    for (const int realizations : {2, 3, 5})
+      for (const double cubic : {0.0, 1e-2}) {
+        const MemoryLog log = recorded({realizations, seed, 1e-5, cubic});
+        const std::vector<Finding> findings = told(log);
+        EXPECT_TRUE(findings.empty()) << seed << " " << realizations << "\n" << text(findings);
+      }
+}
+
+TEST(RealizationComparison, NamesTheChannelTheChangeAndTheRealization) {
+  struct Fault {
+    std::function<void(LogSamples&)> by;
+    Cause cause;
+    const char* channel;
+    double value;  // factor or us; 0: none
+  };
+  const auto late = [](Eigen::MatrixXd& samples, Eigen::Index c) {
+    const Eigen::VectorXd before = samples.col(c);
+    samples.col(c).tail(before.size() - 1) = before.head(before.size() - 1);
+  };
+  const std::vector<Fault> faults = {
+      {[](LogSamples& s) { s.sensors.col(1) *= 1.05; }, Cause::scale, "z2", 1.05},
+      {[](LogSamples& s) { s.sensors.col(1) *= 2.36; }, Cause::scale, "z2", 2.36},
+      {[](LogSamples& s) { s.sensors.col(2) *= -1.0; }, Cause::sign, "z3", -1.0},
+      {[](LogSamples& s) { s.actuators.col(0) *= 1.2; }, Cause::scale, "a1", 1.2},
+      {[&](LogSamples& s) { late(s.sensors, 0); }, Cause::skew, "z1", 500.0},
+      {[&](LogSamples& s) { late(s.actuators, 1); }, Cause::skew, "a2", 500.0},
+      {[](LogSamples& s) { s.sensors.col(0).swap(s.sensors.col(2)); }, Cause::swapped, "z1 z3", 0},
+      {[](LogSamples& s) { s.actuators.col(0).swap(s.actuators.col(1)); }, Cause::swapped, "a1 a2",
+       0}};
+  for (std::size_t f = 0; f < faults.size(); ++f)
+    for (const int realizations : {3, 4})
+      for (const int wrong : {0, 2})
+        for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+          MemoryLog log = recorded({realizations, seed});
+          change(log, wrong, faults[f].by);
+          const std::vector<Finding> findings = told(log);
+          ASSERT_EQ(findings.size(), 1U) << f << " " << seed << "\n" << text(findings);
+          EXPECT_EQ(findings[0].severity, Severity::fault);
+          EXPECT_EQ(findings[0].cause, faults[f].cause) << f;
+          EXPECT_EQ(findings[0].channel, faults[f].channel) << f;
+          EXPECT_EQ(findings[0].realizations, std::vector<int>{wrong}) << f;
+          EXPECT_THAT(findings[0].what, HasSubstr("realization " + std::to_string(wrong + 1)));
+          if (faults[f].value == 0.0) continue;
+          const std::size_t at = findings[0].figure.find_first_of("-0123456789");
+          EXPECT_NEAR(std::stod(findings[0].figure.substr(at)), faults[f].value,
+                      0.02 * std::abs(faults[f].value))
+              << f;
+        }
+}
+
+TEST(RealizationComparison, OfTwoRealizationsEitherMayBeWrong) {
+  MemoryLog log = recorded({2, 5});
+  change(log, 1, [](LogSamples& s) { s.sensors.col(1) *= 2.0; });
+  const std::vector<Finding> findings = told(log);
+  ASSERT_EQ(findings.size(), 1U) << text(findings);
+  EXPECT_THAT(findings[0].what, HasSubstr("in realization 2 than in realization 1, one of which"));
+  EXPECT_EQ(findings[0].realizations, (std::vector<int>{0, 1}));
+}
+
+}  // namespace test_realization_comparison
+}  // namespace stageid
