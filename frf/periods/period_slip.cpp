@@ -63,10 +63,15 @@ bool clearly_shifted(const MatrixXd& earlier, const MatrixXd& later, Index chann
   return false;
 }
 
+struct Suspicion {
+  bool of_kind = false;  ///< of all channels of a kind
+  bool of_one = false;   ///< of a single channel
+};
+
 /// Whether, in some block of one kind of channels, the earlier period shifted by a sample fits as well as the
 /// period itself, or clearly better in one channel. This is always the case after a gap, and also if there is only
 /// noise.
-bool suspicious(const MatrixXd& earlier, const MatrixXd& later) {
+Suspicion suspicion(const MatrixXd& earlier, const MatrixXd& later) {
   const Index N = later.rows();
   const Index blocks = blocks_of(N);
   ArrayXd evidence = ArrayXd::Zero(blocks);
@@ -81,7 +86,7 @@ bool suspicious(const MatrixXd& earlier, const MatrixXd& later) {
     one = one || ratio.minCoeff() * kWorthTrying < 1.0 ||
           (ratio.minCoeff() < 1.0 && clearly_shifted(earlier, later, c, here));
   }
-  return one || (later.cols() > 0 && (evidence <= 0.0).any());
+  return {later.cols() > 0 && (evidence <= 0.0).any(), one};
 }
 
 /// Residuals of one kind of channels without and with a shift, per sample, over the scatter of the channels.
@@ -161,6 +166,18 @@ Change best_change(const ArrayXd& gain) {
   return best;
 }
 
+/// Whether the rest of the period repeats without a shift, and the rows of `change` do not. A slow motion that does not
+/// repeat may look like a shift in some rows, but it differs in all of them.
+bool rest_repeats(const Explained& of, const Change& change) {
+  const Index rows = change.last - change.first;
+  const Index others = of.before.size() - rows;
+  if (others == 0) return true;
+  const double inside = of.before.segment(change.first, rows).sum();
+  const double outside = of.before.sum() - inside;
+  return kLeastRatioOfOne * outside * static_cast<double>(rows) <
+         inside * static_cast<double>(others);
+}
+
 /// ln of the ratio by which the shifted period fits the rows of `change` better; 0 if it is not significant.
 double advantage(const Explained& of, const Change& change) {
   const Index rows = change.last - change.first;
@@ -222,9 +239,11 @@ std::vector<Index> shifts_to_try(const LogSamples& earlier, const LogSamples& la
 
 std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples& later,
                                     RealDft& dft) {
-  if (!suspicious(earlier.sensors, later.sensors) &&
-      !suspicious(earlier.actuators, later.actuators))
-    return std::nullopt;
+  const Suspicion of_y = suspicion(earlier.sensors, later.sensors);
+  const Suspicion of_u = suspicion(earlier.actuators, later.actuators);
+  const bool of_kind = of_y.of_kind || of_u.of_kind;
+  const bool of_single = of_y.of_one || of_u.of_one;
+  if (!of_kind && !of_single) return std::nullopt;
   const Index N = later.sensors.rows();
   std::optional<PeriodSlip> found;
   double largest = 0.0;
@@ -248,7 +267,7 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
     };
     for (const ArrayXd& gain : gains) {
       const Change change = best_change(gain);
-      if (!(change.gain > largest)) continue;
+      if (!of_kind || !(change.gain > largest)) continue;
       const double y = advantage(sensors, change);
       const double u = advantage(actuators, change);
       // A transient or a stuck sensor may look like a long shift. With a wrong period length, every period is
@@ -261,11 +280,11 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
       found = slip_of(change, y >= 0.0, u >= 0.0);
       largest = change.gain;
     }
-    if (!near) continue;
+    if (!near || !of_single) continue;
     const auto try_one = [&](const Explained& channel, Index c, bool of_sensor) {
       const Change change = best_change(channel.before - channel.after);
       if (!(change.gain > largest_of_one) ||
-          advantage(channel, change) < std::log(kLeastRatioOfOne))
+          advantage(channel, change) < std::log(kLeastRatioOfOne) || !rest_repeats(channel, change))
         return;
       of_one = slip_of(change, of_sensor, !of_sensor);
       of_one->channel = c;

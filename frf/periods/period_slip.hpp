@@ -32,8 +32,8 @@ struct PeriodSlip {
 /// than 4 samples needs a factor of 10 in both kinds, and must start inside a period. Too few samples at the
 /// edge of a period (1600 over the channels) are not enough; the next period reveals the gap.
 ///
-/// A channel with its own recorder or filter may lose samples alone. It needs a factor of 30, at most 4 samples, and
-/// explains more than a gap of its whole kind.
+/// A channel with its own recorder or filter may lose samples alone. It needs a factor of 30, at most 4 samples, a rest of
+/// the period that repeats, and explains more than a gap of its whole kind.
 ///
 /// d is any of -4 ... 4, or near one of the three largest peaks of the periods' cross-correlation.
 /// @pre both have `dft.length()` rows
