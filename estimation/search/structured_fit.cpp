@@ -347,6 +347,9 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   judge_explained(frf, options, result);
   if (options.uncertainty) fill_shape_deviations(frf, options, result);
   if (options.covariance) fill_covariance(frf, options, result);
+  // An interrupt between two fits has shortened the search as well.
+  if (options.limit->was_interrupted() && !ended_by_limit(result))
+    result.distrust(FitStatus::interrupted, options.limit->message());
   return result;
 }
 

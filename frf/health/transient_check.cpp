@@ -226,7 +226,9 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
     }
     const std::complex<double> q = window.ratio();
     const double shift = window.shift(q, evidence.runs.front().start_used);
-    settled = std::max(settled, window.shift(q, false));
+    // At an end of the lines, what rings lies beside them and shifts no mode.
+    if (peak > 0 && peak + 1 < evidence.frequency_hz.size())
+      settled = std::max(settled, window.shift(q, false));
     if (shift <= kLargestShift) continue;
     frequencies.push_back(window.frequency_hz());
     more = std::max(more, static_cast<int>(

@@ -32,7 +32,7 @@ namespace stageid {
 /// fitted parameter in its own standard deviations (Cauchy-Schwarz). Shifts below half a deviation are not
 /// reported; the remedy discards as many periods as are needed to get there. Runs have random phases, so the
 /// expected shift is the bound over the root of their number. A fault if it is above three deviations although the
-/// first period is discarded.
+/// first period is discarded, at a maximum between the lines.
 std::vector<Finding> check_start_transient(const StartEvidence& evidence);
 
 }  // namespace stageid

@@ -81,9 +81,8 @@ TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
       run({"validate", name("few.json"), name("all/frf_validation.h5")});
   EXPECT_EQ(validated.exit_code, 3);
   EXPECT_THAT(validated.out, HasSubstr("verdict: not to be trusted: the residual is "));
-  const ProgramResult reported =
-      run({"report", name("few.json"), name("all/frf.h5"), name("all/frf_validation.h5"), "-o",
-           name("few.html")});
+  const ProgramResult reported = run({"report", name("few.json"), name("all/frf.h5"),
+                                      name("all/frf_validation.h5"), "-o", name("few.html")});
   EXPECT_EQ(reported.exit_code, 3);
   EXPECT_THAT(reported.err, HasSubstr("not to be trusted: the residual is "));
   EXPECT_TRUE(std::filesystem::exists(at("few.html")));
