@@ -96,8 +96,10 @@ std::string named_realizations(const std::vector<int>& realizations) {
 }
 
 int rank_of(const Finding& finding) noexcept {
-  if (finding.cause == Cause::limit_cycle) return 0;  // causes other faults
-  if (finding.severity == Severity::fault) return 1;
+  const bool fault = finding.severity == Severity::fault;
+  // They cause other faults; a transient also makes the noise of runs differ.
+  if (fault && (finding.cause == Cause::unsettled || finding.cause == Cause::limit_cycle)) return 0;
+  if (fault) return 1;
   if (finding.cause == Cause::unknown_stage) return 2;
   if (finding.severity == Severity::unchecked) return 5;
   return finding.cause == Cause::uneven_noise ? 4 : 3;  // a transient or a drift looks like noise
