@@ -289,12 +289,14 @@ void Examination::check_excluded() {
   double inputs = 0.0;
   for (const Index a : excited) inputs += power(a);
   if (!(inputs > 0.0)) return;
+  const double noise = noise_share(record_);
   for (Index a = 0; a < record_.n_u(); ++a) {
     const Index c = record_.n_y() + a;
     if (std::find(excited.begin(), excited.end(), a) != excited.end()) continue;
     const double share = power(a) / inputs;
     if (share > kExcludedPower && responds(record_, c))
-      find(Severity::doubt, Cause::excluded, name(c),
+      // The bias of the response is about the root of the share.
+      find(share > noise ? Severity::fault : Severity::doubt, Cause::excluded, name(c),
            "is not an input of the sub-plant but moves on the excited lines, which biases the "
            "response",
            fmt::format("{:.2g} of the power of the inputs", share),

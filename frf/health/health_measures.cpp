@@ -59,6 +59,16 @@ double common_motion(const HealthRecord& record, Index one, Index other) {
   return values.empty() ? 0.0 : order_statistic(values, 0.5);
 }
 
+double noise_share(const HealthRecord& record) {
+  std::vector<double> values;
+  for (const LineRecord& line : record.lines) {
+    const Eigen::MatrixXcd Y = line.Z.topRows(record.n_y());
+    const double power = record.mean(Y).squaredNorm() / static_cast<double>(record.experiments());
+    if (power > 0.0) values.push_back(record.variance_of_mean(Y).sum() / power);
+  }
+  return values.empty() ? 0.0 : order_statistic(values, 0.5);
+}
+
 double condition(const Eigen::MatrixXcd& M) {
   const Eigen::VectorXd row_norm = M.rowwise().norm();
   if (!(row_norm.minCoeff() > 0.0)) return std::numeric_limits<double>::infinity();

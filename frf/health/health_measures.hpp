@@ -22,6 +22,9 @@ double median_coherence(const HealthRecord& record, Eigen::Index channel);
 /// 1/nu if they are independent; 0 with nu = scatter_dof() < 2.
 double common_motion(const HealthRecord& record, Eigen::Index one, Eigen::Index other);
 
+/// Median over the lines of the power of noise in the means of the sensors, relative to their power.
+double noise_share(const HealthRecord& record);
+
 /// Condition number with rows of norm one, because their units differ; infinite if a row is zero.
 double condition(const Eigen::MatrixXcd& M);
 

@@ -67,7 +67,8 @@ TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
     EXPECT_NE(finding.remedy.find("--stage"), std::string::npos) << finding.remedy;
   }
   EXPECT_EQ(unchecked, 1);
-  EXPECT_EQ(findings.front().cause, Cause::unknown_stage);
+  EXPECT_TRUE(std::any_of(findings.begin(), findings.end(),
+                          [](const Finding& f) { return f.cause == Cause::unknown_stage; }));
 }
 
 // The nearly constant record of another actuator would fit in its place, but its own would not fit in the other's.
@@ -172,8 +173,9 @@ TEST(DataHealth, ActuatorsThatMoveUnexcitedAreNoFaultOfTheWiring) {
   const MemoryLog log = test::simulate_faulty_log(request, {});
   const auto nominal = std::optional(nominal_stage(request.configured));
   const auto findings = check_health(read_health_record({&log}, {}), nominal);
-  EXPECT_FALSE(any_fault(findings)) << told(findings);
   ASSERT_FALSE(findings.empty());
+  for (const Finding& f : findings)
+    EXPECT_TRUE(f.severity != Severity::fault || f.cause == Cause::excluded) << told(findings);
   EXPECT_EQ(findings.front().cause, Cause::excluded) << told(findings);
   EXPECT_EQ(findings.back().cause, Cause::rigid_body);
   EXPECT_EQ(findings.back().severity, Severity::unchecked);
