@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -130,6 +131,9 @@ struct FitResult {
   FitCovariance
       covariance;  ///< empty unless requested; if it cannot be computed, a decision contains the reason
   bool trustworthy() const noexcept { return is_trustworthy(status); }
+  bool is_held(std::size_t submodel) const noexcept {
+    return std::find(held.begin(), held.end(), submodel) != held.end();
+  }
   /// Adds a reason not to trust the fit, to status, message and the record of the model. The gravest reason is the
   /// status and the first in the message. Order: interrupt, faulty data, budget, no convergence, unexplained residual,
   /// undetermined modes.

@@ -1,18 +1,19 @@
 #include "estimation/search/channel_delays.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "acquisition/files/counted.hpp"
+#include "frf/statistics/order_statistic.hpp"
+
 namespace stageid {
 namespace {
 
-constexpr double kClear = 5.0;  // standard deviations
-constexpr double kLeastSamples =
-    1e-3;  // below, the effect is smaller than that of the hold's accuracy
+constexpr double kClear = 5.0;          // standard deviations
+constexpr double kLeastSamples = 1e-3;  // smaller than the accuracy of the hold
 constexpr std::size_t kMostNamed = 6;
 
 /// Of one kind. With two channels, the earlier one counts as right.
@@ -20,10 +21,9 @@ void add_late(const ChannelList& channels, const Eigen::VectorXd& delay_s,
               const Eigen::VectorXd& std_s, double sample_rate_hz, std::vector<std::string>& out) {
   if (delay_s.size() < 2) return;
   std::vector<double> sorted(delay_s.begin(), delay_s.end());
-  const auto middle = sorted.begin() + (delay_s.size() - 1) / 2;
-  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double middle_s = value_of_rank(sorted, (sorted.size() - 1) / 2);
   for (Eigen::Index i = 0; i < delay_s.size(); ++i) {
-    const double samples = (delay_s[i] - *middle) * sample_rate_hz;
+    const double samples = (delay_s[i] - middle_s) * sample_rate_hz;
     const double deviation = std_s.size() > i ? std_s[i] * sample_rate_hz : 0.0;
     if (std::abs(samples) > std::max(kLeastSamples, kClear * deviation))
       out.push_back(
@@ -40,12 +40,10 @@ std::string late_channels(const AdditiveModel& model) {
   add_late(model.inputs, model.input_delays_s(), model.input_delay_std_s, model.sample_rate_hz,
            late);
   if (late.empty()) return {};
-  const std::size_t named = std::min(kMostNamed, late.size());
   return fmt::format(
-      "the delays of the channels differ: {} samples{} relative to the others. The model contains "
+      "the delays of the channels differ: {} samples relative to the others. The model contains "
       "them. If all channels should be simultaneous, check the timing of the recorder",
-      fmt::join(late.begin(), late.begin() + static_cast<std::ptrdiff_t>(named), ", "),
-      late.size() > named ? fmt::format(" and {} more", late.size() - named) : "");
+      listed(late, kMostNamed));
 }
 
 }  // namespace stageid

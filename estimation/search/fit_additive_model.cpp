@@ -297,8 +297,7 @@ void rearrange(const std::vector<std::size_t>& sources, FitResult& fit) {
   std::vector<Eigen::Index> frozen;
   Eigen::Index next = 0;
   for (const std::size_t i : sources) {
-    if (std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end())
-      held.push_back(model.submodels.size());
+    if (fit.is_held(i)) held.push_back(model.submodels.size());
     for (const Eigen::Index p : fit.frozen)
       if (p >= first[i] && p < first[i + 1]) frozen.push_back(next + p - first[i]);
     next += first[i + 1] - first[i];

@@ -35,9 +35,8 @@ bool is_coloured(const FitResult& fit, std::size_t i) {
   const AdditiveModel& model = fit.model;
   const Submodel& s = model.submodels[i];
   const double f = s.natural_frequency_hz();
-  return std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end() ||
-         f < model.fit.band_hz[0] || f > model.fit.band_hz[1] || s.damping_ratio() > kBroad ||
-         overlaps_another(model, i);
+  return fit.is_held(i) || f < model.fit.band_hz[0] || f > model.fit.band_hz[1] ||
+         s.damping_ratio() > kBroad || overlaps_another(model, i);
 }
 
 /// Whether the modes added by a round are not worth their parameters without their best line each. With noise tails

@@ -123,11 +123,7 @@ std::string describe(const std::vector<ResidueRankTest>& tests) {
                         least);
     if (!higher.empty()) text += "; ";
   }
-  const std::size_t shown = std::min(higher.size(), kMostShown);
-  text += fmt::format(
-      "{}", fmt::join(higher.begin(), higher.begin() + static_cast<std::ptrdiff_t>(shown), ", "));
-  if (shown < higher.size()) text += fmt::format(" and {} more", higher.size() - shown);
-  return text;
+  return text + listed(higher, kMostShown);
 }
 
 }  // namespace stageid

@@ -42,10 +42,10 @@ std::optional<OpenMode> most_open(const FitResult& fit) {
     if (!is_searched_mode(s) || s.frequency_held) continue;
     const double damping = s.damping_ratio();
     const double width_hz = damping * s.natural_frequency_hz();
-    const bool at_bound = std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end();
-    const double doubt = at_bound ? HUGE_VAL
-                                  : std::max(s.damping_ratio_std.value_or(0.0) / damping,
-                                             s.natural_frequency_std_hz.value_or(0.0) / width_hz);
+    const double doubt = fit.is_held(i)
+                             ? HUGE_VAL
+                             : std::max(s.damping_ratio_std.value_or(0.0) / damping,
+                                        s.natural_frequency_std_hz.value_or(0.0) / width_hz);
     if (doubt > (open ? open->doubt : kLeastDoubt)) open = {i, doubt};
   }
   return open;

@@ -249,11 +249,9 @@ void settle_suspension(const FrfEstimate& frf, const ModeSelection& selection,
     for (std::size_t i = 0; i < result.model.submodels.size(); ++i) {
       Submodel& s = result.model.submodels[i];
       if (s.role != SubmodelRole::suspension || s.frequency_held) continue;
-      const bool at_bound =
-          std::find(result.held.begin(), result.held.end(), i) != result.held.end();
       const double deviation =
-          at_bound ? std::numeric_limits<double>::infinity()
-                   : s.natural_frequency_std_hz.value_or(0.0) / s.natural_frequency_hz();
+          result.is_held(i) ? std::numeric_limits<double>::infinity()
+                            : s.natural_frequency_std_hz.value_or(0.0) / s.natural_frequency_hz();
       if (!(deviation > worst_deviation)) continue;
       worst = &s;
       worst_deviation = deviation;

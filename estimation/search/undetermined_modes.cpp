@@ -28,10 +28,6 @@ bool is_between_lines(const Submodel& s, const FitRecord& record, bool with_flan
   return f >= record.band_hz[0] - reach && f <= record.band_hz[1] + reach;
 }
 
-bool is_at_bound(const FitResult& fit, std::size_t i) {
-  return std::find(fit.held.begin(), fit.held.end(), i) != fit.held.end();
-}
-
 /// Two for the pole, plus those of a residue of its rank.
 double parameters_of(const Submodel& s) {
   const auto n_y = static_cast<double>(s.numerator[0].rows());
@@ -47,7 +43,7 @@ std::string doubt_of(const FrfEstimate& frf, bool number_asked, const FitResult&
   const Submodel& s = fit.model.submodels[i];
   if (!is_searched_mode(s) || s.frequency_held || s.damping_held) return {};
   if (is_between_lines(s, fit.model.fit, number_asked)) {
-    if (is_at_bound(fit, i))
+    if (fit.is_held(i))
       return s.damping_ratio() < kBroad
                  ? "at its bound: narrower than the line spacing, undamped or unstable"
                  : "at its bound";

@@ -194,12 +194,9 @@ std::string periods_text(int periods) {
 
 /// "71, 182 and 3 more Hz"
 std::string names_of(const std::vector<double>& frequencies_hz) {
-  std::string names;
-  for (std::size_t i = 0; i < frequencies_hz.size() && i < kMostNamed; ++i)
-    names += fmt::format("{}{:.4g}", i > 0 ? ", " : "", frequencies_hz[i]);
-  if (frequencies_hz.size() > kMostNamed)
-    names += fmt::format(" and {} more", frequencies_hz.size() - kMostNamed);
-  return names + " Hz";
+  std::vector<std::string> names;
+  for (const double f : frequencies_hz) names.push_back(fmt::format("{:.4g}", f));
+  return listed(names, kMostNamed) + " Hz";
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
 #include "frf/periods/health_finding.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <string_view>
+
+#include "acquisition/files/counted.hpp"
 
 namespace stageid {
 namespace {
@@ -87,12 +87,9 @@ std::optional<Cause> cause_of(std::string_view name) noexcept {
 }
 
 std::string named_realizations(const std::vector<int>& realizations) {
-  std::string text = realizations.size() == 1 ? "realization " : "realizations ";
-  for (std::size_t i = 0; i < realizations.size() && i < kMostNamed; ++i)
-    text += fmt::format("{}{}", i > 0 ? ", " : "", realizations[i] + 1);
-  if (realizations.size() > kMostNamed)
-    text += fmt::format(" and {} more", realizations.size() - kMostNamed);
-  return text;
+  std::vector<std::string> numbers;
+  for (const int m : realizations) numbers.push_back(std::to_string(m + 1));
+  return (numbers.size() == 1 ? "realization " : "realizations ") + listed(numbers, kMostNamed);
 }
 
 int rank_of(const Finding& finding) noexcept {

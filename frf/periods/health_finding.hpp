@@ -67,7 +67,8 @@ struct Finding {
 /// "realization 3", "realizations 2, 3", "realizations 1, 2, 3, 4 and 6 more". @pre counted from 0, not empty
 std::string named_realizations(const std::vector<int>& realizations);
 
-/// Order in the table: faults, an unknown stage, doubts, other unchecked properties.
+/// Order in the table: faults (first those that cause others), an unknown stage, doubts (uneven noise last), other
+/// unchecked properties.
 int rank_of(const Finding& finding) noexcept;
 
 /// Whether there is a fault.

@@ -152,7 +152,7 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
   return outcome == Outcome::ok && (now.late || past_deadline) ? Outcome::late : outcome;
 }
 
-/// The node's time has 16 bits; the arrival tells how often they have overflowed.
+/// The node's time has 16 bits. The arrival time shows how often it has wrapped around.
 void CanStage::stamp(Inputs& inputs) noexcept {
   inputs.t_arrival_ns = arrival_ns_;
   const auto step_us = static_cast<std::uint16_t>(node_us_ - stamped_us_);

@@ -118,7 +118,7 @@ std::vector<std::string> real_time_obstacles(int cpu, const fs::path& root) {
   const auto note = [&found](std::string line) {
     if (!line.empty()) found.push_back(std::move(line));
   };
-  // One processor stands for all: they are usually configured alike.
+  // Processors are usually configured alike, so the first one with a problem is reported.
   const auto note_first = [&](auto check) {
     for (const fs::path& processor : processors(cpu, root))
       if (std::string line = check(processor); !line.empty()) return note(std::move(line));

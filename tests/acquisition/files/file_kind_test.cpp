@@ -4,6 +4,8 @@
 
 #include <cerrno>
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_kind.hpp"
@@ -89,6 +91,10 @@ TEST(Counted, OneHasNoS) {
   EXPECT_EQ(counted(0U, "experiment"), "0 experiments");
   EXPECT_EQ(counted(2L, "axis", "axes"), "2 axes");
   EXPECT_EQ(counted(1, "axis", "axes"), "1 axis");
+  const std::vector<std::string> three = {"a", "b", "c"};
+  EXPECT_EQ(listed(three, 3), "a, b, c");
+  EXPECT_EQ(listed(three, 2), "a, b and 1 more");
+  EXPECT_EQ(listed({}, 2), "");
 }
 
 }  // namespace test_file_kind

@@ -11,6 +11,7 @@
 
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
+#include "tests/support/logs/told_findings.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
@@ -18,6 +19,7 @@ namespace test_sample_slip {
 
 using Eigen::Index;
 using test::MemoryLog;
+using test::text;
 
 test::LoopExperiment experiment(std::uint64_t seed) {
   test::LoopExperiment x;
@@ -66,15 +68,7 @@ void lose(MemoryLog& log, std::size_t run, Index row, Index count, bool sensors 
 }
 
 std::vector<Finding> told(const HealthRecord& record) {
-  std::vector<Finding> findings = check_health(record, std::nullopt);
-  std::erase_if(findings, [](const Finding& f) { return f.severity == Severity::unchecked; });
-  return findings;
-}
-
-std::string text(const std::vector<Finding>& findings) {
-  std::string all;
-  for (const Finding& f : findings) all += f.channel + " " + f.what + " (" + f.figure + ")\n";
-  return all;
+  return test::told(check_health(record, std::nullopt));
 }
 
 /// Mean over lines and entries of |G - truth|^2 over the stated variance; 1 if the variance is right.

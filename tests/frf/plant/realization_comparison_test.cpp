@@ -11,12 +11,14 @@
 
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
+#include "tests/support/logs/told_findings.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
 namespace test_realization_comparison {
 
 using test::MemoryLog;
+using test::text;
 using testing::HasSubstr;
 
 struct Spec {
@@ -50,16 +52,7 @@ void change(MemoryLog& log, int realization, const std::function<void(LogSamples
 }
 
 std::vector<Finding> told(const MemoryLog& log) {
-  std::vector<Finding> findings =
-      check_health(estimate_plant_frf_and_health({&log}).health, std::nullopt);
-  std::erase_if(findings, [](const Finding& f) { return f.severity == Severity::unchecked; });
-  return findings;
-}
-
-std::string text(const std::vector<Finding>& findings) {
-  std::string all;
-  for (const Finding& f : findings) all += f.channel + " " + f.what + " (" + f.figure + ")\n";
-  return all;
+  return test::told(check_health(estimate_plant_frf_and_health({&log}).health, std::nullopt));
 }
 
 TEST(RealizationComparison, FindsNothingInCleanAndDistortedLogs) {
