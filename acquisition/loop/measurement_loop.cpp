@@ -64,7 +64,8 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
       sets_pace_(stage.info().sets_pace),
       jitter_ns_(std::llround(1e9 * options.jitter_s / stage.info().pace)),
       jitter_ns2_(std::pow(1e9 * options.jitter_rms_s / stage.info().pace, 2)),
-      clock_(jitter_ns_) {
+      clock_(jitter_ns_,
+             options.jitter_rms_s > 0.0 ? std::llround(std::sqrt(jitter_ns2_)) : jitter_ns_) {
   const StageInfo& info = stage.info();
   const std::size_t actuators = info.actuators.size();
   const std::size_t sensors = info.sensors.size();
