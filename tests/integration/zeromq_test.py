@@ -5,6 +5,7 @@ started again, with a second host, under garbage.
     zeromq_test.py STAGEID SOURCE_DIR WORK_DIR
 """
 
+import csv
 import json
 import pathlib
 import random
@@ -107,13 +108,23 @@ class ZeroMq(unittest.TestCase):
         sources = ["zeromq_node.c", "can_frame.c", "can_node.c", "can_resident.c", "stage_plant.c"]
         for name, define in (("node", []), ("slow_node", ["-DSAMPLES_PER_TICK=1"])):
             subprocess.run(["cc", *FLAGS, *define, "-o", name, *sources, "-lzmq", "-lm"], cwd=WORK, check=True)
+        # A loop of the node with a feed-forward: a constant, and a sine of 0.5 Hz, which is a line of the excitation.
+        text = (WORK / "can_resident.c").read_text()
+        none = "  memset(u_n, 0, STAGE_ACTUATORS * sizeof *u_n);\n"
+        assert none in text
+        loop = ("  static unsigned n;\n  u_n[0] = 0.05 + 0.02 * sin(0.0157079632679489662 * n++) - 10.0 * y_m[0];\n"
+                "  u_n[1] = -10.0 * y_m[1];\n")
+        (WORK / "feed_forward.c").write_text("#include <math.h>\n" + text.replace(none, loop))
+        subprocess.run(["cc", *FLAGS, "-o", "forward_node", *[s.replace("can_resident", "feed_forward") for s in sources],
+                        "-lzmq", "-lm"], cwd=WORK, check=True)
 
     def setUp(self):
         self.port = free_port()
         self.nodes = []
         stage = (WORK / "stage_zeromq.yaml").read_text().replace("5555", str(self.port))
         (WORK / "stage.yaml").write_text(stage)
-        (WORK / "run.slog").unlink(missing_ok=True)
+        for file in ("run.slog", "run.csv"):
+            (WORK / file).unlink(missing_ok=True)
         short = (WORK / "experiment.yaml").read_text()
         for old, new in (("axes: [z1, z2]", "axes: [z1]"), ("period_s: 10", "period_s: 4"), ("band_hz: [0.4", "band_hz: [0.5"),
                          ("transient_periods: 3", "transient_periods: 1")):
@@ -142,13 +153,13 @@ class ZeroMq(unittest.TestCase):
         return subprocess.Popen([PROGRAM, "run", f"{experiment}.yaml", "-o", log, *options], cwd=WORK,
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
-    def ends(self, process, code, text=""):
+    def ends(self, process, code, text="", warnings=0):
         _, err = process.communicate(timeout=120)
         said = [line for line in err.splitlines() if line.startswith("stageid:")]
         self.assertEqual(process.returncode, code, err)
         if text:
             self.assertRegex(err, text)
-        self.assertEqual(len(said), int(code != 0), err)
+        self.assertEqual(len(said), int(code != 0) + warnings, err)
         if (WORK / "run.slog").exists():
             self.assertEqual(self.call("log", "verify", "run.slog").returncode, 0)
 
@@ -157,7 +168,21 @@ class ZeroMq(unittest.TestCase):
 
     def test_the_modes_are_those_of_the_stage(self):
         self.node()
-        self.ends(self.start("experiment"), 0)
+        self.check_modes()
+
+    def test_a_feed_forward_of_the_node_is_in_the_record(self):
+        stage = (WORK / "stage.yaml").read_text()
+        self.assertIn("controller: {}", stage)
+        (WORK / "stage.yaml").write_text(re.sub(r"controller: \{\}.*", "controller: peer", stage))
+        self.node("forward_node")
+        self.check_modes(warnings=1)  # that the loop of the node is not tested
+        self.assertEqual(self.call("log", "convert", "run.slog", "-o", "run.csv").returncode, 0)
+        with open(WORK / "run.csv", newline="") as file:
+            forces = [float(row["actuator z1 [N]"]) for row in csv.DictReader(file)]
+        self.assertAlmostEqual(sum(forces) / len(forces), 0.05, delta=0.01)
+
+    def check_modes(self, warnings=0):
+        self.ends(self.start("experiment"), 0, warnings=warnings)
         self.assertEqual(self.call("frf", "run.slog", "-o", "frf.h5").returncode, 0)
         done = self.call("--json", "fit", "frf.h5", "-o", "model.json", "--rigid-body", "none")
         self.assertEqual(done.returncode, 0, done.stderr)
