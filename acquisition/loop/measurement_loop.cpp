@@ -132,7 +132,6 @@ void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excita
   status_ = {};
   stamp_ = {};
   clock_.restart();
-  jitter_left_ns2_ = jitter_ns2_ * static_cast<double>(excitation_.period_samples);
   std::fill(y_.begin(), y_.end(), 0.0);
   std::fill(last_finite_u_.begin(), last_finite_u_.end(), 0.0);
   controller_.reset();
@@ -171,6 +170,7 @@ void MeasurementLoop::begin(std::uint64_t quiet_samples) noexcept {
   complete_ = false;
   reason_ = StopReason::none;
   last_trouble_ = Outcome::ok;
+  jitter_left_ns2_ = jitter_ns2_ * static_cast<double>(excitation_.samples);
   phase_ = Phase::leading;
   begin_measuring();
   lead_gain();
@@ -255,11 +255,9 @@ void MeasurementLoop::judge_instant(std::int64_t sent_ns) noexcept {
 
 bool MeasurementLoop::regular(std::int64_t deviation_ns) noexcept {
   if (std::abs(deviation_ns) > jitter_ns_) return false;
-  if (jitter_ns2_ == 0.0) return true;
+  if (jitter_ns2_ == 0.0 || !recording()) return true;
   const double square = static_cast<double>(deviation_ns) * static_cast<double>(deviation_ns);
-  jitter_left_ns2_ = std::min(jitter_left_ns2_ + jitter_ns2_,
-                              jitter_ns2_ * static_cast<double>(excitation_.period_samples));
-  if (square > jitter_left_ns2_) return false;
+  if (square > jitter_ns2_ && square > jitter_left_ns2_) return false;
   jitter_left_ns2_ -= square;
   return true;
 }

@@ -126,7 +126,7 @@ void warn_of_real_time(const RealTimeOptions& options, const Console& console) {
     console.warning("realtime: " + obstacle);
 }
 
-/// A single sample may be late if its period is regular: the response is an average over the period.
+/// A single sample may be late if the run is regular: the response is an average over the run.
 void limit_jitter(const ExperimentConfig& config, const ExperimentPlan& plan, double sample_rate_hz,
                   RunExperimentOptions& options) {
   options.jitter_s = config.stage.real_time.jitter_s;
