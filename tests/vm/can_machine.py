@@ -20,6 +20,7 @@ CAUSES = ["none", "watchdog", "limit", "not finite", "interlock", "amplifier", "
           "temperature", "bus off", "host heartbeat"]
 
 SHORT = (("realizations: 3", "realizations: 2"), ("realization: 3", "realization: 2"))  # of the experiment
+QUICK = (*SHORT, ("transient_periods: 2", "transient_periods: 1"), ("  periods: 3", "  periods: 2"))
 
 
 class Machine:

@@ -37,6 +37,7 @@ class Row:
     log: bool = True  # whether there is one
     repeated: bool = False  # at least one cycle; more on a busy machine
     own_watchdog: bool = False  # of the node: its default
+    misses_allowed: int = 10  # fewer for a slow line, where each one takes two worst replies
     state: tuple = AT_REST  # of the node at the end; empty: unavailable
 
 
@@ -56,7 +57,8 @@ ROWS = repeated_rows('tcp', '') + repeated_rows('rtu', ', RTU') + [
         own_watchdog=True),
     Row('no reply for good', FAILED, 'no reply within', fault('late_reply@300x0:1.6'), state=()),
     Row('wrong unit for good', FAILED, 'corrupt', fault('wrong_unit@300x0'), state=()),
-    Row('wrong unit for good, RTU', FAILED, 'corrupt', fault('wrong_unit@300x0'), line='rtu', state=()),
+    Row('wrong unit for good, RTU', FAILED, 'corrupt', fault('wrong_unit@300x0'), line='rtu', state=(),
+        misses_allowed=4),
     Row('exception for good', FAILED, 'refused', fault('exception@300x0:4'), state=()),
     Row('dead server', FAILED, 'not connected', fault('dead_server@300'), state=()),
     Row('frozen node', FAILED, 'no reply within', pace=1, disturb='freeze'),
@@ -93,6 +95,7 @@ def open_line(bench, row):
         stage = bench.stage('stage', door=f'tcp: {{port: {port}}}')
     elif row.line == 'plant':
         stage = bench.stage('stage', backend='sim', supervisor=port)
+    stage.write_text(stage.read_text() + f'realtime: {{misses_allowed: {row.misses_allowed}}}\n')
     return node, port, options, stage
 
 

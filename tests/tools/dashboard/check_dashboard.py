@@ -119,7 +119,7 @@ def check_numbers(file, seen):
 def watch_one(program, configs, work):
     # Few samples a period and 2.5 ms between them: a busy machine, this browser included, is seldom so
     # late, and then in few of the periods. A realization that it spoils is left out, in the page too.
-    log, running, browser = start(program, configs, work, "whole", PACE, realizations=4, periods=6, period_s=0.05)
+    log, running, browser = start(program, configs, work, "whole", PACE, realizations=3, periods=6, period_s=0.05)
     try:
         expect(browser.wait_for("window.stageidDashboard.state && window.stageidDashboard.state.state === 'running'"), "no state came")
         expect(browser.wait_for("window.stageidDashboard.edition() >= 1"), "no response came")
