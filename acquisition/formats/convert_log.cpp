@@ -76,6 +76,7 @@ void write_run_attributes(Hdf5File& file, const std::string& group, const LogRun
   count("late_cycles", run.health.late);
   count("missing_cycles", run.health.missing);
   count("marked_samples", run.health.marked);
+  count("irregular_samples", run.health.irregular);
 }
 
 /// Appends the rows of one run to growing datasets, piece by piece.
@@ -225,7 +226,7 @@ void convert_run_to_csv(const LogReader& reader, std::size_t run, CsvFile& csv,
       const std::uint64_t row = first + static_cast<std::uint64_t>(r);
       csv.text(head);
       csv.number(static_cast<double>(row) / info.sample_rate_hz);
-      csv.text(samples.marked[r] != 0 ? ",1" : ",0");
+      csv.text(fmt::format(",{}", samples.marked[r]));
       write_cells(csv, excitation.row(static_cast<Eigen::Index>(
                            row % static_cast<std::uint64_t>(info.period_samples))));
       write_cells(csv, samples.actuators.row(r));

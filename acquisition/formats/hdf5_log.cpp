@@ -12,6 +12,7 @@
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/record/log_checks.hpp"
 #include "acquisition/record/row_transpose.hpp"
+#include "acquisition/slog/slog_format.hpp"
 
 namespace stageid {
 
@@ -317,8 +318,9 @@ void Hdf5LogReader::read_marked(const std::string& dataset, std::uint64_t first,
     const std::lock_guard lock(hdf5_mutex());
     file_->read_rows(dataset, first, values.size(), values.data());
   }
-  std::transform(values.begin(), values.end(), out.marked.data(),
-                 [](double value) { return static_cast<std::uint8_t>(value != 0.0); });
+  std::transform(values.begin(), values.end(), out.marked.data(), [](double value) {
+    return value == kIrregularMark ? kIrregularMark : value != 0.0 ? kBadMark : std::uint8_t{0};
+  });
 }
 
 void Hdf5LogReader::read(std::size_t run, std::uint64_t first, std::uint64_t count,

@@ -63,13 +63,16 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
       misses_allowed_(options.misses_allowed),
       sets_pace_(stage.info().sets_pace),
       jitter_ns_(std::llround(1e9 * options.jitter_s / stage.info().pace)),
-      clock_(jitter_ns_) {
+      jitter_ns2_(std::pow(1e9 * options.jitter_rms_s / stage.info().pace, 2)),
+      clock_(jitter_ns_,
+             options.jitter_rms_s > 0.0 ? std::llround(std::sqrt(jitter_ns2_)) : jitter_ns_) {
   const StageInfo& info = stage.info();
   const std::size_t actuators = info.actuators.size();
   const std::size_t sensors = info.sensors.size();
   if (!(options.ramp_s >= 0.0) || !std::isfinite(options.ramp_s) || options.misses_allowed < 0 ||
-      !(options.jitter_s >= 0.0)) {
-    throw std::invalid_argument("loop: ramp_s, jitter_s and misses_allowed must be 0 or more");
+      !(options.jitter_s >= 0.0) || !(options.jitter_rms_s >= 0.0)) {
+    throw std::invalid_argument(
+        "loop: ramp_s, jitter_s, jitter_rms_s and misses_allowed must be 0 or more");
   }
   if (static_cast<std::size_t>(controller.sensors()) != sensors ||
       static_cast<std::size_t>(controller.actuators()) != actuators) {
@@ -129,6 +132,7 @@ void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excita
   status_ = {};
   stamp_ = {};
   clock_.restart();
+  jitter_left_ns2_ = jitter_ns2_ * static_cast<double>(excitation_.period_samples);
   std::fill(y_.begin(), y_.end(), 0.0);
   std::fill(last_finite_u_.begin(), last_finite_u_.end(), 0.0);
   controller_.reset();
@@ -244,9 +248,20 @@ void MeasurementLoop::judge_instant(std::int64_t sent_ns) noexcept {
   if (jitter_ns_ == 0) return;
   const std::int64_t expected_ns =
       sets_pace_ ? static_cast<std::int64_t>(cycle_) * period_ns_ : sent_ns;
-  if (std::abs(clock_.take(expected_ns, inputs_.stamp_ns)) <= jitter_ns_) return;
+  if (regular(clock_.take(expected_ns, inputs_.stamp_ns))) return;
   status_.irregular = status_.marked = true;
   health_.irregular += recording() ? 1U : 0U;
+}
+
+bool MeasurementLoop::regular(std::int64_t deviation_ns) noexcept {
+  if (std::abs(deviation_ns) > jitter_ns_) return false;
+  if (jitter_ns2_ == 0.0) return true;
+  const double square = static_cast<double>(deviation_ns) * static_cast<double>(deviation_ns);
+  jitter_left_ns2_ = std::min(jitter_left_ns2_ + jitter_ns2_,
+                              jitter_ns2_ * static_cast<double>(excitation_.period_samples));
+  if (square > jitter_left_ns2_) return false;
+  jitter_left_ns2_ -= square;
+  return true;
 }
 
 /// If the stage does not report when its wait began, the whole exchange counts as waiting.

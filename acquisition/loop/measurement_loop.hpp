@@ -20,6 +20,9 @@ struct LoopOptions {
   /// Samples whose instant deviates by more are marked; 0: not checked. Only on the wall clock, of stages that stamp
   /// their samples.
   double jitter_s = 0.0;
+  /// Samples are also marked that would raise the rms deviation within a period of the excitation beyond this; 0: not
+  /// checked. Needs jitter_s.
+  double jitter_rms_s = 0.0;
   int misses_allowed = 10;  ///< leaky bucket: +2 per bad cycle, -1 per good one; above this: stop
   BetweenRuns between_runs = BetweenRuns::release;
 };
@@ -64,7 +67,8 @@ const char* to_string(StopReason reason) noexcept;
 /// (LimitedStage), once it has braked. A row contains the applied u, even if it differs from the command.
 ///
 /// A stage that stamps its samples is also watched for jitter: a row whose instant deviates by more than jitter_s
-/// from the followed clock (SampleClock) is marked as irregular, and does not count in the bucket.
+/// from the followed clock (SampleClock) is marked as irregular, and does not count in the bucket. With jitter_rms_s, so
+/// is a row whose squared deviation exceeds what the last period has left of period_samples jitter_rms_s^2.
 ///
 /// Held between runs (BetweenRuns::hold), the loop stays closed after that ramp, unrecorded, with the same limits and
 /// reasons to stop. The next run begins without a step: before its first sample, r rises linearly over ramp_s, with
@@ -127,6 +131,7 @@ class MeasurementLoop {
   void count_bad_cycle(Outcome outcome) noexcept;
   void time_cycle(std::int64_t computed_ns, Outcome outcome) noexcept;
   void judge_instant(std::int64_t sent_ns) noexcept;
+  bool regular(std::int64_t deviation_ns) noexcept;
   void tell_state() noexcept;
   void tell(LoopEvent::Kind kind, std::uint8_t code) noexcept;
   void end(StopReason reason) noexcept;
@@ -163,6 +168,8 @@ class MeasurementLoop {
   bool stamps_;          // whether rows have them
   bool sets_pace_;
   std::int64_t jitter_ns_;
+  double jitter_ns2_;           // mean square; 0: any
+  double jitter_left_ns2_ = 0;  // sum that the samples of a period may still have
   SampleClock clock_;
   int bucket_ = 0;
   Phase phase_ = Phase::idle;

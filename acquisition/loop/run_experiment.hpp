@@ -38,8 +38,9 @@ struct RunExperimentOptions {
   /// Called between realizations, with all data in the log and the stage at a standstill. A nonempty reason ends
   /// the experiment as complete.
   std::function<std::string()> enough = {};
-  double ramp_s = 0.1;      ///< duration of the ramp of the excitation to zero before stopping
-  double jitter_s = 0.0;    ///< see LoopOptions
+  double ramp_s = 0.1;    ///< duration of the ramp of the excitation to zero before stopping
+  double jitter_s = 0.0;  ///< see LoopOptions
+  double jitter_rms_s = 0.0;
   int misses_allowed = 10;  ///< leaky bucket: +2 per bad cycle, -1 per good one; above this: stop
   /// hold: the loop remains closed from the first run to the last. In virtual time no time passes between runs.
   BetweenRuns between_runs = BetweenRuns::release;

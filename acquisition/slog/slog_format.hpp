@@ -136,6 +136,16 @@ constexpr SampleStatus unpack_status(std::uint64_t word) noexcept {
           static_cast<std::uint32_t>(word >> 32), (word & kSlogIrregularBit) != 0};
 }
 
+/// Values of LogSamples::marked. An irregular sample has a good value at another instant.
+inline constexpr std::uint8_t kBadMark = 1;
+inline constexpr std::uint8_t kIrregularMark = 2;
+
+/// @returns 0 for a good sample
+constexpr std::uint8_t mark_of(const SampleStatus& status) noexcept {
+  if (!status.marked) return 0;
+  return status.irregular && status.outcome == 0 ? kIrregularMark : kBadMark;
+}
+
 /// Time stamps of one sample, stored in the word before the status.
 struct SampleStamp {
   std::uint32_t arrival_ns = 0;          ///< after the instant of the setpoint; 0: unknown

@@ -209,8 +209,9 @@ void write_samples(SlogWriter& writer, const LogSamples& samples) {
   words.leftCols(n_u) = samples.actuators;
   words.middleCols(n_u, n_y) = samples.sensors;
   for (Eigen::Index r = 0; r < words.rows(); ++r) {
-    const bool marked = samples.marked.size() > 0 && samples.marked[r] != 0;
-    words(r, n_u + n_y) = std::bit_cast<double>(pack_status({.marked = marked}));
+    const std::uint8_t mark = samples.marked.size() > 0 ? samples.marked[r] : 0;
+    words(r, n_u + n_y) = std::bit_cast<double>(
+        pack_status({.marked = mark != 0, .irregular = mark == kIrregularMark}));
   }
   writer.write({words.data(), static_cast<std::size_t>(words.size())});
 }

@@ -40,15 +40,15 @@ std::int64_t SampleClock::take(std::int64_t expected_ns, std::int64_t stamp_ns) 
   }
   irregular_ = 0;
   ++count_;
+  const auto pull = static_cast<double>(std::clamp(deviation, -trust_ns_, trust_ns_));
   const double share = std::max(kSmallestShare, 1.0 / count_);
   const auto since = static_cast<double>(std::max<std::int64_t>(1, expected_ns - expected_ns_));
-  const double fraction = fraction_ns_ + drift_ * since + share * static_cast<double>(deviation);
+  const double fraction = fraction_ns_ + drift_ * since + share * pull;
   const double whole = std::floor(fraction);
   stamp_ns_ += (expected_ns - expected_ns_) + static_cast<std::int64_t>(whole);
   fraction_ns_ = fraction - whole;
   expected_ns_ = expected_ns;
-  drift_ = std::clamp(drift_ + 0.5 * share * share * static_cast<double>(deviation) / since,
-                      -kLargestDrift, kLargestDrift);
+  drift_ = std::clamp(drift_ + 0.5 * share * share * pull / since, -kLargestDrift, kLargestDrift);
   return deviation;
 }
 

@@ -12,7 +12,10 @@ namespace stageid {
 /// make the next ones early. After three in a row, the clock has jumped and is followed from its new reading.
 class SampleClock {
  public:
-  explicit SampleClock(std::int64_t limit_ns) noexcept : limit_ns_(limit_ns) {}
+  explicit SampleClock(std::int64_t limit_ns) noexcept : SampleClock(limit_ns, limit_ns) {}
+  /// A deviation beyond trust_ns corrects as one of trust_ns: many late samples do not pass for the instant of all.
+  SampleClock(std::int64_t limit_ns, std::int64_t trust_ns) noexcept
+      : limit_ns_(limit_ns), trust_ns_(trust_ns) {}
 
   void restart() noexcept { count_ = irregular_ = 0; }
 
@@ -27,6 +30,7 @@ class SampleClock {
 
  private:
   std::int64_t limit_ns_;
+  std::int64_t trust_ns_;
   std::int64_t expected_ns_ = 0;
   std::int64_t stamp_ns_ = 0;
   double fraction_ns_ = 0.0;  // of stamp_ns_, which a double cannot hold to a nanosecond

@@ -169,7 +169,9 @@ BENCHMARK(WriteBlocks)->Unit(benchmark::kMicrosecond)->Iterations(2000);
 /// Does nothing, at once.
 class IdleStage final : public CyclicStage {
  public:
-  IdleStage() {
+  explicit IdleStage(Clock clock = Clock::virtual_time, bool stamps = false) {
+    info_.clock = clock;
+    info_.stamps = stamps;
     info_.sample_rate_hz = 10'000.0;
     info_.actuators.resize(kActuators);
     info_.sensors.resize(kSensors);
@@ -182,6 +184,10 @@ class IdleStage final : public CyclicStage {
   [[nodiscard]] Outcome exchange(const Outputs& outputs, Inputs& inputs,
                                  Deadline) noexcept override {
     inputs.y[0] = 1e-6 * outputs.u[0];
+    if (info_.stamps) {
+      inputs.t_sample_ns = static_cast<std::int64_t>(outputs.cycle + 1) * 100'000;
+      inputs.t_arrival_ns = inputs.stamp_ns = inputs.t_sample_ns + 7'000;
+    }
     return Outcome::ok;
   }
   void stop() noexcept override {}
@@ -214,14 +220,13 @@ BENCHMARK(Controller);
 
 /// One cycle with the row taken out again by the same thread, in batches. Less Controller, this is what
 /// the loop itself costs.
-void LoopStep(benchmark::State& state) {
-  IdleStage stage;
+void step(benchmark::State& state, IdleStage stage, const LoopOptions& options, int inputs) {
   MotionController controller = small_controller();
   SampleRing ring(kWords, 4096);
-  MeasurementLoop loop(stage, controller, ring);
+  MeasurementLoop loop(stage, controller, ring, options);
   LoopExcitation excitation;
-  excitation.period = Eigen::MatrixXd::Ones(kPeriod, state.range(0));
-  for (int i = 0; i < state.range(0); ++i) excitation.actuators.push_back(i);
+  excitation.period = Eigen::MatrixXd::Ones(kPeriod, inputs);
+  for (int i = 0; i < inputs; ++i) excitation.actuators.push_back(i);
   excitation.samples = ~std::uint64_t{0} >> 1;
   loop.start(1, excitation);
   for (auto _ : state) {
@@ -232,7 +237,18 @@ void LoopStep(benchmark::State& state) {
   }
   report_bytes(state, kWords * sizeof(double));
 }
+void LoopStep(benchmark::State& state) {
+  step(state, IdleStage(), {}, static_cast<int>(state.range(0)));
+}
 BENCHMARK(LoopStep)->Arg(1)->Arg(13);
+
+/// With the clock read twice per cycle; the second one also judges the time stamps of the samples.
+void LoopStepByWallClock(benchmark::State& state) { step(state, IdleStage(Clock::wall), {}, 1); }
+BENCHMARK(LoopStepByWallClock);
+void LoopStepWithStamps(benchmark::State& state) {
+  step(state, IdleStage(Clock::wall, true), {.jitter_s = 50e-6, .jitter_rms_s = 8e-6}, 1);
+}
+BENCHMARK(LoopStepWithStamps);
 
 }  // namespace
 }  // namespace stageid

@@ -42,6 +42,7 @@ DOORS = {
     "hdf5": {"files"},
     "H5": {"files"},
     "modbus": {"hal"},
+    "zmq.h": {"hal"},
     "matio": {"tools"},
     "zlib": {"tools"},
     "zip.h": {"tools"},

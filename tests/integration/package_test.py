@@ -105,7 +105,7 @@ class Debian(unittest.TestCase):
     def test_dependencies_are_those_of_the_libraries(self):
         for package in ("stageid", "python3-stageid"):
             depends = self.field(package, "Depends")
-            for library in ("libc6", "libfftw3", "libhdf5", "libmodbus", "libyaml-cpp", "libmatio"):
+            for library in ("libc6", "libfftw3", "libhdf5", "libmodbus", "libzmq5", "libyaml-cpp", "libmatio"):
                 self.assertRegex(depends, rf"\b{re.escape(library)}")
         self.assertIn("python3-numpy", self.field("python3-stageid", "Depends"))
         self.assertIn("libeigen3-dev", self.field("libstageid-dev", "Depends"))

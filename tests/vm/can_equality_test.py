@@ -5,7 +5,7 @@ import re
 import signal
 import subprocess
 
-from can_machine import CanTest, counts, shell
+from can_machine import SHORT, CanTest, counts, shell
 
 
 class Equality(CanTest):
@@ -17,11 +17,11 @@ class Equality(CanTest):
             return file["response"][:]
 
     def compare(self, mode, tolerance):
-        name = self.machine.configure(mode, mode=mode, axes="[a1, a2, a3]")
+        name = self.machine.configure(mode, mode=mode, axes="[a1, a2, a3]", experiment=SHORT)
         with self.machine.node(name):
             code, out, err = self.machine.run(name, mode)
             self.assertEqual(code, 0, err)
-        self.assertEqual(counts(out), {"cycles": 22500, "late": 0, "missing": 0, "marked": 0})
+        self.assertEqual(counts(out), {"cycles": 15000, "late": 0, "missing": 0, "marked": 0})
         code, out, err = self.machine.run(name, "sim", "--backend", "sim")
         self.assertEqual(code, 0, err)
         wire, here = self.frf(mode), self.frf("sim")
@@ -31,7 +31,7 @@ class Equality(CanTest):
         self.assertGreater(error, 0.0, "the same bytes would mean that nothing went over the wire")
 
     # A count is 40 N 1.25 / 2^23 = 6e-6 N against 1 N rms on 197 lines (0.1 N per line), and 1.5e-10 m
-    # against 1e-7 m: rounding of 1e-4 per sample, white, reduced by sqrt(1000 samples 3 periods 3 times).
+    # against 1e-7 m: rounding of 1e-4 per sample, white, reduced by sqrt(500 samples 3 periods 2 times).
     def test_streaming_gives_the_frf_of_the_simulator(self):
         self.compare("streaming", 1e-5)
 
@@ -41,7 +41,7 @@ class Equality(CanTest):
 
     def test_two_buses(self):
         shell("ip link add dev vcan1 type vcan && ip link set dev vcan1 mtu 72 up")
-        name = self.machine.configure("two", interfaces=("vcan0", "vcan1"))
+        name = self.machine.configure("two", interfaces=("vcan0", "vcan1"), experiment=SHORT)
         with self.machine.node(name, interface="vcan0,vcan1"):
             code, out, err = self.machine.run(name)
         shell("ip link del vcan1")
@@ -86,7 +86,7 @@ class Decoding(CanTest):
 
     def test_candump_and_dbc_give_the_log(self):
         import numpy as np
-        name = self.machine.configure("decode")
+        name = self.machine.configure("decode", experiment=SHORT)
         written = self.machine.call("config", "dbc", f"{name}_stage.yaml", "-o", "stage.dbc")
         self.assertEqual(written.returncode, 0, written.stderr)
         with self.machine.node(name), open(self.machine.at / "dump", "w") as dump:

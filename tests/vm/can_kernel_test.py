@@ -15,7 +15,7 @@ import sys
 import unittest
 
 from can_equality_test import Decoding, Equality  # noqa: F401, found by unittest
-from can_machine import CanTest, counts, node_state, send_error, shell, wait_for_state
+from can_machine import SHORT, CanTest, counts, node_state, send_error, shell, wait_for_state
 
 ERROR_CONTROLLER, ERROR_BUS_OFF, TX_PASSIVE = 0x4, 0x40, 0x20
 FOREVER = "x1000000000"
@@ -42,8 +42,7 @@ class FrameFaults(CanTest):
     ]
 
     def test_rows(self):
-        name = self.machine.configure("frames", experiment=(("realizations: 3", "realizations: 2"),
-                                                            ("realization: 3", "realization: 2")))
+        name = self.machine.configure("frames", experiment=SHORT)
         for label, fault, code, text in self.ROWS:
             with self.subTest(label), self.machine.node(name, "--can-fault", fault):
                 out = self.ends(self.machine.start(name), code, text)

@@ -19,6 +19,8 @@ STATES = ["not ready", "switch on disabled", "ready", "switched on", "operation 
 CAUSES = ["none", "watchdog", "limit", "not finite", "interlock", "amplifier", "gravity",
           "temperature", "bus off", "host heartbeat"]
 
+SHORT = (("realizations: 3", "realizations: 2"), ("realization: 3", "realization: 2"))  # of the experiment
+
 
 class Machine:
     """Runs the program on copies of the small configurations in an empty directory."""

@@ -8,6 +8,7 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/output_file.hpp"
+#include "hal/can/can_c_header.hpp"
 #include "hal/can/can_dbc.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/config/config_schema.hpp"
@@ -65,6 +66,12 @@ ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console
   dbc_command->add_option("stage", stage_file_, "stage file with a group 'can'")->required();
   dbc_command->add_option("-o,--output", output_, "file to write (.dbc)")->required();
   dbc_command->final_callback([this] { dbc(); });
+  CLI::App* header_command = add_command(
+      *config, "header",
+      "Write the messages of a stage file as C structures for its node (firmware, Simulink)");
+  header_command->add_option("stage", stage_file_, "stage file with a group 'can'")->required();
+  header_command->add_option("-o,--output", output_, "file to write (.h)")->required();
+  header_command->final_callback([this] { header(); });
 }
 
 void ConfigCommand::schema() const {
@@ -126,15 +133,30 @@ void ConfigCommand::check(const std::filesystem::path& file) const {
                               counted(plan.grid().size(), "line")));
 }
 
-void ConfigCommand::dbc() const {
-  const StageConfig stage = load_stage_config(stage_file_);
+StageConfig ConfigCommand::can_stage() const {
+  StageConfig stage = load_stage_config(stage_file_);
   if (!stage.can.present)
     throw std::invalid_argument(
         fmt::format("{}: has no group 'can'; see 'stageid config schema'", stage_file_.string()));
-  const StageInfo& info = stage.spec.info;
-  write_text_file(output_, can_dbc(can_layout(stage.can.spec, info), info));
+  return stage;
+}
+
+void ConfigCommand::write(const std::string& text) const {
+  write_text_file(output_, text);
   console_.result(fmt::format("wrote {}", output_.string()));
   console_.result({{"file", output_.string()}});
+}
+
+void ConfigCommand::dbc() const {
+  const StageConfig stage = can_stage();
+  const StageInfo& info = stage.spec.info;
+  write(can_dbc(can_layout(stage.can.spec, info), info));
+}
+
+void ConfigCommand::header() const {
+  const StageConfig stage = can_stage();
+  const StageInfo& info = stage.spec.info;
+  write(can_c_header(can_layout(stage.can.spec, info), info, stage.spec.limits));
 }
 
 }  // namespace stageid

@@ -7,6 +7,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "hal/can/can_zeromq.hpp"
+
 namespace stageid {
 namespace {
 
@@ -16,7 +18,9 @@ constexpr double kLeastWatchdog_s = 20e-3;
 void describe_bus(ConfigVisitor& v, std::vector<CanFile::Bus>& list) {
   CanFile::Bus bus;
   v.text("interface", bus.spec.interface, kRequired,
-         "interface name on the host and the node, e.g. can0");
+         "interface name on the host and the node, e.g. can0; with mode: resident also "
+         "tcp://HOST:PORT, "
+         "a node behind ZeroMQ");
   v.number("nominal_bit_rate_hz", bus.spec.nominal_bit_rate_hz, positive("bit/s"), kOptional,
            "of the arbitration phase; used for the bus load only, 'ip link' sets it");
   v.number("data_bit_rate_hz", bus.spec.data_bit_rate_hz, positive("bit/s"), kOptional,
@@ -110,6 +114,11 @@ CanConfig complete_can(const CanFile& file, const StageInfo& info, const StageLi
                         ? file.watchdog_s
                         : std::max(kLeastWatchdog_s, pause_s + 1.0 / info.sample_rate_hz);
   const bool only = file.buses.size() == 1;
+  for (const CanFile::Bus& bus : file.buses)
+    if (is_zeromq(bus.spec.interface) && (config.mode != CanMode::resident || !only))
+      throw std::invalid_argument(fmt::format(
+          "can: bus {}: ZeroMQ carries resident experiments over a single bus; set mode: resident",
+          bus.spec.interface));
   for (const CanFile::Bus& bus : file.buses) {
     CanBusSpec complete = bus.spec;
     complete.actuators = channel_numbers(bus.actuators, info.actuators, only, bus.spec.interface);

@@ -15,8 +15,8 @@ void describe_real_time(ConfigVisitor& visitor, RealTimeKeys& keys) {
   keys.options.lock_memory = lock == 1;
   visitor.number(
       "jitter_s", keys.jitter_s, not_negative("s"), kOptional,
-      "on the wall clock, samples whose instant deviates by more are marked; 0: from the highest "
-      "excited frequency, whose phase may deviate by 0.1 rad");
+      "on the wall clock, samples whose instant deviates by more are marked; 0: by half a sample, "
+      "or if the phase of the highest excited frequency would deviate by 0.1 rad rms in a period");
   count(visitor, "misses_allowed", keys.misses_allowed, 0, 1'000'000, kOptional,
         "leaky bucket: +2 per bad cycle, -1 per good one; above this value the run is stopped");
 }

@@ -53,6 +53,7 @@ void add_counts(const DashboardState& s, Json& json) {
                     {"late", health.late},
                     {"missing", health.missing},
                     {"marked", health.marked},
+                    {"irregular", health.irregular},
                     {"largest_lateness_s", 1e-9 * static_cast<double>(health.largest_lateness_ns)}};
   json["timing"] = timing_json(timing);
 }

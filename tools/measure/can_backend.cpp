@@ -6,11 +6,14 @@
 #include "hal/can/can_bus_load.hpp"
 #include "hal/can/can_resident_stage.hpp"
 #include "hal/can/can_socket.hpp"
+#include "hal/can/can_zeromq.hpp"
 
 namespace stageid {
 namespace {
 
 std::unique_ptr<CanTransport> open_buses(const CanSpec& spec, const CanLayout& layout) {
+  if (is_zeromq(spec.buses.front().interface))
+    return std::make_unique<ZeroMqCan>(spec.buses.front().interface);
   std::vector<std::string> interfaces;
   for (const CanBusSpec& bus : spec.buses) interfaces.push_back(bus.interface);
   return std::make_unique<SocketCan>(interfaces, can_host_identifiers(layout));

@@ -59,7 +59,8 @@ int exit_code_of(const ExperimentResult& result) {
   return kWorldFailed;
 }
 
-void conclude(const MeasuredStage& stage, double jitter_s, MeasurementResult& result) {
+void conclude(const MeasuredStage& stage, const RunExperimentOptions& options,
+              MeasurementResult& result) {
   result.message = result.experiment.message;
   result.exit_code = exit_code_of(result.experiment);
   const RunHealth& health = result.experiment.health;
@@ -71,10 +72,11 @@ void conclude(const MeasuredStage& stage, double jitter_s, MeasurementResult& re
         counted(health.marked, "sample is", "samples are"));
   if (health.irregular > 0 && result.exit_code == kNotTrustworthy)
     result.message += fmt::format(
-        "; {} the jitter limit of {:.3g} us ('jitter_s' in the stage file): use a real-time "
-        "kernel, or "
-        "a node with a clock",
-        counted(health.irregular, "exceeds", "exceed"), 1e6 * jitter_s);
+        "; {} the jitter limit of {:.3g} us{} ('jitter_s' in the stage file): use a real-time "
+        "kernel, or a node with a clock",
+        counted(health.irregular, "exceeds", "exceed"),
+        1e6 * (options.jitter_rms_s > 0.0 ? options.jitter_rms_s : options.jitter_s),
+        options.jitter_rms_s > 0.0 ? " rms" : "");
   stage.explain(result);
 }
 
@@ -124,9 +126,13 @@ void warn_of_real_time(const RealTimeOptions& options, const Console& console) {
     console.warning("realtime: " + obstacle);
 }
 
-double jitter_limit_s(const ExperimentConfig& config, const ExperimentPlan& plan) {
-  const double given_s = config.stage.real_time.jitter_s;
-  return given_s > 0.0 ? given_s : tolerable_jitter_s(plan.grid().frequency_hz().maxCoeff());
+/// A single sample may be late if its period is regular: the response is an average over the period.
+void limit_jitter(const ExperimentConfig& config, const ExperimentPlan& plan, double sample_rate_hz,
+                  RunExperimentOptions& options) {
+  options.jitter_s = config.stage.real_time.jitter_s;
+  if (options.jitter_s > 0.0) return;
+  options.jitter_s = 0.5 / sample_rate_hz;
+  options.jitter_rms_s = tolerable_jitter_s(plan.grid().frequency_hz().maxCoeff());
 }
 
 void warn_of_until(const ExperimentPlan& plan, const FrfOptions& options, const Console& console) {
@@ -233,7 +239,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   const StageInfo& info = stage->info();
   options.real_time = config.stage.real_time.options;
   options.misses_allowed = config.stage.real_time.misses_allowed;
-  options.jitter_s = jitter_limit_s(config, plan);
+  limit_jitter(config, plan, info.sample_rate_hz, options);
   options.ramp_s = config.stage.ramp_s;
   // A recorded run ends with the run.
   if (request.backend != Backend::replay) options.between_runs = config.stage.between_runs;
@@ -259,7 +265,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   listen(options, *events, progress, dashboard.get());
   result.experiment = stage->perform(log, options);
   result.seconds = progress.seconds();
-  conclude(*stage, options.jitter_s, result);
+  conclude(*stage, options, result);
   if (until && result.experiment.end == ExperimentEnd::complete)
     tell_reached(*until, result, console);
   if (result.experiment.end != ExperimentEnd::log_failed)

@@ -76,7 +76,7 @@ space as functions with numpy arrays in and out.")
 set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_NAME libstageid-dev)
 set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_DEPENDS
-  "libeigen3-dev, libfmt-dev, nlohmann-json3-dev, libfftw3-dev, libhdf5-dev, libmodbus-dev, libxxhash-dev")
+  "libeigen3-dev, libfmt-dev, nlohmann-json3-dev, libfftw3-dev, libhdf5-dev, libmodbus-dev, libzmq3-dev, libxxhash-dev")
 set(CPACK_COMPONENT_UNSPECIFIED_DESCRIPTION 
   "Static libraries and headers: what find_package(stageid) gives to C++ programs.")
 include(CPack)

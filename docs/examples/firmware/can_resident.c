@@ -2,7 +2,10 @@
 
 #include "can_node.h"
 
-enum { SAMPLES_AT_ONCE = 256, ROW_BYTES = 4 * (STAGE_ACTUATORS + STAGE_SENSORS + 1) };
+#ifndef SAMPLES_PER_TICK /* of the simulated stage; 1 with converters */
+#define SAMPLES_PER_TICK 256
+#endif
+enum { ROW_BYTES = 4 * (STAGE_ACTUATORS + STAGE_SENSORS + 1) };
 
 const char* can_upload(struct can_node* node, const struct can_command* command) {
   uint64_t bytes = 4 * (uint64_t)command->c;
@@ -153,5 +156,5 @@ void can_send_chunks(struct can_node* node) {
 
 void can_play(struct can_node* node) {
   int i;
-  for (i = 0; i < SAMPLES_AT_ONCE && node->resident == PLAYING; ++i) play_sample(node); /* one per tick of a clock */
+  for (i = 0; i < SAMPLES_PER_TICK && node->resident == PLAYING; ++i) play_sample(node); /* one per tick of a clock */
 }

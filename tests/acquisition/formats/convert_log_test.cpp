@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <fstream>
 #include <sstream>
 
@@ -74,6 +75,36 @@ TEST(ConvertLog, AnHDF5LogIsConvertedToTheSameAgain) {
     EXPECT_EQ(of_a.sensors, of_b.sensors);
     EXPECT_TRUE((of_a.marked == of_b.marked).all());
   }
+}
+
+TEST(ConvertLog, AMarkOfTimingStaysOneOfTiming) {
+  const test::TemporaryDirectory directory;
+  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+  log.begin_run(test::run_of(0), test::excitation_of(0));
+  std::vector<double> rows = test::rows_of(0, 0, 36);
+  const std::size_t words = rows.size() / 36;
+  const auto put = [&](std::size_t row, const SampleStatus& status) {
+    rows[row * words + words - 1] = std::bit_cast<double>(pack_status(status));
+  };
+  put(3, {.marked = true, .irregular = true});
+  put(4, {.outcome = 1, .marked = true, .irregular = true});
+  put(5, {});
+  log.write(rows);
+  LogRun run = test::run_of(0);
+  run.health.irregular = 1;
+  log.end_run(run);
+  log.close(3, "");
+  convert_log(*open_log(directory / "a.slog"), directory / "a.h5");
+  convert_log(*open_log(directory / "a.h5"), directory / "b.slog");
+  for (const char* name : {"a.slog", "a.h5", "b.slog"}) {
+    SCOPED_TRACE(name);
+    LogSamples samples;
+    open_log(directory / name)->read(0, 3, 3, samples);
+    EXPECT_THAT(std::vector<int>(samples.marked.begin(), samples.marked.end()),
+                testing::ElementsAre(kIrregularMark, kBadMark, 0));
+  }
+  const Hdf5File file = Hdf5File::open(directory / "a.h5");
+  EXPECT_EQ(file.read_integer_attribute("/runs/0000", "irregular_samples"), 1);
 }
 
 TEST(ConvertLog, RunsThatWereBrokenOffCanBeLeftOut) {

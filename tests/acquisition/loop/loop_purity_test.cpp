@@ -33,16 +33,45 @@ namespace test_loop_purity {
 
 constexpr std::uint64_t kSamples = 2000;
 
-/// The whole wafer stage in closed loop, in virtual time (pace 0) or on the wall clock, with a missed cycle to cover
-/// the exceptional paths.
+/// A simulated stage that stamps its samples. Every tenth is late.
+class StampingStage final : public CyclicStage {
+ public:
+  explicit StampingStage(const WaferStageSpec& spec) : plant_(spec), info_(plant_.info()) {
+    info_.stamps = info_.clock == Clock::wall;
+  }
+  const StageInfo& info() const noexcept override { return info_; }
+  void start(std::uint64_t seed, Inputs& first) override { plant_.start(seed, first); }
+  Outcome exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept override {
+    const Outcome outcome = plant_.exchange(outputs, inputs, deadline);
+    if (!info_.stamps) return outcome;
+    const auto period_ns = static_cast<std::int64_t>(1e9 / info_.sample_rate_hz);
+    inputs.t_arrival_ns = inputs.t_sample_ns + 1000;
+    inputs.stamp_ns = static_cast<std::int64_t>(inputs.cycle) * period_ns +
+                      (inputs.cycle % 10 == 0 ? period_ns / 4 : 0);
+    inputs.stamp_of_stage = true;
+    return outcome;
+  }
+  void stop() noexcept override { plant_.stop(); }
+
+ private:
+  SimulatedStage plant_;
+  StageInfo info_;
+};
+
+/// The whole wafer stage in closed loop, in virtual time (pace 0) or on the wall clock, with a missed cycle and samples
+/// that are late to cover the exceptional paths.
 class WholeLoop {
  public:
   explicit WholeLoop(double pace)
       : spec_(spec_of(pace)),
-        stage_(std::make_unique<SimulatedStage>(spec_), spec_.limits),
+        stage_(std::make_unique<StampingStage>(spec_), spec_.limits),
         controller_(spec_.controller),
-        ring_(spec_.info.actuators.size() + spec_.info.sensors.size() + 1, 4096),
-        loop_(stage_, controller_, ring_, {.ramp_s = 0.01, .misses_allowed = 1'000'000}) {
+        ring_(spec_.info.actuators.size() + spec_.info.sensors.size() + 2, 4096),
+        loop_(stage_, controller_, ring_,
+              {.ramp_s = 0.01,
+               .jitter_s = 50e-6,
+               .jitter_rms_s = 5e-6,
+               .misses_allowed = 1'000'000}) {
     LoopExcitation excitation;
     excitation.period = Eigen::MatrixXd::Constant(100, 1, 0.1);
     excitation.actuators = {0};
@@ -83,6 +112,7 @@ TEST_P(LoopPurity, NoAllocationAndNoLock) {
   EXPECT_EQ(locks.count(), 0U);
   EXPECT_EQ(whole.loop().health().cycles, kSamples);
   EXPECT_EQ(whole.loop().timing().empty(), GetParam() == 0.0);
+  EXPECT_EQ(whole.loop().health().irregular > 0, GetParam() > 0.0) << "judged by their stamps";
 }
 
 /// Counts from the end of start(), when the stage may move, to the first exchange.

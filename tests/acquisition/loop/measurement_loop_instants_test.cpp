@@ -57,10 +57,12 @@ struct Row {
   SampleStamp stamp;
 };
 
-std::vector<Row> run(StampedStage& stage, double jitter_s, RunHealth* health = nullptr) {
+std::vector<Row> run(StampedStage& stage, double jitter_s, RunHealth* health = nullptr,
+                     double rms_s = 0.0) {
   MotionController controller(test::analytic_controller(stage.info()));
   SampleRing ring(4, 1024);
-  MeasurementLoop loop(stage, controller, ring, {.ramp_s = 0.0, .jitter_s = jitter_s});
+  MeasurementLoop loop(stage, controller, ring,
+                       {.ramp_s = 0.0, .jitter_s = jitter_s, .jitter_rms_s = rms_s});
   loop.start(1, {Eigen::MatrixXd::Constant(10, 1, 1.0), {0}, kSamples});
   while (loop.step() == LoopStatus::running) {
   }
@@ -98,6 +100,20 @@ TEST(MeasurementLoopInstants, WithoutALimitNothingIsMarked) {
   StampedStage stage;
   stage.deviation_ns = {{50, 900'000}};
   EXPECT_THAT(marked(run(stage, 0.0)), testing::IsEmpty());
+}
+
+// 20 us rms in a period of 10 samples: one of 63 us, again once the next 9 have been regular.
+TEST(MeasurementLoopInstants, AFewLateSamplesAreGoodIfTheirPeriodIs) {
+  StampedStage stage;
+  stage.deviation_ns = {{50, 60'000}, {52, 60'000}, {70, -60'000}, {100, 68'000}};
+  for (std::uint64_t n = 130; n < 150; ++n) stage.deviation_ns[n] = n % 2 == 0 ? 18'000 : -18'000;
+  EXPECT_THAT(marked(run(stage, 500e-6, nullptr, 20e-6)), testing::ElementsAre(52, 100));
+}
+
+TEST(MeasurementLoopInstants, SamplesOffByMoreThanTheLimitAreMarkedWhateverTheirPeriod) {
+  StampedStage stage;
+  stage.deviation_ns = {{50, 60'000}};
+  EXPECT_THAT(marked(run(stage, 50e-6, nullptr, 20e-6)), testing::ElementsAre(50));
 }
 
 TEST(MeasurementLoopInstants, ATickThatTheStageSkippedIsMarked) {

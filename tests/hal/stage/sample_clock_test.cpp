@@ -19,6 +19,15 @@ std::int64_t stamp(std::int64_t expected_ns) {
   return kOffset_ns + expected_ns + std::llround(kDrift * static_cast<double>(expected_ns));
 }
 
+TEST(SampleClock, ManyLateSamplesDoNotPassForTheInstantOfAll) {
+  SampleClock clock(10'000'000, 800'000);
+  for (std::int64_t n = 0; n < 5000; ++n)
+    static_cast<void>(clock.take(n * 20'000'000, n * 20'000'000 + (n % 7 == 3 ? 4'000'000 : 0)));
+  // One of seven pulls by 0.8 ms, the others hold by what they deviate: 0.8 ms / 6.
+  constexpr std::int64_t kNext_ns = 5000 * 20'000'000LL;
+  EXPECT_NEAR(static_cast<double>(clock.stamp_ns(kNext_ns) - kNext_ns), 0.13e6, 0.1e6);
+}
+
 TEST(SampleClock, FindsOffsetAndDriftAndThenTheJitterOfEachSample) {
   SampleClock clock(kLimit_ns);
   std::mt19937 random(7);

@@ -28,7 +28,7 @@ class Patience:
 # A pty hands its bytes on in a worker of the kernel, a transaction passes four of them, and on a busy machine one took
 # 0.6 s (eight busy loops on two cores; 1.9 s for a process of nice 8) where a pipe or socket took 0.03 s.
 TCP = Patience(response_s=0.4, worst_reply_s=1.0, watchdog_s=3, run_s=40)
-RTU = Patience(response_s=3.0, worst_reply_s=5.0, watchdog_s=10, run_s=150)
+RTU = Patience(response_s=2.0, worst_reply_s=3.0, watchdog_s=6, run_s=150)
 
 
 class Bench:

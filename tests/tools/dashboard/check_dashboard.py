@@ -23,7 +23,7 @@ try:
 except ImportError:
     h5py = None
 
-PACE = 0.1  # of a stage at 2 kHz
+PACE = 0.2  # of a stage at 2 kHz
 
 failures = []
 
@@ -117,7 +117,7 @@ def check_numbers(file, seen):
 
 
 def watch_one(program, configs, work):
-    # Few samples a period and 5 ms between them: a busy machine, this browser included, is seldom so
+    # Few samples a period and 2.5 ms between them: a busy machine, this browser included, is seldom so
     # late, and then in few of the periods. A realization that it spoils is left out, in the page too.
     log, running, browser = start(program, configs, work, "whole", PACE, realizations=4, periods=6, period_s=0.05)
     try:

@@ -49,6 +49,7 @@ function figures(state) {
     ['measured', duration(state.seconds_done)],
     ['stage', state.state === 'ended' ? '\u2013' : state.node_state],
     ['late', flaggedCount(state.health.late)], ['missing', flaggedCount(state.health.missing)], ['marked', flaggedCount(state.health.marked)],
+    ['irregular', flaggedCount(state.health.irregular)],
   ];
   if (state.timing) list.push(['execution, 99.9 %', percent(state.timing.execution.p99_9_s / shown.period_s) + ' of a period']);
   else list.push(['speed', number(state.speed) + ' \u00d7 real time']);

@@ -1,0 +1,130 @@
+#include "hal/can/can_c_header.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <vector>
+
+#include "hal/can/can_messages.hpp"
+
+namespace stageid {
+namespace {
+
+// Sizes are checked when the header is compiled. Members are aligned to their sizes: no packing is needed.
+constexpr const char* kStructures = R"(/* A message over ZeroMQ. All numbers are little-endian. */
+typedef struct {
+  uint16_t id;
+  uint16_t length;   /* used bytes of data */
+  uint32_t reserved; /* 0 */
+  uint8_t data[64];  /* a header of 8 bytes, then the payload */
+} stageid_message;
+
+typedef struct {
+  uint16_t sequence;
+  uint8_t kind;
+  uint8_t run;
+  uint16_t detail;
+  uint16_t crc;
+} stageid_header;
+
+/* Payload of 0x080. */
+typedef struct {
+  uint64_t a;
+  uint64_t b;
+  uint32_t c;
+  uint32_t d;
+  uint32_t host;
+  uint32_t session;
+  uint8_t version;
+  uint8_t reserved[7];
+} stageid_command;
+
+/* Payload of 0x200. */
+typedef struct {
+  uint8_t version;
+  uint8_t cause;
+  uint8_t answer;
+  uint8_t resident;
+  uint32_t gaps;
+  uint32_t repeated;
+  uint32_t rejected;
+  uint64_t sample;
+  uint32_t fingerprint;
+  uint32_t boot;
+  uint32_t host;
+  uint32_t session;
+} stageid_state;
+
+/* Payload of 0x300 and 0x380. */
+typedef struct {
+  uint8_t bytes[56];
+} stageid_chunk;
+
+/* Payload of 0x381. */
+typedef struct {
+  uint8_t received[48];
+} stageid_missing;
+
+/* One sample of the trace memory. */
+typedef struct {
+  float actuators[STAGEID_ACTUATORS];
+  float sensors[STAGEID_SENSORS];
+  uint32_t outcome;
+} stageid_trace_row;
+
+typedef char stageid_sizes_are_right[sizeof(stageid_message) == 72 && sizeof(stageid_header) == 8 &&
+                                     sizeof(stageid_command) == 40 && sizeof(stageid_state) == 40 &&
+                                     sizeof(stageid_trace_row) == 4 * (STAGEID_ACTUATORS + STAGEID_SENSORS + 1)
+                                         ? 1 : -1];
+
+#endif
+)";
+
+std::string number(double value) {
+  return std::isfinite(value) ? fmt::format("{}", value) : "HUGE_VAL";
+}
+
+/// `/* s1 [m] */ 1e-3, ...`
+void add_table(std::string& text, const char* name, const std::vector<Channel>& channels,
+               const std::vector<std::string>& values) {
+  std::vector<std::string> entries;
+  for (std::size_t i = 0; i < channels.size(); ++i)
+    entries.push_back(
+        fmt::format("/* {} [{}] */ {}", channels[i].name, channels[i].unit, values[i]));
+  text += fmt::format("#define {} {{ \\\n  {} }}\n", name, fmt::join(entries, ", \\\n  "));
+}
+
+void add_channels(std::string& text, const std::string& kind, const std::vector<Channel>& channels,
+                  const std::vector<CanScale>& scales, const Eigen::VectorXd& limits) {
+  std::vector<std::string> names, counts, largest;
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    names.push_back(fmt::format("\"{}\"", channels[i].name));
+    counts.push_back(number(scales[i].si_per_count));
+    largest.push_back(number(limits[static_cast<Eigen::Index>(i)]));
+  }
+  add_table(text, fmt::format("STAGEID_{}_NAMES", kind).c_str(), channels, names);
+  add_table(text, fmt::format("STAGEID_{}_LIMITS", kind).c_str(), channels, largest);
+  add_table(text, fmt::format("STAGEID_{}_PER_COUNT", kind).c_str(), channels, counts);
+}
+
+}  // namespace
+
+std::string can_c_header(const CanLayout& layout, const StageInfo& info,
+                         const StageLimits& limits) {
+  std::string text =
+      "/* Written by 'stageid config header'. The protocol is described in docs/can-protocol.md. "
+      "*/\n"
+      "#ifndef STAGEID_STAGE_H\n#define STAGEID_STAGE_H\n\n#include <math.h>\n#include "
+      "<stdint.h>\n\n";
+  text += fmt::format("#define STAGEID_PROTOCOL_VERSION {}\n", kCanProtocolVersion);
+  text += fmt::format("#define STAGEID_FINGERPRINT 0x{:08x}u\n", layout.fingerprint);
+  text += fmt::format("#define STAGEID_SAMPLE_RATE_HZ {}\n", number(info.sample_rate_hz));
+  text += fmt::format("enum {{ STAGEID_ACTUATORS = {}, STAGEID_SENSORS = {} }};\n\n",
+                      info.actuators.size(), info.sensors.size());
+  add_channels(text, "ACTUATOR", info.actuators, layout.actuator_scale, limits.actuator_n);
+  add_channels(text, "SENSOR", info.sensors, layout.sensor_scale, limits.position_window_m);
+  return text + "\n" + kStructures;
+}
+
+}  // namespace stageid

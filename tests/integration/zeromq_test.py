@@ -1,0 +1,321 @@
+#!/usr/bin/env python3
+"""The example node behind ZeroMQ, docs/examples/firmware/zeromq_node.c, in a process of its own: measured, killed,
+started again, with a second host, under garbage.
+
+    zeromq_test.py STAGEID SOURCE_DIR WORK_DIR
+"""
+
+import csv
+import json
+import pathlib
+import random
+import re
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import time
+import unittest
+
+PROGRAM, SOURCE, WORK = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
+FIRMWARE = SOURCE / "docs/examples/firmware"
+FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
+COMMAND, STATE, UPLOAD_CHUNK = 0x080, 0x200, 0x300
+HELLO, START, STOP, UPLOAD, ARM, TRIGGER, DOWNLOAD = 1, 2, 3, 16, 18, 19, 20
+MEASURING = "state 5,"
+
+
+def crc(data):
+    value = 0xFFFF
+    for byte in data:
+        value ^= byte << 8
+        for _ in range(8):
+            value = (value << 1 ^ 0x1021 if value & 0x8000 else value << 1) & 0xFFFF
+    return value
+
+
+def message(identifier, head, payload, length):
+    """A sealed frame in its 72 bytes."""
+    body = payload.ljust(length - 8, b"\0")
+    seal = struct.pack("<H", crc(struct.pack("<H", identifier) + head + body))
+    return struct.pack("<HHI", identifier, length, 0) + (head + seal + body).ljust(64, b"\0")
+
+
+def command(code, sequence, a=0, b=0, c=0, d=0, host=0x01020304, session=0):
+    payload = struct.pack("<QQIIIIB", a, b, c, d, host, session, 2)
+    return message(COMMAND, struct.pack("<HBBH", sequence, code, 0, 0), payload, 48)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Peer:
+    """One connection of ZMTP 3.0, by hand: it can also send what libzmq would not."""
+
+    def __init__(self, port=None, connection=None, kind=b"DEALER"):
+        self.socket = connection or socket.create_connection(("127.0.0.1", port), timeout=10)
+        self.socket.settimeout(10)
+        self.socket.sendall(b"\xff" + bytes(8) + b"\x7f\x03\0" + b"NULL".ljust(20, b"\0") + bytes(32))
+        self.receive(64)
+        ready = b"\x05READY" + b"\x0bSocket-Type" + struct.pack(">I", len(kind)) + kind
+        self.socket.sendall(bytes([4, len(ready)]) + ready)
+        self.frame()
+
+    def receive(self, count):
+        data = b""
+        while len(data) < count:
+            part = self.socket.recv(count - len(data))
+            if not part:
+                raise ConnectionError("the node has closed the connection")
+            data += part
+        return data
+
+    def frame(self):
+        flags, size = self.receive(2)
+        if flags & 2:
+            size = int.from_bytes(bytes([size]) + self.receive(7), "big")
+        return self.receive(size)
+
+    def send(self, *parts):
+        for i, part in enumerate(parts):
+            more = int(i + 1 < len(parts))
+            size = bytes([more, len(part)]) if len(part) < 256 else bytes([more | 2]) + struct.pack(">Q", len(part))
+            self.socket.sendall(size + part)
+
+    def state_after(self, text):
+        """The answer to a command: (answer, rejected)."""
+        self.send(text)
+        while True:
+            got = self.frame()
+            if struct.unpack_from("<H", got)[0] == STATE and got[8:10] == text[8:10]:
+                return got[8 + 10], struct.unpack_from("<I", got, 8 + 20)[0]
+
+    def close(self):
+        self.socket.close()
+
+
+class ZeroMq(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        shutil.rmtree(WORK, ignore_errors=True)
+        shutil.copytree(FIRMWARE, WORK)
+        subprocess.run([PROGRAM, "config", "header", "stage_zeromq.yaml", "-o", "stage.h"], cwd=WORK, check=True,
+                       stdout=subprocess.DEVNULL)
+        sources = ["zeromq_node.c", "can_frame.c", "can_node.c", "can_resident.c", "stage_plant.c"]
+        for name, define in (("node", []), ("slow_node", ["-DSAMPLES_PER_TICK=1"])):
+            subprocess.run(["cc", *FLAGS, *define, "-o", name, *sources, "-lzmq", "-lm"], cwd=WORK, check=True)
+        # A loop of the node with a feed-forward: a constant, and a sine of 0.5 Hz, which is a line of the excitation.
+        text = (WORK / "can_resident.c").read_text()
+        none = "  memset(u_n, 0, STAGE_ACTUATORS * sizeof *u_n);\n"
+        assert none in text
+        loop = ("  static unsigned n;\n  u_n[0] = 0.05 + 0.02 * sin(0.0157079632679489662 * n++) - 10.0 * y_m[0];\n"
+                "  u_n[1] = -10.0 * y_m[1];\n")
+        (WORK / "feed_forward.c").write_text("#include <math.h>\n" + text.replace(none, loop))
+        subprocess.run(["cc", *FLAGS, "-o", "forward_node", *[s.replace("can_resident", "feed_forward") for s in sources],
+                        "-lzmq", "-lm"], cwd=WORK, check=True)
+
+    def setUp(self):
+        self.port = free_port()
+        self.nodes = []
+        stage = (WORK / "stage_zeromq.yaml").read_text().replace("5555", str(self.port))
+        (WORK / "stage.yaml").write_text(stage)
+        for file in ("run.slog", "run.csv"):
+            (WORK / file).unlink(missing_ok=True)
+        short = (WORK / "experiment.yaml").read_text()
+        for old, new in (("axes: [z1, z2]", "axes: [z1]"), ("period_s: 10", "period_s: 4"), ("band_hz: [0.4", "band_hz: [0.5"),
+                         ("transient_periods: 3", "transient_periods: 1")):
+            self.assertIn(old, short)
+            short = short.replace(old, new)
+        (WORK / "short.yaml").write_text(short)
+
+    def tearDown(self):
+        for node in self.nodes:
+            node.kill()
+            node.wait()
+            node.stdout.close()
+
+    def node(self, name="node"):
+        node = subprocess.Popen([WORK / name, f"tcp://127.0.0.1:{self.port}"], cwd=WORK, stdout=subprocess.PIPE, text=True)
+        self.nodes.append(node)
+        self.wait_for(node, "state 1,")
+        return node
+
+    def wait_for(self, node, state):
+        while not (line := node.stdout.readline()).startswith(state):
+            self.assertNotEqual(line, "", "the node has ended")
+        return line
+
+    def start(self, experiment="short", log="run.slog", *options):
+        return subprocess.Popen([PROGRAM, "run", f"{experiment}.yaml", "-o", log, *options], cwd=WORK,
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def ends(self, process, code, text="", warnings=0):
+        _, err = process.communicate(timeout=120)
+        said = [line for line in err.splitlines() if line.startswith("stageid:")]
+        self.assertEqual(process.returncode, code, err)
+        if text:
+            self.assertRegex(err, text)
+        self.assertEqual(len(said), int(code != 0) + warnings, err)
+        if (WORK / "run.slog").exists():
+            self.assertEqual(self.call("log", "verify", "run.slog").returncode, 0)
+
+    def call(self, *words):
+        return subprocess.run([PROGRAM, *words], cwd=WORK, capture_output=True, text=True, timeout=120)
+
+    def test_the_modes_are_those_of_the_stage(self):
+        self.node()
+        self.check_modes()
+
+    def test_a_feed_forward_of_the_node_is_in_the_record(self):
+        stage = (WORK / "stage.yaml").read_text()
+        self.assertIn("controller: {}", stage)
+        (WORK / "stage.yaml").write_text(re.sub(r"controller: \{\}.*", "controller: peer", stage))
+        self.node("forward_node")
+        self.check_modes(warnings=1)  # that the loop of the node is not tested
+        self.assertEqual(self.call("log", "convert", "run.slog", "-o", "run.csv").returncode, 0)
+        with open(WORK / "run.csv", newline="") as file:
+            forces = [float(row["actuator z1 [N]"]) for row in csv.DictReader(file)]
+        self.assertAlmostEqual(sum(forces) / len(forces), 0.05, delta=0.01)
+
+    def check_modes(self, warnings=0):
+        self.ends(self.start("experiment"), 0, warnings=warnings)
+        self.assertEqual(self.call("frf", "run.slog", "-o", "frf.h5").returncode, 0)
+        done = self.call("--json", "fit", "frf.h5", "-o", "model.json", "--rigid-body", "none")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = sorted(mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"])
+        true_hz = sorted(float(hz) for hz in re.findall(r"\{(\d+\.\d+), 0\.\d+, \{", (WORK / "stage_plant.c").read_text()))
+        self.assertEqual(len(true_hz), 5)
+        self.assertEqual(len(found), 5, found)
+        errors = [abs(measured / expected - 1.0) for expected, measured in zip(true_hz, found)]
+        print(f"largest error of a frequency: {max(errors):.1e}", file=sys.stderr)
+        self.assertLess(max(errors), 1e-4)
+
+    def test_nobody_is_there(self):
+        self.ends(self.start(), 1, "no node answered")
+        self.assertFalse((WORK / "run.slog").exists(), "nothing was measured: no log")
+
+    def test_a_killed_node(self):
+        node = self.node("slow_node")
+        host = self.start()
+        self.wait_for(node, MEASURING)
+        node.kill()
+        self.ends(host, 1, f"127.0.0.1:{self.port}: no node answered")
+
+    def test_a_node_that_was_started_again(self):
+        node = self.node("slow_node")
+        host = self.start()
+        self.wait_for(node, MEASURING)
+        node.kill()
+        node.wait()
+        self.node("slow_node")
+        self.ends(host, 1, "restarted")
+        (WORK / "run.slog").unlink()
+        self.ends(self.start(), 0)
+
+    def test_a_killed_host_leaves_the_stage_without_forces(self):
+        node = self.node("slow_node")
+        host = self.start()
+        self.wait_for(node, MEASURING)
+        host.kill()
+        host.communicate()
+        killed = time.monotonic()
+        self.assertRegex(self.wait_for(node, "state 8,"), "cause 1, forces 0 0 N")
+        self.assertLess(time.monotonic() - killed, 3.0)
+        (WORK / "run.slog").unlink(missing_ok=True)
+        self.ends(self.start(), 1, "in fault .*--reset-fault")
+        self.ends(self.start("short", "run.slog", "--reset-fault"), 0)
+
+    def test_ctrl_c_stops_the_stage(self):
+        node = self.node("slow_node")
+        host = self.start()
+        self.wait_for(node, MEASURING)
+        host.send_signal(2)
+        self.ends(host, 130, "interrupted; the measured data are kept")
+        self.wait_for(node, "state 1,")
+
+    def test_a_second_host_is_refused_and_the_first_one_completes(self):
+        node = self.node("slow_node")
+        first = self.start()
+        self.wait_for(node, MEASURING)
+        second = self.start("short", "second.slog")
+        _, err = second.communicate(timeout=60)
+        self.assertEqual(second.returncode, 1, err)
+        self.assertIn("another host", err)
+        self.ends(first, 0)
+
+    # 10 000 commands and 20 000 chunks that are sealed but forged, 50 000 random messages, 20 connections of no ZeroMQ.
+    def test_forged_and_random_messages_change_nothing(self):
+        (WORK / "long.yaml").write_text((WORK / "short.yaml").read_text().replace("  periods: 3", "  periods: 8"))
+        self.node()
+        self.ends(self.start("long"), 0)
+        quiet = self.call("log", "convert", "run.slog", "-o", "quiet.csv")
+        self.assertEqual(quiet.returncode, 0, quiet.stderr)
+        node = self.node_again("slow_node")
+        host = self.start("long")
+        self.wait_for(node, MEASURING)
+        dice = random.Random(5)
+        peer = Peer(self.port)
+        before = peer.state_after(command(HELLO, 1))[1]
+        forged = [command(code, 7, 3, 0, 800, 0, session=dice.getrandbits(32))
+                  for code in (START, STOP, UPLOAD, ARM, TRIGGER, DOWNLOAD)]
+        chunk = message(UPLOAD_CHUNK, struct.pack("<HBBH", 0, 0, 4, 56), bytes(56), 64)
+        for i in range(10_000):
+            peer.send(forged[i % len(forged)])
+            peer.send(chunk)
+            peer.send(chunk)
+            for _ in range(5):
+                peer.send(*(dice.randbytes(dice.choice((0, 1, 8, 71, 72, 72, 73, 300))) for _ in range(dice.choice((1, 1, 2)))))
+            if i % 500 == 0:
+                with socket.create_connection(("127.0.0.1", self.port)) as other:
+                    other.sendall(dice.randbytes(200))
+            if i % 100 == 0:  # what the node answered must not fill its queue for this peer
+                answer, rejected = peer.state_after(command(HELLO, 1000 + i // 100))
+                self.assertEqual(answer, 1)
+        self.assertGreater(rejected - before, 50_000)
+        self.assertIsNone(host.poll(), "the run lasts longer than the attack")
+        peer.close()
+        self.ends(host, 0)
+        loud = self.call("log", "convert", "run.slog", "-o", "loud.csv")
+        self.assertEqual(loud.returncode, 0, loud.stderr)
+        self.assertEqual((WORK / "quiet.csv").read_bytes(), (WORK / "loud.csv").read_bytes(), "a sample differs")
+
+    def node_again(self, name):
+        self.nodes[-1].kill()
+        self.nodes[-1].wait()
+        (WORK / "run.slog").unlink(missing_ok=True)
+        return self.node(name)
+
+    def test_garbage_instead_of_a_node(self):
+        with socket.create_server(("127.0.0.1", self.port)) as server:
+            server.settimeout(10)
+            host = self.start()
+            peer = Peer(connection=server.accept()[0], kind=b"ROUTER")
+            dice = random.Random(6)
+            for _ in range(2000):
+                peer.send(dice.randbytes(dice.choice((0, 8, 71, 72, 72, 72, 73, 3000))))
+            self.ends(host, 1, "no node answered")
+            peer.close()
+
+    def test_streaming_is_refused(self):
+        stage = (WORK / "stage.yaml").read_text()
+        (WORK / "stage.yaml").write_text(stage.replace("mode: resident ", "mode: streaming "))
+        self.ends(self.start(), 2, "ZeroMQ carries resident experiments over a single bus; set mode: resident")
+
+    def test_a_header_of_another_stage_is_refused(self):
+        header = (WORK / "stage.h").read_text()
+        other = WORK / "other"
+        shutil.copytree(FIRMWARE, other)
+        (other / "stage.h").write_text(re.sub(r"FINGERPRINT 0x\w+", "FINGERPRINT 0x1u", header))
+        sources = ["zeromq_node.c", "can_frame.c", "can_node.c", "can_resident.c", "stage_plant.c"]
+        subprocess.run(["cc", *FLAGS, "-o", "node", *sources, "-lzmq", "-lm"], cwd=other, check=True)
+        done = subprocess.run([other / "node"], capture_output=True, text=True, timeout=10)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("another stage", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)
