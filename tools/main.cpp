@@ -1,9 +1,13 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <exception>
 #include <filesystem>
 #include <new>
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "estimation/problem/freed_memory.hpp"
 #include "estimation/problem/weight_matrices.hpp"
@@ -15,6 +19,12 @@
 
 namespace {
 
+/// Otherwise a file would be opened as a closed standard stream, and messages written into it.
+void open_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(stream, F_GETFD) < 0) static_cast<void>(::open("/dev/null", O_RDWR));
+}
+
 int report(const std::exception& error, int exit_code) {
   stageid::wait_if_ending();
   stageid::Console().warning(error.what());
@@ -24,7 +34,9 @@ int report(const std::exception& error, int exit_code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_streams();
   stageid::catch_signals();  // as early as possible
+  stageid::protect_inputs();
   stageid::keep_freed_memory();
   try {
     return stageid::run_program(argc, argv);

@@ -19,6 +19,7 @@ namespace stageid {
 namespace {
 
 constexpr std::uint32_t kFillRows = 1024;
+constexpr std::uint64_t kMostFilled = 2;  // times the size of the damaged log
 
 /// Copies intact blocks to a new log and fills the gaps.
 class Recovery {
@@ -77,7 +78,7 @@ class Recovery {
         return end_run(block);
       case SlogBlockType::end:
         close_run();
-        append_json(SlogBlockType::end, json(block), block.header.time_ns);
+        append_json(SlogBlockType::end, to_json(parse_end(json(block))), block.header.time_ns);
         ended_ = true;
         return;
     }
@@ -102,6 +103,7 @@ class Recovery {
   }
 
   void begin_run(std::uint32_t number, SlogRunBegin begin, const SlogBlock& block) {
+    check_run_begin(begin, info_);
     close_run();
     append_json(SlogBlockType::log, to_json(info_), block.header.time_ns);
     run_ = Run{};
@@ -123,14 +125,15 @@ class Recovery {
 
   void copy_excitation(const SlogBlock& block) {
     const bool fits = run_ && run_->number == block.header.run && run_->rows == 0 &&
-                      block.header.cols == run_->begin.excitation_columns.size();
+                      !run_->excitation &&
+                      is_slog_excitation(block.header, info_, run_->begin.excitation_columns);
     if (!fits) return lose(block);
     copy(block, block.header.first_row);
     run_->excitation = true;
   }
 
   void copy_samples(const SlogBlock& block) {
-    if (block.header.cols != slog_row_words(info_)) return lose(block);
+    if (!are_slog_samples(block.header, info_)) return lose(block);
     open_orphan(block);
     if (block.header.first_row < run_->rows || !fill(block.header.first_row)) return lose(block);
     copy(block, run_->rows);
@@ -166,7 +169,9 @@ class Recovery {
   bool fill(std::uint64_t row) {
     const std::uint32_t words = slog_row_words(info_);
     const std::uint64_t missing = row - run_->rows;
-    if (missing > scan_.file_bytes) return false;
+    const std::uint64_t row_bytes = sizeof(double) * words;
+    if (missing > (kMostFilled * scan_.file_bytes - filled_bytes_) / row_bytes) return false;
+    filled_bytes_ += missing * row_bytes;
     std::vector<double> rows(std::size_t{words} * kFillRows, 0.0);
     const std::uint64_t status = pack_status({0, true, 0});
     for (std::size_t r = 0; r < kFillRows; ++r) {
@@ -216,7 +221,8 @@ class Recovery {
   SlogAppender out_;
   RecoverReport report_;
   std::optional<Run> run_;
-  std::uint64_t filled_ = 0;
+  std::uint64_t filled_ = 0;  ///< rows of the run
+  std::uint64_t filled_bytes_ = 0;
   bool ended_ = false;
 };
 

@@ -8,6 +8,8 @@
 #include <sstream>
 
 #include "acquisition/files/file_kind.hpp"
+#include "acquisition/files/input_files.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/files/system_reason.hpp"
 
 namespace stageid {
@@ -97,6 +99,7 @@ std::vector<std::string> JsonNode::texts() const {
 }
 
 JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file_(std::move(file)) {
+  note_input(file_);
   std::ifstream stream(file_, std::ios::binary);
   if (!stream) throw FileError(file_.string() + ": cannot be read: " + system_reason(errno));
   if (std::filesystem::is_directory(file_))
@@ -113,7 +116,9 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
   };
   if (!text.str().starts_with('{')) refuse_other_kind();
   try {
-    value_ = nlohmann::ordered_json::parse(text.str());
+    value_ = nlohmann::ordered_json::parse(text.str(), JsonBounds<nlohmann::ordered_json>());
+  } catch (const JsonTooLarge& error) {
+    throw FormatError(file_, "", std::string(error.what()) + "; give " + wanted);
   } catch (const nlohmann::ordered_json::out_of_range& error) {
     const std::string what = error.what();  // ... number overflow parsing '1e999'
     const std::size_t start = what.find('\'');

@@ -13,6 +13,7 @@
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
@@ -44,7 +45,7 @@ std::string kind_of(const std::filesystem::path& file) {
   if (ending == ".slog") return "stageid-log";
   if (ending == ".yaml" || ending == ".yml") return "stageid-stage";
   if (ending == ".json") {
-    const Json json = Json::parse(read_text(file), nullptr, false);
+    const Json json = parse_json<Json>(read_text(file));
     if (json.is_discarded())
       throw FormatError(file, "", "is not JSON, or is truncated; copy it again or write it again");
     return text_in(json, "format");
@@ -183,7 +184,7 @@ void add_log(ReportData& data, const std::filesystem::path& file) {
   const std::unique_ptr<LogReader> log = open_log(file, false);
   data.runs = log->runs();
   data.sample_rate_hz = log->info().sample_rate_hz;
-  const Json metadata = Json::parse(log->info().metadata_json, nullptr, false);
+  const Json metadata = parse_json<Json>(log->info().metadata_json);
   if (!metadata.is_object()) return;
   data.period_s = wall_period_s(log->info());
   data.geometry = geometry_of_log(file, metadata);

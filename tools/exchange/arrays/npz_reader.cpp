@@ -56,6 +56,12 @@ class NpzArchive {
     if (archive_ == nullptr || error || bytes_ == 0)  // libzip accepts an empty file as an archive
       throw FormatError(file, "",
                         "is not an .npz file, or is truncated; write it with numpy.savez()");
+    zip_uint64_t stored = 0;  // members that share bytes would multiply them
+    for (zip_uint64_t i = 0; i < members() && stored <= bytes_; ++i)
+      stored += std::min(member(i).comp_size, bytes_ + 1);
+    if (stored > bytes_)
+      throw FormatError(file, "",
+                        "its members are larger than the file; the file is truncated or damaged");
   }
 
   zip_uint64_t members() const {
