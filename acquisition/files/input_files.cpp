@@ -1,12 +1,18 @@
 #include "acquisition/files/input_files.hpp"
 
+#include <fcntl.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <stdexcept>
 #include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/system_reason.hpp"
 
 namespace stageid {
 namespace {
@@ -54,5 +60,32 @@ void note_input(const std::filesystem::path& file) { note(file, noted().inputs, 
 void note_output(const std::filesystem::path& file) { note(file, noted().outputs, noted().inputs); }
 
 void note_own_file(const std::filesystem::path& file) { note(file, noted().own, noted().inputs); }
+
+std::string read_whole_file(const std::filesystem::path& file) {
+  note_input(file);
+  const auto fail = [&file](const std::string& what) {
+    throw FileError(file.string() + ": " + what);
+  };
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) fail("cannot be read: " + system_reason(errno));
+  struct Close {
+    int descriptor;
+    ~Close() { ::close(descriptor); }
+  } const closed_at_the_end{descriptor};
+  struct stat status {};
+  if (::fstat(descriptor, &status) != 0) fail("cannot be read: " + system_reason(errno));
+  if (S_ISDIR(status.st_mode)) fail("is a directory; give the name of a file");
+  if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode))
+    fail("is not a regular file; give the name of a file");
+  std::string text;
+  std::string piece(std::size_t{1} << 18, '\0');
+  while (true) {
+    const ssize_t got = ::read(descriptor, piece.data(), piece.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) fail("cannot be read: " + system_reason(errno));
+    if (got == 0) return text;
+    text.append(piece, 0, static_cast<std::size_t>(got));
+  }
+}
 
 }  // namespace stageid

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 namespace stageid {
 
@@ -17,5 +18,8 @@ void note_output(const std::filesystem::path& file);
 /// A file that this command may read and replace: its own temporary files and results.
 /// @throws std::invalid_argument if it was read before
 void note_own_file(const std::filesystem::path& file);
+
+/// The content of an input. @throws FileError if it cannot be read to its end, or is a device or directory
+std::string read_whole_file(const std::filesystem::path& file);
 
 }  // namespace stageid

@@ -143,8 +143,13 @@ OutputFile::OutputFile(const std::filesystem::path& target)
   if (!descriptor)
     fail(target_, "cannot create a file in this directory", errno,
          errno == ENOENT ? "create the directory first" : "");
-  unfinished().files.insert(temporary_);
-  note_own_file(temporary_);
+  try {
+    unfinished().files.insert(temporary_);
+    note_own_file(temporary_);
+  } catch (...) {  // out of memory: no destructor will remove it
+    ::unlink(temporary_.c_str());
+    throw;
+  }
 }
 
 OutputFile::~OutputFile() {

@@ -29,9 +29,9 @@ def limits():
     resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
 
 
-def run(*arguments, **options):
+def run(*arguments):
     return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, errors="replace",
-                          cwd=WORK, preexec_fn=limits, check=False, **options)
+                          cwd=WORK, preexec_fn=limits, check=False, timeout=60)
 
 
 def crc32c(data):
