@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -20,6 +22,24 @@ namespace {
 
 constexpr std::uint32_t kFillRows = 1024;
 constexpr std::uint64_t kMostFilled = 2;  // times the size of the damaged log
+
+bool are_finite(std::span<const std::byte> numbers) {
+  for (std::size_t at = 0; at + sizeof(double) <= numbers.size(); at += sizeof(double)) {
+    double number = 0.0;
+    std::memcpy(&number, numbers.data() + at, sizeof(number));
+    if (!std::isfinite(number)) return false;
+  }
+  return true;
+}
+
+/// Whether all measured numbers are finite. The stamp and the status of a row are no numbers.
+bool are_samples(std::span<const std::byte> rows, const LogInfo& info) {
+  const std::size_t row_bytes = sizeof(double) * slog_row_words(info);
+  const std::size_t number_bytes = sizeof(double) * (info.actuators.size() + info.sensors.size());
+  for (; rows.size() >= row_bytes; rows = rows.subspan(row_bytes))
+    if (!are_finite(rows.first(number_bytes))) return false;
+  return true;
+}
 
 /// Copies intact blocks to a new log and fills the gaps.
 class Recovery {
@@ -126,14 +146,16 @@ class Recovery {
   void copy_excitation(const SlogBlock& block) {
     const bool fits = run_ && run_->number == block.header.run && run_->rows == 0 &&
                       !run_->excitation &&
-                      is_slog_excitation(block.header, info_, run_->begin.excitation_columns);
+                      is_slog_excitation(block.header, info_, run_->begin.excitation_columns) &&
+                      are_finite(read_payload(source_, block));
     if (!fits) return lose(block);
     copy(block, block.header.first_row);
     run_->excitation = true;
   }
 
   void copy_samples(const SlogBlock& block) {
-    if (!are_slog_samples(block.header, info_)) return lose(block);
+    if (!are_slog_samples(block.header, info_) || !are_samples(read_payload(source_, block), info_))
+      return lose(block);
     open_orphan(block);
     if (block.header.first_row < run_->rows || !fill(block.header.first_row)) return lose(block);
     copy(block, run_->rows);
