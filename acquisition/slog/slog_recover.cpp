@@ -21,7 +21,7 @@ namespace stageid {
 namespace {
 
 constexpr std::uint32_t kFillRows = 1024;
-constexpr std::uint64_t kMostFilled = 2;  // times the size of the damaged log
+constexpr std::uint64_t kMostAdded = 2;  // times the size of the damaged log
 
 bool are_finite(std::span<const std::byte> numbers) {
   for (std::size_t at = 0; at + sizeof(double) <= numbers.size(); at += sizeof(double)) {
@@ -48,11 +48,12 @@ class Recovery {
       : source_(source),
         scan_(scan_slog(source, SlogScanDepth::payloads)),
         info_(index_slog(source, scan_).info),
+        description_(to_json(info_)),
         out_(SlogAppender::create(to)) {}
 
   RecoverReport run() {
     // The first block must be a description, even if that of the old log is damaged.
-    append_json(SlogBlockType::log, to_json(info_), 0);
+    append_json(SlogBlockType::log, description_, 0);
     for (const SlogBlock& block : scan_.blocks) {
       try {
         take(block);
@@ -125,7 +126,9 @@ class Recovery {
   void begin_run(std::uint32_t number, SlogRunBegin begin, const SlogBlock& block) {
     check_run_begin(begin, info_);
     close_run();
-    append_json(SlogBlockType::log, to_json(info_), block.header.time_ns);
+    // Every run has a description, but many starts of runs must not multiply a long one.
+    if (may_add(description_.size()))
+      append_json(SlogBlockType::log, description_, block.header.time_ns);
     run_ = Run{};
     run_->number = number;
     run_->begin = std::move(begin);
@@ -187,13 +190,18 @@ class Recovery {
     run_.reset();
   }
 
+  /// Whether so many bytes that are not in the damaged log may be written; if so, they count.
+  bool may_add(std::uint64_t bytes) {
+    if (bytes > kMostAdded * scan_.file_bytes - added_bytes_) return false;
+    added_bytes_ += bytes;
+    return true;
+  }
+
   /// Appends marked rows of zeros up to `row`. @returns false if the number is implausible
   bool fill(std::uint64_t row) {
     const std::uint32_t words = slog_row_words(info_);
     const std::uint64_t missing = row - run_->rows;
-    const std::uint64_t row_bytes = sizeof(double) * words;
-    if (missing > (kMostFilled * scan_.file_bytes - filled_bytes_) / row_bytes) return false;
-    filled_bytes_ += missing * row_bytes;
+    if (missing > scan_.file_bytes || !may_add(missing * sizeof(double) * words)) return false;
     std::vector<double> rows(std::size_t{words} * kFillRows, 0.0);
     const std::uint64_t status = pack_status({0, true, 0});
     for (std::size_t r = 0; r < kFillRows; ++r) {
@@ -240,11 +248,12 @@ class Recovery {
   const SlogSource& source_;
   SlogScan scan_;
   LogInfo info_;
+  std::string description_;
   SlogAppender out_;
   RecoverReport report_;
   std::optional<Run> run_;
   std::uint64_t filled_ = 0;  ///< rows of the run
-  std::uint64_t filled_bytes_ = 0;
+  std::uint64_t added_bytes_ = 0;
   bool ended_ = false;
 };
 

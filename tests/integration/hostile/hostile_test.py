@@ -287,6 +287,10 @@ class Logs(Case):
         self.blocks[last] = changed(self.blocks[last], "<Q", 32, 90_000)
         self.recover(self.blocks)
         self.assertLess((WORK / "r.slog").stat().st_size, 4 * (WORK / "x.slog").stat().st_size)
+        begin = self.blocks[self.of_type(2)[0]]
+        starts = [changed(begin, "<Q", 16, 1 + k) for k in range(1000)]
+        self.recover([self.blocks[0], *(changed(block, "<I", 24, k) for k, block in enumerate(starts))])
+        self.assertLess((WORK / "r.slog").stat().st_size, 5 * (WORK / "x.slog").stat().st_size)
 
     def test_what_the_reader_refuses_is_not_copied(self):
         samples, excitation = self.of_type(4)[0], self.of_type(3)[0]
