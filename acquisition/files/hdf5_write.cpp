@@ -12,9 +12,12 @@
 namespace stageid {
 namespace {
 
-[[noreturn]] void fail(const Hdf5File& file) {
-  throw FileError(file.path().string() +
-                  ": cannot be written: " + with_remedy(hdf5::take_reason()));
+/// Names the object only if it matters: where the disk was full does not.
+[[noreturn]] void fail(const Hdf5File& file, const std::string& object) {
+  const std::string reason = hdf5::take_reason();
+  const std::string remedied = with_remedy(reason);
+  throw FileError(file.path().string() + (remedied == reason ? ":" + object : "") +
+                  ": cannot be written: " + remedied);
 }
 
 /// Creation properties without time of creation: same content, same bytes.
@@ -60,7 +63,7 @@ void Hdf5File::create_group(const std::string& group) {
     if (!exists(part)) {
       Hdf5Handle handle(H5Gcreate2(id(), part.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
                         H5Gclose);
-      if (!handle || !handle.close()) fail(*this);
+      if (!handle || !handle.close()) fail(*this, part);
     }
     if (end == std::string::npos) return;
   }
@@ -78,11 +81,11 @@ void Hdf5File::write_dataset(const std::string& dataset, const std::vector<hsize
   Hdf5Handle handle(H5Dcreate2(id(), dataset.c_str(), file_type, space.get(), H5P_DEFAULT,
                                properties.get(), H5P_DEFAULT),
                     H5Dclose);
-  if (!handle) fail(*this);
+  if (!handle) fail(*this, dataset);
   const bool empty = H5Sget_simple_extent_npoints(space.get()) == 0;
   if (!empty && H5Dwrite(handle.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
-    fail(*this);
-  if (!handle.close()) fail(*this);
+    fail(*this, dataset);
+  if (!handle.close()) fail(*this, dataset);
 }
 
 void Hdf5File::write_reals(const std::string& dataset, const std::vector<hsize_t>& shape,
@@ -132,7 +135,7 @@ void Hdf5File::create_growing(const std::string& dataset, hsize_t columns, hid_t
                                          properties.get(), H5P_DEFAULT)
                             : -1,
                     H5Dclose);
-  if (!handle || !handle.close()) fail(*this);
+  if (!handle || !handle.close()) fail(*this, dataset);
 }
 
 void Hdf5File::append(const std::string& dataset, hsize_t count, hid_t memory_type,
@@ -147,14 +150,14 @@ void Hdf5File::append(const std::string& dataset, hsize_t count, hid_t memory_ty
   std::vector<hsize_t> start(extent.size(), 0);
   start[0] = extent[0];
   extent[0] += count;
-  if (H5Dset_extent(handle, extent.data()) < 0) fail(*this);
+  if (H5Dset_extent(handle, extent.data()) < 0) fail(*this, dataset);
   extent[0] = count;
   const Hdf5Handle space(H5Dget_space(handle), H5Sclose);
   H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr);
   const Hdf5Handle memory(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr),
                           H5Sclose);
   if (H5Dwrite(handle, memory_type, memory.get(), space.get(), H5P_DEFAULT, data) < 0) {
-    fail(*this);
+    fail(*this, dataset);
   }
 }
 
