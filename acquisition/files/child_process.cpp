@@ -42,7 +42,7 @@ std::size_t bytes_in_use() {
 
 void set_limits(std::size_t file_bytes) {
   limit(RLIMIT_CORE, 0);
-  limit(RLIMIT_CPU, kChildSeconds * (1 + (file_bytes >> 30U)));
+  limit(RLIMIT_CPU, kChildSeconds + file_bytes / kBytesPerSecond);
   limit(RLIMIT_AS, bytes_in_use() + kChildBytes + kChildBytesPerByte * file_bytes);
 }
 

@@ -240,6 +240,14 @@ class Matlab(Case):
                 self.ends("import", "x.mat")
 
 
+    def test_files_that_crashed_libmatio(self):
+        files = sorted((pathlib.Path(__file__).parents[2] / "fuzz/corpus/mat").iterdir())
+        self.assertGreater(len(files), 3)
+        for file in files:
+            shutil.copy(file, WORK / "x.mat")
+            self.ends("import", "x.mat")
+
+
 class Archives(Case):
     def test_members_that_overlap(self):
         with zipfile.ZipFile(WORK / "x.npz", "w", zipfile.ZIP_DEFLATED) as archive:
