@@ -31,6 +31,8 @@ namespace {
 
 constexpr int kGrowthIterations = 12;   // a mode that is still moving is finished later
 constexpr std::size_t kCandidates = 4;  // tried before the search concludes that no mode is missing
+constexpr std::size_t kMergesAtOnce = 8;  // the nearest pairs first
+constexpr double kHopeless = 10.0;  // times the cost: a search from nothing that is not followed up
 constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
 constexpr double kSettledDeviations = 0.1;  // if several ways to a number of modes are compared
 constexpr int kMostGrown = 40;              // modes; more are placed at once before growing
@@ -230,9 +232,16 @@ class AutomaticFit {
 
   /// Replaces two modes closer than a half-power width by one if the second is not worth its parameters.
   void merge() {
-    for (bool merged = true; merged && !limit_reached();) {
+    for (std::size_t done = 0; !limit_reached();) {
       const Sample sample(*this);
-      merged = take_best(sample, merges(sample.data.options, sample.data.model));
+      const std::vector<StructureMove> all = merges(sample.data.options, sample.data.model);
+      for (; done < all.size(); done += kMergesAtOnce) {
+        const auto first = all.begin() + static_cast<std::ptrdiff_t>(done);
+        const auto count = static_cast<std::ptrdiff_t>(std::min(kMergesAtOnce, all.size() - done));
+        if (take_best(sample, {first, first + count})) break;
+      }
+      if (done >= all.size()) return;
+      done = 0;
     }
   }
 
@@ -240,11 +249,15 @@ class AutomaticFit {
   struct Sample {
     explicit Sample(const AutomaticFit& search)
         : data(structure_trial(search.frf_, search.quick_, search.best_.model)),
-          worth(data.frf, search.structure_, data.options.user_weights),
-          now(worth.criterion(fit_additive_model(data.frf, data.model, data.options))) {}
+          worth(data.frf, search.structure_, data.options.user_weights) {
+      const FitResult fit = fit_additive_model(data.frf, data.model, data.options);
+      now = worth.criterion(fit);
+      cost = fit.model.fit.cost;
+    }
     StructureTrial data;
     ModeWorth worth;
-    double now;
+    double now = 0.0;  ///< criterion
+    double cost = 0.0;
   };
 
   /// Ranks the moves by trial on the sample and takes the first that all data confirm.
@@ -269,8 +282,7 @@ class AutomaticFit {
   }
 
   FitResult tried(const Sample& sample, const StructureMove& move) {
-    const auto fit = [&] { return fit_additive_model(sample.data.frf, move.model, move.options); };
-    if (!move.from_nothing) return fit();
+    if (!move.from_nothing) return fit_additive_model(sample.data.frf, move.model, move.options);
     std::vector<std::size_t> structure = {static_cast<std::size_t>(sample.data.frf.lines())};
     for (const Submodel& s : move.model.submodels) {
       structure.push_back(static_cast<std::size_t>(s.integrators));
@@ -278,8 +290,17 @@ class AutomaticFit {
       structure.push_back(s.numerator.size());
     }
     const auto [at, is_new] = from_nothing_.try_emplace(std::move(structure));
-    if (is_new) at->second = fit();
-    return at->second;
+    if (!is_new) return at->second;
+    FitResult& result = at->second;
+    FitOptions options = move.options;
+    options.max_iterations /= 3;
+    result = fit_additive_model(sample.data.frf, move.model, options);
+    if (result.status == FitStatus::iteration_limit &&
+        result.model.fit.cost < kHopeless * sample.cost) {
+      options.max_iterations *= 2;
+      result = fit_additive_model(sample.data.frf, result.model, options);
+    }
+    return result;
   }
 
   /// @returns false if all data do not confirm the move
@@ -301,6 +322,7 @@ class AutomaticFit {
   /// Adds modes while they are worth their parameters. @returns true if any was added.
   bool grow() {
     bool grown = false;
+    if (history_.size() == exhausted_at_) return false;
     watch_.cut();
     for (int round = 0; wanted_more(); ++round) {
       const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
@@ -318,6 +340,7 @@ class AutomaticFit {
       best_ = watch_.model();
       say("{}", watch_.finding());
     }
+    exhausted_at_ = history_.size();
     return grown;
   }
 
@@ -441,6 +464,7 @@ class AutomaticFit {
       from_nothing_;  ///< results of such moves, by structure
   std::vector<std::string> decisions_;
   std::vector<double> history_;
+  std::size_t exhausted_at_ = 0;  ///< size of the history when no mode was left to add
 };
 
 /// With a requested number of modes, the path determines which minimum is reached. A path with surplus modes is tried
