@@ -210,18 +210,15 @@ class AutomaticFit {
     return changed;
   }
 
-  /// Moves that start from nothing come last: until the rest of the structure is right, they do not fit either.
   bool change_structure() {
     const Sample sample(*this);
-    std::vector<StructureMove> near, far;
-    for (StructureMove& move : structure_moves(sample.data.frf, sample.data.options,
-                                               sample.data.model, structure_.open)) {
-      const bool keeps_number = count_modes(move.model) == count_modes(best_.model);
-      if (selection_.exactly > 0 && !keeps_number) continue;
-      move.flag.insert(0, "structure: ");
-      (move.from_nothing ? far : near).push_back(std::move(move));
-    }
-    if (!take_best(sample, std::move(near)) && !take_best(sample, std::move(far))) return false;
+    std::vector<StructureMove> moves =
+        structure_moves(sample.data.frf, sample.data.options, sample.data.model, structure_.open);
+    std::erase_if(moves, [&](const StructureMove& move) {
+      return selection_.exactly > 0 && count_modes(move.model) != count_modes(best_.model);
+    });
+    for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
+    if (!take_best(sample, std::move(moves))) return false;
     const OpenStructure open = structure_.open;
     structure_ = structure_of(best_.model);
     structure_.open = open;
