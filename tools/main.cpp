@@ -1,9 +1,17 @@
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <string_view>
+#include <system_error>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
+#include "acquisition/files/output_file.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "estimation/problem/freed_memory.hpp"
 #include "estimation/problem/weight_matrices.hpp"
@@ -15,7 +23,26 @@
 
 namespace {
 
+/// Otherwise a file would be opened as a closed standard stream, and messages written into it.
+void open_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(stream, F_GETFD) < 0) static_cast<void>(::open("/dev/null", O_RDWR));
+}
+
+bool has_ended = false;
+
+/// HDF5 calls exit() when it is out of memory.
+void end_after_library() {
+  if (has_ended) return;
+  stageid::remove_unfinished_files();
+  constexpr std::string_view kMessage =
+      "stageid: out of memory within a library; free some memory\n";
+  static_cast<void>(!::write(STDERR_FILENO, kMessage.data(), kMessage.size()));
+  ::_exit(stageid::kWorldFailed);
+}
+
 int report(const std::exception& error, int exit_code) {
+  has_ended = true;
   stageid::wait_if_ending();
   stageid::Console().warning(error.what());
   return exit_code;
@@ -24,10 +51,15 @@ int report(const std::exception& error, int exit_code) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  stageid::catch_signals();  // as early as possible
-  stageid::keep_freed_memory();
+  open_standard_streams();
+  std::atexit(end_after_library);
   try {
-    return stageid::run_program(argc, argv);
+    stageid::catch_signals();  // as early as possible
+    stageid::protect_inputs();
+    stageid::keep_freed_memory();
+    const int exit_code = stageid::run_program(argc, argv);
+    has_ended = true;
+    return exit_code;
   } catch (const stageid::Interrupted& error) {
     return report(error, stageid::kInterrupted);
   } catch (const stageid::FormatError& error) {
@@ -44,6 +76,10 @@ int main(int argc, char** argv) {
     return report(error, stageid::kNotTrustworthy);
   } catch (const std::invalid_argument& error) {
     return report(error, stageid::kRequestWrong);
+  } catch (const std::system_error& error) {
+    return report(std::runtime_error("the system refused a resource: " +
+                                     stageid::system_reason(error.code().value())),
+                  stageid::kWorldFailed);
   } catch (const std::bad_alloc&) {
     return report(
         std::runtime_error("out of memory; reduce the number of lines, channels or modes"),

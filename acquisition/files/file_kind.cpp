@@ -75,7 +75,7 @@ std::string named_format(const std::filesystem::path& file, const std::string& h
       return "";  // damaged: use its first bytes
     }
   }
-  static const std::regex text(R"re((?:^|\n)\s*\{?\s*"?format"?\s*:\s*"?(stageid-[a-z]+))re");
+  static const std::regex text(R"re((?:^|\n)[ \t{"]*format"?[ \t]*:[ \t]*"?(stageid-[a-z]+))re");
   std::smatch found;
   return std::regex_search(head, found, text) ? found[1].str() : "";
 }

@@ -4,6 +4,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/hdf5_support.hpp"
+#include "acquisition/files/system_reason.hpp"
 
 namespace stageid {
 namespace {
@@ -71,15 +72,16 @@ void write_values(const Hdf5File& file, const std::string& object, const std::st
                   const Hdf5Handle& space, hid_t file_type, hid_t memory_type, const void* data) {
   const auto fail = [&](const std::string& reason) {
     throw FileError(file.path().string() + ":" + object + ": cannot write attribute '" + name +
-                    "': " + reason);
+                    "': " + with_remedy(reason));
   };
   if (file.has_attribute(object, name)) fail("already exists");
-  const Hdf5Handle attribute(H5Acreate_by_name(file.id(), object.c_str(), name.c_str(), file_type,
-                                               space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                             H5Aclose);
+  Hdf5Handle attribute(H5Acreate_by_name(file.id(), object.c_str(), name.c_str(), file_type,
+                                         space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                       H5Aclose);
   if (!attribute) fail(hdf5::take_reason());
   const bool empty = H5Sget_simple_extent_npoints(space.get()) == 0;  // HDF5 requires a buffer
   if (!empty && H5Awrite(attribute.get(), memory_type, data) < 0) fail(hdf5::take_reason());
+  if (!attribute.close()) fail(hdf5::take_reason());
 }
 
 Hdf5Handle scalar_space() { return {H5Screate(H5S_SCALAR), H5Sclose}; }

@@ -4,17 +4,21 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <string_view>
 
+#include "acquisition/files/child_process.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_heap_check.hpp"
 #include "acquisition/files/hdf5_library.hpp"
 #include "acquisition/files/hdf5_support.hpp"
+#include "acquisition/files/hdf5_survey.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/system_reason.hpp"
 
@@ -71,6 +75,7 @@ Hdf5File& Hdf5File::operator=(Hdf5File&&) noexcept = default;
 
 Hdf5File Hdf5File::open(const std::filesystem::path& file) {
   prepare_hdf5();
+  note_input(file);
   check_can_be_opened(file);
   if (H5Fis_hdf5(file.c_str()) <= 0) {
     H5Eclear2(H5E_DEFAULT);
@@ -82,6 +87,14 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
                           : "is not an HDF5 file, or its header is damaged; give an HDF5 file");
   }
   hdf5::check_global_heaps(file);
+  in_child(file, [&] {
+    hdf5::survey(opened(file));
+    return std::string();
+  });
+  return opened(file);
+}
+
+Hdf5File Hdf5File::opened(const std::filesystem::path& file) {
   Hdf5Handle handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!handle) {
     throw FormatError(file, "",
@@ -111,11 +124,14 @@ Hdf5File Hdf5File::create(const std::filesystem::path& file,
 
 void Hdf5File::close() {
   if (!file_) return;
-  open_datasets_ = std::make_unique<OpenDatasets>();
-  const bool flushed = H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0;
-  const std::string reason = flushed ? "" : with_remedy(hdf5::take_reason());
-  file_.reset();
-  if (!flushed) throw FileError(path_.string() + ": cannot be written: " + reason);
+  std::string reason;
+  const auto require = [&reason](bool done) {
+    if (!done && reason.empty()) reason = with_remedy(hdf5::take_reason());
+  };
+  for (OpenDatasets::Entry& entry : open_datasets_->entries) require(entry.handle.close());
+  require(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0);
+  require(file_.close());
+  if (!reason.empty()) throw FileError(path_.string() + ": cannot be written: " + reason);
 }
 
 bool Hdf5File::exists(const std::string& object) const {
@@ -158,6 +174,18 @@ std::vector<std::string> Hdf5File::children(const std::string& group) const {
   return names;
 }
 
+/// HDF5 allocates a whole chunk, however few of its rows exist.
+void Hdf5File::check_chunk(const std::string& dataset, hid_t id) const {
+  const Hdf5Handle properties(H5Dget_create_plist(id), H5Pclose);
+  if (H5Pget_layout(properties.get()) != H5D_CHUNKED) return;
+  const Hdf5Handle type(H5Dget_type(id), H5Tclose);
+  std::vector<hsize_t> chunk(H5S_MAX_RANK);
+  const int rank = H5Pget_chunk(properties.get(), H5S_MAX_RANK, chunk.data());
+  chunk.resize(static_cast<std::size_t>(std::clamp(rank, 0, H5S_MAX_RANK)));
+  hdf5::plausible_count(path_, dataset, chunk, H5Tget_size(type.get()),
+                        H5Pget_nfilters(properties.get()) > 0);
+}
+
 hid_t Hdf5File::open_dataset(const std::string& dataset) const {
   for (const OpenDatasets::Entry& entry : open_datasets_->entries) {
     if (entry.handle && entry.name == dataset) return entry.handle.get();
@@ -174,7 +202,11 @@ hid_t Hdf5File::open_dataset(const std::string& dataset) const {
         path_, dataset,
         "is not a dataset, or is damaged" + hdf5::take_system_reason() + "; expected a dataset");
   }
+  check_chunk(dataset, handle.get());
   OpenDatasets::Entry& entry = open_datasets_->entries[open_datasets_->oldest];
+  if (!entry.handle.close())
+    throw FileError(path_.string() + ":" + entry.name +
+                    ": cannot be written: " + with_remedy(hdf5::take_reason()));
   open_datasets_->oldest = (open_datasets_->oldest + 1) % OpenDatasets::kEntries;
   entry.handle = std::move(handle);
   entry.name = dataset;

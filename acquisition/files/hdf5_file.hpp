@@ -17,7 +17,7 @@ class Hdf5Handle {
  public:
   using Close = herr_t (*)(hid_t);
   Hdf5Handle() = default;
-  Hdf5Handle(hid_t id, Close close) noexcept : id_(id), close_(close) {}
+  Hdf5Handle(hid_t id, Close closer) noexcept : id_(id), close_(closer) {}
   ~Hdf5Handle() { reset(); }
   Hdf5Handle(Hdf5Handle&& other) noexcept { swap(other); }
   Hdf5Handle& operator=(Hdf5Handle&& other) noexcept {
@@ -26,9 +26,12 @@ class Hdf5Handle {
   }
   hid_t get() const noexcept { return id_; }
   explicit operator bool() const noexcept { return id_ >= 0; }
-  void reset() noexcept {
-    if (id_ >= 0) close_(id_);
+  void reset() noexcept { static_cast<void>(close()); }
+  /// False if HDF5 could not write what it still held back. Only what was written needs the answer.
+  [[nodiscard]] bool close() noexcept {
+    const bool closed = id_ < 0 || close_(id_) >= 0;
     id_ = -1;
+    return closed;
   }
 
  private:
@@ -113,13 +116,15 @@ class Hdf5File {
   void append_rows(const std::string& dataset, hsize_t count, const double* data);
   void append_rows(const std::string& dataset, hsize_t count, const unsigned char* data);
 
-  /// Flushes and closes; @throws FileError if the disk is full.
+  /// Flushes and closes; @throws FileError if anything could not be written. Needed after writing.
   void close();
 
  private:
   struct OpenDatasets;
   Hdf5File(std::filesystem::path path, Hdf5Handle file);
+  static Hdf5File opened(const std::filesystem::path& file);
   hid_t open_dataset(const std::string& dataset) const;
+  void check_chunk(const std::string& dataset, hid_t id) const;
   void write_dataset(const std::string& dataset, const std::vector<hsize_t>& shape, hid_t file_type,
                      hid_t memory_type, const void* data);
   void append(const std::string& dataset, hsize_t count, hid_t memory_type, const void* data);

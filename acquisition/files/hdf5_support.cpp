@@ -20,7 +20,8 @@ herr_t keep_innermost(unsigned depth, const H5E_error2_t* error, void* reason) {
 /// HDF5 describes a failing system call in several lines with addresses; only its message is kept.
 constexpr std::string_view kSystemMessage = "error message = '";
 
-std::string on_one_line(std::string reason) {
+std::string on_one_line(const std::string& innermost) {
+  std::string reason = innermost;
   if (const auto start = reason.find(kSystemMessage); start != std::string::npos) {
     reason.erase(0, start + kSystemMessage.size());
     reason.erase(std::min(reason.find('\''), reason.size()));
@@ -44,7 +45,7 @@ std::string take_reason() { return on_one_line(take_innermost()); }
 std::string take_system_reason() {
   std::string reason = take_innermost();
   if (reason.find(kSystemMessage) == std::string::npos) return "";
-  return " (" + on_one_line(std::move(reason)) + ")";
+  return fmt::format(" ({})", on_one_line(reason));
 }
 
 Hdf5Handle property_list(hid_t class_id) { return {H5Pcreate(class_id), H5Pclose}; }

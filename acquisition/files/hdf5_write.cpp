@@ -7,13 +7,17 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/hdf5_support.hpp"
+#include "acquisition/files/system_reason.hpp"
 
 namespace stageid {
 namespace {
 
+/// Names the object only if it matters: where the disk was full does not.
 [[noreturn]] void fail(const Hdf5File& file, const std::string& object) {
-  throw FileError(file.path().string() + ":" + object +
-                  ": cannot be written: " + hdf5::take_reason());
+  const std::string reason = hdf5::take_reason();
+  const std::string remedied = with_remedy(reason);
+  throw FileError(file.path().string() + (remedied == reason ? ":" + object : "") +
+                  ": cannot be written: " + remedied);
 }
 
 /// Creation properties without time of creation: same content, same bytes.
@@ -57,9 +61,9 @@ void Hdf5File::create_group(const std::string& group) {
   for (std::size_t end = group.find('/', 1);; end = group.find('/', end + 1)) {
     const std::string part = group.substr(0, end);
     if (!exists(part)) {
-      const Hdf5Handle handle(
-          H5Gcreate2(id(), part.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Gclose);
-      if (!handle) fail(*this, part);
+      Hdf5Handle handle(H5Gcreate2(id(), part.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
+                        H5Gclose);
+      if (!handle || !handle.close()) fail(*this, part);
     }
     if (end == std::string::npos) return;
   }
@@ -74,14 +78,14 @@ void Hdf5File::write_dataset(const std::string& dataset, const std::vector<hsize
   const Hdf5Handle properties = timeless(H5P_DATASET_CREATE);
   fill_with_nan(properties.get(), file_type);
   protect(properties.get(), shape, H5Tget_size(file_type));
-  const Hdf5Handle handle(H5Dcreate2(id(), dataset.c_str(), file_type, space.get(), H5P_DEFAULT,
-                                     properties.get(), H5P_DEFAULT),
-                          H5Dclose);
+  Hdf5Handle handle(H5Dcreate2(id(), dataset.c_str(), file_type, space.get(), H5P_DEFAULT,
+                               properties.get(), H5P_DEFAULT),
+                    H5Dclose);
   if (!handle) fail(*this, dataset);
-  if (H5Sget_simple_extent_npoints(space.get()) == 0) return;
-  if (H5Dwrite(handle.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
+  const bool empty = H5Sget_simple_extent_npoints(space.get()) == 0;
+  if (!empty && H5Dwrite(handle.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
     fail(*this, dataset);
-  }
+  if (!handle.close()) fail(*this, dataset);
 }
 
 void Hdf5File::write_reals(const std::string& dataset, const std::vector<hsize_t>& shape,
@@ -127,11 +131,11 @@ void Hdf5File::create_growing(const std::string& dataset, hsize_t columns, hid_t
   fill_with_nan(properties.get(), file_type);
   const bool chunked =
       H5Pset_chunk(properties.get(), rank, chunk) >= 0 && H5Pset_fletcher32(properties.get()) >= 0;
-  const Hdf5Handle handle(chunked ? H5Dcreate2(id(), dataset.c_str(), file_type, space.get(),
-                                               H5P_DEFAULT, properties.get(), H5P_DEFAULT)
-                                  : -1,
-                          H5Dclose);
-  if (!handle) fail(*this, dataset);
+  Hdf5Handle handle(chunked ? H5Dcreate2(id(), dataset.c_str(), file_type, space.get(), H5P_DEFAULT,
+                                         properties.get(), H5P_DEFAULT)
+                            : -1,
+                    H5Dclose);
+  if (!handle || !handle.close()) fail(*this, dataset);
 }
 
 void Hdf5File::append(const std::string& dataset, hsize_t count, hid_t memory_type,

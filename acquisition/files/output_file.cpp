@@ -13,8 +13,10 @@
 #include <set>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/system_reason.hpp"
 
 namespace stageid {
@@ -47,8 +49,11 @@ class Descriptor {
   ~Descriptor() {
     if (descriptor_ >= 0) ::close(descriptor_);
   }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
+  Descriptor(Descriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(descriptor_, other.descriptor_);
+    return *this;
+  }
   int get() const noexcept { return descriptor_; }
   explicit operator bool() const noexcept { return descriptor_ >= 0; }
 
@@ -123,14 +128,28 @@ std::filesystem::path shown_name(const std::filesystem::path& file) {
 
 OutputFile::OutputFile(const std::filesystem::path& target)
     : target_(resolve_target(target)), temporary_(temporary_beside(target_)) {
+  note_output(target_);
   constexpr mode_t kMode = 0666;  // minus the user's umask
   const std::lock_guard lock(unfinished().mutex);
-  const Descriptor descriptor(
-      ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
+  const auto create = [this] {
+    return Descriptor(::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
+  };
+  Descriptor descriptor = create();
+  // A process of the same number, in another container or before a crash, may have left its file.
+  while (!descriptor && errno == EEXIST) {
+    temporary_ = temporary_beside(target_);
+    descriptor = create();
+  }
   if (!descriptor)
     fail(target_, "cannot create a file in this directory", errno,
          errno == ENOENT ? "create the directory first" : "");
-  unfinished().files.insert(temporary_);
+  try {
+    unfinished().files.insert(temporary_);
+    note_own_file(temporary_);
+  } catch (...) {  // out of memory: no destructor will remove it
+    ::unlink(temporary_.c_str());
+    throw;
+  }
 }
 
 OutputFile::~OutputFile() {
@@ -149,6 +168,7 @@ void OutputFile::commit() {
     unfinished().files.erase(temporary_);
   }
   committed_ = true;
+  note_own_file(target_);
   synchronize(directory_of(target_), O_RDONLY | O_DIRECTORY, target_);
 }
 
@@ -157,13 +177,15 @@ void remove_unfinished_files() {
   for (const std::filesystem::path& file : unfinished().files) ::unlink(file.c_str());
 }
 
+void OutputFile::append(std::string_view text) {
+  const Descriptor descriptor(::open(temporary_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
+  if (!descriptor) fail(target_, "cannot be written", errno);
+  write_all(descriptor.get(), text, target_);
+}
+
 void write_text_file(const std::filesystem::path& target, std::string_view text) {
   OutputFile output(target);
-  {
-    const Descriptor descriptor(::open(output.path().c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
-    if (!descriptor) fail(target, "cannot be written", errno);
-    write_all(descriptor.get(), text, target);
-  }
+  output.append(text);
   output.commit();
 }
 

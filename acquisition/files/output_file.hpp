@@ -10,16 +10,20 @@ namespace stageid {
 std::filesystem::path shown_name(const std::filesystem::path& file);
 
 /// An output that is written completely or not at all. Write to path(); commit() then renames it to the target
-/// (after fsync). Without commit(), the destructor removes the temporary file.
+/// (after fsync). Without commit(), the destructor removes the temporary file. note_output() knows the target.
 class OutputFile {
  public:
-  /// @throws FileError if the directory does not exist or cannot be written.
+  /// @throws FileError if the directory does not exist or cannot be written; std::invalid_argument if the target was
+  /// read and inputs are protected.
   explicit OutputFile(const std::filesystem::path& target);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
   const std::filesystem::path& path() const noexcept { return temporary_; }
+
+  /// Adds to the temporary file. @throws FileError
+  void append(std::string_view text);
 
   /// @throws FileError if the file cannot be synchronized or renamed.
   void commit();

@@ -15,6 +15,8 @@ struct Remedy {
 constexpr std::array kRemedies = {Remedy{ENOSPC, "free some space, or write elsewhere"},
                                   Remedy{EDQUOT, "free some space, or write elsewhere"},
                                   Remedy{EFBIG, "raise the limit (ulimit -f), or write elsewhere"},
+                                  Remedy{EIO, "check the disk"},
+                                  Remedy{EAGAIN, "raise the limit of processes (ulimit -u)"},
                                   Remedy{EROFS, "write elsewhere"},
                                   Remedy{EACCES, "check the permissions"},
                                   Remedy{ENOENT, "check the path"},

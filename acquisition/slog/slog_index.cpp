@@ -113,14 +113,7 @@ class Indexer {
   void begin_run(const SlogBlock& block) {
     close_run();
     SlogRunBegin begin = parse_run_begin(json(block));
-    const std::vector<int>& columns = begin.excitation_columns;
-    const bool increasing =
-        std::adjacent_find(columns.begin(), columns.end(), std::greater_equal<>()) == columns.end();
-    if (!increasing ||
-        (!columns.empty() && (columns.front() < 0 || static_cast<std::size_t>(columns.back()) >=
-                                                         index_.info.excitation.size()))) {
-      throw std::invalid_argument("contains unknown excitation channels");
-    }
+    check_run_begin(begin, index_.info);
     if (block.header.run < index_.runs.size()) {
       throw std::invalid_argument(
           fmt::format("is a duplicate start of run {}", slog_run_name(block.header.run)));
@@ -149,9 +142,7 @@ class Indexer {
     SlogRunIndex& run = open_run(block);
     const SlogBlockHeader& header = block.header;
     if (run.excitation || !run.samples.empty() ||
-        header.rows != static_cast<std::uint32_t>(index_.info.period_samples) ||
-        header.cols != run.excitation_columns.size() ||
-        header.payload_bytes != std::uint64_t{8} * header.rows * header.cols) {
+        !is_slog_excitation(header, index_.info, run.excitation_columns)) {
       throw std::invalid_argument("does not match the start of the run");
     }
     run.excitation = block;
@@ -160,8 +151,7 @@ class Indexer {
   void take_samples(const SlogBlock& block) {
     SlogRunIndex& run = open_run(block);
     const SlogBlockHeader& header = block.header;
-    if (header.cols != slog_row_words(index_.info) || header.rows == 0 ||
-        header.payload_bytes != std::uint64_t{8} * header.rows * header.cols) {
+    if (!are_slog_samples(header, index_.info)) {
       throw std::invalid_argument(
           "has a different number of words per row than the log has channels");
     }
@@ -201,7 +191,31 @@ class Indexer {
   bool open_ = false;
 };
 
+bool has_its_bytes(const SlogBlockHeader& header) noexcept {
+  return header.payload_bytes == std::uint64_t{8} * header.rows * header.cols;
+}
+
 }  // namespace
+
+void check_run_begin(const SlogRunBegin& begin, const LogInfo& info) {
+  const std::vector<int>& columns = begin.excitation_columns;
+  const bool increasing =
+      std::adjacent_find(columns.begin(), columns.end(), std::greater_equal<>()) == columns.end();
+  if (!increasing ||
+      (!columns.empty() &&
+       (columns.front() < 0 || static_cast<std::size_t>(columns.back()) >= info.excitation.size())))
+    throw std::invalid_argument("contains unknown excitation channels");
+}
+
+bool is_slog_excitation(const SlogBlockHeader& header, const LogInfo& info,
+                        const std::vector<int>& columns) noexcept {
+  return header.rows == static_cast<std::uint32_t>(info.period_samples) &&
+         header.cols == columns.size() && has_its_bytes(header);
+}
+
+bool are_slog_samples(const SlogBlockHeader& header, const LogInfo& info) noexcept {
+  return header.cols == slog_row_words(info) && header.rows > 0 && has_its_bytes(header);
+}
 
 SlogIndex index_slog(const SlogSource& source, const SlogScan& scan) {
   return Indexer(source, scan).run();

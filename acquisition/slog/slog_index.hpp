@@ -36,6 +36,13 @@ struct SlogIndex {
 /// @throws FormatError if no description of the log is left, or one is invalid.
 SlogIndex index_slog(const SlogSource& source, const SlogScan& scan);
 
+/// @throws std::invalid_argument unless a run of this log can start like this
+void check_run_begin(const SlogRunBegin& begin, const LogInfo& info);
+/// Whether the numbers in a header are those of an excitation or of samples of this log.
+bool is_slog_excitation(const SlogBlockHeader& header, const LogInfo& info,
+                        const std::vector<int>& columns) noexcept;
+bool are_slog_samples(const SlogBlockHeader& header, const LogInfo& info) noexcept;
+
 /// Words per row of samples: actuators, sensors, stamp if there are any, status.
 std::uint32_t slog_row_words(const LogInfo& info) noexcept;
 

@@ -1,4 +1,5 @@
 #include "acquisition/slog/slog_json.hpp"
+#include "acquisition/files/json_text.hpp"
 
 #include <fmt/format.h>
 
@@ -24,8 +25,8 @@ std::string text_of(const Json& json) {
 template <typename Read>
 auto parse(std::string_view text, const char* what, Read read) {
   try {
-    return read(Json::parse(text));
-  } catch (const Json::exception&) {
+    return read(parse_json<Json>(text));
+  } catch (const Json::exception&) {  // discarded, too
     throw std::invalid_argument(fmt::format("the {} is invalid", what));
   }
 }
@@ -77,12 +78,8 @@ RunTiming timing_of(const Json& json) {
 }  // namespace
 
 std::string to_json(const LogInfo& info) {
-  Json metadata;
-  try {
-    metadata = Json::parse(info.metadata_json);
-  } catch (const Json::exception&) {
-    throw std::invalid_argument("log: metadata_json is not valid JSON");
-  }
+  Json metadata = parse_json<Json>(info.metadata_json);
+  if (metadata.is_discarded()) throw std::invalid_argument("log: metadata_json is not valid JSON");
   Json json = {
       {"sample_rate_hz", info.sample_rate_hz},       {"period_samples", info.period_samples},
       {"transient_periods", info.transient_periods}, {"excitation", json_of(info.excitation)},

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -19,6 +21,25 @@ namespace stageid {
 namespace {
 
 constexpr std::uint32_t kFillRows = 1024;
+constexpr std::uint64_t kMostAdded = 2;  // times the size of the damaged log
+
+bool are_finite(std::span<const std::byte> numbers) {
+  for (std::size_t at = 0; at + sizeof(double) <= numbers.size(); at += sizeof(double)) {
+    double number = 0.0;
+    std::memcpy(&number, numbers.data() + at, sizeof(number));
+    if (!std::isfinite(number)) return false;
+  }
+  return true;
+}
+
+/// Whether all measured numbers are finite. The stamp and the status of a row are no numbers.
+bool are_samples(std::span<const std::byte> rows, const LogInfo& info) {
+  const std::size_t row_bytes = sizeof(double) * slog_row_words(info);
+  const std::size_t number_bytes = sizeof(double) * (info.actuators.size() + info.sensors.size());
+  for (; rows.size() >= row_bytes; rows = rows.subspan(row_bytes))
+    if (!are_finite(rows.first(number_bytes))) return false;
+  return true;
+}
 
 /// Copies intact blocks to a new log and fills the gaps.
 class Recovery {
@@ -27,11 +48,12 @@ class Recovery {
       : source_(source),
         scan_(scan_slog(source, SlogScanDepth::payloads)),
         info_(index_slog(source, scan_).info),
+        description_(to_json(info_)),
         out_(SlogAppender::create(to)) {}
 
   RecoverReport run() {
     // The first block must be a description, even if that of the old log is damaged.
-    append_json(SlogBlockType::log, to_json(info_), 0);
+    append_json(SlogBlockType::log, description_, 0);
     for (const SlogBlock& block : scan_.blocks) {
       try {
         take(block);
@@ -77,7 +99,7 @@ class Recovery {
         return end_run(block);
       case SlogBlockType::end:
         close_run();
-        append_json(SlogBlockType::end, json(block), block.header.time_ns);
+        append_json(SlogBlockType::end, to_json(parse_end(json(block))), block.header.time_ns);
         ended_ = true;
         return;
     }
@@ -102,8 +124,11 @@ class Recovery {
   }
 
   void begin_run(std::uint32_t number, SlogRunBegin begin, const SlogBlock& block) {
+    check_run_begin(begin, info_);
     close_run();
-    append_json(SlogBlockType::log, to_json(info_), block.header.time_ns);
+    // Every run has a description, but many starts of runs must not multiply a long one.
+    if (may_add(description_.size()))
+      append_json(SlogBlockType::log, description_, block.header.time_ns);
     run_ = Run{};
     run_->number = number;
     run_->begin = std::move(begin);
@@ -123,14 +148,17 @@ class Recovery {
 
   void copy_excitation(const SlogBlock& block) {
     const bool fits = run_ && run_->number == block.header.run && run_->rows == 0 &&
-                      block.header.cols == run_->begin.excitation_columns.size();
+                      !run_->excitation &&
+                      is_slog_excitation(block.header, info_, run_->begin.excitation_columns) &&
+                      are_finite(read_payload(source_, block));
     if (!fits) return lose(block);
     copy(block, block.header.first_row);
     run_->excitation = true;
   }
 
   void copy_samples(const SlogBlock& block) {
-    if (block.header.cols != slog_row_words(info_)) return lose(block);
+    if (!are_slog_samples(block.header, info_) || !are_samples(read_payload(source_, block), info_))
+      return lose(block);
     open_orphan(block);
     if (block.header.first_row < run_->rows || !fill(block.header.first_row)) return lose(block);
     copy(block, run_->rows);
@@ -162,11 +190,18 @@ class Recovery {
     run_.reset();
   }
 
+  /// Whether so many bytes that are not in the damaged log may be written; if so, they count.
+  bool may_add(std::uint64_t bytes) {
+    if (bytes > kMostAdded * scan_.file_bytes - added_bytes_) return false;
+    added_bytes_ += bytes;
+    return true;
+  }
+
   /// Appends marked rows of zeros up to `row`. @returns false if the number is implausible
   bool fill(std::uint64_t row) {
     const std::uint32_t words = slog_row_words(info_);
     const std::uint64_t missing = row - run_->rows;
-    if (missing > scan_.file_bytes) return false;
+    if (missing > scan_.file_bytes || !may_add(missing * sizeof(double) * words)) return false;
     std::vector<double> rows(std::size_t{words} * kFillRows, 0.0);
     const std::uint64_t status = pack_status({0, true, 0});
     for (std::size_t r = 0; r < kFillRows; ++r) {
@@ -213,10 +248,12 @@ class Recovery {
   const SlogSource& source_;
   SlogScan scan_;
   LogInfo info_;
+  std::string description_;
   SlogAppender out_;
   RecoverReport report_;
   std::optional<Run> run_;
-  std::uint64_t filled_ = 0;
+  std::uint64_t filled_ = 0;  ///< rows of the run
+  std::uint64_t added_bytes_ = 0;
   bool ended_ = false;
 };
 

@@ -8,11 +8,14 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <iterator>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <system_error>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/slog/crc32c.hpp"
 
 namespace stageid {
@@ -45,6 +48,8 @@ class Scanner {
           source_.path(), "",
           "contains no intact block of a native log (.slog); give a log written by 'stageid run'");
     }
+    keep_those_in_order();
+    report_missing();
     return std::move(scan_);
   }
 
@@ -85,22 +90,53 @@ class Scanner {
     if (depth_ == SlogScanDepth::payloads && !payload_intact(source_, block)) {
       return skip_payload(block);
     }
-    if (block.header.sequence < next_sequence_) {
-      scan_.damage.push_back(
-          {block.offset, slog_block_bytes(block.header), describe(block) + " is out of order"});
-      return block.end();
-    }
-    const bool behind_damage =
-        !scan_.damage.empty() && scan_.damage.back().bytes > 0 &&
-        scan_.damage.back().offset + scan_.damage.back().bytes == block.offset;
-    if (block.header.sequence > next_sequence_ && !behind_damage) {
-      scan_.damage.push_back(
-          {block.offset, 0,
-           fmt::format("blocks {} to {} are missing", next_sequence_, block.header.sequence - 1)});
-    }
-    next_sequence_ = block.header.sequence + 1;
     scan_.blocks.push_back(block);
     return block.end();
+  }
+
+  /// Keeps the longest list of blocks with increasing numbers: a misplaced one must not cost those around it.
+  void keep_those_in_order() {
+    std::vector<std::size_t> last;  // of a list of n + 1 blocks, with the lowest number
+    std::vector<std::size_t> previous(scan_.blocks.size(), 0);
+    const auto number = [this](std::size_t k) { return scan_.blocks[k].header.sequence; };
+    for (std::size_t k = 0; k < scan_.blocks.size(); ++k) {
+      const auto place = std::lower_bound(
+          last.begin(), last.end(), number(k),
+          [&](std::size_t a, std::uint64_t sequence) { return number(a) < sequence; });
+      if (place != last.begin()) previous[k] = *std::prev(place);
+      if (place == last.end())
+        last.push_back(k);
+      else if (number(*place) != number(k))
+        *place = k;
+    }
+    std::vector<bool> kept(scan_.blocks.size(), false);
+    for (std::size_t n = last.size(), k = last.back(); n > 0; --n, k = previous[k]) kept[k] = true;
+    std::vector<SlogBlock> in_order;
+    for (std::size_t k = 0; k < scan_.blocks.size(); ++k) {
+      const SlogBlock& block = scan_.blocks[k];
+      if (kept[k])
+        in_order.push_back(block);
+      else
+        scan_.damage.push_back(
+            {block.offset, slog_block_bytes(block.header), describe(block) + " is out of order"});
+    }
+    scan_.blocks = std::move(in_order);
+  }
+
+  /// Reports gaps in the numbers, except behind damage, which explains them.
+  void report_missing() {
+    std::set<std::uint64_t> damage_ends;
+    for (const LogDamage& damage : scan_.damage) damage_ends.insert(damage.offset + damage.bytes);
+    std::uint64_t next = 0;
+    for (const SlogBlock& block : scan_.blocks) {
+      if (block.header.sequence > next && !damage_ends.contains(block.offset))
+        scan_.damage.push_back(
+            {block.offset, 0,
+             fmt::format("blocks {} to {} are missing", next, block.header.sequence - 1)});
+      next = block.header.sequence + 1;
+    }
+    std::stable_sort(scan_.damage.begin(), scan_.damage.end(),
+                     [](const LogDamage& a, const LogDamage& b) { return a.offset < b.offset; });
   }
 
   /// The length in an intact header is valid unless bytes were inserted or deleted after it.
@@ -138,12 +174,12 @@ class Scanner {
   const SlogSource& source_;
   SlogScanDepth depth_;
   SlogScan scan_;
-  std::uint64_t next_sequence_ = 0;
 };
 
 }  // namespace
 
 SlogSource::SlogSource(std::filesystem::path file) : path_(std::move(file)) {
+  note_input(path_);
   file_ = FileDescriptor(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
   if (file_.get() < 0 || ::fstat(file_.get(), &status) != 0) {

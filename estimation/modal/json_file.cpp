@@ -3,12 +3,11 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <limits>
-#include <sstream>
 
 #include "acquisition/files/file_kind.hpp"
-#include "acquisition/files/system_reason.hpp"
+#include "acquisition/files/input_files.hpp"
+#include "acquisition/files/json_text.hpp"
 
 namespace stageid {
 namespace {
@@ -97,13 +96,8 @@ std::vector<std::string> JsonNode::texts() const {
 }
 
 JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file_(std::move(file)) {
-  std::ifstream stream(file_, std::ios::binary);
-  if (!stream) throw FileError(file_.string() + ": cannot be read: " + system_reason(errno));
-  if (std::filesystem::is_directory(file_))
-    throw FileError(file_.string() + ": is a directory; give a JSON file");
-  std::stringstream text;
-  text << stream.rdbuf();
-  if (text.str().empty())
+  const std::string text = read_whole_file(file_);
+  if (text.empty())
     throw FormatError(file_, "", "is empty; expected a JSON file of format " + format);
   const std::string wanted =
       format == "stageid-model" ? "a model (.json)" : "a " + format + " file (.json)";
@@ -111,9 +105,11 @@ JsonFile::JsonFile(std::filesystem::path file, const std::string& format) : file
     const std::string other = other_kind(file_, wanted);
     if (!other.empty()) throw FormatError(file_, "", other);
   };
-  if (!text.str().starts_with('{')) refuse_other_kind();
+  if (!text.starts_with('{')) refuse_other_kind();
   try {
-    value_ = nlohmann::ordered_json::parse(text.str());
+    value_ = nlohmann::ordered_json::parse(text, JsonBounds<nlohmann::ordered_json>());
+  } catch (const JsonTooLarge& error) {
+    throw FormatError(file_, "", std::string(error.what()) + "; give " + wanted);
   } catch (const nlohmann::ordered_json::out_of_range& error) {
     const std::string what = error.what();  // ... number overflow parsing '1e999'
     const std::size_t start = what.find('\'');

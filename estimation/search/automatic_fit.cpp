@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <ranges>
 #include <stdexcept>
@@ -16,7 +17,6 @@
 #include "estimation/search/growth_watch.hpp"
 #include "estimation/search/hidden_modes.hpp"
 #include "estimation/search/mode_worth.hpp"
-#include "estimation/search/overlapping_modes.hpp"
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/residue_rank_test.hpp"
 #include "estimation/search/search_advice.hpp"
@@ -31,6 +31,8 @@ namespace {
 
 constexpr int kGrowthIterations = 12;   // a mode that is still moving is finished later
 constexpr std::size_t kCandidates = 4;  // tried before the search concludes that no mode is missing
+constexpr std::size_t kMergesAtOnce = 8;  // the nearest pairs first
+constexpr double kHopeless = 10.0;  // times the cost: a search from nothing that is not followed up
 constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
 constexpr double kSettledDeviations = 0.1;  // if several ways to a number of modes are compared
 constexpr int kMostGrown = 40;              // modes; more are placed at once before growing
@@ -208,45 +210,108 @@ class AutomaticFit {
     return changed;
   }
 
-  /// The changes are ranked by trial on a part of the data; the first that all data confirm is taken.
   bool change_structure() {
-    const StructureTrial data = structure_trial(frf_, quick_, best_.model);
-    const ModeWorth worth(data.frf, structure_, data.options.user_weights);
-    const double now = worth.criterion(fit_additive_model(data.frf, data.model, data.options));
-    std::vector<std::pair<double, StructureMove>> better;
-    for (StructureMove& move :
-         structure_moves(data.frf, data.options, data.model, structure_.open)) {
-      const bool keeps_number = count_modes(move.model) == count_modes(best_.model);
-      if (selection_.exactly > 0 && !keeps_number) continue;
-      FitResult trial = fit_additive_model(data.frf, move.model, move.options);
-      const double then = worth.criterion(trial);
-      if (trial.status == FitStatus::singular || !(then < now)) continue;
-      move.model = std::move(trial.model);
-      better.emplace_back(then, std::move(move));
-    }
-    std::stable_sort(better.begin(), better.end(),
-                     [](const auto& a, const auto& b) { return a.first < b.first; });
-    return std::any_of(better.begin(), better.end(),
-                       [this](const auto& ranked) { return take(ranked.second); });
+    const Sample sample(*this);
+    std::vector<StructureMove> moves =
+        structure_moves(sample.data.frf, sample.data.options, sample.data.model, structure_.open);
+    std::erase_if(moves, [&](const StructureMove& move) {
+      return selection_.exactly > 0 && count_modes(move.model) != count_modes(best_.model);
+    });
+    for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
+    if (!take_best(sample, std::move(moves))) return false;
+    const OpenStructure open = structure_.open;
+    structure_ = structure_of(best_.model);
+    structure_.open = open;
+    worth_ = ModeWorth(frf_, structure_, quick_.user_weights);
+    watch_ = {};  // it compares models of one structure
+    return true;
   }
 
-  /// @returns false if all data do not confirm the change
-  bool take(const StructureMove& move) {
+  /// Replaces two modes closer than a half-power width by one if the second is not worth its parameters.
+  void merge() {
+    for (std::size_t done = 0; !limit_reached();) {
+      const Sample sample(*this);
+      const std::vector<StructureMove> all = merges(sample.data.options, sample.data.model);
+      for (; done < all.size(); done += kMergesAtOnce) {
+        const auto first = all.begin() + static_cast<std::ptrdiff_t>(done);
+        const auto count = static_cast<std::ptrdiff_t>(std::min(kMergesAtOnce, all.size() - done));
+        if (take_best(sample, {first, first + count})) break;
+      }
+      if (done >= all.size()) return;
+      done = 0;
+    }
+  }
+
+  /// A part of the data, on which moves are tried, and the score of best_ there.
+  struct Sample {
+    explicit Sample(const AutomaticFit& search)
+        : data(structure_trial(search.frf_, search.quick_, search.best_.model)),
+          worth(data.frf, search.structure_, data.options.user_weights) {
+      const FitResult fit = fit_additive_model(data.frf, data.model, data.options);
+      now = worth.criterion(fit);
+      cost = fit.model.fit.cost;
+    }
+    StructureTrial data;
+    ModeWorth worth;
+    double now = 0.0;  ///< criterion
+    double cost = 0.0;
+  };
+
+  /// Ranks the moves by trial on the sample and takes the first that all data confirm.
+  bool take_best(const Sample& sample, std::vector<StructureMove> moves) {
+    struct Better {
+      double criterion;
+      StructureMove move;
+      FitResult fit;
+    };
+    std::vector<Better> better;
+    for (StructureMove& move : moves) {
+      FitResult trial = tried(sample, move);
+      const double then = sample.worth.criterion(trial);
+      if (trial.status == FitStatus::singular || !(then < sample.now)) continue;
+      better.push_back({then, std::move(move), std::move(trial)});
+    }
+    std::stable_sort(better.begin(), better.end(),
+                     [](const Better& a, const Better& b) { return a.criterion < b.criterion; });
+    return std::any_of(better.begin(), better.end(), [&](Better& ranked) {
+      return take(ranked.move, std::move(ranked.fit), sample.data.all);
+    });
+  }
+
+  FitResult tried(const Sample& sample, const StructureMove& move) {
+    if (!move.from_nothing) return fit_additive_model(sample.data.frf, move.model, move.options);
+    std::vector<std::size_t> structure = {static_cast<std::size_t>(sample.data.frf.lines())};
+    for (const Submodel& s : move.model.submodels) {
+      structure.push_back(static_cast<std::size_t>(s.integrators));
+      structure.push_back(s.denominator.size());
+      structure.push_back(s.numerator.size());
+    }
+    const auto [at, is_new] = from_nothing_.try_emplace(std::move(structure));
+    if (!is_new) return at->second;
+    FitResult& result = at->second;
+    FitOptions options = move.options;
+    options.max_iterations /= 3;
+    result = fit_additive_model(sample.data.frf, move.model, options);
+    if (result.status == FitStatus::iteration_limit &&
+        result.model.fit.cost < kHopeless * sample.cost) {
+      options.max_iterations *= 2;
+      result = fit_additive_model(sample.data.frf, result.model, options);
+    }
+    return result;
+  }
+
+  /// @returns false if all data do not confirm the move
+  bool take(const StructureMove& move, FitResult&& fit, bool all) {
     FitOptions options = quick_;
     options.delay = move.options.delay;
     options.delay_s = move.options.delay_s;
-    FitResult fit = fit_additive_model(frf_, with_all_inputs(frf_, move.model), options);
+    if (!all) fit = fit_additive_model(frf_, with_all_inputs(frf_, fit.model), options);
     if (fit.status == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
       return false;
-    say("structure: {}: cost {:.6g} -> {:.6g}, {} -> {} parameters", move.flag,
-        best_.model.fit.cost, fit.model.fit.cost, best_.parameters, fit.parameters);
-    const OpenStructure open = structure_.open;
-    structure_ = structure_of(fit.model);
-    structure_.open = open;
+    say("{}: cost {:.6g} -> {:.6g}, {} -> {} parameters", move.flag, best_.model.fit.cost,
+        fit.model.fit.cost, best_.parameters, fit.parameters);
     quick_.delay = options_.delay = options.delay;
     quick_.delay_s = options_.delay_s = options.delay_s;
-    worth_ = ModeWorth(frf_, structure_, quick_.user_weights);
-    watch_ = {};  // it compares models of one structure
     adopt(std::move(fit));
     return true;
   }
@@ -254,6 +319,7 @@ class AutomaticFit {
   /// Adds modes while they are worth their parameters. @returns true if any was added.
   bool grow() {
     bool grown = false;
+    if (history_.size() == exhausted_at_) return false;
     watch_.cut();
     for (int round = 0; wanted_more(); ++round) {
       const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
@@ -271,6 +337,7 @@ class AutomaticFit {
       best_ = watch_.model();
       say("{}", watch_.finding());
     }
+    exhausted_at_ = history_.size();
     return grown;
   }
 
@@ -335,21 +402,6 @@ class AutomaticFit {
     return true;
   }
 
-  /// Replaces two modes closer than a half-power width by one if the second is not worth its parameters. On a single
-  /// resonance, two nearly equal modes with large opposite residues fit as well as one, and neither can be dropped
-  /// alone.
-  void merge() {
-    const std::vector<Submodel>& all = best_.model.submodels;
-    for (const auto& [i, j] : overlapping_modes(best_.model)) {
-      FitResult merged = fit_additive_model(frf_, with_one_of(best_.model, i, j), quick_);
-      if (!(worth_.criterion(merged) < worth_.criterion(best_))) continue;
-      say("merged {:.6g} and {:.6g} Hz: cost {:.6g} -> {:.6g}", all[i].natural_frequency_hz(),
-          all[j].natural_frequency_hz(), best_.model.fit.cost, merged.model.fit.cost);
-      adopt(std::move(merged));
-      return merge();  // the indices of the other pairs have changed
-    }
-  }
-
   /// Drops modes that are not worth their parameters, several at a time, or one by one if that fails.
   void prune() {
     std::size_t at_once = best_.model.submodels.size();
@@ -405,8 +457,11 @@ class AutomaticFit {
   int threads_ = 1;
   GrowthWatch watch_;
   FitResult best_;
+  std::map<std::vector<std::size_t>, FitResult>
+      from_nothing_;  ///< results of such moves, by structure
   std::vector<std::string> decisions_;
   std::vector<double> history_;
+  std::size_t exhausted_at_ = 0;  ///< size of the history when no mode was left to add
 };
 
 /// With a requested number of modes, the path determines which minimum is reached. A path with surplus modes is tried

@@ -1,7 +1,11 @@
 #include "estimation/search/structure_moves.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
+
+#include "estimation/search/overlapping_modes.hpp"
 
 namespace stageid {
 namespace {
@@ -84,6 +88,7 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
     StructureMove skewed{"--delay per_channel", model, options};
     free_delays(DelayModel::per_channel, skewed);
     skewed.options.max_iterations *= kIterationsOfDelays;
+    skewed.from_nothing = true;
     // Modes that were fitted to channels with different delays lead to another minimum.
     std::erase_if(skewed.model.submodels, is_searched_mode);
     const ModelStructure structure{.general_damping = has(model, is_general)};
@@ -128,6 +133,16 @@ std::vector<StructureMove> structure_moves(const FrfEstimate& frf, const FitOpti
   return out;
 }
 
+std::vector<StructureMove> merges(const FitOptions& options, const AdditiveModel& model) {
+  std::vector<StructureMove> out;
+  for (const auto& [i, j] : overlapping_modes(model))
+    out.push_back(
+        {fmt::format("merged {:.6g} and {:.6g} Hz", model.submodels[i].natural_frequency_hz(),
+                     model.submodels[j].natural_frequency_hz()),
+         with_one_of(model, i, j), options});
+  return out;
+}
+
 StructureTrial structure_trial(const FrfEstimate& frf, const FitOptions& options,
                                const AdditiveModel& model) {
   const Eigen::Index wanted =
@@ -145,6 +160,7 @@ StructureTrial structure_trial(const FrfEstimate& frf, const FitOptions& options
     out.frf.inputs.names.push_back(frf.inputs.names[static_cast<std::size_t>(inputs[u])]);
     out.frf.inputs.units.push_back(frf.inputs.units[static_cast<std::size_t>(inputs[u])]);
   }
+  out.all = step == 1 && count == frf.n_inputs();
   out.options = options;
   out.options.user_weights = Eigen::MatrixXd((*options.user_weights)(channels, lines));
   out.frf.frequency_hz = frf.frequency_hz(lines);

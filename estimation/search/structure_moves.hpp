@@ -8,11 +8,13 @@
 
 namespace stageid {
 
-/// A model with the same modes and one part of the structure changed, to be fitted with these options.
+/// A model with one part changed, to be fitted with these options.
 struct StructureMove {
-  std::string flag;  ///< of `stageid fit`, that requests it
+  std::string flag;  ///< of `stageid fit`, that requests it; else what it does
   AdditiveModel model;
   FitOptions options;
+  bool from_nothing =
+      false;  ///< its modes and delays are searched anew: expensive, and only the structure matters
 };
 
 /// One part more, of those that are open: numerators B_0 + B_1 s, a direct term, a rigid body, a rigid body on springs
@@ -34,6 +36,7 @@ struct StructureTrial {
   FrfEstimate frf;
   FitOptions options;
   AdditiveModel model;
+  bool all = false;  ///< there are few: these are all
 };
 
 /// As many lines and inputs as show the structure: it acts on all, while a mode acts on few lines. All, if there are
@@ -41,6 +44,10 @@ struct StructureTrial {
 /// @param options with FitOptions::user_weights, which become those of the trial
 StructureTrial structure_trial(const FrfEstimate& frf, const FitOptions& options,
                                const AdditiveModel& model);
+
+/// One of two overlapping modes instead of both. On a single resonance, two nearly equal modes with large opposite
+/// residues fit as well as one, and neither can be dropped alone.
+std::vector<StructureMove> merges(const FitOptions& options, const AdditiveModel& model);
 
 /// The poles and delays of a model of a trial, for all inputs; of those that were not in it, the mean delay.
 AdditiveModel with_all_inputs(const FrfEstimate& frf, AdditiveModel model);

@@ -25,8 +25,10 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kSuspicion = 0.05;       // of clipping, if u = r - C y is violated
-constexpr double kStuckShare = 0.02;      // of a run's samples that have one value
+constexpr double kSuspicion = 0.05;   // of clipping, if u = r - C y is violated
+constexpr double kStuckShare = 0.02;  // of a run's samples that have one value
+constexpr double kCoarse =
+    25.0;  // times the longest expected sequence: motion is slow and differs between runs
 constexpr double kExcludedPower = 1e-4;   // of the inputs' power
 constexpr double kWorstExcitation = 1e3;  // cond(R)
 constexpr double kWorstInputs = 1e2;      // median of cond(U) in the upper half of the band
@@ -82,9 +84,12 @@ void Examination::check_samples() {
     const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
     const bool sensor = c < record_.n_y();
     const auto stuck = static_cast<double>(scan.longest_constant());
+    // Coarse steps repeat values everywhere, a stuck channel does not.
+    const double expected = std::min(kCoarse * scan.expected_constant(), 0.5 * run_samples);
     const bool piles_up = std::min(scan.log_p_high(), scan.log_p_low()) < limit;
     // A channel that is not driven may be constant, and a constant run is not clipped.
-    if (stuck > std::max(kStuckShare * run_samples, 2.0) && !(piles_up && scan.returns())) {
+    if (stuck > std::max({kStuckShare * run_samples, 2.0, expected}) &&
+        !(piles_up && scan.returns())) {
       bool known = false;
       const auto excited = excited_actuators();
       const bool driven =
@@ -134,19 +139,49 @@ bool Examination::find_suspected(Index first, Index count) {
   return true;
 }
 
+/// Whether the motion of the nominal rigid body under the recorded inputs is above the noise of this sensor.
+bool Examination::expected_above_noise(Index sensor) const {
+  bool known = false;
+  if (!expected_to_respond(sensor, known)) return false;
+  std::string missing;
+  const auto y = positions_in(nominal_->sensors, record_.info.sensors.names, missing);
+  const auto u = positions_in(nominal_->actuators, record_.info.actuators.names, missing);
+  return above_noise(record_, sensor, [&](Index k) -> Eigen::RowVectorXcd {
+    const Eigen::MatrixXcd G = nominal_->rigid_body(record_.frequency_hz[k])(y, u);
+    const LineRecord& line = record_.lines[static_cast<std::size_t>(k)];
+    return G.row(sensor) * record_.mean(line.Z.bottomRows(record_.n_u()));
+  });
+}
+
+/// Sensors on which the excitation does not show, because the stage moves by more on its own.
+void Examination::find_drowned(const std::vector<Index>& sensors) {
+  if (sensors.empty()) return;
+  std::string names;
+  if (static_cast<Index>(sensors.size()) < record_.n_y())
+    for (const Index s : sensors) names += (names.empty() ? "" : " ") + name(s);
+  const std::string figure =
+      fmt::format("no line of {} is above its other motion", counted(sensors.size(), "sensor"));
+  const bool hidden = std::none_of(sensors.begin(), sensors.end(),
+                                   [this](Index s) { return expected_above_noise(s); });
+  // Forces act within the loop; a setpoint enters u beside r - C y.
+  if (nominal_ && nominal_->controller && hidden && why_no_nominal(true).empty() &&
+      follows_controller(record_, *nominal_))
+    find(Severity::fault, Cause::limit_cycle, names,
+         "the stage moves by more than the excitation moves it: its loop oscillates, as coarse "
+         "steps of the command or friction cause, or forces disturb it",
+         figure, "raise the level, excite all axes in every experiment, or use a finer converter");
+  else
+    find(Severity::fault, Cause::incoherent, names,
+         "no signal repeats with the excitation: a disturbance or a moving setpoint moves the "
+         "stage, or the excitation does not reach it",
+         figure,
+         "keep the setpoint constant, raise the level or check the injection, then measure again");
+}
+
 void Examination::check_responses() {
   std::vector<bool> responding;
   for (Index s = 0; s < record_.n_y(); ++s) responding.push_back(responds(record_, s));
   const bool none = std::find(responding.begin(), responding.end(), true) == responding.end();
-  if (none && spoilt_.empty()) {
-    find(Severity::fault, Cause::incoherent, "",
-         "no sensor signal repeats with the excitation: a disturbance moves the stage, or the "
-         "excitation does not reach it",
-         fmt::format("no line of {} is above the noise",
-                     counted(static_cast<std::size_t>(record_.n_y()), "sensor")),
-         "keep the setpoint constant, raise the level or check the injection, then measure again");
-    return;
-  }
   // Dead sensors have independent noise; what moves the stage moves several.
   const auto moves = [this](Index s) {
     for (Index other = 0; other < record_.n_y(); ++other)
@@ -154,27 +189,28 @@ void Examination::check_responses() {
         return true;
     return false;
   };
+  std::vector<Index> drowned;
   for (Index s = 0; s < record_.n_y(); ++s) {
     if (spoilt(s)) continue;
     bool known = false;
     const bool expected = expected_to_respond(s, known);
     if (!responding[static_cast<std::size_t>(s)]) {
-      if (known && !expected) continue;
-      if (moves(s)) {
-        find(Severity::fault, Cause::incoherent, name(s),
-             "moves with other sensors, but not with the excitation: a disturbance or a moving "
-             "setpoint drowns the response",
-             "no line above the motion", "keep the setpoint constant, then measure again");
+      if (none && spoilt_.empty()) {
+        drowned.push_back(s);
+      } else if (known && !expected) {
         continue;
+      } else if (moves(s) || (expected && !expected_above_noise(s))) {
+        drowned.push_back(s);
+      } else {
+        find(known ? Severity::fault : Severity::doubt, Cause::dead, name(s),
+             known ? "dead: only noise, although the rigid body moves it"
+                   : "no response to the excitation: the sensor is dead, or these axes do not move "
+                     "it",
+             "no line above the noise",
+             known ? "check its cable and power supply, then measure again"
+                   : "exclude it with --outputs, or check its cable");
+        spoilt_.push_back(s);
       }
-      find(known ? Severity::fault : Severity::doubt, Cause::dead, name(s),
-           known
-               ? "dead: only noise, although the rigid body moves it"
-               : "no response to the excitation: the sensor is dead, or these axes do not move it",
-           "no line above the noise",
-           known ? "check its cable and power supply, then measure again"
-                 : "exclude it with --outputs, or check its cable");
-      spoilt_.push_back(s);
       continue;
     }
     const double coherence = median_coherence(record_, s);
@@ -185,6 +221,7 @@ void Examination::check_responses() {
            fmt::format("median coherence {:.2f}", coherence),
            "raise the level, or measure more periods");
   }
+  find_drowned(drowned);
 }
 
 /// Signals per excitation, X = Z R^-1: an axis is not driven if its column of X is noise in every channel. One F

@@ -19,14 +19,14 @@ constexpr double kRounding = 1e-24;  // of a line's power: rounding errors witho
 
 }  // namespace
 
-bool responds(const HealthRecord& record, Index channel) {
+bool above_noise(const HealthRecord& record, Index channel,
+                 const std::function<Eigen::RowVectorXcd(Index)>& response) {
   if (record.scatter_dof() == 0) return true;
   double evidence = 0.0;
-  for (const LineRecord& line : record.lines) {
-    const Eigen::MatrixXcd row = line.Z.row(channel);
-    const double variance = record.variance_of_mean(row)[0];
+  for (std::size_t k = 0; k < record.lines.size(); ++k) {
+    const double variance = record.variance_of_mean(record.lines[k].Z.row(channel))[0];
     const double mean_square =
-        record.mean(row).squaredNorm() / static_cast<double>(record.experiments());
+        response(static_cast<Index>(k)).squaredNorm() / static_cast<double>(record.experiments());
     if (variance > kRounding * mean_square)
       evidence -= log_tail_of_f(mean_square / variance, static_cast<int>(record.experiments()),
                                 record.scatter_dof());
@@ -34,6 +34,12 @@ bool responds(const HealthRecord& record, Index channel) {
       return true;
   }
   return tail_of_evidence(evidence, static_cast<Index>(record.lines.size())) < kSignificance;
+}
+
+bool responds(const HealthRecord& record, Index channel) {
+  return above_noise(record, channel, [&](Index k) -> Eigen::RowVectorXcd {
+    return record.mean(record.lines[static_cast<std::size_t>(k)].Z.row(channel));
+  });
 }
 
 double median_coherence(const HealthRecord& record, Index channel) {

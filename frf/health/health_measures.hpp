@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 
 #include "frf/runs/health_record.hpp"
 
@@ -9,9 +10,13 @@ namespace stageid {
 /// Significance of a check over all channels.
 inline constexpr double kSignificance = 1e-4;
 
-/// Whether the channel (of [sensors; actuators]) moves with the excitation. One F test per line of the mean over
-/// periods against its scatter, over the experiments; Fisher's sum over the lines; kSignificance. True with only
-/// one period, because the noise is unknown then.
+/// Whether a response of the channel (of [sensors; actuators]) is above its noise. One F test per line of the mean over
+/// periods (`response` of the line's index: one value per experiment) against the scatter, over the experiments;
+/// Fisher's sum over the lines; kSignificance. True with only one period, because the noise is unknown then.
+bool above_noise(const HealthRecord& record, Eigen::Index channel,
+                 const std::function<Eigen::RowVectorXcd(Eigen::Index)>& response);
+
+/// Whether the channel moves with the excitation: above_noise() of what it recorded.
 bool responds(const HealthRecord& record, Eigen::Index channel);
 
 /// Median over the lines of the multiple coherence of one period: the share of the power that repeats. 1 for a

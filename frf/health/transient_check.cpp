@@ -21,6 +21,8 @@ constexpr Index kReach = 2;             // lines on either side of a maximum
 constexpr double kMemory = 0.6;         // see the header
 constexpr double kLargestShift = 0.5;   // deviations
 constexpr double kTolerable = 3.0;      // standard deviations, of the expected shift
+constexpr double kAgreement = 0.5;      // of phases: half way between chance and certainty
+constexpr double kSteady = 0.98;        // of consecutive periods: what rings longer is a drift
 
 /// Noise of one period on each line, and the power of the start relative to it.
 struct Lines {
@@ -64,7 +66,13 @@ class Phases {
   void add(std::complex<double> x, double squared_weight) {
     const double size = std::abs(x);
     if (size > 0.0) resultant_ += std::sqrt(squared_weight) * x / size;
+    weights_ += std::sqrt(squared_weight);
     squares_ += squared_weight;
+  }
+  /// Mean cosine between the phases of two runs, weighted: 1 if they agree, 0 for random ones.
+  double agreement() const {
+    const double pairs = weights_ * weights_ - squares_;
+    return pairs > 0.0 ? (std::norm(resultant_) - squares_) / pairs : 1.0;
   }
   /// @param by_memory resultant over the root of the sum of squared weights that noise with a memory has
   double p_value(double by_memory) const {
@@ -75,6 +83,7 @@ class Phases {
 
  private:
   std::complex<double> resultant_ = 0.0;
+  double weights_ = 0.0;
   double squares_ = 0.0;
 };
 
@@ -116,6 +125,8 @@ class Window {
   bool straight() const {
     return bends_.p_value(0.0) >= kFalseAlarms && p_of_decay() >= kFalseAlarms;
   }
+  /// Whether the start decays by the same complex ratio in all runs, as every linear transient does.
+  bool linear() const { return phases_.agreement() > kAgreement; }
 
   /// Ratio q of the transient in consecutive periods.
   std::complex<double> ratio() const;
@@ -210,24 +221,26 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
   double of_largest = 0.0;
   double settled = 0.0;  // the largest shift if the start is discarded
   int more = 0;
+  bool linear = false;
   std::vector<double> drifting;
   double least_p = 1.0;
   for (const Index peak : peaks) {
     const Window window(evidence, lines, peak);
     const double p = window.p_value() * static_cast<double>(peaks.size());
     if (p >= kFalseAlarms) continue;
-    if (window.straight()) {
+    const std::complex<double> q = window.ratio();
+    if (window.straight() || std::abs(q) > kSteady) {
       least_p = std::min(least_p, p);
       drifting.push_back(window.frequency_hz());
       continue;
     }
-    const std::complex<double> q = window.ratio();
     const double shift = window.shift(q, evidence.runs.front().start_used);
     // At an end of the lines, what rings lies beside them and shifts no mode.
     if (peak > 0 && peak + 1 < evidence.frequency_hz.size())
       settled = std::max(settled, window.shift(q, false));
     if (shift <= kLargestShift) continue;
     frequencies.push_back(window.frequency_hz());
+    linear = linear || window.linear();
     more = std::max(more, static_cast<int>(
                               std::ceil(std::log(shift / kLargestShift) / -std::log(std::abs(q)))));
     if (shift > largest) {
@@ -262,6 +275,15 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
       needed <= recorded - 2
           ? fmt::format("--transient-periods {}, or --method lpm", needed)
           : fmt::format("--method lpm, or measure again with transient_periods: {}", needed);
+  if (!linear) {
+    finding.cause = Cause::limit_cycle;
+    finding.what = fmt::format(
+        "the loop oscillates at the start of the runs at {} and comes to rest, in each run in "
+        "another way: a limit cycle, as coarse steps of the command or friction cause",
+        names_of(frequencies));
+    finding.remedy =
+        "raise the level, excite all axes in every experiment, or use a finer converter";
+  }
   findings.push_back(std::move(finding));
   return findings;
 }

@@ -25,7 +25,10 @@ namespace stageid {
 ///
 /// A drift changes the periods along a straight line, which test 1 detects as well. The phase of the curvature K
 /// relative to the slope L (RunStart) is the same in all runs for a transient and random for a drift. If neither it
-/// nor test 2 shows a decay, the finding is a drift.
+/// nor test 2 shows a decay, or if less than 2 % decays in a period, the finding is a drift.
+///
+/// Where test 2 finds a decay but the phases of the runs do not agree, the motion is not that of a linear system: a limit
+/// cycle that comes to rest.
 ///
 /// From W = c B follows q: c = (q - mean q^2...q^P) / (1 - mean q...q^P). The transient in the mean of the used
 /// periods, relative to its noise and over all runs, sensors and lines of the window, bounds the shift of every

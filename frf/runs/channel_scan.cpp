@@ -66,6 +66,7 @@ void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples,
       const std::uint64_t counts = driven == nullptr || driven[i] != 0 ? 1 : 0;
       const bool repeats_last = stretch_ > 0 && v == last_;
       stretch_ = repeats_last ? stretch_ + 1 : 1;
+      stretches_ += repeats_last ? 0 : 1;
       driven_ = repeats_last ? driven_ + counts : 1;
       longest_ = std::max(longest_, stretch_);
       longest_driven_ = std::max(longest_driven_, driven_);
@@ -73,6 +74,7 @@ void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples,
     }
     return;
   }
+  stretches_ += static_cast<std::uint64_t>(samples.size());
   stretch_ = driven_ = 1;
   longest_ = std::max(longest_, stretch_);
   longest_driven_ = std::max(longest_driven_, driven_);
@@ -83,6 +85,7 @@ void ChannelScan::add(const ChannelScan& other) noexcept {
   high_.add(other.high_);
   low_.add(other.low_);
   samples_ += other.samples_;
+  stretches_ += other.stretches_;
   longest_ = std::max(longest_, other.longest_);
   longest_driven_ = std::max(longest_driven_, other.longest_driven_);
 }
@@ -93,6 +96,12 @@ Extreme ChannelScan::low() const noexcept {
 
 bool ChannelScan::returns() const noexcept {
   return high_.value != low().value && std::max(high_.count, low_.count) > longest_;
+}
+
+double ChannelScan::expected_constant() const noexcept {
+  if (stretches_ == 0 || stretches_ == samples_) return 1.0;
+  const auto n = static_cast<double>(stretches_);
+  return -std::log(n) / std::log1p(-n / static_cast<double>(samples_));
 }
 
 double ChannelScan::log_p_high() const noexcept { return log_p_of_pile(high_); }

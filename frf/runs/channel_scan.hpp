@@ -32,6 +32,9 @@ class ChannelScan {
   std::uint64_t samples() const noexcept { return samples_; }
   /// The largest number of driven samples in a sequence of equal ones.
   std::uint64_t longest_constant() const noexcept { return longest_driven_; }
+  /// Length that the longest sequence of equal samples has if each repeats the previous one with the same probability p,
+  /// as behind a coarse converter: ln(number of sequences) / ln(1 / p).
+  double expected_constant() const noexcept;
   const Extreme& high() const noexcept { return high_; }
   Extreme low() const noexcept;  ///< of the negated samples, with the original sign
 
@@ -51,6 +54,7 @@ class ChannelScan {
   Extreme high_;
   Extreme low_;  // of the negated samples
   std::uint64_t samples_ = 0;
+  std::uint64_t stretches_ = 0;
   std::uint64_t stretch_ = 0;
   std::uint64_t driven_ = 0;  // within the current sequence
   std::uint64_t longest_ = 0;

@@ -28,6 +28,7 @@ class Examination {
   void check_cycles();
   void check_samples();
   void check_responses();
+  void find_drowned(const std::vector<Eigen::Index>& sensors);
   void check_arrival();
   void check_excitation();
   void check_injection();
@@ -51,6 +52,7 @@ class Examination {
   bool find_suspected(Eigen::Index first, Eigen::Index count);
   std::vector<Eigen::Index> excited_actuators() const;
   bool expected_to_respond(Eigen::Index sensor, bool& known) const;
+  bool expected_above_noise(Eigen::Index sensor) const;
   bool controlled(Eigen::Index actuator, bool& known) const;
   std::string why_no_nominal(bool all_sensors) const;
 

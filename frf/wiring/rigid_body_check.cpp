@@ -43,7 +43,7 @@ struct Gains {
 Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j) {
   const auto K = static_cast<Index>(lines.size());
   const double highest = std::pow(lines.back().omega_rad_s, 2);
-  Eigen::MatrixXd X(K, 3);
+  Eigen::MatrixXd X(K, 4);
   Eigen::MatrixXd rhs(K, 2);
   for (Index k = 0; k < K; ++k) {
     const PlantLine& line = lines[static_cast<std::size_t>(k)];
@@ -53,10 +53,10 @@ Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j)
     const double variance =
         0.5 * line.variance(i, j) + kRigidModelError * kRigidModelError * row_square;
     const double w = 1.0 / (omega2 * std::sqrt(std::max(1e-300, variance)));
-    X.row(k) << w, w * x, w * x * x;
+    X.row(k) << w, w * x, w * x * x, w / x;  // body, modes above, suspension below
     rhs.row(k) << -w * omega2 * line.G(i, j).real(), -w * omega2 * line.G0(i, j).real();
   }
-  const Eigen::Matrix3d normal_inverse = (X.transpose() * X).inverse();
+  const Eigen::Matrix4d normal_inverse = (X.transpose() * X).inverse();
   const Eigen::MatrixXd solution = normal_inverse * X.transpose() * rhs;
   return {solution(0, 0), solution(0, 1), normal_inverse(0, 0)};
 }

@@ -67,15 +67,12 @@ void Examination::check_injection() {
     const std::string figure = std::abs(m.factor - 1.0) < 1e-5
                                    ? std::string("identical")
                                    : fmt::format("factor {:.6g}", m.factor);
-    if (known || mapped.size() < all) {
-      find(Severity::fault, Cause::injection, name(record_.n_y() + m.actuator),
-           fmt::format("equals the excitation {}: it contains no feedback", excitation), figure,
-           "map the plant input (after the summation point)");
-    } else {
-      find(Severity::doubt, Cause::injection, name(record_.n_y() + m.actuator),
-           fmt::format("equals the excitation {}, which is correct only in open loop", excitation),
-           figure, "in a closed loop, map the plant input (after the summation point)");
-    }
+    const bool may_be_open = !known && mapped.size() >= all;
+    find(Severity::fault, Cause::injection, name(record_.n_y() + m.actuator),
+         fmt::format("equals the excitation {}: it contains no feedback", excitation), figure,
+         may_be_open ? "in a closed loop, map the plant input (after the summation point); if the "
+                       "loop is open, say so with a controller file: --stage FILE"
+                     : "map the plant input (after the summation point)");
     spoilt_.push_back(record_.n_y() + m.actuator);
   }
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/file/frf_file.hpp"
@@ -27,7 +28,7 @@ namespace {
 
 /// The delay of the stage that a stageid log declares; 0 for other logs.
 double declared_delay_s(const std::filesystem::path& log) {
-  const auto json = nlohmann::json::parse(open_log(log)->info().metadata_json, nullptr, false);
+  const auto json = parse_json<nlohmann::json>(open_log(log)->info().metadata_json);
   return number_in(json, "transport_delay_s").value_or(0.0);
 }
 

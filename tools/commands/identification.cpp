@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <iterator>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
@@ -64,6 +66,10 @@ bool is_complete(const std::filesystem::path& log, const ExperimentConfig& confi
   return true;
 }
 
+constexpr std::array kResults = {"excitation.h5", "run.slog",   "frf.h5",   "frf_validation.h5",
+                                 "modes.json",    "model.json", "model.h5", "model.csv",
+                                 "summary.json",  "report.html"};
+
 }  // namespace
 
 Identification::Identification(const ExperimentConfig& config, IdentificationRequest request,
@@ -71,6 +77,7 @@ Identification::Identification(const ExperimentConfig& config, IdentificationReq
     : config_(config), request_(std::move(request)), console_(console), plan_(make_plan(config)) {}
 
 int Identification::run() {
+  for (const char* name : kResults) note_own_file(path(name));
   require_backend(config_, config_.stage.backend, config_.stage.spec.pace);
   say_at_interrupt("finished steps are kept; continue with --resume");
   design();

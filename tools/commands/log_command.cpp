@@ -9,6 +9,7 @@
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/formats/convert_log.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
@@ -84,7 +85,7 @@ Json info_json(const LogReader& log) {
                             {"started_utc", run.started_utc},
                             {"health", counts_json(run.health)},
                             {"timing", timing_json(run.timing)}});
-  json["metadata"] = Json::parse(info.metadata_json, nullptr, false);
+  json["metadata"] = parse_json<Json>(info.metadata_json);
   return json;
 }
 

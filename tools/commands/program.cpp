@@ -96,6 +96,7 @@ class Program {
       return kDone;
     }
     refuse_unknown_command(argc, argv);
+    refuse_empty_words(argc, argv);
     if (!parse(argc, argv)) return kDone;
     if (app_.get_subcommands().empty())
       throw std::invalid_argument("no command given; 'stageid --help' lists the commands");
@@ -103,6 +104,14 @@ class Program {
   }
 
  private:
+  /// An empty word is a variable without value in a script. As the name of an output it would mean none.
+  static void refuse_empty_words(int argc, const char* const* argv) {
+    for (int k = 2; k < argc; ++k)
+      if (*argv[k] == '\0')
+        throw std::invalid_argument(fmt::format(
+            "the word after '{}' is empty; write a value, or leave both out", argv[k - 1]));
+  }
+
   void refuse_unknown_command(int argc, const char* const* argv) const {
     const std::vector<std::string> names = names_of(command_tree(app_).commands);
     int first = 1;

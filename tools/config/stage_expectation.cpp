@@ -6,6 +6,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "tools/config/controller_file.hpp"
@@ -81,7 +82,7 @@ std::optional<NominalStage> nominal_stage_of(const LogInfo& info,
     if (is_controller_file(document)) return with_channels_of(info, read_controller_file(document));
     return nominal_stage(load_stage_config(stage_file).spec);
   }
-  const auto json = nlohmann::json::parse(info.metadata_json, nullptr, false);
+  const auto json = parse_json<nlohmann::json>(info.metadata_json);
   const std::string stage = text_in(json, "stage");
   if (stage.empty()) return std::nullopt;
   try {

@@ -19,6 +19,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/file_kind.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/system_reason.hpp"
 
 namespace stageid {
@@ -225,6 +226,7 @@ void YamlDocument::fail(const YamlMark& mark, const std::string& message) const 
 YamlDocument YamlDocument::read(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(file))
     throw FileError(fmt::format("{}: is a directory; use a YAML file", file.string()));
+  note_input(file);
   std::ifstream stream(file, std::ios::binary);
   if (!stream)
     throw FileError(fmt::format("{}: cannot be read: {}", file.string(), system_reason(errno)));

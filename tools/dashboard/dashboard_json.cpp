@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "acquisition/files/json_text.hpp"
 #include "tools/report/page_template.hpp"
 #include "tools/report/timing_json.hpp"
 
@@ -100,8 +101,7 @@ std::string dashboard_state_json(const DashboardState& s) {
       {"exit_code", s.exit_code ? Json(*s.exit_code) : Json()}};
   add_counts(s, json);
   json["events"] = Json::array();
-  for (const std::string& event : s.events)
-    json["events"].push_back(Json::parse(event, nullptr, false));
+  for (const std::string& event : s.events) json["events"].push_back(parse_json<Json>(event));
   return text_of(json);
 }
 

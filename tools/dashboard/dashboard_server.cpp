@@ -25,6 +25,8 @@ constexpr int kNice = 10;
 constexpr int kOtherThreads = 8;  // besides those of the streams: pages, responses, the abort
 constexpr auto kKeepAlive = 250ms;
 constexpr int kKeepAlive_ms = 1000;  // until the next request of a connection
+constexpr std::size_t kLargestHead = std::size_t{1}
+                                     << 14;  // with the cookies of other servers here
 constexpr const char* kAbortHeader = "X-Stageid";
 
 /// Not those of httplib, which let two programs share a port.
@@ -48,8 +50,9 @@ std::string host_in_url(const std::string& host) {
 
 }  // namespace
 
-/// One request of a client, with a deadline for its header and body. httplib limits the time between two pieces
-/// only, so a few clients that send a byte now and then would occupy all threads.
+/// One request of a client, with a deadline and a largest size for its header and body. httplib limits the time between
+/// two pieces only, so a few clients that send a byte now and then would occupy all threads, and keeps lines and bodies
+/// of any length.
 class PatientStream final : public httplib::Stream {
  public:
   explicit PatientStream(int socket) : socket_(socket) {}
@@ -58,8 +61,13 @@ class PatientStream final : public httplib::Stream {
   bool is_readable() const override { return ready(POLLIN); }
   bool is_writable() const override { return ready(POLLOUT); }
   ssize_t read(char* data, std::size_t size) override {
-    return is_readable() ? ::recv(socket_, data, size, 0) : -1;
+    const ssize_t got =
+        left_ > 0 && is_readable() ? ::recv(socket_, data, std::min(size, left_), 0) : -1;
+    if (got > 0) left_ -= static_cast<std::size_t>(got);
+    return got;
   }
+  bool is_exhausted() const { return left_ == 0; }
+
   ssize_t write(const char* data, std::size_t size) override {
     return is_writable() ? ::send(socket_, data, size, MSG_NOSIGNAL) : -1;
   }
@@ -78,6 +86,7 @@ class PatientStream final : public httplib::Stream {
   }
 
   int socket_;
+  std::size_t left_ = kLargestHead + DashboardServer::kLargestBody;
   Clock::time_point deadline_ = Clock::now() + kPatience;
 };
 
@@ -90,8 +99,10 @@ class PatientServer final : public httplib::Server {
       if (svr_sock_ == INVALID_SOCKET || ::poll(&next, 1, kKeepAlive_ms) <= 0) break;
       PatientStream stream(socket);
       good = process_request(stream, left == 1, closed, [&stream](httplib::Request& request) {
+        request.ranges.clear();  // each would be a copy of the page
         if (request.method == "GET") stream.request_is_read();
       });
+      good = good && !stream.is_exhausted();  // what follows is the rest of this request
     }
     ::shutdown(socket, SHUT_RDWR);
     ::close(socket);

@@ -11,6 +11,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "estimation/modal/validation.hpp"
 #include "estimation/model/additive_model.hpp"
 #include "frf/file/frf_file.hpp"
@@ -111,7 +112,7 @@ auto interpolated(const Columns& columns, const Between& at) {
 }
 
 double period_s_of(const FrfEstimate& frf) {
-  const auto json = nlohmann::json::parse(frf.provenance_json, nullptr, false);
+  const auto json = parse_json<nlohmann::json>(frf.provenance_json);
   if (!json.is_object() || !json.contains("options")) return 0.0;
   return number_in(json["options"], "period_samples").value_or(0.0) / frf.sample_rate_hz;
 }

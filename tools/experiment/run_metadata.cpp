@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 #include "acquisition/record/utc_time.hpp"
 
@@ -30,12 +31,11 @@ std::string run_metadata(const ExperimentConfig& config, Backend backend, const 
 }
 
 std::string measurement_id_of(const LogInfo& info) {
-  return text_in(Json::parse(info.metadata_json, nullptr, false), "measurement_id");
+  return text_in(parse_json<Json>(info.metadata_json), "measurement_id");
 }
 
 double wall_period_s(const LogInfo& info) {
-  const double pace =
-      number_in(Json::parse(info.metadata_json, nullptr, false), "pace").value_or(0.0);
+  const double pace = number_in(parse_json<Json>(info.metadata_json), "pace").value_or(0.0);
   return pace > 0.0 ? 1.0 / (info.sample_rate_hz * pace) : 0.0;
 }
 

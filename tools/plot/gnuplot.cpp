@@ -11,12 +11,11 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <string_view>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/terminal/interrupt.hpp"
 
@@ -88,13 +87,6 @@ std::vector<std::string> environment_of_gnuplot() {
     if (!text.starts_with("LC_ALL=") && !text.starts_with("TZ=")) out.emplace_back(text);
   }
   return out;
-}
-
-std::string read_whole(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
 }
 
 std::atomic<pid_t> running_gnuplot = -1;
@@ -197,10 +189,12 @@ void draw(const Picture& picture, const std::filesystem::path& file) {
                   preamble(picture, format) + picture.script + "unset output\n");
   const int status = run_gnuplot(directory.path());
   throw_if_interrupted();
-  std::string bytes = read_whole(directory.path() / "picture");
+  const std::filesystem::path picture_file = directory.path() / "picture";
+  std::string bytes =
+      std::filesystem::exists(picture_file) ? read_whole_file(picture_file) : std::string();
   if (status != 0 || !is_whole(bytes, format))
     throw FileError(fmt::format("{}: gnuplot failed: {}; check the free space in {}", file.string(),
-                                first_message(read_whole(directory.path() / "messages")),
+                                first_message(read_whole_file(directory.path() / "messages")),
                                 std::filesystem::temp_directory_path().string()));
   if (format == PictureFormat::pdf) forget_date(bytes);
   write_text_file(file, bytes);

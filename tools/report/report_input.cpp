@@ -3,16 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
@@ -30,21 +30,13 @@ namespace {
 
 using Json = nlohmann::json;
 
-std::string read_text(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw FileError(fmt::format("{}: cannot be read; check the path", file.string()));
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
-
 /// The format in the file: "stageid-frf", "stageid-log", ...; empty if there is none.
 std::string kind_of(const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
   if (ending == ".slog") return "stageid-log";
   if (ending == ".yaml" || ending == ".yml") return "stageid-stage";
   if (ending == ".json") {
-    const Json json = Json::parse(read_text(file), nullptr, false);
+    const Json json = parse_json<Json>(read_whole_file(file));
     if (json.is_discarded())
       throw FormatError(file, "", "is not JSON, or is truncated; copy it again or write it again");
     return text_in(json, "format");
@@ -183,7 +175,7 @@ void add_log(ReportData& data, const std::filesystem::path& file) {
   const std::unique_ptr<LogReader> log = open_log(file, false);
   data.runs = log->runs();
   data.sample_rate_hz = log->info().sample_rate_hz;
-  const Json metadata = Json::parse(log->info().metadata_json, nullptr, false);
+  const Json metadata = parse_json<Json>(log->info().metadata_json);
   if (!metadata.is_object()) return;
   data.period_s = wall_period_s(log->info());
   data.geometry = geometry_of_log(file, metadata);
@@ -254,7 +246,7 @@ void complete_report(ReportData& data, const ReportSources& sources) {
   }
   if (!sources.log.empty()) add_log(data, sources.log);
   if (!sources.stage.empty())
-    data.geometry = stage_geometry(sources.stage, read_text(sources.stage));
+    data.geometry = stage_geometry(sources.stage, read_whole_file(sources.stage));
   if (!data.geometry.stage.empty()) data.title = data.geometry.stage;
   if (!sources.summary.is_null()) add_summary(data, sources.summary_file, sources.summary);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "acquisition/files/json_text.hpp"
 #include "estimation/model/cmif_deviation.hpp"
 #include "frf/response/confidence.hpp"
 #include "frf/response/responding_channels.hpp"
@@ -259,7 +260,7 @@ Json run_json(const LogRun& run, double sample_rate_hz) {
 
 /// A provenance as JSON if it can be parsed, else as text.
 Json provenance(const std::string& text) {
-  Json parsed = Json::parse(text, nullptr, false);
+  Json parsed = parse_json<Json>(text);
   return parsed.is_discarded() ? Json(text) : parsed;
 }
 

@@ -8,6 +8,7 @@
 
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 #include "frf/response/nonlinearity_sentence.hpp"
 #include "tools/fit/frf_quality.hpp"
@@ -40,7 +41,7 @@ std::string provenance(const FitSetup& setup, const FitResult& result, const std
   json["decisions"] = result.decisions;
   if (!doubts.empty()) json["doubts"] = doubts;
   if (setup.distortion.band_hz.size() > 0) json["distortion"] = distortion_json(setup.distortion);
-  const Json frf = Json::parse(setup.frf.provenance_json, nullptr, false);
+  const Json frf = parse_json<Json>(setup.frf.provenance_json);
   json["frf"] = frf.is_discarded() ? Json::object() : frf;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -115,7 +116,7 @@ FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
 }
 
 Distortion distortion_of(const AdditiveModel& model) {
-  const Json json = Json::parse(model.provenance_json, nullptr, false);
+  const Json json = parse_json<Json>(model.provenance_json);
   const Eigen::Index channels = model.n_outputs() * model.n_inputs();
   Distortion out;
   if (!json.is_object() || !json.contains("distortion") || !json["distortion"].is_array())
@@ -136,11 +137,11 @@ Distortion distortion_of(const AdditiveModel& model) {
 }
 
 std::vector<std::string> decisions_of(const AdditiveModel& model) {
-  return texts_in(Json::parse(model.provenance_json, nullptr, false), "decisions");
+  return texts_in(parse_json<Json>(model.provenance_json), "decisions");
 }
 
 std::vector<std::string> doubts_of(const AdditiveModel& model) {
-  return texts_in(Json::parse(model.provenance_json, nullptr, false), "doubts");
+  return texts_in(parse_json<Json>(model.provenance_json), "doubts");
 }
 
 std::string relative_error_text(const FitRecord& fit) {

@@ -10,6 +10,7 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/health/data_health.hpp"
@@ -25,7 +26,7 @@ using Json = nlohmann::ordered_json;
 
 /// The reproducible part of the metadata of a log: everything except times.
 Json lasting_metadata(const LogReader& log) {
-  Json metadata = Json::parse(log.info().metadata_json, nullptr, false);
+  Json metadata = parse_json<Json>(log.info().metadata_json);
   if (!metadata.is_object()) return Json::object();
   metadata.erase("started_utc");
   return metadata;
@@ -44,7 +45,7 @@ Json options_json(const FrfOptions& options) {
 
 std::string complete_provenance(const FrfEstimate& frf, const std::vector<const LogReader*>& logs,
                                 const FrfOptions& options) {
-  Json provenance = Json::parse(frf.provenance_json, nullptr, false);
+  Json provenance = parse_json<Json>(frf.provenance_json);
   if (!provenance.is_object()) provenance = Json::object();
   provenance["stageid_version"] = version();
   provenance["request_id"] = frf_request_id(logs, options);
@@ -69,7 +70,7 @@ std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfO
 }
 
 std::string request_id_of(const std::string& provenance_json) {
-  return text_in(Json::parse(provenance_json, nullptr, false), "request_id");
+  return text_in(parse_json<Json>(provenance_json), "request_id");
 }
 
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,

@@ -9,6 +9,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/health/experiment_noise_check.hpp"
 #include "frf/health/interpolation_check.hpp"
@@ -126,7 +127,7 @@ std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings
   for (Finding& finding : unsettled_bands) findings.push_back(std::move(finding));
   std::stable_sort(findings.begin(), findings.end(),
                    [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });
-  Json provenance = Json::parse(frf.provenance_json, nullptr, false);
+  Json provenance = parse_json<Json>(frf.provenance_json);
   if (!provenance.is_object()) provenance = Json::object();
   provenance["health"] = health_json(findings);
   frf.provenance_json = provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -134,7 +135,7 @@ std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings
 }
 
 std::vector<Finding> health_of(const std::string& provenance_json) {
-  const Json provenance = Json::parse(provenance_json, nullptr, false);
+  const Json provenance = parse_json<Json>(provenance_json);
   std::vector<Finding> findings;
   if (!provenance.is_object() || !provenance.contains("health") || !provenance["health"].is_array())
     return findings;

@@ -44,6 +44,22 @@ bool numeric(const std::string& text) {
   return !text.empty() && (text[0] == '-' || text[0] == '+' || (text[0] >= '0' && text[0] <= '9'));
 }
 
+/// Names in foreign files may contain control characters, which a terminal would obey: they are shown as \x1B.
+std::string shown(const std::string& text) {
+  std::string plain;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const auto byte = static_cast<unsigned char>(text[k]);
+    const auto next = static_cast<unsigned char>(k + 1 < text.size() ? text[k + 1] : '\0');
+    const bool c1 = byte == 0xC2 && next >= 0x80 && next < 0xA0;  // 0x80 to 0x9F in UTF-8
+    if (c1) ++k;
+    if (c1 || (byte < ' ' && byte != '\n' && byte != '\t') || byte == 0x7F)
+      plain += fmt::format("\\x{:02X}", c1 ? next : byte);
+    else
+      plain += text[k];
+  }
+  return plain;
+}
+
 /// Writes to stderr. A closed terminal is not a reason to abort the work.
 template <typename... Values>
 void tell(fmt::format_string<Values...> format, Values&&... values) {
@@ -65,7 +81,7 @@ void print_result(fmt::format_string<Values...> format, Values&&... values) {
 }  // namespace
 
 void Console::result(const std::string& line) const {
-  if (!json) print_result("{}\n", line);
+  if (!json) print_result("{}\n", shown(line));
 }
 void Console::result(const nlohmann::ordered_json& object) const {
   // Names from foreign files may contain anything: invalid UTF-8 is replaced instead of an exception.
@@ -74,12 +90,16 @@ void Console::result(const nlohmann::ordered_json& object) const {
                  object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 void Console::message(const std::string& line) const {
-  if (verbosity >= Verbosity::normal) tell("{}\n", line);
+  if (verbosity >= Verbosity::normal) tell("{}\n", shown(line));
 }
 void Console::detail(const std::string& line) const {
-  if (verbosity >= Verbosity::debug) tell("{}\n", line);
+  if (verbosity >= Verbosity::debug) tell("{}\n", shown(line));
 }
-void Console::warning(const std::string& line) const { tell("stageid: {}\n", line); }
+void Console::warning(const std::string& line) const {
+  std::string one_line = shown(line);
+  std::replace(one_line.begin(), one_line.end(), '\n', ' ');
+  tell("stageid: {}\n", one_line);
+}
 
 Progress::Progress(const Console& console, std::string label, std::string unit, double scale)
     : console_(console),

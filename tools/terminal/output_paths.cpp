@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/system_reason.hpp"
 
@@ -38,6 +39,7 @@ std::string named(const std::filesystem::path& file, const std::string& message)
 }
 
 void require_readable(const std::filesystem::path& file) {
+  note_input(file);
   errno = 0;
   if (!std::ifstream(file, std::ios::binary) || std::filesystem::is_directory(file))
     throw FileError(fmt::format("{}: cannot be read: {}", file.string(),

@@ -5,11 +5,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 
 #include "acquisition/files/file_error.hpp"
-#include "tools/terminal/output_paths.hpp"
+#include "acquisition/files/input_files.hpp"
 
 namespace stageid {
 namespace {
@@ -18,10 +16,8 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // of UTF-8 files f
 
 }  // namespace
 
-TextLines::TextLines(const std::filesystem::path& file) : file_(file) {
-  require_readable(file);
-  std::ifstream stream(file, std::ios::binary);
-  if (stream) text_.assign(std::istreambuf_iterator<char>(stream), {});
+TextLines::TextLines(const std::filesystem::path& file)
+    : file_(file), text_(read_whole_file(file)) {
   if (text_.starts_with(kByteOrderMark)) at_ = kByteOrderMark.size();
 }
 

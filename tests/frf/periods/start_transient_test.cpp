@@ -135,9 +135,11 @@ TEST(StartTransient, TheEstimateGathersTheSame) {
       estimate_plant_frf_and_health({&log}, {.method = FrfMethod::lpm}).health.start.runs.empty());
 }
 
-/// 30 runs of five periods and the one before them: noise, and change(p) times a random phase on five lines.
+/// 30 runs of five periods and the one before them: noise, and change(p) times a random phase on `lines` lines, which is
+/// the same in all periods of a run or `new_phases` in each.
 template <typename Change>
-std::vector<Finding> of_change(const Change& change, std::uint64_t seed) {
+std::vector<Finding> of_change(const Change& change, std::uint64_t seed, bool new_phases = false,
+                               Eigen::Index lines = 5) {
   test::RandomNumbers random(seed);
   StartEvidence evidence{.frequency_hz = Eigen::VectorXd::LinSpaced(60, 5.0, 64.0),
                          .runs = {},
@@ -148,13 +150,17 @@ std::vector<Finding> of_change(const Change& change, std::uint64_t seed) {
     const auto period = [&](const Eigen::MatrixXcd& shape, int p) {
       Eigen::MatrixXcd Z =
           Eigen::MatrixXcd::NullaryExpr(2, 60, [&random] { return random.circular(); });
-      Z.middleCols(30, 5) += change(p) * shape;
+      Z.middleCols((60 - lines) / 2, lines) += change(p) * shape;
       return Z;
     };
-    const Eigen::MatrixXcd shape =
-        Eigen::MatrixXcd::NullaryExpr(2, 5, [&random] { return random.circular(); });
-    StartRecorder recorder(period(shape, 0));
-    for (int p = 1; p <= 4; ++p) recorder.take(period(shape, p));
+    Eigen::MatrixXcd shape;
+    const auto next = [&](int p) {
+      if (p == 0 || new_phases)
+        shape = Eigen::MatrixXcd::NullaryExpr(2, lines, [&random] { return random.circular(); });
+      return period(shape, p);
+    };
+    StartRecorder recorder(next(0));
+    for (int p = 1; p <= 4; ++p) recorder.take(next(p));
     evidence.runs.push_back(recorder.finish());
   }
   return check_start_transient(evidence);
@@ -181,6 +187,27 @@ TEST(StartTransient, ADecayIsNoDrift) {
       named += found.size() == 1 && found[0].cause == Cause::unsettled;
     }
     EXPECT_GE(named, 19) << q;
+  }
+}
+
+// A loop that oscillates and comes to rest is not linear: no phase of one period follows from that of the last.
+TEST(StartTransient, ADecayWithoutACommonRatioIsALimitCycle) {
+  int named = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const std::vector<Finding> found =
+        of_change([](int p) { return 30.0 * std::pow(0.5, p); }, seed, true);
+    named += found.size() == 1 && found[0].cause == Cause::limit_cycle;
+  }
+  EXPECT_GE(named, 19);
+}
+
+// A mode that rings for a thousand periods is rarer than one that drifts.
+TEST(StartTransient, WhatHardlyDecaysIsADrift) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const std::vector<Finding> found =
+        of_change([](int p) { return 3e5 * std::pow(0.99, p); }, seed, false, 60);
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_EQ(found[0].cause, Cause::drift) << found[0].figure;
   }
 }
 

@@ -45,6 +45,23 @@ TEST(ChannelScan, SumOfPartsIsTheWhole) {
   EXPECT_EQ(first.samples(), whole.samples());
 }
 
+// A slow signal behind a coarse converter repeats values for long everywhere; a stuck channel does so once.
+TEST(ChannelScan, ExpectsTheRepetitionsOfACoarseConverter) {
+  const Eigen::VectorXd noise = normal_samples(100000, 3);
+  Eigen::VectorXd slow(noise.size());
+  double state = 0.0;
+  for (Eigen::Index i = 0; i < noise.size(); ++i)
+    slow[i] = state = 0.9 * state + std::sqrt(0.19) * noise[i];
+  ChannelScan coarse;
+  coarse.add(Eigen::VectorXd((slow / 2.0).array().round()));
+  EXPECT_GT(coarse.expected_constant(), 0.5 * static_cast<double>(coarse.longest_constant()));
+  EXPECT_LT(coarse.expected_constant(), 2.0 * static_cast<double>(coarse.longest_constant()));
+  slow.segment(20000, 2000).setZero();
+  ChannelScan stuck;
+  stuck.add(slow);
+  EXPECT_LT(100.0 * stuck.expected_constant(), static_cast<double>(stuck.longest_constant()));
+}
+
 /// The definition, sample by sample.
 std::uint64_t longest_stretch(const Eigen::VectorXd& x) {
   std::uint64_t longest = 0;

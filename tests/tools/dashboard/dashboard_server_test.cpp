@@ -22,8 +22,13 @@ using namespace std::chrono_literals;
 /// A connection that requests the stream and may or may not read it.
 class RawWatcher {
  public:
+  struct Request {
+    std::string bytes;
+  };
   explicit RawWatcher(int port, const std::string& path = "/events")
-      : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+      : RawWatcher(port, Request{"GET " + path + " HTTP/1.1\r\nHost: localhost:" +
+                                 std::to_string(port) + "\r\n\r\n"}) {}
+  RawWatcher(int port, const Request& request) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
     const int small = 1024;
     ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
     sockaddr_in to{};
@@ -31,15 +36,17 @@ class RawWatcher {
     to.sin_port = htons(static_cast<std::uint16_t>(port));
     to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     const bool connected = ::connect(socket_, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0;
-    const std::string request =
-        "GET " + path + " HTTP/1.1\r\nHost: localhost:" + std::to_string(port) + "\r\n\r\n";
-    good_ = connected && ::send(socket_, request.data(), request.size(), 0) ==
-                             static_cast<ssize_t>(request.size());
+    good_ = connected && send(request.bytes);
   }
   ~RawWatcher() { ::close(socket_); }
   RawWatcher(const RawWatcher&) = delete;
   RawWatcher& operator=(const RawWatcher&) = delete;
   bool good() const { return good_; }
+  /// False if the other end has hung up.
+  bool send(const std::string& bytes) const {
+    return ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
+           static_cast<ssize_t>(bytes.size());
+  }
   /// What comes until `end` is in it.
   std::string read_until(const std::string& end) const {
     std::string text;
@@ -126,6 +133,31 @@ TEST_F(DashboardServerTest, ClientsThatTrickleTheirHeaderDoNotLockOthersOut) {
   for (const int socket : sockets) ::close(socket);
   ASSERT_TRUE(result) << "no answer";
   EXPECT_EQ(result->body, "<p>page</p>");
+}
+
+TEST_F(DashboardServerTest, KeepsNoMoreOfARequestThanABrowserSends) {
+  serve();
+  const std::string post = "POST /abort HTTP/1.1\r\nHost: localhost:" + std::to_string(port_);
+  const std::string junk(std::size_t{1} << 16, 'x');
+  for (const std::string& begin :
+       {std::string(), post + "\r\n\r\n", post + "\r\nContent-Length: 1000000000\r\n\r\n",
+        post + "\r\nTransfer-Encoding: chunked\r\n\r\n7FFFFFFF\r\n"}) {
+    const RawWatcher client(port_, RawWatcher::Request{begin});
+    std::size_t sent = 0;
+    constexpr std::size_t kMost = std::size_t{64} << 20;
+    while (sent < kMost && client.send(junk)) sent += junk.size();
+    EXPECT_LT(sent, kMost) << begin;  // the server hung up
+  }
+  EXPECT_EQ(client().Get("/")->body, "<p>page</p>");
+}
+
+TEST_F(DashboardServerTest, SendsThePageOnceHoweverManyRangesAreAskedFor) {
+  serve();
+  std::string ranges = "bytes=0-";
+  for (int k = 0; k < 1000; ++k) ranges += ",0-";
+  const auto answer = client().Get("/", {{"Range", ranges}});
+  ASSERT_TRUE(answer);
+  EXPECT_LT(answer->body.size(), 100U);
 }
 
 TEST_F(DashboardServerTest, StreamsTheNewestState) {

@@ -45,7 +45,8 @@ TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
   fail({"run", log, "-o", name("x.slog")}, 2, "run.slog: is a native log, not a YAML file;");
   fail({"export", config_, "-o", name("m.mat")}, 2, "is an experiment file, not a model (.json);");
   std::filesystem::create_directory(at("folder.json"));
-  fail({"export", name("folder.json"), "-o", name("m.mat")}, 1, "is a directory; give a JSON file");
+  fail({"export", name("folder.json"), "-o", name("m.mat")}, 1,
+       "is a directory; give the name of a file");
 }
 
 TEST_F(BadRequest, MissingFiles) {

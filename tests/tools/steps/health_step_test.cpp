@@ -55,6 +55,16 @@ TEST(DataHealth, EveryPlantedFaultIsNamedAndNothingElse) {
   }
 }
 
+// A cubic spring stiffens the suspension beyond the configured one. Above it, the mass is right.
+TEST(DataHealth, AStifferSuspensionIsNoWrongScale) {
+  test::FaultyLogRequest request = request_of(5);
+  for (double& hz : request.plant.suspension_hz) hz *= 4.0;
+  const MemoryLog log = test::simulate_faulty_log(request, {});
+  const auto findings =
+      check_health(read_health_record({&log}, {}), nominal_stage(request.configured));
+  EXPECT_TRUE(health_notes(findings).empty()) << told(findings);
+}
+
 TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
   test::FaultyLogRequest request = request_of(4);
   request.axes = 3;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 
 #include "acquisition/files/file_error.hpp"
 #include "tools/terminal/text_lines.hpp"
@@ -68,9 +69,10 @@ bool all_numbers(const std::vector<std::string>& fields, char separator) {
 
 std::vector<std::string> names_of(const TextLines& lines, const std::vector<std::string>& fields) {
   std::vector<std::string> names;
+  std::set<std::string> known;
   for (const std::string& field : fields) {
     names.push_back(utf8_of_text(trimmed(field)));
-    if (!names.back().empty() && std::count(names.begin(), names.end(), names.back()) > 1)
+    if (!names.back().empty() && !known.insert(names.back()).second)
       lines.fail(fmt::format("duplicate column name '{}'; rename one", names.back()));
   }
   return names;

@@ -9,6 +9,7 @@
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 
 #include "tools/exchange/arrays/csv_table.hpp"
@@ -146,7 +147,7 @@ void describe(const ArrayList& arrays, FrfEstimate& frf) {
     return;
   }
   try {
-    read_description(nlohmann::json::parse(text), frf);
+    read_description(parse_json<nlohmann::json>(text), frf);
   } catch (const nlohmann::json::exception&) {
     throw FormatError(arrays.file, "",
                       "its line '# {\"format\":...}' is damaged. Remove that line, or export the "

@@ -1,14 +1,15 @@
 #include <fmt/format.h>
 
 #include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
+#include "tools/exchange/arrays/arrays_in_child.hpp"
 #include "tools/exchange/arrays/named_array.hpp"
 
 namespace stageid {
 namespace {
 
-/// Deeper groups are not expected; a group that links to itself is infinitely deep.
-constexpr int kDeepest = 20;
+constexpr int kDeepest = 20;  // deeper groups are not expected
 
 std::vector<std::size_t> sizes(const std::vector<hsize_t>& shape) {
   return {shape.begin(), shape.end()};
@@ -98,10 +99,12 @@ void write_dataset(Hdf5File& file, const NamedArray& array) {
 }  // namespace
 
 ArrayList read_hdf5_arrays(const std::filesystem::path& path) {
-  const Hdf5File file = Hdf5File::open(path);
-  ArrayList list{path, {}};
-  read_object(file, "/", 0, list);
-  return list;
+  note_input(path);
+  return arrays_in_child(path, [](const std::filesystem::path& file) {
+    ArrayList list{file, {}};
+    read_object(Hdf5File::open(file), "/", 0, list);
+    return list;
+  });
 }
 
 void write_hdf5_arrays(const std::filesystem::path& path, const ArrayList& list) {

@@ -64,7 +64,7 @@ class NpzArchive {
   std::string name(zip_uint64_t index) const { return member(index).name; }
 
   /// @throws FormatError naming the member
-  std::string content(zip_uint64_t index) const {
+  std::string content(zip_uint64_t index) {
     const zip_stat_t stat = member(index);
     const auto fail = [&](const char* what) { throw FormatError(file_, stat.name, what); };
     if (stat.encryption_method != ZIP_EM_NONE) fail("is encrypted; save it without a password");
@@ -72,6 +72,8 @@ class NpzArchive {
     if (!stored && stat.comp_method != ZIP_CM_DEFLATE)
       fail("unsupported compression method; use numpy.savez()");
     if (stat.comp_size > bytes_) fail("unexpected end of file; the file is truncated or damaged");
+    taken_ += stat.comp_size;
+    if (taken_ > bytes_) fail("shares its bytes with another member; the file is damaged");
     if (stat.size > (stored ? stat.comp_size : kMostInflation * (stat.comp_size + 1)))
       fail("its size is damaged");
     const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> opened(
@@ -100,6 +102,7 @@ class NpzArchive {
 
   const std::filesystem::path& file_;
   zip_uint64_t bytes_ = 0;
+  zip_uint64_t taken_ = 0;  ///< by the members read
   std::unique_ptr<zip_t, decltype(&zip_discard)> archive_;
 };
 
@@ -252,7 +255,7 @@ NamedArray array_of(const std::filesystem::path& file, std::string name, std::st
 
 ArrayList read_npz(const std::filesystem::path& file) {
   require_readable(file);
-  const NpzArchive archive(file);
+  NpzArchive archive(file);
   ArrayList list{file, {}};
   for (zip_uint64_t i = 0; i < archive.members(); ++i) {
     std::string name = archive.name(i);

@@ -6,13 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <string_view>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/input_files.hpp"
 
 namespace stageid {
 namespace {
@@ -129,8 +128,7 @@ UnreadVariable unread_object(const std::string& name, const std::string& object_
 }
 
 std::vector<UnreadVariable> objects_of_v5(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  const std::string content(std::istreambuf_iterator<char>(stream), {});
+  const std::string content = read_whole_file(path);
   std::vector<UnreadVariable> objects;
   if (!content.starts_with("MATLAB 5.0") || content.size() < kHeadBytes) return objects;
   const bool big_endian = content[126] == 'M';

@@ -9,7 +9,9 @@
 #include <string_view>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/hdf5_library.hpp"
+#include "tools/exchange/arrays/arrays_in_child.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
 #include "tools/exchange/matlab/mat_objects.hpp"
 #include "tools/terminal/output_paths.hpp"
@@ -260,11 +262,9 @@ std::string no_matlab_file(const std::filesystem::path& path) {
   return "is not a MATLAB file, or is damaged; use a .mat file";
 }
 
-}  // namespace
-
-ArrayList read_mat(const std::filesystem::path& path) {
-  require_readable(path);
+ArrayList read_here(const std::filesystem::path& path) {
   prepare_hdf5();  // suppress the error output of HDF5
+  if (H5Fis_hdf5(path.c_str()) > 0) static_cast<void>(Hdf5File::open(path));  // refuses links
   const MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), &Mat_Close);
   if (!file) throw FormatError(path, "", no_matlab_file(path));
   const std::uintmax_t bytes = std::filesystem::file_size(path);
@@ -287,6 +287,13 @@ ArrayList read_mat(const std::filesystem::path& path) {
   if (list.arrays.empty() && list.unread.empty())
     throw FormatError(path, "", "contains no variables; the file is empty or damaged");
   return list;
+}
+
+}  // namespace
+
+ArrayList read_mat(const std::filesystem::path& path) {
+  require_readable(path);
+  return arrays_in_child(path, read_here);
 }
 
 }  // namespace stageid

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <complex>
-#include <fstream>
-#include <sstream>
 
 #include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/exchange/arrays/channel_order.hpp"
 #include "tools/exchange/model/modal_hdf5.hpp"
@@ -35,12 +34,8 @@ void write_submodels(Hdf5File& file, const AdditiveModel& model) {
 std::string model_text(const AdditiveModel& model, const std::filesystem::path& beside) {
   // write_model() only writes files, so its text is read from a temporary file beside the target.
   const OutputFile scratch(beside.string() + ".json");
-  const std::filesystem::path file = scratch.path();
-  write_model(file, model);
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
+  write_model(scratch.path(), model);
+  return read_whole_file(scratch.path());
 }
 
 /// Content needed by every reader: channels, delays, and the model in the format of stageid.

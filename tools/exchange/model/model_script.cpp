@@ -29,8 +29,16 @@ class Syntax {
     if (python_)
       return nlohmann::json(value).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
     std::string quoted = "'";
-    for (const char c : value) quoted.append(c == '\'' ? 2 : 1, c);
-    return quoted + "'";
+    bool joined = false;  // a line break would end the text, and begin a command
+    for (const char c : value) {
+      const bool control = static_cast<unsigned char>(c) < ' ';
+      joined = joined || control;
+      if (control)
+        quoted += fmt::format("', char({}), '", static_cast<int>(c));
+      else
+        quoted.append(c == '\'' ? 2 : 1, c);
+    }
+    return joined ? fmt::format("[{}']", quoted) : quoted + "'";
   }
 
   std::string texts(const std::vector<std::string>& values) const {

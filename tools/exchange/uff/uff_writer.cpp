@@ -3,10 +3,12 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
 
 #include "acquisition/files/output_file.hpp"
 #include "tools/exchange/uff/uff_file.hpp"
+#include "tools/terminal/text_lines.hpp"
 
 namespace stageid {
 namespace {
@@ -64,7 +66,10 @@ struct EvenAbscissa {
 
 EvenAbscissa even_abscissa(const std::vector<double>& x) {
   if (x.size() < 2) return {};
-  const EvenAbscissa found{true, std::stod(short_field(x[0])), std::stod(short_field(x[1] - x[0]))};
+  const std::optional<double> minimum = parse_number(short_field(x[0]));
+  const std::optional<double> step = parse_number(short_field(x[1] - x[0]));
+  if (!minimum || !step) return {};
+  const EvenAbscissa found{true, *minimum, *step};
   for (std::size_t k = 0; k < x.size(); ++k)
     if (found.minimum + static_cast<double>(k) * found.step != x[k]) return {};
   return found;
