@@ -17,6 +17,7 @@
 #include "estimation/search/growth_watch.hpp"
 #include "estimation/search/hidden_modes.hpp"
 #include "estimation/search/mode_worth.hpp"
+#include "estimation/search/overlapping_modes.hpp"
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/residue_rank_test.hpp"
 #include "estimation/search/search_advice.hpp"
@@ -210,6 +211,7 @@ class AutomaticFit {
     return changed;
   }
 
+  /// @returns false if no change is better
   bool change_structure() {
     const Sample sample(*this);
     std::vector<StructureMove> moves =
@@ -230,6 +232,7 @@ class AutomaticFit {
   /// Replaces two modes closer than a half-power width by one if the second is not worth its parameters.
   void merge() {
     for (std::size_t done = 0; !limit_reached();) {
+      if (overlapping_modes(best_.model).empty()) return;
       const Sample sample(*this);
       const std::vector<StructureMove> all = merges(sample.data.options, sample.data.model);
       for (; done < all.size(); done += kMergesAtOnce) {
@@ -278,6 +281,7 @@ class AutomaticFit {
     });
   }
 
+  /// The trial of a move on the sample. From nothing, the result depends on the structure only.
   FitResult tried(const Sample& sample, const StructureMove& move) {
     if (!move.from_nothing) return fit_additive_model(sample.data.frf, move.model, move.options);
     std::vector<std::size_t> structure = {static_cast<std::size_t>(sample.data.frf.lines())};
