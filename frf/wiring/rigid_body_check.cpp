@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "frf/response/rigid_lines.hpp"
 
@@ -40,10 +41,11 @@ struct Gains {
 };
 
 /// The constant terms of entry (i, j) of A and of A0, and their variance.
-Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j) {
+/// @param suspended with a term for a suspension that differs from the configured one
+Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j, bool suspended) {
   const auto K = static_cast<Index>(lines.size());
   const double highest = std::pow(lines.back().omega_rad_s, 2);
-  Eigen::MatrixXd X(K, 4);
+  Eigen::MatrixXd X(K, suspended ? 4 : 3);
   Eigen::MatrixXd rhs(K, 2);
   for (Index k = 0; k < K; ++k) {
     const PlantLine& line = lines[static_cast<std::size_t>(k)];
@@ -53,22 +55,23 @@ Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j)
     const double variance =
         0.5 * line.variance(i, j) + kRigidModelError * kRigidModelError * row_square;
     const double w = 1.0 / (omega2 * std::sqrt(std::max(1e-300, variance)));
-    X.row(k) << w, w * x, w * x * x, w / x;  // body, modes above, suspension below
+    X.row(k).head<3>() << w, w * x, w * x * x;
+    if (suspended) X(k, 3) = w / x;
     rhs.row(k) << -w * omega2 * line.G(i, j).real(), -w * omega2 * line.G0(i, j).real();
   }
-  const Eigen::Matrix4d normal_inverse = (X.transpose() * X).inverse();
+  const Eigen::MatrixXd normal_inverse = (X.transpose() * X).inverse();
   const Eigen::MatrixXd solution = normal_inverse * X.transpose() * rhs;
   return {solution(0, 0), solution(0, 1), normal_inverse(0, 0)};
 }
 
-Gains fit_gains(const std::vector<PlantLine>& lines) {
+Gains fit_gains(const std::vector<PlantLine>& lines, bool suspended) {
   const Index n_y = lines.front().G.rows();
   const Index n_u = lines.front().G.cols();
   Gains gains{Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u)};
   Eigen::MatrixXd variance(n_y, n_u);
   for (Index i = 0; i < n_y; ++i)
     for (Index j = 0; j < n_u; ++j) {
-      const Eigen::Vector3d entry = fit_entry(lines, i, j);
+      const Eigen::Vector3d entry = fit_entry(lines, i, j, suspended);
       gains.A(i, j) = entry[0];
       gains.A0(i, j) = entry[1];
       variance(i, j) = entry[2];
@@ -164,7 +167,9 @@ RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
   }
   check.band_hz[0] = lines.front().omega_rad_s / (2.0 * std::numbers::pi);
   check.band_hz[1] = lines.back().omega_rad_s / (2.0 * std::numbers::pi);
-  Gains gains = fit_gains(lines);
+  Gains gains = fit_gains(lines, false);
+  if (Gains suspended = fit_gains(lines, true); cost(suspended.A, gains) < cost(gains.A, gains))
+    gains = std::move(suspended);
   for (Index j = 0; j < gains.A.cols(); ++j) {
     if (gains.A.col(j).norm() > kDead * gains.A0.col(j).norm()) continue;
     check.dead_actuators.push_back(inputs[static_cast<std::size_t>(j)]);

@@ -25,7 +25,8 @@ struct RigidBodyCheck {
 /// Below the first flexible mode, for sensor i and actuator j,
 ///   -omega^2 G_ij = A_ij + D_ij omega^2 + D'_ij omega^4,
 /// real apart from the delay: A is the rigid body, D the compliance of the flexible modes. The same fit to the nominal
-/// rigid body gives A0. A wiring gain g of a channel scales its row or column; an exchange of channels exchanges them.
+/// rigid body gives A0. A term in 1 / omega^2, for another suspension than the configured one, is added if it brings A
+/// closer to A0. A wiring gain g of a channel scales its row or column; an exchange of channels exchanges them.
 /// The change that brings A closest to A0 is accepted, and the search is repeated. Positive gains after which the body
 /// still differs by more than kLargestRigidDeviation are no explanation and are discarded. Entries have a tolerance of 10 % of
 /// the rms of their row, the accuracy of amplifiers, masses and positions. A gain is accepted from 30 % on, or if it
