@@ -34,7 +34,8 @@ constexpr double kWorstExcitation = 1e3;  // cond(R)
 constexpr double kWorstInputs = 1e2;      // median of cond(U) in the upper half of the band
 constexpr double kLeastCoherence = 0.9;
 constexpr double kMovedTogether = 0.5;  // coherence of two sensors beside the excitation
-constexpr double kCertain = 1e6;        // evidence if there is no noise
+constexpr double kUnexplained = 0.9;  // of the power of C y, most of which leaks from a limit cycle
+constexpr double kCertain = 1e6;      // evidence if there is no noise
 
 }  // namespace
 
@@ -163,9 +164,9 @@ void Examination::find_drowned(const std::vector<Index>& sensors) {
       fmt::format("no line of {} is above its other motion", counted(sensors.size(), "sensor"));
   const bool hidden = std::none_of(sensors.begin(), sensors.end(),
                                    [this](Index s) { return expected_above_noise(s); });
-  // Forces act within the loop; a setpoint enters u beside r - C y.
+  // Forces act within the loop: u = r - C y holds in every period. A setpoint enters u beside it.
   if (nominal_ && nominal_->controller && hidden && why_no_nominal(true).empty() &&
-      follows_controller(record_, *nominal_))
+      unexplained_motion(record_, *nominal_) < kUnexplained)
     find(Severity::fault, Cause::limit_cycle, names,
          "the stage moves by more than the excitation moves it: its loop oscillates, as coarse "
          "steps of the command or friction cause, or forces disturb it",

@@ -49,6 +49,7 @@ class Search {
   ControllerCheck run();
   /// Whether there is nothing to search for.
   bool follows();
+  double unexplained_motion() const;
 
  private:
   void refresh();
@@ -346,6 +347,19 @@ bool Search::follows() {
   return true;
 }
 
+double Search::unexplained_motion() const {
+  double unexplained = 0.0;
+  double controlled = 0.0;
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    if (!lines_[k].known) continue;
+    const Eigen::MatrixXcd& Z = record_.lines[k].Z;
+    const Eigen::MatrixXcd by_controller = lines_[k].F * Z.topRows(record_.n_y());
+    unexplained += record_.scatter(Z.bottomRows(record_.n_u()) - by_controller).trace().real();
+    controlled += record_.scatter(by_controller).trace().real();
+  }
+  return controlled > 0.0 ? unexplained / controlled : 1.0;
+}
+
 ControllerCheck Search::run() {
   ControllerCheck check;
   refresh();
@@ -406,6 +420,10 @@ std::vector<ControllerMisfit> Search::misfits() const {
 
 bool follows_controller(HealthRecord& record, const NominalStage& nominal) {
   return Search(record, nominal).follows();
+}
+
+double unexplained_motion(HealthRecord& record, const NominalStage& nominal) {
+  return Search(record, nominal).unexplained_motion();
 }
 
 ControllerCheck check_controller(HealthRecord& record, const NominalStage& nominal) {

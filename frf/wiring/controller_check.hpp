@@ -46,4 +46,9 @@ ControllerCheck check_controller(HealthRecord& record, const NominalStage& nomin
 /// for any size. @pre as check_controller()
 bool follows_controller(HealthRecord& record, const NominalStage& nominal);
 
+/// Power of what does not repeat in u - r + C y, relative to that in C y: below one where u answers to y (it is not near
+/// zero, because single periods leak), one where u does not answer to a slow motion, as of a setpoint.
+/// @pre as check_controller()
+double unexplained_motion(HealthRecord& record, const NominalStage& nominal);
+
 }  // namespace stageid
