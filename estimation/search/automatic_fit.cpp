@@ -33,7 +33,8 @@ namespace {
 constexpr int kGrowthIterations = 12;   // a mode that is still moving is finished later
 constexpr std::size_t kCandidates = 4;  // tried before the search concludes that no mode is missing
 constexpr std::size_t kMergesAtOnce = 8;  // the nearest pairs first
-constexpr double kHopeless = 10.0;  // times the cost: a search from nothing that is not followed up
+// A trial from nothing that is this many times as costly as the model after a third of its iterations is given up.
+constexpr double kHopeless = 10.0;
 constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
 constexpr double kSettledDeviations = 0.1;  // if several ways to a number of modes are compared
 constexpr int kMostGrown = 40;              // modes; more are placed at once before growing

@@ -170,7 +170,7 @@ void Examination::find_drowned(const std::vector<Index>& sensors) {
     find(Severity::fault, Cause::limit_cycle, names,
          "the stage moves by more than the excitation moves it: its loop oscillates, as coarse "
          "steps of the command or friction cause, or forces disturb it",
-         figure, "raise the level, excite all axes in every experiment, or use a finer converter");
+         figure, kRemedyOfLimitCycle);
   else
     find(Severity::fault, Cause::incoherent, names,
          "no signal repeats with the excitation: a disturbance or a moving setpoint moves the "

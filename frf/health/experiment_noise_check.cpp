@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include "frf/health/health_measures.hpp"
+
 namespace stageid {
 namespace {
 
@@ -58,8 +60,7 @@ std::vector<Finding> check_experiment_noise(const FrfEstimate& frf,
     finding.what =
         "the loop oscillates by itself in some experiments: a limit cycle, as coarse steps of the "
         "command or friction cause";
-    finding.remedy =
-        "raise the level, excite all axes in every experiment, or use a finer converter";
+    finding.remedy = kRemedyOfLimitCycle;
   }
   return {finding};
 }

@@ -10,6 +10,9 @@ namespace stageid {
 /// Significance of a check over all channels.
 inline constexpr double kSignificance = 1e-4;
 
+inline constexpr const char* kRemedyOfLimitCycle =
+    "raise the level, excite all axes in every experiment, or use a finer converter";
+
 /// Whether a response of the channel (of [sensors; actuators]) is above its noise. One F test per line of the mean over
 /// periods (`response` of the line's index: one value per experiment) against the scatter, over the experiments;
 /// Fisher's sum over the lines; kSignificance. True with only one period, because the noise is unknown then.

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "acquisition/files/counted.hpp"
+#include "frf/health/health_measures.hpp"
 #include "frf/statistics/distributions.hpp"
 
 namespace stageid {
@@ -281,8 +282,7 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
         "the loop oscillates at the start of the runs at {} and comes to rest, in each run in "
         "another way: a limit cycle, as coarse steps of the command or friction cause",
         names_of(frequencies));
-    finding.remedy =
-        "raise the level, excite all axes in every experiment, or use a finer converter";
+    finding.remedy = kRemedyOfLimitCycle;
   }
   findings.push_back(std::move(finding));
   return findings;

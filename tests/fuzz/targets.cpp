@@ -73,16 +73,6 @@ std::string text_of(Bytes bytes) {
 
 void read_yaml(Bytes bytes) { YamlDocument::parse("fuzz.yaml", text_of(bytes)); }
 
-void read_stage(Bytes bytes) {
-  const ScratchFile file(bytes, ".yaml");
-  load_stage_config(file.path());
-}
-
-void read_map(Bytes bytes) {
-  const ScratchFile file(bytes, ".yaml");
-  read_import_map(file.path());
-}
-
 void read_everything(const LogReader& log) {
   LogSamples samples;
   for (std::size_t run = 0; run < log.runs().size(); ++run) {
@@ -131,19 +121,15 @@ void read_hdf5_log(Bytes bytes) {
   read_everything(*open_log(file.path()));
 }
 
-void read_hdf5_frf(Bytes bytes) {
-  const ScratchFile file(bytes, ".h5");
-  read_frf(file.path());
-}
+constexpr char kAnyName[] = "";
+constexpr char kYaml[] = ".yaml";
+constexpr char kHdf5[] = ".h5";
+constexpr char kTouchstone[] = ".s2p";
 
-void read_excitation(Bytes bytes) {
-  const ScratchFile file(bytes, ".h5");
-  read_experiment_plan(file.path());
-}
-
-template <auto read>
-void read_arrays(Bytes bytes) {
-  const ScratchFile file(bytes, "");
+/// A reader that takes the path of a file alone.
+template <auto read, const char* ending = kAnyName>
+void read_file(Bytes bytes) {
+  const ScratchFile file(bytes, ending);
   read(file.path());
 }
 
@@ -151,11 +137,6 @@ void read_csv_tables(Bytes bytes) {
   const ScratchFile file(bytes, ".csv");
   read_csv(file.path());
   if (is_frf_csv(file.path())) read_frf_csv(file.path());
-}
-
-void read_touchstone_file(Bytes bytes) {
-  const ScratchFile file(bytes, ".s2p");
-  read_touchstone(file.path());
 }
 
 class Registers final : public ModbusRegisters {
@@ -236,21 +217,21 @@ void ask_dashboard(Bytes bytes) {
 }
 
 constexpr std::array kTargets = {Target{"yaml", read_yaml},
-                                 Target{"stage", read_stage},
-                                 Target{"map", read_map},
+                                 Target{"stage", read_file<load_stage_config, kYaml>},
+                                 Target{"map", read_file<read_import_map, kYaml>},
                                  Target{"slog", read_slog},
                                  Target{"torn_slog", read_torn_slog},
                                  Target{"hdf5_log", read_hdf5_log},
-                                 Target{"hdf5_frf", read_hdf5_frf},
-                                 Target{"excitation", read_excitation},
-                                 Target{"hdf5_arrays", read_arrays<read_hdf5_arrays>},
-                                 Target{"model", read_arrays<read_model>},
-                                 Target{"modes", read_arrays<read_modes>},
-                                 Target{"uff", read_arrays<read_uff>},
-                                 Target{"mat", read_arrays<read_mat>},
-                                 Target{"npz", read_arrays<read_npz>},
+                                 Target{"hdf5_frf", read_file<read_frf, kHdf5>},
+                                 Target{"excitation", read_file<read_experiment_plan, kHdf5>},
+                                 Target{"hdf5_arrays", read_file<read_hdf5_arrays>},
+                                 Target{"model", read_file<read_model>},
+                                 Target{"modes", read_file<read_modes>},
+                                 Target{"uff", read_file<read_uff>},
+                                 Target{"mat", read_file<read_mat>},
+                                 Target{"npz", read_file<read_npz>},
                                  Target{"csv", read_csv_tables},
-                                 Target{"touchstone", read_touchstone_file},
+                                 Target{"touchstone", read_file<read_touchstone, kTouchstone>},
                                  Target{"modbus", answer_modbus},
                                  Target{"can", decode_can},
                                  Target{"dashboard", ask_dashboard}};

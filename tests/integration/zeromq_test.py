@@ -5,6 +5,7 @@ started again, with a second host, under garbage.
     zeromq_test.py STAGEID SOURCE_DIR WORK_DIR
 """
 
+import binascii
 import csv
 import json
 import pathlib
@@ -26,19 +27,10 @@ HELLO, START, STOP, UPLOAD, ARM, TRIGGER, DOWNLOAD = 1, 2, 3, 16, 18, 19, 20
 MEASURING = "state 5,"
 
 
-def crc(data):
-    value = 0xFFFF
-    for byte in data:
-        value ^= byte << 8
-        for _ in range(8):
-            value = (value << 1 ^ 0x1021 if value & 0x8000 else value << 1) & 0xFFFF
-    return value
-
-
 def message(identifier, head, payload, length):
     """A sealed frame in its 72 bytes."""
     body = payload.ljust(length - 8, b"\0")
-    seal = struct.pack("<H", crc(struct.pack("<H", identifier) + head + body))
+    seal = struct.pack("<H", binascii.crc_hqx(struct.pack("<H", identifier) + head + body, 0xFFFF))
     return struct.pack("<HHI", identifier, length, 0) + (head + seal + body).ljust(64, b"\0")
 
 

@@ -6,6 +6,7 @@
 To be run inside the machine of vmrun.sh, which has vcan0.
 """
 
+import binascii
 import json
 import pathlib
 import re
@@ -26,20 +27,11 @@ WATCHDOG_S = 2.0
 DELAY_S = 5.0  # of a machine in a machine
 
 
-def crc(data):
-    value = 0xFFFF
-    for byte in data:
-        value ^= byte << 8
-        for _ in range(8):
-            value = (value << 1 ^ 0x1021 if value & 0x8000 else value << 1) & 0xFFFF
-    return value
-
-
 def send_setpoint(run, sequence):
     """A setpoint for two actuators, in a frame of 16 bytes."""
     head = struct.pack("<HBBH", sequence, 0, run, 0x1234)
     values = bytes([0, 0, 0x10] * 2 + [0, 0])
-    data = head + struct.pack("<H", crc(b"\x00\x01" + head + values)) + values
+    data = head + struct.pack("<H", binascii.crc_hqx(b"\x00\x01" + head + values, 0xFFFF)) + values
     with raw_socket("vcan0") as raw:
         raw.send(FRAME.pack(0x100, len(data), 1, 0, 0, data))
 

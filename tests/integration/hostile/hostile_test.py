@@ -93,6 +93,17 @@ class Case(unittest.TestCase):
         self.assertIn(done.returncode, (0, 1, 2, 3), (arguments, done.returncode, done.stderr[-300:]))
         return done
 
+    def flipped(self, name, to, places, bytes_each):
+        """The file with some bytes changed at random, 25 times."""
+        good = (WORK / name).read_bytes()
+        for seed in range(25):
+            random = np.random.default_rng(seed)
+            bad = bytearray(good)
+            for at in random.integers(places.start, min(len(bad), places.stop), bytes_each):
+                bad[at] = random.integers(256)
+            (WORK / to).write_bytes(bad)
+            self.ends("import", to)
+
     def copy(self, name, to):
         shutil.copy(WORK / name, WORK / to)
         return h5py.File(WORK / to, "r+")
@@ -209,14 +220,7 @@ class Hdf5(Case):
         self.refused("import", "x.h5", says="exceeds the size of the file")
 
     def test_flipped_bytes(self):
-        good = (WORK / "frf.h5").read_bytes()
-        for seed in range(25):
-            random = np.random.default_rng(seed)
-            bad = bytearray(good)
-            for at in random.integers(0, min(len(bad), 6000), 8):
-                bad[at] = random.integers(256)
-            (WORK / "x.h5").write_bytes(bad)
-            self.ends("import", "x.h5")
+        self.flipped("frf.h5", "x.h5", range(6000), 8)
 
 
 class Matlab(Case):
@@ -230,15 +234,7 @@ class Matlab(Case):
         self.assertEqual(run("export", "model.json", "-o", "good.mat").returncode, 0)
         self.assertEqual(run("export", "model.json", "-o", "good73.mat", "--mat-version", "7.3").returncode, 0)
         for name in ("good.mat", "good73.mat"):
-            good = (WORK / name).read_bytes()
-            for seed in range(25):
-                random = np.random.default_rng(seed)
-                bad = bytearray(good)
-                for at in random.integers(128, min(len(bad), 40_000), 30):
-                    bad[at] = random.integers(256)
-                (WORK / "x.mat").write_bytes(bad)
-                self.ends("import", "x.mat")
-
+            self.flipped(name, "x.mat", range(128, 40_000), 30)
 
     def test_files_that_crashed_libmatio(self):
         files = sorted((pathlib.Path(__file__).parents[2] / "fuzz/corpus/mat").iterdir())
