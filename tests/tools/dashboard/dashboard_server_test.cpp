@@ -5,19 +5,24 @@
 #include <gtest/gtest.h>
 #include <httplib.h>
 #include <netinet/in.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 #include <vector>
 
 #include "hal/stage/stage.hpp"
+#include "tests/support/process/resident_bytes.hpp"
 
 namespace stageid {
 namespace test_dashboard_server {
 
 using namespace std::chrono_literals;
+
+constexpr std::chrono::seconds kPatience{DashboardServer::kPatience_s};
 
 /// A connection that requests the stream and may or may not read it.
 class RawWatcher {
@@ -133,6 +138,34 @@ TEST_F(DashboardServerTest, ClientsThatTrickleTheirHeaderDoNotLockOthersOut) {
   for (const int socket : sockets) ::close(socket);
   ASSERT_TRUE(result) << "no answer";
   EXPECT_EQ(result->body, "<p>page</p>");
+}
+
+TEST_F(DashboardServerTest, AThousandIdleAndAHundredSlowClientsDelayNobody) {
+  rlimit files{};
+  ::getrlimit(RLIMIT_NOFILE, &files);
+  files.rlim_cur = std::min<rlim_t>(files.rlim_max, 4096);
+  ::setrlimit(RLIMIT_NOFILE, &files);
+  serve();
+  const std::size_t before = test::resident_bytes();
+  std::vector<std::unique_ptr<RawWatcher>> clients;
+  for (int i = 0; i < 1000; ++i)
+    clients.push_back(std::make_unique<RawWatcher>(port_, RawWatcher::Request{}));
+  for (int i = 0; i < 100; ++i)
+    clients.push_back(
+        std::make_unique<RawWatcher>(port_, RawWatcher::Request{"GET / HTTP/1.1\r\nX: "}));
+  const auto began = std::chrono::steady_clock::now();
+  httplib::Client other = client();
+  other.set_read_timeout(30s);
+  const httplib::Result page = other.Get("/");
+  const httplib::Result abort =
+      client().Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, "", "text/plain");
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 2 * kPatience + 2s)
+      << "the threads are taken";
+  ASSERT_TRUE(page) << "no answer";
+  EXPECT_EQ(page->body, "<p>page</p>");
+  ASSERT_TRUE(abort) << "no answer";
+  EXPECT_EQ(aborts_, 1);
+  EXPECT_LT(test::resident_bytes() - before, std::size_t{32} << 20);
 }
 
 TEST_F(DashboardServerTest, KeepsNoMoreOfARequestThanABrowserSends) {
