@@ -317,10 +317,13 @@ void StageNode::hold(std::int64_t now_ns) {
 
 void StageNode::come_to_rest() {
   stage_.stop();
-  if (stage_.emergency().cause.kind != LimitKind::none)
-    reason_ = machine_.cause() == FaultCause::watchdog
-                  ? fmt::format("{}; {}", to_string(machine_.cause()), describe_stop(stage_))
-                  : describe_stop(stage_);
+  const Emergency& emergency = stage_.emergency();
+  if (emergency.cause.kind != LimitKind::none)
+    reason_ =
+        machine_.cause() == FaultCause::watchdog
+            ? fmt::format("{}; its last force moved the stage too far; {}",
+                          to_string(machine_.cause()), emergency.braked ? "braked" : "not braked")
+            : describe_stop(stage_);
   running_ = false;
   hold_began_ns_.reset();
 }

@@ -226,6 +226,25 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertNotIn("truth", json.loads((self.work / "all/summary.json").read_text()))
 
+    def test_is_supervised_and_shown_like_any_other(self):
+        plant = (self.work / "plant.yaml")
+        plant.write_text(STAGE.read_text())
+        node = subprocess.Popen([PROGRAM, "node", plant, "--modbus-tcp", "0", "--modbus-fault", "interlock@12"],
+                                stdout=subprocess.PIPE, text=True)
+        self.peers.append(node)
+        door = re.search(r"127\.0\.0\.1:(\d+)", node.stdout.readline())[1]
+        file = self.udp("supervised", self.peer())
+        stage = self.work / "supervised_stage.yaml"
+        stage.write_text(stage.read_text() + f"supervisor: {{modbus: {{tcp: {{port: {door}}}}}, poll_period_s: 0.1, gravity_compensator_n: [10, 50],\n"
+                         "  temperature_k: [285, 325]}\n")
+        file.write_text(re.sub(r"realizations: \d+", "realizations: 60", file.read_text()))
+        log = self.work / "supervised.slog"
+        done = run("run", file, "-o", log, "--dashboard", "0")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("the interlock is open", done.stderr)
+        self.assertRegex(done.stderr, r"dashboard: http://127\.0\.0\.1:\d+/\?token=")
+        self.assertIn(run("log", "verify", log).returncode, (0, 3))
+
     def refused(self, name, plugin, *words):
         done = run("run", self.experiment(name, plugin), "-o", self.work / f"{name}.slog")
         self.assertEqual(done.returncode, 1, done.stderr)

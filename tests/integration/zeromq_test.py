@@ -6,11 +6,13 @@ started again, with a second host, under garbage.
 """
 
 import binascii
+import contextlib
 import csv
 import json
 import pathlib
 import random
 import re
+import resource
 import shutil
 import socket
 import struct
@@ -43,6 +45,10 @@ def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
+
+
+def resident_bytes(process):
+    return int(pathlib.Path(f"/proc/{process}/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 class Peer:
@@ -274,6 +280,26 @@ class ZeroMq(unittest.TestCase):
         loud = self.call("log", "convert", "run.slog", "-o", "loud.csv")
         self.assertEqual(loud.returncode, 0, loud.stderr)
         self.assertEqual((WORK / "quiet.csv").read_bytes(), (WORK / "loud.csv").read_bytes(), "a sample differs")
+
+    def test_a_thousand_idle_and_a_hundred_slow_clients_change_nothing(self):
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 4096), hard))  # the node inherits it
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+        node = self.node("slow_node")
+        before = resident_bytes(node.pid)
+        host = self.start()
+        self.wait_for(node, MEASURING)
+        with contextlib.ExitStack() as clients:
+            for _ in range(1000):
+                clients.enter_context(socket.create_connection(("127.0.0.1", self.port), timeout=10))
+            slow = [Peer(self.port) for _ in range(100)]  # they never read what the node sends to those who gave a command
+            for peer in slow:
+                clients.callback(peer.close)
+                peer.send(command(HELLO, 1))
+            self.ends(host, 0)
+            (WORK / "run.slog").unlink()
+            self.ends(self.start(), 0)
+            self.assertLess(resident_bytes(node.pid) - before, 64 << 20)
 
     def node_again(self, name):
         self.nodes[-1].kill()
