@@ -11,13 +11,8 @@
 #include <atomic>
 #include <cerrno>
 #include <chrono>
-#include <condition_variable>
 #include <cstring>
-#include <functional>
-#include <mutex>
 #include <thread>
-#include <utility>
-#include <vector>
 
 #include "hal/stage/stage.hpp"
 
@@ -95,48 +90,6 @@ class PatientStream final : public httplib::Stream {
   Clock::time_point deadline_ = Clock::now() + kPatience;
 };
 
-/// Threads that serve the newest connection first: clients that only connect keep a thread each until their time is
-/// over, and must not delay those that come after them.
-class NewestFirst final : public httplib::TaskQueue {
- public:
-  explicit NewestFirst(std::size_t threads) {
-    for (std::size_t i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
-  }
-  void enqueue(std::function<void()> task) override {
-    const std::lock_guard lock(mutex_);
-    tasks_.push_back(std::move(task));
-    changed_.notify_one();
-  }
-  void shutdown() override {
-    {
-      const std::lock_guard lock(mutex_);
-      ended_ = true;
-    }
-    changed_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
-  }
-
- private:
-  void work() {
-    std::unique_lock lock(mutex_);
-    while (true) {
-      changed_.wait(lock, [this] { return ended_ || !tasks_.empty(); });
-      if (tasks_.empty()) return;
-      const std::function<void()> task = std::move(tasks_.back());
-      tasks_.pop_back();
-      lock.unlock();
-      task();
-      lock.lock();
-    }
-  }
-
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<std::function<void()>> tasks_;
-  std::vector<std::thread> threads_;
-  bool ended_ = false;
-};
-
 class PatientServer final : public httplib::Server {
   bool process_and_close_socket(socket_t socket) override {
     bool good = true;
@@ -194,7 +147,7 @@ void DashboardServer::State::listen() {
   server.set_socket_options(set_socket_options);
   server.set_tcp_nodelay(true);
   server.set_payload_max_length(kLargestBody);
-  server.new_task_queue = [] { return new NewestFirst(kWatchers + kOtherThreads); };
+  server.new_task_queue = [] { return new httplib::ThreadPool(kWatchers + kOtherThreads); };
   errno = 0;
   if (address.port == 0) {
     address.port = server.bind_to_any_port(address.host);
