@@ -33,7 +33,7 @@ namespace {
 constexpr int kGrowthIterations = 12;   // a mode that is still moving is finished later
 constexpr std::size_t kCandidates = 4;  // tried before the search concludes that no mode is missing
 constexpr std::size_t kMergesAtOnce = 8;  // the nearest pairs first
-// A trial from nothing that is this many times as costly as the model after a third of its iterations is given up.
+// A new search is given up if, after a third of its iterations, its cost is this many times that of the model.
 constexpr double kHopeless = 10.0;
 constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
 constexpr double kSettledDeviations = 0.1;  // if several ways to a number of modes are compared
