@@ -25,6 +25,9 @@ constexpr int kNice = 10;
 constexpr int kOtherThreads = 8;  // besides those of the streams: pages, responses, the abort
 constexpr auto kKeepAlive = 250ms;
 constexpr int kKeepAlive_ms = 1000;  // until the next request of a connection
+// While connections wait for a thread, so that silent ones cannot keep the abort from its turn.
+constexpr int kBusyKeepAlive_ms = 50;
+constexpr auto kBusyPatience = 250ms;
 constexpr std::size_t kLargestHead = std::size_t{1}
                                      << 14;  // with the cookies of other servers here
 constexpr const char* kAbortHeader = "X-Stageid";
@@ -35,7 +38,7 @@ void set_socket_options(int socket) {
   ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
 }
 
-constexpr std::chrono::seconds kPatience{DashboardServer::kPatience_s};
+constexpr std::chrono::milliseconds kPatience = std::chrono::seconds{DashboardServer::kPatience_s};
 
 constexpr const char* kWholeAddress = "open the address printed by stageid, with its token";
 
@@ -55,7 +58,8 @@ std::string host_in_url(const std::string& host) {
 /// of any length.
 class PatientStream final : public httplib::Stream {
  public:
-  explicit PatientStream(int socket) : socket_(socket) {}
+  PatientStream(int socket, std::chrono::milliseconds patience)
+      : socket_(socket), deadline_(Clock::now() + patience) {}
   void request_is_read() { deadline_ = Clock::time_point::max(); }
 
   bool is_readable() const override { return ready(POLLIN); }
@@ -87,17 +91,46 @@ class PatientStream final : public httplib::Stream {
 
   int socket_;
   std::size_t left_ = kLargestHead + DashboardServer::kLargestBody;
-  Clock::time_point deadline_ = Clock::now() + kPatience;
+  Clock::time_point deadline_;
 };
 
+/// Counts the connections that wait for a thread.
+class CountingPool final : public httplib::TaskQueue {
+ public:
+  CountingPool(std::size_t threads, std::atomic<int>& waiting)
+      : waiting_(waiting), pool_(threads) {}
+  void enqueue(std::function<void()> task) override {
+    ++waiting_;
+    pool_.enqueue([this, task = std::move(task)] {
+      --waiting_;
+      task();
+    });
+  }
+  void shutdown() override { pool_.shutdown(); }
+
+ private:
+  std::atomic<int>& waiting_;
+  httplib::ThreadPool pool_;
+};
+
+/// Patient with a client only while no other waits for its thread.
 class PatientServer final : public httplib::Server {
+ public:
+  explicit PatientServer(std::size_t threads) {
+    new_task_queue = [this, threads] { return new CountingPool(threads, waiting_); };
+  }
+  /// For a bound server. httplib lets five connections wait: others repeat theirs after seconds.
+  void let_many_wait() { ::listen(svr_sock_, SOMAXCONN); }
+
+ private:
   bool process_and_close_socket(socket_t socket) override {
     bool good = true;
     bool closed = false;
     for (auto left = keep_alive_max_count_; good && !closed && left > 0; --left) {
       pollfd next{socket, POLLIN, 0};
-      if (svr_sock_ == INVALID_SOCKET || ::poll(&next, 1, kKeepAlive_ms) <= 0) break;
-      PatientStream stream(socket);
+      const int keep_alive_ms = waiting_ > 0 ? kBusyKeepAlive_ms : kKeepAlive_ms;
+      if (svr_sock_ == INVALID_SOCKET || ::poll(&next, 1, keep_alive_ms) <= 0) break;
+      PatientStream stream(socket, waiting_ > 0 ? kBusyPatience : kPatience);
       good = process_request(stream, left == 1, closed, [&stream](httplib::Request& request) {
         request.ranges.clear();  // each would be a copy of the page
         if (request.method == "GET") stream.request_is_read();
@@ -108,6 +141,8 @@ class PatientServer final : public httplib::Server {
     ::close(socket);
     return good;
   }
+
+  std::atomic<int> waiting_ = 0;
 };
 
 struct DashboardServer::State {
@@ -118,7 +153,7 @@ struct DashboardServer::State {
   DashboardContent& content;
   std::string token;
   std::string url;
-  PatientServer server;
+  PatientServer server{kWatchers + kOtherThreads};
   std::thread thread;
   std::atomic<int> watchers = 0;
   std::atomic<bool> finishing = false;
@@ -147,14 +182,16 @@ void DashboardServer::State::listen() {
   server.set_socket_options(set_socket_options);
   server.set_tcp_nodelay(true);
   server.set_payload_max_length(kLargestBody);
-  server.new_task_queue = [] { return new httplib::ThreadPool(kWatchers + kOtherThreads); };
   errno = 0;
   if (address.port == 0) {
     address.port = server.bind_to_any_port(address.host);
   } else if (!server.bind_to_port(address.host, address.port)) {
     address.port = -1;
   }
-  if (address.port > 0) return;
+  if (address.port > 0) {
+    server.let_many_wait();
+    return;
+  }
   const std::string why = errno != 0 ? std::strerror(errno) : "no such address";
   throw StageError(
       fmt::format("--dashboard: cannot listen on {} ({}); use another port, or 0 for any free one",
