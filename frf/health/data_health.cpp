@@ -430,6 +430,8 @@ void Examination::check_others(std::vector<Finding> own) {
 
 std::vector<Finding> Examination::examine() {
   findings_ = check_timing(record_, nominal_);
+  for (Finding& finding : to_findings(record_.steps, record_.info.actuators))
+    findings_.push_back(std::move(finding));
   check_cycles();
   check_samples();
   spoilt_of_log_ = spoilt_;

@@ -76,6 +76,8 @@ const char* to_string(Cause cause) noexcept {
       return "excitation_timing";
     case Cause::drift:
       return "drift";
+    case Cause::actuator_step:
+      return "actuator_step";
   }
   return kUnknown;
 }

@@ -44,6 +44,7 @@ enum class Cause : std::uint8_t {
   lost_samples,       ///< samples of a run are missing or duplicated
   excitation_timing,  ///< the excitation was recorded whole samples late or early
   drift,              ///< the response changes during the measurement
+  actuator_step,      ///< an actuator applies its recorded command in coarse steps
 };
 const char* to_string(Cause cause) noexcept;
 /// The cause of that name, or nothing.

@@ -48,4 +48,18 @@ std::string FrfProvenance::json() const {
       .dump();
 }
 
+std::string with_steps(const std::string& provenance_json, const std::vector<ActuatorStep>& steps,
+                       const ChannelList& actuators) {
+  using Json = nlohmann::ordered_json;
+  Json provenance = Json::parse(provenance_json);
+  for (const ActuatorStep& s : steps) {
+    const auto at = static_cast<std::size_t>(s.actuator);
+    provenance["actuator_steps"].push_back({{"actuator", actuators.names[at]},
+                                            {"step", s.step},
+                                            {"unit", actuators.units[at]},
+                                            {"rounding", to_string(s.rounding)}});
+  }
+  return provenance.dump();
+}
+
 }  // namespace stageid

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "frf/periods/actuator_step.hpp"
 #include "frf/runs/channel_choice.hpp"
 #include "frf/runs/run_table.hpp"
 
@@ -31,5 +32,9 @@ class FrfProvenance {
   const ChannelChoice& channels_;
   std::vector<Log> logs_;
 };
+
+/// Adds "actuator_steps" to the provenance of an estimate from logs with these steps.
+std::string with_steps(const std::string& provenance_json, const std::vector<ActuatorStep>& steps,
+                       const ChannelList& actuators);
 
 }  // namespace stageid

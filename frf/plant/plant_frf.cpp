@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <memory>
@@ -12,12 +13,14 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_error.hpp"
 #include "excitation/multisine/frequency_grid.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/plant/detection_average.hpp"
 #include "frf/plant/frf_provenance.hpp"
 #include "frf/plant/line_alignment.hpp"
 #include "frf/plant/plant_average.hpp"
+#include "frf/plant/step_search.hpp"
 #include "frf/plant/zippered_fit.hpp"
 #include "frf/response/covariance_smoothing.hpp"
 #include "frf/runs/byte_counter.hpp"
@@ -33,6 +36,9 @@
 
 namespace stageid {
 namespace {
+
+constexpr double kClearlyLess = 0.8;  // of the total variance
+constexpr double kRounding = 1e-30;   // of a ratio of variances
 
 /// Lines and axes, which the first realization determines for all.
 struct ExcitedPart {
@@ -376,20 +382,99 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   return select_channels(frf, channels_.inputs, frf.outputs.names);
 }
 
+/// The chosen runs, with what an earlier estimate has shown.
+ChosenRuns runs_of(const std::vector<const LogReader*>& logs, const FrfOptions& options,
+                   const EarlierEstimate& earlier) {
+  ChosenRuns chosen = choose_runs(logs, options);
+  if (earlier.steps.empty()) return chosen;
+  for (RealizationRuns& realization : chosen.realizations)
+    for (UsedRun& run : realization.runs) run.earlier = &earlier;
+  return chosen;
+}
+
+/// One pass over the logs. Without `health_wanted`, the record is empty.
+FrfAndHealth estimate_once(const std::vector<const LogReader*>& logs, FrfOptions options,
+                           const EarlierEstimate& earlier, bool health_wanted) {
+  if (!earlier.steps.empty()) options.periods = PeriodChoice::unmarked;  // steps look like outliers
+  PlantEstimation estimation(runs_of(logs, options, earlier), options);
+  std::optional<HealthGathering> health;
+  if (health_wanted) health.emplace(estimation.realizations());
+  FrfEstimate frf = estimation.estimate(health ? &*health : nullptr);
+  return {std::move(frf), health ? health->finish() : HealthRecord{}};
+}
+
+/// Whether there is anything that steps could explain, or no test has looked for it.
+bool is_suspicious(const FrfEstimate& frf) {
+  const NonlinearityTest& test = frf.nonlinearity;
+  if (test.band_hz.rows() == 0 || test.nonlinear() || frf.experiment_noise_ratio > 1.0) return true;
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b)
+    if (!test.settled(b)) return true;
+  return false;
+}
+
+/// Whether the realizations scatter clearly less, as if the steps were really there: on average over lines and channels.
+bool scatters_less(const FrfEstimate& with_steps, const FrfEstimate& without) {
+  const Eigen::ArrayXXd ratio = with_steps.total_variance.array() / without.total_variance.array();
+  return ratio.isFinite().all() && std::exp(ratio.max(kRounding).log().mean()) < kClearlyLess;
+}
+
+/// The steps of the actuators, from all realizations. The response of a single one would contain most of their effect.
+/// Each found step makes the others more visible. @param frf of the options' realizations
+std::vector<ActuatorStep> steps_of(const std::vector<const LogReader*>& logs, FrfOptions options,
+                                   FrfEstimate frf) {
+  if (!options.realizations.empty()) {
+    options.realizations.clear();
+    frf = estimate_once(logs, options, {}, false).frf;
+  }
+  EarlierEstimate earlier{{}, frf.dropped_periods};
+  while (frf.realizations > 1 && is_suspicious(frf)) {
+    const std::vector<ActuatorStep> found =
+        find_actuator_steps(runs_of(logs, options, earlier).realizations, frf, options);
+    if (found.empty()) break;
+    EarlierEstimate next = earlier;
+    next.steps.insert(next.steps.end(), found.begin(), found.end());
+    FrfEstimate better = estimate_once(logs, options, next, false).frf;
+    if (!scatters_less(better, frf)) break;
+    earlier = std::move(next);
+    frf = std::move(better);
+  }
+  std::sort(earlier.steps.begin(), earlier.steps.end(),
+            [](const ActuatorStep& a, const ActuatorStep& b) { return a.actuator < b.actuator; });
+  return earlier.steps;
+}
+
+/// Estimates from what the actuators applied.
+FrfAndHealth estimate(const std::vector<const LogReader*>& logs, const FrfOptions& options,
+                      bool health_wanted) {
+  FrfAndHealth done = estimate_once(logs, options, {}, health_wanted);
+  EarlierEstimate earlier{{}, done.frf.dropped_periods};
+  try {
+    earlier.steps = steps_of(logs, options, done.frf);
+  } catch (const FormatError&) {
+    // Realizations that were not asked for may be unusable.
+  } catch (const std::invalid_argument&) {
+  }
+  if (earlier.steps.empty()) return done;
+  FrfAndHealth again = estimate_once(logs, options, earlier, health_wanted);
+  // The fingerprints are those of the logs, and so are the recorded signals.
+  again.frf.provenance_json =
+      with_steps(done.frf.provenance_json, earlier.steps, logs.front()->info().actuators);
+  done.frf = std::move(again.frf);
+  done.health.take_results_of_estimate(std::move(again.health));
+  done.health.steps = earlier.steps;
+  return done;
+}
+
 }  // namespace
 
 FrfEstimate estimate_plant_frf(const std::vector<const LogReader*>& logs,
                                const FrfOptions& options) {
-  PlantEstimation estimation(choose_runs(logs, options), options);
-  return estimation.estimate(nullptr);
+  return estimate(logs, options, false).frf;
 }
 
 FrfAndHealth estimate_plant_frf_and_health(const std::vector<const LogReader*>& logs,
                                            const FrfOptions& options) {
-  PlantEstimation estimation(choose_runs(logs, options), options);
-  HealthGathering health(estimation.realizations());
-  FrfEstimate frf = estimation.estimate(&health);
-  return {std::move(frf), health.finish()};
+  return estimate(logs, options, true);
 }
 
 }  // namespace stageid

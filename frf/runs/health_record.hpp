@@ -2,9 +2,11 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "acquisition/record/log_reader.hpp"
+#include "frf/periods/actuator_step.hpp"
 #include "frf/periods/mode_drift.hpp"
 #include "frf/periods/noisy_run.hpp"
 #include "frf/periods/realization_change.hpp"
@@ -51,10 +53,18 @@ struct HealthRecord : RealizationRecord {
   std::vector<ChannelScan> scan;       ///< [sensors; actuators], over all used runs
   RunHealth health;                    ///< over all used runs
   std::vector<SampleSlip> slips;       ///< of the same runs
+  std::vector<ActuatorStep> steps;     ///< of the converters behind the records of the actuators
   std::optional<ModeDrift> drift;      ///< of the response, if there was an estimate
   std::vector<NoisyRun> noisy_runs;    ///< the same
   RealizationDifferences differences;  ///< the same
   StartEvidence start;                 ///< of the start of the runs; empty if there is no evidence
+
+  /// Takes what only an estimate provides from the record of another one of the same logs.
+  void take_results_of_estimate(HealthRecord&& other) {
+    drift = other.drift;
+    noisy_runs = std::move(other.noisy_runs);
+    differences = std::move(other.differences);
+  }
 
   Eigen::Index n_y() const noexcept { return static_cast<Eigen::Index>(info.sensors.size()); }
   Eigen::Index n_u() const noexcept { return static_cast<Eigen::Index>(info.actuators.size()); }

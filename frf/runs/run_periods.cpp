@@ -103,6 +103,22 @@ class PeriodReading {
   std::vector<OwnLoss> own_losses_;
 };
 
+/// Calls take(p) with the actuators' steps in the workspace's samples, unless an earlier estimate has left p out.
+void take_or_leave_out(const UsedRun& used, int p, RunWorkspace& w,
+                       const std::function<void(int)>& take,
+                       const std::function<void(int period, const std::string& why)>& leave_out) {
+  if (used.earlier == nullptr) return take(p);
+  for (const DroppedPeriod& d : used.earlier->dropped)
+    if (d.realization == used.run().realization && d.experiment == used.run().experiment &&
+        d.period == p)
+      return leave_out(p, d.reason);
+  const Eigen::MatrixXd commands = w.samples.actuators;
+  for (const ActuatorStep& s : used.earlier->steps)
+    for (double& command : w.samples.actuators.col(s.actuator)) command = s.applied(command);
+  take(p);
+  w.samples.actuators = commands;
+}
+
 }  // namespace
 
 // A period is taken only after the next one has been compared with it, because a gap in the first period shows only
@@ -120,7 +136,7 @@ std::vector<SampleSlip> for_each_period(
     if (!waiting) return;
     std::swap(w.samples, w.ahead);
     any_taken = true;
-    take(*waiting);
+    take_or_leave_out(used, *waiting, w, take, leave_out);
     waiting.reset();
   };
   for (int p = 0; p < used.periods; ++p) {

@@ -4,16 +4,25 @@
 #include <vector>
 
 #include "acquisition/record/log_reader.hpp"
+#include "frf/periods/actuator_step.hpp"
+#include "frf/response/frf_estimate.hpp"
 #include "frf/response/frf_options.hpp"
 
 namespace stageid {
+
+/// What an estimate from the same runs has shown.
+struct EarlierEstimate {
+  std::vector<ActuatorStep> steps;     ///< the actuators' records become what was applied
+  std::vector<DroppedPeriod> dropped;  ///< from the records as they are
+};
 
 /// One used run and its location.
 struct UsedRun {
   const LogReader* log = nullptr;
   std::size_t index = 0;  ///< of the run in its log
   int transient_periods = 0;
-  int periods = 0;  ///< number recorded after the transient
+  int periods = 0;                           ///< number recorded after the transient
+  const EarlierEstimate* earlier = nullptr;  ///< applied by for_each_period()
 
   const LogRun& run() const { return log->runs()[index]; }
   std::string place() const;  ///< "file:/runs/0003", for messages

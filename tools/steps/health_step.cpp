@@ -69,10 +69,15 @@ std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& file
 std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
                              const std::optional<NominalStage>& nominal) {
   const std::vector<NoisyRun> noisy = record.noisy_runs;
+  const bool steps_known = record.steps.size() >= frf.inputs.size();
   std::vector<Finding> findings = check_health(std::move(record), nominal);
   if (!has(findings, Cause::drift))
     for (Finding& finding : check_experiment_noise(frf, noisy))
       findings.push_back(std::move(finding));
+  // It comes from the steps, and the response is that to them.
+  if (steps_known)
+    for (Finding& finding : findings)
+      if (finding.cause == Cause::limit_cycle) finding.severity = Severity::doubt;
   return findings;
 }
 
@@ -115,9 +120,10 @@ std::vector<std::string> health_notes(const std::vector<Finding>& findings,
 
 std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings) {
   for (Finding& finding : check_interpolation(frf)) findings.push_back(std::move(finding));
-  // Drift and ringing modes are already reported; the bands that they affect add little.
+  // Drift, ringing modes and steps are already reported; the bands that they affect add little.
   const auto settled_so_far = [&] {
-    return !has(findings, Cause::drift) && !has(findings, Cause::unsettled);
+    return !has(findings, Cause::drift) && !has(findings, Cause::unsettled) &&
+           !has(findings, Cause::actuator_step);
   };
   if (settled_so_far())
     for (Finding& finding : check_discarded_starts(frf)) findings.push_back(std::move(finding));

@@ -62,8 +62,8 @@ TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
   RandomNumbers random(stage.seed * 0x9e37ULL + 101 * static_cast<std::uint64_t>(trouble) + 3);
   TroublePlan plan;
   plan.trouble = trouble;
-  const std::vector<std::string> distortion = {"distort",    "nonlinear", "linearity",
-                                               "resolution", "quantiz",   "limit_cycle"};
+  const std::vector<std::string> distortion = {"distort", "nonlinear",   "linearity",  "resolution",
+                                               "quantiz", "limit_cycle", "oscillates", "in steps"};
   const double share = std::exp(random.uniform(std::log(0.03), std::log(0.3)));
   switch (trouble) {
     case Trouble::clean:

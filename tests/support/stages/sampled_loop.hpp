@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <cstdint>
+#include <functional>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -20,6 +21,8 @@ namespace stageid::test {
 struct SampledPlant {
   Eigen::MatrixXd A, B, C;
   Eigen::MatrixXd K;  ///< n_u x n_y
+  /// What actuator i applies for a command; empty: the command.
+  std::function<double(Eigen::Index i, double command)> applied{};
 
   Eigen::MatrixXcd response(double omega_rad_s, double sample_rate_hz) const {
     const std::complex<double> z = std::polar(1.0, omega_rad_s / sample_rate_hz);
@@ -40,8 +43,11 @@ struct PlantMode {
 inline SampledPlant sampled_plant(int outputs, int inputs, const std::vector<PlantMode>& modes,
                                   double sample_rate_hz, double gain) {
   const auto n = static_cast<Eigen::Index>(2 * modes.size());
-  SampledPlant plant{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, inputs),
-                     Eigen::MatrixXd::Zero(outputs, n), Eigen::MatrixXd(inputs, outputs)};
+  SampledPlant plant{Eigen::MatrixXd::Zero(n, n),
+                     Eigen::MatrixXd::Zero(n, inputs),
+                     Eigen::MatrixXd::Zero(outputs, n),
+                     Eigen::MatrixXd(inputs, outputs),
+                     {}};
   for (std::size_t m = 0; m < modes.size(); ++m) {
     const double angle = 2.0 * std::numbers::pi * modes[m].frequency_hz / sample_rate_hz;
     const double radius = std::exp(-1.0 / (modes[m].decay_s * sample_rate_hz));
@@ -80,9 +86,11 @@ inline LogSamples simulate_sampled_run(const SampledPlant& plant, const LoopExpe
     Eigen::VectorXd y = plant.C * state;
     y.array() += cubic * y.array().cube();
     for (Eigen::Index i = 0; i < y.size(); ++i) y[i] += noise_std * real_gaussian(random);
-    const Eigen::VectorXd u = period.row(n % x.period_samples).transpose() - plant.K * y;
+    Eigen::VectorXd u = period.row(n % x.period_samples).transpose() - plant.K * y;
     record.sensors.row(n) = y;
     record.actuators.row(n) = u;
+    if (plant.applied)
+      for (Eigen::Index i = 0; i < u.size(); ++i) u[i] = plant.applied(i, u[i]);
     state = plant.A * state + plant.B * u;
   }
   return record;

@@ -1,0 +1,54 @@
+#include "frf/periods/actuator_step.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace stageid {
+
+const char* to_string(Rounding rounding) noexcept {
+  switch (rounding) {
+    case Rounding::nearest:
+      return "rounded to the nearest";
+    case Rounding::down:
+      return "rounded down";
+    case Rounding::to_zero:
+      return "rounded towards zero";
+  }
+  return "";
+}
+
+double ActuatorStep::applied(double command) const noexcept {
+  const double steps = command / step;
+  switch (rounding) {
+    case Rounding::nearest:
+      return step * std::round(steps);
+    case Rounding::down:
+      return step * std::floor(steps);
+    case Rounding::to_zero:
+      return step * std::trunc(steps);
+  }
+  return command;
+}
+
+std::vector<Finding> to_findings(const std::vector<ActuatorStep>& steps,
+                                 const ChannelList& actuators) {
+  std::vector<Finding> findings;
+  for (const ActuatorStep& s : steps) {
+    const auto at = static_cast<std::size_t>(s.actuator);
+    const std::string figure =
+        fmt::format("{:.4g} {}, {}", s.step, actuators.units[at], to_string(s.rounding));
+    if (!findings.empty() && findings.back().figure == figure) {
+      findings.back().channel += " " + actuators.names[at];
+      continue;
+    }
+    findings.push_back(
+        {Severity::doubt, Cause::actuator_step, actuators.names[at],
+         "applies its command in steps, as a coarse converter does; the response is that to the "
+         "steps, not to the recorded command",
+         figure, "use a finer converter, or record what it applies"});
+  }
+  return findings;
+}
+
+}  // namespace stageid

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "acquisition/record/log_info.hpp"
+#include "frf/periods/health_finding.hpp"
+
+namespace stageid {
+
+enum class Rounding : std::uint8_t { nearest, down, to_zero };
+const char* to_string(Rounding rounding) noexcept;
+
+/// An actuator that applies the commands of the log in steps, because a coarse converter stands between recorder and
+/// amplifier.
+struct ActuatorStep {
+  Eigen::Index actuator = 0;  ///< index in the log
+  double step = 0.0;          ///< in the actuator's unit
+  Rounding rounding = Rounding::nearest;
+
+  /// The multiple of the step that is applied for a command.
+  double applied(double command) const noexcept;
+};
+
+/// One finding per step, which names its actuators.
+std::vector<Finding> to_findings(const std::vector<ActuatorStep>& steps,
+                                 const ChannelList& actuators);
+
+}  // namespace stageid

@@ -1,0 +1,159 @@
+#include "frf/plant/step_search.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "frf/plant/plant_frf.hpp"
+#include "frf/runs/run_table.hpp"
+#include "tests/support/stages/sampled_loop.hpp"
+
+namespace stageid {
+namespace test_step_search {
+
+using test::LoopExperiment;
+using test::MemoryLog;
+using test::SampledPlant;
+
+SampledPlant linear_plant() {
+  return test::sampled_plant(2, 2, {{12.3, 0.1}, {37.0, 0.1}}, 200.0, 0.5);
+}
+
+LoopExperiment experiment(std::uint64_t seed) {
+  LoopExperiment x{.sample_rate_hz = 200.0, .period_samples = 1000, .axes = 2};
+  x.lines = test::line_range(21, 301, 4);
+  x.realizations = 3;
+  x.periods = 3;
+  x.transient_periods = 1;
+  x.seed = seed;
+  return x;
+}
+
+/// Rms of the largest command of the linear loop.
+double command_rms() {
+  const MemoryLog log = test::simulate_sampled_log(linear_plant(), experiment(1), 0.0);
+  const Eigen::MatrixXd& u = log.records[0].actuators;
+  return std::sqrt(u.colwise().squaredNorm().maxCoeff() / static_cast<double>(u.rows()));
+}
+
+/// The first actuator rounds to the nearest step, the second one cuts.
+SampledPlant stepped_plant(double first, double second) {
+  SampledPlant plant = linear_plant();
+  plant.applied = [=](Eigen::Index i, double u) {
+    return i == 0 ? first * std::round(u / first) : second * std::trunc(u / second);
+  };
+  return plant;
+}
+
+/// Mean of |G - truth|^2 / total variance.
+double misfit(const FrfEstimate& frf, const SampledPlant& plant) {
+  double sum = 0.0;
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const Eigen::MatrixXcd truth =
+        plant.response(2.0 * std::numbers::pi * frf.frequency_hz[k], frf.sample_rate_hz);
+    sum += ((frf.response.col(k) - truth.reshaped()).array().abs2() /
+            frf.total_variance.col(k).array())
+               .mean();
+  }
+  return sum / static_cast<double>(frf.lines());
+}
+
+std::vector<ActuatorStep> steps_in(const MemoryLog& log) {
+  const FrfEstimate frf = estimate_plant_frf({&log});
+  return find_actuator_steps(choose_runs({&log}, {}).realizations, frf, {});
+}
+
+TEST(StepSearch, FindsStepAndRoundingOfEachActuator) {
+  const double rms = command_rms();
+  for (const auto& [first, second] : {std::pair{0.2, 0.2}, {0.1, 0.33}, {0.5, 0.07}}) {
+    const MemoryLog log = test::simulate_sampled_log(stepped_plant(first * rms, second * rms),
+                                                     experiment(5), 1e-4 * rms);
+    const std::vector<ActuatorStep> found = estimate_plant_frf_and_health({&log}).health.steps;
+    SCOPED_TRACE(testing::Message() << first << ", " << second);
+    ASSERT_EQ(found.size(), 2U);
+    EXPECT_NEAR(found[0].step / rms, first, 2e-3 * first);
+    EXPECT_NEAR(found[1].step / rms, second, 2e-3 * second);
+    EXPECT_EQ(found[0].rounding, Rounding::nearest);
+    EXPECT_EQ(found[1].rounding, Rounding::to_zero);
+  }
+}
+
+// The idle actuator of an experiment moves by less than a step: its command is recorded, its force is zero.
+TEST(StepSearch, TheResponseIsThatOfThePlant) {
+  const double rms = command_rms();
+  double sum = 0.0;
+  constexpr int kLogs = 10;
+  for (int seed = 1; seed <= kLogs; ++seed) {
+    const MemoryLog log =
+        test::simulate_sampled_log(stepped_plant(0.3 * rms, 0.3 * rms),
+                                   experiment(static_cast<std::uint64_t>(seed)), 1e-4 * rms);
+    sum += misfit(estimate_plant_frf({&log}), linear_plant());
+  }
+  // 2 degrees of freedom: the expectation of F(2, 4) is 2.
+  EXPECT_LT(sum / kLogs, 3.0);
+}
+
+TEST(StepSearch, FindsNothingWithoutSteps) {
+  const double rms = command_rms();
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const double cubic = seed % 2 == 0 ? 1e-2 / (rms * rms) : 0.0;
+    EXPECT_TRUE(
+        steps_in(test::simulate_sampled_log(linear_plant(), experiment(seed), 1e-3 * rms, cubic))
+            .empty())
+        << seed;
+  }
+}
+
+// The recorder has the same converter: the record is what is applied.
+TEST(StepSearch, FindsNothingInARecordOfTheSteps) {
+  const double rms = command_rms();
+  MemoryLog log =
+      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.2 * rms), experiment(3), 1e-4 * rms);
+  for (LogSamples& record : log.records) {
+    for (double& u : record.actuators.col(0)) u = 0.2 * rms * std::round(u / (0.2 * rms));
+    for (double& u : record.actuators.col(1)) u = 0.2 * rms * std::trunc(u / (0.2 * rms));
+  }
+  EXPECT_TRUE(steps_in(log).empty());
+}
+
+// Lost samples are found in the records as they are, and both are told.
+TEST(StepSearch, LostSamplesAreStillFound) {
+  const double rms = command_rms();
+  MemoryLog log =
+      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.2 * rms), experiment(7), 1e-4 * rms);
+  LogSamples& record = log.records[1];
+  const Eigen::Index rows = record.sensors.rows();
+  for (Eigen::MatrixXd* samples : {&record.sensors, &record.actuators})
+    samples->middleRows(2300, rows - 2301) = samples->bottomRows(rows - 2301).eval();
+  const FrfAndHealth found = estimate_plant_frf_and_health({&log});
+  EXPECT_EQ(found.health.slips.size(), 1U);
+  EXPECT_EQ(found.health.steps.size(), 2U);
+  ASSERT_EQ(found.frf.dropped_periods.size(), 1U);
+  EXPECT_THAT(found.frf.dropped_periods[0].reason, testing::HasSubstr("lost"));
+}
+
+TEST(StepSearch, NumberOfThreadsDoesNotMatter) {
+  const double rms = command_rms();
+  const MemoryLog log =
+      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.3 * rms), experiment(2), 1e-3 * rms);
+  FrfOptions options;
+  options.threads = 1;
+  const FrfEstimate one = estimate_plant_frf({&log}, options);
+  options.threads = 4;
+  EXPECT_EQ(one.response, estimate_plant_frf({&log}, options).response);
+}
+
+// The fingerprint in the provenance is that of the log, and the steps are told beside it.
+TEST(StepSearch, TheProvenanceTellsTheSteps) {
+  const double rms = command_rms();
+  const MemoryLog log =
+      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.3 * rms), experiment(2), 1e-4 * rms);
+  EXPECT_THAT(estimate_plant_frf({&log}).provenance_json,
+              testing::AllOf(testing::HasSubstr("actuator_steps"),
+                             testing::HasSubstr("rounded towards zero")));
+}
+
+}  // namespace test_step_search
+}  // namespace stageid
