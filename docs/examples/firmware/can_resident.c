@@ -132,7 +132,7 @@ static void play_sample(struct can_node* node) {
     can_put(row, 0, 4); /* outcome of y[n]: a bad one ends the run before its row */
     node->trace_bytes += ROW_BYTES;
   }
-  if (can_move(node, u_n) != 0) return;
+  if (!can_move(node, u_n)) return;
   if (node->sample < node->samples + node->ramp) return;
   stage_hardware_stop();
   node->state = OPERATION_ENABLED;

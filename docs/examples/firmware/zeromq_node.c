@@ -1,6 +1,6 @@
 /* Runs the CAN node behind ZeroMQ, for a rapid-prototyping controller or any computer without CAN FD. Resident only.
  *   stageid config header stage_zeromq.yaml -o stage.h
- *   cc -std=c99 -O2 -o zeromq_node zeromq_node.c can_*.c stage_plant.c -lzmq -lm
+ *   cc -std=c99 -O2 -o zeromq_node zeromq_node.c can_*.c stage_limits.c stage_plant.c -lzmq -lm
  *   ./zeromq_node tcp://0.0.0.0:5555 */
 #define _DEFAULT_SOURCE
 #include <stdio.h>
