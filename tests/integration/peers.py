@@ -1,9 +1,13 @@
 """The other end of a connection, by hand: it can also send what a library would not."""
 import binascii
 import contextlib
+import os
+import pty
+import select
 import socket
 import struct
 import threading
+import tty
 
 RUN_KEY, SETPOINT_SEQUENCE, MEASUREMENT = 24, 26, 300  # addresses of Modbus registers
 
@@ -90,6 +94,48 @@ class ModbusClient(ModbusConnection):
 
     def setpoint(self, key, sequence, u=(0, 0)):
         return self.exchange(RUN_KEY, words(key, sequence, *u), MEASUREMENT, 16)
+
+
+def modbus_crc(frame):
+    """The two bytes behind a frame on a serial line."""
+    crc = 0xFFFF
+    for byte in frame:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
+    return struct.pack("<H", crc)
+
+
+class SharedLine:
+    """A serial line between a host and a node: the frames of other units pass by before the host has its reply."""
+
+    def __init__(self, frames):
+        self.frames = b"".join(frames)
+        pairs = [pty.openpty() for _ in range(2)]
+        (self.host, _), (self.node, _) = pairs
+        self.ends = []
+        for _, end in pairs:
+            tty.setraw(end)
+            self.ends.append(os.ttyname(end))
+        self.descriptors = [one for pair in pairs for one in pair]
+        self.closed = False
+        self.thread = threading.Thread(target=self.carry)
+        self.thread.start()
+
+    def close(self):
+        self.closed = True
+        self.thread.join()
+        for descriptor in self.descriptors:
+            os.close(descriptor)
+
+    def carry(self):
+        while not self.closed:
+            ready, _, _ = select.select([self.host, self.node], [], [], 0.1)
+            for end in ready:
+                data = os.read(end, 4096)
+                if end == self.node:
+                    os.write(self.node, self.frames)
+                os.write(self.node if end == self.host else self.host, data)
 
 
 class ModbusRelay:
