@@ -219,3 +219,40 @@ class ZeroMqPeer(Connection):
             more = int(i + 1 < len(parts))
             size = bytes([more, len(part)]) if len(part) < 256 else bytes([more | 2]) + struct.pack(">Q", len(part))
             self.socket.sendall(size + part)
+
+
+class ZeroMqHub:
+    """Connects one host with nodes behind one address. Flooded, it hands nothing on but random messages."""
+
+    def __init__(self, server, node_ports):
+        self.flooded = threading.Event()
+        self.host = ZeroMqPeer(accepted=server.accept()[0], kind=b"ROUTER")
+        self.nodes = [ZeroMqPeer(port) for port in node_ports]
+        for one in (self.to_nodes, self.flood, *(lambda node=node: self.to_host(node) for node in self.nodes)):
+            threading.Thread(target=self.until_closed, args=(one,), daemon=True).start()
+
+    def close(self):
+        self.flooded.set()
+        for peer in (self.host, *self.nodes):
+            with contextlib.suppress(OSError):  # the peer may be gone
+                peer.socket.shutdown(socket.SHUT_RDWR)
+            peer.close()
+
+    def until_closed(self, carry):
+        with contextlib.suppress(OSError):
+            while True:
+                carry()
+
+    def to_nodes(self):
+        text = self.host.frame()
+        for node in self.nodes:
+            node.send(text)
+
+    def to_host(self, node):
+        text = node.frame()
+        if not self.flooded.is_set():
+            self.host.send(text)
+
+    def flood(self):
+        self.flooded.wait()
+        self.host.send(os.urandom(72))

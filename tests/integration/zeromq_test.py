@@ -12,6 +12,7 @@ import pathlib
 import random
 import re
 import resource
+import signal
 import shutil
 import socket
 import struct
@@ -21,7 +22,7 @@ import time
 import unittest
 
 from example_firmware import CAN, ExampleFirmware
-from peers import (ARM, CAN_COMMAND, CAN_STATE, DOWNLOAD, HELLO, START, STOP, TRIGGER, UPLOAD, ZeroMqPeer,
+from peers import (ARM, CAN_COMMAND, CAN_STATE, DOWNLOAD, HELLO, START, STOP, TRIGGER, UPLOAD, ZeroMqHub, ZeroMqPeer,
                    can_command, sealed)
 
 PROGRAM, SOURCE, WORK = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
@@ -261,6 +262,43 @@ class ZeroMq(unittest.TestCase):
         self.nodes[-1].wait()
         (WORK / "run.slog").unlink(missing_ok=True)
         return self.node(name)
+
+    @contextlib.contextmanager
+    def behind_a_hub(self, nodes, name="node"):
+        """Nodes, a run of a host, and the hub between them."""
+        ports = []
+        hub_port = self.port
+        for _ in range(nodes):
+            self.port = free_port()
+            ports.append(self.port)
+            self.node(name)
+        with socket.create_server(("127.0.0.1", hub_port)) as server:
+            server.settimeout(10)
+            host = self.start()
+            with contextlib.closing(ZeroMqHub(server, ports)) as hub:
+                yield host, hub
+
+    def test_two_nodes_behind_one_address_are_refused(self):
+        with self.behind_a_hub(2) as (host, _):
+            self.ends(host, 1, "two nodes answer")
+        self.assertFalse((WORK / "run.slog").exists(), "nothing was measured: no log")
+
+    def end_under_a_flood(self, code, text, number=None):
+        with self.behind_a_hub(1, "slow_node") as (host, hub):
+            self.wait_for(self.nodes[0], MEASURING)
+            self.nodes[0].send_signal(signal.SIGSTOP)
+            hub.flooded.set()
+            if number:
+                host.send_signal(number)
+            began = time.monotonic()
+            self.ends(host, code, text)
+            self.assertLess(time.monotonic() - began, 10.0)
+
+    def test_a_frozen_node_is_noticed_on_a_wire_that_is_never_silent(self):
+        self.end_under_a_flood(1, "no node answered")
+
+    def test_ctrl_c_ends_a_run_on_a_wire_that_is_never_silent(self):
+        self.end_under_a_flood(130, "interrupted", signal.SIGINT)
 
     def test_garbage_instead_of_a_node(self):
         with socket.create_server(("127.0.0.1", self.port)) as server:
