@@ -18,8 +18,8 @@ class ExampleFirmware:
         self.folder = folder
 
     def build(self, name, sources, *options, plant="stage_plant.c"):
-        subprocess.run(["cc", *FLAGS, "-I.", "-o", name, *map(str, (*sources, plant)), *options, "-lm"], cwd=self.folder,
-                       check=True)
+        files = map(str, (*sources, plant))
+        subprocess.run(["cc", *FLAGS, "-I.", "-o", name, *files, *options, "-lm"], cwd=self.folder, check=True)
 
     def check_modes(self, test, found_hz):
         """`found_hz`: of a fit."""

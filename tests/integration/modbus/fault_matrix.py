@@ -138,10 +138,11 @@ STATUS = [
         alter=coarse_actuators),
 ]
 OTHER_UNITS = [frame + modbus_crc(frame) for frame in (
-    bytes([2, 3, 0, 0, 0, 10]), bytes([2, 3, 20, *range(20)]), bytes([3, 0x83, 2]), bytes([2, 16, 0, 1, 0, 1, 2, 1, 3]))]
+    bytes([2, 3, 0, 0, 0, 10]), bytes([2, 3, 20, *range(20)]), bytes([3, 0x83, 2]),
+    bytes([2, 16, 0, 1, 0, 1, 2, 1, 3]))]
 WIRE = [
-    altered('replies late by up to a period', MARKED, 'the jitter limit', alter=late_by_up_to_a_period, pace=1, misses_allowed=1000,
-        marked=range(50, 1000)),
+    altered('replies late by up to a period', MARKED, 'the jitter limit', alter=late_by_up_to_a_period, pace=1,
+        misses_allowed=1000, marked=range(50, 1000)),
     altered('frozen under a flood of old replies', FAILED, 'corrupt', alter=samples(lambda _: False), within_s=20),
     altered('interrupted under a flood of old replies', INTERRUPTED, 'interrupted', alter=samples(lambda _: False),
         disturb='interrupt', within_s=20),
