@@ -203,7 +203,7 @@ class ZeroMq(unittest.TestCase):
 
     # 10 000 commands and 20 000 chunks that are sealed but forged, 100 000 random messages, 20 connections of no ZeroMQ.
     def test_forged_and_random_messages_change_nothing(self):
-        (WORK / "long.yaml").write_text((WORK / "short.yaml").read_text().replace("  periods: 3", "  periods: 8"))
+        (WORK / "long.yaml").write_text((WORK / "short.yaml").read_text().replace("  periods: 3", "  periods: 16"))
         self.node()
         self.ends(self.start("long"), 0)
         quiet = self.call("log", "convert", "run.slog", "-o", "quiet.csv")

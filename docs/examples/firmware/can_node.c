@@ -21,7 +21,7 @@ void can_draw_key(struct can_node* node) {
 
 /* The key of the host that has the stage; 0: none. */
 static uint32_t holder(const struct can_node* node) {
-  return node->state == MEASURING || node->resident == ARMED ? node->session : 0;
+  return node->state == MEASURING || node->reserved ? node->session : 0;
 }
 
 static void send_state(struct can_node* node, const struct can_command* answered, int accepted, const char* text) {
@@ -68,6 +68,7 @@ void can_safe_stop(struct can_node* node, enum stage_state next, enum stage_caus
   stage_hardware_stop();
   if (node->resident == PLAYING) node->resident = FAILED;
   if (node->resident == ARMED) node->resident = IDLE;
+  node->reserved = 0;
   node->state = next;
   node->cause = cause;
 }
@@ -241,9 +242,11 @@ void can_node_tick(struct can_node* node, uint32_t now_us, int interlock_closed)
   node->now_us = now_us;
   node->interlock_closed = interlock_closed;
   if (powered && !interlock_closed) can_safe_stop(node, FAULT, INTERLOCK);
-  if (resident && now_us - node->heard_us > SILENCE_US)
-    can_safe_stop(node, node->resident == ARMED ? SWITCH_ON_DISABLED : FAULT,
-              node->resident == ARMED ? NO_CAUSE : HOST_SILENT);
+  if (node->reserved && now_us - node->heard_us > SILENCE_US) {
+    node->reserved = 0;
+    if (node->resident == ARMED) can_safe_stop(node, SWITCH_ON_DISABLED, NO_CAUSE);
+    if (node->resident == PLAYING) can_safe_stop(node, FAULT, HOST_SILENT);
+  }
   if (!resident && node->state == MEASURING && now_us - node->setpoint_us > node->watchdog_us)
     can_safe_stop(node, FAULT, HOST_SILENT);
   if (node->state == MEASURING) {

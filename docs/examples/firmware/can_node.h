@@ -22,7 +22,7 @@ struct can_node {
   enum stage_cause cause;
   enum can_resident resident;
   uint32_t boot, random, now_us, state_us, setpoint_us, sample_us, heard_us, watchdog_us;
-  int interlock_closed;
+  int interlock_closed, reserved; /* reserved: from arm until stop or silence */
   /* Run: key, and the command that began it. */
   uint32_t session, trace_session, host;
   uint16_t begun_sequence, last_sequence, trigger_sequence;

@@ -63,9 +63,10 @@ const char* can_arm(struct can_node* node, const struct can_command* command) {
     return "the memory contains a different waveform; upload it";
   if (command->b == 0 || command->b > CAN_TRACE_BYTES / ROW_BYTES) return "the run exceeds the trace memory";
   if ((refusal = can_enable(node)) != NULL) return refusal;
-  if (node->resident != ARMED) can_draw_key(node);
+  if (!node->reserved) can_draw_key(node);
   node->trace_session = node->session;
   node->resident = ARMED;
+  node->reserved = 1;
   node->seed_high = (uint32_t)(command->a >> 32);
   node->seed_low = (uint32_t)command->a;
   node->samples = command->b;
