@@ -214,11 +214,17 @@ class ZeroMqPeer(Connection):
             size = int.from_bytes(bytes([size]) + self.receive(7), "big")
         return self.receive(size)
 
-    def send(self, *parts):
+    @staticmethod
+    def encode(*parts):
+        data = b""
         for i, part in enumerate(parts):
             more = int(i + 1 < len(parts))
             size = bytes([more, len(part)]) if len(part) < 256 else bytes([more | 2]) + struct.pack(">Q", len(part))
-            self.socket.sendall(size + part)
+            data += size + part
+        return data
+
+    def send(self, *parts):
+        self.socket.sendall(self.encode(*parts))
 
 
 class ZeroMqHub:
